@@ -1,0 +1,139 @@
+"""Which commands does the tool answer to, and how does it say that something went wrong?
+
+Each command lives in its own file, `upright/cli/NAME.py`, as a function called NAME. The file is
+imported when the command runs, so that listing the commands loads no numerical library.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from upright.errors import UprightError
+
+COMMANDS = {
+    "lab": "Run an experiment of the paper on the simulated rig, from release to report.",
+    "show": "Print and draw what a log holds: columns, sample rate, quanta, gaps, lying columns.",
+    "init": "Write a commented study file from a log, filled in with what could be recognised.",
+    "identify": "Fit a rig's parameters to its logs as a study file says; write estimates and report.",
+    "predict": "Score other runs with a model that was fitted before.",
+}
+
+USER_ERROR, BUG, INTERRUPTED = 2, 1, 130
+
+
+class LazyGroup(TyperGroup):
+    """The commands by name and help line; a command's module is imported when it is asked for."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Replace the stand-in that carried the help line by the command itself."""
+        name, command, rest = super().resolve_command(ctx, args)
+        if name in COMMANDS:
+            command = _load(name)
+        return name, command, rest
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run a command; what a person got wrong becomes a sentence and an exit code."""
+        with sentences():
+            return super().invoke(ctx)
+
+
+def _load(name: str) -> Any:
+    function = getattr(import_module(f"upright.cli.{name}"), name)
+    one = typer.Typer(add_completion=False)
+    one.command(name, help=function.__doc__ or COMMANDS[name])(function)
+    return typer.main.get_command(one)
+
+
+@contextmanager
+def sentences() -> Iterator[None]:
+    """Turn errors into one sentence on stderr and an exit code; `UPRIGHT_DEBUG=1` shows the traceback."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise _stop("stopped by Ctrl-C; what was already written is kept.", INTERRUPTED) from None
+    except BrokenPipeError:  # `upright show LOG | head`: the reader has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise typer.Exit(0) from None
+    except UprightError as error:
+        _debug()
+        raise _stop(str(error), USER_ERROR) from None
+    except OSError as error:
+        _debug()
+        raise _stop(_about_file(error), USER_ERROR) from None
+    except MemoryError:
+        _debug()
+        raise _stop("not enough memory for this input; try a shorter time window or fewer runs.", USER_ERROR) from None
+    except Exception as error:
+        _debug()
+        if isinstance(error, typer.Exit | typer.Abort) or hasattr(error, "exit_code"):
+            raise  # typer's own: usage errors and requested exits
+        where = f"{type(error).__name__}: {error}".rstrip(": ")
+        raise _stop(f"this is a bug in upright ({where}); UPRIGHT_DEBUG=1 shows where it happened.", BUG) from None
+
+
+def _debug() -> None:
+    if os.environ.get("UPRIGHT_DEBUG", "0") not in ("", "0"):
+        raise  # what the caller is handling
+
+
+def _stop(sentence: str, code: int) -> typer.Exit:
+    typer.echo(f"upright: {' '.join(sentence.split())}", err=True)
+    return typer.Exit(code)
+
+
+def _about_file(error: OSError) -> str:
+    name = f"'{error.filename}'" if error.filename is not None else "a file"
+    if isinstance(error, FileNotFoundError):
+        return f"{name} was not found; check the spelling and the folder it is looked for in."
+    if isinstance(error, IsADirectoryError):
+        return f"{name} is a folder, a file is needed; name the file inside it."
+    if isinstance(error, NotADirectoryError | FileExistsError):
+        return f"a folder is needed where {name} is a file; choose another place with -o."
+    if isinstance(error, PermissionError):
+        return f"{name} may not be read or written by you; check its permissions or choose another place with -o."
+    return f"{name} could not be used: {error.strerror or error}; check the disk and the path."
+
+
+app = typer.Typer(
+    name="upright",
+    cls=LazyGroup,
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="Start with `upright lab`; with a log of your own: `upright show`, `upright init`, `upright identify`.",
+)
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from upright import __version__
+
+        typer.echo(f"upright {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _upright(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_version, is_eager=True)
+    ] = False,
+) -> None:
+    """From one Lagrangian to a fitted real rig: a log goes in, a trusted nonlinear model comes out."""
+
+
+for _name, _help in COMMANDS.items():
+    app.command(_name, help=_help)(lambda: None)
+
+
+def main() -> None:
+    """Run the command line; the entry point of the script `upright`."""
+    app()
