@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from importlib import import_module
 from typing import Annotated, Any
@@ -53,7 +53,7 @@ def _load(name: str) -> Any:
 
 
 @contextmanager
-def sentences() -> Iterator[None]:
+def sentences() -> Generator[None]:
     """Turn errors into one sentence on stderr and an exit code; `UPRIGHT_DEBUG=1` shows the traceback."""
     try:
         yield
