@@ -1,0 +1,33 @@
+"""What a person can get wrong, and how the program says so.
+
+Every message has three parts: what was needed, what came, and what to try.
+"""
+
+from __future__ import annotations
+
+
+class UprightError(Exception):
+    """Base of every error a user is meant to read; the command line prints it without a traceback."""
+
+
+class BadInput(UprightError, ValueError):
+    """A file, study or argument that cannot be used as it is."""
+
+
+class ImpossiblePhysics(UprightError, ValueError):
+    """Parameters that no rig can have, such as a negative mass."""
+
+
+class NotIdentifiable(UprightError, RuntimeError):
+    """The data cannot answer the question asked."""
+
+
+def nearest(name: str, valid: object) -> str:
+    """Name the valid spelling closest to `name`, as a phrase, or list what exists."""
+    from difflib import get_close_matches
+
+    names = [str(v) for v in valid]  # type: ignore[attr-defined]
+    close = get_close_matches(name, names, n=1, cutoff=0.6)
+    if close:
+        return f"did you mean '{close[0]}'?"
+    return f"valid names: {', '.join(sorted(names))}" if names else "nothing is defined here"
