@@ -1,0 +1,91 @@
+"""What the rig is: plants, their equations of motion and their linear models."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+
+from upright.errors import BadInput, UprightError, nearest
+from upright.physics.derived import Derived, DryJoint
+from upright.physics.linear import Linear, linearize
+from upright.physics.loads import added_inertia, added_mass
+from upright.physics.oscillators import chain
+from upright.physics.pendulums import CartPendulum, Furuta, Pendulum
+from upright.physics.plant import Coordinate, Input, Joint, Plant
+
+__all__ = [
+    "BUILT_IN",
+    "CartPendulum",
+    "Coordinate",
+    "Derived",
+    "DryJoint",
+    "Furuta",
+    "Input",
+    "Joint",
+    "Linear",
+    "Pendulum",
+    "Plant",
+    "added_inertia",
+    "added_mass",
+    "chain",
+    "find",
+    "linearize",
+]
+
+BUILT_IN: dict[str, type[Plant]] = {
+    "pendulum": Pendulum,
+    "cart-pendulum": CartPendulum,
+    "furuta": Furuta,
+    **{f"{kind}-{n}": chain(n, kind) for kind in ("rectilinear", "torsional") for n in (1, 2, 3)},
+}
+_ALIASES = {"chain": "rectilinear-2", "rectilinear": "rectilinear-2", "torsional": "torsional-2"} | {
+    f"chain-{n}": f"rectilinear-{n}" for n in (1, 2, 3)
+}
+
+
+def find(name: str, folder: Path | None = None) -> type[Plant]:
+    """Plant class by name.
+
+    Parameters
+    ----------
+    name : str
+        ``"furuta"``, ``"cart-pendulum"``, ``"pendulum"``, ``"chain"`` (two carts), ``"torsional-3"``, ...,
+        or ``"my_plant.py:DoublePendulum"``: a class in a file of the user's own.
+    folder : Path, optional
+        Where a relative file is looked for; the current folder when omitted.
+
+    Raises
+    ------
+    BadInput
+        When there is no such plant, file or class.
+    """
+    if ".py:" in name:
+        file, _, class_name = name.rpartition(":")
+        return _from_file((folder or Path()) / file, class_name)
+    key = _ALIASES.get(name.lower(), name.lower())
+    if key in BUILT_IN:
+        return BUILT_IN[key]
+    kind, _, bodies = key.replace("chain", "rectilinear").partition("-")
+    if kind in ("rectilinear", "torsional") and bodies.isdigit():
+        return chain(int(bodies), kind)
+    raise BadInput(f"no plant is called '{name}'; {nearest(name, [*BUILT_IN, 'chain', 'my_plant.py:ClassName'])}")
+
+
+def _from_file(path: Path, class_name: str) -> type[Plant]:
+    if not path.is_file():
+        raise BadInput(f"the plant's file {path} does not exist; give it relative to the study file.")
+    spec = importlib.util.spec_from_file_location(f"upright_user_{path.stem}", path)
+    assert spec is not None and spec.loader is not None  # a .py file always has a loader
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    try:
+        spec.loader.exec_module(module)
+    except UprightError:
+        raise
+    except Exception as error:
+        raise BadInput(f"the plant's file {path} does not run: {type(error).__name__}: {error}") from error
+    plants = {k: v for k, v in vars(module).items() if isinstance(v, type) and issubclass(v, Plant) and v is not Plant}
+    if class_name not in plants:
+        raise BadInput(f"{path} has no plant '{class_name}'; {nearest(class_name, plants)}")
+    return plants[class_name]

@@ -1,0 +1,1 @@
+"""Equations of motion of the built-in plants, generated."""

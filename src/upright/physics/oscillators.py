@@ -1,0 +1,113 @@
+"""What shakes: a chain of inertias joined by springs; carts on a rail or disks on a shaft, one plant in two sets of units.
+
+Body i has inertia ``m_i`` (``J_i``), a known addition ``a_i``, a spring ``k_i`` and a dashpot ``c_i`` to ground, and a
+spring ``k_ij`` and a dashpot ``c_ij`` to its neighbour. Two bodies without ground springs have one rigid mode and one
+flexible mode at ``sqrt(k_12 (1/m_1 + 1/m_2))``: the paper's flexible manipulator.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from upright.errors import BadInput
+from upright.physics.plant import Coordinate, Input, Joint, Plant
+from upright.quantities import quantity
+
+_UNITS = {
+    "rectilinear": ("kg", "m", "N", "N/m", "N s/m", "N s^2/m^2", "m/s", "mass", "force", "position of cart"),
+    "torsional": (
+        "kg m^2",
+        "rad",
+        "N m",
+        "N m/rad",
+        "N m s/rad",
+        "N m s^2/rad^2",
+        "rad/s",
+        "inertia",
+        "torque",
+        "angle of disk",
+    ),
+}
+
+
+def chain(bodies: int, kind: str = "rectilinear") -> type[Plant]:
+    """Class of a chain of `bodies` inertias.
+
+    Parameters
+    ----------
+    bodies : int
+        1 to 9.
+    kind : {"rectilinear", "torsional"}
+        Carts with masses ``m_i`` and positions ``x_i`` driven by F, or disks with inertias ``J_i`` and angles
+        ``theta_i`` driven by T; both act on body 1.
+
+    Raises
+    ------
+    BadInput
+        When `bodies` or `kind` is none of these.
+    """
+    if kind not in _UNITS:
+        raise BadInput(f"a chain is 'rectilinear' or 'torsional', got '{kind}'")
+    if not 1 <= bodies <= 9:
+        raise BadInput(f"a chain has 1 to 9 bodies, got {bodies}")
+    built_in = _BUILT_IN.get((kind, bodies))
+    return built_in if built_in is not None else _chain(bodies, kind)
+
+
+def _chain(bodies: int, kind: str) -> type[Plant]:
+    mass_unit, position_unit, force_unit, k_unit, c_unit, q_unit, v_unit, inertia, effort, place = _UNITS[kind]
+    m, x, u = ("m", "x", "F") if kind == "rectilinear" else ("J", "theta", "T")
+    indices = range(1, bodies + 1)
+    members: dict[str, Any] = {"__annotations__": {}, "__module__": __name__, "__qualname__": f"{kind.title()}{bodies}"}
+
+    def add(name: str, unit: str, meaning: str, **bounds: float) -> None:
+        members["__annotations__"][name] = float
+        members[name] = quantity(unit, meaning, **bounds)
+
+    for i in indices:
+        add(f"{m}_{i}", mass_unit, f"{inertia} of body {i}", above=0)
+    for i in indices[:-1]:
+        add(f"k_{i}{i + 1}", k_unit, f"stiffness between bodies {i} and {i + 1}", at_least=0)
+    for i in indices:
+        add(f"k_{i}", k_unit, f"stiffness from body {i} to ground", default=0.0, at_least=0)
+    for i in indices:
+        add(f"c_{i}", c_unit, f"viscous friction of body {i}", default=0.0, at_least=0)
+    for i in indices[:-1]:
+        add(f"c_{i}{i + 1}", c_unit, f"damping between bodies {i} and {i + 1}", default=0.0, at_least=0)
+    for i in indices:
+        add(f"a_{i}", mass_unit, f"known {inertia} added to body {i}", default=0.0, at_least=0)
+        add(f"f_{i}c", force_unit, f"Coulomb friction of body {i}", default=0.0, at_least=0)
+        add(f"f_{i}q", q_unit, f"quadratic drag of body {i}", default=0.0, at_least=0)
+        add(f"f_{i}s", force_unit, f"break-away {effort} of body {i} (0: as Coulomb)", default=0.0, at_least=0)
+        add(f"v_{i}s", v_unit, f"Stribeck speed of body {i}", default=0.0, at_least=0)
+        add(f"delta_{i}", position_unit, f"presliding length of body {i} (Dahl)", default=0.0, at_least=0)
+
+    def energies(p: Any, q: Any, v: Any) -> tuple[Any, Any, Any]:
+        T = V = D = 0
+        for i in indices:
+            here, speed = q[i - 1], v[i - 1]
+            T += (getattr(p, f"{m}_{i}") + getattr(p, f"a_{i}")) * speed**2 / 2
+            V += getattr(p, f"k_{i}") * here**2 / 2
+            D += getattr(p, f"c_{i}") * speed**2 / 2
+            if i < bodies:
+                V += getattr(p, f"k_{i}{i + 1}") * (q[i] - here) ** 2 / 2
+                D += getattr(p, f"c_{i}{i + 1}") * (v[i] - speed) ** 2 / 2
+        return T, V, D
+
+    members |= {
+        "__doc__": f"Chain of {bodies} {inertia}(s), {effort} on body 1.",
+        "coordinates": tuple(Coordinate(f"{x}_{i}", position_unit, f"{place} {i}") for i in indices),
+        "inputs": (Input(u, force_unit, f"{effort} on body 1", on=f"{x}_1"),),
+        "joints": tuple(Joint(f"{x}_{i}", f"f_{i}c", f"f_{i}q", f"f_{i}s", f"v_{i}s", f"delta_{i}") for i in indices),
+        "energies": staticmethod(energies),
+    }
+    return type(Plant)(f"{kind.title()}{bodies}", (Plant,), members)
+
+
+_BUILT_IN: dict[tuple[str, int], type[Plant]] = {}
+for _kind in _UNITS:
+    for _bodies in (1, 2, 3):
+        _BUILT_IN[_kind, _bodies] = _chain(_bodies, _kind)
+
+Rectilinear1, Rectilinear2, Rectilinear3 = (_BUILT_IN["rectilinear", n] for n in (1, 2, 3))
+Torsional1, Torsional2, Torsional3 = (_BUILT_IN["torsional", n] for n in (1, 2, 3))
