@@ -1,0 +1,189 @@
+"""What is asked of the data? A rig with known and unknown numbers, and the runs that speak about them.
+
+These values are all that a study file says, in SI, with the columns already read; the estimator knows no file.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.physics import Plant
+
+Array = NDArray[np.float64]
+
+ACTUATOR = {
+    "actuator.gain": ("force per unit of command", 1.0),
+    "actuator.offset": ("added to the command", 0.0),
+    "actuator.limit": ("largest command that passes", math.inf),
+    "actuator.lag": ("first-order lag", 0.0),
+    "actuator.delay": ("dead time", 0.0),
+    "actuator.slope": ("force lost per speed (back-EMF)", 0.0),
+}
+"""Numbers every actuator has, besides the plant's own parameters: meaning and default."""
+
+PER_RUN = ("initial", "offset", "gain", "friction", "input_offset")
+"""What may differ from run to run: initial state, sensor offsets, actuator gain (a factor), dry and viscous friction
+of every joint (one common factor), a constant added to the command."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """One number of the rig: known, known to within `uncertainty` (one sigma), or to estimate from `value`."""
+
+    name: str
+    value: float
+    unit: str = "1"
+    meaning: str = ""
+    estimate: bool = False
+    lower: float = -math.inf
+    upper: float = math.inf
+    uncertainty: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Feedback:
+    """A law that closed the loop during a run: ``u = u_column + k_pf r - K (y - offset)``, sampled, `K` per state.
+
+    `gains` are per state in the paper's order; `reference` is (N,) in SI or a constant.
+    """
+
+    gains: tuple[float, ...]
+    k_pf: float = 0.0
+    reference: Array | float = 0.0
+    alpha: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """One stretch of data in SI.
+
+    Attributes
+    ----------
+    label : str
+        Name in reports.
+    role : {"fit", "predict"}
+        Whether the estimator may see it.
+    t : (N,) array
+        Uniform time [s].
+    u : (N, inputs) array
+        Commands in the actuator's unit; zeros for a free run.
+    y : (N, len(measured)) array
+        Measured coordinates, sign and scale applied.
+    measured : tuple of str
+        Names of the coordinates in the columns of `y`.
+    quantum : tuple of float
+        Resolution of each column of `y` [SI], 0 when continuous.
+    held : mapping of str to (N,) array or float
+        Coordinates that did not move freely: their measured motion, or the constant they were locked at.
+    known : mapping of str to float
+        Parameters that differ in this run and are known, such as an added mass.
+    unknown : tuple of str
+        Which of `PER_RUN` are estimated for this run; "initial" is the rule.
+    initial : mapping of str to float
+        States known at the first sample, by name; they are then not estimated.
+    horizon : float or None
+        Seconds ahead that are predicted from each measured state; None simulates freely from the first sample.
+    score_from : float
+        Seconds after the first sample before which the run is simulated but not scored (a held-out tail).
+    loop : Feedback or None
+        The law that closed the loop, when it is simulated too.
+    source : str
+        File, window and hash, for the report.
+    """
+
+    label: str
+    role: Literal["fit", "predict"]
+    t: Array
+    u: Array
+    y: Array
+    measured: tuple[str, ...]
+    quantum: tuple[float, ...] = ()
+    held: Mapping[str, Array | float] = field(default_factory=dict[str, "Array | float"])
+    known: Mapping[str, float] = field(default_factory=dict[str, float])
+    unknown: tuple[str, ...] = ("initial",)
+    initial: Mapping[str, float] = field(default_factory=dict[str, float])
+    horizon: float | None = None
+    score_from: float = 0.0
+    loop: Feedback | None = None
+    source: str = ""
+
+    @property
+    def period(self) -> float:
+        """Sample period [s]."""
+        return float((self.t[-1] - self.t[0]) / (self.t.size - 1))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rig:
+    """A plant with what is known and what is asked about its parameters and its actuator."""
+
+    plant: type[Plant]
+    parameters: Mapping[str, Parameter]
+    substeps: int = 1
+
+    @property
+    def estimated(self) -> tuple[str, ...]:
+        """Names of the parameters to estimate, in order."""
+        return tuple(n for n, p in self.parameters.items() if p.estimate)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """What the data say about one number.
+
+    `status` is "firm", "weak" (interval wider than the value), "unseen" (the data cannot tell), "at bound" or "known".
+    """
+
+    value: float
+    stderr: float
+    interval: tuple[float, float]
+    unit: str
+    status: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunScore:
+    """How well one run is explained: fit percent per signal, over which horizon, and the simulated signals."""
+
+    role: str
+    fit_percent: Mapping[str, float]
+    horizon: float | None
+    t: Array
+    y: Array
+    simulated: Array
+    measured: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fit:
+    """A rig explained by its runs.
+
+    `per_run` holds what was estimated run by run, by run label and name; `unseen` says in sentences which
+    combinations the data cannot see and which number would fix it; `singular_values` belong to the scaled Jacobian,
+    `directions` (rows) to them, in the order of `names`.
+    """
+
+    rig: Rig
+    estimates: Mapping[str, Estimate]
+    per_run: Mapping[str, Mapping[str, Estimate]]
+    runs: Mapping[str, RunScore]
+    verdict: str
+    trusted: bool
+    method: str
+    evaluations: int
+    seconds: float
+    cost: float
+    names: tuple[str, ...] = ()
+    correlation: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    singular_values: Array = field(default_factory=lambda: np.zeros(0))
+    directions: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    unseen: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    history: tuple[tuple[str, float, int], ...] = ()
+    interrupted: bool = False
