@@ -1,0 +1,104 @@
+"""How fast is it, beside what? `python -m benchmarks [NAMES] [--json FILE] [--quick] [--full]`."""
+
+from __future__ import annotations
+
+import os
+
+for _variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    os.environ.setdefault(_variable, "1")  # core for core; before numpy is imported
+os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1")
+
+import argparse
+import importlib
+import json
+import platform
+import sys
+from dataclasses import asdict
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.measure import Line
+
+NAMES = ("trajectory", "ensemble", "fit", "startup")
+LIBRARIES = ("upright", "numpy", "scipy", "numba", "control", "casadi", "jax", "mujoco")
+
+
+def amount(seconds: float) -> str:
+    """Seconds with a readable unit."""
+    for unit, factor in (("s", 1.0), ("ms", 1e3), ("us", 1e6)):
+        if seconds * factor >= 1 or unit == "us":
+            return f"{seconds * factor:,.3g} {unit}" if seconds * factor < 1000 else f"{seconds * factor:,.0f} {unit}"
+    return "0 s"
+
+
+def row(line: Line) -> list[str]:
+    """Cells of one line."""
+    seconds = spread = ratio = ""
+    if line.seconds is not None:
+        seconds = amount(line.seconds[0])
+        spread = f"{amount(line.seconds[1])} to {amount(line.seconds[2])}"
+    if line.ratio is not None:
+        middle, low, high = (f"{r:,.0f}" if r >= 100 else f"{r:.3g}" for r in line.ratio)
+        ratio = middle if low == middle == high else f"{middle} ({low} to {high})"
+    reached = {None: "", True: "[green]reached[/]", False: "[red]missed[/]"}[line.reached]
+    error = "" if line.error is None else f"{line.error:.1e}"
+    return [line.contender, seconds, spread, ratio, error, str(line.target or ""), reached, line.note]
+
+
+def table(name: str, title: str, lines: list[Line]) -> Table:
+    """All lines of one benchmark."""
+    out = Table(title=f"[bold]{name}[/]: {title}", title_justify="left")
+    out.add_column("contender")
+    for heading in ("median", "quartiles", "times the first (quartiles)", "error", "target"):
+        out.add_column(heading, justify="right")
+    out.add_column("reached")
+    out.add_column("note")
+    for line in lines:
+        out.add_row(*row(line))
+    return out
+
+
+def versions() -> dict[str, str]:
+    """Versions of what was compared."""
+    found = {"python": platform.python_version(), "machine": platform.machine()}
+    for name in LIBRARIES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the benchmarks named; 1 when a target was missed."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAMES", help=f"which ones, of {', '.join(NAMES)}; default: all")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write every figure to a file too")
+    parser.add_argument("--quick", action="store_true", help="fewer rounds and smaller shares, under two minutes")
+    parser.add_argument("--full", action="store_true", help="run what is otherwise estimated from its parts")
+    asked = parser.parse_args(arguments)
+    if unknown := set(asked.names) - set(NAMES):
+        parser.error(f"no benchmark is called {', '.join(sorted(unknown))}; there are {', '.join(NAMES)}")
+
+    console = Console(width=None if sys.stdout.isatty() else 200)
+    told = Console(stderr=True)
+    results: dict[str, Any] = {"versions": versions(), "lines": []}
+    missed = 0
+    for name in asked.names or NAMES:
+        module = importlib.import_module(f"benchmarks.{name}")
+        extra = {"full": asked.full} if name == "fit" else {}
+        lines: list[Line] = module.run(quick=asked.quick, progress=lambda text: told.print(f"[dim]{text}[/]"), **extra)
+        console.print(table(name, (module.__doc__ or "").splitlines()[0], lines))
+        results["lines"] += [asdict(line) | {"reached": line.reached} for line in lines]
+        missed += sum(line.reached is False for line in lines)
+    if asked.json:
+        asked.json.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,143 @@
+"""How are two programs compared fairly on a machine that others use too?
+
+Contenders take turns, round after round; a ratio is taken within each round and its median and quartiles
+are shown. In-process work is timed in CPU seconds of this process on one thread, which a neighbour cannot
+stretch; whole processes are timed by the clock on the wall.
+"""
+
+from __future__ import annotations
+
+import gc
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+
+class Unavailable(Exception):
+    """A contender cannot run here; the message says why."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Target:
+    """What has to be reached: at most `most` times the reference's time, or at most `most` seconds."""
+
+    most: float
+    of: str = "ratio"  # or "seconds"
+
+    def __str__(self) -> str:
+        if self.of == "seconds":
+            return f"< {self.most:g} s" if self.most >= 0.1 else f"< {1e3 * self.most:g} ms"
+        return f"<= {self.most:g} x"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contender:
+    """Something to time: `run()` does `share` of the whole problem, `error()` says how wrong it is."""
+
+    name: str
+    run: Callable[[], Any]
+    share: float = 1.0
+    target: Target | None = None
+    error: Callable[[Any], float] | None = None
+    note: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Line:
+    """One row of the table; seconds and ratios as (median, lower quartile, upper quartile)."""
+
+    benchmark: str
+    contender: str
+    seconds: tuple[float, float, float] | None = None
+    ratio: tuple[float, float, float] | None = None
+    rounds: int = 0
+    error: float | None = None
+    target: Target | None = None
+    note: str = ""
+
+    @property
+    def reached(self) -> bool | None:
+        """Whether the median meets the target; None where nothing was asked or nothing ran."""
+        value = self.ratio if self.target is not None and self.target.of == "ratio" else self.seconds
+        if self.target is None or value is None:
+            return None
+        return value[0] <= self.target.most
+
+
+def spread(values: Sequence[float]) -> tuple[float, float, float]:
+    """Median, lower and upper quartile."""
+    low, middle, high = np.percentile(values, [25, 50, 75])
+    return float(middle), float(low), float(high)
+
+
+def built(benchmark: str, builders: dict[str, Callable[[], Contender]]) -> tuple[list[Contender], list[Line]]:
+    """Contenders that can run here, and a line with the reason for each that cannot."""
+    able, unable = [], []
+    for name, build in builders.items():
+        try:
+            able.append(build())
+        except ImportError as missing:
+            unable.append(Line(benchmark=benchmark, contender=name, note=f"left out: {missing.name or missing} is not installed"))
+        except Unavailable as reason:
+            unable.append(Line(benchmark=benchmark, contender=name, note=f"left out: {reason}"))
+    return able, unable
+
+
+def compare(
+    benchmark: str,
+    builders: dict[str, Callable[[], Contender]],
+    *,
+    rounds: int,
+    patience: float = 3.0,
+    clock: Callable[[], float] = time.process_time,
+    progress: Callable[[str], None] = print,
+) -> list[Line]:
+    """Time every contender in turn; the first that can run is the reference of the ratios.
+
+    A contender whose one run takes longer than `patience` seconds sits out all rounds but two.
+    """
+    able, lines = built(benchmark, builders)
+    taken: dict[str, list[float]] = {c.name: [] for c in able}
+    ratios: dict[str, list[float]] = {c.name: [] for c in able}
+    errors: dict[str, float | None] = {}
+    for contender in able:
+        progress(f"{benchmark}: {contender.name}")
+        start = time.perf_counter()
+        result = contender.run()  # compiles, allocates, fills caches
+        errors[contender.name] = contender.error(result) if contender.error else None
+        del result
+        slow = time.perf_counter() - start > patience
+        if slow:
+            taken[contender.name] = [float("inf")] * (rounds - 2)
+    for _ in range(rounds):
+        reference = None
+        for contender in able:
+            if len(taken[contender.name]) >= rounds:
+                continue
+            gc.collect()
+            start = clock()
+            contender.run()
+            seconds = (clock() - start) / contender.share
+            reference = seconds if contender is able[0] else reference
+            taken[contender.name].append(seconds)
+            if reference:
+                ratios[contender.name].append(seconds / reference)
+    for contender in able:
+        finite = [t for t in taken[contender.name] if np.isfinite(t)]
+        lines.append(
+            Line(
+                benchmark=benchmark,
+                contender=contender.name,
+                seconds=spread(finite),
+                ratio=spread(ratios[contender.name]) if ratios[contender.name] else None,
+                rounds=len(finite),
+                error=errors[contender.name],
+                target=contender.target,
+                note=contender.note,
+            )
+        )
+    order = list(builders)
+    return sorted(lines, key=lambda line: order.index(line.contender))
