@@ -79,10 +79,10 @@ def built(benchmark: str, builders: dict[str, Callable[[], Contender]]) -> tuple
     for name, build in builders.items():
         try:
             able.append(build())
-        except ImportError as missing:
-            unable.append(Line(benchmark=benchmark, contender=name, note=f"left out: {missing.name or missing} is not installed"))
-        except Unavailable as reason:
-            unable.append(Line(benchmark=benchmark, contender=name, note=f"left out: {reason}"))
+        except (ImportError, Unavailable) as reason:
+            missing = getattr(reason, "name", None)
+            note = f"left out: {f'{missing} is not installed' if missing else reason}"
+            unable.append(Line(benchmark=benchmark, contender=name, note=note))
     return able, unable
 
 

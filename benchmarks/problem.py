@@ -89,7 +89,9 @@ def loop_numbers() -> np.ndarray:
 def controller(lib: Any, x: Any, seen: Any, c: Any) -> tuple[Any, Any]:
     """Encoder, filtered difference, feedback, without the saturation; returns effort and memory."""
     y = tuple(lib.floor(q / QUANTUM + 0.5) * QUANTUM for q in x[:2])
-    speeds = tuple(KEEP * old + (1 - KEEP) * (new - was) / PERIOD for old, new, was in zip(seen[2:], y, seen[:2], strict=True))
+    speeds = tuple(
+        KEEP * old + (1 - KEEP) * (new - was) / PERIOD for old, new, was in zip(seen[2:], y, seen[:2], strict=True)
+    )
     return -(c[0] * y[0] + c[1] * (y[1] - math.pi) + c[2] * speeds[0] + c[3] * speeds[1]), (*y, *speeds)
 
 

@@ -56,9 +56,7 @@ class Furuta:
         )
         return out
 
-    def ensemble(
-        self, p: np.ndarray, x0: np.ndarray, loop: np.ndarray, *, samples: int, friction: bool
-    ) -> np.ndarray:
+    def ensemble(self, p: np.ndarray, x0: np.ndarray, loop: np.ndarray, *, samples: int, friction: bool) -> np.ndarray:
         """Last states (4, n) of n closed loops; p (10, n), x0 (4, n)."""
         p, x0 = np.ascontiguousarray(p), np.ascontiguousarray(x0)
         last = np.empty_like(x0)
@@ -88,6 +86,7 @@ def compiled(*, lanes: bool, width: str = "") -> Furuta:
     return Furuta(library, " ".join([compiler, *flags]))
 
 
+@functools.cache
 def fastest_lanes(seconds: Callable[[Furuta], float]) -> Furuta:
     """Variant in lanes with the vector width for which `seconds(furuta)` is smallest."""
     variants, refusals = [], []

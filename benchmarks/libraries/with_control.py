@@ -25,9 +25,7 @@ def trajectory() -> Callable[[], np.ndarray]:
 
     rig = control.nlsys(slope, None, inputs=1, outputs=4, states=4)
     torque = np.zeros_like(t)
-    return lambda: (
-        control.input_output_response(rig, t, torque, problem.RELEASE, solve_ivp_kwargs=TOLERANCE).states.T
-    )
+    return lambda: control.input_output_response(rig, t, torque, problem.RELEASE, solve_ivp_kwargs=TOLERANCE).states.T
 
 
 def ensemble(samples: int) -> Callable[[], np.ndarray]:

@@ -1,0 +1,165 @@
+"""How long does a fit take? Eight unknowns of a Furuta rig from 10 s at 1 kHz, started 30 % off.
+
+Unknown are J_d, l_cg, J_p, both viscous and both Coulomb frictions and the angle of release; a torque of
+0.02 sin(2 pi 0.7 t) N m is known, both angles are encoder counts. Every fit goes over 1 s first, then over 10 s.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from benchmarks import baseline, problem
+from benchmarks.measure import Contender, Line, Target, compare
+
+NAME = "fit"
+UNKNOWN = ("J_d", "l_cg", "J_p", "b_1", "b_2", "b_1c", "b_2c")
+WHERE = [problem.NAMES.index(name) for name in UNKNOWN]
+TRUTH = np.array([*problem.RIG[WHERE], problem.RELEASE[1]])
+START = TRUTH * (1 + 0.3 * np.array([1, -1, 1, -1, 1, -1, 1, -1]))
+HORIZONS = (1_000, problem.STEPS)
+TORQUE = 0.02 * np.sin(2 * math.pi * 0.7 * problem.PERIOD * np.arange(problem.STEPS))
+SIMPLEX = {"xatol": 1e-6, "fatol": 1e-10, "adaptive": True, "maxfev": 20_000, "maxiter": 20_000}
+
+
+def rig(unknown: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ten parameters and the initial state for eight values of the unknowns."""
+    p, x0 = problem.RIG.copy(), problem.RELEASE.copy()
+    p[WHERE], x0[1] = unknown[:-1], unknown[-1]
+    return p, x0
+
+
+def counts(states: np.ndarray) -> np.ndarray:
+    """What two encoders make of psi and theta."""
+    return np.floor(states[:, :2] / problem.QUANTUM + 0.5) * problem.QUANTUM
+
+
+def relative_error(unknown: np.ndarray) -> float:
+    """Largest relative error of the eight."""
+    return float(np.abs(unknown / TRUTH - 1).max())
+
+
+def simplex(swing: Callable[[np.ndarray, int], np.ndarray], measured: np.ndarray) -> tuple[np.ndarray, list[int]]:
+    """Nelder-Mead on the logarithms; eight estimates and the evaluations over each horizon."""
+    from scipy.optimize import minimize
+
+    z, used = np.zeros(len(START)), []
+    for steps in HORIZONS:
+
+        def cost(z: np.ndarray, steps: int = steps) -> float:
+            total = float(((swing(START * np.exp(z), steps) - measured[: steps + 1]) ** 2).sum())
+            return total if math.isfinite(total) else 1e30
+
+        first = np.vstack([z, z + 0.1 * np.eye(len(z))])
+        found = minimize(cost, z, method="Nelder-Mead", options={**SIMPLEX, "initial_simplex": first})
+        z = found.x
+        used.append(int(found.nfev))
+    return START * np.exp(z), used
+
+
+def in_c() -> Callable[[np.ndarray, int], np.ndarray]:
+    """Angles by scalar C, Coulomb friction smoothed."""
+    c = baseline.compiled(lanes=False)
+
+    def swing(unknown: np.ndarray, steps: int) -> np.ndarray:
+        p, x0 = rig(unknown)
+        return c.trajectory(p, x0, h=problem.PERIOD, steps=steps, friction=True, torque=TORQUE)[:, :2]
+
+    return swing
+
+
+def with_solve_ivp() -> Callable[[np.ndarray, int], np.ndarray]:
+    """Angles by solve_ivp at 1e-6, as most would write it; the torque is the smooth sine."""
+    from scipy.integrate import solve_ivp
+
+    def swing(unknown: np.ndarray, steps: int) -> np.ndarray:
+        p, x0 = rig(unknown)
+        k = tuple(map(float, problem.lumps(p)))
+        t = np.linspace(0, steps * problem.PERIOD, steps + 1)
+
+        def slope(t: float, x: np.ndarray) -> tuple[float, ...]:
+            _, theta, v, w = x.tolist()
+            torque = 0.02 * math.sin(2 * math.pi * 0.7 * t)
+            return (v, w, *problem.accelerations(math, theta, v, w, torque, k, friction=True))
+
+        return solve_ivp(slope, (t[0], t[-1]), x0, t_eval=t, rtol=1e-6, atol=1e-6).y[:2].T
+
+    return swing
+
+
+def estimated_over_solve_ivp(evaluations: list[int]) -> Line:
+    """Cost of an evaluation over each horizon, times how many the simplex needed over the same cost in C."""
+    swing, taken = with_solve_ivp(), []
+    for steps in HORIZONS:
+        each = []
+        for _ in range(3):
+            start = time.process_time()
+            swing(TRUTH, steps)
+            each.append(time.process_time() - start)
+        taken.append(float(np.median(each)))
+    seconds = float(np.dot(taken, evaluations))
+    costs = " and ".join(f"{n:,} x {1e3 * s:.1f} ms" for n, s in zip(evaluations, taken, strict=True))
+    return Line(
+        benchmark=NAME,
+        contender="simplex over solve_ivp",
+        seconds=(seconds, seconds, seconds),
+        note=f"estimated: {costs}; --full runs it",
+    )
+
+
+def ours() -> Contender:
+    """The estimator of the package."""
+    from benchmarks import ours
+
+    return Contender(
+        name="upright", run=ours.fit(), error=relative_error, target=Target(most=0.030, of="seconds"),
+        note="Levenberg-Marquardt, Jacobian from the lanes, exact stick-slip",
+    )  # fmt: skip
+
+
+def run(*, quick: bool, full: bool, progress: Callable[[str], None]) -> list[Line]:
+    """Ours, the simplex over compiled C, the simplex over solve_ivp."""
+    swing, evaluations = in_c(), [0, 0]
+    measured = counts(swing(TRUTH, problem.STEPS))
+
+    def simplex_in_c() -> np.ndarray:
+        found, evaluations[:] = simplex(swing, measured)
+        return found
+
+    builders: dict[str, Callable[[], Contender]] = {
+        "upright": ours,
+        "simplex over scalar C": lambda: Contender(
+            name="simplex over scalar C", run=simplex_in_c, error=relative_error, note="tanh friction"
+        ),
+    }
+    lines = compare(NAME, builders, rounds=5 if quick else 21, progress=progress)
+    if full:
+        slow = with_solve_ivp()
+        return lines + compare(
+            NAME,
+            {
+                "simplex over solve_ivp": lambda: Contender(
+                    name="simplex over solve_ivp",
+                    run=lambda: simplex(slow, measured)[0],
+                    error=relative_error,
+                    note="tanh friction",
+                )
+            },
+            rounds=1,
+            progress=progress,
+        )
+    lines.append(estimated_over_solve_ivp(evaluations))
+    first: Any = next((line.seconds for line in lines if line.seconds), None)
+    return [with_ratio(line, first[0]) if line.ratio is None and line.seconds else line for line in lines]
+
+
+def with_ratio(line: Line, first: float) -> Line:
+    """Line whose ratio is taken from medians, because it was not part of the rounds."""
+    from dataclasses import replace
+
+    ratio = line.seconds[0] / first if line.seconds else 1.0
+    return replace(line, ratio=(ratio, ratio, ratio))
