@@ -1,0 +1,210 @@
+"""What does "2 mm" mean inside, where everything is SI with radians?
+
+Values from a study, a form or the command line wear their unit and lose it here, once. Pint does the
+arithmetic on the units a laboratory uses; it is imported when the first unit is read.
+
+A radian counts as 1, so ``N m s/rad`` and ``N m s`` agree. Encoder counts are a quantity of their own:
+they become an angle or a length only through counts per revolution or per metre.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from functools import lru_cache
+from typing import Any
+
+from upright.errors import BadInput
+
+# Only what a rig needs: pint's full list reads "Nm" as a textile unit and "rev" not at all.
+_DEFINITIONS = """
+nano- = 1e-9 = n-
+micro- = 1e-6 = µ- = μ- = u-
+milli- = 1e-3 = m-
+centi- = 1e-2 = c-
+kilo- = 1e3 = k-
+mega- = 1e6 = M-
+meter = [length] = m = metre
+kilogram = [mass] = kg
+gram = 1e-3 * kilogram = g
+second = [time] = s = sec
+ampere = [current] = A = amp
+count = [count] = _ = counts
+radian = [] = rad
+degree = 0.017453292519943295 * radian = deg = °
+revolution = 6.283185307179586 * radian = rev = turn
+percent = 0.01 = pct
+minute = 60 * second = min
+hour = 3600 * second = h
+hertz = 1 / second = Hz
+revolutions_per_minute = revolution / minute = rpm
+newton = kilogram * meter / second ** 2 = N
+joule = newton * meter = J
+watt = joule / second = W
+volt = watt / ampere = V
+ohm = volt / ampere = Ω
+henry = volt * second / ampere = H
+inch = 0.0254 * meter = in
+pound = 0.45359237 * kilogram = lb
+"""
+
+COMMON = (
+    "1 %  m mm cm um km in  kg g mg lb  s ms us min  Hz kHz rad mrad deg rev counts count"
+    "  N mN kN  J W V mV A mA ohm H mH  rpm"
+).split() + [
+    *("kg m^2", "kg cm^2", "g cm^2", "g mm^2", "N m", "mN m", "N/m", "N m/rad", "N s/m", "N m s/rad", "N m s^2/rad^2"),
+    *("N m/A", "V s/rad", "N/V", "N m/V", "N/A", "m/s", "m/s^2", "rad/s", "rad/s^2", "deg/s", "counts/rev", "rad/V"),
+    *(
+        "counts/m",
+        "counts/cm",
+        "counts/s",
+        "m/V",
+        "V/rad",
+        "V/m",
+        "V s/m",
+        "V s^2/m",
+        "counts/V",
+        "V/count",
+        "1/s",
+        "kg/m",
+    ),
+]
+
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
+_UNIT = re.compile(r"[A-Za-zµμΩ°%·*/^() .0-9-]{0,60}")
+_EXPONENT = re.compile(r"\^\s*\(?\s*-?\s*\d{2,}|\*\*\s*\(?\s*-?\s*\d{2,}|\d{3,}")
+
+
+def parse(text: str, expected: str = "") -> float:
+    """Value of a text such as ``"2 mm"`` in SI units with radians; counts stay counts.
+
+    Parameters
+    ----------
+    text : str
+        A number and its unit.
+    expected : str, optional
+        Unit of the quantity asked for, such as ``"kg m^2"``; any unit of the same dimension is accepted.
+        Without it every unit is.
+
+    Raises
+    ------
+    BadInput
+        When there is no number, the unit is unknown, or its dimension is not the one expected.
+    """
+    wanted = (
+        f"a value in {expected} such as '0.5 {expected}'" if expected not in ("", "1") else "a number with its unit"
+    )
+    if expected == "1":
+        wanted = "a pure number such as '0.5'"
+    match = _NUMBER.fullmatch(text)
+    if match is None:
+        raise BadInput(f"Expected {wanted}, got {text[:60]!r}; write the number first, then the unit.")
+    number, unit = float(match[1]), match[2]
+    try:
+        factor = scale(unit)
+    except BadInput:
+        raise BadInput(f"Expected {wanted}, got {text[:60]!r}: {_hint(unit, expected)}") from None
+    if expected and not same_dimension(unit, expected):
+        if not unit:
+            raise BadInput(f"Expected {wanted}, got {text[:60]!r} without a unit; write '{text.strip()} {expected}'.")
+        raise BadInput(f"Expected {wanted}, got {text[:60]!r}, which is {_kind(unit)}: {_hint(unit, expected)}")
+    value = number * factor
+    if not math.isfinite(value):
+        raise BadInput(f"Expected {wanted}, got {text[:60]!r}, which is too large to compute with; check the exponent.")
+    return value
+
+
+def scale(unit: str) -> float:
+    """SI value (radians, counts) of one `unit`: 0.001 for ``"mm"``, pi/180 for ``"deg"``.
+
+    Raises
+    ------
+    BadInput
+        When the unit is unknown.
+    """
+    return _si(unit)[0]
+
+
+def same_dimension(unit: str, other: str) -> bool:
+    """Whether two units measure the same thing; a radian counts as 1."""
+    return _si(unit)[1] == _si(other)[1]
+
+
+def known(unit: str) -> bool:
+    """Whether `unit` can be read."""
+    try:
+        _si(unit)
+    except BadInput:
+        return False
+    return True
+
+
+def format_value(value: float, unit: str = "", *, digits: int = 4) -> str:
+    """Text of an SI `value` shown in `unit`: ``format_value(0.002, "mm")`` is ``"2 mm"``."""
+    shown = value / scale(unit) if unit else value
+    return f"{shown:.{digits}g} {unit}".rstrip() if unit != "1" else f"{shown:.{digits}g}"
+
+
+@lru_cache(maxsize=512)
+def _si(unit: str) -> tuple[float, str]:
+    """SI factor and dimension of a unit."""
+    plain = unit.strip()
+    if plain in ("", "1"):
+        return 1.0, "[]"
+    if not _UNIT.fullmatch(plain) or _EXPONENT.search(plain):
+        raise BadInput(f"Expected a unit such as 'kg m^2', got {unit[:60]!r}: {_hint(unit, '')}")
+    spelled = plain.replace("·", "*").replace("%", " percent ").replace("^", "**").replace("°", " degree ").strip()
+    try:
+        quantity = _registry().parse_expression(spelled)
+        base = quantity.to_base_units()
+        factor, dimension = float(base.magnitude), str(quantity.dimensionality)
+    except Exception:  # pint raises AssertionError, TypeError, tokenize and its own errors for a bad unit
+        raise BadInput(f"Expected a unit such as 'kg m^2', got {unit!r}: {_hint(unit, '')}") from None
+    if not (math.isfinite(factor) and factor > 0):
+        raise BadInput(f"Expected a unit such as 'kg m^2', got {unit!r}: {_hint(unit, '')}")
+    return factor, "[]" if dimension == "dimensionless" else dimension
+
+
+@lru_cache(maxsize=1)
+def _registry() -> Any:
+    import pint
+
+    registry: Any = pint.UnitRegistry(None, system=None)
+    registry.load_definitions(_DEFINITIONS.strip().splitlines())
+    return registry
+
+
+def _kind(unit: str) -> str:
+    """What a unit measures, in a few words."""
+    names = {
+        "m": "a length",
+        "kg": "a mass",
+        "s": "a time",
+        "Hz": "a frequency or an angular speed",
+        "N": "a force",
+        "N m": "a torque or an energy",
+        "kg m^2": "an inertia",
+        "V": "a voltage",
+        "A": "a current",
+        "counts": "a number of encoder counts",
+        "m/s": "a speed",
+        "1": "an angle or a pure number",
+    }
+    return next((words for known_unit, words in names.items() if same_dimension(unit, known_unit)), "something else")
+
+
+def _hint(unit: str, expected: str) -> str:
+    """The nearest unit that would have been right."""
+    from difflib import get_close_matches
+
+    fitting = [u for u in COMMON if not expected or same_dimension(u, expected)]
+    if expected:
+        fitting = [expected, *(u for u in fitting if u != expected)]
+    folded = {re.sub(r"[\s*·^]", "", u).lower(): u for u in reversed(fitting)}
+    key = re.sub(r"[\s*·^]", "", unit).lower()
+    close = (
+        [folded[key]] if key in folded else [folded[k] for k in get_close_matches(key, list(folded), n=1, cutoff=0.5)]
+    )
+    if close:
+        return f"did you mean '{close[0]}'?"
+    return f"use {' or '.join(repr(u) for u in fitting[:3])}."

@@ -1,0 +1,95 @@
+"""Does a value lose its unit correctly, and is a wrong unit named with the right one?"""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from upright import units
+from upright.errors import BadInput
+
+
+# Expected values from the definitions of the units (SI brochure; inch and pound by their 1959 definition).
+@pytest.mark.parametrize(
+    ("text", "expected", "value"),
+    [
+        ("2 mm", "m", 0.002),
+        ("0.107 kg", "kg", 0.107),
+        ("1.6e-3 kg m^2", "kg m^2", 1.6e-3),
+        ("2 g cm^2", "kg m^2", 2e-7),
+        ("1 kg*m**2", "kg m^2", 1.0),
+        ("5e-4 N m s/rad", "N m s", 5e-4),
+        ("0.5 rev", "rad", math.pi),
+        ("180 deg", "rad", math.pi),
+        ("60 rpm", "rad/s", 2 * math.pi),
+        ("16000 counts/rev", "counts/rad", 16000 / (2 * math.pi)),
+        ("3 counts", "counts", 3.0),
+        ("560 counts/cm", "counts/m", 56000.0),
+        ("-3.5 V", "V", -3.5),
+        ("0.1034 N m/A", "V s/rad", 0.1034),
+        ("16 ohm", "V/A", 16.0),
+        ("1.16 mH", "V s/A", 1.16e-3),
+        ("9.81 m/s^2", "m/s^2", 9.81),
+        ("50 %", "1", 0.5),
+        ("0.3", "1", 0.3),
+        ("1 in", "m", 0.0254),
+        ("2mm", "m", 0.002),
+    ],
+)
+def test_a_value_becomes_si(text: str, expected: str, value: float) -> None:
+    assert units.parse(text, expected) == pytest.approx(value, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected", "sentence"),
+    [
+        ("2 V", "kg m^2", "a voltage: use 'kg m\\^2'"),
+        ("2 Nm", "N m", "did you mean 'N m'"),
+        ("1 Kg", "kg", "did you mean 'kg'"),
+        ("2 kgm^2", "kg m^2", "did you mean 'kg m\\^2'"),
+        ("3 counts", "rad", "encoder counts"),
+        ("0.23", "m", "without a unit; write '0.23 m'"),
+        ("long", "m", "write the number first"),
+        ("1e999 m", "m", "too large"),
+        ("3 m^99", "m", "did you mean 'm'"),
+        ("9**9**9 m", "m", "Expected a value in m"),
+    ],
+)
+def test_a_wrong_unit_is_answered_with_the_right_one(text: str, expected: str, sentence: str) -> None:
+    with pytest.raises(BadInput, match=sentence):
+        units.parse(text, expected)
+
+
+@pytest.mark.parametrize("unit", units.COMMON)
+def test_a_formatted_value_reads_back(unit: str) -> None:
+    assert units.parse(units.format_value(units.scale(unit) * 0.125, unit), unit) == pytest.approx(
+        units.scale(unit) * 0.125
+    )
+
+
+@settings(deadline=None)  # the first call pays for an import
+@given(st.text(max_size=40), st.sampled_from(["", "m", "kg m^2", "counts", "1"]))
+def test_any_text_is_a_finite_value_or_a_sentence(text: str, expected: str) -> None:
+    try:
+        assert math.isfinite(units.parse(text, expected))
+    except BadInput:
+        pass
+
+
+@settings(deadline=None)  # the first call pays for an import
+@given(st.text(alphabet="0123456789 mskgNVrad^*/().-", max_size=20))
+def test_any_unit_like_text_is_a_finite_value_or_a_sentence(text: str) -> None:
+    try:
+        assert math.isfinite(units.parse("1 " + text))
+    except BadInput:
+        pass
+
+
+def test_pint_waits_until_a_unit_is_read() -> None:
+    code = "import sys, upright.units; sys.exit('pint' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
