@@ -1,0 +1,122 @@
+"""What is asked of which data? A study file (TOML) becomes a rig and its runs, in SI.
+
+Every complaint is one sentence with file, line, what was expected and the nearest valid name.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from upright.identification.model import Rig, Run
+from upright.identification.study_keys import names
+from upright.identification.study_rig import read_plant, read_rig
+from upright.identification.study_runs import read_runs
+from upright.identification.study_sensors import drive_unit
+from upright.identification.study_text import Section, StudyText
+from upright.records import Record
+
+PathLike = str | os.PathLike[str]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """A rig, its runs, and where they are written.
+
+    Attributes
+    ----------
+    path : Path
+        The study file.
+    plant : str
+        Plant as the study names it.
+    rig : Rig
+    runs : tuple of Run
+    title, source : str
+        Heading and origin of the data, for the report; may be empty.
+    sha256 : str
+        Of the study's text.
+    """
+
+    path: Path
+    plant: str
+    rig: Rig
+    runs: tuple[Run, ...]
+    title: str = ""
+    source: str = ""
+    sha256: str = ""
+
+
+def load_study(path: PathLike, *, data: PathLike | None = None, fixed: Mapping[str, float] | None = None) -> Study:
+    """Rig and runs that a study file describes.
+
+    Parameters
+    ----------
+    path : path-like
+        TOML file; see `docs/study.md`.
+    data : path-like, optional
+        Folder that the runs' files are relative to; the study's own when omitted.
+    fixed : mapping of str to float, optional
+        Parameters [SI] of a model fitted before, ``actuator.*`` included: nothing is then estimated.
+
+    Raises
+    ------
+    BadInput
+        With file and line, when the study or a log cannot be used as it is.
+    """
+    path = Path(path)
+    text = StudyText(path)
+    study = text.root()
+    study.check(names(""))
+    plant = read_plant(study)
+    rig = read_rig(study, plant, drive_unit(study), fixed)
+    folder = Path(data) if data is not None else path.parent
+    logs: dict[tuple[str, str, str], Record] = {}
+    runs = read_runs(study, plant, lambda run: _log(run, folder, logs))
+    return Study(
+        path=path,
+        plant=study.section("rig").text_of("plant", "furuta"),
+        rig=rig,
+        runs=runs,
+        title=study.text_of("title", "My rig") if "title" in study else "",
+        source=study.text_of("source", "https://...") if "source" in study else "",
+        sha256=hashlib.sha256(text.text.encode()).hexdigest(),
+    )
+
+
+def _log(run: Section, folder: Path, logs: dict[tuple[str, str, str], Record]) -> Record:
+    """Record of the file a run names, read once."""
+    from upright.readers import read
+
+    name = run.text_of("file", "logs/run_01.csv")
+    reader = run.text_of("reader", "csv") if "reader" in run else ""
+    time = run.text_of("time", "t") if "time" in run else ""
+    key = (name, reader, time)
+    if key not in logs:
+        file = folder / name
+        if not file.is_file():
+            raise run.error("file", f"the log {file} does not exist; {_instead(file, folder)}")
+        with run.text.at(run.place("reader" if reader else "file")):
+            record = read(file, reader=reader or None)
+        with run.text.at(run.place("time")):
+            logs[key] = _retimed(record, time) if time else record
+    return logs[key]
+
+
+def _retimed(record: Record, time: str) -> Record:
+    from upright.identification.columns import column
+
+    return record.replace(t=column(record, time))
+
+
+def _instead(file: Path, folder: Path) -> str:
+    """Where the file may be instead."""
+    from difflib import get_close_matches
+
+    here = sorted(p.name for p in file.parent.iterdir() if p.is_file()) if file.parent.is_dir() else []
+    close = get_close_matches(file.name, here, n=1, cutoff=0.6)
+    if close:
+        return f"did you mean '{close[0]}'?"
+    return f"files are looked for in {folder}, and --data DIR names another folder"

@@ -1,0 +1,135 @@
+"""What may a study say? Every key with its form and meaning; the check and `docs/study.md` both come from here."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from upright.identification.model import ACTUATOR, PER_RUN
+
+
+class Key(NamedTuple):
+    """One key of a study: name, how its value is written, what it means."""
+
+    name: str
+    form: str
+    meaning: str
+
+
+_SENSOR = (
+    Key("column", '"theta"', "column of the log that measures this coordinate; the coordinate's own name if left out"),
+    Key("unit", '"counts"', "unit of the column (rad, deg, rev, m, mm, counts, ...); as the log states it if left out"),
+    Key("counts_per_rev", "14400", "encoder counts per turn: scale of a column in counts, else its resolution only"),
+    Key("counts_per_m", "16000 / 0.0706 as 226629", "the same for a coordinate in m"),
+    Key("scale", "1.02", "factor on the reading; for a column in counts without counts_per_*, SI per count"),
+    Key("sign", "-1", "+1 or -1: -1 when the column counts against the coordinate"),
+    Key("offset", '"180 deg"', "reading at which the coordinate is zero; a plain number is in the column's unit"),
+    Key("resolution", '"0.1 deg"', "smallest step of the sensor, when no counts are given"),
+)
+_DRIVE = (
+    Key("column", '"v"', "column of the log that commands the actuator"),
+    Key("expression", '"2.5*(0.2 - z)"', "or arithmetic on columns and the time t; see Expressions"),
+    Key("unit", '"V"', "unit of the command; as the log states it if left out"),
+    Key("scale", "0.001", "factor on the command"),
+    Key("sign", "-1", "+1 or -1"),
+)
+_SHARED = (
+    Key("window", "[1.0, 9.0]", 'seconds of the log that count; "start" and "end" are allowed'),
+    Key("role", '"fit"', '"fit" (the default) or "predict": scored, never seen by the estimator'),
+    Key("drive", '"v", 0 or a table', "replaces [drive] for this run; 0 is a free run"),
+    Key("inputs", "table", "replaces [inputs.NAME] for this run"),
+    Key("sensors", "table", "changes keys of [sensors.COORDINATE] for this run"),
+    Key("measured", '["theta"]', "coordinates compared with the model; every sensor if left out"),
+    Key("locked", "{ x = 0.0 }", "coordinates that could not move, and where they were; a list of names means at zero"),
+    Key("held", '["x"]', "coordinates moved from outside: their measured motion is prescribed"),
+    Key("known", '{ a_1 = "0.5 kg" }', "parameters that differ in this run and are known"),
+    Key("unknown", '["initial"]', f"what is estimated for this run alone, of {', '.join(PER_RUN)}"),
+    Key("initial", '{ theta = "1 rad" }', "states known at the first sample; these are not estimated"),
+    Key("horizon", '"0.5 s"', "predict this far ahead, again and again, from measured states; free run if left out"),
+    Key("score_from", '"30 s"', "seconds after the window's start before which nothing is scored"),
+    Key("loop", "table", "law that closed the loop, simulated with the plant"),
+    Key("period", '"2 ms"', "sample period to resample to; the log's own if left out"),
+    Key("reader", '"csv"', "reader of the file, when it is not recognised"),
+    Key("time", '"stamp"', "column that holds the time [s], when the reader took another one"),
+)
+
+SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
+    "": (
+        "The study",
+        (
+            Key("title", '"Crane, three gains"', "heading of the report"),
+            Key("source", '"https://..."', "where the data come from; text for the report"),
+            Key("rig", "table", "the plant"),
+            Key("parameters", "table", "every number of the plant: known or asked"),
+            Key("actuator", "table", "what stands between command and force"),
+            Key("sensors", "table", "how a column becomes a coordinate"),
+            Key("drive", "table", "what commands the (first) input; a run without it is free"),
+            Key("inputs", "table", "the same by name of the input, for plants with several"),
+            Key("defaults", "table", "keys of [[runs]] that all runs share"),
+            Key("runs", "list of tables", "stretches of data"),
+        ),
+    ),
+    "rig": (
+        "[rig]",
+        (
+            Key("plant", '"cart-pendulum"', 'built-in plant, or "my_plant.py:MyRig" beside the study'),
+            Key("substeps", "2", "integration steps per sample"),
+            Key("period", '"2 ms"', "sample period that all runs are resampled to; each log's own if left out"),
+        ),
+    ),
+    "value": (
+        "Values of [parameters] and [actuator]",
+        (
+            Key("value", '"0.23 m"', "a known number"),
+            Key("uncertainty", '"2 mm" or "1 %"', "its standard uncertainty"),
+            Key("guess", '"1.6e-3 kg m^2"', "a number to estimate, and where to start"),
+            Key("min", "0", "lower bound of the estimate; the plant's own if left out"),
+            Key("max", '"5e-3 kg m^2"', "upper bound of the estimate"),
+        ),
+    ),
+    "actuator": (
+        "[actuator]",
+        tuple(
+            Key(name.partition(".")[2], "value", f"{meaning}; {default:g} if left out")
+            for name, (meaning, default) in ACTUATOR.items()
+        ),
+    ),
+    "sensors": ("[sensors.COORDINATE]", _SENSOR),
+    "drive": ("[drive], [inputs.NAME]", _DRIVE),
+    "runs": (
+        "[[runs]]",
+        (
+            Key("label", '"kP 10"', "name in the report; the file's name if left out"),
+            Key("file", '"logs/run_03.mat"', "log, relative to the study or to --data"),
+            *_SHARED,
+        ),
+    ),
+    "defaults": ("[defaults]", _SHARED),
+    "loop": (
+        "runs.loop",
+        (
+            Key("gains", '{ x = "2.5 V/m" }', "gain per state; the law is u = drive + k_pf r - K (y - offset)"),
+            Key("k_pf", '"2.5 V/m"', "gain of the reference; the first gain if left out"),
+            Key("reference", '"0.2 m", a column or an expression', "what the loop follows, in SI"),
+            Key("alpha", "0.9", "pole of the differentiator's filter (0: plain difference)"),
+        ),
+    ),
+}
+"""Sections by their short name: heading and keys."""
+
+
+def names(section: str) -> tuple[str, ...]:
+    """Names of the keys of one section."""
+    return tuple(key.name for key in SECTIONS[section][1])
+
+
+def reference() -> str:
+    """Markdown tables of all keys."""
+    parts: list[str] = []
+    for section, (heading, keys) in SECTIONS.items():
+        if section == "defaults":
+            parts.append("### `[defaults]`\n\nEvery key of `[[runs]]` except `label` and `file`.")
+            continue
+        title = heading if " " in heading and not heading.startswith("[") else f"`{heading}`"
+        rows = "\n".join(f"| `{key.name}` | `{key.form}` | {key.meaning} |" for key in keys)
+        parts.append(f"### {title}\n\n| key | for example | meaning |\n|---|---|---|\n{rows}")
+    return "\n\n".join(parts) + "\n"
