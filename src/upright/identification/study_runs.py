@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 import numpy as np
 
@@ -141,7 +141,7 @@ def _role(run: Section) -> Literal["fit", "predict"]:
         raise run.error(
             "role", f'role must be "fit" or "predict", got {show(role)}; {nearest(str(role), ("fit", "predict"))}'
         )
-    return cast(Literal["fit", "predict"], role)
+    return role
 
 
 def _locked(run: Section, plant: type[Plant]) -> dict[str, float]:

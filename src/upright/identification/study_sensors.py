@@ -63,7 +63,7 @@ def read_unit(section: Section) -> str:
 def read_sign(section: Section) -> float:
     """+1 or -1."""
     sign: Any = section.values.get("sign", 1)
-    if sign not in (1, -1) or isinstance(sign, bool):
+    if isinstance(sign, bool) or sign not in (1, -1):
         raise section.error("sign", f"sign must be 1 or -1, got {show(sign)}")
     return float(sign)
 

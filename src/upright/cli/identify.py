@@ -1,0 +1,117 @@
+"""What are the parameters of this rig? A study goes in, estimates and a report come out."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from upright.errors import BadInput
+
+INTERRUPTED, NOT_TRUSTED = 130, 3
+METHODS = ("auto", "simplex", "least-squares")
+
+
+def identify(
+    study: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="Rig and runs; `upright init LOG` writes one.")],
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", metavar="OUT", help="Folder for results; STUDY-fit if left out.")
+    ] = None,
+    data: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder the runs' files are in; the study's own if left out.")
+    ] = None,
+    method: Annotated[str, typer.Option(metavar="METHOD", help=f"How to search: {', '.join(METHODS)}.")] = "auto",
+    as_json: Annotated[bool, typer.Option("--json", help="Print fit.json instead of tables.")] = False,
+    report: Annotated[bool, typer.Option(help="Write report.html as well.")] = True,
+    strict: Annotated[bool, typer.Option("--strict", help="Exit with 3 when the verdict is not to trust it.")] = False,
+) -> None:
+    r"""Fit a rig's parameters to its logs as a study file says; write estimates and report.
+
+    A study names a rig and the runs that speak about it:
+
+        \[rig]
+        plant = "pendulum"      # cart-pendulum, furuta, torsional-2, my.py:MyRig
+        \[parameters]
+        m_p  = "0.107 kg"                                     # known
+        l_cg = { value = "0.23 m", uncertainty = "2 mm" }     # known about
+        J_p  = { guess = "1.6e-3 kg m^2", min = 0 }           # to estimate
+        b_2c = { guess = "1e-4 N m" }
+        \[sensors.theta]
+        column = "theta"        # as `upright show LOG` lists them
+        unit = "counts"
+        counts_per_rev = 14400
+        sign = -1
+        \[\[runs]]
+        file = "swing.csv"
+        window = \[1.0, 30.0]
+        \[\[runs]]
+        file = "swing.csv"
+        label = "tail"
+        window = \[30.0, 60.0]
+        role = "predict"        # scored, never fitted
+
+    A driven rig adds, for instance,
+        \[drive]
+        column = "v"            # or expression = "2.5*(0.2 - z)"
+        unit = "V"
+        \[actuator]
+        gain = { guess = "2 N/V" }
+
+    All keys: docs/study.md. Writes OUT/fit.json and OUT/report.html.
+    Ctrl-C keeps the best so far and writes it.
+    Exit code: 0 a fit was written (3 with --strict when its verdict is not to
+    trust it), 2 the study or a log is wrong, 130 stopped by Ctrl-C.
+    """
+    from upright.cli.terminal import print_fit, progress_line
+    from upright.errors import nearest
+
+    if method not in METHODS:
+        raise BadInput(f"--method must be one of {', '.join(METHODS)}, got '{method}'; {nearest(method, METHODS)}")
+    if not study.exists():
+        raise BadInput(f"the study {study} does not exist; `upright init LOG -o {study.name}` writes one from a log")
+    from upright.identification.study import load_study
+
+    folder = out if out is not None else study.with_name(f"{study.stem}-fit")
+    if folder.exists() and not folder.is_dir():
+        raise BadInput(f"results need a folder, but {folder} is a file; name another with -o")
+    asked = load_study(study, data=data)
+    if not asked.rig.estimated:
+        raise BadInput(
+            f'{study}: nothing is asked; give a parameter a guess, such as J_p = {{ guess = "1e-3 kg m^2" }}, or score'
+            " the runs with a model fitted before: upright predict OUT/fit.json STUDY.toml"
+        )
+    if not any(run.role == "fit" for run in asked.runs):
+        raise BadInput(f'{study}: every run has role = "predict"; at least one needs role = "fit"')
+    from upright.identification.estimate import identify as estimate
+    from upright.identification.fitfile import write_fit
+
+    with progress_line(quiet=as_json) as progress:
+        fit = estimate(asked.rig, asked.runs, method=method, progress=progress)
+    written = [folder / "fit.json"]
+    content = write_fit(fit, asked, written[0])
+    if report:
+        written += _report(fit, folder, asked)
+    if as_json:
+        typer.echo(json.dumps(content, indent=2, ensure_ascii=False))
+    else:
+        print_fit(fit, written, study)
+    if fit.interrupted:
+        raise typer.Exit(INTERRUPTED)
+    if strict and not fit.trusted:
+        raise typer.Exit(NOT_TRUSTED)
+
+
+def _report(fit: Any, folder: Path, asked: Any) -> list[Path]:
+    """Write report.html."""
+    from upright.report.document import write_fit_report
+
+    provenance: dict[str, object] = {
+        "study": asked.path.name,
+        "sha256 of the study": asked.sha256,
+        "data": asked.source or "not stated",
+        "runs": {run.label: run.source for run in asked.runs},
+    }
+    title = asked.title or asked.path.stem.replace("_", " ")
+    return [write_fit_report(fit, folder, title=title, provenance=provenance)]

@@ -1,0 +1,73 @@
+"""Does a model that was fitted before explain other runs?"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from upright.errors import BadInput
+
+
+def predict(
+    model: Annotated[Path, typer.Argument(metavar="OUT/fit.json", help="Model that `upright identify` wrote.")],
+    study: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="Runs to score; its guesses are not used.")],
+    data: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder the runs' files are in; the study's own if left out.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", metavar="OUT", help="Folder for prediction.json; none if left out.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the scores as JSON instead of a table.")] = False,
+) -> None:
+    r"""Score other runs with a model that was fitted before.
+
+    The study is written as for `upright identify`; \[parameters] and \[actuator]
+    may be left out, since every number comes from the fit. Every run is scored,
+    whatever its role. What a run lists under `unknown` (its initial state, unless
+    it says otherwise) is estimated for that run alone; nothing else is.
+
+    upright predict swing-fit/fit.json other_day.toml
+    """
+    from upright.cli.terminal import console, print_scores
+    from upright.identification.fitfile import read_fit
+    from upright.identification.study import load_study
+
+    for file, what in ((model, "the model"), (study, "the study")):
+        if not file.exists():
+            raise BadInput(f"{what} {file} does not exist; the call is upright predict OUT/fit.json STUDY.toml")
+    if model.is_dir():
+        model = model / "fit.json"
+    fitted = read_fit(model)
+    asked = load_study(study, data=data, fixed=fitted.values)
+    missing = [n for n in fitted.values if n not in asked.rig.parameters]
+    if missing:
+        raise BadInput(
+            f"{study}: the plant '{asked.plant}' has no parameter {missing[0]}, and {model} is a '{fitted.plant}';"
+            " both must be the same plant"
+        )
+    from upright.identification.estimate import predict as score
+
+    rig = replace(asked.rig, substeps=fitted.substeps)
+    scores = score(rig, fitted.values, [replace(run, role="predict") for run in asked.runs])
+    content: dict[str, Any] = {
+        "model": model.name,
+        "study": study.name,
+        "runs": {
+            label: {"role": s.role, "fit_percent": dict(s.fit_percent), "horizon": s.horizon}
+            for label, s in scores.items()
+        },
+    }
+    text = json.dumps(content, indent=2, ensure_ascii=False)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        (out / "prediction.json").write_text(text + "\n", encoding="utf-8")
+    if as_json:
+        typer.echo(text)
+        return
+    print_scores(scores)
+    if not fitted.trusted:
+        console().print(f"\nThe model's own verdict was: {fitted.verdict}", soft_wrap=True, markup=False)

@@ -1,0 +1,97 @@
+"""How does a fit look on a terminal? Progress while it runs, then tables, verdict and what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from upright.identification.model import Fit, RunScore
+
+Progress = Callable[[str, float, float, int], None]
+
+
+def console(*, error: bool = False) -> Any:
+    """Terminal to print on; plain text when it is piped."""
+    from rich.console import Console
+
+    return Console(stderr=error, highlight=False, soft_wrap=False)
+
+
+@contextmanager
+def progress_line(*, quiet: bool = False) -> Generator[Progress | None]:
+    """One line on stderr that follows the search; nothing when `quiet` or when nobody watches."""
+    screen = console(error=True)
+    if quiet or not screen.is_terminal:
+        yield None
+        return
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bar
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("cost {task.fields[cost]}, {task.fields[evaluations]} evaluations"),
+        TimeElapsedColumn(),
+        TextColumn("Ctrl-C keeps the best so far"),
+    )
+    with Bar(*columns, console=screen, transient=True, refresh_per_second=8) as bar:
+        task = bar.add_task("starting", total=1.0, cost="", evaluations=0)
+
+        def follow(stage: str, fraction: float, cost: float, evaluations: int) -> None:
+            bar.update(task, description=stage, completed=fraction, cost=f"{cost:.6g}", evaluations=evaluations)
+
+        yield follow
+
+
+def print_fit(fit: Fit, files: Sequence[Path], study: Path) -> None:
+    """Parameters, scores, verdict, warnings, files and next steps."""
+    from rich.table import Table
+
+    from upright.report.advice import next_steps
+    from upright.report.tables import parameter_rows, run_rows
+
+    screen = console()
+    table = Table(title="Parameters", title_justify="left", box=None, pad_edge=False, header_style="bold")
+    for heading in ("", "value", "standard error", "interval", "unit", "status", "meaning"):
+        table.add_column(heading, justify="right" if heading in ("value", "standard error") else "left")
+    for row in (*parameter_rows(fit), *run_rows(fit)):
+        name = f"{row.name} ({row.run})" if row.run else row.name
+        table.add_row(name, row.value, row.stderr, row.interval, row.unit, row.status, row.meaning)
+    screen.print(table)
+    print_scores(fit.runs)
+    how = f"{fit.method}, {fit.evaluations} evaluations, {fit.seconds:.2f} s"
+    screen.print(f"\n[bold]Verdict[/bold] ({how}): {_plain(fit.verdict)}", soft_wrap=True)
+    for warning in fit.warnings:
+        screen.print(f"[bold]Warning[/bold]: {_plain(warning)}", soft_wrap=True)
+    screen.print("\nWritten: " + ", ".join(str(file) for file in files), soft_wrap=True)
+    screen.print("What next:", style="bold")
+    for step in next_steps(fit, study=str(study), folder=str(files[0].parent)):
+        screen.print(f"- {_plain(step.sentence)}", soft_wrap=True)
+        for line in step.command.splitlines():
+            screen.print(f"    {_plain(line)}", soft_wrap=True)
+
+
+def print_scores(runs: Any) -> None:
+    """Fit percent per run and signal."""
+    from rich.table import Table
+
+    table = Table(title="\nFit", title_justify="left", box=None, pad_edge=False, header_style="bold")
+    for heading in ("run", "", "signal", "fit %", "compared"):
+        table.add_column(heading, justify="right" if heading == "fit %" else "left")
+    scores: list[tuple[str, RunScore]] = sorted(runs.items(), key=lambda item: item[1].role != "fit")
+    for label, score in scores:
+        over = "free run" if score.horizon is None else f"restarted every {score.horizon:g} s"
+        role = "fitted" if score.role == "fit" else "predicted"
+        for name, percent in score.fit_percent.items():
+            table.add_row(_plain(label), role, name, f"{percent:.2f}", over)
+    console().print(table)
+
+
+def _plain(text: str) -> str:
+    """Text whose square brackets are not taken for markup."""
+    from rich.markup import escape
+
+    return escape(text)
