@@ -26,6 +26,7 @@ COMMANDS = {
     "predict": "Score other runs with a model that was fitted before.",
 }
 
+SETTINGS = {"help_option_names": ["-h", "--help"]}
 USER_ERROR, BUG, INTERRUPTED = 2, 1, 130
 
 
@@ -47,8 +48,10 @@ class LazyGroup(TyperGroup):
 
 def _load(name: str) -> Any:
     function = getattr(import_module(f"upright.cli.{name}"), name)
-    one = typer.Typer(add_completion=False)
-    one.command(name, help=function.__doc__ or COMMANDS[name])(function)
+    text = function.__doc__ or COMMANDS[name]
+    one = typer.Typer(add_completion=False, rich_markup_mode="rich", context_settings=SETTINGS)
+    # Docstrings are raw, for rich's escapes; \b keeps the line breaks of a paragraph.
+    one.command(name, help=text.replace("\\b\n", "\b\n"))(function)
     return typer.main.get_command(one)
 
 
@@ -107,8 +110,9 @@ app = typer.Typer(
     cls=LazyGroup,
     no_args_is_help=True,
     add_completion=False,
+    rich_markup_mode="rich",
     pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings=SETTINGS,
     epilog="Start with `upright lab`; with a log of your own: `upright show`, `upright init`, `upright identify`.",
 )
 
