@@ -1,0 +1,170 @@
+"""Which terms does this motion need, so that the kernel computes nothing else?
+
+A flavour is what is fixed when a kernel is compiled; everything else (parameters, states, inputs, modes) is data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from upright.errors import BadInput, nearest
+from upright.physics.derived import Derived
+
+ACTUATOR = ("gain", "offset", "limit", "lag", "delay", "slope")
+"""Actuator parameters of each input, in the kernel's order."""
+
+ACTUATOR_DEFAULTS = {"gain": 1.0, "offset": 0.0, "limit": float("inf"), "lag": 0.0, "delay": 0.0, "slope": 0.0}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flavour:
+    """Terms compiled into a kernel; numbers are indices of coordinates.
+
+    Attributes
+    ----------
+    dry : tuple of int
+        Joints that stick and slip, exactly.
+    drag : tuple of int
+        Joints with quadratic drag.
+    stribeck : tuple of int
+        Joints whose sliding friction falls from the stiction to the Coulomb level with speed.
+    dahl : tuple of int
+        Joints that deflect before they slide (Dahl); these do not stick.
+    held : tuple of int
+        Coordinates whose motion is prescribed.
+    dynamic : bool
+        The actuator has lag, delay or a torque-speed slope.
+    loop : bool
+        A sampled controller computes the input.
+    record : bool
+        The motion is returned, not only what it reduces to.
+    """
+
+    dry: tuple[int, ...] = ()
+    drag: tuple[int, ...] = ()
+    stribeck: tuple[int, ...] = ()
+    dahl: tuple[int, ...] = ()
+    held: tuple[int, ...] = ()
+    dynamic: bool = False
+    loop: bool = False
+    record: bool = True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layout:
+    """Names and places that the parts of the generated text agree on."""
+
+    derived: Derived
+    flavour: Flavour
+
+    @cached_property
+    def n(self) -> int:
+        """Number of coordinates."""
+        return len(self.derived.coordinates)
+
+    @cached_property
+    def nu(self) -> int:
+        """Number of inputs."""
+        return len(self.derived.inputs)
+
+    @cached_property
+    def free(self) -> tuple[int, ...]:
+        """Coordinates that obey the equations of motion."""
+        return tuple(i for i in range(self.n) if i not in self.flavour.held)
+
+    @cached_property
+    def velocities(self) -> tuple[str, ...]:
+        """Names of the velocities."""
+        return tuple(f"{q}_dot" for q in self.derived.coordinates)
+
+    @cached_property
+    def drives(self) -> tuple[int, ...]:
+        """Coordinate on which each input acts first."""
+        column = [[self.derived.gain[i * self.nu + j] != "0" for i in range(self.n)] for j in range(self.nu)]
+        return tuple(c.index(True) if True in c else 0 for c in column)
+
+    @cached_property
+    def constants(self) -> tuple[str, ...]:
+        """Names of what is computed once per lane."""
+        f = self.flavour
+        joints = sorted({*f.dry, *f.dahl})
+        names = [f"k{i}" for i in range(len(self.derived.lumps))]
+        names += [f"_Fc{i}" for i in joints] + [f"_Fs{i}" for i in joints]
+        names += [f"_cq{i}" for i in f.drag] + [f"_iv{i}" for i in f.stribeck] + [f"_id{i}" for i in f.dahl]
+        return tuple(names + ([f"_sl{j}" for j in range(self.nu)] if f.dynamic else []))
+
+    @cached_property
+    def rows(self) -> dict[str, int]:
+        """Place of each per-lane number in the working array."""
+        f, n, nu = self.flavour, range(self.n), range(self.nu)
+        names = [f"q{i}" for i in n] + [f"v{i}" for i in n] + [f"y{i}" for i in f.dahl] + [f"s{i}" for i in f.dry]
+        names += [f"oq{i}" for i in n] + [f"ov{i}" for i in n] + [f"oy{i}" for i in f.dahl]
+        names += [f"{c}{j}" for c in ("ua", "um", "ub", "gain", "off", "lim", "ff", "cn") for j in nu]
+        if f.dynamic:
+            names += [f"{c}{j}" for c in ("co", "w", "e", "g1", "th", "df") for j in nu]
+        if f.loop:
+            names += [f"{c}{i}" for c in ("yp", "vf", "tg") for i in n]
+            names += [f"K{j}_{i}" for j in nu for i in range(2 * self.n)] + ["kr", "ref"]
+        if not f.record:
+            names += [f"{c}{i}" for c in ("mx", "er") for i in n] + [f"{c}{j}" for c in ("sat",) for j in nu]
+        names += [f"h{c}{i}{s}" for i in f.held for s in "amb" for c in "qva"] + [f"hb{i}" for i in f.held]
+        return {name: i for i, name in enumerate([*names, *self.constants, "flag"])}
+
+
+def choose(
+    derived: Derived,
+    params: Mapping[str, Any],
+    *,
+    free: Collection[str] = (),
+    held: Collection[str] = (),
+    loop: bool = False,
+    record: bool = True,
+) -> Flavour:
+    """Smallest flavour that computes what `params` ask for.
+
+    Parameters
+    ----------
+    derived : Derived
+        Equations of the plant.
+    params : mapping of str to float or array
+        Values by name; a term is left out when its parameters are zero or missing in every lane.
+    free : collection of str
+        Parameters that will be varied later, so that their terms stay in although they are zero now.
+    held : collection of str
+        Coordinates whose motion is prescribed.
+    loop, record : bool
+        A controller computes the input; the motion is returned.
+
+    Raises
+    ------
+    BadInput
+        When a held coordinate or a named parameter does not exist.
+    """
+    known = {*derived.parameters, *(f"actuator.{a}" for a in ACTUATOR)}
+    for name in (*params, *free):
+        if name not in known:
+            raise BadInput(f"{derived.name} has no parameter '{name}'; {nearest(name, known)}")
+    for name in held:
+        if name not in derived.coordinates:
+            raise BadInput(f"{derived.name} has no coordinate '{name}' to hold; {nearest(name, derived.coordinates)}")
+
+    def on(name: str) -> bool:
+        return bool(name) and (name in free or bool(np.any(np.asarray(params.get(name, 0.0)) != 0.0)))
+
+    moving = [j for j in derived.joints if derived.coordinates[j.coordinate] not in held]
+    rough = [j for j in moving if on(j.coulomb) or on(j.stiction)]
+    return Flavour(
+        dry=tuple(j.coordinate for j in rough if not on(j.presliding)),
+        dahl=tuple(j.coordinate for j in rough if on(j.presliding)),
+        stribeck=tuple(j.coordinate for j in rough if on(j.stribeck_speed)),
+        drag=tuple(j.coordinate for j in moving if on(j.quadratic)),
+        held=tuple(i for i, c in enumerate(derived.coordinates) if c in held),
+        dynamic=any(on(f"actuator.{a}") for a in ("lag", "delay", "slope")),
+        loop=loop,
+        record=record,
+    )

@@ -1,0 +1,209 @@
+"""How does this plant move from here?"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from upright.errors import BadInput
+from upright.physics.derived import Derived
+from upright.physics.plant import Plant
+from upright.simulation.flavour import Flavour, choose
+from upright.simulation.parts import Held, Loop
+from upright.simulation.simulator import Simulator
+
+Array = NDArray[np.float64]
+
+
+def simulate(
+    plant: type[Plant] | Plant | Derived,
+    params: Mapping[str, ArrayLike],
+    x0: ArrayLike,
+    u: ArrayLike | None,
+    dt: float,
+    *,
+    samples: int,
+    substeps: int = 1,
+    start: ArrayLike = 0,
+    loop: Loop | None = None,
+    held: Mapping[str, Held] | None = None,
+    every: int = 1,
+    threads: int = 1,
+) -> Array:
+    """Motion of a plant in one or many lanes, sample by sample.
+
+    Parameters
+    ----------
+    plant : class of a plant, plant, or Derived
+        A plant brings its own parameters; those in `params` replace them.
+    params : mapping of str to float or array, shape (lanes,)
+        Parameters by name; the actuator's as ``"actuator.gain"``, ``"actuator.offset"``, ``"actuator.limit"``,
+        ``"actuator.lag"`` [s], ``"actuator.delay"`` [s], ``"actuator.slope"`` (defaults 1, 0, inf, 0, 0, 0).
+    x0 : array, shape (states,) or (lanes, states)
+        Initial states: coordinate, its velocity, next coordinate, ...
+    u : array, shape (T,) or (T, inputs), or None
+        Input at the samples, held between them and after the last.
+    dt : float
+        Sample time [s].
+    samples : int
+        Rows returned, the first of which is `x0`.
+    substeps : int
+        Runge-Kutta steps per sample.
+    start : int or int array, shape (lanes,)
+        Sample of `u`, reference and held motion at which a lane begins: windows of one record are lanes.
+    loop : Loop, optional
+        Sampled controller.
+    held : mapping of str to Held, optional
+        Coordinates whose motion is prescribed, or locked with ``Held()``.
+    every : int
+        Only each `every`-th sample is returned.
+    threads : int
+        Threads among which blocks of 16 lanes are shared.
+
+    Returns
+    -------
+    array, shape (samples, states, lanes), or (samples, states + inputs, lanes) with a loop
+        See `Simulator.run`.
+
+    Raises
+    ------
+    BadInput
+        When a name is unknown or missing, or shapes do not fit together.
+    """
+    job = _prepare(plant, params, x0, u, dt, substeps, start, loop, held or {}, record=True)
+    return job.simulator.run(job.table, job.x0, job.u, samples=samples, start=job.start, every=every, threads=threads)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Ensemble:
+    """What many motions reduce to; lanes on the last axis.
+
+    Attributes
+    ----------
+    largest : array, shape (coordinates, lanes)
+        Largest absolute value of each coordinate at the samples.
+    error : array, shape (coordinates, lanes)
+        Largest distance from the loop's target, zero without loop, from the time `settle` on.
+    saturated : array, shape (inputs, lanes)
+        Share of the samples at which the command met its limit.
+    final : array, shape (states, lanes)
+        Last state. NaN or infinite, as are the others then, where a lane diverged.
+    """
+
+    largest: Array
+    error: Array
+    saturated: Array
+    final: Array
+
+
+def ensemble(
+    plant: type[Plant] | Plant | Derived,
+    params: Mapping[str, ArrayLike],
+    x0: ArrayLike,
+    u: ArrayLike | None,
+    dt: float,
+    *,
+    samples: int,
+    settle: float = 0.0,
+    substeps: int = 1,
+    start: ArrayLike = 0,
+    loop: Loop | None = None,
+    held: Mapping[str, Held] | None = None,
+    threads: int | None = None,
+) -> Ensemble:
+    """Extremes and final states of many motions, without keeping the motions.
+
+    Parameters are those of `simulate`; `settle` [s] is when errors begin to count, and `threads` defaults to the
+    number of processors this process may use.
+    """
+    job = _prepare(plant, params, x0, u, dt, substeps, start, loop, held or {}, record=False)
+    workers = threads or (len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1)
+    rows = job.simulator.run(
+        job.table, job.x0, job.u, samples=samples, start=job.start, threads=workers, settle=settle
+    )
+    n, nu = len(job.simulator.derived.coordinates), len(job.simulator.derived.inputs)
+    final = rows[2 * n + nu :]
+    wrong = ~np.isfinite(final).all(axis=0)
+    rows[: 2 * n, wrong] = np.nan
+    return Ensemble(largest=rows[:n], error=rows[n : 2 * n], saturated=rows[2 * n : 2 * n + nu] / samples, final=final)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Job:
+    simulator: Simulator
+    table: Array
+    x0: Array
+    u: Array | None
+    start: NDArray[np.int64] | None
+
+
+def _prepare(
+    plant: Any,
+    params: Mapping[str, ArrayLike],
+    x0: ArrayLike,
+    u: ArrayLike | None,
+    dt: float,
+    substeps: int,
+    start: ArrayLike,
+    loop: Loop | None,
+    held: Mapping[str, Held],
+    *,
+    record: bool,
+) -> _Job:
+    values: dict[str, Any] = {**plant.parameters(), **params} if isinstance(plant, Plant) else dict(params)
+    derived: Derived = plant if isinstance(plant, Derived) else plant.derived_for(values)
+    flavour = choose(derived, values, held=held, loop=loop is not None, record=record)
+    if loop is not None and loop.delay > 0.0:
+        flavour = _with_delay(flavour)
+    friction = {
+        name for j in derived.joints for name in (j.coulomb, j.quadratic, j.stiction, j.stribeck_speed, j.presliding)
+    }
+    missing = [name for name in derived.parameters if name not in values and name not in friction]
+    if missing:
+        raise BadInput(f"{derived.name} needs a value for {', '.join(missing)}; only friction may be left out.")
+    first = np.asarray(x0, dtype=np.float64)
+    first = first[None, :] if first.ndim == 1 else first
+    nx = 2 * len(derived.coordinates)
+    if first.ndim != 2 or first.shape[1] != nx:
+        raise BadInput(f"x0 needs shape ({nx},) or (lanes, {nx}), got {np.shape(x0)}.")
+    begin = np.asarray(start)
+    if begin.dtype.kind not in "iu":
+        raise BadInput(f"start counts samples and needs whole numbers, got {begin.dtype}.")
+    sizes: dict[str, int] = {"x0": len(first), "start": begin.size}
+    for name, value in values.items():
+        if np.ndim(value) > 1:
+            raise BadInput(f"{name} needs one value or one for each lane, got shape {np.shape(value)}.")
+        sizes[name] = np.size(value)
+    if loop is not None:
+        sizes["K"] = np.shape(loop.K)[2] if np.ndim(loop.K) == 3 else 1
+        sizes["target"] = np.shape(loop.target)[1] if np.ndim(loop.target) == 2 else 1
+        sizes["k_pf"] = np.size(loop.k_pf)
+    lanes = max(sizes.values())
+    for name, size in sizes.items():
+        if size not in (1, lanes):
+            raise BadInput(f"{name} has {size} lanes where others have {lanes}; give one value or {lanes}.")
+    simulator = Simulator(derived=derived, flavour=flavour, dt=dt, substeps=substeps, loop=loop, held=held)
+    command = None
+    if u is not None:
+        command = np.asarray(u, dtype=np.float64)
+        command = command[:, None] if command.ndim == 1 and len(derived.inputs) == 1 else command
+    return _Job(
+        simulator=simulator,
+        table=simulator.table(values, lanes),
+        x0=np.repeat(first.T, lanes, axis=1) if len(first) == 1 else first.T,
+        u=command,
+        start=None if not begin.any() else np.broadcast_to(begin.astype(np.int64).ravel(), (lanes,)),
+    )
+
+
+@lru_cache
+def _with_delay(flavour: Flavour) -> Flavour:
+    from dataclasses import replace
+
+    return replace(flavour, dynamic=True)

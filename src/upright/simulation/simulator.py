@@ -1,0 +1,229 @@
+"""Where is the plant at every sample, in one motion or in ten thousand?
+
+The one place that steps a plant. Classical Runge-Kutta with `substeps` steps per sample; dry friction sticks and slips
+at moments found inside the step. The input is held between samples. Per lane it runs through limit, offset, gain,
+delay, lag: ``force = gain * lag(delay(clip(u, limit) + offset)) - slope * speed``; before the first sample of the
+record it is what it is there. Delay and lag keep mean and first moment of the input within a substep exactly, so
+that the motion depends continuously on both.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from upright.errors import BadInput
+from upright.physics.derived import Derived
+from upright.simulation.compiled import WIDTH, kernel
+from upright.simulation.flavour import ACTUATOR, ACTUATOR_DEFAULTS, Flavour, Layout
+from upright.simulation.parts import Held, Loop
+
+Array = NDArray[np.float64]
+_NONE = np.zeros((1, 0, 0))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Simulator:
+    """A plant ready to be stepped again and again with other numbers, at a few microseconds per call.
+
+    Attributes
+    ----------
+    derived : Derived
+        Equations of the plant.
+    flavour : Flavour
+        Terms to compute, from `upright.simulation.choose`.
+    dt : float
+        Sample time [s].
+    substeps : int
+        Runge-Kutta steps per sample.
+    loop : Loop, optional
+        Controller, present exactly when the flavour says so.
+    held : mapping of str to Held
+        Coordinates whose motion is prescribed, exactly those of the flavour.
+    """
+
+    derived: Derived
+    flavour: Flavour
+    dt: float
+    substeps: int = 1
+    loop: Loop | None = None
+    held: Mapping[str, Held] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not (self.dt > 0.0 and math.isfinite(self.dt)):
+            raise BadInput(f"the sample time must be positive, got {self.dt:g} s.")
+        if self.substeps < 1:
+            raise BadInput(f"substeps must be at least 1, got {self.substeps}.")
+        if (self.loop is not None) != self.flavour.loop:
+            raise BadInput("a loop was given without a flavour for it, or the other way round; use choose(loop=...).")
+        wanted = {self.derived.coordinates[i] for i in self.flavour.held}
+        if set(self.held) != wanted:
+            raise BadInput(f"the flavour holds {sorted(wanted)}, but motion was given for {sorted(self.held)}.")
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the rows of `params`: the plant's parameters, then each actuator quantity for every input."""
+        actuator = [f"actuator.{a}" for a in ACTUATOR for _ in self.derived.inputs]
+        return (*self.derived.parameters, *actuator)
+
+    @cached_property
+    def _layout(self) -> Layout:
+        return Layout(derived=self.derived, flavour=self.flavour)
+
+    @cached_property
+    def _kernel(self) -> Any:
+        return kernel(self._layout)
+
+    @cached_property
+    def _grid(self) -> Array:
+        """Prescribed motion at every half substep, three columns for each held coordinate."""
+        grids = [self.held[self.derived.coordinates[i]].grid(self.dt, self.substeps) for i in self.flavour.held]
+        if not grids:
+            return np.zeros((1, 0))
+        longest = max(len(g) for g in grids)
+        return np.hstack([np.vstack([g, np.repeat(g[-1:], longest - len(g), axis=0)]) for g in grids])
+
+    @cached_property
+    def _scalars(self) -> Array:
+        n = len(self.derived.coordinates)
+        out = np.zeros(n + 4)
+        if self.loop is not None:
+            try:
+                out[:n] = self.loop.quantum
+            except ValueError:
+                raise BadInput(f"quantum needs one value or {n}, got {np.shape(self.loop.quantum)}.") from None
+            out[n : n + 3] = self.loop.alpha, float(self.loop.velocity == "true"), self.loop.delay
+        return out
+
+    @cached_property
+    def _reference(self) -> Array:
+        return np.zeros(0) if self.loop is None else self.loop.signal()
+
+    def table(self, params: Mapping[str, ArrayLike], lanes: int) -> Array:
+        """Rows of `names` from values by name, shape (rows, lanes); what is missing takes its default or zero."""
+        out = np.zeros((len(self.names), lanes))
+        for r, name in enumerate(self.names):
+            out[r] = params.get(name, ACTUATOR_DEFAULTS.get(name.removeprefix("actuator."), 0.0))  # type: ignore[arg-type]
+        return out
+
+    def run(
+        self,
+        params: Array,
+        x0: Array,
+        u: Array | None = None,
+        *,
+        samples: int,
+        start: NDArray[np.int64] | None = None,
+        every: int = 1,
+        threads: int = 1,
+        settle: float = 0.0,
+    ) -> Array:
+        """Motion of every lane.
+
+        Parameters
+        ----------
+        params : array, shape (rows, lanes)
+            In the order of `names`.
+        x0 : array, shape (states, lanes)
+            Initial states in the paper's order: coordinate, its velocity, next coordinate, ...
+        u : array, shape (T, inputs), optional
+            Input at the samples, held between them and after the last; nothing when omitted.
+        samples : int
+            Rows returned; the first is `x0`.
+        start : int array, shape (lanes,), optional
+            Sample of `u`, reference and held motion at which each lane begins, 0 when omitted.
+        every : int
+            Only each `every`-th sample is returned.
+        threads : int
+            Threads among which blocks of lanes are shared.
+        settle : float
+            Time [s] from which distances from the target count, when the flavour records nothing.
+
+        Returns
+        -------
+        array, shape (samples, states, lanes), or (samples, states + inputs, lanes) with a loop
+            States, then the command of the controller after its limit. A lane that diverges holds NaN or
+            infinity from there on, and only there. When the flavour records nothing: the rows of `ensemble`.
+
+        Raises
+        ------
+        BadInput
+            When shapes do not fit together.
+        """
+        n, nu, f = self._layout.n, self._layout.nu, self.flavour
+        lanes = params.shape[1] if params.ndim == 2 else 0
+        if lanes == 0 or params.shape[0] != len(self.names):
+            raise BadInput(f"params needs shape ({len(self.names)}, lanes), got {params.shape}; see Simulator.names.")
+        if x0.shape != (2 * n, lanes):
+            raise BadInput(f"x0 needs shape ({2 * n}, {lanes}): states first, lanes last; got {x0.shape}.")
+        if samples < 1 or every < 1:
+            raise BadInput(f"samples and every must be at least 1, got {samples} and {every}.")
+        u = np.zeros((0, nu)) if u is None else np.ascontiguousarray(u, dtype=np.float64)
+        if u.ndim != 2 or u.shape[1] != nu:
+            raise BadInput(f"u needs shape (T, {nu}): time first, one column for each input; got {u.shape}.")
+        width = 1 if lanes == 1 else WIDTH
+        blocks = -(-lanes // width)
+        loop_rows = 0 if self.loop is None else nu * 2 * n + n + 1
+        P = _padded(params, blocks * width, extra=loop_rows)
+        if self.loop is not None:
+            P[len(params) :, :lanes] = self.loop.rows(n, nu, lanes)
+            P[len(params) :, lanes:] = P[len(params) :, lanes - 1 : lanes]
+        X0 = _padded(x0, blocks * width)
+        begin = np.zeros(blocks * width, np.int64)
+        if start is not None:
+            if np.shape(start) != (lanes,) or np.min(start) < 0:
+                raise BadInput(f"start needs {lanes} sample numbers that are not negative, got {start!r}.")
+            begin[:lanes] = start
+        base = np.zeros((len(f.held), blocks * width))
+        for k, i in enumerate(f.held):
+            if self.held[self.derived.coordinates[i]].locked:
+                base[k] = X0[2 * i]
+        buffer = 1
+        if f.loop and f.dynamic:
+            row = self.names.index("actuator.delay")
+            delays = params[row : row + nu] / self.dt + self._scalars[n + 2]
+            longest = float(np.max(delays[np.isfinite(delays)], initial=0.0))
+            if longest > 1e4:
+                raise BadInput(f"a delay of {longest:g} samples is too long for a loop; is it in seconds?")
+            buffer = int(max(longest, 0.0)) + 3
+        scalars = self._scalars.copy()
+        scalars[n + 3] = math.ceil(settle / self.dt - 1e-9)
+        out, reduced = _NONE, _NONE[0]
+        if f.record:
+            out = np.empty((samples, 2 * n + (nu if f.loop else 0), blocks * width))
+        else:
+            reduced = np.empty((4 * n + nu, blocks * width))
+        step = self._kernel.run_1 if width == 1 else self._kernel.run_16
+        call = (lanes, P, X0, u, self._reference, begin, self._grid, base, (samples - 1) * every, every)
+        call += (self.substeps, self.dt, scalars, buffer, out, reduced)
+        if threads <= 1 or blocks < 2 * threads:
+            step(0, blocks, *call)
+        else:
+            _share(step, blocks, threads, call)
+        return out[:, :, :lanes] if f.record else reduced[:, :lanes]
+
+
+def _padded(a: Array, width: int, extra: int = 0) -> Array:
+    """Contiguous copy with the last lane repeated and room for `extra` rows."""
+    rows, lanes = a.shape
+    out = np.empty((rows + extra, width))
+    out[:rows, :lanes] = a
+    out[:rows, lanes:] = a[:, -1:]
+    return out
+
+
+def _share(step: Any, blocks: int, threads: int, call: tuple[Any, ...]) -> None:
+    """Let threads take turns at pieces of the work; the kernel holds no lock."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    pieces = min(blocks, 4 * threads)
+    edges = [blocks * k // pieces for k in range(pieces + 1)]
+    step(0, 0, *call)  # compiled before the threads ask for it
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(lambda k: step(edges[k], edges[k + 1], *call), range(pieces)))
