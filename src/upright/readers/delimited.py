@@ -1,0 +1,199 @@
+"""What does a table of numbers hold, with or without a line of names?
+
+Commas, semicolons, tabs or blanks part the cells; names stand in the line above the numbers, perhaps after
+a ``#`` or ``%``. Without names the columns are c0, c1, ... and c0 is the time when it increases.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from upright.readers.source import Source
+from upright.readers.table import line_of_row, numbers
+from upright.readers.timebase import exact_seconds, is_epoch, is_index, rebuild, time_scale
+from upright.records import Record
+
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?|[+-]?(?:nan|inf|infinity)"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layout:
+    """How a table is laid out: names, delimiter, and the line (from 1) where numbers begin."""
+
+    names: tuple[str, ...]
+    delimiter: str | None
+    first_line: int
+    body: str
+    named: bool
+    decimal_comma: bool = False
+
+
+def layout(source: Source) -> Layout:
+    """Find names, delimiter and numbers.
+
+    Raises
+    ------
+    BadInput
+        When no line begins with a number, or a name stands above two columns.
+    """
+    lines = source.text.split("\n")
+    first = next((i for i, line in enumerate(lines[:200]) if begins_with_number(line)), -1)
+    if first < 0:
+        raise source.bad(
+            "expected rows of numbers under at most one line of names, got none;"
+            " readable are ECP exports, CSV, tab-separated text and MATLAB version 5",
+            line=1,
+        )
+    above = [i for i in range(first) if lines[i].strip()]
+    candidates = [lines[i].strip() for i in above]
+    delimiter = _delimiter(lines[first], candidates[-1] if candidates else "")
+    width = len(lines[first].split(delimiter))
+    names = _split(re.sub(r"^[#%]+\s*", "", candidates[-1]), delimiter) if candidates else []
+    if names and len(names) != width and not candidates[-1].startswith(("#", "%")):
+        raise source.bad(
+            f"expected a name for each of the {width} columns below, got {len(names)};"
+            " mend the line of names or the first row",
+            line=above[-1] + 1,
+        )
+    named = bool(names) and len(names) == width
+    names = [name or f"c{j}" for j, name in enumerate(names)] if named else [f"c{j}" for j in range(width)]
+    for j, name in enumerate(names):
+        if name in names[:j]:
+            raise source.bad(
+                "expected a different name for each column, got this one twice",
+                line=above[-1] + 1,
+                column=j + 1,
+                name=name,
+            )
+    body = "\n".join(lines[first:])
+    comma = delimiter in (";", "\t", None) and "," in lines[first] and "." not in lines[first]
+    return Layout(
+        names=tuple(names), delimiter=delimiter, first_line=first + 1, body=body, named=named, decimal_comma=comma
+    )
+
+
+def read(source: Source) -> Record:
+    """Record of a table; time is the column named like it, else the first when it increases."""
+    found = layout(source)
+    table = numbers(
+        source,
+        found.body,
+        names=found.names,
+        delimiter=found.delimiter,
+        first_line=found.first_line,
+        decimal_comma=found.decimal_comma,
+    )
+    at, seconds = _time_column(source, found, table)
+    notes: list[str] = []
+    if not found.named:
+        notes.append("The log names no columns; they are called c0, c1, ... and c0 increases, so it is the time.")
+    elif not time_scale(found.names[at]):
+        notes.append(f"No column is named like a time; '{found.names[at]}' is the first and increases.")
+    t = table[:, at] * seconds
+    if is_epoch(t) and seconds == 1:
+        rows = [line for line in found.body.split("\n") if line.strip()]
+        cells = [row.split(found.delimiter)[at] for row in rows]
+        t, first = exact_seconds(
+            source, cells, range(found.first_line, found.first_line + len(cells)), name=found.names[at], column=at + 1
+        )
+        notes.append(f"Time is counted from the first sample, epoch {first * 1e-9:.6f} s.")
+    _increasing(source, found, t, at)
+    index = next((table[:, j] for j, name in enumerate(found.names) if is_index(name, table[:, j])), None)
+    t, note = rebuild(t, index)
+    last = found.body.rstrip(" ") if not found.body.endswith("\n") else ""
+    if last:
+        notes.append(_torn(source, found, table.shape[0]))
+    signals = {name: table[:, j] for j, name in enumerate(found.names) if j != at}
+    return Record(
+        t=t,
+        signals=signals,
+        units={name: stated_unit(name) for name in signals},
+        provenance=source.provenance("table", *filter(None, [note, *notes])),
+    )
+
+
+def stated_unit(name: str) -> str:
+    """Unit in brackets behind a name, as in ``theta [rad]``; empty when there is none that can be read."""
+    match = re.fullmatch(r".*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*", name)
+    if match is None:
+        return ""
+    from upright.units import known
+
+    return match[1] if known(match[1]) else ""
+
+
+def begins_with_number(line: str) -> bool:
+    """Whether the first cell of a line is a number."""
+    return re.match(rf"\s*(?:{_NUMBER})\s*(?:[,;\s]|$)", line, re.IGNORECASE) is not None
+
+
+def _delimiter(row: str, header: str) -> str | None:
+    for delimiter in ("\t", ";"):
+        if delimiter in row:
+            return delimiter
+    decimal = re.fullmatch(r"\s*[+-]?\d+,\d+(\s+[+-]?\d+,\d+)*\s*", row) and "," not in header and row.count(",") > 1
+    return "," if "," in row and not decimal else None
+
+
+def _split(line: str, delimiter: str | None) -> list[str]:
+    if delimiter is None:
+        wide = re.split(r"\s{2,}", line)  # names may hold single blanks
+        return [name.strip('"') for name in (wide if len(wide) > 1 else line.split())]
+    try:
+        cells = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
+    except csv.Error:
+        cells = line.split(delimiter)
+    return [name.strip() for name in cells]
+
+
+def _time_column(source: Source, found: Layout, table: np.ndarray) -> tuple[int, float]:
+    for j, name in enumerate(found.names if found.named else ()):
+        if seconds := time_scale(name):
+            return j, seconds
+    first = table[:, 0]
+    if found.named and is_index(found.names[0], first):
+        raise source.bad(
+            f"expected a time column named 't' or 'time', got only the sample index '{found.names[0]}';"
+            " add the time of each sample in s",
+            line=found.first_line - 1,
+        )
+    if found.named and first.size > 1 and not (np.diff(first) > 0).all():
+        raise source.bad(
+            f"expected a time column named 't' or 'time', got: {', '.join(found.names)[:120]};"
+            " name the time column or put it first",
+            line=max(found.first_line - 1, 1),
+        )
+    return 0, 1.0
+
+
+def _increasing(source: Source, found: Layout, t: np.ndarray, at: int) -> None:
+    bad = np.flatnonzero(~(np.diff(t) > 0))
+    if bad.size:
+        row = int(bad[0]) + 1
+        raise source.bad(
+            f"time must increase from row to row, got {t[row]:.9g} s after {t[row - 1]:.9g} s;"
+            " mend or delete the row, or read each run on its own",
+            line=line_of_row(found.body, row, found.first_line),
+            column=at + 1,
+            name=found.names[at],
+        )
+
+
+def _torn(source: Source, found: Layout, rows: int) -> str:
+    """Judge a last row without line end: torn when its last number is shorter than the fixed format above it."""
+    lines = [line for line in found.body.split("\n")[-8:] if line.strip()]
+    ends = [line.split(found.delimiter)[-1].strip() for line in lines]
+    decimals = {len(end.partition(".")[2]) for end in ends[:-1]}
+    if len(ends) > 3 and len(decimals) == 1 and len(ends[-1].partition(".")[2]) not in decimals:
+        raise source.bad(
+            f"expected {decimals.pop()} decimals and a line end, got {ends[-1]!r}; the last row is torn,"
+            " export the log again or delete it",
+            line=line_of_row(found.body, rows - 1, found.first_line),
+            column=len(found.names),
+            name=found.names[-1],
+        )
+    return "The last row has no line end; if the log was cut short, its last number may be cut as well."

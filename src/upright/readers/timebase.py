@@ -1,0 +1,138 @@
+"""When was each sample taken, if the log rounds its time or hides it in an epoch?
+
+A clock that is rounded to 1 ms shows steps of 1 and 2 ms where every sample was 1.1275 ms after the last.
+Such a time base is rebuilt from the sample index; a true jitter is left as it is.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from upright.readers.source import Source
+from upright.records import Array
+
+TIME_NAMES = ("t", "time", "t_received", "timestamp", "__time", "tout", "time_s", "t_s", "seconds", "sec")
+INDEX_NAMES = ("sample", "n", "index", "i", "k", "no", "step", "row")
+_UNIT_SUFFIX = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+
+# A rounding below one part in 50 of the period disturbs a fit less than the sensors do.
+_MATTERS = 0.02
+_EPOCH = 1e6  # s; a clock that reads more than 11 days counts from an epoch
+
+
+def time_scale(name: str) -> float:
+    """Seconds per unit of a column that is called like a time; 0 when it is not.
+
+    ``"t"``, ``"Time"``, ``"time [ms]"``, ``"Time (s)"`` and ``"t_us"`` are.
+    """
+    match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(]\s*(\w+)\s*[\])])?\s*", name.casefold())
+    stem, unit = (match[1], match[2] or "") if match else ("", "")
+    if stem in TIME_NAMES:
+        return _UNIT_SUFFIX.get(unit, 0.0) if unit else 1.0
+    head, _, suffix = stem.rpartition("_")
+    return _UNIT_SUFFIX.get(suffix, 0.0) if head in TIME_NAMES else 0.0
+
+
+def is_index(name: str, values: Array) -> bool:
+    """Whether a column counts the samples: named so, whole numbers, increasing."""
+    whole = bool((values == np.round(values)).all())
+    return name.casefold() in INDEX_NAMES and whole and bool((np.diff(values) > 0).all())
+
+
+def is_epoch(t: Array) -> bool:
+    """Whether times count from 1970 or the like, where float64 resolves only parts of a microsecond."""
+    return t.size > 0 and abs(float(t[0])) > _EPOCH
+
+
+def exact_seconds(
+    source: Source, cells: Sequence[str], lines: Sequence[int], *, name: str, column: int
+) -> tuple[Array, int]:
+    """Seconds (N,) since the first cell, subtracted as whole nanoseconds, and that first cell in nanoseconds.
+
+    An epoch stamp such as 1707681595.547459602 has 19 digits; a float64 keeps 16.
+    """
+    nanoseconds = _alike(cells) or [
+        _nanoseconds(source, cell, line, name, column) for cell, line in zip(cells, lines, strict=True)
+    ]
+    first = nanoseconds[0]
+    return np.array([(value - first) for value in nanoseconds], dtype=np.float64) * 1e-9, first
+
+
+def _alike(cells: Sequence[str]) -> list[int]:
+    """Nanoseconds of stamps all written with the same digits before and after the point; empty when they are not."""
+    point = cells[0].find(".") if cells else -1
+    decimals = len(cells[0]) - point - 1 if point > 0 else 0
+    joined = [cell[:point] + cell[point + 1 :] for cell in cells]
+    text = "".join(joined)
+    alike = 0 < decimals <= 9 and {len(cell) for cell in cells} == {len(cells[0])} and len(cells[0]) < 19 + 2
+    if not (alike and text.isascii() and text.isdigit() and {cell[point] for cell in cells} == {"."}):
+        return []
+    scale = 10 ** (9 - decimals)
+    return [int(digits) * scale for digits in joined]
+
+
+def _nanoseconds(source: Source, cell: str, line: int, name: str, column: int) -> int:
+    match = re.fullmatch(r"\s*([+-]?)(\d{1,15})(?:\.(\d*))?\s*", cell, re.ASCII)
+    if match is None:
+        try:
+            value = float(cell)
+        except ValueError:
+            value = math.inf
+        if not abs(value) < 1e15:
+            raise source.bad(
+                f"expected a time stamp in s, got {cell.strip()[:40]!r}; mend or delete the row",
+                line=line,
+                column=column,
+                name=name,
+            )
+        return round(value * 10**9)
+    value = int(match[2]) * 10**9 + int((match[3] or "").ljust(9, "0")[:9])
+    return -value if match[1] == "-" else value
+
+
+def rebuild(t: Array, index: Array | None = None) -> tuple[Array, str]:
+    """Uniform times (N,) [s] where `t` is a rounded uniform clock, and the sentence that says so.
+
+    Period = (t_last - t_first) / (i_last - i_first), with the sample index i of the log or a plain count. Without
+    evidence of rounding, `t` comes back as it was with an empty sentence.
+
+    The evidence: all times are multiples of 1, 0.1 or 0.01 ms (or 1 s, 0.1 s, 10 ms), the steps take two
+    neighbouring multiples only, and the rounding is coarse beside the period.
+    """
+    n = t.size
+    if n < 8 or not (np.diff(t) > 0).all():
+        return t, ""
+    count = np.arange(n, dtype=np.float64) if index is None else index - index[0]
+    step = rounding(t)
+    span = float(count[-1])
+    period = float(t[-1] - t[0]) / span
+    if step == 0 or step < _MATTERS * period:
+        return t, ""
+    ticks = np.round(np.diff(t) / step)
+    advance = np.diff(count)
+    low, high = math.floor(period / step + 1e-9), math.ceil(period / step - 1e-9)
+    if low == high or not ((ticks >= low * advance - 1) & (ticks <= high * advance + 1)).all():
+        return t, ""
+    inner = ticks[advance == 1]
+    if inner.size < 4 or not ((inner == low) | (inner == high)).all():
+        return t, ""
+    uniform = t[0] + period * count
+    wander = float(np.abs(uniform - t).max())
+    return uniform, (
+        f"Time was rounded to {step * 1e3:g} ms; rebuilt from the sample index with a period of {period * 1e3:.6g} ms"
+        f" (the logged stamps wander up to {wander * 1e3:.2g} ms from it)."
+    )
+
+
+def rounding(t: Array) -> float:
+    """Coarsest of 1 s, 0.1 s ... 1 us of which every time is a multiple; 0 when none is [s]."""
+    tolerance = 8 * np.finfo(np.float64).eps * float(np.abs(t).max())
+    for exponent in range(7):
+        step = 10.0**-exponent
+        if (np.abs(t - np.round(t / step) * step) <= max(tolerance, 1e-9 * step)).all():
+            return step
+    return 0.0
