@@ -1,0 +1,105 @@
+"""What should be done next, and with which command?"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from upright.identification.model import Fit
+from upright.report.figures import autocorrelation
+from upright.report.symbols import percent, plain
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step:
+    """A sentence and, where there is one, the command or the lines of a study that do it."""
+
+    sentence: str
+    command: str = ""
+
+
+def next_steps(fit: Fit, *, study: str = "STUDY.toml", folder: str = "OUT") -> list[Step]:
+    """Steps in order of weight: what would make the model wrong first, what would make it better last."""
+    steps = [*_broken(fit), *_blind(fit), *_friction(fit, study, folder)]
+    if not any(s.role == "predict" for s in fit.runs.values()):
+        steps.append(
+            Step(
+                sentence="Every run was fitted, so nothing tests the model yet; keep one run or one tail back.",
+                command='[[runs]]\nlabel = "tail"\nrole = "predict"',
+            )
+        )
+    steps.append(
+        Step(
+            sentence="See whether the model predicts a run it has not met: name that run in a study of its own.",
+            command=f"upright predict {folder}/fit.json OTHER.toml",
+        )
+    )
+    return steps
+
+
+def _broken(fit: Fit) -> list[Step]:
+    steps: list[Step] = []
+    if fit.interrupted:
+        steps.append(Step(sentence="The search was stopped; these are its best values so far. Run it to its end."))
+    for label, score in fit.runs.items():
+        for name, value in score.fit_percent.items():
+            if value < 0:
+                steps.append(
+                    Step(
+                        sentence=f"{plain(name)} of run '{label}' is explained worse than by its mean "
+                        f"({percent(value)}): look at the sign and scale of the column first, a reversed sign scores about −100 %.",
+                        command=f"[sensors.{name}]\nsign = -1",
+                    )
+                )
+    for name, e in fit.estimates.items():
+        if e.status == "at bound":
+            steps.append(Step(sentence=f"{name} stopped at its bound; widen the bound or give its value as known."))
+    return steps
+
+
+def _blind(fit: Fit) -> list[Step]:
+    steps = [Step(sentence=sentence) for sentence in fit.unseen]
+    weak = [n for n, e in fit.estimates.items() if e.status in ("weak", "unseen")]
+    if weak and not fit.unseen:
+        steps.append(
+            Step(
+                sentence=f"The data hardly see {', '.join(weak)}: measure one of them on the bench and give it "
+                "as known, or add a run that moves it more.",
+                command=f'{weak[0]} = {{ value = "…", uncertainty = "…" }}',
+            )
+        )
+    return steps
+
+
+def _friction(fit: Fit, study: str, folder: str) -> list[Step]:
+    """Residuals that remember themselves: is there a friction term that was left out?"""
+    coloured: list[str] = []
+    for label, score in fit.runs.items():
+        for j, name in enumerate(score.measured):
+            rest = score.y[:, j] - score.simulated[:, j]
+            rest = rest[np.isfinite(rest)]
+            lags = max(1, rest.size // 10)
+            if rest.size < 20 or score.role != "fit":
+                continue
+            r = autocorrelation(rest, lags)[1:]
+            if np.mean(np.abs(r) > 1.96 / math.sqrt(rest.size)) > 0.3:
+                coloured.append(f"{plain(name)} of '{label}'")
+    fixed = [
+        f"{term} of {joint.on} ({name})"
+        for joint in fit.rig.plant.joints
+        for term, name in (("Coulomb friction", joint.coulomb), ("quadratic drag", joint.quadratic))
+        if name and name not in fit.rig.estimated
+    ]
+    if not coloured or not fixed:
+        return []
+    names = [f.rpartition("(")[2].rstrip(")") for f in fixed]
+    return [
+        Step(
+            sentence=f"What is left over is not noise ({', '.join(coloured[:3])}"
+            f"{' and others' if coloured[3:] else ''}). Not estimated so far: {'; '.join(fixed)}. "
+            "Add one, and keep it only if held-out data are predicted better.",
+            command=f'[parameters]\n{names[0]} = {{ guess = "…", min = 0 }}\n\nupright identify {study} -o {folder}',
+        )
+    ]

@@ -1,0 +1,142 @@
+"""How does a picture look, on a screen and on grey paper, and how does it get into a page?
+
+Okabe and Ito's colours, which colour-blind readers can tell apart, each with a line style of its own.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Callable
+from functools import wraps
+from io import StringIO
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+P, R = ParamSpec("P"), TypeVar("R")
+Array = NDArray[np.float64]
+
+BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
+BLUE, VERMILLION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#6b6b6b"
+CYCLE = (
+    (BLUE, "-"),
+    (VERMILLION, "--"),
+    (GREEN, "-."),
+    (PURPLE, (0, (1, 1))),
+    (ORANGE, (0, (6, 1, 1, 1, 1, 1))),
+    (BLACK, (0, (3, 3))),
+)
+"""Colour and line style of the n-th curve."""
+
+WIDTH = 7.4  # inches; a column of the page
+_STYLE: dict[Any, Any] = {
+    "font.size": 9,
+    "font.family": ["sans-serif"],
+    "font.sans-serif": ["DejaVu Sans"],
+    "axes.titlesize": 10,
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.unicode_minus": True,
+    "grid.color": "#e4e4e4",
+    "grid.linewidth": 0.6,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "lines.linewidth": 1.2,
+    "path.simplify": True,
+    "svg.fonttype": "none",  # text stays text: it can be searched, read aloud and scaled
+    "svg.hashsalt": "upright",  # the same fit draws the same bytes
+    "mathtext.fontset": "dejavusans",
+    "mathtext.default": "it",
+}
+
+
+def styled(draw: Callable[P, R]) -> Callable[P, R]:
+    """Draw in the house style; matplotlib's settings are put back afterwards."""
+
+    @wraps(draw)
+    def inside(*args: P.args, **kwargs: P.kwargs) -> R:
+        import matplotlib
+
+        with matplotlib.rc_context(_STYLE):
+            return draw(*args, **kwargs)
+
+    return inside
+
+
+def figure(height: float, width: float = WIDTH, *, margins: tuple[float, ...] = ()) -> Figure:
+    """Empty figure, sizes in inches; no window and no global state belong to it.
+
+    `margins` are left, right, top and bottom; without them matplotlib measures every text, which takes longer.
+    """
+    from matplotlib.figure import Figure
+
+    drawing = Figure(figsize=(width, height), layout=None if margins else "constrained")
+    if margins:
+        left, right, top, bottom = margins
+        drawing.subplots_adjust(left / width, bottom / height, 1 - right / width, 1 - top / height)
+    return drawing
+
+
+@styled
+def svg(drawing: Figure, name: str) -> str:
+    """Markup of a figure to stand inside a page; ids begin with `name`, so that several figures can share it."""
+    page = StringIO()
+    with warnings.catch_warnings():  # about glyphs that only the reader's fonts have
+        warnings.simplefilter("ignore", UserWarning)
+        drawing.savefig(page, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+    text = page.getvalue()
+    text = text[text.index("<svg") :]
+    # `Figure.savefig` writes six decimals; a hundredth of a point is finer than any printer
+    text = re.sub(r'(?<= d=")[^"]*', lambda m: re.sub(r"(\.\d\d)\d+", r"\1", m[0]), text)
+    text = re.sub(r'\b(id=")', rf"\1{name}-", text)
+    text = re.sub(r"(url\(#|href=\"#)", rf"\1{name}-", text)
+    text = re.sub(r'\s(xmlns|xmlns:xlink|version)="[^"]*"', "", text)
+    text = re.sub(r"\n\s*", "\n", text)
+    opening = text[: text.index(">")]
+    responsive = re.sub(r'\s(width|height)="[^"]*"', "", opening)
+    share = 100 * min(1.0, drawing.get_figwidth() / WIDTH)
+    return f'{responsive} style="max-width:{share:.0f}%" aria-hidden="true" focusable="false"{text[len(opening) :]}'
+
+
+def decimated(t: Array, *columns: Array, buckets: int = 450) -> tuple[Array, ...]:
+    """Time and columns thinned to what an eye can see: the least and the greatest sample of every bucket.
+
+    Fewer than ``3 buckets`` samples come back as they are; each column is returned as (time, values).
+    """
+    if t.size <= 3 * buckets:
+        return tuple(a for c in columns for a in (t, c))
+    edges = np.linspace(0, t.size, buckets + 1).astype(int)
+    out: list[Array] = []
+    for c in columns:
+        kept = {0, t.size - 1}
+        for lo, hi in pairwise(edges):
+            kept |= {lo + int(np.argmin(c[lo:hi])), lo + int(np.argmax(c[lo:hi]))}
+        index = np.array(sorted(kept))
+        out += [t[index], c[index]]
+    return tuple(out)
+
+
+def broken(t: Array, y: Array, every: float | None) -> tuple[Array, Array]:
+    """Curve with a gap wherever a prediction was restarted, `every` seconds."""
+    if every is None or t.size < 2:
+        return t, y
+    window = np.floor((t - t[0]) / every + 1e-9)
+    cuts = np.flatnonzero(np.diff(window)) + 1
+    return np.insert(t, cuts, t[cuts]), np.insert(y, cuts, np.nan)
+
+
+def hide_inner_times(axes: list[Axes]) -> None:
+    """Label only the lowest of panels that share their time axis."""
+    for a in axes[:-1]:
+        a.tick_params(labelbottom=False)
+    axes[-1].set_xlabel("time [s]")

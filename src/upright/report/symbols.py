@@ -1,0 +1,86 @@
+"""How is a name, a number or a unit of the program written for a person?"""
+
+from __future__ import annotations
+
+import math
+import re
+
+_LETTERS = (
+    "alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi omicron pi rho sigmaf sigma tau upsilon"
+    " phi chi psi omega"
+)
+GREEK = {name: chr(code) for code, name in enumerate(_LETTERS.split(), start=0x3B1)}
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_SYMBOL = re.compile(r"[A-Za-z]+(_[A-Za-z0-9]+)*[0-9]*\Z")
+
+
+def parts(name: str) -> tuple[str, str, str]:
+    """Stem, subscript and dot of a symbol: ``theta1_dot`` -> ``θ``, ``1``, ``.``; ``b_1c`` -> ``b``, ``1c``, nothing."""
+    dot = "." if name.endswith("_dot") else ""
+    stem, _, below = name.removesuffix("_dot").partition("_")
+    digits = re.fullmatch(r"([A-Za-z]+)([0-9]+)", stem)
+    if digits and not below:
+        stem, below = digits.groups()
+    return GREEK.get(stem, stem), GREEK.get(below, below).replace("_", ","), dot
+
+
+def plain(name: str) -> str:
+    """Symbol as text: ``theta_dot`` -> ``θ̇``, ``b_1c`` stays as the study file spells it."""
+    stem, below, dot = parts(name)
+    return f"{stem}{chr(0x307) if dot else ''}{below}" if dot or not below or name[-1:].isdigit() else name
+
+
+def mathtext(name: str) -> str:
+    """Symbol for matplotlib: ``b_1c`` -> ``$b_{1c}$``; what is no symbol comes back with its dollars escaped."""
+    if not _SYMBOL.match(name):
+        return name.replace("$", r"\$")
+    stem, below, dot = parts(name)
+    stem = rf"\mathrm{{{stem}}}" if len(stem) > 1 else stem
+    stem = rf"\dot{{{stem}}}" if dot else stem
+    return f"${stem}_{{\\mathrm{{{below}}}}}$" if below else f"${stem}$"
+
+
+def unit(text: str) -> str:
+    """Unit with raised powers: ``kg m^2`` -> ``kg m²``; a pure number has none."""
+    raised = re.sub(r"(?:\^|\*\*)(-?[0-9]+)", lambda m: m[1].translate(_SUPERSCRIPT), text)
+    return "" if raised in ("1", "") else raised.replace("*", "·")
+
+
+def axis(symbol: str, of: str) -> str:
+    """Axis label: ``θ [rad]``."""
+    return f"{symbol} [{unit(of)}]" if unit(of) else symbol
+
+
+def number(value: float, digits: int = 4) -> str:
+    """Number with `digits` significant figures, powers of ten written out: ``1.6·10⁻³``."""
+    if math.isnan(value):
+        return "not known"
+    if math.isinf(value):
+        return "∞" if value > 0 else "−∞"
+    if value == 0:
+        return "0"
+    exponent = math.floor(math.log10(abs(value)))
+    if -3 < exponent < 6:
+        text = f"{value:.{max(0, digits - 1 - exponent)}f}"
+        return text.replace("-", "−")
+    mantissa, power = f"{value:.{digits - 1}e}".split("e")
+    return f"{mantissa}·10{str(int(power)).translate(_SUPERSCRIPT)}".replace("-", "−")
+
+
+def figures(value: float, stderr: float) -> int:
+    """How many significant figures of `value` its standard error leaves, two of the error included."""
+    if not (math.isfinite(stderr) and math.isfinite(value)) or stderr <= 0 or value == 0:
+        return 4
+    return min(max(math.floor(math.log10(abs(value))) - math.floor(math.log10(stderr)) + 2, 2), 8)
+
+
+def measured(value: float, stderr: float) -> tuple[str, str]:
+    """Value and its standard error, to the two figures of the error that mean something."""
+    return number(value, figures(value, stderr)), number(stderr, 2) if stderr > 0 else "–"
+
+
+def percent(value: float) -> str:
+    """Fit percent; one figure after the point, two above 99."""
+    if not math.isfinite(value):
+        return number(value)
+    return f"{value:.2f} %" if value > 99 else f"{value:.1f} %".replace("-", "−")

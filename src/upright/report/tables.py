@@ -1,0 +1,117 @@
+"""Which numbers came out, in which unit, and how far can they be trusted?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from markupsafe import Markup
+
+from upright.identification.model import Estimate, Fit, Parameter
+from upright.report.mathml import symbol
+from upright.report.symbols import figures, measured, number, percent, plain, unit
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParameterRow:
+    """One line of the table of parameters, as text; `symbol` is markup."""
+
+    name: str
+    symbol: Markup
+    meaning: str
+    value: str
+    stderr: str
+    interval: str
+    unit: str
+    status: str
+    run: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScoreRow:
+    """One line of the table of runs: fit percent of one signal."""
+
+    run: str
+    role: str
+    signal: str
+    fit: str
+    horizon: str
+
+
+def parameter_rows(fit: Fit) -> list[ParameterRow]:
+    """Estimated parameters, then those that were given and are not zero."""
+    about = fit.rig.parameters
+    rows = [_estimate(n, e, about.get(n)) for n, e in fit.estimates.items() if e.status != "known"]
+    given = {n: p for n, p in about.items() if not p.estimate and n not in {r.name for r in rows}}
+    return rows + [_given(n, p) for n, p in given.items() if p.value != _default(n)]
+
+
+def _default(name: str) -> float:
+    from upright.identification.model import ACTUATOR
+
+    return ACTUATOR[name][1] if name in ACTUATOR else 0.0
+
+
+def run_rows(fit: Fit) -> list[ParameterRow]:
+    """What was estimated run by run."""
+    return [_estimate(n, e, None, run) for run, own in fit.per_run.items() for n, e in own.items()]
+
+
+def _estimate(name: str, e: Estimate, about: Parameter | None, run: str = "") -> ParameterRow:
+    value, stderr = measured(e.value, e.stderr)
+    digits = figures(e.value, e.stderr)
+    low, high = e.interval
+    return ParameterRow(
+        name=name,
+        symbol=Markup(symbol(name)),
+        meaning=about.meaning if about else "",
+        value=value,
+        stderr=stderr,
+        interval=f"{number(low, digits)} to {number(high, digits)}",
+        unit=unit(e.unit),
+        status=e.status,
+        run=run,
+    )
+
+
+def _given(name: str, p: Parameter) -> ParameterRow:
+    return ParameterRow(
+        name=name,
+        symbol=Markup(symbol(name)),
+        meaning=p.meaning,
+        value=number(p.value),
+        stderr=number(p.uncertainty, 2) if p.uncertainty else "exact",
+        interval="",
+        unit=unit(p.unit),
+        status="given",
+    )
+
+
+def score_rows(fit: Fit) -> list[ScoreRow]:
+    """Fit percent of every signal of every run, fitted runs first."""
+    runs = sorted(fit.runs.items(), key=lambda item: item[1].role != "fit")
+    return [
+        ScoreRow(
+            run=label,
+            role="fitted" if score.role == "fit" else "predicted",
+            signal=plain(name),
+            fit=percent(value),
+            horizon="from the first sample" if score.horizon is None else f"restarted every {score.horizon:g} s",
+        )
+        for label, score in runs
+        for name, value in score.fit_percent.items()
+    ]
+
+
+def provenance_rows(provenance: Mapping[str, object], above: str = "") -> list[tuple[str, str]]:
+    """What is known about the origin, nested mappings written out: ``runs / decay / file``."""
+    rows: list[tuple[str, str]] = []
+    for key, value in provenance.items():
+        name = f"{above} / {key}" if above else str(key)
+        if isinstance(value, Mapping):
+            rows += provenance_rows({str(k): v for k, v in value.items()}, name)
+        elif isinstance(value, list | tuple | set | frozenset):
+            rows.append((name, "; ".join(str(v) for v in value)))
+        elif value is not None and value != "":
+            rows.append((name, str(value)))
+    return rows
