@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+import traceback
 from pathlib import Path
 
 from upright.errors import BadInput, UprightError, nearest
@@ -63,6 +64,8 @@ def find(name: str, folder: Path | None = None) -> type[Plant]:
     if ".py:" in name:
         file, _, class_name = name.rpartition(":")
         return _from_file((folder or Path()) / file, class_name)
+    if name.endswith(".py"):
+        raise BadInput(f"name the class in the file too, such as '{name}:DoublePendulum'.")
     key = _ALIASES.get(name.lower(), name.lower())
     if key in BUILT_IN:
         return BUILT_IN[key]
@@ -76,15 +79,20 @@ def _from_file(path: Path, class_name: str) -> type[Plant]:
     if not path.is_file():
         raise BadInput(f"the plant's file {path} does not exist; give it relative to the study file.")
     spec = importlib.util.spec_from_file_location(f"upright_user_{path.stem}", path)
-    assert spec is not None and spec.loader is not None  # a .py file always has a loader
+    if spec is None or spec.loader is None:
+        raise BadInput(f"the plant's file {path} is no Python file.")
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
     try:
         spec.loader.exec_module(module)
-    except UprightError:
-        raise
+    except UprightError as error:
+        raise type(error)(f"{path}: {error}") from error
+    except SyntaxError as error:
+        raise BadInput(f"the plant's file {path} has a syntax error in line {error.lineno}: {error.msg}.") from error
     except Exception as error:
-        raise BadInput(f"the plant's file {path} does not run: {type(error).__name__}: {error}") from error
+        lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if Path(f.filename) == path]
+        where = f" stops in line {lines[-1]}" if lines else " does not run"
+        raise BadInput(f"the plant's file {path}{where}: {type(error).__name__}: {error}.") from error
     plants = {k: v for k, v in vars(module).items() if isinstance(v, type) and issubclass(v, Plant) and v is not Plant}
     if class_name not in plants:
         raise BadInput(f"{path} has no plant '{class_name}'; {nearest(class_name, plants)}")

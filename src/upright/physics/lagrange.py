@@ -7,14 +7,13 @@ Euler and Lagrange: with L = T - V, ``M = d2L/dv2`` and
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from types import SimpleNamespace
 from typing import Any
 
 import sympy as sp
-from sympy.printing.pycode import PythonCodePrinter
 
-from upright.errors import BadInput
-from upright.physics.derived import Derived, DryJoint
+from upright.errors import BadInput, nearest
 from upright.physics.plant import Plant
 
 
@@ -27,15 +26,65 @@ def symbols(cls: type[Plant]) -> tuple[SimpleNamespace, list[Any], list[Any], li
     return p, q, v, u
 
 
-def motion(cls: type[Plant]) -> tuple[Any, Any]:
-    """Mass matrix M and force vector f of ``M a = f(q, v, u)``, as SymPy matrices, dry friction left out."""
+def energies(cls: type[Plant]) -> tuple[Any, Any, Any]:
+    """T, V and D as the plant states them, checked.
+
+    Raises
+    ------
+    BadInput
+        When they do not evaluate, or are not those of a mechanical system in these coordinates.
+    """
+    p, q, v, _ = symbols(cls)
+    where = f"{cls.__name__}.energies(p, q, v)"
+    try:
+        stated: Any = cls.energies(p, q, v)
+    except AttributeError as error:
+        if error.obj is not p:
+            raise BadInput(f"{where} does not run: {error}; write it with SymPy's functions.") from error
+        raise BadInput(f"{where} uses p.{error.name}; {nearest(str(error.name), cls.names())}") from error
+    except Exception as error:
+        raise BadInput(
+            f"{where} does not run: {type(error).__name__}: {error}; write it with SymPy's sin, cos and sqrt."
+        ) from error
+    if not isinstance(stated, (tuple, list)) or len(stated) != 3:
+        raise BadInput(f"{where} must return T, V, D (0 where there is none), got {stated!r}.")
+    try:
+        T, V, D = (sp.sympify(e, strict=True) for e in stated)
+    except sp.SympifyError as error:
+        raise BadInput(f"{where} must return SymPy expressions or numbers, got {stated!r}.") from error
+    foreign = (T + V + D).free_symbols - {*vars(p).values(), *q, *v}
+    if foreign:
+        names = ", ".join(sorted(str(s) for s in foreign))
+        raise BadInput(f"{where} uses {names}, which is none of its own symbols; take them from p, q and v.")
+    if V.has(*v):
+        raise BadInput(f"{where}: the potential energy V must not depend on velocities; move that term to T or D.")
+    M = sp.hessian(T, v)
+    if M.has(*v):
+        raise BadInput(f"{where}: the kinetic energy T must be quadratic in the velocities; drag belongs to D.")
+    _check_inertia(cls, M)
+    return T, V, D
+
+
+def _check_inertia(cls: type[Plant], M: Any) -> None:
+    """Every motion needs an inertia; tried at arbitrary values, since a determinant in symbols can be long."""
+    values = {s: (1 + sp.sqrt(2 + i)).evalf(30) for i, s in enumerate(sorted(M.free_symbols, key=str))}
+    sample = M.evalf(30, subs=values)
+    if abs(sample.det()) > 1e-20 * max(abs(e) for e in (*sample, sp.Float(1e-300))) ** M.rows:
+        return
+    idle = [c.name for i, c in enumerate(cls.coordinates) if M[i, :].is_zero_matrix]
+    what = f"{', '.join(idle)} has no inertia" if idle else "some motion of the coordinates has no inertia"
+    raise BadInput(f"{cls.__name__}: {what}, so its acceleration is undefined; give it a mass or leave it out.")
+
+
+def motion(cls: type[Plant], *, without: Collection[str] = ()) -> tuple[Any, Any]:
+    """Mass matrix M and force vector f of ``M a = f(q, v, u)``, as SymPy matrices, dry friction left out.
+
+    Parameters named in `without` are zero.
+    """
     p, q, v, u = symbols(cls)
-    T, V, D = (sp.sympify(e) for e in cls.energies(p, q, v))
+    T, V, D = (e.subs({getattr(p, name): 0 for name in without}) for e in energies(cls))
     lagrangian = T - V
     Q = [sum((ui for ui, i in zip(u, cls.inputs, strict=True) if i.on == c.name), sp.S.Zero) for c in cls.coordinates]
-    M = sp.hessian(lagrangian, v)
-    if M.has(*v):
-        raise BadInput(f"{cls.__name__}: kinetic energy must be quadratic in the velocities; check energies().")
     f = sp.Matrix(
         [
             sp.diff(lagrangian, qi) - sum(sp.diff(lagrangian, vi, qj) * vj for qj, vj in zip(q, v, strict=True))
@@ -43,35 +92,40 @@ def motion(cls: type[Plant]) -> tuple[Any, Any]:
             for qi, vi, Qi in zip(q, v, Q, strict=True)
         ]
     )  # fmt: skip
-    return M, f
+    return sp.hessian(T, v), f
 
 
-def linear(cls: type[Plant], at: str) -> tuple[Any, Any]:
+def linear(cls: type[Plant], at: str, *, without: Collection[str] = ()) -> tuple[Any, Any]:
     """Matrices A, B about a named equilibrium, states in the paper's order, as simplified SymPy matrices."""
+    determinant, A, B = over_determinant(cls, at, without=without)
+    return tuple((m / determinant).applyfunc(sp.simplify) for m in (A, B))  # type: ignore[return-value]
+
+
+def over_determinant(cls: type[Plant], at: str, *, without: Collection[str] = ()) -> tuple[Any, Any, Any]:
+    """Determinant of the mass matrix (the paper's D_2), and A, B multiplied by it, about a named equilibrium."""
     _, q, v, u = symbols(cls)
-    M, f = motion(cls)
+    M, f = motion(cls, without=without)
     point = {qi: sp.nsimplify(cls.equilibria[at].get(qi.name, 0), [sp.pi]) for qi in q}
     rest = {**dict.fromkeys(v, 0), **dict.fromkeys(u, 0), **point}
-    Minv = M.subs(point).inv()
+    mass = M.subs(point)
+    determinant, adjugate = sp.factor(sp.expand(mass.det(method="berkowitz"))), mass.adjugate()
     n = len(q)
     A, B = sp.zeros(2 * n), sp.zeros(2 * n, len(u))
-    for rows, wrt in ((0, q), (1, v)):
-        block = (Minv * f.jacobian(wrt).subs(rest)).applyfunc(sp.simplify)
+    for wrt, first, stride, into in ((q, 0, 2, A), (v, 1, 2, A), (u, 0, 1, B)):
+        slope = adjugate * f.jacobian(wrt).subs(rest) if wrt else sp.zeros(n, 0)
         for i in range(n):
-            A[2 * i, 2 * i + 1] = 1
-            for j in range(n):
-                A[2 * i + 1, 2 * j + rows] = block[i, j]
-    if u:
-        block = (Minv * f.jacobian(u).subs(rest)).applyfunc(sp.simplify)
-        for i in range(n):
-            B[2 * i + 1, :] = block[i, :]
-    return A, B
+            for j in range(len(wrt)):
+                into[2 * i + 1, first + stride * j] = sp.factor(slope[i, j])
+    for i in range(n):
+        A[2 * i, 2 * i + 1] = determinant
+    return determinant, A, B
 
 
 def latex(cls: type[Plant]) -> str:
-    """Equations of motion as a LaTeX ``align`` block, velocities dotted."""
+    """Equations of motion as a LaTeX ``align`` block, velocities dotted, optional parameters left out."""
     _, q, v, _ = symbols(cls)
-    M, f = motion(cls)
+    equations: Any = [m.applyfunc(lambda e: sp.trigsimp(sp.expand(e))) for m in motion(cls, without=cls.optional)]
+    M, f = equations
     names = {vi: rf"\dot{{{sp.latex(qi)}}}" for qi, vi in zip(q, v, strict=True)}
     accelerations = sp.Matrix([sp.Symbol(rf"\ddot{{{sp.latex(qi)}}}") for qi in q])
     rows = [
@@ -81,116 +135,13 @@ def latex(cls: type[Plant]) -> str:
     return "\\begin{align}\n" + " \\\\\n".join(rows) + "\n\\end{align}"
 
 
-class _Printer(PythonCodePrinter):
-    """Small integer powers as products, which every compiler turns into multiplications."""
+def latex_linear(cls: type[Plant], at: str) -> str:
+    """Linear model about a named equilibrium as a LaTeX ``align`` block, the common denominator D written once.
 
-    def _print_Pow(self, expr: Any, rational: bool = False) -> str:
-        base, exponent = expr.args
-        if exponent.is_Integer and 2 <= int(exponent) <= 4:
-            factor = self._print(base) if base.is_Symbol else f"({self._print(base)})"
-            return "(" + "*".join([factor] * int(exponent)) + ")"
-        return super()._print_Pow(expr, rational=rational)
-
-
-_PRINTER = _Printer({"fully_qualified_modules": False})
-
-
-def text(expression: Any) -> str:
-    """Python source of an expression, functions unqualified."""
-    return _PRINTER.doprint(expression)
-
-
-def derive(cls: type[Plant], *, without: frozenset[str] = frozenset()) -> Derived:
-    """Derive a plant's equations of motion from its energies.
-
-    Raises
-    ------
-    BadInput
-        When the energies are not those of a mechanical system in these coordinates.
+    Optional parameters are left out.
     """
-    p, q, v, u = symbols(cls)
-    zero = {getattr(p, n): 0 for n in without}
-    M, f = (m.subs(zero) for m in motion(cls))
-    T, V, D = (sp.sympify(e).subs(zero) for e in cls.energies(p, q, v))
-    n = len(q)
-    entries = [M[i, j] for i in range(n) for j in range(i, n)] + list(f)
-    trig, entries = _name_trig(entries)
-    lumps, entries = _lump(entries, [s for t in trig for s in t[:2]], [*q, *v, *u], list(vars(p).values()))
-    steps, entries = sp.cse(entries, symbols=(sp.Symbol(f"w{i}") for i in range(1000)), optimizations="basic")
-    rest = {**dict.fromkeys(v, 0), **dict.fromkeys(u, 0)}
-    index = {c.name: i for i, c in enumerate(cls.coordinates)}
-    momentum_energy = sum(vi * sp.diff(T, vi) for vi in v) - T  # T without its velocity-linear terms
-    return Derived(
-        name=cls.__name__,
-        coordinates=tuple(index),
-        inputs=tuple(i.name for i in cls.inputs),
-        parameters=cls.names(),
-        lumps=tuple(text(k) for k in lumps),
-        trig=tuple((s.name, c.name, text(a)) for s, c, a in trig),
-        steps=tuple((s.name, text(e)) for s, e in steps),
-        mass=tuple(text(e) for e in entries[: -n or None]),
-        force=tuple(text(e) for e in entries[-n:]),
-        stiffness=tuple(text(e) for e in -f.jacobian(q).subs(rest)),
-        damping=tuple(text(e) for e in -f.jacobian(v).subs(rest)),
-        gain=tuple(text(e) for e in f.jacobian(u).subs(rest)) if u else (),
-        kinetic=text(sp.expand(momentum_energy) if momentum_energy.is_polynomial(*v) else momentum_energy),
-        potential=text(V),
-        power_lost=text(sum(vi * sp.diff(D, vi) for vi in v)),
-        joints=tuple(
-            DryJoint(
-                coordinate=index[j.on],
-                coulomb=j.coulomb,
-                quadratic=j.quadratic,
-                stiction=j.stiction,
-                stribeck_speed=j.stribeck_speed,
-                presliding=j.presliding,
-            )
-            for j in cls.joints
-        ),
-    )
-
-
-def _name_trig(entries: list[Any]) -> tuple[list[tuple[Any, Any, Any]], list[Any]]:
-    """Replace sines and cosines by symbols, one pair per argument, and squares of cosines by 1 - sine^2."""
-    entries = [sp.expand(e) for e in entries]
-    found: set[Any] = set()
-    for e in entries:
-        found |= {a.args[0] for a in e.atoms(sp.sin, sp.cos)}
-    arguments = sorted(found, key=str)
-    trig = [(sp.Symbol(f"s{i}"), sp.Symbol(f"c{i}"), a) for i, a in enumerate(arguments)]
-    names = {f(a): s for s0, c0, a in trig for f, s in ((sp.sin, s0), (sp.cos, c0))}
-    named: list[Any] = []
-    for e in entries:
-        e = sp.expand(e.subs(names))
-        for s, c, _ in trig:
-            e = sp.expand(sp.rem(e, c**2 + s**2 - 1, c)) if e.is_polynomial(c) else e
-        named.append(e)
-    return trig, named
-
-
-def _lump(entries: list[Any], trig: list[Any], moving: list[Any], parameters: list[Any]) -> tuple[list[Any], list[Any]]:
-    """Collect what depends on parameters alone: each distinct coefficient, up to a rational factor, becomes k0, k1, ..."""
-    generators = [*trig, *moving]
-    lumps: list[Any] = []
-    lumped: list[Any] = []
-    for e in entries:
-        if not e.is_polynomial(*generators):  # such as a user's own nonlinear spring: parameters stay as they are
-            present = [p for p in parameters if p in e.free_symbols]
-            e = e.subs({p: _lump_symbol(lumps, p) for p in present})
-            lumped.append(e)
-            continue
-        total = sp.S.Zero
-        for monomial, coefficient in sp.Poly(e, *generators).terms():
-            product = sp.prod(g**m for g, m in zip(generators, monomial, strict=True))
-            factor, lump = sp.factor_terms(sp.expand(coefficient)).as_coeff_Mul()
-            if lump.could_extract_minus_sign():
-                factor, lump = -factor, -lump
-            total += factor * product * (sp.S.One if lump == 1 else _lump_symbol(lumps, sp.expand(lump)))
-        lumped.append(total)
-    return lumps, lumped
-
-
-def _lump_symbol(lumps: list[Any], expression: Any) -> Any:
-    if expression not in lumps:
-        lumps.append(expression)
-    return sp.Symbol(f"k{lumps.index(expression)}")
+    determinant, *numerators = over_determinant(cls, at, without=cls.optional)
+    below = sp.Symbol("D")
+    A, B = (m.applyfunc(lambda e: sp.S.One if e == determinant else e / below) for m in numerators)
+    rows = [f"A &= {sp.latex(A)}", f"B &= {sp.latex(B)}", f"D &= {sp.latex(determinant)}"]
+    return "\\begin{align}\n" + " \\\\\n".join(rows) + "\n\\end{align}"

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.errors import NotIdentifiable
+from upright.errors import ImpossiblePhysics, NotIdentifiable
 from upright.physics.plant import Plant, evaluate
 
 if TYPE_CHECKING:
     from upright.physics.derived import Derived
 
 Matrix = NDArray[np.float64]
+Roots = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,16 +65,40 @@ class Linear:
         )
 
     def transfer_functions(self) -> dict[tuple[str, str], tuple[Matrix, Matrix]]:
-        """Numerator and denominator, highest power first, by (output, input), common factors kept."""
-        den = np.poly(self.A).real
+        """Numerator and denominator, highest power first, by (output, input); zeros and poles that meet are cancelled.
+
+        They count as met when they are closer than 1e-6 of the fastest pole.
+        """
+        poles = self.poles()
+        near = 1e-6 * np.abs(poles).max(initial=0.0)
         out: dict[tuple[str, str], tuple[Matrix, Matrix]] = {}
         for i, y in enumerate(self.outputs):
             for j, u in enumerate(self.inputs):
                 # det(sI - A + b c) = det(sI - A) + c adj(sI - A) b
-                num = np.poly(self.A - np.outer(self.B[:, j], self.C[i])).real - den
+                num = np.poly(self.A - np.outer(self.B[:, j], self.C[i])).real - np.poly(self.A).real
                 num[np.abs(num) < 1e-12 * np.abs(num).max(initial=0.0)] = 0.0
-                out[y, u] = np.trim_zeros(num, "f") if num.any() else np.zeros(1), den
+                num = np.trim_zeros(num, "f") if num.any() else np.zeros(1)
+                zeros, left = _cancel(np.roots(num).astype(np.complex128), poles, near)
+                out[y, u] = num[0] * _polynomial(zeros, near), _polynomial(left, near)
         return out
+
+
+def _cancel(zeros: Roots, poles: Roots, near: float) -> tuple[Roots, Roots]:
+    """Zeros and poles without the pairs that lie closer than `near`."""
+    kept: list[complex] = []
+    left = list(poles)
+    for zero in zeros:
+        distance = [abs(zero - p) for p in left]
+        if distance and min(distance) <= near:
+            left.pop(int(np.argmin(distance)))
+        else:
+            kept.append(complex(zero))
+    return np.array(kept, dtype=np.complex128), np.array(left, dtype=np.complex128)
+
+
+def _polynomial(roots: Roots, near: float) -> Matrix:
+    """Monic polynomial with these roots; those closer to 0 than `near` are taken as 0."""
+    return np.atleast_1d(np.poly(np.where(np.abs(roots) <= near, 0.0, roots))).real.astype(np.float64)
 
 
 def linearize(plant: Plant, at: str | None = None) -> Linear:
@@ -83,12 +108,18 @@ def linearize(plant: Plant, at: str | None = None) -> Linear:
     ------
     NotIdentifiable
         When the named point is no equilibrium and none is found near it.
+    ImpossiblePhysics
+        When the mass matrix there is not positive definite.
     """
     derived = plant.derived_for(plant.parameters())
     point = _rest(plant, derived, plant.equilibrium(at))
     scope = {**plant.parameters(), **point}
     n, m = len(derived.coordinates), len(derived.inputs)
     mass = _mass(derived, scope)
+    if np.linalg.eigvalsh(mass).min() <= 0:
+        raise ImpossiblePhysics(
+            f"{type(plant).__name__} needs a positive definite mass matrix, got {mass.tolist()}; check its inertias."
+        )
     solve = np.linalg.solve(
         mass,
         np.hstack(
@@ -135,8 +166,7 @@ def _motion(derived: Derived, scope: dict[str, float]) -> tuple[Matrix, Matrix]:
     n = len(derived.coordinates)
     M = np.zeros((n, n))
     M[np.triu_indices(n)] = [float(evaluate(e, scope)) for e in derived.mass]
-    M = M + np.triu(M, 1).T
-    return M, np.array([float(evaluate(e, scope)) for e in derived.force])
+    return M + np.triu(M, 1).T, np.array([float(evaluate(e, scope)) for e in derived.force])
 
 
 def _mass(derived: Derived, scope: dict[str, float]) -> Matrix:
@@ -145,7 +175,19 @@ def _mass(derived: Derived, scope: dict[str, float]) -> Matrix:
 
 
 def _rest(plant: Plant, derived: Derived, point: dict[str, float]) -> dict[str, float]:
-    """Newton's steps from a nominal equilibrium to the true one."""
+    """Nearest true equilibrium to a nominal one; a coordinate that floats there is also tried from either side."""
+    aside = [{**point, name: value + d} for name, value in point.items() for d in (0.5, -0.5)]
+    for start in (point, *aside):
+        found = _newton(plant, derived, start)
+        if found is not None:
+            return found
+    raise NotIdentifiable(
+        f"{type(plant).__name__} has no equilibrium near {point}; level the rig or anchor the free coordinate."
+    )
+
+
+def _newton(plant: Plant, derived: Derived, point: dict[str, float]) -> dict[str, float] | None:
+    """Newton's steps, none longer than 0.3, to where no force is left."""
     still = {**{f"{c}_dot": 0.0 for c in derived.coordinates}, **dict.fromkeys(derived.inputs, 0.0)}
     n = len(point)
     for _ in range(50):
@@ -156,8 +198,6 @@ def _rest(plant: Plant, derived: Derived, point: dict[str, float]) -> dict[str, 
         if np.all(np.abs(force) <= 1e-12 * scale) or not force.any():
             return point
         step = np.linalg.lstsq(stiffness, force, rcond=1e-9)[0]
-        step *= min(1.0, 0.3 / max(np.abs(step).max(), 1e-300))
+        step *= min(1.0, 0.3 / max(float(np.abs(step).max()), 1e-300))
         point = {name: value + float(d) for (name, value), d in zip(point.items(), step, strict=True)}
-    raise NotIdentifiable(
-        f"{type(plant).__name__} has no equilibrium near {point}; level the rig or anchor the free coordinate."
-    )
+    return None

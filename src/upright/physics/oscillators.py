@@ -1,4 +1,4 @@
-"""What shakes: a chain of inertias joined by springs; carts on a rail or disks on a shaft, one plant in two sets of units.
+"""What shakes: a chain of inertias joined by springs; carts on a rail or disks on a shaft, one plant in two units.
 
 Body i has inertia ``m_i`` (``J_i``), a known addition ``a_i``, a spring ``k_i`` and a dashpot ``c_i`` to ground, and a
 spring ``k_ij`` and a dashpot ``c_ij`` to its neighbour. Two bodies without ground springs have one rigid mode and one
@@ -7,6 +7,7 @@ flexible mode at ``sqrt(k_12 (1/m_1 + 1/m_2))``: the paper's flexible manipulato
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 from upright.errors import BadInput
@@ -54,6 +55,7 @@ def chain(bodies: int, kind: str = "rectilinear") -> type[Plant]:
     return built_in if built_in is not None else _chain(bodies, kind)
 
 
+@cache
 def _chain(bodies: int, kind: str) -> type[Plant]:
     mass_unit, position_unit, force_unit, k_unit, c_unit, q_unit, v_unit, inertia, effort, place = _UNITS[kind]
     m, x, u = ("m", "x", "F") if kind == "rectilinear" else ("J", "theta", "T")
@@ -83,16 +85,13 @@ def _chain(bodies: int, kind: str) -> type[Plant]:
         add(f"delta_{i}", position_unit, f"presliding length of body {i} (Dahl)", default=0.0, at_least=0)
 
     def energies(p: Any, q: Any, v: Any) -> tuple[Any, Any, Any]:
-        T = V = D = 0
-        for i in indices:
-            here, speed = q[i - 1], v[i - 1]
-            T += (getattr(p, f"{m}_{i}") + getattr(p, f"a_{i}")) * speed**2 / 2
-            V += getattr(p, f"k_{i}") * here**2 / 2
-            D += getattr(p, f"c_{i}") * speed**2 / 2
-            if i < bodies:
-                V += getattr(p, f"k_{i}{i + 1}") * (q[i] - here) ** 2 / 2
-                D += getattr(p, f"c_{i}{i + 1}") * (v[i] - speed) ** 2 / 2
-        return T, V, D
+        links = [(i - 1, i, f"{i}{i + 1}") for i in indices[:-1]]
+        T = sum((getattr(p, f"{m}_{i}") + getattr(p, f"a_{i}")) * v[i - 1] ** 2 / 2 for i in indices)
+        V = sum(getattr(p, f"k_{i}") * q[i - 1] ** 2 / 2 for i in indices)
+        D = sum(getattr(p, f"c_{i}") * v[i - 1] ** 2 / 2 for i in indices)
+        V_links = sum(getattr(p, f"k_{name}") * (q[j] - q[i]) ** 2 / 2 for i, j, name in links)
+        D_links = sum(getattr(p, f"c_{name}") * (v[j] - v[i]) ** 2 / 2 for i, j, name in links)
+        return T, V + V_links, D + D_links
 
     members |= {
         "__doc__": f"Chain of {bodies} {inertia}(s), {effort} on body 1.",
@@ -101,7 +100,8 @@ def _chain(bodies: int, kind: str) -> type[Plant]:
         "joints": tuple(Joint(f"{x}_{i}", f"f_{i}c", f"f_{i}q", f"f_{i}s", f"v_{i}s", f"delta_{i}") for i in indices),
         "energies": staticmethod(energies),
     }
-    return type(Plant)(f"{kind.title()}{bodies}", (Plant,), members)
+    made: Any = type(Plant)
+    return made(f"{kind.title()}{bodies}", (Plant,), members)
 
 
 _BUILT_IN: dict[tuple[str, int], type[Plant]] = {}

@@ -9,12 +9,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from importlib import import_module
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upright.errors import BadInput, ImpossiblePhysics, nearest
+from upright.errors import BadInput, nearest
+from upright.physics.declaration import declare
 from upright.physics.derived import Derived
 from upright.quantities import Quantity, quantities, quantity
 
@@ -63,8 +65,10 @@ class Plant:
 
     Raises
     ------
+    BadInput
+        When the class is made and does not state a plant; see `declaration.py`.
     ImpossiblePhysics
-        When a parameter lies outside the bounds its `quantity` states.
+        When a plant is built with a parameter outside the bounds its `quantity` states.
     """
 
     coordinates: ClassVar[tuple[Coordinate, ...]] = ()
@@ -76,11 +80,7 @@ class Plant:
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        dataclass(frozen=True, kw_only=True)(cls)
-        known = {c.name for c in cls.coordinates}
-        for part in (*cls.inputs, *cls.joints):
-            if part.on not in known:
-                raise BadInput(f"{cls.__name__}: {part} acts on '{part.on}', {nearest(part.on, known)}")
+        declare(cls, Plant)
 
     def __post_init__(self) -> None:
         for name, what in quantities(self).items():
@@ -188,7 +188,7 @@ class Plant:
 def evaluate(expression: str, scope: Mapping[str, Any]) -> NDArray[np.float64]:
     """Value of a derived expression; names are looked up in `scope`, elementwise on arrays."""
     functions = {"sin": np.sin, "cos": np.cos, "sqrt": np.sqrt, "tan": np.tan, "exp": np.exp, "pi": np.pi}
-    value = eval(_code(expression), {"__builtins__": {}, **functions}, dict(scope))  # noqa: S307 - our own text
+    value = eval(_code(expression), {"__builtins__": {}, **functions}, dict(scope))  # our own text
     return np.asarray(value, dtype=np.float64) + 0.0
 
 
@@ -199,9 +199,10 @@ def _code(expression: str) -> Any:
 
 @cache
 def _derived(cls: type[Plant], without: frozenset[str]) -> Derived:
-    if cls.__module__.startswith("upright.physics."):
-        return import_module(f"upright.physics.generated.{module_name(cls, without)}").DERIVED
-    from upright.physics.lagrange import derive
+    module = f"upright.physics.generated.{module_name(cls, without)}"
+    if cls.__module__.startswith("upright.physics.") and find_spec(module):
+        return import_module(module).DERIVED
+    from upright.physics.derivation import derive
 
     return derive(cls, without=without)
 
@@ -209,10 +210,3 @@ def _derived(cls: type[Plant], without: frozenset[str]) -> Derived:
 def module_name(cls: type[Plant], without: frozenset[str] = frozenset()) -> str:
     """Name of the module that holds a built-in plant's equations."""
     return "_without_".join([cls.__name__.lower(), *(["_".join(sorted(without))] if without else [])])
-
-
-def check_positive_mass(plant: Plant) -> None:
-    """Raise `ImpossiblePhysics` when the mass matrix at the first equilibrium is not positive definite."""
-    m = plant.linear().mass
-    if np.any(np.linalg.eigvalsh(m) <= 0):
-        raise ImpossiblePhysics(f"the mass matrix {m.tolist()} is not positive definite; check the inertias.")
