@@ -1,0 +1,58 @@
+"""The same pendulum and the same loop with upright's kernel; functions without arguments, ready to be timed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from benchmarks import problem
+
+ORDER = (0, 2, 1, 3)  # psi, psi_dot, theta, theta_dot from psi, theta, psi_dot, theta_dot; its own inverse
+
+
+def parameters(p: np.ndarray, *, stick_slip: bool) -> Mapping[str, np.ndarray | float]:
+    """Parameters by name; without dry friction the Coulomb levels are left out, and so are their terms."""
+    left_out = () if stick_slip else ("b_1c", "b_2c")
+    return {name: value for name, value in zip(problem.NAMES, p, strict=True) if name not in left_out} | {
+        "J_a": 0.0,
+        "k_psi": 0.0,
+        "tilt_x": 0.0,
+        "tilt_y": 0.0,
+    }
+
+
+def trajectory(*, stick_slip: bool) -> Callable[[], np.ndarray]:
+    """One free swing of 10 s at 1 kHz."""
+    from upright.physics import Furuta
+    from upright.simulation import simulate
+
+    values = parameters(problem.RIG, stick_slip=stick_slip)
+    start = problem.RELEASE[list(ORDER)]
+
+    def run() -> np.ndarray:
+        return simulate(Furuta, values, start, None, problem.PERIOD, samples=problem.STEPS + 1)[:, ORDER, 0]
+
+    return run
+
+
+def ensemble(p: np.ndarray, x0: np.ndarray, *, samples: int, stick_slip: bool) -> Callable[[], np.ndarray]:
+    """n closed loops; last states (4, n)."""
+    from upright.physics import Furuta
+    from upright.simulation import Loop
+    from upright.simulation import ensemble as loops
+
+    values = parameters(p, stick_slip=stick_slip) | {"actuator.limit": problem.LIMIT}
+    start = np.ascontiguousarray(x0[list(ORDER)].T)
+    loop = Loop(
+        K=problem.gains()[list(ORDER)], target=[0.0, np.pi], quantum=[problem.QUANTUM] * 2, alpha=problem.KEEP
+    )
+
+    def run() -> np.ndarray:
+        done = loops(
+            Furuta, values, start, None, problem.PERIOD,
+            samples=samples + 1, substeps=problem.SUBSTEPS, loop=loop, threads=1,
+        )  # fmt: skip
+        return done.final[list(ORDER)]
+
+    return run
