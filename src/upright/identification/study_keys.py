@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from upright.identification.model import ACTUATOR, PER_RUN
@@ -19,8 +20,8 @@ _SENSOR = (
     Key("column", '"theta"', "column of the log that measures this coordinate; the coordinate's own name if left out"),
     Key("unit", '"counts"', "unit of the column (rad, deg, rev, m, mm, counts, ...); as the log states it if left out"),
     Key("counts_per_rev", "14400", "encoder counts per turn: scale of a column in counts, else its resolution only"),
-    Key("counts_per_m", "16000 / 0.0706 as 226629", "the same for a coordinate in m"),
-    Key("scale", "1.02", "factor on the reading; for a column in counts without counts_per_*, SI per count"),
+    Key("counts_per_m", "226629", "the same for a coordinate in m"),
+    Key("scale", "1.02", 'factor; on a column of another kind SI per unit, as in "35 deg/V"'),
     Key("sign", "-1", "+1 or -1: -1 when the column counts against the coordinate"),
     Key("offset", '"180 deg"', "reading at which the coordinate is zero; a plain number is in the column's unit"),
     Key("resolution", '"0.1 deg"', "smallest step of the sensor, when no counts are given"),
@@ -28,7 +29,7 @@ _SENSOR = (
 _DRIVE = (
     Key("column", '"v"', "column of the log that commands the actuator"),
     Key("expression", '"2.5*(0.2 - z)"', "or arithmetic on columns and the time t; see Expressions"),
-    Key("unit", '"V"', "unit of the command; as the log states it if left out"),
+    Key("unit", '"V"', "unit of the command; read off the gain's unit if left out"),
     Key("scale", "0.001", "factor on the command"),
     Key("sign", "-1", "+1 or -1"),
 )
@@ -48,7 +49,7 @@ _SHARED = (
     Key("score_from", '"30 s"', "seconds after the window's start before which nothing is scored"),
     Key("loop", "table", "law that closed the loop, simulated with the plant"),
     Key("period", '"2 ms"', "sample period to resample to; the log's own if left out"),
-    Key("reader", '"csv"', "reader of the file, when it is not recognised"),
+    Key("reader", '"table"', "reader of the file (ecp, table, ros-bag, matlab, upright), when it is not recognised"),
     Key("time", '"stamp"', "column that holds the time [s], when the reader took another one"),
 )
 
@@ -89,7 +90,11 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
     "actuator": (
         "[actuator]",
         tuple(
-            Key(name.partition(".")[2], "value", f"{meaning}; {default:g} if left out")
+            Key(
+                name.partition(".")[2],
+                '"2 N/V" or a table as above' if name.endswith("gain") else "value",
+                f"{meaning}; {'no limit' if default == math.inf else f'{default:g}'} if left out",
+            )
             for name, (meaning, default) in ACTUATOR.items()
         ),
     ),
@@ -133,3 +138,18 @@ def reference() -> str:
         rows = "\n".join(f"| `{key.name}` | `{key.form}` | {key.meaning} |" for key in keys)
         parts.append(f"### {title}\n\n| key | for example | meaning |\n|---|---|---|\n{rows}")
     return "\n\n".join(parts) + "\n"
+
+
+def write_reference(page: str) -> str:
+    """A page whose part after the mark is replaced by the tables."""
+    head, mark, _ = page.partition("<!-- keys")
+    note = "<!-- keys: written by python -m upright.identification.study_keys -->"
+    return f"{head}{note if mark else ''}\n\n{reference()}"
+
+
+if __name__ == "__main__":
+    import sys
+    from pathlib import Path
+
+    file = Path(sys.argv[1] if len(sys.argv) > 1 else "docs/study.md")
+    file.write_text(write_reference(file.read_text(encoding="utf-8")), encoding="utf-8")

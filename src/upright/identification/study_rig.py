@@ -90,13 +90,15 @@ def actuator_unit(plant: type[Plant], key: str, drive_unit: str) -> str:
     drive = drive_unit or "1"
     if key == "gain":
         return force if drive == "1" else per(force, drive)
-    return {"offset": drive, "limit": drive, "lag": "s", "delay": "s", "slope": f"{force} s/{place}"}[key]
+    return {"offset": drive, "limit": drive, "lag": "s", "delay": "s", "slope": per(force, f"{place}/s")}[key]
 
 
 def per(above: str, below: str) -> str:
-    """Unit of a ratio."""
+    """Unit of a ratio; a speed below is written as time above, N s/m."""
+    if below.endswith("/s"):
+        return f"{above} s/{below[:-2]}"
     top = above if " " not in above else f"({above})"
-    return f"{top}/{below}" if " " not in below or below.startswith("(") else f"{top}/({below})"
+    return f"{top}/({below})" if " " in below or "/" in below else f"{top}/{below}"
 
 
 def read_parameter(section: Section, key: str, name: str, what: Quantity) -> Parameter:

@@ -20,7 +20,7 @@ from upright.physics import Plant
 from upright.records import Record
 
 Log = Callable[[Section], Record]
-_EPOCH = 1e8  # a time that starts beyond this many seconds counts from some epoch, so windows count from its start
+_EPOCH = 1e6  # a time that starts beyond this many seconds counts from some epoch, so windows count from its start
 
 
 def read_runs(study: Section, plant: type[Plant], log: Log) -> tuple[Run, ...]:
