@@ -1,0 +1,169 @@
+"""What is told at the end? Estimates with their uncertainty, scores, and what the data cannot see, as one `Fit`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.identification.chain import Log, count
+from upright.identification.conventions import doubts
+from upright.identification.descent import Descent
+from upright.identification.model import Estimate, Fit, Rig, Run, RunScore
+from upright.identification.problem import Problem, pose
+from upright.identification.profile import profile
+from upright.identification.scoring import predict, score
+from upright.identification.seeing import Sight, hidden, look, sentences
+from upright.identification.statistics import Spread, assess
+from upright.identification.unknowns import SHARED, Unknown
+from upright.identification.verdict import GOOD, judge
+
+Array = NDArray[np.float64]
+
+
+def answer(
+    asked: Rig,
+    chosen: Rig,
+    runs: Sequence[Run],
+    problem: Problem,
+    found: Descent,
+    *,
+    log: Log,
+    method: str,
+    left_out: Sequence[str],
+    seconds: Callable[[], float],
+) -> Fit:
+    """Everything known about an optimum."""
+    x = found.x
+    spread = assess(problem, x)
+    sight = look(problem, x, spread)
+    blind = hidden(sight)
+    estimates, per_run = _estimates(problem, x, spread, blind, interrupted=found.interrupted)
+    for name in left_out:
+        estimates[name] = Estimate(
+            value=0.0, stderr=0.0, interval=(0.0, 0.0), unit=asked.parameters[name].unit, status="left out"
+        )
+        log.warnings.append(f"{name} was left out: with it the held-out part of the runs is not predicted better.")
+    estimates = {n: estimates[n] for n in [*asked.parameters] if n in estimates}
+    scores = _scores(chosen, runs, problem, x, {n: e.value for n, e in estimates.items()})
+    units = {n: p.unit for n, p in asked.parameters.items()}
+    unseen = sentences(sight, units, known=())
+    worst = min((p for s in scores.values() if s.role == "fit" for p in s.fit_percent.values()), default=100.0)
+    conventions = doubts(chosen, [r for r in runs if r.role == "fit"], problem.base) if worst < GOOD else ()
+    verdict, trusted = judge(
+        runs=scores,
+        estimates=estimates,
+        unseen=unseen,
+        conventions=conventions,
+        converged=found.converged,
+        interrupted=found.interrupted,
+        memory=spread.memory,
+        period=min(t.period for t in problem.tracks),
+    )
+    places = [i for i, u in enumerate(problem.unknowns) if u.run == SHARED]
+    return Fit(
+        rig=asked,
+        estimates=estimates,
+        per_run=per_run,
+        runs=scores,
+        verdict=verdict,
+        trusted=trusted,
+        method=method,
+        evaluations=problem.evaluations,
+        seconds=seconds(),
+        cost=found.normal.cost,
+        names=sight.names,
+        correlation=_correlation(spread.covariance, places, problem, sight),
+        singular_values=sight.singular_values,
+        directions=sight.directions,
+        unseen=unseen,
+        warnings=(*log.warnings, *conventions),
+        history=tuple(log.history),
+        interrupted=found.interrupted,
+    )
+
+
+def quantile(samples: float, unknowns: int) -> float:
+    """Student's 97.5 % point for as many independent scores as the residuals' memory leaves."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(max(samples - unknowns, 2.0), 0.975))
+
+
+def _estimates(
+    problem: Problem, x: Array, spread: Spread, blind: set[str], *, interrupted: bool
+) -> tuple[dict[str, Estimate], dict[str, dict[str, Estimate]]]:
+    value = problem.value(x)
+    q = quantile(spread.samples, x.size)
+    shared: dict[str, Estimate] = {}
+    own: dict[str, dict[str, Estimate]] = {t.run.label: {} for t in problem.tracks}
+    budget = 4.0e7  # residuals that profiles may cost altogether
+    for i, u in enumerate(problem.unknowns):
+        plain = _estimate(problem, u, float(x[i]), float(value[i]), math.sqrt(max(spread.covariance[i, i], 0.0)), q)
+        if u.run != SHARED:
+            own[problem.tracks[u.run].run.label][u.name] = plain
+            continue
+        if u.name in blind:
+            shared[u.name] = Estimate(
+                value=plain.value, stderr=math.inf, interval=(-math.inf, math.inf), unit=plain.unit, status="unseen"
+            )
+            continue
+        status = "firm" if u.asked else "known"
+        interval = plain.interval
+        wide = interval[1] - interval[0] > abs(plain.value)
+        near = spread.pinned[i] or interval[0] <= u.lower < plain.value or interval[1] >= u.upper > plain.value
+        if u.asked and (wide or near):
+            cost = 60.0 * count(problem) * (x.size + 1) / 16
+            if cost < budget and not interrupted:
+                budget -= cost
+                interval = profile(problem, x, i, spread, q)
+                wide = interval[1] - interval[0] > abs(plain.value)
+            status = "at bound" if spread.pinned[i] else "weak" if wide else "firm"
+        interval = max(interval[0], u.lower), min(interval[1], u.upper)
+        shared[u.name] = Estimate(
+            value=plain.value, stderr=plain.stderr, interval=interval, unit=plain.unit, status=status
+        )
+    return shared, own  # type: ignore[return-value]
+
+
+def _estimate(problem: Problem, u: Unknown, x: float, value: float, sigma: float, q: float) -> Estimate:
+    if u.log:
+        interval = value * math.exp(-min(q * sigma, 700.0)), value * math.exp(min(q * sigma, 700.0))
+        stderr = value * sigma
+    else:
+        interval, stderr = (value - q * sigma, value + q * sigma), sigma
+    return Estimate(value=value, stderr=stderr, interval=interval, unit=_unit(problem.rig, u.name), status="firm")
+
+
+def _unit(rig: Rig, name: str) -> str:
+    if name in rig.parameters:
+        return rig.parameters[name].unit
+    kind, _, which = name.partition(".")
+    units = {c.name: c.unit for c in rig.plant.coordinates}
+    if kind in ("initial", "offset"):
+        return units.get(which) or f"{units.get(which.removesuffix('_dot'), '1')}/s"
+    if kind == "input_offset" and "actuator.offset" in rig.parameters:
+        return rig.parameters["actuator.offset"].unit
+    return "1"
+
+
+def _scores(rig: Rig, runs: Sequence[Run], problem: Problem, x: Array, values: dict[str, float]) -> dict[str, RunScore]:
+    fitted = [run for run in runs if run.role == "fit"]
+    whole = pose(rig, fitted, thin=False)
+    found = {run.label: score(whole, i, x) for i, run in enumerate(fitted)}
+    ahead = [run for run in runs if run.role != "fit"]
+    found |= predict(values, rig, ahead)
+    return {run.label: found[run.label] for run in runs}
+
+
+def _correlation(covariance: Array, places: list[int], problem: Problem, sight: Sight) -> Array:
+    """Correlation (names, names) of the shared numbers in the order of `sight.names`."""
+    chosen = [i for i in places if problem.unknowns[i].name in sight.names]
+    C = covariance[np.ix_(chosen, chosen)]
+    d = np.sqrt(np.maximum(np.diag(C), 0.0))
+    s = np.where(d > 0, 1 / np.where(d > 0, d, 1.0), 0.0)
+    R = C * s[:, None] * s
+    np.fill_diagonal(R, 1.0)
+    return R

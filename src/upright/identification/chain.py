@@ -1,0 +1,136 @@
+"""In which order are the methods tried? The guess, closed-form starts, a growing horizon, then the simplex.
+
+Starts matter more than optimizers (DESIGN 9): from a start within a few percent least squares needs about a hundred
+simulations; from a bad one it fails outright.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.identification.accelerations import Sample, observe, regress
+from upright.identification.descent import Descent, Report, descend, first_horizon, grow
+from upright.identification.model import Rig, Run
+from upright.identification.problem import Problem
+from upright.identification.release import friction_from_energy
+from upright.identification.simplex import simplex
+from upright.identification.unknowns import SHARED
+
+Array = NDArray[np.float64]
+
+POOR = 0.04
+"""A mean squared residual above this (a fit of less than 80 %) is worth another attempt."""
+
+
+@dataclass
+class Log:
+    """What happened on the way: stages with their cost and simulations, and the best so far should one interrupt."""
+
+    report: Report | None = None
+    history: list[tuple[str, float, int]] = field(default_factory=list[tuple[str, float, int]])
+    best: Array | None = None
+    warnings: list[str] = field(default_factory=list[str])
+
+
+def closed_form_starts(rig: Rig, runs: Sequence[Run]) -> list[dict[str, float]]:
+    """Values of the shared numbers from accelerations, then from the energy lost between turning points.
+
+    Empty when a moving coordinate was not measured.
+    """
+    samples = samples_of(rig, runs)
+    if not samples or not rig.estimated:
+        return []
+    agreement = regress(rig, samples)
+    if not math.isfinite(agreement.unexplained):
+        return []
+    found = [agreement.values]
+    friction = friction_from_energy(rig, samples, agreement.values)
+    if friction:
+        found.insert(0, agreement.values | friction)
+    return found
+
+
+def samples_of(rig: Rig, runs: Sequence[Run], most: int = 20000) -> list[Sample]:
+    """Smoothed motion of every run that allows it, long runs thinned to at most `most` samples."""
+    from dataclasses import replace
+
+    found: list[Sample] = []
+    for run in runs:
+        k = -(-run.t.size // most)
+        if k > 1:
+            held = {n: v[::k] if isinstance(v, np.ndarray) else v for n, v in run.held.items()}
+            run = replace(run, t=run.t[::k], u=run.u[::k], y=run.y[::k], held=held, loop=None if run.loop else run.loop)
+        sample = observe(rig, run)
+        if sample is not None:
+            found.append(sample)
+    return found
+
+
+def placed(problem: Problem, values: Mapping[str, float], x: Array | None = None) -> Array:
+    """Coordinates with shared numbers from `values`, the rest from `x` or the start."""
+    x = problem.start if x is None else x.copy()
+    for i, u in enumerate(problem.unknowns):
+        if u.run == SHARED and u.name in values:
+            v = values[u.name]
+            if not u.log or v > 0:
+                x[i] = u.inside(v)
+    return np.clip(x, problem.lower, problem.upper)
+
+
+def count(problem: Problem, horizon: float = math.inf) -> int:
+    """Number of residuals within `horizon` seconds."""
+    return sum(
+        problem.samples(i, horizon) * t.restarts.size * max(1, int(np.count_nonzero(t.weights)))
+        for i, t in enumerate(problem.tracks)
+    )
+
+
+def explain(problem: Problem, candidates: Sequence[Array], log: Log, *, patient: bool = True) -> Descent:
+    """Best of several starts, walked over a growing horizon; more attempts when what comes out is poor."""
+    h = min(problem.duration, first_horizon(problem))
+    ranked = _ranked(problem, candidates, h)
+    log.best = ranked[0]
+    found = grow(problem, ranked[0], report=log.report, history=log.history)
+    log.best = found.x
+    if found.interrupted or not patient:
+        return found
+    n = count(problem)
+    others = list(ranked[1:])
+    attempts = 0
+    while found.normal.cost > POOR * n and attempts < 3 and not found.interrupted:
+        attempts += 1
+        if others:
+            x, name = others.pop(0), "another start"
+        else:
+            name = "simplex"
+            x, _ = simplex(problem, ranked[0], horizon=h, limit=400, report=log.report)
+            attempts = 3
+        log.history.append((name, problem.cost(x, h), problem.evaluations))
+        other = grow(problem, x, report=log.report, history=log.history)
+        if other.normal.cost < found.normal.cost:
+            found = other
+            log.best = found.x
+    return found
+
+
+def _ranked(problem: Problem, candidates: Sequence[Array], h: float) -> list[Array]:
+    """Candidates walked a little over the first horizon, best first."""
+    if len(candidates) == 1:
+        return list(candidates)
+    costs: list[tuple[float, int, Array]] = []
+    for k, x in enumerate(candidates):
+        if not math.isfinite(problem.cost(x, h)):
+            costs.append((math.inf, k, x))
+            continue
+        problem.settle_steps(x, h)
+        walked = descend(lambda z: problem.normal(z, h), x, problem.lower, problem.upper, tolerance=1e-2, limit=12)
+        costs.append((walked.normal.cost, k, walked.x))
+        if walked.interrupted:
+            break
+    costs.sort(key=lambda c: c[:2])
+    return [x for _, _, x in costs]

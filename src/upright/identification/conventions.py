@@ -1,0 +1,59 @@
+"""Is a sensor reversed, or its zero upright? A reversed sign scores about -100 %, so it is looked for first.
+
+Every convention is tried on the measured accelerations, which need no simulation.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+
+from upright.identification.accelerations import Sample, observe, regress
+from upright.identification.model import Rig, Run
+
+CLEAR = 0.5
+"""Another convention is named when it leaves less than this share of the variance that the declared one leaves."""
+
+
+def doubts(rig: Rig, runs: Sequence[Run], base: Mapping[str, float]) -> tuple[str, ...]:
+    """Sentences on signs and zeros that would explain the accelerations far better than the declared ones."""
+    declared = _unexplained(rig, runs, base, {}, {})
+    if not 0.1 < declared < math.inf:
+        return ()
+    measured = sorted({c for run in runs for c in run.measured if c not in run.held})
+    angles = {c.name for c in rig.plant.coordinates if c.unit == "rad"}
+    driven = any(run.u.size and run.u.any() for run in runs)
+    best, found = declared, ({}, {})
+    for signs in itertools.product((1.0, -1.0), repeat=len(measured)):
+        for turned in itertools.product((0.0, math.pi), repeat=len(measured)):
+            flips = dict(zip(measured, signs, strict=True))
+            turns = {c: t for c, t in zip(measured, turned, strict=True) if t and c in angles}
+            if len(turns) != sum(1 for t in turned if t) or not (turns or -1.0 in signs):
+                continue
+            if not driven and not turns and all(s < 0 for s in signs):
+                continue
+            left = _unexplained(rig, runs, base, flips, turns)
+            fewer = sum(s < 0 for s in flips.values()) + len(turns)
+            if left < best * (0.98 if fewer else 1.0):
+                best, found = left, (flips, turns)
+    if best > CLEAR * declared:
+        return ()
+    flips, turns = found
+    said = [f"set sign = -1 for {c} (its sign looks reversed)" for c, s in flips.items() if s < 0]
+    said += [f"add an offset of pi to {c} (its zero looks upright)" for c in turns]
+    return (
+        f"The conventions look wrong: {' and '.join(said)}; "
+        f"the accelerations are then explained to {100 * (1 - best):.0f} % instead of {100 * (1 - min(declared, 1)):.0f} %.",
+    )
+
+
+def _unexplained(
+    rig: Rig, runs: Sequence[Run], base: Mapping[str, float], flips: Mapping[str, float], turns: Mapping[str, float]
+) -> float:
+    samples: list[Sample] = []
+    for run in runs:
+        sample = observe(rig, run, flips=flips, turns=turns)
+        if sample is not None:
+            samples.append(sample)
+    return regress(rig, samples, base).unexplained if samples else math.inf

@@ -1,0 +1,138 @@
+"""Which numbers explain these runs, how sure is that, and what can they not tell?"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.errors import BadInput
+from upright.identification.answer import answer
+from upright.identification.chain import Log, closed_form_starts, count, explain, placed
+from upright.identification.descent import Descent, Report, descend, grow
+from upright.identification.ladder import choose
+from upright.identification.model import Fit, Rig, Run
+from upright.identification.problem import Problem, pose
+from upright.identification.scoring import fit_percent, predict
+from upright.identification.simplex import simplex
+
+__all__ = ["METHODS", "fit_percent", "identify", "predict"]
+
+Array = NDArray[np.float64]
+
+METHODS = ("auto", "least-squares", "simplex")
+"""`auto`: closed-form starts, friction ladder, growing least squares, simplex where it stalls. `least-squares`: from
+the guess over a growing horizon. `simplex`: the paper's, then polished by least squares."""
+
+
+def identify(rig: Rig, runs: Sequence[Run], *, method: str = "auto", progress: Report | None = None) -> Fit:
+    """Estimate a rig's parameters from its runs.
+
+    Parameters
+    ----------
+    rig : Rig
+        Plant, what is known and what is asked.
+    runs : sequence of Run
+        Those with role ``"fit"`` are explained together; those with role ``"predict"`` are only scored, with the
+        parameters fixed.
+    method : {"auto", "least-squares", "simplex"}
+        See `METHODS`.
+    progress : callable, optional
+        Called with stage, fraction done, cost and number of simulations.
+
+    Returns
+    -------
+    Fit
+        Also when the search did not settle or was interrupted (the best so far, `interrupted` set): its `verdict`
+        says so in a sentence.
+
+    Raises
+    ------
+    BadInput
+        When no run may be fitted, nothing is asked, or a name does not exist.
+    """
+    began = time.perf_counter()
+    seen = [run for run in runs if run.role == "fit"]
+    _check(rig, seen, method)
+    log = Log(report=progress)
+    left_out: tuple[str, ...] = ()
+    chosen = rig
+    problem = pose(rig, seen)
+    found: Descent | None = None
+    try:
+        if method == "auto":
+            chosen, candidates, left_out = choose(rig, seen, log)
+            if chosen is not rig:
+                problem = pose(chosen, seen)
+            found = explain(problem, candidates, log)
+        elif method == "simplex":
+            x = problem.start
+            limit = 200 * x.size
+            x, _ = simplex(problem, x, horizon=_half(problem), limit=limit, report=progress)
+            log.best = x
+            x, cost = simplex(problem, x, limit=limit, report=progress)
+            log.history.append(("simplex", cost, problem.evaluations))
+            log.best = x
+            found = grow(problem, x, report=progress, history=log.history, horizon=math.inf)
+        else:
+            found = grow(problem, problem.start, report=progress, history=log.history)
+            if found.normal.cost > 0.04 * count(problem) and not found.interrupted:
+                starts = [placed(problem, s) for s in closed_form_starts(rig, seen)]
+                other = explain(problem, starts, log, patient=False) if starts else found
+                found = min(found, other, key=lambda d: d.normal.cost)
+        found = _weigh_priors(problem, found)
+    except KeyboardInterrupt:
+        x = log.best if log.best is not None and log.best.size == problem.start.size else problem.start
+        found = Descent(x=x, normal=problem.normal(x), converged=False, interrupted=True)
+    return answer(
+        rig,
+        chosen,
+        runs,
+        problem,
+        found,
+        log=log,
+        method=method,
+        left_out=left_out,
+        seconds=lambda: time.perf_counter() - began,
+    )
+
+
+def _half(problem: Problem) -> float:
+    from upright.identification.descent import first_horizon
+
+    return min(problem.duration, 2 * first_horizon(problem))
+
+
+def _weigh_priors(problem: Problem, found: Descent) -> Descent:
+    """Weigh prior knowledge by the residuals found, memory included, and settle again."""
+    if found.interrupted or not any(u.prior is not None for u in problem.unknowns):
+        return found
+    from upright.identification.statistics import assess
+
+    for _ in range(2):
+        spread = assess(problem, found.x)
+        ratio = np.diag(spread.covariance)[spread.white > 0] / spread.white[spread.white > 0]
+        inflation = max(1.0, float(np.median(ratio))) if ratio.size else 1.0
+        noise = math.sqrt(spread.variance * inflation)
+        if abs(math.log(max(noise, 1e-12) / problem.noise)) < 0.1:
+            break
+        problem.noise = max(noise, 1e-12)
+        found = descend(problem.normal, found.x, problem.lower, problem.upper, limit=30)
+    return found
+
+
+def _check(rig: Rig, seen: Sequence[Run], method: str) -> None:
+    from upright.errors import nearest
+
+    if method not in METHODS:
+        raise BadInput(f"the method must be one of {', '.join(METHODS)}, got '{method}'; {nearest(method, METHODS)}")
+    if not seen:
+        raise BadInput("an identification needs at least one run with role 'fit', none came; set it for one run.")
+    if not rig.estimated:
+        raise BadInput("nothing is asked: no parameter is to be estimated; give at least one a guess.")
+    for run in seen:
+        if run.t.size < 10:
+            raise BadInput(f"run '{run.label}' has {run.t.size} samples, at least 10 are needed; widen its window.")

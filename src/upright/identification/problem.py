@@ -1,0 +1,255 @@
+"""How far are the simulated runs from the measured ones, and how does that change with every number sought?
+
+All perturbed numbers of a run are simulated side by side in the lanes of one call (DESIGN 2).
+Residuals are in units of each signal's spread over its run, so that a fit percent is driven, not a unit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.identification.model import Rig, Run
+from upright.identification.tracks import Track, outputs, prepare, simulator
+from upright.identification.unknowns import (
+    SHARED,
+    Unknown,
+    base_values,
+    friction_names,
+    run_unknowns,
+    shared_unknowns,
+)
+from upright.simulation import Simulator
+
+Array = NDArray[np.float64]
+
+STEP = 1e-5
+"""A perturbed number moves the weighted outputs by about this much, root mean square."""
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Residuals (T, outputs) of one run, windows one after another, and their Jacobian (T, outputs, sought here)."""
+
+    residual: Array
+    jacobian: Array
+    sought: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Normal:
+    """Sum of squares, its Gauss-Newton matrix J'J and gradient J'r."""
+
+    cost: float
+    matrix: Array
+    gradient: Array
+
+
+@dataclass
+class Problem:
+    """Rig, runs and the numbers sought; counts its simulations in `evaluations`.
+
+    `steps` (sought,) are the perturbations, `noise` the residual that one sigma of prior knowledge is worth.
+    """
+
+    rig: Rig
+    tracks: list[Track]
+    unknowns: list[Unknown]
+    base: dict[str, float]
+    friction: tuple[str, ...]
+    steps: Array
+    noise: float = 0.1
+    evaluations: int = 0
+    solvers: dict[int, Simulator] = field(default_factory=dict[int, Simulator])
+
+    @property
+    def lower(self) -> Array:
+        """Lower bounds of the coordinates (sought,)."""
+        return np.array([u.bounds[0] for u in self.unknowns])
+
+    @property
+    def upper(self) -> Array:
+        """Upper bounds of the coordinates (sought,)."""
+        return np.array([u.bounds[1] for u in self.unknowns])
+
+    @property
+    def start(self) -> Array:
+        """Coordinates of the start (sought,)."""
+        return np.array([u.inside(u.value) for u in self.unknowns])
+
+    @property
+    def duration(self) -> float:
+        """Seconds of the longest simulation."""
+        return max(t.duration for t in self.tracks)
+
+    def sought_in(self, index: int) -> NDArray[np.int64]:
+        """Places of the numbers that matter in one run."""
+        return np.array([i for i, u in enumerate(self.unknowns) if u.run in (SHARED, index)], dtype=np.int64)
+
+    def value(self, x: Array) -> Array:
+        """Values (sought,) or (sought, lanes) of coordinates."""
+        log = np.array([u.log for u in self.unknowns])
+        out = x.copy()
+        out[log] = np.exp(np.minimum(x[log], 300.0))
+        return out
+
+    def simulate(self, index: int, x: Array, samples: int) -> Array:
+        """Outputs (samples, W, outputs, lanes) of one run for coordinates `x` (sought, lanes)."""
+        track, lanes = self.tracks[index], x.shape[1]
+        values: dict[str, float | Array] = {**self.base, **track.run.known}
+        names = self.rig.plant.state_names()
+        x0 = np.repeat(track.x0.T[:, :, None], lanes, axis=2)
+        offsets = np.zeros((len(track.columns), lanes))
+        friction: float | Array = 1.0
+        v = self.value(x)
+        late: list[tuple[str, Array]] = []
+        for i, u in enumerate(self.unknowns):
+            if u.run == SHARED:
+                values[u.name] = v[i]
+            elif u.run == index:
+                late.append((u.name, v[i]))
+        for name, lane in late:
+            kind, _, which = name.partition(".")
+            if kind == "initial":
+                x0[names.index(which)] = lane
+            elif kind == "offset":
+                k = track.run.measured.index(which)
+                offsets[k] = lane
+                if "initial" not in track.run.unknown or track.windowed:
+                    x0[track.columns[k]] -= lane
+            elif kind == "gain":
+                values["actuator.gain"] = values["actuator.gain"] * lane
+            elif kind == "input_offset":
+                values["actuator.offset"] = values["actuator.offset"] + lane
+            else:
+                friction = lane
+        if isinstance(friction, np.ndarray):
+            for name in self.friction:
+                values[name] = values[name] * friction
+        self.evaluations += 1
+        return outputs(self.solver(index), track, values, x0, offsets, samples=samples)
+
+    def solver(self, index: int) -> Simulator:
+        """Solver of one run, made once."""
+        if index not in self.solvers:
+            track = self.tracks[index]
+            free = [u.name for u in self.unknowns if u.run == SHARED]
+            if any(u.name == "input_offset" for u in self.unknowns):
+                free.append("actuator.offset")
+            self.solvers[index] = simulator(self.rig, track, {**self.base, **track.run.known}, free)
+        return self.solvers[index]
+
+    def samples(self, index: int, horizon: float) -> int:
+        """Samples of one run within `horizon` seconds, at least two."""
+        track = self.tracks[index]
+        if horizon >= track.duration or track.windowed:
+            return track.length
+        return max(2, min(track.length, int(horizon / track.dt) + 1))
+
+    def rows(self, index: int, x: Array, horizon: float = math.inf, *, central: bool = False) -> Rows | None:
+        """Residuals and Jacobian of one run, None when the simulation ran away."""
+        track, sought = self.tracks[index], self.sought_in(index)
+        n, m = self.samples(index, horizon), sought.size
+        lanes = np.repeat(x[:, None], 2 * m + 1 if central else m + 1, axis=1)
+        here = np.arange(m)
+        lanes[sought, 1 + here] += self.steps[sought]
+        if central:
+            lanes[sought, 1 + m + here] -= self.steps[sought]
+        y = self.simulate(index, lanes, n)
+        weights = track.weights[:, None]
+        target = track.targets(n)
+        skip = 0 if track.windowed else min(track.first, n - 1)
+        residual = (y[skip:, :, :, 0] - target[skip:]) * track.weights
+        if not np.isfinite(residual.sum()):
+            return None
+        if central:
+            slope = (y[skip:, :, :, 1 : m + 1] - y[skip:, :, :, m + 1 :]) * (weights / (2 * self.steps[sought]))
+        else:
+            slope = (y[skip:, :, :, 1:] - y[skip:, :, :, :1]) * (weights / self.steps[sought])
+        k = len(track.columns)
+        return Rows(
+            np.moveaxis(residual, 1, 0).reshape(-1, k), np.moveaxis(slope, 1, 0).reshape(-1, k, m), sought
+        )  # windows one after another
+
+    def normal(self, x: Array, horizon: float = math.inf, *, central: bool = False) -> Normal:
+        """Cost and its Gauss-Newton model at coordinates `x`; the cost is infinite when a simulation ran away."""
+        size = x.size
+        A, g, cost = np.zeros((size, size)), np.zeros(size), 0.0
+        for index in range(len(self.tracks)):
+            rows = self.rows(index, x, horizon, central=central)
+            if rows is None:
+                return Normal(math.inf, A, g)
+            r, J = rows.residual.reshape(-1), rows.jacobian.reshape(-1, rows.sought.size)
+            squares = products(J, r)
+            cost += squares[2]
+            A[np.ix_(rows.sought, rows.sought)] += squares[0]
+            g[rows.sought] += squares[1]
+        r, J = self.prior_rows(x)
+        cost += float(r @ r)
+        normal = Normal(cost, A + J.T @ J, g + J.T @ r)
+        return normal if np.isfinite(normal.matrix.sum()) else Normal(math.inf, A, g)
+
+    def prior_rows(self, x: Array) -> tuple[Array, Array]:
+        """Residuals and Jacobian of what was known beforehand, worth `noise` per sigma."""
+        known = [(i, u.prior) for i, u in enumerate(self.unknowns) if u.prior is not None]
+        r, J = np.zeros(len(known)), np.zeros((len(known), x.size))
+        for row, (i, (mean, sigma)) in enumerate(known):
+            r[row] = self.noise * (x[i] - mean) / sigma
+            J[row, i] = self.noise / sigma
+        return r, J
+
+    def cost(self, x: Array, horizon: float = math.inf) -> float:
+        """Sum of squares alone, one lane per run."""
+        r, _ = self.prior_rows(x)
+        total = float(r @ r)
+        for index, track in enumerate(self.tracks):
+            n = self.samples(index, horizon)
+            skip = 0 if track.windowed else min(track.first, n - 1)
+            e = (self.simulate(index, x[:, None], n)[skip:, :, :, 0] - track.targets(n)[skip:]) * track.weights
+            total += float(np.sum(e * e))
+        return total if math.isfinite(total) else math.inf
+
+    def settle_steps(self, x: Array, horizon: float) -> None:
+        """Choose perturbations that move the outputs by about `STEP`, so that no guess of a size is needed."""
+        for _ in range(4):
+            matrix = self.normal(x, horizon).matrix
+            samples = sum(self.samples(i, horizon) * t.restarts.size for i, t in enumerate(self.tracks))
+            effect = np.sqrt(np.maximum(np.diag(matrix), 0.0) / samples)
+            wanted = np.where(effect > 0, STEP / np.maximum(effect, 1e-300), 100 * self.steps)
+            wanted = np.clip(wanted, self.steps * 1e-4, self.steps * 1e4)
+            scale = np.array([u.scale for u in self.unknowns])
+            wanted = np.clip(wanted, 1e-9 * scale, 1e-3 * scale)
+            done = np.all((wanted < 30 * self.steps) & (wanted > self.steps / 30))
+            self.steps = wanted
+            if done:
+                return
+
+
+def products(J: Array, r: Array) -> tuple[Array, Array, float]:
+    """``J'J``, ``J'r`` and ``r'r`` in blocks too small for a linear-algebra library to wake its threads for.
+
+    On a busy machine waiting for those threads costs more than the products themselves.
+    """
+    rows = max(64, 200_000 // max(1, J.shape[1] + 1) ** 2)
+    whole = r.size // rows * rows
+    both = np.concatenate([J, r[:, None]], axis=1)
+    blocks = both[:whole].reshape(-1, rows, both.shape[1])
+    total = np.matmul(blocks.transpose(0, 2, 1), blocks).sum(axis=0) + both[whole:].T @ both[whole:]
+    return total[:-1, :-1], total[:-1, -1], float(total[-1, -1])
+
+
+def pose(rig: Rig, runs: Sequence[Run], *, thin: bool = True, only_shared: bool = False) -> Problem:
+    """Set up the problem of explaining `runs`; `only_shared` leaves out what differs from run to run."""
+    tracks = [prepare(rig, run, thin=thin) for run in runs]
+    unknowns = shared_unknowns(rig)
+    if not only_shared:
+        for index, track in enumerate(tracks):
+            unknowns += run_unknowns(rig, index, track.run, track.start)
+    steps = np.array([1e-6 * u.scale for u in unknowns])
+    return Problem(
+        rig=rig, tracks=tracks, unknowns=unknowns, base=base_values(rig), friction=friction_names(rig), steps=steps
+    )

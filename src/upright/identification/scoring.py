@@ -1,0 +1,91 @@
+"""How much of a run does the model explain? Fit percent per signal, for runs it has seen and runs it has not."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from upright.identification.descent import Report, grow
+from upright.identification.model import Fit, Rig, Run, RunScore
+from upright.identification.problem import Problem, pose
+
+Array = NDArray[np.float64]
+
+
+def fit_percent(y: ArrayLike, simulated: ArrayLike) -> float:
+    """``100 (1 - |y - yhat| / |y - mean y|)``: 100 is exact, 0 no better than the mean, never below -1000.
+
+    A signal that does not move scores 100 when it is met exactly and 0 otherwise.
+    """
+    y, simulated = np.asarray(y, dtype=np.float64), np.asarray(simulated, dtype=np.float64)
+    moved = float(np.linalg.norm(y - y.mean()))
+    missed = float(np.linalg.norm(y - simulated))
+    if moved == 0:
+        return 100.0 if missed == 0 else 0.0
+    score = 100 * (1 - missed / moved)
+    return max(-1000.0, score) if math.isfinite(score) else -1000.0
+
+
+def score(problem: Problem, index: int, x: Array) -> RunScore:
+    """Score of one run for coordinates `x`; windows restarted from measured states are laid end to end."""
+    track = problem.tracks[index]
+    run = track.run
+    free = [k for k, c in enumerate(run.measured) if c not in run.held]
+    y = problem.simulate(index, x[:, None], track.length)[:, :, :, 0]
+    if not track.windowed:
+        t, measured, simulated = run.t, track.y, y[:, 0, :]
+    else:
+        # every sample once: a window's last sample is the next one's first and belongs to the prediction
+        rows = (track.restarts[None, :] + np.arange(track.length)[:, None])[1:]
+        measured = np.moveaxis(track.y[rows], 1, 0).reshape(-1, len(run.measured))
+        simulated = np.moveaxis(y[1:], 1, 0).reshape(-1, len(run.measured))
+        t = run.t[0] + track.dt * rows.T.reshape(-1)
+    skip = int(np.searchsorted(t, run.t[0] + run.score_from - 1e-9)) if run.score_from > 0 else 0
+    percents = {run.measured[k]: fit_percent(measured[skip:, k], simulated[skip:, k]) for k in free}
+    return RunScore(
+        role=run.role, fit_percent=percents, horizon=run.horizon, t=t, y=measured, simulated=simulated,
+        measured=run.measured,
+    )  # fmt: skip
+
+
+def with_values(rig: Rig, values: Mapping[str, float]) -> Rig:
+    """The rig with every number known: `values` by name, the rest as it stands."""
+    parameters = {
+        n: replace(p, value=float(values.get(n, p.value)), estimate=False, uncertainty=0.0)
+        for n, p in rig.parameters.items()
+    }
+    return replace(rig, parameters=parameters)
+
+
+def predict(
+    fitted: Fit | Mapping[str, float], rig: Rig, runs: Sequence[Run], *, progress: Report | None = None
+) -> dict[str, RunScore]:
+    """Scores of runs that a fitted model has not seen, by label.
+
+    Parameters
+    ----------
+    fitted : Fit or mapping of str to float
+        The model, or its parameters by name.
+    rig : Rig
+        Where parameters that were not fitted come from.
+    runs : sequence of Run
+        What differs from run to run (initial state, declared offsets and factors) is estimated from the run itself:
+        from what comes before `score_from` when that is set, from all of it otherwise. The parameters stay as they are.
+    """
+    values = {n: e.value for n, e in fitted.estimates.items()} if isinstance(fitted, Fit) else dict(fitted)
+    known = with_values(rig, values)
+    return {run.label: _predict(known, run, progress) for run in runs}
+
+
+def _predict(rig: Rig, run: Run, progress: Report | None) -> RunScore:
+    problem = pose(rig, [replace(run, score_from=0.0)])
+    x = problem.start
+    if x.size:
+        upto = run.score_from if run.score_from > 0 else math.inf
+        x = grow(problem, x, report=progress, upto=upto).x
+    whole = pose(rig, [run], thin=False)
+    return score(whole, 0, x)

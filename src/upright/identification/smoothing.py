@@ -1,0 +1,80 @@
+"""How fast was it moving? Speeds, accelerations and periods out of sampled angles, without a model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class State:
+    """Measured state: `x` (states,) in the paper's order and how much each state varies over the run, `spread`."""
+
+    x: Array
+    spread: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """Position, speed and acceleration of one coordinate, each (N,), and how far the ends are unreliable."""
+
+    q: Array
+    v: Array
+    a: Array
+    edge: int
+
+
+def dominant_period(y: Array, dt: float) -> float:
+    """Period [s] of the root-mean-square frequency of a signal (N,), its slowest 99 % of power counted.
+
+    A signal without motion has the length of the record as its period.
+    """
+    n = y.size
+    whole = n * dt
+    ramp = np.linspace(-1.0, 1.0, n)
+    z = y - y.mean()
+    z = z - ramp * (np.sum(ramp * z) / np.sum(ramp * ramp))
+    power = np.abs(np.fft.rfft(z * np.hanning(n))) ** 2
+    total = power.sum()
+    if not total > 0:
+        return whole
+    last = int(np.searchsorted(np.cumsum(power), 0.99 * total)) + 1
+    f = np.fft.rfftfreq(n, dt)[:last]
+    mean_square = float(np.sum(f * f * power[:last]) / power[:last].sum())
+    return whole if mean_square <= 0 else min(whole, 1.0 / np.sqrt(mean_square))
+
+
+def savitzky_golay(y: Array, dt: float, width: int, *, order: int = 4) -> Motion:
+    """Least-squares polynomials over a sliding window of `width` samples (made odd), fitted one-sided at the ends."""
+    from scipy.signal import savgol_filter
+
+    n = y.size
+    width = max(order + 2, min(width, n))
+    width -= 1 - width % 2
+    if width <= order:
+        order = max(1, width - 1)
+    if order < 2:
+        v = np.gradient(y, dt) if n > 1 else np.zeros(n)
+        return Motion(q=y.copy(), v=v, a=np.zeros(n), edge=0)
+    q, v, a = (savgol_filter(y, width, order, deriv=d, delta=dt, mode="interp") for d in range(3))
+    return Motion(q=q, v=v, a=a, edge=width // 2)
+
+
+def smoothing_width(y: Array, dt: float, period: float, quantum: float) -> int:
+    """Samples over which a polynomial of order 4 may be fitted: an eighth of a period, at least 15 steps of motion."""
+    width = int(round(period / 8 / dt))
+    if quantum > 0:
+        speed = float(np.std(y)) * 2 * np.pi / period
+        if speed > 0:
+            width = max(width, min(int(round(15 * quantum / (speed * dt))), 2 * width))
+    return max(7, width)
+
+
+def spread(y: Array) -> float:
+    """Standard deviation of a signal, never zero."""
+    s = float(np.std(y))
+    return s if s > 0 else 1.0

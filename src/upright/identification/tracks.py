@@ -1,0 +1,171 @@
+"""How does one run become lanes? Its data on the grid of the solver, and many sets of numbers simulated at once."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.identification.model import Rig, Run
+from upright.identification.smoothing import (
+    State,
+    dominant_period,
+    savitzky_golay,
+    smoothing_width,
+    spread,
+)
+from upright.simulation import Held, Loop, Simulator, choose
+
+Array = NDArray[np.float64]
+
+STEPS_PER_PERIOD = 120
+"""Steps a free run is simulated with per period: RK4 is then off by less than 1e-6 per period."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Track:
+    """A run made ready: `y` (N, outputs) and `u` (N, inputs) on a grid of `dt`, windows of `length` samples.
+
+    `columns` are the measured coordinates' places in the state, `weights` (outputs,) one over their spread (0 for a
+    held one), `restarts` (W,) the first samples of the windows and `x0` (W, states) the measured states there.
+    """
+
+    run: Run
+    dt: float
+    y: Array
+    u: Array
+    columns: tuple[int, ...]
+    weights: Array
+    restarts: NDArray[np.int64]
+    length: int
+    x0: Array
+    period: float
+    start: State
+    held: Mapping[str, Held]
+    first: int
+
+    @property
+    def windowed(self) -> bool:
+        """Whether the run is restarted from measured states."""
+        return self.run.horizon is not None
+
+    @property
+    def duration(self) -> float:
+        """Seconds that one simulation spans."""
+        return (self.length - 1) * self.dt
+
+    def targets(self, samples: int) -> Array:
+        """Measured outputs (samples, W, outputs) that windows cut to `samples` are compared with."""
+        rows = self.restarts[None, :] + np.arange(samples)[:, None]
+        return self.y[rows]
+
+
+def prepare(rig: Rig, run: Run, *, thin: bool) -> Track:
+    """Make a run ready; `thin` takes every k-th sample of a run without input, as many as its period needs."""
+    names = rig.plant.state_names()
+    period_s, n = run.period, run.t.size
+    columns = tuple(names.index(c) for c in run.measured)
+    quantum = run.quantum or (0.0,) * len(run.measured)
+    free = [k for k, c in enumerate(run.measured) if c not in run.held]
+    periods = [dominant_period(run.y[:, k], period_s) for k in free if np.ptp(run.y[:, k]) > 3 * quantum[k]]
+    period = min(periods, default=n * period_s)
+
+    stride = 1
+    if thin and run.loop is None and run.horizon is None and not np.any(run.u != run.u[:1]):
+        stride = max(1, min(int(period / STEPS_PER_PERIOD / period_s), n // 200))
+    dt = period_s * stride
+    length = (n - 1) // stride + 1
+    restarts = np.zeros(1, dtype=np.int64)
+    if run.horizon is not None:
+        length = min(length, max(2, int(round(run.horizon / dt)) + 1))
+        # the last sample of a window is the first of the next, so that no sample is scored at its own restart only
+        restarts = np.arange(0, n - length + 1, length - 1, dtype=np.int64)
+
+    x, sizes = np.zeros((n, len(names))), np.ones(len(names))
+    for k, (c, column) in enumerate(zip(run.measured, columns, strict=True)):
+        width = smoothing_width(run.y[:, k], period_s, period, quantum[k])
+        motion = savitzky_golay(run.y[:, k], period_s, width)
+        x[:, column], x[:, column + 1] = motion.q, motion.v
+        sizes[column], sizes[column + 1] = spread(motion.q), spread(motion.v)
+        if c in run.held:
+            sizes[column : column + 2] = 1.0
+    for name, value in run.initial.items():
+        x[0, names.index(name)] = value
+    held: dict[str, Held] = {}
+    for c, value in run.held.items():
+        array = np.asarray(value, dtype=np.float64)
+        i = names.index(c)
+        if array.ndim == 0:
+            x[:, i], x[:, i + 1] = float(array), 0.0
+            held[c] = Held()
+        else:
+            motion = savitzky_golay(array, period_s, smoothing_width(array, period_s, period, 0.0), order=3)
+            x[:, i], x[:, i + 1] = motion.q, motion.v
+            held[c] = Held(q=motion.q[::stride])
+    weights = np.array([0.0 if c in run.held else 1.0 / spread(run.y[:, k]) for k, c in enumerate(run.measured)])
+    return Track(
+        run=run,
+        dt=dt,
+        y=np.ascontiguousarray(run.y[::stride]),
+        u=np.ascontiguousarray(run.u[::stride]),
+        columns=columns,
+        weights=weights,
+        restarts=restarts,
+        length=length,
+        x0=x[::stride][restarts],
+        period=period,
+        start=State(x=x[0], spread=sizes),
+        held=held,
+        first=int(np.ceil(run.score_from / dt)),
+    )
+
+
+def simulator(rig: Rig, track: Track, values: Mapping[str, float | Array], free: Collection[str]) -> Simulator:
+    """Solver of one run; terms whose parameters are in `free` stay although they are zero now."""
+    derived = rig.plant.derived_for({**values, **{n: 1.0 for n in free}})
+    free = [n for n in free if n in derived.parameters or n.startswith("actuator.")]
+    flavour = choose(derived, values, free=free, held=tuple(track.held), loop=track.run.loop is not None)
+    loop = None
+    if track.run.loop is not None:
+        law = track.run.loop
+        reference = np.asarray(law.reference, dtype=np.float64)
+        loop = Loop(
+            K=np.asarray(law.gains, dtype=np.float64),
+            k_pf=law.k_pf,
+            reference=np.full(2, float(reference)) if reference.ndim == 0 else reference,
+            alpha=law.alpha,
+        )
+    return Simulator(
+        derived=derived, flavour=flavour, dt=track.dt, substeps=rig.substeps, loop=loop, held=dict(track.held)
+    )
+
+
+def outputs(
+    solver: Simulator, track: Track, values: Mapping[str, float | Array], x0: Array, offsets: Array, *, samples: int
+) -> Array:
+    """Simulated outputs (samples, W, outputs, lanes), sensor offsets added.
+
+    Parameters
+    ----------
+    values : mapping
+        Every parameter, a number or one per lane, (lanes,).
+    x0 : (states, W, lanes) array
+        First states of the windows.
+    offsets : (outputs, lanes) array
+        Sensor offsets.
+    """
+    states, windows, lanes = x0.shape
+    if windows > 1:
+        values = {n: np.tile(v, windows) if isinstance(v, np.ndarray) else v for n, v in values.items()}
+    table = solver.table(values, windows * lanes)
+    start = np.repeat(track.restarts, lanes) if windows > 1 else None
+    out = solver.run(table, x0.reshape(states, windows * lanes), track.u, samples=samples, start=start)
+    if windows == 1:
+        y = np.empty((samples, 1, len(track.columns), lanes))
+        for k, column in enumerate(track.columns):
+            np.add(out[:, column], offsets[k], out=y[:, 0, k])
+        return y
+    y = out[:, list(track.columns), :].reshape(samples, len(track.columns), windows, lanes)
+    return np.moveaxis(y, 1, 2) + offsets[None, None]

@@ -1,0 +1,172 @@
+"""Which numbers are sought? Parameters that all runs share, and what may differ from run to run.
+
+Numbers that can only be positive are sought by their logarithm, so that masses never change sign on the way;
+levels of friction are sought as they are, because zero must be reachable.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.identification.model import ACTUATOR, Parameter, Rig, Run
+from upright.identification.smoothing import State
+
+Array = NDArray[np.float64]
+
+SHARED = -1
+"""Index of the run for a number that all runs share."""
+
+FRICTION_SPREAD = 0.3
+"""One sigma of the logarithm of a run's friction factor; two runs of one day differed by 13 % (DESIGN 9)."""
+
+GAIN_SPREAD = 1.0
+"""One sigma of the logarithm of a run's gain factor; a factor of 3.2 was met (DESIGN 9)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unknown:
+    """One number sought.
+
+    Attributes
+    ----------
+    name : str
+        ``"J_p"``, ``"actuator.gain"``; for one run ``"initial.theta_dot"``, ``"offset.theta"``, ``"gain"``,
+        ``"friction"``, ``"input_offset"``.
+    run : int
+        Index of the run it belongs to, or `SHARED`.
+    value, lower, upper : float
+        Start and bounds, SI.
+    log : bool
+        Whether its logarithm is the coordinate in which it is sought.
+    scale : float
+        A change that would matter, in that coordinate.
+    prior : tuple of float or None
+        Mean and standard deviation known beforehand, in that coordinate.
+    asked : bool
+        Whether the answer was asked for; a known number with an uncertainty is sought but not asked.
+    """
+
+    name: str
+    run: int
+    value: float
+    lower: float
+    upper: float
+    log: bool
+    scale: float
+    prior: tuple[float, float] | None = None
+    asked: bool = True
+
+    def inside(self, value: float) -> float:
+        """Coordinate in which the number is sought."""
+        return math.log(value) if self.log else value
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Bounds in the coordinate in which the number is sought."""
+        if not self.log:
+            return self.lower, self.upper
+        lower = math.log(self.lower) if self.lower > 0 else -math.inf
+        return lower, math.log(self.upper) if math.isfinite(self.upper) else math.inf
+
+
+def shared_unknowns(rig: Rig) -> list[Unknown]:
+    """Parameters to estimate, and known ones that carry an uncertainty."""
+    found: list[Unknown] = []
+    for p in rig.parameters.values():
+        if p.estimate or p.uncertainty > 0:
+            found.append(_shared(rig, p))
+    return found
+
+
+def _shared(rig: Rig, p: Parameter) -> Unknown:
+    lower, upper = p.lower, p.upper
+    positive = False
+    if p.name in rig.plant.names():
+        q = rig.plant.quantity(p.name)
+        lower, upper = max(lower, q.lower), min(upper, q.upper)
+        positive = q.open_lower and q.lower == 0
+    elif p.name in ("actuator.lag", "actuator.delay", "actuator.slope"):
+        lower = max(lower, 0.0)
+    log = positive and p.value > 0
+    value = min(max(p.value, lower), upper)
+    prior = None
+    if not p.estimate:
+        prior = (math.log(p.value), p.uncertainty / p.value) if log else (p.value, p.uncertainty)
+    scale = 1.0 if log else max(abs(value), p.uncertainty) or _FALLBACK.get(p.name, 1e-3)
+    return Unknown(
+        name=p.name, run=SHARED, value=value, lower=lower, upper=upper, log=log, scale=scale, prior=prior,
+        asked=p.estimate,
+    )  # fmt: skip
+
+
+_FALLBACK = {"actuator.gain": 1.0, "actuator.lag": 5e-3, "actuator.delay": 5e-3, "actuator.offset": 1e-2}
+
+
+def run_unknowns(rig: Rig, index: int, run: Run, start: State) -> list[Unknown]:
+    """What is sought for one run alone; `start` is its measured first state and its uncertainty."""
+    free = -math.inf, math.inf
+    found: list[Unknown] = []
+
+    def add(name: str, value: float, scale: float, prior: tuple[float, float] | None = None, log: bool = False) -> None:
+        found.append(
+            Unknown(name=name, run=index, value=value, lower=0.0 if log else free[0], upper=free[1], log=log,
+                    scale=scale, prior=prior)
+        )  # fmt: skip
+
+    names = rig.plant.state_names()
+    if "initial" in run.unknown and run.horizon is None:
+        for i, name in enumerate(names):
+            if names[i - i % 2] not in run.held and name not in run.initial:
+                add(f"initial.{name}", float(start.x[i]), float(start.spread[i]))
+    if "offset" in run.unknown:
+        for name in run.measured:
+            if name not in run.held:
+                add(f"offset.{name}", 0.0, float(start.spread[names.index(name)]))
+    if "gain" in run.unknown:
+        add("gain", 1.0, 1.0, (0.0, GAIN_SPREAD), log=True)
+    if "friction" in run.unknown:
+        add("friction", 1.0, 1.0, (0.0, FRICTION_SPREAD), log=True)
+    if "input_offset" in run.unknown:
+        size = float(np.std(run.u)) if run.u.size else 0.0
+        add("input_offset", 0.0, size or 1.0)
+    return found
+
+
+def friction_names(rig: Rig) -> tuple[str, ...]:
+    """Parameters that a run's friction factor multiplies: viscous terms and every level of dry friction."""
+    derived = rig.plant.derived()
+    words = {w for text in derived.damping for w in re.findall(r"[A-Za-z_]\w*", text)}
+    for joint in derived.joints:
+        words |= {joint.coulomb, joint.quadratic, joint.stiction}
+    return tuple(n for n in derived.parameters if n in words)
+
+
+def base_values(rig: Rig) -> dict[str, float]:
+    """Value of every parameter of plant and actuator, defaults filled in.
+
+    Raises
+    ------
+    BadInput
+        When the plant needs a parameter that the rig does not name.
+    """
+    from dataclasses import MISSING, fields
+
+    from upright.errors import BadInput
+
+    values = {n: default for n, (_, default) in ACTUATOR.items()}
+    for f in fields(rig.plant):  # type: ignore[arg-type]
+        if f.default is not MISSING:
+            values[f.name] = float(f.default)
+    values |= {n: p.value for n, p in rig.parameters.items()}
+    missing = [n for n in rig.plant.names() if n not in values]
+    if missing:
+        raise BadInput(
+            f"{rig.plant.__name__} needs a value or a guess of {', '.join(missing)}, none came; "
+            f"add {'it' if len(missing) == 1 else 'them'} to the parameters of the rig."
+        )
+    return values
