@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -44,9 +45,7 @@ def ensemble(p: np.ndarray, x0: np.ndarray, *, samples: int, stick_slip: bool) -
 
     values = parameters(p, stick_slip=stick_slip) | {"actuator.limit": problem.LIMIT}
     start = np.ascontiguousarray(x0[list(ORDER)].T)
-    loop = Loop(
-        K=problem.gains()[list(ORDER)], target=[0.0, np.pi], quantum=[problem.QUANTUM] * 2, alpha=problem.KEEP
-    )
+    loop = Loop(K=problem.gains()[list(ORDER)], target=[0.0, np.pi], quantum=[problem.QUANTUM] * 2, alpha=problem.KEEP)
 
     def run() -> np.ndarray:
         done = loops(
@@ -56,3 +55,65 @@ def ensemble(p: np.ndarray, x0: np.ndarray, *, samples: int, stick_slip: bool) -
         return done.final[list(ORDER)]
 
     return run
+
+
+def study() -> tuple[Any, Any]:
+    """Rig and run of the synthetic fit: eight unknowns, two encoders."""
+    from benchmarks import fit as asked
+    from upright.identification.model import Parameter, Rig, Run
+    from upright.physics import Furuta
+    from upright.simulation import simulate
+
+    true = parameters(problem.RIG, stick_slip=True)
+    start = problem.RELEASE[list(ORDER)]
+    states = simulate(Furuta, true, start, asked.TORQUE, problem.PERIOD, samples=problem.STEPS + 1)[:, ORDER, 0]
+    guesses = dict(zip(asked.UNKNOWN, asked.START, strict=False))
+    rig = Rig(
+        plant=Furuta,
+        parameters={
+            name: Parameter(name=name, value=guesses.get(name, value), estimate=name in guesses, lower=0.0)
+            for name, value in true.items()
+        },
+    )
+    run = Run(
+        label="swing",
+        role="fit",
+        t=np.arange(problem.STEPS + 1) * problem.PERIOD,
+        u=np.append(asked.TORQUE, asked.TORQUE[-1])[:, None],
+        y=asked.counts(states),
+        measured=("psi", "theta"),
+        quantum=(problem.QUANTUM,) * 2,
+        initial={"psi": 0.0, "psi_dot": 0.0, "theta_dot": 0.0},
+    )
+    return rig, run
+
+
+def search() -> Callable[[], np.ndarray]:
+    """Levenberg-Marquardt over the growing horizon, nothing else; estimates as `benchmarks.fit.TRUTH`."""
+    from benchmarks import fit as asked
+    from upright.identification.descent import grow
+    from upright.identification.problem import pose
+
+    rig, run = study()
+
+    def estimate() -> np.ndarray:
+        posed = pose(rig, [run])
+        found = dict(zip([u.name for u in posed.unknowns], posed.value(grow(posed, posed.start).x), strict=True))
+        return np.array([found[name] for name in (*asked.UNKNOWN, "initial.theta")])
+
+    return estimate
+
+
+def fit() -> Callable[[], np.ndarray]:
+    """All that `upright identify` does once the files are read: search, errors, correlations, verdict."""
+    from benchmarks import fit as asked
+    from upright.identification.estimate import identify
+
+    rig, run = study()
+
+    def estimate() -> np.ndarray:
+        found = identify(rig, [run], method="least-squares")
+        released = found.per_run["swing"]["initial.theta"].value
+        return np.array([*(found.estimates[name].value for name in asked.UNKNOWN), released])
+
+    return estimate
