@@ -48,27 +48,14 @@ inch = 0.0254 * meter = in
 pound = 0.45359237 * kilogram = lb
 """
 
+_PLAIN = "1 % m mm cm um km in kg g mg lb s ms us min Hz kHz rad mrad deg rev counts N mN kN J W V mV A mA ohm H mH rpm"
 COMMON = (
-    "1 %  m mm cm um km in  kg g mg lb  s ms us min  Hz kHz rad mrad deg rev counts count"
-    "  N mN kN  J W V mV A mA ohm H mH  rpm"
-).split() + [
-    *("kg m^2", "kg cm^2", "g cm^2", "g mm^2", "N m", "mN m", "N/m", "N m/rad", "N s/m", "N m s/rad", "N m s^2/rad^2"),
-    *("N m/A", "V s/rad", "N/V", "N m/V", "N/A", "m/s", "m/s^2", "rad/s", "rad/s^2", "deg/s", "counts/rev", "rad/V"),
-    *(
-        "counts/m",
-        "counts/cm",
-        "counts/s",
-        "m/V",
-        "V/rad",
-        "V/m",
-        "V s/m",
-        "V s^2/m",
-        "counts/V",
-        "V/count",
-        "1/s",
-        "kg/m",
-    ),
-]
+    *_PLAIN.split(),
+    *("kg m^2", "kg cm^2", "g cm^2", "g mm^2", "kg/m", "N m", "mN m", "N/m", "N m/rad", "N s/m", "N m s/rad"),
+    *("N m s^2/rad^2", "N m/A", "V s/rad", "N/V", "N m/V", "N/A", "m/s", "m/s^2", "rad/s", "rad/s^2", "deg/s", "1/s"),
+    *("counts/rev", "counts/m", "counts/cm", "counts/s", "counts/V", "rad/V", "m/V", "V/rad", "V/m", "V s/m"),
+    *("V s^2/m", "V/count", "V s/count", "V s^2/count"),
+)
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
 _UNIT = re.compile(r"[A-Za-zµμΩ°%·*/^() .0-9-]{0,60}")
@@ -169,7 +156,7 @@ def _si(unit: str) -> tuple[float, str]:
 def _registry() -> Any:
     import pint
 
-    registry: Any = pint.UnitRegistry(None, system=None)
+    registry: Any = pint.UnitRegistry("", system="")
     registry.load_definitions(_DEFINITIONS.strip().splitlines())
     return registry
 

@@ -28,7 +28,7 @@ _STEP_NAMES = ("dt", "ts", "t_s", "h", "period", "sampletime")
 class Found:
     """Time (N,) [s], signals on it, and what to say about them."""
 
-    t: Array
+    t: Any
     signals: dict[str, Array]
     notes: tuple[str, ...] = ()
 
@@ -160,7 +160,8 @@ def _pieces(source: Source, content: dict[str, Any]) -> Found | None:
     pieces.sort(key=lambda piece: float(piece[0][0]))
     table = np.concatenate([piece[1] for piece in pieces])
     signals = {f"{stem}_{j + 1}": table[:, j] for j in range(table.shape[1])}
-    note = f"Pieces joined in the order of time: {', '.join(piece[2] for piece in pieces)}; rows became columns {', '.join(signals)}."
+    joined, columns = ", ".join(piece[2] for piece in pieces), ", ".join(signals)
+    note = f"Pieces joined in the order of time: {joined}; rows became columns {columns}."
     return Found(t=np.concatenate([piece[0] for piece in pieces]), signals=signals, notes=(note,))
 
 

@@ -10,6 +10,7 @@ import csv
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from upright.readers.source import Source
 from upright.readers.table import cell
@@ -26,7 +27,7 @@ class Topic:
 
     clock: int
     columns: tuple[int, ...]
-    rows: Array  # indices of rows, as integers
+    rows: NDArray[np.intp]  # where it wrote
 
 
 def recognise(names: tuple[str, ...]) -> bool:
@@ -39,7 +40,9 @@ def read(source: Source) -> Record:
     names, cells = _cells(source)
     filled = np.array([[bool(entry) for entry in column] for column in cells])
     notes = [
-        f"Empty column '{name}' left out." for name, any_ in zip(names, filled.any(axis=1), strict=True) if not any_
+        f"Empty column '{name}' left out."
+        for name, any_ in zip(names, map(any, filled.tolist()), strict=True)
+        if not any_
     ]
     topics = _topics(source, names, filled)
     if not topics:

@@ -1,0 +1,205 @@
+"""What can be told about a log before any model: is its time true, and what is each column?"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from upright.errors import BadInput, nearest
+from upright.readers import lies, quantum
+from upright.readers.guess import guess_unit, is_drive
+from upright.readers.quantum import Quantum
+from upright.readers.timebase import rounding
+from upright.records import Array, Record
+
+_SHOWN = 12  # switches, gaps and rests beyond these tell nothing new
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gap:
+    """Samples missing after `start` [s], over `length` [s]."""
+
+    start: float
+    length: float
+    missing: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimeBase:
+    """Sampling of a record.
+
+    `period`: mean without gaps [s]; `rounding`: of the logged stamps, 0 when finer than 1 us [s];
+    `jitter`: 99th percentile of |step - period| [s]; `late`: first time when it is not 0 [s];
+    `rebuilt`: the reader replaced rounded stamps by a uniform grid.
+    """
+
+    samples: int
+    period: float
+    duration: float
+    late: float
+    rounding: float
+    jitter: float
+    gaps: tuple[Gap, ...]
+    rebuilt: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Column:
+    """One column, in the unit of the log.
+
+    `unit` is stated by the log, `guess` ours when it is not; `low_share` and `high_share`: share of the samples
+    pinned at the lowest and highest value (0 unless they stay there); `turns`: whole revolutions in the offset;
+    `switches`: (time [s], new value) of a drive that moves in steps; `idle`: a drive that never leaves 0.
+    """
+
+    name: str
+    unit: str
+    guess: str
+    low: float
+    high: float
+    quantum: Quantum
+    constant: bool
+    low_share: float
+    high_share: float
+    turns: int
+    drive: bool
+    idle: bool
+    switches: tuple[tuple[float, float], ...]
+    lies: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inspection:
+    """Time base, columns in the order of the log, and spans (start, stop) [s] in which nothing moves."""
+
+    file: str
+    reader: str
+    time: TimeBase
+    columns: tuple[Column, ...]
+    rests: tuple[tuple[float, float], ...]
+    notes: tuple[str, ...]
+
+    def column(self, name: str) -> Column:
+        """One column by name."""
+        for column in self.columns:
+            if column.name == name:
+                return column
+        raise BadInput(f"The log has no column '{name}': {nearest(name, [c.name for c in self.columns])}")
+
+    @property
+    def suspects(self) -> tuple[str, ...]:
+        """Names of columns that are constant or lie."""
+        return tuple(c.name for c in self.columns if c.constant or c.lies)
+
+
+def inspect_record(record: Record) -> Inspection:
+    """Inspection of a record."""
+    columns = tuple(_column(record, name) for name in record.names)
+    moving = [
+        record[c.name]
+        for c in columns
+        if not (c.drive or c.constant or any("time" in s or "index" in s for s in c.lies))
+    ]
+    return Inspection(
+        file=record.provenance.file,
+        reader=record.provenance.reader,
+        time=time_base(record),
+        columns=columns,
+        rests=_rests(record.t, moving),
+        notes=record.provenance.notes,
+    )
+
+
+def time_base(record: Record) -> TimeBase:
+    """Sampling of a record; a gap is a step of more than 1.9 medians."""
+    t = record.t
+    steps = np.diff(t)
+    middle = float(np.median(steps))
+    wide = np.flatnonzero(steps > 1.9 * middle)
+    regular = steps[steps <= 1.9 * middle]
+    period = float(regular.mean()) if wide.size else float(t[-1] - t[0]) / steps.size
+    gaps = tuple(
+        Gap(start=float(t[i]), length=float(steps[i]), missing=max(round(float(steps[i]) / period) - 1, 1))
+        for i in wide.tolist()
+    )
+    logged = re.search(r"Time was rounded to ([\d.e-]+) ms; rebuilt", " ".join(record.provenance.notes))
+    jitter = float(np.percentile(np.abs(regular - period), 99))
+    return TimeBase(
+        samples=t.size,
+        period=period,
+        duration=float(t[-1] - t[0]),
+        late=float(t[0]),
+        rounding=float(logged[1]) * 1e-3 if logged else rounding(t),
+        jitter=jitter if jitter > 1e-9 * max(float(np.abs(t).max()), 1.0) else 0.0,
+        gaps=gaps,
+        rebuilt=logged is not None,
+    )
+
+
+def _column(record: Record, name: str) -> Column:
+    x = record.signals[name]
+    low, high = float(x.min()), float(x.max())
+    step = quantum.find(x)
+    unit = record.units[name]
+    guess = unit or ("1" if lies.sample_index(x) else guess_unit(name, x, step))
+    constant = low == high
+    drive = is_drive(name, x, guess)
+    if step.counts_per_rev and guess != "rad":
+        step = Quantum(step=step.step, decimals=step.decimals)
+    return Column(
+        name=name,
+        unit=unit,
+        guess=guess,
+        low=low,
+        high=high,
+        quantum=step,
+        constant=constant,
+        low_share=0.0 if constant else _pinned(x, low, step.step),
+        high_share=0.0 if constant else _pinned(x, high, step.step),
+        turns=min((round(float(end) / (2 * math.pi)) for end in (x[0], x[-1])), key=abs) if guess == "rad" else 0,
+        drive=drive,
+        idle=drive and constant and low == 0,
+        switches=_switches(record.t, x) if drive and not constant else (),
+        lies=lies.about(record, name),
+    )
+
+
+def _pinned(x: Array, level: float, step: float) -> float:
+    """Share of samples at an extreme that a signal with many levels stays at for 3 samples or more."""
+    if np.unique(x[:: max(x.size // 5000, 1)]).size < 12:
+        return 0.0
+    at = np.abs(x - level) <= 0.25 * step
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], at.astype(np.int8), [0]))))
+    longest = int((edges[1::2] - edges[::2]).max())
+    return float(at.mean()) if longest >= 3 else 0.0
+
+
+def _switches(t: Array, x: Array) -> tuple[tuple[float, float], ...]:
+    """Times and new values where a piecewise constant signal changes; for others when it leaves 0 and returns."""
+    changes = np.flatnonzero(np.diff(x)) + 1
+    if changes.size <= _SHOWN:
+        return tuple((float(t[i]), float(x[i])) for i in changes.tolist())
+    live = np.flatnonzero(x != 0)
+    first, last = int(live[0]), int(live[-1])
+    out = [(float(t[first]), float(x[first]))] if first > 0 else []
+    return tuple(out + ([(float(t[last + 1]), 0.0)] if last + 1 < t.size else []))
+
+
+def _rests(t: Array, signals: list[Array]) -> tuple[tuple[float, float], ...]:
+    """Spans of at least 0.5 s and 1 % of the record in which no signal moves by more than 1 % of its range."""
+    width = max(int(0.25 / float(np.median(np.diff(t)))), 2)
+    starts = np.arange(0, t.size - width + 1, width)
+    if not signals or starts.size < 2:
+        return ()
+    still = np.ones(starts.size, dtype=bool)
+    for x in signals:
+        swing = np.maximum.reduceat(x, starts) - np.minimum.reduceat(x, starts)
+        still &= swing <= 0.01 * np.ptp(x)
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], still.astype(np.int8), [0]))))
+    least = max(0.5, 0.01 * float(t[-1] - t[0]))
+    first, after = starts[edges[::2]], np.append(starts, t.size)[edges[1::2]]
+    spans = [(float(t[a]), float(t[b - 1])) for a, b in zip(first.tolist(), after.tolist(), strict=True)]
+    return tuple(span for span in spans if span[1] - span[0] >= least)[:_SHOWN]
