@@ -1,0 +1,102 @@
+"""Does everything that is shown also run? Scripts, plants and studies in examples/, commands in the pages."""
+
+import ast
+import os
+import re
+import subprocess
+import sys
+from dataclasses import MISSING, fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from upright.cli import COMMANDS, app
+from upright.physics import Plant, find, linearize
+from upright.simulation import simulate
+
+ROOT = Path(__file__).parents[1]
+EXAMPLES = ROOT / "examples"
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+def classes(path: Path) -> list[str]:
+    """Names of the plants in a file, read without running it."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    bases = {"Plant", "Pendulum", "CartPendulum", "Furuta"}
+    return [
+        node.name
+        for node in tree.body
+        if isinstance(node, ast.ClassDef) and bases & {getattr(b, "id", getattr(b, "attr", "")) for b in node.bases}
+    ]
+
+
+PLANTS = [(path, name) for path in sorted(EXAMPLES.glob("plants/*.py")) for name in classes(path)]
+SCRIPTS = sorted(EXAMPLES.glob("*.py"))
+STUDIES = sorted(EXAMPLES.glob("studies/*.toml"))
+
+
+def name_of(value: object) -> str:
+    return value.name if isinstance(value, Path) else str(value)
+
+
+def test_there_is_something_to_run():
+    assert PLANTS
+    assert STUDIES
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("script", SCRIPTS, ids=name_of)
+def test_a_script_runs_to_its_end(script, tmp_path):
+    done = subprocess.run(
+        [sys.executable, str(script)],
+        cwd=tmp_path, env=os.environ | {"MPLBACKEND": "Agg"}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(("path", "name"), PLANTS, ids=name_of)
+def test_a_plant_from_a_file_stays_where_it_hangs(path, name):
+    """An equilibrium is a place that is not left: the one named first is stable in every example."""
+    plant = find(f"{path.name}:{name}", folder=path.parent)
+    assert issubclass(plant, Plant)
+    rig = plant(**{f.name: 0.1 for f in fields(plant) if f.default is MISSING})
+    place = next(iter(plant.equilibria))
+    assert np.all(np.isfinite(linearize(rig, place).A))
+    x0 = np.zeros(len(plant.state_names()))
+    motion = simulate(rig, {}, x0, None, 1e-3, samples=201)
+    np.testing.assert_allclose(motion[:, :, 0], np.broadcast_to(x0, (201, x0.size)), atol=1e-12)
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize("path", STUDIES, ids=name_of)
+def test_a_study_finds_its_logs_and_says_whose_they_are(path, monkeypatch):
+    folder = os.environ.get("UPRIGHT_REAL_DATA")
+    if not folder:
+        pytest.skip("UPRIGHT_REAL_DATA is not set")
+    from upright.identification.study import load_study
+
+    study = load_study(path, data=folder)
+    assert study.runs
+    assert study.source, f"{path.name} should name the public source of its data"
+
+
+def commands(page: Path) -> list[tuple[str, list[str]]]:
+    """Every `upright COMMAND --option` shown on a page."""
+    shown = re.findall(r"upright ([a-z]+)((?: [^\s`#|&;]+)*)", page.read_text(encoding="utf-8"))
+    return [(name, re.findall(r"(?<!\S)(--?[a-z][a-z-]*)", rest)) for name, rest in shown if name in COMMANDS]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_pages_show_options_that_exist(page):
+    for name, options in commands(page):
+        listing = CliRunner().invoke(app, [name, "--help"], terminal_width=200).stdout
+        for option in options:
+            assert re.search(rf"{re.escape(option)}\b", listing), f"{page.name}: upright {name} has no {option}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_pages_link_to_files_that_exist(page):
+    for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text(encoding="utf-8")):
+        assert (page.parent / target).exists(), f"{page.name} links to {target}"
