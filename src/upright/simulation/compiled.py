@@ -29,7 +29,9 @@ HEAD = '''"""Generated kernel of {name}; {flavour}"""
 
 from math import cos, exp, expm1, pi, sin, sqrt, tan
 
-from numba import bool_, float64, int64, njit
+from llvmlite import ir
+from numba import carray, cfunc, float64, int64, njit, types
+from numba.extending import intrinsic
 from numpy import empty, floor, nan, zeros
 
 FAST = {{"contract", "reassoc", "arcp", "nsz", "afn"}}
@@ -37,6 +39,19 @@ inline = njit(fastmath=FAST, error_model="numpy", forceinline=True)
 inline_strict = njit(fastmath={{"contract"}}, error_model="numpy", forceinline=True)
 scalar = njit(fastmath={{"contract"}}, error_model="numpy")
 compiled = njit(fastmath=FAST, error_model="numpy", nogil=True, cache=True)
+
+
+@intrinsic
+def call(context, address, data, L, i, h):
+    """Call the search of events by its address, so that it is compiled once and not into every loop."""
+
+    def generate(context, builder, signature, args):
+        kinds = [ir.IntType(64), ir.IntType(64), ir.IntType(64), ir.DoubleType()]
+        function = builder.inttoptr(args[0], ir.FunctionType(ir.VoidType(), kinds).as_pointer())
+        builder.call(function, args[1:])
+        return context.get_dummy_value()
+
+    return types.void(types.int64, types.int64, types.int64, types.int64, types.float64), generate
 
 '''
 

@@ -13,270 +13,247 @@ from upright.simulation.flavour import Layout
 
 SEARCH = '''
 @scalar
-def solve(M, F, A, b, a, moves):
-    """Accelerations of the joints that move; the others stay."""
-    for i in range(NF):
-        b[i] = F[i] if moves[i] else 0.0
-        for j in range(NF):
-            A[i, j] = M[i, j] if moves[i] and moves[j] else 0.0
-        if not moves[i]:
-            A[i, i] = 1.0
-    for k in range(NF):
-        for i in range(k + 1, NF):
+def copy(a, b):
+    for k in range(a.shape[0]):
+        b[k] = a[k]
+
+
+@scalar
+def solve(F, moves, B):
+    """Accelerations of the coordinates that move; the others stay."""
+    M, A, a = B[0], B[1], B[3]
+    n = F.shape[0]
+    for i in range(n):
+        a[i] = F[i] * moves[i]
+        for j in range(n):
+            A[i, j] = M[i, j] * moves[i] * moves[j]
+        A[i, i] += 1.0 - moves[i]
+    for k in range(n):
+        for i in range(k + 1, n):
             c = A[i, k] / A[k, k]
-            for j in range(k, NF):
+            for j in range(k, n):
                 A[i, j] -= c * A[k, j]
-            b[i] -= c * b[k]
-    for i in range(NF - 1, -1, -1):
-        c = b[i]
-        for j in range(i + 1, NF):
-            c -= A[i, j] * a[j]
-        a[i] = c / A[i, i]
+            a[i] -= c * a[k]
+    for k in range(n):
+        i = n - 1 - k
+        for j in range(i + 1, n):
+            a[i] -= A[i, j] * a[j]
+        a[i] /= A[i, i]
 
 
 @scalar
-def hold(i, M, F, a):
-    """Force that coordinate `i` must take up."""
-    c = F[i]
-    for j in range(NF):
-        c -= M[i, j] * a[j]
-    return c
+def margins(x, s, at, t, B, moves, g, need):
+    """How far each dry joint is from leaving its mode: speed in its direction, or force to spare when stuck.
 
-
-@scalar
-def equilibrium(x, s, W, L, i, t, h, M, F, A, b, a, moves):
-    """Mass matrix, forces and accelerations with the modes as they are."""
-    terms_at(x, s, W, L, i, t, h, M, F)
-    moves[:] = True
-    for w in range(ND):
+    Returns the first joint that has left it, -1 when none has.
+    """
+    M, F, a, dry, hold = B[0], B[2], B[3], B[4], B[5]
+    n = F.shape[0]
+    for w in range(s.shape[0]):
+        g[w] = s[w] * x[n + dry[w]]
+        need = need or s[w] == 0.0
+    if need:
+        terms_at(x, s, at, t, M, F)
+        for k in range(n):
+            moves[k] = 1.0
+        for w in range(s.shape[0]):
+            moves[dry[w]] = abs(s[w])
+        solve(F, moves, B)
+    first = -1
+    for w in range(s.shape[0]):
         if s[w] == 0.0:
-            moves[DRY[w]] = False
-    solve(M, F, A, b, a, moves)
+            c = F[dry[w]]
+            for k in range(n):
+                c -= M[dry[w], k] * a[k]
+            g[w] = hold[w] - abs(c)
+        if g[w] < 0.0 and first < 0:
+            first = w
+    return first
 
 
 @scalar
-def violated(x, s, W, L, i, t, h, M, F, A, b, a, moves, but):
-    """Index of a dry joint that contradicts its mode, -1 when none does."""
-    stuck = False
-    for w in range(ND):
-        stuck = stuck or s[w] == 0.0
-        if w != but and s[w] * x[NF + DRY[w]] < 0.0:
-            return w
-    if stuck:
-        equilibrium(x, s, W, L, i, t, h, M, F, A, b, a, moves)
-        for w in range(ND):
-            if w != but and s[w] == 0.0 and abs(hold(DRY[w], M, F, a)) > W[BREAK[w] * L + i]:
-                return w
-    return -1
-
-
-@scalar
-def decide(x, s, W, L, i, t, h, M, F, A, b, a, moves, forced):
-    """Modes of every dry joint at rest; joint `forced` (if not -1) has just reached its break-away level."""
-    rest = zeros(ND, int64)
-    loose = zeros(ND, int64)
-    level = zeros(ND)
-    for w in range(ND):
-        if s[w] == 0.0 or x[NF + DRY[w]] == 0.0:
-            rest[w] = 1
-            s[w] = 0.0
-    equilibrium(x, s, W, L, i, t, h, M, F, A, b, a, moves)
-    pull = hold(DRY[forced], M, F, a) if forced >= 0 else 0.0
-    some = False
-    for w in range(ND):
-        if rest[w] == 1 and (w == forced or abs(hold(DRY[w], M, F, a)) > W[BREAK[w] * L + i]):
-            loose[w] = 1
-            some = True
-    if not some:
-        return
-    g = zeros(NF)
-    for _ in range(ND + 1):
-        for w in range(ND):
-            level[w] = W[SLIDE[w] * L + i] if loose[w] == 1 else W[BREAK[w] * L + i]
-        slide(M, F, A, b, a, moves, g, rest, level, s)
-        more = False
-        for w in range(ND):
-            if rest[w] == 1 and s[w] != 0.0 and loose[w] == 0:
-                loose[w] = 1
-                more = True
-        if not more:
+def decide(s, g, B, moves, forced):
+    """Modes of the joints at rest (s = 0, margins `g`); joint `forced`, if not -1, has reached its break-away level."""
+    M, F, a, dry, hold, slide = B[0], B[2], B[3], B[4], B[5], B[6]
+    n, nd = F.shape[0], s.shape[0]
+    rest, level, f, keep = zeros(nd), zeros(nd), zeros(n), zeros(n)
+    again = False
+    pull = 0.0
+    for w in range(nd):
+        rest[w] = 1.0 if s[w] == 0.0 else 0.0
+        level[w] = hold[w]
+        if s[w] == 0.0 and (w == forced or g[w] < 0.0):
+            level[w] = slide[w]
+            rest[w] = 2.0
+            again = True
+    if forced >= 0:
+        pull = F[dry[forced]]
+        for k in range(n):
+            pull -= M[dry[forced], k] * a[k]
+    # signs of the accelerations: guessed by coordinate descent, verified by solving exactly
+    for turn in range(400):
+        if not again:
             break
+        for sweep in range(8 * n):
+            j = sweep % n
+            c = F[j] + M[j, j] * keep[j]
+            for k in range(n):
+                c -= M[j, k] * keep[k]
+            for w in range(nd):
+                if dry[w] == j and rest[w] > 0.0:
+                    c = c - level[w] if c > level[w] else (c + level[w] if c < -level[w] else 0.0)
+            keep[j] = c / M[j, j]
+        for j in range(n):
+            moves[j] = 1.0
+            f[j] = F[j]
+        for w in range(nd):
+            if rest[w] > 0.0:
+                j = dry[w]
+                s[w] = 1.0 if keep[j] > 0.0 else (-1.0 if keep[j] < 0.0 else 0.0)
+                moves[j] = abs(s[w])
+                f[j] = F[j] - s[w] * level[w]
+        solve(f, moves, B)
+        again = False
+        for w in range(nd):
+            if rest[w] > 0.0:
+                j = dry[w]
+                c = f[j]
+                for k in range(n):
+                    c -= M[j, k] * a[k]
+                again = again or s[w] * a[j] < 0.0 or (s[w] == 0.0 and abs(c) > level[w] * (1.0 + 1e-12))
+        for w in range(nd):
+            if not again and rest[w] == 1.0 and s[w] != 0.0:
+                # dragged along by another joint: it slides at its own lower level
+                rest[w] = 2.0
+                level[w] = slide[w]
+                again = True
     if forced >= 0 and s[forced] == 0.0:
         s[forced] = 1.0 if pull > 0.0 else -1.0
 
 
 @scalar
-def slide(M, F, A, b, a, moves, g, rest, level, s):
-    """Signs of the accelerations of the joints at rest: guess by coordinate descent, verify by solving exactly."""
-    for j in range(NF):
-        a[j] = 0.0
-    for _ in range(50):
-        for _ in range(8):
-            for j in range(NF):
-                c = F[j]
-                for k in range(NF):
-                    if k != j:
-                        c -= M[j, k] * a[k]
-                for w in range(ND):
-                    if DRY[w] == j and rest[w] == 1:
-                        c = c - level[w] if c > level[w] else (c + level[w] if c < -level[w] else 0.0)
-                a[j] = c / M[j, j]
-        for j in range(NF):
-            moves[j] = True
-            b[j] = F[j]
-            g[j] = F[j]
-        for w in range(ND):
-            if rest[w] == 1:
-                j = DRY[w]
-                s[w] = 1.0 if a[j] > 0.0 else (-1.0 if a[j] < 0.0 else 0.0)
-                moves[j] = s[w] != 0.0
-                g[j] = F[j] - s[w] * level[w]
-        keep = a.copy()
-        solve(M, g, A, b, a, moves)
-        good = True
-        for w in range(ND):
-            if rest[w] == 1:
-                j = DRY[w]
-                if s[w] * a[j] < 0.0 or (s[w] == 0.0 and abs(hold(j, M, g, a)) > level[w] * (1.0 + 1e-12)):
-                    good = False
-        if good:
-            return
-        a[:] = keep
-
-
-@scalar
-def margin(w, x, s, W, L, i, t, h, M, F, A, b, a, moves):
-    """How far joint `w` is from leaving its mode: speed in its direction, or force to spare."""
-    if s[w] != 0.0:
-        return s[w] * x[NF + DRY[w]]
-    equilibrium(x, s, W, L, i, t, h, M, F, A, b, a, moves)
-    return W[BREAK[w] * L + i] - abs(hold(DRY[w], M, F, a))
-
-
-@scalar
-def moment(w, x, x1, s, W, L, i, t, hi, h, M, F, A, b, a, moves):
-    """Time in [0, hi] at which joint `w` leaves its mode; 0 when it cannot stay in it at all."""
-    lo = 0.0
-    glo = margin(w, x, s, W, L, i, t, h, M, F, A, b, a, moves)
-    leap(x, x1, s, W, L, i, t, hi, h)
-    ghi = margin(w, x1, s, W, L, i, t + hi, h, M, F, A, b, a, moves)
-    if not ghi < 0.0:
-        return hi
-    if glo <= 0.0:
-        c = 0.5 * hi
-        for _ in range(40):
-            leap(x, x1, s, W, L, i, t, c, h)
-            g = margin(w, x1, s, W, L, i, t + c, h, M, F, A, b, a, moves)
-            if g > 0.0:
-                lo, glo = c, g
+def redo(x, x1, s, at, B, moves):
+    """Step over one substep, event by event: a small machine, so that each search is compiled in one place only."""
+    h, n, nd, dry = at[3], B[2].shape[0], s.shape[0], B[4]
+    g0, g, x2 = zeros(nd), zeros(nd), zeros(x.shape[0])
+    BASE, FULL, MIDDLE, ROOT, DECIDE = 0, 1, 2, 3, 4
+    phase, w, forced, count, events, turns, side = 0, -1, -1, 0, 0, 0, 0
+    t, c, lo, hi, ga, gb, scale = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for _ in range(1000):
+        if phase == BASE or phase == DECIDE:
+            copy(x, x1)
+        else:
+            leap(x, x1, s, at, t, c)
+        first = margins(x1, s, at, t + c, B, moves, g, phase == DECIDE)
+        if phase == DECIDE:
+            decide(s, g, B, moves, forced)
+            phase, forced, turns = BASE, -1, turns + 1
+            continue
+        if phase == BASE:
+            if first >= 0 and s[first] == 0.0 and turns < 2 * nd + 2:
+                for k in range(nd):
+                    s[k] = 0.0 if x[n + dry[k]] == 0.0 else s[k]
+                phase = DECIDE
+                continue
+            copy(g, g0)
+            phase, c, turns = FULL, h - t, 0
+            if c <= 0.0:
                 break
-            hi, ghi = c, g
-            c *= 0.5
-        if glo <= 0.0:
-            return 0.0
-    scale = glo - ghi
-    side = 0
-    ga, gb = glo, ghi
-    for k in range(60):
-        c = lo + (hi - lo) * ga / (ga - gb)
-        if k > 12 and k % 3 == 0:
-            c = 0.5 * (lo + hi)
-        if not (c > lo and c < hi):
-            break
-        leap(x, x1, s, W, L, i, t, c, h)
-        g = margin(w, x1, s, W, L, i, t + c, h, M, F, A, b, a, moves)
-        if abs(g) <= 1e-15 * scale:
-            return c
-        # Illinois: halve the weight of an end that stays
-        if g > 0.0:
-            lo, ga = c, g
+            continue
+        if phase == FULL or phase == MIDDLE:
+            if first < 0 or events > 40:
+                if phase == MIDDLE:
+                    copy(x2, x)
+                    break
+                copy(x1, x2)
+                if events > 0:
+                    copy(x1, x)
+                    break
+                # nothing at the end: has a joint turned twice in between?
+                phase, c = MIDDLE, 0.5 * c
+                continue
+            phase, w = ROOT, first
+            lo, hi, ga, gb, count, side, scale = 0.0, c, g0[w], g[w], 0, 0, 0.0
+        elif count > 100 or (ga > 0.0 and (abs(g[w]) <= scale or hi - lo <= 4e-16 * h)):
+            other = -1
+            for k in range(nd):
+                if k != w and g[k] < 0.0 and g0[k] > 0.0:
+                    other = k
+            if other >= 0 and count <= 100:
+                w = other
+                lo, hi, ga, gb, count, side, scale = 0.0, c, g0[w], g[w], 0, 0, 0.0
+            else:
+                # the moment is found: stop the joint, or let it break away
+                t += c
+                copy(x1, x)
+                if s[w] != 0.0:
+                    x[n + dry[w]] = 0.0
+                else:
+                    forced = w
+                for k in range(nd):
+                    s[k] = 0.0 if x[n + dry[k]] == 0.0 else s[k]
+                phase, c, events = DECIDE, 0.0, events + 1
+                continue
+        elif g[w] > 0.0:
+            # Illinois: halve the weight of an end that stays
+            lo, ga = c, g[w]
             gb = 0.5 * gb if side == 1 else gb
             side = 1
         else:
-            hi, gb = c, g
+            hi, gb = c, g[w]
             ga = 0.5 * ga if side == -1 else ga
             side = -1
-        if hi - lo <= 4e-16 * h:
-            break
-    return hi
-
-
-@scalar
-def events(W, L, i, h):
-    """Redo one substep of one lane, event by event."""
-    x, x1, s = empty(NX), empty(NX), empty(ND)
-    M, F, A, b, a, moves = zeros((NF, NF)), zeros(NF), zeros((NF, NF)), zeros(NF), zeros(NF), zeros(NF, bool_)
-    for k in range(NX):
-        x[k] = W[OLD[k] * L + i]
-    for w in range(ND):
-        s[w] = W[MODE[w] * L + i]
-    t = 0.0
-    for _ in range(ND):
-        w = violated(x, s, W, L, i, t, h, M, F, A, b, a, moves, -1)
-        if w < 0:
-            break
-        decide(x, s, W, L, i, t, h, M, F, A, b, a, moves, -1)
-    for _ in range(40):
-        left = h - t
-        leap(x, x1, s, W, L, i, t, left, h)
-        w = violated(x1, s, W, L, i, h, h, M, F, A, b, a, moves, -1)
-        c = left
-        if w < 0:
-            # a joint may have turned twice within the substep
-            leap(x, x1, s, W, L, i, t, 0.5 * left, h)
-            w = violated(x1, s, W, L, i, t + 0.5 * left, h, M, F, A, b, a, moves, -1)
-            c = 0.5 * left
-            if w < 0:
-                break
-        for _ in range(ND + 1):
-            c = moment(w, x, x1, s, W, L, i, t, c, h, M, F, A, b, a, moves)
-            leap(x, x1, s, W, L, i, t, c, h)
-            other = violated(x1, s, W, L, i, t + c, h, M, F, A, b, a, moves, w)
-            if other < 0 or c == 0.0:
-                break
-            w = other
-        t = t + c
-        if c > 0.0:
-            x[:] = x1
-        if s[w] == 0.0:
-            decide(x, s, W, L, i, t, h, M, F, A, b, a, moves, w)
+        count += 1
+        if ga > 0.0:
+            scale = 1e-13 * (ga - gb) if scale == 0.0 else scale
+            c = lo + (hi - lo) * ga / (ga - gb)
+            if count % 16 == 15 or not (c > lo and c < hi):
+                c = 0.5 * (lo + hi)
+        elif count < 40:
+            # the mode begins on its border: find a later time at which it still stands
+            c = 0.5 * hi
+            side = 0
         else:
-            x[NF + DRY[w]] = 0.0
+            # it cannot stand at all
+            x[n + dry[w]] = 0.0
             s[w] = 0.0
-            if c > 0.0:
-                decide(x, s, W, L, i, t, h, M, F, A, b, a, moves, -1)
-        if t >= h:
-            break
-    if t < h:
-        leap(x, x1, s, W, L, i, t, h - t, h)
-        x[:] = x1
-    for w in range(ND):
+            phase, c, events, turns = BASE, 0.0, events + 1, 2 * nd + 2
+    for w in range(nd):
         # what is left after too many events rests
-        if s[w] * x[NF + DRY[w]] < 0.0:
-            x[NF + DRY[w]] = 0.0
+        if s[w] * x[n + dry[w]] < 0.0:
+            x[n + dry[w]] = 0.0
             s[w] = 0.0
-        W[MODE[w] * L + i] = s[w]
-    for k in range(NX):
-        W[NEW[k] * L + i] = x[k]
 '''
 
 
 def events(p: Layout) -> str:
-    """Text of the search of events for one plant."""
+    """Text of the search of events for one plant, and of the call to it."""
     f, place = p.flavour, {c: k for k, c in enumerate(p.free)}
     states = [f"q{i}" for i in p.free] + [f"v{i}" for i in p.free] + [f"y{i}" for i in f.dahl]
-    slide = [f"_Fs{i}" if i in f.stribeck else f"_Fc{i}" for i in f.dry]
-    tables = {
-        "DRY": [place[i] for i in f.dry],
-        "OLD": [p.rows[f"o{s}"] for s in states],
-        "NEW": [p.rows[s] for s in states],
-        "MODE": [p.rows[f"s{i}"] for i in f.dry],
-        "BREAK": [p.rows[f"_Fs{i}"] for i in f.dry],
-        "SLIDE": [p.rows[name] for name in slide],
-    }
-    sizes = [f"NF, ND, NX = {len(p.free)}, {len(f.dry)}, {len(states)}"]
-    lines = sizes + [f"{name} = ({', '.join(map(str, values))},)" for name, values in tables.items()]
-    return "\n".join(lines) + "\n\n\n" + _leap(p) + "\n\n" + _terms_at(p) + "\n" + SEARCH
+    nf, nd, nx = len(p.free), len(f.dry), len(states)
+
+    def w(name: str) -> str:
+        return f"W[{p.rows[name]} * L + i]"
+
+    lines = [
+        f"W = carray(data, ({len(p.rows)} * L,))",
+        f"x, x1, s, hold, slide = empty({nx}), empty({nx}), empty({nd}), empty({nd}), empty({nd})",
+        f"dry, moves = empty({nd}, int64), empty({nf})",
+        f"B = (zeros(({nf}, {nf})), zeros(({nf}, {nf})), zeros({nf}), zeros({nf}), dry, hold, slide)",
+        *(f"x[{k}] = {w('o' + name)}" for k, name in enumerate(states)),
+    ]
+    for k, i in enumerate(f.dry):
+        lines += [f"s[{k}] = {w(f's{i}')}", f"dry[{k}] = {place[i]}", f"hold[{k}] = {w(f'_Fs{i}')}"]
+        lines.append(f"slide[{k}] = {w(f'_Fs{i}' if i in f.stribeck else f'_Fc{i}')}")
+    lines.append("redo(x, x1, s, (W, L, i, h), B, moves)")
+    lines += [f"{w(name)} = x[{k}]" for k, name in enumerate(states)]
+    lines += [f"{w(f's{i}')} = s[{k}]" for k, i in enumerate(f.dry)]
+    body = "\n".join(f"    {line}" for line in lines)
+    head = '@cfunc("void(CPointer(float64), int64, int64, float64)", error_model="numpy", cache=True)\n'
+    return (
+        f"{_leap(p)}\n\n{_terms_at(p)}\n{SEARCH}\n\n"
+        f'{head}def events(data, L, i, h):\n    """Redo one substep of lane `i`."""\n{body}\n'
+    )
 
 
 def _state(p: Layout) -> dict[str, str]:
@@ -315,8 +292,9 @@ def _leap(p: Layout) -> str:
     return (
         "@inline\ndef parabola(first, middle, last, z):\n"
         "    return first + z * (4.0 * middle - 3.0 * first - last + z * 2.0 * (first + last - 2.0 * middle))\n\n\n"
-        "@scalar\ndef leap(x, x1, s, W, L, i, t, d, h):\n"
-        '    """Step `d` from the state `x` at time `t` within the substep `h`."""\n'
+        "@scalar\ndef leap(x, x1, s, at, t, d):\n"
+        '    """Step `d` from the state `x` at time `t` within the substep."""\n'
+        "    W, L, i, h = at\n"
         "    za, zm, zb = t / h, (t + 0.5 * d) / h, (t + d) / h\n"
         f"    {result}, flag = step({call})\n"
     )
@@ -330,7 +308,7 @@ def _terms_at(p: Layout) -> str:
     values |= {f"_ah{i}": _motion(p, "a", i, "z") for i in f.held} | known
     call = ", ".join(values[a] for a in arguments(p))
     return (
-        "@scalar\ndef terms_at(x, s, W, L, i, t, h, M, F):\n"
-        '    """Mass matrix and forces of state `x` at time `t` within the substep `h`."""\n'
-        f"    z = t / h\n    terms({call}, M, F)\n"
+        "@scalar\ndef terms_at(x, s, at, t, M, F):\n"
+        '    """Mass matrix and forces of state `x` at time `t` within the substep."""\n'
+        f"    W, L, i, h = at\n    z = t / h\n    terms({call}, M, F)\n"
     )

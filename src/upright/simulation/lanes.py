@@ -12,7 +12,7 @@ from upright.simulation.equations import step_arguments
 from upright.simulation.flavour import ACTUATOR, Layout
 
 RUN_ARGUMENTS = (
-    "_b0, _b1, _total, P, X0, U, R, START, HELD, HBASE, _nsteps, _every, _substeps, _dt, FL, _nbuf, OUT, STAT"
+    "_b0, _b1, _total, P, X0, U, R, START, HELD, HBASE, _nsteps, _every, _substeps, _dt, FL, _nbuf, OUT, STAT, _events"
 )
 
 
@@ -325,4 +325,4 @@ def _substep(w: Writer) -> None:
         w.depth -= 1
         w.add("_bad = 0.0", f"for _i in range({w.width}):", "    _bad += {flag}")
         w.add("if _bad > 0.0:", "    for _i in range(_valid):", "        if {flag} > 0.0:")
-        w.add(f"            events(W, {w.width}, _i, _h)")
+        w.add(f"            call(_events, W.ctypes.data, {w.width}, _i, _h)")

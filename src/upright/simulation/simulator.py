@@ -201,7 +201,7 @@ class Simulator:
             reduced = np.empty((4 * n + nu, blocks * width))
         step = self._kernel.run_1 if width == 1 else self._kernel.run_16
         call = (lanes, P, X0, u, self._reference, begin, self._grid, base, (samples - 1) * every, every)
-        call += (self.substeps, self.dt, scalars, buffer, out, reduced)
+        call += (self.substeps, self.dt, scalars, buffer, out, reduced, self._kernel.events.address if f.dry else 0)
         if threads <= 1 or blocks < 2 * threads:
             step(0, blocks, *call)
         else:
