@@ -49,10 +49,10 @@ def predict(
             f"{study}: the plant '{asked.plant}' has no parameter {missing[0]}, and {model} is a '{fitted.plant}';"
             " both must be the same plant"
         )
-    from upright.identification.estimate import predict as score
+    from upright.identification.scoring import predict as score
 
     rig = replace(asked.rig, substeps=fitted.substeps)
-    scores = score(rig, fitted.values, [replace(run, role="predict") for run in asked.runs])
+    scores = score(fitted.values, rig, [replace(run, role="predict") for run in asked.runs])
     content: dict[str, Any] = {
         "model": model.name,
         "study": study.name,

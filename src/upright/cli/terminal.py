@@ -15,9 +15,12 @@ Progress = Callable[[str, float, float, int], None]
 
 def console(*, error: bool = False) -> Any:
     """Terminal to print on; plain text when it is piped."""
+    import sys
+
     from rich.console import Console
 
-    return Console(stderr=error, highlight=False, soft_wrap=False)
+    watched = (sys.stderr if error else sys.stdout).isatty()
+    return Console(stderr=error, highlight=False, width=None if watched else 160)
 
 
 @contextmanager
@@ -55,11 +58,15 @@ def print_fit(fit: Fit, files: Sequence[Path], study: Path) -> None:
 
     screen = console()
     table = Table(title="Parameters", title_justify="left", box=None, pad_edge=False, header_style="bold")
-    for heading in ("", "value", "standard error", "interval", "unit", "status", "meaning"):
-        table.add_column(heading, justify="right" if heading in ("value", "standard error") else "left")
+    headings = ["", "value", "std. error", "interval", "unit", "status", "meaning"]
+    headings = headings if screen.width >= 110 else headings[:-1]
+    for heading in headings:
+        right = heading in ("value", "std. error")
+        table.add_column(heading, justify="right" if right else "left", no_wrap=heading != "meaning")
     for row in (*parameter_rows(fit), *run_rows(fit)):
         name = f"{row.name} ({row.run})" if row.run else row.name
-        table.add_row(name, row.value, row.stderr, row.interval, row.unit, row.status, row.meaning)
+        cells = (name, row.value, row.stderr, row.interval, row.unit, row.status, row.meaning)
+        table.add_row(*(_plain(cell) for cell in cells[: len(headings)]))
     screen.print(table)
     print_scores(fit.runs)
     how = f"{fit.method}, {fit.evaluations} evaluations, {fit.seconds:.2f} s"
@@ -78,7 +85,13 @@ def print_scores(runs: Any) -> None:
     """Fit percent per run and signal."""
     from rich.table import Table
 
-    table = Table(title="\nFit", title_justify="left", box=None, pad_edge=False, header_style="bold")
+    table = Table(
+        title="\nHow much of each signal is explained",
+        title_justify="left",
+        box=None,
+        pad_edge=False,
+        header_style="bold",
+    )
     for heading in ("run", "", "signal", "fit %", "compared"):
         table.add_column(heading, justify="right" if heading == "fit %" else "left")
     scores: list[tuple[str, RunScore]] = sorted(runs.items(), key=lambda item: item[1].role != "fit")

@@ -1,0 +1,250 @@
+"""What can a study take from a log before anybody has said what the rig is? Plant, columns, windows, rest levels."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from upright.errors import BadInput
+from upright.identification.columns import Array
+from upright.physics import Plant, find
+from upright.readers.inspection import Column, Inspection
+from upright.records import Record
+
+_RATE = re.compile(r"velocity|speed|rate|_dot\b|omega|\bqd|accel", re.IGNORECASE)
+_EFFORT = re.compile(r"effort|volt|current|torque|force|plant_input|cmd|^(u|v|i)$", re.IGNORECASE)
+_REFERENCE = re.compile(r"target|reference|\bref\b|commanded|set.?point", re.IGNORECASE)
+_ARM = re.compile(r"arm|psi|joint0|base|motor", re.IGNORECASE)
+_CART = re.compile(r"cart|pos|^[xz]\d?$|distance|displacement", re.IGNORECASE)
+_DISK = re.compile(r"disk|disc|theta\s*_?[123]\b", re.IGNORECASE)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recognised:
+    """What a log shows.
+
+    Attributes
+    ----------
+    plant : str
+        Plant that fits the columns.
+    columns : mapping of str to Column
+        Column per coordinate of the plant.
+    rest : mapping of str to float
+        Reading of each at rest, in the column's unit.
+    drive : Column or None
+        What commands the rig.
+    reversed : bool
+        Whether a positive command first moves the driven column down.
+    window : tuple of float
+        Where something happens [s].
+    frequency : float
+        Of the slowest swing of the last coordinate [rad/s]; 0 when it does not swing.
+    doubts : tuple of str
+        Sentences about what was guessed.
+    """
+
+    plant: str
+    columns: dict[str, Column]
+    rest: dict[str, float]
+    drive: Column | None
+    reversed: bool
+    window: tuple[float, float]
+    frequency: float
+    doubts: tuple[str, ...]
+
+
+def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
+    """What can be told from a record and its inspection; `plant` overrides the guess.
+
+    Raises
+    ------
+    BadInput
+        When nothing in the log moves.
+    """
+    places = _places(record, seen)
+    if not places:
+        raise BadInput(
+            f"{seen.file}: no column moves like an angle, a position or a count; `upright show` lists what there is"
+        )
+    drive = _drive(record, seen)
+    doubts: list[str] = []
+    if not plant:
+        plant, doubt = _plant(places, drive)
+        doubts += [doubt] if doubt else []
+    columns, missing = _assign(find(plant), places)
+    doubts += [f"No column was found for {name}; lock it, leave it unmeasured or name its column." for name in missing]
+    last = record[list(columns.values())[-1].name]
+    window = _window(record, seen, [record[c.name] for c in columns.values()], drive)
+    inside = (record.t >= window[0]) & (record.t <= window[1])
+    rest = {name: _zero(record, seen, c, drive, window) for name, c in columns.items()}
+    centre = rest[list(columns)[-1]]
+    driven = record[next(iter(columns.values())).name]
+    return Recognised(
+        plant=plant,
+        columns=columns,
+        rest=rest,
+        drive=drive,
+        reversed=drive is not None and _reversed(record.t, record[drive.name], driven),
+        window=window,
+        frequency=swing_frequency(record.t[inside], last[inside] - centre),
+        doubts=tuple(doubts),
+    )
+
+
+def _places(record: Record, seen: Inspection) -> list[Column]:
+    """Columns that measure a place and move, without speeds, drives, clocks and liars."""
+    kinds = ("rad", "m", "counts", "deg", "mm", "")
+    found = [c for c in seen.columns if not (c.drive or c.constant or c.lies) and c.guess in kinds]
+    found = [c for c in found if not _RATE.search(c.name) and not _is_speed(record, c.name, [o.name for o in found])]
+    found = [_as_angle(record, c, seen) for c in found]
+    found = [c for c in found if c.guess] or found
+    span = {c.name: c.high - c.low for c in found}
+    largest = {unit: max(span[c.name] for c in found if c.guess == unit) for unit in {c.guess for c in found}}
+    return [c for c in found if span[c.name] > 0.01 * largest[c.guess]]  # a locked arm still moves by some mrad
+
+
+def _is_speed(record: Record, name: str, others: list[str]) -> bool:
+    """Whether a column is the slope of another one."""
+    step = max(record.t.size // 5000, 1)
+    x = record[name]
+    for other in others:
+        if other != name:
+            slope = np.gradient(record[other], record.t)
+            width = max(step, 5)
+            a, b = (np.convolve(v, np.ones(width) / width, "valid")[::step] for v in (slope, x))
+            if a.std() > 0 and b.std() > 0 and np.corrcoef(a, b)[0, 1] > 0.97:
+                return True
+    return False
+
+
+def _as_angle(record: Record, c: Column, seen: Inspection) -> Column:
+    """A nameless column that comes to rest half a turn from zero is an angle."""
+    if c.guess or c.high - c.low < 0.3:
+        return c
+    rest = rest_level(record[c.name], seen, record.t)
+    return replace(c, guess="rad") if abs(abs(rest) - math.pi) < 0.1 else c
+
+
+def _drive(record: Record, seen: Inspection) -> Column | None:
+    candidates = [c for c in seen.columns if c.drive and not c.constant and not c.lies]
+    candidates = [c for c in candidates if not _REFERENCE.search(c.name)]
+    effort = [c for c in candidates if _EFFORT.search(c.name)]
+    return (effort or candidates or [None])[0]
+
+
+def _plant(places: list[Column], drive: Column | None) -> tuple[str, str]:
+    """Plant whose coordinates look like these columns, and how sure that is."""
+    lengths = [c for c in places if c.guess in ("m", "mm")]
+    counts = [c for c in places if c.guess in ("counts", "")]
+    angles = [c for c in places if c.guess in ("rad", "deg")]
+    bodies = min(len(counts), 3)
+    if counts and not angles and not lengths:
+        kind = "torsional" if any(_DISK.search(c.name) for c in counts) else "rectilinear"
+        other = "rectilinear" if kind == "torsional" else "torsional"
+        return (
+            f"{kind}-{bodies}",
+            f"Counts of {bodies} encoder(s) were taken for a {kind} chain; {other}-{bodies} looks the same.",
+        )
+    if lengths and angles:
+        return "cart-pendulum", ""
+    if len(angles) >= 2:
+        if all(_DISK.search(c.name) for c in angles):
+            return f"torsional-{min(len(angles), 3)}", "Several angles were taken for disks on a shaft."
+        return "furuta", "Two angles were taken for arm and pendulum of a Furuta pendulum."
+    if lengths:
+        return f"rectilinear-{min(len(lengths), 3)}", "Positions were taken for carts on springs."
+    doubt = "One angle was taken for a pendulum on a fixed pivot." if drive is not None else ""
+    return "pendulum", doubt
+
+
+def _assign(plant: type[Plant], places: list[Column]) -> tuple[dict[str, Column], list[str]]:
+    """Column per coordinate: by name, then by kind and order."""
+    left, out, missing = list(places), dict[str, Column](), list[str]()
+    for coordinate in plant.coordinates:
+        kinds = ("rad", "deg") if coordinate.unit == "rad" else ("m", "mm")
+        fitting = [c for c in left if c.guess in kinds] or [c for c in left if c.guess in ("counts", "")]
+        pattern = {"psi": _ARM, "x": _CART}.get(coordinate.name)
+        best = next((c for c in fitting if c.name == coordinate.name), None)
+        best = best or next((c for c in fitting if pattern and pattern.search(c.name)), None)
+        best = best or (fitting[0] if fitting else None)
+        if best is None:
+            missing.append(coordinate.name)
+        else:
+            out[coordinate.name] = best
+            left.remove(best)
+    if not out:
+        raise BadInput(f"no column looks like {plant.coordinates[0].meaning}; choose another --plant")
+    return out, missing
+
+
+def _zero(record: Record, seen: Inspection, c: Column, drive: Column | None, window: tuple[float, float]) -> float:
+    """Reading at which a coordinate is taken to be zero: before the first command, else where it comes to rest."""
+    x = record[c.name]
+    if drive is not None:
+        u = record[drive.name]
+        first = int(np.argmax(u != u[0]))
+        if u[0] == 0 and first >= 5:
+            return float(np.median(x[max(0, first - 50) : first]))
+        return float(x[np.searchsorted(record.t, window[0])]) if c.guess != "rad" else rest_level(x, seen, record.t)
+    return rest_level(x, seen, record.t)
+
+
+def rest_level(x: Array, seen: Inspection, t: Array) -> float:
+    """Reading at rest: where it lies still at the end, else at the start, else the middle of the last swings."""
+    for start, stop in reversed(seen.rests):
+        if stop >= t[-1] - 0.05 * (t[-1] - t[0]):
+            return float(np.median(x[(t >= start) & (t <= stop)]))
+    late = x[-max(x.size // 5, 2) :]
+    middle = (float(late.max()) + float(late.min())) / 2
+    start = next((span for span in seen.rests if span[0] <= t[0] + 0.02 * (t[-1] - t[0])), None)
+    held = float(np.median(x[(t >= start[0]) & (t <= start[1])])) if start else middle
+    # lying still away from the middle is a hand that holds it before release
+    return held if abs(held - middle) < 0.1 * float(np.ptp(x)) else middle
+
+
+def _window(record: Record, seen: Inspection, signals: list[Array], drive: Column | None) -> tuple[float, float]:
+    """From the release, or shortly before the first command, to where everything has come to rest."""
+    t = record.t
+    start, stop = float(t[0]), float(t[-1])
+    length = stop - start
+    first = next((span for span in seen.rests if span[0] <= start + 0.02 * length), None)
+    if first is not None:
+        if drive is not None and drive.switches:
+            start = max(start, drive.switches[0][0] - 0.1)
+        else:
+            moved = [np.flatnonzero(np.abs(x - np.median(x[t <= first[1]])) > 0.05 * np.ptp(x)) for x in signals]
+            after = [float(t[m[m >= np.searchsorted(t, first[0])][0]]) for m in moved if m.size]
+            start = min(after) if after else start
+    last = next((span for span in reversed(seen.rests) if span[1] >= stop - 0.05 * length), None)
+    if last is not None and last[0] > start + 0.1 * length:
+        stop = min(stop, last[0] + 0.5)
+    return start, stop
+
+
+def _reversed(t: Array, u: Array, x: Array) -> bool:
+    """Whether the driven column moves against the first command."""
+    live = np.flatnonzero(u != u[0])
+    if not live.size:
+        return False
+    i = int(live[0])
+    after = x[i : i + max(int(0.3 / float(np.median(np.diff(t)))), 5)]
+    moved = after - x[i]
+    far = np.flatnonzero(np.abs(moved) > 0.03 * np.ptp(x))
+    return bool(far.size and moved[far[0]] * (u[i] - u[0]) < 0)
+
+
+def swing_frequency(t: Array, x: Array) -> float:
+    """Angular frequency [rad/s] of the last swings about zero, where they are small; 0 without three crossings."""
+    far = np.flatnonzero(np.abs(x) > 0.3 * np.std(x))  # hysteresis: noise about zero is no swing
+    if far.size < 2:
+        return 0.0
+    turns = np.flatnonzero(np.diff(np.signbit(x[far])))
+    if turns.size < 4:
+        return 0.0
+    before, after = far[turns], far[turns + 1]
+    at = (t[before] * np.abs(x[after]) + t[after] * np.abs(x[before])) / (np.abs(x[before]) + np.abs(x[after]))
+    half = float(np.median(np.diff(at[-21:])))
+    return math.pi / half if half > 0 else 0.0
