@@ -147,7 +147,7 @@ def test_two_coupled_blocks_of_which_one_sticks_follow_an_independent_event_solv
 @LANES
 def test_energy_never_rises_without_input(rotary, lanes):
     p = {**FURUTA, "b_1c": 3e-2, "b_2c": 1e-2}
-    x = simulate(rotary, p, lanes_of([0.1, 2.0, 2.0, -1.0], lanes), None, 1e-3, samples=6001, substeps=2)
+    x = simulate(rotary, p, lanes_of([0.1, 2.0, 2.0, -1.0], lanes), None, 1e-3, samples=8001, substeps=2)
     scope = {**p, "sin": np.sin, "cos": np.cos}
     names = ("psi", "psi_dot", "theta", "theta_dot")
     energy = eval(f"({rotary.kinetic}) + ({rotary.potential})", scope, {n: x[:, i] for i, n in enumerate(names)})

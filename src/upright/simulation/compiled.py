@@ -42,6 +42,17 @@ compiled = njit(fastmath=FAST, error_model="numpy", nogil=True, cache=True)
 
 
 @intrinsic
+def wide(context):
+    """Let the enclosing function use 512-bit registers where there are any; LLVM would settle for 256."""
+
+    def generate(context, builder, signature, args):
+        set.add(builder.function.attributes, '"prefer-vector-width"="512"')
+        return context.get_dummy_value()
+
+    return types.void(), generate
+
+
+@intrinsic
 def call(context, address, data, L, i, h):
     """Call the search of events by its address, so that it is compiled once and not into every loop."""
 

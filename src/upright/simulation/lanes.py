@@ -42,6 +42,7 @@ def run(p: Layout, width: int) -> str:
     """Text of ``run_{width}``."""
     w = Writer(p, width)
     w.add(
+        "wide()",
         f"W = zeros({len(p.rows) * width})",
         f"DI = zeros({width}, int64)",
         "_h = _dt / _substeps",
