@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
 from tests.readers.logs import FOLDER, SYNTHETIC
+
 from upright.errors import BadInput
 from upright.readers import read_source
 from upright.readers.source import Source
@@ -23,7 +23,7 @@ from upright.readers.source import Source
 TRIALS = int(os.environ.get("UPRIGHT_FUZZ", "400"))
 HEAD = 24_000  # bytes; damage looks the same in the first rows of a large log
 STRANGE = (b"nan", b"inf", b"1e999", b"-", b"", b"\x00", b"\xff\xfe", b"1e300", b"--3", b"9" * 400, b"0x1F", b"1_0")
-SIGNS = b"0123456789.,;[]\t\n\r eE+-#%\x00\xff\"/"
+SIGNS = b'0123456789.,;[]\t\n\r eE+-#%\x00\xff"/'
 
 
 def originals() -> list[tuple[str, bytes]]:
@@ -47,21 +47,21 @@ def head(path: Path) -> bytes:
 
 
 def shortened(data: bytes) -> bytes:
+    """MATLAB file with shorter vectors, not compressed, so that damage reaches the numbers behind zlib's checksum."""
     from scipy.io import loadmat, savemat
 
     content = {k: v for k, v in loadmat(io.BytesIO(data)).items() if not k.startswith("__")}
-    if sum(v.nbytes for v in content.values()) > 40_000 and all(v.dtype != object and not v.dtype.names for v in content.values()):
-        content = {k: np.ravel(v)[:500] for k, v in content.items()}
-        file = io.BytesIO()
-        savemat(file, content, do_compression=True)
-        return file.getvalue()
-    return data if len(data) < 200_000 else data[:HEAD]
+    if any(v.dtype == object or "signals" in (v.dtype.names or ()) for v in content.values()):
+        return data[:HEAD]
+    file = io.BytesIO()
+    savemat(file, {k: v if v.dtype.names else np.ravel(v)[:500] for k, v in content.items()})
+    return file.getvalue()
 
 
 def mutate(data: bytes, rng: np.random.Generator) -> bytes:
     """Copy with one to three kinds of damage."""
     out = bytearray(data)
-    for _ in range(int(rng.integers(1, 4))):
+    for _ in range(int(rng.choice((1, 1, 2, 3)))):
         at = int(rng.integers(0, max(len(out), 1)))
         span = int(rng.integers(1, 60))
         match int(rng.integers(0, 9)):
@@ -102,8 +102,12 @@ def judge(name: str, data: bytes) -> bool:
     try:
         record = read_source(Source(file=name, data=data))
     except BadInput as error:
-        assert str(error).strip().endswith((".", "?")), str(error)
-        assert "\n" not in str(error)
+        sentence = str(error)
+    else:
+        sentence = ""
+    if sentence:
+        assert sentence.endswith((".", "?")), sentence
+        assert "\n" not in sentence
         return False
     assert len(record) >= 2
     assert (np.diff(record.t) > 0).all()
@@ -130,7 +134,9 @@ def test_a_damaged_log_is_a_valid_record_or_one_sentence() -> None:
 def test_any_cut_and_any_splice_is_a_valid_record_or_one_sentence(name: str, data: st.DataObject) -> None:
     content = SYNTHETIC[name]()
     cut = data.draw(st.integers(0, len(content)))
-    splice = data.draw(st.binary(max_size=30) | st.text(alphabet="0123456789.,;[]\t\n eE-", max_size=30).map(str.encode))
+    splice = data.draw(
+        st.binary(max_size=30) | st.text(alphabet="0123456789.,;[]\t\n eE-", max_size=30).map(str.encode)
+    )
     judge(name, content[:cut] + splice + content[data.draw(st.integers(cut, len(content))) :])
 
 
@@ -147,6 +153,6 @@ def test_any_bytes_after_a_matlab_header_are_a_valid_record_or_one_sentence(data
 
 
 @settings(deadline=None)
-@given(st.text(alphabet="01.,;\t\n -e#[]tx\"", max_size=200))
+@given(st.text(alphabet='01.,;\t\n -e#[]tx"', max_size=200))
 def test_any_table_like_text_is_a_valid_record_or_one_sentence(text: str) -> None:
     judge("log.csv", text.encode())

@@ -36,14 +36,16 @@ class Quantum:
 def find(values: Array) -> Quantum:
     """Step of a column (N,)."""
     rounding = decimal_rounding(values)
+    if rounding > 0 and np.ptp(values) > 0:  # whole multiples of a digit: exact
+        whole = np.round(np.unique(values) / rounding).astype(np.int64)
+        common = int(np.gcd.reduce(whole - whole[0]))
+        if whole.size > 2 and (common > 1 or rounding >= 1):
+            return Quantum(step=common * rounding)
     levels = _levels(values, rounding)
     if levels.size < 3:
         return Quantum()
-    if rounding >= 1:  # whole numbers: exact
-        whole = np.round(levels - levels[0]).astype(np.int64)
-        return Quantum(step=float(np.gcd.reduce(whole)))
     step = _grid(levels, rounding)
-    if step <= 2 * rounding:
+    if step == 0 or step < 1.5 * rounding:
         # Steps no coarser than the text's own digits tell about the text, not about the sensor.
         few = rounding > 0 and levels.size < 0.5 * values.size
         return Quantum(step=rounding, decimals=True) if few else Quantum()

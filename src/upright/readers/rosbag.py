@@ -71,6 +71,7 @@ def read(source: Source) -> Record:
             held.append(name)
     notes.append(f"Time is '{names[base.clock]}' counted from its first message, epoch {epoch * 1e-9:.6f} s.")
     if held:
+        notes += _moves_before(t, signals, units, held)
         notes.append(f"Held from message to message, 0 before the first: {', '.join(held)}.")
     return Record(t=t, signals=signals, units=units, provenance=source.provenance("ros-bag", *notes))
 
@@ -182,6 +183,23 @@ def _held(
     values = _numbers(source, cells[j], topic.rows, j, names[j])
     last = np.searchsorted(when, t, side="right") - 1
     return np.where(last >= 0, values[np.maximum(last, 0)], 0.0)
+
+
+def _moves_before(t: Array, signals: dict[str, Array], units: dict[str, str], held: list[str]) -> list[str]:
+    """Warning when the rig moves before its first command: an earlier one was not recorded."""
+    moves = [
+        np.abs(x - x[0]) > 0.02 * np.ptp(x) for name, x in signals.items() if name not in held and name not in units
+    ]
+    first_motion = min((int(np.argmax(far)) for far in moves if far.any()), default=t.size)
+    notes: list[str] = []
+    for name in held:
+        commanded = np.flatnonzero(signals[name])
+        if commanded.size and first_motion < commanded[0] and t[commanded[0]] - t[first_motion] > 0.05:
+            notes.append(
+                f"The rig moves at {t[first_motion]:.4g} s, before the first command of '{name}' at"
+                f" {t[commanded[0]]:.4g} s: an earlier command was not recorded; use a window after the first."
+            )
+    return notes
 
 
 def _increasing(source: Source, t: Array, topic: Topic, names: tuple[str, ...], *, strictly: bool) -> None:

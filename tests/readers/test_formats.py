@@ -1,0 +1,282 @@
+"""Does each program's log come back as the numbers it was made from, and is damage named by line and column?"""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.readers import logs
+
+from upright.errors import BadInput
+from upright.readers import read, read_source, recognise
+from upright.readers.source import Source
+from upright.readers.timebase import rebuild
+from upright.records import Record
+
+
+def source(data: bytes, name: str = "log.csv") -> Source:
+    return Source(file=name, data=data)
+
+
+@pytest.mark.parametrize(
+    ("name", "reader"),
+    [
+        ("ecp.csv", "ecp"),
+        ("front end.txt", "table"),
+        ("named.csv", "table"),
+        ("bare.csv", "table"),
+        ("hash.txt", "table"),
+        ("bag.csv", "ros-bag"),
+        ("plain.mat", "matlab"),
+    ],
+)
+def test_the_format_is_told_by_the_content_not_by_the_suffix(name: str, reader: str) -> None:
+    assert recognise(source(logs.SYNTHETIC[name](), "renamed.dat")) == reader
+
+
+@pytest.mark.parametrize("newline", ["\r\n", "\n"])
+def test_an_ecp_export_goes_by_the_names_of_its_columns(newline: str) -> None:
+    record = read_source(source(logs.ecp_export(newline=newline, columns=("Encoder 2 Pos", "Control Effort"))))
+    assert record.names == ("Sample", "Encoder 2 Pos", "Control Effort")
+    assert record.units == {"Sample": "1", "Encoder 2 Pos": "counts", "Control Effort": "V"}
+    np.testing.assert_array_equal(record["Encoder 2 Pos"], np.round(300 * np.sin(0.1 * np.arange(60))))
+    np.testing.assert_array_equal(record["Control Effort"], 0.5)
+
+
+@settings(deadline=None)
+@given(st.floats(0.0021, 0.05), st.integers(20, 400), st.floats(0, 0.9))
+def test_a_clock_rounded_to_1_ms_is_rebuilt_to_its_period(period: float, n: int, phase: float) -> None:
+    true = period * np.arange(n) + phase * 1e-3
+    rebuilt, note = rebuild(np.round(true, 3))
+    if note:
+        # Both ends are off by half a millisecond at most, so no sample is off by more than that.
+        np.testing.assert_allclose(rebuilt, true, atol=0.51e-3)
+        assert np.ptp(np.diff(rebuilt)) < 1e-9
+
+
+def test_a_true_jitter_is_left_as_it_is() -> None:
+    rng = np.random.default_rng(3)
+    t = np.cumsum(0.002 + 4e-4 * rng.random(500))
+    kept, note = rebuild(t)
+    assert note == ""
+    np.testing.assert_array_equal(kept, t)
+
+
+def test_a_missing_sample_keeps_its_place_when_the_log_counts_samples() -> None:
+    lines = logs.tab_export(80).decode().split("\n")
+    del lines[41]  # sample 41
+    record = read_source(source("\n".join(lines).encode()))
+    steps = np.diff(record.t)
+    assert int(np.argmax(steps)) == 39
+    assert steps[39] == pytest.approx(2 * np.median(steps), rel=1e-6)
+
+
+def test_a_table_without_names_counts_its_columns() -> None:
+    record = read_source(source(logs.bare_csv()))
+    assert record.names == ("c1", "c2")
+    np.testing.assert_allclose(record.t, 0.00667 * np.arange(60), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "t", "names"),
+    [
+        ("time [ms];theta [deg]\n0;1\n2;3\n5;4\n", [0, 0.002, 0.005], ("theta [deg]",)),
+        ("t\tx\n0\t1,5\n1\t2,5\n", [0, 1], ("x",)),
+        ("% made by hand\n% t x\n0 1\n1 2\n", [0, 1], ("x",)),
+        ("x, t\n5, 0\n5, 1\n", [0, 1], ("x",)),
+        ('"t","x, raw"\n0,1\n1,2\n', [0, 1], ("x, raw",)),
+        ("t  Encoder 1 Pos\n0  1\n1  2\n", [0, 1], ("Encoder 1 Pos",)),
+        ("t_us,x\n0,1\n2000,2\n", [0, 0.002], ("x",)),
+        ("0 1d0\n1 2D0\n", [0, 1], ("c1",)),
+    ],
+)
+def test_habits_of_other_programs_are_read(text: str, t: list[float], names: tuple[str, ...]) -> None:
+    record = read_source(source(text.encode()))
+    np.testing.assert_allclose(record.t, t, rtol=1e-12)
+    assert record.names == names
+
+
+def test_a_unit_in_brackets_is_the_stated_unit() -> None:
+    units = read_source(source(b"t [s],theta [rad],note (no unit),V\n0,1,2,3\n1,2,3,4\n")).units
+    assert units == {"theta [rad]": "rad", "note (no unit)": "", "V": ""}
+
+
+def test_an_epoch_in_a_table_keeps_its_nanoseconds() -> None:
+    record = read_source(source(b"time,x\n1707681595.547459602,0\n1707681595.547459603,0\n1707681595.549459605,1\n"))
+    np.testing.assert_allclose(record.t, [0, 1e-9, 2.000003e-3], rtol=1e-12)
+
+
+def test_a_bag_keeps_nanoseconds_and_holds_its_commands() -> None:
+    record = read_source(source(logs.ros_bag()))
+    np.testing.assert_allclose(record.t, 2_000_123e-9 * np.arange(60), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(record["/joint_states/joint1/position"], 0.01 * np.arange(60), atol=1e-12)
+    # Message i = 9, 19, ... was followed 0.9 ms later by the command i; the next sample is 2 ms after.
+    expected = [0.0 if i < 10 else (i // 10) * 10 - 1 for i in range(60)]
+    np.testing.assert_array_equal(record["/effort_control/data.0"], expected)
+
+
+@pytest.mark.parametrize("compressed", [True, False])
+def test_our_matlab_parser_agrees_with_scipy(compressed: bool) -> None:
+    from scipy.io import savemat
+
+    from upright.readers.mat5 import Cells, variables
+
+    rng = np.random.default_rng(1)
+    given_ = {
+        "a": rng.normal(size=(3, 5)),
+        "i": np.arange(-7, 9, dtype=np.int16),
+        "b": np.uint8([[200]]),
+        "f": np.float32([1.5, 2.5]),
+        "text": "Square Wave µ",
+        "s": {"gain": 0.5, "inner": {"x": np.arange(4.0)}},
+        "c": np.array([np.arange(3.0), "two"], dtype=object),
+        "e": np.empty((0, 0)),
+        "z": np.array([1 + 2j, 3]),
+        "q": np.zeros((2, 3, 4)),
+    }
+    file = io.BytesIO()
+    savemat(file, given_, do_compression=compressed)
+    found = variables(source(file.getvalue(), "a.mat"))
+    for name in ("a", "i", "b", "f", "e", "q"):
+        np.testing.assert_array_equal(found[name].ravel(), np.ravel(given_[name]))
+    assert found["a"].shape == (3, 5)
+    assert found["text"] == "Square Wave µ"
+    np.testing.assert_array_equal(found["s"]["inner"]["x"].ravel(), np.arange(4.0))
+    assert isinstance(found["c"], Cells)
+    assert found["c"].items[1] == "two"
+    assert found["z"].kind == "complex numbers"
+
+
+def test_simulink_structures_share_their_time(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    t = 60 + np.arange(50) * 1e-4
+    structure = {
+        name: {
+            "time": t[:, None],
+            "signals": {"values": values[:, None], "dimensions": 1, "label": ""},
+            "blockName": "x",
+        }
+        for name, values in (("Theta1", np.cos(t)), ("Distance", 0 * t))
+    }
+    savemat(tmp_path / "run.mat", structure)
+    record = read(tmp_path / "run.mat")
+    assert record.names == ("Theta1", "Distance")
+    np.testing.assert_array_equal(record["Theta1"], np.cos(t))
+    np.testing.assert_array_equal(record.t, t)
+
+
+def test_pieces_that_follow_on_are_joined_in_the_order_of_time(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    t = np.arange(90) * 1e-3
+    y = np.vstack((np.sin(t), np.cos(t)))
+
+    def cells(*items: np.ndarray) -> np.ndarray:
+        out = np.empty((len(items), 1), dtype=object)
+        out[:, 0] = items
+        return out
+
+    content = {
+        "Time_b": cells(t[60:, None]),
+        "Y_b": cells(y[:, 60:]),
+        "Time_a": cells(t[:30, None], t[30:60, None]),
+        "Y_a": cells(y[:, :30], y[:, 30:60]),
+        "dt": 1e-3,
+    }
+    savemat(tmp_path / "pieces.mat", content)
+    record = read(tmp_path / "pieces.mat")
+    assert record.names == ("Y_1", "Y_2")
+    np.testing.assert_array_equal(record.t, t)
+    np.testing.assert_array_equal(record["Y_2"], np.cos(t))
+    assert any("dt = 0.001" in note for note in record.provenance.notes)
+
+
+def test_settings_become_notes(tmp_path: Path) -> None:
+    record = read_source(source(logs.mat_vectors(runParameters={"P_gain": 0.6, "Waveform": "Square Wave"}), "a.mat"))
+    assert any("P_gain = 0.6, Waveform = 'Square Wave'" in note for note in record.provenance.notes)
+
+
+@pytest.mark.parametrize("form", ["csv", "mat"])
+def test_our_own_files_are_recognised(tmp_path: Path, form: str) -> None:
+    record = Record(t=[0, 1, 2.5], signals={"my θ, raw": [1, 2, 4]}, units={"my θ, raw": "rad"}, outputs=("my θ, raw",))
+    getattr(record, f"to_{form}")(tmp_path / "record")
+    back = read(tmp_path / "record")
+    np.testing.assert_array_equal(back["my θ, raw"], record["my θ, raw"])
+    assert (back.units, back.outputs) == (record.units, record.outputs)
+
+
+@pytest.mark.parametrize(
+    ("data", "sentence"),
+    [
+        (b"", "the file is empty"),
+        (b" \r\n \n", "the file is empty"),
+        (b"t,x\n0,1\n1,two\n", "line 3, column 2 \\(x\\).*'two'"),
+        (b"t,x\n0,1\n1,\n2,3\n", "line 3, column 2 \\(x\\).*empty cell"),
+        (b"t,x\n0,1\n1,nan\n", "line 3, column 2 \\(x\\).*'nan'"),
+        (b"t,x\n0,1\n1,1e999\n", "line 3, column 2 \\(x\\).*too large"),
+        (b"t,x\n0,1\n1,1e200\n", "line 3, column 2 \\(x\\).*too large"),
+        (b"t,x\n0,1\n\n2,3\n1,3\n", "line 5, column 1 \\(t\\).*1 s after 2 s"),
+        (b"t,x\n0,1\n1,2\n2", "line 4.*the last row is torn"),
+        (b"t,x\n0.00,1.00\n1.00,2.00\n2.00,2.50\n3.00,2.5", "line 5, column 2 \\(x\\).*the last row is torn"),
+        (b"t,x,y\n0,1\n1,2\n", "line 1.*a name for each of the 2 columns below, got 3"),
+        (b"t,x,x\n0,1,2\n1,2,3\n", "line 1, column 3 \\(x\\).*got this one twice"),
+        (b"a,b\n3,1\n2,2\n", "line 1.*a time column named 't'"),
+        (b"Sample,x\n1,1\n2,2\n", "only the sample index"),
+        (b"t,x\n", "expected rows of numbers"),
+        (b"t,x\n0,1\n", "at least 2 samples"),
+        (b"t,x\n0,1\n1,\x002\n", "line 3, column 3.*byte 0x00"),
+        (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "binary format"),
+        (b"MATLAB 7.3 MAT-file" + b" " * 493 + b"\x89HDF\r\n\x1a\n", "version 7.3 \\(HDF5\\).*'-v7'"),
+        (b"MATLAB 5.0 MAT-file", "damaged or older"),
+        (logs.mat_vectors(61)[:-9], "cut short or damaged"),
+        (logs.ecp_export().replace(b"]", b";"), "line 62.*expected ']'"),
+        (logs.ecp_export()[:2000], "cut short|torn"),
+        (logs.ecp_export().replace(b";", b" ", 1), "line 3.*expected ';'"),
+        (logs.ros_bag().replace(b",0.050000000", b",", 1), "line 7, column 4 .*this cell is empty"),
+        (logs.ros_bag()[:-8], "torn"),
+    ],
+)
+def test_damage_is_named_in_one_sentence_with_its_place(data: bytes, sentence: str, tmp_path: Path) -> None:
+    path = tmp_path / "damaged"
+    path.write_bytes(data)
+    with pytest.raises(BadInput, match=sentence) as caught:
+        read(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_missing_file_is_answered_with_its_neighbour(tmp_path: Path) -> None:
+    (tmp_path / "swing.csv").write_bytes(logs.named_csv())
+    with pytest.raises(BadInput, match=r"did you mean 'swing\.csv'"):
+        read(tmp_path / "swnig.csv")
+    with pytest.raises(BadInput, match="is a folder"):
+        read(tmp_path)
+
+
+def test_a_last_number_that_may_be_cut_is_noted(tmp_path: Path) -> None:
+    record = read_source(source(b"t,x\n0,1\n1,25\n2,3"))
+    assert any("no line end" in note for note in record.provenance.notes)
+
+
+def test_provenance_names_the_content() -> None:
+    import hashlib
+
+    data = logs.named_csv()
+    assert read_source(source(data)).provenance.sha256 == hashlib.sha256(data).hexdigest()
+
+
+def test_two_megabytes_are_read_in_half_a_second() -> None:
+    from time import perf_counter
+
+    data = logs.named_csv(30_000)
+    assert len(data) > 2e6
+    best = 1e9
+    for _ in range(3):
+        start = perf_counter()
+        read_source(source(data))
+        best = min(best, perf_counter() - start)
+    assert best < 0.5

@@ -1,0 +1,132 @@
+"""Is a log seen through: its steps, its lies, its gaps and when it rests?"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from upright.readers import inspect, quantum
+from upright.records import Record
+
+
+def swing(n: int = 4000, dt: float = 2e-3) -> tuple[np.ndarray, np.ndarray]:
+    t = dt * np.arange(n)
+    return t, 0.9 * np.exp(-0.3 * t) * np.cos(5 * t)
+
+
+def counted(x: np.ndarray, step: float) -> np.ndarray:
+    return step * np.round(x / step)
+
+
+@settings(deadline=None)
+@given(st.sampled_from([2000, 2048, 4096, 8192, 14400, 16000, 40000]), st.floats(-3, 3))
+def test_the_counts_of_an_encoder_are_found(counts: int, offset: float) -> None:
+    _, theta = swing()
+    found = quantum.find(counted(theta, 2 * math.pi / counts) + offset)
+    assert found.counts_per_rev == counts
+    assert found.step == pytest.approx(2 * math.pi / counts, rel=1e-9)
+
+
+@pytest.mark.parametrize("decimals", [5, 6, 9])
+def test_the_counts_survive_text_with_few_decimals(decimals: int) -> None:
+    _, theta = swing()
+    found = quantum.find(np.round(counted(theta, 2 * math.pi / 2000), decimals))
+    assert found.counts_per_rev == 2000
+
+
+@settings(deadline=None)
+@given(st.floats(2e-5, 1e-2).filter(lambda step: abs(math.log10(step) % 1) > 1e-6))  # 1e-3 could be decimals
+def test_a_linear_encoder_has_its_step_and_no_revolution(step: float) -> None:
+    _, x = swing()
+    found = quantum.find(counted(x, step))
+    assert found.step == pytest.approx(step, rel=1e-6)
+
+
+def test_a_smooth_signal_has_no_step() -> None:
+    rng = np.random.default_rng(5)
+    assert quantum.find(rng.normal(size=3000)).step == 0
+    assert quantum.find(swing()[1]).step == 0
+
+
+def test_whole_counts_are_exact() -> None:
+    assert quantum.find(np.array([0.0, 6, -9, 3, 12])).step == 3
+
+
+def test_a_difference_quotient_is_no_sensor_but_a_tachometer_is() -> None:
+    t, theta = swing()
+    theta_counts = counted(theta, 2 * math.pi / 2000)
+    quotient = np.diff(theta_counts, prepend=theta_counts[0]) / 2e-3
+    filtered = np.zeros_like(quotient)
+    for k in range(1, t.size):
+        filtered[k] = filtered[k - 1] + 0.2 * (quotient[k] - filtered[k - 1])
+    tachometer = np.gradient(theta, t) + np.random.default_rng(0).normal(0, 0.01, t.size)
+    record = Record(t=t, signals={"p": theta_counts, "v": quotient, "vf": filtered, "tacho": tachometer})
+    seen = inspect(record)
+    assert "backward difference quotient of 'p'" in seen.column("v").lies[0]
+    assert "first-order filter (weight 0.2)" in " ".join(seen.column("vf").lies)
+    assert seen.column("tacho").lies == ()
+    assert seen.column("p").lies == ()
+
+
+def test_an_exact_rate_beside_an_exact_position_is_not_accused() -> None:
+    t, theta = swing()
+    assert inspect(Record(t=t, signals={"p": theta, "v": np.gradient(theta, t)})).column("v").lies == ()
+
+
+def test_copies_of_time_index_and_other_columns_are_named() -> None:
+    t, theta = swing(500)
+    seen = inspect(
+        Record(t=t, signals={"received": t + 4e-4, "Sample": np.arange(500), "x": theta, "deg": theta * 180 / math.pi})
+    )
+    assert "a copy of the time, 0.4 ms later" in seen.column("received").lies[0]
+    assert "sample index" in seen.column("Sample").lies[0]
+    assert "times 57.2958" in seen.column("deg").lies[0]
+
+
+@pytest.mark.parametrize(
+    ("level", "sentence"),
+    [(409, "409 = 0.5 V"), (573, "573 = 0.7 V"), (-491, "-491 = -0.6 V"), (1000, "the reference")],
+)
+def test_an_effort_in_dac_counts_is_told_from_a_reference(level: int, sentence: str) -> None:
+    t, theta = swing(900)
+    effort = np.where((t > 0.5) & (t < 1.2), level, 0)
+    column = inspect(Record(t=t, signals={"enc": np.round(900 * theta), "Control Effort": effort})).column(
+        "Control Effort"
+    )
+    assert sentence in column.lies[0]
+    assert column.drive
+    assert [value for _, value in column.switches] == [level, 0]
+
+
+def test_gaps_jitter_and_a_late_start_are_measured() -> None:
+    t = 0.028 + 1e-3 * np.delete(np.arange(1000), np.arange(300, 320))
+    time = inspect(Record(t=t, signals={"x": t})).time
+    assert time.late == pytest.approx(0.028)
+    assert [(gap.missing, round(gap.start, 6)) for gap in time.gaps] == [(20, 0.327)]
+    assert time.period == pytest.approx(1e-3)
+    assert time.jitter == 0
+
+
+def test_saturation_rests_and_turns_are_seen() -> None:
+    t, theta = swing(3000)
+    u = np.clip(20 * np.cos(3 * t), -10, 10)
+    still = np.where(t < 2, 0.0, np.sin(4 * (t - 2)))
+    seen = inspect(Record(t=t, signals={"theta": 4 * np.pi + 0.1 * theta, "plant_input": u, "alpha": still}))
+    # |20 cos| > 10 for two thirds of a cycle, half of that on each side.
+    assert seen.column("plant_input").high_share == pytest.approx(1 / 3, abs=0.05)
+    assert seen.column("plant_input").low_share == pytest.approx(1 / 3, abs=0.05)
+    assert seen.column("theta").turns == 2
+    alone = inspect(Record(t=t, signals={"alpha": still}))
+    assert alone.rests[0][0] == 0
+    assert alone.rests[0][1] == pytest.approx(2, abs=0.26)
+
+
+def test_an_idle_input_is_named() -> None:
+    t, theta = swing(300)
+    column = inspect(Record(t=t, signals={"theta": theta, "Control Effort": 0 * t})).column("Control Effort")
+    assert column.idle
+    assert column.constant
