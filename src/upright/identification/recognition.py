@@ -9,7 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from upright.errors import BadInput
-from upright.identification.columns import Array
+from upright.identification.happenings import (
+    moves_against,
+    moving_window,
+    rest_level,
+    swing_frequency,
+    zero_reading,
+)
 from upright.physics import Plant, find
 from upright.readers.inspection import Column, Inspection
 from upright.records import Record
@@ -77,9 +83,10 @@ def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
     columns, missing = _assign(find(plant), places)
     doubts += [f"No column was found for {name}; lock it, leave it unmeasured or name its column." for name in missing]
     last = record[list(columns.values())[-1].name]
-    window = _window(record, seen, [record[c.name] for c in columns.values()], drive)
+    pushed = plant in ("cart-pendulum", "furuta") and len(columns) > 1
+    window = moving_window(record, seen, [record[c.name] for c in columns.values()], drive, pushed=pushed)
     inside = (record.t >= window[0]) & (record.t <= window[1])
-    rest = {name: _zero(record, seen, c, drive, window) for name, c in columns.items()}
+    rest = {name: zero_reading(record, seen, c, drive, window) for name, c in columns.items()}
     centre = rest[list(columns)[-1]]
     driven = record[next(iter(columns.values())).name]
     return Recognised(
@@ -87,7 +94,7 @@ def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
         columns=columns,
         rest=rest,
         drive=drive,
-        reversed=drive is not None and _reversed(record.t, record[drive.name], driven),
+        reversed=drive is not None and moves_against(record.t, record[drive.name], driven),
         window=window,
         frequency=swing_frequency(record.t[inside], last[inside] - centre),
         doubts=tuple(doubts),
@@ -178,73 +185,3 @@ def _assign(plant: type[Plant], places: list[Column]) -> tuple[dict[str, Column]
     if not out:
         raise BadInput(f"no column looks like {plant.coordinates[0].meaning}; choose another --plant")
     return out, missing
-
-
-def _zero(record: Record, seen: Inspection, c: Column, drive: Column | None, window: tuple[float, float]) -> float:
-    """Reading at which a coordinate is taken to be zero: before the first command, else where it comes to rest."""
-    x = record[c.name]
-    if drive is not None:
-        u = record[drive.name]
-        first = int(np.argmax(u != u[0]))
-        if u[0] == 0 and first >= 5:
-            return float(np.median(x[max(0, first - 50) : first]))
-        return float(x[np.searchsorted(record.t, window[0])]) if c.guess != "rad" else rest_level(x, seen, record.t)
-    return rest_level(x, seen, record.t)
-
-
-def rest_level(x: Array, seen: Inspection, t: Array) -> float:
-    """Reading at rest: where it lies still at the end, else at the start, else the middle of the last swings."""
-    for start, stop in reversed(seen.rests):
-        if stop >= t[-1] - 0.05 * (t[-1] - t[0]):
-            return float(np.median(x[(t >= start) & (t <= stop)]))
-    late = x[-max(x.size // 5, 2) :]
-    middle = (float(late.max()) + float(late.min())) / 2
-    start = next((span for span in seen.rests if span[0] <= t[0] + 0.02 * (t[-1] - t[0])), None)
-    held = float(np.median(x[(t >= start[0]) & (t <= start[1])])) if start else middle
-    # lying still away from the middle is a hand that holds it before release
-    return held if abs(held - middle) < 0.1 * float(np.ptp(x)) else middle
-
-
-def _window(record: Record, seen: Inspection, signals: list[Array], drive: Column | None) -> tuple[float, float]:
-    """From the release, or shortly before the first command, to where everything has come to rest."""
-    t = record.t
-    start, stop = float(t[0]), float(t[-1])
-    length = stop - start
-    first = next((span for span in seen.rests if span[0] <= start + 0.02 * length), None)
-    if first is not None:
-        if drive is not None and drive.switches:
-            start = max(start, drive.switches[0][0] - 0.1)
-        else:
-            moved = [np.flatnonzero(np.abs(x - np.median(x[t <= first[1]])) > 0.05 * np.ptp(x)) for x in signals]
-            after = [float(t[m[m >= np.searchsorted(t, first[0])][0]]) for m in moved if m.size]
-            start = min(after) if after else start
-    last = next((span for span in reversed(seen.rests) if span[1] >= stop - 0.05 * length), None)
-    if last is not None and last[0] > start + 0.1 * length:
-        stop = min(stop, last[0] + 0.5)
-    return start, stop
-
-
-def _reversed(t: Array, u: Array, x: Array) -> bool:
-    """Whether the driven column moves against the first command."""
-    live = np.flatnonzero(u != u[0])
-    if not live.size:
-        return False
-    i = int(live[0])
-    after = x[i : i + max(int(0.3 / float(np.median(np.diff(t)))), 5)]
-    moved = after - x[i]
-    far = np.flatnonzero(np.abs(moved) > 0.03 * np.ptp(x))
-    return bool(far.size and moved[far[0]] * (u[i] - u[0]) < 0)
-
-
-def swing_frequency(t: Array, x: Array) -> float:
-    """Angular frequency [rad/s] of the last swings about zero, where they are small; 0 without three crossings."""
-    far = np.flatnonzero(np.abs(x) > 0.3 * np.std(x))  # hysteresis: noise about zero is no swing
-    if far.size < 2:
-        return 0.0
-    turns = np.flatnonzero(np.diff(np.signbit(x[far])))
-    if turns.size < 4:
-        return 0.0
-    before, after = far[turns], far[turns + 1]
-    at = (t[before] * np.abs(x[after]) + t[after] * np.abs(x[before])) / (np.abs(x[before]) + np.abs(x[after]))
-    half = float(np.median(np.diff(at[-21:])))
-    return math.pi / half if half > 0 else 0.0
