@@ -29,7 +29,7 @@ kilogram = [mass] = kg
 gram = 1e-3 * kilogram = g
 second = [time] = s = sec
 ampere = [current] = A = amp
-count = [count] = _ = counts
+encoder_count = [count] = _ = count = counts
 radian = [] = rad
 degree = 0.017453292519943295 * radian = deg = °
 revolution = 6.283185307179586 * radian = rev = turn
