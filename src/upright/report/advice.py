@@ -49,7 +49,8 @@ def _broken(fit: Fit) -> list[Step]:
                 steps.append(
                     Step(
                         sentence=f"{plain(name)} of run '{label}' is explained worse than by its mean "
-                        f"({percent(value)}): look at the sign and scale of the column first, a reversed sign scores about −100 %.",
+                        f"({percent(value)}): look at the sign and scale of the column first; "
+                        "a reversed sign scores about −100 %.",
                         command=f"[sensors.{name}]\nsign = -1",
                     )
                 )

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-P, R = ParamSpec("P"), TypeVar("R")
+P = ParamSpec("P")
+R = TypeVar("R")
 Array = NDArray[np.float64]
 
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
@@ -108,22 +109,19 @@ def svg(drawing: Figure, name: str) -> str:
     return f'{responsive} style="max-width:{share:.0f}%" aria-hidden="true" focusable="false"{text[len(opening) :]}'
 
 
-def decimated(t: Array, *columns: Array, buckets: int = 450) -> tuple[Array, ...]:
-    """Time and columns thinned to what an eye can see: the least and the greatest sample of every bucket.
+def decimated(t: Array, y: Array, buckets: int = 450) -> tuple[Array, Array]:
+    """Curve thinned to what an eye can see: the least and the greatest sample of every bucket.
 
-    Fewer than ``3 buckets`` samples come back as they are; each column is returned as (time, values).
+    Fewer than ``3 buckets`` samples come back as they are.
     """
     if t.size <= 3 * buckets:
-        return tuple(a for c in columns for a in (t, c))
+        return t, y
     edges = np.linspace(0, t.size, buckets + 1).astype(int)
-    out: list[Array] = []
-    for c in columns:
-        kept = {0, t.size - 1}
-        for lo, hi in pairwise(edges):
-            kept |= {lo + int(np.argmin(c[lo:hi])), lo + int(np.argmax(c[lo:hi]))}
-        index = np.array(sorted(kept))
-        out += [t[index], c[index]]
-    return tuple(out)
+    kept = {0, t.size - 1}
+    for lo, hi in pairwise(edges):
+        kept |= {int(lo + np.argmin(y[lo:hi])), int(lo + np.argmax(y[lo:hi]))}
+    index = np.array(sorted(kept))
+    return t[index], y[index]
 
 
 def broken(t: Array, y: Array, every: float | None) -> tuple[Array, Array]:

@@ -74,25 +74,20 @@ def fit_figure(
 
 
 def _signal(upper: Axes, lower: Axes, score: RunScore, j: int, unit: str, buckets: int) -> None:
-    t, y, model = score.t, score.y[:, j], score.simulated[:, j]
-    left = y - model
-    tm, seen, tr, rest = decimated(t, y, left, buckets=buckets)
-    tn, foreseen = broken(*decimated(t, model, buckets=buckets), score.horizon)
-    upper.plot(tm, seen, color=SKY, linewidth=2.6, solid_capstyle="butt", label="measured")
-    upper.plot(tn, foreseen, color=BLACK, linewidth=0.9, linestyle=(0, (5, 1.5)), label="model")
-    upper.set_ylabel(axis(plain(score.measured[j]), unit))
-    lower.axhline(0, color=GREY, linewidth=0.6)
-    lower.plot(tr, rest, color=VERMILLION, linewidth=0.7)
-    lower.set_ylabel("residual", fontsize=8)
-    lower.yaxis.set_major_locator(_few())
-    for panel, values in ((upper, np.concatenate([y, model])), (lower, left)):
-        _limits(panel, values)
-
-
-def _few() -> object:
     from matplotlib.ticker import MaxNLocator
 
-    return MaxNLocator(nbins=3, symmetric=True)
+    t, y, model = score.t, score.y[:, j], score.simulated[:, j]
+    left = y - model
+    upper.plot(*decimated(t, y, buckets), color=SKY, linewidth=2.6, solid_capstyle="butt", label="measured")
+    foreseen = broken(*decimated(t, model, buckets), score.horizon)
+    upper.plot(*foreseen, color=BLACK, linewidth=0.9, linestyle=(0, (5, 1.5)), label="model")
+    upper.set_ylabel(axis(plain(score.measured[j]), unit))
+    lower.axhline(0, color=GREY, linewidth=0.6)
+    lower.plot(*decimated(t, left, buckets), color=VERMILLION, linewidth=0.7)
+    lower.set_ylabel("residual", fontsize=8)
+    lower.yaxis.set_major_locator(MaxNLocator(nbins=3, symmetric=True))
+    for panel, values in ((upper, np.concatenate([y, model])), (lower, left)):
+        _limits(panel, values)
 
 
 def _limits(panel: Axes, values: Array) -> None:
@@ -132,7 +127,7 @@ def autocorrelation_figure(runs: Mapping[str, RunScore]) -> Figure:
         rest = rest[np.isfinite(rest)]
         lags = max(1, min(rest.size // 4, 400 if rest.size < 20_000 else 2000))
         period = float(score.t[-1] - score.t[0]) / max(score.t.size - 1, 1)
-        lag, r = decimated(np.arange(lags + 1) * period, autocorrelation(rest, lags), buckets=150)
+        lag, r = decimated(np.linspace(0, lags * period, lags + 1), autocorrelation(rest, lags), 150)
         band = 1.96 / np.sqrt(max(rest.size, 1))
         ax.axhspan(-band, band, color=GREY, alpha=0.4, linewidth=0)
         ax.axhline(0, color=GREY, linewidth=0.6)

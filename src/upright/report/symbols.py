@@ -15,7 +15,7 @@ _SYMBOL = re.compile(r"[A-Za-z]+(_[A-Za-z0-9]+)*[0-9]*\Z")
 
 
 def parts(name: str) -> tuple[str, str, str]:
-    """Stem, subscript and dot of a symbol: ``theta1_dot`` -> ``θ``, ``1``, ``.``; ``b_1c`` -> ``b``, ``1c``, nothing."""
+    """Stem, subscript and dot of a symbol: ``theta1_dot`` -> ``θ``, ``1``, ``.``; ``b_1c`` -> ``b``, ``1c``."""
     dot = "." if name.endswith("_dot") else ""
     stem, _, below = name.removesuffix("_dot").partition("_")
     digits = re.fullmatch(r"([A-Za-z]+)([0-9]+)", stem)
