@@ -156,7 +156,8 @@ def _si(unit: str) -> tuple[float, str]:
 def _registry() -> Any:
     import pint
 
-    registry: Any = pint.UnitRegistry("", system="")
+    nothing: Any = None  # not "", which stands for pint's full list
+    registry: Any = pint.UnitRegistry(nothing, system=nothing)
     registry.load_definitions(_DEFINITIONS.strip().splitlines())
     return registry
 
