@@ -29,7 +29,7 @@ ACTUATOR = {
 
 PER_RUN = ("initial", "offset", "gain", "friction", "input_offset")
 """What may differ from run to run: initial state, sensor offsets, actuator gain (a factor), dry and viscous friction
-of every joint (one common factor), a constant added to the command."""
+of every joint (one common factor), a constant added to the command. "offset.theta" means the offset of one sensor."""
 
 
 @dataclass(frozen=True, kw_only=True)

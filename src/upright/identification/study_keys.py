@@ -43,7 +43,7 @@ _SHARED = (
     Key("locked", "{ x = 0.0 }", "coordinates that could not move, and where they were; a list of names means at zero"),
     Key("held", '["x"]', "coordinates moved from outside: their measured motion is prescribed"),
     Key("known", '{ a_1 = "0.5 kg" }', "parameters that differ in this run and are known"),
-    Key("unknown", '["initial"]', f"what is estimated for this run alone, of {', '.join(PER_RUN)}"),
+    Key("unknown", '["initial"]', f"what is estimated for this run alone, of {', '.join(PER_RUN)}, offset.COORDINATE"),
     Key("initial", '{ theta = "1 rad" }', "states known at the first sample; these are not estimated"),
     Key("horizon", '"0.5 s"', "predict this far ahead, again and again, from measured states; free run if left out"),
     Key("score_from", '"30 s"', "seconds after the window's start before which nothing is scored"),

@@ -100,7 +100,7 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
         quantum=tuple(quanta[n] for n in measured),
         held={**locked, **{n: readings[n] for n in held_names}},
         known=known_values(run.section("known"), plant),
-        unknown=run.names("unknown", PER_RUN, ("initial",)),
+        unknown=run.names("unknown", (*PER_RUN, *(f"offset.{n}" for n in coordinates)), ("initial",)),
         initial=_states(run, plant),
         horizon=_horizon(run, grid),
         score_from=_score_from(run, grid),

@@ -28,6 +28,10 @@ GAIN_SPREAD = 1.0
 """One sigma of the logarithm of a run's gain factor; a factor of 3.2 was met (DESIGN 9)."""
 
 
+INITIAL_SPREAD = (0.02, 0.1)
+"""One sigma of a measured first coordinate and velocity, as a share of how much each varies over the run."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Unknown:
     """One number sought.
@@ -122,11 +126,13 @@ def run_unknowns(rig: Rig, index: int, run: Run, start: State) -> list[Unknown]:
     if "initial" in run.unknown and run.horizon is None:
         for i, name in enumerate(names):
             if names[i - i % 2] not in run.held and name not in run.initial:
-                add(f"initial.{name}", float(start.x[i]), float(start.spread[i]))
-    if "offset" in run.unknown:
-        for name in run.measured:
-            if name not in run.held:
-                add(f"offset.{name}", 0.0, float(start.spread[names.index(name)]))
+                # measured to a few percent; more freedom would excuse a wrong model
+                size, measured = float(start.spread[i]), float(start.x[i])
+                prior = (measured, INITIAL_SPREAD[i % 2] * size) if names[i - i % 2] in run.measured else None
+                add(f"initial.{name}", measured, size, prior)
+    for name in run.measured:
+        if name not in run.held and ("offset" in run.unknown or f"offset.{name}" in run.unknown):
+            add(f"offset.{name}", 0.0, float(start.spread[names.index(name)]))
     if "gain" in run.unknown:
         add("gain", 1.0, 1.0, (0.0, GAIN_SPREAD), log=True)
     if "friction" in run.unknown:
@@ -144,6 +150,25 @@ def friction_names(rig: Rig) -> tuple[str, ...]:
     for joint in derived.joints:
         words |= {joint.coulomb, joint.quadratic, joint.stiction}
     return tuple(n for n in derived.parameters if n in words)
+
+
+def matters(rig: Rig, coordinate: str) -> bool:
+    """Whether a coordinate's own value, not only its changes, is felt: by gravity, a spring or the mass matrix.
+
+    A constant error of the sensor cannot be told from the place where the run began otherwise.
+    """
+    from upright.physics.plant import evaluate
+
+    derived = rig.plant.derived()
+    values = base_values(rig)
+    scope = {**values, **{n: 0.1 + values[n] for n in rig.estimated if n in values}}
+    generator = np.random.default_rng(1)
+    for c in derived.coordinates:
+        scope[c], scope[f"{c}_dot"] = generator.normal(size=2)
+    energies = [float(evaluate(text, scope)) for text in (derived.kinetic, derived.potential)]
+    scope[coordinate] += 1.0
+    moved = [float(evaluate(text, scope)) for text in (derived.kinetic, derived.potential)]
+    return not np.allclose(energies, moved, rtol=1e-12, atol=0.0)
 
 
 def base_values(rig: Rig) -> dict[str, float]:
