@@ -145,13 +145,14 @@ def acceleration(p: Layout) -> str:
 
 
 def terms(p: Layout) -> str:
-    """Text of ``terms(..., _M, _F)``: mass matrix and forces of the free coordinates, written into arrays."""
+    """Text of ``terms(..., _W, _o)``: mass matrix, row by row, then forces of the free coordinates, from `_o` on."""
     lines, mass = _forces(p)
     place = {c: k for k, c in enumerate(p.free)}
+    n = len(p.free)
     for i in p.free:
-        lines += [f"_M[{place[i]}, {place[j]}] = {mass.get((i, j), '0.0')}" for j in p.free]
-        lines.append(f"_F[{place[i]}] = _f{i}")
-    return _function("@scalar", "terms", [*arguments(p), "_M", "_F"], lines)
+        lines += [f"_W[_o + {n * place[i] + place[j]}] = {mass.get((i, j), '0.0')}" for j in p.free]
+        lines.append(f"_W[_o + {n * n + place[i]}] = _f{i}")
+    return _function("@inline", "terms", [*arguments(p), "_W", "_o"], lines)
 
 
 def step_arguments(p: Layout) -> list[str]:

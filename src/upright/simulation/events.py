@@ -13,200 +13,240 @@ from upright.simulation.flavour import Layout
 
 SEARCH = '''
 @scalar
-def copy(a, b):
-    for k in range(a.shape[0]):
-        b[k] = a[k]
+def solve(W, o, right):
+    """Accelerations of the coordinates that move, from the forces at `right`; the others stay."""
+    for i in range(NF):
+        W[o + ACC + i] = W[o + right + i] * W[o + MOVES + i]
+        for j in range(NF):
+            W[o + WORK + NF * i + j] = W[o + MASS + NF * i + j] * W[o + MOVES + i] * W[o + MOVES + j]
+        W[o + WORK + NF * i + i] += 1.0 - W[o + MOVES + i]
+    for k in range(NF):
+        for i in range(k + 1, NF):
+            c = W[o + WORK + NF * i + k] / W[o + WORK + NF * k + k]
+            for j in range(k, NF):
+                W[o + WORK + NF * i + j] -= c * W[o + WORK + NF * k + j]
+            W[o + ACC + i] -= c * W[o + ACC + k]
+    for k in range(NF):
+        i = NF - 1 - k
+        for j in range(i + 1, NF):
+            W[o + ACC + i] -= W[o + WORK + NF * i + j] * W[o + ACC + j]
+        W[o + ACC + i] /= W[o + WORK + NF * i + i]
+
+
+@inline_strict
+def taken(W, o, j, right):
+    """Force that coordinate `j` takes up."""
+    c = W[o + right + j]
+    for k in range(NF):
+        c -= W[o + MASS + NF * j + k] * W[o + ACC + k]
+    return c
 
 
 @scalar
-def solve(F, moves, B):
-    """Accelerations of the coordinates that move; the others stay."""
-    M, A, a = B[0], B[1], B[3]
-    n = F.shape[0]
-    for i in range(n):
-        a[i] = F[i] * moves[i]
-        for j in range(n):
-            A[i, j] = M[i, j] * moves[i] * moves[j]
-        A[i, i] += 1.0 - moves[i]
-    for k in range(n):
-        for i in range(k + 1, n):
-            c = A[i, k] / A[k, k]
-            for j in range(k, n):
-                A[i, j] -= c * A[k, j]
-            a[i] -= c * a[k]
-    for k in range(n):
-        i = n - 1 - k
-        for j in range(i + 1, n):
-            a[i] -= A[i, j] * a[j]
-        a[i] /= A[i, i]
+def load(W, L, i, o, state, t, h, fresh):
+    """Accelerations of a state with the modes as they are, and the margins of the stuck joints.
 
-
-@scalar
-def margins(x, s, at, t, B, moves, g, need):
-    """How far each dry joint is from leaving its mode: speed in its direction, or force to spare when stuck.
-
-    Returns the first joint that has left it, -1 when none has.
+    Returns the first joint that cannot hold, -1 when all can. Mass and forces are computed when `fresh`.
     """
-    M, F, a, dry, hold = B[0], B[2], B[3], B[4], B[5]
-    n = F.shape[0]
-    for w in range(s.shape[0]):
-        g[w] = s[w] * x[n + dry[w]]
-        need = need or s[w] == 0.0
-    if need:
-        terms_at(x, s, at, t, M, F)
-        for k in range(n):
-            moves[k] = 1.0
-        for w in range(s.shape[0]):
-            moves[dry[w]] = abs(s[w])
-        solve(F, moves, B)
+    if fresh:
+        terms_at(W, L, i, o, state, t, h)
+        for k in range(NF):
+            W[o + MOVES + k] = 1.0
+    for w in range(ND):
+        W[o + MOVES + joint(w)] = abs(W[o + MODES + w])
+    solve(W, o, FORCE)
     first = -1
-    for w in range(s.shape[0]):
-        if s[w] == 0.0:
-            c = F[dry[w]]
-            for k in range(n):
-                c -= M[dry[w], k] * a[k]
-            g[w] = hold[w] - abs(c)
-        if g[w] < 0.0 and first < 0:
-            first = w
+    for w in range(ND):
+        if W[o + MODES + w] == 0.0:
+            g = W[o + HOLD + w] - abs(taken(W, o, joint(w), FORCE))
+            W[o + MARGIN + w] = g
+            first = w if g < 0.0 and first < 0 else first
     return first
 
 
+@inline_strict
+def turned(W, o, state, w):
+    """Speed of a sliding joint in its direction."""
+    return W[o + MODES + w] * W[o + state + NF + joint(w)]
+
+
 @scalar
-def decide(s, g, B, moves, forced):
-    """Modes of the joints at rest (s = 0, margins `g`); joint `forced`, if not -1, has reached its break-away level."""
-    M, F, a, dry, hold, slide = B[0], B[2], B[3], B[4], B[5], B[6]
-    n, nd = F.shape[0], s.shape[0]
-    rest, level, f, keep = zeros(nd), zeros(nd), zeros(n), zeros(n)
-    again = False
-    pull = 0.0
-    for w in range(nd):
-        rest[w] = 1.0 if s[w] == 0.0 else 0.0
-        level[w] = hold[w]
-        if s[w] == 0.0 and (w == forced or g[w] < 0.0):
-            level[w] = slide[w]
-            rest[w] = 2.0
-            again = True
-    if forced >= 0:
-        pull = F[dry[forced]]
-        for k in range(n):
-            pull -= M[dry[forced], k] * a[k]
+def decide(W, o, forced):
+    """Modes of the joints at rest, after `load`; joint `forced`, if not -1, has reached its break-away level."""
+    resting, again = 0, False
+    pull = taken(W, o, joint(forced), FORCE) if forced >= 0 else 0.0
+    for w in range(ND):
+        W[o + REST + w] = 0.0
+        if W[o + MODES + w] == 0.0:
+            resting += 1
+            W[o + REST + w] = 1.0
+            W[o + LEVEL + w] = W[o + HOLD + w]
+            if w == forced or W[o + MARGIN + w] < 0.0:
+                W[o + REST + w] = 2.0
+                W[o + LEVEL + w] = W[o + SLIDE + w]
+                again = True
+    if resting == 1 and again:
+        for w in range(ND):
+            if W[o + REST + w] > 0.0:
+                W[o + MODES + w] = 1.0 if taken(W, o, joint(w), FORCE) > 0.0 else -1.0
+        return
+    for k in range(NF):
+        W[o + KEEP + k] = 0.0
     # signs of the accelerations: guessed by coordinate descent, verified by solving exactly
     for turn in range(400):
         if not again:
             break
-        for sweep in range(8 * n):
-            j = sweep % n
-            c = F[j] + M[j, j] * keep[j]
-            for k in range(n):
-                c -= M[j, k] * keep[k]
-            for w in range(nd):
-                if dry[w] == j and rest[w] > 0.0:
-                    c = c - level[w] if c > level[w] else (c + level[w] if c < -level[w] else 0.0)
-            keep[j] = c / M[j, j]
-        for j in range(n):
-            moves[j] = 1.0
-            f[j] = F[j]
-        for w in range(nd):
-            if rest[w] > 0.0:
-                j = dry[w]
-                s[w] = 1.0 if keep[j] > 0.0 else (-1.0 if keep[j] < 0.0 else 0.0)
-                moves[j] = abs(s[w])
-                f[j] = F[j] - s[w] * level[w]
-        solve(f, moves, B)
+        for sweep in range(8 * NF):
+            j = sweep % NF
+            c = W[o + FORCE + j] + W[o + MASS + NF * j + j] * W[o + KEEP + j]
+            for k in range(NF):
+                c -= W[o + MASS + NF * j + k] * W[o + KEEP + k]
+            for w in range(ND):
+                if joint(w) == j and W[o + REST + w] > 0.0:
+                    level = W[o + LEVEL + w]
+                    c = c - level if c > level else (c + level if c < -level else 0.0)
+            W[o + KEEP + j] = c / W[o + MASS + NF * j + j]
+        for j in range(NF):
+            W[o + RIGHT + j] = W[o + FORCE + j]
+        for w in range(ND):
+            if W[o + REST + w] > 0.0:
+                j = joint(w)
+                c = W[o + KEEP + j]
+                W[o + MODES + w] = 1.0 if c > 0.0 else (-1.0 if c < 0.0 else 0.0)
+                W[o + MOVES + j] = abs(W[o + MODES + w])
+                W[o + RIGHT + j] -= W[o + MODES + w] * W[o + LEVEL + w]
+        solve(W, o, RIGHT)
         again = False
-        for w in range(nd):
-            if rest[w] > 0.0:
-                j = dry[w]
-                c = f[j]
-                for k in range(n):
-                    c -= M[j, k] * a[k]
-                again = again or s[w] * a[j] < 0.0 or (s[w] == 0.0 and abs(c) > level[w] * (1.0 + 1e-12))
-        for w in range(nd):
-            if not again and rest[w] == 1.0 and s[w] != 0.0:
+        for w in range(ND):
+            if W[o + REST + w] > 0.0:
+                c = abs(taken(W, o, joint(w), RIGHT)) - W[o + LEVEL + w] * (1.0 + 1e-12)
+                again = again or W[o + MODES + w] * W[o + ACC + joint(w)] < 0.0
+                again = again or (W[o + MODES + w] == 0.0 and c > 0.0)
+        for w in range(ND):
+            if not again and W[o + REST + w] == 1.0 and W[o + MODES + w] != 0.0:
                 # dragged along by another joint: it slides at its own lower level
-                rest[w] = 2.0
-                level[w] = slide[w]
+                W[o + REST + w] = 2.0
+                W[o + LEVEL + w] = W[o + SLIDE + w]
                 again = True
-    if forced >= 0 and s[forced] == 0.0:
-        s[forced] = 1.0 if pull > 0.0 else -1.0
+    if forced >= 0 and W[o + MODES + forced] == 0.0:
+        W[o + MODES + forced] = 1.0 if pull > 0.0 else -1.0
 
 
 @scalar
-def redo(x, x1, s, at, B, moves):
-    """Step over one substep, event by event: a small machine, so that each search is compiled in one place only."""
-    h, n, nd, dry = at[3], B[2].shape[0], s.shape[0], B[4]
-    g0, g, x2 = zeros(nd), zeros(nd), zeros(x.shape[0])
-    BASE, FULL, MIDDLE, ROOT, DECIDE = 0, 1, 2, 3, 4
-    phase, w, forced, count, events, turns, side = 0, -1, -1, 0, 0, 0, 0
-    t, c, lo, hi, ga, gb, scale = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+def redo(W, L, i, o, h):
+    """Step over one substep, event by event: a small machine, so that each search is compiled in one place only.
+
+    It starts with the whole substep's result in NEXT, as the lanes computed it.
+    """
+    FULL, MIDDLE, ROOT = 0, 1, 2
+    phase, w, count, events, turns, side = FULL, -1, 0, 0, 0, 0
+    t, c, lo, hi, ga, gb, scale = 0.0, h, 0.0, 0.0, 0.0, 0.0, 0.0
+    done, begin = True, True
     for _ in range(1000):
-        if phase == BASE or phase == DECIDE:
-            copy(x, x1)
-        else:
-            leap(x, x1, s, at, t, c)
-        first = margins(x1, s, at, t + c, B, moves, g, phase == DECIDE)
-        if phase == DECIDE:
-            decide(s, g, B, moves, forced)
-            phase, forced, turns = BASE, -1, turns + 1
-            continue
-        if phase == BASE:
-            if first >= 0 and s[first] == 0.0 and turns < 2 * nd + 2:
-                for k in range(nd):
-                    s[k] = 0.0 if x[n + dry[k]] == 0.0 else s[k]
-                phase = DECIDE
+        if begin:
+            # modes at the start of what is left
+            first = load(W, L, i, o, STATE, t, h, True)
+            if first >= 0 and turns < 2 * ND + 2:
+                decide(W, o, -1)
+                turns, done = turns + 1, False
                 continue
-            copy(g, g0)
-            phase, c, turns = FULL, h - t, 0
+            for k in range(ND):
+                W[o + BEFORE + k] = W[o + MARGIN + k]
+                if W[o + MODES + k] != 0.0:
+                    W[o + BEFORE + k] = turned(W, o, STATE, k)
+            for k in range(NF):
+                W[o + FIRST + k] = W[o + ACC + k]
+            begin, phase, c, turns = False, FULL, h - t, 0
             if c <= 0.0:
                 break
-            continue
-        if phase == FULL or phase == MIDDLE:
+        if not done:
+            leap(W, L, i, o, t, c, h)
+        done = False
+        first, stuck = -1, False
+        for k in range(ND):
+            stuck = stuck or W[o + MODES + k] == 0.0
+            if W[o + MODES + k] != 0.0:
+                W[o + MARGIN + k] = turned(W, o, NEXT, k)
+                first = k if W[o + MARGIN + k] < 0.0 and first < 0 else first
+        if stuck:
+            other = load(W, L, i, o, NEXT, t + c, h, True)
+            first = other if first < 0 else first
+        if phase != ROOT:
             if first < 0 or events > 40:
                 if phase == MIDDLE:
-                    copy(x2, x)
+                    for k in range(NX):
+                        W[o + STATE + k] = W[o + WHOLE + k]
                     break
-                copy(x1, x2)
                 if events > 0:
-                    copy(x1, x)
+                    for k in range(NX):
+                        W[o + STATE + k] = W[o + NEXT + k]
                     break
                 # nothing at the end: has a joint turned twice in between?
+                for k in range(NX):
+                    W[o + WHOLE + k] = W[o + NEXT + k]
                 phase, c = MIDDLE, 0.5 * c
                 continue
             phase, w = ROOT, first
-            lo, hi, ga, gb, count, side, scale = 0.0, c, g0[w], g[w], 0, 0, 0.0
-        elif count > 100 or (ga > 0.0 and (abs(g[w]) <= scale or hi - lo <= 4e-16 * h)):
-            other = -1
-            for k in range(nd):
-                if k != w and g[k] < 0.0 and g0[k] > 0.0:
-                    other = k
-            if other >= 0 and count <= 100:
-                w = other
-                lo, hi, ga, gb, count, side, scale = 0.0, c, g0[w], g[w], 0, 0, 0.0
-            else:
-                # the moment is found: stop the joint, or let it break away
-                t += c
-                copy(x1, x)
-                if s[w] != 0.0:
-                    x[n + dry[w]] = 0.0
-                else:
-                    forced = w
-                for k in range(nd):
-                    s[k] = 0.0 if x[n + dry[k]] == 0.0 else s[k]
-                phase, c, events = DECIDE, 0.0, events + 1
-                continue
-        elif g[w] > 0.0:
-            # Illinois: halve the weight of an end that stays
-            lo, ga = c, g[w]
-            gb = 0.5 * gb if side == 1 else gb
-            side = 1
+            lo, hi, ga, gb, count, side = 0.0, c, W[o + BEFORE + w], W[o + MARGIN + w], 0, 0
+            scale = 1e-6 * (ga - gb) if W[o + MODES + w] != 0.0 else 1e-14 * (ga - gb)
         else:
-            hi, gb = c, g[w]
-            ga = 0.5 * ga if side == -1 else ga
-            side = -1
+            g = W[o + MARGIN + w]
+            if count > 100 or (ga > 0.0 and (abs(g) <= scale or hi - lo <= 4e-16 * h)):
+                other = -1
+                for k in range(ND):
+                    if k != w and W[o + MARGIN + k] < 0.0 and W[o + BEFORE + k] > 0.0:
+                        other = k
+                if other >= 0 and count <= 100:
+                    w = other
+                    lo, hi, ga, gb, count, side = 0.0, c, W[o + BEFORE + w], W[o + MARGIN + w], 0, 0
+                    scale = 1e-6 * (ga - gb) if W[o + MODES + w] != 0.0 else 1e-14 * (ga - gb)
+                else:
+                    # the moment is found: stop the joint, or let it break away
+                    forced = w
+                    if not stuck:
+                        load(W, L, i, o, NEXT, t + c, h, True)
+                    if W[o + MODES + w] != 0.0:
+                        # the last millionth of the way by Taylor's series
+                        forced = -1
+                        k = joint(w)
+                        d = -W[o + NEXT + NF + k] / W[o + ACC + k]
+                        if abs(d) < 2e-6 * h:
+                            for k in range(NF):
+                                W[o + NEXT + k] += d * (W[o + NEXT + NF + k] + 0.5 * d * W[o + ACC + k])
+                                W[o + NEXT + NF + k] += d * W[o + ACC + k]
+                            c += d
+                        W[o + NEXT + NF + joint(w)] = 0.0
+                    t += c
+                    for k in range(NX):
+                        W[o + STATE + k] = W[o + NEXT + k]
+                    for k in range(ND):
+                        if W[o + STATE + NF + joint(k)] == 0.0:
+                            W[o + FORCE + joint(k)] += W[o + MODES + k] * W[o + SLIDE + k]
+                            W[o + MODES + k] = 0.0
+                    load(W, L, i, o, STATE, t, h, False)
+                    decide(W, o, forced)
+                    begin, events = True, events + 1
+                    continue
+            elif g > 0.0:
+                # Illinois: halve the weight of an end that stays
+                lo, ga = c, g
+                gb = 0.5 * gb if side == 1 else gb
+                side = 1
+            else:
+                hi, gb = c, g
+                ga = 0.5 * ga if side == -1 else ga
+                side = -1
         count += 1
         if ga > 0.0:
-            scale = 1e-13 * (ga - gb) if scale == 0.0 else scale
             c = lo + (hi - lo) * ga / (ga - gb)
+            if count == 1 and W[o + MODES + w] != 0.0:
+                # parabola through speed and acceleration at the start and speed at the end
+                slope = W[o + MODES + w] * W[o + FIRST + joint(w)]
+                curve = (gb - ga - slope * hi) / (hi * hi)
+                root = slope * slope - 4.0 * curve * ga
+                if root >= 0.0:
+                    d = -2.0 * ga / (slope - sqrt(root))
+                    c = d if d > 0.0 and d < hi else c
             if count % 16 == 15 or not (c > lo and c < hi):
                 c = 0.5 * (lo + hi)
         elif count < 40:
@@ -215,54 +255,66 @@ def redo(x, x1, s, at, B, moves):
             side = 0
         else:
             # it cannot stand at all
-            x[n + dry[w]] = 0.0
-            s[w] = 0.0
-            phase, c, events, turns = BASE, 0.0, events + 1, 2 * nd + 2
-    for w in range(nd):
+            W[o + STATE + NF + joint(w)] = 0.0
+            W[o + MODES + w] = 0.0
+            begin, events, turns = True, events + 1, 2 * ND + 2
+    for w in range(ND):
         # what is left after too many events rests
-        if s[w] * x[n + dry[w]] < 0.0:
-            x[n + dry[w]] = 0.0
-            s[w] = 0.0
+        if turned(W, o, STATE, w) < 0.0:
+            W[o + STATE + NF + joint(w)] = 0.0
+            W[o + MODES + w] = 0.0
 '''
+
+
+def scratch(p: Layout) -> dict[str, int]:
+    """Places of the search behind the lanes' numbers, and their total under ``"END"``."""
+    nf, nd = len(p.free), len(p.flavour.dry)
+    nx = 2 * nf + len(p.flavour.dahl)
+    sizes = {"STATE": nx, "NEXT": nx, "WHOLE": nx, "MASS": nf * nf, "FORCE": nf, "WORK": nf * nf}
+    sizes |= dict.fromkeys(("ACC", "RIGHT", "KEEP", "MOVES", "FIRST"), nf)
+    sizes |= dict.fromkeys(("MODES", "HOLD", "SLIDE", "MARGIN", "BEFORE", "REST", "LEVEL"), nd)
+    places, end = {}, 0
+    for name, size in sizes.items():
+        places[name] = end
+        end += size
+    return places | {"END": end}
 
 
 def events(p: Layout) -> str:
     """Text of the search of events for one plant, and of the call to it."""
-    f, place = p.flavour, {c: k for k, c in enumerate(p.free)}
+    f, place, rows = p.flavour, {c: k for k, c in enumerate(p.free)}, p.rows
     states = [f"q{i}" for i in p.free] + [f"v{i}" for i in p.free] + [f"y{i}" for i in f.dahl]
-    nf, nd, nx = len(p.free), len(f.dry), len(states)
-
-    def w(name: str) -> str:
-        return f"W[{p.rows[name]} * L + i]"
-
-    lines = [
-        f"W = carray(data, ({len(p.rows)} * L,))",
-        f"x, x1, s, hold, slide = empty({nx}), empty({nx}), empty({nd}), empty({nd}), empty({nd})",
-        f"dry, moves = empty({nd}, int64), empty({nf})",
-        f"B = (zeros(({nf}, {nf})), zeros(({nf}, {nf})), zeros({nf}), zeros({nf}), dry, hold, slide)",
-        *(f"x[{k}] = {w('o' + name)}" for k, name in enumerate(states)),
-    ]
+    at = scratch(p)
+    lines = [f"o = {len(rows)} * L", f"W = carray(data, (o + {at['END']},))"]
+    for k, name in enumerate(states):
+        lines.append(f"W[o + {at['STATE'] + k}] = W[{rows['o' + name]} * L + i]")
+        lines.append(f"W[o + {at['NEXT'] + k}] = W[{rows[name]} * L + i]")
     for k, i in enumerate(f.dry):
-        lines += [f"s[{k}] = {w(f's{i}')}", f"dry[{k}] = {place[i]}", f"hold[{k}] = {w(f'_Fs{i}')}"]
-        lines.append(f"slide[{k}] = {w(f'_Fs{i}' if i in f.stribeck else f'_Fc{i}')}")
-    lines.append("redo(x, x1, s, (W, L, i, h), B, moves)")
-    lines += [f"{w(name)} = x[{k}]" for k, name in enumerate(states)]
-    lines += [f"{w(f's{i}')} = s[{k}]" for k, i in enumerate(f.dry)]
+        slide = f"_Fs{i}" if i in f.stribeck else f"_Fc{i}"
+        for name, row in (("MODES", f"s{i}"), ("HOLD", f"_Fs{i}"), ("SLIDE", slide)):
+            lines.append(f"W[o + {at[name] + k}] = W[{rows[row]} * L + i]")
+    lines.append("redo(W, L, i, o, h)")
+    lines += [f"W[{rows[name]} * L + i] = W[o + {at['STATE'] + k}]" for k, name in enumerate(states)]
+    lines += [f"W[{rows[f's{i}']} * L + i] = W[o + {at['MODES'] + k}]" for k, i in enumerate(f.dry)]
     body = "\n".join(f"    {line}" for line in lines)
+    sizes = f"NF, ND, NX = {len(p.free)}, {len(f.dry)}, {len(states)}\n"
+    sizes += "\n".join(f"{name} = {value}" for name, value in at.items())
+    joint = " else ".join(f"{place[i]} if w == {k}" for k, i in enumerate(f.dry)) + " else 0"
+    joint = "w" if [place[i] for i in f.dry] == list(range(len(f.dry))) else joint
     head = '@cfunc("void(CPointer(float64), int64, int64, float64)", error_model="numpy", cache=True)\n'
     return (
-        f"{_leap(p)}\n\n{_terms_at(p)}\n{SEARCH}\n\n"
+        f"{sizes}\n\n\n@inline\ndef joint(w):\n    return {joint}\n\n\n{_leap(p)}\n\n{_terms_at(p)}\n{SEARCH}\n\n"
         f'{head}def events(data, L, i, h):\n    """Redo one substep of lane `i`."""\n{body}\n'
     )
 
 
-def _state(p: Layout) -> dict[str, str]:
+def _known(p: Layout, state: str) -> dict[str, str]:
     """Where the search keeps what the equations call by name."""
-    nf, f = len(p.free), p.flavour
-    known = {f"_q{i}": f"x[{k}]" for k, i in enumerate(p.free)}
-    known |= {f"_v{i}": f"x[{nf + k}]" for k, i in enumerate(p.free)}
-    known |= {f"_y{i}": f"x[{2 * nf + k}]" for k, i in enumerate(f.dahl)}
-    known |= {f"_s{i}": f"s[{k}]" for k, i in enumerate(f.dry)}
+    nf, f, modes = len(p.free), p.flavour, scratch(p)["MODES"]
+    known = {f"_q{i}": f"W[o + {state} + {k}]" for k, i in enumerate(p.free)}
+    known |= {f"_v{i}": f"W[o + {state} + {nf + k}]" for k, i in enumerate(p.free)}
+    known |= {f"_y{i}": f"W[o + {state} + {2 * nf + k}]" for k, i in enumerate(f.dahl)}
+    known |= {f"_s{i}": f"W[o + {modes + k}]" for k, i in enumerate(f.dry)}
     return known | {name: f"W[{p.rows[name]} * L + i]" for name in p.constants}
 
 
@@ -281,34 +333,32 @@ def _motion(p: Layout, c: str, i: int, z: str) -> str:
 
 
 def _leap(p: Layout) -> str:
-    known, f = _state(p), p.flavour
+    known, f = _known(p, "STATE"), p.flavour
     known["_h"] = "d"
     for when, z in (("a", "za"), ("m", "zm"), ("b", "zb")):
         known |= {f"_u{when}{j}": _input(p, j, z) for j in range(p.nu)}
         known |= {f"_h{c}{i}{when}": _motion(p, c, i, z) for i in f.held for c in "qva"}
     call = ", ".join(known[a] for a in step_arguments(p))
-    states = range(2 * len(p.free) + len(f.dahl))
-    result = ", ".join(f"x1[{k}]" for k in states)
+    result = ", ".join(f"W[o + NEXT + {k}]" for k in range(2 * len(p.free) + len(f.dahl)))
     return (
         "@inline\ndef parabola(first, middle, last, z):\n"
         "    return first + z * (4.0 * middle - 3.0 * first - last + z * 2.0 * (first + last - 2.0 * middle))\n\n\n"
-        "@scalar\ndef leap(x, x1, s, at, t, d):\n"
-        '    """Step `d` from the state `x` at time `t` within the substep."""\n'
-        "    W, L, i, h = at\n"
+        "@scalar\ndef leap(W, L, i, o, t, d, h):\n"
+        '    """Step `d` from STATE at time `t` within the substep `h`, into NEXT."""\n'
         "    za, zm, zb = t / h, (t + 0.5 * d) / h, (t + d) / h\n"
         f"    {result}, flag = step({call})\n"
     )
 
 
 def _terms_at(p: Layout) -> str:
-    known, f = _state(p), p.flavour
-    values = {q: (_motion(p, "q", i, "z") if i in f.held else known[f"_q{i}"]) for i, q in enumerate(p.derived.coordinates)}
-    values |= {v: (_motion(p, "v", i, "z") if i in f.held else known[f"_v{i}"]) for i, v in enumerate(p.velocities)}
-    values |= {u: _input(p, j, "z") for j, u in enumerate(p.derived.inputs)}
-    values |= {f"_ah{i}": _motion(p, "a", i, "z") for i in f.held} | known
-    call = ", ".join(values[a] for a in arguments(p))
+    known, f = _known(p, "state"), p.flavour
+    for i, (q, v) in enumerate(zip(p.derived.coordinates, p.velocities, strict=True)):
+        known[q], known[v] = (_motion(p, "q", i, "z"), _motion(p, "v", i, "z")) if i in f.held else (known[f"_q{i}"], known[f"_v{i}"])
+    known |= {u: _input(p, j, "z") for j, u in enumerate(p.derived.inputs)}
+    known |= {f"_ah{i}": _motion(p, "a", i, "z") for i in f.held}
+    call = ", ".join(known[a] for a in arguments(p))
     return (
-        "@scalar\ndef terms_at(x, s, at, t, M, F):\n"
-        '    """Mass matrix and forces of state `x` at time `t` within the substep."""\n'
-        f"    W, L, i, h = at\n    z = t / h\n    terms({call}, M, F)\n"
+        "@scalar\ndef terms_at(W, L, i, o, state, t, h):\n"
+        '    """Mass matrix and forces of a state at time `t` within the substep `h`."""\n'
+        f"    z = t / h\n    terms({call}, W, o + MASS)\n"
     )

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 
 from upright.simulation.equations import step_arguments
+from upright.simulation.events import scratch
 from upright.simulation.flavour import ACTUATOR, Layout
 
 RUN_ARGUMENTS = (
@@ -43,7 +44,7 @@ def run(p: Layout, width: int) -> str:
     w = Writer(p, width)
     w.add(
         "wide()",
-        f"W = zeros({len(p.rows) * width})",
+        f"W = zeros({len(p.rows) * width + (scratch(p)['END'] if p.flavour.dry else 0)})",
         f"DI = zeros({width}, int64)",
         "_h = _dt / _substeps",
         f"BUF = zeros(_nbuf * {p.nu * width})",
