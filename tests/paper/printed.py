@@ -10,7 +10,28 @@ import sympy as sp
 p = SimpleNamespace(
     **{
         n: sp.Symbol(n, real=True)
-        for n in "m_p l_cg r J_d J_p J_a J_xx J_zz m_c b_1 b_2 b_1c b_2c g K_1 K_2 psi theta psi_dot theta_dot".split()
+        for n in [
+            "m_p",
+            "l_cg",
+            "r",
+            "J_d",
+            "J_p",
+            "J_a",
+            "J_xx",
+            "J_zz",
+            "m_c",
+            "b_1",
+            "b_2",
+            "b_1c",
+            "b_2c",
+            "g",
+            "K_1",
+            "K_2",
+            "psi",
+            "theta",
+            "psi_dot",
+            "theta_dot",
+        ]
     }
 )
 s = sp.Symbol("s")

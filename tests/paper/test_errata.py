@@ -6,9 +6,9 @@ from math import ceil, floor
 import numpy as np
 import pytest
 import sympy as sp
-
 from tests.paper import printed
 from tests.paper.printed import J_A, p, s
+
 from upright.physics import Furuta
 from upright.physics.lagrange import linear, motion, over_determinant
 
@@ -147,6 +147,6 @@ def test_untouched_equation_2_has_a_wrong_unstable_pole_and_its_gains_miss():
     assert np.linalg.eigvals(right).real.max() == pytest.approx(unstable, rel=1e-12)
     table_1 = np.sort_complex(np.array(printed.TABLE_1[0]))
     b_right = numbers(printed.B_2(D_2))[:, 0]
-    for model, b, hits in ((A, b, False), (right, b_right, True)):
-        closed = np.sort_complex(np.linalg.eigvals(plant.A - plant.B @ gains(model, b, table_1)[None]))
+    for model, column, hits in ((A, b, False), (right, b_right, True)):
+        closed = np.sort_complex(np.linalg.eigvals(plant.A - plant.B @ gains(model, column, table_1)[None]))
         assert np.allclose(closed, table_1, atol=1e-6) is hits

@@ -128,10 +128,8 @@ def latex(cls: type[Plant]) -> str:
     M, f = equations
     names = {vi: rf"\dot{{{sp.latex(qi)}}}" for qi, vi in zip(q, v, strict=True)}
     accelerations = sp.Matrix([sp.Symbol(rf"\ddot{{{sp.latex(qi)}}}") for qi in q])
-    rows = [
-        sp.latex((M[i, :] * accelerations)[0], symbol_names=names) + " &= " + sp.latex(f[i], symbol_names=names)
-        for i in range(len(q))
-    ]
+    sides = zip(M * accelerations, f, strict=True)
+    rows = [" &= ".join(sp.latex(side, symbol_names=names) for side in row) for row in sides]
     return "\\begin{align}\n" + " \\\\\n".join(rows) + "\n\\end{align}"
 
 
