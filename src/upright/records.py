@@ -163,81 +163,63 @@ class Record:
     # To other tools and back; each import waits until it is wanted.
     def to_pandas(self) -> Any:
         """`pandas.DataFrame` indexed by time [s]; units and provenance in ``attrs``."""
-        from upright import exchange
-
-        return exchange.to_pandas(self)
+        return _exchange().to_pandas(self)
 
     @staticmethod
     def from_pandas(frame: Any) -> Record:
         """Record of a data frame whose index is time [s]."""
-        from upright import exchange
-
-        return exchange.from_pandas(frame)
+        return _exchange().from_pandas(frame)
 
     def to_xarray(self) -> Any:
         """`xarray.Dataset` with coordinate ``t`` [s]; each variable carries its ``units``."""
-        from upright import exchange
-
-        return exchange.to_xarray(self)
+        return _exchange().to_xarray(self)
 
     @staticmethod
     def from_xarray(dataset: Any) -> Record:
         """Record of a dataset with one coordinate ``t`` [s]."""
-        from upright import exchange
-
-        return exchange.from_xarray(dataset)
+        return _exchange().from_xarray(dataset)
 
     def to_control(self) -> Any:
         """`control.TimeResponseData` of inputs and outputs; other columns and units are left behind."""
-        from upright import exchange
-
-        return exchange.to_control(self)
+        return _exchange().to_control(self)
 
     @staticmethod
     def from_control(response: Any) -> Record:
         """Record of a single-trace response of python-control."""
-        from upright import exchange
-
-        return exchange.from_control(response)
+        return _exchange().from_control(response)
 
     def to_csv(self, path: PathLike) -> None:
         """Write text that `from_csv` reads back bit for bit; two comment lines hold units and provenance."""
-        from upright import exchange
-
-        exchange.to_csv(self, path)
+        _exchange().to_csv(self, path)
 
     @staticmethod
     def from_csv(path: PathLike) -> Record:
         """Record written by `to_csv`; logs of others are for `upright.readers.read`."""
-        from upright import exchange
-
-        return exchange.from_csv(path)
+        return _exchange().from_csv(path)
 
     def to_mat(self, path: PathLike) -> None:
         """Write MATLAB version 5: ``t``, matrix ``signals``, cells ``names`` and ``units``."""
-        from upright import exchange
-
-        exchange.to_mat(self, path)
+        _exchange().to_mat(self, path)
 
     @staticmethod
     def from_mat(path: PathLike) -> Record:
         """Record written by `to_mat`; logs of others are for `upright.readers.read`."""
-        from upright import exchange
-
-        return exchange.from_mat(path)
+        return _exchange().from_mat(path)
 
     def to_parquet(self, path: PathLike) -> None:
         """Write Parquet, one column per signal; units and provenance in the schema's metadata."""
-        from upright import exchange
-
-        exchange.to_parquet(self, path)
+        _exchange().to_parquet(self, path)
 
     @staticmethod
     def from_parquet(path: PathLike) -> Record:
         """Record of a Parquet file with a column ``t`` [s]."""
-        from upright import exchange
+        return _exchange().from_parquet(path)
 
-        return exchange.from_parquet(path)
+
+def _exchange() -> Any:
+    from upright import exchange
+
+    return exchange
 
 
 def _column(what: str, values: Any) -> Array:

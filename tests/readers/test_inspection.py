@@ -130,3 +130,17 @@ def test_an_idle_input_is_named() -> None:
     column = inspect(Record(t=t, signals={"theta": theta, "Control Effort": 0 * t})).column("Control Effort")
     assert column.idle
     assert column.constant
+
+
+WILD = st.sampled_from([0.0, 1.0, -1.0, 409.0, 1e29, -1e29, 1e-300, 0.5, 3.3, 1e-12, 2 * math.pi])
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.lists(st.tuples(st.floats(1e-6, 1e6), WILD, WILD, WILD), min_size=2, max_size=40))
+def test_any_valid_record_can_be_inspected(rows: list[tuple[float, float, float, float]]) -> None:
+    steps, x, y, z = np.array(rows).T
+    names = {"Commanded Pos": x, "Encoder 1 Pos": y, "Control Effort": z, "theta": x + y}
+    seen = inspect(Record(t=np.cumsum(steps), signals=names))
+    assert len(seen.columns) == 4
+    assert all(math.isfinite(c.low) and math.isfinite(c.quantum.step) and 0 <= c.low_share <= 1 for c in seen.columns)
+    assert seen.time.period > 0

@@ -86,7 +86,7 @@ def follows_encoder(record: Record, name: str, x: Array) -> str:
     for other, y in record.signals.items():
         if "encoder" in other.casefold() and np.ptp(y) > 0:
             gap = np.abs(np.diff(x - y))
-            if np.ptp(x) > 0.5 * np.ptp(y) and np.corrcoef(x, y)[0, 1] > 0.97 and np.unique(x).size > 10:
+            if np.ptp(x) > 0.5 * np.ptp(y) and _correlation(x, y) > 0.97 and np.unique(x).size > 10:
                 return f"follows '{other}' (steps differ by {np.median(gap):g} at the median); no reference, open loop"
     return ""
 
@@ -124,6 +124,12 @@ def difference_of(t: Array, other: str, p: Array, v: Array) -> str:
     if 0.01 < b < 0.98 and _share(step, b * pull) > _SAME:
         return f"the difference quotient of '{other}' through a first-order filter (weight {b:.2g})"
     return ""
+
+
+def _correlation(x: Array, y: Array) -> float:
+    u, v = x - x.mean(), y - y.mean()
+    size = float(np.linalg.norm(u)) * float(np.linalg.norm(v))
+    return float(u @ v) / size if size > 0 else 0.0
 
 
 def _share(x: Array, y: Array) -> float:

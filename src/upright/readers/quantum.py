@@ -57,6 +57,8 @@ def decimal_rounding(values: Array) -> float:
     top = float(np.abs(values).max())
     for exponent in range(8):
         step = 10.0**-exponent
+        if top > 1e15 * step:  # float64 has no more digits
+            return 0.0
         error = np.abs(values - np.round(values / step) * step)
         if (error <= max(1e-6 * step, 8 * np.finfo(np.float64).eps * top)).all():
             return step
