@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +36,7 @@ class Question:
     known: Mapping[str, tuple[float, float]]
     asked: Mapping[str, float]
     bounds: Mapping[str, tuple[float, float]]
+    unknown: tuple[str, ...] = ("initial",)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -77,7 +78,7 @@ def questions(rig: Twin) -> tuple[Question, ...]:
     rng = np.random.default_rng([rig.seed, 42])
     guess = {n: getattr(rig.truth, n) * rng.choice([0.7, 1.3]) for n in ("m_p", "J_p", *FRICTION)}
     known = bench(rig)
-    blind = {n: v for n, v in known.items() if n != "J_d"}
+    blind = {n: v for n, v in known.items() if n not in ("J_d", "J_a")}
     tilt = {"tilt_x": (-0.1, 0.1), "tilt_y": (-0.1, 0.1)}
     spring = {**known, "k_psi": (SPRING, 0.01 * SPRING)}
 
@@ -94,10 +95,13 @@ def questions(rig: Twin) -> tuple[Question, ...]:
 
     return (
         ask("free_swing", "Large free swing of a level rig", "", known),
-        ask("no_scale", "The same swing, disk inertia not given", "", blind, J_d=1.3 * known["J_d"][0]),
+        ask("no_scale", "The same swing, no inertia given", "", blind, J_d=1.3 * known["J_d"][0], J_a=0.7 * known["J_a"][0]),
         ask("level_model", "A rig out of level, explained as if it were level", "_tilted", known),
         ask("tilt_model", "A rig out of level, its lean estimated too", "_tilted", known, tilt_x=0.0, tilt_y=0.0),
-        ask("spring", "A rig out of level, anchored by a soft spring, explained as if it were level", "_spring", spring),
+        replace(
+            ask("spring", "A rig out of level, anchored by a soft spring, as if it were level", "_spring", spring),
+            unknown=("initial", "offset"),  # the spring's own zero lies where the lean lets it
+        ),
     )
 
 
@@ -122,11 +126,13 @@ def study_text(q: Question, rig: Twin) -> str:
         limits = f", min = {low:g}" + (f", max = {high:g}" if math.isfinite(high) else "")
         lines.append(f"{name} = {{ guess = {_with_unit(name, guess)}{limits} }}")
     for name in ("psi", "theta"):
-        lines += ["", f"[sensors.{name}]", f'column = "{name}"', f"counts_per_rev = {COUNTS}"]
+        lines += ["", f"[sensors.{name}]", f'column = "{name}"', 'unit = "counts"', f"counts_per_rev = {COUNTS}"]
     for role, file in (("fit", q.fitted), ("predict", q.predicted)):
         if file:
             lines += ["", "[[runs]]", f'label = "{file.removesuffix(".csv").replace("_", " ")}"', f'file = "{file}"']
             lines += [f'role = "{role}"']
+    lines += ["", "[defaults]", "initial = { psi_dot = 0.0, theta_dot = 0.0 }  # released from rest"]
+    lines += [f"unknown = {list(q.unknown)}".replace("'", '"')]
     return "\n".join(lines) + "\n"
 
 

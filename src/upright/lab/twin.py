@@ -140,8 +140,7 @@ def acquire(
     release = release or Release()
     meant = Release(angle=release.angle + rng.normal(0, 0.01), push=release.push)
     t, x = motion(rig, meant, seconds=seconds, every=every)
-    # the edge between two counts lies anywhere: a random phase per encoder
-    counts = np.floor(x[:, 0::2] * (COUNTS / (2 * math.pi)) + rng.uniform(0, 1, 2))
+    counts = np.round(x[:, 0::2] * (COUNTS / (2 * math.pi)))  # zeroed where both joints rest
     return Record(
         t=t,
         signals={"psi": counts[:, 0], "theta": counts[:, 1]},
