@@ -75,8 +75,9 @@ def moves_against(t: Array, u: Array, x: Array) -> bool:
     if not live.size:
         return False
     i = int(live[0])
-    after = x[i : i + max(int(0.3 / float(np.median(np.diff(t)))), 5)]
-    moved = after - x[i]
+    changes = np.flatnonzero(np.sign(u[i:]) != np.sign(u[i]))
+    most = max(int(2.0 / float(np.median(np.diff(t)))), 5)
+    moved = x[i : i + min(int(changes[0]) if changes.size else most, most)] - x[i]
     far = np.flatnonzero(np.abs(moved) > 0.03 * np.ptp(x))
     return bool(far.size and moved[far[0]] * (u[i] - u[0]) < 0)
 

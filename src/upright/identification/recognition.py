@@ -104,13 +104,20 @@ def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
 def _places(record: Record, seen: Inspection) -> list[Column]:
     """Columns that measure a place and move, without speeds, drives, clocks and liars."""
     kinds = ("rad", "m", "counts", "deg", "mm", "")
-    found = [c for c in seen.columns if not (c.drive or c.constant or c.lies) and c.guess in kinds]
+    found = [c for c in seen.columns if not (c.drive or c.constant or _lies(c, seen)) and c.guess in kinds]
     found = [c for c in found if not _RATE.search(c.name) and not _is_speed(record, c.name, [o.name for o in found])]
     found = [_as_angle(record, c, seen) for c in found]
     found = [c for c in found if c.guess] or found
     span = {c.name: c.high - c.low for c in found}
     largest = {unit: max(span[c.name] for c in found if c.guess == unit) for unit in {c.guess for c in found}}
     return [c for c in found if span[c.name] > 0.01 * largest[c.guess]]  # a locked arm still moves by some mrad
+
+
+def _lies(c: Column, seen: Inspection) -> bool:
+    """Whether a column is not what it is called; of two equal ones, the reference or the later one lies."""
+    names = [o.name for o in seen.columns]
+    earlier = [f"the same as '{o.name}'" for o in seen.columns[: names.index(c.name)] if not o.drive]
+    return any(not lie.startswith("the same as") or lie in earlier for lie in c.lies)
 
 
 def _is_speed(record: Record, name: str, others: list[str]) -> bool:

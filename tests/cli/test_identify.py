@@ -1,0 +1,168 @@
+"""Does a log on disk become a fit, a report and a prediction, and is a person who errs told what to do?"""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from upright.cli import app
+
+LENGTH, G = 0.35, 9.81
+W = math.sqrt(G / LENGTH)
+T = np.arange(1500) * 0.01
+
+
+def swing(t, amplitude=0.02, phase=0.0):
+    """Undamped small swing, a closed form: theta'' = -(g/l) sin(theta), to amplitude^2/16 in the period."""
+    return amplitude * np.cos(W * (1 - amplitude**2 / 16) * t + phase)
+
+
+STUDY = """
+title = "A thread and a bob"
+[rig]
+plant = "pendulum"
+[parameters]
+m_p = "1 kg"
+l_cg = { guess = "0.5 m", min = "1 cm", max = "5 m" }
+[sensors.theta]
+unit = "rad"
+[[runs]]
+label = "one"
+file = "one.csv"
+[[runs]]
+label = "two"
+file = "two.csv"
+role = "predict"
+"""
+
+
+@pytest.fixture
+def bench(tmp_path, monkeypatch):
+    """A folder with a study and two logs of one pendulum."""
+    monkeypatch.chdir(tmp_path)
+    for name, amplitude, phase in (("one", 0.02, 0.0), ("two", 0.015, 1.0)):
+        rows = np.column_stack([T, swing(T, amplitude, phase)])
+        np.savetxt(f"{name}.csv", rows, "%.12g", ",", header="t,theta", comments="")
+    (tmp_path / "study.toml").write_text(STUDY)
+    return tmp_path
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, list(arguments))
+
+
+@pytest.fixture
+def fitted(bench):
+    outcome = run("identify", "study.toml", "-o", "out")
+    assert outcome.exit_code == 0, outcome.output
+    return bench, outcome, json.loads((bench / "out" / "fit.json").read_text())
+
+
+def test_the_length_of_a_pendulum_is_found_from_its_period(fitted):
+    _, _, fit = fitted
+    assert fit["parameters"]["l_cg"]["value"] == pytest.approx(LENGTH, rel=1e-3)
+    assert fit["runs"]["two"]["fit_percent"]["theta"] > 99
+
+
+def test_fit_json_has_the_promised_keys(fitted):
+    _, _, fit = fitted
+    assert {"parameters", "runs", "verdict", "method", "evaluations", "seconds", "provenance"} <= set(fit)
+    assert {"value", "stderr", "interval", "unit", "status"} <= set(fit["parameters"]["l_cg"])
+    assert {"role", "fit_percent", "horizon"} <= set(fit["runs"]["one"])
+    assert (fit["runs"]["one"]["role"], fit["runs"]["two"]["role"]) == ("fit", "predict")
+    assert fit["parameters"]["m_p"]["status"] == "known"
+    assert fit["parameters"]["l_cg"]["unit"] == "m"
+    assert "one.csv" in fit["provenance"]["runs"]["one"]
+
+
+def test_a_report_is_written_and_the_terminal_says_what_next(fitted):
+    folder, outcome, fit = fitted
+    assert (folder / "out" / "report.html").stat().st_size > 10_000
+    assert "A thread and a bob" in (folder / "out" / "report.html").read_text()
+    for words in ("l_cg", "two", fit["verdict"][:30], "What next", "upright predict"):
+        assert words in outcome.stdout
+
+
+def test_a_fitted_model_scores_another_study(fitted):
+    outcome = run("predict", "out/fit.json", "study.toml", "--json", "-o", "scores")
+    assert outcome.exit_code == 0, outcome.output
+    scores = json.loads(outcome.stdout)["runs"]
+    assert {label: s["role"] for label, s in scores.items()} == {"one": "predict", "two": "predict"}
+    assert min(s["fit_percent"]["theta"] for s in scores.values()) > 99
+    assert json.loads((fitted[0] / "scores" / "prediction.json").read_text())["runs"] == scores
+
+
+def test_prediction_needs_no_parameters_in_its_study(fitted):
+    folder = fitted[0]
+    head, _, tail = STUDY.partition("[parameters]")
+    (folder / "other.toml").write_text(head + tail[tail.index("[sensors") :])
+    outcome = run("predict", "out/fit.json", "other.toml")
+    assert outcome.exit_code == 0, outcome.output
+    assert "two" in outcome.stdout
+
+
+def test_json_on_the_terminal_is_the_file(bench):
+    outcome = run("identify", "study.toml", "-o", "out", "--json", "--no-report")
+    assert json.loads(outcome.stdout) == json.loads((bench / "out" / "fit.json").read_text())
+    assert not (bench / "out" / "report.html").exists()
+
+
+def test_ctrl_c_keeps_and_writes_the_best_so_far(bench, monkeypatch):
+    from dataclasses import replace
+
+    from upright.identification import estimate
+
+    whole = estimate.identify
+    monkeypatch.setattr(estimate, "identify", lambda *a, **k: replace(whole(*a, **k), interrupted=True))
+    outcome = run("identify", "study.toml", "-o", "out", "--no-report")
+    assert outcome.exit_code == 130
+    assert json.loads((bench / "out" / "fit.json").read_text())["interrupted"] is True
+
+
+def test_a_log_becomes_a_study_becomes_a_fit_without_an_edit(bench):
+    made = run("init", "one.csv", "-o", "drafted.toml")
+    assert made.exit_code == 0, made.output
+    assert "upright identify drafted.toml" in made.stdout
+    outcome = run("identify", "drafted.toml", "-o", "out", "--no-report", "--json")
+    assert outcome.exit_code == 0, outcome.output
+    assert json.loads(outcome.stdout)["parameters"]["l_cg"]["value"] == pytest.approx(LENGTH, rel=2e-3)
+
+
+def test_init_does_not_overwrite_unless_told(bench):
+    assert "exists already" in run("init", "one.csv", "-o", "study.toml").stderr
+    assert (bench / "study.toml").read_text() == STUDY
+    assert run("init", "one.csv", "-o", "study.toml", "--force").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["identify", "gone.toml"], "upright init LOG"),
+        (["identify", "one.csv"], "upright init"),
+        (["identify", "study.toml", "--method", "simplx"], "did you mean 'simplex'?"),
+        (["identify", "study.toml", "-o", "one.csv"], "one.csv is a file"),
+        (["identify", "study.toml", "--data", "nowhere"], "nowhere"),
+        (["identify", "known.toml"], "give a parameter a guess"),
+        (["identify", "unseen.toml"], "at least one needs role"),
+        (["predict", "gone.json", "study.toml"], "upright predict OUT/fit.json STUDY.toml"),
+        (["predict", "study.toml", "study.toml"], "no fit.json"),
+        (["predict", "empty.json", "study.toml"], "lacks the keys"),
+        (["predict", "chain.json", "study.toml"], "both must be the same plant"),
+        (["init", "gone.csv"], "does not exist"),
+        (["init", "."], "is a folder"),
+        (["init", "one.csv", "--plant", "furutta", "-o", "x.toml"], "did you mean 'furuta'?"),
+        (["init", "one.csv", "--plant", "rectilinear-1", "-o", "x.toml"], "choose another --plant"),
+    ],
+)
+def test_a_mistake_is_answered_in_one_sentence(bench, arguments, says):
+    (bench / "known.toml").write_text(STUDY.replace('{ guess = "0.5 m", min = "1 cm", max = "5 m" }', '"0.5 m"'))
+    (bench / "unseen.toml").write_text(STUDY.replace('label = "one"', 'label = "one"\nrole = "predict"'))
+    (bench / "empty.json").write_text("{}")
+    entry = {"plant": "rectilinear-1", "verdict": "", "format": 1, "parameters": {"m_1": {"value": 1.0}}}
+    (bench / "chain.json").write_text(json.dumps(entry))
+    outcome = run(*arguments)
+    assert outcome.exit_code == 2, outcome.output
+    assert says in outcome.stderr
+    assert outcome.stderr.count("\n") == 1
