@@ -103,19 +103,19 @@ def compare(
     taken: dict[str, list[float]] = {c.name: [] for c in able}
     ratios: dict[str, list[float]] = {c.name: [] for c in able}
     errors: dict[str, float | None] = {}
+    turns: dict[str, int] = {}
     for contender in able:
         progress(f"{benchmark}: {contender.name}")
-        start = time.perf_counter()
         result = contender.run()  # compiles, allocates, fills caches
         errors[contender.name] = contender.error(result) if contender.error else None
         del result
-        slow = time.perf_counter() - start > patience
-        if slow:
-            taken[contender.name] = [float("inf")] * (rounds - 2)
+        start = time.perf_counter()
+        contender.run()
+        turns[contender.name] = rounds if time.perf_counter() - start < patience else min(2, rounds)
     for _ in range(rounds):
         reference = None
         for contender in able:
-            if len(taken[contender.name]) >= rounds:
+            if len(taken[contender.name]) >= turns[contender.name]:
                 continue
             gc.collect()
             start = clock()
@@ -126,14 +126,13 @@ def compare(
             if reference:
                 ratios[contender.name].append(seconds / reference)
     for contender in able:
-        finite = [t for t in taken[contender.name] if np.isfinite(t)]
         lines.append(
             Line(
                 benchmark=benchmark,
                 contender=contender.name,
-                seconds=spread(finite),
+                seconds=spread(taken[contender.name]),
                 ratio=spread(ratios[contender.name]) if ratios[contender.name] else None,
-                rounds=len(finite),
+                rounds=len(taken[contender.name]),
                 error=errors[contender.name],
                 target=contender.target,
                 note=contender.note,
