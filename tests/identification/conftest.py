@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from tests.identification.crane_log import THETA, T, X
 
+from tests.identification.crane_log import THETA, T, X
 from upright.identification.study import load_study
 
 
@@ -19,3 +19,16 @@ def study(tmp_path):
         return load_study(tmp_path / name)
 
     return load
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with a log; t from 0 to 10 s, theta in counts, z in m, v."""
+    place = tmp_path_factory.mktemp("study")
+    t = np.arange(1001) * 0.01
+    columns = [t, np.round(700 * np.cos(6 * t)), 0.05 * np.sin(t), np.ones_like(t)]
+    np.savetxt(place / "log.csv", np.column_stack(columns), "%.10g", ",", header="t,theta,z,v", comments="")
+    silent = (t < 4) | (t > 6)
+    np.savetxt(place / "silent.csv", np.column_stack(columns)[silent], "%.10g", ",", header="t,theta,z,v", comments="")
+    (place / "bad_plant.py").write_text("import nothing_of_this_name\n")
+    return place

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from tests.identification.crane_log import RIG, RUN, SENSORS, THETA, T, X, one
 
+from tests.identification.crane_log import RIG, RUN, SENSORS, THETA, T, X, one
 from upright.identification.study import load_study
 
 

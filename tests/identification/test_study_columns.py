@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+
 from tests.identification.crane_log import RIG, RUN, SENSORS, THETA, T, X, one
 
 

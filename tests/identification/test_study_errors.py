@@ -1,58 +1,13 @@
 """Is a wrong study answered with the line, what was expected and the nearest valid name, in one sentence?"""
 
-import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from tests.identification.good_study import GOOD
 from upright.errors import BadInput
 from upright.identification.study import load_study
 from upright.identification.study_keys import names
-
-GOOD = """\
-[rig]
-plant = "cart-pendulum"
-substeps = 2
-[parameters]
-m_c = "0.5 kg"
-m_p = { value = "0.107 kg", uncertainty = "1 g" }
-l_cg = "0.23 m"
-J_p = { guess = "1.6e-3 kg m^2", min = 0 }
-[actuator]
-gain = { guess = "5 N/V" }
-[sensors.theta]
-column = "theta"
-unit = "counts"
-counts_per_rev = 14400
-sign = -1
-[sensors.x]
-column = "z"
-[drive]
-column = "v"
-unit = "V"
-[[runs]]
-label = "a"
-file = "log.csv"
-window = [1.0, 9.0]
-role = "fit"
-[[runs]]
-label = "b"
-file = "log.csv"
-locked = { x = 0.0 }
-"""
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """A folder with a log; t from 0 to 10 s, theta in counts, z in m, v."""
-    place = tmp_path_factory.mktemp("study")
-    t = np.arange(1001) * 0.01
-    columns = [t, np.round(700 * np.cos(6 * t)), 0.05 * np.sin(t), np.ones_like(t)]
-    np.savetxt(place / "log.csv", np.column_stack(columns), "%.10g", ",", header="t,theta,z,v", comments="")
-    silent = (t < 4) | (t > 6)
-    np.savetxt(place / "silent.csv", np.column_stack(columns)[silent], "%.10g", ",", header="t,theta,z,v", comments="")
-    (place / "bad_plant.py").write_text("import nothing_of_this_name\n")
-    return place
 
 
 def complaint(folder, text, **kwargs):
