@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 
 import pytest
-from tests.readers import logs
 from typer.testing import CliRunner
 
+from tests.readers import logs
 from upright.cli import app
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.readers import logs
 
+from tests.readers import logs
 from upright.errors import BadInput
 from upright.readers import read, read_source, recognise
 from upright.readers.source import Source

@@ -46,6 +46,13 @@ def test_a_linear_encoder_has_its_step_and_no_revolution(step: float) -> None:
     assert found.step == pytest.approx(step, rel=1e-6)
 
 
+def test_a_converter_is_told_from_the_digits_of_its_text() -> None:
+    _, x = swing()
+    found = quantum.find(np.round(counted(30 * x, 80 / 4096), 6))  # 12 bits over +-40 V, always an even last digit
+    assert found.step == pytest.approx(80 / 4096, rel=1e-5)
+    assert quantum.find(counted(x, 2e-5)).step == pytest.approx(2e-5)
+
+
 def test_a_smooth_signal_has_no_step() -> None:
     rng = np.random.default_rng(5)
     assert quantum.find(rng.normal(size=3000)).step == 0

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.readers.logs import FOLDER, SYNTHETIC
 
+from tests.readers.logs import FOLDER, SYNTHETIC
 from upright.errors import BadInput
 from upright.readers import read_source
 from upright.readers.source import Source

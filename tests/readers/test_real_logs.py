@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from tests.readers.logs import needs_real_data, real
 
+from tests.readers.logs import needs_real_data, real
 from upright.errors import BadInput
 from upright.readers import inspect, read
 

@@ -121,11 +121,15 @@ def remarks(column: Column) -> list[str]:
     told = list(column.lies)
     if column.drive and not told:
         told.append("drives?")
-    if column.switches and len(column.switches) <= 6:
+    if column.switches and not column.stepwise:
+        told.append(
+            ", ".join(f"{'back at' if value == 0 else 'leaves'} 0 at {t:.4g} s" for t, value in column.switches)
+        )
+    elif column.switches and len(column.switches) <= 6:
         told.append("switches " + ", ".join(f"to {value:.4g} at {t:.4g} s" for t, value in column.switches))
     if column.drive:
         for share, level in ((column.low_share, column.low), (column.high_share, column.high)):
-            if share and not column.switches:
+            if share and not column.stepwise:
                 told.append(f"at {level:.4g} for {100 * share:.2g} % of the samples (saturated?)")
     if column.turns:
         told.append(f"offset of {column.turns} turns (2 pi each)")

@@ -52,7 +52,8 @@ class Column:
 
     `unit` is stated by the log, `guess` ours when it is not; `low_share` and `high_share`: share of the samples
     pinned at the lowest and highest value (0 unless they stay there); `turns`: whole revolutions in the offset;
-    `switches`: (time [s], new value) of a drive that moves in steps; `idle`: a drive that never leaves 0.
+    `switches`: (time [s], new value) of a drive, at every step when it is `stepwise`, else where it leaves 0 and
+    returns; `idle`: a drive that never leaves 0.
     """
 
     name: str
@@ -68,6 +69,7 @@ class Column:
     drive: bool
     idle: bool
     switches: tuple[tuple[float, float], ...]
+    stepwise: bool
     lies: tuple[str, ...]
 
 
@@ -163,6 +165,7 @@ def _column(record: Record, name: str) -> Column:
         drive=drive,
         idle=drive and constant and low == 0,
         switches=_switches(record.t, x) if drive and not constant else (),
+        stepwise=0 < int(np.count_nonzero(np.diff(x))) <= _SHOWN,
         lies=lies.about(record, name),
     )
 

@@ -36,20 +36,26 @@ class Quantum:
 def find(values: Array) -> Quantum:
     """Step of a column (N,)."""
     rounding = decimal_rounding(values)
-    if rounding > 0 and np.ptp(values) > 0:  # whole multiples of a digit: exact
-        whole = np.round(np.unique(values) / rounding).astype(np.int64)
-        common = int(np.gcd.reduce(whole - whole[0]))
-        if whole.size > 2 and (common > 1 or rounding >= 1):
-            return Quantum(step=common * rounding)
+    if rounding >= 1:  # counts
+        return Quantum(step=_common_divisor(values, rounding))
     levels = _levels(values, rounding)
     if levels.size < 3:
         return Quantum()
     step = _grid(levels, rounding)
-    if step == 0 or step < 1.5 * rounding:
-        # Steps no coarser than the text's own digits tell about the text, not about the sensor.
-        few = rounding > 0 and levels.size < 0.5 * values.size
-        return Quantum(step=rounding, decimals=True) if few else Quantum()
-    return Quantum(step=step, counts_per_rev=counts_per_rev(step))
+    if step >= 1.5 * rounding and step > 0:
+        return Quantum(step=step, counts_per_rev=counts_per_rev(step))
+    common = _common_divisor(values, rounding) if rounding else 0.0
+    if levels.size > 8 and common > 1.5 * rounding:  # too fine beside its text for a fit, yet exact
+        return Quantum(step=common)
+    # Steps no coarser than the text's own digits tell about the text, not about the sensor.
+    few = rounding > 0 and levels.size < 0.5 * values.size
+    return Quantum(step=rounding, decimals=True) if few else Quantum()
+
+
+def _common_divisor(values: Array, digit: float) -> float:
+    """Greatest step of which all differences are multiples, for multiples of a digit; 0 below 3 levels."""
+    whole = np.round(np.unique(values) / digit).astype(np.int64)
+    return float(np.gcd.reduce(whole - whole[0])) * digit if whole.size > 2 else 0.0
 
 
 def decimal_rounding(values: Array) -> float:

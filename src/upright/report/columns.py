@@ -34,7 +34,7 @@ def draw_columns(record: Record, seen: Inspection) -> Figure:
         for gap in seen.time.gaps[:20]:
             axes.axvline(gap.start, color=GREY, linewidth=0.6, linestyle=":")
         t, y = decimated(record.t, record[column.name], buckets=800)
-        axes.plot(t, y, color=colour, linewidth=1.0, drawstyle="steps-post" if column.switches else "default")
+        axes.plot(t, y, color=colour, linewidth=1.0, drawstyle="steps-post" if column.stepwise else "default")
         unit = column.unit or (f"{column.guess}?" if column.guess else "")
         name = column.name if len(column.name) <= 30 else "…" + column.name[-29:]
         label = axes.set_ylabel(f"{name}\n[{unit}]" if unit else name, rotation=0, ha="right", va="center")
