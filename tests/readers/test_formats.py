@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.readers import logs
-from upright.errors import BadInput
 from upright.readers import read, read_source, recognise
 from upright.readers.source import Source
 from upright.readers.timebase import rebuild
@@ -208,58 +207,6 @@ def test_our_own_files_are_recognised(tmp_path: Path, form: str) -> None:
     back = read(tmp_path / "record")
     np.testing.assert_array_equal(back["my θ, raw"], record["my θ, raw"])
     assert (back.units, back.outputs) == (record.units, record.outputs)
-
-
-@pytest.mark.parametrize(
-    ("data", "sentence"),
-    [
-        (b"", "the file is empty"),
-        (b" \r\n \n", "the file is empty"),
-        (b"t,x\n0,1\n1,two\n", "line 3, column 2 \\(x\\).*'two'"),
-        (b"t,x\n0,1\n1,\n2,3\n", "line 3, column 2 \\(x\\).*empty cell"),
-        (b"t,x\n0,1\n1,nan\n", "line 3, column 2 \\(x\\).*'nan'"),
-        (b"t,x\n0,1\n1,1e999\n", "line 3, column 2 \\(x\\).*too large"),
-        (b"t,x\n0,1\n1,1e200\n", "line 3, column 2 \\(x\\).*too large"),
-        (b"t,x\n0,1\n\n2,3\n1,3\n", "line 5, column 1 \\(t\\).*1 s after 2 s"),
-        (b"t,x\n0,1\n1,2\n2", "line 4.*the last row is torn"),
-        (b"t,x\n0.00,1.00\n1.00,2.00\n2.00,2.50\n3.00,2.5", "line 5, column 2 \\(x\\).*the last row is torn"),
-        (b"t,x,y\n0,1\n1,2\n", "line 1.*a name for each of the 2 columns below, got 3"),
-        (b"t,x,x\n0,1,2\n1,2,3\n", "line 1, column 3 \\(x\\).*got this one twice"),
-        (b"a,b\n3,1\n2,2\n", "line 1.*a time column named 't'"),
-        (b"Sample,x\n1,1\n2,2\n", "only the sample index"),
-        (b"t,x\n", "expected rows of numbers"),
-        (b"t,x\n0,1\n", "at least 2 samples"),
-        (b"t,x\n0,1\n1,\x002\n", "line 3, column 3.*byte 0x00"),
-        (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "binary format"),
-        (b"MATLAB 7.3 MAT-file" + b" " * 493 + b"\x89HDF\r\n\x1a\n", "version 7.3 \\(HDF5\\).*'-v7'"),
-        (b"MATLAB 5.0 MAT-file", "damaged or older"),
-        (logs.mat_vectors(61)[:-9], "cut short or damaged"),
-        (logs.ecp_export().replace(b"]", b";"), "line 62.*expected ']'"),
-        (logs.ecp_export()[:2000], "cut short|torn"),
-        (logs.ecp_export().replace(b";", b" ", 1), "line 3.*expected ';'"),
-        (logs.ros_bag().replace(b",0.050000000", b",", 1), "line 7, column 4 .*this cell is empty"),
-        (logs.ros_bag()[:-8], "torn"),
-    ],
-)
-def test_damage_is_named_in_one_sentence_with_its_place(data: bytes, sentence: str, tmp_path: Path) -> None:
-    path = tmp_path / "damaged"
-    path.write_bytes(data)
-    with pytest.raises(BadInput, match=sentence) as caught:
-        read(path)
-    assert "\n" not in str(caught.value)
-
-
-def test_a_missing_file_is_answered_with_its_neighbour(tmp_path: Path) -> None:
-    (tmp_path / "swing.csv").write_bytes(logs.named_csv())
-    with pytest.raises(BadInput, match=r"did you mean 'swing\.csv'"):
-        read(tmp_path / "swnig.csv")
-    with pytest.raises(BadInput, match="is a folder"):
-        read(tmp_path)
-
-
-def test_a_last_number_that_may_be_cut_is_noted(tmp_path: Path) -> None:
-    record = read_source(source(b"t,x\n0,1\n1,25\n2,3"))
-    assert any("no line end" in note for note in record.provenance.notes)
 
 
 def test_provenance_names_the_content() -> None:
