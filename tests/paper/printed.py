@@ -7,33 +7,9 @@ from types import SimpleNamespace
 
 import sympy as sp
 
-p = SimpleNamespace(
-    **{
-        n: sp.Symbol(n, real=True)
-        for n in [
-            "m_p",
-            "l_cg",
-            "r",
-            "J_d",
-            "J_p",
-            "J_a",
-            "J_xx",
-            "J_zz",
-            "m_c",
-            "b_1",
-            "b_2",
-            "b_1c",
-            "b_2c",
-            "g",
-            "K_1",
-            "K_2",
-            "psi",
-            "theta",
-            "psi_dot",
-            "theta_dot",
-        ]
-    }
-)
+INERTIAS = ["m_p", "l_cg", "r", "J_d", "J_p", "J_a", "J_xx", "J_zz", "m_c"]
+OTHERS = ["b_1", "b_2", "b_1c", "b_2c", "g", "K_1", "K_2", "psi", "theta", "psi_dot", "theta_dot"]
+p = SimpleNamespace(**{name: sp.Symbol(name, real=True) for name in [*INERTIAS, *OTHERS]})
 s = sp.Symbol("s")
 J_A = p.J_p + p.m_p * p.l_cg**2
 

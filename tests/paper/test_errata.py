@@ -6,9 +6,9 @@ from math import ceil, floor
 import numpy as np
 import pytest
 import sympy as sp
+
 from tests.paper import printed
 from tests.paper.printed import J_A, p, s
-
 from upright.physics import Furuta
 from upright.physics.lagrange import linear, motion, over_determinant
 

@@ -5,9 +5,9 @@ from functools import cache
 import numpy as np
 import pytest
 import sympy as sp
+
 from tests.paper import printed
 from tests.paper.printed import J_A, p, s
-
 from upright.physics import CartPendulum, Furuta, Plant
 from upright.physics.lagrange import linear
 

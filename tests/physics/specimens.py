@@ -31,7 +31,7 @@ class Specimen:
         """Contacts off, no armature, fourth-order Runge and Kutta."""
         gravity = " ".join(repr(g) for g in self.gravity)
         return f"""<mujoco><compiler angle="radian" autolimits="false" inertiafromgeom="false" balanceinertia="false"/>
-<option timestep="5e-4" integrator="RK4" gravity="{gravity}"><flag contact="disable" constraint="disable"/></option>
+<option timestep="1e-3" integrator="RK4" gravity="{gravity}"><flag contact="disable" constraint="disable"/></option>
 <worldbody>{self.bodies}</worldbody><tendon>{self.tendons}</tendon></mujoco>"""
 
 

@@ -7,9 +7,9 @@ import sys
 import numpy as np
 import pytest
 import sympy as sp
+
 from tests.physics.specimens import EXAMPLES, SPECIMENS
 from tests.physics.text import acceleration, slope, swing
-
 from upright.physics import Plant, find, lagrange
 from upright.physics.derivation import derive
 from upright.physics.generate import FOLDER, source, variants
@@ -20,6 +20,7 @@ MOTOR = find("qube_motor.py:QubeMotor", EXAMPLES)(
 )
 PLANTS = {name: specimen.plant for name, specimen in SPECIMENS.items()} | {"qube motor": MOTOR}
 CASES = [(name, at) for name, plant in PLANTS.items() for at in plant.equilibria]
+QUICK_IN_SYMBOLS = [name for name in PLANTS if not name.endswith(("level", "-3", "-4"))]
 
 
 @pytest.fixture

@@ -194,10 +194,11 @@ def _newton(plant: Plant, derived: Derived, point: dict[str, float]) -> dict[str
         scope = {**plant.parameters(), **still, **point}
         force = _motion(derived, scope)[1]
         stiffness = _matrix(derived.stiffness, scope, n, n)
-        scale = np.abs(stiffness).max(initial=0.0)
-        if np.all(np.abs(force) <= 1e-12 * scale) or not force.any():
+        scale = np.abs(stiffness).max(axis=1, initial=0.0)
+        if np.all(np.abs(force) <= 1e-12 * scale):
             return point
-        step = np.linalg.lstsq(stiffness, force, rcond=1e-9)[0]
+        even = 1 / np.sqrt(np.where(scale > 0, scale, 1.0))  # a stiff anchor must not hide a soft pendulum
+        step = even * np.linalg.lstsq(stiffness * even[:, None] * even, force * even, rcond=1e-9)[0]
         step *= min(1.0, 0.3 / max(float(np.abs(step).max()), 1e-300))
         point = {name: value + float(d) for (name, value), d in zip(point.items(), step, strict=True)}
     return None

@@ -1,0 +1,143 @@
+"""Is a wrong plant of the user's own answered in one sentence that says what to do?"""
+
+import pytest
+
+from tests.physics.specimens import EXAMPLES
+from upright.errors import BadInput, ImpossiblePhysics
+from upright.physics import find
+
+HEAD = """
+from upright.physics import Coordinate, Input, Joint, Plant
+from upright.quantities import quantity
+
+class Mine(Plant):
+    m: float = quantity("kg", "mass", above=0)
+    coordinates = (Coordinate("x", "m", "position"),)
+"""
+ENERGIES = """
+    @staticmethod
+    def energies(p, q, v):
+        return p.m * v[0]**2 / 2, 0, 0
+"""
+RIGHT = HEAD + ENERGIES
+
+WHEN_MADE = {
+    "no energies": (HEAD, r"Mine states no energies; define energies\(p, q, v\)"),
+    "no coordinates": (RIGHT.replace("coordinates =", "coordinate ="), "Mine has no coordinates; write coordinates"),
+    "parameter without unit": (RIGHT + "    k: float = 3.0\n", "parameter 'k' has no unit; write k: float = quantity"),
+    "parameter without type": (
+        RIGHT + "    k = quantity('N/m', 'spring')\n",
+        "k = quantity.* needs a type; write k: float",
+    ),
+    "parameter like a coordinate": (RIGHT.replace('"x"', '"m"', 1), "'m' is both coordinate and parameter; rename"),
+    "parameter like a velocity": (
+        RIGHT + "    x_dot: float = quantity('m/s', 'speed')\n",
+        "'x_dot' is both velocity and parameter",
+    ),
+    "parameter like an intermediate result": (
+        RIGHT + "    k1: float = quantity('N/m', 'spring')\n",
+        "parameter 'k1' is a name that equations use themselves; call it 'k_1'",
+    ),
+    "parameter that hides a method": (
+        RIGHT + "    energy: float = quantity('J', 'energy')\n",
+        "parameter 'energy' hides what a plant itself calls energy",
+    ),
+    "coordinate that is no name": (RIGHT.replace('"x"', '"x 1"', 1), "coordinate 'x 1' is no Python name"),
+    "unknown coordinate in a joint": (RIGHT + "    joints = (Joint('y'),)\n", "a joint names 'y'; valid names: x"),
+    "unknown parameter in a joint": (
+        RIGHT + "    joints = (Joint('x', coulomb='mm'),)\n",
+        "the joint on x names 'mm'; did you mean 'm'",
+    ),
+    "unknown coordinate of an input": (
+        RIGHT + "    inputs = (Input('F', 'N', 'force', on='X'),)\n",
+        "input F names 'X'",
+    ),
+    "unknown coordinate of an equilibrium": (
+        RIGHT + "    equilibria = {'up': {'theta': 3.1}}\n",
+        "equilibrium 'up' names 'theta'",
+    ),
+    "syntax error": (RIGHT + "    joints = (\n", r"mine\.py has a syntax error in line 11"),
+    "error while it runs": (RIGHT + "    l = lenght\n", r"mine\.py stops in line 11: NameError: name 'lenght'"),
+    "another class": (RIGHT.replace("Mine", "Mime"), "has no plant 'Mine'; did you mean 'Mime'"),
+}
+
+WHEN_DERIVED = {
+    "T of third order": (RIGHT.replace("v[0]**2", "v[0]**3"), "T must be quadratic in the velocities"),
+    "V with a velocity": (RIGHT.replace("/ 2, 0, 0", "/ 2, v[0], 0"), "V must not depend on velocities"),
+    "no inertia": (RIGHT.replace("p.m * v[0]**2 / 2", "0"), "x has no inertia, so its acceleration is undefined"),
+    "misspelt parameter": (RIGHT.replace("p.m *", "p.mm *"), r"uses p\.mm; did you mean 'm'"),
+    "two energies": (RIGHT.replace("/ 2, 0, 0", "/ 2, 0"), "must return T, V, D"),
+    "text for an energy": (RIGHT.replace("/ 2, 0, 0", "/ 2, 'heavy', 0"), "must return SymPy expressions or numbers"),
+    "math instead of sympy": (
+        "import math\n" + RIGHT.replace("/ 2, 0, 0", "/ 2, math.cos(q[0]), 0"),
+        "does not run: TypeError: .* write it with SymPy's sin, cos and sqrt",
+    ),
+    "foreign symbol": (
+        "import sympy\n" + RIGHT.replace("/ 2, 0, 0", "/ 2, sympy.Symbol('h'), 0"),
+        "uses h, which is none of its own symbols; take them from p, q and v",
+    ),
+    "self in energies": (RIGHT.replace("(p, q, v)", "(self, p, q, v)"), "does not run: TypeError"),
+}
+
+
+def write(folder, text):
+    (folder / "mine.py").write_text(text.lstrip("\n"))
+    return folder
+
+
+@pytest.mark.parametrize("case", WHEN_MADE)
+def test_a_plant_wrongly_stated_is_refused_when_read(case, tmp_path):
+    text, sentence = WHEN_MADE[case]
+    with pytest.raises(BadInput, match=sentence) as refused:
+        find("mine.py:Mine", write(tmp_path, text))
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("case", WHEN_DERIVED)
+def test_energies_of_no_mechanical_system_are_refused_when_derived(case, tmp_path):
+    text, sentence = WHEN_DERIVED[case]
+    plant = find("mine.py:Mine", write(tmp_path, text))
+    with pytest.raises(BadInput, match=sentence) as refused:
+        plant.derived()
+    assert "\n" not in str(refused.value)
+
+
+def test_a_right_plant_is_derived(tmp_path):
+    plant = find("mine.py:Mine", write(tmp_path, RIGHT))
+    assert plant.derived().mass == ("k0",)
+    assert plant(m=2.0).energy([0.0, 3.0]) == 9.0
+
+
+def test_an_inertia_that_can_be_negative_is_refused_in_numbers(tmp_path):
+    text = RIGHT.replace("above=0", "default=1.0").replace("p.m * v", "(p.m - 2) * v")
+    with pytest.raises(ImpossiblePhysics, match="positive definite mass matrix"):
+        find("mine.py:Mine", write(tmp_path, text))().linear()
+
+
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("nowhere.py:Mine", r"nowhere\.py does not exist; give it relative to the study file"),
+        ("double_pendulum.py", "name the class in the file too"),
+        ("double_pendulum.py:DoublePendulums", "did you mean 'DoublePendulum'"),
+    ],
+)
+def test_a_file_that_cannot_be_used_is_named(name, sentence):
+    with pytest.raises(BadInput, match=sentence):
+        find(name, EXAMPLES)
+
+
+def test_a_constant_angle_and_a_gear_ratio_are_taken_out_of_the_sines(tmp_path):
+    """cos(x + alpha) by the addition theorem, cos(n x) with its ratio as a lump: both against plain evaluation."""
+    from math import sin
+
+    from tests.physics.text import acceleration
+
+    text = "from sympy import cos\n" + RIGHT.replace("/ 2, 0, 0", "/ 2, cos(q[0] + p.alpha) + cos(p.n * q[0]), 0")
+    text = text.replace(
+        "    coordinates",
+        "    alpha: float = quantity('rad', 'a')\n    n: float = quantity('1', 'ratio')\n    coordinates",
+    )
+    plant = find("mine.py:Mine", write(tmp_path, text))(m=2.0, alpha=0.3, n=1.7)
+    a = acceleration(plant.derived(), plant.parameters())([0.9], [0.2], [])
+    assert a == pytest.approx([(sin(1.2) + 1.7 * sin(1.7 * 0.9)) / 2.0], rel=1e-12)
