@@ -49,7 +49,7 @@ def answer(
     estimates = {n: estimates[n] for n in [*asked.parameters] if n in estimates}
     scores = _scores(chosen, runs, problem, x, {n: e.value for n, e in estimates.items()})
     units = {n: p.unit for n, p in asked.parameters.items()}
-    unseen = sentences(sight, units, known=())
+    unseen = sentences(sight, units)
     worst = min((p for s in scores.values() if s.role == "fit" for p in s.fit_percent.values()), default=100.0)
     conventions = doubts(chosen, [r for r in runs if r.role == "fit"], problem.base) if worst < GOOD else ()
     verdict, trusted = judge(

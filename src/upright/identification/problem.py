@@ -92,7 +92,7 @@ class Problem:
 
     def value(self, x: Array) -> Array:
         """Values (sought,) or (sought, lanes) of coordinates."""
-        log = np.array([u.log for u in self.unknowns])
+        log = np.array([u.log for u in self.unknowns], dtype=bool)
         out = x.copy()
         out[log] = np.exp(np.minimum(x[log], 300.0))
         return out
@@ -237,6 +237,8 @@ def products(J: Array, r: Array) -> tuple[Array, Array, float]:
     rows = max(64, 200_000 // max(1, J.shape[1] + 1) ** 2)
     whole = r.size // rows * rows
     both = np.concatenate([J, r[:, None]], axis=1)
+    if not float(np.max(np.abs(both), initial=0.0)) < 1e100:
+        return np.zeros((J.shape[1], J.shape[1])), np.zeros(J.shape[1]), math.inf
     blocks = both[:whole].reshape(-1, rows, both.shape[1])
     total = np.matmul(blocks.transpose(0, 2, 1), blocks).sum(axis=0) + both[whole:].T @ both[whole:]
     return total[:-1, :-1], total[:-1, -1], float(total[-1, -1])

@@ -5,7 +5,6 @@ A free swing without a known force or inertia sees only ratios: masses, forces a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,15 +27,14 @@ PART = 0.05
 class Sight:
     """Singular values (largest first) and directions (rows) of the Jacobian scaled to relative changes.
 
-    `names` are the columns, `blind` the rows of directions that the data cannot see.
+    `names` are the columns, `blind` the rows of directions that the data cannot see, `effects` the columns' lengths.
     """
 
     names: tuple[str, ...]
-    places: tuple[int, ...]
     singular_values: Array
     directions: Array
     blind: Array
-    sizes: Array
+    effects: Array
 
 
 def look(problem: Problem, x: Array, spread: Spread) -> Sight:
@@ -65,8 +63,8 @@ def look(problem: Problem, x: Array, spread: Spread) -> Sight:
     if not blind:
         blind = [d for d in directions if d @ cov @ d > FAINT**2]
     return Sight(
-        names=names, places=tuple(shared), singular_values=singular, directions=directions,
-        blind=np.array(blind).reshape(-1, len(shared)), sizes=sizes,
+        names=names, singular_values=singular, directions=directions,
+        blind=np.array(blind).reshape(-1, len(shared)), effects=np.sqrt(np.maximum(np.diag(S), 0.0)),
     )  # fmt: skip
 
 
@@ -86,23 +84,28 @@ def _null(S: Array) -> list[Array]:
     return found
 
 
-def parts(names: Sequence[str], direction: Array) -> list[tuple[str, float]]:
-    """Numbers that take part in a direction, with their shares relative to the largest, largest first."""
+def parts(sight: Sight, direction: Array) -> list[tuple[str, float]]:
+    """Numbers that take part in a direction, with their shares relative to the largest, largest first.
+
+    A number takes part by the size of its change or by the size of its effect.
+    """
     share = direction / direction[np.argmax(np.abs(direction))]
+    effect = np.abs(direction * sight.effects)
     order = np.argsort(-np.abs(share))
-    return [(names[i], float(share[i])) for i in order if abs(share[i]) >= PART]
+    strong = effect >= PART * effect.max(initial=0.0)
+    return [(sight.names[i], float(share[i])) for i in order if abs(share[i]) >= PART or (strong[i] and effect[i] > 0)]
 
 
 def hidden(sight: Sight) -> set[str]:
     """Names of the numbers that take part in a direction the data cannot see."""
-    return {n for d in sight.blind for n, _ in parts(sight.names, d)}
+    return {n for d in sight.blind for n, _ in parts(sight, d)}
 
 
-def sentences(sight: Sight, units: dict[str, str], known: Sequence[str]) -> tuple[str, ...]:
+def sentences(sight: Sight, units: dict[str, str]) -> tuple[str, ...]:
     """Say which combinations cannot be seen and which one number would fix it."""
     said: list[str] = []
     for d in sight.blind:
-        share = parts(sight.names, d)
+        share = parts(sight, d)
         names = [n for n, _ in share]
         if len(names) == 1:
             said.append(
@@ -123,5 +126,5 @@ def sentences(sight: Sight, units: dict[str, str], known: Sequence[str]) -> tupl
     return tuple(said)
 
 
-def _list(names: Sequence[str], word: str = "and") -> str:
+def _list(names: list[str], word: str = "and") -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} {word} {names[-1]}"
