@@ -27,8 +27,9 @@ WIDTH = 16
 # no `nnan` or `ninf`: a lane that diverges must stay visible as NaN (DESIGN 2)
 HEAD = '''"""Generated kernel of {name}; {flavour}"""
 
-from math import cos, exp, expm1, pi, sin, sqrt, tan
+from math import cos, exp, pi, sin, sqrt, tan
 
+import numpy
 from llvmlite import ir
 from numba import carray, cfunc, float64, int64, njit, types
 from numba.extending import intrinsic

@@ -41,7 +41,7 @@ def falling(x):
     z = r * r
     p = r * ((1.26177193074810590878e-4 * z + 3.02994407707441961300e-2) * z + 9.99999999999999999910e-1)
     q = ((3.00198505138664455042e-6 * z + 2.52448340349684104192e-3) * z + 2.27265548208155028766e-1) * z + 2.0
-    e = (1.0 + 2.0 * p / (q - p)) * int64((int64(n) + 1023) << 52).view(float64)
+    e = (1.0 + 2.0 * p / (q - p)) * numpy.int64((numpy.int64(n) + 1023) << 52).view(numpy.float64)
     return 0.0 if x >= 700.0 else e
 '''
 
@@ -179,9 +179,11 @@ def step(p: Layout) -> str:
     lines = ["_hh = 0.5 * _h"]
 
     def stage(k: int, when: str, shift: str, speed: str) -> None:
-        """One evaluation: coordinates moved by `shift`, velocities called `speed`, both plus the coordinate's number."""
+        """One evaluation: coordinates moved by `shift`, velocities called `speed`, each with its number."""
         call: list[str] = []
-        call += [f"_h{'q'}{i}{when}" if i in f.held else (f"_q{i} + {shift}{i}" if shift else f"_q{i}") for i in range(p.n)]
+        call += [
+            f"_h{'q'}{i}{when}" if i in f.held else (f"_q{i} + {shift}{i}" if shift else f"_q{i}") for i in range(p.n)
+        ]
         call += [f"_h{'v'}{i}{when}" if i in f.held else f"{speed}{i}" for i in range(p.n)]
         call += [f"_u{when}{j}" for j in range(p.nu)] + [f"_s{i}" for i in f.dry]
         for i in f.dahl:
@@ -192,7 +194,9 @@ def step(p: Layout) -> str:
         lines.append(f"({', '.join(result)},) = acceleration({', '.join(call)})")
 
     stage(1, "a", "", "_v")
-    for k, (when, weight, before) in enumerate((("m", "_hh", "_v"), ("m", "_hh", "_p2_"), ("b", "_h", "_p3_")), start=2):
+    for k, (when, weight, before) in enumerate(
+        (("m", "_hh", "_v"), ("m", "_hh", "_p2_"), ("b", "_h", "_p3_")), start=2
+    ):
         lines += [f"_g{k}_{i} = {weight} * {before}{i}" for i in free]
         lines += [f"_p{k}_{i} = _v{i} + {weight} * _a{k - 1}_{i}" for i in free]
         stage(k, when, f"_g{k}_", f"_p{k}_")

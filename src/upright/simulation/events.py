@@ -353,7 +353,9 @@ def _leap(p: Layout) -> str:
 def _terms_at(p: Layout) -> str:
     known, f = _known(p, "state"), p.flavour
     for i, (q, v) in enumerate(zip(p.derived.coordinates, p.velocities, strict=True)):
-        known[q], known[v] = (_motion(p, "q", i, "z"), _motion(p, "v", i, "z")) if i in f.held else (known[f"_q{i}"], known[f"_v{i}"])
+        known[q], known[v] = (
+            (_motion(p, "q", i, "z"), _motion(p, "v", i, "z")) if i in f.held else (known[f"_q{i}"], known[f"_v{i}"])
+        )
     known |= {u: _input(p, j, "z") for j, u in enumerate(p.derived.inputs)}
     known |= {f"_ah{i}": _motion(p, "a", i, "z") for i in f.held}
     call = ", ".join(known[a] for a in arguments(p))

@@ -113,7 +113,9 @@ def _start(w: Writer) -> None:
             _start_actuator(w, j, first)
     if f.loop:
         row = first + len(ACTUATOR) * p.nu
-        for name in [f"K{j}_{i}" for j in range(p.nu) for i in range(2 * p.n)] + [f"tg{i}" for i in range(p.n)] + ["kr"]:
+        for name in (
+            [f"K{j}_{i}" for j in range(p.nu) for i in range(2 * p.n)] + [f"tg{i}" for i in range(p.n)] + ["kr"]
+        ):
             w.add(f"{{{name}}} = P[{row}, _m]")
             row += 1
 
@@ -131,7 +133,6 @@ def _start_actuator(w: Writer, j: int, first: int) -> None:
         "_x = _h / _tau if _tau > 0.0 else 1e300",
         f"{{e{j}}} = exp(-_x)",
         f"{{th{j}}} = 1.0 / _x",
-        f"{{g1{j}}} = 1.0 + expm1(-_x) / _x + 0.5 * expm1(-_x) if _x > 1e-3 else _x / 12.0 - _x * _x / 24.0",
         f"_z = P[{row['delay']}, _m] / _dt" + (f" + FL[{p.n + 2}]" if loop else ""),
         "if not (abs(_z) < 1e6) or not (_tau == _tau):",
         "    {q0} = nan",
@@ -139,6 +140,8 @@ def _start_actuator(w: Writer, j: int, first: int) -> None:
         "_z = _z if _z > 0.0 else 0.0",
         "DI[_i] = int64(floor(_z))" if j == 0 else "",
         f"{{df{j}}} = _z - floor(_z)",
+        # what is left at the end of a substep of a jump inside it
+        f"{{ep{j}}} = exp(-_x * (1.0 - ({{df{j}}} * _substeps - floor({{df{j}}} * _substeps))))",
     )
     if loop:
         w.add(f"{{w{j}}} = {{gain{j}}} * {{off{j}}}")
@@ -163,9 +166,8 @@ def _start_actuator(w: Writer, j: int, first: int) -> None:
         "    continue",
         "for _j in range(_substeps):",
         f"    _z = {{df{j}}} * _substeps - _j",
-        "    _z = 0.0 if _z < 0.0 else (1.0 if _z > 1.0 else _z)",
-        "    _x = _cn + _z * (_co - _cn)",
-        f"    {{w{j}}} = _x + ({{w{j}}} - _x) * {{e{j}}} + 6.0 * (_co - _cn) * _z * (_z - 1.0) * {{g1{j}}}",
+        f"    _z = {{e{j}}} if _z <= 0.0 else (1.0 if _z >= 1.0 else {{ep{j}}})",
+        f"    {{w{j}}} = _cn + ({{w{j}}} - _co) * {{e{j}}} + (_co - _cn) * _z",
     )
     w.depth -= 1
 
@@ -303,9 +305,11 @@ def _substep(w: Writer) -> None:
                 "_p = 1.0 if _p > 1.0 else _p",
                 f"_d = {{co{j}}} - {{cn{j}}}",
                 f"_r = {{cn{j}}} + _p * _d",
-                "_d = 6.0 * _d * _p * (_p - 1.0)",
                 f"_w0 = {{w{j}}}",
-                f"_w1 = _r + (_w0 - _r) * {{e{j}}} + _d * {{g1{j}}}",
+                f"_z = {{e{j}}} if _p <= 0.0 else {{ep{j}}}",
+                "_z = 1.0 if _p >= 1.0 else _z",
+                f"_w1 = {{cn{j}}} + (_w0 - {{co{j}}}) * {{e{j}}} + _d * _z",
+                "_d = 6.0 * _d * _p * (_p - 1.0)",
                 f"_wm = _r - (_w1 - _w0) * {{th{j}}}",
                 f"_d = 0.5 * _d - 6.0 * {{th{j}}} * (0.5 * (_w0 + _w1) - _wm)",
                 f"{{w{j}}} = _w1",

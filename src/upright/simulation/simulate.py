@@ -124,9 +124,7 @@ def ensemble(
     """
     job = _prepare(plant, params, x0, u, dt, substeps, start, loop, held or {}, record=False)
     workers = threads or (len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1)
-    rows = job.simulator.run(
-        job.table, job.x0, job.u, samples=samples, start=job.start, threads=workers, settle=settle
-    )
+    rows = job.simulator.run(job.table, job.x0, job.u, samples=samples, start=job.start, threads=workers, settle=settle)
     n, nu = len(job.simulator.derived.coordinates), len(job.simulator.derived.inputs)
     final = rows[2 * n + nu :]
     wrong = ~np.isfinite(final).all(axis=0)
