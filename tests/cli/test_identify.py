@@ -8,6 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from upright.cli import app
+from upright.identification.study_keys import SECTIONS
 
 LENGTH, G = 0.35, 9.81
 W = math.sqrt(G / LENGTH)
@@ -128,6 +129,12 @@ def test_a_log_becomes_a_study_becomes_a_fit_without_an_edit(bench):
     outcome = run("identify", "drafted.toml", "-o", "out", "--no-report", "--json")
     assert outcome.exit_code == 0, outcome.output
     assert json.loads(outcome.stdout)["parameters"]["l_cg"]["value"] == pytest.approx(LENGTH, rel=2e-3)
+
+
+def test_every_key_of_a_study_is_printed_on_request():
+    listing = run("identify", "--keys")
+    assert listing.exit_code == 0
+    assert all(f"| `{key.name}` |" in listing.stdout for _, keys in SECTIONS.values() for key in keys)
 
 
 def test_init_does_not_overwrite_unless_told(bench):

@@ -14,6 +14,14 @@ INTERRUPTED, NOT_TRUSTED = 130, 3
 METHODS = ("auto", "simplex", "least-squares")
 
 
+def _keys(asked: bool) -> None:
+    if asked:
+        from upright.identification.study_keys import reference
+
+        typer.echo(reference())
+        raise typer.Exit
+
+
 def identify(
     study: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="Rig and runs; `upright init LOG` writes one.")],
     out: Annotated[
@@ -25,6 +33,9 @@ def identify(
     method: Annotated[str, typer.Option(metavar="METHOD", help=f"How to search: {', '.join(METHODS)}.")] = "auto",
     as_json: Annotated[bool, typer.Option("--json", help="Print fit.json instead of tables.")] = False,
     report: Annotated[bool, typer.Option(help="Write report.html as well.")] = True,
+    keys: Annotated[
+        bool, typer.Option("--keys", help="Print every key a study may have.", callback=_keys, is_eager=True)
+    ] = False,
     strict: Annotated[bool, typer.Option("--strict", help="Exit with 3 when the verdict is not to trust it.")] = False,
 ) -> None:
     r"""Fit a rig's parameters to its logs as a study file says; write estimates and report.
@@ -59,7 +70,8 @@ def identify(
         \[actuator]
         gain = { guess = "2 N/V" }
 
-    All keys: docs/study.md. Writes OUT/fit.json and OUT/report.html.
+    All keys: `upright identify --keys`, or docs/study.md.
+    Writes OUT/fit.json and OUT/report.html.
     Ctrl-C keeps the best so far and writes it.
     Exit code: 0 a fit was written (3 with --strict when its verdict is not to
     trust it), 2 the study or a log is wrong, 130 stopped by Ctrl-C.
@@ -96,7 +108,8 @@ def identify(
     if as_json:
         typer.echo(json.dumps(content, indent=2, ensure_ascii=False))
     else:
-        print_fit(fit, written, study)
+        again = f"{study} --data {data}" if data is not None else str(study)
+        print_fit(fit, written, again)
     if fit.interrupted:
         raise typer.Exit(INTERRUPTED)
     if strict and not fit.trusted:

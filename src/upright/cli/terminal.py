@@ -49,8 +49,8 @@ def progress_line(*, quiet: bool = False) -> Generator[Progress | None]:
         yield follow
 
 
-def print_fit(fit: Fit, files: Sequence[Path], study: Path) -> None:
-    """Parameters, scores, verdict, warnings, files and next steps."""
+def print_fit(fit: Fit, files: Sequence[Path], study: str) -> None:
+    """Parameters, scores, verdict, warnings, files and next steps; `study` as the command line names it."""
     from rich.table import Table
 
     from upright.report.advice import next_steps
@@ -75,7 +75,7 @@ def print_fit(fit: Fit, files: Sequence[Path], study: Path) -> None:
         screen.print(f"[bold]Warning[/bold]: {_plain(warning)}", soft_wrap=True)
     screen.print("\nWritten: " + ", ".join(str(file) for file in files), soft_wrap=True)
     screen.print("What next:", style="bold")
-    for step in next_steps(fit, study=str(study), folder=str(files[0].parent)):
+    for step in next_steps(fit, study=study, folder=str(files[0].parent)):
         screen.print(f"- {_plain(step.sentence)}", soft_wrap=True)
         for line in step.command.splitlines():
             screen.print(f"    {_plain(line)}", soft_wrap=True)

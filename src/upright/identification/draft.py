@@ -47,7 +47,7 @@ def _head(log: Path, found: Recognised) -> str:
     lines = [
         f"# Study of {log.name}, drafted by `upright init`. Check it, then: upright identify THIS_FILE -o OUT",
         "# A number in quotes wears its unit; { guess = ... } asks for it; a plain text or number is known.",
-        "# Lines marked MEASURE hold placeholders. All keys: docs/study.md.",
+        "# Lines marked MEASURE hold placeholders. All keys: `upright identify --keys`.",
         *(f"# GUESSED: {doubt}" for doubt in found.doubts),
         f'title = "{_quoted(log.stem)}"',
     ]
