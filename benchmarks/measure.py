@@ -8,12 +8,15 @@ stretch; whole processes are timed by the clock on the wall.
 from __future__ import annotations
 
 import gc
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+
+BATCH = 0.02  # s; what is shorter is run several times in its turn, as a program in use would
 
 
 class Unavailable(Exception):
@@ -104,6 +107,7 @@ def compare(
     ratios: dict[str, list[float]] = {c.name: [] for c in able}
     errors: dict[str, float | None] = {}
     turns: dict[str, int] = {}
+    batch: dict[str, int] = {}
     for contender in able:
         progress(f"{benchmark}: {contender.name}")
         result = contender.run()  # compiles, allocates, fills caches
@@ -111,16 +115,21 @@ def compare(
         del result
         start = time.perf_counter()
         contender.run()
-        turns[contender.name] = rounds if time.perf_counter() - start < patience else min(2, rounds)
+        once = time.perf_counter() - start
+        turns[contender.name] = rounds if once < patience else min(2, rounds)
+        batch[contender.name] = max(1, math.ceil(BATCH / once))
     for _ in range(rounds):
         reference = None
         for contender in able:
             if len(taken[contender.name]) >= turns[contender.name]:
                 continue
             gc.collect()
+            gc.disable()  # as timeit does: whoever comes late would pay for everyone's objects
             start = clock()
-            contender.run()
-            seconds = (clock() - start) / contender.share
+            for _ in range(batch[contender.name]):
+                contender.run()
+            seconds = (clock() - start) / batch[contender.name] / contender.share
+            gc.enable()
             reference = seconds if contender is able[0] else reference
             taken[contender.name].append(seconds)
             if reference:
