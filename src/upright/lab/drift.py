@@ -1,7 +1,7 @@
 """Why does the disk wander during a free swing, and what stops it?
 
-No torque but friction acts about the axis of a level, free disk, so the momentum about it,
-``p = M_11 psi' + M_12 theta'``, can only be rubbed away. Released at rest, ``p = 0``: psi is a function of theta, swings
+No torque but friction acts about the axis of a level, free disk, so the momentum about it, ``M_11 psi' + M_12
+theta'``, can only be rubbed away. Released at rest it is zero: psi is a function of theta, swings
 about a fixed centre, and creeps home only as friction takes hold. A push at the release gives momentum, an axis out
 of level gives gravity a lever; a soft spring to ground, which the paper suggests, gives psi a home.
 """
@@ -9,13 +9,13 @@ of level gives gravity a lever; a soft spring to ground, which the paper suggest
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upright.lab.twin import Release, Twin, motion
 from upright.physics import Furuta
+from upright.report.experiment import Wander
 
 Array = NDArray[np.float64]
 
@@ -25,33 +25,6 @@ PUSH = 0.15
 """Speed that a careless hand gives the disk [rad/s]."""
 SPRING = 0.04
 """Soft anchoring spring [N m/rad]; the disk alone would swing on it at a third of the pendulum's frequency."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Wander:
-    """Path of one disk after a release.
-
-    Attributes
-    ----------
-    name : str
-        What was done to the rig.
-    remedy : bool
-        Whether the spring was on.
-    t, psi, centre : (N,) arrays
-        Time [s], angle [rad], and the line about which it swings [rad].
-    slope : float
-        Drift [rad/s]: slope of the straight line closest to the path.
-    end : float
-        Where the disk is in the last seconds, from its angle at the release [rad].
-    """
-
-    name: str
-    remedy: bool
-    t: Array
-    psi: Array
-    centre: Array
-    slope: float
-    end: float
 
 
 def wander(name: str, rig: Twin, release: Release | None = None, *, seconds: float, remedy: bool = False) -> Wander:

@@ -45,9 +45,7 @@ class BrassPendulum:
         l_cg = (rod * self.length / 2 + weight * self.weight_at) / m_p
         rod_square, weight_square = self.outer**2 + self.bore**2, self.weight_diameter**2 + self.outer**2
         transverse_rod = rod * (self.length**2 / 12 + rod_square / 16 + (self.length / 2 - l_cg) ** 2)
-        transverse_weight = weight * (
-            self.weight_thickness**2 / 12 + weight_square / 16 + (self.weight_at - l_cg) ** 2
-        )
+        transverse_weight = weight * (self.weight_thickness**2 / 12 + weight_square / 16 + (self.weight_at - l_cg) ** 2)
         axial = (rod * rod_square + weight * weight_square) / 8
         return {"m_p": m_p, "l_cg": l_cg, "J_p": transverse_rod + transverse_weight, "J_a": axial}
 
@@ -112,7 +110,7 @@ def motion(
     x0 = rig.truth.state(psi_dot=release.push, theta=release.angle)
     rows = round(seconds / SERVO / every) + 1
     x = simulate(rig.truth, {}, x0, None, SERVO, samples=rows, every=every)[:, :, 0]
-    return np.arange(len(x)) * (SERVO * every), x
+    return np.linspace(0.0, (rows - 1) * every * SERVO, rows), x
 
 
 def acquire(

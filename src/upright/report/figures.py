@@ -23,7 +23,7 @@ from upright.report.drawing import (
     hide_inner_times,
     styled,
 )
-from upright.report.symbols import axis, percent, plain
+from upright.report.symbols import axis, number, percent, plain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,7 +55,7 @@ def fit_figure(
         Long runs are thinned to the extremes in so many buckets.
     """
     units, n = units_of(plant), len(score.measured)
-    drawing = figure(0.65 + 2.2 * n, width, margins=(0.78, 0.1, 0.28, 0.42))
+    drawing = figure(0.65 + 2.2 * n, width, margins=(0.85, 0.1, 0.28, 0.42))
     grid = drawing.add_gridspec(2 * n, 1, height_ratios=[3.2, 1] * n, hspace=0.32)
     panels: list[Axes] = []
     for j, name in enumerate(score.measured):
@@ -66,15 +66,16 @@ def fit_figure(
         upper.set_title(f"fit {percent(score.fit_percent.get(name, float('nan')))}", loc="right", fontsize=9)
     if title:
         panels[0].set_title(_short(title, 70), parse_math=False)
-    panels[0].legend(loc="upper right", ncols=2)
+    panels[0].legend(loc="lower center", bbox_to_anchor=(0.64, 0.97), ncols=2, borderaxespad=0.1)
     panels[0].set_xlim(float(score.t[0]), float(score.t[-1]))
     hide_inner_times(panels)
-    drawing.align_ylabels(panels)
+    for panel in panels:
+        panel.yaxis.set_label_coords(-0.62 / (width - 0.95), 0.5)
     return drawing
 
 
 def _signal(upper: Axes, lower: Axes, score: RunScore, j: int, unit: str, buckets: int) -> None:
-    from matplotlib.ticker import MaxNLocator
+    from matplotlib.ticker import FuncFormatter, MaxNLocator
 
     t, y, model = score.t, score.y[:, j], score.simulated[:, j]
     left = y - model
@@ -86,6 +87,7 @@ def _signal(upper: Axes, lower: Axes, score: RunScore, j: int, unit: str, bucket
     lower.plot(*decimated(t, left, buckets), color=VERMILLION, linewidth=0.7)
     lower.set_ylabel("residual", fontsize=8)
     lower.yaxis.set_major_locator(MaxNLocator(nbins=3, symmetric=True))
+    lower.yaxis.set_major_formatter(FuncFormatter(lambda value, _: number(float(f"{value:.3g}"), 1)))
     for panel, values in ((upper, np.concatenate([y, model])), (lower, left)):
         _limits(panel, values)
 

@@ -10,7 +10,7 @@ from html import escape
 from upright.report.symbols import parts
 
 _WEAK, _SUM, _PRODUCT, _POWER = 0, 1, 2, 3
-_LINE = 32  # names on one line of an equation
+_LINE = 38  # names on one line of an equation
 _THIN = '<mspace width="0.17em"/>'
 
 

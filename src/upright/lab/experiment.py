@@ -1,0 +1,92 @@
+"""How does experiment 4 go, from release to report?"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.lab import drift, energy, free_swing
+from upright.lab.free_swing import Answer, Progress
+from upright.lab.twin import SERVO, Twin, motion, twin
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Balance:
+    """Energy of the release over time: time (N,) [s], what is still there and what each friction took [J]."""
+
+    t: Array
+    stored: Array
+    taken: Mapping[str, Array]
+
+
+@dataclass(kw_only=True, eq=False)
+class Experiment:
+    """What has been found so far; it is filled step by step, so that an interrupted one can be reported."""
+
+    rig: Twin
+    folder: Path
+    answers: dict[str, Answer] = field(default_factory=dict[str, Answer])
+    wanders: tuple[drift.Wander, ...] = ()
+    balance: Balance | None = None
+    interrupted: bool = False
+    seconds: float = 0.0
+
+
+def run(seed: int, folder: Path, progress: Progress | None = None) -> Experiment:
+    """Run the experiment on one rig of the make; Ctrl-C stops it and keeps what is there.
+
+    Parameters
+    ----------
+    seed : int
+        Which rig.
+    folder : Path
+        Takes logs and studies.
+    progress : callable, optional
+        Told the step at work and the share of the experiment done.
+    """
+    began = time.perf_counter()
+    done = Experiment(rig=twin(seed), folder=folder)
+    tell = progress or (lambda step, share: None)
+    with _kept(done):
+        tell("releasing the pendulum", 0.0)
+        asked = free_swing.write(done.rig, folder)
+        for i, (question, path) in enumerate(asked):
+            base, part = 0.05 + 0.85 * i / len(asked), 0.85 / len(asked)
+            found = free_swing.answer(question, path, lambda step, share, b=base, p=part: tell(step, b + p * share))
+            done.answers[question.name] = found
+            if found.fit.interrupted:
+                raise KeyboardInterrupt
+        tell("following the disk", 0.9)
+        done.wanders = drift.study(done.rig)
+        done.balance = balance(done)
+    done.seconds = time.perf_counter() - began
+    return done
+
+
+@contextmanager
+def _kept(done: Experiment) -> Generator[None]:
+    with suppress(KeyboardInterrupt):
+        done.interrupted = True
+        yield
+        done.interrupted = False
+
+
+def balance(done: Experiment) -> Balance:
+    """Where the energy of the first release went, as the fitted model tells it."""
+    fit = done.answers["free_swing"].fit
+    values = {n: p.value for n, p in fit.rig.parameters.items() if n in fit.rig.plant.names()}
+    values |= {n: e.value for n, e in fit.estimates.items() if n in values}
+    model = done.rig.truth.replace(**values)
+    t, x = motion(Twin(truth=model, seed=done.rig.seed), seconds=12.0, every=1)
+    stored = model.energy(x) - float(model.energy(model.state()))
+    taken = energy.losses(model, t, x)
+    every = max(1, round(0.02 / SERVO))
+    return Balance(t=t[::every], stored=stored[::every], taken={n: e[::every] for n, e in taken.items()})

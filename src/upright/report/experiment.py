@@ -1,0 +1,138 @@
+"""What did an experiment show beyond a fit: paths of the disk, the way of the energy, estimates beside a truth?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from upright.report.drawing import (
+    BLUE,
+    CYCLE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+    Array,
+    decimated,
+    figure,
+    styled,
+)
+from upright.report.symbols import mathtext, plain
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Wander:
+    """Path of one disk after a release.
+
+    Attributes
+    ----------
+    name : str
+        What was done to the rig.
+    remedy : bool
+        Whether the spring was on.
+    t, psi, centre : (N,) arrays
+        Time [s], angle [rad], and the line about which it swings [rad].
+    slope : float
+        Drift [rad/s]: slope of the straight line closest to the path.
+    end : float
+        Where the disk is in the last seconds, from its angle at the release [rad].
+    """
+
+    name: str
+    remedy: bool
+    t: Array
+    psi: Array
+    centre: Array
+    slope: float
+    end: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recovered:
+    """One number: truth of the twin, what the fit says, and whether the truth lies in its interval."""
+
+    name: str
+    unit: str
+    truth: float
+    value: float
+    interval: tuple[float, float]
+    inside: bool
+
+
+@styled
+def drift_figure(paths: Sequence[Wander]) -> Figure:
+    """Angle of the disk over time, free disks on the left and anchored ones on the right, one scale for both."""
+    drawing = figure(3.3, margins=(0.62, 0.1, 0.3, 0.42))
+    free, held = drawing.subplots(1, 2, sharey=True, gridspec_kw={"wspace": 0.06})
+    for ax, remedy, title in ((free, False, "disk free"), (held, True, "disk anchored by a soft spring")):
+        for path, (colour, line) in zip((p for p in paths if p.remedy == remedy), CYCLE, strict=False):
+            ax.plot(*decimated(path.t, np.degrees(path.psi), 300), color=colour, linewidth=0.6, alpha=0.45)
+            ax.plot(*decimated(path.t, np.degrees(path.centre), 150), color=colour, linestyle=line, linewidth=1.9)
+            ax.plot([], [], color=colour, linestyle=line, linewidth=1.9, label=path.name)
+        ax.set_title(title)
+        ax.set_xlabel("time [s]")
+        ax.legend(loc="upper left")
+        ax.margins(x=0)
+    low, high = free.get_ylim()
+    free.set_ylim(low, high + 0.25 * (high - low))  # room for the legend
+    free.set_ylabel("angle of the disk [°]")
+    return drawing
+
+
+def _with_symbols(text: str) -> str:
+    return " ".join(plain(word) for word in text.split())
+
+
+@styled
+def energy_figure(t: Array, stored: Array, taken: Mapping[str, Array]) -> Figure:
+    """Stacked: energy still in the motion, and what each kind of friction has taken."""
+    drawing = figure(2.7, margins=(0.62, 0.1, 0.12, 0.42))
+    ax = drawing.subplots()
+    thin = max(1, t.size // 400)
+    layers = [stored, *taken.values()]
+    colours = [SKY, VERMILLION, ORANGE, PURPLE, GREEN, GREY, BLUE]
+    ax.stackplot(
+        t[::thin],
+        *[1e3 * layer[::thin] for layer in layers],
+        labels=["still in the motion", *(f"taken by {_with_symbols(name)}" for name in taken)],
+        colors=colours[: len(layers)],
+        edgecolor="white",
+        linewidth=0.4,
+    )
+    for layer, hatch in zip(ax.collections, ("", "///", "\\\\\\", "...", "xxx", "|||", "---"), strict=False):
+        layer.set_hatch(hatch)  # tells the areas apart on grey paper
+    ax.set_xlabel("time [s]")
+    ax.set_ylabel("energy [mJ]")
+    ax.margins(x=0, y=0)
+    ax.legend(loc="center right", frameon=True, framealpha=0.9, edgecolor="none")
+    return drawing
+
+
+@styled
+def truth_figure(found: Sequence[Recovered]) -> Figure:
+    """Every estimate with its interval relative to the true value."""
+    shown = [f for f in found if f.truth != 0 and all(math.isfinite(x) for x in f.interval)]
+    drawing = figure(0.6 + 0.26 * max(len(shown), 1))
+    ax = drawing.add_subplot()
+    for row, f in enumerate(shown):
+        low, high = (100 * (x / f.truth - 1) for x in f.interval)
+        colour = BLUE if f.inside else VERMILLION
+        ax.plot([low, high], [row, row], color=colour, linewidth=2, linestyle="-" if f.inside else (0, (3, 1)))
+        ax.plot(100 * (f.value / f.truth - 1), row, "o" if f.inside else "s", color=colour, markersize=4.5)
+    ax.axvline(0, color=GREY, linewidth=0.8)
+    ax.set_yticks(range(len(shown)), [mathtext(f.name) for f in shown])
+    ax.set_ylim(len(shown) - 0.5, -0.5)
+    reach = 1.1 * max((abs(x) for x in ax.get_xlim()), default=1.0)
+    ax.set_xlim(-reach, reach)
+    ax.set_xlabel("estimate and 95 % interval, from the truth of the twin [%]")
+    ax.grid(visible=False, axis="y")
+    return drawing
