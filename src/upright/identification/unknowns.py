@@ -131,7 +131,8 @@ def run_unknowns(rig: Rig, index: int, run: Run, start: State) -> list[Unknown]:
                 prior = (measured, INITIAL_SPREAD[i % 2] * size) if names[i - i % 2] in run.measured else None
                 add(f"initial.{name}", measured, size, prior)
     for name in run.measured:
-        if name not in run.held and ("offset" in run.unknown or f"offset.{name}" in run.unknown):
+        every = "offset" in run.unknown and (run.loop is not None or matters(rig, name))
+        if name not in run.held and (every or f"offset.{name}" in run.unknown):
             add(f"offset.{name}", 0.0, float(start.spread[names.index(name)]))
     if "gain" in run.unknown:
         add("gain", 1.0, 1.0, (0.0, GAIN_SPREAD), log=True)
