@@ -100,6 +100,15 @@ def test_a_moving_cart_without_a_drive_is_prescribed_by_its_own_motion(drafted):
     assert study.runs[0].measured == ("theta",)
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_pendulum_that_is_thrown_the_wrong_way_is_mirrored(drafted, sign):
+    # steady answer of theta'' = -x''/l - w^2 theta to x = a sin(nu t), with a start at rest left out
+    nu, a = 3.0, 0.02
+    theta = a * nu**2 / LENGTH / (W**2 - nu**2) * np.sin(nu * T) + 0.05 * np.cos(W * T)
+    text, _ = drafted(x=a * np.sin(nu * T), theta=sign * theta)
+    assert ("\nsign = -1   # it is thrown" in text) == (sign == -1)
+
+
 def test_an_arm_that_hardly_moves_is_no_second_coordinate(drafted):
     _, study = drafted(psi=1e-4 * np.sin(T), theta=SWING)
     assert study.plant == "pendulum"

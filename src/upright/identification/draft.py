@@ -189,7 +189,10 @@ def _sensor(record: Record, seen: Inspection, found: Recognised, plant: type[Pla
         lines.append(f'resolution = "{c.quantum.step:.4g} {c.guess}"   # from the column\'s steps')
     zero = found.rest[name]
     lines.append(f"offset = {zero:.6g}   # reading at which {name} is zero, here where it {_how(found)}")
-    lines.append("# sign = -1   # when the column counts the other way")
+    if found.mirrored and name == plant.coordinates[-1].name:
+        lines.append("sign = -1   # it is thrown the other way than the plant's angle")
+    else:
+        lines.append("# sign = -1   # when the column counts the other way")
     return "\n".join(lines) + "\n"
 
 

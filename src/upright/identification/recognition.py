@@ -10,6 +10,7 @@ import numpy as np
 
 from upright.errors import BadInput
 from upright.identification.happenings import (
+    coupling,
     moves_against,
     moving_window,
     rest_level,
@@ -44,6 +45,8 @@ class Recognised:
         What commands the rig.
     reversed : bool
         Whether a positive command first moves the driven column down.
+    mirrored : bool
+        Whether the pendulum's column counts against the coordinate, judged by how the hinge's motion throws it.
     window : tuple of float
         Where something happens [s].
     frequency : float
@@ -57,6 +60,7 @@ class Recognised:
     rest: dict[str, float]
     drive: Column | None
     reversed: bool
+    mirrored: bool
     window: tuple[float, float]
     frequency: float
     doubts: tuple[str, ...]
@@ -89,12 +93,17 @@ def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
     rest = {name: zero_reading(record, seen, c, drive, window) for name, c in columns.items()}
     centre = rest[list(columns)[-1]]
     driven = record[next(iter(columns.values())).name]
+    mirrored = False
+    if pushed and all(c.guess == "rad" or name == "x" for name, c in columns.items()):
+        thrown = coupling(record.t[inside], driven[inside], last[inside] - centre)
+        mirrored = thrown * (1 if plant == "furuta" else -1) < 0
     return Recognised(
         plant=plant,
         columns=columns,
         rest=rest,
         drive=drive,
         reversed=drive is not None and moves_against(record.t, record[drive.name], driven),
+        mirrored=mirrored,
         window=window,
         frequency=swing_frequency(record.t[inside], last[inside] - centre),
         doubts=tuple(doubts),
