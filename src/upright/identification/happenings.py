@@ -110,7 +110,8 @@ def coupling(t: Array, x: Array, theta: Array) -> float:
     if grid.size < 4 * width:
         return 0.0
     angle, place = np.interp(grid, t, theta), np.interp(grid, t, x)
-    a, b = (savgol_filter(v, width, 4, deriv=2, delta=step)[width:-width] for v in (angle, place))
+    accelerations = (np.asarray(savgol_filter(v, width, 4, deriv=2, delta=step)) for v in (angle, place))
+    a, b = (v[width:-width] for v in accelerations)
     angle = angle[width:-width]
     both = np.column_stack([np.cos(angle) * b, -np.sin(angle)])
     slopes, *_ = np.linalg.lstsq(both, a, rcond=None)
