@@ -96,7 +96,7 @@ def test_stick_slip_with_stribeck_follows_an_event_solver(block, lanes):
         z, t = [r.y[0, -1], 0.0], r.t[-1]
     x = simulate(
         block, {**BLOCK, "k": k, "F_c": F_c, "F_s": F_s, "v_s": v_s}, np.tile([0.5, 0.0], (lanes, 1)), None, 1e-3,
-        samples=4001, substeps=4,
+        samples=8001, substeps=4,
     )  # fmt: skip
     assert np.allclose(x[-1, 0], z[0], rtol=0, atol=1e-10)
     assert np.all(x[-1, 1] == 0.0)

@@ -36,9 +36,10 @@ from numba.extending import intrinsic
 from numpy import empty, floor, nan, zeros
 
 FAST = {{"contract", "reassoc", "arcp", "nsz", "afn"}}
-inline = njit(fastmath=FAST, error_model="numpy", forceinline=True)
-inline_strict = njit(fastmath={{"contract"}}, error_model="numpy", forceinline=True)
-scalar = njit(fastmath={{"contract"}}, error_model="numpy")
+BARE = {{"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}}
+inline = njit(fastmath=FAST, forceinline=True, **BARE)
+inline_strict = njit(fastmath={{"contract"}}, forceinline=True, **BARE)
+scalar = njit(fastmath={{"contract"}}, **BARE)
 compiled = njit(fastmath=FAST, error_model="numpy", nogil=True, cache=True)
 
 

@@ -48,13 +48,13 @@ def load(W, L, i, o, state, t, h, fresh):
 
     Returns the first joint that cannot hold, -1 when all can. Mass and forces are computed when `fresh`.
     """
-    if fresh:
+    if fresh > 0:
         terms_at(W, L, i, o, state, t, h)
         for k in range(NF):
             W[o + MOVES + k] = 1.0
     for w in range(ND):
         W[o + MOVES + joint(w)] = abs(W[o + MODES + w])
-    solve(W, o, FORCE)
+    solve(W, o, int64(FORCE))
     first = -1
     for w in range(ND):
         if W[o + MODES + w] == 0.0:
@@ -115,7 +115,7 @@ def decide(W, o, forced):
                 W[o + MODES + w] = 1.0 if c > 0.0 else (-1.0 if c < 0.0 else 0.0)
                 W[o + MOVES + j] = abs(W[o + MODES + w])
                 W[o + RIGHT + j] -= W[o + MODES + w] * W[o + LEVEL + w]
-        solve(W, o, RIGHT)
+        solve(W, o, int64(RIGHT))
         again = False
         for w in range(ND):
             if W[o + REST + w] > 0.0:
@@ -139,15 +139,17 @@ def redo(W, L, i, o, h):
     It starts with the whole substep's result in NEXT, as the lanes computed it.
     """
     FULL, MIDDLE, ROOT = 0, 1, 2
+    # not literals: Numba would compile what they are passed to once for each
+    here, there, none, fresh, known = int64(STATE), int64(NEXT), int64(-1), int64(1), int64(0)
     phase, w, count, events, turns, side = FULL, -1, 0, 0, 0, 0
     t, c, lo, hi, ga, gb, scale = 0.0, h, 0.0, 0.0, 0.0, 0.0, 0.0
     done, begin = True, True
     for _ in range(1000):
         if begin:
             # modes at the start of what is left
-            first = load(W, L, i, o, STATE, t, h, True)
+            first = load(W, L, i, o, here, t, h, fresh)
             if first >= 0 and turns < 2 * ND + 2:
-                decide(W, o, -1)
+                decide(W, o, none)
                 turns, done = turns + 1, False
                 continue
             for k in range(ND):
@@ -169,7 +171,7 @@ def redo(W, L, i, o, h):
                 W[o + MARGIN + k] = turned(W, o, NEXT, k)
                 first = k if W[o + MARGIN + k] < 0.0 and first < 0 else first
         if stuck:
-            other = load(W, L, i, o, NEXT, t + c, h, True)
+            other = load(W, L, i, o, there, t + c, h, fresh)
             first = other if first < 0 else first
         if phase != ROOT:
             if first < 0 or events > 40:
@@ -202,12 +204,12 @@ def redo(W, L, i, o, h):
                     scale = 1e-6 * (ga - gb) if W[o + MODES + w] != 0.0 else 1e-14 * (ga - gb)
                 else:
                     # the moment is found: stop the joint, or let it break away
-                    forced = w
+                    forced = int64(w)
                     if not stuck:
-                        load(W, L, i, o, NEXT, t + c, h, True)
+                        load(W, L, i, o, there, t + c, h, fresh)
                     if W[o + MODES + w] != 0.0:
                         # the last millionth of the way by Taylor's series
-                        forced = -1
+                        forced = none
                         k = joint(w)
                         d = -W[o + NEXT + NF + k] / W[o + ACC + k]
                         if abs(d) < 2e-6 * h:
@@ -223,7 +225,7 @@ def redo(W, L, i, o, h):
                         if W[o + STATE + NF + joint(k)] == 0.0:
                             W[o + FORCE + joint(k)] += W[o + MODES + k] * W[o + SLIDE + k]
                             W[o + MODES + k] = 0.0
-                    load(W, L, i, o, STATE, t, h, False)
+                    load(W, L, i, o, here, t, h, known)
                     decide(W, o, forced)
                     begin, events = True, events + 1
                     continue

@@ -59,7 +59,7 @@ class Loop:
 
     def rows(self, n: int, nu: int, lanes: int) -> Array:
         """Gains, targets and prefilter as the kernel reads them, shape (nu*2n + n + 1, lanes)."""
-        K = np.asarray(self.K, dtype=np.float64)
+        K: Array = np.asarray(self.K, dtype=np.float64)
         K = K.reshape(1, -1) if K.ndim == 1 else K
         K = K[:, :, None] if K.ndim == 2 else K
         if K.shape[:2] != (nu, 2 * n) or K.shape[2] not in (1, lanes):
