@@ -3,6 +3,7 @@
 import ast
 import os
 import re
+import shlex
 import subprocess
 import sys
 from dataclasses import MISSING, fields
@@ -47,10 +48,19 @@ def test_there_is_something_to_run():
 
 
 @pytest.mark.slow
+@pytest.mark.real_data
 @pytest.mark.parametrize("script", SCRIPTS, ids=name_of)
-def test_a_script_runs_to_its_end(script, tmp_path):
+def test_a_script_runs_as_its_first_lines_say(script, tmp_path):
+    """The command in the docstring, with DATA standing for the folder of public logs."""
+    shown = re.search(r"^ +python (.+)$", ast.get_docstring(ast.parse(script.read_text(encoding="utf-8"))) or "", re.M)
+    assert shown, f"{script.name} should show how it is run"
+    data = os.environ.get("UPRIGHT_REAL_DATA")
+    if "DATA" in shown[1] and not data:
+        pytest.skip("UPRIGHT_REAL_DATA is not set")
+    words = [str(data) if word == "DATA" else word for word in shlex.split(shown[1])]
+    words = [str(ROOT / word) if (ROOT / word).is_file() else word for word in words]
     done = subprocess.run(
-        [sys.executable, str(script)],
+        [sys.executable, *words],
         cwd=tmp_path, env=os.environ | {"MPLBACKEND": "Agg"}, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
