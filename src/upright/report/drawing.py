@@ -11,6 +11,7 @@ from collections.abc import Callable
 from functools import wraps
 from io import StringIO
 from itertools import pairwise
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import numpy as np
@@ -107,6 +108,15 @@ def svg(drawing: Figure, name: str) -> str:
     responsive = re.sub(r'\s(width|height)="[^"]*"', "", opening)
     share = 100 * min(1.0, drawing.get_figwidth() / WIDTH)
     return f'{responsive} style="max-width:{share:.0f}%" aria-hidden="true" focusable="false"{text[len(opening) :]}'
+
+
+@styled
+def save(drawing: Figure, path: Path) -> Path:
+    """Write a figure by itself, as SVG or PNG by the ending of `path`."""
+    vector = path.suffix.lower() == ".svg"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    drawing.savefig(path, dpi=160, facecolor="white", metadata={"Date": None, "Creator": None} if vector else {})
+    return path
 
 
 def decimated(t: Array, y: Array, buckets: int = 450) -> tuple[Array, Array]:

@@ -37,7 +37,13 @@ def units_of(plant: type[Plant] | None) -> dict[str, str]:
 
 @styled
 def fit_figure(
-    score: RunScore, plant: type[Plant] | None = None, *, title: str = "", width: float = WIDTH, buckets: int = 450
+    score: RunScore,
+    plant: type[Plant] | None = None,
+    *,
+    title: str = "",
+    width: float = WIDTH,
+    height: float = 2.2,
+    buckets: int = 450,
 ) -> Figure:
     """Data against model, signal by signal, each with a strip of what is left over.
 
@@ -49,13 +55,13 @@ def fit_figure(
         States the units on the axes.
     title : str
         Put above, with the fit percent of each signal.
-    width : float
-        Inches.
+    width, height : float
+        Inches; `height` is for each signal.
     buckets : int
         Long runs are thinned to the extremes in so many buckets.
     """
     units, n = units_of(plant), len(score.measured)
-    drawing = figure(0.65 + 2.2 * n, width, margins=(0.85, 0.1, 0.28, 0.42))
+    drawing = figure(0.65 + height * n, width, margins=(0.85, 0.1, 0.28, 0.42))
     grid = drawing.add_gridspec(2 * n, 1, height_ratios=[3.2, 1] * n, hspace=0.32)
     panels: list[Axes] = []
     for j, name in enumerate(score.measured):
@@ -66,7 +72,7 @@ def fit_figure(
         upper.set_title(f"fit {percent(score.fit_percent.get(name, float('nan')))}", loc="right", fontsize=9)
     if title:
         panels[0].set_title(_short(title, 70), parse_math=False)
-    panels[0].legend(loc="lower center", bbox_to_anchor=(0.64, 0.97), ncols=2, borderaxespad=0.1)
+    drawing.legend(*panels[0].get_legend_handles_labels(), loc="lower left", bbox_to_anchor=(0.8 / width, 0.0), ncols=2)
     panels[0].set_xlim(float(score.t[0]), float(score.t[-1]))
     hide_inner_times(panels)
     for panel in panels:
