@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -139,11 +140,25 @@ def model_accelerations(plant: type[Plant], values: Mapping[str, float], sample:
 def disagreement(rig: Rig, values: Mapping[str, float], sample: Sample) -> Array:
     """Weighted difference (free coordinates, T) between the model's accelerations and the measured ones."""
     a = model_accelerations(rig.plant, {**values, **sample.run.known}, sample)
-    smooth = np.array([savitzky_golay(row, 1.0, sample.width).q for row in a])
+    smooth = _same_smoothing(a, sample.width)
     edge = min(sample.edge, a.shape[1] // 4)
     here = slice(edge, a.shape[1] - edge)
     measured = sample.a[list(sample.free)]
     return (smooth[:, here] - measured[:, here]) / np.array([[spread(row)] for row in measured])
+
+
+def _same_smoothing(a: Array, width: int) -> Array:
+    """Rows of `a` through the polynomials that smoothed the motion; the ends are not used."""
+    from scipy.ndimage import correlate1d
+
+    return correlate1d(a, _coefficients(width - (1 - width % 2)), axis=1, mode="nearest")
+
+
+@cache
+def _coefficients(width: int) -> Array:
+    from scipy.signal import savgol_coeffs
+
+    return savgol_coeffs(width, min(4, width - 1), use="dot")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -178,13 +193,13 @@ def regress(rig: Rig, samples: list[Sample], start: Mapping[str, float] | None =
         J = np.empty((r.size, size))
         for j, u in enumerate(unknowns):
             z = x.copy()
-            step = 1e-5 * (1.0 if u.log else max(abs(x[j]), u.scale))
+            step = 1e-5 * (1.0 if u.log else max(abs(float(x[j])), u.scale))
             z[j] += step
             J[:, j] = (residual(z) - r) / step
         if not np.isfinite(J.sum()):
             return Normal(math.inf, np.zeros((size, size)), np.zeros(size))
         # a faint pull towards the start keeps numbers that the accelerations cannot see where they were
-        pull = np.array([1e-3 * math.sqrt(r.size) / (1.0 if u.log else u.scale) for u in unknowns])
+        pull = np.array([1e-3 * math.sqrt(r.size) / u.scale for u in unknowns])
         away = pull * (x - x0)
         return Normal(float(r @ r + away @ away), J.T @ J + np.diag(pull**2), J.T @ r + pull * away)
 

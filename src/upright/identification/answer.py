@@ -99,7 +99,7 @@ def _estimates(
     q = quantile(spread.samples, x.size)
     shared: dict[str, Estimate] = {}
     own: dict[str, dict[str, Estimate]] = {t.run.label: {} for t in problem.tracks}
-    budget = 4.0e7  # residuals that profiles may cost altogether
+    budget = 2.0e7  # residuals that profiles may cost altogether
     for i, u in enumerate(problem.unknowns):
         plain = _estimate(problem, u, float(x[i]), float(value[i]), math.sqrt(max(spread.covariance[i, i], 0.0)), q)
         if u.run != SHARED:
@@ -115,7 +115,7 @@ def _estimates(
         wide = interval[1] - interval[0] > abs(plain.value)
         near = spread.pinned[i] or interval[0] <= u.lower < plain.value or interval[1] >= u.upper > plain.value
         if u.asked and (wide or near):
-            cost = 60.0 * count(problem) * (x.size + 1) / 16
+            cost = 40.0 * count(problem) * (x.size + 1) / 16
             if cost < budget and not interrupted:
                 budget -= cost
                 interval = profile(problem, x, i, spread, q)

@@ -55,7 +55,7 @@ def closed_form_starts(rig: Rig, runs: Sequence[Run]) -> list[dict[str, float]]:
     return found
 
 
-def samples_of(rig: Rig, runs: Sequence[Run], most: int = 20000) -> list[Sample]:
+def samples_of(rig: Rig, runs: Sequence[Run], most: int = 6000) -> list[Sample]:
     """Smoothed motion of every run that allows it, long runs thinned to at most `most` samples."""
     from dataclasses import replace
 

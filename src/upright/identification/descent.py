@@ -152,7 +152,7 @@ def grow(
     history: list[tuple[str, float, int]] | None = None,
     horizon: float | None = None,
     upto: float = math.inf,
-    tolerance: float = 1e-8,
+    tolerance: float = 1e-6,
 ) -> Descent:
     """Descend over a horizon that grows to the whole of the runs, at least doubling, at most to where it still follows.
 
@@ -171,7 +171,7 @@ def grow(
         problem.settle_steps(x, h)
         found = descend(
             lambda z, h=h: problem.normal(z, h), x, problem.lower, problem.upper,
-            tolerance=tolerance if last else 1e-3, limit=80 if last else 40, report=tell,
+            tolerance=tolerance if last else 1e-3, limit=60 if last else 25, report=tell,
         )  # fmt: skip
         x = found.x
         if history is not None:

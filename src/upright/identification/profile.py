@@ -36,12 +36,12 @@ def profile(problem: Problem, x: Array, place: int, spread: Spread, quantile: fl
 
 
 def _end(problem: Problem, x: Array, place: int, best: float, rise: float, step: float) -> float:
-    """Coordinate at which the refitted cost has risen by `rise`, by at most six secant steps in the square root."""
+    """Coordinate at which the refitted cost has risen by `rise`, by at most four secant steps in the square root."""
     lower, upper = problem.lower.copy(), problem.upper.copy()
     bound = float(lower[place] if step < 0 else upper[place])
     near, far = 0.0, step
     z = x
-    for _ in range(6):
+    for _ in range(4):
         at = float(x[place]) + far
         if (step < 0 and at <= bound) or (step > 0 and at >= bound):
             at = bound
@@ -49,7 +49,7 @@ def _end(problem: Problem, x: Array, place: int, best: float, rise: float, step:
             return at
         lower[place] = upper[place] = at
         found = descend(problem.normal, np.where(np.arange(x.size) == place, at, z), lower, upper,
-                        tolerance=1e-4, limit=12)  # fmt: skip
+                        tolerance=1e-3, limit=6)  # fmt: skip
         z = found.x
         height = math.sqrt(max(found.normal.cost - best, 0.0) / rise)
         if abs(height - 1) < 0.05:
