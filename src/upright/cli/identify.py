@@ -30,6 +30,9 @@ def identify(
     data: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder the runs' files are in; the study's own if left out.")
     ] = None,
+    hold_out: Annotated[
+        list[str] | None, typer.Option("--hold-out", metavar="LABEL", help="Predict this run instead of fitting it.")
+    ] = None,
     method: Annotated[str, typer.Option(metavar="METHOD", help=f"How to search: {', '.join(METHODS)}.")] = "auto",
     as_json: Annotated[bool, typer.Option("--json", help="Print fit.json instead of tables.")] = False,
     report: Annotated[bool, typer.Option(help="Write report.html as well.")] = True,
@@ -88,7 +91,7 @@ def identify(
     folder = out if out is not None else study.with_name(f"{study.stem}-fit")
     if folder.exists() and not folder.is_dir():
         raise BadInput(f"results need a folder, but {folder} is a file; name another with -o")
-    asked = load_study(study, data=data)
+    asked = load_study(study, data=data).hold_out(*(hold_out or ()))
     if not asked.rig.estimated:
         raise BadInput(
             f'{study}: nothing is asked; give a parameter a guess, such as J_p = {{ guess = "1e-3 kg m^2" }}, or score'

@@ -8,9 +8,10 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from upright.errors import BadInput, nearest
 from upright.identification.model import Rig, Run
 from upright.identification.study_keys import names
 from upright.identification.study_rig import read_plant, read_rig
@@ -47,6 +48,22 @@ class Study:
     title: str = ""
     source: str = ""
     sha256: str = ""
+
+    def hold_out(self, *labels: str) -> Study:
+        """The same study with some of its fitted runs predicted instead.
+
+        Raises
+        ------
+        BadInput
+            When a label names no run, or no run is left to fit.
+        """
+        for label in labels:
+            if label not in {r.label for r in self.runs}:
+                raise BadInput(f"no run is called '{label}'; {nearest(label, [r.label for r in self.runs])}")
+        runs = tuple(replace(r, role="predict") if r.label in labels else r for r in self.runs)
+        if all(r.role == "predict" for r in runs):
+            raise BadInput(f"holding out {', '.join(labels)} leaves no run to fit; hold out fewer.")
+        return replace(self, runs=runs)
 
 
 def load_study(path: PathLike, *, data: PathLike | None = None, fixed: Mapping[str, float] | None = None) -> Study:
