@@ -18,6 +18,7 @@ ask.add_argument("study", type=Path)
 ask.add_argument("--data", type=Path, help="folder of the runs' files; the study's own when left out")
 ask.add_argument("--run", help="label of the run to draw; the first when left out")
 ask.add_argument("-o", "--out", type=Path, default=Path("picture.svg"), help="SVG or PNG")
+ask.add_argument("--title", help="heading; the study's own when left out")
 asked = ask.parse_args()
 
 study = load_study(asked.study, data=asked.data)
@@ -25,6 +26,8 @@ fit = identify(study.rig, study.runs)
 label = asked.run or next(iter(fit.runs))
 score = fit.runs[label]
 what = "fitted" if score.role == "fit" else "predicted, not fitted"
-drawing = fit_figure(score, study.rig.plant, title=f"{study.title}, run {label}, {what}", width=7.0, height=1.75)
+drawing = fit_figure(
+    score, study.rig.plant, title=f"{asked.title or study.title}, run {label}, {what}", width=7.0, height=1.75
+)
 print(fit.verdict)
 print(save(drawing, asked.out))

@@ -128,7 +128,7 @@ def test_intervals_without_end_and_numbers_that_are_none_are_written(changed, wr
     }
     _, page = written(changed(estimates=odd, names=("J_d", "J_p"), correlation=np.full((2, 2), np.nan)))
     assert "−∞ to ∞" in page.prose
-    assert "at its bound" in page.prose
+    assert "stopped at its bound" in page.prose
 
 
 def test_a_fit_of_nothing_is_a_page_too(changed, written):

@@ -54,8 +54,12 @@ def _broken(fit: Fit) -> list[Step]:
                         command=f"[sensors.{name}]\nsign = -1",
                     )
                 )
-    for name, e in fit.estimates.items():
-        if e.status == "at bound":
+    stopped = [n for n, e in fit.estimates.items() if e.status == "at bound"]
+    none = [n for n in stopped if fit.estimates[n].value == 0]
+    if none:
+        steps.append(Step(sentence=f"These runs need no {', '.join(none)}: the estimate ended at zero; leave it out."))
+    for name in stopped:
+        if name not in none:
             steps.append(Step(sentence=f"{name} stopped at its bound; widen the bound or give its value as known."))
     return steps
 

@@ -61,7 +61,7 @@ def fit_figure(
         Long runs are thinned to the extremes in so many buckets.
     """
     units, n = units_of(plant), len(score.measured)
-    drawing = figure(0.65 + height * n, width, margins=(0.85, 0.1, 0.28, 0.42))
+    drawing = figure(0.7 + height * n, width, margins=(0.85, 0.1, 0.28, 0.46))
     grid = drawing.add_gridspec(2 * n, 1, height_ratios=[3.2, 1] * n, hspace=0.32)
     panels: list[Axes] = []
     for j, name in enumerate(score.measured):
@@ -72,7 +72,14 @@ def fit_figure(
         upper.set_title(f"fit {percent(score.fit_percent.get(name, float('nan')))}", loc="right", fontsize=9)
     if title:
         panels[0].set_title(_short(title, 70), parse_math=False)
-    drawing.legend(*panels[0].get_legend_handles_labels(), loc="lower left", bbox_to_anchor=(0.8 / width, 0.0), ncols=2)
+    drawing.legend(
+        *panels[0].get_legend_handles_labels(),
+        loc="lower left",
+        bbox_to_anchor=(0.85 / width, 0.0),
+        ncols=2,
+        borderpad=0,
+        borderaxespad=0.1,
+    )
     panels[0].set_xlim(float(score.t[0]), float(score.t[-1]))
     hide_inner_times(panels)
     for panel in panels:
