@@ -18,6 +18,8 @@ from upright.identification.model import Fit, Rig, Run
 from upright.identification.problem import Problem, pose
 from upright.identification.scoring import fit_percent, predict
 from upright.identification.simplex import simplex
+from upright.identification.statistics import loudness, pseudo_inverse
+from upright.identification.unknowns import SHARED
 
 __all__ = ["METHODS", "fit_percent", "identify", "predict"]
 
@@ -107,20 +109,21 @@ def _half(problem: Problem) -> float:
 
 
 def _weigh_priors(problem: Problem, found: Descent) -> Descent:
-    """Weigh prior knowledge by the residuals found, memory included, and settle again."""
+    """Weigh prior knowledge by the residuals found, memory included, and settle again; unless it makes no difference."""
     if found.interrupted or not any(u.prior is not None for u in problem.unknowns):
         return found
-    from upright.identification.statistics import assess
-
-    for _ in range(2):
-        spread = assess(problem, found.x)
-        ratio = np.diag(spread.covariance)[spread.white > 0] / spread.white[spread.white > 0]
-        inflation = max(1.0, float(np.median(ratio))) if ratio.size else 1.0
-        noise = math.sqrt(spread.variance * inflation)
-        if abs(math.log(max(noise, 1e-12) / problem.noise)) < 0.1:
+    for _ in range(3):
+        r, J = problem.prior_rows(found.x)
+        pull = pseudo_inverse(found.normal.matrix) @ (J.T @ r)
+        variance = found.normal.cost / count(problem)
+        error = np.sqrt(np.maximum(np.diag(pseudo_inverse(found.normal.matrix)) * variance, 0.0))
+        if np.all(np.abs(pull) <= 0.02 * error) and not any(u.prior and u.run == SHARED for u in problem.unknowns):
             break
-        problem.noise = max(noise, 1e-12)
-        found = descend(problem.normal, found.x, problem.lower, problem.upper, limit=30)
+        noise = max(loudness(problem, found.x), 1e-9)
+        if abs(math.log(noise / problem.noise)) < 0.2:
+            break
+        problem.noise = noise
+        found = descend(problem.normal, found.x, problem.lower, problem.upper, tolerance=1e-6, limit=20)
     return found
 
 

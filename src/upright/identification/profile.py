@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from upright.identification.descent import descend
 from upright.identification.problem import Problem
-from upright.identification.statistics import Spread
+from upright.identification.statistics import Spread, pseudo_inverse
 
 Array = NDArray[np.float64]
 
@@ -22,44 +22,52 @@ Array = NDArray[np.float64]
 def profile(problem: Problem, x: Array, place: int, spread: Spread, quantile: float) -> tuple[float, float]:
     """Interval of one number's value, an infinite end where the cost never rises enough."""
     best = problem.normal(x)
-    white = float(spread.white[place])
-    robust = float(spread.covariance[place, place])
-    inflation = max(1.0, robust / white) if white > 0 else 1.0
-    rise = quantile**2 * spread.variance * inflation
     u = problem.unknowns[place]
-    first = math.sqrt(robust) * quantile if robust > 0 else 0.1 * u.scale
-    first = min(first, 2.0 if u.log else 2 * max(abs(float(x[place])), u.scale))
-    ends = [_end(problem, x, place, best.cost, rise, sign * first) for sign in (-1.0, 1.0)]
+    ratio = np.diag(spread.covariance)[spread.white > 0] / spread.white[spread.white > 0]
+    here = float(spread.covariance[place, place] / spread.white[place]) if spread.white[place] > 0 else 0.0
+    rise = quantile**2 * spread.variance * max(1.0, here or float(np.median(ratio)) if ratio.size else 1.0)
+    curvature = _curvature(best.matrix, place, spread)
+    g = float(best.gradient[place]) if spread.pinned[place] else 0.0
+    ends: list[float] = []
+    for sign in (-1.0, 1.0):
+        # where the quadratic model has risen enough: 2 g s + c s^2 = rise
+        slope = g * sign
+        step = (-slope + math.sqrt(slope**2 + curvature * rise)) / curvature if curvature > 0 else u.scale
+        most = 2.0 if u.log else 100 * max(abs(float(x[place])), u.scale)
+        ends.append(_end(problem, x, place, best.cost, rise, sign * min(max(step, 1e-9 * u.scale), most)))
     if u.log:
         return (math.exp(ends[0]) if ends[0] > -700 else 0.0), math.exp(min(ends[1], 700.0))
     return ends[0], ends[1]
 
 
+def _curvature(A: Array, place: int, spread: Spread) -> float:
+    """Curvature of the cost along one number, the others following."""
+    others = np.array([i for i in range(A.shape[0]) if i != place and not spread.pinned[i]], dtype=np.int64)
+    row = A[place, others]
+    return float(A[place, place] - row @ pseudo_inverse(A[np.ix_(others, others)]) @ row)
+
+
 def _end(problem: Problem, x: Array, place: int, best: float, rise: float, step: float) -> float:
-    """Coordinate at which the refitted cost has risen by `rise`, by at most four secant steps in the square root."""
+    """Coordinate at which the refitted cost has risen by `rise`, by secants of its square root, bracketed."""
     lower, upper = problem.lower.copy(), problem.upper.copy()
     bound = float(lower[place] if step < 0 else upper[place])
-    near, far = 0.0, step
-    z = x
-    for _ in range(4):
-        at = float(x[place]) + far
-        if (step < 0 and at <= bound) or (step > 0 and at >= bound):
-            at = bound
-        if at == x[place]:
-            return at
+    reached, inner, outer = step, 0.0, math.inf
+    height, z = 0.0, x
+    for _ in range(5):
+        at = float(np.clip(x[place] + reached, problem.lower[place], problem.upper[place]))
         lower[place] = upper[place] = at
-        found = descend(problem.normal, np.where(np.arange(x.size) == place, at, z), lower, upper,
-                        tolerance=1e-3, limit=6)  # fmt: skip
+        start = np.where(np.arange(x.size) == place, at, z)
+        found = descend(problem.normal, start, lower, upper, tolerance=1e-3, limit=6)
         z = found.x
         height = math.sqrt(max(found.normal.cost - best, 0.0) / rise)
-        if abs(height - 1) < 0.05:
+        if abs(height - 1) < 0.05 or (at == bound and height < 1):
             return at
-        if at == bound and height < 1:
-            return bound
-        reached = at - float(x[place])
         if height < 1:
-            near = reached
-            far = reached * min(3.0, 1 / max(height, 0.1))
+            inner = abs(reached)
         else:
-            far = reached / height if near == 0.0 else (near + reached) / 2
-    return float(x[place]) + far if height > 0.3 else math.copysign(math.inf, step)
+            outer = abs(reached)
+        guess = abs(reached) * min(3.0, 1 / max(height, 1e-3))
+        if not inner < guess < outer:
+            guess = (inner + outer) / 2
+        reached = math.copysign(guess, step)
+    return float(x[place]) + reached if height > 0.3 else math.copysign(math.inf, step)

@@ -42,11 +42,9 @@ def look(problem: Problem, x: Array, spread: Spread) -> Sight:
     shared = [i for i, u in enumerate(problem.unknowns) if u.run == SHARED and not spread.pinned[i]]
     own = [i for i, u in enumerate(problem.unknowns) if u.run != SHARED and not spread.pinned[i]]
     value = problem.value(x)
+    unknowns = [problem.unknowns[i] for i in shared]
     sizes = np.array(
-        [
-            1.0 if problem.unknowns[i].log else max(abs(float(value[i])), 1e-3 * problem.unknowns[i].scale)
-            for i in shared
-        ]
+        [1.0 if u.log else max(abs(float(value[i])), u.scale) for i, u in zip(shared, unknowns, strict=True)]
     )
     A = spread.matrix[np.ix_(shared, shared)]
     if own:

@@ -12,10 +12,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class State:
-    """Measured state: `x` (states,) in the paper's order and how much each state varies over the run, `spread`."""
+    """Measured first state: `x` (states,) in the paper's order, its standard `error`, and each state's `spread`."""
 
     x: Array
     spread: Array
+    error: Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,6 +63,15 @@ def savitzky_golay(y: Array, dt: float, width: int, *, order: int = 4) -> Motion
         return Motion(q=y.copy(), v=v, a=np.zeros(n), edge=0)
     q, v, a = (savgol_filter(y, width, order, deriv=d, delta=dt, mode="interp") for d in range(3))
     return Motion(q=q, v=v, a=a, edge=width // 2)
+
+
+def end_errors(y: Array, q: Array, dt: float, width: int, *, order: int = 4) -> tuple[float, float]:
+    """Standard errors of position and speed at the end of a signal (N,) that polynomials smoothed to `q`."""
+    m = max(order + 2, min(width, y.size))
+    noise = float(np.std(y - q)) * np.sqrt(m / max(m - order - 1, 1))
+    V = np.vander(np.linspace(0.0, 1.0, m), order + 1, increasing=True)
+    C = np.linalg.pinv(V.T @ V)
+    return noise * float(np.sqrt(C[0, 0])), noise * float(np.sqrt(C[1, 1])) / ((m - 1) * dt)
 
 
 def smoothing_width(y: Array, dt: float, period: float, quantum: float) -> int:

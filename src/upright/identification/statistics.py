@@ -63,13 +63,24 @@ def long_run(scores: Array, span: int) -> Array:
 def automatic_span(scores: Array) -> int:
     """Samples out to which autocovariances count, by Andrews' rule for first-order memory, column by column."""
     n = scores.shape[0]
-    before, after = scores[:-1], scores[1:]
-    power = np.einsum("tp,tp->p", before, before)
-    rho = np.einsum("tp,tp->p", before, after) / np.where(power > 0, power, 1.0)
-    rho = np.clip(rho, 0.0, 1 - 1.0 / n)
+    rho = _first_order(scores)
     alpha = 4 * rho**2 / ((1 - rho) ** 2 * (1 + rho) ** 2)
     longest = float(np.max(alpha, initial=0.0))
     return max(1, min(int(1.1447 * (longest * n) ** (1 / 3)) + 1, n // 4))
+
+
+def lost_share(scores: Array, span: int) -> float:
+    """Share of the long-run sum that Bartlett's weights lose when memory is first-order, at most one half."""
+    rho = float(np.max(_first_order(scores), initial=0.0))
+    return min(0.5, 2 * rho / ((1 - rho**2) * span))
+
+
+def _first_order(scores: Array) -> Array:
+    """First-order autocorrelation of every column, between 0 and just below 1."""
+    before, after = scores[:-1], scores[1:]
+    power = np.einsum("tp,tp->p", before, before)
+    rho = np.einsum("tp,tp->p", before, after) / np.where(power > 0, power, 1.0)
+    return np.clip(rho, 0.0, 1 - 1.0 / scores.shape[0])
 
 
 def memory(residual: Array, dt: float) -> float:
@@ -84,6 +95,21 @@ def memory(residual: Array, dt: float) -> float:
         below = np.flatnonzero(r < r[0] / math.e)
         longest = max(longest, float(below[0] if below.size else e.size) * dt)
     return longest
+
+
+def loudness(problem: Problem, x: Array) -> float:
+    """Weighted residual that one independent observation carries: its deviation times the root of its memory.
+
+    What was known beforehand is weighed against the data in this unit.
+    """
+    squares, samples = 0.0, 0
+    for index, track in enumerate(problem.tracks):
+        y = problem.simulate(index, x[:, None], track.length)[:, :, :, 0]
+        e = np.moveaxis((y - track.targets(track.length)) * track.weights, 1, 0).reshape(-1, len(track.columns))
+        alike = max(1.0, 2 * memory(e, track.dt) / track.dt - 1)
+        squares += alike * float(np.sum(e * e))
+        samples += e.shape[0] * max(1, int(np.count_nonzero(track.weights)))
+    return math.sqrt(squares / max(samples, 1))
 
 
 def pseudo_inverse(A: Array) -> Array:
@@ -115,7 +141,7 @@ def assess(problem: Problem, x: Array, *, clusters: bool = True) -> Spread:
         A[here] += flat.T @ flat
         scores = np.einsum("tk,tkp->tp", r, J)
         span = automatic_span(scores)
-        hac[here] += long_run(scores, span)
+        hac[here] += long_run(scores, span) / (1 - lost_share(scores, span))
         g = scores.sum(axis=0)
         from_runs[here] += np.outer(g, g)
         cost += float(np.sum(r * r))
@@ -130,12 +156,13 @@ def assess(problem: Problem, x: Array, *, clusters: bool = True) -> Spread:
     inverse = np.zeros((size, size))
     inverse[np.ix_(free, free)] = pseudo_inverse(A[np.ix_(free, free)])
     variance = cost / max(count - int(free.sum()), 1)
-    prior_variance = problem.noise**2  # a prior's row is one residual of this size
-    meat = hac + prior.T @ prior * prior_variance
+    # a prior's row is one residual of the size that one sigma is worth
+    prior_meat = prior.T @ prior * problem.noise**2
+    meat = hac + prior_meat
     covariance = inverse @ meat @ inverse
     runs = len(all_rows)
     if clusters and runs > 1:
-        spread = inverse @ (from_runs * runs / (runs - 1) + prior.T @ prior * prior_variance) @ inverse
+        spread = inverse @ (from_runs * runs / (runs - 1) + prior_meat) @ inverse
         factor = np.sqrt(np.maximum(np.diag(spread) / np.where(np.diag(covariance) > 0, np.diag(covariance), 1.0), 1.0))
         covariance = covariance * np.outer(factor, factor)
     white = np.diag(inverse) * variance

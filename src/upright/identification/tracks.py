@@ -12,6 +12,7 @@ from upright.identification.model import Rig, Run
 from upright.identification.smoothing import (
     State,
     dominant_period,
+    end_errors,
     savitzky_golay,
     smoothing_width,
     spread,
@@ -83,12 +84,13 @@ def prepare(rig: Rig, run: Run, *, thin: bool) -> Track:
         # the last sample of a window is the first of the next, so that no sample is scored at its own restart only
         restarts = np.arange(0, n - length + 1, length - 1, dtype=np.int64)
 
-    x, sizes = np.zeros((n, len(names))), np.ones(len(names))
+    x, sizes, errors = np.zeros((n, len(names))), np.ones(len(names)), np.zeros(len(names))
     for k, (c, column) in enumerate(zip(run.measured, columns, strict=True)):
         width = smoothing_width(run.y[:, k], period_s, period, quantum[k])
         motion = savitzky_golay(run.y[:, k], period_s, width)
         x[:, column], x[:, column + 1] = motion.q, motion.v
         sizes[column], sizes[column + 1] = spread(motion.q), spread(motion.v)
+        errors[column : column + 2] = end_errors(run.y[:, k], motion.q, period_s, width)
         if c in run.held:
             sizes[column : column + 2] = 1.0
     for name, value in run.initial.items():
@@ -116,7 +118,7 @@ def prepare(rig: Rig, run: Run, *, thin: bool) -> Track:
         length=length,
         x0=x[::stride][restarts],
         period=period,
-        start=State(x=x[0], spread=sizes),
+        start=State(x=x[0], spread=sizes, error=errors),
         held=held,
         first=int(np.ceil(run.score_from / dt)),
     )
@@ -124,7 +126,7 @@ def prepare(rig: Rig, run: Run, *, thin: bool) -> Track:
 
 def simulator(rig: Rig, track: Track, values: Mapping[str, float | Array], free: Collection[str]) -> Simulator:
     """Solver of one run; terms whose parameters are in `free` stay although they are zero now."""
-    derived = rig.plant.derived_for({**values, **{n: 1.0 for n in free}})
+    derived = rig.plant.derived_for({**values, **dict.fromkeys(free, 1.0)})
     free = [n for n in free if n in derived.parameters or n.startswith("actuator.")]
     flavour = choose(derived, values, free=free, held=tuple(track.held), loop=track.run.loop is not None)
     loop = None

@@ -29,7 +29,7 @@ GAIN_SPREAD = 1.0
 
 
 INITIAL_SPREAD = (0.02, 0.1)
-"""One sigma of a measured first coordinate and velocity, as a share of how much each varies over the run."""
+"""Least sigma of a measured first coordinate and velocity, as a share of how much each varies over the run."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,7 +128,8 @@ def run_unknowns(rig: Rig, index: int, run: Run, start: State) -> list[Unknown]:
             if names[i - i % 2] not in run.held and name not in run.initial:
                 # measured to a few percent; more freedom would excuse a wrong model
                 size, measured = float(start.spread[i]), float(start.x[i])
-                prior = (measured, INITIAL_SPREAD[i % 2] * size) if names[i - i % 2] in run.measured else None
+                sigma = max(INITIAL_SPREAD[i % 2] * size, 2 * float(start.error[i]))
+                prior = (measured, sigma) if names[i - i % 2] in run.measured else None
                 add(f"initial.{name}", measured, size, prior)
     for name in run.measured:
         every = "offset" in run.unknown and (run.loop is not None or matters(rig, name))
