@@ -24,6 +24,7 @@ pytestmark = [
 
 ASKED = {
     "aau_pendulum": {("whole fall", "theta"): 99.3},
+    "aau_pendulum_tail": {("tail, restarted", "theta"): 97.0},
     "uw_pendulum": {("55 s", "theta"): 98.5},
     "uw_pendulum_tail": {("tail", "theta"): 90.0},
     "furuta_fall": {("fall", "theta"): 98.0},
