@@ -17,7 +17,7 @@ from pathlib import Path
 from types import ModuleType
 
 from upright.simulation.equations import ELEMENTARY, acceleration, step, terms
-from upright.simulation.events import events
+from upright.simulation.events import events, scratch
 from upright.simulation.flavour import Layout
 from upright.simulation.lanes import run
 
@@ -31,7 +31,7 @@ from math import cos, exp, pi, sin, sqrt, tan
 
 import numpy
 from llvmlite import ir
-from numba import carray, cfunc, float64, int64, njit, types
+from numba import cfunc, float64, int64, njit, types
 from numba.extending import intrinsic
 from numpy import empty, floor, nan, zeros
 
@@ -55,13 +55,14 @@ def wide(context):
 
 
 @intrinsic
-def call(context, address, data, L, i, h):
+def call(context, address, lane, scratch, L, h):
     """Call the search of events by its address, so that it is compiled once and not into every loop."""
 
     def generate(context, builder, signature, args):
-        kinds = [ir.IntType(64), ir.IntType(64), ir.IntType(64), ir.DoubleType()]
-        function = builder.inttoptr(args[0], ir.FunctionType(ir.VoidType(), kinds).as_pointer())
-        builder.call(function, args[1:])
+        number = ir.DoubleType().as_pointer()
+        kind = ir.FunctionType(ir.VoidType(), [number, number, ir.IntType(64), ir.DoubleType()])
+        lane, scratch = (builder.inttoptr(a, number) for a in args[1:3])
+        builder.call(builder.inttoptr(args[0], kind.as_pointer()), [lane, scratch, *args[3:]])
         return context.get_dummy_value()
 
     return types.void(types.int64, types.int64, types.int64, types.int64, types.float64), generate
@@ -73,7 +74,7 @@ def source(p: Layout) -> str:
     """Text of the module that steps one plant in one flavour."""
     parts = [HEAD.format(name=p.derived.name, flavour=p.flavour), ELEMENTARY, acceleration(p), step(p)]
     if p.flavour.dry:
-        parts += [terms(p), events(p)]
+        parts += [terms(p, scratch(p)), events(p)]
     return "\n\n".join([*parts, run(p, 1), run(p, WIDTH)])
 
 

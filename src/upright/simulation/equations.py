@@ -144,15 +144,15 @@ def acceleration(p: Layout) -> str:
     return _function("@inline", "acceleration", arguments(p), [*lines, f"return ({result},)"])
 
 
-def terms(p: Layout) -> str:
-    """Text of ``terms(..., _W, _o)``: mass matrix, row by row, then forces of the free coordinates, from `_o` on."""
+def terms(p: Layout, places: dict[str, int]) -> str:
+    """Text of ``terms(..., _S)``: mass matrix, row by row, and forces of the free coordinates, where `places` says."""
     lines, mass = _forces(p)
     place = {c: k for k, c in enumerate(p.free)}
     n = len(p.free)
     for i in p.free:
-        lines += [f"_W[_o + {n * place[i] + place[j]}] = {mass.get((i, j), '0.0')}" for j in p.free]
-        lines.append(f"_W[_o + {n * n + place[i]}] = _f{i}")
-    return _function("@inline", "terms", [*arguments(p), "_W", "_o"], lines)
+        lines += [f"_S[{places['MASS'] + n * place[i] + place[j]}] = {mass.get((i, j), '0.0')}" for j in p.free]
+        lines.append(f"_S[{places['FORCE'] + place[i]}] = _f{i}")
+    return _function("@inline", "terms", [*arguments(p), "_S"], lines)
 
 
 def step_arguments(p: Layout) -> list[str]:

@@ -8,135 +8,137 @@ and the new modes follow from statics (every joint at rest holds if it can) and 
 
 from __future__ import annotations
 
+import re
+
 from upright.simulation.equations import arguments, step_arguments
 from upright.simulation.flavour import Layout
 
 SEARCH = '''
 @scalar
-def solve(W, o, right):
+def solve(S, right):
     """Accelerations of the coordinates that move, from the forces at `right`; the others stay."""
     for i in range(NF):
-        W[o + ACC + i] = W[o + right + i] * W[o + MOVES + i]
+        S[ACC + i] = S[right + i] * S[MOVES + i]
         for j in range(NF):
-            W[o + WORK + NF * i + j] = W[o + MASS + NF * i + j] * W[o + MOVES + i] * W[o + MOVES + j]
-        W[o + WORK + NF * i + i] += 1.0 - W[o + MOVES + i]
+            S[WORK + NF * i + j] = S[MASS + NF * i + j] * S[MOVES + i] * S[MOVES + j]
+        S[WORK + NF * i + i] += 1.0 - S[MOVES + i]
     for k in range(NF):
         for i in range(k + 1, NF):
-            c = W[o + WORK + NF * i + k] / W[o + WORK + NF * k + k]
+            c = S[WORK + NF * i + k] / S[WORK + NF * k + k]
             for j in range(k, NF):
-                W[o + WORK + NF * i + j] -= c * W[o + WORK + NF * k + j]
-            W[o + ACC + i] -= c * W[o + ACC + k]
+                S[WORK + NF * i + j] -= c * S[WORK + NF * k + j]
+            S[ACC + i] -= c * S[ACC + k]
     for k in range(NF):
         i = NF - 1 - k
         for j in range(i + 1, NF):
-            W[o + ACC + i] -= W[o + WORK + NF * i + j] * W[o + ACC + j]
-        W[o + ACC + i] /= W[o + WORK + NF * i + i]
+            S[ACC + i] -= S[WORK + NF * i + j] * S[ACC + j]
+        S[ACC + i] /= S[WORK + NF * i + i]
 
 
 @inline_strict
-def taken(W, o, j, right):
+def taken(S, j, right):
     """Force that coordinate `j` takes up."""
-    c = W[o + right + j]
+    c = S[right + j]
     for k in range(NF):
-        c -= W[o + MASS + NF * j + k] * W[o + ACC + k]
+        c -= S[MASS + NF * j + k] * S[ACC + k]
     return c
 
 
 @scalar
-def load(W, L, i, o, state, t, h, fresh):
+def load(W, S, L, state, t, h, fresh):
     """Accelerations of a state with the modes as they are, and the margins of the stuck joints.
 
     Returns the first joint that cannot hold, -1 when all can. Mass and forces are computed when `fresh`.
     """
     if fresh > 0:
-        terms_at(W, L, i, o, state, t, h)
+        terms_at(W, S, L, state, t, h)
         for k in range(NF):
-            W[o + MOVES + k] = 1.0
+            S[MOVES + k] = 1.0
     for w in range(ND):
-        W[o + MOVES + joint(w)] = abs(W[o + MODES + w])
-    solve(W, o, int64(FORCE))
+        S[MOVES + joint(w)] = abs(S[MODES + w])
+    solve(S, int64(FORCE))
     first = -1
     for w in range(ND):
-        if W[o + MODES + w] == 0.0:
-            g = W[o + HOLD + w] - abs(taken(W, o, joint(w), FORCE))
-            W[o + MARGIN + w] = g
+        if S[MODES + w] == 0.0:
+            g = S[HOLD + w] - abs(taken(S, joint(w), FORCE))
+            S[MARGIN + w] = g
             first = w if g < 0.0 and first < 0 else first
     return first
 
 
 @inline_strict
-def turned(W, o, state, w):
+def turned(S, state, w):
     """Speed of a sliding joint in its direction."""
-    return W[o + MODES + w] * W[o + state + NF + joint(w)]
+    return S[MODES + w] * S[state + NF + joint(w)]
 
 
 @scalar
-def decide(W, o, forced):
+def decide(S, forced):
     """Modes of the joints at rest, after `load`; joint `forced`, if not -1, has reached its break-away level."""
     resting, again = 0, False
-    pull = taken(W, o, joint(forced), FORCE) if forced >= 0 else 0.0
+    pull = taken(S, joint(forced), FORCE) if forced >= 0 else 0.0
     for w in range(ND):
-        W[o + REST + w] = 0.0
-        if W[o + MODES + w] == 0.0:
+        S[REST + w] = 0.0
+        if S[MODES + w] == 0.0:
             resting += 1
-            W[o + REST + w] = 1.0
-            W[o + LEVEL + w] = W[o + HOLD + w]
-            if w == forced or W[o + MARGIN + w] < 0.0:
-                W[o + REST + w] = 2.0
-                W[o + LEVEL + w] = W[o + SLIDE + w]
+            S[REST + w] = 1.0
+            S[LEVEL + w] = S[HOLD + w]
+            if w == forced or S[MARGIN + w] < 0.0:
+                S[REST + w] = 2.0
+                S[LEVEL + w] = S[SLIDE + w]
                 again = True
     if resting == 1 and again:
         for w in range(ND):
-            if W[o + REST + w] > 0.0:
-                W[o + MODES + w] = 1.0 if taken(W, o, joint(w), FORCE) > 0.0 else -1.0
+            if S[REST + w] > 0.0:
+                S[MODES + w] = 1.0 if taken(S, joint(w), FORCE) > 0.0 else -1.0
         return
     for k in range(NF):
-        W[o + KEEP + k] = 0.0
+        S[KEEP + k] = 0.0
     # signs of the accelerations: guessed by coordinate descent, verified by solving exactly
     for turn in range(400):
         if not again:
             break
         for sweep in range(8 * NF):
             j = sweep % NF
-            c = W[o + FORCE + j] + W[o + MASS + NF * j + j] * W[o + KEEP + j]
+            c = S[FORCE + j] + S[MASS + NF * j + j] * S[KEEP + j]
             for k in range(NF):
-                c -= W[o + MASS + NF * j + k] * W[o + KEEP + k]
+                c -= S[MASS + NF * j + k] * S[KEEP + k]
             for w in range(ND):
-                if joint(w) == j and W[o + REST + w] > 0.0:
-                    level = W[o + LEVEL + w]
+                if joint(w) == j and S[REST + w] > 0.0:
+                    level = S[LEVEL + w]
                     c = c - level if c > level else (c + level if c < -level else 0.0)
-            W[o + KEEP + j] = c / W[o + MASS + NF * j + j]
+            S[KEEP + j] = c / S[MASS + NF * j + j]
         for j in range(NF):
-            W[o + RIGHT + j] = W[o + FORCE + j]
+            S[RIGHT + j] = S[FORCE + j]
         for w in range(ND):
-            if W[o + REST + w] > 0.0:
+            if S[REST + w] > 0.0:
                 j = joint(w)
-                c = W[o + KEEP + j]
-                W[o + MODES + w] = 1.0 if c > 0.0 else (-1.0 if c < 0.0 else 0.0)
-                W[o + MOVES + j] = abs(W[o + MODES + w])
-                W[o + RIGHT + j] -= W[o + MODES + w] * W[o + LEVEL + w]
-        solve(W, o, int64(RIGHT))
+                c = S[KEEP + j]
+                S[MODES + w] = 1.0 if c > 0.0 else (-1.0 if c < 0.0 else 0.0)
+                S[MOVES + j] = abs(S[MODES + w])
+                S[RIGHT + j] -= S[MODES + w] * S[LEVEL + w]
+        solve(S, int64(RIGHT))
         again = False
         for w in range(ND):
-            if W[o + REST + w] > 0.0:
-                c = abs(taken(W, o, joint(w), RIGHT)) - W[o + LEVEL + w] * (1.0 + 1e-12)
-                again = again or W[o + MODES + w] * W[o + ACC + joint(w)] < 0.0
-                again = again or (W[o + MODES + w] == 0.0 and c > 0.0)
+            if S[REST + w] > 0.0:
+                c = abs(taken(S, joint(w), RIGHT)) - S[LEVEL + w] * (1.0 + 1e-12)
+                again = again or S[MODES + w] * S[ACC + joint(w)] < 0.0
+                again = again or (S[MODES + w] == 0.0 and c > 0.0)
         for w in range(ND):
-            if not again and W[o + REST + w] == 1.0 and W[o + MODES + w] != 0.0:
+            if not again and S[REST + w] == 1.0 and S[MODES + w] != 0.0:
                 # dragged along by another joint: it slides at its own lower level
-                W[o + REST + w] = 2.0
-                W[o + LEVEL + w] = W[o + SLIDE + w]
+                S[REST + w] = 2.0
+                S[LEVEL + w] = S[SLIDE + w]
                 again = True
-    if forced >= 0 and W[o + MODES + forced] == 0.0:
-        W[o + MODES + forced] = 1.0 if pull > 0.0 else -1.0
+    if forced >= 0 and S[MODES + forced] == 0.0:
+        S[MODES + forced] = 1.0 if pull > 0.0 else -1.0
 
 
 @scalar
-def redo(W, L, i, o, h):
+def redo(W, S, L, h):
     """Step over one substep, event by event: a small machine, so that each search is compiled in one place only.
 
-    It starts with the whole substep's result in NEXT, as the lanes computed it.
+    It starts with the whole substep's result, as the lanes computed it.
     """
     FULL, MIDDLE, ROOT = 0, 1, 2
     # not literals: Numba would compile what they are passed to once for each
@@ -147,86 +149,86 @@ def redo(W, L, i, o, h):
     for _ in range(1000):
         if begin:
             # modes at the start of what is left
-            first = load(W, L, i, o, here, t, h, fresh)
+            first = load(W, S, L, here, t, h, fresh)
             if first >= 0 and turns < 2 * ND + 2:
-                decide(W, o, none)
+                decide(S, none)
                 turns, done = turns + 1, False
                 continue
             for k in range(ND):
-                W[o + BEFORE + k] = W[o + MARGIN + k]
-                if W[o + MODES + k] != 0.0:
-                    W[o + BEFORE + k] = turned(W, o, STATE, k)
+                S[BEFORE + k] = S[MARGIN + k]
+                if S[MODES + k] != 0.0:
+                    S[BEFORE + k] = turned(S, STATE, k)
             for k in range(NF):
-                W[o + FIRST + k] = W[o + ACC + k]
+                S[FIRST + k] = S[ACC + k]
             begin, phase, c, turns = False, FULL, h - t, 0
             if c <= 0.0:
                 break
         if not done:
-            leap(W, L, i, o, t, c, h)
+            leap(W, S, L, t, c, h)
         done = False
         first, stuck = -1, False
         for k in range(ND):
-            stuck = stuck or W[o + MODES + k] == 0.0
-            if W[o + MODES + k] != 0.0:
-                W[o + MARGIN + k] = turned(W, o, NEXT, k)
-                first = k if W[o + MARGIN + k] < 0.0 and first < 0 else first
+            stuck = stuck or S[MODES + k] == 0.0
+            if S[MODES + k] != 0.0:
+                S[MARGIN + k] = turned(S, NEXT, k)
+                first = k if S[MARGIN + k] < 0.0 and first < 0 else first
         if stuck:
-            other = load(W, L, i, o, there, t + c, h, fresh)
+            other = load(W, S, L, there, t + c, h, fresh)
             first = other if first < 0 else first
         if phase != ROOT:
             if first < 0 or events > 40:
                 if phase == MIDDLE:
                     for k in range(NX):
-                        W[o + STATE + k] = W[o + WHOLE + k]
+                        S[STATE + k] = S[WHOLE + k]
                     break
                 if events > 0:
                     for k in range(NX):
-                        W[o + STATE + k] = W[o + NEXT + k]
+                        S[STATE + k] = S[NEXT + k]
                     break
                 # nothing at the end: has a joint turned twice in between?
                 for k in range(NX):
-                    W[o + WHOLE + k] = W[o + NEXT + k]
+                    S[WHOLE + k] = S[NEXT + k]
                 phase, c = MIDDLE, 0.5 * c
                 continue
             phase, w = ROOT, first
-            lo, hi, ga, gb, count, side = 0.0, c, W[o + BEFORE + w], W[o + MARGIN + w], 0, 0
-            scale = 1e-6 * (ga - gb) if W[o + MODES + w] != 0.0 else 1e-14 * (ga - gb)
+            lo, hi, ga, gb, count, side = 0.0, c, S[BEFORE + w], S[MARGIN + w], 0, 0
+            scale = 1e-6 * (ga - gb) if S[MODES + w] != 0.0 else 1e-14 * (ga - gb)
         else:
-            g = W[o + MARGIN + w]
+            g = S[MARGIN + w]
             if count > 100 or (ga > 0.0 and (abs(g) <= scale or hi - lo <= 4e-16 * h)):
                 other = -1
                 for k in range(ND):
-                    if k != w and W[o + MARGIN + k] < 0.0 and W[o + BEFORE + k] > 0.0:
+                    if k != w and S[MARGIN + k] < 0.0 and S[BEFORE + k] > 0.0:
                         other = k
                 if other >= 0 and count <= 100:
                     w = other
-                    lo, hi, ga, gb, count, side = 0.0, c, W[o + BEFORE + w], W[o + MARGIN + w], 0, 0
-                    scale = 1e-6 * (ga - gb) if W[o + MODES + w] != 0.0 else 1e-14 * (ga - gb)
+                    lo, hi, ga, gb, count, side = 0.0, c, S[BEFORE + w], S[MARGIN + w], 0, 0
+                    scale = 1e-6 * (ga - gb) if S[MODES + w] != 0.0 else 1e-14 * (ga - gb)
                 else:
                     # the moment is found: stop the joint, or let it break away
                     forced = int64(w)
                     if not stuck:
-                        load(W, L, i, o, there, t + c, h, fresh)
-                    if W[o + MODES + w] != 0.0:
+                        load(W, S, L, there, t + c, h, fresh)
+                    if S[MODES + w] != 0.0:
                         # the last millionth of the way by Taylor's series
                         forced = none
                         k = joint(w)
-                        d = -W[o + NEXT + NF + k] / W[o + ACC + k]
+                        d = -S[NEXT + NF + k] / S[ACC + k]
                         if abs(d) < 2e-6 * h:
                             for k in range(NF):
-                                W[o + NEXT + k] += d * (W[o + NEXT + NF + k] + 0.5 * d * W[o + ACC + k])
-                                W[o + NEXT + NF + k] += d * W[o + ACC + k]
+                                S[NEXT + k] += d * (S[NEXT + NF + k] + 0.5 * d * S[ACC + k])
+                                S[NEXT + NF + k] += d * S[ACC + k]
                             c += d
-                        W[o + NEXT + NF + joint(w)] = 0.0
+                        S[NEXT + NF + joint(w)] = 0.0
                     t += c
                     for k in range(NX):
-                        W[o + STATE + k] = W[o + NEXT + k]
+                        S[STATE + k] = S[NEXT + k]
                     for k in range(ND):
-                        if W[o + STATE + NF + joint(k)] == 0.0:
-                            W[o + FORCE + joint(k)] += W[o + MODES + k] * W[o + SLIDE + k]
-                            W[o + MODES + k] = 0.0
-                    load(W, L, i, o, here, t, h, known)
-                    decide(W, o, forced)
+                        if S[STATE + NF + joint(k)] == 0.0:
+                            S[FORCE + joint(k)] += S[MODES + k] * S[SLIDE + k]
+                            S[MODES + k] = 0.0
+                    load(W, S, L, here, t, h, known)
+                    decide(S, forced)
                     begin, events = True, events + 1
                     continue
             elif g > 0.0:
@@ -241,9 +243,9 @@ def redo(W, L, i, o, h):
         count += 1
         if ga > 0.0:
             c = lo + (hi - lo) * ga / (ga - gb)
-            if count == 1 and W[o + MODES + w] != 0.0:
+            if count == 1 and S[MODES + w] != 0.0:
                 # parabola through speed and acceleration at the start and speed at the end
-                slope = W[o + MODES + w] * W[o + FIRST + joint(w)]
+                slope = S[MODES + w] * S[FIRST + joint(w)]
                 curve = (gb - ga - slope * hi) / (hi * hi)
                 root = slope * slope - 4.0 * curve * ga
                 if root >= 0.0:
@@ -257,14 +259,14 @@ def redo(W, L, i, o, h):
             side = 0
         else:
             # it cannot stand at all
-            W[o + STATE + NF + joint(w)] = 0.0
-            W[o + MODES + w] = 0.0
+            S[STATE + NF + joint(w)] = 0.0
+            S[MODES + w] = 0.0
             begin, events, turns = True, events + 1, 2 * ND + 2
     for w in range(ND):
         # what is left after too many events rests
-        if turned(W, o, STATE, w) < 0.0:
-            W[o + STATE + NF + joint(w)] = 0.0
-            W[o + MODES + w] = 0.0
+        if turned(S, STATE, w) < 0.0:
+            S[STATE + NF + joint(w)] = 0.0
+            S[MODES + w] = 0.0
 '''
 
 
@@ -287,50 +289,58 @@ def events(p: Layout) -> str:
     f, place, rows = p.flavour, {c: k for k, c in enumerate(p.free)}, p.rows
     states = [f"q{i}" for i in p.free] + [f"v{i}" for i in p.free] + [f"y{i}" for i in f.dahl]
     at = scratch(p)
-    lines = [f"o = {len(rows)} * L", f"W = carray(data, (o + {at['END']},))"]
+    lines: list[str] = []
     for k, name in enumerate(states):
-        lines.append(f"W[o + {at['STATE'] + k}] = W[{rows['o' + name]} * L + i]")
-        lines.append(f"W[o + {at['NEXT'] + k}] = W[{rows[name]} * L + i]")
+        lines.append(f"S[{at['STATE'] + k}] = W[{rows['o' + name]} * L]")
+        lines.append(f"S[{at['NEXT'] + k}] = W[{rows[name]} * L]")
     for k, i in enumerate(f.dry):
         slide = f"_Fs{i}" if i in f.stribeck else f"_Fc{i}"
         for name, row in (("MODES", f"s{i}"), ("HOLD", f"_Fs{i}"), ("SLIDE", slide)):
-            lines.append(f"W[o + {at[name] + k}] = W[{rows[row]} * L + i]")
-    lines.append("redo(W, L, i, o, h)")
-    lines += [f"W[{rows[name]} * L + i] = W[o + {at['STATE'] + k}]" for k, name in enumerate(states)]
-    lines += [f"W[{rows[f's{i}']} * L + i] = W[o + {at['MODES'] + k}]" for k, i in enumerate(f.dry)]
+            lines.append(f"S[{at[name] + k}] = W[{rows[row]} * L]")
+    lines.append("redo(W, S, L, h)")
+    lines += [f"W[{rows[name]} * L] = S[{at['STATE'] + k}]" for k, name in enumerate(states)]
+    lines += [f"W[{rows[f's{i}']} * L] = S[{at['MODES'] + k}]" for k, i in enumerate(f.dry)]
     body = "\n".join(f"    {line}" for line in lines)
-    sizes = f"NF, ND, NX = {len(p.free)}, {len(f.dry)}, {len(states)}\n"
-    sizes += "\n".join(f"{name} = {value}" for name, value in at.items())
     joint = " else ".join(f"{place[i]} if w == {k}" for k, i in enumerate(f.dry)) + " else 0"
-    joint = "w" if [place[i] for i in f.dry] == list(range(len(f.dry))) else joint
-    head = '@cfunc("void(CPointer(float64), int64, int64, float64)", error_model="numpy", cache=True)\n'
-    return (
-        f"{sizes}\n\n\n@inline\ndef joint(w):\n    return {joint}\n\n\n{_leap(p)}\n\n{_terms_at(p)}\n{SEARCH}\n\n"
-        f'{head}def events(data, L, i, h):\n    """Redo one substep of lane `i`."""\n{body}\n'
+    plain = [place[i] for i in f.dry] == list(range(len(f.dry)))
+    numbers = at | {"NF": len(p.free), "ND": len(f.dry), "NX": len(states)}
+    head = (
+        '@cfunc("void(CPointer(float64), CPointer(float64), int64, float64)", error_model="numpy", cache=True)\n'
+        "def events(W, S, L, h):\n"
+        '    """Redo one substep of the lane at `W`, with `S` to write on."""\n'
     )
+    parts = ["" if plain else f"@inline\ndef joint(w):\n    return {joint}\n", _leap(p), _terms_at(p)]
+    search = re.sub(r"\bjoint\((\w+)\)", r"\1", SEARCH) if plain else SEARCH
+    return _folded("\n\n".join([*parts, search]), numbers) + f"\n\n{head}{body}\n"
+
+
+def _folded(text: str, numbers: dict[str, int]) -> str:
+    """Text with the numbers in place of their names, sums of two at the start of an index added up."""
+    text = re.sub(r"\b[A-Z]{2,}\b", lambda m: str(numbers.get(m[0], m[0])), text)
+    return re.sub(r"(?<=\[)(\d+) \+ (\d+)(?= \+|\])", lambda m: str(int(m[1]) + int(m[2])), text)
 
 
 def _known(p: Layout, state: str) -> dict[str, str]:
     """Where the search keeps what the equations call by name."""
     nf, f, modes = len(p.free), p.flavour, scratch(p)["MODES"]
-    known = {f"_q{i}": f"W[o + {state} + {k}]" for k, i in enumerate(p.free)}
-    known |= {f"_v{i}": f"W[o + {state} + {nf + k}]" for k, i in enumerate(p.free)}
-    known |= {f"_y{i}": f"W[o + {state} + {2 * nf + k}]" for k, i in enumerate(f.dahl)}
-    known |= {f"_s{i}": f"W[o + {modes + k}]" for k, i in enumerate(f.dry)}
-    return known | {name: f"W[{p.rows[name]} * L + i]" for name in p.constants}
+    known = {f"_q{i}": f"S[{state} + {k}]" for k, i in enumerate(p.free)}
+    known |= {f"_v{i}": f"S[{state} + {nf + k}]" for k, i in enumerate(p.free)}
+    known |= {f"_y{i}": f"S[{state} + {2 * nf + k}]" for k, i in enumerate(f.dahl)}
+    known |= {f"_s{i}": f"S[{modes + k}]" for k, i in enumerate(f.dry)}
+    return known | {name: f"W[{p.rows[name]} * L]" for name in p.constants}
 
 
 def _input(p: Layout, j: int, z: str) -> str:
     """Input `j` at the fraction `z` of the substep, along which it runs straight."""
     if not p.flavour.dynamic:
-        return f"W[{p.rows[f'um{j}']} * L + i]"
-    first, last = (f"W[{p.rows[f'u{w}{j}']} * L + i]" for w in "ab")
+        return f"W[{p.rows[f'um{j}']} * L]"
+    first, last = (f"W[{p.rows[f'u{w}{j}']} * L]" for w in "ab")
     return f"{first} + ({last} - {first}) * {z}"
 
 
 def _motion(p: Layout, c: str, i: int, z: str) -> str:
     """Held motion at the fraction `z`: a parabola through start, middle and end of the substep."""
-    first, middle, last = (f"W[{p.rows[f'h{c}{i}{w}']} * L + i]" for w in "amb")
+    first, middle, last = (f"W[{p.rows[f'h{c}{i}{w}']} * L]" for w in "amb")
     return f"parabola({first}, {middle}, {last}, {z})"
 
 
@@ -341,12 +351,12 @@ def _leap(p: Layout) -> str:
         known |= {f"_u{when}{j}": _input(p, j, z) for j in range(p.nu)}
         known |= {f"_h{c}{i}{when}": _motion(p, c, i, z) for i in f.held for c in "qva"}
     call = ", ".join(known[a] for a in step_arguments(p))
-    result = ", ".join(f"W[o + NEXT + {k}]" for k in range(2 * len(p.free) + len(f.dahl)))
+    result = ", ".join(f"S[NEXT + {k}]" for k in range(2 * len(p.free) + len(f.dahl)))
     return (
         "@inline\ndef parabola(first, middle, last, z):\n"
         "    return first + z * (4.0 * middle - 3.0 * first - last + z * 2.0 * (first + last - 2.0 * middle))\n\n\n"
-        "@scalar\ndef leap(W, L, i, o, t, d, h):\n"
-        '    """Step `d` from STATE at time `t` within the substep `h`, into NEXT."""\n'
+        "@scalar\ndef leap(W, S, L, t, d, h):\n"
+        '    """Step `d` from the state at time `t` within the substep `h`."""\n'
         "    za, zm, zb = t / h, (t + 0.5 * d) / h, (t + d) / h\n"
         f"    {result}, flag = step({call})\n"
     )
@@ -362,7 +372,7 @@ def _terms_at(p: Layout) -> str:
     known |= {f"_ah{i}": _motion(p, "a", i, "z") for i in f.held}
     call = ", ".join(known[a] for a in arguments(p))
     return (
-        "@scalar\ndef terms_at(W, L, i, o, state, t, h):\n"
+        "@scalar\ndef terms_at(W, S, L, state, t, h):\n"
         '    """Mass matrix and forces of a state at time `t` within the substep `h`."""\n'
-        f"    z = t / h\n    terms({call}, W, o + MASS)\n"
+        f"    z = t / h\n    terms({call}, S)\n"
     )

@@ -106,7 +106,7 @@ class Layout:
         names += [f"oq{i}" for i in n] + [f"ov{i}" for i in n] + [f"oy{i}" for i in f.dahl]
         names += [f"{c}{j}" for c in ("ua", "um", "ub", "gain", "off", "lim", "ff", "cn") for j in nu]
         if f.dynamic:
-            names += [f"{c}{j}" for c in ("co", "w", "e", "ep", "th", "df") for j in nu]
+            names += [f"{c}{j}" for c in ("co", "w", "e", "ep", "th", "df") for j in nu] + ["di"]
         if f.loop:
             names += [f"{c}{i}" for c in ("yp", "vf", "tg") for i in n]
             names += [f"K{j}_{i}" for j in nu for i in range(2 * self.n)] + ["kr", "ref"]

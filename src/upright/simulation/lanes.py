@@ -13,8 +13,14 @@ from upright.simulation.events import scratch
 from upright.simulation.flavour import ACTUATOR, Layout
 
 RUN_ARGUMENTS = (
-    "_b0, _b1, _total, P, X0, U, R, START, HELD, HBASE, _nsteps, _every, _substeps, _dt, FL, _nbuf, OUT, STAT, _events"
+    "_b0, _b1, _total, P, X0, U, R, START, HELD, HBASE, _nsteps, _every, _substeps, _dt, FL, _nbuf, OUT, STAT, W, _data, _events"
 )
+
+
+def room(p: Layout, width: int, buffer: int) -> int:
+    """Size of the working array ``W``: the lanes' numbers, commands still on their way, the search of events."""
+    late = buffer * p.nu * width if p.flavour.loop and p.flavour.dynamic else 0
+    return len(p.rows) * width + late + (scratch(p)["END"] if p.flavour.dry else 0)
 
 
 class Writer:
@@ -44,16 +50,13 @@ def run(p: Layout, width: int) -> str:
     w = Writer(p, width)
     w.add(
         "wide()",
-        f"W = zeros({len(p.rows) * width + (scratch(p)['END'] if p.flavour.dry else 0)})",
-        f"DI = zeros({width}, int64)",
         "_h = _dt / _substeps",
-        f"BUF = zeros(_nbuf * {p.nu * width})",
         "_last = U.shape[0] - 1",
         "_final = HELD.shape[0] - 1",
         "for _b in range(_b0, _b1):",
     )
     w.depth = 2
-    w.add(f"_base = _b * {width}", f"_valid = min({width}, _total - _base)", "W[:] = 0.0", "BUF[:] = 0.0")
+    w.add(f"_base = _b * {width}", f"_valid = min({width}, _total - _base)", "W[:] = 0.0")
     w.lanes()
     _start(w)
     w.depth = 2
@@ -138,7 +141,7 @@ def _start_actuator(w: Writer, j: int, first: int) -> None:
         "    {q0} = nan",
         "    _z = 0.0",
         "_z = _z if _z > 0.0 else 0.0",
-        "DI[_i] = int64(floor(_z))" if j == 0 else "",
+        "{di} = floor(_z)" if j == 0 else "",
         f"{{df{j}}} = _z - floor(_z)",
         # what is left at the end of a substep of a jump inside it
         f"{{ep{j}}} = exp(-_x * (1.0 - ({{df{j}}} * _substeps - floor({{df{j}}} * _substeps))))",
@@ -155,7 +158,7 @@ def _start_actuator(w: Writer, j: int, first: int) -> None:
     w.depth += 1
     for name, back in (("_cn", 0), ("_co", 1)):
         w.add(
-            f"_z = U[min(max(START[_m] + _k - DI[_i] - {back}, 0), _last), {j}] if _last >= 0 else 0.0",
+            f"_z = U[min(max(START[_m] + _k - int64({{di}}) - {back}, 0), _last), {j}] if _last >= 0 else 0.0",
             f"_z = {{lim{j}}} if _z > {{lim{j}}} else _z",
             f"_z = 0.0 - {{lim{j}}} if _z < 0.0 - {{lim{j}}} else _z",
             f"{name} = {{gain{j}}} * (_z + {{off{j}}})",
@@ -204,7 +207,7 @@ def _command(w: Writer) -> None:
     now = "START[_base + _i] + _k"
     w.add("if _last >= 0:")
     w.depth += 1
-    _feed(w, (("ff", f"{now} - DI[_i]"), ("co", f"{now} - DI[_i] - 1")) if f.dynamic else (("ff", now),))
+    _feed(w, (("ff", f"{now} - int64({{di}})"), ("co", f"{now} - int64({{di}}) - 1")) if f.dynamic else (("ff", now),))
     w.depth -= 1
     w.lanes()
     for j in range(p.nu):
@@ -254,11 +257,11 @@ def _controller(w: Writer) -> None:
         w.depth -= 1
         w.lanes()
         for j in range(p.nu):
-            place = f"(_slot * {p.nu} + {j}) * {w.width} + _i"
-            w.add("_slot = _k % _nbuf", f"BUF[{place}] = {{ua{j}}}")
-            for name, back in (("cn", "DI[_i]"), ("co", "DI[_i] - 1")):
-                gap = back if name == "cn" else "DI[_i] + 1"
-                w.add(f"_slot = (_k - ({gap})) % _nbuf", f"_c = BUF[{place}] if _k >= {gap} else 0.0")
+            place = f"(_slot * {p.nu} + {j} + {len(p.rows)}) * {w.width} + _i"
+            w.add("_slot = _k % _nbuf", f"W[{place}] = {{ua{j}}}")
+            for name, back in (("cn", "int64({di})"), ("co", "int64({di}) - 1")):
+                gap = back if name == "cn" else "int64({di}) + 1"
+                w.add(f"_slot = (_k - ({gap})) % _nbuf", f"_c = W[{place}] if _k >= {gap} else 0.0")
                 w.add(f"{{{name}{j}}} = {{gain{j}}} * (_c + {{off{j}}})")
 
 
@@ -331,4 +334,4 @@ def _substep(w: Writer) -> None:
         w.depth -= 1
         w.add("_bad = 0.0", f"for _i in range({w.width}):", "    _bad += {flag}")
         w.add("if _bad > 0.0:", "    for _i in range(_valid):", "        if {flag} > 0.0:")
-        w.add(f"            call(_events, W.ctypes.data, {w.width}, _i, _h)")
+        w.add(f"            call(_events, _data + 8 * _i, _data + 8 * (W.size - {scratch(p)['END']}), {w.width}, _h)")

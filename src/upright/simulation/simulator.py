@@ -10,7 +10,7 @@ that the motion depends continuously on both.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -22,6 +22,7 @@ from upright.errors import BadInput
 from upright.physics.derived import Derived
 from upright.simulation.compiled import WIDTH, kernel
 from upright.simulation.flavour import ACTUATOR, ACTUATOR_DEFAULTS, Flavour, Layout
+from upright.simulation.lanes import room
 from upright.simulation.parts import Held, Loop
 
 Array = NDArray[np.float64]
@@ -199,13 +200,19 @@ class Simulator:
             out = np.empty((samples, 2 * n + (nu if f.loop else 0), blocks * width))
         else:
             reduced = np.empty((4 * n + nu, blocks * width))
-        step = self._kernel.run_1 if width == 1 else self._kernel.run_16
+        compiled = self._kernel.run_1 if width == 1 else self._kernel.run_16
+        size, events = room(self._layout, width, buffer), self._kernel.events.address if f.dry else 0
         call = (lanes, P, X0, u, self._reference, begin, self._grid, base, (samples - 1) * every, every)
-        call += (self.substeps, self.dt, scalars, buffer, out, reduced, self._kernel.events.address if f.dry else 0)
+        call += (self.substeps, self.dt, scalars, buffer, out, reduced)
+
+        def step(first: int, last: int) -> None:
+            W, address = _aligned(size)
+            compiled(first, last, *call, W, address, events)
+
         if threads <= 1 or blocks < 2 * threads:
-            step(0, blocks, *call)
+            step(0, blocks)
         else:
-            _share(step, blocks, threads, call)
+            _share(step, blocks, threads)
         return out[:, :, :lanes] if f.record else reduced[:, :lanes]
 
 
@@ -218,12 +225,20 @@ def _padded(a: Array, width: int, extra: int = 0) -> Array:
     return out
 
 
-def _share(step: Any, blocks: int, threads: int, call: tuple[Any, ...]) -> None:
+def _aligned(size: int) -> tuple[Array, int]:
+    """Zeros that start on a cache line, so that no vector straddles two; and where that is."""
+    raw = np.zeros(size + 7)
+    address = raw.ctypes.data
+    first = (-address // 8) % 8
+    return raw[first : first + size], address + 8 * first
+
+
+def _share(step: Callable[[int, int], None], blocks: int, threads: int) -> None:
     """Let threads take turns at pieces of the work; the kernel holds no lock."""
     from concurrent.futures import ThreadPoolExecutor
 
     pieces = min(blocks, 4 * threads)
     edges = [blocks * k // pieces for k in range(pieces + 1)]
-    step(0, 0, *call)  # compiled before the threads ask for it
+    step(0, 0)  # compiled before the threads ask for it
     with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(lambda k: step(edges[k], edges[k + 1], *call), range(pieces)))
+        list(pool.map(lambda k: step(edges[k], edges[k + 1]), range(pieces)))
