@@ -13,7 +13,8 @@ from upright.simulation import simulate
 
 PENDULUM = {"m_p": 0.2, "l_cg": 0.3, "J_p": 2e-3, "b_2": 2e-3, "b_2c": 2e-3, "b_2q": 1e-3}
 FURUTA = {
-    "m_p": 0.2, "r": 0.12, "l_cg": 0.15, "J_p": 1e-4, "J_d": 0.008, "b_1": 5e-3, "b_2": 2e-4, "b_1c": 1e-3, "b_2c": 2e-4,
+    "m_p": 0.2, "r": 0.12, "l_cg": 0.15, "J_p": 1e-4, "J_d": 0.008,
+    "b_1": 5e-3, "b_2": 2e-4, "b_1c": 1e-3, "b_2c": 2e-4,
 }  # fmt: skip
 
 

@@ -42,9 +42,11 @@ def doubts(rig: Rig, runs: Sequence[Run], base: Mapping[str, float]) -> tuple[st
     flips, turns = found
     said = [f"set sign = -1 for {c} (its sign looks reversed)" for c, s in flips.items() if s < 0]
     said += [f"add an offset of pi to {c} (its zero looks upright)" for c in turns]
+    now, then = 100 * (1 - min(declared, 1.0)), 100 * (1 - best)
+    what = " and ".join(said)
     return (
-        f"The conventions look wrong: {' and '.join(said)}; "
-        f"the accelerations are then explained to {100 * (1 - best):.0f} % instead of {100 * (1 - min(declared, 1)):.0f} %.",
+        f"The conventions look wrong: {what}; the accelerations are then explained to {then:.0f} % "
+        f"instead of {now:.0f} %.",
     )
 
 

@@ -13,6 +13,9 @@ from upright.identification.problem import Normal, Problem
 
 Array = NDArray[np.float64]
 
+CREEP = 1e-3
+"""A walk that gained less than this share in its last ten steps counts as settled when its evaluations run out."""
+
 Report = Callable[[str, float, float, int], None]
 """Called with stage, fraction done, cost, evaluations."""
 
@@ -62,8 +65,10 @@ def descend(
     damping, growth = 1e-3 / stride, 2.0
     diagonal = np.zeros(x.size)
     converged = False
+    passed: list[float] = []
     try:
         for _ in range(limit):
+            passed.append(here.cost)
             if not math.isfinite(here.cost):
                 break
             A, g = here.matrix, here.gradient
@@ -97,7 +102,9 @@ def descend(
                     break
     except KeyboardInterrupt:
         return Descent(x=x, normal=here, converged=False, interrupted=True)
-    return Descent(x=x, normal=here, converged=converged)
+    # along a valley that the data hardly see the steps go on for long, and matter no more
+    creeping = len(passed) > 10 and passed[-10] - here.cost <= CREEP * here.cost
+    return Descent(x=x, normal=here, converged=converged or creeping)
 
 
 def _bounded_step(A: Array, g: Array, least: Array, most: Array) -> Array:

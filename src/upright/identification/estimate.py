@@ -109,7 +109,7 @@ def _half(problem: Problem) -> float:
 
 
 def _weigh_priors(problem: Problem, found: Descent) -> Descent:
-    """Weigh prior knowledge by the residuals found, memory included, and settle again; unless it makes no difference."""
+    """Weigh prior knowledge by the residuals found, memory included, and settle again; unless it hardly pulls."""
     if found.interrupted or not any(u.prior is not None for u in problem.unknowns):
         return found
     for _ in range(3):

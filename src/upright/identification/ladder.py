@@ -99,7 +99,7 @@ def choose(rig: Rig, runs: Sequence[Run], log: Log) -> tuple[Rig, list[Array], t
         if k and costs[k] > costs[k - 1] * (1 + 1e-6):
             log.warnings.append(
                 f"With {rung.name} the first part of the runs was fitted worse (cost {costs[k]:.6g}) than without it "
-                f"({costs[k - 1]:.6g}); a richer model that contains the poorer one should never be: the search stalled."
+                f"({costs[k - 1]:.6g}); a richer model that contains the poorer one never should be: the search stalled."
             )
         v = part.value(found.x)
         values = {u.name: float(v[i]) for i, u in enumerate(part.unknowns) if u.run == SHARED}

@@ -16,9 +16,6 @@ from upright.identification.unknowns import SHARED
 
 Array = NDArray[np.float64]
 
-FAINT = 3.0
-"""A direction is unseen as well when its relative standard error exceeds this: the answer could be anything."""
-
 PART = 0.05
 """A number takes part in a direction when its share is at least this much of the largest share."""
 
@@ -56,10 +53,7 @@ def look(problem: Problem, x: Array, spread: Spread) -> Sight:
     order = np.argsort(w)[::-1]
     singular = np.sqrt(np.maximum(w[order], 0.0))
     directions = V[:, order].T
-    cov = spread.covariance[np.ix_(shared, shared)] / np.outer(sizes, sizes)
-    blind = [d for d in _null(S) if d is not None]
-    if not blind:
-        blind = [d for d in directions if d @ cov @ d > FAINT**2]
+    blind = _null(S)
     return Sight(
         names=names, singular_values=singular, directions=directions,
         blind=np.array(blind).reshape(-1, len(shared)), effects=np.sqrt(np.maximum(np.diag(S), 0.0)),

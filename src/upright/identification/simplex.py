@@ -46,11 +46,6 @@ def simplex(
     for i in range(x.size):
         if x[i] + 0.1 * size[i] > upper[i]:
             corners[1 + i, i] = -0.1
-    try:
-        minimize(
-            cost, np.zeros(x.size), method="Nelder-Mead",
-            options={"initial_simplex": corners, "maxfev": limit, "adaptive": True, "xatol": 1e-6, "fatol": 1e-9 * best[1]},
-        )  # fmt: skip
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt from None
+    options = {"initial_simplex": corners, "maxfev": limit, "adaptive": True, "xatol": 1e-6, "fatol": 1e-9 * best[1]}
+    minimize(cost, np.zeros(x.size), method="Nelder-Mead", options=options)
     return np.asarray(best[0]), float(best[1])

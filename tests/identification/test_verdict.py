@@ -1,0 +1,66 @@
+"""Reversed signs, zeros that stand upright, frictions that are not there: the verdict says so."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, shaken, swing
+from upright.identification.estimate import identify
+from upright.physics import Furuta, Pendulum
+
+
+def test_a_reversed_sensor_is_named() -> None:
+    run = noisy(shaken(seconds=3.0), 1e-4, seed=1)
+    reversed_ = replace(run, y=run.y * [1.0, -1.0])
+    fit = identify(rig(Furuta, FURUTA, {"J_d": 0.01, "b_1": 4e-3}), [reversed_])
+    assert not fit.trusted
+    assert "sign = -1 for theta" in fit.verdict or "sign = -1 for psi" in fit.verdict
+
+
+def test_a_zero_that_stands_upright_is_named() -> None:
+    run = noisy(swing(seconds=6.0), 1e-3, seed=2)
+    upright = replace(run, y=run.y + math.pi)
+    fit = identify(rig(Pendulum, PENDULUM, {"J_p": 3e-3, "b_2": 1e-3}), [upright])
+    assert not fit.trusted
+    assert "offset of pi to theta" in fit.verdict
+
+
+def test_a_friction_that_is_not_there_is_left_out_or_zero() -> None:
+    viscous = {**PENDULUM, "b_2": 4e-3, "b_2c": 0.0, "b_2q": 0.0}
+    run = noisy(swing(viscous), 2e-3, seed=3)
+    fit = identify(rig(Pendulum, viscous, {"b_2": 1e-3, "b_2c": 1e-3, "b_2q": 1e-3, "J_p": 3e-3}), [run])
+    assert fit.estimates["b_2"].value == pytest.approx(4e-3, rel=0.05)
+    for name, unit in (("b_2c", 4e-3 * 3.0), ("b_2q", 4e-3 / 3.0)):
+        e = fit.estimates[name]
+        assert e.status in ("left out", "at bound", "weak")
+        assert e.value < 0.05 * unit
+
+
+def test_coulomb_friction_that_is_there_is_kept() -> None:
+    dry = {**PENDULUM, "b_2": 1e-3, "b_2c": 5e-3, "b_2q": 0.0}
+    fit = identify(rig(Pendulum, dry, {"b_2": 2e-3, "b_2c": 1e-3, "J_p": 3e-3}), [noisy(swing(dry), 1e-3, seed=4)])
+    assert fit.estimates["b_2c"].value == pytest.approx(5e-3, rel=0.02)
+    assert fit.estimates["b_2c"].status == "firm"
+
+
+def test_a_run_that_no_parameter_explains_is_not_trusted() -> None:
+    generator = np.random.default_rng(5)
+    run = swing(seconds=4.0)
+    noise = replace(run, y=generator.normal(size=run.y.shape))
+    fit = identify(rig(Pendulum, PENDULUM, {"b_2": 1e-3, "b_2c": 1e-3}), [noise])
+    assert not fit.trusted
+    assert "not explained" in fit.verdict
+
+
+def test_no_answer_is_nan_or_none() -> None:
+    fit = identify(rig(Pendulum, PENDULUM, {"m_p": 0.3, "J_p": 3e-3, "b_2": 1e-3}, b_2c=0.0, b_2q=0.0),
+                   [swing({**PENDULUM, "b_2c": 0.0, "b_2q": 0.0})])  # fmt: skip
+    for e in fit.estimates.values():
+        assert not any(math.isnan(v) for v in (e.value, e.stderr, *e.interval))
+    assert np.all(np.isfinite(fit.correlation))
+    assert np.all(np.isfinite(fit.singular_values))
+    assert math.isfinite(fit.cost)
