@@ -40,8 +40,12 @@ def look(problem: Problem, x: Array, spread: Spread) -> Sight:
     own = [i for i, u in enumerate(problem.unknowns) if u.run != SHARED and not spread.pinned[i]]
     value = problem.value(x)
     unknowns = [problem.unknowns[i] for i in shared]
+    # relative to the value found, which a search along a blind direction may have carried far from its guess
     sizes = np.array(
-        [1.0 if u.log else max(abs(float(value[i])), u.scale) for i, u in zip(shared, unknowns, strict=True)]
+        [
+            1.0 if u.log else abs(v) if (v := float(value[i])) and abs(v) > 1e-3 * u.scale else u.scale
+            for i, u in zip(shared, unknowns, strict=True)
+        ]
     )
     A = spread.matrix[np.ix_(shared, shared)]
     if own:
