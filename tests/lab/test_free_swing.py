@@ -107,6 +107,12 @@ def test_an_interrupted_experiment_keeps_and_tells_what_is_there(tmp_path):
     assert "was interrupted" in text
 
 
+def test_a_stop_that_a_fit_has_swallowed_is_still_obeyed(tmp_path):
+    done = experiment.run(0, tmp_path, stopped=lambda: True)
+    assert done.interrupted
+    assert list(done.answers) == ["free_swing"]
+
+
 def test_interrupted_at_once_there_is_still_a_page(tmp_path):
     def stop(step, share):
         raise KeyboardInterrupt

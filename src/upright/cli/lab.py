@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import signal
+import threading
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -39,8 +42,9 @@ def lab(
     from upright.identification.fitfile import write_fit
     from upright.lab import experiment, page
 
-    with _progress(quiet=as_json) as tell:
-        done = experiment.run(seed, out, tell)
+    with _ctrl_c() as pressed, _progress(quiet=as_json) as tell:
+        done = experiment.run(seed, out, tell, stopped=lambda: pressed.times > 0)
+        pressed.patient = True
         tell("writing the report", 0.95)
         if "free_swing" in done.answers:
             first = done.answers["free_swing"]
@@ -50,8 +54,36 @@ def lab(
         typer.echo(json.dumps(page.summary(done, report), indent=2, ensure_ascii=False, allow_nan=False))
     else:
         _say(done, report)
-    if done.interrupted:
+    if done.interrupted or pressed.times:
         raise typer.Exit(INTERRUPTED)
+
+
+@dataclass
+class _Pressed:
+    """How often Ctrl-C was pressed; once `patient`, the first press lets the report be written."""
+
+    times: int = 0
+    patient: bool = False
+
+
+@contextmanager
+def _ctrl_c() -> Generator[_Pressed]:
+    """Count Ctrl-C besides raising it, for the time of the experiment."""
+    pressed = _Pressed()
+
+    def note(_signal: int, _frame: object) -> None:
+        pressed.times += 1
+        if not pressed.patient or pressed.times > 1:
+            raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield pressed
+        return
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield pressed
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @contextmanager

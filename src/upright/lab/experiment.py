@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -40,7 +40,9 @@ class Experiment:
     seconds: float = 0.0
 
 
-def run(seed: int, folder: Path, progress: Progress | None = None) -> Experiment:
+def run(
+    seed: int, folder: Path, progress: Progress | None = None, *, stopped: Callable[[], bool] = lambda: False
+) -> Experiment:
     """Run the experiment on one rig of the make; Ctrl-C stops it and keeps what is there.
 
     Parameters
@@ -51,6 +53,8 @@ def run(seed: int, folder: Path, progress: Progress | None = None) -> Experiment
         Takes logs and studies.
     progress : callable, optional
         Told the step at work and the share of the experiment done.
+    stopped : callable, optional
+        Asked after each fit whether to stop there; a fit may finish on its best so far when Ctrl-C is pressed.
     """
     began = time.perf_counter()
     done = Experiment(rig=twin(seed), folder=folder)
@@ -62,7 +66,7 @@ def run(seed: int, folder: Path, progress: Progress | None = None) -> Experiment
             base, part = 0.05 + 0.85 * i / len(asked), 0.85 / len(asked)
             found = free_swing.answer(question, path, lambda step, share, b=base, p=part: tell(step, b + p * share))
             done.answers[question.name] = found
-            if found.fit.interrupted:
+            if found.fit.interrupted or stopped():
                 raise KeyboardInterrupt
         tell("following the disk", 0.9)
         done.wanders = drift.study(done.rig)
