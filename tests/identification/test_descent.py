@@ -9,7 +9,8 @@ import pytest
 
 from tests.identification.twins import PENDULUM, noisy, rig, swing
 from upright.identification.descent import descend, grow
-from upright.identification.problem import Normal, pose, products
+from upright.identification.normal import Normal, products
+from upright.identification.problem import pose
 from upright.identification.scoring import fit_percent
 from upright.identification.simplex import simplex
 from upright.physics import Pendulum

@@ -20,8 +20,10 @@ FURUTA = {
 
 def rig(plant: type, values: Mapping[str, float], guesses: Mapping[str, float], **known: float) -> Rig:
     """A rig that knows `values` except those with a guess."""
-    parameters = {n: Parameter(name=n, value=v) for n, v in {**values, **known}.items()}
-    parameters |= {n: Parameter(name=n, value=g, estimate=True) for n, g in guesses.items()}
+    names = plant.names()
+    unit = {n: plant.quantity(n).unit if n in names else "1" for n in (*values, *guesses, *known)}
+    parameters = {n: Parameter(name=n, value=v, unit=unit[n]) for n, v in {**values, **known}.items()}
+    parameters |= {n: Parameter(name=n, value=g, unit=unit[n], estimate=True) for n, g in guesses.items()}
     return Rig(plant=plant, parameters=parameters)
 
 

@@ -7,8 +7,8 @@ through the same smoothing. Masses and forces that only scale together are left 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.descent import descend
-from upright.identification.model import Rig, Run
-from upright.identification.problem import Normal
+from upright.identification.model import Feedback, Rig, Run
+from upright.identification.normal import Normal
 from upright.identification.smoothing import dominant_period, savitzky_golay, smoothing_width, spread
 from upright.identification.unknowns import Unknown, base_values, shared_unknowns
 from upright.physics.plant import Plant, evaluate
@@ -79,6 +79,34 @@ def observe(rig: Rig, run: Run, *, flips: Mapping[str, float] | None = None,
     return Sample(run=run, dt=dt, q=q, v=v, a=a, u=u, free=free, fades=fades, width=width, edge=edge, period=period)
 
 
+def samples_of(
+    rig: Rig,
+    runs: Sequence[Run],
+    *,
+    most: int = 6000,
+    flips: Mapping[str, float] | None = None,
+    turns: Mapping[str, float] | None = None,
+) -> list[Sample]:
+    """Smoothed motion of every run that allows it, long runs thinned to at most `most` samples."""
+    found: list[Sample] = []
+    for run in runs:
+        k = -(-run.t.size // most)
+        thin = run
+        if k > 1:
+            held = {n: v[::k] if isinstance(v, np.ndarray) else v for n, v in run.held.items()}
+            thin = replace(run, t=run.t[::k], u=run.u[::k], y=run.y[::k], held=held, loop=_thin_law(run.loop, k))
+        sample = observe(rig, thin, flips=flips, turns=turns)
+        if sample is not None:
+            found.append(sample)
+    return found
+
+
+def _thin_law(law: Feedback | None, k: int) -> Feedback | None:
+    if law is None or not isinstance(law.reference, np.ndarray):
+        return law
+    return replace(law, reference=law.reference[::k])
+
+
 def effort(values: Mapping[str, float], sample: Sample, plant: type[Plant]) -> Array:
     """Force of every input (inputs, N), actuator and its delays included."""
     out = np.empty_like(sample.u)
@@ -134,7 +162,7 @@ def model_accelerations(plant: type[Plant], values: Mapping[str, float], sample:
     if held:
         f = f - np.einsum("tij,jt->ti", M[:, :, held], sample.a[held])
         M, f = M[:, free][:, :, free], f[:, free]
-    return np.linalg.solve(M, f[:, :, None])[:, :, 0].T
+    return np.asarray(np.linalg.solve(M, f[:, :, None])[:, :, 0].T, dtype=np.float64)
 
 
 def disagreement(rig: Rig, values: Mapping[str, float], sample: Sample) -> Array:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.chain import Log, count
-from upright.identification.conventions import doubts
 from upright.identification.descent import Descent
 from upright.identification.model import Estimate, Fit, Rig, Run, RunScore
 from upright.identification.problem import Problem, pose
@@ -51,7 +50,7 @@ def answer(
     units = {n: p.unit for n, p in asked.parameters.items()}
     unseen = sentences(sight, units)
     worst = min((p for s in scores.values() if s.role == "fit" for p in s.fit_percent.values()), default=100.0)
-    conventions = doubts(chosen, [r for r in runs if r.role == "fit"], problem.base) if worst < GOOD else ()
+    conventions = tuple(log.doubts()) if worst < GOOD else ()
     verdict, trusted = judge(
         runs=scores,
         estimates=estimates,

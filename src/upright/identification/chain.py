@@ -7,13 +7,13 @@ simulations; from a bad one it fails outright.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.accelerations import Sample, observe, regress
+from upright.identification.accelerations import regress, samples_of
 from upright.identification.descent import Descent, Report, descend, first_horizon, grow
 from upright.identification.model import Rig, Run
 from upright.identification.problem import Problem
@@ -27,14 +27,22 @@ POOR = 0.04
 """A mean squared residual above this (a fit of less than 80 %) is worth another attempt."""
 
 
+PATIENCE = 5e8
+"""Simulated samples, lanes counted, after which no further attempt begins."""
+
+
 @dataclass
 class Log:
-    """What happened on the way: stages with their cost and simulations, and the best so far should one interrupt."""
+    """What happened on the way: stages with their cost and simulations, and the best so far should one interrupt.
+
+    `doubts` says which conventions look wrong; asked only when a fit is poor, since no search mends a reversed sign.
+    """
 
     report: Report | None = None
     history: list[tuple[str, float, int]] = field(default_factory=list[tuple[str, float, int]])
     best: Array | None = None
     warnings: list[str] = field(default_factory=list[str])
+    doubts: Callable[[], Sequence[str]] = tuple
 
 
 def closed_form_starts(rig: Rig, runs: Sequence[Run]) -> list[dict[str, float]]:
@@ -52,22 +60,6 @@ def closed_form_starts(rig: Rig, runs: Sequence[Run]) -> list[dict[str, float]]:
     friction = friction_from_energy(rig, samples, agreement.values)
     if friction:
         found.insert(0, agreement.values | friction)
-    return found
-
-
-def samples_of(rig: Rig, runs: Sequence[Run], most: int = 6000) -> list[Sample]:
-    """Smoothed motion of every run that allows it, long runs thinned to at most `most` samples."""
-    from dataclasses import replace
-
-    found: list[Sample] = []
-    for run in runs:
-        k = -(-run.t.size // most)
-        if k > 1:
-            held = {n: v[::k] if isinstance(v, np.ndarray) else v for n, v in run.held.items()}
-            run = replace(run, t=run.t[::k], u=run.u[::k], y=run.y[::k], held=held, loop=None if run.loop else run.loop)
-        sample = observe(rig, run)
-        if sample is not None:
-            found.append(sample)
     return found
 
 
@@ -101,8 +93,10 @@ def explain(problem: Problem, candidates: Sequence[Array], log: Log, *, patient:
         return found
     n = count(problem)
     others = list(ranked[1:])
-    attempts = 0
+    attempts, x_size = 0, problem.start.size + 1
     while found.normal.cost > POOR * n and attempts < 3 and not found.interrupted:
+        if problem.evaluations * n * x_size > PATIENCE or log.doubts():
+            break
         attempts += 1
         if others:
             x, name = others.pop(0), "another start"

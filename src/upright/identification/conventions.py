@@ -9,16 +9,16 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 
-from upright.identification.accelerations import Sample, observe, regress
+from upright.identification.accelerations import regress, samples_of
 from upright.identification.model import Rig, Run
 
 CLEAR = 0.5
 """Another convention is named when it leaves less than this share of the variance that the declared one leaves."""
 
 
-def doubts(rig: Rig, runs: Sequence[Run], base: Mapping[str, float]) -> tuple[str, ...]:
+def doubts(rig: Rig, runs: Sequence[Run]) -> tuple[str, ...]:
     """Sentences on signs and zeros that would explain the accelerations far better than the declared ones."""
-    declared = _unexplained(rig, runs, base, {}, {})
+    declared = _unexplained(rig, runs, {}, {})
     if not 0.1 < declared < math.inf:
         return ()
     measured = sorted({c for run in runs for c in run.measured if c not in run.held})
@@ -33,7 +33,7 @@ def doubts(rig: Rig, runs: Sequence[Run], base: Mapping[str, float]) -> tuple[st
                 continue
             if not driven and not turns and all(s < 0 for s in signs):
                 continue
-            left = _unexplained(rig, runs, base, flips, turns)
+            left = _unexplained(rig, runs, flips, turns)
             fewer = sum(s < 0 for s in flips.values()) + len(turns)
             if left < best * (0.98 if fewer else 1.0):
                 best, found = left, (flips, turns)
@@ -50,12 +50,6 @@ def doubts(rig: Rig, runs: Sequence[Run], base: Mapping[str, float]) -> tuple[st
     )
 
 
-def _unexplained(
-    rig: Rig, runs: Sequence[Run], base: Mapping[str, float], flips: Mapping[str, float], turns: Mapping[str, float]
-) -> float:
-    samples: list[Sample] = []
-    for run in runs:
-        sample = observe(rig, run, flips=flips, turns=turns)
-        if sample is not None:
-            samples.append(sample)
-    return regress(rig, samples, base).unexplained if samples else math.inf
+def _unexplained(rig: Rig, runs: Sequence[Run], flips: Mapping[str, float], turns: Mapping[str, float]) -> float:
+    samples = samples_of(rig, runs, most=2000, flips=flips, turns=turns)
+    return regress(rig, samples).unexplained if samples else math.inf

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.problem import Normal, Problem
+from upright.identification.normal import Normal
+from upright.identification.problem import Problem
 
 Array = NDArray[np.float64]
 

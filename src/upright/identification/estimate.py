@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from upright.errors import BadInput
 from upright.identification.answer import answer
 from upright.identification.chain import Log, closed_form_starts, count, explain, placed
+from upright.identification.conventions import doubts
 from upright.identification.descent import Descent, Report, descend, grow
 from upright.identification.ladder import choose
 from upright.identification.model import Fit, Rig, Run
@@ -59,7 +61,7 @@ def identify(rig: Rig, runs: Sequence[Run], *, method: str = "auto", progress: R
     began = time.perf_counter()
     seen = [run for run in runs if run.role == "fit"]
     _check(rig, seen, method)
-    log = Log(report=progress)
+    log = Log(report=progress, doubts=cache(lambda: doubts(rig, seen)))
     left_out: tuple[str, ...] = ()
     chosen = rig
     problem = pose(rig, seen)

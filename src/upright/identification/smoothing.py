@@ -61,7 +61,7 @@ def savitzky_golay(y: Array, dt: float, width: int, *, order: int = 4) -> Motion
     if order < 2:
         v = np.gradient(y, dt) if n > 1 else np.zeros(n)
         return Motion(q=y.copy(), v=v, a=np.zeros(n), edge=0)
-    q, v, a = (savgol_filter(y, width, order, deriv=d, delta=dt, mode="interp") for d in range(3))
+    q, v, a = (np.asarray(savgol_filter(y, width, order, deriv=d, delta=dt), dtype=np.float64) for d in range(3))
     return Motion(q=q, v=v, a=a, edge=width // 2)
 
 
