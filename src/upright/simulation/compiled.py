@@ -17,9 +17,10 @@ from pathlib import Path
 from types import ModuleType
 
 from upright.simulation.equations import ELEMENTARY, acceleration, step, terms
-from upright.simulation.events import events, scratch
+from upright.simulation.events import events
 from upright.simulation.flavour import Layout
 from upright.simulation.lanes import run
+from upright.simulation.reach import places
 
 WIDTH = 16
 """Lanes of a block: two AVX-512 or four AVX2 registers of each number hide the latency of the arithmetic."""
@@ -74,7 +75,7 @@ def source(p: Layout) -> str:
     """Text of the module that steps one plant in one flavour."""
     parts = [HEAD.format(name=p.derived.name, flavour=p.flavour), ELEMENTARY, acceleration(p), step(p)]
     if p.flavour.dry:
-        parts += [terms(p, scratch(p)), events(p)]
+        parts += [terms(p, places(p)), events(p)]
     return "\n\n".join([*parts, run(p, 1), run(p, WIDTH)])
 
 

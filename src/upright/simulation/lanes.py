@@ -6,43 +6,23 @@ Text of ``run_L``: blocks of L lanes, their numbers interleaved in one flat arra
 
 from __future__ import annotations
 
-import re
-
+from upright.simulation.beginning import start
 from upright.simulation.equations import step_arguments
-from upright.simulation.events import scratch
-from upright.simulation.flavour import ACTUATOR, Layout
+from upright.simulation.flavour import Layout
+from upright.simulation.inputs import command, controller, prescribed
+from upright.simulation.reach import places
+from upright.simulation.writer import Writer
 
 RUN_ARGUMENTS = (
-    "_b0, _b1, _total, P, X0, U, R, START, HELD, HBASE, _nsteps, _every, _substeps, _dt, FL, _nbuf, OUT, STAT, W, _data, _events"
+    "_b0, _b1, _total, P, X0, U, R, START, HELD, HBASE, _nsteps, _every, _substeps, _dt, FL, _nbuf, OUT, STAT, "
+    "W, _data, _events"
 )
 
 
 def room(p: Layout, width: int, buffer: int) -> int:
     """Size of the working array ``W``: the lanes' numbers, commands still on their way, the search of events."""
     late = buffer * p.nu * width if p.flavour.loop and p.flavour.dynamic else 0
-    return len(p.rows) * width + late + (scratch(p)["END"] if p.flavour.dry else 0)
-
-
-class Writer:
-    """Lines of one function, with the working array's places filled in."""
-
-    def __init__(self, layout: Layout, width: int) -> None:
-        self.p, self.width, self.lines, self.depth = layout, width, [], 1
-
-    def at(self, name: str) -> str:
-        """Place of a per-lane number in the working array."""
-        return f"W[{self.p.rows[name] * self.width} + _i]"
-
-    def add(self, *lines: str) -> None:
-        """Write lines; ``{name}`` in braces becomes that number's place."""
-        for line in lines:
-            text = re.sub(r"\{(\w+)\}", lambda m: self.at(m[1]), line)
-            self.lines.append("    " * self.depth + text)
-
-    def lanes(self) -> None:
-        """Open a loop over the lanes of the block."""
-        self.add(f"for _i in range({self.width}):")
-        self.depth += 1
+    return len(p.rows) * width + late + (places(p)["END"] if p.flavour.dry else 0)
 
 
 def run(p: Layout, width: int) -> str:
@@ -58,12 +38,12 @@ def run(p: Layout, width: int) -> str:
     w.depth = 2
     w.add(f"_base = _b * {width}", f"_valid = min({width}, _total - _base)", "W[:] = 0.0")
     w.lanes()
-    _start(w)
+    start(w)
     w.depth = 2
     w.add("for _k in range(_nsteps + 1):")
     w.depth = 3
-    _prescribed(w)
-    (_controller if p.flavour.loop else _command)(w)
+    prescribed(w)
+    (controller if p.flavour.loop else command)(w)
     w.depth = 3
     (_record if p.flavour.record else _reduce)(w)
     w.depth = 3
@@ -82,187 +62,6 @@ def _statistics(p: Layout) -> list[str]:
     n = range(p.n)
     ends = [f"{c}{i}" for i in n for c in "qv"]
     return [*(f"mx{i}" for i in n), *(f"er{i}" for i in n), *(f"sat{j}" for j in range(p.nu)), *ends]
-
-
-def _start(w: Writer) -> None:
-    """One lane's constants, initial state, modes and actuator."""
-    p, d, f = w.p, w.p.derived, w.p.flavour
-    first = len(d.parameters)
-    texts = " ".join(d.lumps) + " " + " ".join(" ".join(vars(j)[k] for k in _JOINT) for j in d.joints)
-    used = set(re.findall(r"[A-Za-z_]\w*", texts))
-    w.add("_m = _base + _i")
-    w.add(*(f"{name} = P[{r}, _m]" for r, name in enumerate(d.parameters) if name in used))
-    w.add(*(f"{{k{i}}} = {text}" for i, text in enumerate(d.lumps)))
-    for j in d.joints:
-        i = j.coordinate
-        if i in (*f.dry, *f.dahl):
-            w.add(f"_c = {j.coulomb or '0.0'}", f"_level = {j.stiction or '0.0'}")
-            w.add(f"{{_Fc{i}}} = _c", f"{{_Fs{i}}} = _level if _level > _c else _c")
-        if i in f.drag:
-            w.add(f"{{_cq{i}}} = {j.quadratic}")
-        for name, on, text in (("_iv", f.stribeck, j.stribeck_speed), ("_id", f.dahl, j.presliding)):
-            if i in on:
-                w.add(f"{{{name}{i}}} = 1.0 / {text} if {text} > 0.0 else 1e300")
-    for i in range(p.n):
-        w.add(f"{{q{i}}} = X0[{2 * i}, _m]", f"{{v{i}}} = X0[{2 * i + 1}, _m]")
-        for name, on in (("s", f.dry), ("y", f.dahl)):
-            if i in on:
-                w.add(f"{{{name}{i}}} = 1.0 if {{v{i}}} > 0.0 else (-1.0 if {{v{i}}} < 0.0 else 0.0)")
-    w.add(*(f"{{hb{i}}} = HBASE[{k}, _m]" for k, i in enumerate(f.held)))
-    for j in range(p.nu):
-        for k, name in enumerate(("gain", "off", "lim")):
-            w.add(f"{{{name}{j}}} = P[{first + k * p.nu + j}, _m]")
-        if f.dynamic:
-            _start_actuator(w, j, first)
-    if f.loop:
-        row = first + len(ACTUATOR) * p.nu
-        for name in (
-            [f"K{j}_{i}" for j in range(p.nu) for i in range(2 * p.n)] + [f"tg{i}" for i in range(p.n)] + ["kr"]
-        ):
-            w.add(f"{{{name}}} = P[{row}, _m]")
-            row += 1
-
-
-_JOINT = ("coulomb", "quadratic", "stiction", "stribeck_speed", "presliding")
-
-
-def _start_actuator(w: Writer, j: int, first: int) -> None:
-    """Lag, delay and slope of input `j`; the lag starts from what the input was before."""
-    p, loop, nu = w.p, w.p.flavour.loop, w.p.nu
-    row = {name: first + k * nu + j for k, name in enumerate(ACTUATOR)}
-    w.add(
-        f"{{_sl{j}}} = P[{row['slope']}, _m]",
-        f"_tau = P[{row['lag']}, _m]",
-        "_x = _h / _tau if _tau > 0.0 else 1e300",
-        f"{{e{j}}} = exp(-_x)",
-        f"{{th{j}}} = 1.0 / _x",
-        f"_z = P[{row['delay']}, _m] / _dt" + (f" + FL[{p.n + 2}]" if loop else ""),
-        "if not (abs(_z) < 1e6) or not (_tau == _tau):",
-        "    {q0} = nan",
-        "    _z = 0.0",
-        "_z = _z if _z > 0.0 else 0.0",
-        "{di} = floor(_z)" if j == 0 else "",
-        f"{{df{j}}} = _z - floor(_z)",
-        # what is left at the end of a substep of a jump inside it
-        f"{{ep{j}}} = exp(-_x * (1.0 - ({{df{j}}} * _substeps - floor({{df{j}}} * _substeps))))",
-    )
-    if loop:
-        w.add(f"{{w{j}}} = {{gain{j}}} * {{off{j}}}")
-        return
-    # settle the lag on the input before the first sample, which is held where the record does not reach
-    w.add(
-        "_n = START[_m] if 40.0 * _tau > _dt * START[_m] else int64(40.0 * _tau / _dt) + 1",
-        "_n = min(_n, START[_m]) if _tau > 0.0 else 0",
-        "for _k in range(-_n - 1, 0):",
-    )
-    w.depth += 1
-    for name, back in (("_cn", 0), ("_co", 1)):
-        w.add(
-            f"_z = U[min(max(START[_m] + _k - int64({{di}}) - {back}, 0), _last), {j}] if _last >= 0 else 0.0",
-            f"_z = {{lim{j}}} if _z > {{lim{j}}} else _z",
-            f"_z = 0.0 - {{lim{j}}} if _z < 0.0 - {{lim{j}}} else _z",
-            f"{name} = {{gain{j}}} * (_z + {{off{j}}})",
-        )
-    w.add(
-        "if _k == -_n - 1:",
-        f"    {{w{j}}} = _cn",
-        "    continue",
-        "for _j in range(_substeps):",
-        f"    _z = {{df{j}}} * _substeps - _j",
-        f"    _z = {{e{j}}} if _z <= 0.0 else (1.0 if _z >= 1.0 else {{ep{j}}})",
-        f"    {{w{j}}} = _cn + ({{w{j}}} - _co) * {{e{j}}} + (_co - _cn) * _z",
-    )
-    w.depth -= 1
-
-
-def _prescribed(w: Writer) -> None:
-    """Held coordinates where they are at this sample."""
-    held = w.p.flavour.held
-    if not held:
-        return
-    w.lanes()
-    w.add("_m = min(max((START[_base + _i] + _k) * 2 * _substeps, 0), _final)")
-    for k, i in enumerate(held):
-        w.add(f"{{q{i}}} = HELD[_m, {3 * k}] + {{hb{i}}}", f"{{v{i}}} = HELD[_m, {3 * k + 1}]")
-    w.depth -= 1
-
-
-def _clip(w: Writer, j: int, name: str) -> None:
-    w.add(f"_c = {{lim{j}}} if _c > {{lim{j}}} else _c", f"_c = 0.0 - {{lim{j}}} if _c < 0.0 - {{lim{j}}} else _c")
-    w.add(f"{{{name}{j}}} = {{gain{j}}} * (_c + {{off{j}}})")
-
-
-def _feed(w: Writer, back: tuple[tuple[str, str], ...]) -> None:
-    """Input samples of each lane, which may start at different places of the record."""
-    w.lanes()
-    for name, index in back:
-        w.add(f"_m = min(max({index}, 0), _last)")
-        w.add(*(f"{{{name}{j}}} = U[_m, {j}]" for j in range(w.p.nu)))
-    w.depth -= 1
-
-
-def _command(w: Writer) -> None:
-    """Open loop: command, limit, offset and gain."""
-    p, f = w.p, w.p.flavour
-    now = "START[_base + _i] + _k"
-    w.add("if _last >= 0:")
-    w.depth += 1
-    _feed(w, (("ff", f"{now} - int64({{di}})"), ("co", f"{now} - int64({{di}}) - 1")) if f.dynamic else (("ff", now),))
-    w.depth -= 1
-    w.lanes()
-    for j in range(p.nu):
-        w.add(f"_c = {{ff{j}}}")
-        if not f.record:
-            w.add(f"{{sat{j}}} += 1.0 if abs(_c) > {{lim{j}}} else 0.0")
-        _clip(w, j, "cn" if f.dynamic else "um")
-        if f.dynamic:
-            w.add(f"_c = {{co{j}}}")
-            _clip(w, j, "co")
-
-
-def _controller(w: Writer) -> None:
-    """Closed loop: encoder, differentiator, gains, limit, delay."""
-    p, f, n = w.p, w.p.flavour, w.p.n
-    w.add("if _last >= 0:")
-    w.depth += 1
-    _feed(w, (("ff", "START[_base + _i] + _k"),))
-    w.depth -= 1
-    w.add("if R.shape[0] > 0:")
-    w.depth += 1
-    w.lanes()
-    w.add("{ref} = R[min(max(START[_base + _i] + _k, 0), R.shape[0] - 1)]")
-    w.depth -= 2
-    w.add(f"_alpha, _true = FL[{n}], FL[{n + 1}]", "_rate = (1.0 - _alpha) / _dt if _k > 0 else 0.0")
-    w.add(*(f"_quantum{i} = FL[{i}]" for i in range(n)))
-    w.add(*(f"_per{i} = 1.0 / _quantum{i} if _quantum{i} > 0.0 else 0.0" for i in range(n)))
-    w.lanes()
-    for i in range(n):
-        w.add(
-            f"_y{i} = floor({{q{i}}} * _per{i} + 0.5) * _quantum{i}",
-            f"_y{i} = _y{i} if _quantum{i} > 0.0 else {{q{i}}}",
-            f"_d{i} = _alpha * {{vf{i}}} + _rate * (_y{i} - {{yp{i}}})",
-            f"{{vf{i}}} = _d{i}",
-            f"{{yp{i}}} = _y{i}",
-            f"_d{i} = {{v{i}}} if _true > 0.0 else _d{i}",
-            f"_y{i} = _y{i} - {{tg{i}}}",
-        )
-    for j in range(p.nu):
-        feedback = " + ".join(f"{{K{j}_{2 * i}}} * _y{i} + {{K{j}_{2 * i + 1}}} * _d{i}" for i in range(n))
-        w.add(f"_c = {{ff{j}}} + {{kr}} * {{ref}} - ({feedback})")
-        if not f.record:
-            w.add(f"{{sat{j}}} += 1.0 if abs(_c) > {{lim{j}}} else 0.0")
-        _clip(w, j, "cn" if f.dynamic else "um")
-        w.add(f"{{ua{j}}} = _c")
-    if f.dynamic:
-        w.depth -= 1
-        w.lanes()
-        for j in range(p.nu):
-            place = f"(_slot * {p.nu} + {j} + {len(p.rows)}) * {w.width} + _i"
-            w.add("_slot = _k % _nbuf", f"W[{place}] = {{ua{j}}}")
-            for name, back in (("cn", "int64({di})"), ("co", "int64({di}) - 1")):
-                gap = back if name == "cn" else "int64({di}) + 1"
-                w.add(f"_slot = (_k - ({gap})) % _nbuf", f"_c = W[{place}] if _k >= {gap} else 0.0")
-                w.add(f"{{{name}{j}}} = {{gain{j}}} * (_c + {{off{j}}})")
 
 
 def _record(w: Writer) -> None:
@@ -320,10 +119,10 @@ def _substep(w: Writer) -> None:
                 f"{{um{j}}} = _wm",
                 f"{{ub{j}}} = _wm + _d",
             )
-    places = {a: a[1:] if a[1:] in p.rows and a != "_h" else a for a in step_arguments(p)}
+    number = {a: a[1:] if a[1:] in p.rows and a != "_h" else a for a in step_arguments(p)}
     if not f.dynamic:
-        places |= {f"_u{when}{j}": f"um{j}" for when in "ab" for j in range(p.nu)}
-    call = ", ".join("_h" if a == "_h" else f"{{{place}}}" for a, place in places.items())
+        number |= {f"_u{when}{j}": f"um{j}" for when in "ab" for j in range(p.nu)}
+    call = ", ".join("_h" if a == "_h" else f"{{{place}}}" for a, place in number.items())
     new = [f"q{i}" for i in p.free] + [f"v{i}" for i in p.free] + [f"y{i}" for i in f.dahl]
     result = [f"_n{name}" for name in new] + (["_flag"] if f.dry else [])
     w.add(f"({', '.join(result)},) = step({call})")
@@ -334,4 +133,4 @@ def _substep(w: Writer) -> None:
         w.depth -= 1
         w.add("_bad = 0.0", f"for _i in range({w.width}):", "    _bad += {flag}")
         w.add("if _bad > 0.0:", "    for _i in range(_valid):", "        if {flag} > 0.0:")
-        w.add(f"            call(_events, _data + 8 * _i, _data + 8 * (W.size - {scratch(p)['END']}), {w.width}, _h)")
+        w.add(f"            call(_events, _data + 8 * _i, _data + 8 * (W.size - {places(p)['END']}), {w.width}, _h)")
