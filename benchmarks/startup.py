@@ -32,7 +32,7 @@ def process(*arguments: str, caches: Path | None = None) -> None:
     if caches is not None:
         environment |= {"UPRIGHT_CACHE": str(caches / "upright"), "NUMBA_CACHE_DIR": str(caches / "numba")}
     command = [sys.executable, *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, env=environment, cwd=HERE, check=False)
+    done = subprocess.run(command, capture_output=True, encoding="utf-8", env=environment, cwd=HERE, check=False)
     if done.returncode:
         raise RuntimeError(f"python {' '.join(arguments)} failed: {done.stderr.strip().splitlines()[-1]}")
 

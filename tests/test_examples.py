@@ -61,7 +61,7 @@ def test_a_script_runs_as_its_first_lines_say(script, tmp_path):
     words = [str(ROOT / word) if (ROOT / word).is_file() else word for word in words]
     done = subprocess.run(
         [sys.executable, *words],
-        cwd=tmp_path, env=os.environ | {"MPLBACKEND": "Agg"}, capture_output=True, text=True, check=False,
+        cwd=tmp_path, env=os.environ | {"MPLBACKEND": "Agg"}, capture_output=True, encoding="utf-8", check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
 

@@ -80,7 +80,11 @@ def compiled(*, lanes: bool, width: str = "") -> Furuta:
     flags = [*FLAGS, *(VECTOR if lanes else ()), *([width] if width else [])]
     library = Path(_folder().name) / f"furuta-{'lanes' if lanes else 'scalar'}{width}.so"
     done = subprocess.run(
-        [*compiler.split(), *flags, str(SOURCE), "-o", str(library), "-lm"], capture_output=True, text=True, check=False
+        [*compiler.split(), *flags, str(SOURCE), "-o", str(library), "-lm"],
+        capture_output=True,
+        encoding="utf-8",
+        errors="replace",
+        check=False,
     )
     if done.returncode:
         raise NoCompiler(f"{compiler} refused the baseline: {done.stderr.strip().splitlines()[-1]}")

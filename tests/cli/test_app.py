@@ -39,7 +39,7 @@ def test_help_and_version_load_no_numerical_library(line):
         "except SystemExit as stop: assert not stop.code\n"
         f"print('loaded:', *[name for name in {HEAVY!r} if name in sys.modules])"
     )
-    out = subprocess.run([sys.executable, "-c", code, line], capture_output=True, text=True, check=True)
+    out = subprocess.run([sys.executable, "-c", code, line], capture_output=True, encoding="utf-8", check=True)
     assert out.stdout.splitlines()[-1].strip() == "loaded:"
 
 
@@ -102,5 +102,7 @@ def test_upright_debug_shows_where_it_happened(show_that_raises, monkeypatch):
 
 
 def test_python_minus_m_upright_is_the_same_program():
-    out = subprocess.run([sys.executable, "-m", "upright", "--version"], capture_output=True, text=True, check=True)
+    out = subprocess.run(
+        [sys.executable, "-m", "upright", "--version"], capture_output=True, encoding="utf-8", check=True
+    )
     assert out.stdout.strip() == f"upright {__version__}"

@@ -46,7 +46,7 @@ def bench(tmp_path, monkeypatch):
     for name, amplitude, phase in (("one", 0.02, 0.0), ("two", 0.015, 1.0)):
         rows = np.column_stack([T, swing(T, amplitude, phase)])
         np.savetxt(f"{name}.csv", rows, "%.12g", ",", header="t,theta", comments="")
-    (tmp_path / "study.toml").write_text(STUDY)
+    (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
     return tmp_path
 
 
@@ -58,7 +58,7 @@ def run(*arguments):
 def fitted(bench):
     outcome = run("identify", "study.toml", "-o", "out")
     assert outcome.exit_code == 0, outcome.output
-    return bench, outcome, json.loads((bench / "out" / "fit.json").read_text())
+    return bench, outcome, json.loads((bench / "out" / "fit.json").read_text(encoding="utf-8"))
 
 
 def test_the_length_of_a_pendulum_is_found_from_its_period(fitted):
@@ -81,7 +81,7 @@ def test_fit_json_has_the_promised_keys(fitted):
 def test_a_report_is_written_and_the_terminal_says_what_next(fitted):
     folder, outcome, fit = fitted
     assert (folder / "out" / "report.html").stat().st_size > 10_000
-    assert "A thread and a bob" in (folder / "out" / "report.html").read_text()
+    assert "A thread and a bob" in (folder / "out" / "report.html").read_text(encoding="utf-8")
     for words in ("l_cg", "two", fit["verdict"][:30], "What next", "upright predict"):
         assert words in outcome.stdout
 
@@ -92,13 +92,13 @@ def test_a_fitted_model_scores_another_study(fitted):
     scores = json.loads(outcome.stdout)["runs"]
     assert {label: s["role"] for label, s in scores.items()} == {"one": "predict", "two": "predict"}
     assert min(s["fit_percent"]["theta"] for s in scores.values()) > 99
-    assert json.loads((fitted[0] / "scores" / "prediction.json").read_text())["runs"] == scores
+    assert json.loads((fitted[0] / "scores" / "prediction.json").read_text(encoding="utf-8"))["runs"] == scores
 
 
 def test_prediction_needs_no_parameters_in_its_study(fitted):
     folder = fitted[0]
     head, _, tail = STUDY.partition("[parameters]")
-    (folder / "other.toml").write_text(head + tail[tail.index("[sensors") :])
+    (folder / "other.toml").write_text(head + tail[tail.index("[sensors") :], encoding="utf-8")
     outcome = run("predict", "out/fit.json", "other.toml")
     assert outcome.exit_code == 0, outcome.output
     assert "two" in outcome.stdout
@@ -106,7 +106,7 @@ def test_prediction_needs_no_parameters_in_its_study(fitted):
 
 def test_json_on_the_terminal_is_the_file(bench):
     outcome = run("identify", "study.toml", "-o", "out", "--json", "--no-report")
-    assert json.loads(outcome.stdout) == json.loads((bench / "out" / "fit.json").read_text())
+    assert json.loads(outcome.stdout) == json.loads((bench / "out" / "fit.json").read_text(encoding="utf-8"))
     assert not (bench / "out" / "report.html").exists()
 
 
@@ -119,7 +119,7 @@ def test_ctrl_c_keeps_and_writes_the_best_so_far(bench, monkeypatch):
     monkeypatch.setattr(estimate, "identify", lambda *a, **k: replace(whole(*a, **k), interrupted=True))
     outcome = run("identify", "study.toml", "-o", "out", "--no-report")
     assert outcome.exit_code == 130
-    assert json.loads((bench / "out" / "fit.json").read_text())["interrupted"] is True
+    assert json.loads((bench / "out" / "fit.json").read_text(encoding="utf-8"))["interrupted"] is True
 
 
 def test_a_log_becomes_a_study_becomes_a_fit_without_an_edit(bench):
@@ -139,7 +139,7 @@ def test_every_key_of_a_study_is_printed_on_request():
 
 def test_init_does_not_overwrite_unless_told(bench):
     assert "exists already" in run("init", "one.csv", "-o", "study.toml").stderr
-    assert (bench / "study.toml").read_text() == STUDY
+    assert (bench / "study.toml").read_text(encoding="utf-8") == STUDY
     assert run("init", "one.csv", "-o", "study.toml", "--force").exit_code == 0
 
 
@@ -164,11 +164,14 @@ def test_init_does_not_overwrite_unless_told(bench):
     ],
 )
 def test_a_mistake_is_answered_in_one_sentence(bench, arguments, says):
-    (bench / "known.toml").write_text(STUDY.replace('{ guess = "0.5 m", min = "1 cm", max = "5 m" }', '"0.5 m"'))
-    (bench / "unseen.toml").write_text(STUDY.replace('label = "one"', 'label = "one"\nrole = "predict"'))
-    (bench / "empty.json").write_text("{}")
+    known = STUDY.replace('{ guess = "0.5 m", min = "1 cm", max = "5 m" }', '"0.5 m"')
+    (bench / "known.toml").write_text(known, encoding="utf-8")
+    (bench / "unseen.toml").write_text(
+        STUDY.replace('label = "one"', 'label = "one"\nrole = "predict"'), encoding="utf-8"
+    )
+    (bench / "empty.json").write_text("{}", encoding="utf-8")
     entry = {"plant": "rectilinear-1", "verdict": "", "format": 1, "parameters": {"m_1": {"value": 1.0}}}
-    (bench / "chain.json").write_text(json.dumps(entry))
+    (bench / "chain.json").write_text(json.dumps(entry), encoding="utf-8")
     outcome = run(*arguments)
     assert outcome.exit_code == 2, outcome.output
     assert says in outcome.stderr

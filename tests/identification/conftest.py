@@ -15,7 +15,7 @@ def study(tmp_path):
         columns = columns or {"theta": THETA, "x": X, "v": 2 * T}
         rows = np.column_stack([t, *columns.values()])
         np.savetxt(tmp_path / log, rows, "%.17g", ",", header=",".join(["t", *columns]), comments="")
-        (tmp_path / name).write_text(text)
+        (tmp_path / name).write_text(text, encoding="utf-8")
         return load_study(tmp_path / name)
 
     return load
@@ -30,5 +30,5 @@ def folder(tmp_path_factory):
     np.savetxt(place / "log.csv", np.column_stack(columns), "%.10g", ",", header="t,theta,z,v", comments="")
     silent = (t < 4) | (t > 6)
     np.savetxt(place / "silent.csv", np.column_stack(columns)[silent], "%.10g", ",", header="t,theta,z,v", comments="")
-    (place / "bad_plant.py").write_text("import nothing_of_this_name\n")
+    (place / "bad_plant.py").write_text("import nothing_of_this_name\n", encoding="utf-8")
     return place

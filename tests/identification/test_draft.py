@@ -32,7 +32,7 @@ def drafted(tmp_path):
         np.savetxt(tmp_path / name, rows, "%.17g", ",", header=",".join(["t", *columns]), comments="")
         record = read(tmp_path / name)
         text = draft(record, inspect(record), tmp_path / name, tmp_path / "study.toml", plant=plant)
-        (tmp_path / "study.toml").write_text(text)
+        (tmp_path / "study.toml").write_text(text, encoding="utf-8")
         return text, load_study(tmp_path / "study.toml")
 
     return make
@@ -153,7 +153,7 @@ def test_every_real_log_drafts_a_study_that_loads(tmp_path):
         except BadInput as error:
             refused.append(f"{log.name}: {error}")
             continue
-        (tmp_path / "study.toml").write_text(text)
+        (tmp_path / "study.toml").write_text(text, encoding="utf-8")
         assert load_study(tmp_path / "study.toml").runs, log.name
     assert len(refused) <= 2, refused  # the authors' own parameters are a .mat file too, and no log
     assert len(logs) > 50

@@ -136,7 +136,8 @@ def test_a_user_plant_is_found_beside_the_study(study, tmp_path):
         '    coordinates = (Coordinate("x", "m", "place"),)\n'
         "    @staticmethod\n"
         "    def energies(p, q, v):\n"
-        "        return p.m * v[0] ** 2 / 2, 0, 0\n"
+        "        return p.m * v[0] ** 2 / 2, 0, 0\n",
+        encoding="utf-8",
     )
     run = study('[rig]\nplant = "my_plant.py:Mass"\n[parameters]\nm = { guess = 1 }\n[sensors.x]\n' + RUN)
     assert run.rig.plant.__name__ == "Mass"

@@ -18,7 +18,7 @@ def complaint(folder, text, **kwargs):
 
 
 def test_the_good_study_is_good(folder):
-    (folder / "study.toml").write_text(GOOD)
+    (folder / "study.toml").write_text(GOOD, encoding="utf-8")
     assert len(load_study(folder / "study.toml").runs) == 2
 
 

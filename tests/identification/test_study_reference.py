@@ -30,7 +30,7 @@ def test_the_example_of_the_page_is_a_study(tmp_path):
     rows = np.column_stack([t, 0.1 * np.sin(t), 0.2 * np.cos(5 * t)])
     for name in ("kp_025.csv", "decay.csv"):
         np.savetxt(tmp_path / name, rows, "%.12g", ",", header="t,z,theta", comments="")
-    (tmp_path / "study.toml").write_text(example.replace(".mat", ".csv"))
+    (tmp_path / "study.toml").write_text(example.replace(".mat", ".csv"), encoding="utf-8")
     study = load_study(tmp_path / "study.toml")
     assert [run.label for run in study.runs] == ["kP 2.5", "decay"]
     assert study.rig.estimated == ("J_p", "b_1", "b_2c", "actuator.gain")
@@ -56,7 +56,8 @@ def test_a_key_of_the_page_is_never_called_unknown(tmp_path, section, key):
         f"[rig]\n{'' if key == 'plant' else 'plant = `rectilinear-1`'.replace('`', chr(39))}\n{tables['rig']}\n"
         f"[parameters]\nm_1 = {{ guess = 1 }}\n[sensors.x_1]\n{tables['sensors']}\n"
         f"[drive]\n{tables['drive']}\n[[runs]]\n{tables['runs']}\n"
-        + (f"[runs.loop]\n{tables['loop']}\n" if section == "loop" else "")
+        + (f"[runs.loop]\n{tables['loop']}\n" if section == "loop" else ""),
+        encoding="utf-8",
     )
     answer = ""
     try:

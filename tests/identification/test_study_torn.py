@@ -44,7 +44,7 @@ def test_no_value_makes_the_study_stumble(folder, line, junk, more):
     lines = GOOD.splitlines()
     key, equals, _ = lines[line].partition(" = ")
     lines[line] = f"{key} = {junk}" if equals else more
-    (folder / "study.toml").write_text("\n".join(lines) + "\n")
+    (folder / "study.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
     for answer in complaints(folder):
         assert "study.toml, line " in answer
         assert "\n" not in answer

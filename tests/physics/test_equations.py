@@ -94,7 +94,7 @@ def test_accelerations_are_those_of_an_unabridged_derivation(name, rng):
 def test_generated_equations_are_those_of_the_energies(plant, without):
     """If this fails: python -m upright.physics.generate."""
     path = FOLDER / f"{module_name(plant, without)}.py"
-    assert path.read_text() == source(derive(plant, without=without))
+    assert path.read_text(encoding="utf-8") == source(derive(plant, without=without))
 
 
 def test_derivation_does_not_depend_on_the_order_of_hashes():
@@ -108,7 +108,7 @@ def test_derivation_does_not_depend_on_the_order_of_hashes():
         subprocess.run(
             [sys.executable, "-c", program],
             env={**os.environ, "PYTHONHASHSEED": seed, "PYTHONPATH": os.pathsep.join(sys.path)},
-            capture_output=True, text=True, check=True,
+            capture_output=True, encoding="utf-8", check=True,
         ).stdout
         for seed in ("1", "2", "3")
     }  # fmt: skip

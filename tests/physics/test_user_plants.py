@@ -81,7 +81,7 @@ WHEN_DERIVED = {
 
 
 def write(folder, text):
-    (folder / "mine.py").write_text(text.lstrip("\n"))
+    (folder / "mine.py").write_text(text.lstrip("\n"), encoding="utf-8")
     return folder
 
 

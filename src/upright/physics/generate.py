@@ -43,9 +43,10 @@ def source(derived: Derived) -> str:
 def main() -> None:
     """Write every variant's module."""
     FOLDER.mkdir(exist_ok=True)
-    (FOLDER / "__init__.py").write_text('"""Equations of motion of the built-in plants, generated."""\n')
-    for cls, without in variants():
-        (FOLDER / f"{module_name(cls, without)}.py").write_text(source(derive(cls, without=without)))
+    texts = {"__init__": '"""Equations of motion of the built-in plants, generated."""\n'}
+    texts |= {module_name(cls, without): source(derive(cls, without=without)) for cls, without in variants()}
+    for name, text in texts.items():
+        (FOLDER / f"{name}.py").write_text(text, encoding="utf-8", newline="\n")
 
 
 if __name__ == "__main__":
