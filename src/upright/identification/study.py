@@ -61,7 +61,7 @@ class Study:
             if label not in {r.label for r in self.runs}:
                 raise BadInput(f"no run is called '{label}'; {nearest(label, [r.label for r in self.runs])}")
         runs = tuple(replace(r, role="predict") if r.label in labels else r for r in self.runs)
-        if all(r.role == "predict" for r in runs):
+        if labels and all(r.role == "predict" for r in runs):
             raise BadInput(f"holding out {', '.join(labels)} leaves no run to fit; hold out fewer.")
         return replace(self, runs=runs)
 
