@@ -24,8 +24,9 @@ def test_it_ends_with_the_report_and_what_to_try_next(spoken):
         assert command in outcome.stdout
 
 
-def test_what_it_proposes_works(spoken):
+def test_what_it_proposes_works(spoken, tmp_path, monkeypatch):
     _, outcome = spoken
+    monkeypatch.chdir(tmp_path)
     lines = [line.split() for line in outcome.stdout.splitlines() if line.startswith("    upright ")]
     tried = [line[1:] for line in lines if line[1] in ("identify", "predict", "show")]
     assert len(tried) == 3
