@@ -99,7 +99,8 @@ def choose(rig: Rig, runs: Sequence[Run], log: Log) -> tuple[Rig, list[Array], t
         if k and costs[k] > costs[k - 1] * (1 + 1e-6):
             log.warnings.append(
                 f"With {rung.name} the first part of the runs was fitted worse (cost {costs[k]:.6g}) than without it "
-                f"({costs[k - 1]:.6g}); a richer model that contains the poorer one never should be: the search stalled."
+                f"({costs[k - 1]:.6g}); a richer model that contains the poorer one never should be, so the search "
+                "stalled; try better guesses."
             )
         v = part.value(found.x)
         values = {u.name: float(v[i]) for i, u in enumerate(part.unknowns) if u.run == SHARED}
@@ -134,12 +135,11 @@ def _held_out(rig: Rig, runs: Sequence[Run], part: Problem, x: Array) -> float:
     whole.steps = part.steps
     total, samples = 0.0, 0
     for index, track in enumerate(whole.tracks):
-        y = whole.simulate(index, x[:, None], track.length)[:, :, :, 0]
-        e = (y - track.targets(track.length)) * track.weights
+        e = whole.missed(index, x)
         if track.windowed:
-            e = e[:, int(SEEN * track.restarts.size) :]
+            e = e[int(SEEN * track.restarts.size) :]
         else:
-            e = e[int(SEEN * track.length) :]
+            e = e[0].reshape(-1, len(track.columns))[int(SEEN * track.length) :]
         # one run that slips a cycle should not outvote all others
         total += float(np.sum(np.minimum(e * e, 4.0))) if np.isfinite(e.sum()) else 4.0 * e.size
         samples += e.size

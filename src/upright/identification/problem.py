@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.model import Rig, Run
+from upright.identification.normal import Normal, gram, products
+from upright.identification.restarts import PERTURBATION, Restart, settle
 from upright.identification.tracks import Track, outputs, prepare, simulator
 from upright.identification.unknowns import (
     SHARED,
@@ -38,15 +40,6 @@ class Rows:
     residual: Array
     jacobian: Array
     sought: NDArray[np.int64]
-
-
-@dataclass(frozen=True)
-class Normal:
-    """Sum of squares, its Gauss-Newton matrix J'J and gradient J'r."""
-
-    cost: float
-    matrix: Array
-    gradient: Array
 
 
 @dataclass
@@ -97,8 +90,11 @@ class Problem:
         out[log] = np.exp(np.minimum(x[log], 300.0))
         return out
 
-    def simulate(self, index: int, x: Array, samples: int) -> Array:
-        """Outputs (samples, W, outputs, lanes) of one run for coordinates `x` (sought, lanes)."""
+    def simulate(self, index: int, x: Array, samples: int, shift: Array | None = None) -> Array:
+        """Outputs (samples, W, outputs, lanes) of one run for coordinates `x` (sought, lanes).
+
+        `shift` (states, W, lanes or 1) is added to the states at which windows start.
+        """
         track, lanes = self.tracks[index], x.shape[1]
         values: dict[str, float | Array] = {**self.base, **track.run.known}
         names = self.rig.plant.state_names()
@@ -130,6 +126,8 @@ class Problem:
         if isinstance(friction, np.ndarray):
             for name in self.friction:
                 values[name] = values[name] * friction
+        if shift is not None:
+            x0 += shift
         self.evaluations += 1
         return outputs(self.solver(index), track, values, x0, offsets, samples=samples)
 
@@ -159,39 +157,94 @@ class Problem:
         lanes[sought, 1 + here] += self.steps[sought]
         if central:
             lanes[sought, 1 + m + here] -= self.steps[sought]
-        y = self.simulate(index, lanes, n)
+        restart = self.restart(index, x) if track.doubtful.size else None
+        y = self.simulate(index, lanes, n, None if restart is None else restart.shift)
         weights = track.weights[:, None]
         target = track.targets(n)
         skip = 0 if track.windowed else min(track.first, n - 1)
         residual = (y[skip:, :, :, 0] - target[skip:]) * track.weights
         if not np.isfinite(residual.sum()):
             return None
-        if central:
-            slope = (y[skip:, :, :, 1 : m + 1] - y[skip:, :, :, m + 1 :]) * (weights / (2 * self.steps[sought]))
-        else:
-            slope = (y[skip:, :, :, 1:] - y[skip:, :, :, :1]) * (weights / self.steps[sought])
+        with np.errstate(over="ignore", invalid="ignore"):  # a lane that ran away makes the cost infinite
+            if central:
+                slope = (y[skip:, :, :, 1 : m + 1] - y[skip:, :, :, m + 1 :]) * (weights / (2 * self.steps[sought]))
+            else:
+                slope = (y[skip:, :, :, 1:] - y[skip:, :, :, :1]) * (weights / self.steps[sought])
         k = len(track.columns)
-        return Rows(
-            np.moveaxis(residual, 1, 0).reshape(-1, k), np.moveaxis(slope, 1, 0).reshape(-1, k, m), sought
-        )  # windows one after another
+        r, J = np.moveaxis(residual, 1, 0), np.moveaxis(slope, 1, 0)  # windows one after another
+        if restart is not None:
+            r, J = restart.rows(r.reshape(track.restarts.size, -1), J.reshape(track.restarts.size, -1, m))
+        return Rows(r.reshape(-1, k), J.reshape(-1, k, m), sought)
+
+    def missed(self, index: int, x: Array, horizon: float = math.inf) -> Array:
+        """Residuals (W, samples) of every window of one run, each from the restart that suits it; no Jacobian."""
+        track = self.tracks[index]
+        if track.doubtful.size:
+            restart = self.restart(index, x)
+            return np.concatenate([restart.residual, restart.price], axis=1)
+        n = self.samples(index, horizon)
+        skip = 0 if track.windowed else min(track.first, n - 1)
+        y = self.simulate(index, x[:, None], n)[skip:, :, :, 0]
+        return np.moveaxis((y - track.targets(n)[skip:]) * track.weights, 1, 0).reshape(track.restarts.size, -1)
+
+    def restart(self, index: int, x: Array) -> Restart:
+        """Where the windows of one run are best restarted, for coordinates `x`."""
+        track = self.tracks[index]
+        places = track.doubtful
+        sizes = PERTURBATION * track.start.spread[places]
+        targets = track.targets(track.length)
+        lanes = np.repeat(x[:, None], 1 + places.size, axis=1)
+
+        def respond(d: Array) -> tuple[Array, Array]:
+            shift = np.zeros((track.x0.shape[1], track.restarts.size, 1 + places.size))
+            shift[places] = d.T[:, :, None]
+            shift[places, :, 1 + np.arange(places.size)] += sizes[:, None]
+            y = self.simulate(index, lanes, track.length, shift)
+            residual = np.moveaxis((y[..., 0] - targets) * track.weights, 1, 0).reshape(len(d), -1)
+            slope = np.moveaxis((y[..., 1:] - y[..., :1]) * (track.weights[:, None] / sizes), 1, 0)
+            return residual, slope.reshape(*residual.shape, -1)
+
+        d, residual, slope = settle(respond, track.doubt)
+        shift = np.zeros((track.x0.shape[1], track.restarts.size, 1))
+        shift[places] = d.T[:, :, None]
+        return Restart(shift=shift, residual=residual, slope=slope, change=d, variance=track.doubt)
 
     def normal(self, x: Array, horizon: float = math.inf, *, central: bool = False) -> Normal:
         """Cost and its Gauss-Newton model at coordinates `x`; the cost is infinite when a simulation ran away."""
         size = x.size
         A, g, cost = np.zeros((size, size)), np.zeros(size), 0.0
         for index in range(len(self.tracks)):
-            rows = self.rows(index, x, horizon, central=central)
-            if rows is None:
+            sought = self.sought_in(index)
+            if central or self.tracks[index].windowed:
+                rows = self.rows(index, x, horizon, central=central)
+                if rows is None:
+                    return Normal(math.inf, A, g)
+                squares = products(rows.jacobian.reshape(-1, sought.size), rows.residual.reshape(-1))
+            else:
+                squares = self._squares(index, x, horizon, sought)
+            if not math.isfinite(squares[2]):
                 return Normal(math.inf, A, g)
-            r, J = rows.residual.reshape(-1), rows.jacobian.reshape(-1, rows.sought.size)
-            squares = products(J, r)
             cost += squares[2]
-            A[np.ix_(rows.sought, rows.sought)] += squares[0]
-            g[rows.sought] += squares[1]
+            A[np.ix_(sought, sought)] += squares[0]
+            g[sought] += squares[1]
         r, J = self.prior_rows(x)
         cost += float(r @ r)
         normal = Normal(cost, A + J.T @ J, g + J.T @ r)
         return normal if np.isfinite(normal.matrix.sum()) else Normal(math.inf, A, g)
+
+    def _squares(self, index: int, x: Array, horizon: float, sought: NDArray[np.int64]) -> tuple[Array, Array, float]:
+        """``J'J``, ``J'r`` and ``r'r`` of a free run, in the lanes as they come: the same numbers as from `rows`."""
+        track, n = self.tracks[index], self.samples(index, horizon)
+        lanes = np.repeat(x[:, None], 1 + sought.size, axis=1)
+        lanes[sought, 1 + np.arange(sought.size)] += self.steps[sought]
+        y = self.simulate(index, lanes, n)[min(track.first, n - 1) :, 0]
+        with np.errstate(over="ignore", invalid="ignore"):
+            y[:, :, 1:] -= y[:, :, :1]
+            y[:, :, 0] -= track.y[n - y.shape[0] : n]
+            y *= track.weights[:, None]
+        G = gram(y.reshape(-1, y.shape[2]))
+        h = self.steps[sought]
+        return G[1:, 1:] / np.outer(h, h), G[1:, 0] / h, float(G[0, 0])
 
     def prior_rows(self, x: Array) -> tuple[Array, Array]:
         """Residuals and Jacobian of what was known beforehand, worth `noise` per sigma."""
@@ -206,42 +259,28 @@ class Problem:
         """Sum of squares alone, one lane per run."""
         r, _ = self.prior_rows(x)
         total = float(r @ r)
-        for index, track in enumerate(self.tracks):
-            n = self.samples(index, horizon)
-            skip = 0 if track.windowed else min(track.first, n - 1)
-            e = (self.simulate(index, x[:, None], n)[skip:, :, :, 0] - track.targets(n)[skip:]) * track.weights
-            total += float(np.sum(e * e))
+        for index in range(len(self.tracks)):
+            e = self.missed(index, x, horizon)
+            with np.errstate(over="ignore"):
+                total += float(np.sum(e * e))
         return total if math.isfinite(total) else math.inf
 
     def settle_steps(self, x: Array, horizon: float) -> None:
         """Choose perturbations that move the outputs by about `STEP`, so that no guess of a size is needed."""
         for _ in range(4):
-            matrix = self.normal(x, horizon).matrix
-            samples = sum(self.samples(i, horizon) * t.restarts.size for i, t in enumerate(self.tracks))
-            effect = np.sqrt(np.maximum(np.diag(matrix), 0.0) / samples)
-            wanted = np.where(effect > 0, STEP / np.maximum(effect, 1e-300), 100 * self.steps)
-            wanted = np.clip(wanted, self.steps * 1e-4, self.steps * 1e4)
-            scale = np.array([u.scale for u in self.unknowns])
-            wanted = np.clip(wanted, 1e-9 * scale, 1e-3 * scale)
-            done = np.all((wanted < 30 * self.steps) & (wanted > self.steps / 30))
-            self.steps = wanted
-            if done:
+            before = self.steps
+            self.rescale_steps(self.normal(x, horizon), horizon)
+            if np.all((self.steps < 30 * before) & (self.steps > before / 30)):
                 return
 
-
-def products(J: Array, r: Array) -> tuple[Array, Array, float]:
-    """``J'J``, ``J'r`` and ``r'r`` in blocks too small for a linear-algebra library to wake its threads for.
-
-    On a busy machine waiting for those threads costs more than the products themselves.
-    """
-    rows = max(64, 200_000 // max(1, J.shape[1] + 1) ** 2)
-    whole = r.size // rows * rows
-    both = np.concatenate([J, r[:, None]], axis=1)
-    if not float(np.max(np.abs(both), initial=0.0)) < 1e100:
-        return np.zeros((J.shape[1], J.shape[1])), np.zeros(J.shape[1]), math.inf
-    blocks = both[:whole].reshape(-1, rows, both.shape[1])
-    total = np.matmul(blocks.transpose(0, 2, 1), blocks).sum(axis=0) + both[whole:].T @ both[whole:]
-    return total[:-1, :-1], total[:-1, -1], float(total[-1, -1])
+    def rescale_steps(self, normal: Normal, horizon: float) -> None:
+        """Choose perturbations by the effects found at an earlier evaluation within `horizon` seconds."""
+        samples = sum(self.samples(i, horizon) * t.restarts.size for i, t in enumerate(self.tracks))
+        effect = np.sqrt(np.maximum(np.diag(normal.matrix), 0.0) / samples)
+        wanted = np.where(effect > 0, STEP / np.maximum(effect, 1e-300), 100 * self.steps)
+        wanted = np.clip(wanted, self.steps * 1e-4, self.steps * 1e4)
+        scale = np.array([u.scale for u in self.unknowns])
+        self.steps = np.clip(wanted, 1e-9 * scale, 1e-3 * scale)
 
 
 def pose(rig: Rig, runs: Sequence[Run], *, thin: bool = True, only_shared: bool = False) -> Problem:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.model import Rig, Run
+from upright.identification.restarts import worth
 from upright.identification.smoothing import (
     State,
     dominant_period,
@@ -30,7 +31,8 @@ class Track:
     """A run made ready: `y` (N, outputs) and `u` (N, inputs) on a grid of `dt`, windows of `length` samples.
 
     `columns` are the measured coordinates' places in the state, `weights` (outputs,) one over their spread (0 for a
-    held one), `restarts` (W,) the first samples of the windows and `x0` (W, states) the measured states there.
+    held one), `restarts` (W,) the first samples of the windows and `x0` (W, states) the measured states there, whose
+    `variance` (W, states) counts in variances of a weighted residual: 0 where they are known, or sought with the rest.
     """
 
     run: Run
@@ -46,11 +48,24 @@ class Track:
     start: State
     held: Mapping[str, Held]
     first: int
+    variance: Array
 
     @property
     def windowed(self) -> bool:
         """Whether the run is restarted from measured states."""
         return self.run.horizon is not None
+
+    @property
+    def doubtful(self) -> NDArray[np.int64]:
+        """Places of the states that restarts know from a measurement only."""
+        if not self.variance.any():
+            return np.zeros(0, dtype=np.int64)
+        return np.sort(np.concatenate([self.columns, np.add(self.columns, 1)])).astype(np.int64)
+
+    @property
+    def doubt(self) -> Array:
+        """Variances (W, doubtful) of those states."""
+        return self.variance[:, self.doubtful]
 
     @property
     def duration(self) -> float:
@@ -85,6 +100,7 @@ def prepare(rig: Rig, run: Run, *, thin: bool) -> Track:
         restarts = np.arange(0, n - length + 1, length - 1, dtype=np.int64)
 
     x, sizes, errors = np.zeros((n, len(names))), np.ones(len(names)), np.zeros(len(names))
+    variance = np.zeros((restarts.size, len(names)))
     for k, (c, column) in enumerate(zip(run.measured, columns, strict=True)):
         width = smoothing_width(run.y[:, k], period_s, period, quantum[k])
         motion = savitzky_golay(run.y[:, k], period_s, width)
@@ -93,8 +109,11 @@ def prepare(rig: Rig, run: Run, *, thin: bool) -> Track:
         errors[column : column + 2] = end_errors(run.y[:, k], motion.q, period_s, width)
         if c in run.held:
             sizes[column : column + 2] = 1.0
+        elif run.horizon is not None:
+            variance[:, column : column + 2] = worth(n, width, period_s, restarts) * spread(run.y[:, k]) ** 2
     for name, value in run.initial.items():
         x[0, names.index(name)] = value
+        variance[0, names.index(name)] = 0.0
     held: dict[str, Held] = {}
     for c, value in run.held.items():
         array = np.asarray(value, dtype=np.float64)
@@ -121,6 +140,7 @@ def prepare(rig: Rig, run: Run, *, thin: bool) -> Track:
         start=State(x=x[0], spread=sizes, error=errors),
         held=held,
         first=int(np.ceil(run.score_from / dt)),
+        variance=variance,
     )
 
 
