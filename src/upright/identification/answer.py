@@ -150,7 +150,8 @@ def _unit(rig: Rig, name: str) -> str:
 
 def _scores(rig: Rig, runs: Sequence[Run], problem: Problem, x: Array, values: dict[str, float]) -> dict[str, RunScore]:
     fitted = [run for run in runs if run.role == "fit"]
-    whole = pose(rig, fitted, thin=False)
+    thinned = any(t.y.shape[0] < t.run.t.size for t in problem.tracks)
+    whole = pose(rig, fitted, thin=False) if thinned else problem
     found = {run.label: score(whole, i, x) for i, run in enumerate(fitted)}
     ahead = [run for run in runs if run.role != "fit"]
     found |= predict(values, rig, ahead)

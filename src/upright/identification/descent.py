@@ -168,6 +168,7 @@ def grow(
     """
     whole = min(problem.duration, upto)
     h = min(whole, first_horizon(problem) if horizon is None else horizon)
+    settled = False
     while True:
         last = h >= whole
         name = "whole runs" if last else f"first {h:.3g} s"
@@ -176,7 +177,9 @@ def grow(
             if report is not None:
                 report(name, h / whole if math.isfinite(whole) else 1.0, cost, problem.evaluations)
 
-        problem.settle_steps(x, h)
+        if not settled:
+            problem.settle_steps(x, h)
+            settled = True
         found = descend(
             lambda z, h=h: problem.normal(z, h), x, problem.lower, problem.upper,
             tolerance=tolerance if last else 1e-3, limit=60 if last else 25, report=tell,
@@ -186,6 +189,7 @@ def grow(
             history.append((name, found.normal.cost, problem.evaluations))
         if last or found.interrupted:
             return found
+        problem.rescale_steps(found.normal, h)
         h = min(whole, max(2 * h, reach(problem, x)))
         if h > 0.7 * whole:
             h = whole

@@ -25,11 +25,15 @@ def products(J: Array, r: Array) -> tuple[Array, Array, float]:
 
     On a busy machine waiting for those threads costs more than the products themselves.
     """
-    rows = max(64, 200_000 // max(1, J.shape[1] + 1) ** 2)
-    whole = r.size // rows * rows
-    both = np.concatenate([J, r[:, None]], axis=1)
-    if not float(np.max(np.abs(both), initial=0.0)) < 1e100:
-        return np.zeros((J.shape[1], J.shape[1])), np.zeros(J.shape[1]), math.inf
-    blocks = both[:whole].reshape(-1, rows, both.shape[1])
-    total = np.matmul(blocks.transpose(0, 2, 1), blocks).sum(axis=0) + both[whole:].T @ both[whole:]
+    total = gram(np.concatenate([J, r[:, None]], axis=1))
     return total[:-1, :-1], total[:-1, -1], float(total[-1, -1])
+
+
+def gram(both: Array) -> Array:
+    """``B'B`` of a tall array (T, p), infinite where it has run away."""
+    rows = max(64, 200_000 // max(1, both.shape[1]) ** 2)
+    whole = both.shape[0] // rows * rows
+    blocks = both[:whole].reshape(-1, rows, both.shape[1])
+    with np.errstate(over="ignore", invalid="ignore"):
+        total = np.matmul(blocks.transpose(0, 2, 1), blocks).sum(axis=0) + both[whole:].T @ both[whole:]
+    return total if np.isfinite(total.sum()) else np.full_like(total, math.inf)

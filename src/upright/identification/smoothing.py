@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +52,7 @@ def dominant_period(y: Array, dt: float) -> float:
 
 def savitzky_golay(y: Array, dt: float, width: int, *, order: int = 4) -> Motion:
     """Least-squares polynomials over a sliding window of `width` samples (made odd), fitted one-sided at the ends."""
-    from scipy.signal import savgol_filter
+    from scipy.ndimage import correlate1d
 
     n = y.size
     width = max(order + 2, min(width, n))
@@ -60,9 +61,33 @@ def savitzky_golay(y: Array, dt: float, width: int, *, order: int = 4) -> Motion
         order = max(1, width - 1)
     if order < 2:
         v = np.gradient(y, dt) if n > 1 else np.zeros(n)
-        return Motion(q=y.copy(), v=v, a=np.zeros(n), edge=0)
-    q, v, a = (np.asarray(savgol_filter(y, width, order, deriv=d, delta=dt), dtype=np.float64) for d in range(3))
-    return Motion(q=q, v=v, a=a, edge=width // 2)
+        return Motion(q=y + 0.0, v=np.asarray(v, dtype=np.float64), a=np.zeros(n), edge=0)
+    half = width // 2
+    fit, powers = _polynomials(width, order)
+    parts: list[Array] = []
+    for d in range(3):
+        # the middle of the window: the d-th coefficient times d!
+        part = correlate1d(y, fit[d] * (1.0, 1.0, 2.0)[d], mode="nearest")
+        part[:half] = powers[d, :half] @ (fit @ y[:width])
+        part[n - half :] = powers[d, half + 1 :] @ (fit @ y[n - width :])
+        parts.append(part / dt**d)
+    return Motion(q=parts[0], v=parts[1], a=parts[2], edge=half)
+
+
+@cache
+def _polynomials(width: int, order: int) -> tuple[Array, Array]:
+    """Coefficients (order + 1, width) of the fitted polynomial per sample, and derivatives 0 to 2 at the samples."""
+    s = np.arange(width) - width // 2
+    scale = float(width // 2)
+    V = np.vander(s / scale, order + 1, increasing=True)
+    unit = scale ** -np.arange(order + 1.0)
+    fit = np.linalg.pinv(V) * unit[:, None]
+    k = np.arange(order + 1)
+    powers = np.zeros((3, width, order + 1))
+    for d in range(3):
+        factor = np.prod([k - j for j in range(d)], axis=0) if d else np.ones(order + 1)
+        powers[d] = np.where(k >= d, factor * s[:, None].astype(float) ** np.maximum(k - d, 0), 0.0)
+    return fit, powers
 
 
 def end_errors(y: Array, q: Array, dt: float, width: int, *, order: int = 4) -> tuple[float, float]:
