@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.chain import Log, closed_form_starts, explain, placed
+from upright.identification.descent import grow
 from upright.identification.model import Rig, Run
-from upright.identification.problem import Problem, pose
+from upright.identification.pose import pose
+from upright.identification.problem import Problem
 from upright.identification.unknowns import SHARED
 
 Array = NDArray[np.float64]
@@ -93,6 +95,10 @@ def choose(rig: Rig, runs: Sequence[Run], log: Log) -> tuple[Rig, list[Array], t
         candidates = [_carry(part, values, own, rig, set(rung.adds))] if k else [part.start]
         candidates += starts if k == 0 else starts[:1]
         found = explain(part, candidates, log, patient=k == 0)
+        if k and found.normal.cost > costs[-1] and not found.interrupted:
+            # another start looked better over the first seconds and led astray; the poorer fit's end cannot
+            other = grow(part, candidates[0], report=log.report, history=log.history, horizon=math.inf)
+            found = min(found, other, key=lambda d: d.normal.cost)
         if found.interrupted:
             raise KeyboardInterrupt
         costs.append(found.normal.cost)
