@@ -92,7 +92,7 @@ def search() -> Callable[[], np.ndarray]:
     """Levenberg-Marquardt over the growing horizon, nothing else; estimates as `benchmarks.fit.TRUTH`."""
     from benchmarks import fit as asked
     from upright.identification.descent import grow
-    from upright.identification.problem import pose
+    from upright.identification.pose import pose
 
     rig, run = study()
 

@@ -10,7 +10,7 @@ import pytest
 from tests.identification.twins import PENDULUM, noisy, rig, swing
 from upright.identification.descent import descend, grow
 from upright.identification.normal import Normal, products
-from upright.identification.problem import pose
+from upright.identification.pose import pose
 from upright.identification.scoring import fit_percent
 from upright.identification.simplex import simplex
 from upright.physics import Pendulum

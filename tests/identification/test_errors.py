@@ -8,7 +8,7 @@ import pytest
 from tests.identification.twins import PENDULUM, noisy, rig, swing
 from upright.identification.descent import grow
 from upright.identification.estimate import identify
-from upright.identification.problem import pose
+from upright.identification.pose import pose
 from upright.identification.statistics import assess, automatic_span, long_run
 from upright.physics import Pendulum
 

@@ -8,7 +8,7 @@ import pytest
 from tests.identification.twins import PENDULUM, rig, shaken, swing
 from upright.identification.estimate import identify
 from upright.identification.model import Run
-from upright.identification.problem import pose
+from upright.identification.pose import pose
 from upright.identification.restarts import Restart, settle, worth
 from upright.physics import Pendulum
 

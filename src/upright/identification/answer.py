@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from upright.identification.chain import Log, count
 from upright.identification.descent import Descent
 from upright.identification.model import Estimate, Fit, Rig, Run, RunScore
-from upright.identification.problem import Problem, pose
+from upright.identification.pose import pose
+from upright.identification.problem import Problem
 from upright.identification.profile import profile
 from upright.identification.scoring import predict, score
 from upright.identification.seeing import Sight, hidden, look, sentences

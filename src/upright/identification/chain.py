@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from upright.identification.accelerations import regress, samples_of
 from upright.identification.descent import Descent, Report, descend, first_horizon, grow
 from upright.identification.model import Rig, Run
+from upright.identification.pose import settle_steps
 from upright.identification.problem import Problem
 from upright.identification.release import friction_from_energy
 from upright.identification.simplex import simplex
@@ -121,7 +122,7 @@ def _ranked(problem: Problem, candidates: Sequence[Array], h: float) -> list[Arr
         if not math.isfinite(problem.cost(x, h)):
             costs.append((math.inf, k, x))
             continue
-        problem.settle_steps(x, h)
+        settle_steps(problem, x, h)
         walked = descend(lambda z: problem.normal(z, h), x, problem.lower, problem.upper, tolerance=1e-2, limit=12)
         costs.append((walked.normal.cost, k, walked.x))
         if walked.interrupted:

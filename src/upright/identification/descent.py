@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.normal import Normal
+from upright.identification.pose import rescale_steps, settle_steps
 from upright.identification.problem import Problem
 
 Array = NDArray[np.float64]
@@ -178,7 +179,7 @@ def grow(
                 report(name, h / whole if math.isfinite(whole) else 1.0, cost, problem.evaluations)
 
         if not settled:
-            problem.settle_steps(x, h)
+            settle_steps(problem, x, h)
             settled = True
         found = descend(
             lambda z, h=h: problem.normal(z, h), x, problem.lower, problem.upper,
@@ -189,7 +190,7 @@ def grow(
             history.append((name, found.normal.cost, problem.evaluations))
         if last or found.interrupted:
             return found
-        problem.rescale_steps(found.normal, h)
+        rescale_steps(problem, found.normal, h)
         h = min(whole, max(2 * h, reach(problem, x)))
         if h > 0.7 * whole:
             h = whole

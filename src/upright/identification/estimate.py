@@ -17,7 +17,8 @@ from upright.identification.conventions import doubts
 from upright.identification.descent import Descent, Report, descend, grow
 from upright.identification.ladder import choose
 from upright.identification.model import Fit, Rig, Run
-from upright.identification.problem import Problem, pose
+from upright.identification.pose import pose
+from upright.identification.problem import Problem
 from upright.identification.scoring import fit_percent, predict
 from upright.identification.simplex import simplex
 from upright.identification.statistics import loudness, pseudo_inverse

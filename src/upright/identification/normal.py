@@ -20,6 +20,15 @@ class Normal:
     gradient: Array
 
 
+@dataclass(frozen=True)
+class Rows:
+    """Residuals (T, outputs) of one run, windows one after another, and their Jacobian (T, outputs, sought here)."""
+
+    residual: Array
+    jacobian: Array
+    sought: NDArray[np.int64]
+
+
 def products(J: Array, r: Array) -> tuple[Array, Array, float]:
     """``J'J``, ``J'r`` and ``r'r`` in blocks too small for a linear-algebra library to wake its threads for.
 

@@ -7,39 +7,22 @@ Residuals are in units of each signal's spread over its run, so that a fit perce
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model import Rig, Run
-from upright.identification.normal import Normal, gram, products
+from upright.identification.model import Rig
+from upright.identification.normal import Normal, Rows, gram, products
 from upright.identification.restarts import PERTURBATION, Restart, settle
-from upright.identification.tracks import Track, outputs, prepare, simulator
+from upright.identification.tracks import Track, outputs, simulator
 from upright.identification.unknowns import (
     SHARED,
     Unknown,
-    base_values,
-    friction_names,
-    run_unknowns,
-    shared_unknowns,
 )
 from upright.simulation import Simulator
 
 Array = NDArray[np.float64]
-
-STEP = 1e-5
-"""A perturbed number moves the weighted outputs by about this much, root mean square."""
-
-
-@dataclass(frozen=True)
-class Rows:
-    """Residuals (T, outputs) of one run, windows one after another, and their Jacobian (T, outputs, sought here)."""
-
-    residual: Array
-    jacobian: Array
-    sought: NDArray[np.int64]
 
 
 @dataclass
@@ -264,33 +247,3 @@ class Problem:
             with np.errstate(over="ignore"):
                 total += float(np.sum(e * e))
         return total if math.isfinite(total) else math.inf
-
-    def settle_steps(self, x: Array, horizon: float) -> None:
-        """Choose perturbations that move the outputs by about `STEP`, so that no guess of a size is needed."""
-        for _ in range(4):
-            before = self.steps
-            self.rescale_steps(self.normal(x, horizon), horizon)
-            if np.all((self.steps < 30 * before) & (self.steps > before / 30)):
-                return
-
-    def rescale_steps(self, normal: Normal, horizon: float) -> None:
-        """Choose perturbations by the effects found at an earlier evaluation within `horizon` seconds."""
-        samples = sum(self.samples(i, horizon) * t.restarts.size for i, t in enumerate(self.tracks))
-        effect = np.sqrt(np.maximum(np.diag(normal.matrix), 0.0) / samples)
-        wanted = np.where(effect > 0, STEP / np.maximum(effect, 1e-300), 100 * self.steps)
-        wanted = np.clip(wanted, self.steps * 1e-4, self.steps * 1e4)
-        scale = np.array([u.scale for u in self.unknowns])
-        self.steps = np.clip(wanted, 1e-9 * scale, 1e-3 * scale)
-
-
-def pose(rig: Rig, runs: Sequence[Run], *, thin: bool = True, only_shared: bool = False) -> Problem:
-    """Set up the problem of explaining `runs`; `only_shared` leaves out what differs from run to run."""
-    tracks = [prepare(rig, run, thin=thin) for run in runs]
-    unknowns = shared_unknowns(rig)
-    if not only_shared:
-        for index, track in enumerate(tracks):
-            unknowns += run_unknowns(rig, index, track.run, track.start)
-    steps = np.array([1e-6 * u.scale for u in unknowns])
-    return Problem(
-        rig=rig, tracks=tracks, unknowns=unknowns, base=base_values(rig), friction=friction_names(rig), steps=steps
-    )

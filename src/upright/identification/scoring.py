@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from upright.identification.descent import Report, grow
 from upright.identification.model import Fit, Rig, Run, RunScore
-from upright.identification.problem import Problem, pose
+from upright.identification.pose import pose
+from upright.identification.problem import Problem
 
 Array = NDArray[np.float64]
 

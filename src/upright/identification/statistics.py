@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.problem import Problem, Rows
+from upright.identification.normal import Rows
+from upright.identification.problem import Problem
 
 Array = NDArray[np.float64]
 

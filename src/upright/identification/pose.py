@@ -1,0 +1,51 @@
+"""How is the question put? Rig and runs become tracks and numbers sought, perturbed by what the outputs can feel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.identification.model import Rig, Run
+from upright.identification.normal import Normal
+from upright.identification.problem import Problem
+from upright.identification.tracks import prepare
+from upright.identification.unknowns import base_values, friction_names, run_unknowns, shared_unknowns
+
+Array = NDArray[np.float64]
+
+STEP = 1e-5
+"""A perturbed number moves the weighted outputs by about this much, root mean square."""
+
+
+def pose(rig: Rig, runs: Sequence[Run], *, thin: bool = True, only_shared: bool = False) -> Problem:
+    """Set up the problem of explaining `runs`; `only_shared` leaves out what differs from run to run."""
+    tracks = [prepare(rig, run, thin=thin) for run in runs]
+    unknowns = shared_unknowns(rig)
+    if not only_shared:
+        for index, track in enumerate(tracks):
+            unknowns += run_unknowns(rig, index, track.run, track.start)
+    steps = np.array([1e-6 * u.scale for u in unknowns])
+    return Problem(
+        rig=rig, tracks=tracks, unknowns=unknowns, base=base_values(rig), friction=friction_names(rig), steps=steps
+    )
+
+
+def settle_steps(problem: Problem, x: Array, horizon: float) -> None:
+    """Choose perturbations that move the outputs by about `STEP`, so that no guess of a size is needed."""
+    for _ in range(4):
+        before = problem.steps
+        rescale_steps(problem, problem.normal(x, horizon), horizon)
+        if np.all((problem.steps < 30 * before) & (problem.steps > before / 30)):
+            return
+
+
+def rescale_steps(problem: Problem, normal: Normal, horizon: float) -> None:
+    """Choose perturbations by the effects found at an earlier evaluation within `horizon` seconds."""
+    samples = sum(problem.samples(i, horizon) * t.restarts.size for i, t in enumerate(problem.tracks))
+    effect = np.sqrt(np.maximum(np.diag(normal.matrix), 0.0) / samples)
+    wanted = np.where(effect > 0, STEP / np.maximum(effect, 1e-300), 100 * problem.steps)
+    wanted = np.clip(wanted, problem.steps * 1e-4, problem.steps * 1e4)
+    scale = np.array([u.scale for u in problem.unknowns])
+    problem.steps = np.clip(wanted, 1e-9 * scale, 1e-3 * scale)
