@@ -171,6 +171,15 @@ def test_threads_change_nothing(rotary):
     assert np.array_equal(one, simulate(rotary, FURUTA, x0, None, 1e-3, samples=51, threads=2))
 
 
+def test_threads_change_nothing_in_an_ensemble_that_sticks(rotary):
+    x0 = np.random.default_rng(4).uniform(-1, 1, (200, 4))
+    p = {**FURUTA, "b_1c": 3e-2, "b_2c": 1e-2}
+    one = ensemble(rotary, p, x0, None, 1e-3, samples=101, threads=1)
+    two = ensemble(rotary, p, x0, None, 1e-3, samples=101, threads=2)
+    for name in ("largest", "error", "saturated", "final"):
+        assert np.array_equal(getattr(one, name), getattr(two, name))
+
+
 def test_wrong_calls_are_answered_in_sentences(rotary, block):
     with pytest.raises(BadInput, match="did you mean 'm_p'"):
         simulate(rotary, {**FURUTA, "mp": 1.0}, [0, 0, 0, 0], None, 1e-3, samples=2)

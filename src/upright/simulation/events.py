@@ -20,7 +20,7 @@ def turned(S, state, w):
 '''
 
 HEAD = '''
-@cfunc("void(CPointer(float64), CPointer(float64), int64, float64)", error_model="numpy", cache=True)
+{decorator}
 def events(W, S, L, h):
     """Redo one substep of the lane at `W`, event by event, with `S` to write on.
 
@@ -159,7 +159,11 @@ SEARCH = """\
 """
 
 
+BY_ADDRESS = '@cfunc("void(CPointer(float64), CPointer(float64), int64, float64)", error_model="numpy", cache=True)'
+
+
 def events(p: Layout) -> str:
     """Text of the search of events for one plant."""
-    help_ = [leap(p), terms_at(p), statics(len(p.free), len(p.flavour.dry)), TURNED, HEAD]
+    head = HEAD.format(decorator="@scalar" if p.plain else BY_ADDRESS)
+    help_ = [leap(p), terms_at(p), statics(len(p.free), len(p.flavour.dry)), TURNED, head]
     return located(p, "\n\n".join(help_) + fetch(p) + SEARCH + store(p))

@@ -61,6 +61,7 @@ class Layout:
 
     derived: Derived
     flavour: Flavour
+    plain: bool = False
 
     @cached_property
     def n(self) -> int:

@@ -29,7 +29,7 @@ def run(p: Layout, width: int) -> str:
     """Text of ``run_{width}``."""
     w = Writer(p, width)
     w.add(
-        "wide()",
+        "" if p.plain else "wide()",
         "_h = _dt / _substeps",
         "_last = U.shape[0] - 1",
         "_final = HELD.shape[0] - 1",
@@ -133,4 +133,8 @@ def _substep(w: Writer) -> None:
         w.depth -= 1
         w.add("_bad = 0.0", f"for _i in range({w.width}):", "    _bad += {flag}")
         w.add("if _bad > 0.0:", "    for _i in range(_valid):", "        if {flag} > 0.0:")
-        w.add(f"            call(_events, _data + 8 * _i, _data + 8 * (W.size - {places(p)['END']}), {w.width}, _h)")
+        end = places(p)["END"]
+        if p.plain:
+            w.add(f"            events(W[_i:], W[W.size - {end}:], {w.width}, _h)")
+        else:
+            w.add(f"            call(_events, _data + 8 * _i, _data + 8 * (W.size - {end}), {w.width}, _h)")

@@ -38,6 +38,9 @@ def simulate(
 ) -> Array:
     """Motion of a plant in one or many lanes, sample by sample.
 
+    Each call looks at names and shapes anew, which takes longer than a short motion; what is called again and again
+    with other numbers holds a `Simulator`.
+
     Parameters
     ----------
     plant : class of a plant, plant, or Derived
@@ -62,7 +65,7 @@ def simulate(
     held : mapping of str to Held, optional
         Coordinates whose motion is prescribed, or locked with ``Held()``.
     every : int
-        Only each `every`-th sample is returned.
+        Only each `every`-th sample is returned; `samples` counts what is returned, so `every` multiplies the work.
     threads : int
         Threads among which blocks of 16 lanes are shared.
 

@@ -20,18 +20,30 @@ from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput
 from upright.physics.derived import Derived
-from upright.simulation.compiled import WIDTH, kernel
+from upright.simulation.compiled import kernel
 from upright.simulation.flavour import ACTUATOR, ACTUATOR_DEFAULTS, Flavour, Layout
 from upright.simulation.lanes import room
 from upright.simulation.parts import Held, Loop
+from upright.simulation.source import WIDTH, direct
 
 Array = NDArray[np.float64]
 _NONE = np.zeros((1, 0, 0))
+_KIND = ("C", "A", "W")  # any other kind of array, or of number, would be compiled for anew
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Simulator:
     """A plant ready to be stepped again and again with other numbers, at a few microseconds per call.
+
+    Names are resolved once: `table` makes the first array of parameters, and what changes is written into its rows. ::
+
+        values = furuta.parameters()
+        derived = furuta.derived_for(values)
+        stepper = Simulator(derived=derived, flavour=choose(derived, values, free=["b_1c"]), dt=1e-3)
+        params, row = stepper.table(values, lanes=1), stepper.names.index("b_1c")
+        for level in levels:
+            params[row] = level
+            motion = stepper.run(params, x0, samples=1001)
 
     Attributes
     ----------
@@ -47,6 +59,8 @@ class Simulator:
         Controller, present exactly when the flavour says so.
     held : mapping of str to Held
         Coordinates whose motion is prescribed, exactly those of the flavour.
+    plain : bool
+        Keep to what Numba documents, slower; done anyway where the rest does not work.
     """
 
     derived: Derived
@@ -55,6 +69,7 @@ class Simulator:
     substeps: int = 1
     loop: Loop | None = None
     held: Mapping[str, Held] = field(default_factory=dict)
+    plain: bool = False
 
     def __post_init__(self) -> None:
         if not (self.dt > 0.0 and math.isfinite(self.dt)):
@@ -75,7 +90,7 @@ class Simulator:
 
     @cached_property
     def _layout(self) -> Layout:
-        return Layout(derived=self.derived, flavour=self.flavour)
+        return Layout(derived=self.derived, flavour=self.flavour, plain=self.plain or not direct())
 
     @cached_property
     def _kernel(self) -> Any:
@@ -88,7 +103,9 @@ class Simulator:
         if not grids:
             return np.zeros((1, 0))
         longest = max(len(g) for g in grids)
-        return np.hstack([np.vstack([g, np.repeat(g[-1:], longest - len(g), axis=0)]) for g in grids])
+        return np.ascontiguousarray(
+            np.hstack([np.vstack([g, np.repeat(g[-1:], longest - len(g), axis=0)]) for g in grids])
+        )
 
     @cached_property
     def _scalars(self) -> Array:
@@ -104,7 +121,7 @@ class Simulator:
 
     @cached_property
     def _reference(self) -> Array:
-        return np.zeros(0) if self.loop is None else self.loop.signal()
+        return np.zeros(0) if self.loop is None else np.require(self.loop.signal(), np.float64, _KIND)
 
     def table(self, params: Mapping[str, ArrayLike], lanes: int) -> Array:
         """Rows of `names` from values by name, shape (rows, lanes); what is missing takes its default or zero."""
@@ -140,7 +157,7 @@ class Simulator:
         start : int array, shape (lanes,), optional
             Sample of `u`, reference and held motion at which each lane begins, 0 when omitted.
         every : int
-            Only each `every`-th sample is returned.
+            Only each `every`-th sample is returned; `samples` counts what is returned.
         threads : int
             Threads among which blocks of lanes are shared.
         settle : float
@@ -165,7 +182,7 @@ class Simulator:
             raise BadInput(f"x0 needs shape ({2 * n}, {lanes}): states first, lanes last; got {x0.shape}.")
         if samples < 1 or every < 1:
             raise BadInput(f"samples and every must be at least 1, got {samples} and {every}.")
-        u = np.zeros((0, nu)) if u is None else np.ascontiguousarray(u, dtype=np.float64)
+        u = np.zeros((0, nu)) if u is None else np.require(u, np.float64, _KIND)
         if u.ndim != 2 or u.shape[1] != nu:
             raise BadInput(f"u needs shape (T, {nu}): time first, one column for each input; got {u.shape}.")
         width = 1 if lanes == 1 else WIDTH
@@ -201,9 +218,10 @@ class Simulator:
         else:
             reduced = np.empty((4 * n + nu, blocks * width))
         compiled = self._kernel.run_1 if width == 1 else self._kernel.run_16
-        size, events = room(self._layout, width, buffer), self._kernel.events.address if f.dry else 0
-        call = (lanes, P, X0, u, self._reference, begin, self._grid, base, (samples - 1) * every, every)
-        call += (self.substeps, self.dt, scalars, buffer, out, reduced)
+        size = room(self._layout, width, buffer)
+        events = self._kernel.events.address if f.dry and not self._layout.plain else 0
+        call = (lanes, P, X0, u, self._reference, begin, self._grid, base, int((samples - 1) * every), int(every))
+        call += (int(self.substeps), float(self.dt), scalars, buffer, out, reduced)
 
         def step(first: int, last: int) -> None:
             W, address = _aligned(size)
