@@ -94,14 +94,14 @@ def scaled(share: float) -> str:
 
 def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     """All contenders; C in lanes is the reference."""
-    one, few, many = 1 / problem.LOOPS, 20, 500 if quick else 2000
+    one, few, many = 1 / problem.LOOPS, 20, 500 if quick else problem.LOOPS
     lanes = f"C, SIMD by hand, {baseline.LANES} lanes"
     builders: dict[str, Callable[[], Contender]] = {
         lanes: lambda: in_c(lanes=True, friction=False),
         f"{lanes}, tanh friction": lambda: in_c(lanes=True, friction=True),
         "upright, no dry friction": lambda: ours(stick_slip=False),
         "upright, exact stick-slip": lambda: ours(stick_slip=True),
-        "C, scalar": lambda: in_c(lanes=False, friction=False, share=0.02 if quick else 0.1),
+        "C, scalar": lambda: in_c(lanes=False, friction=False, share=0.02 if quick else 1.0),
         "JAX, elementwise scan": library("jax", "JAX, elementwise scan", many, share=many * one),
         "CasADi, fold + map": library("casadi", "CasADi, fold + map", few, share=few * one),
         "MuJoCo, controller in Python": library("mujoco", "MuJoCo, controller in Python", share=one),
