@@ -157,3 +157,21 @@ def test_every_real_log_drafts_a_study_that_loads(tmp_path):
         assert load_study(tmp_path / "study.toml").runs, log.name
     assert len(refused) <= 2, refused  # the authors' own parameters are a .mat file too, and no log
     assert len(logs) > 50
+
+
+def test_a_command_in_converter_counts_drives_in_volts(drafted):
+    # ECP's front end: 409 counts are 0.5 V
+    command = np.where((T > 5) & (T < 10), -409.0, 0.0)
+    text, study = drafted(target_value=command, cart1pos=ENC1, cart2pos=ENC2)
+    assert 'column = "target_value"' in text
+    run = study.runs[0]
+    assert {round(float(v), 3) for v in np.unique(run.u)} == {-0.499, 0.0}
+
+
+def test_a_nameless_column_that_only_switches_is_the_command(drafted):
+    # a cart pushed to and fro by -4 A and 4 A, switched far more often than once in a hundred samples
+    current = np.where(np.mod(T, 0.6) < 0.3, 4.0, -4.0)
+    text, study = drafted(c1=current, c2=0.3 + 0.01 * np.sin(2 * np.pi * T / 0.6) + 1e-4 * np.sin(40 * T))
+    assert study.plant == "rectilinear-1"
+    assert '[drive]\ncolumn = "c1"' in text
+    assert "Column 'c2' says neither unit nor kind" in text

@@ -84,7 +84,7 @@ WRONG = [
     ('label = "a"\nfile = "log.csv"', 'label = "a"', 21, "needs file as text"),
     ('label = "a"\nfile = "log.csv"', 'label = "a"\nfile = "bad_plant.py"', 23, "bad_plant.py"),
     ('label = "a"\nfile = "log.csv"', 'label = "a"\nfile = "silent.csv"', 24, "silent from t = 3.99 to 6.01 s"),
-    ("window = [1.0, 9.0]", "window = [9.0, 1.0]", 24, "must lie inside the record, from 0 to 10 s"),
+    ("window = [1.0, 9.0]", "window = [9.0, 1.0]", 24, "must start before it ends, got 9 to 1 s"),
     ("window = [1.0, 9.0]", "window = [1.0, 90.0]", 24, 'write window = [1, "end"]'),
     ("window = [1.0, 9.0]", "window = 9.0", 24, "two times in s"),
     ("window = [1.0, 9.0]", 'window = ["begin", 9.0]', 24, "write the number first"),

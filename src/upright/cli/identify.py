@@ -79,13 +79,15 @@ def identify(
     Exit code: 0 a fit was written (3 with --strict when its verdict is not to
     trust it), 2 the study or a log is wrong, 130 stopped by Ctrl-C.
     """
-    from upright.cli.terminal import print_fit, progress_line
+    from upright.cli.terminal import print_fit, progress_line, typed
     from upright.errors import nearest
 
     if method not in METHODS:
         raise BadInput(f"--method must be one of {', '.join(METHODS)}, got '{method}'; {nearest(method, METHODS)}")
     if not study.exists():
-        raise BadInput(f"the study {study} does not exist; `upright init LOG -o {study.name}` writes one from a log")
+        raise BadInput(
+            f"the study {study} does not exist; `upright init LOG -o {typed(study.name)}` writes one from a log"
+        )
     from upright.identification.study import load_study
 
     folder = out if out is not None else study.with_name(f"{study.stem}-fit")
@@ -111,7 +113,7 @@ def identify(
     if as_json:
         typer.echo(json.dumps(content, indent=2, ensure_ascii=False))
     else:
-        again = f"{study} --data {data}" if data is not None else str(study)
+        again = typed(study) + (f" --data {typed(data)}" if data is not None else "")
         print_fit(fit, written, again)
     if fit.interrupted:
         raise typer.Exit(INTERRUPTED)

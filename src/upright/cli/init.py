@@ -36,11 +36,11 @@ def init(
 
     Lines marked MEASURE hold placeholders: weigh, measure, or look them up.
     """
-    from upright.cli.terminal import console
+    from upright.cli.terminal import console, typed
 
     study = out if out is not None else Path(f"{log.stem}.toml")
     if not log.is_file():
-        raise BadInput(f"the log {log} {'is a folder; name one file of it' if log.is_dir() else 'does not exist'}")
+        raise BadInput(f"the log {log} {'is a folder; name one file of it' if log.is_dir() else 'does not exist; check the path'}")
     if study.is_dir():
         study = study / f"{log.stem}.toml"
     if study.exists() and not force:
@@ -62,11 +62,13 @@ def init(
     for line in text.splitlines():
         if line.startswith("# GUESSED"):
             screen.print(line.removeprefix("# "), soft_wrap=True, markup=False)
-    measure = [line.split(" =")[0] for line in text.splitlines() if "MEASURE" in line and " = " in line]
+    marked = (line.split(" =")[0] for line in text.splitlines() if "MEASURE" in line and " = " in line)
+    measure = list(dict.fromkeys(marked))
     if measure:
         screen.print(
             f"Placeholders to replace by what you measured: {', '.join(measure)}", soft_wrap=True, markup=False
         )
+    fit = study.with_name(f"{study.stem}-fit")
     screen.print(
-        f"What next: read it, then\n    upright identify {study} -o {study.stem}-fit", soft_wrap=True, markup=False
+        f"What next: read it, then\n    upright identify {typed(study)} -o {typed(fit)}", soft_wrap=True, markup=False
     )

@@ -139,9 +139,9 @@ def remarks(column: Column) -> list[str]:
 def _print_next(log: Path) -> None:
     from rich.markup import escape
 
-    from upright.cli.terminal import console
+    from upright.cli.terminal import console, typed
 
-    name = f'"{log}"' if " " in str(log) else str(log)
+    name = typed(log)
     screen = console()
     screen.print("\nWhat next:", style="bold")
     screen.print("- write a study file, filled in with what was recognised:", soft_wrap=True)

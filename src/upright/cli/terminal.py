@@ -49,6 +49,17 @@ def progress_line(*, quiet: bool = False) -> Generator[Progress | None]:
         yield follow
 
 
+def typed(path: Path | str) -> str:
+    """A path as it is typed on a command line: in quotes when it holds blanks or what a shell would read."""
+    import re
+    import shlex
+
+    text = str(path)
+    if re.fullmatch(r"[\w./\\:~+=@%,-]+", text):
+        return text
+    return shlex.quote(text) if re.search(r"[\"$`!]", text) else f'"{text}"'
+
+
 def print_fit(fit: Fit, files: Sequence[Path], study: str) -> None:
     """Parameters, scores, verdict, warnings, files and next steps; `study` as the command line names it."""
     from rich.table import Table
@@ -75,7 +86,7 @@ def print_fit(fit: Fit, files: Sequence[Path], study: str) -> None:
         screen.print(f"[bold]Warning[/bold]: {_plain(warning)}", soft_wrap=True)
     screen.print("\nWritten: " + ", ".join(str(file) for file in files), soft_wrap=True)
     screen.print("What next:", style="bold")
-    for step in next_steps(fit, study=study, folder=str(files[0].parent)):
+    for step in next_steps(fit, study=study, folder=typed(files[0].parent)):
         screen.print(f"- {_plain(step.sentence)}", soft_wrap=True)
         for line in step.command.splitlines():
             screen.print(f"    {_plain(line)}", soft_wrap=True)

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from upright.identification.recognition import Recognised, recognise
+from upright.identification.recognition import Recognised, in_dac_counts, recognise
 from upright.identification.study_rig import per
 from upright.physics import Plant, find
 from upright.readers.inspection import Column, Inspection
+from upright.readers.lies import DAC_COUNTS_PER_VOLT
 from upright.records import Record
 
 _G = 9.81
@@ -142,11 +143,14 @@ def _drive(record: Record, found: Recognised, plant: type[Plant]) -> str:
     if found.drive is None or not plant.inputs:
         return '# [drive]\n# column = "..."   # no column drives: the runs are free\n' if plant.inputs else ""
     c, force = found.drive, plant.inputs[0]
-    unit = c.unit or c.guess
+    unit = "V" if in_dac_counts(c) else c.unit or c.guess
     gain_unit = per(force.unit, unit) if unit else force.unit
     low, high = c.low, c.high
     lines = ["[drive]", f'column = "{_quoted(c.name)}"   # {low:.4g} to {high:.4g} {unit}'.rstrip()]
     lines += [f'unit = "{unit}"'] if unit else ['# unit = "V"']
+    if in_dac_counts(c):
+        lines[1] = lines[1].removesuffix(" V") + " DAC counts"
+        lines.append(f"scale = {1 / DAC_COUNTS_PER_VOLT:.6g}   # {DAC_COUNTS_PER_VOLT:g} counts per V")
     lines += ["sign = -1   # the first command moves the column down"] if found.reversed else []
     driven = next(iter(found.columns))
     guess = _gain(record, found)
@@ -166,6 +170,7 @@ def _gain(record: Record, found: Recognised) -> float:
     assert found.drive is not None
     inertia = {"furuta": 2e-3, "cart-pendulum": 1.1}.get(found.plant, 1.0)
     u = max(abs(found.drive.low), abs(found.drive.high)) or 1.0
+    u /= DAC_COUNTS_PER_VOLT if in_dac_counts(found.drive) else 1.0
     w = found.frequency or 6.0
     return max(inertia * _swing(record, found) * w**2 / u, 1e-9)
 

@@ -22,7 +22,7 @@ from upright.readers.inspection import Column, Inspection
 from upright.records import Record
 
 _RATE = re.compile(r"velocity|speed|rate|_dot\b|omega|\bqd|accel", re.IGNORECASE)
-_EFFORT = re.compile(r"effort|volt|current|torque|force|plant_input|cmd|^(u|v|i)$", re.IGNORECASE)
+_EFFORT = re.compile(r"effort|volt|current|torque|force|plant_input|cmd|duty|^(u|v|i)$", re.IGNORECASE)
 _REFERENCE = re.compile(r"target|reference|\bref\b|commanded|set.?point", re.IGNORECASE)
 _ARM = re.compile(r"arm|psi|joint0|base|motor", re.IGNORECASE)
 _CART = re.compile(r"cart|pos|^[xz]\d?$|distance|displacement", re.IGNORECASE)
@@ -151,8 +151,17 @@ def _as_angle(record: Record, c: Column, seen: Inspection) -> Column:
     return replace(c, guess="rad") if abs(abs(rest) - math.pi) < 0.1 else c
 
 
+def in_dac_counts(c: Column) -> bool:
+    """Whether a column holds the command in counts of ECP's converter."""
+    return any(lie.startswith("the command in DAC counts") for lie in c.lies)
+
+
 def _drive(record: Record, seen: Inspection) -> Column | None:
-    candidates = [c for c in seen.columns if c.drive and not c.constant and not c.lies]
+    dac = next((c for c in seen.columns if in_dac_counts(c)), None)
+    if dac is not None:
+        return dac
+    candidates = [c for c in seen.columns if c.drive and not c.constant]
+    candidates = [c for c in candidates if all(lie.startswith("the first samples are outliers") for lie in c.lies)]
     candidates = [c for c in candidates if not _REFERENCE.search(c.name)]
     effort = [c for c in candidates if _EFFORT.search(c.name)]
     return (effort or candidates or [None])[0]
@@ -167,9 +176,14 @@ def _plant(places: list[Column], drive: Column | None) -> tuple[str, str]:
     if counts and not angles and not lengths:
         kind = "torsional" if any(_DISK.search(c.name) for c in counts) else "rectilinear"
         other = "rectilinear" if kind == "torsional" else "torsional"
+        what = f"Counts of {bodies} encoder{'s' if bodies > 1 else ''} were"
+        if not all(c.guess for c in counts):
+            first = next(c.name for c in counts if not c.guess)
+            what = f"Column '{first}' says neither unit nor kind; it was"
+        angle = "" if bodies > 1 else "; an angle that hangs would be --plant pendulum"
         return (
             f"{kind}-{bodies}",
-            f"Counts of {bodies} encoder(s) were taken for a {kind} chain; {other}-{bodies} looks the same.",
+            f"{what} taken for a {kind} chain; {other}-{bodies} looks the same{angle}.",
         )
     if lengths and angles:
         return "cart-pendulum", ""

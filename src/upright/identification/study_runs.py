@@ -126,7 +126,11 @@ def _window(run: Section, record: Record) -> tuple[float, float]:
         start = first if value[0] == "start" else si(value[0], "s", "window")
         stop = last if value[1] == "end" else si(value[1], "s", "window")
         slack = record.period
-        if not start < stop or start < first - slack or stop > last + slack:
+        if not start < stop:
+            raise BadInput(
+                f"the window must start before it ends, got {start:g} to {stop:g} s; give start and end in s"
+            )
+        if start < first - slack or stop > last + slack:
             rest = start if first <= start < last else first
             raise BadInput(
                 f"the window {start:g} to {stop:g} s must lie inside the record, from {first:g} to {last:g} s;"

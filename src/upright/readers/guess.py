@@ -41,4 +41,4 @@ def is_drive(name: str, values: Array, unit: str) -> bool:
         return True
     changes = int(np.count_nonzero(np.diff(values)))
     levels = np.unique(values).size
-    return unit not in ("rad", "m", "counts") and 2 <= levels <= 5 and 0 < changes <= 0.01 * values.size
+    return unit not in ("rad", "m", "counts") and 2 <= levels <= 5 and 0 < changes <= 0.1 * values.size
