@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from tests.simulation.conftest import BLOCK
-from upright.simulation import simulate
-from upright.simulation.compiled import called, folder, written
+from upright.simulation import choose, simulate
+from upright.simulation.compiled import called, folder, kernel, written
+from upright.simulation.flavour import Layout
 
 MOTION = """
 from upright.physics import chain
@@ -127,6 +128,20 @@ def test_a_file_that_cannot_be_replaced_will_do_if_it_says_the_same(monkeypatch,
         with pytest.raises(PermissionError):
             written(path, "a = 1\n")
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_every_kind_of_array_and_number_meets_the_same_machine_code(block):
+    # two signatures compiled at once by two processes could swap places in Numba's cache
+    flavour = choose(block, BLOCK)
+    u = np.linspace(0.0, 1.0, 20)
+    locked = u.copy()
+    locked.setflags(write=False)
+    paths = []
+    for given in (u, locked, u.reshape(20, 1), np.repeat(u, 2)[::2], u[:, None].astype(">f8"), list(u)):
+        for count in (21, np.int32(21)):
+            paths.append(simulate(block, BLOCK, np.zeros(2, np.float32), given, np.float64(0.01), samples=count))
+    assert all(np.array_equal(paths[0], path) for path in paths)
+    assert len(kernel(Layout(derived=block, flavour=flavour)).run_1.signatures) == 1
 
 
 def test_another_version_of_the_compiler_gets_another_file(monkeypatch):
