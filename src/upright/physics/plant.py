@@ -89,7 +89,7 @@ class Plant:
     @staticmethod
     def energies(p: Any, q: Any, v: Any) -> tuple[Any, Any, Any]:
         """Kinetic energy T, potential energy V, Rayleigh's dissipation D, as SymPy expressions."""
-        raise NotImplementedError("a plant states its energies(p, q, v) -> T, V, D")
+        raise BadInput("a plant states its energies(p, q, v) -> T, V, D, but this one has none; add the method.")
 
     # what follows from the statement
 
