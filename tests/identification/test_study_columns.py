@@ -27,6 +27,7 @@ from tests.identification.crane_log import RIG, RUN, SENSORS, THETA, T, X, one
         ('unit = "counts"\nscale = 0.001', THETA / 0.001),
         ('unit = "counts"\ncounts_per_rev = 16000', THETA * 16000 / (2 * math.pi)),
         ('unit = "counts"\ncounts_per_rev = 16000\noffset = 120', THETA * 16000 / (2 * math.pi) + 120),
+        ('unit = "counts"\ncounts_per_rev = 16000\noffset = "180 deg"', THETA * 16000 / (2 * math.pi) + 8000),
     ],
 )
 def test_a_sensor_turns_readings_into_the_coordinate(study, sensor, reading):

@@ -64,3 +64,28 @@ def test_no_answer_is_nan_or_none() -> None:
     assert np.all(np.isfinite(fit.correlation))
     assert np.all(np.isfinite(fit.singular_values))
     assert math.isfinite(fit.cost)
+
+
+def test_a_fifth_of_a_swing_tells_no_friction_and_is_not_trusted() -> None:
+    run = noisy(swing(seconds=0.3, dt=0.005), 3e-3, seed=8)
+    guesses = {n: PENDULUM[n] for n in ("J_p", "b_2", "b_2c", "b_2q")}
+    fit = identify(rig(Pendulum, PENDULUM, guesses), [run])
+    assert min(fit.runs["swing"].fit_percent.values()) > 95
+    assert not fit.trusted
+    assert "hardly seen" in fit.verdict or "cannot see" in fit.verdict
+
+
+def test_a_bound_that_excludes_the_truth_is_not_trusted() -> None:
+    question = rig(Pendulum, PENDULUM, {"J_p": 8e-3, "b_2": 1e-3, "b_2c": 1e-3, "b_2q": 1e-3})
+    bounded = {**question.parameters, "J_p": replace(question.parameters["J_p"], lower=4e-3)}  # twice the truth
+    fit = identify(replace(question, parameters=bounded), [noisy(swing(), 1e-3, seed=9)])
+    assert fit.estimates["J_p"].value == pytest.approx(4e-3)
+    assert not fit.trusted
+    assert "push J_p past a bound" in fit.verdict
+
+
+def test_a_column_that_stands_still_has_no_doubtful_convention() -> None:
+    run = replace(swing(), y=np.full((1001, 1), 3.1))
+    fit = identify(rig(Pendulum, PENDULUM, {"b_2": 1e-3, "J_p": 3e-3}), [run])
+    assert not fit.trusted
+    assert "conventions" not in fit.verdict

@@ -40,7 +40,8 @@ def init(
 
     study = out if out is not None else Path(f"{log.stem}.toml")
     if not log.is_file():
-        raise BadInput(f"the log {log} {'is a folder; name one file of it' if log.is_dir() else 'does not exist; check the path'}")
+        wrong = "is a folder; name one file of it" if log.is_dir() else "does not exist; check the path"
+        raise BadInput(f"the log {log} {wrong}")
     if study.is_dir():
         study = study / f"{log.stem}.toml"
     if study.exists() and not force:

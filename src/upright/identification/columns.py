@@ -74,7 +74,10 @@ class Sensor:
         factor = self.factor(unit)
         zero = self.offset
         if isinstance(zero, str) and unit and not units.same_dimension(unit, self.coordinate.unit):
-            zero = in_unit(zero, unit)
+            try:
+                zero = units.parse(zero, self.coordinate.unit) / factor  # "180 deg" of a column in counts
+            except BadInput:
+                zero = in_unit(zero, unit)
         elif isinstance(zero, str):
             zero = units.parse(zero, self.coordinate.unit) / units.scale(unit)
         values = self.sign * factor * (readings - zero)

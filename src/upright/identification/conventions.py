@@ -37,7 +37,7 @@ def doubts(rig: Rig, runs: Sequence[Run]) -> tuple[str, ...]:
             fewer = sum(s < 0 for s in flips.values()) + len(turns)
             if left < best * (0.98 if fewer else 1.0):
                 best, found = left, (flips, turns)
-    if best > CLEAR * declared:
+    if best > CLEAR * min(declared, 1.0):  # what explains next to nothing is no better convention
         return ()
     flips, turns = found
     said = [f"set sign = -1 for {c} (its sign looks reversed)" for c, s in flips.items() if s < 0]

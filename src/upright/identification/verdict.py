@@ -55,6 +55,13 @@ def judge(
         against.append(f"runs that were not fitted are predicted much worse than fitted ones ({', '.join(worse)})")
     if unseen:
         against.append("the data cannot see everything that was asked")
+    asked = {n: e for n, e in estimates.items() if e.status in ("firm", "weak", "at bound", "unseen")}
+    faint = [n for n, e in asked.items() if e.status == "weak"]
+    if not unseen and faint and (len(faint) > len(asked) / 2 or not any(e.status == "firm" for e in asked.values())):
+        against.append("most of the numbers asked are hardly seen, so others would explain the runs as well")
+    stuck = [n for n, e in asked.items() if e.status == "at bound" and e.value != 0]
+    if stuck:
+        against.append(f"the data would push {', '.join(stuck)} past a bound")
     against += [s[0].lower() + s[1:].rstrip(".") for s in conventions]
     said: list[str] = []
     best = _range(runs, "fit")
