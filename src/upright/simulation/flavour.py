@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -117,6 +117,17 @@ class Layout:
         return {name: i for i, name in enumerate([*names, *self.constants, "flag"])}
 
 
+@lru_cache(maxsize=64)
+def _known(derived: Derived) -> frozenset[str]:
+    return frozenset({*derived.parameters, *(f"actuator.{a}" for a in ACTUATOR)})
+
+
+@lru_cache(maxsize=64)
+def lay_out(derived: Derived, flavour: Flavour, plain: bool = False) -> Layout:
+    """Layout of a kernel, worked out once."""
+    return Layout(derived=derived, flavour=flavour, plain=plain)
+
+
 def choose(
     derived: Derived,
     params: Mapping[str, Any],
@@ -146,7 +157,7 @@ def choose(
     BadInput
         When a held coordinate or a named parameter does not exist.
     """
-    known = {*derived.parameters, *(f"actuator.{a}" for a in ACTUATOR)}
+    known = _known(derived)
     for name in (*params, *free):
         if name not in known:
             raise BadInput(f"{derived.name} has no parameter '{name}'; {nearest(name, known)}")
@@ -155,7 +166,10 @@ def choose(
             raise BadInput(f"{derived.name} has no coordinate '{name}' to hold; {nearest(name, derived.coordinates)}")
 
     def on(name: str) -> bool:
-        return bool(name) and (name in free or bool(np.any(np.asarray(params.get(name, 0.0)) != 0.0)))
+        if not name or name in free:
+            return bool(name)
+        value = params.get(name, 0.0)
+        return value != 0.0 if isinstance(value, float) else bool(np.any(np.asarray(value) != 0.0))
 
     moving = [j for j in derived.joints if derived.coordinates[j.coordinate] not in held]
     rough = [j for j in moving if on(j.coulomb) or on(j.stiction)]

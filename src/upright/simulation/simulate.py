@@ -178,6 +178,8 @@ def _prepare(
         raise BadInput(f"start counts samples and needs whole numbers, got {begin.dtype}.")
     sizes: dict[str, int] = {"x0": len(first), "start": begin.size}
     for name, value in values.items():
+        if isinstance(value, float):
+            continue
         if np.ndim(value) > 1:
             raise BadInput(f"{name} needs one value or one for each lane, got shape {np.shape(value)}.")
         sizes[name] = np.size(value)

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from upright.errors import BadInput
 from upright.physics.derived import Derived
 from upright.simulation.compiled import kernel
-from upright.simulation.flavour import ACTUATOR, ACTUATOR_DEFAULTS, Flavour, Layout
+from upright.simulation.flavour import ACTUATOR, ACTUATOR_DEFAULTS, Flavour, Layout, lay_out
 from upright.simulation.lanes import room
 from upright.simulation.parts import Held, Loop
 from upright.simulation.source import WIDTH, direct
@@ -90,7 +90,7 @@ class Simulator:
 
     @cached_property
     def _layout(self) -> Layout:
-        return Layout(derived=self.derived, flavour=self.flavour, plain=self.plain or not direct())
+        return lay_out(self.derived, self.flavour, self.plain or not direct())
 
     @cached_property
     def _kernel(self) -> Any:
