@@ -101,3 +101,17 @@ def test_fit_percent_by_hand() -> None:
     assert fit_percent(y, [math.nan] * 3) == -1000.0
     assert fit_percent([1.0, 1.0], [1.0, 1.0]) == 100.0
     assert fit_percent([1.0, 1.0], [1.0, 2.0]) == 0.0
+
+
+def test_squares_of_lanes_are_those_of_the_residuals_laid_out() -> None:
+    """The fast sum of a free run against the plain product of residuals and Jacobian of `rows`."""
+    asked = rig(Pendulum, PENDULUM, {"J_p": 2.4e-3, "b_2": 1.8e-3, "b_2c": 2.2e-3})
+    problem = pose(asked, [noisy(swing(unknown=("initial", "offset")), 2e-3, 5)])
+    rows = problem.rows(0, problem.start)
+    assert rows is not None
+    r, J = rows.residual.reshape(-1), rows.jacobian.reshape(-1, problem.start.size)
+    prior, slope = problem.prior_rows(problem.start)
+    found = problem.normal(problem.start)
+    assert found.cost == pytest.approx(r @ r + prior @ prior, rel=1e-12)
+    assert found.gradient == pytest.approx(J.T @ r + slope.T @ prior, rel=1e-9)
+    assert found.matrix == pytest.approx(J.T @ J + slope.T @ slope, rel=1e-9)

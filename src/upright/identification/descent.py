@@ -42,6 +42,7 @@ def descend(
     limit: int = 60,
     stride: float = 1.0,
     report: Callable[[float], None] | None = None,
+    here: Normal | None = None,
 ) -> Descent:
     """Minimize a sum of squares by Levenberg-Marquardt steps projected onto bounds.
 
@@ -57,13 +58,15 @@ def descend(
         Largest number of evaluations.
     stride : float
         Longest first step as a multiple of the undamped one; smaller is more careful.
+    here : Normal, optional
+        The model at the start, when it is known already.
 
     Notes
     -----
     Damping after Nielsen (1999); scaled by the largest diagonal met (More 1978), so that no unit matters.
     """
     x = np.clip(x, lower, upper)
-    here = evaluate(x)
+    here = evaluate(x) if here is None else here
     damping, growth = 1e-3 / stride, 2.0
     diagonal = np.zeros(x.size)
     converged = False
@@ -169,7 +172,8 @@ def grow(
     """
     whole = min(problem.duration, upto)
     h = min(whole, first_horizon(problem) if horizon is None else horizon)
-    settled = False
+    x = np.clip(x, problem.lower, problem.upper)
+    here: Normal | None = settle_steps(problem, x, h)
     while True:
         last = h >= whole
         name = "whole runs" if last else f"first {h:.3g} s"
@@ -178,12 +182,9 @@ def grow(
             if report is not None:
                 report(name, h / whole if math.isfinite(whole) else 1.0, cost, problem.evaluations)
 
-        if not settled:
-            settle_steps(problem, x, h)
-            settled = True
         found = descend(
             lambda z, h=h: problem.normal(z, h), x, problem.lower, problem.upper,
-            tolerance=tolerance if last else 1e-3, limit=60 if last else 25, report=tell,
+            tolerance=tolerance if last else 1e-3, limit=60 if last else 25, report=tell, here=here,
         )  # fmt: skip
         x = found.x
         if history is not None:
@@ -191,6 +192,7 @@ def grow(
         if last or found.interrupted:
             return found
         rescale_steps(problem, found.normal, h)
+        here = None
         h = min(whole, max(2 * h, reach(problem, x)))
         if h > 0.7 * whole:
             h = whole

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +28,34 @@ class Rows:
     residual: Array
     jacobian: Array
     sought: NDArray[np.int64]
+
+
+def squares(lanes: Sequence[Array], target: Array, offset: Array, weights: Array) -> Array:
+    """``B'B`` (p, p) of what p lanes miss and how they differ, ``B = (z_0 - y, z_1 - z_0, ...)`` times `weights`.
+
+    Parameters
+    ----------
+    lanes : sequence of (T, p) arrays
+        Simulated outputs, one after another; `offset` (outputs, p) is added to them.
+    target : (T, outputs) array
+        Measured outputs.
+
+    Notes
+    -----
+    In blocks small enough to stay near the processor, time along the fast axis.
+    """
+    block = np.empty((offset.shape[1], 1024))
+    total = np.zeros((offset.shape[1],) * 2)
+    with np.errstate(over="ignore", invalid="ignore"):  # a lane that ran away makes the sum infinite
+        for k in map(int, np.flatnonzero(weights)):
+            for first in range(0, target.shape[0], block.shape[1]):
+                here = slice(first, first + block.shape[1])
+                B = block[:, : target[here].shape[0]]
+                np.add(lanes[k][here].T, offset[k][:, None], out=B)
+                B[1:] -= B[0]
+                B[0] -= target[here, k]
+                total += weights[k] ** 2 * (B @ B.T)
+    return total if np.isfinite(total.sum()) else np.full_like(total, math.inf)
 
 
 def products(J: Array, r: Array) -> tuple[Array, Array, float]:

@@ -32,13 +32,18 @@ def pose(rig: Rig, runs: Sequence[Run], *, thin: bool = True, only_shared: bool 
     )
 
 
-def settle_steps(problem: Problem, x: Array, horizon: float) -> None:
-    """Choose perturbations that move the outputs by about `STEP`, so that no guess of a size is needed."""
+def settle_steps(problem: Problem, x: Array, horizon: float) -> Normal:
+    """Choose perturbations that move the outputs by about `STEP`, so that no guess of a size is needed.
+
+    The model at `x` comes back, found with perturbations not far from those.
+    """
     for _ in range(4):
         before = problem.steps
-        rescale_steps(problem, problem.normal(x, horizon), horizon)
+        here = problem.normal(x, horizon)
+        rescale_steps(problem, here, horizon)
         if np.all((problem.steps < 30 * before) & (problem.steps > before / 30)):
-            return
+            return here
+    return problem.normal(x, horizon)
 
 
 def rescale_steps(problem: Problem, normal: Normal, horizon: float) -> None:

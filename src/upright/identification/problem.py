@@ -13,13 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.model import Rig
-from upright.identification.normal import Normal, Rows, gram, products
+from upright.identification.normal import Normal, Rows, products, squares
 from upright.identification.restarts import PERTURBATION, Restart, settle
-from upright.identification.tracks import Track, outputs, simulator
-from upright.identification.unknowns import (
-    SHARED,
-    Unknown,
-)
+from upright.identification.tracks import Track, motions, outputs, simulator
+from upright.identification.unknowns import SHARED, Unknown
 from upright.simulation import Simulator
 
 Array = NDArray[np.float64]
@@ -41,6 +38,7 @@ class Problem:
     noise: float = 0.1
     evaluations: int = 0
     solvers: dict[int, Simulator] = field(default_factory=dict[int, Simulator])
+    memory: Array = field(default_factory=lambda: np.empty(0))
 
     @property
     def lower(self) -> Array:
@@ -78,6 +76,14 @@ class Problem:
 
         `shift` (states, W, lanes or 1) is added to the states at which windows start.
         """
+        values, x0, offsets = self._dressed(index, x)
+        if shift is not None:
+            x0 += shift
+        self.evaluations += 1
+        return outputs(self.solver(index), self.tracks[index], values, x0, offsets, samples=samples)
+
+    def _dressed(self, index: int, x: Array) -> tuple[dict[str, float | Array], Array, Array]:
+        """Parameters by name, first states (states, W, lanes) and sensor offsets (outputs, lanes) of one run."""
         track, lanes = self.tracks[index], x.shape[1]
         values: dict[str, float | Array] = {**self.base, **track.run.known}
         names = self.rig.plant.state_names()
@@ -85,12 +91,8 @@ class Problem:
         offsets = np.zeros((len(track.columns), lanes))
         friction: float | Array = 1.0
         v = self.value(x)
-        late: list[tuple[str, Array]] = []
-        for i, u in enumerate(self.unknowns):
-            if u.run == SHARED:
-                values[u.name] = v[i]
-            elif u.run == index:
-                late.append((u.name, v[i]))
+        values |= {u.name: v[i] for i, u in enumerate(self.unknowns) if u.run == SHARED}
+        late = [(u.name, v[i]) for i, u in enumerate(self.unknowns) if u.run == index]
         for name, lane in late:
             kind, _, which = name.partition(".")
             if kind == "initial":
@@ -109,10 +111,7 @@ class Problem:
         if isinstance(friction, np.ndarray):
             for name in self.friction:
                 values[name] = values[name] * friction
-        if shift is not None:
-            x0 += shift
-        self.evaluations += 1
-        return outputs(self.solver(index), track, values, x0, offsets, samples=samples)
+        return values, x0, offsets
 
     def solver(self, index: int) -> Simulator:
         """Solver of one run, made once."""
@@ -220,12 +219,13 @@ class Problem:
         track, n = self.tracks[index], self.samples(index, horizon)
         lanes = np.repeat(x[:, None], 1 + sought.size, axis=1)
         lanes[sought, 1 + np.arange(sought.size)] += self.steps[sought]
-        y = self.simulate(index, lanes, n)[min(track.first, n - 1) :, 0]
-        with np.errstate(over="ignore", invalid="ignore"):
-            y[:, :, 1:] -= y[:, :, :1]
-            y[:, :, 0] -= track.y[n - y.shape[0] : n]
-            y *= track.weights[:, None]
-        G = gram(y.reshape(-1, y.shape[2]))
+        values, x0, offsets = self._dressed(index, lanes)
+        self.evaluations += 1
+        if self.memory.size < (most := n * len(x0) * (lanes.shape[1] + 15)):
+            self.memory = np.empty(most)
+        motion = motions(self.solver(index), track, values, x0, samples=n, memory=self.memory)
+        skip = min(track.first, n - 1)
+        G = squares([motion[skip:, c] for c in track.columns], track.y[skip:n], offsets, track.weights)
         h = self.steps[sought]
         return G[1:, 1:] / np.outer(h, h), G[1:, 0] / h, float(G[0, 0])
 

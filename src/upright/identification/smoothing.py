@@ -50,8 +50,11 @@ def dominant_period(y: Array, dt: float) -> float:
     return whole if mean_square <= 0 else min(whole, 1.0 / np.sqrt(mean_square))
 
 
-def savitzky_golay(y: Array, dt: float, width: int, *, order: int = 4) -> Motion:
-    """Least-squares polynomials over a sliding window of `width` samples (made odd), fitted one-sided at the ends."""
+def savitzky_golay(y: Array, dt: float, width: int, *, order: int = 4, derivatives: int = 2) -> Motion:
+    """Least-squares polynomials over a sliding window of `width` samples (made odd), fitted one-sided at the ends.
+
+    The acceleration is zero when only one of the `derivatives` is asked for.
+    """
     from scipy.ndimage import correlate1d
 
     n = y.size
@@ -65,13 +68,13 @@ def savitzky_golay(y: Array, dt: float, width: int, *, order: int = 4) -> Motion
     half = width // 2
     fit, powers = _polynomials(width, order)
     parts: list[Array] = []
-    for d in range(3):
+    for d in range(derivatives + 1):
         # the middle of the window: the d-th coefficient times d!
         part = correlate1d(y, fit[d] * (1.0, 1.0, 2.0)[d], mode="nearest")
         part[:half] = powers[d, :half] @ (fit @ y[:width])
         part[n - half :] = powers[d, half + 1 :] @ (fit @ y[n - width :])
         parts.append(part / dt**d)
-    return Motion(q=parts[0], v=parts[1], a=parts[2], edge=half)
+    return Motion(q=parts[0], v=parts[1], a=parts[2] if derivatives > 1 else np.zeros(n), edge=half)
 
 
 @cache

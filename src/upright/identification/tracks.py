@@ -103,7 +103,7 @@ def prepare(rig: Rig, run: Run, *, thin: bool) -> Track:
     variance = np.zeros((restarts.size, len(names)))
     for k, (c, column) in enumerate(zip(run.measured, columns, strict=True)):
         width = smoothing_width(run.y[:, k], period_s, period, quantum[k])
-        motion = savitzky_golay(run.y[:, k], period_s, width)
+        motion = savitzky_golay(run.y[:, k], period_s, width, derivatives=1)
         x[:, column], x[:, column + 1] = motion.q, motion.v
         sizes[column], sizes[column + 1] = spread(motion.q), spread(motion.v)
         errors[column : column + 2] = end_errors(run.y[:, k], motion.q, period_s, width)
@@ -122,7 +122,9 @@ def prepare(rig: Rig, run: Run, *, thin: bool) -> Track:
             x[:, i], x[:, i + 1] = float(array), 0.0
             held[c] = Held()
         else:
-            motion = savitzky_golay(array, period_s, smoothing_width(array, period_s, period, 0.0), order=3)
+            motion = savitzky_golay(
+                array, period_s, smoothing_width(array, period_s, period, 0.0), order=3, derivatives=1
+            )
             x[:, i], x[:, i + 1] = motion.q, motion.v
             held[c] = Held(q=motion.q[::stride])
     weights = np.array([0.0 if c in run.held else 1.0 / spread(run.y[:, k]) for k, c in enumerate(run.measured)])
@@ -164,6 +166,20 @@ def simulator(rig: Rig, track: Track, values: Mapping[str, float | Array], free:
     )
 
 
+def motions(
+    solver: Simulator, track: Track, values: Mapping[str, float | Array], x0: Array, *, samples: int,
+    memory: Array | None = None,
+) -> Array:  # fmt: skip
+    """Simulated states (samples, states, W times lanes); a view of `memory` when it is given, see `Simulator.run`."""
+    states, windows, lanes = x0.shape
+    if windows > 1:
+        values = {n: np.tile(v, windows) if isinstance(v, np.ndarray) else v for n, v in values.items()}
+    table = solver.table(values, windows * lanes)
+    start = np.repeat(track.restarts, lanes) if windows > 1 else None
+    first = x0.reshape(states, windows * lanes)
+    return solver.run(table, first, track.u, samples=samples, start=start, memory=memory)
+
+
 def outputs(
     solver: Simulator, track: Track, values: Mapping[str, float | Array], x0: Array, offsets: Array, *, samples: int
 ) -> Array:
@@ -178,12 +194,8 @@ def outputs(
     offsets : (outputs, lanes) array
         Sensor offsets.
     """
-    states, windows, lanes = x0.shape
-    if windows > 1:
-        values = {n: np.tile(v, windows) if isinstance(v, np.ndarray) else v for n, v in values.items()}
-    table = solver.table(values, windows * lanes)
-    start = np.repeat(track.restarts, lanes) if windows > 1 else None
-    out = solver.run(table, x0.reshape(states, windows * lanes), track.u, samples=samples, start=start)
+    _, windows, lanes = x0.shape
+    out = motions(solver, track, values, x0, samples=samples)
     if windows == 1:
         y = np.empty((samples, 1, len(track.columns), lanes))
         for k, column in enumerate(track.columns):

@@ -141,6 +141,7 @@ class Simulator:
         every: int = 1,
         threads: int = 1,
         settle: float = 0.0,
+        memory: Array | None = None,
     ) -> Array:
         """Motion of every lane.
 
@@ -162,6 +163,9 @@ class Simulator:
             Threads among which blocks of lanes are shared.
         settle : float
             Time [s] from which distances from the target count, when the flavour records nothing.
+        memory : array, shape (values,), optional
+            Where the motion is written, for who calls often and is done with one motion before the next: what comes
+            back is a view of it. At least samples x rows x lanes values, lanes rounded up to 16 unless there is one.
 
         Returns
         -------
@@ -214,7 +218,7 @@ class Simulator:
         scalars[n + 3] = math.ceil(settle / self.dt - 1e-9)
         out, reduced = _NONE, _NONE[0]
         if f.record:
-            out = np.empty((samples, 2 * n + (nu if f.loop else 0), blocks * width))
+            out = _room((samples, 2 * n + (nu if f.loop else 0), blocks * width), memory)
         else:
             reduced = np.empty((4 * n + nu, blocks * width))
         compiled = self._kernel.run_1 if width == 1 else self._kernel.run_16
@@ -232,6 +236,16 @@ class Simulator:
         else:
             _share(step, blocks, threads)
         return out[:, :, :lanes] if f.record else reduced[:, :lanes]
+
+
+def _room(shape: tuple[int, int, int], memory: Array | None) -> Array:
+    """Array to record into: fresh, or the first part of `memory`."""
+    if memory is None:
+        return np.empty(shape)
+    size = math.prod(shape)
+    if memory.ndim != 1 or memory.size < size or memory.dtype != np.float64 or not memory.flags.carray:
+        raise BadInput(f"memory needs at least {size} contiguous float64 values in one row, got {memory.shape}.")
+    return memory[:size].reshape(shape)
 
 
 def _padded(a: Array, width: int, extra: int = 0) -> Array:
