@@ -54,10 +54,8 @@ def test_a_script_runs_as_its_first_lines_say(script, tmp_path):
     """The command in the docstring, with DATA standing for the folder of public logs."""
     shown = re.search(r"^ +python (.+)$", ast.get_docstring(ast.parse(script.read_text(encoding="utf-8"))) or "", re.M)
     assert shown, f"{script.name} should show how it is run"
-    data = os.environ.get("UPRIGHT_REAL_DATA")
-    if "DATA" in shown[1] and not data:
-        pytest.skip("UPRIGHT_REAL_DATA is not set")
-    words = [str(data) if word == "DATA" else word for word in shlex.split(shown[1])]
+    data = os.environ["UPRIGHT_REAL_DATA"]
+    words = [data if word == "DATA" else word for word in shlex.split(shown[1])]
     words = [str(ROOT / word) if (ROOT / word).is_file() else word for word in words]
     done = subprocess.run(
         [sys.executable, *words],
@@ -82,12 +80,9 @@ def test_a_plant_from_a_file_stays_where_it_hangs(path, name):
 @pytest.mark.real_data
 @pytest.mark.parametrize("path", STUDIES, ids=name_of)
 def test_a_study_finds_its_logs_and_says_whose_they_are(path, monkeypatch):
-    folder = os.environ.get("UPRIGHT_REAL_DATA")
-    if not folder:
-        pytest.skip("UPRIGHT_REAL_DATA is not set")
     from upright.identification.study import load_study
 
-    study = load_study(path, data=folder)
+    study = load_study(path, data=os.environ["UPRIGHT_REAL_DATA"])
     assert study.runs
     assert study.source, f"{path.name} should name the public source of its data"
 

@@ -20,7 +20,6 @@ DATA = os.environ.get("UPRIGHT_REAL_DATA", "")
 pytestmark = [
     pytest.mark.real_data,
     pytest.mark.slow,
-    pytest.mark.skipif(not DATA, reason="UPRIGHT_REAL_DATA names no folder of real logs"),
 ]
 
 

@@ -122,6 +122,7 @@ def test_ctrl_c_keeps_and_writes_the_best_so_far(bench, monkeypatch):
     assert json.loads((bench / "out" / "fit.json").read_text(encoding="utf-8"))["interrupted"] is True
 
 
+@pytest.mark.slow
 def test_a_log_becomes_a_study_becomes_a_fit_without_an_edit(bench):
     made = run("init", "one.csv", "-o", "drafted.toml")
     assert made.exit_code == 0, made.output

@@ -15,6 +15,7 @@ def spoken(tmp_path_factory):
     return folder, CliRunner().invoke(app, ["lab", "-o", str(folder)])
 
 
+@pytest.mark.slow
 def test_it_ends_with_the_report_and_what_to_try_next(spoken):
     folder, outcome = spoken
     assert outcome.exit_code == 0, outcome.output
@@ -24,6 +25,7 @@ def test_it_ends_with_the_report_and_what_to_try_next(spoken):
         assert command in outcome.stdout
 
 
+@pytest.mark.slow
 def test_what_it_proposes_works(spoken, tmp_path, monkeypatch):
     _, outcome = spoken
     monkeypatch.chdir(tmp_path)

@@ -65,7 +65,6 @@ def test_two_logs_of_one_name_get_two_figures(tmp_path: Path) -> None:
     assert {p.name for p in tmp_path.glob("*.svg")} == {"show-run.svg", "show-run-2.svg"}
 
 
-@logs.needs_real_data
 @pytest.mark.real_data
 @pytest.mark.parametrize(
     "name",

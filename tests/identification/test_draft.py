@@ -141,7 +141,7 @@ def test_file_and_column_names_survive_any_characters(drafted):
 
 
 @pytest.mark.real_data
-@pytest.mark.skipif("UPRIGHT_REAL_DATA" not in os.environ, reason="UPRIGHT_REAL_DATA names no folder")
+@pytest.mark.slow
 def test_every_real_log_drafts_a_study_that_loads(tmp_path):
     folder = Path(os.environ["UPRIGHT_REAL_DATA"])
     logs = [p for p in folder.rglob("*") if p.suffix in (".csv", ".mat", ".txt") and "README" not in p.name]

@@ -27,6 +27,7 @@ def test_pendulum_with_three_frictions_comes_back(noise: float, off: float) -> N
     assert fit.trusted
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("signs", [(1, 1, 1, 1, 1, 1, 1), (1, -1, 1, -1, 1, -1, 1), (-1, -1, -1, -1, -1, -1, -1)])
 def test_furuta_comes_back_from_guesses_half_off(signs: tuple[int, ...]) -> None:
     names = ("J_d", "l_cg", "J_p", "b_1", "b_2", "b_1c", "b_2c")
@@ -90,6 +91,7 @@ def test_tail_is_predicted_from_the_beginning_alone() -> None:
     assert again == pytest.approx(fit.runs["tail"].fit_percent["theta"], abs=1e-6)
 
 
+@pytest.mark.slow
 def test_windows_restarted_from_measured_states_recover_as_well() -> None:
     run = noisy(shaken(horizon=0.5, unknown=()), 1e-4, seed=7)
     fit = identify(rig(Furuta, FURUTA, {"J_d": 0.01, "b_1": 4e-3, "b_1c": 1.5e-3}), [run])

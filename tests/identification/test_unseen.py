@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 
 from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, shaken, swing
 from upright.identification.estimate import identify
@@ -42,6 +43,7 @@ def test_one_number_given_restores_sight() -> None:
     assert all(e.status == "firm" for e in fit.estimates.values())
 
 
+@pytest.mark.slow
 def test_a_parameter_without_effect_is_named() -> None:
     """The arm is locked, so its inertia moves nothing."""
     from dataclasses import replace
@@ -58,6 +60,7 @@ def test_a_parameter_without_effect_is_named() -> None:
     assert any("J_d" in s and "no measured output" in s for s in fit.unseen)
 
 
+@pytest.mark.slow
 def test_back_emf_and_friction_cannot_be_told_apart() -> None:
     run = noisy(shaken(), 1e-4, seed=3)
     asked = rig(Furuta, FURUTA, {"b_1": 4e-3, "actuator.slope": 1e-3, "J_d": 0.01})

@@ -8,6 +8,8 @@ from upright.lab import experiment, free_swing, page
 from upright.lab.drift import TILT
 from upright.lab.twin import twin
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory):
@@ -34,7 +36,6 @@ def test_most_truths_lie_in_their_intervals(done):
     assert sum(f.inside for f in found) >= 5  # each of six does with 95 %
 
 
-@pytest.mark.slow
 def test_intervals_hold_over_rigs_of_the_make(tmp_path):
     inside = []
     for seed in range(1, 9):

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 FOLDER = os.environ.get("UPRIGHT_REAL_DATA", "")
-needs_real_data = pytest.mark.skipif(not FOLDER, reason="UPRIGHT_REAL_DATA does not name the folder of public logs")
 
 
 def real(name: str) -> Path:

@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from tests.readers.logs import needs_real_data, real
+from tests.readers.logs import real
 from upright.errors import BadInput
 from upright.readers import inspect, read
 
-pytestmark = [needs_real_data, pytest.mark.real_data]
+pytestmark = pytest.mark.real_data
 
 EXPORT = "ecp210_rectilinear_ucsd_export/"
 FRONT_END = "ecp210_rectilinear_ucsd_1khz/"
