@@ -10,7 +10,7 @@ that the motion depends continuously on both.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput
 from upright.physics.derived import Derived
+from upright.simulation.blocks import aligned, padded, share
 from upright.simulation.compiled import kernel
 from upright.simulation.flavour import ACTUATOR, ACTUATOR_DEFAULTS, Flavour, Layout, lay_out
 from upright.simulation.lanes import room
@@ -192,11 +193,11 @@ class Simulator:
         width = 1 if lanes == 1 else WIDTH
         blocks = -(-lanes // width)
         loop_rows = 0 if self.loop is None else nu * 2 * n + n + 1
-        P = _padded(params, blocks * width, extra=loop_rows)
+        P = padded(params, blocks * width, extra=loop_rows)
         if self.loop is not None:
             P[len(params) :, :lanes] = self.loop.rows(n, nu, lanes)
             P[len(params) :, lanes:] = P[len(params) :, lanes - 1 : lanes]
-        X0 = _padded(x0, blocks * width)
+        X0 = padded(x0, blocks * width)
         begin = np.zeros(blocks * width, np.int64)
         if start is not None:
             if np.shape(start) != (lanes,) or np.min(start) < 0:
@@ -228,13 +229,13 @@ class Simulator:
         call += (int(self.substeps), float(self.dt), scalars, buffer, out, reduced)
 
         def step(first: int, last: int) -> None:
-            W, address = _aligned(size)
+            W, address = aligned(size)
             compiled(first, last, *call, W, address, events)
 
         if threads <= 1 or blocks < 2 * threads:
             step(0, blocks)
         else:
-            _share(step, blocks, threads)
+            share(step, blocks, threads)
         return out[:, :, :lanes] if f.record else reduced[:, :lanes]
 
 
@@ -246,31 +247,3 @@ def _room(shape: tuple[int, int, int], memory: Array | None) -> Array:
     if memory.ndim != 1 or memory.size < size or memory.dtype != np.float64 or not memory.flags.carray:
         raise BadInput(f"memory needs at least {size} contiguous float64 values in one row, got {memory.shape}.")
     return memory[:size].reshape(shape)
-
-
-def _padded(a: Array, width: int, extra: int = 0) -> Array:
-    """Contiguous copy with the last lane repeated and room for `extra` rows."""
-    rows, lanes = a.shape
-    out = np.empty((rows + extra, width))
-    out[:rows, :lanes] = a
-    out[:rows, lanes:] = a[:, -1:]
-    return out
-
-
-def _aligned(size: int) -> tuple[Array, int]:
-    """Zeros that start on a cache line, so that no vector straddles two; and where that is."""
-    raw = np.zeros(size + 7)
-    address = raw.ctypes.data
-    first = (-address // 8) % 8
-    return raw[first : first + size], address + 8 * first
-
-
-def _share(step: Callable[[int, int], None], blocks: int, threads: int) -> None:
-    """Let threads take turns at pieces of the work; the kernel holds no lock."""
-    from concurrent.futures import ThreadPoolExecutor
-
-    pieces = min(blocks, 4 * threads)
-    edges = [blocks * k // pieces for k in range(pieces + 1)]
-    step(0, 0)  # compiled before the threads ask for it
-    with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(lambda k: step(edges[k], edges[k + 1]), range(pieces)))
