@@ -28,7 +28,7 @@ def test_the_command_that_init_proposes_is_found_by_a_shell(tmp_path):
     (folder / "log a.csv").write_text("t,theta\n" + rows, encoding="utf-8")
     done = subprocess.run(
         [sys.executable, "-m", "upright", "init", "two words/log a.csv", "-o", "two words/study b.toml"],
-        cwd=tmp_path, capture_output=True, text=True, check=True,
+        cwd=tmp_path, capture_output=True, encoding="utf-8", check=True,
     )  # fmt: skip
     proposed = shlex.split(next(line for line in done.stdout.splitlines() if "upright identify" in line))
     assert (tmp_path / proposed[2]).is_file()

@@ -39,7 +39,7 @@ def process(cache, *, friction=False):
     environment.pop("NUMBA_CACHE_DIR", None)
     text = MOTION.format(friction={"f_1c": 0.5} if friction else {})
     return subprocess.Popen(
-        [sys.executable, "-c", text], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [sys.executable, "-c", text], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, encoding="utf-8"
     )
 
 
@@ -79,7 +79,7 @@ def fresh_folder(monkeypatch, tmp_path):
 
 def nowhere_to_write(monkeypatch, tmp_path):
     """Every folder of the user lies below a file: not even root may write there."""
-    (tmp_path / "file").write_text("")
+    (tmp_path / "file").write_text("", encoding="utf-8")
     for name in ("UPRIGHT_CACHE", "HOME", "XDG_CACHE_HOME", "LOCALAPPDATA"):
         monkeypatch.setenv(name, str(tmp_path / "file" / "below"))
 
@@ -106,9 +106,9 @@ def test_code_is_not_run_from_a_temporary_folder_that_others_can_write_to(monkey
 
 def test_a_damaged_file_is_written_again(tmp_path):
     path = written(tmp_path / "kernel.py", "a = 1\n")
-    path.write_text("a =")
+    path.write_text("a =", encoding="utf-8")
     before = path.stat().st_mtime
-    assert written(path, "a = 1\n").read_text() == "a = 1\n"
+    assert written(path, "a = 1\n").read_text(encoding="utf-8") == "a = 1\n"
     assert path.stat().st_mtime < before  # its fixed stamp again, by which Numba knows it
     assert list(tmp_path.iterdir()) == [path]
 
@@ -118,7 +118,7 @@ def test_a_file_that_cannot_be_replaced_will_do_if_it_says_the_same(monkeypatch,
     path = tmp_path / "kernel.py"
 
     def refused(source, target):
-        Path(target).write_text(other)  # another process was faster and still has it open
+        Path(target).write_text(other, encoding="utf-8")  # another process was faster and still has it open
         raise PermissionError(13, "the file is in use", str(target))
 
     monkeypatch.setattr(os, "replace", refused)
