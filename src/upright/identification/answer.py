@@ -35,19 +35,23 @@ def answer(
     left_out: Sequence[str],
     seconds: Callable[[], float],
 ) -> Fit:
-    """Everything known about an optimum."""
+    """Everything known about an optimum; of an interrupted search only what takes no time, so no predictions."""
     x = found.x
+    warnings = list(log.warnings)
     spread = assess(problem, x)
     sight = look(problem, x, spread)
     blind = hidden(sight)
-    estimates, per_run = _estimates(problem, x, spread, blind, interrupted=found.interrupted)
+    estimates, per_run = _estimates(problem, x, spread, blind, log, interrupted=found.interrupted)
     for name in left_out:
         estimates[name] = Estimate(
             value=0.0, stderr=0.0, interval=(0.0, 0.0), unit=asked.parameters[name].unit, status="left out"
         )
-        log.warnings.append(f"{name} was left out: with it the held-out part of the runs is not predicted better.")
+        warnings.append(f"{name} was left out: with it the held-out part of the runs is not predicted better.")
     estimates = {n: estimates[n] for n in [*asked.parameters] if n in estimates}
-    scores = _scores(chosen, runs, problem, x, {n: e.value for n, e in estimates.items()})
+    told = [run for run in runs if run.role == "fit" or not found.interrupted]
+    scores = _scores(chosen, told, problem, x, {n: e.value for n, e in estimates.items()}, log)
+    if len(told) < len(runs):
+        warnings.append("What was held out is not predicted, because the search was interrupted.")
     units = {n: p.unit for n, p in asked.parameters.items()}
     unseen = sentences(sight, units)
     worst = min((p for s in scores.values() if s.role == "fit" for p in s.fit_percent.values()), default=100.0)
@@ -79,7 +83,7 @@ def answer(
         singular_values=sight.singular_values,
         directions=sight.directions,
         unseen=unseen,
-        warnings=(*log.warnings, *conventions),
+        warnings=(*warnings, *conventions),
         history=tuple(log.history),
         interrupted=found.interrupted,
     )
@@ -93,7 +97,7 @@ def quantile(samples: float, unknowns: int) -> float:
 
 
 def _estimates(
-    problem: Problem, x: Array, spread: Spread, blind: set[str], *, interrupted: bool
+    problem: Problem, x: Array, spread: Spread, blind: set[str], log: Log, *, interrupted: bool
 ) -> tuple[dict[str, Estimate], dict[str, dict[str, Estimate]]]:
     value = problem.value(x)
     q = quantile(spread.samples, x.size)
@@ -118,7 +122,7 @@ def _estimates(
             cost = 40.0 * count(problem) * (x.size + 1) / 16
             if cost < budget and not interrupted:
                 budget -= cost
-                interval = profile(problem, x, i, spread, q)
+                interval = profile(problem, x, i, spread, q, report=log.report)
                 wide = interval[1] - interval[0] > abs(plain.value)
             status = "at bound" if spread.pinned[i] else "weak" if wide else "firm"
         interval = max(interval[0], u.lower), min(interval[1], u.upper)
@@ -149,13 +153,15 @@ def _unit(rig: Rig, name: str) -> str:
     return "1"
 
 
-def _scores(rig: Rig, runs: Sequence[Run], problem: Problem, x: Array, values: dict[str, float]) -> dict[str, RunScore]:
+def _scores(
+    rig: Rig, runs: Sequence[Run], problem: Problem, x: Array, values: dict[str, float], log: Log
+) -> dict[str, RunScore]:
     fitted = [run for run in runs if run.role == "fit"]
     thinned = any(t.y.shape[0] < t.run.t.size for t in problem.tracks)
     whole = pose(rig, fitted, thin=False) if thinned else problem
     found = {run.label: score(whole, i, x) for i, run in enumerate(fitted)}
     ahead = [run for run in runs if run.role != "fit"]
-    found |= predict(values, rig, ahead)
+    found |= predict(values, rig, ahead, progress=log.report)
     return {run.label: found[run.label] for run in runs}
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,14 +36,24 @@ PATIENCE = 5e8
 class Log:
     """What happened on the way: stages with their cost and simulations, and the best so far should one interrupt.
 
+    `best` holds the problem last worked on and where in it the search stood.
+
     `doubts` says which conventions look wrong; asked only when a fit is poor, since no search mends a reversed sign.
     """
 
     report: Report | None = None
     history: list[tuple[str, float, int]] = field(default_factory=list[tuple[str, float, int]])
-    best: Array | None = None
+    best: tuple[Problem, Array] | None = None
     warnings: list[str] = field(default_factory=list[str])
     doubts: Callable[[], Sequence[str]] = tuple
+
+    def keep(self, problem: Problem) -> Callable[[Array], None]:
+        """What to call with coordinates better than those before."""
+
+        def best(x: Array) -> None:
+            self.best = problem, x
+
+        return best
 
 
 def closed_form_starts(rig: Rig, runs: Sequence[Run]) -> list[dict[str, float]]:
@@ -75,6 +85,13 @@ def placed(problem: Problem, values: Mapping[str, float], x: Array | None = None
     return np.clip(x, problem.lower, problem.upper)
 
 
+def carried(part: Problem, x: Array, whole: Problem) -> Array:
+    """Coordinates of one problem put into another on the same runs; what the first does not seek keeps its start."""
+    known = {(u.run, u.name): float(z) for u, z in zip(part.unknowns, x, strict=True)}
+    start = [known.get((u.run, u.name), float(z)) for u, z in zip(whole.unknowns, whole.start, strict=True)]
+    return np.clip(np.array(start), whole.lower, whole.upper)
+
+
 def count(problem: Problem, horizon: float = math.inf) -> int:
     """Number of residuals within `horizon` seconds."""
     return sum(
@@ -87,9 +104,9 @@ def explain(problem: Problem, candidates: Sequence[Array], log: Log, *, patient:
     """Best of several starts, walked over a growing horizon; more attempts when what comes out is poor."""
     h = min(problem.duration, first_horizon(problem))
     ranked = _ranked(problem, candidates, h)
-    log.best = ranked[0]
+    log.best = problem, ranked[0]
     found = grow(problem, ranked[0], report=log.report, history=log.history)
-    log.best = found.x
+    log.best = problem, found.x
     if found.interrupted or not patient:
         return found
     n = count(problem)
@@ -107,10 +124,15 @@ def explain(problem: Problem, candidates: Sequence[Array], log: Log, *, patient:
             attempts = 3
         log.history.append((name, problem.cost(x, h), problem.evaluations))
         other = grow(problem, x, report=log.report, history=log.history)
-        if other.normal.cost < found.normal.cost:
-            found = other
-            log.best = found.x
+        found = better(found, other)
+        log.best = problem, found.x
     return found
+
+
+def better(a: Descent, b: Descent) -> Descent:
+    """The one with the lower cost, interrupted when either was."""
+    best = min(a, b, key=lambda d: d.normal.cost)
+    return replace(best, interrupted=a.interrupted or b.interrupted)
 
 
 def _ranked(problem: Problem, candidates: Sequence[Array], h: float) -> list[Array]:
@@ -126,6 +148,6 @@ def _ranked(problem: Problem, candidates: Sequence[Array], h: float) -> list[Arr
         walked = descend(lambda z: problem.normal(z, h), x, problem.lower, problem.upper, tolerance=1e-2, limit=12)
         costs.append((walked.normal.cost, k, walked.x))
         if walked.interrupted:
-            break
+            raise KeyboardInterrupt
     costs.sort(key=lambda c: c[:2])
     return [x for _, _, x in costs]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -191,8 +191,12 @@ def grow(
             history.append((name, found.normal.cost, problem.evaluations))
         if last or found.interrupted:
             return found
-        rescale_steps(problem, found.normal, h)
+        try:
+            rescale_steps(problem, found.normal, h)
+            followed = reach(problem, x)
+        except KeyboardInterrupt:
+            return replace(found, converged=False, interrupted=True)
         here = None
-        h = min(whole, max(2 * h, reach(problem, x)))
+        h = min(whole, max(2 * h, followed))
         if h > 0.7 * whole:
             h = whole

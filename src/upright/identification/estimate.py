@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from upright.errors import BadInput
 from upright.identification.answer import answer
-from upright.identification.chain import Log, closed_form_starts, count, explain, placed
+from upright.identification.chain import Log, better, carried, closed_form_starts, count, explain, placed
 from upright.identification.conventions import doubts
 from upright.identification.descent import Descent, Report, descend, grow
 from upright.identification.ladder import choose
@@ -74,35 +75,46 @@ def identify(rig: Rig, runs: Sequence[Run], *, method: str = "auto", progress: R
                 problem = pose(chosen, seen)
             found = explain(problem, candidates, log)
         elif method == "simplex":
-            x = problem.start
-            limit = 200 * x.size
-            x, _ = simplex(problem, x, horizon=_half(problem), limit=limit, report=progress)
-            log.best = x
-            x, cost = simplex(problem, x, limit=limit, report=progress)
-            log.history.append(("simplex", cost, problem.evaluations))
-            log.best = x
+            x, limit = problem.start, 200 * problem.start.size
+            for horizon in (_half(problem), math.inf):
+                x, cost = simplex(problem, x, horizon=horizon, limit=limit, report=progress, keep=log.keep(problem))
+                log.history.append(("simplex", cost, problem.evaluations))
             found = grow(problem, x, report=progress, history=log.history, horizon=math.inf)
         else:
             found = grow(problem, problem.start, report=progress, history=log.history)
+            log.best = problem, found.x
             if found.normal.cost > 0.04 * count(problem) and not found.interrupted:
                 starts = [placed(problem, s) for s in closed_form_starts(rig, seen)]
                 other = explain(problem, starts, log, patient=False) if starts else found
-                found = min(found, other, key=lambda d: d.normal.cost)
+                found = better(found, other)
         found = _weigh_priors(problem, found)
+        if found.interrupted:  # perhaps over a part of the runs
+            found = replace(found, normal=problem.normal(found.x))
     except KeyboardInterrupt:
-        x = log.best if log.best is not None and log.best.size == problem.start.size else problem.start
+        chosen, problem, x = _resumed(rig, seen, log)
+        left_out = tuple(n for n in rig.estimated if n not in chosen.estimated)
         found = Descent(x=x, normal=problem.normal(x), converged=False, interrupted=True)
-    return answer(
-        rig,
-        chosen,
-        runs,
-        problem,
-        found,
-        log=log,
-        method=method,
-        left_out=left_out,
-        seconds=lambda: time.perf_counter() - began,
-    )
+
+    def told(found: Descent) -> Fit:
+        return answer(
+            rig, chosen, runs, problem, found,
+            log=log, method=method, left_out=left_out, seconds=lambda: time.perf_counter() - began,
+        )  # fmt: skip
+
+    try:
+        return told(found)
+    except KeyboardInterrupt:  # intervals and predictions may take long too; without them an answer is near
+        return told(replace(found, interrupted=True))
+
+
+def _resumed(rig: Rig, seen: Sequence[Run], log: Log) -> tuple[Rig, Problem, Array]:
+    """Rig, problem and coordinates of the best so far, which may be of a part of the runs."""
+    if log.best is None:
+        problem = pose(rig, seen)
+        return rig, problem, problem.start
+    part, x = log.best
+    problem = pose(part.rig, seen)
+    return part.rig, problem, carried(part, x, problem)
 
 
 def _half(problem: Problem) -> float:
@@ -116,6 +128,8 @@ def _weigh_priors(problem: Problem, found: Descent) -> Descent:
     if found.interrupted or not any(u.prior is not None for u in problem.unknowns):
         return found
     for _ in range(3):
+        if found.interrupted:
+            break
         r, J = problem.prior_rows(found.x)
         pull = pseudo_inverse(found.normal.matrix) @ (J.T @ r)
         variance = found.normal.cost / count(problem)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.chain import Log, closed_form_starts, explain, placed
+from upright.identification.chain import Log, better, closed_form_starts, explain, placed
 from upright.identification.descent import grow
 from upright.identification.model import Rig, Run
 from upright.identification.pose import pose
@@ -98,7 +98,7 @@ def choose(rig: Rig, runs: Sequence[Run], log: Log) -> tuple[Rig, list[Array], t
         if k and found.normal.cost > costs[-1] and not found.interrupted:
             # another start looked better over the first seconds and led astray; the poorer fit's end cannot
             other = grow(part, candidates[0], report=log.report, history=log.history, horizon=math.inf)
-            found = min(found, other, key=lambda d: d.normal.cost)
+            found = better(found, other)
         if found.interrupted:
             raise KeyboardInterrupt
         costs.append(found.normal.cost)

@@ -8,19 +8,28 @@ a memory (the ratio of the robust to the white variance).
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.descent import descend
+from upright.identification.descent import Report, descend
 from upright.identification.problem import Problem
 from upright.identification.statistics import Spread, pseudo_inverse
 
 Array = NDArray[np.float64]
 
 
-def profile(problem: Problem, x: Array, place: int, spread: Spread, quantile: float) -> tuple[float, float]:
-    """Interval of one number's value, an infinite end where the cost never rises enough."""
+def profile(
+    problem: Problem, x: Array, place: int, spread: Spread, quantile: float, *, report: Report | None = None
+) -> tuple[float, float]:
+    """Interval of one number's value, an infinite end where the cost never rises enough.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        When somebody interrupts: half a profile is no interval.
+    """
     best = problem.normal(x)
     u = problem.unknowns[place]
     ratio = np.diag(spread.covariance)[spread.white > 0] / spread.white[spread.white > 0]
@@ -34,7 +43,12 @@ def profile(problem: Problem, x: Array, place: int, spread: Spread, quantile: fl
         slope = g * sign
         step = (-slope + math.sqrt(slope**2 + curvature * rise)) / curvature if curvature > 0 else u.scale
         most = 2.0 if u.log else 100 * max(abs(float(x[place])), u.scale)
-        ends.append(_end(problem, x, place, best.cost, rise, sign * min(max(step, 1e-9 * u.scale), most)))
+
+        def tell(cost: float, share: float = (sign + 1) / 2) -> None:
+            if report is not None:
+                report(f"interval of {u.name}", share, cost, problem.evaluations)
+
+        ends.append(_end(problem, x, place, best.cost, rise, sign * min(max(step, 1e-9 * u.scale), most), tell))
     if u.log:
         return (math.exp(ends[0]) if ends[0] > -700 else 0.0), math.exp(min(ends[1], 700.0))
     return ends[0], ends[1]
@@ -47,7 +61,9 @@ def _curvature(A: Array, place: int, spread: Spread) -> float:
     return float(A[place, place] - row @ pseudo_inverse(A[np.ix_(others, others)]) @ row)
 
 
-def _end(problem: Problem, x: Array, place: int, best: float, rise: float, step: float) -> float:
+def _end(
+    problem: Problem, x: Array, place: int, best: float, rise: float, step: float, tell: Callable[[float], None]
+) -> float:
     """Coordinate at which the refitted cost has risen by `rise`, by secants of its square root, bracketed."""
     lower, upper = problem.lower.copy(), problem.upper.copy()
     bound = float(lower[place] if step < 0 else upper[place])
@@ -57,7 +73,9 @@ def _end(problem: Problem, x: Array, place: int, best: float, rise: float, step:
         at = float(np.clip(x[place] + reached, problem.lower[place], problem.upper[place]))
         lower[place] = upper[place] = at
         start = np.where(np.arange(x.size) == place, at, z)
-        found = descend(problem.normal, start, lower, upper, tolerance=1e-3, limit=6)
+        found = descend(problem.normal, start, lower, upper, tolerance=1e-3, limit=6, report=tell)
+        if found.interrupted:
+            raise KeyboardInterrupt
         z = found.x
         height = math.sqrt(max(found.normal.cost - best, 0.0) / rise)
         if abs(height - 1) < 0.05 or (at == bound and height < 1):

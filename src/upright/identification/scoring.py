@@ -76,6 +76,13 @@ def predict(
     runs : sequence of Run
         What differs from run to run (initial state, declared offsets and factors) is estimated from the run itself:
         from what comes before `score_from` when that is set, from all of it otherwise. The parameters stay as they are.
+    progress : callable, optional
+        Called with stage, fraction done, cost and number of simulations.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        When somebody interrupts: half a prediction is none.
     """
     values = {n: e.value for n, e in fitted.estimates.items()} if isinstance(fitted, Fit) else dict(fitted)
     known = with_values(rig, values)
@@ -87,6 +94,9 @@ def _predict(rig: Rig, run: Run, progress: Report | None) -> RunScore:
     x = problem.start
     if x.size:
         upto = run.score_from if run.score_from > 0 else math.inf
-        x = grow(problem, x, report=progress, upto=upto).x
+        found = grow(problem, x, report=progress, upto=upto)
+        if found.interrupted:
+            raise KeyboardInterrupt
+        x = found.x
     whole = pose(rig, [run], thin=False)
     return score(whole, 0, x)

@@ -6,6 +6,7 @@ It copes where stiction makes the cost a staircase, and costs 5 to 40 times more
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +18,12 @@ Array = NDArray[np.float64]
 
 
 def simplex(
-    problem: Problem, x: Array, *, horizon: float = math.inf, limit: int = 2000, report: Report | None = None
-) -> tuple[Array, float]:
+    problem: Problem, x: Array, *, horizon: float = math.inf, limit: int = 2000, report: Report | None = None,
+    keep: Callable[[Array], None] | None = None,
+) -> tuple[Array, float]:  # fmt: skip
     """Best coordinates within `horizon` seconds and their cost, after at most `limit` simulations.
 
-    The first simplex reaches 10 % of each number, or 10 % of its scale when it is zero.
+    Every improvement is handed to `keep`, should somebody interrupt. The first simplex reaches 10 % of each number, or 10 % of its scale when it is zero.
     """
     from scipy.optimize import minimize
 
@@ -37,6 +39,8 @@ def simplex(
         count += 1
         if value < best[1]:
             best[0], best[1] = here, value
+            if keep is not None:
+                keep(here)
             if report is not None and count % 20 == 0:
                 report("simplex", count / limit, value, problem.evaluations)
         return value if math.isfinite(value) else 1e300
