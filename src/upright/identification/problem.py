@@ -221,7 +221,8 @@ class Problem:
         lanes[sought, 1 + np.arange(sought.size)] += self.steps[sought]
         values, x0, offsets = self._dressed(index, lanes)
         self.evaluations += 1
-        if self.memory.size < (most := n * len(x0) * (lanes.shape[1] + 15)):
+        rows = len(x0) + track.u.shape[1]  # a loop records its commands as well
+        if self.memory.size < (most := n * rows * (lanes.shape[1] + 15)):
             self.memory = np.empty(most)
         motion = motions(self.solver(index), track, values, x0, samples=n, memory=self.memory)
         skip = min(track.first, n - 1)
