@@ -56,9 +56,8 @@ def judge(
     if unseen:
         against.append("the data cannot see everything that was asked")
     asked = {n: e for n, e in estimates.items() if e.status in ("firm", "weak", "at bound", "unseen")}
-    faint = [n for n, e in asked.items() if e.status == "weak"]
-    if not unseen and faint and (len(faint) > len(asked) / 2 or not any(e.status == "firm" for e in asked.values())):
-        against.append("most of the numbers asked are hardly seen, so others would explain the runs as well")
+    if asked and not unseen and not any(e.status == "firm" for e in asked.values()):
+        against.append("none of the numbers asked is seen well, so others would explain the runs as well")
     stuck = [n for n, e in asked.items() if e.status == "at bound" and e.value != 0]
     if stuck:
         against.append(f"the data would push {', '.join(stuck)} past a bound")
