@@ -77,3 +77,15 @@ def test_a_weakly_seen_number_is_called_weak() -> None:
     e = fit.estimates["b_2q"]
     assert e.status in ("weak", "at bound", "unseen")
     assert e.interval[0] <= PENDULUM["b_2q"] <= e.interval[1]
+
+
+def test_a_mass_that_nothing_shows_stays_a_number_one_can_print() -> None:
+    # without gravity, force or friction the mass of a spinning arm is in no output
+    from tests.identification.twins import rig as known
+    from upright.identification.unknowns import FAR, shared_unknowns
+    from upright.physics import Pendulum
+
+    values = {"m_p": 0.2, "l_cg": 0.3, "J_p": 2e-3}
+    [sought] = shared_unknowns(known(Pendulum, values, {"m_p": 0.2}))
+    lower, upper = sought.bounds
+    assert abs(upper - lower - 2 * np.log(FAR)) < 1e-9

@@ -54,3 +54,14 @@ def test_a_stopped_search_is_to_be_ended(changed):
 
 def test_every_fit_is_to_be_tried_on_a_run_it_has_not_met(fit):
     assert next_steps(fit, folder="out")[-1].command == "upright predict out/fit.json OTHER.toml"
+
+
+def test_a_run_that_is_lost_is_restarted(changed, swing):
+    run = swing(n=400)
+    lost = replace(run, fit_percent={"psi": 40.0, "theta": 5.0}, horizon=None)
+    assert 'horizon = "0.5 s"' in said(changed(runs={"spin": lost}))
+    assert 'horizon = "0.5 s"' not in said(changed(runs={"spin": replace(lost, horizon=0.5)}))
+
+
+def test_a_run_that_is_followed_needs_no_restart(fit):
+    assert "horizon" not in said(fit)

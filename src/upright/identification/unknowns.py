@@ -28,6 +28,9 @@ GAIN_SPREAD = 1.0
 """One sigma of the logarithm of a run's gain factor; a factor of 3.2 was met (DESIGN 9)."""
 
 
+FAR = 1e9
+"""A positive number ends within this factor of its guess."""
+
 INITIAL_SPREAD = (0.02, 0.1)
 """Least sigma of a measured first coordinate and velocity, as a share of how much each varies over the run."""
 
@@ -98,6 +101,8 @@ def _shared(rig: Rig, p: Parameter) -> Unknown:
         lower = max(lower, 0.0)
     log = positive and p.value > 0
     value = min(max(p.value, lower), upper)
+    if log:  # a number that the data do not see would otherwise run to 1e130
+        lower, upper = max(lower, value / FAR), min(upper, value * FAR)
     prior = None
     if not p.estimate:
         prior = (math.log(p.value), p.uncertainty / p.value) if log else (p.value, p.uncertainty)

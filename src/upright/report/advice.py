@@ -11,6 +11,9 @@ from upright.identification.model import Fit
 from upright.report.figures import autocorrelation
 from upright.report.symbols import percent, plain
 
+FOLLOWED = 80.0
+"""Fit percent below which a free run counts as lost."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Step:
@@ -54,6 +57,19 @@ def _broken(fit: Fit) -> list[Step]:
                         command=f"[sensors.{name}]\nsign = -1",
                     )
                 )
+    lost = [
+        label
+        for label, s in fit.runs.items()
+        if s.role == "fit" and s.horizon is None and any(v < FOLLOWED for v in s.fit_percent.values())
+    ]
+    if lost:
+        steps.append(
+            Step(
+                sentence=f"The simulation of run {', '.join(map(repr, lost))} loses the measurement. If the figure "
+                "shows that it followed at first, end the window there, or restart it from measured states.",
+                command='[[runs]]\nhorizon = "0.5 s"',
+            )
+        )
     stopped = [n for n, e in fit.estimates.items() if e.status == "at bound"]
     none = [n for n in stopped if fit.estimates[n].value == 0]
     if none:
