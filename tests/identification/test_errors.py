@@ -36,6 +36,19 @@ def test_scatter_matches_the_reported_errors(memory: float) -> None:
     assert np.all((ratio > 0.75) & (ratio < 1.35)), ratio
 
 
+@pytest.mark.parametrize("memory", [0.0, 0.5, 0.9])
+def test_intervals_of_short_records_hold_the_truth_too(memory: float) -> None:
+    """100 samples, four numbers sought: what the fit takes from the residuals must be given back."""
+    clean = swing({**PENDULUM, "b_2c": 0.0, "b_2q": 0.0}, angle=0.4, seconds=2.0, dt=0.02)
+    asked = rig(Pendulum, {**PENDULUM, "b_2c": 0.0, "b_2q": 0.0}, {"J_p": 3e-3, "b_2": 1.5e-3})
+    held = []
+    for seed in range(150):
+        e = identify(asked, [noisy(clean, 0.02, seed, memory)], method="least-squares").estimates
+        held.append([e[n].interval[0] <= PENDULUM[n] <= e[n].interval[1] for n in ("J_p", "b_2")])
+    # 150 draws at 95 %: three sigma of the binomial is 5.3 %
+    assert np.all(np.mean(held, axis=0) >= 0.897), np.mean(held, axis=0)
+
+
 def test_white_errors_would_be_too_small() -> None:
     """First-order memory rho makes errors of slow sensitivities sqrt((1 + rho)/(1 - rho)) = 4.4 times larger."""
     clean = swing(seconds=20.0, dt=0.005)

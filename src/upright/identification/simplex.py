@@ -23,7 +23,8 @@ def simplex(
 ) -> tuple[Array, float]:  # fmt: skip
     """Best coordinates within `horizon` seconds and their cost, after at most `limit` simulations.
 
-    Every improvement is handed to `keep`, should somebody interrupt. The first simplex reaches 10 % of each number, or 10 % of its scale when it is zero.
+    Every improvement is handed to `keep`, should somebody interrupt.
+    The first simplex reaches 10 % of each number, or 10 % of its scale when it is zero.
     """
     from scipy.optimize import minimize
 

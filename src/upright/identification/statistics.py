@@ -157,6 +157,8 @@ def assess(problem: Problem, x: Array, *, clusters: bool = True) -> Spread:
     inverse = np.zeros((size, size))
     inverse[np.ix_(free, free)] = pseudo_inverse(A[np.ix_(free, free)])
     variance = cost / max(count - int(free.sum()), 1)
+    # the fit has made the scores smaller, by as many as it could choose of those that are independent
+    hac *= independent / max(independent - float(free.sum()), independent / 2, 1e-9)
     # a prior's row is one residual of the size that one sigma is worth
     prior_meat = prior.T @ prior * problem.noise**2
     meat = hac + prior_meat
