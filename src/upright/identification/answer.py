@@ -23,6 +23,10 @@ from upright.identification.verdict import GOOD, judge
 Array = NDArray[np.float64]
 
 
+NARROW = 0.1
+"""A profile below this share of the interval from the standard error was not followed along its valley."""
+
+
 def answer(
     asked: Rig,
     chosen: Rig,
@@ -123,6 +127,9 @@ def _estimates(
             if cost < budget and not interrupted:
                 budget -= cost
                 interval = profile(problem, x, i, spread, q, report=log.report)
+                whole = plain.interval[1] - plain.interval[0]
+                if not u.log and interval[1] - interval[0] < NARROW * whole:
+                    interval = plain.interval  # a valley too narrow to follow with one number held
                 wide = interval[1] - interval[0] > abs(plain.value)
             status = "at bound" if spread.pinned[i] else "weak" if wide else "firm"
         interval = max(interval[0], u.lower), min(interval[1], u.upper)
