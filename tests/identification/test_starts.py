@@ -11,7 +11,7 @@ from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, shaken, swi
 from upright.errors import NotIdentifiable
 from upright.identification.accelerations import observe, regress
 from upright.identification.release import decrement, friction_from_energy, turning_points
-from upright.identification.smoothing import dominant_period, savitzky_golay
+from upright.identification.smoothing import dominant_period, first_order, savitzky_golay
 from upright.identification.unknowns import base_values
 from upright.physics import Furuta, Pendulum
 
@@ -77,3 +77,31 @@ def test_smoothing_polynomials_are_exact_for_polynomials() -> None:
     assert motion.q == pytest.approx(t**4 - 2 * t**2, abs=1e-10)
     assert motion.v == pytest.approx(4 * t**3 - 4 * t, abs=1e-8)
     assert motion.a == pytest.approx(12 * t**2 - 4, abs=1e-5)
+
+
+def test_first_order_lag_is_the_filter_of_scipy() -> None:
+    from scipy.signal import lfilter
+
+    for n in (1, 2, 129, 1000):
+        u = np.random.default_rng(n).normal(size=n)
+        expected = lfilter([0.0, 0.07], [1.0, -0.93], u, zi=[u[0]])[0]
+        assert first_order(u, 0.93) == pytest.approx(expected, abs=1e-12)
+
+
+def test_nothing_heavy_is_imported_to_fit() -> None:
+    """scipy.signal alone takes longer to import than a free swing takes to fit."""
+    import subprocess
+    import sys
+
+    code = (
+        "import sys\n"
+        "from tests.identification.twins import PENDULUM, rig, swing\n"
+        "from upright.identification.estimate import identify\n"
+        "from upright.physics import Pendulum\n"
+        "guesses = {'J_p': 3e-3, 'b_2': 1e-3, 'b_2c': 1e-3}\n"
+        "identify(rig(Pendulum, PENDULUM, guesses), [swing(seconds=3.0)])\n"
+        "heavy = ('scipy.signal', 'scipy.stats', 'sympy', 'pandas', 'matplotlib', 'control')\n"
+        "print([m for m in heavy if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,21 @@ from numpy.typing import NDArray
 from upright.identification.descent import descend
 from upright.identification.model import Feedback, Rig, Run
 from upright.identification.normal import Normal
-from upright.identification.smoothing import dominant_period, savitzky_golay, smoothing_width, spread
+from upright.identification.smoothing import (
+    dominant_period,
+    first_order,
+    middle,
+    savitzky_golay,
+    smoothing_width,
+    spread,
+)
+    dominant_period,
+    first_order,
+    middle,
+    savitzky_golay,
+    smoothing_width,
+    spread,
+)
 from upright.identification.unknowns import Unknown, base_values, shared_unknowns
 from upright.physics.plant import Plant, evaluate
 
@@ -119,10 +132,7 @@ def effort(values: Mapping[str, float], sample: Sample, plant: type[Plant]) -> A
         if late > 0:
             command = np.interp(np.arange(n) - late, np.arange(n), command)
         if lag > 0:
-            from scipy.signal import lfilter
-
-            keep = math.exp(-sample.dt / lag)
-            command = lfilter([0.0, 1 - keep], [1.0, -keep], command, zi=[command[0] * 1.0 * keep])[0]
+            command = first_order(command, math.exp(-sample.dt / lag))
         out[k] = values["actuator.gain"] * command - values["actuator.slope"] * sample.v[i]
     return out
 
@@ -179,14 +189,7 @@ def _same_smoothing(a: Array, width: int) -> Array:
     """Rows of `a` through the polynomials that smoothed the motion; the ends are not used."""
     from scipy.ndimage import correlate1d
 
-    return correlate1d(a, _coefficients(width - (1 - width % 2)), axis=1, mode="nearest")
-
-
-@cache
-def _coefficients(width: int) -> Array:
-    from scipy.signal import savgol_coeffs
-
-    return savgol_coeffs(width, min(4, width - 1), use="dot")
+    return correlate1d(a, middle(width - (1 - width % 2)), axis=1, mode="nearest")
 
 
 @dataclass(frozen=True, kw_only=True)
