@@ -25,13 +25,6 @@ from upright.identification.smoothing import (
     smoothing_width,
     spread,
 )
-    dominant_period,
-    first_order,
-    middle,
-    savitzky_golay,
-    smoothing_width,
-    spread,
-)
 from upright.identification.unknowns import Unknown, base_values, shared_unknowns
 from upright.physics.plant import Plant, evaluate
 
