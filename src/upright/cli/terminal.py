@@ -108,6 +108,7 @@ def print_scores(runs: Any) -> None:
     scores: list[tuple[str, RunScore]] = sorted(runs.items(), key=lambda item: item[1].role != "fit")
     for label, score in scores:
         over = "free run" if score.horizon is None else f"restarted every {score.horizon:g} s"
+        over += f", from {score.score_from:g} s on" if score.score_from > 0 else ""
         role = "fitted" if score.role == "fit" else "predicted"
         for name, percent in score.fit_percent.items():
             table.add_row(_plain(label), role, name, f"{percent:.2f}", over)

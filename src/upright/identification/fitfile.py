@@ -77,6 +77,7 @@ def as_json(fit: Fit, study: Study) -> dict[str, Any]:
                 "role": score.role,
                 "fit_percent": {n: _finite(v) for n, v in score.fit_percent.items()},
                 "horizon": score.horizon,
+                "score_from": score.score_from,
             }
             for label, score in fit.runs.items()
         },

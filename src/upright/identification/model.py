@@ -149,7 +149,10 @@ class Estimate:
 
 @dataclass(frozen=True, kw_only=True)
 class RunScore:
-    """How well one run is explained: fit percent per signal, over which horizon, and the simulated signals."""
+    """How well one run is explained: fit percent per signal, over which horizon, and the simulated signals.
+
+    Scores count from `score_from` seconds after the first sample on.
+    """
 
     role: str
     fit_percent: Mapping[str, float]
@@ -158,6 +161,7 @@ class RunScore:
     y: Array
     simulated: Array
     measured: tuple[str, ...]
+    score_from: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)

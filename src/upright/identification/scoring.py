@@ -49,7 +49,7 @@ def score(problem: Problem, index: int, x: Array) -> RunScore:
     percents = {run.measured[k]: fit_percent(measured[skip:, k], simulated[skip:, k]) for k in free}
     return RunScore(
         role=run.role, fit_percent=percents, horizon=run.horizon, t=t, y=measured, simulated=simulated,
-        measured=run.measured,
+        measured=run.measured, score_from=run.score_from,
     )  # fmt: skip
 
 

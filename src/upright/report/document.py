@@ -141,6 +141,7 @@ def run_pictures(fit: Fit, prefix: str) -> list[Picture]:
     for i, (label, score) in enumerate(runs):
         what = "fitted" if score.role == "fit" else "predicted, not fitted"
         how = "" if score.horizon is None else f", restarted from the measured state every {score.horizon:g} s"
+        how += f", scored from {score.score_from:g} s on" if score.score_from > 0 else ""
         fits = ", ".join(f"{plain(n)} {percent(v)}" for n, v in score.fit_percent.items())
         pictures.append(
             picture(

@@ -76,7 +76,7 @@ def fit_figure(
         *panels[0].get_legend_handles_labels(),
         loc="lower left",
         bbox_to_anchor=(0.85 / width, 0.0),
-        ncols=2,
+        ncols=3,
         borderpad=0,
         borderaxespad=0.1,
     )
@@ -101,6 +101,9 @@ def _signal(upper: Axes, lower: Axes, score: RunScore, j: int, unit: str, bucket
     lower.set_ylabel("residual", fontsize=8)
     lower.yaxis.set_major_locator(MaxNLocator(nbins=3, symmetric=True))
     lower.yaxis.set_major_formatter(FuncFormatter(lambda value, _: number(float(f"{value:.3g}"), 1)))
+    if score.score_from > 0:
+        for panel, label in ((upper, "not scored"), (lower, None)):
+            panel.axvspan(t[0], t[0] + score.score_from, color=GREY, alpha=0.25, linewidth=0, label=label)
     for panel, values in ((upper, np.concatenate([y, model])), (lower, left)):
         _limits(panel, values)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from markupsafe import Markup
 
-from upright.identification.model import Estimate, Fit, Parameter
+from upright.identification.model import Estimate, Fit, Parameter, RunScore
 from upright.report.mathml import symbol
 from upright.report.symbols import figures, measured, number, percent, plain, unit
 
@@ -96,11 +96,17 @@ def score_rows(fit: Fit) -> list[ScoreRow]:
             role="fitted" if score.role == "fit" else "predicted",
             signal=plain(name),
             fit=percent(value),
-            horizon="from the first sample" if score.horizon is None else f"restarted every {score.horizon:g} s",
+            horizon=_over(score),
         )
         for label, score in runs
         for name, value in score.fit_percent.items()
     ]
+
+
+def _over(score: RunScore) -> str:
+    """What of the run was compared, and how it was simulated."""
+    over = "from the first sample" if score.horizon is None else f"restarted every {score.horizon:g} s"
+    return f"{over}; scored from {score.score_from:g} s on" if score.score_from > 0 else over
 
 
 def provenance_rows(provenance: Mapping[str, object], above: str = "") -> list[tuple[str, str]]:
