@@ -1,1 +1,55 @@
-"""What its parameters are: studies of logs, fits of a plant to them, and how sure that is."""
+"""What its parameters are: studies of logs, fits of a plant to them, and how sure that is. ::
+
+    study = load_study("study.toml")
+    fit = identify(study.rig, study.runs)
+    print(fit.verdict, fit.estimates["J_p"].interval)
+    ahead = predict(fit, study.rig, other.runs)
+
+The names are fetched when they are first used, so that reading a study does not wait for the solver.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from upright.identification.estimate import METHODS, fit_percent, identify, predict
+    from upright.identification.lmfit_border import to_lmfit
+    from upright.identification.model import Estimate, Feedback, Fit, Parameter, Rig, Run, RunScore
+    from upright.identification.study import Study, load_study
+
+__all__ = [
+    "METHODS",
+    "Estimate",
+    "Feedback",
+    "Fit",
+    "Parameter",
+    "Rig",
+    "Run",
+    "RunScore",
+    "Study",
+    "fit_percent",
+    "identify",
+    "load_study",
+    "predict",
+    "to_lmfit",
+]
+
+_HOMES = {
+    "estimate": ("METHODS", "fit_percent", "identify", "predict"),
+    "lmfit_border": ("to_lmfit",),
+    "model": ("Estimate", "Feedback", "Fit", "Parameter", "Rig", "Run", "RunScore"),
+    "study": ("Study", "load_study"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    for home, names in _HOMES.items():
+        if name in names:
+            return getattr(importlib.import_module(f"{__name__}.{home}"), name)
+    raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

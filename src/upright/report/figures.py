@@ -77,6 +77,7 @@ def fit_figure(
         loc="lower left",
         bbox_to_anchor=(0.85 / width, 0.0),
         ncols=3,
+        columnspacing=1.0,
         borderpad=0,
         borderaxespad=0.1,
     )
