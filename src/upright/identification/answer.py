@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +47,8 @@ def answer(
     sight = look(problem, x, spread)
     blind = hidden(sight)
     estimates, per_run = _estimates(problem, x, spread, blind, log, interrupted=found.interrupted)
+    for name, value in log.rivals.items():
+        estimates[name] = _widened(estimates[name], value)
     for name in left_out:
         estimates[name] = Estimate(
             value=0.0, stderr=0.0, interval=(0.0, 0.0), unit=asked.parameters[name].unit, status="left out"
@@ -137,6 +140,12 @@ def _estimates(
             value=plain.value, stderr=plain.stderr, interval=interval, unit=plain.unit, status=status
         )
     return shared, own  # type: ignore[return-value]
+
+
+def _widened(e: Estimate, value: float) -> Estimate:
+    """An estimate whose interval holds `value` too."""
+    low, high = min(e.interval[0], value), max(e.interval[1], value)
+    return replace(e, interval=(low, high), status="weak" if e.status == "firm" else e.status)
 
 
 def _estimate(problem: Problem, u: Unknown, x: float, value: float, sigma: float, q: float) -> Estimate:

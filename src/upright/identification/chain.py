@@ -38,6 +38,7 @@ class Log:
 
     `best` holds the problem last worked on and where in it the search stood.
 
+    `rivals` are values of another model that the data do not refuse.
     `doubts` says which conventions look wrong; asked only when a fit is poor, since no search mends a reversed sign.
     """
 
@@ -45,6 +46,7 @@ class Log:
     history: list[tuple[str, float, int]] = field(default_factory=list[tuple[str, float, int]])
     best: tuple[Problem, Array] | None = None
     warnings: list[str] = field(default_factory=list[str])
+    rivals: dict[str, float] = field(default_factory=dict[str, float])
     doubts: Callable[[], Sequence[str]] = tuple
 
     def keep(self, problem: Problem) -> Callable[[Array], None]:

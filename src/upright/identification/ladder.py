@@ -25,6 +25,9 @@ Array = NDArray[np.float64]
 SEEN = 2 / 3
 """Share of every run that the rungs are fitted on; the rest judges them."""
 
+BETTER = 0.97
+"""A richer model that leaves less than this share of the cost has something to say although it predicts worse."""
+
 LEAST_RUN = 200
 """Runs with fewer samples are not cut."""
 
@@ -87,6 +90,7 @@ def choose(rig: Rig, runs: Sequence[Run], log: Log) -> tuple[Rig, list[Array], t
     seen = [first_part(run) for run in runs]
     best = (math.inf, 0, problem.start, "")
     costs: list[float] = []
+    tried: list[dict[str, float]] = []
     values: dict[str, float] = {}
     own: dict[tuple[int, str], float] = {}
     for k, rung in enumerate(ladder):
@@ -110,6 +114,7 @@ def choose(rig: Rig, runs: Sequence[Run], log: Log) -> tuple[Rig, list[Array], t
             )
         v = part.value(found.x)
         values = {u.name: float(v[i]) for i, u in enumerate(part.unknowns) if u.run == SHARED}
+        tried.append(values)
         own = {(u.run, u.name): float(v[i]) for i, u in enumerate(part.unknowns) if u.run != SHARED}
         missed = _held_out(rung.rig, runs, part, found.x)
         log.history.append((f"{rung.name}: held-out cost", missed, part.evaluations))
@@ -118,7 +123,30 @@ def choose(rig: Rig, runs: Sequence[Run], log: Log) -> tuple[Rig, list[Array], t
             best = (missed, k, _carry(whole, values, own, rig, set()), rung.name)
     chosen = ladder[best[1]]
     out = tuple(n for rung in ladder[best[1] + 1 :] for n in rung.adds)
+    _compare(chosen, out, tried, costs, best[1], log)
     return chosen.rig, [best[2]], out
+
+
+def _compare(
+    chosen: Rung, out: tuple[str, ...], tried: list[dict[str, float]], costs: list[float], k: int, log: Log
+) -> None:
+    """Note what a richer model would have said otherwise, where it explains its part of the runs better.
+
+    That the rest is predicted worse then means that something else is missing, not that the richer model is wrong.
+    """
+    rival = min(range(k, len(costs)), key=lambda i: costs[i])
+    if costs[rival] > BETTER * costs[k]:
+        return
+    for n in chosen.rig.estimated:
+        a, b = tried[k].get(n, 0.0), tried[rival].get(n, 0.0)
+        if abs(a - b) > 0.5 * max(abs(a), abs(b)):
+            log.rivals[n] = b
+    if log.rivals:
+        log.warnings.append(
+            f"The first part of the runs is explained better with {', '.join(out)} (cost {costs[rival]:.3g} against "
+            f"{costs[k]:.3g}), the rest is predicted better without, so something else is missing from the model; "
+            f"until it is found, the intervals of {', '.join(log.rivals)} hold what both models say."
+        )
 
 
 def _carry(

@@ -137,7 +137,8 @@ class Rig:
 class Estimate:
     """What the data say about one number.
 
-    `status` is "firm", "weak" (interval wider than the value), "unseen" (the data cannot tell), "at bound" or "known".
+    `status` is "firm", "weak" (interval wider than the value, or two models differ), "unseen" (the data cannot tell),
+    "at bound" or "known".
     """
 
     value: float

@@ -76,7 +76,7 @@ def judge(
     said += unseen
     weak = [n for n, e in estimates.items() if e.status == "weak"]
     if weak:
-        said.append(f"Weakly seen, with an interval wider than the value: {', '.join(weak)}.")
+        said.append(f"Weakly seen, with a wide interval: {', '.join(weak)}.")
     bound = [n for n, e in estimates.items() if e.status == "at bound"]
     if bound:
         said.append(f"At a bound: {', '.join(bound)}; the data would go further or need it less.")

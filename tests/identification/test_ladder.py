@@ -1,0 +1,46 @@
+"""Friction that is really there is kept when the model is right, and not denied firmly when it is wrong."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.identification.twins import noisy, rig
+from upright.identification.estimate import identify
+from upright.identification.model import Fit, Run
+from upright.physics import Furuta
+from upright.simulation import simulate
+
+# the paper's pendulum on a spring, a quarter of a degree out of level
+TRUTH = {
+    "m_p": 0.1356, "r": 0.1485, "l_cg": 0.1832, "J_p": 6.02e-4, "J_a": 2e-5, "J_d": 7.2e-3, "k_psi": 0.04,
+    "b_1": 5.4e-4, "b_2": 2.25e-5, "b_1c": 1.4e-3, "b_2c": 2.4e-4, "tilt_y": 4.4e-3,
+}  # fmt: skip
+FRICTION = ("b_1", "b_2", "b_1c", "b_2c")
+
+
+def fitted(**known: float) -> Fit:
+    n, dt = 1700, 0.007
+    x = simulate(Furuta(**TRUTH), {}, [0.0, 0.0, np.pi / 2, 0.0], None, dt, samples=n, substeps=2)
+    run = Run(
+        label="release", role="fit", t=np.arange(n) * dt, u=np.zeros((n, 1)), y=x[:, [0, 2], 0],
+        measured=("psi", "theta"), unknown=("initial", "offset"), initial={"psi_dot": 0.0, "theta_dot": 0.0},
+    )  # fmt: skip
+    guesses = {name: 0.7 * TRUTH[name] for name in ("m_p", "J_p", *FRICTION)}
+    return identify(rig(Furuta, TRUTH | known, guesses), [noisy(run, 1e-4, seed=1)])
+
+
+def test_the_right_model_keeps_both_frictions() -> None:
+    fit = fitted()
+    for name in FRICTION:
+        assert fit.estimates[name].status == "firm"
+        assert fit.estimates[name].value == pytest.approx(TRUTH[name], rel=0.05)
+
+
+def test_a_wrong_model_is_not_firm_about_friction_without_dry_friction() -> None:
+    fit = fitted(tilt_y=0.0)
+    assert fit.estimates["b_1c"].status == "left out"  # without it the rest of the run is predicted better
+    low, high = fit.estimates["b_1"].interval
+    assert low <= TRUTH["b_1"] <= high
+    assert fit.estimates["b_1"].status == "weak"
+    assert any("something else is missing" in w and "b_1" in w for w in fit.warnings)
