@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from upright.identification.descent import descend
 from upright.identification.model import Feedback, Rig, Run
-from upright.identification.normal import Normal
+from upright.identification.normal import Normal, finite
 from upright.identification.smoothing import (
     dominant_period,
     first_order,
@@ -212,7 +212,7 @@ def regress(rig: Rig, samples: list[Sample], start: Mapping[str, float] | None =
 
     def normal(x: Array) -> Normal:
         r = residual(x)
-        if not np.isfinite(r.sum()):
+        if not finite(r):
             return Normal(math.inf, np.zeros((size, size)), np.zeros(size))
         J = np.empty((r.size, size))
         for j, u in enumerate(unknowns):
@@ -220,7 +220,7 @@ def regress(rig: Rig, samples: list[Sample], start: Mapping[str, float] | None =
             step = 1e-5 * (1.0 if u.log else max(abs(float(x[j])), u.scale))
             z[j] += step
             J[:, j] = (residual(z) - r) / step
-        if not np.isfinite(J.sum()):
+        if not finite(J):
             return Normal(math.inf, np.zeros((size, size)), np.zeros(size))
         # a faint pull towards the start keeps numbers that the accelerations cannot see where they were
         pull = np.array([1e-3 * math.sqrt(r.size) / u.scale for u in unknowns])
@@ -231,7 +231,7 @@ def regress(rig: Rig, samples: list[Sample], start: Mapping[str, float] | None =
     lower, upper = (np.array([u.bounds[k] for u in unknowns]) for k in (0, 1))
     found = descend(normal, x0, lower, upper, tolerance=1e-5, limit=40)
     r = residual(found.x)
-    return Agreement(values=values(found.x), unexplained=float(np.mean(r * r)) if np.isfinite(r.sum()) else math.inf)
+    return Agreement(values=values(found.x), unexplained=float(np.mean(r * r)) if finite(r) else math.inf)
 
 
 def _inside(u: Unknown, value: float) -> float:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from upright.identification.chain import Log, better, closed_form_starts, explain, placed
 from upright.identification.descent import grow
 from upright.identification.model import Rig, Run
+from upright.identification.normal import finite
 from upright.identification.pose import pose
 from upright.identification.problem import Problem
 from upright.identification.unknowns import SHARED
@@ -175,6 +176,6 @@ def _held_out(rig: Rig, runs: Sequence[Run], part: Problem, x: Array) -> float:
         else:
             e = e[0].reshape(-1, len(track.columns))[int(SEEN * track.length) :]
         # one run that slips a cycle should not outvote all others
-        total += float(np.sum(np.minimum(e * e, 4.0))) if np.isfinite(e.sum()) else 4.0 * e.size
+        total += float(np.sum(np.minimum(e * e, 4.0))) if finite(e) else 4.0 * e.size
         samples += e.size
     return total / max(samples, 1)

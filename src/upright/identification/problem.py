@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.model import Rig
-from upright.identification.normal import Normal, Rows, products, squares
+from upright.identification.normal import Normal, Rows, finite, products, squares
 from upright.identification.restarts import PERTURBATION, Restart, settle
 from upright.identification.tracks import Track, motions, outputs, simulator
 from upright.identification.unknowns import SHARED, Unknown
@@ -145,7 +145,7 @@ class Problem:
         target = track.targets(n)
         skip = 0 if track.windowed else min(track.first, n - 1)
         residual = (y[skip:, :, :, 0] - target[skip:]) * track.weights
-        if not np.isfinite(residual.sum()):
+        if not finite(residual):
             return None
         with np.errstate(over="ignore", invalid="ignore"):  # a lane that ran away makes the cost infinite
             if central:
@@ -212,7 +212,7 @@ class Problem:
         r, J = self.prior_rows(x)
         cost += float(r @ r)
         normal = Normal(cost, A + J.T @ J, g + J.T @ r)
-        return normal if np.isfinite(normal.matrix.sum()) else Normal(math.inf, A, g)
+        return normal if finite(normal.matrix) else Normal(math.inf, A, g)
 
     def _squares(self, index: int, x: Array, horizon: float, sought: NDArray[np.int64]) -> tuple[Array, Array, float]:
         """``J'J``, ``J'r`` and ``r'r`` of a free run, in the lanes as they come: the same numbers as from `rows`."""
