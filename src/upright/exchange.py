@@ -185,7 +185,7 @@ def from_mat(path: PathLike) -> Record:
         raise BadInput(
             f"'{path}' lacks the variable {error}; for other MATLAB logs use upright.readers.read."
         ) from None
-    except (ValueError, TypeError, OSError, NotImplementedError) as error:
+    except (ValueError, TypeError, OSError, RuntimeError) as error:  # scipy's word on v7.3 files is a RuntimeError
         if isinstance(error, BadInput):
             raise
         raise BadInput(f"'{path}' must be a MATLAB file written by upright, but cannot be read: {error}.") from None

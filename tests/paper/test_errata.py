@@ -65,6 +65,13 @@ def test_erratum_2_arm_friction_reaches_the_pendulum_over_the_radius(at, A, sign
     assert all_zero(A_true - corrected(A, sign))
 
 
+@pytest.mark.parametrize(("at", "B"), [("hanging", printed.B_1), ("inverted", printed.B_2)])
+def test_erratum_1_reaches_the_input_and_nothing_else_of_it_is_wrong(at, B):
+    _, B_true = derived(at)
+    assert not all_zero(B_true - B())  # as printed, with the plus in D_2
+    assert all_zero(B_true - B(D_2))
+
+
 def test_erratum_2_units():
     """[rad/s^2 per rad/s] must not change when lengths are told in another unit."""
     unit = sp.Symbol("unit", positive=True)

@@ -20,7 +20,6 @@ MOTOR = find("qube_motor.py:QubeMotor", EXAMPLES)(
 )
 PLANTS = {name: specimen.plant for name, specimen in SPECIMENS.items()} | {"qube motor": MOTOR}
 CASES = [(name, at) for name, plant in PLANTS.items() for at in plant.equilibria]
-QUICK_IN_SYMBOLS = [name for name in PLANTS if not name.endswith(("level", "-3", "-4"))]
 
 
 @pytest.fixture

@@ -109,5 +109,6 @@ for _kind in _UNITS:
     for _bodies in (1, 2, 3):
         _BUILT_IN[_kind, _bodies] = _chain(_bodies, _kind)
 
+# under the names their classes carry, so that a plant can be pickled and sent to another process
 Rectilinear1, Rectilinear2, Rectilinear3 = (_BUILT_IN["rectilinear", n] for n in (1, 2, 3))
 Torsional1, Torsional2, Torsional3 = (_BUILT_IN["torsional", n] for n in (1, 2, 3))

@@ -91,11 +91,6 @@ class Inspection:
                 return column
         raise BadInput(f"The log has no column '{name}': {nearest(name, [c.name for c in self.columns])}")
 
-    @property
-    def suspects(self) -> tuple[str, ...]:
-        """Names of columns that are constant or lie."""
-        return tuple(c.name for c in self.columns if c.constant or c.lies)
-
 
 def inspect_record(record: Record) -> Inspection:
     """Inspection of a record."""
