@@ -14,6 +14,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from upright.identification.curve import CurveFit, fit_curve
     from upright.identification.estimate import METHODS, fit_percent, identify, predict
     from upright.identification.lmfit_border import to_lmfit
     from upright.identification.model import Estimate, Feedback, Fit, Parameter, Rig, Run, RunScore
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "METHODS",
+    "CurveFit",
     "Estimate",
     "Feedback",
     "Fit",
@@ -29,6 +31,7 @@ __all__ = [
     "Run",
     "RunScore",
     "Study",
+    "fit_curve",
     "fit_percent",
     "identify",
     "load_study",
@@ -37,6 +40,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "curve": ("CurveFit", "fit_curve"),
     "estimate": ("METHODS", "fit_percent", "identify", "predict"),
     "lmfit_border": ("to_lmfit",),
     "model": ("Estimate", "Feedback", "Fit", "Parameter", "Rig", "Run", "RunScore"),
