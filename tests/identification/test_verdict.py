@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, shaken, swing
-from upright.identification.estimate import identify
+from upright.identification.estimate import identify, predict
 from upright.physics import Furuta, Pendulum
 
 
@@ -89,3 +89,26 @@ def test_a_column_that_stands_still_has_no_doubtful_convention() -> None:
     fit = identify(rig(Pendulum, PENDULUM, {"b_2": 1e-3, "J_p": 3e-3}), [run])
     assert not fit.trusted
     assert "conventions" not in fit.verdict
+
+
+def test_a_speed_that_is_held_scores_what_the_closed_form_says() -> None:
+    """A swing A sin(wt): held from its zero crossings for h, it misses A (wt - sin wt)."""
+    w, dt = 2 * math.pi, 1e-3
+    t = np.arange(1001) * dt
+    run = replace(swing(seconds=1.0, dt=dt), t=t, u=np.zeros((t.size, 1)), y=0.01 * np.sin(w * t)[:, None], horizon=0.5)
+    ahead = np.tile(dt * np.arange(1, 501), 2)
+    y = np.sin(w * np.arange(1, 1001) * dt)
+    missed = np.linalg.norm(w * ahead - np.sin(w * ahead)) / np.linalg.norm(y - y.mean())
+    score = predict({}, rig(Pendulum, PENDULUM, {}), [run])["swing"]
+    # the restart's speed is smoothed over a polynomial of order 4
+    assert score.naive["theta"] == pytest.approx(100 * (1 - missed), abs=0.02 * 100 * missed)
+    free = predict({}, rig(Pendulum, PENDULUM, {}), [replace(run, horizon=None)])["swing"]
+    assert free.naive == {}
+
+
+@pytest.mark.parametrize(("horizon", "blank"), [(0.03, True), (1.0, False)])
+def test_a_horizon_that_a_held_speed_masters_is_said_to_tell_nothing(horizon: float, blank: bool) -> None:
+    run = replace(noisy(swing(), 1e-4, seed=6), horizon=horizon)
+    fit = identify(rig(Pendulum, PENDULUM, {"J_p": 3e-3, "b_2": 1e-3}), [run])
+    assert ("holding the measured speed" in fit.verdict) is blank
+    assert not (blank and fit.trusted)

@@ -103,15 +103,17 @@ def print_scores(runs: Any) -> None:
         pad_edge=False,
         header_style="bold",
     )
-    for heading in ("run", "", "signal", "fit %", "compared"):
-        table.add_column(heading, justify="right" if heading == "fit %" else "left")
     scores: list[tuple[str, RunScore]] = sorted(runs.items(), key=lambda item: item[1].role != "fit")
+    windowed = any(score.naive for _, score in scores)
+    for heading in ("run", "", "signal", "fit %", *(["held speed %"] if windowed else []), "compared"):
+        table.add_column(heading, justify="right" if heading.endswith("%") else "left")
     for label, score in scores:
         over = "free run" if score.horizon is None else f"restarted every {score.horizon:g} s"
         over += f", from {score.score_from:g} s on" if score.score_from > 0 else ""
         role = "fitted" if score.role == "fit" else "predicted"
         for name, percent in score.fit_percent.items():
-            table.add_row(_plain(label), role, name, f"{percent:.2f}", over)
+            naive = [f"{score.naive[name]:.2f}" if name in score.naive else ""] if windowed else []
+            table.add_row(_plain(label), role, name, f"{percent:.2f}", *naive, over)
     console().print(table)
 
 

@@ -78,6 +78,7 @@ def as_json(fit: Fit, study: Study) -> dict[str, Any]:
                 "fit_percent": {n: _finite(v) for n, v in score.fit_percent.items()},
                 "horizon": score.horizon,
                 "score_from": score.score_from,
+                "naive": {n: _finite(v) for n, v in score.naive.items()},
             }
             for label, score in fit.runs.items()
         },

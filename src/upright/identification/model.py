@@ -153,6 +153,8 @@ class RunScore:
     """How well one run is explained: fit percent per signal, over which horizon, and the simulated signals.
 
     Scores count from `score_from` seconds after the first sample on.
+    `naive` is the fit percent that holding the measured speed reaches from the same restarts, empty for a free run: a
+    horizon at which the model is hardly better tells nothing about the model.
     """
 
     role: str
@@ -163,6 +165,7 @@ class RunScore:
     simulated: Array
     measured: tuple[str, ...]
     score_from: float = 0.0
+    naive: Mapping[str, float] = field(default_factory=dict[str, float])
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,6 +13,7 @@ from upright.identification.descent import Report, grow
 from upright.identification.model import Fit, Rig, Run, RunScore
 from upright.identification.pose import pose
 from upright.identification.problem import Problem
+from upright.identification.tracks import Track
 
 Array = NDArray[np.float64]
 
@@ -47,10 +48,22 @@ def score(problem: Problem, index: int, x: Array) -> RunScore:
         t = run.t[0] + track.dt * rows.T.reshape(-1)
     skip = int(np.searchsorted(t, run.t[0] + run.score_from - 1e-9)) if run.score_from > 0 else 0
     percents = {run.measured[k]: fit_percent(measured[skip:, k], simulated[skip:, k]) for k in free}
+    naive = held_speed(track) if track.windowed else np.zeros((0, len(run.measured)))
     return RunScore(
         role=run.role, fit_percent=percents, horizon=run.horizon, t=t, y=measured, simulated=simulated,
         measured=run.measured, score_from=run.score_from,
+        naive={run.measured[k]: fit_percent(measured[skip:, k], naive[skip:, k]) for k in free if len(naive)},
     )  # fmt: skip
+
+
+def held_speed(track: Track) -> Array:
+    """Outputs (samples, outputs) of windows laid end to end, if every measured speed lasted: a prediction by no model.
+
+    It starts from the same measured states as the model does.
+    """
+    q, v = (track.x0[:, np.add(track.columns, k)] for k in (0, 1))
+    ahead = track.dt * np.arange(1, track.length)
+    return (q[:, None] + v[:, None] * ahead[:, None]).reshape(-1, len(track.columns))
 
 
 def with_values(rig: Rig, values: Mapping[str, float]) -> Rig:

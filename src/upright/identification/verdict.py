@@ -13,6 +13,10 @@ DROP = 15.0
 """Percent by which a predicted signal may fall behind the worst fitted one of the same name."""
 
 
+MARGIN = 2.0
+"""Percent by which a model has to beat held speeds for its horizon to tell anything; one step ahead fits anything."""
+
+
 def judge(
     *,
     runs: Mapping[str, RunScore],
@@ -53,6 +57,9 @@ def judge(
     worse = _worse(runs)
     if worse:
         against.append(f"runs that were not fitted are predicted much worse than fitted ones ({', '.join(worse)})")
+    blank = uninformative(runs)
+    if blank and len(blank) == sum(len(s.fit_percent) for s in runs.values()):
+        against.append("no run is predicted far enough ahead to test the model")
     if unseen:
         against.append("the data cannot see everything that was asked")
     asked = {n: e for n, e in estimates.items() if e.status in ("firm", "weak", "at bound", "unseen")}
@@ -73,6 +80,12 @@ def judge(
     ahead = _range(runs, "predict")
     if ahead:
         said.append(f"It predicts {ahead} of runs it has not seen.")
+    if blank:
+        where = ", ".join(f"{label} {signal} at {runs[label].horizon:g} s" for label, signal in blank)
+        said.append(
+            f"Some horizons tell nothing, because holding the measured speed predicts as well to within {MARGIN:.0f} % "
+            f"({where}); predict further ahead."
+        )
     said += unseen
     weak = [n for n, e in estimates.items() if e.status == "weak"]
     if weak:
@@ -86,6 +99,19 @@ def judge(
             "the standard errors allow for it."
         )
     return " ".join(said), not against
+
+
+def uninformative(runs: Mapping[str, RunScore]) -> list[tuple[str, str]]:
+    """Runs and signals whose horizon is so short that a held speed predicts them as well as the model.
+
+    A model that explains nothing is no proof of a short horizon.
+    """
+    return [
+        (label, signal)
+        for label, s in runs.items()
+        for signal, percent in s.naive.items()
+        if percent >= GOOD and percent >= s.fit_percent[signal] - MARGIN
+    ]
 
 
 def _range(runs: Mapping[str, RunScore], role: str) -> str:

@@ -36,6 +36,7 @@ class ScoreRow:
     signal: str
     fit: str
     horizon: str
+    naive: str = ""
 
 
 def parameter_rows(fit: Fit) -> list[ParameterRow]:
@@ -97,6 +98,7 @@ def score_rows(fit: Fit) -> list[ScoreRow]:
             signal=plain(name),
             fit=percent(value),
             horizon=_over(score),
+            naive=percent(score.naive[name]) if name in score.naive else "",
         )
         for label, score in runs
         for name, value in score.fit_percent.items()
