@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from upright.identification.chain import Log, count
 from upright.identification.descent import Descent
 from upright.identification.model import Estimate, Fit, Rig, Run, RunScore
+from upright.identification.own import estimate, own_estimates, quantile
 from upright.identification.pose import pose
 from upright.identification.problem import Problem
 from upright.identification.profile import profile
 from upright.identification.scoring import predict, score
 from upright.identification.seeing import Sight, hidden, look, sentences
 from upright.identification.statistics import Spread, assess
-from upright.identification.unknowns import SHARED, Unknown
+from upright.identification.unknowns import SHARED
 from upright.identification.verdict import GOOD, judge
 
 Array = NDArray[np.float64]
@@ -46,7 +47,8 @@ def answer(
     spread = assess(problem, x)
     sight = look(problem, x, spread)
     blind = hidden(sight)
-    estimates, per_run = _estimates(problem, x, spread, blind, log, interrupted=found.interrupted)
+    estimates = _estimates(problem, x, spread, blind, log, interrupted=found.interrupted)
+    per_run, groups = own_estimates(problem, x, spread)
     for name, value in log.rivals.items():
         estimates[name] = _widened(estimates[name], value)
     for name in left_out:
@@ -56,7 +58,8 @@ def answer(
         warnings.append(f"{name} was left out: with it the held-out part of the runs is not predicted better.")
     estimates = {n: estimates[n] for n in [*asked.parameters] if n in estimates}
     told = [run for run in runs if run.role == "fit" or not found.interrupted]
-    scores = _scores(chosen, told, problem, x, {n: e.value for n, e in estimates.items()}, log)
+    known = {label: {n: e.value for n, e in group.items()} for label, group in groups.items()}
+    scores = _scores(chosen, told, problem, x, {n: e.value for n, e in estimates.items()}, known, log)
     if len(told) < len(runs):
         warnings.append("What was held out is not predicted, because the search was interrupted.")
     units = {n: p.unit for n, p in asked.parameters.items()}
@@ -73,11 +76,12 @@ def answer(
         memory=spread.memory,
         period=min(t.period for t in problem.tracks),
     )
-    places = [i for i, u in enumerate(problem.unknowns) if u.run == SHARED]
+    places = [i for i, u in enumerate(problem.unknowns) if u.runs == SHARED]
     return Fit(
         rig=asked,
         estimates=estimates,
         per_run=per_run,
+        groups=groups,
         runs=scores,
         verdict=verdict,
         trusted=trusted,
@@ -96,26 +100,17 @@ def answer(
     )
 
 
-def quantile(samples: float, unknowns: int) -> float:
-    """Student's 97.5 % point for as many independent scores as the residuals' memory leaves."""
-    from scipy.special import stdtrit
-
-    return float(stdtrit(max(samples - unknowns, 2.0), 0.975))
-
-
 def _estimates(
     problem: Problem, x: Array, spread: Spread, blind: set[str], log: Log, *, interrupted: bool
-) -> tuple[dict[str, Estimate], dict[str, dict[str, Estimate]]]:
+) -> dict[str, Estimate]:
     value = problem.value(x)
     q = quantile(spread.samples, x.size)
     shared: dict[str, Estimate] = {}
-    own: dict[str, dict[str, Estimate]] = {t.run.label: {} for t in problem.tracks}
     budget = 2.0e7  # residuals that profiles may cost altogether
     for i, u in enumerate(problem.unknowns):
-        plain = _estimate(problem, u, float(x[i]), float(value[i]), math.sqrt(max(spread.covariance[i, i], 0.0)), q)
-        if u.run != SHARED:
-            own[problem.tracks[u.run].run.label][u.name] = plain
+        if u.runs != SHARED:
             continue
+        plain = estimate(problem, u, float(value[i]), math.sqrt(max(spread.covariance[i, i], 0.0)), q)
         if u.name in blind:
             shared[u.name] = Estimate(
                 value=plain.value, stderr=math.inf, interval=(-math.inf, math.inf), unit=plain.unit, status="unseen"
@@ -139,7 +134,7 @@ def _estimates(
         shared[u.name] = Estimate(
             value=plain.value, stderr=plain.stderr, interval=interval, unit=plain.unit, status=status
         )
-    return shared, own  # type: ignore[return-value]
+    return shared
 
 
 def _widened(e: Estimate, value: float) -> Estimate:
@@ -148,36 +143,16 @@ def _widened(e: Estimate, value: float) -> Estimate:
     return replace(e, interval=(low, high), status="weak" if e.status == "firm" else e.status)
 
 
-def _estimate(problem: Problem, u: Unknown, x: float, value: float, sigma: float, q: float) -> Estimate:
-    if u.log:
-        interval = value * math.exp(-min(q * sigma, 700.0)), value * math.exp(min(q * sigma, 700.0))
-        stderr = value * sigma
-    else:
-        interval, stderr = (value - q * sigma, value + q * sigma), sigma
-    return Estimate(value=value, stderr=stderr, interval=interval, unit=_unit(problem.rig, u.name), status="firm")
-
-
-def _unit(rig: Rig, name: str) -> str:
-    if name in rig.parameters:
-        return rig.parameters[name].unit
-    kind, _, which = name.partition(".")
-    units = {c.name: c.unit for c in rig.plant.coordinates}
-    if kind in ("initial", "offset"):
-        return units.get(which) or f"{units.get(which.removesuffix('_dot'), '1')}/s"
-    if kind == "input_offset" and "actuator.offset" in rig.parameters:
-        return rig.parameters["actuator.offset"].unit
-    return "1"
-
-
 def _scores(
-    rig: Rig, runs: Sequence[Run], problem: Problem, x: Array, values: dict[str, float], log: Log
-) -> dict[str, RunScore]:
+    rig: Rig, runs: Sequence[Run], problem: Problem, x: Array, values: dict[str, float],
+    groups: Mapping[str, Mapping[str, float]], log: Log,
+) -> dict[str, RunScore]:  # fmt: skip
     fitted = [run for run in runs if run.role == "fit"]
     thinned = any(t.y.shape[0] < t.run.t.size for t in problem.tracks)
     whole = pose(rig, fitted, thin=False) if thinned else problem
     found = {run.label: score(whole, i, x) for i, run in enumerate(fitted)}
     ahead = [run for run in runs if run.role != "fit"]
-    found |= predict(values, rig, ahead, progress=log.report)
+    found |= predict(values, rig, ahead, groups=groups, progress=log.report)
     return {run.label: found[run.label] for run in runs}
 
 

@@ -80,7 +80,7 @@ def placed(problem: Problem, values: Mapping[str, float], x: Array | None = None
     """Coordinates with shared numbers from `values`, the rest from `x` or the start."""
     x = problem.start if x is None else x.copy()
     for i, u in enumerate(problem.unknowns):
-        if u.run == SHARED and u.name in values:
+        if u.runs == SHARED and u.name in values:
             v = values[u.name]
             if not u.log or v > 0:
                 x[i] = u.inside(v)
@@ -89,8 +89,8 @@ def placed(problem: Problem, values: Mapping[str, float], x: Array | None = None
 
 def carried(part: Problem, x: Array, whole: Problem) -> Array:
     """Coordinates of one problem put into another on the same runs; what the first does not seek keeps its start."""
-    known = {(u.run, u.name): float(z) for u, z in zip(part.unknowns, x, strict=True)}
-    start = [known.get((u.run, u.name), float(z)) for u, z in zip(whole.unknowns, whole.start, strict=True)]
+    known = {(u.runs, u.name): float(z) for u, z in zip(part.unknowns, x, strict=True)}
+    start = [known.get((u.runs, u.name), float(z)) for u, z in zip(whole.unknowns, whole.start, strict=True)]
     return np.clip(np.array(start), whole.lower, whole.upper)
 
 

@@ -134,7 +134,7 @@ def _weigh_priors(problem: Problem, found: Descent) -> Descent:
         pull = pseudo_inverse(found.normal.matrix) @ (J.T @ r)
         variance = found.normal.cost / count(problem)
         error = np.sqrt(np.maximum(np.diag(pseudo_inverse(found.normal.matrix)) * variance, 0.0))
-        if np.all(np.abs(pull) <= 0.02 * error) and not any(u.prior and u.run == SHARED for u in problem.unknowns):
+        if np.all(np.abs(pull) <= 0.02 * error) and not any(u.prior and u.runs == SHARED for u in problem.unknowns):
             break
         noise = max(loudness(problem, found.x), 1e-9)
         if abs(math.log(noise / problem.noise)) < 0.2:

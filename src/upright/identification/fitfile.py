@@ -10,7 +10,7 @@ import json
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -23,13 +23,14 @@ FORMAT = 1
 
 @dataclass(frozen=True, kw_only=True)
 class FittedModel:
-    """What `upright predict` takes from a `fit.json`: the plant's name and every parameter [SI]."""
+    """What `upright predict` takes from a `fit.json`: the plant's name, every parameter [SI], and what groups share."""
 
     plant: str
     values: Mapping[str, float]
     substeps: int
     verdict: str
     trusted: bool
+    groups: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
 
 
 def write_fit(fit: Fit, study: Study, path: Path) -> dict[str, Any]:
@@ -72,6 +73,7 @@ def as_json(fit: Fit, study: Study) -> dict[str, Any]:
         "interrupted": fit.interrupted,
         "parameters": {n: {**_estimate(e), "meaning": meanings.get(n, "")} for n, e in estimates.items()},
         "per_run": {label: {n: _estimate(e) for n, e in own.items()} for label, own in fit.per_run.items()},
+        "groups": {label: {n: _estimate(e) for n, e in own.items()} for label, own in fit.groups.items()},
         "runs": {
             label: {
                 "role": score.role,
@@ -79,6 +81,7 @@ def as_json(fit: Fit, study: Study) -> dict[str, Any]:
                 "horizon": score.horizon,
                 "score_from": score.score_from,
                 "naive": {n: _finite(v) for n, v in score.naive.items()},
+                "adapted": list(score.adapted),
             }
             for label, score in fit.runs.items()
         },
@@ -151,4 +154,13 @@ def read_fit(path: Path) -> FittedModel:
         substeps=int(content.get("substeps", 1)),
         verdict=str(content["verdict"]),
         trusted=bool(content.get("trusted", False)),
+        groups=_groups(path, content.get("groups", {})),
     )
+
+
+def _groups(path: Path, content: Any) -> dict[str, dict[str, float]]:
+    """Values by group and name."""
+    try:
+        return {label: {n: float(e["value"]) for n, e in group.items()} for label, group in content.items()}
+    except (AttributeError, KeyError, TypeError, ValueError):
+        raise BadInput(f"{path}: groups must hold estimates by group and name; identify again") from None

@@ -93,7 +93,7 @@ def choose(rig: Rig, runs: Sequence[Run], log: Log) -> tuple[Rig, list[Array], t
     costs: list[float] = []
     tried: list[dict[str, float]] = []
     values: dict[str, float] = {}
-    own: dict[tuple[int, str], float] = {}
+    own: dict[tuple[tuple[int, ...], str], float] = {}
     for k, rung in enumerate(ladder):
         part = pose(rung.rig, seen)
         starts = [placed(part, s) for s in closed_form_starts(rung.rig, seen)]
@@ -114,9 +114,9 @@ def choose(rig: Rig, runs: Sequence[Run], log: Log) -> tuple[Rig, list[Array], t
                 "stalled; try better guesses."
             )
         v = part.value(found.x)
-        values = {u.name: float(v[i]) for i, u in enumerate(part.unknowns) if u.run == SHARED}
+        values = {u.name: float(v[i]) for i, u in enumerate(part.unknowns) if u.runs == SHARED}
         tried.append(values)
-        own = {(u.run, u.name): float(v[i]) for i, u in enumerate(part.unknowns) if u.run != SHARED}
+        own = {(u.runs, u.name): float(v[i]) for i, u in enumerate(part.unknowns) if u.runs != SHARED}
         missed = _held_out(rung.rig, runs, part, found.x)
         log.history.append((f"{rung.name}: held-out cost", missed, part.evaluations))
         if missed < best[0]:
@@ -151,7 +151,7 @@ def _compare(
 
 
 def _carry(
-    problem: Problem, values: dict[str, float], own: dict[tuple[int, str], float], rig: Rig, new: set[str]
+    problem: Problem, values: dict[str, float], own: dict[tuple[tuple[int, ...], str], float], rig: Rig, new: set[str]
 ) -> Array:
     """Coordinates that continue a poorer fit; terms that are new begin at a tenth of their guess, or at zero."""
     start = dict(values)
@@ -159,8 +159,8 @@ def _carry(
         start[n] = 0.1 * rig.parameters[n].value if n in rig.parameters else 0.0
     x = placed(problem, start)
     for i, u in enumerate(problem.unknowns):
-        if (u.run, u.name) in own:
-            x[i] = u.inside(own[u.run, u.name])
+        if (u.runs, u.name) in own:
+            x[i] = u.inside(own[u.runs, u.name])
     return x
 
 

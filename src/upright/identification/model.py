@@ -29,7 +29,8 @@ ACTUATOR = {
 
 PER_RUN = ("initial", "offset", "gain", "friction", "input_offset")
 """What may differ from run to run: initial state, sensor offsets, actuator gain (a factor), dry and viscous friction
-of every joint (one common factor), a constant added to the command. "offset.theta" means the offset of one sensor."""
+of every joint (one common factor), a constant added to the command. "offset.theta" means the offset of one sensor,
+"scale.theta" its gain (a factor)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,6 +86,12 @@ class Run:
         Parameters that differ in this run and are known, such as an added mass.
     unknown : tuple of str
         Which of `PER_RUN` are estimated for this run; "initial" is the rule.
+    shared : mapping of str to str
+        Names of what is estimated for a group of runs, and the group's label: all runs that give a name the same label
+        have one value of it, as friction has on one day. These need not be in `unknown` as well.
+    spread : mapping of str to float
+        One sigma of the logarithm of this run's factors, where it is not the usual one: how far ``friction``, ``gain``
+        and ``scale.theta`` may reasonably differ from 1.
     initial : mapping of str to float
         States known at the first sample, by name; they are then not estimated.
     horizon : float or None
@@ -107,6 +114,8 @@ class Run:
     held: Mapping[str, Array | float] = field(default_factory=dict[str, "Array | float"])
     known: Mapping[str, float] = field(default_factory=dict[str, float])
     unknown: tuple[str, ...] = ("initial",)
+    shared: Mapping[str, str] = field(default_factory=dict[str, str])
+    spread: Mapping[str, float] = field(default_factory=dict[str, float])
     initial: Mapping[str, float] = field(default_factory=dict[str, float])
     horizon: float | None = None
     score_from: float = 0.0
@@ -155,6 +164,7 @@ class RunScore:
     Scores count from `score_from` seconds after the first sample on.
     `naive` is the fit percent that holding the measured speed reaches from the same restarts, empty for a free run: a
     horizon at which the model is hardly better tells nothing about the model.
+    `adapted` names what was estimated from the run itself: a prediction that chose its own gain is less of one.
     """
 
     role: str
@@ -166,13 +176,15 @@ class RunScore:
     measured: tuple[str, ...]
     score_from: float = 0.0
     naive: Mapping[str, float] = field(default_factory=dict[str, float])
+    adapted: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fit:
     """A rig explained by its runs.
 
-    `per_run` holds what was estimated run by run, by run label and name; `unseen` says in sentences which
+    `per_run` holds what was estimated run by run, by run label and name, `groups` what several runs share, by the
+    group's label and name; `unseen` says in sentences which
     combinations the data cannot see and which number would fix it; `singular_values` belong to the scaled Jacobian,
     `directions` (rows) to them, in the order of `names`.
     """
@@ -180,6 +192,7 @@ class Fit:
     rig: Rig
     estimates: Mapping[str, Estimate]
     per_run: Mapping[str, Mapping[str, Estimate]]
+    groups: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict[str, Mapping[str, Estimate]])
     runs: Mapping[str, RunScore]
     verdict: str
     trusted: bool

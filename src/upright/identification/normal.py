@@ -36,13 +36,13 @@ def finite(values: Array) -> bool:
         return bool(np.isfinite(values.sum()))
 
 
-def squares(lanes: Sequence[Array], target: Array, offset: Array, weights: Array) -> Array:
+def squares(lanes: Sequence[Array], target: Array, offset: Array, weights: Array, scale: Array | None = None) -> Array:
     """``B'B`` (p, p) of what p lanes miss and how they differ, ``B = (z_0 - y, z_1 - z_0, ...)`` times `weights`.
 
     Parameters
     ----------
     lanes : sequence of (T, p) arrays
-        Simulated outputs, one after another; `offset` (outputs, p) is added to them.
+        Simulated outputs, one after another; they are multiplied by `scale`, then `offset` is added, (outputs, p) each.
     target : (T, outputs) array
         Measured outputs.
 
@@ -57,7 +57,11 @@ def squares(lanes: Sequence[Array], target: Array, offset: Array, weights: Array
             for first in range(0, target.shape[0], block.shape[1]):
                 here = slice(first, first + block.shape[1])
                 B = block[:, : target[here].shape[0]]
-                np.add(lanes[k][here].T, offset[k][:, None], out=B)
+                if scale is None:
+                    np.add(lanes[k][here].T, offset[k][:, None], out=B)
+                else:
+                    np.multiply(lanes[k][here].T, scale[k][:, None], out=B)
+                    B += offset[k][:, None]
                 B[1:] -= B[0]
                 B[0] -= target[here, k]
                 total += weights[k] ** 2 * (B @ B.T)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.model import Rig, Run
 from upright.identification.normal import Normal
+from upright.identification.nuisances import run_unknowns
 from upright.identification.problem import Problem
 from upright.identification.tracks import prepare
-from upright.identification.unknowns import base_values, friction_names, run_unknowns, shared_unknowns
+from upright.identification.unknowns import base_values, friction_names, shared_unknowns
 
 Array = NDArray[np.float64]
 
@@ -19,13 +21,30 @@ STEP = 1e-5
 """A perturbed number moves the weighted outputs by about this much, root mean square."""
 
 
-def pose(rig: Rig, runs: Sequence[Run], *, thin: bool = True, only_shared: bool = False) -> Problem:
-    """Set up the problem of explaining `runs`; `only_shared` leaves out what differs from run to run."""
+def pose(
+    rig: Rig,
+    runs: Sequence[Run],
+    *,
+    thin: bool = True,
+    only_shared: bool = False,
+    given: Mapping[str, Mapping[str, float]] | None = None,
+) -> Problem:
+    """Set up the problem of explaining `runs`.
+
+    `only_shared` leaves out what differs from run to run; `given` holds what is known of a group of runs, by its label
+    and name.
+    """
     tracks = [prepare(rig, run, thin=thin) for run in runs]
     unknowns = shared_unknowns(rig)
-    if not only_shared:
-        for index, track in enumerate(tracks):
-            unknowns += run_unknowns(rig, index, track.run, track.start)
+    own = [run_unknowns(rig, i, t.run, t.start) for i, t in enumerate(tracks)] if not only_shared else []
+    for u in (u for found in own for u in found):
+        place = next((i for i, o in enumerate(unknowns) if u.group and (o.name, o.group) == (u.name, u.group)), None)
+        if place is not None:
+            unknowns[place] = replace(unknowns[place], runs=(*unknowns[place].runs, *u.runs))
+        elif (value := (given or {}).get(u.group, {}).get(u.name)) is not None:
+            unknowns.append(replace(u, value=value, lower=value, upper=value))
+        else:
+            unknowns.append(u)
     steps = np.array([1e-6 * u.scale for u in unknowns])
     return Problem(
         rig=rig, tracks=tracks, unknowns=unknowns, base=base_values(rig), friction=friction_names(rig), steps=steps

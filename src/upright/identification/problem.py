@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from upright.identification.model import Rig
 from upright.identification.normal import Normal, Rows, finite, products, squares
+from upright.identification.nuisances import Dressed, dress
 from upright.identification.restarts import PERTURBATION, Restart, settle
 from upright.identification.tracks import Track, motions, outputs, simulator
 from upright.identification.unknowns import SHARED, Unknown
@@ -62,7 +63,7 @@ class Problem:
 
     def sought_in(self, index: int) -> NDArray[np.int64]:
         """Places of the numbers that matter in one run."""
-        return np.array([i for i, u in enumerate(self.unknowns) if u.run in (SHARED, index)], dtype=np.int64)
+        return np.array([i for i, u in enumerate(self.unknowns) if u.runs == SHARED or index in u.runs], dtype=np.int64)
 
     def value(self, x: Array) -> Array:
         """Values (sought,) or (sought, lanes) of coordinates."""
@@ -76,48 +77,24 @@ class Problem:
 
         `shift` (states, W, lanes or 1) is added to the states at which windows start.
         """
-        values, x0, offsets = self._dressed(index, x)
-        if shift is not None:
-            x0 += shift
+        d = self._dressed(index, x)
+        x0 = d.x0 if shift is None else d.x0 + shift
         self.evaluations += 1
-        return outputs(self.solver(index), self.tracks[index], values, x0, offsets, samples=samples)
+        return outputs(self.solver(index), self.tracks[index], d.values, x0, d.offsets, d.scales, samples=samples)
 
-    def _dressed(self, index: int, x: Array) -> tuple[dict[str, float | Array], Array, Array]:
-        """Parameters by name, first states (states, W, lanes) and sensor offsets (outputs, lanes) of one run."""
-        track, lanes = self.tracks[index], x.shape[1]
+    def _dressed(self, index: int, x: Array) -> Dressed:
+        """What one run is simulated with, for coordinates `x` (sought, lanes)."""
+        track, v = self.tracks[index], self.value(x)
         values: dict[str, float | Array] = {**self.base, **track.run.known}
-        names = self.rig.plant.state_names()
-        x0 = np.repeat(track.x0.T[:, :, None], lanes, axis=2)
-        offsets = np.zeros((len(track.columns), lanes))
-        friction: float | Array = 1.0
-        v = self.value(x)
-        values |= {u.name: v[i] for i, u in enumerate(self.unknowns) if u.run == SHARED}
-        late = [(u.name, v[i]) for i, u in enumerate(self.unknowns) if u.run == index]
-        for name, lane in late:
-            kind, _, which = name.partition(".")
-            if kind == "initial":
-                x0[names.index(which)] = lane
-            elif kind == "offset":
-                k = track.run.measured.index(which)
-                offsets[k] = lane
-                if "initial" not in track.run.unknown or track.windowed:
-                    x0[track.columns[k]] -= lane
-            elif kind == "gain":
-                values["actuator.gain"] = values["actuator.gain"] * lane
-            elif kind == "input_offset":
-                values["actuator.offset"] = values["actuator.offset"] + lane
-            else:
-                friction = lane
-        if isinstance(friction, np.ndarray):
-            for name in self.friction:
-                values[name] = values[name] * friction
-        return values, x0, offsets
+        values |= {u.name: v[i] for i, u in enumerate(self.unknowns) if u.runs == SHARED}
+        own = {u.name: v[i] for i, u in enumerate(self.unknowns) if index in u.runs}
+        return dress(self.rig, track, values, own, self.friction, x.shape[1])
 
     def solver(self, index: int) -> Simulator:
         """Solver of one run, made once."""
         if index not in self.solvers:
             track = self.tracks[index]
-            free = [u.name for u in self.unknowns if u.run == SHARED]
+            free = [u.name for u in self.unknowns if u.runs == SHARED]
             if any(u.name == "input_offset" for u in self.unknowns):
                 free.append("actuator.offset")
             self.solvers[index] = simulator(self.rig, track, {**self.base, **track.run.known}, free)
@@ -219,14 +196,14 @@ class Problem:
         track, n = self.tracks[index], self.samples(index, horizon)
         lanes = np.repeat(x[:, None], 1 + sought.size, axis=1)
         lanes[sought, 1 + np.arange(sought.size)] += self.steps[sought]
-        values, x0, offsets = self._dressed(index, lanes)
+        d = self._dressed(index, lanes)
         self.evaluations += 1
-        rows = len(x0) + track.u.shape[1]  # a loop records its commands as well
+        rows = len(d.x0) + track.u.shape[1]  # a loop records its commands as well
         if self.memory.size < (most := n * rows * (lanes.shape[1] + 15)):
             self.memory = np.empty(most)
-        motion = motions(self.solver(index), track, values, x0, samples=n, memory=self.memory)
+        motion = motions(self.solver(index), track, d.values, d.x0, samples=n, memory=self.memory)
         skip = min(track.first, n - 1)
-        G = squares([motion[skip:, c] for c in track.columns], track.y[skip:n], offsets, track.weights)
+        G = squares([motion[skip:, c] for c in track.columns], track.y[skip:n], d.offsets, track.weights, d.scales)
         h = self.steps[sought]
         return G[1:, 1:] / np.outer(h, h), G[1:, 0] / h, float(G[0, 0])
 

@@ -76,7 +76,12 @@ def with_values(rig: Rig, values: Mapping[str, float]) -> Rig:
 
 
 def predict(
-    fitted: Fit | Mapping[str, float], rig: Rig, runs: Sequence[Run], *, progress: Report | None = None
+    fitted: Fit | Mapping[str, float],
+    rig: Rig,
+    runs: Sequence[Run],
+    *,
+    groups: Mapping[str, Mapping[str, float]] | None = None,
+    progress: Report | None = None,
 ) -> dict[str, RunScore]:
     """Scores of runs that a fitted model has not seen, by label.
 
@@ -88,7 +93,11 @@ def predict(
         Where parameters that were not fitted come from.
     runs : sequence of Run
         What differs from run to run (initial state, declared offsets and factors) is estimated from the run itself:
-        from what comes before `score_from` when that is set, from all of it otherwise. The parameters stay as they are.
+        from what comes before `score_from` when that is set, from all of it otherwise; the scores say what
+        (`RunScore.adapted`). The parameters stay as they are, and so does what a group of runs shares when the group
+        was fitted.
+    groups : mapping, optional
+        What groups of runs share, by label and name; those of a `Fit` when omitted.
     progress : callable, optional
         Called with stage, fraction done, cost and number of simulations.
 
@@ -98,12 +107,14 @@ def predict(
         When somebody interrupts: half a prediction is none.
     """
     values = {n: e.value for n, e in fitted.estimates.items()} if isinstance(fitted, Fit) else dict(fitted)
+    if groups is None and isinstance(fitted, Fit):
+        groups = {label: {n: e.value for n, e in group.items()} for label, group in fitted.groups.items()}
     known = with_values(rig, values)
-    return {run.label: _predict(known, run, progress) for run in runs}
+    return {run.label: _predict(known, run, groups or {}, progress) for run in runs}
 
 
-def _predict(rig: Rig, run: Run, progress: Report | None) -> RunScore:
-    problem = pose(rig, [replace(run, score_from=0.0)])
+def _predict(rig: Rig, run: Run, groups: Mapping[str, Mapping[str, float]], progress: Report | None) -> RunScore:
+    problem = pose(rig, [replace(run, score_from=0.0)], given=groups)
     x = problem.start
     if x.size:
         upto = run.score_from if run.score_from > 0 else math.inf
@@ -111,5 +122,7 @@ def _predict(rig: Rig, run: Run, progress: Report | None) -> RunScore:
         if found.interrupted:
             raise KeyboardInterrupt
         x = found.x
-    whole = pose(rig, [run], thin=False)
-    return score(whole, 0, x)
+    whole = pose(rig, [run], thin=False, given=groups)
+    sought = [u.name for u in problem.unknowns if u.lower < u.upper]
+    adapted = dict.fromkeys("initial" if name.startswith("initial.") else name for name in sought)
+    return replace(score(whole, 0, x), adapted=tuple(adapted))

@@ -36,8 +36,8 @@ class Sight:
 
 def look(problem: Problem, x: Array, spread: Spread) -> Sight:
     """Singular values of the shared numbers' Jacobian, everything that differs from run to run eliminated."""
-    shared = [i for i, u in enumerate(problem.unknowns) if u.run == SHARED and not spread.pinned[i]]
-    own = [i for i, u in enumerate(problem.unknowns) if u.run != SHARED and not spread.pinned[i]]
+    shared = [i for i, u in enumerate(problem.unknowns) if u.runs == SHARED and not spread.pinned[i]]
+    own = [i for i, u in enumerate(problem.unknowns) if u.runs != SHARED and not spread.pinned[i]]
     value = problem.value(x)
     unknowns = [problem.unknowns[i] for i in shared]
     # relative to the value found, which a search along a blind direction may have carried far from its guess

@@ -181,9 +181,10 @@ def motions(
 
 
 def outputs(
-    solver: Simulator, track: Track, values: Mapping[str, float | Array], x0: Array, offsets: Array, *, samples: int
-) -> Array:
-    """Simulated outputs (samples, W, outputs, lanes), sensor offsets added.
+    solver: Simulator, track: Track, values: Mapping[str, float | Array], x0: Array, offsets: Array,
+    scales: Array | None = None, *, samples: int,
+) -> Array:  # fmt: skip
+    """Simulated outputs (samples, W, outputs, lanes) as the sensors show them.
 
     Parameters
     ----------
@@ -191,15 +192,19 @@ def outputs(
         Every parameter, a number or one per lane, (lanes,).
     x0 : (states, W, lanes) array
         First states of the windows.
-    offsets : (outputs, lanes) array
-        Sensor offsets.
+    offsets, scales : (outputs, lanes) arrays
+        Sensor offsets and gains, the latter 1 when omitted.
     """
     _, windows, lanes = x0.shape
     out = motions(solver, track, values, x0, samples=samples)
     if windows == 1:
         y = np.empty((samples, 1, len(track.columns), lanes))
         for k, column in enumerate(track.columns):
-            np.add(out[:, column], offsets[k], out=y[:, 0, k])
+            if scales is None:
+                np.add(out[:, column], offsets[k], out=y[:, 0, k])
+            else:
+                np.multiply(out[:, column], scales[k], out=y[:, 0, k])
+                y[:, 0, k] += offsets[k]
         return y
-    y = out[:, list(track.columns), :].reshape(samples, len(track.columns), windows, lanes)
-    return np.moveaxis(y, 1, 2) + offsets[None, None]
+    y = np.moveaxis(out[:, list(track.columns), :].reshape(samples, len(track.columns), windows, lanes), 1, 2)
+    return y + offsets if scales is None else y * scales + offsets

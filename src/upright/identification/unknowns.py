@@ -13,26 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model import ACTUATOR, Parameter, Rig, Run
-from upright.identification.smoothing import State
+from upright.identification.model import ACTUATOR, Parameter, Rig
 
 Array = NDArray[np.float64]
 
-SHARED = -1
-"""Index of the run for a number that all runs share."""
-
-FRICTION_SPREAD = 0.3
-"""One sigma of the logarithm of a run's friction factor; two runs of one day differed by 13 % (DESIGN 9)."""
-
-GAIN_SPREAD = 1.0
-"""One sigma of the logarithm of a run's gain factor; a factor of 3.2 was met (DESIGN 9)."""
-
+SHARED: tuple[int, ...] = ()
+"""Runs of a number that all runs share."""
 
 FAR = 1e9
 """A positive number ends within this factor of its guess."""
-
-INITIAL_SPREAD = (0.02, 0.1)
-"""Least sigma of a measured first coordinate and velocity, as a share of how much each varies over the run."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,10 +31,9 @@ class Unknown:
     Attributes
     ----------
     name : str
-        ``"J_p"``, ``"actuator.gain"``; for one run ``"initial.theta_dot"``, ``"offset.theta"``, ``"gain"``,
-        ``"friction"``, ``"input_offset"``.
-    run : int
-        Index of the run it belongs to, or `SHARED`.
+        ``"J_p"``, ``"actuator.gain"``; for some runs ``"initial.theta_dot"``, ``"offset.theta"``, ``"friction"``, ...
+    runs : tuple of int
+        Places of the runs it belongs to, or `SHARED` for all.
     value, lower, upper : float
         Start and bounds, SI.
     log : bool
@@ -56,10 +44,12 @@ class Unknown:
         Mean and standard deviation known beforehand, in that coordinate.
     asked : bool
         Whether the answer was asked for; a known number with an uncertainty is sought but not asked.
+    group : str
+        Label of the runs that share it, empty for a number of one run or of all.
     """
 
     name: str
-    run: int
+    runs: tuple[int, ...]
     value: float
     lower: float
     upper: float
@@ -67,6 +57,7 @@ class Unknown:
     scale: float
     prior: tuple[float, float] | None = None
     asked: bool = True
+    group: str = ""
 
     def inside(self, value: float) -> float:
         """Coordinate in which the number is sought."""
@@ -108,46 +99,12 @@ def _shared(rig: Rig, p: Parameter) -> Unknown:
         prior = (math.log(p.value), p.uncertainty / p.value) if log else (p.value, p.uncertainty)
     scale = 1.0 if log else max(abs(value), p.uncertainty) or _FALLBACK.get(p.name, 1e-3)
     return Unknown(
-        name=p.name, run=SHARED, value=value, lower=lower, upper=upper, log=log, scale=scale, prior=prior,
+        name=p.name, runs=SHARED, value=value, lower=lower, upper=upper, log=log, scale=scale, prior=prior,
         asked=p.estimate,
     )  # fmt: skip
 
 
 _FALLBACK = {"actuator.gain": 1.0, "actuator.lag": 5e-3, "actuator.delay": 5e-3, "actuator.offset": 1e-2}
-
-
-def run_unknowns(rig: Rig, index: int, run: Run, start: State) -> list[Unknown]:
-    """What is sought for one run alone; `start` is its measured first state and its uncertainty."""
-    free = -math.inf, math.inf
-    found: list[Unknown] = []
-
-    def add(name: str, value: float, scale: float, prior: tuple[float, float] | None = None, log: bool = False) -> None:
-        found.append(
-            Unknown(name=name, run=index, value=value, lower=0.0 if log else free[0], upper=free[1], log=log,
-                    scale=scale, prior=prior)
-        )  # fmt: skip
-
-    names = rig.plant.state_names()
-    if "initial" in run.unknown and run.horizon is None:
-        for i, name in enumerate(names):
-            if names[i - i % 2] not in run.held and name not in run.initial:
-                # measured to a few percent; more freedom would excuse a wrong model
-                size, measured = float(start.spread[i]), float(start.x[i])
-                sigma = max(INITIAL_SPREAD[i % 2] * size, 2 * float(start.error[i]))
-                prior = (measured, sigma) if names[i - i % 2] in run.measured else None
-                add(f"initial.{name}", measured, size, prior)
-    for name in run.measured:
-        every = "offset" in run.unknown and (run.loop is not None or matters(rig, name))
-        if name not in run.held and (every or f"offset.{name}" in run.unknown):
-            add(f"offset.{name}", 0.0, float(start.spread[names.index(name)]))
-    if "gain" in run.unknown:
-        add("gain", 1.0, 1.0, (0.0, GAIN_SPREAD), log=True)
-    if "friction" in run.unknown:
-        add("friction", 1.0, 1.0, (0.0, FRICTION_SPREAD), log=True)
-    if "input_offset" in run.unknown:
-        size = float(np.std(run.u)) if run.u.size else 0.0
-        add("input_offset", 0.0, size or 1.0)
-    return found
 
 
 def friction_names(rig: Rig) -> tuple[str, ...]:

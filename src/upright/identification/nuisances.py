@@ -1,0 +1,121 @@
+"""What differs from run to run? Each nuisance with where its search starts, and what it does to a simulated run.
+
+A nuisance belongs to one run, or to all runs that give it the same label in `Run.shared`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.identification.model import Rig, Run
+from upright.identification.smoothing import State
+from upright.identification.tracks import Track
+from upright.identification.unknowns import Unknown, matters
+
+Array = NDArray[np.float64]
+
+SPREADS = {"friction": 0.3, "gain": 1.0, "scale": 1.0}
+"""One sigma of the logarithm of a run's factor, unless the run says otherwise.
+
+Friction of two runs of one day differed by 13 %, an actuator's gain by a factor of 3.2 (DESIGN 9).
+"""
+
+INITIAL_SPREAD = (0.02, 0.1)
+"""Least sigma of a measured first coordinate and velocity, as a share of how much each varies over the run."""
+
+
+def run_unknowns(rig: Rig, index: int, run: Run, start: State) -> list[Unknown]:
+    """What is sought for one run alone; `start` is its measured first state and its uncertainty."""
+    found: list[Unknown] = []
+    wanted = {*run.unknown, *run.shared}
+
+    def add(name: str, value: float, scale: float, prior: tuple[float, float] | None = None) -> None:
+        found.append(
+            Unknown(name=name, runs=(index,), value=value, lower=-math.inf, upper=math.inf, log=False, scale=scale,
+                    prior=prior, group=run.shared.get(name, ""))
+        )  # fmt: skip
+
+    def factor(name: str) -> None:
+        sigma = run.spread.get(name, SPREADS[name.partition(".")[0]])
+        found.append(
+            Unknown(name=name, runs=(index,), value=1.0, lower=0.0, upper=math.inf, log=True, scale=1.0,
+                    prior=(0.0, sigma), group=run.shared.get(name, ""))
+        )  # fmt: skip
+
+    names = rig.plant.state_names()
+    if "initial" in wanted and run.horizon is None:
+        for i, name in enumerate(names):
+            coordinate = names[i - i % 2]
+            if coordinate not in run.held and name not in run.initial:
+                # measured to a few percent; more freedom would excuse a wrong model
+                size, measured = float(start.spread[i]), float(start.x[i])
+                sigma = max(INITIAL_SPREAD[i % 2] * size, 2 * float(start.error[i]))
+                sure = coordinate in run.measured and f"scale.{coordinate}" not in wanted
+                add(f"initial.{name}", measured, size, (measured, sigma) if sure else None)
+    for name in run.measured:
+        if name in run.held:
+            continue
+        every = "offset" in wanted and (run.loop is not None or matters(rig, name))
+        if every or f"offset.{name}" in wanted:
+            add(f"offset.{name}", 0.0, float(start.spread[names.index(name)]))
+        if f"scale.{name}" in wanted:
+            factor(f"scale.{name}")
+    for name in ("gain", "friction"):
+        if name in wanted:
+            factor(name)
+    if "input_offset" in wanted:
+        size = float(np.std(run.u)) if run.u.size else 0.0
+        add("input_offset", 0.0, size or 1.0)
+    return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dressed:
+    """What one run is simulated with: parameters by name, first states (states, W, lanes), and what its sensors make
+    of the motion, ``y = scale q + offset``, each (outputs, lanes); a scale of None is 1.
+    """
+
+    values: dict[str, float | Array]
+    x0: Array
+    offsets: Array
+    scales: Array | None
+
+
+def dress(
+    rig: Rig, track: Track, values: dict[str, float | Array], own: Mapping[str, Array], friction: tuple[str, ...],
+    lanes: int,
+) -> Dressed:  # fmt: skip
+    """Put a run's own numbers `own` (name to (lanes,)) into the parameters `values` and its first states.
+
+    `friction` names the parameters that a friction factor multiplies.
+    """
+    run, names = track.run, rig.plant.state_names()
+    x0 = np.repeat(track.x0.T[:, :, None], lanes, axis=2)
+    offsets = np.zeros((len(track.columns), lanes))
+    scales: Array | None = None
+    for k, (c, column) in enumerate(zip(run.measured, track.columns, strict=True)):
+        if f"offset.{c}" in own:
+            offsets[k] = own[f"offset.{c}"]
+            x0[column] -= offsets[k]
+        if f"scale.{c}" in own:
+            scales = np.ones_like(offsets) if scales is None else scales
+            scales[k] = own[f"scale.{c}"]
+            x0[column : column + 2] /= scales[k]
+    for name, value in run.initial.items():
+        x0[names.index(name), 0] = value
+    for name, value in own.items():
+        if name.startswith("initial."):
+            x0[names.index(name.removeprefix("initial."))] = value
+    if "gain" in own:
+        values["actuator.gain"] = values["actuator.gain"] * own["gain"]
+    if "input_offset" in own:
+        values["actuator.offset"] = values["actuator.offset"] + own["input_offset"]
+    if "friction" in own:
+        for name in friction:
+            values[name] = values[name] * own["friction"]
+    return Dressed(values=values, x0=x0, offsets=offsets, scales=scales)
