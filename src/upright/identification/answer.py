@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.identification import assumptions
 from upright.identification.chain import Log, count
 from upright.identification.descent import Descent
 from upright.identification.model import Estimate, Fit, Rig, Run, RunScore
@@ -77,6 +78,8 @@ def answer(
         period=min(t.period for t in problem.tracks),
     )
     places = [i for i, u in enumerate(problem.unknowns) if u.runs == SHARED]
+    taken = () if found.interrupted else assumptions.assumptions(chosen, problem, x, spread.pinned, estimates)
+    verdict = " ".join([verdict, *assumptions.sentences(taken)])
     return Fit(
         rig=asked,
         estimates=estimates,
@@ -97,6 +100,7 @@ def answer(
         warnings=(*warnings, *conventions),
         history=tuple(log.history),
         interrupted=found.interrupted,
+        assumptions=taken,
     )
 
 

@@ -72,6 +72,16 @@ def as_json(fit: Fit, study: Study) -> dict[str, Any]:
         "cost": _finite(fit.cost),
         "interrupted": fit.interrupted,
         "parameters": {n: {**_estimate(e), "meaning": meanings.get(n, "")} for n, e in estimates.items()},
+        "assumed": [
+            {
+                "name": a.name,
+                "value": a.value,
+                "unit": a.unit,
+                "percent_per_percent": {n: round(e, 6) for n, e in a.follows.items()},
+                "without_it": {n: _estimate(e) for n, e in a.without.items()},
+            }
+            for a in fit.assumptions
+        ],
         "per_run": {label: {n: _estimate(e) for n, e in own.items()} for label, own in fit.per_run.items()},
         "groups": {label: {n: _estimate(e) for n, e in own.items()} for label, own in fit.groups.items()},
         "runs": {

@@ -35,7 +35,10 @@ of every joint (one common factor), a constant added to the command. "offset.the
 
 @dataclass(frozen=True, kw_only=True)
 class Parameter:
-    """One number of the rig: known, known to within `uncertainty` (one sigma), or to estimate from `value`."""
+    """One number of the rig: known, known to within `uncertainty` (one sigma), or to estimate from `value`.
+
+    An `assumed` one is a convention: the report says what rests on it.
+    """
 
     name: str
     value: float
@@ -45,6 +48,7 @@ class Parameter:
     lower: float = -math.inf
     upper: float = math.inf
     uncertainty: float = 0.0
+    assumed: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,6 +162,21 @@ class Estimate:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Assumption:
+    """A number taken as given without knowing it, and what would follow it.
+
+    `follows` are percent by which each estimate would change per percent of it, `without` the estimates proportional
+    to it, per unit of the command and of the encoders.
+    """
+
+    name: str
+    value: float
+    unit: str
+    follows: Mapping[str, float]
+    without: Mapping[str, Estimate]
+
+
+@dataclass(frozen=True, kw_only=True)
 class RunScore:
     """How well one run is explained: fit percent per signal, over which horizon, and the simulated signals.
 
@@ -208,3 +227,4 @@ class Fit:
     warnings: tuple[str, ...] = ()
     history: tuple[tuple[str, float, int], ...] = ()
     interrupted: bool = False
+    assumptions: tuple[Assumption, ...] = ()

@@ -117,7 +117,7 @@ def read_parameter(section: Section, key: str, name: str, what: Quantity) -> Par
             f' for instance {key} = {{ guess = "1 {what.unit}", min = 0 }}',
         )
     estimate = "guess" in table
-    for wrong in ("min", "max") if not estimate else ("uncertainty",):
+    for wrong in ("min", "max") if not estimate else ("uncertainty", "assumed"):
         if wrong in table:
             raise table.error(
                 wrong,
@@ -129,7 +129,12 @@ def read_parameter(section: Section, key: str, name: str, what: Quantity) -> Par
     _check(section, (key, main), name, number, what)
     if not estimate:
         sigma = _uncertainty(section, key, table.values.get("uncertainty", 0.0), number, what)
-        return Parameter(name=name, value=number, unit=what.unit, meaning=what.meaning, uncertainty=sigma)
+        assumed = table.flag("assumed")
+        if assumed and sigma > 0:
+            raise table.error("assumed", f"{name} has an uncertainty, so it is known about, not assumed; leave one out")
+        return Parameter(
+            name=name, value=number, unit=what.unit, meaning=what.meaning, uncertainty=sigma, assumed=assumed
+        )
     lower, upper = (
         _number(section, (key, bound), table.values[bound], what) if bound in table else default
         for bound, default in (("min", what.lower), ("max", what.upper))

@@ -156,6 +156,13 @@ class Section:
             raise self.error(key, f"{key} must be above zero, got {show(self.values[key])}")
         return value
 
+    def flag(self, key: str) -> bool:
+        """True or false, false when left out."""
+        value = self.values.get(key, False)
+        if not isinstance(value, bool):
+            raise self.error(key, f"{key} must be true or false, got {show(value)}")
+        return value
+
     def whole(self, key: str, default: int) -> int:
         """Whole number, at least 1."""
         value = self.values.get(key, default)

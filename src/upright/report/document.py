@@ -12,11 +12,12 @@ from typing import Any
 
 from markupsafe import Markup
 
+from upright.identification.assumptions import sentences
 from upright.identification.model import Fit
 from upright.report.advice import next_steps
 from upright.report.drawing import svg
 from upright.report.equations import equations
-from upright.report.tables import parameter_rows, provenance_rows, run_rows, score_rows
+from upright.report.tables import parameter_rows, provenance_rows, run_rows, score_rows, without_rows
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,6 +98,8 @@ def fit_content(
         "provenance": provenance_rows(provenance),
         "motion": Markup(motion(fit)),
         "parameters": parameter_rows(fit),
+        "without": without_rows(fit),
+        "assumed": sentences(fit.assumptions),
         "own": run_rows(fit),
         "scores": score_rows(fit),
         "runs": run_pictures(fit, prefix),

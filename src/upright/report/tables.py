@@ -53,6 +53,11 @@ def _default(name: str) -> float:
     return ACTUATOR[name][1] if name in ACTUATOR else 0.0
 
 
+def without_rows(fit: Fit) -> list[ParameterRow]:
+    """What rests on assumed numbers, stated without them."""
+    return [_estimate(n, e, fit.rig.parameters.get(n)) for a in fit.assumptions for n, e in a.without.items()]
+
+
 def run_rows(fit: Fit) -> list[ParameterRow]:
     """What was estimated run by run."""
     return [_estimate(n, e, None, run) for run, own in fit.per_run.items() for n, e in own.items()]
