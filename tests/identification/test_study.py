@@ -112,6 +112,21 @@ def test_what_a_run_says_about_itself_arrives(study):
     np.testing.assert_array_equal(run.y[:, 1], -THETA)
 
 
+def test_runs_name_what_they_share_with_others(study):
+    text = '[defaults]\nshared = { friction = "Monday" }\nspread = { friction = 0.15, scale.x = 0.5 }\n'
+    first, second = study(
+        RIG
+        + SENSORS
+        + text
+        + RUN
+        + RUN
+        + 'label = "b"\nshared = { gain = "loop", scale.x = "loop", "offset.x" = "rig" }\n'
+    ).runs
+    assert first.shared == {"friction": "Monday"}
+    assert second.shared == {"gain": "loop", "scale.x": "loop", "offset.x": "rig"}
+    assert second.spread == {"friction": 0.15, "scale.x": 0.5}
+
+
 def test_a_loop_carries_gains_in_the_order_of_the_states(study):
     loop = 'loop = { gains = { x = "2.5 V/m", theta_dot = "0.1 V s/rad" }, reference = "where(t < 1, 0, 0.2)" }\n'
     drive = '[drive]\ncolumn = "v"\nunit = "V"\n'

@@ -52,12 +52,17 @@ def predict(
     from upright.identification.scoring import predict as score
 
     rig = replace(asked.rig, substeps=fitted.substeps)
-    scores = score(fitted.values, rig, [replace(run, role="predict") for run in asked.runs])
+    scores = score(fitted.values, rig, [replace(run, role="predict") for run in asked.runs], groups=fitted.groups)
     content: dict[str, Any] = {
         "model": model.name,
         "study": study.name,
         "runs": {
-            label: {"role": s.role, "fit_percent": dict(s.fit_percent), "horizon": s.horizon}
+            label: {
+                "role": s.role,
+                "fit_percent": dict(s.fit_percent),
+                "horizon": s.horizon,
+                "adapted": list(s.adapted),
+            }
             for label, s in scores.items()
         },
     }

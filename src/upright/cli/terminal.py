@@ -110,6 +110,7 @@ def print_scores(runs: Any) -> None:
     for label, score in scores:
         over = "free run" if score.horizon is None else f"restarted every {score.horizon:g} s"
         over += f", from {score.score_from:g} s on" if score.score_from > 0 else ""
+        over += f"; its own {', '.join(score.adapted)}" if score.adapted else ""
         role = "fitted" if score.role == "fit" else "predicted"
         for name, percent in score.fit_percent.items():
             naive = [f"{score.naive[name]:.2f}" if name in score.naive else ""] if windowed else []

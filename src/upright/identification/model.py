@@ -33,6 +33,16 @@ of every joint (one common factor), a constant added to the command. "offset.the
 "scale.theta" its gain (a factor)."""
 
 
+FOR_GROUPS = ("gain", "friction", "input_offset")
+"""Of these a group of runs may share one value; of sensor offsets and gains too."""
+
+SPREADS = {"friction": 0.3, "gain": 1.0, "scale": 1.0}
+"""One sigma of the logarithm of a run's factor, unless the run says otherwise.
+
+Friction of two runs of one day differed by 13 %, an actuator's gain by a factor of 3.2 (DESIGN 9).
+"""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Parameter:
     """One number of the rig: known, known to within `uncertainty` (one sigma), or to estimate from `value`.

@@ -12,18 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model import Rig, Run
+from upright.identification.model import SPREADS, Rig, Run
 from upright.identification.smoothing import State
 from upright.identification.tracks import Track
 from upright.identification.unknowns import Unknown, matters
 
 Array = NDArray[np.float64]
-
-SPREADS = {"friction": 0.3, "gain": 1.0, "scale": 1.0}
-"""One sigma of the logarithm of a run's factor, unless the run says otherwise.
-
-Friction of two runs of one day differed by 13 %, an actuator's gain by a factor of 3.2 (DESIGN 9).
-"""
 
 INITIAL_SPREAD = (0.02, 0.1)
 """Least sigma of a measured first coordinate and velocity, as a share of how much each varies over the run."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from upright.identification.model import ACTUATOR, PER_RUN
+from upright.identification.model import ACTUATOR, FOR_GROUPS, PER_RUN
 
 
 class Key(NamedTuple):
@@ -43,7 +43,23 @@ _SHARED = (
     Key("locked", "{ x = 0.0 }", "coordinates that could not move, and where they were; a list of names means at zero"),
     Key("held", '["x"]', "coordinates moved from outside: their measured motion is prescribed"),
     Key("known", '{ a_1 = "0.5 kg" }', "parameters that differ in this run and are known"),
-    Key("unknown", '["initial"]', f"what is estimated for this run alone, of {', '.join(PER_RUN)}, offset.COORDINATE"),
+    Key(
+        "unknown",
+        '["initial"]',
+        f"what is estimated for this run alone, of {', '.join(PER_RUN)}, offset.COORDINATE, scale.COORDINATE",
+    ),
+    Key(
+        "shared",
+        '{ friction = "28 Jan" }',
+        f"what is estimated once for all runs that give the same label, of {', '.join(FOR_GROUPS)}, offset.COORDINATE,"
+        " scale.COORDINATE",
+    ),
+    Key(
+        "spread",
+        "{ friction = 0.15 }",
+        "by how much friction, gain or scale.COORDINATE may reasonably differ from 1 in this run, one sigma of the"
+        " logarithm; 0.3, 1 and 1 if left out",
+    ),
     Key("initial", '{ theta = "1 rad" }', "states known at the first sample; these are not estimated"),
     Key("horizon", '"0.5 s"', "predict this far ahead, again and again, from measured states; free run if left out"),
     Key("score_from", '"30 s"', "seconds after the window's start before which nothing is scored"),

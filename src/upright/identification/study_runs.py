@@ -10,7 +10,7 @@ import numpy as np
 
 from upright.errors import BadInput, nearest
 from upright.identification.columns import Array, Grid
-from upright.identification.model import PER_RUN, Run
+from upright.identification.model import FOR_GROUPS, PER_RUN, SPREADS, Run
 from upright.identification.study_keys import names
 from upright.identification.study_loop import read_loop, state_units
 from upright.identification.study_rig import known_values
@@ -100,7 +100,9 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
         quantum=tuple(quanta[n] for n in measured),
         held={**locked, **{n: readings[n] for n in held_names}},
         known=known_values(run.section("known"), plant),
-        unknown=run.names("unknown", (*PER_RUN, *(f"offset.{n}" for n in coordinates)), ("initial",)),
+        unknown=run.names("unknown", (*PER_RUN, *_sensor_names(plant)), ("initial",)),
+        shared={key: own.text_of(last, "28 Jan") for key, own, last in _nuisances(run, "shared", plant)},
+        spread={key: own.positive(last, "1", 1.0) for key, own, last in _nuisances(run, "spread", plant)},
         initial=_states(run, plant),
         horizon=_horizon(run, grid),
         score_from=_score_from(run, grid),
@@ -155,6 +157,27 @@ def _locked(run: Section, plant: type[Plant]) -> dict[str, float]:
     section = run.section("locked")
     section.check(coordinates, f"coordinate of {plant.__name__} called")
     return {name: section.number(name, coordinates[name]) for name in section.values}
+
+
+def _sensor_names(plant: type[Plant]) -> tuple[str, ...]:
+    return tuple(f"{kind}.{c.name}" for kind in ("offset", "scale") for c in plant.coordinates)
+
+
+def _nuisances(run: Section, key: str, plant: type[Plant]) -> list[tuple[str, Section, str]]:
+    """Entries of a table by the name of a nuisance: name, table and key; ``scale.x`` may stand in quotes or not."""
+    valid = (*FOR_GROUPS, *_sensor_names(plant))
+    if key == "spread":
+        valid = tuple(n for n in valid if n.partition(".")[0] in SPREADS)
+    table = run.section(key)
+    found: list[tuple[str, Section, str]] = []
+    for name, value in table.values.items():
+        inner = table.section(name) if isinstance(value, dict) else table
+        entries = [(f"{name}.{last}", last) for last in inner.values] if inner is not table else [(name, name)]
+        for whole, last in entries:
+            if whole not in valid:
+                raise inner.error(last, f"{key} has no '{whole}'; {nearest(whole, valid)}")
+            found.append((whole, inner, last))
+    return found
 
 
 def _states(run: Section, plant: type[Plant]) -> dict[str, float]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from upright.identification.model import Fit
+from upright.identification.model import SPREADS, Fit
 from upright.report.figures import autocorrelation
 from upright.report.symbols import percent, plain
 
@@ -25,7 +25,7 @@ class Step:
 
 def next_steps(fit: Fit, *, study: str = "STUDY.toml", folder: str = "OUT") -> list[Step]:
     """Steps in order of weight: what would make the model wrong first, what would make it better last."""
-    steps = [*_broken(fit), *_blind(fit), *_friction(fit, study, folder)]
+    steps = [*_broken(fit), *_blind(fit), *_nuisances(fit), *_friction(fit, study, folder)]
     if not any(s.role == "predict" for s in fit.runs.values()):
         steps.append(
             Step(
@@ -89,6 +89,36 @@ def _blind(fit: Fit) -> list[Step]:
                 sentence=f"The data hardly see {', '.join(weak)}: measure one of them on the bench and give it "
                 "as known, or add a run that moves it more.",
                 command=f'{weak[0]} = {{ value = "…", uncertainty = "…" }}',
+            )
+        )
+    return steps
+
+
+def _nuisances(fit: Fit) -> list[Step]:
+    """What differs from run to run: useless factors, and predictions that chose their own."""
+    steps: list[Step] = []
+    idle = [
+        f"{name} of {kind}{label}"
+        for kind, homes in (("group ", fit.groups), ("", fit.per_run))
+        for label, own in homes.items()
+        for name, e in own.items()
+        if e.status == "unseen"
+    ]
+    if idle:
+        steps.append(Step(sentence=f"The runs say nothing about {', '.join(idle)}: leave it out of unknown or shared."))
+    fitted_to = {
+        label: [n for n in score.adapted if n.partition(".")[0] in SPREADS]
+        for label, score in fit.runs.items()
+        if score.role != "fit"
+    }
+    label = next((label for label, names in fitted_to.items() if names), None)
+    if label is not None:
+        names = " and ".join(fitted_to[label])
+        steps.append(
+            Step(
+                sentence=f"The prediction of run '{label}' chose its own {names}, so it proves less; "
+                "let the run share that with runs that are fitted.",
+                command=f'[[runs]]\nlabel = "{label}"\nshared = {{ {fitted_to[label][0]} = "that day" }}',
             )
         )
     return steps

@@ -59,8 +59,9 @@ def without_rows(fit: Fit) -> list[ParameterRow]:
 
 
 def run_rows(fit: Fit) -> list[ParameterRow]:
-    """What was estimated run by run."""
-    return [_estimate(n, e, None, run) for run, own in fit.per_run.items() for n, e in own.items()]
+    """What was estimated for groups of runs, then run by run."""
+    rows = [_estimate(n, e, None, f"group {group}") for group, own in fit.groups.items() for n, e in own.items()]
+    return rows + [_estimate(n, e, None, run) for run, own in fit.per_run.items() for n, e in own.items()]
 
 
 def _estimate(name: str, e: Estimate, about: Parameter | None, run: str = "") -> ParameterRow:
@@ -102,7 +103,7 @@ def score_rows(fit: Fit) -> list[ScoreRow]:
             role="fitted" if score.role == "fit" else "predicted",
             signal=plain(name),
             fit=percent(value),
-            horizon=_over(score),
+            horizon=over(score),
             naive=percent(score.naive[name]) if name in score.naive else "",
         )
         for label, score in runs
@@ -110,10 +111,11 @@ def score_rows(fit: Fit) -> list[ScoreRow]:
     ]
 
 
-def _over(score: RunScore) -> str:
-    """What of the run was compared, and how it was simulated."""
-    over = "from the first sample" if score.horizon is None else f"restarted every {score.horizon:g} s"
-    return f"{over}; scored from {score.score_from:g} s on" if score.score_from > 0 else over
+def over(score: RunScore) -> str:
+    """What of the run was compared, how it was simulated, and what a prediction took from the run itself."""
+    text = "from the first sample" if score.horizon is None else f"restarted every {score.horizon:g} s"
+    text += f"; scored from {score.score_from:g} s on" if score.score_from > 0 else ""
+    return f"{text}; its own {', '.join(score.adapted)}" if score.adapted else text
 
 
 def provenance_rows(provenance: Mapping[str, object], above: str = "") -> list[tuple[str, str]]:
