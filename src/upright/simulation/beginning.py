@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+from upright.simulation.drive import begin
 from upright.simulation.flavour import ACTUATOR
 from upright.simulation.writer import Writer
 
@@ -69,6 +70,7 @@ def _actuator(w: Writer, j: int, first: int) -> None:
         # what is left at the end of a substep of a jump inside it
         f"{{ep{j}}} = exp(-_x * (1.0 - ({{df{j}}} * _substeps - floor({{df{j}}} * _substeps))))",
     )
+    begin(w, j, row)
     if loop:
         w.add(f"{{w{j}}} = {{gain{j}}} * {{off{j}}}")
         return

@@ -6,6 +6,7 @@ Names that start with an underscore are ours, so that they cannot meet a plant's
 
 from __future__ import annotations
 
+from upright.simulation.drive import force, nodes
 from upright.simulation.flavour import Layout
 
 ELEMENTARY = '''
@@ -56,6 +57,7 @@ def arguments(p: Layout) -> list[str]:
         *(f"_s{i}" for i in f.dry),
         *(f"_y{i}" for i in f.dahl),
         *(f"_ah{i}" for i in f.held),
+        *(f"_{c}{j}" for c in nodes(f) for j in range(p.nu)),
         *p.constants,
     ]
 
@@ -63,7 +65,7 @@ def arguments(p: Layout) -> list[str]:
 def _forces(p: Layout) -> tuple[list[str], dict[tuple[int, int], str]]:
     """Lines that compute mass matrix and forces; and the name of each entry that is not zero, free coordinates only."""
     d, f = p.derived, p.flavour
-    lines = [f"{u} = {u} - _sl{j} * {p.velocities[p.drives[j]]}" for j, u in enumerate(d.inputs) if f.dynamic]
+    lines = force(p)
     lines += [f"{s}, {c} = sincos({x})" for s, c, x in d.trig]
     lines += [f"{name} = {text}" for name, text in d.steps]
     entries = {(i, j): d.mass[k] for k, (i, j) in enumerate((i, j) for i in range(p.n) for j in range(i, p.n))}
@@ -162,7 +164,7 @@ def step_arguments(p: Layout) -> list[str]:
         "_h",
         *(f"_q{i}" for i in p.free),
         *(f"_v{i}" for i in p.free),
-        *(f"_u{s}{j}" for s in "amb" for j in u),
+        *(f"_{c}{s}{j}" for c in ("u", *nodes(f)) for s in "amb" for j in u),
         *(f"_h{c}{i}{s}" for i in f.held for s in "amb" for c in "qva"),
         *(f"_s{i}" for i in f.dry),
         *(f"_y{i}" for i in f.dahl),
@@ -189,7 +191,8 @@ def step(p: Layout) -> str:
         for i in f.dahl:
             lines.extend(_presliding(i, f"_y{k}_", f"{shift}{i}") if shift else [])
         call += [(f"_y{k}_{i}" if shift else f"_y{i}") for i in f.dahl]
-        call += [f"_ha{i}{when}" for i in f.held] + list(p.constants)
+        call += [f"_ha{i}{when}" for i in f.held]
+        call += [f"_{c}{when}{j}" for c in nodes(f) for j in range(p.nu)] + list(p.constants)
         result = [f"_a{k}_{i}" for i in free] + [f"_e{k}_{i}" for i in f.dry]
         lines.append(f"({', '.join(result)},) = acceleration({', '.join(call)})")
 

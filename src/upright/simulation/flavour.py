@@ -5,6 +5,7 @@ A flavour is what is fixed when a kernel is compiled; everything else (parameter
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -15,10 +16,23 @@ import numpy as np
 from upright.errors import BadInput, nearest
 from upright.physics.derived import Derived
 
-ACTUATOR = ("gain", "offset", "limit", "lag", "delay", "slope")
-"""Actuator parameters of each input, in the kernel's order."""
+ACTUATOR_DEFAULTS = {
+    "gain": 1.0,
+    "offset": 0.0,
+    "limit": math.inf,
+    "lag": 0.0,
+    "delay": 0.0,
+    "slope": 0.0,
+    "start": -math.inf,
+    "end": math.inf,
+    "damping": 0.0,
+    "standby": 0.0,
+    "knee": math.inf,
+    "fade": 0.0,
+}
+"""Actuator parameters of each input, in the kernel's order, with the values at which they do nothing."""
 
-ACTUATOR_DEFAULTS = {"gain": 1.0, "offset": 0.0, "limit": float("inf"), "lag": 0.0, "delay": 0.0, "slope": 0.0}
+ACTUATOR = tuple(ACTUATOR_DEFAULTS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +52,13 @@ class Flavour:
     held : tuple of int
         Coordinates whose motion is prescribed.
     dynamic : bool
-        The actuator has lag, delay or a torque-speed slope.
+        The actuator has lag, delay, a torque-speed slope or one of the following.
+    gate : bool
+        The drive is alive from a start to an end only.
+    damping : bool
+        The drive brakes while it is alive.
+    curve : bool
+        The drive's force falls beyond a speed.
     loop : bool
         A sampled controller computes the input.
     record : bool
@@ -51,6 +71,9 @@ class Flavour:
     dahl: tuple[int, ...] = ()
     held: tuple[int, ...] = ()
     dynamic: bool = False
+    gate: bool = False
+    damping: bool = False
+    curve: bool = False
     loop: bool = False
     record: bool = True
 
@@ -97,7 +120,8 @@ class Layout:
         names = [f"k{i}" for i in range(len(self.derived.lumps))]
         names += [f"_Fc{i}" for i in joints] + [f"_Fs{i}" for i in joints]
         names += [f"_cq{i}" for i in f.drag] + [f"_iv{i}" for i in f.stribeck] + [f"_id{i}" for i in f.dahl]
-        return tuple(names + ([f"_sl{j}" for j in range(self.nu)] if f.dynamic else []))
+        names += [f"{c}{j}" for c in ["_sl"] * f.dynamic + ["_kn", "_fd"] * f.curve for j in range(self.nu)]
+        return tuple(names)
 
     @cached_property
     def rows(self) -> dict[str, int]:
@@ -108,6 +132,9 @@ class Layout:
         names += [f"{c}{j}" for c in ("ua", "um", "ub", "gain", "off", "lim", "ff", "cn") for j in nu]
         if f.dynamic:
             names += [f"{c}{j}" for c in ("co", "w", "e", "ep", "th", "df") for j in nu] + ["di"]
+            more = ["gs", "ge"] * f.gate + ["ona", "onm", "onb"] * (f.gate and f.curve)
+            more += ["dc", "ds", "zn", "zo", "dma", "dmm", "dmb"] * f.damping
+            names += [f"{c}{j}" for c in more for j in nu]
         if f.loop:
             names += [f"{c}{i}" for c in ("yp", "vf", "tg") for i in n]
             names += [f"K{j}_{i}" for j in nu for i in range(2 * self.n)] + ["kr", "ref"]
@@ -168,10 +195,16 @@ def choose(
     def on(name: str) -> bool:
         if not name or name in free:
             return bool(name)
-        value = params.get(name, 0.0)
-        return value != 0.0 if isinstance(value, float) else bool(np.any(np.asarray(value) != 0.0))
+        idle = ACTUATOR_DEFAULTS.get(name.removeprefix("actuator."), 0.0)
+        value = params.get(name, idle)
+        return value != idle if isinstance(value, float) else bool(np.any(np.asarray(value) != idle))
 
     moving = [j for j in derived.joints if derived.coordinates[j.coordinate] not in held]
+    gate, damping, curve, dynamic = (
+        any(on(f"actuator.{a}") for a in names)
+        for names in (("start", "end"), ("damping", "standby"), ("fade",), ("lag", "delay", "slope"))
+    )
+    curve = curve and on("actuator.knee")
     rough = [j for j in moving if on(j.coulomb) or on(j.stiction)]
     return Flavour(
         dry=tuple(j.coordinate for j in rough if not on(j.presliding)),
@@ -179,7 +212,10 @@ def choose(
         stribeck=tuple(j.coordinate for j in rough if on(j.stribeck_speed)),
         drag=tuple(j.coordinate for j in moving if on(j.quadratic)),
         held=tuple(i for i, c in enumerate(derived.coordinates) if c in held),
-        dynamic=any(on(f"actuator.{a}") for a in ("lag", "delay", "slope")),
+        dynamic=dynamic or gate or damping or curve,
+        gate=gate,
+        damping=damping,
+        curve=curve,
         loop=loop,
         record=record,
     )

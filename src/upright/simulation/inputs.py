@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from upright.simulation.drive import commanded
 from upright.simulation.writer import Writer
 
 
@@ -44,9 +45,11 @@ def command(w: Writer) -> None:
         w.add(f"_c = {{ff{j}}}")
         if not f.record:
             w.add(f"{{sat{j}}} += 1.0 if abs(_c) > {{lim{j}}} else 0.0")
+        commanded(w, j, "n")
         _clip(w, j, "cn" if f.dynamic else "um")
         if f.dynamic:
             w.add(f"_c = {{co{j}}}")
+            commanded(w, j, "o")
             _clip(w, j, "co")
 
 
@@ -92,4 +95,5 @@ def controller(w: Writer) -> None:
             for name, back in (("cn", "int64({di})"), ("co", "int64({di}) - 1")):
                 gap = back if name == "cn" else "int64({di}) + 1"
                 w.add(f"_slot = (_k - ({gap})) % _nbuf", f"_c = W[{place}] if _k >= {gap} else 0.0")
+                commanded(w, j, name[1])
                 w.add(f"{{{name}{j}}} = {{gain{j}}} * (_c + {{off{j}}})")

@@ -7,6 +7,7 @@ Text of ``run_L``: blocks of L lanes, their numbers interleaved in one flat arra
 from __future__ import annotations
 
 from upright.simulation.beginning import start
+from upright.simulation.drive import substep
 from upright.simulation.equations import step_arguments
 from upright.simulation.flavour import Layout
 from upright.simulation.inputs import command, controller, prescribed
@@ -119,6 +120,7 @@ def _substep(w: Writer) -> None:
                 f"{{um{j}}} = _wm",
                 f"{{ub{j}}} = _wm + _d",
             )
+            substep(w, j)
     number = {a: a[1:] if a[1:] in p.rows and a != "_h" else a for a in step_arguments(p)}
     if not f.dynamic:
         number |= {f"_u{when}{j}": f"um{j}" for when in "ab" for j in range(p.nu)}

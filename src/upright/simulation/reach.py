@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 
+from upright.simulation.drive import nodes
 from upright.simulation.equations import arguments, step_arguments
 from upright.simulation.flavour import Layout
 
@@ -73,11 +74,11 @@ def _known(p: Layout, state: str) -> dict[str, str]:
     return known | {name: f"W[{p.rows[name]} * L]" for name in p.constants}
 
 
-def _input(p: Layout, j: int, z: str) -> str:
-    """Input `j` at the fraction `z` of the substep, along which it runs straight."""
+def _input(p: Layout, j: int, z: str, c: str = "u") -> str:
+    """Input `j`, or what its drive does, at the fraction `z` of the substep, along which it runs straight."""
     if not p.flavour.dynamic:
         return f"W[{p.rows[f'um{j}']} * L]"
-    first, last = (f"W[{p.rows[f'u{w}{j}']} * L]" for w in "ab")
+    first, last = (f"W[{p.rows[f'{c}{w}{j}']} * L]" for w in "ab")
     return f"{first} + ({last} - {first}) * {z}"
 
 
@@ -92,7 +93,7 @@ def leap(p: Layout) -> str:
     known, f = _known(p, "STATE"), p.flavour
     known["_h"] = "d"
     for when, z in (("a", "za"), ("m", "zm"), ("b", "zb")):
-        known |= {f"_u{when}{j}": _input(p, j, z) for j in range(p.nu)}
+        known |= {f"_{c}{when}{j}": _input(p, j, z, c) for c in ("u", *nodes(f)) for j in range(p.nu)}
         known |= {f"_h{c}{i}{when}": _motion(p, c, i, z) for i in f.held for c in "qva"}
     call = ", ".join(known[a] for a in step_arguments(p))
     result = ", ".join(f"S[NEXT + {k}]" for k in range(2 * len(p.free) + len(f.dahl)))
@@ -114,6 +115,7 @@ def terms_at(p: Layout) -> str:
             (_motion(p, "q", i, "z"), _motion(p, "v", i, "z")) if i in f.held else (known[f"_q{i}"], known[f"_v{i}"])
         )
     known |= {u: _input(p, j, "z") for j, u in enumerate(p.derived.inputs)}
+    known |= {f"_{c}{j}": _input(p, j, "z", c) for c in nodes(f) for j in range(p.nu)}
     known |= {f"_ah{i}": _motion(p, "a", i, "z") for i in f.held}
     call = ", ".join(known[a] for a in arguments(p))
     return (

@@ -47,7 +47,10 @@ def simulate(
         A plant brings its own parameters; those in `params` replace them.
     params : mapping of str to float or array, shape (lanes,)
         Parameters by name; the actuator's as ``"actuator.gain"``, ``"actuator.offset"``, ``"actuator.limit"``,
-        ``"actuator.lag"`` [s], ``"actuator.delay"`` [s], ``"actuator.slope"`` (defaults 1, 0, inf, 0, 0, 0).
+        ``"actuator.lag"`` [s], ``"actuator.delay"`` [s], ``"actuator.slope"`` (defaults 1, 0, inf, 0, 0, 0);
+        ``"actuator.start"`` and ``"actuator.end"`` [s from the first sample of `u`], between which the drive is alive;
+        ``"actuator.damping"`` [force per speed] while the command is not zero, ``"actuator.standby"`` whatever it is;
+        ``"actuator.fade"``, force lost per speed beyond ``"actuator.knee"`` in the force's own direction.
     x0 : array, shape (states,) or (lanes, states)
         Initial states: coordinate, its velocity, next coordinate, ...
     u : array, shape (T,) or (T, inputs), or None

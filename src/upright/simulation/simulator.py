@@ -3,8 +3,8 @@
 The one place that steps a plant. Classical Runge-Kutta with `substeps` steps per sample; dry friction sticks and slips
 at moments found inside the step. The input is held between samples. Per lane it runs through limit, offset, gain,
 delay, lag: ``force = gain * lag(delay(clip(u, limit) + offset)) - slope * speed``; before the first sample of the
-record it is what it is there. Delay and lag keep mean and first moment of the input within a substep exactly, so
-that the motion depends continuously on both.
+record it is what it is there. What else a drive does stands in `upright.simulation.drive`. Delay, lag and what switches
+keep mean and first moment of the input within a substep exactly, so that the motion depends continuously on them.
 """
 
 from __future__ import annotations

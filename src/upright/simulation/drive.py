@@ -1,0 +1,94 @@
+"""What does the drive do besides what it is told: trip, brake while it is powered, lose force at speed?
+
+Text for one input of a kernel. ``u_eff = F_c(u, v) on(t) - (slope + D(t)) v``, where ``on`` is 1 between start and end,
+``D = damping on(t) [command is not zero] + standby [t < end]``, and the force ``u`` loses `fade` for each unit of speed
+beyond `knee` in its own direction, down to zero at most. ``on`` and ``D`` switch inside a substep: there the straight
+line with the same mean and first moment stands for them, as for a delayed command, so that the motion depends
+continuously on when.
+"""
+
+from __future__ import annotations
+
+from upright.simulation.flavour import Flavour, Layout
+from upright.simulation.writer import Writer
+
+
+def nodes(f: Flavour) -> list[str]:
+    """What a step needs at its start, middle and end besides the input: share of the time on, damping."""
+    return ["on"] * (f.gate and f.curve) + ["dm"] * f.damping
+
+
+def force(p: Layout) -> list[str]:
+    """Lines that turn the force a drive is asked for into the one it gives at the speed it has."""
+    f, lines = p.flavour, list[str]()
+    for j, u in enumerate(p.derived.inputs if f.dynamic else ()):
+        v, lost = p.velocities[p.drives[j]], f"_sl{j}"
+        if f.curve:
+            lines += [
+                f"_z = ({v} if {u} > 0.0 else -{v}) - _kn{j}",
+                f"_w = abs({u}) - _fd{j} * (_z if _z > 0.0 else 0.0)",
+                "_w = _w if _w > 0.0 else 0.0",
+                f"{u} = _w if {u} > 0.0 else -_w",
+            ]
+            lines += [f"{u} = {u} * _on{j}"] if f.gate else []
+        if f.damping:
+            lost = f"({lost} + _dm{j})"
+        lines.append(f"{u} = {u} - {lost} * {v}")
+    return lines
+
+
+def begin(w: Writer, j: int, row: dict[str, int]) -> None:
+    """Numbers of input `j` that stay for one lane; `row` says where each parameter stands."""
+    f = w.p.flavour
+    wanted: list[str] = []
+    if f.gate:
+        # moments in substeps after the lane's own first one
+        w.add(
+            f"{{ge{j}}} = P[{row['end']}, _m] / _h - START[_m] * _substeps",
+            f"_z = P[{row['start']}, _m] / _h - START[_m] * _substeps",
+            f"{{gs{j}}} = _z if _z < {{ge{j}}} else {{ge{j}}}",
+        )
+        wanted += ["start", "end"]
+    if f.damping:
+        w.add(f"{{dc{j}}} = P[{row['damping']}, _m]", f"{{ds{j}}} = P[{row['standby']}, _m]")
+    if f.curve:
+        w.add(f"{{_kn{j}}} = P[{row['knee']}, _m]", f"{{_fd{j}}} = P[{row['fade']}, _m]")
+        wanted += ["knee", "fade"]
+    for name in wanted:
+        # comparisons would let it pass unseen
+        w.add(f"_z = P[{row[name]}, _m]", "if not (_z == _z):", "    {q0} = nan")
+
+
+def commanded(w: Writer, j: int, place: str) -> None:
+    """Whether the command ``_c`` of this sample or of the one before is not zero."""
+    if w.p.flavour.damping:
+        w.add(f"{{z{place}{j}}} = 1.0 if _c != 0.0 else 0.0")
+
+
+def _step_down(name: str, slope: str, moment: str) -> list[str]:
+    """Lines for what is 1 until a moment and 0 after it, both counted in this substep."""
+    return [
+        f"{name} = {moment}",
+        f"{name} = 0.0 if {name} < 0.0 else {name}",
+        f"{name} = 1.0 if {name} > 1.0 else {name}",
+        f"{slope} = 3.0 * {name} * ({name} - 1.0)",
+    ]
+
+
+def substep(w: Writer, j: int) -> None:
+    """Input `j` during one substep, once lag and delay have given it."""
+    f = w.p.flavour
+    if f.gate:
+        w.add("_here = float64(_k * _substeps + _j)")
+        w.add(*_step_down("_ne", "_de", f"{{ge{j}}} - _here"), *_step_down("_ns", "_ds", f"{{gs{j}}} - _here"))
+        w.add("_r = _ne - _ns", "_d = _de - _ds", "_oa = _r - _d", "_om = _r", "_ob = _r + _d")
+        if f.curve:
+            w.add(*(f"{{on{c}{j}}} = _o{c}" for c in "amb"))
+        else:
+            w.add(*(f"{{u{c}{j}}} = {{u{c}{j}}} * _o{c}" for c in "amb"))
+    if f.damping:
+        w.add(*_step_down("_p", "_z", f"{{df{j}}} * _substeps - _j"), f"_d = {{zo{j}}} - {{zn{j}}}")
+        for c, side in zip("amb", ("- ", None, "+ "), strict=True):
+            at = f"{side}_z" if side else ""
+            on, alive = (f" * _o{c}", f" * (_ne {side}_de)" if side else " * _ne") if f.gate else ("", "")
+            w.add(f"{{dm{c}{j}}} = {{dc{j}}} * ({{zn{j}}} + _d * (_p {at})){on} + {{ds{j}}}{alive}")
