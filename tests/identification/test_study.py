@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.identification.crane_log import RIG, RUN, SENSORS, THETA, T, X, one
+from upright.errors import BadInput
 from upright.identification.study import load_study
 
 
@@ -57,6 +58,19 @@ def test_the_slope_is_force_per_speed_and_times_are_seconds(study):
     assert p.rig.parameters["actuator.slope"].value == 2
     assert p.rig.parameters["actuator.lag"].value == pytest.approx(0.02)
     assert p.rig.parameters["actuator.delay"].estimate
+
+
+def test_a_drive_that_trips_and_fades_is_read_with_its_units(study):
+    text = 'end = { guess = "2500 ms" }\nstandby = "2 N s/m"\nknee = "300 mm/s"\nfade = { guess = "1 N s/m" }\n'
+    p = study(f"{RIG}[actuator]\n{text}start = -inf\n{SENSORS}{RUN}").rig.parameters
+    assert p["actuator.end"].value == pytest.approx(2.5)
+    assert p["actuator.end"].estimate
+    assert (p["actuator.standby"].unit, p["actuator.standby"].value) == ("N s/m", 2.0)
+    assert (p["actuator.knee"].unit, p["actuator.knee"].value) == ("m/s", pytest.approx(0.3))
+    assert p["actuator.fade"].lower == 0.0
+    assert (p["actuator.start"].value, p["actuator.damping"].value) == (-math.inf, 0.0)
+    with pytest.raises(BadInput, match="knee"):
+        study(f"{RIG}[actuator]\nknee = 0\n{SENSORS}{RUN}")
 
 
 def test_a_window_keeps_its_part_of_the_record(study):

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.descent import descend
+from upright.identification.effort import effort
 from upright.identification.model import Feedback, Rig, Run
 from upright.identification.normal import Normal, finite
 from upright.identification.smoothing import (
     dominant_period,
-    first_order,
     middle,
     savitzky_golay,
     smoothing_width,
@@ -111,23 +111,6 @@ def _thin_law(law: Feedback | None, k: int) -> Feedback | None:
     if law is None or not isinstance(law.reference, np.ndarray):
         return law
     return replace(law, reference=law.reference[::k])
-
-
-def effort(values: Mapping[str, float], sample: Sample, plant: type[Plant]) -> Array:
-    """Force of every input (inputs, N), actuator and its delays included."""
-    out = np.empty_like(sample.u)
-    n = sample.u.shape[1]
-    late = values["actuator.delay"] / sample.dt
-    lag = values["actuator.lag"]
-    for k, drive in enumerate(plant.inputs):
-        i = [c.name for c in plant.coordinates].index(drive.on)
-        command = np.clip(sample.u[k], -values["actuator.limit"], values["actuator.limit"]) + values["actuator.offset"]
-        if late > 0:
-            command = np.interp(np.arange(n) - late, np.arange(n), command)
-        if lag > 0:
-            command = first_order(command, math.exp(-sample.dt / lag))
-        out[k] = values["actuator.gain"] * command - values["actuator.slope"] * sample.v[i]
-    return out
 
 
 def model_accelerations(plant: type[Plant], values: Mapping[str, float], sample: Sample) -> Array:

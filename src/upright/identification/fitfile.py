@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from upright.errors import BadInput
-from upright.identification.model import Estimate, Fit
+from upright.identification.model import ACTUATOR, Estimate, Fit
 from upright.identification.study import Study
 
 FORMAT = 1
@@ -151,8 +151,8 @@ def read_fit(path: Path) -> FittedModel:
     parameters: Any = content["parameters"]
     for name, entry in parameters.items() if isinstance(parameters, dict) else ():
         value: Any = entry.get("value") if isinstance(entry, dict) else entry
-        if value is None and name == "actuator.limit":
-            value = math.inf
+        if value is None and name in ACTUATOR and math.isinf(ACTUATOR[name][1]):
+            value = ACTUATOR[name][1]
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise BadInput(f"{path}: parameters.{name}.value must be a number, got {value!r}; identify again")
         values[name] = float(value)

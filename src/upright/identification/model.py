@@ -24,8 +24,17 @@ ACTUATOR = {
     "actuator.lag": ("first-order lag", 0.0),
     "actuator.delay": ("dead time", 0.0),
     "actuator.slope": ("force lost per speed (back-EMF)", 0.0),
+    "actuator.start": ("when the drive comes alive, from the run's first sample", -math.inf),
+    "actuator.end": ("when the drive trips, from the run's first sample; no force after it", math.inf),
+    "actuator.damping": ("damping while the drive is alive and its command is not zero", 0.0),
+    "actuator.standby": ("damping until the drive trips, whatever its command", 0.0),
+    "actuator.knee": ("speed in the force's direction from which the force falls", math.inf),
+    "actuator.fade": ("force lost per speed beyond the knee, down to no force", 0.0),
 }
 """Numbers every actuator has, besides the plant's own parameters: meaning and default."""
+
+NEVER_NEGATIVE = tuple(f"actuator.{a}" for a in ("limit", "lag", "delay", "damping", "standby", "knee", "fade"))
+"""Those that make no sense below zero."""
 
 PER_RUN = ("initial", "offset", "gain", "friction", "input_offset")
 """What may differ from run to run: initial state, sensor offsets, actuator gain (a factor), dry and viscous friction

@@ -12,7 +12,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.accelerations import Sample, effort
+from upright.identification.accelerations import Sample
+from upright.identification.effort import effort
 from upright.identification.model import Rig
 from upright.physics.plant import evaluate
 

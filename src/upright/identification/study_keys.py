@@ -110,7 +110,7 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
             Key(
                 name.partition(".")[2],
                 '"2 N/V" or a table as above' if name.endswith("gain") else "value",
-                f"{meaning}; {'no limit' if default == math.inf else f'{default:g}'} if left out",
+                f"{meaning}; {'none' if math.isinf(default) else f'{default:g}'} if left out",
             )
             for name, (meaning, default) in ACTUATOR.items()
         ),

@@ -8,7 +8,7 @@ from typing import Any
 
 from upright.errors import BadInput, ImpossiblePhysics
 from upright.identification.columns import in_unit
-from upright.identification.model import ACTUATOR, Parameter, Rig
+from upright.identification.model import ACTUATOR, NEVER_NEGATIVE, Parameter, Rig
 from upright.identification.study_keys import names
 from upright.identification.study_text import Section, show
 from upright.physics import Plant, find
@@ -57,7 +57,8 @@ def read_rig(study: Section, plant: type[Plant], drive_unit: str, fixed: Mapping
         what = Quantity(
             unit=actuator_unit(plant, key, drive_unit),
             meaning=meaning,
-            lower=0.0 if key in ("limit", "lag", "delay") else -math.inf,
+            lower=0.0 if name in NEVER_NEGATIVE else -math.inf,
+            open_lower=key == "knee",
         )
         if fixed is not None and name in fixed:
             parameters[name] = Parameter(name=name, value=fixed[name], unit=what.unit, meaning=meaning)
@@ -90,7 +91,11 @@ def actuator_unit(plant: type[Plant], key: str, drive_unit: str) -> str:
     drive = drive_unit or "1"
     if key == "gain":
         return force if drive == "1" else per(force, drive)
-    return {"offset": drive, "limit": drive, "lag": "s", "delay": "s", "slope": per(force, f"{place}/s")}[key]
+    if key in ("offset", "limit"):
+        return drive
+    if key in ("lag", "delay", "start", "end"):
+        return "s"
+    return f"{place}/s" if key == "knee" else per(force, f"{place}/s")
 
 
 def per(above: str, below: str) -> str:
@@ -160,7 +165,7 @@ def _number(section: Section, keys: tuple[str, ...], value: Any, what: Quantity)
 
 
 def _check(section: Section, keys: tuple[str, ...], name: str, value: float, what: Quantity) -> None:
-    infinite = name == "actuator.limit" and value == math.inf
+    infinite = math.isinf(value) and name in ACTUATOR and value == ACTUATOR[name][1]
     with section.text.at((*section.place(keys[0]), *keys[1:])):
         try:
             if not infinite:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model import ACTUATOR, Parameter, Rig
+from upright.identification.model import ACTUATOR, NEVER_NEGATIVE, Parameter, Rig
 
 Array = NDArray[np.float64]
 
@@ -88,8 +88,9 @@ def _shared(rig: Rig, p: Parameter) -> Unknown:
         q = rig.plant.quantity(p.name)
         lower, upper = max(lower, q.lower), min(upper, q.upper)
         positive = q.open_lower and q.lower == 0
-    elif p.name in ("actuator.lag", "actuator.delay", "actuator.slope"):
+    elif p.name in (*NEVER_NEGATIVE, "actuator.slope"):
         lower = max(lower, 0.0)
+        positive = p.name == "actuator.knee"
     log = positive and p.value > 0
     value = min(max(p.value, lower), upper)
     if log:  # a number that the data do not see would otherwise run to 1e130
@@ -97,14 +98,19 @@ def _shared(rig: Rig, p: Parameter) -> Unknown:
     prior = None
     if not p.estimate:
         prior = (math.log(p.value), p.uncertainty / p.value) if log else (p.value, p.uncertainty)
-    scale = 1.0 if log else max(abs(value), p.uncertainty) or _FALLBACK.get(p.name, 1e-3)
+    size = 0.0 if p.name in MOMENTS else abs(value)
+    scale = 1.0 if log else max(size, p.uncertainty) or _FALLBACK.get(p.name, 1e-3)
     return Unknown(
         name=p.name, runs=SHARED, value=value, lower=lower, upper=upper, log=log, scale=scale, prior=prior,
         asked=p.estimate,
     )  # fmt: skip
 
 
+MOMENTS = ("actuator.start", "actuator.end")
+"""Moments of a run: how late they are says nothing about the change that would matter."""
+
 _FALLBACK = {"actuator.gain": 1.0, "actuator.lag": 5e-3, "actuator.delay": 5e-3, "actuator.offset": 1e-2}
+_FALLBACK |= dict.fromkeys(MOMENTS, 0.1)
 
 
 def friction_names(rig: Rig) -> tuple[str, ...]:
