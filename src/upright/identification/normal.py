@@ -68,6 +68,16 @@ def squares(lanes: Sequence[Array], target: Array, offset: Array, weights: Array
     return total if finite(total) else np.full_like(total, math.inf)
 
 
+def mixed(
+    lanes: Sequence[Array], target: Array, offset: Array, scale: Array | None, W: Array
+) -> tuple[list[Array], Array, Array, Array]:
+    """Arguments of `squares` for combinations ``W z`` of outputs, weights of one included."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        z = [lane * (1.0 if scale is None else scale[k]) + offset[k] for k, lane in enumerate(lanes)]
+        together = [sum((w * zk for w, zk in zip(row, z, strict=True)), np.zeros(())) for row in W]
+    return together, np.ascontiguousarray(target @ W.T), np.zeros_like(offset), np.ones(len(W))
+
+
 def products(J: Array, r: Array) -> tuple[Array, Array, float]:
     """``J'J``, ``J'r`` and ``r'r`` in blocks too small for a linear-algebra library to wake its threads for.
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.identification.blending import moving_alike
 from upright.identification.model import Rig, Run
 from upright.identification.normal import Normal
 from upright.identification.nuisances import run_unknowns
@@ -46,8 +47,15 @@ def pose(
         else:
             unknowns.append(u)
     steps = np.array([1e-6 * u.scale for u in unknowns])
+    blends = {i: W for i, track in enumerate(tracks) if (W := moving_alike(track)) is not None}
     return Problem(
-        rig=rig, tracks=tracks, unknowns=unknowns, base=base_values(rig), friction=friction_names(rig), steps=steps
+        blends=blends,
+        rig=rig,
+        tracks=tracks,
+        unknowns=unknowns,
+        base=base_values(rig),
+        friction=friction_names(rig),
+        steps=steps,
     )
 
 

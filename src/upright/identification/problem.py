@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.model import Rig
-from upright.identification.normal import Normal, Rows, finite, products, squares
+from upright.identification.normal import Normal, Rows, finite, mixed, products, squares
 from upright.identification.nuisances import Dressed, dress
 from upright.identification.restarts import PERTURBATION, Restart, settle
 from upright.identification.tracks import Track, motions, outputs, simulator
@@ -27,7 +27,8 @@ Array = NDArray[np.float64]
 class Problem:
     """Rig, runs and the numbers sought; counts its simulations in `evaluations`.
 
-    `steps` (sought,) are the perturbations, `noise` the residual that one sigma of prior knowledge is worth.
+    `steps` (sought,) are the perturbations, `noise` the residual that one sigma of prior knowledge is worth,
+    `blends` (outputs, outputs) by run what weighs errors of outputs that err together, in place of the track's weights.
     """
 
     rig: Rig
@@ -40,6 +41,7 @@ class Problem:
     evaluations: int = 0
     solvers: dict[int, Simulator] = field(default_factory=dict[int, Simulator])
     memory: Array = field(default_factory=lambda: np.empty(0))
+    blends: dict[int, Array] = field(default_factory=dict[int, Array])
 
     @property
     def lower(self) -> Array:
@@ -90,6 +92,10 @@ class Problem:
         own = {u.name: v[i] for i, u in enumerate(self.unknowns) if index in u.runs}
         return dress(self.rig, track, values, own, self.friction, x.shape[1])
 
+    def blend(self, index: int) -> Array:
+        """What errors (..., outputs) of one run are weighed with, ``W e``: (outputs, outputs)."""
+        return self.blends.get(index, np.diag(self.tracks[index].weights))
+
     def solver(self, index: int) -> Simulator:
         """Solver of one run, made once."""
         if index not in self.solvers:
@@ -118,17 +124,17 @@ class Problem:
             lanes[sought, 1 + m + here] -= self.steps[sought]
         restart = self.restart(index, x) if track.doubtful.size else None
         y = self.simulate(index, lanes, n, None if restart is None else restart.shift)
-        weights = track.weights[:, None]
+        W = self.blend(index)
         target = track.targets(n)
         skip = 0 if track.windowed else min(track.first, n - 1)
-        residual = (y[skip:, :, :, 0] - target[skip:]) * track.weights
+        residual = (y[skip:, :, :, 0] - target[skip:]) @ W.T
         if not finite(residual):
             return None
         with np.errstate(over="ignore", invalid="ignore"):  # a lane that ran away makes the cost infinite
             if central:
-                slope = (y[skip:, :, :, 1 : m + 1] - y[skip:, :, :, m + 1 :]) * (weights / (2 * self.steps[sought]))
+                slope = W @ ((y[skip:, :, :, 1 : m + 1] - y[skip:, :, :, m + 1 :]) / (2 * self.steps[sought]))
             else:
-                slope = (y[skip:, :, :, 1:] - y[skip:, :, :, :1]) * (weights / self.steps[sought])
+                slope = W @ ((y[skip:, :, :, 1:] - y[skip:, :, :, :1]) / self.steps[sought])
         k = len(track.columns)
         r, J = np.moveaxis(residual, 1, 0), np.moveaxis(slope, 1, 0)  # windows one after another
         if restart is not None:
@@ -144,7 +150,7 @@ class Problem:
         n = self.samples(index, horizon)
         skip = 0 if track.windowed else min(track.first, n - 1)
         y = self.simulate(index, x[:, None], n)[skip:, :, :, 0]
-        return np.moveaxis((y - track.targets(n)[skip:]) * track.weights, 1, 0).reshape(track.restarts.size, -1)
+        return np.moveaxis((y - track.targets(n)[skip:]) @ self.blend(index).T, 1, 0).reshape(track.restarts.size, -1)
 
     def restart(self, index: int, x: Array) -> Restart:
         """Where the windows of one run are best restarted, for coordinates `x`."""
@@ -153,14 +159,15 @@ class Problem:
         sizes = PERTURBATION * track.start.spread[places]
         targets = track.targets(track.length)
         lanes = np.repeat(x[:, None], 1 + places.size, axis=1)
+        W = self.blend(index)
 
         def respond(d: Array) -> tuple[Array, Array]:
             shift = np.zeros((track.x0.shape[1], track.restarts.size, 1 + places.size))
             shift[places] = d.T[:, :, None]
             shift[places, :, 1 + np.arange(places.size)] += sizes[:, None]
             y = self.simulate(index, lanes, track.length, shift)
-            residual = np.moveaxis((y[..., 0] - targets) * track.weights, 1, 0).reshape(len(d), -1)
-            slope = np.moveaxis((y[..., 1:] - y[..., :1]) * (track.weights[:, None] / sizes), 1, 0)
+            residual = np.moveaxis((y[..., 0] - targets) @ W.T, 1, 0).reshape(len(d), -1)
+            slope = np.moveaxis(W @ ((y[..., 1:] - y[..., :1]) / sizes), 1, 0)
             return residual, slope.reshape(*residual.shape, -1)
 
         d, residual, slope = settle(respond, track.doubt)
@@ -203,7 +210,12 @@ class Problem:
             self.memory = np.empty(most)
         motion = motions(self.solver(index), track, d.values, d.x0, samples=n, memory=self.memory)
         skip = min(track.first, n - 1)
-        G = squares([motion[skip:, c] for c in track.columns], track.y[skip:n], d.offsets, track.weights, d.scales)
+        seen = [motion[skip:, c] for c in track.columns]
+        W = self.blends.get(index)
+        if W is None:
+            G = squares(seen, track.y[skip:n], d.offsets, track.weights, d.scales)
+        else:
+            G = squares(*mixed(seen, track.y[skip:n], d.offsets, d.scales, W))
         h = self.steps[sought]
         return G[1:, 1:] / np.outer(h, h), G[1:, 0] / h, float(G[0, 0])
 

@@ -1,0 +1,42 @@
+"""Two disks on one shaft: the twist speaks although friction is wrong by what carries both astray."""
+
+import math
+
+import numpy as np
+
+from upright.identification import Parameter, Rig, Run, identify
+from upright.physics import find
+from upright.simulation import simulate
+
+PLANT = find("torsional-2")
+TRUTH = {"J_1": 2.4e-3, "J_2": 1.9e-3, "k_12": 1.1, "c_1": 4e-3, "c_2": 1e-3, "c_12": 4e-4, "f_1c": 8e-3, "f_2c": 2e-3}
+QUANTUM, DT = 2 * math.pi / 16000, 2e-3
+
+
+def spin_up() -> Run:
+    """Both disks spun up from rest and left alone, read by encoders."""
+    t = np.arange(2501) * DT
+    u = np.where((t > 0.5) & (t < 3.0), 0.06, 0.0)[:, None]
+    x = simulate(PLANT(**TRUTH), {}, [0.0] * 4, u, DT, samples=t.size, substeps=2)
+    y = QUANTUM * np.round(x[:, ::2, 0] / QUANTUM)
+    return Run(label="spin-up", role="fit", t=t, u=u, y=y, measured=("theta_1", "theta_2"), quantum=(QUANTUM,) * 2,
+               unknown=(), initial=dict.fromkeys(PLANT.state_names(), 0.0))  # fmt: skip
+
+
+def test_the_shaft_is_found_although_the_friction_is_another():
+    # the model has no dry friction, the rig has: no viscous friction makes up for it, and both disks are led astray
+    asked = {"J_1", "J_2", "k_12", "c_1", "c_12"}
+    parameters = {n: Parameter(name=n, value=1.3 * TRUTH[n], estimate=True, lower=0.0) for n in asked}
+    parameters["c_2"] = Parameter(name="c_2", value=0.0)
+    run = spin_up()
+    fit = identify(Rig(plant=PLANT, parameters=parameters, substeps=2), [run])
+    score = fit.runs["spin-up"]
+    astray = np.abs(score.y - score.simulated).max()
+    twist = score.y[:, 0] - score.y[:, 1]
+    assert astray > 3 * np.ptp(twist)  # otherwise there would be nothing to drown in
+
+    def flexible(v):  # frequency of two free disks on a shaft, sqrt(k (1/J_1 + 1/J_2))
+        return math.sqrt(v["k_12"] * (1 / v["J_1"] + 1 / v["J_2"]))
+
+    found = {n: e.value for n, e in fit.estimates.items()}
+    assert abs(flexible(found) / flexible(TRUTH) - 1) < 0.02
