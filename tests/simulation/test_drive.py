@@ -198,9 +198,10 @@ def test_a_drive_at_its_defaults_does_nothing(block):
         assert np.allclose(np.moveaxis(x, 2, 0), plain, rtol=0, atol=1e-13)
 
 
-@pytest.mark.parametrize("name", ["start", "end", "damping", "standby", "knee", "fade"])
+@pytest.mark.parametrize("name", ["start", "end", "damping", "standby", "knee", "fade", "relaxation"])
 def test_a_lane_whose_drive_is_not_a_number_says_so(block, name):
-    p = {**BLOCK, **IDLE, "actuator.fade": 1.0, "actuator.knee": 2.0, f"actuator.{name}": np.array([math.nan, 0.5])}
+    p = {**BLOCK, **IDLE, "actuator.fade": 1.0, "actuator.knee": 2.0, "actuator.damping": 0.5}
+    p |= {f"actuator.{name}": np.array([math.nan, 0.5])}
     x = simulate(block, p, [0.1, 0.0], np.ones(10), 0.02, samples=10)
     assert np.isnan(x[-1, 0, 0])
     assert np.isfinite(x[:, :, 1]).all()
@@ -222,3 +223,65 @@ def test_a_loop_that_trips_leaves_the_plant_to_itself(block):
     assert np.allclose(y.transpose(2, 0, 1), path, rtol=0, atol=1e-8)
     e = ensemble(block, p, [[0.3, 0.1]] * 2, None, dt, samples=n, substeps=10, loop=loop)
     assert np.allclose(e.final.T, path[-1][:2], rtol=0, atol=1e-8)
+
+
+def wound(t, x0, pieces, k, c, relaxation):
+    """Place and speed of a unit mass on a spring whose drive brakes by b, relaxation b' + b = D v; from b = 0."""
+    x, out, reached = np.array([*x0, 0.0]), np.empty((t.size, 2)), 0.0
+    for begin, end, F, D in pieces:
+        A = np.array([[0, 1, 0], [-k, -c, -1], [0, D / relaxation, -1 / relaxation]])
+        rest = -np.linalg.solve(A, [0, F, 0])
+        for i in np.flatnonzero((t >= begin - 1e-12) & (t <= end + 1e-12)):
+            out[i] = (rest + expm(A * (t[i] - begin)) @ (x - rest))[:2]
+        x = rest + expm(A * (end - begin)) @ (x - rest)
+        reached = end
+    assert reached >= t[-1]
+    return out
+
+
+@pytest.mark.parametrize("relaxation", [1e-3, 0.08, 5.0])
+def test_braking_builds_up_and_fades_as_the_current_of_a_winding(block, relaxation):
+    k, c, D, F, dt, n, off = 80.0, 0.3, 2.0, 1.5, 0.01, 201, 0.9
+    t = np.arange(n) * dt
+    truth = wound(t, (0.02, 0.0), [(0.0, off, F, D), (off, 3.0, 0.0, 0.0)], k, c, relaxation)
+    p = {**BLOCK, "k": k, "c": c, "actuator.gain": F, "actuator.damping": D, "actuator.relaxation": relaxation}
+    missed = []
+    for substeps in (4, 8, 16):
+        for lanes in (1, 3):
+            x = simulate(block, p, [[0.02, 0.0]] * lanes, np.where(t < off - 1e-9, 1.0, 0.0), dt, samples=n,
+                         substeps=substeps)  # fmt: skip
+            assert np.array_equal(x[:, :, :1].repeat(lanes, 2), x)
+        missed.append(np.abs(x[:, :, 0] - truth).max(axis=0) / np.abs(truth).max(axis=0))
+    # the speed is taken to go on as in the substep before: second order in the substep
+    assert np.all(missed[-1] < missed[0] / 8)
+    assert np.all(missed[-1] < 1e-3)
+
+
+def test_braking_that_needs_no_time_is_damping(block):
+    dt, n = 0.01, 101
+    u = np.ones(n)
+    p = {**BLOCK, "k": 80.0, "actuator.damping": 0.7, "actuator.standby": 0.4}
+    plain = simulate(block, p, [0.02, 0.0], u, dt, samples=n, substeps=16)
+    quick = simulate(block, {**p, "actuator.relaxation": 1e-9}, [0.02, 0.0], u, dt, samples=n, substeps=16)
+    # what the extrapolated speed misses: D (w h)^2 of the motion
+    assert np.allclose(quick, plain, rtol=0, atol=1.1 * 80 * (dt / 16) ** 2 * np.abs(plain).max())
+
+
+def test_a_mass_with_dry_friction_stops_although_its_braking_relaxes(block):
+    # v' = F - F_c - b until it stops; scipy's own event finds when
+    F_c, D, T, v0 = 0.5, 1.2, 0.15, 1.0
+    s = solve_ivp(lambda _, y: [y[1], -F_c - y[2], (D * y[1] - y[2]) / T], (0, 9), [0, v0, 0],
+                  events=stops, method="DOP853", rtol=1e-12, atol=1e-12)  # fmt: skip
+    p = {**BLOCK, "F_c": F_c, "actuator.gain": 1e-12, "actuator.damping": D, "actuator.relaxation": T}
+    x = simulate(block, p, [0.0, v0], np.ones(301), 0.01, samples=301, substeps=4)[:, :, 0]
+    assert s.t_events[0].size == 1
+    assert x[-1, 0] == pytest.approx(s.y_events[0][0][0], rel=1e-4)
+    assert np.all(x[int(s.t_events[0][0] / 0.01) + 2 :, 1] == 0.0)
+
+
+def stops(_, y):
+    """Speed, at whose zero scipy ends."""
+    return y[1]
+
+
+stops.terminal = True

@@ -39,5 +39,8 @@ def effort(values: Mapping[str, float], sample: Sample, plant: type[Plant]) -> A
         force = a["gain"] * command
         lost = a["fade"] * np.maximum(np.sign(force) * v - a["knee"], 0.0)
         force = np.sign(force) * np.maximum(np.abs(force) - lost, 0.0)
-        out[k] = force * on - (a["slope"] + a["damping"] * on * commanded + a["standby"] * alive) * v
+        braking = (a["damping"] * on * commanded + a["standby"] * alive) * v
+        if a["relaxation"] > 0:
+            braking = first_order(braking, math.exp(-sample.dt / a["relaxation"]))
+        out[k] = force * on - a["slope"] * v - braking
     return out

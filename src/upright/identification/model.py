@@ -30,10 +30,11 @@ ACTUATOR = {
     "actuator.standby": ("damping until the drive trips, whatever its command", 0.0),
     "actuator.knee": ("speed in the force's direction from which the force falls", math.inf),
     "actuator.fade": ("force lost per speed beyond the knee, down to no force", 0.0),
+    "actuator.relaxation": ("time in which damping and standby build up and fade", 0.0),
 }
 """Numbers every actuator has, besides the plant's own parameters: meaning and default."""
 
-NEVER_NEGATIVE = tuple(f"actuator.{a}" for a in ("limit", "lag", "delay", "damping", "standby", "knee", "fade"))
+NEVER_NEGATIVE = tuple(f"actuator.{a}" for a in "limit lag delay damping standby knee fade relaxation".split())
 """Those that make no sense below zero."""
 
 PER_RUN = ("initial", "offset", "gain", "friction", "input_offset")

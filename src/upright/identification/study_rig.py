@@ -93,7 +93,7 @@ def actuator_unit(plant: type[Plant], key: str, drive_unit: str) -> str:
         return force if drive == "1" else per(force, drive)
     if key in ("offset", "limit"):
         return drive
-    if key in ("lag", "delay", "start", "end"):
+    if key in ("lag", "delay", "start", "end", "relaxation"):
         return "s"
     return f"{place}/s" if key == "knee" else per(force, f"{place}/s")
 

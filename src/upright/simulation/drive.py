@@ -1,6 +1,7 @@
 """What does the drive do besides what it is told: trip, brake while it is powered, lose force at speed?
 
-Text for one input of a kernel. ``u_eff = F_c(u, v) on(t) - (slope + D(t)) v``, where ``on`` is 1 between start and end,
+Text for one input of a kernel. ``u_eff = F_c(u, v) on(t) - slope v - B``, where the braking ``B = D(t) v`` may need a
+time to build up and to fade, ``relaxation B' + B = D(t) v``, as the current of a winding does. There ``on`` is 1 between start and end,
 ``D = damping on(t) [command is not zero] + standby [t < end]``, and the force ``u`` loses `fade` for each unit of speed
 beyond `knee` in its own direction, down to zero at most. ``on`` and ``D`` switch inside a substep: there the straight
 line with the same mean and first moment stands for them, as for a delayed command, so that the motion depends
@@ -14,8 +15,8 @@ from upright.simulation.writer import Writer
 
 
 def nodes(f: Flavour) -> list[str]:
-    """What a step needs at its start, middle and end besides the input: share of the time on, damping."""
-    return ["on"] * (f.gate and f.curve) + ["dm"] * f.damping
+    """What a step needs at its start, middle and end besides the input: share of the time on, damping or braking."""
+    return ["on"] * (f.gate and f.curve) + (["bk"] if f.relaxation else ["dm"] * f.damping)
 
 
 def force(p: Layout) -> list[str]:
@@ -31,9 +32,9 @@ def force(p: Layout) -> list[str]:
                 f"{u} = _w if {u} > 0.0 else -_w",
             ]
             lines += [f"{u} = {u} * _on{j}"] if f.gate else []
-        if f.damping:
+        if f.damping and not f.relaxation:
             lost = f"({lost} + _dm{j})"
-        lines.append(f"{u} = {u} - {lost} * {v}")
+        lines.append(f"{u} = {u} - {lost} * {v}" + (f" - _bk{j}" if f.relaxation else ""))
     return lines
 
 
@@ -51,6 +52,15 @@ def begin(w: Writer, j: int, row: dict[str, int]) -> None:
         wanted += ["start", "end"]
     if f.damping:
         w.add(f"{{dc{j}}} = P[{row['damping']}, _m]", f"{{ds{j}}} = P[{row['standby']}, _m]")
+    if f.relaxation:
+        w.add(
+            f"_z = P[{row['relaxation']}, _m]",
+            f"{{rt{j}}} = _z",
+            f"{{re{j}}} = exp(-_h / _z) if _z > 0.0 else 0.0",
+            f"{{rh{j}}} = exp(-0.5 * _h / _z) if _z > 0.0 else 0.0",
+            f"{{vp{j}}} = {{v{w.p.drives[j]}}}",
+        )
+        wanted.append("relaxation")
     if f.curve:
         w.add(f"{{_kn{j}}} = P[{row['knee']}, _m]", f"{{_fd{j}}} = P[{row['fade']}, _m]")
         wanted += ["knee", "fade"]
@@ -78,6 +88,8 @@ def _step_down(name: str, slope: str, moment: str) -> list[str]:
 def substep(w: Writer, j: int) -> None:
     """Input `j` during one substep, once lag and delay have given it."""
     f = w.p.flavour
+    if f.relaxation:
+        _build_up(w, j)
     if f.gate:
         w.add("_here = float64(_k * _substeps + _j)")
         w.add(*_step_down("_ne", "_de", f"{{ge{j}}} - _here"), *_step_down("_ns", "_ds", f"{{gs{j}}} - _here"))
@@ -92,3 +104,25 @@ def substep(w: Writer, j: int) -> None:
             at = f"{side}_z" if side else ""
             on, alive = (f" * _o{c}", f" * (_ne {side}_de)" if side else " * _ne") if f.gate else ("", "")
             w.add(f"{{dm{c}{j}}} = {{dc{j}}} * ({{zn{j}}} + _d * (_p {at})){on} + {{ds{j}}}{alive}")
+    if f.relaxation:
+        _braking(w, j)
+
+
+def _build_up(w: Writer, j: int) -> None:
+    """Braking at the end of the substep before, whose damping is still there; none at the first sample."""
+    v = f"{{v{w.p.drives[j]}}}"
+    w.add(
+        f"_a = ({v} - {{vp{j}}}) / _h",
+        f"_z = {{bk{j}}} - {{dmm{j}}} * ({{vp{j}}} - {{rt{j}}} * _a)",
+        f"{{bk{j}}} = {{dmm{j}}} * ({v} - {{rt{j}}} * _a) + _z * {{re{j}}}",
+        f"{{vp{j}}} = {v}",
+        f"{{bka{j}}} = {{bk{j}}}",
+    )
+
+
+def _braking(w: Writer, j: int) -> None:
+    """Braking in the middle and at the end of this substep, if the speed changes as it did in the one before."""
+    v = f"{{v{w.p.drives[j]}}}"
+    w.add(f"_z = {{bk{j}}} - {{dmm{j}}} * ({v} - {{rt{j}}} * _a)")
+    for c, part, left in (("m", "0.5 * _h", "rh"), ("b", "_h", "re")):
+        w.add(f"{{bk{c}{j}}} = {{dmm{j}}} * ({v} + (" + f"{part} - {{rt{j}}}) * _a) + _z * {{{left}{j}}}")

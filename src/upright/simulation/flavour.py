@@ -29,6 +29,7 @@ ACTUATOR_DEFAULTS = {
     "standby": 0.0,
     "knee": math.inf,
     "fade": 0.0,
+    "relaxation": 0.0,
 }
 """Actuator parameters of each input, in the kernel's order, with the values at which they do nothing."""
 
@@ -57,6 +58,8 @@ class Flavour:
         The drive is alive from a start to an end only.
     damping : bool
         The drive brakes while it is alive.
+    relaxation : bool
+        Its braking builds up and fades.
     curve : bool
         The drive's force falls beyond a speed.
     loop : bool
@@ -73,6 +76,7 @@ class Flavour:
     dynamic: bool = False
     gate: bool = False
     damping: bool = False
+    relaxation: bool = False
     curve: bool = False
     loop: bool = False
     record: bool = True
@@ -134,6 +138,7 @@ class Layout:
             names += [f"{c}{j}" for c in ("co", "w", "e", "ep", "th", "df") for j in nu] + ["di"]
             more = ["gs", "ge"] * f.gate + ["ona", "onm", "onb"] * (f.gate and f.curve)
             more += ["dc", "ds", "zn", "zo", "dma", "dmm", "dmb"] * f.damping
+            more += ["bk", "vp", "rt", "re", "rh", "bka", "bkm", "bkb"] * f.relaxation
             names += [f"{c}{j}" for c in more for j in nu]
         if f.loop:
             names += [f"{c}{i}" for c in ("yp", "vf", "tg") for i in n]
@@ -205,6 +210,7 @@ def choose(
         for names in (("start", "end"), ("damping", "standby"), ("fade",), ("lag", "delay", "slope"))
     )
     curve = curve and on("actuator.knee")
+    relaxation = damping and on("actuator.relaxation")
     rough = [j for j in moving if on(j.coulomb) or on(j.stiction)]
     return Flavour(
         dry=tuple(j.coordinate for j in rough if not on(j.presliding)),
@@ -215,6 +221,7 @@ def choose(
         dynamic=dynamic or gate or damping or curve,
         gate=gate,
         damping=damping,
+        relaxation=relaxation,
         curve=curve,
         loop=loop,
         record=record,

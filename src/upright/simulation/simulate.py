@@ -50,6 +50,7 @@ def simulate(
         ``"actuator.lag"`` [s], ``"actuator.delay"`` [s], ``"actuator.slope"`` (defaults 1, 0, inf, 0, 0, 0);
         ``"actuator.start"`` and ``"actuator.end"`` [s from the first sample of `u`], between which the drive is alive;
         ``"actuator.damping"`` [force per speed] while the command is not zero, ``"actuator.standby"`` whatever it is;
+        ``"actuator.relaxation"`` [s], the time in which that braking builds up and fades;
         ``"actuator.fade"``, force lost per speed beyond ``"actuator.knee"`` in the force's own direction.
     x0 : array, shape (states,) or (lanes, states)
         Initial states: coordinate, its velocity, next coordinate, ...
