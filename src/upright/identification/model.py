@@ -34,9 +34,9 @@ ACTUATOR = {
 }
 """Numbers every actuator has, besides the plant's own parameters: meaning and default."""
 
-NEVER_NEGATIVE = tuple(f"actuator.{a}" for a in "limit lag delay damping standby knee fade relaxation".split())
+_SIZES = ("limit", "lag", "delay", "damping", "standby", "knee", "fade", "relaxation")
+NEVER_NEGATIVE = tuple(f"actuator.{a}" for a in _SIZES)
 """Those that make no sense below zero."""
-
 PER_RUN = ("initial", "offset", "gain", "friction", "input_offset")
 """What may differ from run to run: initial state, sensor offsets, actuator gain (a factor), dry and viscous friction
 of every joint (one common factor), a constant added to the command. "offset.theta" means the offset of one sensor,

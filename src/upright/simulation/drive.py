@@ -1,11 +1,11 @@
 """What does the drive do besides what it is told: trip, brake while it is powered, lose force at speed?
 
 Text for one input of a kernel. ``u_eff = F_c(u, v) on(t) - slope v - B``, where the braking ``B = D(t) v`` may need a
-time to build up and to fade, ``relaxation B' + B = D(t) v``, as the current of a winding does. There ``on`` is 1 between start and end,
-``D = damping on(t) [command is not zero] + standby [t < end]``, and the force ``u`` loses `fade` for each unit of speed
-beyond `knee` in its own direction, down to zero at most. ``on`` and ``D`` switch inside a substep: there the straight
-line with the same mean and first moment stands for them, as for a delayed command, so that the motion depends
-continuously on when.
+time to build up and to fade, ``relaxation B' + B = D(t) v``, as the current of a winding does. There ``on`` is 1
+between start and end, ``D = damping on(t) [command is not zero] + standby [t < end]``, and the force ``u`` loses `fade`
+for each unit of speed beyond `knee` in its own direction, down to zero at most. ``on`` and ``D`` switch inside a
+substep: there the straight line with the same mean and first moment stands for them, as for a delayed command, so that
+the motion depends continuously on when.
 """
 
 from __future__ import annotations
