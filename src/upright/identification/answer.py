@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from upright.identification import assumptions
 from upright.identification.chain import Log, count
 from upright.identification.descent import Descent
+from upright.identification.doubt import doubted
 from upright.identification.model import Estimate, Fit, Rig, Run, RunScore
 from upright.identification.own import estimate, own_estimates, quantile
 from upright.identification.pose import pose
@@ -58,6 +59,8 @@ def answer(
         )
         warnings.append(f"{name} was left out: with it the held-out part of the runs is not predicted better.")
     estimates = {n: estimates[n] for n in [*asked.parameters] if n in estimates}
+    if not found.interrupted:
+        estimates = doubted(estimates, asked, chosen, problem, x, spread, left_out, log)
     told = [run for run in runs if run.role == "fit" or not found.interrupted]
     known = {label: {n: e.value for n, e in group.items()} for label, group in groups.items()}
     scores = _scores(chosen, told, problem, x, {n: e.value for n, e in estimates.items()}, known, log)
