@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from upright.simulation.flavour import ACTUATOR, ACTUATOR_DEFAULTS, Flavour, choose
+from upright.simulation.law import Law
 from upright.simulation.parts import Held, Loop
 from upright.simulation.simulate import Ensemble, ensemble, simulate
 from upright.simulation.simulator import Simulator
@@ -13,6 +14,7 @@ __all__ = [
     "Ensemble",
     "Flavour",
     "Held",
+    "Law",
     "Loop",
     "Simulator",
     "choose",

@@ -41,8 +41,11 @@ def start(w: Writer) -> None:
             w.add(f"{{{name}{j}}} = P[{first + k * p.nu + j}, _m]")
         if f.dynamic:
             _actuator(w, j, first)
-    if f.loop:
-        row = first + len(ACTUATOR) * p.nu
+    law = first + len(ACTUATOR) * p.nu
+    if f.law is not None:
+        w.add(*(f"{{{name}}} = P[{law + r}, _m]" for r, name in enumerate(p.numbers)))
+    elif f.loop:
+        row = law
         for name in (
             [f"K{j}_{i}" for j in range(p.nu) for i in range(2 * p.n)] + [f"tg{i}" for i in range(p.n)] + ["kr"]
         ):

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+
+from upright.errors import BadInput
 
 Array = NDArray[np.float64]
 
@@ -25,6 +28,16 @@ def aligned(size: int) -> tuple[Array, int]:
     address = raw.ctypes.data
     first = (-address // 8) % 8
     return raw[first : first + size], address + 8 * first
+
+
+def recorded(shape: tuple[int, int, int], memory: Array | None) -> Array:
+    """Array to record into: fresh, or the first part of `memory`."""
+    if memory is None:
+        return np.empty(shape)
+    size = math.prod(shape)
+    if memory.ndim != 1 or memory.size < size or memory.dtype != np.float64 or not memory.flags.carray:
+        raise BadInput(f"memory needs at least {size} contiguous float64 values in one row, got {memory.shape}.")
+    return memory[:size].reshape(shape)
 
 
 def share(step: Callable[[int, int], None], blocks: int, threads: int) -> None:

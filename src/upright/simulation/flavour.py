@@ -15,6 +15,8 @@ import numpy as np
 
 from upright.errors import BadInput, nearest
 from upright.physics.derived import Derived
+from upright.simulation.law import Law
+from upright.simulation.parts import Loop
 
 ACTUATOR_DEFAULTS = {
     "gain": 1.0,
@@ -64,6 +66,8 @@ class Flavour:
         The drive's force falls beyond a speed.
     loop : bool
         A sampled controller computes the input.
+    law : tuple of int, optional
+        States and references of the controller when it is a `Law`.
     record : bool
         The motion is returned, not only what it reduces to.
     """
@@ -79,6 +83,7 @@ class Flavour:
     relaxation: bool = False
     curve: bool = False
     loop: bool = False
+    law: tuple[int, int] | None = None
     record: bool = True
 
 
@@ -128,6 +133,16 @@ class Layout:
         return tuple(names)
 
     @cached_property
+    def numbers(self) -> tuple[str, ...]:
+        """Names of a law's numbers, matrix by matrix and row by row, then its state."""
+        states, references = self.flavour.law or (0, 0)
+        z, u, w = range(states), range(self.nu), range(self.n + references)
+        sizes = (("A", z, z), ("B", z, w), ("C", u, z), ("D", u, w))
+        return tuple(
+            [f"l{c}{i}_{j}" for c, rows, columns in sizes for i in rows for j in columns] + [f"z{i}" for i in z]
+        )
+
+    @cached_property
     def rows(self) -> dict[str, int]:
         """Place of each per-lane number in the working array."""
         f, n, nu = self.flavour, range(self.n), range(self.nu)
@@ -140,7 +155,9 @@ class Layout:
             more += ["dc", "ds", "zn", "zo", "dma", "dmm", "dmb"] * f.damping
             more += ["bk", "vp", "rt", "re", "rh", "bka", "bkm", "bkb"] * f.relaxation
             names += [f"{c}{j}" for c in more for j in nu]
-        if f.loop:
+        if f.law is not None:
+            names += [*self.numbers, *(f"ref{c}" for c in range(f.law[1]))]
+        elif f.loop:
             names += [f"{c}{i}" for c in ("yp", "vf", "tg") for i in n]
             names += [f"K{j}_{i}" for j in nu for i in range(2 * self.n)] + ["kr", "ref"]
         if not f.record:
@@ -166,7 +183,7 @@ def choose(
     *,
     free: Collection[str] = (),
     held: Collection[str] = (),
-    loop: bool = False,
+    loop: bool | Loop | Law | None = False,
     record: bool = True,
 ) -> Flavour:
     """Smallest flavour that computes what `params` ask for.
@@ -181,8 +198,10 @@ def choose(
         Parameters that will be varied later, so that their terms stay in although they are zero now.
     held : collection of str
         Coordinates whose motion is prescribed.
-    loop, record : bool
-        A controller computes the input; the motion is returned.
+    loop : bool, Loop or Law, optional
+        Controller that computes the input; True stands for a `Loop` without delay.
+    record : bool
+        The motion is returned.
 
     Raises
     ------
@@ -218,11 +237,12 @@ def choose(
         stribeck=tuple(j.coordinate for j in rough if on(j.stribeck_speed)),
         drag=tuple(j.coordinate for j in moving if on(j.quadratic)),
         held=tuple(i for i, c in enumerate(derived.coordinates) if c in held),
-        dynamic=dynamic or gate or damping or curve,
+        dynamic=dynamic or gate or damping or curve or (not isinstance(loop, bool | None) and loop.delay > 0.0),
         gate=gate,
         damping=damping,
         relaxation=relaxation,
         curve=curve,
-        loop=loop,
+        loop=loop is not None and loop is not False,
+        law=loop.sizes if isinstance(loop, Law) else None,
         record=record,
     )

@@ -54,38 +54,15 @@ def command(w: Writer) -> None:
 
 
 def controller(w: Writer) -> None:
-    """Closed loop: encoder, differentiator, gains, limit, delay."""
+    """Closed loop: encoders, the controller's command, limit, delay."""
     p, f, n = w.p, w.p.flavour, w.p.n
     w.add("if _last >= 0:")
     w.depth += 1
     _feed(w, (("ff", "START[_base + _i] + _k"),))
     w.depth -= 1
-    w.add("if R.shape[0] > 0:")
-    w.depth += 1
-    w.lanes()
-    w.add("{ref} = R[min(max(START[_base + _i] + _k, 0), R.shape[0] - 1)]")
-    w.depth -= 2
-    w.add(f"_alpha, _true = FL[{n}], FL[{n + 1}]", "_rate = (1.0 - _alpha) / _dt if _k > 0 else 0.0")
     w.add(*(f"_quantum{i} = FL[{i}]" for i in range(n)))
     w.add(*(f"_per{i} = 1.0 / _quantum{i} if _quantum{i} > 0.0 else 0.0" for i in range(n)))
-    w.lanes()
-    for i in range(n):
-        w.add(
-            f"_y{i} = floor({{q{i}}} * _per{i} + 0.5) * _quantum{i}",
-            f"_y{i} = _y{i} if _quantum{i} > 0.0 else {{q{i}}}",
-            f"_d{i} = _alpha * {{vf{i}}} + _rate * (_y{i} - {{yp{i}}})",
-            f"{{vf{i}}} = _d{i}",
-            f"{{yp{i}}} = _y{i}",
-            f"_d{i} = {{v{i}}} if _true > 0.0 else _d{i}",
-            f"_y{i} = _y{i} - {{tg{i}}}",
-        )
-    for j in range(p.nu):
-        feedback = " + ".join(f"{{K{j}_{2 * i}}} * _y{i} + {{K{j}_{2 * i + 1}}} * _d{i}" for i in range(n))
-        w.add(f"_c = {{ff{j}}} + {{kr}} * {{ref}} - ({feedback})")
-        if not f.record:
-            w.add(f"{{sat{j}}} += 1.0 if abs(_c) > {{lim{j}}} else 0.0")
-        _clip(w, j, "cn" if f.dynamic else "um")
-        w.add(f"{{ua{j}}} = _c")
+    (_gains if f.law is None else _law)(w)
     if f.dynamic:
         w.depth -= 1
         w.lanes()
@@ -97,3 +74,78 @@ def controller(w: Writer) -> None:
                 w.add(f"_slot = (_k - ({gap})) % _nbuf", f"_c = W[{place}] if _k >= {gap} else 0.0")
                 commanded(w, j, name[1])
                 w.add(f"{{{name}{j}}} = {{gain{j}}} * (_c + {{off{j}}})")
+
+
+def _encoder(w: Writer, i: int) -> None:
+    w.add(
+        f"_y{i} = floor({{q{i}}} * _per{i} + 0.5) * _quantum{i}",
+        f"_y{i} = _y{i} if _quantum{i} > 0.0 else {{q{i}}}",
+    )
+
+
+def _put(w: Writer, j: int) -> None:
+    """Command ``_c`` of the controller, limited and put out."""
+    f = w.p.flavour
+    if not f.record:
+        w.add(f"{{sat{j}}} += 1.0 if abs(_c) > {{lim{j}}} else 0.0")
+    _clip(w, j, "cn" if f.dynamic else "um")
+    w.add(f"{{ua{j}}} = _c")
+
+
+def _gains(w: Writer) -> None:
+    """Differentiators and gains, `Loop`."""
+    p, n = w.p, w.p.n
+    w.add("if R.shape[0] > 0:")
+    w.depth += 1
+    w.lanes()
+    w.add("{ref} = R[min(max(START[_base + _i] + _k, 0), R.shape[0] - 1)]")
+    w.depth -= 2
+    w.add(f"_alpha, _true = FL[{n}], FL[{n + 1}]", "_rate = (1.0 - _alpha) / _dt if _k > 0 else 0.0")
+    w.lanes()
+    for i in range(n):
+        _encoder(w, i)
+        w.add(
+            f"_d{i} = _alpha * {{vf{i}}} + _rate * (_y{i} - {{yp{i}}})",
+            f"{{vf{i}}} = _d{i}",
+            f"{{yp{i}}} = _y{i}",
+            f"_d{i} = {{v{i}}} if _true > 0.0 else _d{i}",
+            f"_y{i} = _y{i} - {{tg{i}}}",
+        )
+    for j in range(p.nu):
+        feedback = " + ".join(f"{{K{j}_{2 * i}}} * _y{i} + {{K{j}_{2 * i + 1}}} * _d{i}" for i in range(n))
+        w.add(f"_c = {{ff{j}}} + {{kr}} * {{ref}} - ({feedback})")
+        _put(w, j)
+
+
+def _law(w: Writer) -> None:
+    """A controller with a state of its own, `Law`."""
+    p, n = w.p, w.p.n
+    states, references = p.flavour.law or (0, 0)
+    if references:
+        w.lanes()
+        w.add("_m = min(max(START[_base + _i] + _k, 0), R.shape[0] - 1)")
+        w.add(*(f"{{ref{c}}} = R[_m, {c}]" for c in range(references)))
+        w.depth -= 1
+    w.add(f"_freeze = FL[{n + 1}]")
+    for j in range(p.nu):
+        w.add(f"_step{j} = FL[{n + 4 + j}]", f"_steps{j} = 1.0 / _step{j} if _step{j} > 0.0 else 0.0")
+    w.lanes()
+    for i in range(n):
+        _encoder(w, i)
+    signals = [f"_y{i}" for i in range(n)] + [f"{{ref{c}}}" for c in range(references)]
+
+    def combined(of: str, row: int, by: str) -> str:
+        terms = [f"{{l{of}{row}_{i}}} * {{z{i}}}" for i in range(states)]
+        return " + ".join(terms + [f"{{l{by}{row}_{i}}} * {name}" for i, name in enumerate(signals)])
+
+    w.add("_over = 0.0")
+    for j in range(p.nu):
+        w.add(
+            f"_c = {{ff{j}}} + {combined('C', j, 'D')}",
+            f"_z = floor(_c * _steps{j} + 0.5) * _step{j}",
+            f"_c = _z if _step{j} > 0.0 else _c",
+            f"_over = _freeze if abs(_c) > {{lim{j}}} else _over",
+        )
+        _put(w, j)
+    w.add(*(f"_z{i} = {combined('A', i, 'B')}" for i in range(states)))
+    w.add(*(f"{{z{i}}} = _z{i} if _over == 0.0 else {{z{i}}}" for i in range(states)))

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput
+from upright.simulation.law import shared
 
 Array = NDArray[np.float64]
 
@@ -56,6 +57,19 @@ class Loop:
             raise BadInput(f"the loop's delay must be at least 0 samples, got {self.delay:g}; give it in samples.")
         if np.any(np.asarray(self.quantum) < 0.0):
             raise BadInput("an encoder's quantum must be at least 0, which means no rounding.")
+
+    def widths(self) -> dict[str, int]:
+        """Lanes that each array is given for."""
+        K, target = np.shape(self.K), np.shape(self.target)
+        return {
+            "K": K[2] if len(K) == 3 else 1,
+            "target": target[1] if len(target) == 2 else 1,
+            "k_pf": np.size(self.k_pf),
+        }
+
+    def scalars(self, n: int, nu: int) -> Array:
+        """What all lanes share, as the kernel reads it: quanta, alpha, whether speeds are the states', delay, ..."""
+        return shared(self.quantum, 0.0, n, nu, (self.alpha, float(self.velocity == "true"), self.delay))
 
     def rows(self, n: int, nu: int, lanes: int) -> Array:
         """Gains, targets and prefilter as the kernel reads them, shape (nu*2n + n + 1, lanes)."""

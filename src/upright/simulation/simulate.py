@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from upright.errors import BadInput
 from upright.physics.derived import Derived
 from upright.physics.plant import Plant
-from upright.simulation.flavour import Flavour, choose
+from upright.simulation.flavour import choose
+from upright.simulation.law import Law
 from upright.simulation.parts import Held, Loop
 from upright.simulation.simulator import Simulator
 
@@ -31,7 +31,7 @@ def simulate(
     samples: int,
     substeps: int = 1,
     start: ArrayLike = 0,
-    loop: Loop | None = None,
+    loop: Loop | Law | None = None,
     held: Mapping[str, Held] | None = None,
     every: int = 1,
     threads: int = 1,
@@ -64,7 +64,7 @@ def simulate(
         Runge-Kutta steps per sample.
     start : int or int array, shape (lanes,)
         Sample of `u`, reference and held motion at which a lane begins: windows of one record are lanes.
-    loop : Loop, optional
+    loop : Loop or Law, optional
         Sampled controller.
     held : mapping of str to Held, optional
         Coordinates whose motion is prescribed, or locked with ``Held()``.
@@ -96,7 +96,7 @@ class Ensemble:
     largest : array, shape (coordinates, lanes)
         Largest absolute value of each coordinate at the samples.
     error : array, shape (coordinates, lanes)
-        Largest distance from the loop's target, zero without loop, from the time `settle` on.
+        Largest distance from the target of a `Loop`, else from zero, from the time `settle` on.
     saturated : array, shape (inputs, lanes)
         Share of the samples at which the command met its limit.
     final : array, shape (states, lanes)
@@ -120,7 +120,7 @@ def ensemble(
     settle: float = 0.0,
     substeps: int = 1,
     start: ArrayLike = 0,
-    loop: Loop | None = None,
+    loop: Loop | Law | None = None,
     held: Mapping[str, Held] | None = None,
     threads: int | None = None,
 ) -> Ensemble:
@@ -156,16 +156,14 @@ def _prepare(
     dt: float,
     substeps: int,
     start: ArrayLike,
-    loop: Loop | None,
+    loop: Loop | Law | None,
     held: Mapping[str, Held],
     *,
     record: bool,
 ) -> _Job:
     values: dict[str, Any] = {**plant.parameters(), **params} if isinstance(plant, Plant) else dict(params)
     derived: Derived = plant if isinstance(plant, Derived) else plant.derived_for(values)
-    flavour = choose(derived, values, held=held, loop=loop is not None, record=record)
-    if loop is not None and loop.delay > 0.0:
-        flavour = _with_delay(flavour)
+    flavour = choose(derived, values, held=held, loop=loop, record=record)
     friction = {
         name for j in derived.joints for name in (j.coulomb, j.quadratic, j.stiction, j.stribeck_speed, j.presliding)
     }
@@ -188,9 +186,7 @@ def _prepare(
             raise BadInput(f"{name} needs one value or one for each lane, got shape {np.shape(value)}.")
         sizes[name] = np.size(value)
     if loop is not None:
-        sizes["K"] = np.shape(loop.K)[2] if np.ndim(loop.K) == 3 else 1
-        sizes["target"] = np.shape(loop.target)[1] if np.ndim(loop.target) == 2 else 1
-        sizes["k_pf"] = np.size(loop.k_pf)
+        sizes |= loop.widths()
     lanes = max(sizes.values())
     for name, size in sizes.items():
         if size not in (1, lanes):
@@ -207,10 +203,3 @@ def _prepare(
         u=command,
         start=None if not begin.any() else np.broadcast_to(begin.astype(np.int64).ravel(), (lanes,)),
     )
-
-
-@lru_cache
-def _with_delay(flavour: Flavour) -> Flavour:
-    from dataclasses import replace
-
-    return replace(flavour, dynamic=True)

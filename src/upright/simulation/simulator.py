@@ -20,10 +20,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput
 from upright.physics.derived import Derived
-from upright.simulation.blocks import aligned, padded, share
+from upright.simulation.blocks import aligned, padded, recorded, share
 from upright.simulation.compiled import kernel
 from upright.simulation.flavour import ACTUATOR, ACTUATOR_DEFAULTS, Flavour, Layout, lay_out
 from upright.simulation.lanes import room
+from upright.simulation.law import Law
 from upright.simulation.parts import Held, Loop
 from upright.simulation.source import WIDTH, direct
 
@@ -56,8 +57,8 @@ class Simulator:
         Sample time [s].
     substeps : int
         Runge-Kutta steps per sample.
-    loop : Loop, optional
-        Controller, present exactly when the flavour says so.
+    loop : Loop or Law, optional
+        Controller, the one that the flavour was chosen for.
     held : mapping of str to Held
         Coordinates whose motion is prescribed, exactly those of the flavour.
     plain : bool
@@ -68,7 +69,7 @@ class Simulator:
     flavour: Flavour
     dt: float
     substeps: int = 1
-    loop: Loop | None = None
+    loop: Loop | Law | None = None
     held: Mapping[str, Held] = field(default_factory=dict)
     plain: bool = False
 
@@ -77,7 +78,9 @@ class Simulator:
             raise BadInput(f"the sample time must be positive, got {self.dt:g} s.")
         if self.substeps < 1:
             raise BadInput(f"substeps must be at least 1, got {self.substeps}.")
-        if (self.loop is not None) != self.flavour.loop:
+        law = self.loop.sizes if isinstance(self.loop, Law) else None
+        late = self.loop is not None and self.loop.delay > 0.0 and not self.flavour.dynamic
+        if (self.loop is not None, law) != (self.flavour.loop, self.flavour.law) or late:
             raise BadInput("a loop was given without a flavour for it, or the other way round; use choose(loop=...).")
         wanted = {self.derived.coordinates[i] for i in self.flavour.held}
         if set(self.held) != wanted:
@@ -110,15 +113,8 @@ class Simulator:
 
     @cached_property
     def _scalars(self) -> Array:
-        n = len(self.derived.coordinates)
-        out = np.zeros(n + 4)
-        if self.loop is not None:
-            try:
-                out[:n] = self.loop.quantum
-            except ValueError:
-                raise BadInput(f"quantum needs one value or {n}, got {np.shape(self.loop.quantum)}.") from None
-            out[n : n + 3] = self.loop.alpha, float(self.loop.velocity == "true"), self.loop.delay
-        return out
+        n, nu = self._layout.n, self._layout.nu
+        return np.zeros(n + 4 + nu) if self.loop is None else self.loop.scalars(n, nu)
 
     @cached_property
     def _reference(self) -> Array:
@@ -192,11 +188,11 @@ class Simulator:
             raise BadInput(f"u needs shape (T, {nu}): time first, one column for each input; got {u.shape}.")
         width = 1 if lanes == 1 else WIDTH
         blocks = -(-lanes // width)
-        loop_rows = 0 if self.loop is None else nu * 2 * n + n + 1
-        P = padded(params, blocks * width, extra=loop_rows)
-        if self.loop is not None:
-            P[len(params) :, :lanes] = self.loop.rows(n, nu, lanes)
-            P[len(params) :, lanes:] = P[len(params) :, lanes - 1 : lanes]
+        law = _NONE[0] if self.loop is None else self.loop.rows(n, nu, lanes)
+        P = padded(params, blocks * width, extra=len(law))
+        if f.loop:
+            P[len(params) :, :lanes] = law
+            P[len(params) :, lanes:] = law[:, -1:]
         X0 = padded(x0, blocks * width)
         begin = np.zeros(blocks * width, np.int64)
         if start is not None:
@@ -219,7 +215,7 @@ class Simulator:
         scalars[n + 3] = math.ceil(settle / self.dt - 1e-9)
         out, reduced = _NONE, _NONE[0]
         if f.record:
-            out = _room((samples, 2 * n + (nu if f.loop else 0), blocks * width), memory)
+            out = recorded((samples, 2 * n + (nu if f.loop else 0), blocks * width), memory)
         else:
             reduced = np.empty((4 * n + nu, blocks * width))
         compiled = self._kernel.run_1 if width == 1 else self._kernel.run_16
@@ -237,13 +233,3 @@ class Simulator:
         else:
             share(step, blocks, threads)
         return out[:, :, :lanes] if f.record else reduced[:, :lanes]
-
-
-def _room(shape: tuple[int, int, int], memory: Array | None) -> Array:
-    """Array to record into: fresh, or the first part of `memory`."""
-    if memory is None:
-        return np.empty(shape)
-    size = math.prod(shape)
-    if memory.ndim != 1 or memory.size < size or memory.dtype != np.float64 or not memory.flags.carray:
-        raise BadInput(f"memory needs at least {size} contiguous float64 values in one row, got {memory.shape}.")
-    return memory[:size].reshape(shape)
