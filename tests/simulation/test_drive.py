@@ -285,3 +285,19 @@ def stops(_, y):
 
 
 stops.terminal = True
+
+
+def test_a_commanded_drive_brakes_no_harder_beyond_the_knee(block):
+    # v' = F - D v to the knee, then F - D v_k, a straight line; idle again, D' v however fast
+    dt, n, F, D, S, knee, off = 0.02, 91, 2.0, 0.3, 0.4, 1.4, 1.4
+    t = np.arange(n) * dt
+    p = {**BLOCK, "actuator.gain": F, "actuator.damping": D, "actuator.standby": S, "actuator.knee": knee}
+    x = simulate(block, p, [0.0, 0.0], np.where(t < off - 1e-9, 1.0, 0.0), dt, samples=n, substeps=2)
+    r = D + S
+    there = -math.log(1 - knee * r / F) / r
+    assert there < 1.2
+    v_off = knee + (F - r * knee) * (off - there)
+    rise = np.where(t < there, F / r * -np.expm1(-r * t), knee + (F - r * knee) * (t - there))
+    truth = np.where(t < off, rise, v_off * np.exp(-S * (t - off)))
+    # the kink at the knee lies inside a substep h: slope off by r^2 (v - v_k) there, h^2/8 of it remains
+    assert np.allclose(x[:, 1, 0], truth, rtol=0, atol=r * F * (dt / 2) ** 2)

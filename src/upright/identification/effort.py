@@ -37,9 +37,10 @@ def effort(values: Mapping[str, float], sample: Sample, plant: type[Plant]) -> A
         if lag > 0:
             command = first_order(command, math.exp(-sample.dt / lag))
         force = a["gain"] * command
-        lost = a["fade"] * np.maximum(np.sign(force) * v - a["knee"], 0.0)
-        force = np.sign(force) * np.maximum(np.abs(force) - lost, 0.0)
-        braking = (a["damping"] * on * commanded + a["standby"] * alive) * v
+        beyond = np.maximum(np.sign(force) * v - a["knee"], 0.0)
+        braked = v - np.sign(force) * beyond * on * commanded
+        force = np.sign(force) * np.maximum(np.abs(force) - a["fade"] * beyond, 0.0)
+        braking = (a["damping"] * on * commanded + a["standby"] * alive) * braked
         if a["relaxation"] > 0:
             braking = first_order(braking, math.exp(-sample.dt / a["relaxation"]))
         out[k] = force * on - a["slope"] * v - braking

@@ -28,7 +28,7 @@ ACTUATOR = {
     "actuator.end": ("when the drive trips, from the run's first sample; no force after it", math.inf),
     "actuator.damping": ("damping while the drive is alive and its command is not zero", 0.0),
     "actuator.standby": ("damping until the drive trips, whatever its command", 0.0),
-    "actuator.knee": ("speed in the force's direction from which the force falls", math.inf),
+    "actuator.knee": ("speed in the force's direction beyond which fade acts and braking grows no more", math.inf),
     "actuator.fade": ("force lost per speed beyond the knee, down to no force", 0.0),
     "actuator.relaxation": ("time in which damping and standby build up and fade", 0.0),
 }

@@ -3,9 +3,10 @@
 Text for one input of a kernel. ``u_eff = F_c(u, v) on(t) - slope v - B``, where the braking ``B = D(t) v`` may need a
 time to build up and to fade, ``relaxation B' + B = D(t) v``, as the current of a winding does. There ``on`` is 1
 between start and end, ``D = damping on(t) [command is not zero] + standby [t < end]``, and the force ``u`` loses `fade`
-for each unit of speed beyond `knee` in its own direction, down to zero at most. ``on`` and ``D`` switch inside a
-substep: there the straight line with the same mean and first moment stands for them, as for a delayed command, so that
-the motion depends continuously on when.
+for each unit of speed beyond `knee` in its own direction, down to zero at most. A commanded drive brakes no harder
+beyond the knee than at it, so that `knee` joins a steep and a flat part of a torque-speed curve. ``on`` and ``D``
+switch inside a substep: there the straight line with the same mean and first moment stands for them, as for a delayed
+command, so that the motion depends continuously on when.
 """
 
 from __future__ import annotations
@@ -15,8 +16,9 @@ from upright.simulation.writer import Writer
 
 
 def nodes(f: Flavour) -> list[str]:
-    """What a step needs at its start, middle and end besides the input: share of the time on, damping or braking."""
-    return ["on"] * (f.gate and f.curve) + (["bk"] if f.relaxation else ["dm"] * f.damping)
+    """What a step needs at its start, middle and end besides the input: shares of the time, damping or braking."""
+    braking = ["bk"] if f.relaxation else ["dm"] * f.damping + ["cs"] * (f.damping and f.curve)
+    return ["on"] * (f.gate and f.curve) + braking
 
 
 def force(p: Layout) -> list[str]:
@@ -29,13 +31,22 @@ def force(p: Layout) -> list[str]:
                 f"_z = ({v} if {u} > 0.0 else -{v}) - _kn{j}",
                 f"_w = abs({u}) - _fd{j} * (_z if _z > 0.0 else 0.0)",
                 "_w = _w if _w > 0.0 else 0.0",
-                f"{u} = _w if {u} > 0.0 else -_w",
             ]
+            if f.damping and not f.relaxation:
+                lines.append(f"_vb{j} = {_braked(v, u, f'_cs{j}')}")
+            lines.append(f"{u} = _w if {u} > 0.0 else -_w")
             lines += [f"{u} = {u} * _on{j}"] if f.gate else []
         if f.damping and not f.relaxation:
-            lost = f"({lost} + _dm{j})"
-        lines.append(f"{u} = {u} - {lost} * {v}" + (f" - _bk{j}" if f.relaxation else ""))
+            braking = f" - _dm{j} * {f'_vb{j}' if f.curve else v}"
+        else:
+            braking = f" - _bk{j}" if f.relaxation else ""
+        lines.append(f"{u} = {u} - {lost} * {v}{braking}")
     return lines
+
+
+def _braked(v: str, u: str, share: str) -> str:
+    """Speed at which a drive brakes whose speed lies ``_z`` beyond the knee, for the share of time commanded."""
+    return f"{v} - {share} * ((_z if {u} > 0.0 else -_z) if _z > 0.0 else 0.0)"
 
 
 def begin(w: Writer, j: int, row: dict[str, int]) -> None:
@@ -103,7 +114,9 @@ def substep(w: Writer, j: int) -> None:
         for c, side in zip("amb", ("- ", None, "+ "), strict=True):
             at = f"{side}_z" if side else ""
             on, alive = (f" * _o{c}", f" * (_ne {side}_de)" if side else " * _ne") if f.gate else ("", "")
-            w.add(f"{{dm{c}{j}}} = {{dc{j}}} * ({{zn{j}}} + _d * (_p {at})){on} + {{ds{j}}}{alive}")
+            w.add(f"_r = ({{zn{j}}} + _d * (_p {at})){on}", f"{{dm{c}{j}}} = {{dc{j}}} * _r + {{ds{j}}}{alive}")
+            if f.curve:
+                w.add(f"{{cs{c}{j}}} = _r")
     if f.relaxation:
         _braking(w, j)
 
@@ -111,18 +124,21 @@ def substep(w: Writer, j: int) -> None:
 def _build_up(w: Writer, j: int) -> None:
     """Braking at the end of the substep before, whose damping is still there; none at the first sample."""
     v = f"{{v{w.p.drives[j]}}}"
+    w.add(f"_v = {v}")
+    if w.p.flavour.curve:
+        w.add(f"_z = ({v} if {{um{j}}} > 0.0 else -{v}) - {{_kn{j}}}")
+        w.add(f"_v = {_braked(v, f'{{um{j}}}', f'{{csm{j}}}')}")
     w.add(
-        f"_a = ({v} - {{vp{j}}}) / _h",
+        f"_a = (_v - {{vp{j}}}) / _h",
         f"_z = {{bk{j}}} - {{dmm{j}}} * ({{vp{j}}} - {{rt{j}}} * _a)",
-        f"{{bk{j}}} = {{dmm{j}}} * ({v} - {{rt{j}}} * _a) + _z * {{re{j}}}",
-        f"{{vp{j}}} = {v}",
+        f"{{bk{j}}} = {{dmm{j}}} * (_v - {{rt{j}}} * _a) + _z * {{re{j}}}",
+        f"{{vp{j}}} = _v",
         f"{{bka{j}}} = {{bk{j}}}",
     )
 
 
 def _braking(w: Writer, j: int) -> None:
     """Braking in the middle and at the end of this substep, if the speed changes as it did in the one before."""
-    v = f"{{v{w.p.drives[j]}}}"
-    w.add(f"_z = {{bk{j}}} - {{dmm{j}}} * ({v} - {{rt{j}}} * _a)")
+    w.add(f"_z = {{bk{j}}} - {{dmm{j}}} * (_v - {{rt{j}}} * _a)")
     for c, part, left in (("m", "0.5 * _h", "rh"), ("b", "_h", "re")):
-        w.add(f"{{bk{c}{j}}} = {{dmm{j}}} * ({v} + (" + f"{part} - {{rt{j}}}) * _a) + _z * {{{left}{j}}}")
+        w.add(f"{{bk{c}{j}}} = {{dmm{j}}} * (_v + (" + f"{part} - {{rt{j}}}) * _a) + _z * {{{left}{j}}}")

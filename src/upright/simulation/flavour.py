@@ -153,6 +153,7 @@ class Layout:
             names += [f"{c}{j}" for c in ("co", "w", "e", "ep", "th", "df") for j in nu] + ["di"]
             more = ["gs", "ge"] * f.gate + ["ona", "onm", "onb"] * (f.gate and f.curve)
             more += ["dc", "ds", "zn", "zo", "dma", "dmm", "dmb"] * f.damping
+            more += ["csa", "csm", "csb"] * (f.damping and f.curve)
             more += ["bk", "vp", "rt", "re", "rh", "bka", "bkm", "bkb"] * f.relaxation
             names += [f"{c}{j}" for c in more for j in nu]
         if f.law is not None:
@@ -228,7 +229,7 @@ def choose(
         any(on(f"actuator.{a}") for a in names)
         for names in (("start", "end"), ("damping", "standby"), ("fade",), ("lag", "delay", "slope"))
     )
-    curve = curve and on("actuator.knee")
+    curve = (curve or damping) and on("actuator.knee")
     relaxation = damping and on("actuator.relaxation")
     rough = [j for j in moving if on(j.coulomb) or on(j.stiction)]
     return Flavour(
