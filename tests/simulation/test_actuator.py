@@ -60,6 +60,13 @@ def test_limit_offset_and_gain_act_in_this_order(block):
     assert np.allclose(np.diff(x[:, 1, 0]), [3 * 2.25, 3 * -1.75, 3 * 0.75], rtol=1e-15)
 
 
+def test_no_command_at_all_is_a_command_of_zero(block):
+    # between them stand offset, gain and a delay that needs the sample before
+    p = {**BLOCK, "actuator.delay": 0.005, "actuator.offset": 0.25, "actuator.gain": 3.0}
+    x = simulate(block, p, [0.0, 0.0], None, 0.01, samples=31)
+    assert np.allclose(x[:, 1, 0], 0.75 * 0.01 * np.arange(31), rtol=0, atol=1e-14)
+
+
 def test_the_slope_takes_force_in_proportion_to_speed(block):
     # m v' = u - slope v
     p = {**BLOCK, "actuator.slope": 0.4}

@@ -150,7 +150,7 @@ class Layout:
         names += [f"oq{i}" for i in n] + [f"ov{i}" for i in n] + [f"oy{i}" for i in f.dahl]
         names += [f"{c}{j}" for c in ("ua", "um", "ub", "gain", "off", "lim", "ff", "cn") for j in nu]
         if f.dynamic:
-            names += [f"{c}{j}" for c in ("co", "w", "e", "ep", "th", "df") for j in nu] + ["di"]
+            names += [f"{c}{j}" for c in ("co", "fo", "w", "e", "ep", "th", "df") for j in nu] + ["di"]
             more = ["gs", "ge"] * f.gate + ["ona", "onm", "onb"] * (f.gate and f.curve)
             more += ["dc", "ds", "zn", "zo", "dma", "dmm", "dmb"] * f.damping
             more += ["csa", "csm", "csb"] * (f.damping and f.curve)

@@ -38,7 +38,7 @@ def command(w: Writer) -> None:
     now = "START[_base + _i] + _k"
     w.add("if _last >= 0:")
     w.depth += 1
-    _feed(w, (("ff", f"{now} - int64({{di}})"), ("co", f"{now} - int64({{di}}) - 1")) if f.dynamic else (("ff", now),))
+    _feed(w, (("ff", f"{now} - int64({{di}})"), ("fo", f"{now} - int64({{di}}) - 1")) if f.dynamic else (("ff", now),))
     w.depth -= 1
     w.lanes()
     for j in range(p.nu):
@@ -48,7 +48,7 @@ def command(w: Writer) -> None:
         commanded(w, j, "n")
         _clip(w, j, "cn" if f.dynamic else "um")
         if f.dynamic:
-            w.add(f"_c = {{co{j}}}")
+            w.add(f"_c = {{fo{j}}}")
             commanded(w, j, "o")
             _clip(w, j, "co")
 
