@@ -23,6 +23,7 @@ COMMANDS = {
     "show": "Print and draw what a log holds: columns, sample rate, quanta, gaps, lying columns.",
     "init": "Write a commented study file from a log, filled in with what could be recognised.",
     "identify": "Fit a rig's parameters to its logs as a study file says; write estimates and report.",
+    "ladder": "Grow a model only while it predicts better what it has not seen.",
     "predict": "Score other runs with a model that was fitted before.",
 }
 

@@ -31,7 +31,10 @@ def identify(
         Path | None, typer.Option(metavar="DIR", help="Folder the runs' files are in; the study's own if left out.")
     ] = None,
     hold_out: Annotated[
-        list[str] | None, typer.Option("--hold-out", metavar="LABEL", help="Predict this run instead of fitting it.")
+        list[str] | None,
+        typer.Option(
+            "--hold-out", metavar="LABEL", help="Predict this run instead of fitting it; 'each': all in turn."
+        ),
     ] = None,
     method: Annotated[str, typer.Option(metavar="METHOD", help=f"How to search: {', '.join(METHODS)}.")] = "auto",
     as_json: Annotated[bool, typer.Option("--json", help="Print fit.json instead of tables.")] = False,
@@ -76,6 +79,7 @@ def identify(
     All keys: `upright identify --keys`, or docs/study.md.
     Writes OUT/fit.json and OUT/report.html.
     Ctrl-C keeps the best so far and writes it.
+    --hold-out each predicts every run from a fit of the others as well.
     Exit code: 0 a fit was written (3 with --strict when its verdict is not to
     trust it), 2 the study or a log is wrong, 130 stopped by Ctrl-C.
     """
@@ -93,7 +97,12 @@ def identify(
     folder = out if out is not None else study.with_name(f"{study.stem}-fit")
     if folder.exists() and not folder.is_dir():
         raise BadInput(f"results need a folder, but {folder} is a file; name another with -o")
-    asked = load_study(study, data=data).hold_out(*(hold_out or ()))
+    asked = load_study(study, data=data)
+    each = "each" in (hold_out or ()) and all(run.label != "each" for run in asked.runs)
+    asked = asked.hold_out(*(label for label in hold_out or () if not (each and label == "each")))
+    fitted = sum(run.role == "fit" for run in asked.runs)
+    if each and fitted < 2:
+        raise BadInput(f"{study}: --hold-out each takes two runs to fit or more, got {fitted}; add a run or a window")
     if not asked.rig.estimated:
         raise BadInput(
             f'{study}: nothing is asked; give a parameter a guess, such as J_p = {{ guess = "1e-3 kg m^2" }}, or score'
@@ -101,6 +110,7 @@ def identify(
         )
     if not any(run.role == "fit" for run in asked.runs):
         raise BadInput(f'{study}: every run has role = "predict"; at least one needs role = "fit"')
+    from upright.identification.crossval import cross_validate
     from upright.identification.estimate import identify as estimate
     from upright.identification.fitfile import write_fit
 
@@ -108,20 +118,25 @@ def identify(
         fit = estimate(asked.rig, asked.runs, method=method, progress=progress)
     written = [folder / "fit.json"]
     content = write_fit(fit, asked, written[0])
+    crossed = None
+    if each and not fit.interrupted:
+        with progress_line(quiet=as_json) as progress:
+            crossed = cross_validate(fit, asked.runs, progress=progress)
+        content = write_fit(fit, asked, written[0], crossed)
     if report:
-        written += _report(fit, folder, asked)
+        written += _report(fit, folder, asked, crossed)
     if as_json:
         typer.echo(json.dumps(content, indent=2, ensure_ascii=False))
     else:
         again = typed(study) + (f" --data {typed(data)}" if data is not None else "")
-        print_fit(fit, written, again)
-    if fit.interrupted:
+        print_fit(fit, written, again, crossed)
+    if fit.interrupted or (crossed is not None and crossed.interrupted):
         raise typer.Exit(INTERRUPTED)
     if strict and not fit.trusted:
         raise typer.Exit(NOT_TRUSTED)
 
 
-def _report(fit: Any, folder: Path, asked: Any) -> list[Path]:
+def _report(fit: Any, folder: Path, asked: Any, crossed: Any) -> list[Path]:
     """Write report.html."""
     from upright.report.document import write_fit_report
 
@@ -132,4 +147,4 @@ def _report(fit: Any, folder: Path, asked: Any) -> list[Path]:
         "runs": {run.label: run.source for run in asked.runs},
     }
     title = asked.title or asked.path.stem.replace("_", " ")
-    return [write_fit_report(fit, folder, title=title, provenance=provenance)]
+    return [write_fit_report(fit, folder, title=title, provenance=provenance, crossed=crossed)]

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from upright.identification.crossval import CrossValidation
     from upright.identification.model import Fit, RunScore
 
 Progress = Callable[[str, float, float, int], None]
@@ -60,7 +61,7 @@ def typed(path: Path | str) -> str:
     return shlex.quote(text) if re.search(r"[\"$`!]", text) else f'"{text}"'
 
 
-def print_fit(fit: Fit, files: Sequence[Path], study: str) -> None:
+def print_fit(fit: Fit, files: Sequence[Path], study: str, crossed: CrossValidation | None = None) -> None:
     """Parameters, scores, verdict, warnings, files and next steps; `study` as the command line names it."""
     from rich.table import Table
 
@@ -80,6 +81,8 @@ def print_fit(fit: Fit, files: Sequence[Path], study: str) -> None:
         table.add_row(*(_plain(cell) for cell in cells[: len(headings)]))
     screen.print(table)
     print_scores(fit.runs)
+    if crossed is not None:
+        print_crossed(crossed)
     how = f"{fit.method}, {fit.evaluations} evaluations, {fit.seconds:.2f} s"
     screen.print(f"\n[bold]Verdict[/bold] ({how}): {_plain(fit.verdict)}", soft_wrap=True)
     for warning in fit.warnings:
@@ -116,6 +119,30 @@ def print_scores(runs: Any) -> None:
             naive = [f"{score.naive[name]:.2f}" if name in score.naive else ""] if windowed else []
             table.add_row(_plain(label), role, name, f"{percent:.2f}", *naive, over)
     console().print(table)
+
+
+def print_crossed(crossed: CrossValidation) -> None:
+    """Every run fitted among all, and predicted by a fit of the others."""
+    from rich.table import Table
+
+    from upright.report.tables import cross_rows
+
+    screen = console()
+    title = "\nEvery run fitted among all, and predicted by a fit of the others"
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
+    for heading in ("run", "signal", "fitted", "predicted"):
+        table.add_column(heading, justify="right" if heading.endswith("ed") else "left")
+    for r in cross_rows(crossed):
+        table.add_row(*(_plain(cell) for cell in (r.run, r.signal, r.fitted, r.predicted)))
+    screen.print(table)
+    for label, names in crossed.blind.items():
+        if names:
+            told = (
+                f"The other runs cannot see {', '.join(names)}, so the prediction of '{label}' rests on its own values."
+            )
+            screen.print(_plain(told), soft_wrap=True)
+    if crossed.interrupted:
+        screen.print("Interrupted: runs without a prediction were not reached.", soft_wrap=True)
 
 
 def _plain(text: str) -> str:

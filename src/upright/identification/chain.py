@@ -20,6 +20,7 @@ from upright.identification.pose import settle_steps
 from upright.identification.problem import Problem
 from upright.identification.release import friction_from_energy
 from upright.identification.simplex import simplex
+from upright.identification.statistics import loudness, pseudo_inverse
 from upright.identification.unknowns import SHARED
 
 Array = NDArray[np.float64]
@@ -135,6 +136,27 @@ def better(a: Descent, b: Descent) -> Descent:
     """The one with the lower cost, interrupted when either was."""
     best = min(a, b, key=lambda d: d.normal.cost)
     return replace(best, interrupted=a.interrupted or b.interrupted)
+
+
+def weigh_priors(problem: Problem, found: Descent) -> Descent:
+    """Weigh prior knowledge by the residuals found, memory included, and settle again; unless it hardly pulls."""
+    if found.interrupted or not any(u.prior is not None for u in problem.unknowns):
+        return found
+    for _ in range(3):
+        if found.interrupted:
+            break
+        r, J = problem.prior_rows(found.x)
+        pull = pseudo_inverse(found.normal.matrix) @ (J.T @ r)
+        variance = found.normal.cost / count(problem)
+        error = np.sqrt(np.maximum(np.diag(pseudo_inverse(found.normal.matrix)) * variance, 0.0))
+        if np.all(np.abs(pull) <= 0.02 * error) and not any(u.prior and u.runs == SHARED for u in problem.unknowns):
+            break
+        noise = max(loudness(problem, found.x), 1e-9)
+        if abs(math.log(noise / problem.noise)) < 0.2:
+            break
+        problem.noise = noise
+        found = descend(problem.normal, found.x, problem.lower, problem.upper, tolerance=1e-6, limit=20)
+    return found
 
 
 def _ranked(problem: Problem, candidates: Sequence[Array], h: float) -> list[Array]:

@@ -13,17 +13,15 @@ from numpy.typing import NDArray
 
 from upright.errors import BadInput
 from upright.identification.answer import answer
-from upright.identification.chain import Log, better, carried, closed_form_starts, count, explain, placed
+from upright.identification.chain import Log, better, carried, closed_form_starts, count, explain, placed, weigh_priors
 from upright.identification.conventions import doubts
-from upright.identification.descent import Descent, Report, descend, grow
+from upright.identification.descent import Descent, Report, grow
 from upright.identification.ladder import choose
 from upright.identification.model import Fit, Rig, Run
 from upright.identification.pose import pose
 from upright.identification.problem import Problem
 from upright.identification.scoring import fit_percent, predict
 from upright.identification.simplex import simplex
-from upright.identification.statistics import loudness, pseudo_inverse
-from upright.identification.unknowns import SHARED
 
 __all__ = ["METHODS", "fit_percent", "identify", "predict"]
 
@@ -87,7 +85,7 @@ def identify(rig: Rig, runs: Sequence[Run], *, method: str = "auto", progress: R
                 starts = [placed(problem, s) for s in closed_form_starts(rig, seen)]
                 other = explain(problem, starts, log, patient=False) if starts else found
                 found = better(found, other)
-        found = _weigh_priors(problem, found)
+        found = weigh_priors(problem, found)
         if found.interrupted:  # perhaps over a part of the runs
             found = replace(found, normal=problem.normal(found.x))
     except KeyboardInterrupt:
@@ -121,27 +119,6 @@ def _half(problem: Problem) -> float:
     from upright.identification.descent import first_horizon
 
     return min(problem.duration, 2 * first_horizon(problem))
-
-
-def _weigh_priors(problem: Problem, found: Descent) -> Descent:
-    """Weigh prior knowledge by the residuals found, memory included, and settle again; unless it hardly pulls."""
-    if found.interrupted or not any(u.prior is not None for u in problem.unknowns):
-        return found
-    for _ in range(3):
-        if found.interrupted:
-            break
-        r, J = problem.prior_rows(found.x)
-        pull = pseudo_inverse(found.normal.matrix) @ (J.T @ r)
-        variance = found.normal.cost / count(problem)
-        error = np.sqrt(np.maximum(np.diag(pseudo_inverse(found.normal.matrix)) * variance, 0.0))
-        if np.all(np.abs(pull) <= 0.02 * error) and not any(u.prior and u.runs == SHARED for u in problem.unknowns):
-            break
-        noise = max(loudness(problem, found.x), 1e-9)
-        if abs(math.log(noise / problem.noise)) < 0.2:
-            break
-        problem.noise = noise
-        found = descend(problem.normal, found.x, problem.lower, problem.upper, tolerance=1e-6, limit=20)
-    return found
 
 
 def _check(rig: Rig, seen: Sequence[Run], method: str) -> None:

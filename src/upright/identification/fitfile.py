@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from upright.errors import BadInput
+from upright.identification.crossval import CrossValidation
 from upright.identification.model import ACTUATOR, Estimate, Fit
 from upright.identification.study import Study
 
@@ -33,9 +34,17 @@ class FittedModel:
     groups: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
 
 
-def write_fit(fit: Fit, study: Study, path: Path) -> dict[str, Any]:
-    """Write `fit.json` and return what it holds."""
+def write_fit(fit: Fit, study: Study, path: Path, crossed: CrossValidation | None = None) -> dict[str, Any]:
+    """Write `fit.json` and return what it holds; `crossed` adds what each run's prediction by the others scored."""
     content = as_json(fit, study)
+    if crossed is not None:
+        content["cross_validation"] = {
+            label: {
+                "fit_percent": {n: _finite(v) for n, v in s.fit_percent.items()},
+                "blind": list(crossed.blind[label]),
+            }
+            for label, s in crossed.predicted.items()
+        }
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_suffix(".part")  # a reader never meets half a file
     part.write_text(json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")

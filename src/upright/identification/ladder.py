@@ -14,11 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.chain import Log, better, closed_form_starts, explain, placed
+from upright.identification.decision import by_chance
 from upright.identification.descent import grow
 from upright.identification.model import Rig, Run
 from upright.identification.normal import finite
 from upright.identification.pose import pose
 from upright.identification.problem import Problem
+from upright.identification.rungs import at, friction_rungs
+from upright.identification.statistics import loudness
 from upright.identification.unknowns import SHARED
 
 Array = NDArray[np.float64]
@@ -26,15 +29,12 @@ Array = NDArray[np.float64]
 SEEN = 2 / 3
 """Share of every run that the rungs are fitted on; the rest judges them."""
 
-BETTER = 0.97
-"""A richer model that leaves less than this share of the cost has something to say although it predicts worse."""
-
 LEAST_RUN = 200
 """Runs with fewer samples are not cut."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rung:
+class Place:
     """A friction model: its name, the terms it adds, and the rig with all terms of higher rungs at zero."""
 
     name: str
@@ -42,32 +42,10 @@ class Rung:
     rig: Rig
 
 
-def rungs(rig: Rig) -> list[Rung]:
+def places(rig: Rig) -> list[Place]:
     """Nested friction models within the terms that the rig asks to estimate, poorest first."""
-    asked = set(rig.estimated)
-    joints = rig.plant.derived().joints
-    kinds = [
-        ("Coulomb friction", {j.coulomb for j in joints}),
-        ("quadratic drag", {j.quadratic for j in joints}),
-        ("stiction", {n for j in joints for n in (j.stiction, j.stribeck_speed)}),
-        ("presliding", {j.presliding for j in joints}),
-    ]
-    steps = [(name, tuple(n for n in rig.estimated if n in terms & asked)) for name, terms in kinds]
-    steps = [("viscous friction", ()), *((name, adds) for name, adds in steps if adds)]
-    found: list[Rung] = []
-    for k, (name, adds) in enumerate(steps):
-        off = {n for _, terms in steps[k + 1 :] for n in terms}
-        found.append(Rung(name=name, adds=adds, rig=without(rig, off)))
-    return found
-
-
-def without(rig: Rig, terms: set[str]) -> Rig:
-    """The rig with some terms known to be zero."""
-    parameters = {
-        n: replace(p, value=0.0, estimate=False, uncertainty=0.0) if n in terms else p
-        for n, p in rig.parameters.items()
-    }
-    return replace(rig, parameters=parameters)
+    ladder = friction_rungs(rig)
+    return [Place(name=r.name, adds=r.adds, rig=at(rig, ladder, ladder[: k + 1])) for k, r in enumerate(ladder)]
 
 
 def first_part(run: Run, share: float = SEEN) -> Run:
@@ -84,13 +62,14 @@ def first_part(run: Run, share: float = SEEN) -> Run:
 
 def choose(rig: Rig, runs: Sequence[Run], log: Log) -> tuple[Rig, list[Array], tuple[str, ...]]:
     """Rig of the rung that predicts best, coordinates to start the final fit from, terms left out."""
-    ladder = rungs(rig)
+    ladder = places(rig)
     problem = pose(rig, runs)
     if len(ladder) == 1:
         return rig, [problem.start, *(placed(problem, s) for s in closed_form_starts(rig, runs))], ()
     seen = [first_part(run) for run in runs]
     best = (math.inf, 0, problem.start, "")
     costs: list[float] = []
+    loud: list[float] = []
     tried: list[dict[str, float]] = []
     values: dict[str, float] = {}
     own: dict[tuple[tuple[int, ...], str], float] = {}
@@ -107,6 +86,7 @@ def choose(rig: Rig, runs: Sequence[Run], log: Log) -> tuple[Rig, list[Array], t
         if found.interrupted:
             raise KeyboardInterrupt
         costs.append(found.normal.cost)
+        loud.append(loudness(part, found.x))
         if k and costs[k] > costs[k - 1] * (1 + 1e-6):
             log.warnings.append(
                 f"With {rung.name} the first part of the runs was fitted worse (cost {costs[k]:.6g}) than without it "
@@ -124,19 +104,21 @@ def choose(rig: Rig, runs: Sequence[Run], log: Log) -> tuple[Rig, list[Array], t
             best = (missed, k, _carry(whole, values, own, rig, set()), rung.name)
     chosen = ladder[best[1]]
     out = tuple(n for rung in ladder[best[1] + 1 :] for n in rung.adds)
-    _compare(chosen, out, tried, costs, best[1], log)
+    _compare(chosen, out, tried, costs, loud, best[1], log)
     return chosen.rig, [best[2]], out
 
 
 def _compare(
-    chosen: Rung, out: tuple[str, ...], tried: list[dict[str, float]], costs: list[float], k: int, log: Log
-) -> None:
+    chosen: Place, out: tuple[str, ...], tried: list[dict[str, float]], costs: list[float], loud: list[float], k: int,
+    log: Log,
+) -> None:  # fmt: skip
     """Note what a richer model would have said otherwise, where it explains its part of the runs better.
 
     That the rest is predicted worse then means that something else is missing, not that the richer model is wrong.
+    `loud` are the residuals' loudness, rung by rung.
     """
     rival = min(range(k, len(costs)), key=lambda i: costs[i])
-    if costs[rival] > BETTER * costs[k]:
+    if rival == k or costs[k] - costs[rival] <= by_chance(len(out), loud[rival]):
         return
     for n in chosen.rig.estimated:
         a, b = tried[k].get(n, 0.0), tried[rival].get(n, 0.0)

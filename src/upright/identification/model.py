@@ -124,8 +124,8 @@ class Run:
         Seconds after the first sample before which the run is simulated but not scored (a held-out tail).
     loop : Feedback or None
         The law that closed the loop, when it is simulated too.
-    source : str
-        File, window and hash, for the report.
+    repeats, source : str
+        Label of the runs that repeat this one, when their commands do not show it; file, window and hash.
     """
 
     label: str
@@ -144,6 +144,7 @@ class Run:
     horizon: float | None = None
     score_from: float = 0.0
     loop: Feedback | None = None
+    repeats: str = ""
     source: str = ""
 
     @property
@@ -201,8 +202,8 @@ class RunScore:
     """How well one run is explained: fit percent per signal, over which horizon, and the simulated signals.
 
     Scores count from `score_from` seconds after the first sample on.
-    `naive` is the fit percent that holding the measured speed reaches from the same restarts, empty for a free run: a
-    horizon at which the model is hardly better tells nothing about the model.
+    `naive` is what holding the measured speed reaches from the same restarts, empty for a free run: a horizon at which
+    the model is hardly better tells nothing.
     `adapted` names what was estimated from the run itself: a prediction that chose its own gain is less of one.
     """
 
@@ -223,9 +224,8 @@ class Fit:
     """A rig explained by its runs.
 
     `per_run` holds what was estimated run by run, by run label and name, `groups` what several runs share, by the
-    group's label and name; `unseen` says in sentences which
-    combinations the data cannot see and which number would fix it; `singular_values` belong to the scaled Jacobian,
-    `directions` (rows) to them, in the order of `names`.
+    group's label and name; `unseen` says in sentences which combinations the data cannot see and which number would
+    fix it; `singular_values` belong to the scaled Jacobian, `directions` (rows) to them, in the order of `names`.
     """
 
     rig: Rig

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from upright.identification.chain import weigh_priors
 from upright.identification.descent import Report, grow
 from upright.identification.model import Fit, Rig, Run, RunScore
 from upright.identification.pose import pose
@@ -121,6 +122,8 @@ def _predict(rig: Rig, run: Run, groups: Mapping[str, Mapping[str, float]], prog
         found = grow(problem, x, report=progress, upto=upto)
         if found.interrupted:
             raise KeyboardInterrupt
+        if math.isinf(upto):  # else what is scored must not weigh
+            found = weigh_priors(problem, found)
         x = found.x
     whole = pose(rig, [run], thin=False, given=groups)
     sought = [u.name for u in problem.unknowns if u.lower < u.upper]

@@ -13,7 +13,9 @@ from pathlib import Path
 
 from upright.errors import BadInput, nearest
 from upright.identification.model import Rig, Run
+from upright.identification.rungs import Rung
 from upright.identification.study_keys import names
+from upright.identification.study_ladder import read_ladder
 from upright.identification.study_rig import read_plant, read_rig
 from upright.identification.study_runs import read_runs
 from upright.identification.study_sensors import drive_unit
@@ -39,6 +41,8 @@ class Study:
         Heading and origin of the data, for the report; may be empty.
     sha256 : str
         Of the study's text.
+    ladder : tuple of Rung
+        Rungs that the study declares.
     """
 
     path: Path
@@ -48,6 +52,7 @@ class Study:
     title: str = ""
     source: str = ""
     sha256: str = ""
+    ladder: tuple[Rung, ...] = ()
 
     def hold_out(self, *labels: str) -> Study:
         """The same study with some of its fitted runs predicted instead.
@@ -99,6 +104,7 @@ def load_study(path: PathLike, *, data: PathLike | None = None, fixed: Mapping[s
         runs=runs,
         title=study.text_of("title", "My rig") if "title" in study else "",
         source=study.text_of("source", "https://...") if "source" in study else "",
+        ladder=read_ladder(study, plant),
         sha256=hashlib.sha256(text.text.encode()).hexdigest(),
     )
 

@@ -62,6 +62,7 @@ _SHARED = (
     ),
     Key("initial", '{ theta = "1 rad" }', "states known at the first sample; these are not estimated"),
     Key("horizon", '"0.5 s"', "predict this far ahead, again and again, from measured states; free run if left out"),
+    Key("repeats", '"step 0.5 V"', "runs with the same label here repeat one another; the same command needs no label"),
     Key("score_from", '"30 s"', "seconds after the window's start before which nothing is scored"),
     Key("loop", "table", "law that closed the loop, simulated with the plant"),
     Key("period", '"2 ms"', "sample period to resample to; the log's own if left out"),
@@ -83,6 +84,7 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
             Key("inputs", "table", "the same by name of the input, for plants with several"),
             Key("defaults", "table", "keys of [[runs]] that all runs share"),
             Key("runs", "list of tables", "stretches of data"),
+            Key("ladder", "list of tables", "rungs for `upright ladder`; friction, then drive, if left out"),
         ),
     ),
     "rig": (
@@ -126,6 +128,17 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
         ),
     ),
     "defaults": ("[defaults]", _SHARED),
+    "ladder": (
+        "[[ladder]]",
+        (
+            Key("name", '"Coulomb friction"', "name of the rung"),
+            Key(
+                "adds", '["b_1c", "actuator.knee"]', "parameters estimated from this rung on; below it they do nothing"
+            ),
+            Key("drops", '["b_1"]', "parameters of rungs below that this one does without"),
+            Key("unknown", '["friction"]', "what is estimated run by run from this rung on, as in [[runs]]"),
+        ),
+    ),
     "loop": (
         "runs.loop",
         (

@@ -107,6 +107,7 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
         horizon=_horizon(run, grid),
         score_from=_score_from(run, grid),
         loop=read_loop(run, plant, record, grid, drive_unit(study)),
+        repeats=run.text_of("repeats", "step 0.5 V") if "repeats" in run else "",
         source="; ".join(notes),
     )
 

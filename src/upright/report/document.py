@@ -13,11 +13,12 @@ from typing import Any
 from markupsafe import Markup
 
 from upright.identification.assumptions import sentences
+from upright.identification.crossval import CrossValidation
 from upright.identification.model import Fit
 from upright.report.advice import next_steps
 from upright.report.drawing import svg
 from upright.report.equations import equations
-from upright.report.tables import parameter_rows, provenance_rows, run_rows, score_rows, without_rows
+from upright.report.tables import cross_rows, parameter_rows, provenance_rows, run_rows, score_rows, without_rows
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +63,12 @@ def write_page(folder: Path, template: str, **content: Any) -> Path:
 
 
 def write_fit_report(
-    fit: Fit, folder: Path, *, title: str = "Identification", provenance: Mapping[str, object] | None = None
+    fit: Fit,
+    folder: Path,
+    *,
+    title: str = "Identification",
+    provenance: Mapping[str, object] | None = None,
+    crossed: CrossValidation | None = None,
 ) -> Path:
     """Write what a fit says as one self-contained page.
 
@@ -76,6 +82,8 @@ def write_fit_report(
     provenance : mapping, optional
         Where the data came from: file, window, hash by run; texts, lists or further mappings.
         ``"study"`` is the study's file name, used in the commands that are proposed.
+    crossed : CrossValidation, optional
+        Every run predicted by the others.
 
     Returns
     -------
@@ -83,7 +91,8 @@ def write_fit_report(
         The page, ``folder / "report.html"``.
     """
     provenance = provenance or {}
-    return write_page(folder, "fit.html", **fit_content(fit, title=title, provenance=provenance, folder=folder.name))
+    content = fit_content(fit, title=title, provenance=provenance, folder=folder.name)
+    return write_page(folder, "fit.html", **content, crossed=cross_rows(crossed))
 
 
 def fit_content(

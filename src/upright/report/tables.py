@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from markupsafe import Markup
 
+from upright.identification.crossval import CrossValidation
 from upright.identification.model import Estimate, Fit, Parameter, RunScore
 from upright.report.mathml import symbol
 from upright.report.symbols import figures, measured, number, percent, plain, unit
@@ -37,6 +38,34 @@ class ScoreRow:
     fit: str
     horizon: str
     naive: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CrossRow:
+    """One signal of one run, fitted among all and predicted by a fit of the others, as text."""
+
+    run: str
+    signal: str
+    fitted: str
+    predicted: str
+    blind: str
+
+
+def cross_rows(crossed: CrossValidation | None) -> list[CrossRow]:
+    """Every run and signal of a cross-validation; nothing without one."""
+    if crossed is None:
+        return []
+    return [
+        CrossRow(
+            run=label,
+            signal=plain(signal),
+            fitted=percent(value),
+            predicted=percent(crossed.predicted[label].fit_percent[signal]) if label in crossed.predicted else "",
+            blind=", ".join(crossed.blind.get(label, ())),
+        )
+        for label, score in crossed.fitted.items()
+        for signal, value in score.fit_percent.items()
+    ]
 
 
 def parameter_rows(fit: Fit) -> list[ParameterRow]:
