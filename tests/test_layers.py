@@ -20,11 +20,12 @@ MAY_IMPORT = {
     "physics": {"errors", "quantities"},
     "simulation": {"errors", "quantities", "physics"},
     "identification": BASE | {"records", "readers", "physics", "simulation"},
-    "report": BASE | {"records", "readers", "physics", "simulation", "identification"},
+    "doctor": BASE | {"records", "readers", "physics", "simulation", "identification"},
+    "report": BASE | {"records", "readers", "physics", "simulation", "identification", "doctor"},
     "lab": BASE | {"records", "readers", "physics", "simulation", "identification", "report"},
-    "cli": BASE | {"records", "readers", "physics", "simulation", "identification", "report", "lab"},
+    "cli": BASE | {"records", "readers", "physics", "simulation", "identification", "doctor", "report", "lab"},
     "__main__": {"cli"},
-    "__init__": BASE | {"records", "readers", "physics", "simulation", "identification", "report", "lab"},
+    "__init__": BASE | {"records", "readers", "physics", "simulation", "identification", "doctor", "report", "lab"},
 }
 SAME_LAYER = {"exchange": "records"}  # a Record's ways to and from other tools: one layer in two files
 # A heavy library has one door, opened when it is first needed.

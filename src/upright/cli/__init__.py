@@ -21,6 +21,7 @@ from upright.errors import UprightError
 COMMANDS = {
     "lab": "Run an experiment of the paper on the simulated rig, from release to report.",
     "show": "Print and draw what a log holds: columns, sample rate, quanta, gaps, lying columns.",
+    "doctor": "Say in plain sentences what looks wrong with a log, on which evidence, and what to do.",
     "init": "Write a commented study file from a log, filled in with what could be recognised.",
     "identify": "Fit a rig's parameters to its logs as a study file says; write estimates and report.",
     "ladder": "Grow a model only while it predicts better what it has not seen.",

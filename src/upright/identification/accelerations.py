@@ -113,13 +113,18 @@ def _thin_law(law: Feedback | None, k: int) -> Feedback | None:
     return replace(law, reference=law.reference[::k])
 
 
-def model_accelerations(plant: type[Plant], values: Mapping[str, float], sample: Sample) -> Array:
-    """Accelerations (free coordinates, N) of the model at the measured states, those of held coordinates given."""
+def mass_and_force(
+    plant: type[Plant], values: Mapping[str, float], q: Array, v: Array, u: Array
+) -> tuple[Array, Array]:
+    """Mass matrices (N, n, n) and generalized forces (N, n) at positions and speeds (n, N) and forces `u` (inputs, N).
+
+    As derived: no dry friction, no drag.
+    """
     derived = plant.derived_for(values)
     scope: dict[str, Any] = dict(values)
     for i, c in enumerate(derived.coordinates):
-        scope[c], scope[f"{c}_dot"] = sample.q[i], sample.v[i]
-    scope.update(zip(derived.inputs, effort(values, sample, plant), strict=True))
+        scope[c], scope[f"{c}_dot"] = q[i], v[i]
+    scope.update(zip(derived.inputs, u, strict=True))
     for i, lump in enumerate(derived.lumps):
         scope[f"k{i}"] = evaluate(lump, scope)
     for s, c, argument in derived.trig:
@@ -128,15 +133,22 @@ def model_accelerations(plant: type[Plant], values: Mapping[str, float], sample:
     for name, step in derived.steps:
         scope[name] = evaluate(step, scope)
     n = len(derived.coordinates)
-    M = np.empty((sample.q.shape[1], n, n))
-    f = np.empty((sample.q.shape[1], n))
+    M = np.empty((q.shape[1], n, n))
+    f = np.empty((q.shape[1], n))
     place = 0
     for i in range(n):
         for j in range(i, n):
             M[:, i, j] = M[:, j, i] = evaluate(derived.mass[place], scope)
             place += 1
         f[:, i] = evaluate(derived.force[i], scope)
-    for joint in derived.joints:
+    return M, f
+
+
+def model_accelerations(plant: type[Plant], values: Mapping[str, float], sample: Sample) -> Array:
+    """Accelerations (free coordinates, N) of the model at the measured states, those of held coordinates given."""
+    M, f = mass_and_force(plant, values, sample.q, sample.v, effort(values, sample, plant))
+    n = f.shape[1]
+    for joint in plant.derived_for(values).joints:
         i = joint.coordinate
         v = sample.v[i]
         if joint.coulomb and sample.fades[i] > 0:

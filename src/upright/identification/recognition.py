@@ -74,17 +74,17 @@ def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
     BadInput
         When nothing in the log moves.
     """
-    places = _places(record, seen)
-    if not places:
+    found = places(record, seen)
+    if not found:
         raise BadInput(
             f"{seen.file}: no column moves like an angle, a position or a count; `upright show` lists what there is"
         )
-    drive = _drive(record, seen)
+    drive = drive_column(record, seen)
     doubts: list[str] = []
     if not plant:
-        plant, doubt = _plant(places, drive)
+        plant, doubt = _plant(found, drive)
         doubts += [doubt] if doubt else []
-    columns, missing = _assign(find(plant), places)
+    columns, missing = _assign(find(plant), found)
     doubts += [f"No column was found for {name}; lock it, leave it unmeasured or name its column." for name in missing]
     last = record[list(columns.values())[-1].name]
     pushed = plant in ("cart-pendulum", "furuta") and len(columns) > 1
@@ -110,7 +110,7 @@ def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
     )
 
 
-def _places(record: Record, seen: Inspection) -> list[Column]:
+def places(record: Record, seen: Inspection) -> list[Column]:
     """Columns that measure a place and move, without speeds, drives, clocks and liars."""
     kinds = ("rad", "m", "counts", "deg", "mm", "")
     found = [c for c in seen.columns if not (c.drive or c.constant or _lies(c, seen)) and c.guess in kinds]
@@ -156,7 +156,8 @@ def in_dac_counts(c: Column) -> bool:
     return any(lie.startswith("the command in DAC counts") for lie in c.lies)
 
 
-def _drive(record: Record, seen: Inspection) -> Column | None:
+def drive_column(record: Record, seen: Inspection) -> Column | None:
+    """What commands the rig: the column in converter counts, else one called like an effort, else one that looks so."""
     dac = next((c for c in seen.columns if in_dac_counts(c)), None)
     if dac is not None:
         return dac

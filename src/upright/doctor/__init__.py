@@ -1,0 +1,14 @@
+"""What is wrong with this log, before anybody believes a fit of it? ::
+
+diagnosis = examine(read("run.csv"), read_known("furuta"))
+for finding in diagnosis.findings:
+    print(finding.severity, finding.sentence, finding.key)
+"""
+
+from __future__ import annotations
+
+from upright.doctor.examine import examine
+from upright.doctor.findings import KINDS, Curve, Diagnosis, Finding, Panel
+from upright.doctor.rigs import Known, read_known
+
+__all__ = ["KINDS", "Curve", "Diagnosis", "Finding", "Known", "Panel", "examine", "read_known"]

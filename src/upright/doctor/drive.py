@@ -1,0 +1,158 @@
+"""Did the drive do what the effort column says, all of the time? A drive that trips; a column that is no effort."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.doctor.balance import Balance
+from upright.doctor.case import Case
+from upright.doctor.findings import Curve, Finding, Panel
+from upright.doctor.motion import Motion
+from upright.doctor.sensors import whole
+from upright.doctor.structure import driven_row
+from upright.records import Array
+
+TRIES = 60
+"""Instants that are tried as the end of the effort."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Push:
+    """How the effort explains what friction and springs leave of the driven body's force or acceleration.
+
+    `without`, `full` and `cut` are shares of it left without effort, with all of it, and with the effort until `end`
+    [s]; `after` is the force per unit after `end` beside that before, 0 unless it explains something; `late` is the
+    share of the effort after `end`; `rest` (N,) is what is to be explained.
+    """
+
+    without: float
+    full: float
+    cut: float
+    end: float
+    after: float
+    late: float
+    rest: Array
+    t: Array
+    u: Array
+
+
+def push_of(motion: Motion, balance: Balance | None) -> Push | None:
+    """What the effort explains; None without an effort on a measured body."""
+    if not np.ptp(motion.u) > 0:
+        return None
+    if np.count_nonzero(swift(motion, 0)) < 40:
+        return None
+    row = driven_row(motion, swift(motion, 0))
+    if row is None:
+        return None
+    target, others = row
+    if balance is not None:
+        k = motion.rows.index(balance.driven)
+        tau, _ = balance.needed(np.ones((1, len(balance.names))))
+        driven = balance.driven
+        here = swift(motion, driven)
+        target, others = tau[0, k][here], balance.friction[k][here]
+    else:
+        driven, here = 0, swift(motion, 0)
+    Q = np.linalg.qr(others)[0]
+    rest = target - Q @ (Q.T @ target)
+    size = float(np.sum((target - target.mean()) ** 2)) + 1e-300
+    u, t = motion.u[here], motion.t[here]
+    live = np.flatnonzero(np.abs(u) > 0.02 * float(np.abs(u).max()))
+    if live.size < 8:
+        return None
+    first, last = int(live[0]), int(live[-1])
+    ends = np.unique(np.linspace(first, last + 1, TRIES).astype(int))
+    early = np.where(np.arange(t.size)[None] < ends[:, None], u, 0.0)
+    early_left = early - (early @ Q) @ Q.T
+    power = np.einsum("ht,ht->h", early_left, early_left)
+    gain = (early_left @ rest) / np.where(power > 0, power, 1.0)
+    left = np.sum((rest - gain[:, None] * early_left) ** 2, axis=1) / size
+    k = int(np.argmin(left))
+    late = u - early[k]
+    late_left = late - Q @ (Q.T @ late)
+    both = np.column_stack([early_left[k], late_left])
+    after = 1.0
+    if float(late_left @ late_left) > 1e-9 * float(u @ u):
+        g, *_ = np.linalg.lstsq(both, rest, rcond=None)
+        acts = float(np.sum((rest - both @ g) ** 2)) / size < 0.6 * float(left[k])
+        after = float(g[1] / g[0]) if g[0] and acts else 0.0
+    speed = motion.v[driven][here]
+    sliding = np.abs(speed) > 0.1 * float(np.abs(speed).max())
+    energy = float(np.sum(late[sliding] ** 2)) / float(u @ u)
+    return Push(
+        without=float(rest @ rest) / size,
+        full=float(left[-1]),
+        cut=float(left[k]),
+        end=float(t[min(int(ends[k]), t.size - 1)]),
+        after=after,
+        late=energy,
+        rest=rest,
+        t=t,
+        u=u,
+    )
+
+
+def swift(motion: Motion, i: int) -> NDArray[np.bool_]:
+    """Samples (N,) at which a body is clearly on its way: then friction is known up to a number, and cannot hide."""
+    return np.abs(motion.v[i]) > 0.05 * float(np.abs(motion.v[i]).max())
+
+
+def examine_push(case: Case, push: Push, *, most: float) -> list[Finding]:
+    """A silent trip, when the effort before it leaves less than `most` unexplained."""
+    t, end = case.record.t, push.end
+    panel = Panel(label="what effort must explain\n(scaled)", curves=(
+        Curve(name="needed", t=push.t, y=push.rest / (float(np.abs(push.rest).max()) or 1.0)),
+        Curve(name=f"'{case.drive}'", t=push.t, y=push.u / (float(np.abs(push.u).max()) or 1.0)),
+    ))  # fmt: skip
+    driven = next(iter(case.places.values())).column
+    tripped = (
+        push.cut < most and push.cut < 0.5 * push.full and push.cut < 0.5 * push.without and abs(push.after) < 0.45
+    )
+    if tripped and push.late > 0.04 and push.full > 0.05:
+        live = np.flatnonzero(case.u)
+        return [
+            Finding(
+                kind="trip",
+                columns=(case.drive,),
+                severity="fault",
+                sentence=f"The drive trips silently: '{case.drive}' is logged until {t[live[-1]]:.4g} s, but from about"
+                f" {end:.4g} s on '{driven}' moves as if there were none ({100 * push.full:.0f} % of its force is"
+                f" unexplained with all of the effort, {100 * push.cut:.1f} % with what came before).",
+                evidence={"end [s]": end, "logged end [s]": float(t[live[-1]]), "unexplained with all [%]":
+                          100 * push.full, "unexplained with the first part [%]": 100 * push.cut},
+                advice="Ask for the end of the effective input, or end the window there.",
+                key='unknown = ["initial", "input_end"]',
+                panels=(*whole(case, driven, case.drive), panel),
+                marks=(end,),
+            )
+        ]  # fmt: skip
+    return []
+
+
+def examine_uselessness(case: Case, push: Push) -> list[Finding]:
+    """An effort column that explains little of the force that the driven body needs."""
+    if push.without < 0.3 or push.full < 0.95 * push.without:
+        return []
+    driven = next(iter(case.places.values())).column
+    explains = 100 * (1 - push.full / push.without)
+    panel = Panel(label="what effort must explain\n(scaled)", curves=(
+        Curve(name="needed", t=push.t, y=push.rest / (float(np.abs(push.rest).max()) or 1.0)),
+        Curve(name=f"'{case.drive}'", t=push.t, y=push.u / (float(np.abs(push.u).max()) or 1.0)),
+    ))  # fmt: skip
+    return [
+        Finding(
+            kind="effort",
+            columns=(case.drive,),
+            severity="warning",
+            sentence=f"'{case.drive}' acts like no effort: friction and springs leave {100 * push.without:.0f} %"
+            f" of the driven body's force, and of that '{case.drive}' explains {explains:.0f} %.",
+            evidence={"left to explain [%]": 100 * push.without, "explained by it [%]": explains},
+            advice="Look for the column the controller put out; a reference or a set value is no effort.",
+            key='[drive]\ncolumn = "..."',
+            panels=(*whole(case, driven, case.drive), panel),
+        )
+    ]
