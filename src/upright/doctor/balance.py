@@ -94,7 +94,7 @@ class Balance:
             need = tau[:, k]
             size = np.var(inertial[:, k], axis=1) + 1e-300
             u = self.motion.u if i == self.driven and self.used else None
-            best = np.full(h, np.inf)
+            best, g = np.full(h, np.inf), np.zeros(h)
             for columns in (Q[:, :1], Q):
                 rest = need - (need @ columns) @ columns.T
                 if u is not None:

@@ -184,7 +184,10 @@ def clipped(x: Array, quantum: float, *, inertia: bool) -> tuple[float, float, f
         at = x == level
         edges = np.flatnonzero(np.diff(np.concatenate(([0], at.astype(np.int8), [0]))))
         first, after = edges[::2], edges[1::2]
-        long = (after - first >= 3) & (after < x.size - 7) & ((first > 6) | ((first == 0) & (not inertia)))
+        inside = (first > 6) & (after < x.size - 7)
+        if not inertia:  # an effort may begin or end at its limit
+            inside |= (first == 0) | (after == x.size)
+        long = (after - first >= 3) & inside
         if not long.any():
             continue
         first, after = first[long], after[long]
@@ -198,7 +201,7 @@ def clipped(x: Array, quantum: float, *, inertia: bool) -> tuple[float, float, f
 
 def _abrupt(x: Array, at: NDArray[np.int64], way: int, quantum: float) -> NDArray[np.bool_]:
     """Whether a column leaves its value at samples `at`, going `way`, at the pace it has a few samples on."""
-    place = np.where(at + 6 * way < 0, 6, at)
+    place = np.clip(at, 6, x.size - 7)
     near = np.abs(x[place + 2 * way] - x[place]) / 2
     far = np.abs(x[place + 6 * way] - x[place + 4 * way]) / 2
     return (at == place) & (near > 1.25 * quantum) & (near > 0.5 * far) & (near < 3 * far)

@@ -1,0 +1,91 @@
+"""Does `upright doctor` say what is wrong, with its picture, and nothing where nothing is?"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from upright.cli import app
+
+T = np.arange(1500) * 4e-3
+SWING = np.round(0.8 * np.exp(-0.3 * T) * np.cos(7 * T), 4)
+
+
+def doctor(*arguments: object):
+    return CliRunner().invoke(app, ["doctor", *map(str, arguments)], terminal_width=200)
+
+
+def log(folder: Path, t: np.ndarray = T, theta: np.ndarray = SWING) -> Path:
+    path = folder / "swing.csv"
+    rows = "\n".join(f"{a:.4f},{b:.4f}" for a, b in zip(t, theta, strict=True))
+    path.write_text(f"t,theta [rad]\n{rows}\n", encoding="utf-8")
+    return path
+
+
+def test_a_sound_log_is_exit_code_0_and_says_what_was_looked_for(tmp_path: Path) -> None:
+    outcome = doctor(log(tmp_path), "--rig", "pendulum")
+    told = " ".join(outcome.stdout.split())
+    assert outcome.exit_code == 0, outcome.stdout
+    assert "Nothing wrong found." in told
+    assert "lost counts" in told
+    assert "no effort column" in told
+    assert "upright init" in told
+
+
+def test_lost_counts_are_exit_code_3_with_a_picture(tmp_path: Path) -> None:
+    path = log(tmp_path, theta=SWING + np.where(T > 2.2, 0.15, 0.0))
+    page = tmp_path / "out" / "page.html"
+    outcome = doctor(path, "--html", page)
+    assert outcome.exit_code == 3
+    assert "fault: jump" in outcome.stdout
+    assert "--rig" in outcome.stdout
+    text = page.read_text(encoding="utf-8")
+    assert text.count("<svg") == 1
+    assert "src=" not in text  # nothing is fetched from anywhere
+    assert "window = [" in text
+
+
+def test_json_can_be_read_by_a_program(tmp_path: Path) -> None:
+    outcome = doctor(log(tmp_path, theta=SWING + np.where(T > 2.2, 0.15, 0.0)), "--json")
+    found = json.loads(outcome.stdout)
+    assert found["wrong"] is True
+    jump = next(f for f in found["findings"] if f["kind"] == "jump")
+    assert jump["evidence"]["jump [rad]"] == pytest.approx(0.15, abs=0.03)  # 0.022 rad is the largest step of the swing
+    assert "sign" in found["unchecked"]
+
+
+def test_a_clock_that_starts_again_is_a_finding_not_an_error(tmp_path: Path) -> None:
+    twice = np.concatenate([T[:900], T[:600]])
+    outcome = doctor(log(tmp_path, t=twice))
+    assert outcome.exit_code == 3
+    assert "The clock starts again 1 time" in " ".join(outcome.stdout.split())
+    assert "900 samples" in outcome.stdout
+
+
+def test_instants_written_twice_are_dropped_and_told(tmp_path: Path) -> None:
+    twice = np.sort(np.concatenate([T, T[100:200:10]]))
+    outcome = doctor(log(tmp_path, t=twice, theta=np.interp(twice, T, SWING)))
+    assert outcome.exit_code == 3
+    assert "10 rows repeat the instant of the row before" in " ".join(outcome.stdout.split())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("missing.csv",), "does not exist"),
+        (("swing.csv", "--rig", "furutta"), "furuta"),
+        (("swing.csv", "--rig", "none.toml"), "none.toml"),
+        (("swing.csv", "--html", "."), "is a folder"),
+    ],
+)
+def test_what_a_person_got_wrong_is_a_sentence(tmp_path: Path, monkeypatch, arguments, sentence) -> None:
+    log(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    outcome = doctor(*arguments)
+    assert outcome.exit_code == 2
+    assert sentence in " ".join(outcome.stderr.split())
+    assert "Traceback" not in outcome.stderr
