@@ -201,7 +201,7 @@ def clipped(x: Array, quantum: float, *, inertia: bool) -> tuple[float, float, f
 
 def _abrupt(x: Array, at: NDArray[np.int64], way: int, quantum: float) -> NDArray[np.bool_]:
     """Whether a column leaves its value at samples `at`, going `way`, at the pace it has a few samples on."""
-    place = np.clip(at, 6, x.size - 7)
+    place = np.clip(at, 6, None) if way < 0 else np.clip(at, None, x.size - 7)
     near = np.abs(x[place + 2 * way] - x[place]) / 2
     far = np.abs(x[place + 6 * way] - x[place + 4 * way]) / 2
     return (at == place) & (near > 1.25 * quantum) & (near > 0.5 * far) & (near < 3 * far)
