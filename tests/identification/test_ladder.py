@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from tests.identification.twins import noisy, rig
+from tests.identification.twins import PENDULUM, noisy, rig
 from upright.identification.estimate import identify
 from upright.identification.model import Fit, Run
-from upright.physics import Furuta
+from upright.identification.rungs import friction_rungs
+from upright.physics import Furuta, Pendulum
 from upright.simulation import simulate
 
 # the paper's pendulum on a spring, a quarter of a degree out of level
@@ -55,3 +58,11 @@ def test_intervals_hold_the_truth_whatever_was_left_out():
     for name in ("J_p", "b_2", "b_2c"):
         # fewer than 16 of 20 honest 95 % intervals: one chance in 390 (binomial)
         assert sum(h[name] for h in held) >= 16
+
+
+def test_a_term_that_must_not_be_zero_is_part_of_every_model():
+    guessed = rig(Pendulum, PENDULUM, {"J_p": 2e-3, "b_2c": 2e-3, "b_2q": 1e-3})
+    coulomb = replace(guessed.parameters["b_2c"], lower=1e-4)
+    certain = replace(guessed, parameters={**guessed.parameters, "b_2c": coulomb})
+    assert [rung.adds for rung in friction_rungs(guessed)] == [(), ("b_2c",), ("b_2q",)]
+    assert [rung.adds for rung in friction_rungs(certain)] == [(), ("b_2q",)]

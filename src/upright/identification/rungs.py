@@ -80,7 +80,11 @@ def runs_at(runs: Sequence[Run], kept: Sequence[Rung]) -> list[Run]:
 
 
 def friction_rungs(rig: Rig) -> list[Rung]:
-    """Nested friction models within the terms that the rig asks to estimate, poorest first."""
+    """Nested friction models within the terms that the rig asks to estimate, poorest first.
+
+    A term that must not be zero, since its lower bound is above, is part of them all.
+    """
+    asked = [n for n in rig.estimated if rig.parameters[n].lower <= 0]
     joints = rig.plant.derived().joints
     kinds = [
         ("Coulomb friction", {j.coulomb for j in joints}),
@@ -88,7 +92,7 @@ def friction_rungs(rig: Rig) -> list[Rung]:
         ("stiction", {n for j in joints for n in (j.stiction, j.stribeck_speed)}),
         ("presliding", {j.presliding for j in joints}),
     ]
-    steps = [(name, tuple(n for n in rig.estimated if n in terms)) for name, terms in kinds]
+    steps = [(name, tuple(n for n in asked if n in terms)) for name, terms in kinds]
     return [Rung(name="viscous friction"), *(Rung(name=name, adds=adds) for name, adds in steps if adds)]
 
 
