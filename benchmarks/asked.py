@@ -23,9 +23,15 @@ ASKED: dict[str, dict[tuple[str, str], float]] = {
         **{(f"kP {k}", "theta"): 96.0 for k in ("2.5", "5", "10")},
         ("decay", "theta"): 98.0,
     },
+    "ecp205_held": {
+        ("disk 2 held, -0.5 V", "theta_1"): 90.0,
+        ("disk 2 held, +0.5 V", "theta_1"): 90.0,
+        ("disk 1 held", "theta_2"): 97.0,
+    },
 }
 
 HELD_OUT: dict[tuple[str, str], dict[str, float]] = {
-    ("kawata_crane", f"kP {k}"): {"x": 97.0, "theta": 93.0} for k in ("2.5", "5", "10")
+    **{("kawata_crane", f"kP {k}"): {"x": 97.0, "theta": 93.0} for k in ("2.5", "5", "10")},
+    **{("ecp205_held", f"disk 2 held, {s}0.5 V"): {"theta_1": 85.0} for s in "-+"},
 }
 """Study and the run it must predict from its others: least fit percent by signal."""
