@@ -77,7 +77,9 @@ def observe(rig: Rig, run: Run, *, flips: Mapping[str, float] | None = None,
         motion = savitzky_golay((flips or {}).get(c, 1.0) * y + (turns or {}).get(c, 0.0), dt, width)
         q[i], v[i], a[i], edge = motion.q, motion.v, motion.a, motion.edge
         fades[i] = 0.02 * spread(motion.v)
-    u = run.u.T.copy()
+    since = run.t - run.t[0]
+    acting = (since >= run.guesses.get("input_start", -math.inf)) & (since < run.guesses.get("input_end", math.inf))
+    u = np.where(acting, run.u.T, 0.0)
     if run.loop is not None:
         states = np.empty((2 * len(coordinates), n))
         states[0::2], states[1::2] = q, v

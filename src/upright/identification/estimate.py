@@ -22,6 +22,7 @@ from upright.identification.pose import pose
 from upright.identification.problem import Problem
 from upright.identification.scoring import fit_percent, predict
 from upright.identification.simplex import simplex
+from upright.identification.trips import located, untold
 
 __all__ = ["METHODS", "fit_percent", "identify", "predict"]
 
@@ -59,9 +60,10 @@ def identify(rig: Rig, runs: Sequence[Run], *, method: str = "auto", progress: R
         When no run may be fitted, nothing is asked, or a name does not exist.
     """
     began = time.perf_counter()
-    seen = [run for run in runs if run.role == "fit"]
+    seen = [located(rig, run) for run in runs if run.role == "fit"]
     _check(rig, seen, method)
     log = Log(report=progress, doubts=cache(lambda: doubts(rig, seen)))
+    log.warnings += untold(rig, seen)
     left_out: tuple[str, ...] = ()
     chosen = rig
     problem = pose(rig, seen)

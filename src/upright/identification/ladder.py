@@ -96,7 +96,11 @@ def choose(rig: Rig, runs: Sequence[Run], log: Log) -> tuple[Rig, list[Array], t
         v = part.value(found.x)
         values = {u.name: float(v[i]) for i, u in enumerate(part.unknowns) if u.runs == SHARED}
         tried.append(values)
-        own = {(u.runs, u.name): float(v[i]) for i, u in enumerate(part.unknowns) if u.runs != SHARED}
+        own = {
+            (u.runs, u.name): float(v[i])
+            for i, u in enumerate(part.unknowns)
+            if u.runs != SHARED and u.lower < v[i] < u.upper
+        }
         missed = _held_out(rung.rig, runs, part, found.x)
         log.history.append((f"{rung.name}: held-out cost", missed, part.evaluations))
         if missed < best[0]:

@@ -37,20 +37,6 @@ ACTUATOR = {
 _SIZES = ("limit", "lag", "delay", "damping", "standby", "knee", "fade", "relaxation")
 NEVER_NEGATIVE = tuple(f"actuator.{a}" for a in _SIZES)
 """Those that make no sense below zero."""
-PER_RUN = ("initial", "offset", "gain", "friction", "input_offset")
-"""What may differ from run to run: initial state, sensor offsets, actuator gain (a factor), dry and viscous friction
-of every joint (one common factor), a constant added to the command. "offset.theta" means the offset of one sensor,
-"scale.theta" its gain (a factor)."""
-
-
-FOR_GROUPS = ("gain", "friction", "input_offset")
-"""Of these a group of runs may share one value; of sensor offsets and gains too."""
-
-SPREADS = {"friction": 0.3, "gain": 1.0, "scale": 1.0}
-"""One sigma of the logarithm of a run's factor, unless the run says otherwise.
-
-Friction of two runs of one day differed by 13 %, an actuator's gain by a factor of 3.2 (DESIGN 9).
-"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,6 +102,8 @@ class Run:
     spread : mapping of str to float
         One sigma of the logarithm of this run's factors, where it is not the usual one: how far ``friction``, ``gain``
         and ``scale.theta`` may reasonably differ from 1.
+    guesses : mapping of str to float
+        Where the search for ``input_start`` and ``input_end`` begins; found from the motion when left out.
     initial : mapping of str to float
         States known at the first sample, by name; they are then not estimated.
     horizon : float or None
@@ -140,6 +128,7 @@ class Run:
     unknown: tuple[str, ...] = ("initial",)
     shared: Mapping[str, str] = field(default_factory=dict[str, str])
     spread: Mapping[str, float] = field(default_factory=dict[str, float])
+    guesses: Mapping[str, float] = field(default_factory=dict[str, float])
     initial: Mapping[str, float] = field(default_factory=dict[str, float])
     horizon: float | None = None
     score_from: float = 0.0

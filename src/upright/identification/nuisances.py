@@ -12,12 +12,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model import SPREADS, Rig, Run
+from upright.identification.model import Rig, Run
+from upright.identification.nuisance_names import SPREADS
 from upright.identification.smoothing import State
 from upright.identification.tracks import Track
 from upright.identification.unknowns import Unknown, matters
 
 Array = NDArray[np.float64]
+
+CHANGES = {"input_offset": "actuator.offset", "input_start": "actuator.start", "input_end": "actuator.end"}
+"""Parameters of the actuator that a nuisance moves although they may stand at their defaults."""
+
+MOMENT = 0.1
+"""A change of the moment [s] at which a drive trips that would matter."""
 
 INITIAL_SPREAD = (0.02, 0.1)
 """Least sigma of a measured first coordinate and velocity, as a share of how much each varies over the run."""
@@ -28,9 +35,10 @@ def run_unknowns(rig: Rig, index: int, run: Run, start: State) -> list[Unknown]:
     found: list[Unknown] = []
     wanted = {*run.unknown, *run.shared}
 
-    def add(name: str, value: float, scale: float, prior: tuple[float, float] | None = None) -> None:
+    def add(name: str, value: float, scale: float, prior: tuple[float, float] | None = None,
+            lower: float = -math.inf, upper: float = math.inf) -> None:  # fmt: skip
         found.append(
-            Unknown(name=name, runs=(index,), value=value, lower=-math.inf, upper=math.inf, log=False, scale=scale,
+            Unknown(name=name, runs=(index,), value=value, lower=lower, upper=upper, log=False, scale=scale,
                     prior=prior, group=run.shared.get(name, ""))
         )  # fmt: skip
 
@@ -65,6 +73,14 @@ def run_unknowns(rig: Rig, index: int, run: Run, start: State) -> list[Unknown]:
     if "input_offset" in wanted:
         size = float(np.std(run.u)) if run.u.size else 0.0
         add("input_offset", 0.0, size or 1.0)
+    live = np.flatnonzero(run.u.any(axis=1))
+    if live.size:
+        dt = run.period
+        first, last = live[0] * dt, (live[-1] + 1) * dt
+        # at the logged ends themselves nothing changes with the moment: begin a sample inside
+        for name, logged in (("input_start", first + dt), ("input_end", last - dt)):
+            if name in wanted:
+                add(name, float(np.clip(run.guesses.get(name, logged), first, last)), MOMENT, lower=first, upper=last)
     return found
 
 
@@ -109,6 +125,9 @@ def dress(
         values["actuator.gain"] = values["actuator.gain"] * own["gain"]
     if "input_offset" in own:
         values["actuator.offset"] = values["actuator.offset"] + own["input_offset"]
+    for name in ("start", "end"):
+        if f"input_{name}" in own:
+            values[f"actuator.{name}"] = own[f"input_{name}"]
     if "friction" in own:
         for name in friction:
             values[name] = values[name] * own["friction"]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from upright.identification.model import Rig
 from upright.identification.normal import Normal, Rows, finite, mixed, products, squares
-from upright.identification.nuisances import Dressed, dress
+from upright.identification.nuisances import CHANGES, Dressed, dress
 from upright.identification.restarts import PERTURBATION, Restart, settle
 from upright.identification.tracks import Track, motions, outputs, simulator
 from upright.identification.unknowns import SHARED, Unknown
@@ -101,8 +101,8 @@ class Problem:
         if index not in self.solvers:
             track = self.tracks[index]
             free = [u.name for u in self.unknowns if u.runs == SHARED]
-            if any(u.name == "input_offset" for u in self.unknowns):
-                free.append("actuator.offset")
+            own = {u.name for u in self.unknowns if index in u.runs}
+            free += [p for n, p in CHANGES.items() if n in own]
             self.solvers[index] = simulator(self.rig, track, {**self.base, **track.run.known}, free)
         return self.solvers[index]
 

@@ -15,6 +15,7 @@ from upright.identification.model import Fit, Rig, Run, RunScore
 from upright.identification.pose import pose
 from upright.identification.problem import Problem
 from upright.identification.tracks import Track
+from upright.identification.trips import located
 
 Array = NDArray[np.float64]
 
@@ -115,6 +116,7 @@ def predict(
 
 
 def _predict(rig: Rig, run: Run, groups: Mapping[str, Mapping[str, float]], progress: Report | None) -> RunScore:
+    run = located(rig, run)
     problem = pose(rig, [replace(run, score_from=0.0)], given=groups)
     x = problem.start
     if x.size:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from upright.identification.model import ACTUATOR, FOR_GROUPS, PER_RUN
+from upright.identification.model import ACTUATOR
+from upright.identification.nuisance_names import FOR_GROUPS, PER_RUN
 
 
 class Key(NamedTuple):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from upright.identification.model import ACTUATOR, PER_RUN
+from upright.identification.model import ACTUATOR
+from upright.identification.nuisance_names import PER_RUN
 from upright.identification.rungs import Rung
 from upright.identification.study_keys import names
 from upright.identification.study_text import Section

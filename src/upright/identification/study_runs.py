@@ -10,7 +10,8 @@ import numpy as np
 
 from upright.errors import BadInput, nearest
 from upright.identification.columns import Array, Grid
-from upright.identification.model import FOR_GROUPS, PER_RUN, SPREADS, Run
+from upright.identification.model import Run
+from upright.identification.nuisance_names import FOR_GROUPS, PER_RUN, SPREADS
 from upright.identification.study_keys import names
 from upright.identification.study_loop import read_loop, state_units
 from upright.identification.study_rig import known_values
