@@ -9,6 +9,7 @@ import pytest
 
 from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, shaken, swing
 from upright.identification.estimate import identify, predict
+from upright.identification.pose import pose
 from upright.physics import Furuta, Pendulum
 
 GUESSES = {"J_p": 2.6e-3, "b_2": 1.4e-3, "b_2c": 2.6e-3}
@@ -118,3 +119,20 @@ def test_a_fit_file_keeps_what_groups_share(two_days, tmp_path):
     again = predict(stored.values, fit.rig, [runs[-1]], groups=stored.groups)[runs[-1].label]
     assert again.adapted == ("initial",)
     assert again.fit_percent["theta"] == pytest.approx(fit.runs[runs[-1].label].fit_percent["theta"], abs=1e-6)
+
+
+@pytest.mark.parametrize("offset", [0.4, 0.0, -0.3])
+def test_what_is_known_of_the_first_state_is_what_the_sensor_read(offset):
+    """At the truth a sensor's unknown zero leaves nothing to hold against the first state."""
+    run = swing(seconds=2.0, unknown=("initial", "offset"))
+    problem = pose(rig(Pendulum, PENDULUM, GUESSES), [replace(run, y=run.y + offset)])
+    truth = {"initial.theta": 1.5, "initial.theta_dot": 0.0, "offset.theta": offset}
+    x = np.array([u.inside(truth.get(u.name, u.value)) for u in problem.unknowns])
+    r, J = problem.prior_rows(x)
+    assert r.size == 2
+    # the reading was smoothed before it was known: within a tenth of a sigma of the samples
+    assert np.all(np.abs(r) < 0.1 * problem.noise)
+    for i in range(x.size):
+        e = 1e-3 * np.eye(x.size)[i]
+        slope = (problem.prior_rows(x + e)[0] - problem.prior_rows(x - e)[0]) / 2e-3
+        assert slope == pytest.approx(J[:, i], abs=1e-9)

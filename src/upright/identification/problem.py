@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from upright.identification.model import Rig
 from upright.identification.normal import Normal, Rows, finite, mixed, products, squares
-from upright.identification.nuisances import CHANGES, Dressed, dress
+from upright.identification.nuisances import CHANGES, Dressed, dress, known_beforehand
 from upright.identification.restarts import PERTURBATION, Restart, settle
 from upright.identification.tracks import Track, motions, outputs, simulator
 from upright.identification.unknowns import SHARED, Unknown
@@ -221,12 +221,7 @@ class Problem:
 
     def prior_rows(self, x: Array) -> tuple[Array, Array]:
         """Residuals and Jacobian of what was known beforehand, worth `noise` per sigma."""
-        known = [(i, u.prior) for i, u in enumerate(self.unknowns) if u.prior is not None]
-        r, J = np.zeros(len(known)), np.zeros((len(known), x.size))
-        for row, (i, (mean, sigma)) in enumerate(known):
-            r[row] = self.noise * (x[i] - mean) / sigma
-            J[row, i] = self.noise / sigma
-        return r, J
+        return known_beforehand(self.unknowns, x, self.noise)
 
     def cost(self, x: Array, horizon: float = math.inf) -> float:
         """Sum of squares alone, one lane per run."""
