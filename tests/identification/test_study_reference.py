@@ -25,7 +25,7 @@ def test_every_function_of_an_expression_is_described():
 
 
 def test_the_example_of_the_page_is_a_study(tmp_path):
-    (example,) = re.findall(r"```toml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    example = re.findall(r"```toml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[0]
     t = np.arange(6000) * 0.01
     rows = np.column_stack([t, 0.1 * np.sin(t), 0.2 * np.cos(5 * t)])
     for name in ("kp_025.csv", "decay.csv"):
@@ -35,6 +35,22 @@ def test_the_example_of_the_page_is_a_study(tmp_path):
     assert [run.label for run in study.runs] == ["kP 2.5", "decay"]
     assert study.rig.estimated == ("J_p", "b_1", "b_2c", "actuator.gain")
     np.testing.assert_allclose(study.runs[0].u[:, 0], 2.5 * (0.2 - study.runs[0].y[:, 0]))
+
+
+def test_the_example_of_what_differs_from_run_to_run_is_a_study(tmp_path):
+    example = re.findall(r"```toml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[1]
+    t = np.arange(600) * 0.01
+    rows = np.column_stack([t, 0.1 * np.sin(t), np.ones_like(t)])
+    for name in ("spin_up.csv", "pid.csv", "pd.csv"):
+        np.savetxt(tmp_path / name, rows, "%.12g", ",", header="t,theta_1,v", comments="")
+    rig = "[rig]\nplant = 'torsional-1'\n[parameters]\nJ_1 = { guess = 1 }\n[sensors.theta_1]\n[drive]\ncolumn = 'v'\n"
+    (tmp_path / "study.toml").write_text(rig + example.replace(".mat", ".csv"), encoding="utf-8")
+    first, second, third = load_study(tmp_path / "study.toml").runs
+    assert (first.shared, first.spread) == ({"friction": "28 Jan"}, {"friction": 0.15})
+    assert first.unknown == ("initial", "input_end")
+    assert second.shared == third.shared == {
+        "friction": "29 Jan", "gain": "closed loop", "scale.theta_1": "closed loop"
+    }  # fmt: skip
 
 
 KEYS = [(section, key.name) for section in ("rig", "sensors", "drive", "runs", "loop") for key in SECTIONS[section][1]]
