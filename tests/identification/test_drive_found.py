@@ -12,7 +12,7 @@ from upright.simulation import simulate
 DISK = {"J_1": 2e-3, "c_1": 2e-3}
 DRIVE = {
     "actuator.end": 3.137, "actuator.damping": 4e-3, "actuator.standby": 1.5e-3,
-    "actuator.knee": 8.0, "actuator.fade": 6e-3,
+    "actuator.knee": 8.0, "actuator.fade": 1.5e-3,
 }  # fmt: skip
 
 
