@@ -1,37 +1,95 @@
-"""What was asked of the studies of real rigs: least fit percent by study, run and signal."""
+"""What was asked of the studies of real rigs: least fit percent by study, runs and signal.
+
+A signal is a coordinate, or derived from some: ``"twist"`` is the first measured coordinate minus the second,
+``"speed of x"`` the slope of x, smoothed alike in measurement and model.
+"""
 
 from __future__ import annotations
 
-ASKED: dict[str, dict[tuple[str, str], float]] = {
-    "aau_pendulum": {("whole fall", "theta"): 99.3},
-    "aau_pendulum_tail": {("tail, restarted", "theta"): 97.0},
-    "uw_pendulum": {("55 s", "theta"): 98.5},
-    "uw_pendulum_tail": {("tail", "theta"): 90.0},
-    "furuta_fall": {("fall", "theta"): 98.0},
-    "furuta_sines": {
-        ("sine 2 V", "psi"): 96.0,
-        ("sine 2 V", "theta"): 92.0,
-        ("sine 4 V", "psi"): 96.0,
-        ("sine 4 V", "theta"): 92.0,
-        ("constant 2 V", "psi"): 97.0,
-        ("constant 2 V", "theta"): 85.0,
-        ("constant 4 V", "psi"): 97.0,
-        ("constant 4 V", "theta"): 85.0,
-    },
-    "kawata_crane": {
-        **{(f"kP {k}", "x"): 98.5 for k in ("2.5", "5", "10")},
-        **{(f"kP {k}", "theta"): 96.0 for k in ("2.5", "5", "10")},
-        ("decay", "theta"): 98.0,
-    },
-    "ecp205_held": {
-        ("disk 2 held, -0.5 V", "theta_1"): 90.0,
-        ("disk 2 held, +0.5 V", "theta_1"): 90.0,
-        ("disk 1 held", "theta_2"): 97.0,
-    },
-}
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
 
-HELD_OUT: dict[tuple[str, str], dict[str, float]] = {
-    **{("kawata_crane", f"kP {k}"): {"x": 97.0, "theta": 93.0} for k in ("2.5", "5", "10")},
-    **{("ecp205_held", f"disk 2 held, {s}0.5 V"): {"theta_1": 85.0} for s in "-+"},
-}
-"""Study and the run it must predict from its others: least fit percent by signal."""
+import numpy as np
+
+from upright.identification.model import RunScore
+
+SMOOTHED = 0.05
+"""Seconds over which a speed is taken, by parabolas through the counts."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """One figure that was asked for.
+
+    `how`: the run was fitted; predicted by a fit that never saw it because its role is "predict"; or left out in turn,
+    the others fitted. `over`: every run has to reach it, or the median of the runs. No `runs` means all of that kind.
+    """
+
+    study: str
+    signal: str
+    least: float
+    how: Literal["fitted", "predicted", "left out"] = "fitted"
+    runs: tuple[str, ...] = ()
+    over: Literal["each", "median"] = "each"
+    horizon: float | None = None
+
+    def reached(self, scores: Mapping[str, RunScore]) -> dict[str, float]:
+        """Fit percent of the signal by run, of the runs in question among `scores`."""
+        role = "fit" if self.how == "fitted" else "predict"
+        labels = self.runs or tuple(label for label, s in scores.items() if s.role == role and self._in(s))
+        return {label: self._of(scores[label]) for label in labels}
+
+    def met(self, reached: Mapping[str, float]) -> bool:
+        """Whether that is enough."""
+        values = list(reached.values())
+        return bool(values) and (min(values) if self.over == "each" else float(np.median(values))) >= self.least
+
+    def _in(self, score: RunScore) -> bool:
+        return self.signal == "twist" or self.signal.removeprefix("speed of ") in score.fit_percent
+
+    def _of(self, score: RunScore) -> float:
+        from upright.identification.scoring import fit_percent
+
+        if self.horizon is not None:
+            return score.ahead[self.horizon][self.signal]
+        if self.signal in score.fit_percent:
+            return score.fit_percent[self.signal]
+        if self.signal == "twist":
+            return fit_percent(score.y[:, 0] - score.y[:, 1], score.simulated[:, 0] - score.simulated[:, 1])
+        k = score.measured.index(self.signal.removeprefix("speed of "))
+        return fit_percent(*(slope(score.t, y[:, k]) for y in (score.y, score.simulated)))
+
+
+def slope(t: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Slope of a signal (T,), from parabolas over `SMOOTHED` seconds."""
+    from scipy.signal import savgol_filter
+
+    dt = float((t[-1] - t[0]) / (t.size - 1))
+    return savgol_filter(y, max(5, int(SMOOTHED / dt) | 1), 2, deriv=1, delta=dt)
+
+
+def _each(study: str, least: Mapping[str, float], runs: Sequence[str], how: str = "fitted") -> list[Asked]:
+    return [Asked(study=study, signal=s, least=v, runs=tuple(runs), how=how) for s, v in least.items()]  # type: ignore[arg-type]
+
+
+ASKED: list[Asked] = [
+    Asked(study="aau_pendulum", signal="theta", least=99.3, runs=("whole fall",)),
+    Asked(study="aau_pendulum_tail", signal="theta", least=97.0, runs=("tail, restarted",), how="predicted"),
+    Asked(study="uw_pendulum", signal="theta", least=98.5, runs=("55 s",)),
+    Asked(study="uw_pendulum_tail", signal="theta", least=90.0, runs=("tail",), how="predicted"),
+    Asked(study="furuta_fall", signal="theta", least=98.0, runs=("fall",)),
+    *_each("furuta_sines", {"psi": 96.0, "theta": 92.0}, ("sine 2 V", "sine 4 V")),
+    *_each("furuta_sines", {"psi": 97.0, "theta": 85.0}, ("constant 2 V", "constant 4 V"), "predicted"),
+    *_each("kawata_crane", {"x": 98.5, "theta": 96.0}, ("kP 2.5", "kP 5", "kP 10")),
+    Asked(study="kawata_crane", signal="theta", least=98.0, runs=("decay",)),
+    *_each("kawata_crane", {"x": 97.0, "theta": 93.0}, ("kP 2.5", "kP 5", "kP 10"), "left out"),
+    Asked(study="ecp205_held", signal="theta_1", least=90.0, runs=("disk 2 held, -0.5 V", "disk 2 held, +0.5 V")),
+    Asked(study="ecp205_held", signal="theta_2", least=97.0, runs=("disk 1 held",)),
+    *_each("ecp205_held", {"theta_1": 85.0}, ("disk 2 held, -0.5 V", "disk 2 held, +0.5 V"), "left out"),
+]
+
+
+def studies() -> list[str]:
+    """Studies something was asked of, in order."""
+    return list(dict.fromkeys(a.study for a in ASKED))

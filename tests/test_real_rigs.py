@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.asked import ASKED, HELD_OUT
+from benchmarks.asked import ASKED, studies
+from upright.identification.crossval import cross_validate
 from upright.identification.estimate import identify
 from upright.identification.study import load_study
 
@@ -23,20 +24,14 @@ pytestmark = [
 ]
 
 
-@pytest.mark.parametrize("name", ASKED)
-def test_a_real_rig_is_explained(name):
+@pytest.mark.parametrize("name", studies())
+def test_a_real_rig_is_explained_and_predicted(name):
     study = load_study(STUDIES / f"{name}.toml", data=DATA)
     fit = identify(study.rig, study.runs)
-    reached = {(label, s): v for label, score in fit.runs.items() for s, v in score.fit_percent.items()}
-    assert {key: value for key, value in reached.items() if value < ASKED[name].get(key, 0.0)} == {}
-    assert set(ASKED[name]) <= set(reached)
+    asked = [a for a in ASKED if a.study == name]
+    left_out = {}
+    if any(a.how == "left out" for a in asked):
+        left_out = cross_validate(fit, study.runs).predicted
+    reached = {a: a.reached(left_out if a.how == "left out" else fit.runs) for a in asked}
+    assert {a: values for a, values in reached.items() if not a.met(values)} == {}
     assert fit.trusted, fit.verdict
-
-
-@pytest.mark.parametrize(("name", "left_out"), HELD_OUT)
-def test_a_real_run_is_predicted_from_the_others(name, left_out):
-    study = load_study(STUDIES / f"{name}.toml", data=DATA).hold_out(left_out)
-    fit = identify(study.rig, study.runs)
-    score = fit.runs[left_out]
-    assert score.role == "predict"
-    assert {s: v for s, v in score.fit_percent.items() if v < HELD_OUT[name, left_out][s]} == {}
