@@ -37,8 +37,8 @@ def plain(law, x, r, uff, dt, n, limit=math.inf, delay=0.0):
         c = math.floor(c / law.command_quantum + 0.5) * law.command_quantum if law.command_quantum else c
         beyond, c = abs(c) > limit, min(max(c, -limit), limit)
         over += beyond
-        if not (beyond and law.windup == "hold"):
-            z = M[0] @ z + M[1] @ w
+        stands = (np.eye(len(z)) == M[0]).all(axis=1) & (beyond and law.windup == "hold")
+        z = np.where(stands, z, M[0] @ z + M[1] @ w)
         u.append(c)
         rows.append([*x, c])
         x = soon[0] @ (late[0] @ x + late[1] * u[-2 - whole]) + soon[1] * u[-1 - whole]

@@ -148,4 +148,6 @@ def _law(w: Writer) -> None:
         )
         _put(w, j)
     w.add(*(f"_z{i} = {combined('A', i, 'B')}" for i in range(states)))
-    w.add(*(f"{{z{i}}} = _z{i} if _over == 0.0 else {{z{i}}}" for i in range(states)))
+    for i in range(states):  # at the limit sums stand still; what differences and filters remember goes on
+        adds_up = " and ".join(f"{{lA{i}_{j}}} == {float(i == j)}" for j in range(states))
+        w.add(f"{{z{i}}} = {{z{i}}} if _over != 0.0 and {adds_up} else _z{i}")

@@ -40,7 +40,8 @@ class Law:
     initial : array, shape (z,) or (z, lanes), optional
         State at a lane's first sample, zero when omitted.
     windup : {"free", "hold"}
-        Whether the state runs on while the command is beyond its limit, or stays as it is for that sample.
+        Whether sums, states that A hands on as they are, run on while the command is beyond its limit, or stay as they
+        are for that sample. What differences and filters remember goes on.
     """
 
     A: ArrayLike
