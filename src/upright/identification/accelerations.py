@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from upright.identification.descent import descend
 from upright.identification.effort import effort
-from upright.identification.model import Feedback, Rig, Run
+from upright.identification.model import Rig, Run
 from upright.identification.normal import Normal, finite
 from upright.identification.smoothing import (
     dominant_period,
@@ -81,9 +81,7 @@ def observe(rig: Rig, run: Run, *, flips: Mapping[str, float] | None = None,
     acting = (since >= run.guesses.get("input_start", -math.inf)) & (since < run.guesses.get("input_end", math.inf))
     u = np.where(acting, run.u.T, 0.0)
     if run.loop is not None:
-        states = np.empty((2 * len(coordinates), n))
-        states[0::2], states[1::2] = q, v
-        u = u + run.loop.k_pf * run.loop.reference - np.asarray(run.loop.gains) @ states
+        u = u + run.loop.follow(q.T, coordinates)[0]
     return Sample(run=run, dt=dt, q=q, v=v, a=a, u=u, free=free, fades=fades, width=width, edge=edge, period=period)
 
 
@@ -102,17 +100,13 @@ def samples_of(
         thin = run
         if k > 1:
             held = {n: v[::k] if isinstance(v, np.ndarray) else v for n, v in run.held.items()}
-            thin = replace(run, t=run.t[::k], u=run.u[::k], y=run.y[::k], held=held, loop=_thin_law(run.loop, k))
+            thin = replace(
+                run, t=run.t[::k], u=run.u[::k], y=run.y[::k], held=held, loop=run.loop and run.loop.thinned(k)
+            )
         sample = observe(rig, thin, flips=flips, turns=turns)
         if sample is not None:
             found.append(sample)
     return found
-
-
-def _thin_law(law: Feedback | None, k: int) -> Feedback | None:
-    if law is None or not isinstance(law.reference, np.ndarray):
-        return law
-    return replace(law, reference=law.reference[::k])
 
 
 def mass_and_force(

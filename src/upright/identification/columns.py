@@ -67,10 +67,9 @@ class Sensor:
             raise BadInput(f"column '{self.column}' is in {unit}, so {self.coordinate.name} needs {ways}")
         return self.scale
 
-    def read(self, record: Record) -> tuple[Array, float, tuple[str, ...]]:
-        """Coordinate (N,) [SI] at the record's own instants, its resolution [SI], and what was noticed."""
-        readings = column(record, self.column)
-        unit = self.column_unit(record, readings)
+    def line(self, record: Record) -> tuple[float, float]:
+        """Coordinate [SI] per unit of the column, sign included, and the reading at which the coordinate is zero."""
+        unit = self.column_unit(record, column(record, self.column))
         factor = self.factor(unit)
         zero = self.offset
         if isinstance(zero, str) and unit and not units.same_dimension(unit, self.coordinate.unit):
@@ -80,7 +79,13 @@ class Sensor:
                 zero = in_unit(zero, unit)
         elif isinstance(zero, str):
             zero = units.parse(zero, self.coordinate.unit) / units.scale(unit)
-        values = self.sign * factor * (readings - zero)
+        return self.sign * factor, zero
+
+    def read(self, record: Record) -> tuple[Array, float, tuple[str, ...]]:
+        """Coordinate (N,) [SI] at the record's own instants, its resolution [SI], and what was noticed."""
+        readings = column(record, self.column)
+        factor, zero = self.line(record)
+        values = factor * (readings - zero)
         notes: tuple[str, ...] = ()
         if self.coordinate.unit == "rad" and np.abs(np.diff(values)).max(initial=0.0) > 1.5 * math.pi:
             values = np.unwrap(values)

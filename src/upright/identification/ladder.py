@@ -54,9 +54,7 @@ def first_part(run: Run, share: float = SEEN) -> Run:
     if n < LEAST_RUN * share:
         return run
     held = {c: v[:n] if isinstance(v, np.ndarray) else v for c, v in run.held.items()}
-    loop = run.loop
-    if loop is not None and isinstance(loop.reference, np.ndarray):
-        loop = replace(loop, reference=loop.reference[:n])
+    loop = None if run.loop is None else run.loop.first(n)
     return replace(run, t=run.t[:n], u=run.u[:n], y=run.y[:n], held=held, loop=loop)
 
 

@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.identification.laws.feedback import Feedback
 from upright.physics import Plant
 
 Array = NDArray[np.float64]
@@ -55,19 +56,6 @@ class Parameter:
     upper: float = math.inf
     uncertainty: float = 0.0
     assumed: bool = False
-
-
-@dataclass(frozen=True, kw_only=True)
-class Feedback:
-    """A law that closed the loop during a run: ``u = u_column + k_pf r - K (y - offset)``, sampled, `K` per state.
-
-    `gains` are per state in the paper's order; `reference` is (N,) in SI or a constant.
-    """
-
-    gains: tuple[float, ...]
-    k_pf: float = 0.0
-    reference: Array | float = 0.0
-    alpha: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,6 +13,7 @@ from upright.identification.columns import Array, Grid
 from upright.identification.model import Run
 from upright.identification.nuisance_names import FOR_GROUPS, PER_RUN, SPREADS
 from upright.identification.study_keys import names
+from upright.identification.study_law import Scene
 from upright.identification.study_loop import read_loop, state_units
 from upright.identification.study_rig import known_values
 from upright.identification.study_sensors import drive_unit, read_drives, read_sensors
@@ -87,10 +88,19 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
             "measured" if "measured" in run else "file", _nothing_measured(plant, sensors, locked, held_names)
         )
     u = np.zeros((grid.t.size, len(plant.inputs)))
-    for k, drive in enumerate(read_drives(study, run, plant)):
+    drives = read_drives(study, run, plant)
+    for k, drive in enumerate(drives):
         with run.text.at(drive.place):
             u[:, k] = grid.commands(drive.read(record))
-    notes += [*grid.told(), *record.provenance.notes]
+    loop = None
+    if "loop" in run:
+        known = {name: sensor for name, (sensor, _) in sensors.items()}
+        scene = Scene(
+            plant=plant, record=record, grid=grid, sensors=known, drive=drives[0], unit=drive_unit(study),
+            command=str(study.section("drive").values.get("column", "")),
+        )  # fmt: skip
+        loop = read_loop(run, scene)
+    notes += [*grid.told(), *record.provenance.notes, *([loop.told] if loop and loop.told else [])]
     return Run(
         label=label,
         role=_role(run),
@@ -107,7 +117,7 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
         initial=_states(run, plant),
         horizon=_horizon(run, grid),
         score_from=_score_from(run, grid),
-        loop=read_loop(run, plant, record, grid, drive_unit(study)),
+        loop=loop,
         repeats=run.text_of("repeats", "step 0.5 V") if "repeats" in run else "",
         source="; ".join(notes),
     )

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.identification.laws.simulated import controller, finely, limited, remembering
 from upright.identification.model import Rig, Run
 from upright.identification.restarts import worth
 from upright.identification.smoothing import (
@@ -18,7 +19,7 @@ from upright.identification.smoothing import (
     smoothing_width,
     spread,
 )
-from upright.simulation import Held, Loop, Simulator, choose
+from upright.simulation import Held, Simulator, choose
 
 Array = NDArray[np.float64]
 
@@ -150,20 +151,12 @@ def simulator(rig: Rig, track: Track, values: Mapping[str, float | Array], free:
     """Solver of one run; terms whose parameters are in `free` stay although they are zero now."""
     derived = rig.plant.derived_for({**values, **dict.fromkeys(free, 1.0)})
     free = [n for n in free if n in derived.parameters or n.startswith("actuator.")]
-    flavour = choose(derived, values, free=free, held=tuple(track.held), loop=track.run.loop is not None)
-    loop = None
-    if track.run.loop is not None:
-        law = track.run.loop
-        reference = np.asarray(law.reference, dtype=np.float64)
-        loop = Loop(
-            K=np.asarray(law.gains, dtype=np.float64),
-            k_pf=law.k_pf,
-            reference=np.full(2, float(reference)) if reference.ndim == 0 else reference,
-            alpha=law.alpha,
-        )
-    return Simulator(
-        derived=derived, flavour=flavour, dt=track.dt, substeps=rig.substeps, loop=loop, held=dict(track.held)
-    )
+    loop = track.run.loop
+    every = 1 if loop is None else loop.every
+    held = {n: finely(h, every) for n, h in track.held.items()}
+    law = None if loop is None else controller(loop, track.run, rig.plant)
+    flavour = choose(derived, limited(values, loop), free=free, held=tuple(held), loop=law)
+    return Simulator(derived=derived, flavour=flavour, dt=track.dt / every, substeps=rig.substeps, loop=law, held=held)
 
 
 def motions(
@@ -174,10 +167,16 @@ def motions(
     states, windows, lanes = x0.shape
     if windows > 1:
         values = {n: np.tile(v, windows) if isinstance(v, np.ndarray) else v for n, v in values.items()}
+    loop, start, every, u = track.run.loop, None, 1, track.u
+    if loop is not None:
+        values, every, u = limited(values, loop), loop.every, np.repeat(track.u, loop.every, axis=0)
+        if windows > 1:
+            solver = remembering(solver, track.run, track.restarts, lanes)
+    if windows > 1:
+        start = np.repeat(track.restarts * every, lanes)
     table = solver.table(values, windows * lanes)
-    start = np.repeat(track.restarts, lanes) if windows > 1 else None
     first = x0.reshape(states, windows * lanes)
-    return solver.run(table, first, track.u, samples=samples, start=start, memory=memory)
+    return solver.run(table, first, u, samples=samples, start=start, every=every, memory=memory)
 
 
 def outputs(
