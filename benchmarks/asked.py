@@ -87,6 +87,14 @@ ASKED: list[Asked] = [
     Asked(study="ecp205_held", signal="theta_1", least=90.0, runs=("disk 2 held, -0.5 V", "disk 2 held, +0.5 V")),
     Asked(study="ecp205_held", signal="theta_2", least=97.0, runs=("disk 1 held",)),
     *_each("ecp205_held", {"theta_1": 85.0}, ("disk 2 held, -0.5 V", "disk 2 held, +0.5 V"), "left out"),
+    *_each("ecp210_two_carts", {"x_1": 94.0, "x_2": 94.0}, ()),
+    *_each("ecp210_two_carts", {"x_1": 92.0, "x_2": 91.0}, (), "left out"),
+    *_each("ecp210_cart_1", {"x_1": 89.0}, ()),
+    *_each("ecp210_cart_1", {"x_1": 88.0}, (), "left out"),
+    *_each("ecp210_releases", {"x_2": 86.0}, ()),
+    *_each("ecp210_releases", {"x_2": 85.0}, (), "left out"),
+    *_each("ecp210_export", {"x_1": 95.0, "x_2": 91.0}, ()),
+    *_each("ecp210_export", {"x_1": 91.0, "x_2": 89.0}, (), "left out"),
 ]
 
 
