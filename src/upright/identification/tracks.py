@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.identification.acting import smoothing_width_for
 from upright.identification.laws.simulated import controller, finely, limited, remembering
 from upright.identification.model import Rig, Run
 from upright.identification.restarts import worth
@@ -123,9 +124,11 @@ def prepare(rig: Rig, run: Run, *, thin: bool) -> Track:
             x[:, i], x[:, i + 1] = float(array), 0.0
             held[c] = Held()
         else:
-            motion = savitzky_golay(
-                array, period_s, smoothing_width(array, period_s, period, 0.0), order=3, derivatives=1
-            )
+            # a hand moves at its own pace: the width follows from what counts and noise allow, not from the period
+            steps = np.abs(np.diff(array))
+            count = float(np.min(steps[steps > 0], initial=np.inf))
+            width = smoothing_width_for(array, period_s, count if np.isfinite(count) else 0.0)
+            motion = savitzky_golay(array, period_s, width, order=3, derivatives=1)
             x[:, i], x[:, i + 1] = motion.q, motion.v
             held[c] = Held(q=motion.q[::stride])
     weights = np.array([0.0 if c in run.held else 1.0 / spread(run.y[:, k]) for k, c in enumerate(run.measured)])
