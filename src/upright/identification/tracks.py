@@ -125,9 +125,10 @@ def prepare(rig: Rig, run: Run, *, thin: bool) -> Track:
             held[c] = Held()
         else:
             # a hand moves at its own pace: the width follows from what counts and noise allow, not from the period
+            # a low quartile of its steps, since resampling leaves parts of a count as well
             steps = np.abs(np.diff(array))
-            count = float(np.min(steps[steps > 0], initial=np.inf))
-            width = smoothing_width_for(array, period_s, count if np.isfinite(count) else 0.0)
+            count = float(np.percentile(steps[steps > 0], 25)) if np.any(steps) else 0.0
+            width = smoothing_width_for(array, period_s, count)
             motion = savitzky_golay(array, period_s, width, order=3, derivatives=1)
             x[:, i], x[:, i + 1] = motion.q, motion.v
             held[c] = Held(q=motion.q[::stride])
