@@ -71,7 +71,7 @@ def controller(w: Writer) -> None:
             w.add("_slot = _k % _nbuf", f"W[{place}] = {{ua{j}}}")
             for name, back in (("cn", "int64({di})"), ("co", "int64({di}) - 1")):
                 gap = back if name == "cn" else "int64({di}) + 1"
-                w.add(f"_slot = (_k - ({gap})) % _nbuf", f"_c = W[{place}] if _k >= {gap} else 0.0")
+                w.add(f"_slot = (_k - ({gap})) % _nbuf", f"_c = W[{place}]", f"_c = _c if _k >= {gap} else 0.0")
                 commanded(w, j, name[1])
                 w.add(f"{{{name}{j}}} = {{gain{j}}} * (_c + {{off{j}}})")
 
@@ -149,5 +149,5 @@ def _law(w: Writer) -> None:
         _put(w, j)
     w.add(*(f"_z{i} = {combined('A', i, 'B')}" for i in range(states)))
     for i in range(states):  # at the limit sums stand still; what differences and filters remember goes on
-        adds_up = " and ".join(f"{{lA{i}_{j}}} == {float(i == j)}" for j in range(states))
-        w.add(f"{{z{i}}} = {{z{i}}} if _over != 0.0 and {adds_up} else _z{i}")
+        adds_up = " & ".join(f"({{lA{i}_{j}}} == {float(i == j)})" for j in range(states))
+        w.add(f"_z = {{z{i}}}", f"{{z{i}}} = _z if (_over != 0.0) & {adds_up} else _z{i}")

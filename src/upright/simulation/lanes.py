@@ -109,9 +109,11 @@ def _substep(w: Writer) -> None:
                 f"_d = {{co{j}}} - {{cn{j}}}",
                 f"_r = {{cn{j}}} + _p * _d",
                 f"_w0 = {{w{j}}}",
-                f"_z = {{e{j}}} if _p <= 0.0 else {{ep{j}}}",
+                # read both before one is chosen: a load under a condition keeps LLVM from using vectors
+                f"_e, _z = {{e{j}}}, {{ep{j}}}",
+                "_z = _e if _p <= 0.0 else _z",
                 "_z = 1.0 if _p >= 1.0 else _z",
-                f"_w1 = {{cn{j}}} + (_w0 - {{co{j}}}) * {{e{j}}} + _d * _z",
+                f"_w1 = {{cn{j}}} + (_w0 - {{co{j}}}) * _e + _d * _z",
                 "_d = 6.0 * _d * _p * (_p - 1.0)",
                 f"_wm = _r - (_w1 - _w0) * {{th{j}}}",
                 f"_d = 0.5 * _d - 6.0 * {{th{j}}} * (0.5 * (_w0 + _w1) - _wm)",
