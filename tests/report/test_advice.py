@@ -31,7 +31,7 @@ def test_residuals_with_a_memory_ask_for_the_friction_that_is_missing(changed, s
     text = said(changed(runs={"release": replace(run, y=slow)}), study="mine.toml", folder="out")
     assert "quadratic drag of psi (b_1q)" in text
     assert "Coulomb friction of psi" not in text  # b_1c is estimated already
-    assert "upright identify mine.toml -o out" in text
+    assert "upright ladder mine.toml -o out" in text
 
 
 @pytest.mark.parametrize(("value", "says"), [(0.0, "need no b_2"), (3.0, "b_2 stopped at its bound")])

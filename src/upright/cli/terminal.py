@@ -89,7 +89,7 @@ def print_fit(fit: Fit, files: Sequence[Path], study: str, crossed: CrossValidat
         screen.print(f"[bold]Warning[/bold]: {_plain(warning)}", soft_wrap=True)
     screen.print("\nWritten: " + ", ".join(str(file) for file in files), soft_wrap=True)
     screen.print("What next:", style="bold")
-    for step in next_steps(fit, study=study, folder=typed(files[0].parent)):
+    for step in next_steps(fit, study=study, folder=typed(files[0].parent), crossed=crossed is not None):
         screen.print(f"- {_plain(step.sentence)}", soft_wrap=True)
         for line in step.command.splitlines():
             screen.print(f"    {_plain(line)}", soft_wrap=True)

@@ -17,13 +17,13 @@ from upright.errors import BadInput
 from upright.identification.chain import POOR, Log, better, closed_form_starts, count, explain, placed, weigh_priors
 from upright.identification.crossval import Values, leave_one_out, placed_at, values_at
 from upright.identification.decision import by_chance, compare, percents
-from upright.identification.descent import Descent, Report, descend, grow
+from upright.identification.descent import CREEP, Descent, Report, descend, grow
 from upright.identification.grown import Ladder, Step, reason
 from upright.identification.ladder import LEAST_RUN, SEEN, first_part
 from upright.identification.model import Rig, Run, RunScore
 from upright.identification.pose import pose
 from upright.identification.problem import Problem
-from upright.identification.repeats import repeats
+from upright.identification.repeats import at_ceiling, repeats
 from upright.identification.rungs import Rung, at, check, default_rungs, neutral, runs_at
 from upright.identification.scoring import score
 from upright.identification.statistics import loudness
@@ -95,7 +95,7 @@ class _Climb:
                 rung = waiting.pop(0)
                 if self.try_rung(rung, len(waiting)):
                     self.again(waiting)
-                if self.at_ceiling():
+                if at_ceiling(self.repeats, self.best):
                     stopped = "The model predicts the runs as well as they predict one another: nothing is left."
                     if waiting:
                         stopped = f"{stopped[:-1]} ({', '.join(r.name for r in waiting)} not tried)."
@@ -121,16 +121,6 @@ class _Climb:
             return "each run predicted from a fit of the others"
         return "the last third predicted from a fit of the first two thirds"
 
-    def at_ceiling(self) -> bool:
-        """Whether every signal of runs that are repeated is predicted as well as by a repeat."""
-        if not self.best or not self.repeats:
-            return False
-        return all(
-            np.mean([self.best[label].fit_percent[n] for label in group.labels if label in self.best]) >= ceiling
-            for group in self.repeats
-            for n, ceiling in group.ceiling.items()
-        )
-
     def try_rung(self, rung: Rung, waiting: int) -> bool:
         """Whether a rung is kept."""
         done = len(self.steps)
@@ -153,7 +143,7 @@ class _Climb:
         found = self.fit(problem, rig, shown, rung)
         if found.interrupted:
             raise KeyboardInterrupt
-        if self.steps and found.normal.cost > self.cost * (1 + 1e-6) and not rung.drops:
+        if self.steps and found.normal.cost > self.cost * (1 + CREEP) and not rung.drops:
             self.log.warnings.append(
                 f"With {rung.name} the runs were fitted worse (cost {found.normal.cost:.6g} against {self.cost:.6g}); "
                 "a richer model that contains the poorer one never should, so the search stalled; try better guesses."

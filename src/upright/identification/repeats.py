@@ -5,6 +5,7 @@ Above this ceiling there is nothing left to explain, only what the rig does diff
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from itertools import permutations
@@ -13,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model import Run
+from upright.identification.decision import scatter
+from upright.identification.model import Run, RunScore
 from upright.identification.scoring import fit_percent
 
 Array = NDArray[np.float64]
@@ -31,11 +33,15 @@ class Repeats:
     labels : tuple of str
         Of the runs.
     percents : mapping of str to tuple of float
-        By signal: fit percent of every run by every other one, initial offsets removed.
+        By signal: fit percent of every run by every other one, without what a model may adapt as well: the offset at
+        the start, or the one that suits best where runs estimate their own offset.
+    errors : mapping of str to float
+        By run: mean over the others and the signals of the logarithm of the error, as `log_error` has it.
     """
 
     labels: tuple[str, ...]
     percents: Mapping[str, tuple[float, ...]]
+    errors: Mapping[str, float]
 
     @property
     def ceiling(self) -> dict[str, float]:
@@ -88,16 +94,25 @@ def _first_change(run: Run) -> int:
 
 
 def _overlap(a: Run, b: Run) -> tuple[slice, slice]:
-    """Samples of each run that belong together: their commands change for the first time at the same place."""
-    i, j = _first_change(a), _first_change(b)
-    before = min(i, j)
-    n = min(a.t.size - i, b.t.size - j) + before
-    return slice(i - before, i - before + n), slice(j - before, j - before + n)
+    """Samples of each run that belong together: from the start, or where their commands change for the first time.
+
+    A record may begin just before or just after the command does.
+    """
+
+    def from_(i: int, j: int) -> tuple[float, slice, slice]:
+        before = min(i, j)
+        n = min(a.t.size - i, b.t.size - j) + before
+        here, there = slice(i - before, i - before + n), slice(j - before, j - before + n)
+        return float(np.abs(a.u[here] - b.u[there]).mean()), here, there
+
+    found = min(from_(0, 0), from_(_first_change(a), _first_change(b)), key=lambda one: one[0])
+    return found[1], found[2]
 
 
 def _compare(group: Sequence[Run]) -> Repeats:
     """Every run of a group explained by every other."""
     found: dict[str, list[float]] = {}
+    errors: dict[str, list[float]] = {run.label: [] for run in group}
     for a, b in permutations(group, 2):
         here, there = _overlap(a, b)
         rest = max(1, _first_change(a) - here.start)  # stands still until the command changes
@@ -105,8 +120,34 @@ def _compare(group: Sequence[Run]) -> Repeats:
             if name in a.held:
                 continue
             y, z = a.y[here, k], b.y[there, k]
-            found.setdefault(name, []).append(fit_percent(y - y[:rest].mean(), z - z[:rest].mean()))
-    return Repeats(labels=tuple(run.label for run in group), percents={n: tuple(v) for n, v in found.items()})
+            until = None if {"offset", f"offset.{name}"} & {*a.unknown} else rest
+            percent = fit_percent(y - y[:until].mean(), z - z[:until].mean())
+            found.setdefault(name, []).append(percent)
+            errors[a.label].append(log_error(percent))
+    return Repeats(
+        labels=tuple(run.label for run in group),
+        percents={n: tuple(v) for n, v in found.items()},
+        errors={label: float(np.mean(v)) for label, v in errors.items() if v},
+    )
+
+
+def log_error(percent: float) -> float:
+    """Logarithm of what is missed over how much the signal moves."""
+    return math.log(max(1 - percent / 100, 1e-9))
+
+
+def at_ceiling(groups: Sequence[Repeats], scores: Mapping[str, RunScore]) -> bool:
+    """Whether runs predict one another no better than a model predicts them, by more than one standard error.
+
+    The same rule by which `decision.compare` keeps a richer model, a repeat being the richest of all.
+    """
+    gains = [
+        float(np.mean([log_error(p) for p in scores[label].fit_percent.values()])) - error
+        for group in groups
+        for label, error in group.errors.items()
+        if label in scores
+    ]
+    return bool(gains) and float(np.mean(gains)) <= scatter(np.array(gains))
 
 
 def _alike(a: Any, b: Any) -> bool:

@@ -17,7 +17,7 @@ from upright.physics import Plant
 DRIVE = (
     ("offset of the drive", ("actuator.offset",)),
     ("lag of the drive", ("actuator.lag", "actuator.delay")),
-    ("damping by the drive", ("actuator.slope", "actuator.damping", "actuator.standby")),
+    ("damping by the drive", ("actuator.slope", "actuator.damping", "actuator.standby", "actuator.relaxation")),
     ("torque that falls with speed", ("actuator.knee", "actuator.fade")),
     ("end of the drive", ("actuator.start", "actuator.end")),
 )

@@ -24,10 +24,21 @@ class Step:
     command: str = ""
 
 
-def next_steps(fit: Fit, *, study: str = "STUDY.toml", folder: str = "OUT") -> list[Step]:
-    """Steps in order of weight: what would make the model wrong first, what would make it better last."""
+def next_steps(fit: Fit, *, study: str = "STUDY.toml", folder: str = "OUT", crossed: bool = False) -> list[Step]:
+    """Steps in order of weight: what would make the model wrong first, what would make it better last.
+
+    `crossed` says that every run was predicted by the others already.
+    """
     steps = [*_broken(fit), *_blind(fit), *_nuisances(fit), *_friction(fit, study, folder)]
-    if not any(s.role == "predict" for s in fit.runs.values()):
+    tested = crossed or any(s.role == "predict" for s in fit.runs.values())
+    if not tested and len(fit.runs) > 1:
+        steps.append(
+            Step(
+                sentence="Every run was fitted, so nothing tests the model yet; predict each from a fit of the others.",
+                command=f"upright identify {study} -o {folder} --hold-out each",
+            )
+        )
+    elif not tested:
         steps.append(
             Step(
                 sentence="Every run was fitted, so nothing tests the model yet; keep one run or one tail back.",
@@ -151,7 +162,7 @@ def _friction(fit: Fit, study: str, folder: str) -> list[Step]:
         Step(
             sentence=f"What is left over is not noise ({', '.join(coloured[:3])}"
             f"{' and others' if coloured[3:] else ''}). Not estimated so far: {'; '.join(fixed)}. "
-            "Add one, and keep it only if held-out data are predicted better.",
-            command=f'[parameters]\n{names[0]} = {{ guess = "…", min = 0 }}\n\nupright identify {study} -o {folder}',
+            "Give them guesses; the ladder keeps those with which held-out data are predicted better.",
+            command=f'[parameters]\n{names[0]} = {{ guess = "…", min = 0 }}\n\nupright ladder {study} -o {folder}',
         )
     ]

@@ -91,13 +91,14 @@ def write_fit_report(
         The page, ``folder / "report.html"``.
     """
     provenance = provenance or {}
-    content = fit_content(fit, title=title, provenance=provenance, folder=folder.name)
-    return write_page(folder, "fit.html", **content, crossed=cross_rows(crossed))
+    content = fit_content(fit, title=title, provenance=provenance, folder=folder.name, crossed=crossed)
+    return write_page(folder, "fit.html", **content)
 
 
 def fit_content(
-    fit: Fit, *, title: str, provenance: Mapping[str, object], folder: str, prefix: str = "fit"
-) -> dict[str, Any]:
+    fit: Fit, *, title: str, provenance: Mapping[str, object], folder: str, prefix: str = "fit",
+    crossed: CrossValidation | None = None,
+) -> dict[str, Any]:  # fmt: skip
     """What the template of a fit needs to know."""
     study = str(provenance.get("study") or "STUDY.toml")
     return {
@@ -114,7 +115,8 @@ def fit_content(
         "runs": run_pictures(fit, prefix),
         "certainty": certainty_pictures(fit, prefix),
         "rest": rest_picture(fit, prefix),
-        "steps": next_steps(fit, study=study, folder=folder or "OUT"),
+        "crossed": cross_rows(crossed),
+        "steps": next_steps(fit, study=study, folder=folder or "OUT", crossed=crossed is not None),
     }
 
 

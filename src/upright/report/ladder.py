@@ -101,7 +101,7 @@ def reached(ladder: Ladder, group: Repeats, signal: str) -> float:
 def ladder_figure(ladder: Ladder) -> Figure:
     """Fit and prediction against the rung, one curve per signal's mean, the ceiling as a line; parameters below."""
     steps = ladder.steps
-    drawing = figure(3.9, margins=(0.72, 1.75, 0.3, 1.25))
+    drawing = figure(3.9, margins=(0.62, 1.75, 0.15, 1.2))
     ax = drawing.add_subplot()
     x = np.arange(len(steps))
     predicted = np.array([s.predicted_percent for s in steps])
@@ -115,7 +115,7 @@ def ladder_figure(ladder: Ladder) -> Figure:
                 label=f"{label}, refused" if not kept.all() else None)  # fmt: skip
     ceiling = _ceiling(ladder)
     if math.isfinite(ceiling):
-        ax.axhline(ceiling, color=BLACK, linestyle=(0, (6, 2, 1, 2)), linewidth=1.1, label="one repeat by another")
+        ax.axhline(ceiling, color=BLACK, linestyle=(0, (6, 2, 1, 2)), linewidth=1.1, label="a repeat by another")
     shown = np.concatenate([fitted, predicted, [ceiling] if math.isfinite(ceiling) else []])
     low = max(float(np.nanmin(shown)), 0.0)
     ax.set_ylim(low - 0.08 * (100 - low), 100 + 0.04 * (100 - low))
@@ -136,9 +136,8 @@ def _ceiling(ladder: Ladder) -> float:
 
 
 def _label(step: Step) -> str:
-    name = step.rung.name
-    words, lines = name.split(), [""]
-    for word in words:
+    lines = [""]
+    for word in step.rung.name.split():
         if lines[-1] and len(lines[-1]) + len(word) > 12:
             lines.append("")
         lines[-1] = f"{lines[-1]} {word}".strip()
@@ -155,8 +154,8 @@ def next_rungs(ladder: Ladder, *, study: str, folder: str, data: str, trimmed: b
         steps.append(Advice(sentence=f"Take {', '.join(ladder.left_out)} out of the study: they were refused."))
     own = [n for s in ladder.kept for n in s.rung.unknown]
     if own:
-        steps.append(Advice(sentence=f"Add {', '.join(own)} to what each run has unknown.",
-                            command=f"[[runs]]\nunknown = {['initial', *own]}".replace("'", '"')))  # fmt: skip
+        lines = f"[[runs]]\nunknown = {list(ladder.runs[0].unknown)}".replace("'", '"')
+        steps.append(Advice(sentence=f"Add {', '.join(own)} to what each run has unknown.", command=lines))
     steps.append(
         Advice(
             sentence="Fit the chosen model, with its intervals and what the data cannot see.",
@@ -170,11 +169,11 @@ def next_rungs(ladder: Ladder, *, study: str, folder: str, data: str, trimmed: b
                 "of what any model can explain."
             )
         )
-    refused = [s.rung.name for s in ladder.steps if not s.kept]
+    refused = still_refused(ladder)
     if refused:
         steps.append(
             Advice(
-                sentence=f"If you believe in {', '.join(dict.fromkeys(refused))} all the same, record a run in which "
+                sentence=f"If you believe in {', '.join(refused)} all the same, record a run in which "
                 "it matters more: these runs do not ask for it."
             )
         )
@@ -204,17 +203,23 @@ def ladder_content(
     }
 
 
+def still_refused(ladder: Ladder) -> list[str]:
+    """Names of the rungs that were refused and not kept later."""
+    kept = [s.rung for s in ladder.kept]
+    return list(dict.fromkeys(s.rung.name for s in ladder.steps if s.rung not in kept))
+
+
 def verdict(ladder: Ladder) -> str:
     """What the ladder chose, in two sentences."""
     last = ladder.kept[-1] if ladder.kept else None
     if last is None:
         return f"No rung was finished. {ladder.stopped}"
-    refused = [s.rung.name for s in ladder.steps if not s.kept and s.rung not in [k.rung for k in ladder.kept]]
+    refused = still_refused(ladder)
     names = " + ".join(s.rung.name for s in ladder.kept)
     said = f"The data ask for {names}: {percent(last.predicted_percent)} predicted on average"
     said += f", {percent(last.fit_percent)} fitted."
     if refused:
-        said += f" Refused: {', '.join(dict.fromkeys(refused))}."
+        said += f" Refused: {', '.join(refused)}."
     return f"{said} {ladder.stopped}"
 
 
