@@ -100,10 +100,9 @@ def reached(ladder: Ladder, group: Repeats, signal: str) -> float:
 @styled
 def ladder_figure(ladder: Ladder) -> Figure:
     """Fit and prediction against the rung, one curve per signal's mean, the ceiling as a line; parameters below."""
-    steps = ladder.steps
+    steps, x = ladder.steps, np.arange(len(ladder.steps))
     drawing = figure(3.9, margins=(0.62, 1.75, 0.15, 1.2))
     ax = drawing.add_subplot()
-    x = np.arange(len(steps))
     predicted = np.array([s.predicted_percent for s in steps])
     fitted = np.array([s.fit_percent for s in steps])
     kept = np.array([s.kept for s in steps])
@@ -216,8 +215,8 @@ def verdict(ladder: Ladder) -> str:
         return f"No rung was finished. {ladder.stopped}"
     refused = still_refused(ladder)
     names = " + ".join(s.rung.name for s in ladder.kept)
-    said = f"The data ask for {names}: {percent(last.predicted_percent)} predicted on average"
-    said += f", {percent(last.fit_percent)} fitted."
+    scores = f"{percent(last.predicted_percent)} predicted on average, {percent(last.fit_percent)} fitted"
+    said = f"The data ask for {names}: {scores}."
     if refused:
         said += f" Refused: {', '.join(refused)}."
     return f"{said} {ladder.stopped}"
