@@ -23,6 +23,7 @@ COMMANDS = {
     "show": "Print and draw what a log holds: columns, sample rate, quanta, gaps, lying columns.",
     "doctor": "Say in plain sentences what looks wrong with a log, on which evidence, and what to do.",
     "init": "Write a commented study file from a log, filled in with what could be recognised.",
+    "law": "Recover the control law from a closed-loop log: structure, gains, limit, what is left.",
     "identify": "Fit a rig's parameters to its logs as a study file says; write estimates and report.",
     "ladder": "Grow a model only while it predicts better what it has not seen.",
     "predict": "Score other runs with a model that was fitted before.",

@@ -43,14 +43,9 @@ _JUNK = 3  # first rows, which some front ends fill with whatever their memory h
 
 
 def recover(
-    record: Record,
-    *,
-    measured: Sequence[str],
-    command: str,
-    references: Sequence[str] = (),
-    feedforward: Sequence[str] = (),
-    every: int | None = None,
-) -> Recovery:
+    record: Record, *, measured: Sequence[str], command: str, references: Sequence[str] = (),
+    feedforward: Sequence[str] = (), every: int | None = None,
+) -> Recovery:  # fmt: skip
     """The law between columns of a log, with what it leaves unexplained.
 
     P, PI, PD and PID of each measured signal's error are tried, with plain, two-tap and low-passed differences (the
