@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -153,20 +154,58 @@ def _matrix(entries: tuple[str, ...], scope: dict[str, float], rows: int, column
     return np.array([float(evaluate(e, scope)) for e in entries], dtype=np.float64).reshape(rows, columns)
 
 
-def _motion(derived: Derived, scope: dict[str, float]) -> tuple[Matrix, Matrix]:
+def _motion(derived: Derived, scope: Mapping[str, Any]) -> tuple[Matrix, Matrix]:
     """Mass matrix and force vector at one point."""
-    scope = dict(scope)
-    for i, lump in enumerate(derived.lumps):
-        scope[f"k{i}"] = float(evaluate(lump, scope))
-    for s, c, argument in derived.trig:
-        a = float(evaluate(argument, scope))
-        scope[s], scope[c] = np.sin(a), np.cos(a)
-    for name, step in derived.steps:
-        scope[name] = float(evaluate(step, scope))
+    scope = _resolved(derived, scope)
     n = len(derived.coordinates)
     M = np.zeros((n, n))
     M[np.triu_indices(n)] = [float(evaluate(e, scope)) for e in derived.mass]
     return M + np.triu(M, 1).T, np.array([float(evaluate(e, scope)) for e in derived.force])
+
+
+def _resolved(derived: Derived, scope: Mapping[str, Any]) -> dict[str, Any]:
+    """The scope with the intermediate results in it."""
+    scope = dict(scope)
+    for i, lump in enumerate(derived.lumps):
+        scope[f"k{i}"] = evaluate(lump, scope)
+    for s, c, argument in derived.trig:
+        a = evaluate(argument, scope)
+        scope[s], scope[c] = np.sin(a), np.cos(a)
+    for name, step in derived.steps:
+        scope[name] = evaluate(step, scope)
+    return scope
+
+
+def small_motions(derived: Derived, values: Mapping[str, Any], lanes: int) -> tuple[Matrix, Matrix, Matrix, Matrix]:
+    """Matrices of ``M a + D v + K q = G u`` about a point at rest, for many sets of numbers.
+
+    Parameters
+    ----------
+    derived : Derived
+        Equations of the plant.
+    values : mapping
+        Parameters and the coordinates of the point by name, each a number or an array (lanes,).
+    lanes : int
+        Number of sets.
+
+    Returns
+    -------
+    tuple of arrays
+        M, D and K (lanes, n, n) and G (lanes, n, inputs).
+    """
+    n, m = len(derived.coordinates), len(derived.inputs)
+    still = {**{f"{c}_dot": 0.0 for c in derived.coordinates}, **dict.fromkeys(derived.inputs, 0.0)}
+    scope = _resolved(derived, {**still, **values})
+
+    def matrix(entries: tuple[str, ...], columns: int) -> Matrix:
+        rows = [np.broadcast_to(evaluate(e, scope), (lanes,)) for e in entries]
+        return np.array(rows, dtype=np.float64).reshape(n, columns, lanes).transpose(2, 0, 1).copy()
+
+    M = np.zeros((lanes, n, n))
+    i, j = np.triu_indices(n)
+    M[:, i, j] = np.array([np.broadcast_to(evaluate(e, scope), (lanes,)) for e in derived.mass]).T
+    M[:, j, i] = M[:, i, j]
+    return M, matrix(derived.damping, n), matrix(derived.stiffness, n), matrix(derived.gain, m)
 
 
 def _mass(derived: Derived, scope: dict[str, float]) -> Matrix:
