@@ -66,7 +66,7 @@ def print_fit(fit: Fit, files: Sequence[Path], study: str, crossed: CrossValidat
     from rich.table import Table
 
     from upright.report.advice import next_steps
-    from upright.report.tables import parameter_rows, run_rows
+    from upright.report.tables import parameter_rows, pole_rows, run_rows
 
     screen = console()
     table = Table(title="Parameters", title_justify="left", box=None, pad_edge=False, header_style="bold")
@@ -81,6 +81,8 @@ def print_fit(fit: Fit, files: Sequence[Path], study: str, crossed: CrossValidat
         table.add_row(*(_plain(cell) for cell in cells[: len(headings)]))
     screen.print(table)
     print_scores(fit.runs)
+    for at, pole, interval in pole_rows(fit, growing=True):
+        screen.print(f"\nPole at {at}: {pole} 1/s, 95 % interval {interval}", soft_wrap=True)
     if crossed is not None:
         print_crossed(crossed)
     how = f"{fit.method}, {fit.evaluations} evaluations, {fit.seconds:.2f} s"
@@ -112,12 +114,17 @@ def print_scores(runs: Any) -> None:
         table.add_column(heading, justify="right" if heading.endswith("%") else "left")
     for label, score in scores:
         over = "free run" if score.horizon is None else f"restarted every {score.horizon:g} s"
+        over = f"{score.horizon:g} s ahead" if score.ahead else over
         over += f", from {score.score_from:g} s on" if score.score_from > 0 else ""
         over += f"; its own {', '.join(score.adapted)}" if score.adapted else ""
         role = "fitted" if score.role == "fit" else "predicted"
         for name, percent in score.fit_percent.items():
             naive = [f"{score.naive[name]:.2f}" if name in score.naive else ""] if windowed else []
             table.add_row(_plain(label), role, name, f"{percent:.2f}", *naive, over)
+        for horizon, percents in list(score.ahead.items())[1:]:
+            for name, percent in percents.items():
+                none = [""] if windowed else []
+                table.add_row(_plain(label), role, name, f"{percent:.2f}", *none, f"{horizon:g} s ahead")
     console().print(table)
 
 

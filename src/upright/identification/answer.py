@@ -13,8 +13,9 @@ from upright.identification import assumptions
 from upright.identification.chain import Log, count
 from upright.identification.descent import Descent
 from upright.identification.doubt import doubted
-from upright.identification.model import Estimate, Fit, Rig, Run, RunScore
+from upright.identification.model import NOISE, Estimate, Fit, Rig, Run, RunScore
 from upright.identification.own import estimate, own_estimates, quantile
+from upright.identification.poles import poles
 from upright.identification.pose import pose
 from upright.identification.problem import Problem
 from upright.identification.profile import profile
@@ -80,6 +81,10 @@ def answer(
         memory=spread.memory,
         period=min(t.period for t in problem.tracks),
     )
+    values = _whole(problem, x)
+    there = [(i, u.name) for i, u in enumerate(problem.unknowns) if u.runs == SHARED and u.name in values]
+    C = spread.covariance[np.ix_([i for i, _ in there], [i for i, _ in there])]
+    size = np.array([values[n] if problem.unknowns[i].log else 1.0 for i, n in there])
     places = [i for i, u in enumerate(problem.unknowns) if u.runs == SHARED]
     taken = () if found.interrupted else assumptions.assumptions(chosen, problem, x, spread.pinned, estimates)
     verdict = " ".join([verdict, *assumptions.sentences(taken)])
@@ -103,8 +108,17 @@ def answer(
         warnings=(*warnings, *conventions),
         history=tuple(log.history),
         interrupted=found.interrupted,
+        poles={}
+        if blind  # a pole may depend on what the data cannot see
+        else poles(chosen, values, [n for _, n in there], C * np.outer(size, size), quantile(spread.samples, x.size)),
         assumptions=taken,
     )
+
+
+def _whole(problem: Problem, x: Array) -> dict[str, float]:
+    """Every parameter of plant and actuator at coordinates `x`."""
+    v = problem.value(x)
+    return {**problem.base, **{u.name: float(v[i]) for i, u in enumerate(problem.unknowns) if u.runs == SHARED}}
 
 
 def _estimates(
@@ -127,7 +141,7 @@ def _estimates(
         interval = plain.interval
         wide = interval[1] - interval[0] > abs(plain.value)
         near = spread.pinned[i] or interval[0] <= u.lower < plain.value or interval[1] >= u.upper > plain.value
-        if u.asked and (wide or near):
+        if u.asked and (wide or near) and not u.name.startswith(NOISE):  # of a level its size is enough
             cost = 40.0 * count(problem) * (x.size + 1) / 16
             if cost < budget and not interrupted:
                 budget -= cost

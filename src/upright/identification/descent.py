@@ -151,9 +151,13 @@ def reach(problem: Problem, x: Array) -> float:
 
 
 def first_horizon(problem: Problem) -> float:
-    """Seconds to begin with: one and a half periods of the slowest run; everything when runs are restarted."""
+    """Seconds to begin with: one and a half periods of the slowest run; everything when runs are restarted.
+
+    Of several horizons the shortest: the longer ones amplify what a first guess does to the state.
+    """
     free = [t for t in problem.tracks if not t.windowed]
-    return max((1.5 * t.period for t in free), default=math.inf)
+    shortest = [t.ahead.samples[0] * t.dt for t in problem.tracks if t.ahead]
+    return max((1.5 * t.period for t in free), default=max(shortest, default=math.inf))
 
 
 def grow(

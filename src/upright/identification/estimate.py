@@ -19,6 +19,7 @@ from upright.identification.descent import Descent, Report, grow
 from upright.identification.ladder import choose
 from upright.identification.model import Fit, Rig, Run
 from upright.identification.pose import pose
+from upright.identification.predictor_setup import with_noise
 from upright.identification.problem import Problem
 from upright.identification.scoring import fit_percent, predict
 from upright.identification.simplex import simplex
@@ -60,6 +61,7 @@ def identify(rig: Rig, runs: Sequence[Run], *, method: str = "auto", progress: R
         When no run may be fitted, nothing is asked, or a name does not exist.
     """
     began = time.perf_counter()
+    rig = with_noise(rig, runs)
     seen = [located(rig, run) for run in runs if run.role == "fit"]
     _check(rig, seen, method)
     log = Log(report=progress, doubts=cache(lambda: doubts(rig, seen)))

@@ -101,8 +101,16 @@ def as_json(fit: Fit, study: Study) -> dict[str, Any]:
                 "score_from": score.score_from,
                 "naive": {n: _finite(v) for n, v in score.naive.items()},
                 "adapted": list(score.adapted),
+                "ahead": [
+                    {"horizon": h, "fit_percent": {n: _finite(v) for n, v in percents.items()}}
+                    for h, percents in score.ahead.items()
+                ],
             }
             for label, score in fit.runs.items()
+        },
+        "poles": {
+            at: [{"real": _estimate(p.real), "imag": _estimate(p.imag)} for p in found]
+            for at, found in fit.poles.items()
         },
         "unseen": list(fit.unseen),
         "warnings": list(fit.warnings),

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from upright.identification.chain import Log, better, closed_form_starts, explain, placed
 from upright.identification.decision import by_chance
-from upright.identification.descent import grow
+from upright.identification.descent import first_horizon, grow
 from upright.identification.model import Rig, Run
 from upright.identification.normal import finite
 from upright.identification.pose import pose
@@ -62,6 +62,10 @@ def choose(rig: Rig, runs: Sequence[Run], log: Log) -> tuple[Rig, list[Array], t
     """Rig of the rung that predicts best, coordinates to start the final fit from, terms left out."""
     ladder = places(rig)
     problem = pose(rig, runs)
+    # levels of friction and of noise are sought together, dearly; whether friction predicts better a study may ask
+    if any(t.ahead for t in problem.tracks):
+        starts = [problem.start, *(placed(problem, s) for s in closed_form_starts(rig, runs))]
+        return rig, [min(starts, key=lambda x: problem.cost(x, first_horizon(problem)))], ()
     if len(ladder) == 1:
         return rig, [problem.start, *(placed(problem, s) for s in closed_form_starts(rig, runs))], ()
     seen = [first_part(run) for run in runs]

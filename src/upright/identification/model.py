@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.identification.found import Assumption, Estimate, Pole, RunScore
 from upright.identification.laws.feedback import Feedback
 from upright.physics import Plant
 
@@ -38,6 +39,9 @@ ACTUATOR = {
 _SIZES = ("limit", "lag", "delay", "damping", "standby", "knee", "fade", "relaxation")
 NEVER_NEGATIVE = tuple(f"actuator.{a}" for a in _SIZES)
 """Those that make no sense below zero."""
+
+NOISE = "noise."
+"""Before the name of a coordinate: root of the density of a random force on it, which a Kalman filter allows for."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,8 +98,12 @@ class Run:
         Where the search for ``input_start`` and ``input_end`` begins; found from the motion when left out.
     initial : mapping of str to float
         States known at the first sample, by name; they are then not estimated.
-    horizon : float or None
-        Seconds ahead that are predicted from each measured state; None simulates freely from the first sample.
+    horizon : float, tuple of float or None
+        Seconds ahead that are predicted from each measured state; None simulates freely from the first sample. Several
+        horizons are explained together and need ``restart="kalman"``.
+    restart : {"smooth", "kalman"}
+        Where predictions start: at the smoothed measurement, which the samples of the window itself may move, or at
+        the state of a Kalman filter that knows the past alone; see `upright.identification.predictor`.
     score_from : float
         Seconds after the first sample before which the run is simulated but not scored (a held-out tail).
     loop : Feedback or None
@@ -118,11 +126,19 @@ class Run:
     spread: Mapping[str, float] = field(default_factory=dict[str, float])
     guesses: Mapping[str, float] = field(default_factory=dict[str, float])
     initial: Mapping[str, float] = field(default_factory=dict[str, float])
-    horizon: float | None = None
+    horizon: float | tuple[float, ...] | None = None
+    restart: Literal["smooth", "kalman"] = "smooth"
     score_from: float = 0.0
     loop: Feedback | None = None
     repeats: str = ""
     source: str = ""
+
+    @property
+    def horizons(self) -> tuple[float, ...]:
+        """Horizons [s], the shortest first; none for a free run."""
+        if self.horizon is None:
+            return ()
+        return tuple(sorted(self.horizon)) if isinstance(self.horizon, tuple) else (self.horizon,)
 
     @property
     def period(self) -> float:
@@ -145,64 +161,13 @@ class Rig:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Estimate:
-    """What the data say about one number.
-
-    `status` is "firm", "weak" (interval wider than the value, or two models differ), "unseen" (the data cannot tell),
-    "at bound" or "known".
-    """
-
-    value: float
-    stderr: float
-    interval: tuple[float, float]
-    unit: str
-    status: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class Assumption:
-    """A number taken as given without knowing it, and what would follow it.
-
-    `follows` are percent by which each estimate would change per percent of it, `without` the estimates proportional
-    to it, per unit of the command and of the encoders.
-    """
-
-    name: str
-    value: float
-    unit: str
-    follows: Mapping[str, float]
-    without: Mapping[str, Estimate]
-
-
-@dataclass(frozen=True, kw_only=True)
-class RunScore:
-    """How well one run is explained: fit percent per signal, over which horizon, and the simulated signals.
-
-    Scores count from `score_from` seconds after the first sample on.
-    `naive` is what holding the measured speed reaches from the same restarts, empty for a free run: a horizon at which
-    the model is hardly better tells nothing.
-    `adapted` names what was estimated from the run itself: a prediction that chose its own gain is less of one.
-    """
-
-    role: str
-    fit_percent: Mapping[str, float]
-    horizon: float | None
-    t: Array
-    y: Array
-    simulated: Array
-    measured: tuple[str, ...]
-    score_from: float = 0.0
-    naive: Mapping[str, float] = field(default_factory=dict[str, float])
-    adapted: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, kw_only=True)
 class Fit:
     """A rig explained by its runs.
 
     `per_run` holds what was estimated run by run, by run label and name, `groups` what several runs share, by the
     group's label and name; `unseen` says in sentences which combinations the data cannot see and which number would
-    fix it; `singular_values` belong to the scaled Jacobian, `directions` (rows) to them, in the order of `names`.
+    fix it; `singular_values` belong to the scaled Jacobian, `directions` (rows) to them, in the order of `names`;
+    `poles` are those at every equilibrium of the fitted plant.
     """
 
     rig: Rig
@@ -225,3 +190,4 @@ class Fit:
     history: tuple[tuple[str, float, int], ...] = ()
     interrupted: bool = False
     assumptions: tuple[Assumption, ...] = ()
+    poles: Mapping[str, tuple[Pole, ...]] = field(default_factory=dict[str, tuple[Pole, ...]])

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from upright.identification.model import Rig
 from upright.identification.normal import Normal, Rows, finite, mixed, products, squares
 from upright.identification.nuisances import CHANGES, Dressed, dress, known_beforehand
+from upright.identification.predictor import restart_states
 from upright.identification.restarts import PERTURBATION, Restart, settle
 from upright.identification.tracks import Track, motions, outputs, simulator
 from upright.identification.unknowns import SHARED, Unknown
@@ -84,6 +85,14 @@ class Problem:
         self.evaluations += 1
         return outputs(self.solver(index), self.tracks[index], d.values, x0, d.offsets, d.scales, samples=samples)
 
+    def filtered(self, index: int, x: Array) -> tuple[Array, Array]:
+        """Positions and speeds (W, outputs), as the sensors would show them, that a filter knows at the restarts."""
+        track, d = self.tracks[index], self._dressed(index, x[:, None])
+        at = restart_states(self.solver(index), track, d.values, d.offsets, d.scales)[..., 0]
+        q, v = (at[np.add(track.columns, k)].T for k in (0, 1))
+        gain = 1.0 if d.scales is None else d.scales[:, 0]
+        return q * gain + d.offsets[:, 0], v * gain
+
     def _dressed(self, index: int, x: Array) -> Dressed:
         """What one run is simulated with, for coordinates `x` (sought, lanes)."""
         track, v = self.tracks[index], self.value(x)
@@ -108,10 +117,7 @@ class Problem:
 
     def samples(self, index: int, horizon: float) -> int:
         """Samples of one run within `horizon` seconds, at least two."""
-        track = self.tracks[index]
-        if horizon >= track.duration or track.windowed:
-            return track.length
-        return max(2, min(track.length, int(horizon / track.dt) + 1))
+        return self.tracks[index].within(horizon)
 
     def rows(self, index: int, x: Array, horizon: float = math.inf, *, central: bool = False) -> Rows | None:
         """Residuals and Jacobian of one run, None when the simulation ran away."""
@@ -135,7 +141,7 @@ class Problem:
                 slope = W @ ((y[skip:, :, :, 1 : m + 1] - y[skip:, :, :, m + 1 :]) / (2 * self.steps[sought]))
             else:
                 slope = W @ ((y[skip:, :, :, 1:] - y[skip:, :, :, :1]) / self.steps[sought])
-        k = len(track.columns)
+        k = len(track.columns) * (n if track.ahead else 1)  # all horizons of one restart stand in one row
         r, J = np.moveaxis(residual, 1, 0), np.moveaxis(slope, 1, 0)  # windows one after another
         if restart is not None:
             r, J = restart.rows(r.reshape(track.restarts.size, -1), J.reshape(track.restarts.size, -1, m))

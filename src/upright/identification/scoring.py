@@ -11,8 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from upright.identification.chain import weigh_priors
 from upright.identification.descent import Report, grow
+from upright.identification.ladder import first_part
 from upright.identification.model import Fit, Rig, Run, RunScore
 from upright.identification.pose import pose
+from upright.identification.predictor_setup import Ahead, with_noise
 from upright.identification.problem import Problem
 from upright.identification.tracks import Track
 from upright.identification.trips import located
@@ -37,6 +39,8 @@ def fit_percent(y: ArrayLike, simulated: ArrayLike) -> float:
 def score(problem: Problem, index: int, x: Array) -> RunScore:
     """Score of one run for coordinates `x`; windows restarted from measured states are laid end to end."""
     track = problem.tracks[index]
+    if track.ahead:
+        return _score_ahead(problem, index, x, track.ahead)
     run = track.run
     free = [k for k, c in enumerate(run.measured) if c not in run.held]
     y = problem.simulate(index, x[:, None], track.length)[:, :, :, 0]
@@ -52,9 +56,30 @@ def score(problem: Problem, index: int, x: Array) -> RunScore:
     percents = {run.measured[k]: fit_percent(measured[skip:, k], simulated[skip:, k]) for k in free}
     naive = held_speed(track) if track.windowed else np.zeros((0, len(run.measured)))
     return RunScore(
-        role=run.role, fit_percent=percents, horizon=run.horizon, t=t, y=measured, simulated=simulated,
-        measured=run.measured, score_from=run.score_from,
+        role=run.role, fit_percent=percents, horizon=next(iter(run.horizons), None), t=t, y=measured,
+        simulated=simulated, measured=run.measured, score_from=run.score_from,
         naive={run.measured[k]: fit_percent(measured[skip:, k], naive[skip:, k]) for k in free if len(naive)},
+    )  # fmt: skip
+
+
+def _score_ahead(problem: Problem, index: int, x: Array, plan: Ahead) -> RunScore:
+    """Score of a run that a filter predicts: what was foreseen exactly so far ahead, restart by restart."""
+    track = problem.tracks[index]
+    run = track.run
+    free = [k for k, c in enumerate(run.measured) if c not in run.held]
+    weight = plan.weight[:, None, None]
+    foreseen = problem.simulate(index, x[:, None], track.length)[..., 0] / weight
+    measured = track.targets(track.length) / weight
+    q, v = problem.filtered(index, x)
+    naive = q + v * (track.dt * np.array(plan.samples))[:, None, None]
+
+    def percents(h: int, y: Array) -> dict[str, float]:
+        return {run.measured[k]: fit_percent(measured[h, :, k], y[h, :, k]) for k in free}
+
+    return RunScore(
+        role=run.role, fit_percent=percents(0, foreseen), horizon=run.horizons[0],
+        t=run.t[track.restarts + plan.samples[0]], y=measured[0], simulated=foreseen[0], measured=run.measured,
+        naive=percents(0, naive), ahead={h: percents(i, foreseen) for i, h in enumerate(run.horizons)},
     )  # fmt: skip
 
 
@@ -111,16 +136,19 @@ def predict(
     values = {n: e.value for n, e in fitted.estimates.items()} if isinstance(fitted, Fit) else dict(fitted)
     if groups is None and isinstance(fitted, Fit):
         groups = {label: {n: e.value for n, e in group.items()} for label, group in fitted.groups.items()}
-    known = with_values(rig, values)
+    known = with_values(with_noise(rig, runs), values)
     return {run.label: _predict(known, run, groups or {}, progress) for run in runs}
 
 
 def _predict(rig: Rig, run: Run, groups: Mapping[str, Mapping[str, float]], progress: Report | None) -> RunScore:
     run = located(rig, run)
-    problem = pose(rig, [replace(run, score_from=0.0)], given=groups)
+    before = replace(run, score_from=0.0)
+    upto = run.score_from if run.score_from > 0 else math.inf
+    if run.score_from > 0 and run.horizon is not None:
+        before, upto = first_part(before, run.score_from / (run.period * run.t.size)), math.inf
+    problem = pose(rig, [before], given=groups)
     x = problem.start
     if x.size:
-        upto = run.score_from if run.score_from > 0 else math.inf
         found = grow(problem, x, report=progress, upto=upto)
         if found.interrupted:
             raise KeyboardInterrupt

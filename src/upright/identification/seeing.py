@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.identification.model import NOISE
 from upright.identification.problem import Problem
 from upright.identification.statistics import NULL, Spread, pseudo_inverse
 from upright.identification.unknowns import SHARED
@@ -35,9 +36,10 @@ class Sight:
 
 
 def look(problem: Problem, x: Array, spread: Spread) -> Sight:
-    """Singular values of the shared numbers' Jacobian, everything that differs from run to run eliminated."""
-    shared = [i for i, u in enumerate(problem.unknowns) if u.runs == SHARED and not spread.pinned[i]]
-    own = [i for i, u in enumerate(problem.unknowns) if u.runs != SHARED and not spread.pinned[i]]
+    """Singular values of the shared numbers' Jacobian; what differs from run to run and levels of noise eliminated."""
+    free = [i for i in range(x.size) if not spread.pinned[i]]
+    aside = {i for i in free if (u := problem.unknowns[i]).runs != SHARED or u.name.startswith(NOISE)}
+    shared, own = [i for i in free if i not in aside], sorted(aside)
     value = problem.value(x)
     unknowns = [problem.unknowns[i] for i in shared]
     # relative to the value found, which a search along a blind direction may have carried far from its guess

@@ -106,10 +106,11 @@ def loudness(problem: Problem, x: Array) -> float:
     squares, samples = 0.0, 0
     for index, track in enumerate(problem.tracks):
         y = problem.simulate(index, x[:, None], track.length)[:, :, :, 0]
-        e = np.moveaxis((y - track.targets(track.length)) * track.weights, 1, 0).reshape(-1, len(track.columns))
-        alike = max(1.0, 2 * memory(e, track.dt) / track.dt - 1)
+        e = np.moveaxis((y - track.targets(track.length)) * track.weights, 1, 0)
+        e = e.reshape(len(e), -1) if track.ahead else e.reshape(-1, len(track.columns))
+        alike = max(1.0, 2 * memory(e, track.spacing) / track.spacing - 1)
         squares += alike * float(np.sum(e * e))
-        samples += e.shape[0] * max(1, int(np.count_nonzero(track.weights)))
+        samples += e.shape[0] * max(1, int(np.count_nonzero(track.weights)) * (track.length if track.ahead else 1))
     return math.sqrt(squares / max(samples, 1))
 
 
@@ -146,8 +147,9 @@ def assess(problem: Problem, x: Array, *, clusters: bool = True) -> Spread:
         g = scores.sum(axis=0)
         from_runs[here] += np.outer(g, g)
         cost += float(np.sum(r * r))
-        count += int(np.count_nonzero(problem.tracks[index].weights)) * r.shape[0]
-        longest = max(longest, memory(r, problem.tracks[index].dt))
+        weights = problem.tracks[index].weights
+        count += int(np.count_nonzero(weights)) * r.size // weights.size
+        longest = max(longest, memory(r, problem.tracks[index].spacing))
         independent += r.shape[0] / span
     _, prior = problem.prior_rows(x)
     A = A + prior.T @ prior

@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from upright.errors import BadInput, nearest
-from upright.identification.model import Rig, Run
+from upright.identification.model import NOISE, Rig, Run
+from upright.identification.predictor_setup import with_noise
 from upright.identification.rungs import Rung
 from upright.identification.study_keys import names
 from upright.identification.study_ladder import read_ladder
@@ -97,6 +98,11 @@ def load_study(path: PathLike, *, data: PathLike | None = None, fixed: Mapping[s
     folder = Path(data) if data is not None else path.parent
     logs: dict[tuple[str, str, str], Record] = {}
     runs = read_runs(study, plant, lambda run: _log(run, folder, logs))
+    rig = with_noise(rig, runs)
+    if fixed is not None:
+        levels = {n: p for n, p in rig.parameters.items() if n.startswith(NOISE)}
+        known = {n: replace(p, value=fixed.get(n, p.value), estimate=False) for n, p in levels.items()}
+        rig = replace(rig, parameters={**rig.parameters, **known})
     return Study(
         path=path,
         plant=study.section("rig").text_of("plant", "furuta"),

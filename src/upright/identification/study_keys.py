@@ -62,7 +62,18 @@ _SHARED = (
         " logarithm; 0.3, 1 and 1 if left out",
     ),
     Key("initial", '{ theta = "1 rad" }', "states known at the first sample; these are not estimated"),
-    Key("horizon", '"0.5 s"', "predict this far ahead, again and again, from measured states; free run if left out"),
+    Key(
+        "horizon",
+        '"0.5 s" or ["50 ms", "200 ms"]',
+        "predict this far ahead, again and again, from measured states; free run if left out. A list is explained "
+        'together, from the states of a Kalman filter: restart = "kalman"',
+    ),
+    Key(
+        "restart",
+        '"kalman"',
+        '"smooth" (the default for one horizon): predict from smoothed measurements; "kalman": from a filter that '
+        "knows the past alone, exactly so far ahead, for a plant that its loop keeps at an equilibrium",
+    ),
     Key("repeats", '"step 0.5 V"', "runs with the same label here repeat one another; the same command needs no label"),
     Key("score_from", '"30 s"', "seconds after the window's start before which nothing is scored"),
     Key("loop", "table", "law that closed the loop, simulated with the plant"),

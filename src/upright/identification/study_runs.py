@@ -116,6 +116,7 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
         spread={key: own.positive(last, "1", 1.0) for key, own, last in _nuisances(run, "spread", plant)},
         initial=_states(run, plant),
         horizon=_horizon(run, grid),
+        restart=_restart(run),
         score_from=_score_from(run, grid),
         loop=loop,
         repeats=run.text_of("repeats", "step 0.5 V") if "repeats" in run else "",
@@ -198,15 +199,32 @@ def _states(run: Section, plant: type[Plant]) -> dict[str, float]:
     return {name: section.number(name, states[name]) for name in section.values}
 
 
-def _horizon(run: Section, grid: Grid) -> float | None:
-    if "horizon" not in run or run.values["horizon"] == "free":
+def _horizon(run: Section, grid: Grid) -> float | tuple[float, ...] | None:
+    value: Any = run.values.get("horizon", "free")
+    if value == "free":
         return None
-    horizon, step = run.positive("horizon", "s", 1.0), grid.t[1] - grid.t[0]
-    if horizon < 1.5 * step:
-        raise run.error(
-            "horizon", f"a horizon of {horizon:g} s is less than two samples of {step:g} s; take a longer one"
-        )
-    return None if horizon >= grid.t[-1] - grid.t[0] else horizon
+    listed: list[Any] = value if isinstance(value, list) else [value]
+    with run.text.at(run.place("horizon")):
+        found = [si(v, "s", "horizon") for v in listed]
+    step, length = grid.t[1] - grid.t[0], grid.t[-1] - grid.t[0]
+    for horizon in found:
+        if not horizon >= 1.5 * step and not (_restart(run) == "kalman" and horizon >= step):
+            raise run.error(
+                "horizon", f"a horizon of {horizon:g} s is less than two samples of {step:g} s; take a longer one"
+            )
+    if not found:
+        raise run.error("horizon", 'horizon must be a time such as "0.5 s" or a list of times, got []')
+    if isinstance(value, list):
+        return tuple(found)
+    return None if found[0] >= length else found[0]
+
+
+def _restart(run: Section) -> Literal["smooth", "kalman"]:
+    value: Any = run.values.get("restart", "kalman" if isinstance(run.values.get("horizon"), list) else "smooth")
+    if value not in ("smooth", "kalman"):
+        hint = nearest(str(value), ("smooth", "kalman"))
+        raise run.error("restart", f'restart must be "smooth" or "kalman", got {show(value)}; {hint}')
+    return value
 
 
 def _score_from(run: Section, grid: Grid) -> float:

@@ -8,9 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.errors import BadInput
 from upright.identification.acting import smoothing_width_for
 from upright.identification.laws.simulated import controller, finely, limited, remembering
-from upright.identification.model import Rig, Run
+from upright.identification.model import NOISE, Rig, Run
+from upright.identification.predictor import predicted
+from upright.identification.predictor_setup import Ahead, look_ahead
 from upright.identification.restarts import worth
 from upright.identification.smoothing import (
     State,
@@ -35,6 +38,7 @@ class Track:
     `columns` are the measured coordinates' places in the state, `weights` (outputs,) one over their spread (0 for a
     held one), `restarts` (W,) the first samples of the windows and `x0` (W, states) the measured states there, whose
     `variance` (W, states) counts in variances of a weighted residual: 0 where they are known, or sought with the rest.
+    A run predicted by a filter has `ahead`: what then counts as its samples are its horizons.
     """
 
     run: Run
@@ -51,6 +55,7 @@ class Track:
     held: Mapping[str, Held]
     first: int
     variance: Array
+    ahead: Ahead | None = None
 
     @property
     def windowed(self) -> bool:
@@ -72,10 +77,26 @@ class Track:
     @property
     def duration(self) -> float:
         """Seconds that one simulation spans."""
-        return (self.length - 1) * self.dt
+        return (self.ahead.samples[-1] if self.ahead else self.length - 1) * self.dt
+
+    @property
+    def spacing(self) -> float:
+        """Seconds from one residual to the next."""
+        return float(self.restarts[1] - self.restarts[0]) * self.dt if self.ahead else self.dt
+
+    def within(self, horizon: float) -> int:
+        """Samples that are simulated within `horizon` seconds, at least two; of horizons at least one."""
+        if self.ahead:
+            return max(1, sum(h * self.dt <= horizon * (1 + 1e-9) for h in self.ahead.samples))
+        if horizon >= self.duration or self.windowed:
+            return self.length
+        return max(2, min(self.length, int(horizon / self.dt) + 1))
 
     def targets(self, samples: int) -> Array:
         """Measured outputs (samples, W, outputs) that windows cut to `samples` are compared with."""
+        if self.ahead:
+            rows = self.restarts[None, :] + np.array(self.ahead.samples[:samples])[:, None]
+            return self.y[rows] * self.ahead.weight[:samples, None, None]
         rows = self.restarts[None, :] + np.arange(samples)[:, None]
         return self.y[rows]
 
@@ -96,22 +117,27 @@ def prepare(rig: Rig, run: Run, *, thin: bool) -> Track:
     dt = period_s * stride
     length = (n - 1) // stride + 1
     restarts = np.zeros(1, dtype=np.int64)
-    if run.horizon is not None:
-        length = min(length, max(2, int(round(run.horizon / dt)) + 1))
+    filtered = run.restart == "kalman" and run.horizon is not None
+    if len(run.horizons) > 1 and not filtered:
+        raise BadInput(f"run '{run.label}' has several horizons, which needs restart 'kalman'; or give it one.")
+    if run.horizon is not None and not filtered:
+        length = min(length, max(2, int(round(max(run.horizons) / dt)) + 1))
         # the last sample of a window is the first of the next, so that no sample is scored at its own restart only
         restarts = np.arange(0, n - length + 1, length - 1, dtype=np.int64)
 
     x, sizes, errors = np.zeros((n, len(names))), np.ones(len(names)), np.zeros(len(names))
     variance = np.zeros((restarts.size, len(names)))
+    taken = np.zeros(len(columns))
     for k, (c, column) in enumerate(zip(run.measured, columns, strict=True)):
         width = smoothing_width(run.y[:, k], period_s, period, quantum[k])
         motion = savitzky_golay(run.y[:, k], period_s, width, derivatives=1)
         x[:, column], x[:, column + 1] = motion.q, motion.v
         sizes[column], sizes[column + 1] = spread(motion.q), spread(motion.v)
+        taken[k] = np.std(run.y[:, k] - motion.q)
         errors[column : column + 2] = end_errors(run.y[:, k], motion.q, period_s, width)
         if c in run.held:
             sizes[column : column + 2] = 1.0
-        elif run.horizon is not None:
+        elif run.horizon is not None and not filtered:
             variance[:, column : column + 2] = worth(n, width, period_s, restarts) * spread(run.y[:, k]) ** 2
     for name, value in run.initial.items():
         x[0, names.index(name)] = value
@@ -132,6 +158,10 @@ def prepare(rig: Rig, run: Run, *, thin: bool) -> Track:
             motion = savitzky_golay(array, period_s, width, order=3, derivatives=1)
             x[:, i], x[:, i + 1] = motion.q, motion.v
             held[c] = Held(q=motion.q[::stride])
+    start, ahead = State(x=x[0].copy(), spread=sizes, error=errors), None
+    if filtered:
+        ahead, restarts = look_ahead(rig, run, dt, start, taken)
+        length, variance = len(ahead.samples), np.zeros((restarts.size, len(names)))
     weights = np.array([0.0 if c in run.held else 1.0 / spread(run.y[:, k]) for k, c in enumerate(run.measured)])
     return Track(
         run=run,
@@ -144,10 +174,11 @@ def prepare(rig: Rig, run: Run, *, thin: bool) -> Track:
         length=length,
         x0=x[::stride][restarts],
         period=period,
-        start=State(x=x[0], spread=sizes, error=errors),
+        start=start,
         held=held,
         first=int(np.ceil(run.score_from / dt)),
         variance=variance,
+        ahead=ahead,
     )
 
 
@@ -159,7 +190,8 @@ def simulator(rig: Rig, track: Track, values: Mapping[str, float | Array], free:
     every = 1 if loop is None else loop.every
     held = {n: finely(h, every) for n, h in track.held.items()}
     law = None if loop is None else controller(loop, track.run, rig.plant)
-    flavour = choose(derived, limited(values, loop), free=free, held=tuple(held), loop=law)
+    stepped = {n: v for n, v in values.items() if not n.startswith(NOISE)}
+    flavour = choose(derived, limited(stepped, loop), free=free, held=tuple(held), loop=law)
     return Simulator(derived=derived, flavour=flavour, dt=track.dt / every, substeps=rig.substeps, loop=law, held=held)
 
 
@@ -198,6 +230,9 @@ def outputs(
     offsets, scales : (outputs, lanes) arrays
         Sensor offsets and gains, the latter 1 when omitted.
     """
+    if track.ahead:
+        y = predicted(solver, track, values, offsets, scales, samples=samples)
+        return y * track.ahead.weight[:samples, None, None, None]
     _, windows, lanes = x0.shape
     out = motions(solver, track, values, x0, samples=samples)
     if windows == 1:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model import ACTUATOR, NEVER_NEGATIVE, Parameter, Rig
+from upright.identification.model import ACTUATOR, NEVER_NEGATIVE, NOISE, Parameter, Rig
 
 Array = NDArray[np.float64]
 
@@ -91,6 +91,8 @@ def _shared(rig: Rig, p: Parameter) -> Unknown:
     elif p.name in (*NEVER_NEGATIVE, "actuator.slope"):
         lower = max(lower, 0.0)
         positive = p.name == "actuator.knee"
+    elif p.name.startswith(NOISE):
+        lower, positive = max(lower, 0.0), True
     log = positive and p.value > 0
     value = min(max(p.value, lower), upper)
     if log:  # a number that the data do not see would otherwise run to 1e130

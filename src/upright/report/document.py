@@ -18,7 +18,15 @@ from upright.identification.model import Fit
 from upright.report.advice import next_steps
 from upright.report.drawing import svg
 from upright.report.equations import equations
-from upright.report.tables import cross_rows, parameter_rows, provenance_rows, run_rows, score_rows, without_rows
+from upright.report.tables import (
+    cross_rows,
+    parameter_rows,
+    pole_rows,
+    provenance_rows,
+    run_rows,
+    score_rows,
+    without_rows,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,6 +120,7 @@ def fit_content(
         "assumed": sentences(fit.assumptions),
         "own": run_rows(fit),
         "scores": score_rows(fit),
+        "poles": pole_rows(fit),
         "runs": run_pictures(fit, prefix),
         "certainty": certainty_pictures(fit, prefix),
         "rest": rest_picture(fit, prefix),
@@ -155,6 +164,7 @@ def run_pictures(fit: Fit, prefix: str) -> list[Picture]:
     for i, (label, score) in enumerate(runs):
         what = "fitted" if score.role == "fit" else "predicted, not fitted"
         how = "" if score.horizon is None else f", restarted from the measured state every {score.horizon:g} s"
+        how = f", every sample predicted {score.horizon:g} s ahead" if score.ahead else how
         how += f", scored from {score.score_from:g} s on" if score.score_from > 0 else ""
         fits = ", ".join(f"{plain(n)} {percent(v)}" for n, v in score.fit_percent.items())
         pictures.append(

@@ -94,7 +94,7 @@ def _signal(upper: Axes, lower: Axes, score: RunScore, j: int, unit: str, bucket
     t, y, model = score.t, score.y[:, j], score.simulated[:, j]
     left = y - model
     upper.plot(*decimated(t, y, buckets), color=SKY, linewidth=2.6, solid_capstyle="butt", label="measured")
-    foreseen = broken(*decimated(t, model, buckets), score.horizon)
+    foreseen = broken(*decimated(t, model, buckets), None if score.ahead else score.horizon)
     upper.plot(*foreseen, color=BLACK, linewidth=0.9, linestyle=(0, (5, 1.5)), label="model")
     upper.set_ylabel(axis(plain(score.measured[j]), unit))
     lower.axhline(0, color=GREY, linewidth=0.6)

@@ -126,23 +126,47 @@ def _given(name: str, p: Parameter) -> ParameterRow:
 def score_rows(fit: Fit) -> list[ScoreRow]:
     """Fit percent of every signal of every run, fitted runs first."""
     runs = sorted(fit.runs.items(), key=lambda item: item[1].role != "fit")
-    return [
-        ScoreRow(
-            run=label,
-            role="fitted" if score.role == "fit" else "predicted",
-            signal=plain(name),
-            fit=percent(value),
-            horizon=over(score),
-            naive=percent(score.naive[name]) if name in score.naive else "",
-        )
-        for label, score in runs
-        for name, value in score.fit_percent.items()
-    ]
+    rows: list[ScoreRow] = []
+    for label, score in runs:
+        role = "fitted" if score.role == "fit" else "predicted"
+        for name, value in score.fit_percent.items():
+            naive = percent(score.naive[name]) if name in score.naive else ""
+            rows.append(
+                ScoreRow(run=label, role=role, signal=plain(name), fit=percent(value), horizon=over(score), naive=naive)
+            )
+        for horizon, percents in list(score.ahead.items())[1:]:
+            for name, value in percents.items():
+                far = f"{horizon:g} s ahead"
+                rows.append(
+                    ScoreRow(run=label, role=role, signal=plain(name), fit=percent(value), horizon=far, naive="")
+                )
+    return rows
+
+
+def pole_rows(fit: Fit, *, growing: bool = False) -> list[tuple[str, str, str]]:
+    """Equilibrium, pole and its 95 % interval, as text; `growing` for those alone by which the plant falls."""
+    rows: list[tuple[str, str, str]] = []
+    for at, found in fit.poles.items():
+        for pole in found:
+            value, interval = _measured(pole.real)
+            if pole.imag.value > 0:
+                parts = _measured(pole.imag)
+                value, interval = f"{value} ± {parts[0]} i", f"{interval}; ± ({parts[1]}) i"
+            if not growing or pole.real.value > 1e-6:
+                rows.append((at, value, interval))
+    return rows
+
+
+def _measured(e: Estimate) -> tuple[str, str]:
+    low, high = e.interval
+    digits = figures(e.value, e.stderr)
+    return measured(e.value, e.stderr)[0], f"{number(low, digits)} to {number(high, digits)}"
 
 
 def over(score: RunScore) -> str:
     """What of the run was compared, how it was simulated, and what a prediction took from the run itself."""
     text = "from the first sample" if score.horizon is None else f"restarted every {score.horizon:g} s"
+    text = f"{score.horizon:g} s ahead" if score.ahead else text
     text += f"; scored from {score.score_from:g} s on" if score.score_from > 0 else ""
     return f"{text}; its own {', '.join(score.adapted)}" if score.adapted else text
 
