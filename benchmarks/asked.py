@@ -7,7 +7,7 @@ A signal is a coordinate, or derived from some: ``"twist"`` is the first measure
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -95,6 +95,19 @@ ASKED: list[Asked] = [
     *_each("ecp210_releases", {"x_2": 85.0}, (), "left out"),
     *_each("ecp210_export", {"x_1": 95.0, "x_2": 91.0}, ()),
     *_each("ecp210_export", {"x_1": 91.0, "x_2": 89.0}, (), "left out"),
+]
+
+
+_AHEAD = {  # how, horizon [s]: least
+    ("fitted", 0.05): {"psi": 98.0, "theta": 94.0},
+    ("fitted", 0.2): {"psi": 88.0, "theta": 35.0},
+    ("left out", 0.05): {"psi": 98.0, "theta": 93.0},
+    ("left out", 0.2): {"psi": 86.0, "theta": 20.0},
+}
+ASKED += [
+    replace(asked, horizon=horizon)
+    for (how, horizon), least in _AHEAD.items()
+    for asked in _each("qube_balance", least, ("episode 1", "episode 2", "episode 3"), how)
 ]
 
 
