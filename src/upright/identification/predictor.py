@@ -130,7 +130,7 @@ def gains(solver: Simulator, track: Track, values: Mapping[str, float | Array], 
         keep = np.eye(n) - L @ C
         new = keep @ ahead @ keep.transpose(0, 2, 1) + L @ R @ L.transpose(0, 2, 1)  # Joseph: stays positive
         found.append(L)
-        size = np.sqrt(np.einsum("lii->li", new)) + 1e-300
+        size = np.sqrt(np.maximum(np.einsum("lii->li", new), 0.0)) + 1e-300  # lanes of impossible numbers run away
         if not np.any(np.abs(new - P) > SETTLED * size[:, :, None] * size[:, None, :]):
             break
         P = new
