@@ -193,3 +193,15 @@ def test_wrong_calls_are_answered_in_sentences(rotary, block):
         simulate(block, {**BLOCK, "m": np.ones(3)}, np.zeros((2, 2)), None, 1e-3, samples=2)
     with pytest.raises(BadInput, match="no coordinate 'phi'"):
         simulate(block, BLOCK, [0, 0], None, 1e-3, samples=2, held={"phi": Held()})
+
+
+def test_a_plant_whose_every_coordinate_is_moved_by_hand_follows_the_hand():
+    from upright.physics import Pendulum
+
+    t = np.arange(101) * 0.01
+    q = np.sin(3.0 * t)
+    x = simulate(Pendulum(m_p=0.2, l_cg=0.3, J_p=1e-3), {}, [0.0, 3.0], None, 0.01, samples=t.size,
+                 held={"theta": Held(q=q)})[:, :, 0]  # fmt: skip
+    np.testing.assert_allclose(x[:, 0], q, atol=1e-12)
+    # a cubic spline's slope on steps h is off by less than its end conditions' h^3 max|q''''| / 24
+    np.testing.assert_allclose(x[:, 1], 3.0 * np.cos(3.0 * t), atol=0.01**3 * 81 / 24)

@@ -142,7 +142,7 @@ def acceleration(p: Layout) -> str:
     for i in p.flavour.dry:
         pull = "".join(f" - {mass[i, j]} * _a{j}" for j in p.free if j != i and (i, j) in mass)
         held.append(f"(1.0 - _free{i}) * abs(_f{i}{pull})")
-    result = ", ".join([f"_a{i}" for i in p.free] + held)
+    result = ", ".join([f"_a{i}" for i in p.free] + held or ["0.0"])  # with all coordinates held nothing is left
     return _function("@inline", "acceleration", arguments(p), [*lines, f"return ({result},)"])
 
 
@@ -194,6 +194,7 @@ def step(p: Layout) -> str:
         call += [f"_ha{i}{when}" for i in f.held]
         call += [f"_{c}{when}{j}" for c in nodes(f) for j in range(p.nu)] + list(p.constants)
         result = [f"_a{k}_{i}" for i in free] + [f"_e{k}_{i}" for i in f.dry]
+        result = result or ["_nothing"]
         lines.append(f"({', '.join(result)},) = acceleration({', '.join(call)})")
 
     stage(1, "a", "", "_v")
@@ -220,7 +221,7 @@ def step(p: Layout) -> str:
             lines.append(f"_z = _e4_{i} if _e4_{i} > _e1_{i} else _e1_{i}")
             lines.append(f"_flag = 1.0 if (_w < 0.0) | (_z > _Fs{i}) else _flag")
         result.append("_flag")
-    return _function("@inline", "step", step_arguments(p), [*lines, f"return ({', '.join(result)},)"])
+    return _function("@inline", "step", step_arguments(p), [*lines, f"return ({', '.join(result or ['0.0'])},)"])
 
 
 def _presliding(i: int, target: str, way: str) -> list[str]:

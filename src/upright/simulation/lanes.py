@@ -129,7 +129,7 @@ def _substep(w: Writer) -> None:
     call = ", ".join("_h" if a == "_h" else f"{{{place}}}" for a, place in number.items())
     new = [f"q{i}" for i in p.free] + [f"v{i}" for i in p.free] + [f"y{i}" for i in f.dahl]
     result = [f"_n{name}" for name in new] + (["_flag"] if f.dry else [])
-    w.add(f"({', '.join(result)},) = step({call})")
+    w.add(f"({', '.join(result or ['_nothing'])},) = step({call})")
     if f.dry:
         w.add(*(f"{{o{name}}} = {{{name}}}" for name in new), "{flag} = _flag")
     w.add(*(f"{{{name}}} = _n{name}" for name in new))
