@@ -254,12 +254,12 @@ def _record(
     return Doctored(record=record, known=rig, fault=fault, plant=plant, how=how, channel=channel)
 
 
-def _moving(x: np.ndarray, rng: np.random.Generator) -> int:
-    """A sample in the middle half at which a column is on its way."""
+def _moving(x: np.ndarray, rng: np.random.Generator, share: float = 0.3) -> int:
+    """A sample, not near the ends, at which a column moves at this `share` of its top speed."""
     w = 8
     speed = np.abs(x[w:] - x[:-w])
     inner = np.arange(speed.size // 5, 4 * speed.size // 5)
-    fast = inner[speed[inner] > 0.3 * speed.max()]
+    fast = inner[speed[inner] > share * speed[inner].max()]
     return int(rng.choice(fast if fast.size else inner)) + w // 2
 
 
@@ -311,7 +311,7 @@ def inject(
             keep[i : i + int(rng.integers(3, 50))] = False
         t, columns = t[keep], {k: v[keep] for k, v in columns.items()}
     elif fault == "doubled rows":
-        rows = np.unique([_moving(x, rng) for _ in range(n // 100)])
+        rows = np.unique([_moving(x, rng, 0.6) for _ in range(n // 100)])
         if rng.random() < 0.5:  # a row is written again in place of the next
             for k in columns:
                 columns[k][rows] = columns[k][rows - 1]

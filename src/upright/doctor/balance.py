@@ -131,10 +131,13 @@ class Balance:
         both = np.concatenate([COARSE, -COARSE])
         for i in self.motion.rows:
             best = self._best(i, both, n)
-            for _ in range(2):
-                step = 10 ** (0.15 / 4 ** (_ + 1))
-                near = best.factor * step ** np.arange(-3.0, 4.0)
-                best = min(best, self._best(i, near, n), key=lambda e: e.cost)
+            for k in range(8):  # disks that turn together tell a factor to a part in thousands
+                step = 10 ** (0.15 / 4 ** (k + 1))
+                finer = min(best, self._best(i, best.factor * step ** np.arange(-3.0, 4.0), n), key=lambda e: e.cost)
+                settled = k > 0 and best.cost - finer.cost < 0.02
+                best = finer
+                if settled:
+                    break
             found.append(best)
         if self.used:
             one = np.ones((1, n))

@@ -50,7 +50,7 @@ def jumps(t: Array, x: Array, quantum: float, moduli: Sequence[float] = ()) -> J
     off = d - middle
     spread = (around.max(axis=0) - around.min(axis=0)) * np.maximum(ratio, 1.0)
     noise = 1.4826 * float(np.median(np.abs(off)))
-    found = np.abs(off) > 4 * spread + max(8 * noise, 6 * quantum, 1e-9 * float(np.ptp(x)))
+    found = np.abs(off) > 4 * spread + max(8 * noise, 6 * quantum, 2e-4 * float(np.ptp(x)))
     # a reading that came late is caught up at once: what jumps was missing just before, or is missing just after
     caught = np.abs(np.convolve(off, np.ones(2 * REACH + 1), "same")) < 0.35 * np.abs(off)
     single = np.zeros_like(found)
@@ -162,7 +162,7 @@ def doubled_rows(columns: Sequence[tuple[Array, float]]) -> NDArray[np.int64]:
         same = d == 0
         going = np.zeros(d.size, bool)
         near = np.stack([d[:-4], d[1:-3], d[3:-1], d[4:]])
-        least = max(3.5 * quantum, 3 * float(np.median(np.abs(np.diff(d)))))
+        least = max(3.5 * quantum, 2 * float(np.median(np.abs(np.diff(d)))))
         going[2:-2] = (near.min(axis=0) > least) | (near.max(axis=0) < -least)
         repeats = same if repeats is None else repeats & same
         on_the_way = going if on_the_way is None else on_the_way | going
@@ -181,6 +181,8 @@ def clipped(x: Array, quantum: float, *, inertia: bool) -> tuple[float, float, f
     if np.unique(x[:: max(x.size // 5000, 1)]).size < 12:
         return ends[0], ends[1], share
     for k, level in enumerate((float(x.min()), float(x.max()))):
+        if not inertia and abs(level) < 0.8 * float(np.abs(x).max()):
+            continue  # a drive's limits are alike; this one only paused there
         at = x == level
         edges = np.flatnonzero(np.diff(np.concatenate(([0], at.astype(np.int8), [0]))))
         first, after = edges[::2], edges[1::2]

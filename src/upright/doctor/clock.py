@@ -96,7 +96,7 @@ def _jitter(case: Case) -> list[Finding]:
             severity="warning",
             sentence=f"The samples jitter: 1 % of the steps differ from the period of {time.period * 1e3:.4g} ms by"
             f" more than {time.jitter * 1e3:.3g} ms ({100 * share:.0f} %).",
-            spoils=share > 0.3,
+            spoils=share > 0.5,
             evidence={"jitter [ms]": time.jitter * 1e3, "period [ms]": time.period * 1e3},
             advice="A fit resamples by straight lines; set a period, or log from a loop with a fixed rate.",
             key=f'period = "{time.period * 1e3:.4g} ms"',
@@ -106,13 +106,17 @@ def _jitter(case: Case) -> list[Finding]:
 
 
 def _doubled(case: Case) -> list[Finding]:
-    columns = [(case.record[c.name], c.quantum.step) for c in case.measured if not c.constant]
-    rows = doubled_rows(columns)
+    named = {c.name: case.record[c.name] for c in case.measured if not c.constant}
+    rows = doubled_rows([(x, case.seen.column(name).quantum.step) for name, x in named.items()])
     if rows.size < 2:
         return []
     t = case.record.t
-    name = next(c.name for c in case.measured if not c.constant)
-    i = int(rows[rows.size // 2])
+    moved = [
+        (float(np.ptp(x[j - 3 : j + 4])) / float(np.ptp(x)), name, j)
+        for name, x in named.items()
+        for j in rows.tolist()
+    ]
+    _, name, i = max(moved)
     near = slice(max(i - 15, 0), i + 16)
     curve = Curve(name=name, t=t[near], y=case.record[name][near], style="points")
     return [

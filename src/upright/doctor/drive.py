@@ -15,6 +15,8 @@ from upright.doctor.sensors import whole
 from upright.doctor.structure import driven_row
 from upright.records import Array
 
+LEAST = 0.7
+"""Of what may stay unexplained before a trip, this part must be exceeded with all of the effort."""
 TRIES = 60
 """Instants that are tried as the end of the effort."""
 
@@ -112,8 +114,11 @@ def examine_push(case: Case, push: Push, *, most: float) -> list[Finding]:
     tripped = (
         push.cut < most and push.cut < 0.5 * push.full and push.cut < 0.5 * push.without and abs(push.after) < 0.45
     )
-    if tripped and push.late > 0.04 and push.full > 0.05:
-        live = np.flatnonzero(case.u)
+    live = np.flatnonzero(case.u)
+    strong = push.t[np.abs(push.u) > 0.1 * float(np.abs(push.u).max())]
+    first, last = float(strong[0]), float(strong[-1])
+    lasted = end - first > 0.05 * (last - first)  # a kick at the start is no drive that worked until then
+    if tripped and lasted and push.late > 0.04 and push.full > LEAST * most:
         return [
             Finding(
                 kind="trip",

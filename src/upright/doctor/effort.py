@@ -112,7 +112,8 @@ def _limited(case: Case) -> list[Finding]:
     """Effort cut off at its limit."""
     found: list[Finding] = []
     for c in case.seen.columns:
-        if not c.drive or c.constant or c.stepwise or c.name != case.drive:
+        asked = any(word in c.name.casefold() for word in ("command", "target", "ref"))
+        if not c.drive or c.constant or c.stepwise or asked:
             continue
         low, high, share = clipped(case.record[c.name], c.quantum.step, inertia=False)
         if share < 0.0002:

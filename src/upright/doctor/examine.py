@@ -49,6 +49,8 @@ def examine(record: Record, known: Known | None = None, *, before: tuple[Finding
     found += [*sensors, *examine_effort(case), *examine_rest(case), *examine_settings(case)]
     unchecked = _unchecked(case, known)
     forces, reasons = _forces(case, known, found)
+    if any(f.kind == "scale" for f in forces):  # what looks held is only read on another scale
+        found = [f for f in found if f.kind != "creep"]
     found += forces
     unchecked |= reasons
     order = {s: i for i, s in enumerate(SEVERITIES)}
@@ -118,9 +120,10 @@ def _forces(case: Case, known: Known | None, found: list[Finding]) -> tuple[list
         if not terms:
             reasons["sign"] = "the record holds no motion whose sign is known"
     out += [*trip, *conventions]
-    if not out and balance is not None and push is not None:
+    rough = any(f.kind in HOPELESS for f in found)  # accelerations are then too uneven to blame the effort
+    if not out and not rough and balance is not None and push is not None:
         out += against_gain(case, balance)
-    if not out and push is not None:
+    if not out and not rough and push is not None:
         out += examine_uselessness(case, push)
     if push is None and case.driven:
         reasons["trip"] = "the effort column is none" if lying else "the driven body was not measured or did not move"

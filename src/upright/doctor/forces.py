@@ -14,9 +14,9 @@ from upright.doctor.sensors import whole
 from upright.doctor.structure import MATTERS, Term, terms
 from upright.records import Array
 
-DOUBT, CLEAR, BETTER = 0.04, 0.15, 2.5
-"""A convention is doubted from this unexplained share on; another one must leave less than `CLEAR`, and less than one
-`BETTER`-th of what the declared one leaves."""
+DOUBT, CLEAR, BETTER = 0.02, 0.15, 3.5
+"""A convention is doubted from this unexplained share on; another one must leave less than `CLEAR`, or next to nothing
+of what the declared one leaves, and together over all rows `BETTER` times less."""
 LOST = 0.25
 """Unexplained share of the driven body's force from which its effort is believed no more."""
 CAUSES = {
@@ -49,7 +49,12 @@ def against_numbers(case: Case, balance: Balance) -> list[Finding]:
         return []
     others = balance.others()
     best = others[0] if others else now
-    if best.cost > now.cost - math.log(BETTER) or float(best.unexplained.max()) > CLEAR or 0.8 < best.factor < 1.25:
+    left = float(best.unexplained.max())
+    rows = now.unexplained.size
+    near = (0.8, 1.25) if float(now.unexplained.max()) > 4 * DOUBT else (0.65, 1.55)
+    better = rows * (now.cost - best.cost) > math.log(BETTER)
+    clear = CLEAR if best.who == "effort" else max(CLEAR, 0.01 * float(now.unexplained.max()))
+    if not better or left > clear or near[0] < best.factor < near[1]:
         return []
     alike = [e for e in others if e.cost < best.cost + 0.25 and not 0.8 < e.factor < 1.25]
     return [_mistaken(case, balance, now, alike)]
@@ -119,17 +124,17 @@ def _mistaken(case: Case, balance: Balance, now: Explanation, alike: list[Explan
         evidence={"factor [1]": best.factor, "unexplained now [%]": left, "unexplained then [%]": then},
         advice="Set it in the study, or mend the log; then look again.",
         key=key,
-        panels=(_force_panel(balance, now, "as declared"), _force_panel(balance, best, "with the factor")),
+        panels=(_force_panel(balance, now, "as declared"), _force_panel(balance, best, "with the factor", like=now)),
     )
 
 
-def _force_panel(balance: Balance, e: Explanation, title: str) -> Panel:
-    """Force that the worst row needs, and what is left of it."""
+def _force_panel(balance: Balance, e: Explanation, title: str, *, like: Explanation | None = None) -> Panel:
+    """Force that the worst row needs (of `like`, when given), and what is left of it."""
     factors = np.ones((1, len(balance.names)))
     if e.who in balance.names:
         factors[0, balance.names.index(e.who)] = e.factor
     tau, inertial = balance.needed(factors)
-    k = int(np.argmax(e.unexplained))
+    k = int(np.argmax((like or e).unexplained))
     need = tau[0, k]
     if balance.motion.rows[k] == balance.driven and balance.used:
         need = need - e.gain * balance.motion.u
@@ -196,7 +201,7 @@ def _finding(case: Case, motion: Motion, x: Term, who: str, sentence: str) -> Fi
     table = "drive" if who == "effort" else f"sensors.{who}"
     name = case.drive if who == "effort" else case.places[who].column
     order = np.argsort(x.alone)
-    unit = f"{motion.plant.coordinates[0].unit}/s^2"
+    body = next(c for c in motion.plant.coordinates if c.name == x.who[1])
     curves = (
         Curve(name="acceleration, all else taken out", t=x.t, y=x.target),
         Curve(name=f"{x.text}, all else taken out (times its slope)", t=x.t, y=x.slope * x.alone),
@@ -210,7 +215,10 @@ def _finding(case: Case, motion: Motion, x: Term, who: str, sentence: str) -> Fi
         evidence={"slope found [SI]": slope, "slope expected (sign) [1]": x.expected, "explains [%]": 100 * x.share},
         advice=f"Set the sign of '{name}'.",
         key=f"[{table}]\nsign = -1",
-        panels=(*whole(case, *([case.drive] if case.drive else []), name), Panel(label=f"[{unit}]", curves=curves)),
+        panels=(
+            *whole(case, *dict.fromkeys([case.places[x.who[1]].column, case.drive])),
+            Panel(label=f"acceleration\nof {body.name} [{body.unit}/s^2]", curves=curves),
+        ),
     )
 
 

@@ -63,7 +63,12 @@ def motion_of(case: Case) -> Motion | str:
         return str(error)
     y = {c: grid.outputs(p.y[start:stop]) for c, p in case.places.items()}
     u = grid.commands(case.u[start:stop]) if case.drive else np.zeros(grid.t.size)
-    moving = tuple(c for c in coordinates if c in y and case.moves(c) and np.ptp(y[c]) > 0)
+    told = bool(case.parameters)  # what is known of the rig then tells a wrong scale from a held body
+    moving = tuple(
+        c
+        for c in coordinates
+        if c in y and np.ptp(y[c]) > 50 * told * case.places[c].quantum and (told or case.moves(c))
+    )
     if not moving:
         return "nothing moves"
     n, dt = grid.t.size, float(grid.t[1] - grid.t[0])
