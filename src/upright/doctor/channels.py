@@ -59,7 +59,8 @@ def jumps(t: Array, x: Array, quantum: float, moduli: Sequence[float] = ()) -> J
     repeated = d == 0
     repeated[1:] |= d[:-1] == 0
     repeated[:-1] |= d[1:] == 0
-    found &= (~caught & (np.abs(off) > 4 * np.abs(middle))) | (single & ~(repeated & (np.abs(middle) > quantum)))
+    late = repeated & (np.abs(middle) > quantum) & (np.abs(off) < 3 * np.abs(middle))
+    found &= (~caught & (np.abs(off) > 4 * np.abs(middle))) | (single & ~late)
     at = np.flatnonzero(found)
     spikes: list[int] = []
     steps: list[int] = []
@@ -148,7 +149,7 @@ def frozen_from(x: Array, quantum: float) -> tuple[int, float]:
     noise = float(np.median(np.abs(np.diff(x[: last + 1], n=2)))) / w
     sudden = abs(float(slope[-1])) / max(usual, noise, 1e-300)
     moving = before > 1.2 * quantum
-    return (last, sudden) if moving and sudden > 1.3 else (-1, sudden)
+    return (last, sudden) if moving and sudden > 0.9 else (-1, sudden)
 
 
 def doubled_rows(columns: Sequence[tuple[Array, float]]) -> NDArray[np.int64]:

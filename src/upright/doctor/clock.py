@@ -108,7 +108,7 @@ def _jitter(case: Case) -> list[Finding]:
 def _doubled(case: Case) -> list[Finding]:
     named = {c.name: case.record[c.name] for c in case.measured if not c.constant}
     rows = doubled_rows([(x, case.seen.column(name).quantum.step) for name, x in named.items()])
-    if rows.size < 2:
+    if rows.size < 3:
         return []
     t = case.record.t
     moved = [
