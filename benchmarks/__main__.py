@@ -74,8 +74,12 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every figure to a file too")
     parser.add_argument("--quick", action="store_true", help="fewer rounds and smaller shares, under two minutes")
     parser.add_argument("--full", action="store_true", help="run what is otherwise estimated from its parts")
-    parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the table of real rigs for publication")
+    parser.add_argument(
+        "--markdown", type=Path, metavar="FILE", help="write the table of `real` or `rigs` for publication"
+    )
     asked = parser.parse_args(arguments)
+    if asked.markdown and asked.names not in (["real"], ["rigs"]):
+        parser.error("--markdown writes the table of one benchmark: name real or rigs")
     if unknown := set(asked.names) - set(NAMES):
         parser.error(f"no benchmark is called {', '.join(sorted(unknown))}; there are {', '.join(NAMES)}")
 
@@ -84,8 +88,9 @@ def main(arguments: list[str] | None = None) -> int:
     results: dict[str, Any] = {"versions": versions(), "lines": []}
     missed = 0
     for name in asked.names or NAMES:
+        markdown = {"markdown": asked.markdown}
+        extra = {"fit": {"full": asked.full}, "real": markdown, "rigs": markdown}.get(name, {})
         module = importlib.import_module(f"benchmarks.{name}")
-        extra = {"fit": {"full": asked.full}, "real": {"markdown": asked.markdown}}.get(name, {})
         lines: list[Line] = module.run(quick=asked.quick, progress=lambda text: told.print(f"[dim]{text}[/]"), **extra)
         console.print(table(name, (module.__doc__ or "").splitlines()[0], lines))
         results["lines"] += [asdict(line) | {"reached": line.reached} for line in lines]

@@ -1,4 +1,4 @@
-"""How often do 95 % intervals hold the truth on rigs drawn at random? 200 rigs, residuals with a memory.
+"""How often do 95 % intervals hold the truth on rigs drawn at random? Residuals have a memory.
 
 Five plants, 40 rigs each, every number drawn within a factor of 1.6 about a typical one, dry friction included;
 encoders round, and on top lies first-order noise whose autocorrelation from sample to sample lies from 0 to 0.95 and
@@ -13,6 +13,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -106,7 +107,7 @@ def outcome(make: Make, seed: int) -> tuple[dict[str, bool], dict[str, str], boo
     return held, status, fit.trusted
 
 
-def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
+def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None = None) -> list[Line]:
     """Share of intervals that hold the truth by plant and kind of number."""
     each = 8 if quick else 40
     tally: dict[tuple[str, str], list[bool]] = {}
@@ -129,7 +130,22 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
         note = f"{trusted} of {each} fits trusted, {firm} of {count} numbers firm"
         lines.append(Line(benchmark=NAME, contender=f"{make.plant}: fits", seconds=(seconds,) * 3, note=note))
     lines.append(_line("all", [h for hits in tally.values() for h in hits], None))
+    if markdown is not None:
+        markdown.write_text(page(lines, each * len(MAKES)), encoding="utf-8")
     return lines
+
+
+def page(lines: list[Line], rigs: int) -> str:
+    """The published table."""
+    told = (__doc__ or "").strip().splitlines()
+    head = [
+        f"# Coverage: {told[0]}",
+        "",
+        "Written by `python -m benchmarks rigs --markdown benchmarks/rigs.md`.",
+        *told[2:],
+    ]
+    table = ["", f"| of {rigs} rigs | |", "|---|---|", *(f"| {line.contender} | {line.note} |" for line in lines)]
+    return "\n".join([*head, *table]) + "\n"
 
 
 def _line(name: str, hits: list[bool], seconds: float | None) -> Line:
