@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 
 import pytest
 
@@ -35,3 +36,23 @@ def test_a_real_rig_is_explained_and_predicted(name):
     reached = {a: a.reached(left_out if a.how == "left out" else fit.runs) for a in asked}
     assert {a: values for a, values in reached.items() if not a.met(values)} == {}
     assert fit.trusted, fit.verdict
+
+
+def test_a_run_that_excites_itself_is_named_and_left_out():
+    """Its authors' cart swings ever wider while the volts are on, from 5 to 10 s of the log, and dies down after."""
+    text = (STUDIES / "ecp210_cart_1.toml").read_text()
+    asked = load_study(STUDIES / "ecp210_cart_1.toml", data=DATA)
+    strange = Path(DATA) / "ecp210_rectilinear_ucsd_1khz" / "07-Feb-2025 09_26_10.txt"
+    with NamedTemporaryFile("w", suffix=".toml") as file:
+        file.write(f'{text}\n[[runs]]\nlabel = "9:26"\nfile = "{strange}"\n')
+        file.flush()
+        study = load_study(file.name, data=DATA)
+    fit, clean = identify(study.rig, study.runs), identify(asked.rig, asked.runs)
+    (told,) = [w for w in fit.warnings if w.startswith("Outlier")]
+    assert told.startswith("Outlier: 9:26, 5.")
+    assert "to 10 s: self-excited" in told
+    assert not any(w.startswith("Outlier") for w in clean.warnings)
+    assert fit.runs["9:26"].role == "predict"
+    for name, e in clean.estimates.items():
+        if e.status == "firm":
+            assert e.interval[0] <= fit.estimates[name].value <= e.interval[1], name

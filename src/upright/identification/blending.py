@@ -31,6 +31,8 @@ def moving_alike(track: Track) -> Array | None:
     z = (track.y[:, free] - track.y[:, free].mean(axis=0)) * w
     S = z.T @ z / len(z)
     d = np.sqrt(np.diag(S))
+    if not d.all():  # an output that does not move stands for itself
+        return None
     if np.abs(S / np.outer(d, d) - np.eye(free.size)).max() < ALIKE:
         return None
     power, V = np.linalg.eigh(S)

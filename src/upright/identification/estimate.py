@@ -24,6 +24,7 @@ from upright.identification.problem import Problem
 from upright.identification.scoring import fit_percent, predict
 from upright.identification.simplex import simplex
 from upright.identification.trips import located, untold
+from upright.identification.watch import watched
 
 __all__ = ["METHODS", "fit_percent", "identify", "predict"]
 
@@ -34,7 +35,9 @@ METHODS = ("auto", "least-squares", "simplex")
 the guess over a growing horizon. `simplex`: the paper's, then polished by least squares."""
 
 
-def identify(rig: Rig, runs: Sequence[Run], *, method: str = "auto", progress: Report | None = None) -> Fit:
+def identify(
+    rig: Rig, runs: Sequence[Run], *, method: str = "auto", progress: Report | None = None, watch: bool = True
+) -> Fit:
     """Estimate a rig's parameters from its runs.
 
     Parameters
@@ -48,6 +51,8 @@ def identify(rig: Rig, runs: Sequence[Run], *, method: str = "auto", progress: R
         See `METHODS`.
     progress : callable, optional
         Called with stage, fraction done, cost and number of simulations.
+    watch : bool
+        Whether stretches that something else than the input moved are named, and left out in a second fit.
 
     Returns
     -------
@@ -104,7 +109,10 @@ def identify(rig: Rig, runs: Sequence[Run], *, method: str = "auto", progress: R
         )  # fmt: skip
 
     try:
-        return told(found)
+        fit = told(found)
+        if not watch or fit.interrupted:
+            return fit
+        return watched(fit, rig, runs, lambda kept: identify(rig, kept, method=method, progress=progress, watch=False))
     except KeyboardInterrupt:  # intervals and predictions may take long too; without them an answer is near
         return told(replace(found, interrupted=True))
 
