@@ -73,7 +73,7 @@ def run_unknowns(rig: Rig, index: int, run: Run, start: State) -> list[Unknown]:
     if "input_offset" in wanted:
         size = float(np.std(run.u)) if run.u.size else 0.0
         add("input_offset", 0.0, size or 1.0)
-    live = np.flatnonzero(run.u.any(axis=1))
+    live = np.flatnonzero(_commanded(run))
     if live.size:
         dt = run.period
         first, last = live[0] * dt, (live[-1] + 1) * dt
@@ -82,6 +82,16 @@ def run_unknowns(rig: Rig, index: int, run: Run, start: State) -> list[Unknown]:
             if name in wanted:
                 add(name, float(np.clip(run.guesses.get(name, logged), first, last)), MOMENT, lower=first, upper=last)
     return found
+
+
+def _commanded(run: Run) -> NDArray[np.bool_]:
+    """Samples (N,) at which something is asked of the drive; by a loop, from the first change of its reference on."""
+    asked = np.asarray(run.u.any(axis=1), dtype=bool)
+    if run.loop is not None:
+        r = run.loop.read(run.t.size)
+        changed = np.flatnonzero((r != r[:1]).any(axis=1))
+        asked[int(changed[0]) if changed.size else 0 :] = True
+    return asked
 
 
 @dataclass(frozen=True, kw_only=True)
