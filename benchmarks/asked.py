@@ -97,6 +97,8 @@ ASKED: list[Asked] = [
     *_each("ecp210_cart_1", {"x_1": 88.0}, (), "left out"),
     *_each("ecp210_releases", {"x_2": 86.0}, ()),
     *_each("ecp210_releases", {"x_2": 85.0}, (), "left out"),
+    Asked(study="ecp210_closed_loop", signal="x_1", least=88.0, over="median"),
+    # left out, 86 were asked as well; 83, 89 and 75 are reached: two stick-slip climbs do not tell friction for a third
     *_each("ecp210_export", {"x_1": 95.0, "x_2": 91.0}, ()),
     *_each("ecp210_export", {"x_1": 91.0, "x_2": 89.0}, (), "left out"),
 ]
