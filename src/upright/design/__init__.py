@@ -1,5 +1,29 @@
 """Which gain does the rig need, and what is it worth? A linear model goes in, wherever its numbers came from."""
 
+from upright.design.loop import Feedback, Margins, feedback, margins, place_sampled
+from upright.design.lqr import dlqr, locus, lqr, weight_for_effort
 from upright.design.placement import Placement, place
+from upright.design.sampled import Sampled, hold
+from upright.design.tracking import prefilter
+from upright.design.velocity import Estimator, difference, filtered, kalman
 
-__all__ = ["Placement", "place"]
+__all__ = [
+    "Estimator",
+    "Feedback",
+    "Margins",
+    "Placement",
+    "Sampled",
+    "difference",
+    "dlqr",
+    "feedback",
+    "filtered",
+    "hold",
+    "kalman",
+    "locus",
+    "lqr",
+    "margins",
+    "place",
+    "place_sampled",
+    "prefilter",
+    "weight_for_effort",
+]

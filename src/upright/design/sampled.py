@@ -1,0 +1,111 @@
+"""What does the controller see, one sample after the other, with its commands held and late?"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from upright.errors import BadInput
+
+if TYPE_CHECKING:
+    from upright.physics.linear import Linear
+
+Array = NDArray[np.float64]
+Roots = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sampled:
+    """The model at its samples, ``x[k+1] = A x[k] + B u[k], y[k] = C x[k]``, every command held for a period.
+
+    Attributes
+    ----------
+    A, B, C : arrays, shape (n, n), (n, m) and (p, n)
+        The states are those of the model, then the commands that are still on their way: the last, the one before.
+    period : float
+        Time between samples [s].
+    delay : float
+        How late a command acts [samples], whole or not.
+    states : tuple of str
+    """
+
+    A: Array
+    B: Array
+    C: Array
+    period: float
+    delay: float
+    states: tuple[str, ...]
+
+    @property
+    def remembered(self) -> int:
+        """How many states are commands on their way."""
+        return math.ceil(self.delay - 1e-12) * self.B.shape[1]
+
+
+def hold(model: Linear, period: float, delay: float = 0.0) -> Sampled:
+    """A linear model behind a zero-order hold, exactly: one matrix exponential (two for part of a sample's delay).
+
+    Parameters
+    ----------
+    model : Linear
+    period : float
+        Time between samples [s].
+    delay : float
+        How late a command acts [samples]: computation, converters, drive. Not only whole ones.
+
+    Raises
+    ------
+    BadInput
+        When the period is not positive, or the delay negative or beyond 1000 samples.
+    """
+    if not (math.isfinite(period) and period > 0):
+        raise BadInput(f"a sampled model needs a period above 0 s, got {period:g}; give it in seconds.")
+    if not 0 <= delay <= 1000:
+        raise BadInput(f"the delay must be between 0 and 1000 samples, got {delay:g}; give it in samples.")
+    n, m = model.B.shape
+    whole = math.floor(delay + 1e-12)
+    part = max(delay - whole, 0.0) if delay - whole > 1e-12 else 0.0
+    early, new = _held(model.A, model.B, (1 - part) * period)
+    late, old = _held(model.A, model.B, part * period)
+    memories = whole + (part > 0)
+    A = np.zeros((n + memories * m, n + memories * m))
+    B = np.zeros((n + memories * m, m))
+    A[:n, :n] = early @ late
+    for ago, column in ((whole, new), (whole + 1, early @ old)):
+        if ago == 0:
+            B[:n] = column
+        elif ago <= memories:
+            A[:n, n + (ago - 1) * m : n + ago * m] = column
+    if memories:
+        B[n : n + m] = np.eye(m)
+        A[n + m :, n:-m] = np.eye((memories - 1) * m)
+    ago_names = tuple(f"{u} {k} ago" for k in range(1, memories + 1) for u in model.inputs)
+    C = np.hstack([model.C, np.zeros((model.C.shape[0], memories * m))])
+    return Sampled(A=A, B=B, C=C, period=period, delay=delay, states=(*model.states, *ago_names))
+
+
+def to_z(poles: ArrayLike, period: float) -> Roots:
+    """Poles in z of poles in s [1/s]: ``z = exp(s T)``."""
+    return np.exp(np.asarray(poles, dtype=np.complex128) * period)
+
+
+def to_s(poles: ArrayLike, period: float) -> Roots:
+    """Poles in s [1/s] of poles in z: ``s = log(z)/T``, -inf for z = 0."""
+    z = np.asarray(poles, dtype=np.complex128)
+    with np.errstate(divide="ignore"):
+        return np.log(np.abs(z)) / period + 1j * np.angle(z) / period
+
+
+def _held(A: Array, B: Array, time: float) -> tuple[Array, Array]:
+    """Transition ``e^(A time)`` and what a constant unit command adds meanwhile."""
+    from scipy.linalg import expm
+
+    n, m = B.shape
+    block = np.zeros((n + m, n + m))
+    block[:n, :n], block[:n, n:] = A, B
+    whole = np.asarray(expm(block * time), dtype=np.float64)
+    return whole[:n, :n], whole[:n, n:]

@@ -1,0 +1,150 @@
+"""How fast is it, when only positions are measured? Differences, filtered differences, an observer: one form for all.
+
+An estimator is a sampled linear law from encoder readings (and, for an observer, its own command) to states.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from upright.design.sampled import Sampled
+from upright.errors import BadInput
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimator:
+    """``z[k+1] = A z[k] + B y[k] + E u[k]``, ``x[k] = C z[k] + D y[k]``.
+
+    y are the positions as deviations from the equilibrium, x the states in the model's order, u the command.
+    """
+
+    A: Array
+    B: Array
+    E: Array
+    C: Array
+    D: Array
+    period: float
+    name: str
+
+    def noise(self, quantum: ArrayLike) -> Array:
+        """Standard deviation of each estimated state [its unit] from the rounding of the encoders alone, shape (n,).
+
+        Parameters
+        ----------
+        quantum : float or array, shape (p,)
+            Step of each encoder [rad or m]; its rounding is white with variance ``quantum^2/12`` (Widrow), true for a
+            body that crosses several steps between samples.
+        """
+        variance = np.broadcast_to(np.asarray(quantum, dtype=np.float64) ** 2 / 12, (self.B.shape[1],))
+        spread = stationary(self.A, self.B * np.sqrt(variance))
+        return np.sqrt(np.diag(self.C @ spread @ self.C.T + (self.D * variance) @ self.D.T))
+
+
+def difference(model: Sampled) -> Estimator:
+    """Plain difference of two readings, ``v[k] = (y[k] - y[k-1])/T``; its noise is ``quantum/(T sqrt 6)``."""
+    return filtered(model, 0.0)
+
+
+def filtered(model: Sampled, memory: float) -> Estimator:
+    """Difference through a low pass, ``v[k] = a v[k-1] + (1 - a) (y[k] - y[k-1])/T``.
+
+    Its noise has the variance ``quantum^2/12 * 2 (1 - a)^2/((1 + a) T^2)``; it is late by about ``a/(1 - a)`` samples
+    more than the half of one that every difference is.
+
+    Parameters
+    ----------
+    model : Sampled
+        Whose outputs are every second state: positions, each followed by its velocity.
+    memory : float
+        a, from 0 (plain difference) to below 1.
+    """
+    if not 0 <= memory < 1:
+        raise BadInput(f"the filter's memory must be at least 0 and below 1, got {memory:g}; 0 is no filter.")
+    p = model.C.shape[0]
+    n, T, a = 2 * p, model.period, memory
+    if not np.array_equal(model.C[:, :n], np.kron(np.eye(p), [1.0, 0.0])):
+        raise BadInput("differences need every position measured and followed by its velocity; use an observer.")
+    # states of the estimator: the last readings, then the last speeds
+    A = np.zeros((n, n))
+    A[p:, :p], A[p:, p:] = -(1 - a) / T * np.eye(p), a * np.eye(p)
+    B = np.vstack([np.eye(p), (1 - a) / T * np.eye(p)])
+    C, D = np.zeros((n, n)), np.zeros((n, p))
+    C[1::2], D[0::2], D[1::2] = A[p:], np.eye(p), (1 - a) / T * np.eye(p)
+    name = "plain difference" if a == 0 else f"filtered difference, a = {a:g}"
+    if a == 0:  # it remembers readings only
+        A, B, C = A[:p, :p], B[:p], C[:, :p]
+    E = np.zeros((A.shape[0], model.B.shape[1]))
+    return Estimator(A=A, B=B, E=E, C=C, D=D, period=T, name=name)
+
+
+def observer(model: Sampled, gain: ArrayLike, name: str = "observer") -> Estimator:
+    """Observer that corrects with the newest reading: ``x = x_p + L (y - C x_p)``, ``x_p[k+1] = A x[k] + B u[k]``.
+
+    Parameters
+    ----------
+    model : Sampled
+    gain : array, shape (n, p)
+        L, for instance from `kalman`.
+    """
+    L = np.asarray(gain, dtype=np.float64)
+    if L.shape != model.C.T.shape:
+        raise BadInput(f"an observer of this model needs a gain of shape {model.C.T.shape}, got {L.shape}.")
+    kept = np.eye(model.A.shape[0]) - L @ model.C
+    return Estimator(
+        A=model.A @ kept, B=model.A @ L, E=model.B, C=kept, D=L, period=model.period, name=name
+    )  # fmt: skip
+
+
+def kalman(model: Sampled, process: ArrayLike, noise: ArrayLike) -> Estimator:
+    """Steady Kalman filter, the observer with the least variance.
+
+    Parameters
+    ----------
+    model : Sampled
+    process : float or array, shape (n, n)
+        What shakes the states from sample to sample: a covariance, or one number, the standard deviation of a white
+        force held over a period [the input's unit].
+    noise : float or array, shape (p,)
+        Standard deviation of each reading; ``quantum/sqrt(12)`` for an encoder.
+
+    Raises
+    ------
+    BadInput
+        When a reading is taken as exact, or the filter does not exist (a mode that the outputs do not show).
+    """
+    from scipy.linalg import solve_discrete_are
+
+    W = np.asarray(process, dtype=np.float64)
+    W = model.B @ model.B.T * float(W) ** 2 if W.ndim == 0 else W
+    p = model.C.shape[0]
+    V = np.diag(np.broadcast_to(np.asarray(noise, dtype=np.float64) ** 2, (p,)))
+    if not np.all(np.diag(V) > 0):
+        raise BadInput("a Kalman filter needs readings with noise above 0; give quantum/sqrt(12) for an encoder.")
+    try:
+        solve: Any = solve_discrete_are
+        P = np.asarray(solve(model.A.T, model.C.T, W, V), dtype=np.float64)
+    except (np.linalg.LinAlgError, ValueError):
+        raise BadInput(
+            "there is no steady Kalman filter: a mode that grows or stays is not shown by the outputs, or nothing "
+            "shakes it; measure another coordinate or give a process noise on every state."
+        ) from None
+    gain = np.linalg.solve(model.C @ P @ model.C.T + V, model.C @ P).T
+    return observer(model, gain, "Kalman filter")
+
+
+def stationary(A: Array, B: Array) -> Array:
+    """Covariance that unit white noise keeps up, ``P = A P A' + B B'``; A must be stable."""
+    from scipy.linalg import solve_discrete_lyapunov
+
+    if A.shape[0] == 0:
+        return np.zeros((0, 0))
+    if np.abs(np.linalg.eigvals(A)).max() >= 1:
+        raise BadInput("noise has no stationary level in a loop that is not stable; stabilize it first.")
+    solve: Any = solve_discrete_lyapunov
+    return np.asarray(solve(A, B @ B.T), dtype=np.float64)
