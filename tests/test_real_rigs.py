@@ -5,6 +5,7 @@ The figures asked for were reached by throw-away fits of the same logs; the logs
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 from tempfile import NamedTemporaryFile
@@ -17,6 +18,9 @@ from upright.identification.estimate import identify
 from upright.identification.study import load_study
 
 STUDIES = Path(__file__).parents[1] / "examples" / "studies"
+MODES = {"ecp205_spinup": 3.55}
+"""Flexible modes [Hz] as others found them in the same logs, to 2 %."""
+
 DATA = os.environ.get("UPRIGHT_REAL_DATA", "")
 
 pytestmark = [
@@ -36,6 +40,10 @@ def test_a_real_rig_is_explained_and_predicted(name):
     reached = {a: a.reached(left_out if a.how == "left out" else fit.runs) for a in asked}
     assert {a: values for a, values in reached.items() if not a.met(values)} == {}
     assert fit.trusted, fit.verdict
+    if name in MODES:
+        ((at, mode),) = [(at, p) for at, poles in fit.poles.items() for p in poles if p.imag.value > 0]
+        low, high = (end / (2 * math.pi) for end in mode.imag.interval)
+        assert 0.98 * MODES[name] < low < MODES[name] < high < 1.02 * MODES[name], at
 
 
 def test_a_run_that_excites_itself_is_named_and_left_out():

@@ -66,7 +66,7 @@ def print_fit(fit: Fit, files: Sequence[Path], study: str, crossed: CrossValidat
     from rich.table import Table
 
     from upright.report.advice import next_steps
-    from upright.report.tables import parameter_rows, pole_rows, run_rows
+    from upright.report.tables import parameter_rows, pole_rows, run_rows, swings
 
     screen = console()
     table = Table(title="Parameters", title_justify="left", box=None, pad_edge=False, header_style="bold")
@@ -81,7 +81,9 @@ def print_fit(fit: Fit, files: Sequence[Path], study: str, crossed: CrossValidat
         table.add_row(*(_plain(cell) for cell in cells[: len(headings)]))
     screen.print(table)
     print_scores(fit.runs)
-    for at, pole, interval in pole_rows(fit, growing=True):
+    for at, swing in swings(fit):
+        screen.print(f"\nSwings at {at}: {swing}, 95 % interval in brackets", soft_wrap=True)
+    for at, pole, interval, _ in pole_rows(fit, growing=True):
         screen.print(f"\nPole at {at}: {pole} 1/s, 95 % interval {interval}", soft_wrap=True)
     if crossed is not None:
         print_crossed(crossed)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from markupsafe import Markup
 
 from upright.identification.crossval import CrossValidation
-from upright.identification.model import Estimate, Fit, Parameter, RunScore
+from upright.identification.model import Estimate, Fit, Parameter, Pole, RunScore
 from upright.report.mathml import symbol
 from upright.report.symbols import figures, measured, number, percent, plain, unit
 
@@ -143,9 +144,12 @@ def score_rows(fit: Fit) -> list[ScoreRow]:
     return rows
 
 
-def pole_rows(fit: Fit, *, growing: bool = False) -> list[tuple[str, str, str]]:
-    """Equilibrium, pole and its 95 % interval, as text; `growing` for those alone by which the plant falls."""
-    rows: list[tuple[str, str, str]] = []
+def pole_rows(fit: Fit, *, growing: bool = False) -> list[tuple[str, str, str, str]]:
+    """Equilibrium, pole, its 95 % interval and the frequency of its swing, as text.
+
+    `growing` for those alone by which the plant falls.
+    """
+    rows: list[tuple[str, str, str, str]] = []
     for at, found in fit.poles.items():
         for pole in found:
             value, interval = _measured(pole.real)
@@ -153,8 +157,28 @@ def pole_rows(fit: Fit, *, growing: bool = False) -> list[tuple[str, str, str]]:
                 parts = _measured(pole.imag)
                 value, interval = f"{value} ± {parts[0]} i", f"{interval}; ± ({parts[1]}) i"
             if not growing or pole.real.value > 1e-6:
-                rows.append((at, value, interval))
+                rows.append((at, value, interval, _swing(pole)))
     return rows
+
+
+def swings(fit: Fit) -> list[tuple[str, str]]:
+    """Equilibrium and frequency of every swing that does not grow, as text."""
+    return [
+        (at, _swing(pole)) for at, found in fit.poles.items() for pole in found
+        if pole.imag.value > 0 and pole.real.value <= 1e-6
+    ]  # fmt: skip
+
+
+def _swing(pole: Pole) -> str:
+    """Damped frequency of a pair of poles with its interval; nothing for a real one."""
+    if not pole.imag.value > 0:
+        return ""
+    turn = 2 * math.pi
+    e = pole.imag
+    low, high = e.interval
+    hertz = replace(e, value=e.value / turn, stderr=e.stderr / turn, interval=(low / turn, high / turn))
+    value, interval = _measured(hertz)
+    return f"{value} Hz ({interval})"
 
 
 def _measured(e: Estimate) -> tuple[str, str]:
