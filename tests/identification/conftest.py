@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from tests.identification.crane_log import THETA, T, X
+from upright.identification.draft import draft
 from upright.identification.study import load_study
+from upright.readers import inspect, read
 
 
 @pytest.fixture
@@ -19,6 +21,22 @@ def study(tmp_path):
         return load_study(tmp_path / name)
 
     return load
+
+
+@pytest.fixture
+def drafted(tmp_path):
+    """Draft a study for a log with these columns, and load it."""
+
+    def make(plant="", name="log.csv", **columns):
+        t = columns.pop("t", np.arange(4000) * 0.01)
+        rows = np.column_stack([t, *columns.values()])
+        np.savetxt(tmp_path / name, rows, "%.17g", ",", header=",".join(["t", *columns]), comments="")
+        record = read(tmp_path / name)
+        text = draft(record, inspect(record), tmp_path / name, tmp_path / "study.toml", plant=plant)
+        (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+        return text, load_study(tmp_path / "study.toml")
+
+    return make
 
 
 @pytest.fixture(scope="module")

@@ -22,22 +22,6 @@ SWING = ENVELOPE * np.cos(W * T)
 ENC1, ENC2 = np.round(4000 * SWING), np.round(3000 * ENVELOPE * np.sin(1.7 * W * T))
 
 
-@pytest.fixture
-def drafted(tmp_path):
-    """Draft a study for a log with these columns, and load it."""
-
-    def make(plant="", name="log.csv", **columns):
-        t = columns.pop("t", T)
-        rows = np.column_stack([t, *columns.values()])
-        np.savetxt(tmp_path / name, rows, "%.17g", ",", header=",".join(["t", *columns]), comments="")
-        record = read(tmp_path / name)
-        text = draft(record, inspect(record), tmp_path / name, tmp_path / "study.toml", plant=plant)
-        (tmp_path / "study.toml").write_text(text, encoding="utf-8")
-        return text, load_study(tmp_path / "study.toml")
-
-    return make
-
-
 def test_one_angle_is_a_pendulum_of_the_length_its_period_tells(drafted):
     _, study = drafted(theta=SWING)
     assert study.plant == "pendulum"

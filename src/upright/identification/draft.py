@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from upright.identification.chain_draft import chain_parts, quoted
+from upright.identification.chain_sight import look
 from upright.identification.recognition import Recognised, in_dac_counts, recognise
 from upright.identification.study_rig import per
 from upright.physics import Plant, find
@@ -31,8 +33,12 @@ def draft(record: Record, seen: Inspection, log: Path, study: Path, *, plant: st
         Overrides the plant that the columns suggest.
     """
     found = recognise(record, seen, plant)
-    kind = find(found.plant)
     file = os.path.relpath(log.resolve(), study.resolve().parent).replace(os.sep, "/")
+    if found.plant.startswith(("rectilinear", "torsional")):
+        where = "/".join(log.resolve().parts[-3:])
+        sight = look(record, seen, found, named=bool(plant), path=where)
+        return "\n".join([_head(log, sight.found), *chain_parts(record, sight, file, log.stem)])
+    kind = find(found.plant)
     parts = [
         _head(log, found),
         _rig(record, found, kind),
@@ -50,7 +56,7 @@ def _head(log: Path, found: Recognised) -> str:
         "# A number in quotes wears its unit; { guess = ... } asks for it; a plain text or number is known.",
         "# Lines marked MEASURE hold placeholders. All keys: `upright identify --keys`.",
         *(f"# GUESSED: {doubt}" for doubt in found.doubts),
-        f'title = "{_quoted(log.stem)}"',
+        f'title = "{quoted(log.stem)}"',
     ]
     return "\n".join(lines) + "\n"
 
@@ -146,7 +152,7 @@ def _drive(record: Record, found: Recognised, plant: type[Plant]) -> str:
     unit = "V" if in_dac_counts(c) else c.unit or c.guess
     gain_unit = per(force.unit, unit) if unit else force.unit
     low, high = c.low, c.high
-    lines = ["[drive]", f'column = "{_quoted(c.name)}"   # {low:.4g} to {high:.4g} {unit}'.rstrip()]
+    lines = ["[drive]", f'column = "{quoted(c.name)}"   # {low:.4g} to {high:.4g} {unit}'.rstrip()]
     lines += [f'unit = "{unit}"'] if unit else ['# unit = "V"']
     if in_dac_counts(c):
         lines[1] = lines[1].removesuffix(" V") + " DAC counts"
@@ -178,7 +184,7 @@ def _gain(record: Record, found: Recognised) -> float:
 def _sensor(record: Record, seen: Inspection, found: Recognised, plant: type[Plant], name: str) -> str:
     c: Column = found.columns[name]
     coordinate = next(k for k in plant.coordinates if k.name == name)
-    lines = [f"[sensors.{name}]", f'column = "{_quoted(c.name)}"   # {c.low:.6g} to {c.high:.6g} {c.guess}'.rstrip()]
+    lines = [f"[sensors.{name}]", f'column = "{quoted(c.name)}"   # {c.low:.6g} to {c.high:.6g} {c.guess}'.rstrip()]
     if c.guess:
         lines.append(f'unit = "{c.guess}"' + ("" if c.unit else "   # guessed; the log does not say"))
     if c.guess == "counts":
@@ -225,7 +231,7 @@ def _runs(found: Recognised, plant: type[Plant], file: str, stem: str) -> str:
     for label, a, b, role in runs:
         note = "fitted" if role == "fit" else "scored, never seen by the estimator"
         parts.append(
-            f'[[runs]]\nlabel = "{_quoted(label)}"\nfile = "{_quoted(file)}"\n'
+            f'[[runs]]\nlabel = "{quoted(label)}"\nfile = "{quoted(file)}"\n'
             f'window = [{a:.5g}, {b:.5g}]   # s\nrole = "{role}"   # {note}\n'
         )
     return "\n".join(parts)
@@ -233,7 +239,3 @@ def _runs(found: Recognised, plant: type[Plant], file: str, stem: str) -> str:
 
 def _list(names: list[str]) -> str:
     return "[" + ", ".join(f'"{n}"' for n in names) + "]"
-
-
-def _quoted(text: str) -> str:
-    return text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", " ")

@@ -23,7 +23,7 @@ from upright.records import Record
 
 _RATE = re.compile(r"velocity|speed|rate|_dot\b|omega|\bqd|accel", re.IGNORECASE)
 _EFFORT = re.compile(r"effort|volt|current|torque|force|plant_input|cmd|duty|^(u|v|i)$", re.IGNORECASE)
-_REFERENCE = re.compile(r"target|reference|\bref\b|commanded|set.?point", re.IGNORECASE)
+REFERENCE = re.compile(r"target|reference|\bref\b|commanded|set.?point", re.IGNORECASE)
 _ARM = re.compile(r"arm|psi|joint0|base|motor", re.IGNORECASE)
 _CART = re.compile(r"cart|pos|^[xz]\d?$|distance|displacement", re.IGNORECASE)
 _DISK = re.compile(r"disk|disc|theta\s*_?[123]\b", re.IGNORECASE)
@@ -163,7 +163,7 @@ def drive_column(record: Record, seen: Inspection) -> Column | None:
         return dac
     candidates = [c for c in seen.columns if c.drive and not c.constant]
     candidates = [c for c in candidates if all(lie.startswith("the first samples are outliers") for lie in c.lies)]
-    candidates = [c for c in candidates if not _REFERENCE.search(c.name)]
+    candidates = [c for c in candidates if not REFERENCE.search(c.name)]
     effort = [c for c in candidates if _EFFORT.search(c.name)]
     return (effort or candidates or [None])[0]
 
