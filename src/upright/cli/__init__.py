@@ -26,6 +26,7 @@ COMMANDS = {
     "law": "Recover the control law from a closed-loop log: structure, gains, limit, what is left.",
     "identify": "Fit a rig's parameters to its logs as a study file says; write estimates and report.",
     "ladder": "Grow a model only while it predicts better what it has not seen.",
+    "design": "Find the gains that hold a rig, and what they are worth in the loop a computer runs.",
     "predict": "Score other runs with a model that was fitted before.",
 }
 

@@ -1,0 +1,163 @@
+"""Which gains hold this rig?"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from upright.errors import BadInput, nearest
+
+if TYPE_CHECKING:
+    from upright.lab.designing import Designed
+    from upright.lab.rig_file import RigFile
+
+
+def design(
+    source: Annotated[Path, typer.Argument(metavar="STUDY_OR_FIT", help="fit.json, its folder, or a study (TOML).")],
+    at: Annotated[str, typer.Option(metavar="NAME", help="Equilibrium; the last that the plant names.")] = "",
+    poles: Annotated[str, typer.Option(metavar="LIST", help='Poles [1/s], as in "-4.15+-1.63j, -16.9, -3.2".')] = "",
+    lqr: Annotated[str, typer.Option(metavar="LIST", help='Weights of the states, as in "1,0,1,0".')] = "",
+    effort_weight: Annotated[
+        float | None, typer.Option(metavar="R", help="Weight of the effort; without it --limit decides.")
+    ] = None,
+    limit: Annotated[float | None, typer.Option(metavar="U", help="Largest command, in the command's unit.")] = None,
+    start: Annotated[
+        str, typer.Option(metavar="LIST", help='Deviation to come back from, as in "theta=5 deg, psi_dot=0.2 rad/s".')
+    ] = "",
+    period: Annotated[str, typer.Option(metavar="TIME", help="Between samples.")] = "1 ms",
+    delay: Annotated[float, typer.Option(metavar="SAMPLES", help="Computing a command takes so long.")] = 1.0,
+    speed: Annotated[str, typer.Option(help="Velocities by plain or filtered difference, or kalman.")] = "filtered",
+    memory: Annotated[float, typer.Option(help="a of the filtered difference, 0 to 1.")] = 0.5,
+    counts: Annotated[float, typer.Option(help="Encoder counts per turn, or per metre of a cart.")] = 16_000.0,
+    track: Annotated[str, typer.Option(metavar="COORDINATE", help="Coordinate that follows a reference.")] = "",
+    sampled: Annotated[bool, typer.Option("--sampled", help="Gains whose sampled loop has the poles asked.")] = False,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the rigs drawn from the fit's covariance.")] = 0,
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="For design.json and .html.")] = Path(),
+    as_json: Annotated[bool, typer.Option("--json", help="Print design.json instead of tables.")] = False,
+) -> None:
+    """Find the gains that hold a rig, and say what they are worth in the loop that a computer runs.
+
+    The numbers are those identified (hanging, for instance); the model is the one
+    about another equilibrium, upright. Poles are placed by Ackermann's formula, or
+    chosen by least cost; period, delay and differenced encoders are then put in.
+
+    upright design out/fit.json --at inverted --poles "-4.15+-1.63j, -16.9, -3.2"
+    """
+    from upright.design.requests import read_poles
+    from upright.lab import design_page
+    from upright.lab.designing import Wish, design_for
+    from upright.lab.rig_file import read_rig_file
+    from upright.units import parse
+
+    if out.exists() and not out.is_dir():
+        raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
+    if bool(poles) == bool(lqr):
+        raise BadInput('give either --poles "-4+-2j, -10, -3" or --lqr "1,0,1,0" (weights of the states).')
+    if speed not in ("plain", "filtered", "kalman"):
+        raise BadInput(f"--speed is plain, filtered or kalman, got '{speed}'.")
+    if not counts > 0:
+        raise BadInput(f"--counts must be above 0, got {counts:g}.")
+    rig = read_rig_file(source, seed=seed)
+    here = at or list(rig.plant.equilibria)[-1]
+    if here not in rig.plant.equilibria:
+        raise BadInput(f"'{rig.name}' has no equilibrium '{here}'; {nearest(here, rig.plant.equilibria)}")
+    wish = Wish(
+        at=here,
+        poles=read_poles(poles) if poles else None,
+        weights=_numbers(lqr) if lqr else None,
+        R=effort_weight,
+        period=parse(period, "s"),
+        delay=delay,
+        speed=speed,
+        memory=memory,
+        quantum=_quanta(rig, counts),
+        limit=limit,
+        start=_start(rig, start),
+        track=track,
+        sampled=sampled,
+    )
+    done = design_for(rig, wish)
+    out.mkdir(parents=True, exist_ok=True)
+    content = design_page.as_json(done)
+    text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+    (out / "design.json").write_text(text + "\n", encoding="utf-8")
+    page = design_page.write(done, out / "design.html", str(source))
+    if as_json:
+        typer.echo(text)
+        return
+    _say(done, (out / "design.json", page), source)
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise BadInput(f'weights are numbers separated by commas, as in "1,0,1,0", got {text[:60]!r}.') from None
+
+
+def _quanta(rig: RigFile, counts: float) -> tuple[float, ...]:
+    from math import tau
+
+    return tuple((tau if c.unit == "rad" else 1.0) / counts for c in rig.plant.coordinates)
+
+
+def _start(rig: RigFile, text: str) -> tuple[float, ...]:
+    """Deviation, state by state; empty when none was given."""
+    from upright.units import parse
+
+    if not text.strip():
+        return ()
+    names = rig.plant.state_names()
+    units = dict(zip(names, (u for c in rig.plant.coordinates for u in (c.unit, f"{c.unit}/s")), strict=True))
+    values = dict.fromkeys(names, 0.0)
+    for part in text.split(","):
+        name, _, value = part.partition("=")
+        name = name.strip()
+        if name not in values:
+            raise BadInput(f"--start names states as in \"theta=5 deg\", got '{name}'; {nearest(name, names)}")
+        values[name] = parse(value, units[name])
+    if not any(values.values()):
+        raise BadInput("--start must leave the equilibrium; give one state a value that is not 0.")
+    return tuple(values.values())
+
+
+def _say(done: Designed, files: tuple[Path, Path], source: Path) -> None:
+    from rich.markup import escape
+
+    from upright.cli.terminal import console, typed
+    from upright.lab import design_page
+
+    screen = console()
+    for table in (design_page.gain_table(done), design_page.pole_table(done), design_page.way_table(done)):
+        screen.print(_table(table))
+    if done.placement is not None:
+        screen.print(
+            f"\nFarthest pole from where it was asked: {done.placement.miss:.1g} 1/s. {done.placement.sentence}",
+            soft_wrap=True, markup=False,
+        )  # fmt: skip
+    if done.R is not None:
+        screen.print(f"\nWeight of the effort: {done.R:.4g}", soft_wrap=True)
+    if done.chance is not None:
+        screen.print(f"Of the rigs that the fit allows, {100 * done.chance:.1f} % stand with these gains.")
+    screen.print(f"\n[bold]Verdict[/bold]: {escape(done.verdict)}", soft_wrap=True)
+    screen.print(f"\nWritten: {escape(', '.join(str(f) for f in files))}", soft_wrap=True)
+    screen.print("What next:", style="bold")
+    for step in design_page.next_steps(done, typed(source), typed(files[0].parent)):
+        screen.print(f"- {step.sentence}", soft_wrap=True, markup=False)
+        if step.command:
+            screen.print(f"    {step.command}", soft_wrap=True, markup=False)
+
+
+def _table(content: Any) -> Any:
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(title=f"\n{content.caption}", title_justify="left", box=None, pad_edge=False, header_style="bold")
+    for i, heading in enumerate(content.headings):
+        table.add_column(escape(heading), justify="right" if i in content.numbers else "left")
+    for row in content.rows:
+        table.add_row(*(escape(cell) for cell in row))
+    return table

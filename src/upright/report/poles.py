@@ -1,0 +1,118 @@
+"""Where do the poles lie, before and after, and how does the rig come back?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.report.drawing import BLUE, GREY, ORANGE, VERMILLION, figure, hide_inner_times, styled
+from upright.report.symbols import axis, mathtext
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+Roots = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Poles:
+    """Poles [1/s] of one kind with their mark: ``x`` open loop, ``o`` asked, ``+`` attained."""
+
+    name: str
+    values: Roots
+    mark: str
+    colour: str
+
+
+@styled
+def pole_map(kinds: Sequence[Poles], cloud: Roots | None = None, *, within: float = 1.3) -> Figure:
+    """Poles in the s-plane [1/s], the stable half shaded; `cloud` are those of the rigs that the fit allows.
+
+    The view holds the first two kinds; how many poles of the others lie outside is written below.
+    """
+    drawing = figure(4.2, width=6.2)
+    ax: Any = drawing.subplots()
+    seen = np.concatenate([k.values for k in kinds[:2]])
+    left, right = within * float(min(seen.real.min(), -1.0)), within * float(max(seen.real.max(), 1.0))
+    high = within * float(max(np.abs(seen.imag).max(), 0.25 * (right - left)))
+    ax.axvspan(left, 0.0, color=BLUE, alpha=0.06, linewidth=0)
+    ax.axvline(0.0, color=GREY, linewidth=0.8)
+    ax.axhline(0.0, color=GREY, linewidth=0.8)
+    if cloud is not None and cloud.size:
+        ax.plot(cloud.real, cloud.imag, ".", color=ORANGE, markersize=2, alpha=0.5, label="rigs that the fit allows")
+    outside = 0
+    for kind in kinds:
+        hollow = {"markerfacecolor": "none"} if kind.mark in "os" else {}
+        ax.plot(
+            kind.values.real, kind.values.imag, kind.mark, color=kind.colour, markersize=8 if kind.mark == "o" else 6,
+            markeredgewidth=1.4, linestyle="none", label=kind.name, **hollow,
+        )  # fmt: skip
+        v = kind.values
+        outside += int(np.sum((v.real < left) | (v.real > right) | (np.abs(v.imag) > high)))
+    ax.set_xlim(left, right)
+    ax.set_ylim(-high, high)
+    more = f"; {outside} faster one{'s' if outside > 1 else ''} outside the picture" if outside else ""
+    ax.set_xlabel(f"real part [1/s]{more}")
+    ax.set_ylabel("imaginary part [rad/s]")
+    ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
+    return drawing
+
+
+@styled
+def swing_figure(
+    t: Array, coordinates: dict[str, tuple[Array, str]], command: Array, unit: str, limit: float | None
+) -> Figure:
+    """Linear motion from a deviation: coordinates with their units, and the command with the drive's limit."""
+    drawing = figure(1.4 * (len(coordinates) + 1) + 0.4)
+    axes: list[Any] = drawing.subplots(len(coordinates) + 1, 1, sharex=True, squeeze=False)[:, 0].tolist()
+    for ax, (name, (values, of)) in zip(axes, coordinates.items(), strict=False):
+        ax.plot(t, values, color=BLUE)
+        ax.set_ylabel(axis(mathtext(name), of))
+    axes[-1].plot(t, command, color=VERMILLION)
+    axes[-1].set_ylabel(axis("command", unit))
+    if limit is not None:
+        for side in (-1, 1):
+            axes[-1].axhline(side * limit, color=GREY, linestyle="--", linewidth=0.9)
+        axes[-1].text(t[-1], limit, "limit ", ha="right", va="bottom", fontsize=7.5, color=GREY)
+        reach = 1.25 * max(limit, float(np.abs(command).max()))
+        axes[-1].set_ylim(-reach, reach)
+    hide_inner_times(axes)
+    drawing.align_ylabels(axes)
+    return drawing
+
+
+@styled
+def locus_figure(tracks: Roots, printed: Sequence[Roots], open_loop: Roots) -> Figure:
+    """Poles as the effort's weight falls, shape (weights, n), with printed sets of poles on them.
+
+    Only the upper half plane is drawn; the lower mirrors it.
+    """
+    drawing = figure(3.4)
+    ax: Any = drawing.subplots()
+    ax.axhline(0.0, color=GREY, linewidth=0.8)
+    ax.axvline(0.0, color=GREY, linewidth=0.8)
+    for i, track in enumerate(tracks.T):
+        upper = track[track.imag >= -1e-9]
+        label = "poles of least cost as effort gets cheaper" if i == 0 else None
+        ax.plot(upper.real, upper.imag, ".", color=BLUE, markersize=1.5, label=label)
+    upper = open_loop[open_loop.imag >= -1e-9]
+    ax.plot(upper.real, upper.imag, "x", color=GREY, markersize=7, markeredgewidth=1.5, label="open loop, recovered")
+    for i, (poles, mark) in enumerate(zip(printed, "osD^", strict=False)):
+        upper = poles[poles.imag >= 0]
+        ax.plot(
+            upper.real, upper.imag, mark, color=VERMILLION, markerfacecolor="none", markersize=8, markeredgewidth=1.4,
+            linestyle="none", label=f"printed, set {i + 1}",
+        )  # fmt: skip
+    every = np.concatenate([*printed, open_loop])
+    wide = float(np.ptp(every.real))
+    ax.set_xlim(every.real.min() - 0.08 * wide, every.real.max() + 0.08 * wide)
+    ax.set_ylim(-0.06 * every.imag.max(), 1.15 * every.imag.max())
+    ax.set_xlabel("real part [1/s]")
+    ax.set_ylabel("imaginary part [rad/s]")
+    ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
+    return drawing
