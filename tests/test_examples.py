@@ -89,7 +89,7 @@ def test_a_study_finds_its_logs_and_says_whose_they_are(path, monkeypatch):
 
 def commands(page: Path) -> list[tuple[str, list[str]]]:
     """Every `upright COMMAND --option` shown on a page."""
-    shown = re.findall(r"upright ([a-z]+)((?: [^\s`#|&;]+)*)", page.read_text(encoding="utf-8"))
+    shown = re.findall(r"upright ([a-z]+(?:-[a-z]+)*)((?: [^\s`#|&;]+)*)", page.read_text(encoding="utf-8"))
     return [(name, re.findall(r"(?<!\S)(--?[a-z][a-z-]*)", rest)) for name, rest in shown if name in COMMANDS]
 
 

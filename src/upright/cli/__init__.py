@@ -1,6 +1,6 @@
 """Which commands does the tool answer to, and how does it say that something went wrong?
 
-Each command lives in its own file, `upright/cli/NAME.py`, as a function called NAME. The file is
+Each command lives in its own file, `upright/cli/NAME.py`, as a function called NAME (with _ for -). The file is
 imported when the command runs, so that listing the commands loads no numerical library.
 """
 
@@ -27,6 +27,8 @@ COMMANDS = {
     "identify": "Fit a rig's parameters to its logs as a study file says; write estimates and report.",
     "ladder": "Grow a model only while it predicts better what it has not seen.",
     "design": "Find the gains that hold a rig, and what they are worth in the loop a computer runs.",
+    "loadings": "Find stiffness and bare inertia from step responses with known added masses.",
+    "plan-inertias": "Say which masses, where and how often, give the tightest stiffness for the fewest runs.",
     "predict": "Score other runs with a model that was fitted before.",
 }
 
@@ -51,7 +53,8 @@ class LazyGroup(TyperGroup):
 
 
 def _load(name: str) -> Any:
-    function = getattr(import_module(f"upright.cli.{name}"), name)
+    module = name.replace("-", "_")
+    function = getattr(import_module(f"upright.cli.{module}"), module)
     text = function.__doc__ or COMMANDS[name]
     one = typer.Typer(add_completion=False, rich_markup_mode="rich", context_settings=SETTINGS)
     # Docstrings are raw, for rich's escapes; \b keeps the line breaks of a paragraph.

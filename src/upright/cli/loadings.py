@@ -1,0 +1,203 @@
+"""How stiff, how heavy? Step responses with known added masses or inertias."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from upright.errors import BadInput, NotIdentifiable
+
+if TYPE_CHECKING:
+    from upright.identification.loadings import Loaded, Loadings
+    from upright.records import Record
+
+_MASSES = re.compile(r"\s*(\d+)\s+at\s+(.+)")
+
+
+def loadings(
+    logs: Annotated[
+        list[Path] | None, typer.Argument(metavar="LOG...", help="One log of steps for each loading; repeats welcome.")
+    ] = None,
+    added: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="INERTIA",
+            help="What was added, log by log: '1.5 kg', '4e-3 kg m^2', or '2 at 6.5 cm' (500 g each).",
+        ),
+    ] = None,
+    signal: Annotated[str, typer.Option(metavar="COLUMN", help="Column of the position, in any unit.")] = "",
+    command: Annotated[str, typer.Option(metavar="COLUMN", help="Column of the command that steps.")] = "",
+    tolerance: Annotated[str, typer.Option(help="Standard uncertainty of one added piece.")] = "0 %",
+    free: Annotated[
+        bool, typer.Option("--free", help="Count swings at zero command only, with the drive silent.")
+    ] = False,
+    twin: Annotated[str, typer.Option(metavar="KIND", help="No logs: step a twin, rectilinear or torsional.")] = "",
+    seed: Annotated[int, typer.Option(min=0, help="Which twin of the make; 0 is the one as designed.")] = 0,
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for the report.")] = Path("loadings"),
+    as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON instead of a table.")] = False,
+) -> None:
+    r"""Find stiffness and bare inertia from step responses with known added masses (experiment 1a).
+
+    Each swing gives a damped period, and its extremes viscous and dry friction; 1/omega_n^2 over the added inertia is
+    a line whose slope is 1/k.
+
+    \b
+    upright loadings --twin rectilinear -o out
+    upright loadings bare.csv one.csv two.csv --added "0 kg" --added "0.5 kg" --added "1 kg" --signal x --command u
+    """
+    if out.exists() and not out.is_dir():
+        raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
+    if twin:
+        if logs or added:
+            raise BadInput("--twin steps a simulated rig and takes no logs; leave out either.")
+        _twin(twin, seed, out, as_json)
+        return
+    if not logs or len(added or ()) != len(logs):
+        raise BadInput(
+            f"Every log needs its --added, in the same order: {len(logs or ())} logs came with {len(added or ())};"
+            ' write --added "0 kg" for the bare one, or try --twin rectilinear.'
+        )
+    from upright.identification.loadings import swings, weigh
+    from upright.readers import read
+    from upright.report.advice import Step
+    from upright.report.loadings import write_loadings
+    from upright.units import parse
+
+    values = [inertia(text) for text in added or ()]
+    kinds = {kind for _, kind in values if kind}
+    if len(kinds) > 1:
+        raise BadInput("Masses in kg and inertias in kg m^2 cannot be mixed; carts take masses, disks inertias.")
+    kind = kinds.pop() if kinds else "rectilinear"
+    records: dict[str, Record] = {}
+    signals: dict[str, str] = {}
+    found: list[Loaded] = []
+    left_out: list[str] = []
+    for log, (value, _) in zip(logs, values, strict=True):
+        record = read(log)
+        label = log.name if log.name not in records else f"{log.name} ({len(records) + 1})"
+        column = _column(record, signal, record.outputs, "--signal")
+        drive = _column(record, command, record.inputs, "--command") if command or record.inputs else ""
+        records[label], signals[label] = record, column
+        try:
+            told = swings(record, added=value, label=label, signal=column, command=drive)
+        except NotIdentifiable as error:
+            left_out.append(str(error))
+            continue
+        found += [s for s in told if not free or s.command == 0]
+    if left_out and len({s.added for s in found}) < 2:
+        raise NotIdentifiable(left_out[0])
+    weighed = weigh(found, tolerance=parse(tolerance, "1"))
+    steps = [
+        Step(
+            sentence="Fit the same logs with the equations of motion; give m_1 and k_1 these values as guesses.",
+            command=f"upright init {logs[0].name} -o study.toml",
+        ),
+        Step(
+            sentence="Plan the next loadings with the error of a frequency that these swings show.",
+            command=f'upright plan-inertias --rig {kind} --bare "{weighed.bare.value:.4g}'
+            f' {"kg" if kind == "rectilinear" else "kg m^2"}"',
+        ),
+    ]
+    page = write_loadings(weighed, out, kind=kind, title="Stiffness and bare inertia from added loads", logs=records,
+                          signals=signals, left_out=left_out, steps=steps)  # fmt: skip
+    _tell(weighed, kind, page, as_json, left_out, steps, None)
+
+
+def _twin(kind: str, seed: int, out: Path, as_json: bool) -> None:
+    from upright.lab.loadings import run, truth
+    from upright.report.advice import Step
+    from upright.report.loadings import write_loadings
+
+    if kind != "rectilinear" and kind != "torsional":
+        raise BadInput(f"--twin is rectilinear or torsional, got '{kind}'.")
+    done = run(seed, kind)
+    out.mkdir(parents=True, exist_ok=True)
+    column = next(iter(done.logs.values())).outputs[0]
+    files: dict[str, str] = {}
+    for label, record in done.logs.items():
+        files[label] = label.replace(" masses, run ", "x500g_run") + ".csv"
+        record.to_csv(out / files[label])
+    unit = "kg" if kind == "rectilinear" else "kg m^2"
+    added = " ".join(f'--added "{done.added[label]:.6g} {unit}"' for label in files)
+    steps = [
+        Step(
+            sentence="Weigh the rig again from its logs in that folder, as you would your own.",
+            command=f"upright loadings {' '.join(files.values())} {added}",
+        ),
+        Step(sentence="See which masses would have told most.", command=f"upright plan-inertias --rig {kind}"),
+    ]
+    page = write_loadings(
+        done.found, out, kind=kind, title=f"Experiment 1a on a twin, {kind}, seed {seed}", logs=done.logs,
+        signals=dict.fromkeys(done.logs, column), left_out=done.left_out, truth=truth(done.on), steps=steps,
+    )  # fmt: skip
+    _tell(done.found, kind, page, as_json, list(done.left_out), steps, truth(done.on))
+
+
+def inertia(text: str) -> tuple[float, str]:
+    """Added inertia [SI] and the kind of rig it belongs to; none for a plain zero."""
+    from upright.physics.loads import added_inertia
+    from upright.units import parse, same_dimension
+
+    if masses := _MASSES.fullmatch(text):
+        return added_inertia(int(masses[1]), parse(masses[2], "m"), mass_radius=0.025), "torsional"
+    if text.strip() in ("0", "none"):
+        return 0.0, ""
+    unit = text.lstrip("+-0123456789.eE ").strip()
+    torsional = bool(unit) and same_dimension(unit, "kg m^2")
+    value = parse(text, "kg m^2" if torsional else "kg")
+    if value < 0:
+        raise BadInput(f"--added needs what was put on, got '{text}'; take the heaviest rig's bare body as zero.")
+    return value, "torsional" if torsional else "rectilinear"
+
+
+def _column(record: Record, asked: str, known: tuple[str, ...], option: str) -> str:
+    if asked:
+        _ = record[asked]
+        return asked
+    if len(known) == 1:
+        return known[0]
+    raise BadInput(f"The log holds the columns {', '.join(record.names)}; say which one is meant with {option}.")
+
+
+def _tell(
+    found: Loadings, kind: str, page: Path, as_json: bool, left_out: list[str], steps: list[Any],
+    truth: dict[str, float] | None,
+) -> None:  # fmt: skip
+    from rich.table import Table
+
+    from upright.cli.terminal import console
+    from upright.report.loadings import rows
+
+    if as_json:
+        named = {"k": found.k, "bare": found.bare, "damping": found.damping}
+        content: dict[str, Any] = {
+            n: {"value": w.value, "stderr": w.stderr, "interval": w.interval} for n, w in named.items()
+        }
+        content |= {"kind": kind, "verdict": found.verdict, "report": str(page), "truth": truth, "left_out": left_out}
+        content["swings"] = [
+            {"label": s.label, "added": s.added, "omega_n": s.decay.omega_n, "stderr": s.decay.omega_error,
+             "sigma": s.decay.sigma, "delta": s.decay.delta} for s in found.swings
+        ]  # fmt: skip
+        typer.echo(json.dumps(content, indent=2, ensure_ascii=False))
+        return
+    screen = console()
+    title = f"From {len(found.swings)} swings"
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
+    headings = ["", *(["truth"] if truth else []), "value", "std. error", "95 % interval", "unit", "meaning"]
+    for heading in headings:
+        right = heading in ("truth", "value", "std. error")
+        table.add_column(heading, justify="right" if right else "left", no_wrap=True)
+    for r in rows(found, kind):
+        true = [f"{truth[r['name']]:.4g}" if r["name"] in truth else ""] if truth else []
+        table.add_row(r["name"], *true, r["value"], r["stderr"], r["interval"], r["unit"], r["meaning"])
+    screen.print(table)
+    screen.print(f"\n{found.verdict}", soft_wrap=True, markup=False)
+    for sentence in left_out:
+        screen.print(f"Left out: {sentence}", soft_wrap=True, markup=False)
+    screen.print(f"\nReport: {page}\nWhat next:", soft_wrap=True, markup=False)
+    for step in steps:
+        screen.print(f"- {step.sentence}\n    {step.command}", soft_wrap=True, markup=False)
