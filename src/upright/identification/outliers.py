@@ -119,7 +119,7 @@ def half_swings(known: Rig, run: Run, own: Mapping[str, float]) -> Stretches | N
 
 def _restarted(known: Rig, run: Run, own: Mapping[str, float], seconds: float, free: Sequence[int]) -> Stretches:
     """A run restarted every so many seconds, its coordinates `free`."""
-    problem = pose(known, [replace(run, horizon=seconds, score_from=0.0)], thin=False)
+    problem = pose(known, [replace(run, horizon=seconds, restart="smooth", score_from=0.0)], thin=False)
     x = np.array([u.inside(own.get(u.name, u.value)) for u in problem.unknowns])
     track = problem.tracks[0]
     # started where it suits the stretch, as far as the measurement leaves that open: near upright a slip of a
