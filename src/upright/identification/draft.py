@@ -7,10 +7,17 @@ from pathlib import Path
 
 import numpy as np
 
-from upright.identification.chain_draft import chain_parts, quoted
+from upright.identification.chain_draft import chain_parts, names, quoted
 from upright.identification.chain_sight import look
 from upright.identification.recognition import Recognised, in_dac_counts, recognise
 from upright.identification.study_rig import per
+from upright.identification.upright_draft import (
+    Standing,
+    standing,
+    upright_defaults,
+    upright_recognised,
+    upright_starts,
+)
 from upright.physics import Plant, find
 from upright.readers.inspection import Column, Inspection
 from upright.readers.lies import DAC_COUNTS_PER_VOLT
@@ -39,13 +46,15 @@ def draft(record: Record, seen: Inspection, log: Path, study: Path, *, plant: st
         sight = look(record, seen, found, named=bool(plant), path=where)
         return "\n".join([_head(log, sight.found), *chain_parts(record, sight, file, log.stem)])
     kind = find(found.plant)
+    how = standing(record, found)
+    found = upright_recognised(found, how) if how else found
     parts = [
         _head(log, found),
         _rig(record, found, kind),
-        _parameters(record, found, kind),
-        _drive(record, found, kind),
+        _parameters(record, found, kind, how),
+        _drive(record, found, kind, how),
         *(_sensor(record, seen, found, kind, name) for name in found.columns),
-        _runs(found, kind, file, log.stem),
+        _runs(found, kind, file, log.stem, how),
     ]
     return "\n".join(part for part in parts if part)
 
@@ -75,8 +84,8 @@ def _doc(plant: type[Plant]) -> str:
     return f"coordinates: {coordinates}"
 
 
-def _parameters(record: Record, found: Recognised, plant: type[Plant]) -> str:
-    known, asked = _starts(record, found, plant)
+def _parameters(record: Record, found: Recognised, plant: type[Plant], how: Standing | None) -> str:
+    known, asked, about = upright_starts(how, found.plant) if how else (*_starts(record, found, plant), {})
     lines = ["[parameters]"]
     rest: list[str] = []
     for name in plant.names():
@@ -85,6 +94,11 @@ def _parameters(record: Record, found: Recognised, plant: type[Plant]) -> str:
         if name in known:
             value, why = known[name]
             lines.append(f'{name} = "{value:.4g}{unit}"   # {what.meaning}; {why}')
+        elif name in about:
+            value, doubt = about[name]
+            lines.append(
+                f'{name} = {{ value = "{value:.3g}{unit}", uncertainty = "{doubt}" }}   # {what.meaning}; MEASURE'
+            )
         elif name in asked:
             lines.append(f'{name} = {{ guess = "{asked[name]:.3g}{unit}" }}   # {what.meaning}')
         elif name != "g":
@@ -119,19 +133,6 @@ def _starts(
         if found.drive and first in found.columns:
             wanted |= {"b_1": inertia * 1.0, "b_1c": inertia * 0.1}
         return known, wanted
-    inertias = [n for n in plant.names() if n[:2] in ("m_", "J_") and n[2:].isdigit()]
-    if inertias and found.plant.startswith(("rectilinear", "torsional")):
-        free = found.drive is None
-        wanted = dict.fromkeys(inertias[1:], 1.0)
-        wanted |= {
-            n: w**2 for n in plant.names() if n.startswith("k_") and (len(n) > 3 or n == "k_1" or len(inertias) > 1)
-        }
-        wanted |= {n: 0.05 * w for n in plant.names() if n.startswith("c_") and len(n) == 3}
-        wanted |= {
-            n: 0.01 * w**2 * _swing(record, found) for n in plant.names() if n.startswith("f_") and n.endswith("c")
-        }
-        note = scale if free else "MEASURE: sets the scale; force per command is asked below"
-        return {inertias[0]: (1.0, note)}, wanted
     from dataclasses import MISSING, fields
 
     required = [f.name for f in fields(plant) if f.default is MISSING]  # type: ignore[arg-type]
@@ -145,7 +146,7 @@ def _swing(record: Record, found: Recognised) -> float:
     return (c.high - c.low) / 2 * per
 
 
-def _drive(record: Record, found: Recognised, plant: type[Plant]) -> str:
+def _drive(record: Record, found: Recognised, plant: type[Plant], how: Standing | None) -> str:
     if found.drive is None or not plant.inputs:
         return '# [drive]\n# column = "..."   # no column drives: the runs are free\n' if plant.inputs else ""
     c, force = found.drive, plant.inputs[0]
@@ -159,7 +160,7 @@ def _drive(record: Record, found: Recognised, plant: type[Plant]) -> str:
         lines.append(f"scale = {1 / DAC_COUNTS_PER_VOLT:.6g}   # {DAC_COUNTS_PER_VOLT:g} counts per V")
     lines += ["sign = -1   # the first command moves the column down"] if found.reversed else []
     driven = next(iter(found.columns))
-    guess = _gain(record, found)
+    guess = how.gain(found.plant) if how else _gain(record, found)
     speed = next(f"{k.unit}/s" for k in plant.coordinates if k.name == force.on)
     lines += [
         "",
@@ -167,6 +168,7 @@ def _drive(record: Record, found: Recognised, plant: type[Plant]) -> str:
         f'gain = {{ guess = "{guess:.3g} {gain_unit}", min = 0 }}   # {force.meaning} per command; moves {driven} up',
         f'# slope = {{ guess = "0 {per(force.unit, speed)}" }}   # force lost per speed',
         '# lag = { guess = "5 ms", max = "0.1 s" }',
+        f'{"" if how else "# "}delay = {{ guess = "1 ms", max = "10 ms" }}',
     ]
     return "\n".join(lines) + "\n"
 
@@ -211,17 +213,17 @@ def _how(found: Recognised) -> str:
     return "lay before the first command" if found.drive is not None else "comes to rest"
 
 
-def _runs(found: Recognised, plant: type[Plant], file: str, stem: str) -> str:
+def _runs(found: Recognised, plant: type[Plant], file: str, stem: str, how: Standing | None) -> str:
     start, stop = found.window
     missing = [c.name for c in plant.coordinates if c.name not in found.columns]
     shared: list[str] = []
     if missing:
-        shared.append(f"locked = {_list(missing)}   # no column was found; give them a sensor if they move")
+        shared.append(f"locked = {names(missing)}   # no column was found; give them a sensor if they move")
     first = plant.coordinates[0].name
     if found.drive is None and not missing and found.plant in ("cart-pendulum", "furuta"):
         shared.append(f'held = ["{first}"]   # its measured motion is prescribed, since no column says what drove it')
     unknown = ["initial", "offset"] if found.drive is None else ["initial"]
-    shared.append(f"unknown = {_list(unknown)}   # estimated for each run alone")
+    shared.append(upright_defaults(plant) if how else f"unknown = {names(unknown)}   # estimated for each run alone")
     swings = found.frequency * (stop - start) / (2 * np.pi)
     split = start + 0.6 * (stop - start)
     runs = [(stem, start, stop, "fit")]
@@ -235,7 +237,3 @@ def _runs(found: Recognised, plant: type[Plant], file: str, stem: str) -> str:
             f'window = [{a:.5g}, {b:.5g}]   # s\nrole = "{role}"   # {note}\n'
         )
     return "\n".join(parts)
-
-
-def _list(names: list[str]) -> str:
-    return "[" + ", ".join(f'"{n}"' for n in names) + "]"
