@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.signal import lsim
 
 from tests.simulation.conftest import BLOCK, FURUTA
+from upright.physics.oscillators import Rectilinear2
 from upright.simulation import Held, simulate
 
 LANES = pytest.mark.parametrize("lanes", [1, 3])
@@ -81,6 +83,20 @@ def test_a_stuck_block_is_released_at_once_by_a_jump_of_the_input(block, lanes):
     x = simulate(block, p, lanes_of([0.0, 0.0], lanes), u, 0.01, samples=101)
     s = np.maximum(np.arange(101) * 0.01 - 0.4, 0)
     assert np.allclose(x[:, 0].T, 0.6 * s**2 / 2, rtol=0, atol=1e-15)
+
+
+def test_a_block_at_rest_without_friction_follows_its_spring_beside_lanes_with_friction():
+    """The force on the second block grows from exactly nothing, and so does what its friction could hold."""
+    k, dt = 2.23, 0.002
+    pair = Rectilinear2(m_1=0.0097, m_2=0.0076, k_12=k)
+    u = np.where(np.arange(1000) < 50, 0.0, 0.5)
+    x = simulate(pair, {"f_2c": np.array([0.0, 1e-3])}, np.zeros((2, 4)), u, dt, samples=1001, substeps=10)
+    A = np.array([[0, 1, 0, 0], [-k / 0.0097, 0, k / 0.0097, 0], [0, 0, 0, 1], [k / 0.0076, 0, -k / 0.0076, 0]])
+    times = dt * np.arange(1001)
+    expected = lsim(
+        (A, [[0], [1 / 0.0097], [0], [0]], np.eye(4), np.zeros((4, 1))), np.append(u, 0.5), times, interp=False
+    )
+    assert np.allclose(x[:, :, 0], expected[1], rtol=1e-7, atol=1e-7)  # fourth order, 0.2 ms, a mode of 23 rad/s
 
 
 def test_a_force_between_the_coulomb_and_the_stiction_level_moves_only_what_moves(block):

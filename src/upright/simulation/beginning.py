@@ -24,7 +24,8 @@ def start(w: Writer) -> None:
         i = j.coordinate
         if i in (*f.dry, *f.dahl):
             w.add(f"_c = {j.coulomb or '0.0'}", f"_level = {j.stiction or '0.0'}")
-            w.add(f"{{_Fc{i}}} = _c", f"{{_Fs{i}}} = _level if _level > _c else _c")
+            # not zero: what holds at rest with nothing at all would be on its border for ever
+            w.add(f"{{_Fc{i}}} = _c", f"{{_Fs{i}}} = max(_level if _level > _c else _c, 1e-300)")
         if i in f.drag:
             w.add(f"{{_cq{i}}} = {j.quadratic}")
         for name, on, text in (("_iv", f.stribeck, j.stribeck_speed), ("_id", f.dahl, j.presliding)):
