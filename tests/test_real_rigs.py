@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 import os
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 
 import pytest
 
@@ -38,7 +37,8 @@ def test_a_real_rig_is_explained_and_predicted(name):
     if any(a.how == "left out" for a in asked):
         left_out = cross_validate(fit, study.runs).predicted
     reached = {a: a.reached(left_out if a.how == "left out" else fit.runs) for a in asked}
-    assert {a: values for a, values in reached.items() if not a.met(values)} == {}
+    # what is known to be missed has to be missed still, or the published reason is out of date
+    assert {a: values for a, values in reached.items() if a.met(values) is bool(a.missed)} == {}
     assert fit.trusted, fit.verdict
     if name in MODES:
         ((at, mode),) = [(at, p) for at, poles in fit.poles.items() for p in poles if p.imag.value > 0]
@@ -46,15 +46,14 @@ def test_a_real_rig_is_explained_and_predicted(name):
         assert 0.98 * MODES[name] < low < MODES[name] < high < 1.02 * MODES[name], at
 
 
-def test_a_run_that_excites_itself_is_named_and_left_out():
+def test_a_run_that_excites_itself_is_named_and_left_out(tmp_path):
     """Its authors' cart swings ever wider while the volts are on, from 5 to 10 s of the log, and dies down after."""
-    text = (STUDIES / "ecp210_cart_1.toml").read_text()
+    text = (STUDIES / "ecp210_cart_1.toml").read_text(encoding="utf-8")
     asked = load_study(STUDIES / "ecp210_cart_1.toml", data=DATA)
     strange = Path(DATA) / "ecp210_rectilinear_ucsd_1khz" / "07-Feb-2025 09_26_10.txt"
-    with NamedTemporaryFile("w", suffix=".toml") as file:
-        file.write(f'{text}\n[[runs]]\nlabel = "9:26"\nfile = "{strange}"\n')
-        file.flush()
-        study = load_study(file.name, data=DATA)
+    more = f'{text}\n[[runs]]\nlabel = "9:26"\nfile = "{strange.as_posix()}"\n'
+    (tmp_path / "more.toml").write_text(more, encoding="utf-8")
+    study = load_study(tmp_path / "more.toml", data=DATA)
     fit, clean = identify(study.rig, study.runs), identify(asked.rig, asked.runs)
     (told,) = [w for w in fit.warnings if w.startswith("Outlier")]
     assert told.startswith("Outlier: 9:26, 5.")

@@ -18,6 +18,7 @@ from upright.identification.conventions import doubts
 from upright.identification.descent import Descent, Report, grow
 from upright.identification.ladder import choose
 from upright.identification.model import Fit, Rig, Run
+from upright.identification.moments import other_moments
 from upright.identification.pose import pose
 from upright.identification.predictor_setup import with_noise
 from upright.identification.problem import Problem
@@ -94,7 +95,7 @@ def identify(
                 starts = [placed(problem, s) for s in closed_form_starts(rig, seen)]
                 other = explain(problem, starts, log, patient=False) if starts else found
                 found = better(found, other)
-        found = weigh_priors(problem, found)
+        found = weigh_priors(problem, other_moments(problem, found, log))
         if found.interrupted:  # perhaps over a part of the runs
             found = replace(found, normal=problem.normal(found.x))
     except KeyboardInterrupt:

@@ -189,6 +189,8 @@ def _strange(s: Stretches, others: Sequence[Stretches], spread: Mapping[str, flo
             reason, told = SELF_EXCITED, f"{grown}; {told}"
         elif np.count_nonzero(far[here]) >= GROWS:
             reason = UNEXPLAINED
+        elif not np.any(far[here] & s.constant[here]):
+            continue  # the command changed, so that the model of the drive may be what errs
         elif first < 2 or last >= s.start.size - 2:
             reason = TOUCHED.format("start" if first < 2 else "end")
         else:

@@ -25,6 +25,12 @@ MOVES = 0.1
 """when one of its signals still spans this share of what it spans in the whole run."""
 
 
+ASTRAY = 3.0
+"""Percent by which a run may be explained worse once outliers of others are out: more than they could have bent it."""
+
+STAYS = "Without that stretch the other runs were explained worse, so the fit keeps it."
+
+
 def watched(fit: Fit, rig: Rig, runs: Sequence[Run], again: Callable[[Sequence[Run]], Fit]) -> Fit:
     """The fit, or `again` without what the first one found strange; at most twice, as outliers hide each other.
 
@@ -36,7 +42,11 @@ def watched(fit: Fit, rig: Rig, runs: Sequence[Run], again: Callable[[Sequence[R
         left = without(runs, found)
         if not any(r.role == "fit" for r in left) or _same(left, kept):
             break
-        kept, fit = left, again(left)
+        kept, new = left, again(left)
+        if worse(new, first):
+            told = tuple(f"Outlier: {o.sentence}" for o in found)
+            return replace(first, warnings=(*first.warnings, *told, STAYS))
+        fit = new
         if fit.interrupted:
             break
         found = outliers(fit, rig, runs) or found
@@ -57,6 +67,16 @@ def watched(fit: Fit, rig: Rig, runs: Sequence[Run], again: Callable[[Sequence[R
         verdict=f"{fit.verdict} Left out of the fit as outliers, or in part: {names}; see the warnings.",
         seconds=first.seconds + fit.seconds,
         evaluations=first.evaluations + fit.evaluations,
+    )
+
+
+def worse(new: Fit, old: Fit) -> bool:
+    """Whether runs that both were fitted to are explained worse by the new fit: its search then went astray."""
+    both = [label for label, s in new.runs.items() if s.role == "fit" and label in old.runs]
+    return any(
+        percent < old.runs[label].fit_percent[signal] - ASTRAY
+        for label in both
+        for signal, percent in new.runs[label].fit_percent.items()
     )
 
 
