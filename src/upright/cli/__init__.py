@@ -29,6 +29,7 @@ COMMANDS = {
     "design": "Find the gains that hold a rig, and what they are worth in the loop a computer runs.",
     "loadings": "Find stiffness and bare inertia from step responses with known added masses.",
     "plan-inertias": "Say which masses, where and how often, give the tightest stiffness for the fewest runs.",
+    "reproduce": "Regenerate the pole tables of the paper from a few numbers, and show its misprints.",
     "predict": "Score other runs with a model that was fitted before.",
 }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -127,12 +127,12 @@ def _start(rig: RigFile, text: str) -> tuple[float, ...]:
 def _say(done: Designed, files: tuple[Path, Path], source: Path) -> None:
     from rich.markup import escape
 
-    from upright.cli.terminal import console, typed
+    from upright.cli.terminal import console, on_terminal, typed
     from upright.lab import design_page
 
     screen = console()
     for table in (design_page.gain_table(done), design_page.pole_table(done), design_page.way_table(done)):
-        screen.print(_table(table))
+        screen.print(on_terminal(table))
     if done.placement is not None:
         screen.print(
             f"\nFarthest pole from where it was asked: {done.placement.miss:.1g} 1/s. {done.placement.sentence}",
@@ -149,15 +149,3 @@ def _say(done: Designed, files: tuple[Path, Path], source: Path) -> None:
         screen.print(f"- {step.sentence}", soft_wrap=True, markup=False)
         if step.command:
             screen.print(f"    {step.command}", soft_wrap=True, markup=False)
-
-
-def _table(content: Any) -> Any:
-    from rich.markup import escape
-    from rich.table import Table
-
-    table = Table(title=f"\n{content.caption}", title_justify="left", box=None, pad_edge=False, header_style="bold")
-    for i, heading in enumerate(content.headings):
-        table.add_column(escape(heading), justify="right" if i in content.numbers else "left")
-    for row in content.rows:
-        table.add_row(*(escape(cell) for cell in row))
-    return table

@@ -159,3 +159,15 @@ def _plain(text: str) -> str:
     from rich.markup import escape
 
     return escape(text)
+
+
+def on_terminal(content: Any) -> Any:
+    """A table of a page (`report.sections.Table`) for the terminal."""
+    from rich.table import Table
+
+    table = Table(title=f"\n{content.caption}", title_justify="left", box=None, pad_edge=False, header_style="bold")
+    for i, heading in enumerate(content.headings):
+        table.add_column(_plain(heading), justify="right" if i in content.numbers else "left")
+    for row in content.rows:
+        table.add_row(*(_plain(cell) for cell in row))
+    return table

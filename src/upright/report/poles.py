@@ -30,14 +30,15 @@ class Poles:
 
 
 @styled
-def pole_map(kinds: Sequence[Poles], cloud: Roots | None = None, *, within: float = 1.3) -> Figure:
+def pole_map(kinds: Sequence[Poles], cloud: Roots | None = None, *, frame: int = 2) -> Figure:
     """Poles in the s-plane [1/s], the stable half shaded; `cloud` are those of the rigs that the fit allows.
 
-    The view holds the first two kinds; how many poles of the others lie outside is written below.
+    The view holds the first `frame` kinds; how many poles of the others lie outside is written below.
     """
     drawing = figure(4.2, width=6.2)
     ax: Any = drawing.subplots()
-    seen = np.concatenate([k.values for k in kinds[:2]])
+    seen = np.concatenate([k.values for k in kinds[:frame]])
+    within = 1.3
     left, right = within * float(min(seen.real.min(), -1.0)), within * float(max(seen.real.max(), 1.0))
     high = within * float(max(np.abs(seen.imag).max(), 0.25 * (right - left)))
     ax.axvspan(left, 0.0, color=BLUE, alpha=0.06, linewidth=0)

@@ -1,0 +1,135 @@
+"""Do the printed poles of Tables 1 and 2 follow from one plant and one set of weights each?"""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from tests.paper import printed
+from tests.paper.test_errata import possible
+from upright.cli import app
+from upright.design import lqr
+from upright.design.factorization import effort_ratios, recover_locus
+from upright.lab.paper import tables
+from upright.lab.paper.errata import printed_inverted
+from upright.lab.paper.reproduce import reproduce
+from upright.physics import Furuta, chain
+
+
+@cache
+def done():
+    return reproduce(seed=1)
+
+
+def test_the_package_knows_the_tables_as_printed():
+    for ours, paper in ((tables.TABLE_1, printed.TABLE_1), (tables.TABLE_2, printed.TABLE_2)):
+        for text, row in zip(ours, paper, strict=True):
+            np.testing.assert_array_equal(np.sort_complex(tables.poles(text)[0]), np.sort_complex(np.array(row)))
+    assert printed.TABLE_4 == tables.TABLE_4
+    assert printed.STUDENTS == tables.STUDENTS
+
+
+def test_all_32_poles_come_again_below_the_print_s_rounding():
+    assert sum(p.size for t in done().tables for p in t.printed) == 32
+    for table in done().tables:
+        for error in table.errors:
+            assert np.abs(error.real).max() < 1
+            assert np.abs(error.imag).max() < 1
+
+
+def test_each_locus_is_that_of_its_polynomials():
+    """p(s) p(-s) of the regenerated poles, by numpy, is a(s) a(-s) + 2^k N."""
+    for table in done().tables:
+        a = table.locus.a
+        mirror = a * np.array([1, -1, 1, -1, 1])
+        for k, poles in enumerate(table.locus.sets(4)):
+            p = np.poly(poles).real
+            right = np.polymul(a, mirror)[::2] + np.concatenate([[0], 2**k * table.locus.N])
+            np.testing.assert_allclose(np.polymul(p, p * np.array([1, -1, 1, -1, 1]))[::2], right, rtol=1e-9)
+
+
+def test_the_plants_recovered_are_those_of_the_paper_s_rigs():
+    """Known otherwise: undamped unstable pole 7.981 rad/s; flexible mode 27.11 rad/s with damping ratio 0.038."""
+    first, second = (t.locus for t in done().tables)
+    assert np.sqrt(-first.a[2]) == pytest.approx(7.981, abs=5e-4)
+    flexible = max(np.roots(second.a), key=lambda s: s.imag)
+    assert abs(flexible) == pytest.approx(27.11, abs=0.03)
+    assert -flexible.real / abs(flexible) == pytest.approx(0.038, abs=0.003)
+
+
+@pytest.mark.parametrize("table", [0, 1])
+def test_the_effort_got_cheaper_by_two_from_set_to_set(table):
+    np.testing.assert_allclose(done().tables[table].ratios, 2, atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("plant", "at", "Q", "free"),
+    [
+        (Furuta(m_p=0.2, l_cg=0.15, r=0.2, J_d=0.01, J_p=5e-4), "inverted", [3.0, 0.2, 5.0, 0.4], (2,)),
+        (
+            chain(2, "torsional")(J_1=0.0108, J_2=0.0103, k_12=1.37, c_1=0.02, c_2=0.004),
+            "rest", [2.0, 0.01, 1.0, 0.02], (3, 2, 1),
+        ),
+    ],
+)  # fmt: skip
+def test_a_plant_is_read_from_its_poles(plant, at, Q, free):
+    """Sets made by scipy's Riccati solver, rounded to four decimals; the plant's polynomial is known."""
+    model = plant.linear(at)
+    sets = [np.round(np.linalg.eigvals(model.A - model.B @ lqr(model.A, model.B, Q, R)), 4) for R in (0.4, 0.2, 0.1)]
+    np.testing.assert_allclose(effort_ratios(sets), 2, atol=0.02)  # as rounding leaves it in the paper's own tables
+    locus = recover_locus(sets, [np.full(4, 5e-5 * (1 + 1j))] * 3, free=free)
+    np.testing.assert_allclose(locus.a, np.poly(model.A), rtol=2e-3, atol=2e-3)
+
+
+def test_a_diagonal_q_makes_table_1_on_a_rig_of_that_frequency():
+    """A Furuta with the hanging rod at w_h and the coupled pole of Table 1: scipy's regulator gives set 1."""
+    first = done().tables[0]
+    omega = np.sqrt(-first.locus.a[2])
+    w_h = sorted(done().weights)[len(done().weights) // 2]
+    # J_A and m_p l_cg g fix w_h; r fixes how far coupling raises it: w^2 = w_h^2 J_A J/(J_A J - (m_p l_cg r)^2)
+    m_p, l_cg, J_d = 0.2, 0.15, 0.01
+    J_A = m_p * 9.81 * l_cg / w_h**2
+    share = 1 - w_h**2 / omega**2  # (m_p l_cg r)^2 / (J_A J), J = J_d + m_p r^2
+    r = np.sqrt(share * J_A * J_d / ((m_p * l_cg) ** 2 - share * J_A * m_p))
+    model = Furuta(m_p=m_p, l_cg=l_cg, r=r, J_d=J_d, J_p=J_A - m_p * l_cg**2).linear("inverted")
+    gains = np.array([model.B[1, 0], model.B[1, 0], model.B[3, 0], model.B[3, 0]]) ** 2
+    poles = np.linalg.eigvals(model.A - model.B @ lqr(model.A, model.B, done().weights[w_h] / gains, 1.0))
+    np.testing.assert_allclose(np.sort_complex(poles), np.sort_complex(np.array(printed.TABLE_1[0])), atol=2e-4)
+
+
+def test_each_erratum_is_shown_on_every_rig():
+    assert [e.number for e in done().errata] == [1, 2, 3, 4, 5]
+    assert all(e.shown for e in done().errata)
+
+
+def test_equation_2_in_numbers_is_equation_2_as_printed():
+    import sympy as sp
+
+    rig = Furuta(m_p=0.2, l_cg=0.15, r=0.2, J_d=0.01, J_p=5e-4, b_1=0.007, b_2=3e-4)
+    values = {sp.Symbol(n, real=True): v for n, v in rig.parameters().items()}
+    A, b = printed_inverted(rig)
+    np.testing.assert_allclose(A, np.array(printed.A_2().subs(values), dtype=float), rtol=1e-12)
+    np.testing.assert_allclose(b, np.array(printed.B_2().subs(values), dtype=float)[:, 0], rtol=1e-12)
+
+
+def test_impossible_means_are_counted_as_elsewhere():
+    means = [mean for row in printed.TABLE_4 for mean in row]
+    for n, count in done().impossible.items():
+        shares = sum(not possible(str(share), n, step=100) for share in printed.TABLE_3[0][:2])
+        assert count == sum(not possible(mean, n) for mean in means) + shares
+
+
+def test_the_command_writes_page_and_numbers(tmp_path):
+    outcome = CliRunner().invoke(app, ["reproduce", "--json", "-o", str(tmp_path)])
+    assert outcome.exit_code == 0, outcome.stderr
+    found = json.loads(outcome.stdout)
+    assert max(t["worst_in_roundings"] for t in found["tables"]) < 1
+    page = (tmp_path / "reproduce.html").read_text(encoding="utf-8")
+    assert page.count("<svg") == 4
+    assert "http" not in page.replace("http://www.w3.org", "")
+    told = CliRunner().invoke(app, ["reproduce", "-o", str(tmp_path)], terminal_width=200).stdout
+    assert "What next" in told
