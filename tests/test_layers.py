@@ -21,11 +21,12 @@ MAY_IMPORT = {
     "design": BASE | {"physics"},
     "simulation": {"errors", "quantities", "physics"},
     "identification": BASE | {"records", "readers", "physics", "simulation"},
+    "survey": BASE,
     "doctor": BASE | {"records", "readers", "physics", "simulation", "identification"},
-    "report": BASE | {"records", "readers", "physics", "design", "simulation", "identification", "doctor"},
+    "report": BASE | {"survey", "records", "readers", "physics", "design", "simulation", "identification", "doctor"},
     "lab": BASE | {"records", "readers", "physics", "design", "simulation", "identification", "report"},
     "cli": BASE
-    | {"records", "readers", "physics", "design", "simulation", "identification", "doctor", "report", "lab"},
+    | {"survey", "records", "readers", "physics", "design", "simulation", "identification", "doctor", "report", "lab"},
     "__main__": {"cli"},
     "__init__": BASE | {"records", "readers", "physics", "simulation", "identification", "doctor", "report", "lab"},
 }

@@ -30,6 +30,7 @@ COMMANDS = {
     "loadings": "Find stiffness and bare inertia from step responses with known added masses.",
     "plan-inertias": "Say which masses, where and how often, give the tightest stiffness for the fewest runs.",
     "reproduce": "Regenerate the pole tables of the paper from a few numbers, and show its misprints.",
+    "survey": "Evaluate ratings before and after a course; check printed means and percentages.",
     "predict": "Score other runs with a model that was fitted before.",
 }
 
