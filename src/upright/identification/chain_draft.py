@@ -21,6 +21,9 @@ COUNTS = {
     "rad": ("counts_per_rev", 16000.0, "ECP 205 has 16000"),
     "m": ("counts_per_m", 226629.0, "ECP 210 has 16000 counts per 7.06 cm"),
 }
+REACH = 10.0
+"""Volts that ECP's converter can put out; its log shows what the program asked for."""
+
 _SI = {"mm": 1e-3, "deg": float(np.pi / 180)}
 
 
@@ -76,6 +79,7 @@ def _starts(record: Record, sight: Sight, plant: type[Plant]) -> Starts:
     return starts(
         record.t[rows], _command(record, sight, rows), bodies, free,
         disks=sight.found.plant.startswith("tors"), quanta=quanta, loop=sight.reference is not None,
+        reach=REACH if sight.found.drive is not None and volts(sight)[1] != 1.0 else np.inf,
     )  # fmt: skip
 
 
@@ -163,6 +167,8 @@ def _drive(record: Record, sight: Sight, plant: type[Plant], start: Starts) -> s
         )
     else:
         lines.append(f'# damping = {{ guess = "0 {damping}", min = 0 }}   # of the drive while commanded')
+    if start.limit:
+        lines.append(f'limit = {{ guess = "{start.limit:.3g} {unit}", min = 0 }}   # the bodies feel no more than that')
     hidden = "" if sight.found.plant.startswith("tors") and not sight.loop else "# "
     lines.append(f'{hidden}delay = {{ guess = "2 ms", max = "50 ms" }}')
     return "\n".join(lines) + "\n"

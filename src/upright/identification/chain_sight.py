@@ -84,7 +84,7 @@ def look(record: Record, seen: Inspection, found: Recognised, *, named: bool, pa
         told = [told[0].partition(";")[0].replace("rectilinear", kind).replace("torsional", kind)] if told else []
         told = [d.removesuffix(".") + f", since {why}; otherwise --plant {other}-{len(columns)}." for d in told]
     names = [c.name for c in find(plant).coordinates]
-    windows, loop = [_driven(record, seen, at)], ""
+    windows, loop = [_driven(record, seen, at, disks=plant.startswith("tors"))], ""
     if drive is None:
         windows = releases(t, most) or [found.window]
     elif reference is not None:
@@ -185,13 +185,14 @@ def _drive(record: Record, found: Recognised, reference: Column | None) -> tuple
     return drive, []
 
 
-def _driven(record: Record, seen: Inspection, at: int) -> tuple[float, float]:
+def _driven(record: Record, seen: Inspection, at: int, *, disks: bool) -> tuple[float, float]:
     """From just before the first command to where everything lies still at the end."""
     t = record.t
     start = float(t[max(at - int(0.05 / record.period) - 1, 0)])
     end = float(t[-1])
     last = next((s for s in reversed(seen.rests) if s[1] >= end - 0.05 * (end - float(t[0]))), None)
-    if last is not None and last[0] > start + 0.1 * (end - float(t[0])):
+    # where springs leave a cart tells its friction, so its rest stays in; where a disk stopped says no more
+    if disks and last is not None and last[0] > start + 0.1 * (end - float(t[0])):
         return start, min(end, last[0] + 0.5)
     return start, end
 

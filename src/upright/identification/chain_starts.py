@@ -17,25 +17,40 @@ from upright.identification.happenings import swing_frequency
 from upright.identification.smoothing import savitzky_golay
 from upright.identification.trips import find_trip
 
+RESOLVED = 0.003
+"""Sample period [s] above which the braking of a drive, built up in some 30 ms, is not seen and not asked for."""
+
+PASSES = 0.1
+"""Share of its range that a converter's amplifier may pass when more is asked than the range; where a search begins."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Starts:
     """Where the search for each number of a chain begins, in SI.
 
     `numbers` by the plant's own names; `braked` [force per speed]: damping that acts with the volts on alone, 0 when
-    they never go off; `trips`: whether the drive went off although it is logged as on; `fastest`: angular frequency
-    [rad/s] of the fastest swing, 0 for none; `speed`: largest of body 1.
+    they never go off; `trips`: whether the drive went off although it is logged as on; `limit`: of the command, 0 where
+    it stays within reach; `fastest`: angular frequency [rad/s] of the fastest swing; `speed`: largest of body 1.
     """
 
     numbers: dict[str, float]
     braked: float
     trips: bool
+    limit: float
     fastest: float
     speed: float
 
 
 def starts(
-    t: Array, u: Array | None, bodies: list[Array], free: list[bool], *, disks: bool, quanta: list[float], loop: bool
+    t: Array,
+    u: Array | None,
+    bodies: list[Array],
+    free: list[bool],
+    *,
+    disks: bool,
+    quanta: list[float],
+    loop: bool,
+    reach: float = np.inf,
 ) -> Starts:
     """Starts for a chain.
 
@@ -55,6 +70,8 @@ def starts(
         Resolution of each [SI].
     loop : bool
         Whether `u` follows from the motion: trips are not looked for.
+    reach : float
+        Largest command that can be put out at all.
     """
     dt = float(t[-1] - t[0]) / (t.size - 1)
     moving = max((x for x, f in zip(bodies, free, strict=True) if f), key=lambda x: float(np.ptp(x)))
@@ -63,7 +80,9 @@ def starts(
     m = "J" if disks else "m"
     command = u if u is not None else np.zeros(t.size)
     motion = [savitzky_golay(y, dt, width) for y in bodies]
-    push = savitzky_golay(u, dt, width).q if u is not None else None
+    limit = PASSES * reach if u is not None and np.abs(u).max() > reach else 0.0
+    command = np.clip(command, -limit, limit) if limit else command
+    push = savitzky_golay(command, dt, width).q if u is not None else None
     numbers: dict[str, float] = {}
     w = _frequencies(t, bodies, free)
     inertia = 1.0
@@ -86,7 +105,7 @@ def starts(
             assert push is not None
             on = savitzky_golay(np.where(command != 0, savitzky_golay(bodies[0], dt, width).v, 0.0), dt, width).q
             names, columns = [*names, "u"], [*columns, push]
-            if 0.1 < float(np.mean(command != 0)) < 0.95 and not loop:
+            if 0.1 < float(np.mean(command != 0)) < 0.95 and not loop and dt < RESOLVED:
                 names, columns = [*names, "on"], [*columns, -on]
         names, columns = [*names, "constant"], [*columns, np.ones_like(mo.a)]
         edge = slice(mo.edge, -mo.edge or None)
@@ -94,7 +113,9 @@ def starts(
         value = dict(zip(names, slopes.tolist(), strict=True))
         error = dict(zip(names, errors.tolist(), strict=True))
         if driven:
-            inertia = 1 / value["u"] if value["u"] > 2 * error["u"] else _by_first_motion(t, command, bodies[0])
+            inertia = (
+                1 / value["u"] if value["u"] > 2 * error["u"] and not limit else _by_first_motion(t, command, bodies[0])
+            )
             # braking that builds up late looks like none, so it is asked wherever the volts go off
             braked = inertia * max(value["on"], 0.2 * abs(value["c"]), 0.1 * w) if "on" in value else 0.0
         if i > 0 and numbers.get(f"k_{i}{n}") and value["k_left"] > 0:
@@ -116,7 +137,8 @@ def starts(
         others = [y for y, f in zip(bodies[1:], free[1:], strict=True) if f]
         trips = find_trip(t, u, bodies[0], others, quantum=quanta[0]) is not None
     return Starts(
-        numbers=numbers, braked=braked, trips=trips, fastest=w, speed=float(np.abs(motion[0].v).max()),
+        numbers=numbers, braked=braked, trips=trips,
+        limit=limit, fastest=w, speed=float(np.abs(motion[0].v).max()),
     )  # fmt: skip
 
 
