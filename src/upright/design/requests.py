@@ -124,6 +124,8 @@ def lost_modes(A: Array, B: Array) -> list[complex]:
 def written(poles: ArrayLike, digits: int = 5) -> str:
     """Poles as a person writes them: ``-4.1484±1.6341j, -16.855``; conjugate pairs once."""
     left = [complex(p) for p in np.atleast_1d(np.asarray(poles, dtype=np.complex128))]
+    nothing = 1e-13 * max((abs(p) for p in left), default=0.0)  # what rounding makes of a pole at 0
+    left = [0j if abs(p) <= nothing else p for p in left]
     out: list[str] = []
     while left:
         p = left.pop(0)

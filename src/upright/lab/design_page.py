@@ -33,10 +33,13 @@ def gain_table(done: Designed) -> Table:
     sampled = done.sampled_gains
     rows = tuple(
         (plain(name), number(k, 5), *((number(sampled[0, i], 5),) if sampled is not None else ()), _per(command, unit))
-        for i, (name, k, unit) in enumerate(zip(done.model.states, done.K[0], state_units(done), strict=True))
-    )
-    used = "used" if not done.wish.sampled else "used (sampled)"
-    headings = ("state", f"K, {used}", *(("K for the sampled loop",) if sampled is not None else ()), "unit")
+        for i, (name, k, unit) in enumerate(
+            zip(done.model.states, done.continuous[0], state_units(done), strict=True)
+        )
+    )  # fmt: skip
+    marks = ("", " (used)") if done.wish.sampled else (" (used)", "")
+    second = ("K, sampled" + marks[1],) if sampled is not None else ()
+    headings = ("state", "K, continuous" + marks[0], *second, "unit")
     caption = "Gains of u = −K x" + (f", prefilter k_pf = {number(done.k_pf)}" if done.k_pf is not None else "")
     return Table(caption=caption, headings=headings, rows=rows, numbers=tuple(range(1, len(headings) - 1)))
 
@@ -48,7 +51,9 @@ def pole_table(done: Designed) -> Table:
         rows.append(("asked", written(done.placement.asked)))
         rows.append(("attained, continuous", written(done.placement.attained)))
     else:
-        rows.append(("least cost, continuous", written(np.linalg.eigvals(done.model.A - done.model.B @ done.K))))
+        rows.append(
+            ("least cost, continuous", written(np.linalg.eigvals(done.model.A - done.model.B @ done.continuous)))
+        )
     seen, beyond = seen_poles(done)
     rows.append(("loop as it runs", written(seen, 4) + (f", and {beyond} faster" if beyond else "")))
     return Table(caption="Poles [1/s]", headings=("", "poles"), rows=tuple(rows))
@@ -163,7 +168,7 @@ def next_steps(done: Designed, source: str, folder: str) -> list[Step]:
 def _wanted(done: Designed) -> Any:
     if done.placement is not None:
         return done.placement.asked
-    return np.linalg.eigvals(done.model.A - done.model.B @ done.K)
+    return np.linalg.eigvals(done.model.A - done.model.B @ done.continuous)
 
 
 def write(done: Designed, path: Path, source: str) -> Path:

@@ -60,13 +60,18 @@ class Way:
 
 @dataclass(frozen=True, kw_only=True)
 class Designed:
-    """Gains and what they are worth; `placement` is None for gains of least cost."""
+    """Gains and what they are worth.
+
+    K are the gains in force: the `continuous` ones of placement or least cost (`placement` is None then), or the
+    `sampled_gains`, whose poles are met in the loop as it runs.
+    """
 
     rig: RigFile
     wish: Wish
     model: Linear
     sampled: Sampled
     K: Array
+    continuous: Array
     placement: Placement | None
     sampled_gains: Array | None
     R: float | None
@@ -163,9 +168,9 @@ def design_for(rig: RigFile, wish: Wish) -> Designed:
     ways = tuple(_way(model, sampled, e, used, wish) for e in estimators)
     cloud, chance = _cloud(rig, wish, sampled, law)
     return Designed(
-        rig=rig, wish=wish, model=model, sampled=sampled, K=used, placement=placement, sampled_gains=gains, R=R,
-        law=law, poles=to_s(poles_of(closed(sampled, law)), wish.period), ways=ways, k_pf=k_pf,
-        peak=float(np.abs(swing[2]).max()), swing=swing, chance=chance, cloud=cloud,
+        rig=rig, wish=wish, model=model, sampled=sampled, K=used, continuous=K, placement=placement,
+        sampled_gains=gains, R=R, law=law, poles=to_s(poles_of(closed(sampled, law)), wish.period), ways=ways,
+        k_pf=k_pf, peak=float(np.abs(swing[2]).max()), swing=swing, chance=chance, cloud=cloud,
     )  # fmt: skip
 
 
