@@ -58,7 +58,11 @@ def answer(
         estimates[name] = Estimate(
             value=0.0, stderr=0.0, interval=(0.0, 0.0), unit=asked.parameters[name].unit, status="left out"
         )
-        warnings.append(f"{name} was left out: with it the held-out part of the runs is not predicted better.")
+        warnings.append(
+            f"{name} was left out: shorter than the encoder's rounding, it is plain Coulomb friction."
+            if name in log.unresolved
+            else f"{name} was left out: with it the held-out part of the runs is not predicted better."
+        )
     estimates = {n: estimates[n] for n in [*asked.parameters] if n in estimates}
     if not found.interrupted:
         estimates = doubted(estimates, asked, chosen, problem, x, spread, left_out, log)

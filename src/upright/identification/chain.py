@@ -39,7 +39,7 @@ class Log:
 
     `best` holds the problem last worked on and where in it the search stood.
 
-    `rivals` are values of another model that the data do not refuse.
+    `rivals` are values of another model that the data do not refuse, `unresolved` lengths below the rounding.
     `doubts` says which conventions look wrong; asked only when a fit is poor, since no search mends a reversed sign.
     """
 
@@ -48,6 +48,7 @@ class Log:
     best: tuple[Problem, Array] | None = None
     warnings: list[str] = field(default_factory=list[str])
     rivals: dict[str, float] = field(default_factory=dict[str, float])
+    unresolved: tuple[str, ...] = ()
     doubts: Callable[[], Sequence[str]] = tuple
 
     def keep(self, problem: Problem) -> Callable[[Array], None]:

@@ -19,9 +19,10 @@ from upright.identification.descent import Descent, Report, grow
 from upright.identification.ladder import choose
 from upright.identification.model import Fit, Rig, Run
 from upright.identification.moments import other_moments
-from upright.identification.pose import pose
+from upright.identification.pose import pose, unresolved
 from upright.identification.predictor_setup import with_noise
 from upright.identification.problem import Problem
+from upright.identification.rungs import without
 from upright.identification.scoring import fit_percent, predict
 from upright.identification.simplex import simplex
 from upright.identification.trips import located, untold
@@ -95,7 +96,15 @@ def identify(
                 starts = [placed(problem, s) for s in closed_form_starts(rig, seen)]
                 other = explain(problem, starts, log, patient=False) if starts else found
                 found = better(found, other)
-        found = weigh_priors(problem, other_moments(problem, found, log))
+        found = other_moments(problem, found, log)
+        plain = () if found.interrupted else unresolved(problem, found.x)
+        if plain:  # kept at their bound they would bias everything else
+            log.unresolved = plain
+            left_out += plain
+            chosen, wider = without(chosen, plain), (problem, found.x)
+            problem = pose(chosen, seen)
+            found = grow(problem, carried(*wider, problem), report=progress, history=log.history, horizon=math.inf)
+        found = weigh_priors(problem, found)
         if found.interrupted:  # perhaps over a part of the runs
             found = replace(found, normal=problem.normal(found.x))
     except KeyboardInterrupt:

@@ -14,12 +14,15 @@ from upright.identification.normal import Normal
 from upright.identification.nuisances import run_unknowns
 from upright.identification.problem import Problem
 from upright.identification.tracks import prepare
-from upright.identification.unknowns import base_values, friction_names, shared_unknowns
+from upright.identification.unknowns import Unknown, base_values, friction_names, shared_unknowns
 
 Array = NDArray[np.float64]
 
 STEP = 1e-5
 """A perturbed number moves the weighted outputs by about this much, root mean square."""
+
+ROUNDING = 12**-0.5
+"""Standard deviation of the rounding to steps of one."""
 
 
 def pose(
@@ -36,7 +39,7 @@ def pose(
     and name.
     """
     tracks = [prepare(rig, run, thin=thin) for run in runs]
-    unknowns = shared_unknowns(rig)
+    unknowns = visible(rig, runs, shared_unknowns(rig))
     own = [run_unknowns(rig, i, t.run, t.start) for i, t in enumerate(tracks)] if not only_shared else []
     for u in (u for found in own for u in found):
         place = next((i for i, o in enumerate(unknowns) if u.group and (o.name, o.group) == (u.name, u.group)), None)
@@ -57,6 +60,39 @@ def pose(
         friction=friction_names(rig),
         steps=steps,
     )
+
+
+def visible(rig: Rig, runs: Sequence[Run], unknowns: Sequence[Unknown]) -> list[Unknown]:
+    """The numbers sought, presliding lengths no shorter than `ROUNDING` of the finest encoder step that sees them.
+
+    The effect of shorter ones on the outputs comes from where the steps of the integration happen to fall: differences
+    of simulations then are noise, and a matrix of such differences promises intervals far too narrow.
+    """
+    least = _shortest(rig, runs)
+    return [
+        replace(u, lower=least[u.name], value=max(u.value, least[u.name]))
+        if u.asked and u.lower < least.get(u.name, 0.0) <= u.upper
+        else u
+        for u in unknowns
+    ]
+
+
+def unresolved(problem: Problem, x: Array) -> tuple[str, ...]:
+    """Presliding lengths at coordinates `x` that the encoder does not tell from plain Coulomb friction."""
+    least = _shortest(problem.rig, [track.run for track in problem.tracks])
+    return tuple(
+        u.name
+        for u, value in zip(problem.unknowns, problem.value(x), strict=True)
+        if u.asked and u.name in least and u.lower == least[u.name] and value <= u.lower * (1 + 1e-6)
+    )
+
+
+def _shortest(rig: Rig, runs: Sequence[Run]) -> dict[str, float]:
+    """Least presliding length worth telling, by its name."""
+    derived = rig.plant.derived()
+    seen = [pair for run in runs for pair in zip(run.measured, run.quantum, strict=False)]
+    steps = {c: min((quantum for name, quantum in seen if name == c), default=0.0) for c in derived.coordinates}
+    return {j.presliding: ROUNDING * steps[derived.coordinates[j.coordinate]] for j in derived.joints if j.presliding}
 
 
 def settle_steps(problem: Problem, x: Array, horizon: float) -> Normal:
