@@ -99,6 +99,7 @@ def test_least_cost_uses_up_the_limit(study, tmp_path):
     outcome = design(study, "--lqr", "1,0,1,0", "--limit", "0.5", "--start", "theta=4 deg", "--json", "-o", tmp_path)
     assert outcome.exit_code == 0, outcome.stderr
     assert json.loads(outcome.stdout)["peak_command"] == pytest.approx(0.5, rel=1e-6)
+    assert "as the effort gets cheaper" in (tmp_path / "design.html").read_text(encoding="utf-8")
 
 
 def test_sampled_gains_meet_the_poles_in_the_loop_as_it_runs(study, tmp_path):

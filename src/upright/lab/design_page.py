@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from upright.design.lqr import locus
 from upright.design.requests import written
 from upright.lab.designing import Designed, Way
 from upright.report.advice import Step
-from upright.report.document import picture
+from upright.report.document import Picture, picture
 from upright.report.drawing import BLACK, BLUE, VERMILLION
-from upright.report.poles import Poles, pole_map, swing_figure
+from upright.report.poles import Poles, locus_figure, pole_map, swing_figure
 from upright.report.sections import Part, Table, write_sections
 from upright.report.symbols import number, percent, plain
 from upright.report.symbols import unit as raised
@@ -171,6 +172,23 @@ def _wanted(done: Designed) -> Any:
     return np.linalg.eigvals(done.model.A - done.model.B @ done.continuous)
 
 
+def _locus(done: Designed) -> list[Picture]:
+    """Poles of least cost as the effort's weight varies, a hundredfold either way of the one chosen."""
+    if done.R is None:
+        return []
+    weights = done.wish.weights or (1.0,) * done.model.A.shape[0]
+    tracks = locus(done.model.A, done.model.B, weights, done.R * np.geomspace(100, 0.01, 300))
+    drawing = locus_figure(tracks, {"chosen": np.asarray(_wanted(done))}, done.model.poles())
+    return [
+        picture(
+            drawing, "locus",
+            caption="Poles of least cost as the effort gets cheaper, from a hundred times the weight chosen to a "
+            "hundredth.",
+            description=f"Chosen: R = {number(done.R)}, poles {written(_wanted(done), 4)}.",
+        )
+    ]  # fmt: skip
+
+
 def write(done: Designed, path: Path, source: str) -> Path:
     """Write `design.html`."""
     unit = done.rig.unit
@@ -198,7 +216,7 @@ def write(done: Designed, path: Path, source: str) -> Path:
     )  # fmt: skip
     parts = [
         Part(title="Gains", sentences=tuple(about), tables=(gain_table(done), pole_table(done))),
-        Part(title="Poles", sentences=sure, pictures=(map_picture,)),
+        Part(title="Poles", sentences=sure, pictures=(map_picture, *_locus(done))),
         Part(
             title="The loop as it runs",
             sentences=(

@@ -134,7 +134,7 @@ def design_for(rig: RigFile, wish: Wish) -> Designed:
         When what is asked cannot be had; the sentence says why.
     """
     model = rig.linear(wish.at)
-    start = np.array(wish.start) if wish.start else _tilt(model)
+    start = np.array(wish.start) if wish.start else _tilt(rig)
     if model.B.shape[1] != 1:
         raise BadInput(f"upright design is for one input, and this plant has {model.B.shape[1]}; use design.place.")
     sampled = design.hold(model, wish.period, wish.delay + rig.late / wish.period)
@@ -174,10 +174,10 @@ def design_for(rig: RigFile, wish: Wish) -> Designed:
     )  # fmt: skip
 
 
-def _tilt(model: Linear) -> Array:
-    """Five degrees (or 5 cm) of the last coordinate."""
-    x = np.zeros(model.A.shape[0])
-    x[-2] = math.radians(5)
+def _tilt(rig: RigFile) -> Array:
+    """Five degrees, or 5 cm, of the last coordinate."""
+    x = np.zeros(2 * len(rig.plant.coordinates))
+    x[-2] = math.radians(5) if rig.plant.coordinates[-1].unit == "rad" else 0.05
     return x
 
 

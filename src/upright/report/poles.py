@@ -88,8 +88,8 @@ def swing_figure(
 
 
 @styled
-def locus_figure(tracks: Roots, printed: Sequence[Roots], open_loop: Roots) -> Figure:
-    """Poles as the effort's weight falls, shape (weights, n), with printed sets of poles on them.
+def locus_figure(tracks: Roots, sets: dict[str, Roots], open_loop: Roots, *, origin: str = "open loop") -> Figure:
+    """Poles as the effort's weight falls, shape (weights, n), with up to four named sets of poles on them.
 
     Only the upper half plane is drawn; the lower mirrors it.
     """
@@ -102,17 +102,18 @@ def locus_figure(tracks: Roots, printed: Sequence[Roots], open_loop: Roots) -> F
         label = "poles of least cost as effort gets cheaper" if i == 0 else None
         ax.plot(upper.real, upper.imag, ".", color=BLUE, markersize=1.5, label=label)
     upper = open_loop[open_loop.imag >= -1e-9]
-    ax.plot(upper.real, upper.imag, "x", color=GREY, markersize=7, markeredgewidth=1.5, label="open loop, recovered")
-    for i, (poles, mark) in enumerate(zip(printed, "osD^", strict=False)):
+    ax.plot(upper.real, upper.imag, "x", color=GREY, markersize=7, markeredgewidth=1.5, label=origin)
+    for (name, poles), mark in zip(sets.items(), "osD^", strict=False):
         upper = poles[poles.imag >= 0]
         ax.plot(
             upper.real, upper.imag, mark, color=VERMILLION, markerfacecolor="none", markersize=8, markeredgewidth=1.4,
-            linestyle="none", label=f"printed, set {i + 1}",
+            linestyle="none", label=name,
         )  # fmt: skip
-    every = np.concatenate([*printed, open_loop])
+    every = np.concatenate([*sets.values(), open_loop])
     wide = float(np.ptp(every.real))
     ax.set_xlim(every.real.min() - 0.08 * wide, every.real.max() + 0.08 * wide)
-    ax.set_ylim(-0.06 * every.imag.max(), 1.15 * every.imag.max())
+    high = max(float(every.imag.max()), 0.1 * wide)
+    ax.set_ylim(-0.06 * high, 1.15 * high)
     ax.set_xlabel("real part [1/s]")
     ax.set_ylabel("imaginary part [rad/s]")
     ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))

@@ -110,7 +110,9 @@ def _locus_picture(table: Regenerated, name: str) -> Any:
     rows = [table.locus.poles(float(c)) for c in cheaper]
     for i in range(1, len(rows)):
         rows[i] = matched(rows[i - 1], rows[i])
-    drawing = locus_figure(np.array(rows), table.printed, np.roots(table.locus.a).astype(np.complex128))
+    sets = {f"printed, set {i + 1}": poles for i, poles in enumerate(table.printed)}
+    open_loop = np.roots(table.locus.a).astype(np.complex128)
+    drawing = locus_figure(np.array(rows), sets, open_loop, origin="open loop, recovered")
     return picture(
         drawing, name,
         caption=f"{table.name}. All four printed sets lie on the locus of one plant and one Q, with R halved from set "
