@@ -22,6 +22,8 @@ def test_twins_are_weighed_within_one_percent(kind):
         for found, truth in ((done.found.k, done.on.stiffness), (done.found.bare, done.on.bare)):
             assert found.value == pytest.approx(truth, rel=1e-2)
             held.append(found.interval[0] <= truth <= found.interval[1])
+        assert done.found.damping.value == pytest.approx(done.on.truth.parameters()["c_1"], rel=1e-2)
+        assert abs(done.found.damping.value - done.on.truth.parameters()["c_1"]) < 4 * done.found.damping.stderr
     # twelve pairs that err together: fewer than nine of twelve honest 95 % intervals hold once in 400 times
     assert sum(held) >= 18
 

@@ -52,7 +52,7 @@ class Loadings:
     k, bare : Weighed
         Stiffness [N/m or N m/rad] and inertia of the bare body [kg or kg m^2].
     damping : Weighed
-        Viscous friction ``2 sigma (m_0 + a)`` [N s/m or N m s/rad], over all swings.
+        Viscous friction ``2 sigma k/omega_n^2`` [N s/m or N m s/rad], over all swings.
     y, y_error : (N,) arrays
         ``1/omega_n^2`` [s^2] of each swing and its standard error, repeats considered.
     repeat : float
@@ -182,7 +182,7 @@ def weigh(loaded: Sequence[Loaded], *, tolerance: float = 0.0, piece: float = 0.
         swings=tuple(loaded),
         k=stiffness,
         bare=inertia,
-        damping=_damping(loaded, bare),
+        damping=_damping(loaded, stiffness),
         y=y,
         y_error=error,
         repeat=repeat,
@@ -216,21 +216,21 @@ def _about(value: float, stated: float, widths: tuple[float, float]) -> Weighed:
     return Weighed(value=value, stderr=stated * widths[0], interval=(value - half, value + half))
 
 
-def _damping(loaded: Sequence[Loaded], bare: float) -> Weighed:
-    """Weighted mean over swings."""
-    inertia = np.array([bare + s.added for s in loaded])
-    c = 2 * np.array([s.decay.sigma for s in loaded]) * inertia
-    weight = (2 * np.array([s.decay.sigma_error for s in loaded]) * inertia) ** -2.0
-    value = float(np.average(c, weights=weight))
-    chi = float(weight @ (c - value) ** 2)
-    return _about(value, math.sqrt(1 / float(weight.sum())), _widths(chi, c.size - 1))
+def _damping(loaded: Sequence[Loaded], k: Weighed) -> Weighed:
+    """``c = k (2 sigma/omega_n^2)``, the bracket a weighted mean over swings; both errors count."""
+    square = np.array([s.decay.omega_n for s in loaded]) ** 2
+    g = 2 * np.array([s.decay.sigma for s in loaded]) / square
+    weight = (2 * np.array([s.decay.sigma_error for s in loaded]) / square) ** -2.0
+    mean = float(np.average(g, weights=weight))
+    stated, half = (w / math.sqrt(float(weight.sum())) for w in _widths(float(weight @ (g - mean) ** 2), g.size - 1))
+    reach = math.hypot(k.value * half, mean * (k.interval[1] - k.value))
+    stderr = math.hypot(k.value * stated, mean * k.stderr)
+    return Weighed(value=k.value * mean, stderr=stderr, interval=(k.value * mean - reach, k.value * mean + reach))
 
 
 def _verdict(levels: int, dof: int, chi: float, k: Weighed, bare: Weighed) -> str:
     if bare.interval[0] <= 0:
-        return (
-            "The inertia of the bare body cannot be told from nothing: its interval reaches zero. Add less, or repeat."
-        )
+        return "The bare body's inertia cannot be told from nothing: its interval reaches zero. Add less, or repeat."
     if levels == 2:
         return "Two loadings fix a line but cannot show that it is one; a third would."
     from scipy.stats import chi2
