@@ -24,6 +24,7 @@ class Asked:
 
     `how`: the run was fitted; predicted by a fit that never saw it because its role is "predict"; or left out in turn,
     the others fitted. `over`: every run has to reach it, or the median of the runs. No `runs` means all of that kind.
+    `missed`: why it is not reached; empty for what is.
     `missed` says why it is not reached, where it is not.
     """
 
@@ -110,7 +111,14 @@ ASKED: list[Asked] = [
     *_each("ecp210_releases", {"x_2": 86.0}, ()),
     *_each("ecp210_releases", {"x_2": 85.0}, (), "left out"),
     Asked(study="ecp210_closed_loop", signal="x_1", least=88.0, over="median"),
-    # left out, 86 were asked as well; 83, 89 and 75 are reached: two stick-slip climbs do not tell friction for a third
+    Asked(
+        study="ecp210_closed_loop",
+        signal="x_1",
+        least=86.0,
+        how="left out",
+        missed="where a cart that climbs in stairs stops hangs on what the drive gives at small commands, not known; "
+        "with an offset of the command of each run's own 87, 89 and 93 were reached, but that search did not settle",
+    ),
     *_each("ecp210_export", {"x_1": 95.0, "x_2": 91.0}, ()),
     *_each("ecp210_export", {"x_1": 91.0, "x_2": 89.0}, (), "left out"),
 ]

@@ -83,6 +83,10 @@ def _missed(asked: Asked, reached: dict[str, float]) -> str:
     return "" if asked.met(reached) else ", MISSED"
 
 
+def _why(asked: Asked) -> str:
+    return f"**missed**: {asked.missed}" if asked.missed else "**missed**"
+
+
 def _what(asked: Asked) -> str:
     ahead = f" {1e3 * asked.horizon:g} ms ahead" if asked.horizon is not None else ""
     return f"{asked.signal}{ahead} {asked.how}"
