@@ -10,7 +10,7 @@ import pytest
 
 from upright.identification.estimate import identify, predict
 from upright.identification.model import Parameter, Rig, Run
-from upright.identification.trips import find_trip, find_trips
+from upright.identification.trips import find_trip, find_trips, located
 from upright.physics.oscillators import Torsional2
 from upright.simulation import simulate
 
@@ -129,6 +129,11 @@ def test_a_tripping_rig_is_recovered_from_counts(tripped):
     for name in ("J_1", "J_2", "k_12", "f_1c", "actuator.damping", "actuator.standby"):
         assert fit.estimates[name].value == pytest.approx(truth[name], rel=0.1), name
     assert min(v for s in fit.runs.values() for v in s.fit_percent.values()) > 99
+
+
+def test_where_no_trip_is_seen_the_search_begins_at_the_logged_end():
+    run = located(asked(), spin_up(unknown=("input_end",)))
+    assert run.guesses["input_end"] == pytest.approx(4.0, abs=2 * run.period)  # volts until the sample before 4 s
 
 
 def test_a_prediction_finds_its_own_trip_and_says_so(tripped):

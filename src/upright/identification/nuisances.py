@@ -26,6 +26,9 @@ CHANGES = {"input_offset": "actuator.offset", "input_start": "actuator.start", "
 MOMENT = 0.1
 """A change of the moment [s] at which a drive trips that would matter."""
 
+NEAR = 2.5
+"""How far from the logged moment it is sought where the motion plainly follows the log, in such changes."""
+
 INITIAL_SPREAD = (0.02, 0.1)
 """Least sigma of a measured first coordinate and velocity, as a share of how much each varies over the run."""
 
@@ -80,7 +83,10 @@ def run_unknowns(rig: Rig, index: int, run: Run, start: State) -> list[Unknown]:
         # at the logged ends themselves nothing changes with the moment: begin a sample inside
         for name, logged in (("input_start", first + dt), ("input_end", last - dt)):
             if name in wanted:
-                add(name, float(np.clip(run.guesses.get(name, logged), first, last)), MOMENT, lower=first, upper=last)
+                guess = float(np.clip(run.guesses.get(name, logged), first, last))
+                # where the command plainly acted as logged, a trip would only excuse wrong parameters
+                near = NEAR * MOMENT if name in run.guesses and abs(guess - logged) < dt else math.inf
+                add(name, guess, MOMENT, lower=max(first, guess - near), upper=min(last, guess + near))
     return found
 
 

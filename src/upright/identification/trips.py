@@ -69,22 +69,29 @@ def find_trips(rig: Rig, run: Run) -> list[Trip]:
 
     Nothing is said of runs whose driven coordinate was not measured, or whose law is simulated.
     """
+    return _moments(rig, run)[0]
+
+
+def _moments(rig: Rig, run: Run) -> tuple[list[Trip], bool]:
+    """What `find_trips` says, and whether the command plainly acts until its logged end."""
+    found: list[Trip] = []
+    plain = False
     if not rig.plant.inputs or run.loop is not None:
-        return []
+        return found, plain
     on = rig.plant.inputs[0].on
     if on not in run.measured or on in run.held or not np.any(run.u[:, 0]):
-        return []
+        return found, plain
     quantum = dict(zip(run.measured, run.quantum or (0.0,) * len(run.measured), strict=True))
     signals = {c: run.y[:, k] for k, c in enumerate(run.measured)}
     signals |= {c: v for c, v in run.held.items() if isinstance(v, np.ndarray)}
     others = [signals[c.name] for c in rig.plant.coordinates if c.name in signals and c.name != on]
     gain = rig.parameters["actuator.gain"].value if "actuator.gain" in rig.parameters else 1.0
-    found: list[Trip] = []
     for late in (False, True):
         u = cut(run, found).u[:, 0] * math.copysign(1.0, gain)
-        trip = find_trip(run.t, u, signals[on], others, quantum=quantum[on], late=late)
+        trip, otherwise = _sought(run.t, u, signals[on], others, quantum=quantum[on], late=late)
         found += [trip] if trip is not None else []
-    return found
+        plain = plain or (not late and trip is None and otherwise < CLEAR[1])
+    return found, plain
 
 
 def find_trip(
@@ -103,20 +110,27 @@ def find_trip(
     late : bool
         Ask for a late begin instead of an early end.
     """
+    return _sought(t, u, y, others, quantum=quantum, late=late)[0]
+
+
+def _sought(
+    t: Array, u: Array, y: Array, others: Sequence[Array], *, quantum: float, late: bool
+) -> tuple[Trip | None, float]:
+    """What `find_trip` says, and what is left unexplained with the command as logged, infinite if nobody can say."""
     live = np.flatnonzero(u)
     if t.size < 100 or live.size < 10:
-        return None
+        return None, math.inf
     dt = float(t[-1] - t[0]) / (t.size - 1)
     width = smoothing_width_for(y, dt, quantum)
     if t.size < LEAST * width:
-        return None
+        return None, math.inf
     table = Regression.of(u, y, others, dt, width, late=late)
     if table is None:
-        return None
+        return None, math.inf
     first, last = int(live[0]), int(live[-1]) + 1
     low, high = first + width // 4, last - width // 4
     if low >= high:
-        return None
+        return None, math.inf
     costs: dict[int, float] = {}
     at, step = 0, high - low
     while step > 1:  # three combs, each ten times finer than the one before
@@ -130,13 +144,14 @@ def find_trip(
     logged = table.missed(first if late else last, late=late, backwards=True)
     hardly = abs(table.speed[at]) < SLOW * float(np.abs(table.speed).max()) and not late
     if not (least < (CLEAR[1] if table.levels else CLEAR[0]) * logged and least < POOR) or hardly:
-        return None
+        return None, logged
     before, after = table.around(at, first if not late else last, last if not late else first)
-    return Trip(
+    trip = Trip(
         at=at * dt, error=_uncertainty(costs, at, t.size / width) * dt,
         logged=(first if late else last) * dt, late=late, before=before, after=after,
         unexplained=least, otherwise=logged,
     )  # fmt: skip
+    return trip, logged
 
 
 def _uncertainty(costs: Mapping[int, float], at: int, independent: float) -> float:
@@ -159,11 +174,17 @@ def doubt(run: Run, trip: Trip) -> str:
 
 
 def located(rig: Rig, run: Run) -> Run:
-    """The run with guesses of when its input really began and ended, for those of the two that are asked."""
+    """The run with guesses of when its input really began and ended, for those of the two that are asked.
+
+    Where the motion plainly follows the command until its logged end, the guess is what the log says.
+    """
     asked = [n for n in ("input_start", "input_end") if n in run.unknown and n not in run.guesses]
     if not asked:
         return run
-    found = {"input_start" if trip.late else "input_end": trip.at for trip in find_trips(rig, run)}
+    trips, plain = _moments(rig, run)
+    found = {"input_start" if trip.late else "input_end": trip.at for trip in trips}
+    if plain:  # a sample inside: at the logged moment itself nothing changes with it
+        found["input_end"] = run.period * float(np.flatnonzero(run.u[:, 0])[-1])
     return replace(run, guesses={**{n: found[n] for n in asked if n in found}, **run.guesses})
 
 
