@@ -25,7 +25,6 @@ class Asked:
     `how`: the run was fitted; predicted by a fit that never saw it because its role is "predict"; or left out in turn,
     the others fitted. `over`: every run has to reach it, or the median of the runs. No `runs` means all of that kind.
     `missed`: why it is not reached; empty for what is.
-    `missed` says why it is not reached, where it is not.
     """
 
     study: str

@@ -126,7 +126,7 @@ def page(results: list[Result]) -> str:
                 runs = f"{asked.how}: {len(reached)} runs"
             lines.append(
                 f"| {r.study} | {_what(asked).removesuffix(asked.how).strip()} | {runs} | {_span(reached, asked)} | "
-                f"{over}{asked.least:g} | {'' if asked.met(reached) else f'**missed**: {asked.missed}'} |"
+                f"{over}{asked.least:g} | {'' if asked.met(reached) else _why(asked)} |"
             )
     lines += ["", "| study | seconds | verdict |", "|---|---|---|"]
     lines += [f"| {r.study} | {r.seconds[0]:.2g} | {r.fit.verdict.replace('|', '/')} |" for r in results]
