@@ -40,13 +40,12 @@ def test_the_right_model_keeps_both_frictions() -> None:
         assert fit.estimates[name].value == pytest.approx(TRUTH[name], rel=0.05)
 
 
-def test_a_wrong_model_is_not_firm_about_friction_without_dry_friction() -> None:
+def test_a_wrong_model_says_nothing_false_about_friction() -> None:
     fit = fitted(tilt_y=0.0)
-    assert fit.estimates["b_1c"].status == "left out"  # without it the rest of the run is predicted better
-    low, high = fit.estimates["b_1"].interval
-    assert low <= TRUTH["b_1"] <= high
-    assert fit.estimates["b_1"].status == "weak"
-    assert any("something else is missing" in w and "b_1" in w for w in fit.warnings)
+    for name in FRICTION:
+        low, high = fit.estimates[name].interval
+        assert low <= TRUTH[name] <= high
+    assert fit.estimates["b_1"].status == "weak"  # the lean takes its part
 
 
 @pytest.mark.slow
