@@ -71,7 +71,7 @@ def visible(rig: Rig, runs: Sequence[Run], unknowns: Sequence[Unknown]) -> list[
     least = _shortest(rig, runs)
     return [
         replace(u, lower=least[u.name], value=max(u.value, least[u.name]))
-        if u.asked and u.lower < least.get(u.name, 0.0) <= u.upper
+        if u.asked and u.name in least and u.lower < least[u.name] <= u.upper
         else u
         for u in unknowns
     ]
