@@ -18,11 +18,11 @@ from upright.identification.own import estimate, own_estimates, quantile
 from upright.identification.poles import poles
 from upright.identification.pose import pose
 from upright.identification.problem import Problem
-from upright.identification.profile import profile
+from upright.identification.profile import profile, settled
 from upright.identification.scoring import predict, score
 from upright.identification.seeing import Sight, hidden, look, sentences
 from upright.identification.statistics import Spread, assess
-from upright.identification.unknowns import FAR, SHARED
+from upright.identification.unknowns import SHARED
 from upright.identification.verdict import GOOD, judge
 
 Array = NDArray[np.float64]
@@ -153,8 +153,7 @@ def _estimates(
                 whole = plain.interval[1] - plain.interval[0]
                 if not u.log and interval[1] - interval[0] < NARROW * whole:
                     interval = plain.interval  # a valley too narrow to follow with one number held
-                if u.log and not plain.value / FAR < interval[0] < interval[1] < plain.value * FAR:
-                    interval = plain.interval  # no cost rises as high as a misfit with a long memory would ask
+                interval = settled(interval, plain, log=u.log)
                 wide = interval[1] - interval[0] > abs(plain.value)
             status = "at bound" if spread.pinned[i] else "weak" if wide else "firm"
         interval = max(interval[0], u.lower), min(interval[1], u.upper)

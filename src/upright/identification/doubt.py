@@ -20,7 +20,7 @@ from upright.identification.model import Estimate, Rig
 from upright.identification.own import estimate, quantile
 from upright.identification.pose import pose, settle_steps
 from upright.identification.problem import Problem
-from upright.identification.profile import profile
+from upright.identification.profile import profile, settled
 from upright.identification.statistics import Spread, assess, pseudo_inverse
 from upright.identification.unknowns import SHARED
 
@@ -114,7 +114,8 @@ def _intervals(
         v, sigma = float(value[i]), math.sqrt(max(float(spread.covariance[i, i]), 0.0))
         interval = estimate(problem, u, v, sigma, q).interval
         if u.name in left_out and spread.pinned[i] and 40.0 * count(problem) * (found.x.size + 1) / 16 < AFFORDED:
-            interval = profile(problem, found.x, i, spread, q, report=log.report)
+            plain = Estimate(value=v, stderr=sigma, interval=interval, unit="", status="")
+            interval = settled(profile(problem, found.x, i, spread, q, report=log.report), plain, log=u.log)
         interval = max(interval[0], u.lower), min(interval[1], u.upper)
         out[u.name] = Estimate(value=v, stderr=sigma, interval=interval, unit="", status="")
     wider = beyond_bounds(problem, found.x, spread, out)

@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.descent import Report, descend
+from upright.identification.model import Estimate
 from upright.identification.problem import Problem
 from upright.identification.statistics import Spread, pseudo_inverse
+from upright.identification.unknowns import FAR
 
 Array = NDArray[np.float64]
 
@@ -52,6 +54,18 @@ def profile(
     if u.log:
         return (math.exp(ends[0]) if ends[0] > -700 else 0.0), math.exp(min(ends[1], 700.0))
     return ends[0], ends[1]
+
+
+def settled(found: tuple[float, float], plain: Estimate, *, log: bool) -> tuple[float, float]:
+    """Interval of a profile, with the ends of the standard error where the profile has none.
+
+    A misfit with a long memory asks for a rise that no cost may reach; near the optimum the data tell all the same.
+    A number sought by its `log` has no end that is `FAR` times or one part in `FAR` of its value.
+    """
+    low, high = found
+    if log:
+        return found if plain.value / FAR < low and high < plain.value * FAR else plain.interval
+    return (low if math.isfinite(low) else plain.interval[0]), (high if math.isfinite(high) else plain.interval[1])
 
 
 def _curvature(A: Array, place: int, spread: Spread) -> float:
