@@ -14,6 +14,8 @@ from upright.cli import app
 from upright.identification import climb
 from upright.identification.study import load_study
 
+pytestmark = pytest.mark.slow
+
 STUDY = """
 title = "A rod with a dry hinge"
 [rig]

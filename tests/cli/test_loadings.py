@@ -12,6 +12,8 @@ from typer.testing import CliRunner
 from upright.cli import app
 from upright.lab.loadings import acquire, rig
 
+pytestmark = pytest.mark.slow
+
 
 def upright(*arguments: object):
     return CliRunner().invoke(app, [*map(str, arguments)], terminal_width=200)

@@ -222,6 +222,7 @@ def test_margins_agree_with_python_control():
     assert found.modulus == pytest.approx(min(sm), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_margin_of_delay_is_the_phase_margin_over_the_crossover():
     """One lag and a gain, fast sampled: delay = phase margin / crossover (Astrom and Murray, section 10.3)."""
     plant = linear([[-1]], [[1]], [[1]])

@@ -19,6 +19,8 @@ from upright.identification.study import load_study
 from upright.physics import Pendulum, find
 from upright.simulation import simulate
 
+pytestmark = pytest.mark.slow
+
 STUDIES = Path(__file__).parents[2] / "examples" / "studies"
 DISK = {
     "J_1": 2e-3,

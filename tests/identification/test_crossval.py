@@ -59,6 +59,7 @@ def test_what_was_computed_survives_an_interruption():
     assert set(crossed.fitted) == {"1.5", "1.0", "0.6"}
 
 
+@pytest.mark.slow
 def test_a_parameter_that_one_run_alone_sees_is_named():
     """With the pendulum locked, an arm says nothing about the hinge's friction."""
     free = shaken(seconds=2.0, label="free")

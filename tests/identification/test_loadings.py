@@ -37,6 +37,7 @@ def test_the_line_gives_what_was_put_in(campaign):
     assert "A line explains all 4 loadings" in found.verdict
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth_as_often_as_they_say():
     clean = {a: swing(BARE + a, K, C, F, x0=0.02)[:2] for a in (0.0, 0.5, 1.0, 2.0)}
     held = np.zeros(3)

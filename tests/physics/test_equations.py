@@ -96,6 +96,7 @@ def test_generated_equations_are_those_of_the_energies(plant, without):
     assert path.read_text(encoding="utf-8") == source(derive(plant, without=without))
 
 
+@pytest.mark.slow
 def test_derivation_does_not_depend_on_the_order_of_hashes():
     """Generated text is compared, so it must be the same in every process."""
     program = (

@@ -107,6 +107,7 @@ def test_gains_targets_and_prefilter_may_differ_between_lanes(block):
         assert np.allclose(both[:, :, i], alone[:, :, 0], rtol=0, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_an_ensemble_reduces_what_simulate_records(rotary):
     rng = np.random.default_rng(5)
     x0 = np.zeros((40, 4))

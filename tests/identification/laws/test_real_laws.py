@@ -9,7 +9,7 @@ from tests.readers.logs import real
 from upright.identification.laws import Recovery, recover
 from upright.readers import read
 
-pytestmark = pytest.mark.real_data
+pytestmark = [pytest.mark.real_data, pytest.mark.slow]
 
 QUBE = "furuta_qube_servo_balance/qube_20230828T"
 ECP205 = "ecp205_torsional_ucsd/"
