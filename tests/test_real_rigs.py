@@ -36,9 +36,10 @@ def test_a_real_rig_is_explained_and_predicted(name):
     left_out = {}
     if any(a.how == "left out" for a in asked):
         left_out = cross_validate(fit, study.runs).predicted
-    reached = {a: a.reached(left_out if a.how == "left out" else fit.runs) for a in asked}
-    # what is known to be missed has to be missed still, or the published reason is out of date
-    assert {a: values for a, values in reached.items() if a.met(values) is bool(a.missed)} == {}
+    # What is known to be missed is published (benchmarks/real.md) and not asserted: where a search of that kind ends
+    # hangs on the last digits, and those on the processor.
+    claimed = {a: a.reached(left_out if a.how == "left out" else fit.runs) for a in asked if not a.missed}
+    assert {a: values for a, values in claimed.items() if not a.met(values)} == {}
     assert fit.trusted, fit.verdict
     if name in MODES:
         ((at, mode),) = [(at, p) for at, poles in fit.poles.items() for p in poles if p.imag.value > 0]

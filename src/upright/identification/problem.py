@@ -223,7 +223,8 @@ class Problem:
         else:
             G = squares(*mixed(seen, track.y[skip:n], d.offsets, d.scales, W))
         h = self.steps[sought]
-        return G[1:, 1:] / np.outer(h, h), G[1:, 0] / h, float(G[0, 0])
+        with np.errstate(over="ignore", invalid="ignore"):  # a lane that ran away makes the cost infinite
+            return G[1:, 1:] / np.outer(h, h), G[1:, 0] / h, float(G[0, 0])
 
     def prior_rows(self, x: Array) -> tuple[Array, Array]:
         """Residuals and Jacobian of what was known beforehand, worth `noise` per sigma."""
