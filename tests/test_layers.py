@@ -22,11 +22,14 @@ MAY_IMPORT = {
     "simulation": {"errors", "quantities", "physics"},
     "identification": BASE | {"records", "readers", "physics", "simulation"},
     "survey": BASE,
+    "control": BASE | {"records", "physics", "design", "simulation"},
     "doctor": BASE | {"records", "readers", "physics", "simulation", "identification"},
-    "report": BASE | {"survey", "records", "readers", "physics", "design", "simulation", "identification", "doctor"},
-    "lab": BASE | {"records", "readers", "physics", "design", "simulation", "identification", "report"},
+    "report": BASE
+    | {"survey", "records", "readers", "physics", "design", "simulation", "control", "identification", "doctor"},
+    "lab": BASE | {"records", "readers", "physics", "design", "simulation", "control", "identification", "report"},
     "cli": BASE
-    | {"survey", "records", "readers", "physics", "design", "simulation", "identification", "doctor", "report", "lab"},
+    | {"survey", "records", "readers", "physics", "design", "simulation", "control", "identification", "doctor"}
+    | {"report", "lab"},
     "__main__": {"cli"},
     "__init__": BASE | {"records", "readers", "physics", "simulation", "identification", "doctor", "report", "lab"},
 }
