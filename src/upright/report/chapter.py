@@ -11,6 +11,16 @@ from upright.report.advice import Step
 from upright.report.sections import Part, write_sections
 
 
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """A number for the cover, as text: what it is, its value and, where there are such, interval and truth."""
+
+    what: str
+    value: str
+    interval: str = ""
+    truth: str = ""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Chapter:
     """One experiment, told.
@@ -28,6 +38,8 @@ class Chapter:
         In this order, as far as the experiment has them: data, fit, gains, closed loop.
     steps : tuple of Step
         What to do next.
+    findings : tuple of Finding
+        The few numbers that the cover of the whole report shows.
     numbers : mapping
         The same as plain values for another program: SI, finite.
     """
@@ -40,6 +52,7 @@ class Chapter:
     sound: bool
     parts: tuple[Part, ...]
     steps: tuple[Step, ...] = ()
+    findings: tuple[Finding, ...] = ()
     numbers: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
 

@@ -6,13 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from markupsafe import Markup
+
 from upright.report.advice import Step
 from upright.report.document import Picture, render
 
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
-    """Cells as text, row by row; `numbers` are the columns set flush right."""
+    """Cells as text (or MathML), row by row; `numbers` are the columns set flush right."""
 
     caption: str
     headings: tuple[str, ...]
@@ -22,10 +24,11 @@ class Table:
 
 @dataclass(frozen=True, kw_only=True)
 class Part:
-    """One heading of the page and what stands below it."""
+    """One heading of the page and what stands below it; `formulas` are MathML."""
 
     title: str
     sentences: tuple[str, ...] = ()
+    formulas: tuple[Markup, ...] = ()
     tables: tuple[Table, ...] = ()
     pictures: tuple[Picture, ...] = ()
 
