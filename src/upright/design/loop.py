@@ -26,13 +26,15 @@ class Feedback:
     """State feedback on estimated states as one sampled law, ``z[k+1] = A z + B w``, ``u = C z + D w``.
 
     ``w = [y_0, ..., y_0 at rest, ..., r]``: readings, their values at the equilibrium, then one reference. These are
-    the matrices that `simulation.Law` takes, with the last as its references.
+    the matrices that `simulation.Law` takes, with the last as its references. It is switched on with
+    ``z[0] = begin (y - y at rest)``.
     """
 
     A: Array
     B: Array
     C: Array
     D: Array
+    begin: Array
     outputs: int
 
     def around(self) -> tuple[Array, Array]:
@@ -55,6 +57,7 @@ def feedback(estimator: Estimator, K: ArrayLike, k_pf: float = 0.0) -> Feedback:
         B=np.hstack([By, -By, estimator.E @ Dr]),
         C=C,
         D=np.hstack([Dy, -Dy, Dr]),
+        begin=estimator.begin,
         outputs=Dy.shape[1],
     )
 

@@ -22,6 +22,7 @@ class Estimator:
     """``z[k+1] = A z[k] + B y[k] + E u[k]``, ``x[k] = C z[k] + D y[k]``.
 
     y are the positions as deviations from the equilibrium, x the states in the model's order, u the command.
+    ``begin @ y`` is the state z to switch on with, the rig at rest at y: no jump is then taken for a speed.
     """
 
     A: Array
@@ -29,6 +30,7 @@ class Estimator:
     E: Array
     C: Array
     D: Array
+    begin: Array
     period: float
     name: str
 
@@ -80,7 +82,7 @@ def filtered(model: Sampled, memory: float) -> Estimator:
     if a == 0:  # it remembers readings only
         A, B, C = A[:p, :p], B[:p], C[:, :p]
     E = np.zeros((A.shape[0], model.B.shape[1]))
-    return Estimator(A=A, B=B, E=E, C=C, D=D, period=T, name=name)
+    return Estimator(A=A, B=B, E=E, C=C, D=D, begin=np.eye(A.shape[0], p), period=T, name=name)
 
 
 def observer(model: Sampled, gain: ArrayLike, name: str = "observer") -> Estimator:
@@ -96,8 +98,10 @@ def observer(model: Sampled, gain: ArrayLike, name: str = "observer") -> Estimat
     if L.shape != model.C.T.shape:
         raise BadInput(f"an observer of this model needs a gain of shape {model.C.T.shape}, got {L.shape}.")
     kept = np.eye(model.A.shape[0]) - L @ model.C
+    begin: Array = np.linalg.pinv(model.C).astype(np.float64)
     return Estimator(
-        A=model.A @ kept, B=model.A @ L, E=model.B, C=kept, D=L, period=model.period, name=name
+        A=model.A @ kept, B=model.A @ L, E=model.B, C=kept, D=L, begin=begin, period=model.period,
+        name=name,
     )  # fmt: skip
 
 

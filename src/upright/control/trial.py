@@ -1,0 +1,179 @@
+"""What happens when a law is switched on at a rig? Its encoders, converter, limit and delay included.
+
+Fig. 6 of the paper: counts, velocities from counts, gains, saturation, servo period; the law may be any sampled linear
+one. The rig is nonlinear and has dry friction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from upright.control.rig import Rig
+from upright.design import Feedback
+from upright.errors import BadInput
+from upright.records import Provenance, Record
+from upright.simulation import Law, simulate
+
+Array = NDArray[np.float64]
+
+SUBSTEPS = 2
+"""Runge-Kutta steps per servo period: of 0.4 ms, where the fastest motion of these rigs takes some 10 ms."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trial:
+    """One run of a closed loop.
+
+    Attributes
+    ----------
+    rig : Rig
+    at : str
+        Equilibrium that was to be held.
+    t : array, shape (N,)
+        Time since the law was switched on [s].
+    x : array, shape (N, states)
+        What the states truly were.
+    u : array, shape (N,)
+        Command as put out, rounded to the converter's steps and limited.
+    rest : array, shape (coordinates,)
+        What the law takes for the readings at the equilibrium.
+    record : Record
+        What a program at the rig could log: readings by coordinate [m or rad], ``u``, and ``reference`` if any.
+    """
+
+    rig: Rig
+    at: str
+    t: Array
+    x: Array
+    u: Array
+    rest: Array
+    record: Record
+
+    @property
+    def deviation(self) -> Array:
+        """True coordinates less their values at the equilibrium, shape (N, coordinates)."""
+        point = self.rig.plant.equilibrium(self.at)
+        return self.x[:, 0::2] - np.array(list(point.values()))
+
+
+def trial(
+    rig: Rig,
+    law: Feedback | Law,
+    *,
+    at: str,
+    start: ArrayLike,
+    seconds: float,
+    reference: ArrayLike | None = None,
+    pushes: ArrayLike | None = None,
+    rest: ArrayLike | None = None,
+) -> Trial:
+    """Run a law on a rig.
+
+    Parameters
+    ----------
+    rig : Rig
+        As it truly is.
+    law : Feedback or Law
+        State feedback, switched on knowing where the rig is and taking it to be at rest; or any law on
+        ``[readings, references]``, whose own encoder and converter steps and delay are replaced by the rig's.
+    at : str
+        Equilibrium to hold.
+    start : array, shape (states,)
+        Where the rig is when the law is switched on, as deviation from the equilibrium.
+    seconds : float
+    reference : array, shape (T,), optional
+        Reference at the samples; its last value is held.
+    pushes : array, shape (T,), optional
+        What disturbs the drive, added to the law's command before its limit, sample by sample.
+    rest : array, shape (coordinates,), optional
+        What the law takes for the readings at the equilibrium; without it the plant's own numbers, which the encoders
+        show when they were zeroed where the coordinates are zero and are scaled as said.
+
+    Raises
+    ------
+    BadInput
+        When shapes do not fit together.
+    """
+    count = round(seconds / rig.period) + 1
+    if not count > 1:
+        raise BadInput(f"a trial needs some time, got {seconds:g} s.")
+    point = np.array(list(rig.plant.equilibrium(at).values()))
+    held = point if rest is None else np.asarray(rest, dtype=np.float64)
+    x0 = rig.plant.state(at) + np.asarray(start, dtype=np.float64)
+    given = at_work(rig, law, x0, held, reference)
+    late = None
+    if pushes is not None:
+        late = np.zeros(count)
+        kicks = np.asarray(pushes, dtype=np.float64)[:count]
+        late[: kicks.size] = kicks
+    found = simulate(
+        rig.plant, rig.drive, x0, late, rig.period, samples=count, substeps=SUBSTEPS, loop=given
+    )[:, :, 0]  # fmt: skip
+    n = x0.size
+    x, u, t = found[:, :n], found[:, n], np.arange(count, dtype=np.float64) * rig.period
+    return Trial(rig=rig, at=at, t=t, x=x, u=u, rest=held, record=_logged(rig, t, x, u, reference))
+
+
+def readings(rig: Rig, q: ArrayLike) -> Array:
+    """What the encoders show [m or rad] at coordinates, shape (..., coordinates)."""
+    step = rig.quantum / rig.shown  # a count is what its true length is; the program multiplies by the said one
+    return np.floor(np.asarray(q, dtype=np.float64) / step + 0.5) * rig.quantum
+
+
+def at_work(rig: Rig, law: Feedback | Law, x0: ArrayLike, rest: ArrayLike, reference: ArrayLike | None = None) -> Law:
+    """The law with the rig's encoders and converter about it, for one start or for many lanes.
+
+    Parameters
+    ----------
+    rig : Rig
+    law : Feedback or Law
+    x0 : array, shape (states,) or (lanes, states)
+        Where the rig is when the law is switched on.
+    rest : array, shape (coordinates,)
+        What a `Feedback` takes for the readings at the equilibrium.
+    reference : array, shape (T,), optional
+    """
+    n = len(rig.plant.coordinates)
+    shown = np.concatenate([rig.shown, np.ones(np.shape(law.D)[1] - n)])
+    at_rest = np.asarray(rest, dtype=np.float64)
+    if isinstance(law, Feedback):
+        asked = np.zeros(1) if reference is None else np.asarray(reference, dtype=np.float64)
+        references = np.column_stack([np.tile(at_rest, (asked.size, 1)), asked])
+        seen = readings(rig, np.asarray(x0, dtype=np.float64)[..., 0::2])
+        initial = law.begin @ (seen - at_rest).T
+        windup = "free"
+    else:
+        references = law.signal() if reference is None else reference
+        initial, windup = law.initial, law.windup
+    B, D = (
+        np.asarray(m, dtype=np.float64) * (shown[:, None] if np.ndim(m) == 3 else shown) for m in (law.B, law.D)
+    )  # fmt: skip
+    return Law(
+        A=law.A, B=B, C=law.C, D=D, references=references, quantum=rig.quantum / rig.shown,
+        command_quantum=rig.converter, initial=initial, windup=windup,
+    )  # fmt: skip
+
+
+def _logged(rig: Rig, t: Array, x: Array, u: Array, reference: ArrayLike | None) -> Record:
+    seen = readings(rig, x[:, 0::2])
+    names = [c.name for c in rig.plant.coordinates]
+    signals = {name: seen[:, i] for i, name in enumerate(names)} | {"u": u}
+    units = {c.name: c.unit for c in rig.plant.coordinates} | {"u": rig.unit}
+    if reference is not None:
+        asked = np.asarray(reference, dtype=np.float64)
+        signals["reference"] = asked[np.minimum(np.arange(t.size), asked.size - 1)]
+    return Record(
+        t=t,
+        signals=signals,
+        units=units,
+        inputs=("u",),
+        outputs=tuple(names),
+        provenance=Provenance(
+            reader="twin",
+            rig=f"digital twin of {rig.name}, seed {rig.seed}",
+            notes=("This log was simulated; no rig was touched.",),
+        ),
+    )
