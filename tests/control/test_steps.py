@@ -1,0 +1,93 @@
+"""Do the figures of a step agree with closed forms and python-control, and survive encoders and dry friction?"""
+
+from __future__ import annotations
+
+import math
+
+import control
+import numpy as np
+import pytest
+
+from upright.control.steps import effort, step_figures
+from upright.errors import BadInput
+from upright.physics import chain
+from upright.simulation import simulate
+
+T = np.linspace(0.0, 12.0, 6001)
+
+
+def test_a_first_order_lag_rises_and_settles_by_its_logarithms():
+    tau = 0.7
+    found = step_figures(T, 1 - np.exp(-T / tau), before=0.0, reference=1.0)
+    assert found.rise == pytest.approx(tau * math.log(9), rel=1e-4)
+    assert found.settling_2 == pytest.approx(tau * math.log(50), rel=1e-4)
+    assert found.settling_5 == pytest.approx(tau * math.log(20), rel=1e-4)
+    assert found.overshoot < 1e-6
+    assert abs(found.error) < 1e-6
+
+
+@pytest.mark.parametrize("zeta", [0.2, 0.4, 0.7])
+def test_a_second_order_system_overshoots_by_the_closed_form(zeta):
+    omega = 5.0
+    damped = omega * math.sqrt(1 - zeta**2)
+    phase = math.acos(zeta)
+    y = -2 * (1 - np.exp(-zeta * omega * T) * np.sin(damped * T + phase) / math.sin(phase))  # a step down, of two
+    found = step_figures(T, y, before=0.0, reference=-2.0)
+    assert found.overshoot == pytest.approx(math.exp(-math.pi * zeta / math.sqrt(1 - zeta**2)), rel=1e-4)
+    assert found.peak_time == pytest.approx(math.pi / damped, abs=T[1])
+
+
+@pytest.mark.parametrize("poles", [(-1.0, -3.0, -9.0), (-1.0 + 4.0j, -1.0 - 4.0j, -2.0), (-3.0 + 1.0j, -3.0 - 1.0j)])
+def test_python_control_says_the_same(poles):
+    """To a sample: it does not interpolate."""
+    y = control.step_response(control.tf([1.0], np.poly(poles).real), T).outputs
+    final = 1 / np.poly(poles).real[-1]
+    found = step_figures(T, y, before=0.0, reference=final)
+    for band, ours in ((0.02, found.settling_2), (0.05, found.settling_5)):
+        told = control.step_info(y, T, SettlingTimeThreshold=band, yfinal=final)
+        assert ours == pytest.approx(told["SettlingTime"], abs=2 * T[1])
+    assert found.rise == pytest.approx(told["RiseTime"], abs=2 * T[1])
+    assert 100 * found.overshoot == pytest.approx(told["Overshoot"], abs=1e-3)
+    if told["Overshoot"] > 0.1:
+        assert found.peak_time == pytest.approx(told["PeakTime"], abs=2 * T[1])
+
+
+def test_an_encoder_moves_the_figures_by_no_more_than_its_step():
+    zeta, omega, quantum = 0.3, 6.0, 0.02  # fifty steps in all, as wide as the narrow band
+    damped, phase = omega * math.sqrt(1 - zeta**2), math.acos(zeta)
+    y = 1 - np.exp(-zeta * omega * T) * np.sin(damped * T + phase) / math.sin(phase)
+    smooth = step_figures(T, y, before=0.0, reference=1.0)
+    shown = step_figures(T, np.floor(y / quantum + 0.5) * quantum, before=0.0, reference=1.0, quantum=quantum)
+    assert shown.overshoot == pytest.approx(smooth.overshoot, abs=quantum)
+    # the envelope falls from 5 to 4 or 6 % within log(6/4)/(zeta omega)
+    assert shown.settling_5 == pytest.approx(smooth.settling_5, abs=math.log(6 / 4) / (zeta * omega))
+    assert shown.rise == pytest.approx(smooth.rise, rel=0.1)
+    assert shown.resolution == pytest.approx(quantum)
+
+
+def test_dry_friction_leaves_an_error_and_no_endless_settling():
+    """A body on a spring stops where friction holds it: within f/k of the spring's rest, and stays."""
+    body = chain(1, "rectilinear")(m_1=1.0, k_1=400.0, c_1=4.0, f_1c=0.5)
+    dt = 1e-3
+    x = simulate(body, {}, body.state(), np.full(3001, 4.0), dt, samples=3001)[:, 0, 0]
+    found = step_figures(np.arange(3001) * dt, x, before=0.0, reference=4.0 / 400.0)
+    assert 0 < abs(found.error) <= 0.5 / 400.0 * (1 + 1e-9)
+    assert found.error == pytest.approx(4.0 / 400.0 - x[-1])
+    assert found.settling_2 < 2.0
+
+
+def test_what_has_not_settled_is_said_to_take_for_ever():
+    found = step_figures(T, 1 - np.cos(5 * T), before=0.0, reference=1.0)
+    assert found.settling_5 == math.inf
+
+
+def test_what_did_not_move_is_refused():
+    with pytest.raises(BadInput, match="nothing stepped"):
+        step_figures(T, np.zeros_like(T), before=0.0, reference=1.0, quantum=1e-3)
+
+
+def test_commands_within_half_a_step_of_the_limit_count_as_saturated():
+    given = effort(np.array([1.0, -5.0, 4.9999, 2.0]), limit=5.0, step=1e-3)
+    assert given.peak == 5.0
+    assert given.share == 1.0
+    assert given.saturated == 0.5
