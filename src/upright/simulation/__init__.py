@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from upright.simulation.flavour import ACTUATOR, ACTUATOR_DEFAULTS, Flavour, choose
+from upright.simulation.actuator import ACTUATOR, ACTUATOR_DEFAULTS
+from upright.simulation.flavour import Flavour, choose
 from upright.simulation.law import Law
 from upright.simulation.parts import Held, Loop
+from upright.simulation.rule import Rule
 from upright.simulation.simulate import Ensemble, ensemble, simulate
 from upright.simulation.simulator import Simulator
 
@@ -16,6 +18,7 @@ __all__ = [
     "Held",
     "Law",
     "Loop",
+    "Rule",
     "Simulator",
     "choose",
     "ensemble",

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 
+from upright.simulation.actuator import ACTUATOR
 from upright.simulation.drive import begin
-from upright.simulation.flavour import ACTUATOR
 from upright.simulation.writer import Writer
 
 _JOINT = ("coulomb", "quadratic", "stiction", "stribeck_speed", "presliding")
@@ -43,7 +43,7 @@ def start(w: Writer) -> None:
         if f.dynamic:
             _actuator(w, j, first)
     law = first + len(ACTUATOR) * p.nu
-    if f.law is not None:
+    if f.law is not None or f.rule is not None:
         w.add(*(f"{{{name}}} = P[{law + r}, _m]" for r, name in enumerate(p.numbers)))
     elif f.loop:
         row = law

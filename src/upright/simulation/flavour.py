@@ -5,9 +5,8 @@ A flavour is what is fixed when a kernel is compiled; everything else (parameter
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -15,27 +14,10 @@ import numpy as np
 
 from upright.errors import BadInput, nearest
 from upright.physics.derived import Derived
+from upright.simulation.actuator import ACTUATOR, ACTUATOR_DEFAULTS
 from upright.simulation.law import Law
 from upright.simulation.parts import Loop
-
-ACTUATOR_DEFAULTS = {
-    "gain": 1.0,
-    "offset": 0.0,
-    "limit": math.inf,
-    "lag": 0.0,
-    "delay": 0.0,
-    "slope": 0.0,
-    "start": -math.inf,
-    "end": math.inf,
-    "damping": 0.0,
-    "standby": 0.0,
-    "knee": math.inf,
-    "fade": 0.0,
-    "relaxation": 0.0,
-}
-"""Actuator parameters of each input, in the kernel's order, with the values at which they do nothing."""
-
-ACTUATOR = tuple(ACTUATOR_DEFAULTS)
+from upright.simulation.rule import Rule, Written
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,6 +50,8 @@ class Flavour:
         A sampled controller computes the input.
     law : tuple of int, optional
         States and references of the controller when it is a `Law`.
+    rule : Written, optional
+        The controller when it is a `Rule`.
     record : bool
         The motion is returned, not only what it reduces to.
     """
@@ -85,6 +69,7 @@ class Flavour:
     loop: bool = False
     law: tuple[int, int] | None = None
     record: bool = True
+    rule: Written | None = field(default=None, repr=False)  # its text stands in the kernel as it is
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,12 +120,19 @@ class Layout:
     @cached_property
     def numbers(self) -> tuple[str, ...]:
         """Names of a law's numbers, matrix by matrix and row by row, then its state."""
+        if self.flavour.rule is not None:
+            return self.flavour.rule.numbers
         states, references = self.flavour.law or (0, 0)
         z, u, w = range(states), range(self.nu), range(self.n + references)
         sizes = (("A", z, z), ("B", z, w), ("C", u, z), ("D", u, w))
         return tuple(
             [f"l{c}{i}_{j}" for c, rows, columns in sizes for i in rows for j in columns] + [f"z{i}" for i in z]
         )
+
+    @cached_property
+    def references(self) -> int:
+        """Number of references of a law or rule."""
+        return self.flavour.rule.references if self.flavour.rule else (self.flavour.law or (0, 0))[1]
 
     @cached_property
     def rows(self) -> dict[str, int]:
@@ -156,8 +148,8 @@ class Layout:
             more += ["csa", "csm", "csb"] * (f.damping and f.curve)
             more += ["bk", "vp", "rt", "re", "rh", "bka", "bkm", "bkb"] * f.relaxation
             names += [f"{c}{j}" for c in more for j in nu]
-        if f.law is not None:
-            names += [*self.numbers, *(f"ref{c}" for c in range(f.law[1]))]
+        if f.law is not None or f.rule is not None:
+            names += [*self.numbers, *(f"ref{c}" for c in range(self.references))]
         elif f.loop:
             names += [f"{c}{i}" for c in ("yp", "vf", "tg") for i in n]
             names += [f"K{j}_{i}" for j in nu for i in range(2 * self.n)] + ["kr", "ref"]
@@ -184,7 +176,7 @@ def choose(
     *,
     free: Collection[str] = (),
     held: Collection[str] = (),
-    loop: bool | Loop | Law | None = False,
+    loop: bool | Loop | Law | Rule | None = False,
     record: bool = True,
 ) -> Flavour:
     """Smallest flavour that computes what `params` ask for.
@@ -199,7 +191,7 @@ def choose(
         Parameters that will be varied later, so that their terms stay in although they are zero now.
     held : collection of str
         Coordinates whose motion is prescribed.
-    loop : bool, Loop or Law, optional
+    loop : bool, Loop, Law or Rule, optional
         Controller that computes the input; True stands for a `Loop` without delay.
     record : bool
         The motion is returned.
@@ -245,5 +237,6 @@ def choose(
         curve=curve,
         loop=loop is not None and loop is not False,
         law=loop.sizes if isinstance(loop, Law) else None,
+        rule=loop.sizes if isinstance(loop, Rule) else None,
         record=record,
     )

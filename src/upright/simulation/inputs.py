@@ -62,7 +62,7 @@ def controller(w: Writer) -> None:
     w.depth -= 1
     w.add(*(f"_quantum{i} = FL[{i}]" for i in range(n)))
     w.add(*(f"_per{i} = 1.0 / _quantum{i} if _quantum{i} > 0.0 else 0.0" for i in range(n)))
-    (_gains if f.law is None else _law)(w)
+    (_rule if f.rule is not None else _gains if f.law is None else _law)(w)
     if f.dynamic:
         w.depth -= 1
         w.lanes()
@@ -117,21 +117,52 @@ def _gains(w: Writer) -> None:
         _put(w, j)
 
 
+def _read(w: Writer) -> None:
+    """References of this sample; steps of the converters; then, lane by lane, what the encoders show."""
+    p = w.p
+    if p.references:
+        w.lanes()
+        w.add("_m = min(max(START[_base + _i] + _k, 0), R.shape[0] - 1)")
+        w.add(*(f"{{ref{c}}} = R[_m, {c}]" for c in range(p.references)))
+        w.depth -= 1
+    for j in range(p.nu):
+        w.add(f"_step{j} = FL[{p.n + 4 + j}]", f"_steps{j} = 1.0 / _step{j} if _step{j} > 0.0 else 0.0")
+    w.lanes()
+    for i in range(p.n):
+        _encoder(w, i)
+
+
+def _converted(j: int) -> tuple[str, str]:
+    """Command ``_c`` as the converter rounds it."""
+    return (f"_z = floor(_c * _steps{j} + 0.5) * _step{j}", f"_c = _z if _step{j} > 0.0 else _c")
+
+
+def _rule(w: Writer) -> None:
+    """A controller given as a function, `Rule`."""
+    p, rule = w.p, w.p.flavour.rule
+    assert rule is not None  # asked before
+    _read(w)
+    names = (
+        [f"_y{i}" for i in range(p.n)],
+        *(
+            [f"{{{c}{i}}}" for i in range(size)]
+            for c, size in (("ref", rule.references), ("z", rule.states), ("rp", rule.parameters))
+        ),
+    )
+    given = ", ".join(f"({''.join(f'{name}, ' for name in group)})" for group in names)
+    w.add(f"_put, _kept = rule((START[_base + _i] + _k) * _dt, {given})")
+    for j in range(p.nu):
+        w.add(f"_c = {{ff{j}}} + _put[{j}]", *_converted(j))
+        _put(w, j)
+    w.add(*(f"{{z{i}}} = _kept[{i}]" for i in range(rule.states)))
+
+
 def _law(w: Writer) -> None:
     """A controller with a state of its own, `Law`."""
     p, n = w.p, w.p.n
     states, references = p.flavour.law or (0, 0)
-    if references:
-        w.lanes()
-        w.add("_m = min(max(START[_base + _i] + _k, 0), R.shape[0] - 1)")
-        w.add(*(f"{{ref{c}}} = R[_m, {c}]" for c in range(references)))
-        w.depth -= 1
     w.add(f"_freeze = FL[{n + 1}]")
-    for j in range(p.nu):
-        w.add(f"_step{j} = FL[{n + 4 + j}]", f"_steps{j} = 1.0 / _step{j} if _step{j} > 0.0 else 0.0")
-    w.lanes()
-    for i in range(n):
-        _encoder(w, i)
+    _read(w)
     signals = [f"_y{i}" for i in range(n)] + [f"{{ref{c}}}" for c in range(references)]
 
     def combined(of: str, row: int, by: str) -> str:
@@ -142,8 +173,7 @@ def _law(w: Writer) -> None:
     for j in range(p.nu):
         w.add(
             f"_c = {{ff{j}}} + {combined('C', j, 'D')}",
-            f"_z = floor(_c * _steps{j} + 0.5) * _step{j}",
-            f"_c = _z if _step{j} > 0.0 else _c",
+            *_converted(j),
             f"_over = _freeze if abs(_c) > {{lim{j}}} else _over",
         )
         _put(w, j)

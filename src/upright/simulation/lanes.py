@@ -82,7 +82,7 @@ def _reduce(w: Writer) -> None:
     w.add(f"_on = 1.0 if _k >= FL[{n + 3}] else 0.0")
     w.lanes()
     for i in range(n):
-        goal = f" - {{tg{i}}}" if p.flavour.loop and p.flavour.law is None else ""
+        goal = f" - {{tg{i}}}" if p.flavour.loop and p.flavour.law is None and p.flavour.rule is None else ""
         w.add(f"_c = abs({{q{i}}})", f"_z = {{mx{i}}}", f"{{mx{i}}} = _c if _c > _z else _z")
         w.add(f"_c = abs({{q{i}}}{goal}) * _on", f"_z = {{er{i}}}", f"{{er{i}}} = _c if _c > _z else _z")
 

@@ -16,6 +16,7 @@ from upright.physics.plant import Plant
 from upright.simulation.flavour import choose
 from upright.simulation.law import Law
 from upright.simulation.parts import Held, Loop
+from upright.simulation.rule import Rule
 from upright.simulation.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -31,7 +32,7 @@ def simulate(
     samples: int,
     substeps: int = 1,
     start: ArrayLike = 0,
-    loop: Loop | Law | None = None,
+    loop: Loop | Law | Rule | None = None,
     held: Mapping[str, Held] | None = None,
     every: int = 1,
     threads: int = 1,
@@ -64,7 +65,7 @@ def simulate(
         Runge-Kutta steps per sample.
     start : int or int array, shape (lanes,)
         Sample of `u`, reference and held motion at which a lane begins: windows of one record are lanes.
-    loop : Loop or Law, optional
+    loop : Loop, Law or Rule, optional
         Sampled controller.
     held : mapping of str to Held, optional
         Coordinates whose motion is prescribed, or locked with ``Held()``.
@@ -120,7 +121,7 @@ def ensemble(
     settle: float = 0.0,
     substeps: int = 1,
     start: ArrayLike = 0,
-    loop: Loop | Law | None = None,
+    loop: Loop | Law | Rule | None = None,
     held: Mapping[str, Held] | None = None,
     threads: int | None = None,
 ) -> Ensemble:
@@ -156,7 +157,7 @@ def _prepare(
     dt: float,
     substeps: int,
     start: ArrayLike,
-    loop: Loop | Law | None,
+    loop: Loop | Law | Rule | None,
     held: Mapping[str, Held],
     *,
     record: bool,

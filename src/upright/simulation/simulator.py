@@ -20,12 +20,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput
 from upright.physics.derived import Derived
+from upright.simulation.actuator import ACTUATOR, ACTUATOR_DEFAULTS
 from upright.simulation.blocks import aligned, padded, recorded, share
 from upright.simulation.compiled import kernel
-from upright.simulation.flavour import ACTUATOR, ACTUATOR_DEFAULTS, Flavour, Layout, lay_out
+from upright.simulation.flavour import Flavour, Layout, lay_out
 from upright.simulation.lanes import room
 from upright.simulation.law import Law
 from upright.simulation.parts import Held, Loop
+from upright.simulation.rule import Rule, compiling
 from upright.simulation.source import WIDTH, direct
 
 Array = NDArray[np.float64]
@@ -57,7 +59,7 @@ class Simulator:
         Sample time [s].
     substeps : int
         Runge-Kutta steps per sample.
-    loop : Loop or Law, optional
+    loop : Loop, Law or Rule, optional
         Controller, the one that the flavour was chosen for.
     held : mapping of str to Held
         Coordinates whose motion is prescribed, exactly those of the flavour.
@@ -69,7 +71,7 @@ class Simulator:
     flavour: Flavour
     dt: float
     substeps: int = 1
-    loop: Loop | Law | None = None
+    loop: Loop | Law | Rule | None = None
     held: Mapping[str, Held] = field(default_factory=dict)
     plain: bool = False
 
@@ -78,9 +80,9 @@ class Simulator:
             raise BadInput(f"the sample time must be positive, got {self.dt:g} s.")
         if self.substeps < 1:
             raise BadInput(f"substeps must be at least 1, got {self.substeps}.")
-        law = self.loop.sizes if isinstance(self.loop, Law) else None
+        law = self.loop.sizes if isinstance(self.loop, Law | Rule) else None
         late = self.loop is not None and self.loop.delay > 0.0 and not self.flavour.dynamic
-        if (self.loop is not None, law) != (self.flavour.loop, self.flavour.law) or late:
+        if (self.loop is not None, law) != (self.flavour.loop, self.flavour.law or self.flavour.rule) or late:
             raise BadInput("a loop was given without a flavour for it, or the other way round; use choose(loop=...).")
         wanted = {self.derived.coordinates[i] for i in self.flavour.held}
         if set(self.held) != wanted:
@@ -226,7 +228,8 @@ class Simulator:
 
         def step(first: int, last: int) -> None:
             W, address = aligned(size)
-            compiled(first, last, *call, W, address, events)
+            with compiling(f.rule):
+                compiled(first, last, *call, W, address, events)
 
         if threads <= 1 or blocks < 2 * threads:
             step(0, blocks)

@@ -72,6 +72,7 @@ def source(p: Layout) -> str:
     """Text of the module that steps one plant in one flavour."""
     parts = [HEAD.format(name=p.derived.name, flavour=p.flavour), "" if p.plain else DIRECT]
     parts += [ELEMENTARY, acceleration(p), step(p)]
+    parts += [f"@inline_strict\n{p.flavour.rule.text}\n"] if p.flavour.rule else []
     if p.flavour.dry:
         parts += [terms(p, places(p)), events(p)]
     return "\n\n".join([*parts, run(p, 1), run(p, WIDTH)])
