@@ -44,6 +44,8 @@ class Rig:
         What the encoders show over what is true; 1 where the counts per unit are as said.
     period : float
         Servo period [s].
+    travel : float
+        How far the driven coordinate may go either way before a stop or a cable ends it [m or rad].
     seed : int
         Which rig of the make; 0 is the one as designed.
     """
@@ -60,6 +62,7 @@ class Rig:
     offset: float = 0.0
     unit: str = "V"
     scales: tuple[float, ...] = ()
+    travel: float = math.inf
     seed: int = 0
 
     def __post_init__(self) -> None:

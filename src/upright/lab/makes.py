@@ -42,6 +42,9 @@ PLANTS: Mapping[Make, Plant] = {
 }
 """The rigs as designed."""
 
+_TRAVEL = {"linear": 0.20, "furuta": 2 * math.pi, "rectilinear": 0.03}  # rail, pendulum's cable, stops of the carts
+_LIMIT = {"torsional": 10.0}  # V; else what the vendor's program lets through, 4.884 V in its exported logs
+
 _SPREAD = {"m": 0.02, "J": 0.02, "k": 0.04, "r": 0.01, "b": 0.14, "c": 0.14, "f": 0.14}
 _NAMES = {
     "linear": "ECP 210 + A51, pendulum on a cart",
@@ -88,11 +91,12 @@ def make_rig(make: str, seed: int = 0) -> Rig:
         name=_NAMES[make],
         plant=plant,
         gain=gain,
-        limit=5.0 if on_rail else 10.0,
+        limit=_LIMIT.get(make, 5.0),
         converter=10 / 32768,
         delay=SERVO,
         lag=2e-3,
         counts=(_METRE if on_rail else _TURN, second),
         period=SERVO,
+        travel=_TRAVEL.get(make, math.inf),
         seed=seed,
     )
