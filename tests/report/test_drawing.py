@@ -105,3 +105,10 @@ def test_units_and_symbols_are_those_of_the_paper():
     assert axis("θ", "rad") == "θ [rad]"
     assert plain("theta_dot") == "θ̇"
     assert percent(-123.456) == "−123.5 %"
+
+
+def test_a_notebook_can_show_any_drawing(swing):
+    """Jupyter asks the last value of a cell for this method."""
+    from upright.physics import Furuta
+
+    assert fit_figure(swing(n=100), Furuta)._repr_png_().startswith(b"\x89PNG")

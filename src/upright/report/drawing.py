@@ -8,8 +8,8 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Callable
-from functools import wraps
-from io import StringIO
+from functools import cache, wraps
+from io import BytesIO, StringIO
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
@@ -79,14 +79,28 @@ def figure(height: float, width: float = WIDTH, *, margins: tuple[float, ...] = 
     """Empty figure, sizes in inches; no window and no global state belong to it.
 
     `margins` are left, right, top and bottom; without them matplotlib measures every text, which takes longer.
+    A notebook shows the figure when it is a cell's last value.
     """
-    from matplotlib.figure import Figure
-
-    drawing = Figure(figsize=(width, height), layout=None if margins else "constrained")
+    drawing = _shown_in_notebooks()(figsize=(width, height), layout=None if margins else "constrained")
     if margins:
         left, right, top, bottom = margins
         drawing.subplots_adjust(left / width, bottom / height, 1 - right / width, 1 - top / height)
     return drawing
+
+
+@cache
+def _shown_in_notebooks() -> type[Figure]:
+    """Class of figures that Jupyter can show without pyplot."""
+    from matplotlib.figure import Figure
+
+    class Drawing(Figure):
+        @styled
+        def _repr_png_(self) -> bytes:
+            page = BytesIO()
+            self.savefig(page, format="png", dpi=120, facecolor="white")
+            return page.getvalue()
+
+    return Drawing
 
 
 @styled
