@@ -1,0 +1,127 @@
+"""Do the notebooks of docs/ still run, say what they said, and tell nothing about whoever ran them last?"""
+
+import copy
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from docs.notebook import CellFailed, alike, differences, executed, read
+
+ROOT = Path(__file__).parents[1]
+NOTEBOOKS = sorted((ROOT / "docs").glob("*.ipynb"))
+LARGEST = 200_000  # bytes, pictures included, so that a clone stays quick
+OWN_FOLDERS = re.compile(r"(?<![\w.:/])/(home|root|tmp|opt|Users|work|mnt|var)/|[A-Z]:\\\\")
+
+
+def stem(path):
+    return path.stem
+
+
+def cells(notebook):
+    return [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+
+
+def of(*sources):
+    """Notebook of these cells, never run."""
+    return {"cells": [{"cell_type": "code", "source": [source], "outputs": []} for source in sources]}
+
+
+def text(cell):
+    return "".join(line for output in cell["outputs"] for line in output.get("text", []))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=stem)
+def test_a_notebook_runs_and_says_what_is_stored(path):
+    done = subprocess.run(
+        [sys.executable, "-m", "docs", "--check", path.stem],
+        cwd=ROOT, capture_output=True, encoding="utf-8", check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=stem)
+def test_a_notebook_is_stored_as_it_was_run_from_top_to_bottom(path):
+    stored = read(path)
+    assert [cell["execution_count"] for cell in cells(stored)] == list(range(1, len(cells(stored)) + 1))
+    assert {output["output_type"] for cell in cells(stored) for output in cell["outputs"]} <= {
+        "stream",
+        "display_data",
+        "execute_result",
+    }
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=stem)
+def test_a_notebook_is_small_and_tells_nothing_of_a_machine(path):
+    assert path.stat().st_size < LARGEST
+    stored = read(path)
+    assert set(stored["metadata"]) == {"kernelspec", "language_info"}
+    assert set(stored["metadata"]["language_info"]) == {"name"}
+    said = "".join(line for cell in cells(stored) for o in cell["outputs"] for line in o.get("text", []))
+    assert not OWN_FOLDERS.search(said)
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=stem)
+def test_every_picture_and_table_of_a_notebook_is_introduced(path):
+    """A student is never shown a cell without a sentence between it and the one before the last."""
+    kinds = "".join(cell["cell_type"][0] for cell in read(path)["cells"])
+    assert kinds.startswith("m")
+    assert "ccc" not in kinds
+
+
+def test_cells_share_their_names_and_show_print_picture_and_last_value():
+    import base64
+
+    fresh = executed(
+        of(
+            "x = 20\nprint('printed')\nx + 1",
+            "import matplotlib.pyplot as plt\nplt.plot([0, x]);",
+            "from matplotlib.figure import Figure\nFigure()",
+            "class Formula:\n    def _repr_latex_(self):\n        return '$x$'\nFormula()",
+            "display(x)\nx = None\nx",
+        )
+    )
+    printed, drawn, figure, formula, last = (cell["outputs"] for cell in cells(fresh))
+    assert [o["output_type"] for o in printed] == ["stream", "execute_result"]
+    assert printed[1]["data"] == {"text/plain": ["21"]}
+    for output in (drawn[0], figure[-1]):
+        assert base64.b64decode(output["data"]["image/png"]).startswith(b"\x89PNG")
+    assert formula[0]["data"]["text/latex"] == ["$x$"]
+    assert [o["data"]["text/plain"] for o in last] == [["20"]]
+
+
+def test_a_cell_that_raises_is_named():
+    with pytest.raises(CellFailed, match="cell 2 raises ZeroDivisionError"):
+        executed(of("x = 0", "1 / x"))
+
+
+def test_a_notebook_that_says_something_else_is_told():
+    stored = executed(of("print('gain', 3.14)", "1"))
+    assert list(differences(stored, stored)) == []
+    other = copy.deepcopy(stored)
+    cells(other)[0]["outputs"][0]["text"] = ["gain 3.24\n"]
+    assert len(list(differences(stored, other))) == 1
+    silent = copy.deepcopy(stored)
+    cells(silent)[1]["outputs"] = []
+    assert len(list(differences(stored, silent))) == 1
+
+
+@pytest.mark.parametrize(
+    ("stored", "fresh", "same"),
+    [
+        ("k = 390.1 N/m", "k = 390.2 N/m", True),  # one in the last digit printed
+        ("k = 390.1 N/m", "k = 390.3 N/m", False),
+        ("k = 390.1 N/m", "k = 390.1 N/mm", False),
+        ("2.93e-05", "2.94e-05", True),
+        ("2.93e-05", "2.93e-04", False),
+        ("-0.0", "0.0", True),  # the sign of nothing
+        ("99", "100", True),  # rounding may add a digit
+        ("a 1", "a  1", True),  # columns shift with it
+        ("1 2", "1", False),
+    ],
+)
+def test_numbers_may_differ_by_one_in_their_last_digit(stored, fresh, same):
+    assert alike(stored, fresh) is same
