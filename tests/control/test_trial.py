@@ -73,6 +73,7 @@ def test_a_command_is_rounded_to_the_converter_and_limited():
     expected = np.clip(np.round(kicks / RIG.converter) * RIG.converter, -RIG.limit, RIG.limit)
     np.testing.assert_allclose(run.u, expected, atol=1e-12)
     assert score(run).saturated == pytest.approx(10 / 15)
+    assert score(run).at_limit == pytest.approx(10 * RIG.period)
     assert score(run).effort_peak == RIG.limit
 
 

@@ -1,87 +1,151 @@
-"""How well did it go? The figures of a run, defined once, for what is predicted and for what happened."""
+"""How well did it go? The figures of runs, defined once, for what is predicted and for what happened."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.control.rig import Rig
 from upright.control.trial import Trial
 from upright.errors import BadInput
 
 Array = NDArray[np.float64]
 
-FALLEN = math.radians(30)
-"""Deviation of a pendulum from upright beyond which it counts as fallen and a person would switch off [rad]."""
+FALLEN = math.pi / 2
+"""Deviation beyond which a pendulum has fallen [rad]: past horizontal its pivot moves it the other way."""
 BAND = math.radians(2)
-"""Deviation of a pendulum within which it counts as settled [rad]: forty counts of its encoder."""
+"""Deviation of a pendulum within which it counts as settled [rad]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scores:
+    """Figures of runs side by side; lanes on the last axis. Peaks and effort count up to the loss, if there was one.
+
+    Attributes
+    ----------
+    fell : array, shape (lanes,)
+        Time at which the watched coordinate was lost [s]; inf when it never was.
+    ran_out : array, shape (lanes,)
+        Time at which the driven coordinate came to the end of its travel [s]; inf when it never did.
+    settled : array, shape (lanes,)
+        Time from which the watched coordinate stayed within its band to the end [s]; inf when it did not.
+    peaks : array, shape (coordinates, lanes)
+        Largest deviation of each coordinate [m or rad].
+    final : array, shape (coordinates, lanes)
+        Half of what each coordinate swings over the last third of the run [m or rad]: what dry friction and counts
+        leave.
+    effort_peak, effort_rms : array, shape (lanes,)
+        Of the command [its unit].
+    saturated : array, shape (lanes,)
+        Share of the samples at the limit, 0 to 1.
+    at_limit : array, shape (lanes,)
+        Time spent there [s].
+    """
+
+    fell: Array
+    ran_out: Array
+    settled: Array
+    peaks: Array
+    final: Array
+    effort_peak: Array
+    effort_rms: Array
+    saturated: Array
+    at_limit: Array
+
+    @property
+    def held(self) -> NDArray[np.bool_]:
+        """Which runs neither fell nor came to the end of the travel."""
+        return np.isinf(self.fell) & np.isinf(self.ran_out)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Score:
-    """Figures of a run.
-
-    Attributes
-    ----------
-    fell : float
-        Time at which the watched coordinate left for good what can be held [s]; inf when it never did.
-    settled : float
-        Time from which it stayed within its band to the end [s]; inf when it did not.
-    peaks : array, shape (coordinates,)
-        Largest deviation of each coordinate [m or rad], up to the fall if there was one.
-    final : array, shape (coordinates,)
-        Largest deviation of each coordinate over the last quarter [m or rad]: what dry friction and counts leave.
-    effort_peak, effort_rms : float
-        Of the command [its unit], up to the fall.
-    saturated : float
-        Share of the samples at the limit, up to the fall, 0 to 1.
-    """
+    """Figures of one run, as in `Scores`; peaks and final by coordinate."""
 
     fell: float
+    ran_out: float
     settled: float
     peaks: Array
     final: Array
     effort_peak: float
     effort_rms: float
     saturated: float
+    at_limit: float
 
     @property
     def held(self) -> bool:
-        """Whether it was held to the end."""
-        return not math.isfinite(self.fell)
+        """Whether it was held to the end, within the travel."""
+        return math.isinf(self.fell) and math.isinf(self.ran_out)
 
 
-def score(run: Trial, *, watched: str = "theta", fallen: float = FALLEN, band: float = BAND) -> Score:
+def score(run: Trial, *, watched: str = "", fallen: float = FALLEN, band: float = BAND) -> Score:
     """Figures of a trial that was to hold an equilibrium.
 
     Parameters
     ----------
     run : Trial
     watched : str
-        Coordinate that falls and settles.
+        Coordinate that falls and settles; the last when omitted.
     fallen, band : float
         Deviations beyond which it counts as fallen, and within which as settled [m or rad].
     """
-    names = [c.name for c in run.rig.plant.coordinates]
-    if watched not in names:
+    all_ = scores(
+        run.rig, run.t, run.deviation[:, :, None], run.u[:, None], watched=watched, fallen=fallen, band=band
+    )  # fmt: skip
+    lane: dict[str, Any] = {n: v[..., 0] if v.ndim > 1 else float(v[0]) for n, v in vars(all_).items()}
+    return Score(**lane)
+
+
+def scores(
+    rig: Rig, t: Array, away: Array, u: Array, *, watched: str = "", fallen: float = FALLEN, band: float = BAND
+) -> Scores:
+    """Figures of runs side by side.
+
+    Parameters
+    ----------
+    rig : Rig
+        For its limit, its travel and the names of its coordinates.
+    t : array, shape (N,)
+        Evenly spaced [s].
+    away : array, shape (N, coordinates, lanes)
+        Deviations from the equilibrium.
+    u : array, shape (N, lanes)
+        Commands as put out.
+    watched, fallen, band
+        As in `score`.
+    """
+    names = [c.name for c in rig.plant.coordinates]
+    if (watched or names[-1]) not in names:
         raise BadInput(f"nothing called '{watched}' moves there; watch one of {', '.join(names)}.")
-    away = np.abs(run.deviation)
-    main = away[:, names.index(watched)]
-    beyond = np.flatnonzero(~(main <= fallen))
-    last = int(beyond[0]) if beyond.size else main.size - 1
-    outside = np.flatnonzero(~(main <= band))
-    settled = 0.0 if outside.size == 0 else math.inf
-    if outside.size and outside[-1] + 1 < main.size:
-        settled = float(run.t[outside[-1] + 1])
-    u = run.u[: last + 1]
-    return Score(
-        fell=float(run.t[last]) if beyond.size else math.inf,
-        settled=math.inf if beyond.size else settled,
-        peaks=away[: last + 1].max(axis=0),
-        final=away[-max(1, away.shape[0] // 4) :].max(axis=0),
-        effort_peak=float(np.abs(u).max()),
-        effort_rms=float(np.sqrt(np.mean(u**2))),
-        saturated=float(np.mean(np.abs(u) >= run.rig.limit * (1 - 1e-9))),
+    size = np.abs(away)
+    main = size[:, names.index(watched or names[-1])]
+    fell = _first(t, ~(main <= fallen))
+    ran_out = _first(t, ~(size[:, names.index(rig.plant.inputs[0].on)] <= rig.travel))
+    before = t[:, None] <= np.minimum(fell, ran_out)
+    inside = main <= band
+    # after the last sample outside
+    after = t.size - np.argmax(~inside[::-1], axis=0)
+    settled = np.where(inside.all(axis=0), t[0], t[np.minimum(after, t.size - 1)])
+    lost = np.isfinite(fell) | ~inside[-1]
+    end = away[-max(2, t.size // 3) :]
+    full = before & (np.abs(u) >= rig.limit * (1 - 1e-9))
+    return Scores(
+        fell=fell,
+        ran_out=ran_out,
+        settled=np.where(lost, np.inf, settled),
+        peaks=np.where(before[:, None], size, 0.0).max(axis=0),
+        final=(end.max(axis=0) - end.min(axis=0)) / 2,
+        effort_peak=np.where(before, np.abs(u), 0.0).max(axis=0),
+        effort_rms=np.sqrt(np.sum(np.where(before, u**2, 0.0), axis=0) / before.sum(axis=0)),
+        saturated=full.sum(axis=0) / before.sum(axis=0),
+        at_limit=float(t[1] - t[0]) * full.sum(axis=0),
     )
+
+
+def _first(t: Array, when: NDArray[np.bool_]) -> Array:
+    """First time at which something is so, lane by lane; inf where it never is."""
+    return np.where(when.any(axis=0), t[np.argmax(when, axis=0)], np.inf)

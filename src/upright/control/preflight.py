@@ -1,0 +1,199 @@
+"""Will this law hold that rig? Asked of the model, before anything moves.
+
+Margins and noise come from the linear sampled loop. Everything else is simulated on the nonlinear model as identified,
+with dry friction, encoder counts, converter, limit, delay and lag: the run that is asked for, the same run on every rig
+that the identification allows, and how far the pendulum may lean or be tapped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from upright.control.many import outcomes
+from upright.control.rig import Rig
+from upright.control.score import Score, Scores, score
+from upright.control.trial import Trial, trial
+from upright.design import Feedback, Margins, Sampled, margins
+from upright.design.loop import closed, command_noise
+from upright.design.requests import poles_of
+from upright.errors import BadInput
+from upright.physics import Linear
+
+Array = NDArray[np.float64]
+
+WORDS = ("regulates", "saturates", "too weak", "falls")
+"""What a run can come to; see `words`."""
+FELT = 5e-3
+"""Time at the limit that counts as saturation [s]; what is shorter passes in the drive's own lag."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """What a law is asked to do.
+
+    Attributes
+    ----------
+    start : tuple of float
+        Deviation from the equilibrium when the law is switched on, state by state.
+    at : str
+        Equilibrium to hold.
+    seconds : float
+    hand : tuple of float
+        Standard deviation of the start, as a hand holds it; none when empty.
+    """
+
+    start: tuple[float, ...]
+    at: str = "inverted"
+    seconds: float = 6.0
+    hand: tuple[float, ...] = ()
+
+    def starts(self, lanes: int, rng: np.random.Generator) -> Array:
+        """Starts as a hand would give them, shape (lanes, states)."""
+        wide = np.array(self.hand) if self.hand else np.zeros(len(self.start))
+        return np.array(self.start) + rng.normal(size=(lanes, wide.size)) * wide
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Preflight:
+    """What is expected of a law.
+
+    Attributes
+    ----------
+    margins : Margins or None
+        Of the sampled loop; None when the linear loop falls already.
+    noise : float or None
+        Standard deviation of the command from the encoders' counts [its unit]; None as above.
+    run, score : Trial, Score
+        The run on the model as identified.
+    tilt, push : float
+        Largest tilt [rad] and largest speed from a tap [rad/s] of the last coordinate, each alone, that it recovers.
+    drawn : Scores
+        The run on the rigs that the identification allows, from starts as a hand gives them.
+    words : dict of str to float
+        Share of those runs that come to each of `WORDS`.
+    """
+
+    margins: Margins | None
+    noise: float | None
+    run: Trial
+    score: Score
+    tilt: float
+    push: float
+    drawn: Scores
+    words: Mapping[str, float] = field(default_factory=dict[str, float])
+
+    @property
+    def chance(self) -> float:
+        """Share of the rigs allowed that are held to the end."""
+        return float(np.mean(self.drawn.held))
+
+    @property
+    def word(self) -> str:
+        """What most of them come to."""
+        return max(WORDS, key=lambda w: self.words[w])
+
+
+def preflight(
+    rig: Rig,
+    model: Linear,
+    sampled: Sampled,
+    law: Feedback,
+    task: Task,
+    *,
+    parameters: Mapping[str, ArrayLike],
+    lanes: int,
+    seed: int,
+) -> Preflight:
+    """Say beforehand what a law will come to.
+
+    Parameters
+    ----------
+    rig : Rig
+        As identified.
+    model, sampled : Linear, Sampled
+        Its linear model about the equilibrium, and the same as the law was designed on.
+    law : Feedback
+    task : Task
+    parameters : mapping of str to array, shape (lanes,)
+        Parameters of other rigs that the identification allows; empty when it tells of none.
+    lanes : int
+        How many runs the chance is taken from.
+    seed : int
+        Of the hand's errors.
+    """
+    stands = bool(np.abs(poles_of(closed(sampled, law))).max() < 1)
+    run = trial(rig, law, at=task.at, start=task.start, seconds=task.seconds)
+    starts = task.starts(lanes, np.random.default_rng([seed, 52]))
+    drawn = outcomes(rig, law, at=task.at, starts=starts, seconds=task.seconds, parameters=parameters)
+    told = words(drawn)
+    last = np.zeros(len(task.start))
+    tilted, tapped = last.copy(), last.copy()
+    tilted[-2], tapped[-1] = 1.0, 1.0
+    return Preflight(
+        margins=margins(model, sampled, law) if stands else None,
+        noise=command_noise(sampled, law, rig.quantum) if stands else None,
+        run=run,
+        score=score(run),
+        tilt=largest(rig, law, task.at, tilted, most=np.pi / 2) if stands else 0.0,
+        push=largest(rig, law, task.at, tapped, most=20.0) if stands else 0.0,
+        drawn=drawn,
+        words={w: float(np.mean([t == w for t in told])) for w in WORDS},
+    )
+
+
+def words(found: Scores) -> list[str]:
+    """What each run came to.
+
+    It *falls*; it is *too weak* when the driven body leaves its travel or dry friction keeps the pendulum from
+    settling; it *saturates* when it holds but meets the limit for longer than `FELT`; else it *regulates*.
+    """
+    out: list[str] = []
+    for fell, ran_out, settled, full in zip(
+        found.fell.tolist(), found.ran_out.tolist(), found.settled.tolist(), found.at_limit.tolist(), strict=True
+    ):
+        if fell < ran_out:
+            out.append("falls")
+        elif np.isfinite(ran_out) or np.isinf(settled):
+            out.append("too weak")
+        else:
+            out.append("saturates" if full > FELT else "regulates")
+    return out
+
+
+def word(found: Score) -> str:
+    """The same of one run."""
+    return words(Scores(**{n: np.asarray(v)[..., None] for n, v in vars(found).items()}))[0]
+
+
+def largest(rig: Rig, law: Feedback, at: str, direction: ArrayLike, *, most: float, seconds: float = 3.0) -> float:
+    """How far along a direction of the states the rig may start and still be held; `most` when nothing less fails.
+
+    Sixty-four starts side by side find the first that fails, three times, each between the neighbours of the last.
+
+    Parameters
+    ----------
+    rig : Rig
+    law : Feedback
+    at : str
+    direction : array, shape (states,)
+    most : float
+        Largest factor on the direction to be tried.
+    seconds : float
+        Long enough for a run to be decided.
+    """
+    way = np.asarray(direction, dtype=np.float64)
+    if not way.any() or not most > 0:
+        raise BadInput("a direction needs one state that is not zero, and most must be above 0.")
+    low, high = 0.0, most
+    for _ in range(3):
+        steps = np.linspace(low, high, 65)[1:]
+        held = outcomes(rig, law, at=at, starts=steps[:, None] * way, seconds=seconds).held
+        if held.all():
+            return high
+        first = int(np.argmin(held))
+        low, high = (steps[first - 1] if first else low), steps[first]
+    return float(low)

@@ -1,0 +1,113 @@
+"""Is what is told beforehand bounded by theory, and right where the answer is known?"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from upright import design
+from upright.control import Scores
+from upright.control.many import outcomes
+from upright.control.preflight import Task, largest, preflight, words
+from upright.design.requests import read_poles
+from upright.errors import BadInput
+from upright.lab.makes import make_rig
+from upright.lab.paper.tables import TABLE_1
+
+RIG = make_rig("furuta")
+MODEL = RIG.linear("inverted")
+SAMPLED = design.hold(MODEL, RIG.period, RIG.delay / RIG.period)
+# the same compiled terms as on the true rig, with next to nothing in them
+IDEAL = replace(RIG.changed(b_1c=1e-15, b_2c=1e-15), lag=0.0, converter=0.0, counts=(1e14, 1e14), travel=math.inf)
+
+
+def law(which):
+    K = design.place(MODEL.A, MODEL.B, read_poles(TABLE_1[which])).K
+    return design.feedback(design.filtered(SAMPLED, 0.5), K)
+
+
+@pytest.mark.parametrize("direction", [[0, 0, 1, 0], [0, 0, 0, 1]])
+def test_a_law_on_the_unstable_mode_recovers_what_the_limit_can(direction):
+    """The coordinate z of that mode, z' = p z + b u, runs away beyond b U/p whatever u does; u = -k z reaches it."""
+    rig = replace(IDEAL, limit=0.01)  # so small that the rig is linear
+    values, left = np.linalg.eig(MODEL.A.T)
+    mode = int(np.argmax(values.real))
+    p, w = values[mode].real, left[:, mode].real
+    bound = abs(w @ MODEL.B[:, 0]) * rig.limit / p / abs(w @ np.array(direction))
+    mirrored = np.concatenate([np.delete(values.real, mode), [-p]])  # the others stay, but for the drifting arm
+    mirrored[np.argmin(np.abs(mirrored))] = -0.02
+    K = design.place(MODEL.A, MODEL.B, mirrored).K
+    found = largest(rig, design.feedback(design.filtered(SAMPLED, 0.5), K), "inverted", direction, most=3 * bound)
+    # the filtered difference is late by a sample and a half, the command by one on its way and half of one held
+    late = 2 * RIG.period + RIG.delay
+    assert math.exp(-p * late) * bound < found < bound
+    assert largest(rig, law(3), "inverted", direction, most=3 * bound) < bound
+
+
+def test_twice_the_start_with_twice_the_friction_and_limit_is_twice_the_motion():
+    """Linear but for dry friction and limit, both of degree one: the limit cycle grows with the friction."""
+    start = np.array([0.0, 0.0, 2e-4, 0.0])
+    found = [
+        outcomes(
+            replace(IDEAL, limit=8e-4 * k), law(0), at="inverted", starts=[k * start], seconds=6.0,
+            parameters={"b_1c": k * 5e-5, "b_2c": k * 1e-6},
+        )
+        for k in (1, 2)
+    ]  # fmt: skip
+    assert found[0].saturated[0] > 0
+    for name in ("peaks", "final", "effort_peak", "effort_rms"):
+        np.testing.assert_allclose(getattr(found[1], name), 2 * getattr(found[0], name), rtol=1e-3)
+
+
+def told(rig, start, hand=(), lanes=200):
+    task = Task(start=start, seconds=3.0, hand=hand)
+    return preflight(rig, MODEL, SAMPLED, law(0), task, parameters={}, lanes=lanes, seed=1)
+
+
+def test_the_chance_of_a_hand_that_errs_about_the_edge_is_the_normal_distribution():
+    edge, spread = largest(RIG, law(0), "inverted", [0, 0, 1, 0], most=math.pi / 2), 0.02
+    for z in (-1.0, 0.5):
+        chance = told(RIG, (0, 0, edge + z * spread, 0), hand=(0, 0, spread, 0)).chance
+        expected = 0.5 * math.erfc(z / math.sqrt(2))
+        assert chance == pytest.approx(expected, abs=3 * math.sqrt(expected * (1 - expected) / 200))
+
+
+def test_what_is_sure_has_chance_one_or_none():
+    easy = told(RIG, (0, 0, 0.05, 0))
+    assert easy.chance == 1.0
+    assert easy.word == "regulates"
+    beyond = told(RIG, (0, 0, 1.2, 0))
+    assert beyond.chance == 0.0
+    assert beyond.word == "falls"
+
+
+def test_a_loop_too_slow_for_its_pole_falls_beforehand():
+    """Forty milliseconds of further delay are beyond the margin of set 4, 24 ms."""
+    late = design.hold(MODEL, RIG.period, (RIG.delay + 0.04) / RIG.period)
+    task = Task(start=(0, 0, 0.05, 0), seconds=3.0)
+    found = preflight(
+        replace(RIG, delay=RIG.delay + 0.04), MODEL, late, law(3), task, parameters={}, lanes=16, seed=0
+    )  # fmt: skip
+    assert found.margins is None
+    assert found.chance == 0.0
+
+
+def test_every_end_of_a_run_has_its_word():
+    inf = np.inf
+    found = Scores(
+        fell=np.array([inf, inf, inf, inf, 0.4, 0.4]),
+        ran_out=np.array([inf, inf, inf, 0.3, 0.3, inf]),
+        settled=np.array([1.0, 1.0, inf, 1.0, inf, inf]),
+        saturated=np.zeros(6), at_limit=np.array([0.0, 0.1, 0.0, 0.0, 0.1, 0.1]),
+        peaks=np.zeros((2, 6)), final=np.zeros((2, 6)), effort_peak=np.zeros(6), effort_rms=np.zeros(6),
+    )  # fmt: skip
+    assert words(found) == ["regulates", "saturates", "too weak", "too weak", "too weak", "falls"]
+    assert found.held.tolist() == [True, True, True, False, False, False]
+
+
+def test_no_direction_is_no_question():
+    with pytest.raises(BadInput, match="not zero"):
+        largest(RIG, law(0), "inverted", [0, 0, 0, 0], most=1.0)
