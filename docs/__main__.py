@@ -1,6 +1,7 @@
-"""Run every notebook of this folder and store what it shows: `python -m docs [NAMES] [--check]`.
+"""Build what is computed in this folder: `python -m docs [NAMES] [--check]`.
 
-With --check nothing is written: it says which cells no longer run, or say something else than what is stored.
+Notebooks are run and store what they show, the nomenclature is written from the plants. With --check nothing is
+written: it says which cells no longer run, or say something else than what is stored.
 """
 
 from __future__ import annotations
@@ -9,9 +10,11 @@ import argparse
 import sys
 from pathlib import Path
 
+from docs import nomenclature
 from docs.notebook import CellFailed, differences, executed, read, write
 
 HERE = Path(__file__).parent
+NOMENCLATURE = HERE / "nomenclature.md"
 
 
 def main() -> int:
@@ -25,7 +28,7 @@ def main() -> int:
     )
     asked = ask.parse_args()
     names = asked.names or sorted(path.stem for path in HERE.glob("*.ipynb"))
-    failed = False
+    failed = False if asked.names else _nomenclature(asked.check)
     for name in names:
         path = HERE / f"{name}.ipynb"
         if not path.is_file():
@@ -45,6 +48,17 @@ def main() -> int:
             print(f"{path.name}, {sentence}", file=sys.stderr)
             failed = True
     return int(failed)
+
+
+def _nomenclature(check: bool) -> bool:
+    """Write the table of symbols; when only checked, whether it is out of date."""
+    if not check:
+        NOMENCLATURE.write_text(nomenclature.page(), encoding="utf-8")
+        return False
+    stale = NOMENCLATURE.read_text(encoding="utf-8") != nomenclature.page()
+    if stale:
+        print("nomenclature.md is out of date; run python -m docs.", file=sys.stderr)
+    return stale
 
 
 if __name__ == "__main__":

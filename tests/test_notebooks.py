@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from docs import nomenclature
 from docs.notebook import CellFailed, alike, differences, executed, read
+from upright.physics import BUILT_IN
 
 ROOT = Path(__file__).parents[1]
 NOTEBOOKS = sorted((ROOT / "docs").glob("*.ipynb"))
@@ -125,3 +127,16 @@ def test_a_notebook_that_says_something_else_is_told():
 )
 def test_numbers_may_differ_by_one_in_their_last_digit(stored, fresh, same):
     assert alike(stored, fresh) is same
+
+
+def test_the_nomenclature_is_that_of_the_plants():
+    assert (ROOT / "docs" / "nomenclature.md").read_text(encoding="utf-8") == nomenclature.page()
+
+
+@pytest.mark.parametrize("plant", BUILT_IN)
+def test_the_nomenclature_knows_every_name_of_a_plant(plant):
+    """Bodies of a chain are alike: what holds for 2 and its neighbour holds for 3."""
+    told = set(re.findall(r"^\| `(\w+)` \| .+? \| .+? \| .+? \|", nomenclature.page(), re.M))
+    kind = BUILT_IN[plant]
+    names = {*kind.names(), *(c.name for c in kind.coordinates), *(i.name for i in kind.inputs)}
+    assert {name.replace("23", "12").replace("_3", "_2") for name in names} <= told
