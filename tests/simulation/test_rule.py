@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from math import floor, sin
 
 import numpy as np
@@ -17,7 +18,7 @@ DT = 0.02
 R = np.column_stack([0.2 * np.sin(np.arange(90) * 0.15), np.cos(np.arange(90) * 0.15)])
 
 
-def pid(t, y, r, z, p):
+def pid(t: float, y: Sequence[float], r, z, p) -> tuple[Sequence[float], Sequence[float]]:
     """Sum, last reading, filtered difference of the error."""
     kp, ki, kd, alpha, dt = p
     e = r[0] - y[0]

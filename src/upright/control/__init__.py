@@ -2,6 +2,7 @@
 
 from upright.control.rig import Rig
 from upright.control.score import Score, Scores, score
+from upright.control.swing_up import SwingUp, design_swing_up
 from upright.control.trial import Trial, trial
 
-__all__ = ["Rig", "Score", "Scores", "Trial", "score", "trial"]
+__all__ = ["Rig", "Score", "Scores", "SwingUp", "Trial", "design_swing_up", "score", "trial"]

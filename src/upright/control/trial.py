@@ -15,7 +15,7 @@ from upright.control.rig import Rig
 from upright.design import Feedback
 from upright.errors import BadInput
 from upright.records import Provenance, Record
-from upright.simulation import Law, simulate
+from upright.simulation import Law, Rule, simulate
 
 Array = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ class Trial:
 
 def trial(
     rig: Rig,
-    law: Feedback | Law,
+    law: Feedback | Law | Rule,
     *,
     at: str,
     start: ArrayLike,
@@ -78,7 +78,8 @@ def trial(
         As it truly is.
     law : Feedback or Law
         State feedback, switched on knowing where the rig is and taking it to be at rest; or any law on
-        ``[readings, references]``, whose own encoder and converter steps and delay are replaced by the rig's.
+        ``[readings, references]``, whose own encoder and converter steps and delay are replaced by the rig's; or
+        a rule, which brings the rig's encoders and converter itself.
     at : str
         Equilibrium to hold.
     start : array, shape (states,)
@@ -103,7 +104,7 @@ def trial(
     point = np.array(list(rig.plant.equilibrium(at).values()))
     held = point if rest is None else np.asarray(rest, dtype=np.float64)
     x0 = rig.plant.state(at) + np.asarray(start, dtype=np.float64)
-    given = at_work(rig, law, x0, held, reference)
+    given = law if isinstance(law, Rule) else at_work(rig, law, x0, held, reference)
     late = None
     if pushes is not None:
         late = np.zeros(count)

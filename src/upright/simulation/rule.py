@@ -200,16 +200,17 @@ def text_of(function: Function) -> str:
         raise BadInput("a rule's text could not be read; define it with def, in a file or a notebook.") from None
     if not isinstance(tree, ast.FunctionDef) or len(tree.args.args) != _SIGNATURE:
         raise BadInput("a rule is a function with the arguments t, y, r, z, p, defined with def.")
+    name = tree.name
+    for arg in tree.args.args:
+        arg.annotation = None
+    tree.name, tree.returns, tree.decorator_list = "rule", None, []
     names = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
     made = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
     if outside := sorted(names - made - {a.arg for a in tree.args.args} - KNOWN - _BUILT_IN):
         raise BadInput(
-            f"the rule '{tree.name}' uses {', '.join(outside)}, which the kernel does not know; pass numbers in "
+            f"the rule '{name}' uses {', '.join(outside)}, which the kernel does not know; pass numbers in "
             f"through its parameters, and take of math only {', '.join(sorted(KNOWN))}."
         )
-    for arg in tree.args.args:
-        arg.annotation = None
-    tree.name, tree.returns, tree.decorator_list = "rule", None, []
     if ast.get_docstring(tree) is not None:
         tree.body = tree.body[1:]
     return ast.unparse(tree)

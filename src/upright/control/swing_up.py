@@ -1,0 +1,234 @@
+"""How does a hanging pendulum get upright by its own drive, within the drive's limit and the rig's travel?
+
+`design_swing_up` finds the numbers of the law in `swing_up_law` from a rig's model. The feedback that holds is of least
+cost (Bryson's weights); the ellipsoid ``x'Px <= c`` from which it takes over is the largest on which the command asked
+for stays below twice the limit: there saturation leaves at least half of it, and a least-cost loop bears half its
+gain, so that x'Px falls. That is exact for the linear model only; on the nonlinear one the ellipsoid is then shrunk
+until a few hundred motions from its surface all come to rest within the travel.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from upright import design
+from upright.control.rig import Rig
+from upright.control.swing_up_law import HOLDING, PARAMETERS, SWINGING, swing_and_hold
+from upright.control.trial import SUBSTEPS, readings
+from upright.design.requests import poles_of
+from upright.errors import BadInput
+from upright.simulation import Rule, simulate
+
+Array = NDArray[np.float64]
+
+TRAVEL = {"m": 0.20, "rad": 2 * math.pi}
+"""How far the driven body may go from the middle where the rig does not say: a rail's half, one turn of a cable."""
+NEAR = 0.5
+"""Angle from upright [rad] beyond which the linear model is not asked: sin 0.5 is 4 % below 0.5."""
+AWAY = 0.7
+"""Angle from upright [rad] at which the pendulum counts as fallen and is swung up again."""
+FADE = 0.01
+"""Time constant with which the step of the command at the handover fades [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """A pendulum on a moved pivot, eq. (3) with what both makes have in common; on a cart nothing spins.
+
+    ``(M + spin sin^2) q'' + kappa (cos theta'' - sin theta'^2) + 2 spin sin cos theta' q' + viscous q' = F - dry``
+    and ``J theta'' + kappa cos q'' + weight sin - spin sin cos q'^2 = 0``.
+    """
+
+    M: float
+    spin: float
+    kappa: float
+    J: float
+    weight: float
+    viscous: float
+    dry: float
+
+    @property
+    def omega(self) -> float:
+        """Frequency of a small swing on a pivot at rest [rad/s]."""
+        return math.sqrt(self.weight / self.J)
+
+    def energy(self, theta: ArrayLike, theta_dot: ArrayLike) -> Array:
+        """Energy of the swing over that of rest upright [J]: 0 there, -2 weight hanging."""
+        angle, speed = np.asarray(theta, dtype=np.float64), np.asarray(theta_dot, dtype=np.float64)
+        return np.asarray(0.5 * self.J * speed**2 - self.weight * (1.0 + np.cos(angle)))
+
+    def power(self, theta: ArrayLike, theta_dot: ArrayLike, a: ArrayLike) -> Array:
+        """What the pivot's acceleration `a` adds to that energy per time [W]."""
+        angle, speed = np.asarray(theta, dtype=np.float64), np.asarray(theta_dot, dtype=np.float64)
+        return np.asarray(-self.kappa * np.cos(angle) * speed * np.asarray(a, dtype=np.float64))
+
+
+def body(rig: Rig) -> Body:
+    """Numbers of a rig's pendulum: mass, stiffness and damping matrix hanging, and the mass at a right angle.
+
+    Raises
+    ------
+    BadInput
+        When the rig is no pendulum on a driven body.
+    """
+    plant = rig.plant
+    names = [c.name for c in plant.coordinates]
+    if len(names) != 2 or names[1] != "theta" or not {"hanging", "inverted"} <= set(plant.equilibria):
+        raise BadInput(f"a swing-up needs a pendulum theta on a driven body, and {rig.name} has {', '.join(names)}.")
+    hanging = plant.linear("hanging")
+    m = hanging.mass
+    stiffness, damping = (-(m @ hanging.A[1::2, i::2]) for i in (0, 1))
+    moving, still = plant.energy([[0.0, 1.0, math.pi / 2, 0.0], [0.0, 0.0, math.pi / 2, 0.0]])
+    return Body(
+        M=float(m[0, 0]), spin=float(2 * (moving - still) - m[0, 0]), kappa=float(m[0, 1]), J=float(m[1, 1]),
+        weight=float(stiffness[1, 1]), viscous=float(damping[0, 0]), dry=float(plant.parameters().get("b_1c", 0.0)),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SwingUp:
+    """A swing-up, its catch and its feedback for one model of a rig.
+
+    Attributes
+    ----------
+    body : Body
+    K : array, shape (4,)
+        Gains of the feedback on position and speed of the driven body, angle from upright and its speed.
+    P : array, shape (4, 4)
+    size, sure : float
+        c of the ellipsoid of the catch, and what the linear model alone would allow.
+    fast : float
+        Speed of the driven body up to which it is caught: there its spin lifts the pendulum by a fifth of its weight.
+    memory : float
+        Of the filtered differences.
+    reach : float
+        Acceleration of the pivot while pumping [m/s^2 or rad/s^2].
+    sharp : float
+        How many times the missing energy over `weight` the pump is turned up, 1 being all of `reach`.
+    centre, damp : float
+        Spring [1/s^2] and damper [1/s] to the middle while pumping.
+    travel : float
+        The drive is switched off beyond [m or rad].
+    period, gain, limit : float
+        As in the model of the rig.
+    """
+
+    body: Body
+    K: Array
+    P: Array
+    size: float
+    sure: float
+    fast: float
+    memory: float
+    reach: float
+    sharp: float
+    centre: float
+    damp: float
+    travel: float
+    period: float
+    gain: float
+    limit: float
+
+    def rule(self, rig: Rig, start: ArrayLike, *, holding: bool = False) -> Rule:
+        """The law with the encoders and the converter of a rig.
+
+        Parameters
+        ----------
+        rig : Rig
+            As it truly is.
+        start : array, shape (states,) or (lanes, states)
+            Where it is when the law is switched on, as a person sees it who writes zeros where it hangs.
+        holding : bool
+            Begin with the feedback, which then knows the speeds.
+        """
+        x: Array = np.asarray(start, dtype=np.float64)
+        at = readings(rig, x[..., 0::2])
+        speeds = x[..., 1::2] if holding else np.zeros_like(at)
+        zero = np.zeros_like(at[..., 0])
+        b, (scale_q, scale_theta) = self.body, rig.shown.tolist()
+        numbers = dict(zip(("k0", "k1", "k2", "k3"), self.K.tolist(), strict=True))
+        numbers |= {f"p{i}{j}": float(self.P[i, j]) for i in range(4) for j in range(i, 4)}
+        numbers |= vars(b) | {n: getattr(self, n) for n in PARAMETERS if n in vars(self)}
+        numbers |= {
+            "scale_q": scale_q, "scale_theta": scale_theta, "near": NEAR, "away": AWAY, "allowed": self.travel,
+            "fade": math.exp(-self.period / FADE),
+        }  # fmt: skip
+        mode = zero + (HOLDING if holding else SWINGING)
+        return Rule(
+            function=swing_and_hold, parameters=[numbers[n] for n in PARAMETERS],
+            initial=np.array([at[..., 0], at[..., 1], speeds[..., 0], speeds[..., 1], mode, zero]),
+            quantum=np.abs(rig.quantum / rig.shown), command_quantum=rig.converter,
+        )  # fmt: skip
+
+
+def design_swing_up(model: Rig, *, travel: float | None = None, memory: float = 0.8) -> SwingUp:
+    """Swing-up and catch for a rig's model.
+
+    Parameters
+    ----------
+    model : Rig
+        As it is known; its numbers need not be those of the rig that the law will meet.
+    travel : float, optional
+        How far the driven body may go from the middle [m or rad]; what the rig says when omitted.
+    memory : float
+        Of the filtered differences that give the speeds.
+
+    Raises
+    ------
+    BadInput
+        When the rig has no pendulum to swing up, or no catch keeps within limit and travel.
+    """
+    from scipy.linalg import solve_continuous_are
+
+    b = body(model)
+    known = model.travel if math.isfinite(model.travel) else TRAVEL[model.plant.coordinates[0].unit]
+    room = known if travel is None else travel
+    linear = model.linear("inverted")
+    # Bryson: a quarter of the travel, half a radian and half the limit cost alike
+    Q, R = np.diag([(4 / room) ** 2, 0.0, 4.0, 0.0]), (2 / model.limit) ** 2
+    P = np.asarray(solve_continuous_are(linear.A, linear.B, Q, np.array([[R]])), dtype=np.float64)
+    K = (linear.B.T @ P / R)[0]
+    sampled = design.hold(linear, model.period, (model.delay + model.lag) / model.period)
+    gains = design.place_sampled(sampled, design.filtered(sampled, memory), poles_of(linear.A - linear.B @ K[None]))
+    sure = (2 * model.limit) ** 2 / float(K @ np.linalg.solve(P, K))
+    centre = 0.45 * b.omega
+    law = SwingUp(
+        body=b, K=gains[0], P=P, size=sure, sure=sure, memory=memory,
+        fast=min(math.sqrt(0.2 * b.weight / max(b.spin, 1e-12)), room * b.omega),
+        # half of what would hold the pendulum level, and no wider a swing of the pivot than fits
+        reach=min(0.5 * b.weight / abs(b.kappa), 0.3 * room * b.omega**2), sharp=4.0,
+        centre=centre**2, damp=1.5 * centre, travel=room, period=model.period, gain=model.gain, limit=model.limit,
+    )  # fmt: skip
+    return replace(law, size=0.8 * sure * _share(law, model))
+
+
+def _share(law: SwingUp, model: Rig, *, rays: int = 40, seconds: float = 2.5) -> float:
+    """Share of the sure ellipsoid, in steps of a sixteenth of its radius, from all of whose surface the model rests.
+
+    As many points of each surface are tried as there are `rays`, all of them where the law would catch.
+    """
+    rng = np.random.default_rng(5)
+    shape = np.linalg.inv(np.linalg.cholesky(law.P)).T * math.sqrt(law.sure)
+    radii = np.arange(1, 17) / 16
+    starts: list[Array] = []
+    for radius in radii.tolist():
+        rose = rng.normal(size=(4, 200 * rays))
+        x = radius * shape @ (rose / np.linalg.norm(rose, axis=0))
+        caught = (np.abs(x[2]) <= NEAR) & (np.abs(x[1]) <= law.fast) & (np.abs(x[0]) <= 0.5 * law.travel)
+        starts.append(x[:, np.resize(np.flatnonzero(caught), rays)])
+    start = np.concatenate(starts, axis=1).T + model.plant.state("inverted")
+    out = simulate(
+        model.plant, model.drive, start, None, model.period, samples=round(seconds / model.period), substeps=SUBSTEPS,
+        loop=law.rule(model, start, holding=True),
+    )  # fmt: skip
+    rests = np.abs(out[-200:, 2] - math.pi).max(axis=0) < 0.1
+    rests &= np.abs(out[:, 0]).max(axis=0) < law.travel
+    lost = ~rests.reshape(radii.size, rays).all(axis=1)
+    within = int(np.argmax(lost)) if lost.any() else radii.size
+    if within == 0:
+        raise BadInput(f"no catch of {model.name} keeps within its limit and a travel of {law.travel:g}; allow more.")
+    return float(radii[within - 1] ** 2)
