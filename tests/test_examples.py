@@ -19,7 +19,12 @@ from upright.simulation import simulate
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    *sorted((ROOT / "docs").glob("*.md")),
+    *sorted((ROOT / "docs").glob("*.ipynb")),
+]
 
 
 def classes(path: Path) -> list[str]:
@@ -47,14 +52,23 @@ def test_there_is_something_to_run():
     assert STUDIES
 
 
+def told(script: Path) -> str:
+    """What a script says of itself."""
+    return ast.get_docstring(ast.parse(script.read_text(encoding="utf-8"))) or ""
+
+
+def marked(script: Path):
+    """A script that works on DATA, the folder of public logs, needs them."""
+    return pytest.param(script, id=script.name, marks=[pytest.mark.real_data] if "DATA" in told(script) else [])
+
+
 @pytest.mark.slow
-@pytest.mark.real_data
-@pytest.mark.parametrize("script", SCRIPTS, ids=name_of)
+@pytest.mark.parametrize("script", [marked(script) for script in SCRIPTS])
 def test_a_script_runs_as_its_first_lines_say(script, tmp_path):
-    """The command in the docstring, with DATA standing for the folder of public logs."""
-    shown = re.search(r"^ +python (.+)$", ast.get_docstring(ast.parse(script.read_text(encoding="utf-8"))) or "", re.M)
+    """The command in the docstring; pictures it promises are there."""
+    shown = re.search(r"^ +python (.+)$", told(script), re.M)
     assert shown, f"{script.name} should show how it is run"
-    data = os.environ["UPRIGHT_REAL_DATA"]
+    data = os.environ.get("UPRIGHT_REAL_DATA", "")
     words = [data if word == "DATA" else word for word in shlex.split(shown[1])]
     words = [str(ROOT / word) if (ROOT / word).is_file() else word for word in words]
     done = subprocess.run(
@@ -62,6 +76,9 @@ def test_a_script_runs_as_its_first_lines_say(script, tmp_path):
         cwd=tmp_path, env=os.environ | {"MPLBACKEND": "Agg"}, capture_output=True, encoding="utf-8", check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
+    pictures = re.findall(r"\w+\.(?:png|svg)", told(script))
+    assert pictures
+    assert set(pictures) == {path.name for path in tmp_path.iterdir()}
 
 
 @pytest.mark.parametrize(("path", "name"), PLANTS, ids=name_of)
