@@ -64,7 +64,7 @@ def loadings(
     from upright.identification.loadings import swings, weigh
     from upright.readers import read
     from upright.report.advice import Step
-    from upright.report.loadings import write_loadings
+    from upright.report.loadings_told import write_loadings
     from upright.units import parse
 
     values = [inertia(text) for text in added or ()]
@@ -108,19 +108,15 @@ def loadings(
 
 
 def _twin(kind: str, seed: int, out: Path, as_json: bool) -> None:
-    from upright.lab.loadings import run, truth
+    from upright.lab.loadings import run, truth, write_logs
     from upright.report.advice import Step
-    from upright.report.loadings import write_loadings
+    from upright.report.loadings_told import write_loadings
 
     if kind != "rectilinear" and kind != "torsional":
         raise BadInput(f"--twin is rectilinear or torsional, got '{kind}'.")
     done = run(seed, kind)
-    out.mkdir(parents=True, exist_ok=True)
     column = next(iter(done.logs.values())).outputs[0]
-    files: dict[str, str] = {}
-    for label, record in done.logs.items():
-        files[label] = label.replace(" masses, run ", "x500g_run") + ".csv"
-        record.to_csv(out / files[label])
+    files = write_logs(done, out)
     unit = "kg" if kind == "rectilinear" else "kg m^2"
     added = " ".join(f'--added "{done.added[label]:.6g} {unit}"' for label in files)
     steps = [
@@ -170,7 +166,7 @@ def _tell(
     from rich.table import Table
 
     from upright.cli.terminal import console
-    from upright.report.loadings import rows
+    from upright.report.loadings_told import rows
 
     if as_json:
         named = {"k": found.k, "bare": found.bare, "damping": found.damping}

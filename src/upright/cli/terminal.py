@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from upright.report.symbols import typed
+
 if TYPE_CHECKING:
     from upright.identification.crossval import CrossValidation
     from upright.identification.model import Fit, RunScore
@@ -48,17 +50,6 @@ def progress_line(*, quiet: bool = False) -> Generator[Progress | None]:
             bar.update(task, description=stage, completed=fraction, cost=f"{cost:.6g}", evaluations=evaluations)
 
         yield follow
-
-
-def typed(path: Path | str) -> str:
-    """A path as it is typed on a command line: in quotes when it holds blanks or what a shell would read."""
-    import re
-    import shlex
-
-    text = str(path)
-    if re.fullmatch(r"[\w./\\:~+=@%,-]+", text):
-        return text
-    return shlex.quote(text) if re.search(r"[\"$`!]", text) else f'"{text}"'
 
 
 def print_fit(fit: Fit, files: Sequence[Path], study: str, crossed: CrossValidation | None = None) -> None:

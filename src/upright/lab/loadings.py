@@ -7,7 +7,9 @@ Both stick: dry friction, encoder counts, converter steps and amplifier limits a
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -20,6 +22,7 @@ from upright.physics.loads import added_inertia, added_mass
 from upright.records import Provenance, Record
 
 Kind = Literal["rectilinear", "torsional"]
+Progress = Callable[[str, float], None]
 
 PIECES = 4  # 500 g masses that come with a rig
 RADIUS = 0.065  # m, bolt circle on the disk
@@ -155,13 +158,22 @@ class Campaign:
 def run(
     seed: int = 0, kind: Kind = "rectilinear", *, counts: tuple[int, ...] = (0, 1, 2, 3, 4), shots: int = 2
 ) -> Campaign:
-    """Step a rig with every count of masses, `shots` times each, and weigh it."""
-    on, piece = rig(seed, kind), nominal_piece(kind)
+    """Step a rig of the make with every count of masses, `shots` times each, and weigh it."""
+    return weigh_body(rig(seed, kind), counts=counts, shots=shots)
+
+
+def weigh_body(
+    on: Rig, progress: Progress | None = None, *, counts: tuple[int, ...] = (0, 1, 2, 3, 4), shots: int = 2
+) -> Campaign:
+    """Step a body with every count of masses, `shots` times each, and weigh it."""
+    piece = nominal_piece(on.kind)
     logs: dict[str, Record] = {}
     added: dict[str, float] = {}
     loaded: list[Loaded] = []
     left_out: list[str] = []
-    for count in counts:
+    for i, count in enumerate(counts):
+        if progress:
+            progress(f"stepping with {count} masses", i / len(counts))
         for shot in range(shots):
             name = f"{count} masses, run {shot + 1}"
             record = acquire(on, count, shot=shot)
@@ -171,8 +183,18 @@ def run(
                 loaded += swings(record, added=count * piece, label=name, signal=column, command="u", quantum=1.0)
             except NotIdentifiable as error:
                 left_out.append(str(error))
-    found = weigh(loaded, tolerance=MAKES[kind].tolerance, piece=piece)
+    found = weigh(loaded, tolerance=MAKES[on.kind].tolerance, piece=piece)
     return Campaign(on=on, logs=logs, added=added, found=found, left_out=tuple(left_out))
+
+
+def write_logs(done: Campaign, folder: Path) -> dict[str, str]:
+    """Write every log as CSV; gives back its file by its label."""
+    folder.mkdir(parents=True, exist_ok=True)
+    files: dict[str, str] = {}
+    for label, record in done.logs.items():
+        files[label] = label.replace(" masses, run ", "x500g_run") + ".csv"
+        record.to_csv(folder / files[label])
+    return files
 
 
 def truth(on: Rig) -> dict[str, float]:

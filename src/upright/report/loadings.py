@@ -1,4 +1,4 @@
-"""How do swings, line and plans of experiment 1a look, and how is the result told?"""
+"""How do swings, line and plans of experiment 1a look?"""
 
 from __future__ import annotations
 
@@ -12,10 +12,9 @@ from upright.identification.decrement import Decay
 from upright.identification.loadings import Loaded, Loadings
 from upright.identification.planning import Plan
 from upright.records import Record
-from upright.report.advice import Step
-from upright.report.document import Picture, picture, write_page
+from upright.report.document import Picture, picture
 from upright.report.drawing import BLUE, CYCLE, GREY, VERMILLION, decimated, figure, save, styled
-from upright.report.symbols import number, unit
+from upright.report.symbols import unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -125,36 +124,6 @@ def units_of(kind: str) -> dict[str, str]:
     }
 
 
-def rows(found: Loadings, kind: str) -> list[dict[str, str]]:
-    """Table of what was found."""
-    of = units_of(kind)
-    named = (
-        ("k", "stiffness", found.k, of["stiffness"]),
-        ("J_0" if kind == "torsional" else "m_0", "inertia of the bare body", found.bare, of["inertia"]),
-        ("c", "viscous friction", found.damping, of["damping"]),
-    )
-    return [
-        {
-            "name": name, "meaning": meaning, "value": number(w.value), "stderr": number(w.stderr, 2),
-            "interval": f"{number(w.interval[0])} to {number(w.interval[1])}", "unit": unit(of_it),
-        }
-        for name, meaning, w, of_it in named
-    ]  # fmt: skip
-
-
-def swing_rows(found: Loadings) -> list[dict[str, str]]:
-    """Table of the swings."""
-    return [
-        {
-            "label": s.label, "added": number(s.added), "extremes": str(s.decay.t.size),
-            "omega": number(s.decay.omega_n, 5), "error": number(s.decay.omega_error, 2),
-            "decrement": number(s.decay.decrement, 3), "zeta": number(s.decay.zeta, 3),
-            "delta": f"{number(s.decay.delta, 3)} ± {number(s.decay.delta_error, 2)}",
-        }
-        for s in found.swings
-    ]  # fmt: skip
-
-
 def loading_pictures(
     found: Loadings, logs: Mapping[str, Record], signals: Mapping[str, str], kind: str
 ) -> list[Picture]:
@@ -194,19 +163,3 @@ def loading_pictures(
 
 def _log(s: Loaded) -> str:
     return s.label.rsplit(", step ", 1)[0]
-
-
-def write_loadings(
-    found: Loadings, folder: Path, *, kind: str, title: str, logs: Mapping[str, Record], signals: Mapping[str, str],
-    left_out: Sequence[str] = (), truth: Mapping[str, float] | None = None, steps: Sequence[Step] = (),
-) -> Path:  # fmt: skip
-    """Write what the loadings say as one self-contained page, `folder`/report.html; `truth` is what a twin knows."""
-    table = rows(found, kind)
-    for row in table:
-        row["truth"] = number(truth[row["name"]]) if truth and row["name"] in truth else ""
-    return write_page(
-        folder, "loadings.html", title=title, found=found, rows=table, truth=bool(truth),
-        swings=swing_rows(found), unit=unit(units_of(kind)["inertia"]), left_out=list(left_out),
-        pictures=loading_pictures(found, logs, signals, kind), steps=list(steps),
-        repeat="" if np.isnan(found.repeat) else f"{50 * found.repeat:.2g} %",
-    )  # fmt: skip

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import re
+import shlex
+from pathlib import Path
 
 _LETTERS = (
     "alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi omicron pi rho sigmaf sigma tau upsilon"
@@ -84,3 +86,11 @@ def percent(value: float) -> str:
     if not math.isfinite(value):
         return number(value)
     return f"{value:.2f} %" if value > 99 else f"{value:.1f} %".replace("-", "−")
+
+
+def typed(path: Path | str) -> str:
+    """A path as it is typed on a command line: in quotes when it holds blanks or what a shell would read."""
+    text = str(path)
+    if re.fullmatch(r"[\w./\\:~+=@%,-]+", text):
+        return text
+    return shlex.quote(text) if re.search(r"[\"$`!]", text) else f'"{text}"'
