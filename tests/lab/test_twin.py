@@ -6,8 +6,26 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
+from upright.errors import BadInput
 from upright.lab import drift, energy
-from upright.lab.twin import COUNTS, NOMINAL, SERVO, BrassPendulum, Release, Twin, acquire, motion, twin
+from upright.lab.makes import make_rig
+from upright.lab.twin import (
+    COUNTS,
+    MOTOR_AND_BELT,
+    NOMINAL,
+    SERVO,
+    BrassPendulum,
+    Release,
+    Twin,
+    acquire,
+    freed,
+    motion,
+)
+
+
+def twin(seed):
+    return freed(make_rig("furuta", seed))
+
 
 FRICTIONLESS = dict.fromkeys(("b_1", "b_1c", "b_2", "b_2c"), 0.0)
 
@@ -41,7 +59,10 @@ def test_upright_it_falls_about_as_fast_as_the_paper_s_rig(seed):
 def test_seeds_are_rigs_of_their_own_that_can_be_had_again():
     assert twin(3) == twin(3)
     assert twin(3) != twin(4)
-    assert twin(0).truth == NOMINAL
+    # as designed, without motor and belt: their friction, and their inertia of 5e-4
+    assert twin(0).truth.J_d == pytest.approx(NOMINAL.J_d - MOTOR_AND_BELT)
+    for name in ("m_p", "l_cg", "r", "J_p", "b_1", "b_1c", "b_2", "b_2c"):
+        assert getattr(twin(0).truth, name) == pytest.approx(getattr(NOMINAL, name))
 
 
 def test_a_log_holds_whole_counts_at_the_servo_s_beat():
@@ -153,6 +174,20 @@ def test_the_spring_brings_home_what_a_lean_drags_away():
     free, held = wanders["out of level by 0.25°"], wanders["spring, out of level by 0.25°"]
     assert abs(math.degrees(free.end)) > 45
     # at rest the spring's torque is gravity's: k_psi psi = m_p g r tilt; what remains still swings, hence 3 times
-    home = NOMINAL.m_p * NOMINAL.g * NOMINAL.r * math.sin(drift.TILT) / drift.SPRING
+    home = NOMINAL.m_p * NOMINAL.g * NOMINAL.r * math.sin(drift.TILT) / drift.SPRING["psi"]
     assert abs(held.end) < 4 * home
     assert abs(held.slope) < abs(free.slope) / 30
+
+
+def test_a_cart_s_momentum_is_what_its_release_gave_it():
+    # no friction: p = (m_c + m_p) x' + m_p l_cg cos(theta) theta' is constant, so the cart drifts at p over the mass
+    rig = freed(make_rig("linear")).changed(**FRICTIONLESS)
+    p = rig.truth
+    _, x = motion(rig, Release(push=0.05), seconds=5.0)
+    momentum = (p.m_c + p.m_p) * x[:, 1] + p.m_p * p.l_cg * np.cos(x[:, 2]) * x[:, 3]
+    assert momentum == pytest.approx((p.m_c + p.m_p) * 0.05, rel=1e-7)  # RK4's error over 5 s
+
+
+def test_what_has_no_pendulum_cannot_swing_one():
+    with pytest.raises(BadInput, match="needs a pendulum"):
+        freed(make_rig("rectilinear"))

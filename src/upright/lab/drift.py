@@ -21,10 +21,10 @@ Array = NDArray[np.float64]
 
 TILT = math.radians(0.25)
 """Lean of the axis in the study [rad]: 1 mm in 23 cm, less than a bubble level shows at a glance."""
-PUSH = 0.15
-"""Speed that a careless hand gives the disk [rad/s]."""
-SPRING = 0.04
-"""Soft anchoring spring [N m/rad]; the disk alone would swing on it at a third of the pendulum's frequency."""
+PUSH = {"psi": 0.15, "x": 0.05}
+"""Speed that a careless hand gives disk [rad/s] or cart [m/s]."""
+SPRING = {"psi": 0.04, "x": 20.0}
+"""Soft anchoring spring [N m/rad or N/m]; the disk alone would swing on it at a third of the pendulum's frequency."""
 
 
 def wander(name: str, rig: Twin, release: Release | None = None, *, seconds: float, remedy: bool = False) -> Wander:
@@ -60,15 +60,26 @@ def momentum(plant: Furuta, x: Array) -> Array:
     return own * psi_dot - plant.m_p * plant.r * plant.l_cg * c * theta_dot
 
 
+def anchored(rig: Twin) -> Twin:
+    """The rig with its soft spring to ground."""
+    return rig.changed(**{f"k_{rig.base}": SPRING[rig.base]})
+
+
 def study(rig: Twin, *, seconds: float = 24.0) -> tuple[Wander, ...]:
-    """The same release on the rig as it stands, after a push, out of level, and with the spring in each case."""
-    leaning, push = rig.changed(tilt_y=math.sin(TILT)), Release(push=PUSH)
-    anchored, both = rig.changed(k_psi=SPRING), leaning.changed(k_psi=SPRING)
+    """The same release on the rig as it stands, after a push, out of level, and with the spring in each case.
+
+    A rail out of level by so little does not move a cart that sticks.
+    """
+    push = PUSH[rig.base]
+    body, pushed = "disk" if rig.base == "psi" else "cart", Release(push=push)
+    cases = [(f"free {body}, level", rig, None),
+             (f"pushed at release, {push:g} {'rad/s' if rig.base == 'psi' else 'm/s'}", rig, pushed)]  # fmt: skip
+    held = [("spring, level", rig, None), ("spring, pushed at release", rig, pushed)]
+    if rig.base == "psi":
+        leaning, lean = rig.changed(tilt_y=math.sin(TILT)), f"out of level by {math.degrees(TILT):g}°"
+        cases.append((lean, leaning, None))
+        held.append((f"spring, {lean}", leaning, None))
     return (
-        wander("free disk, level", rig, seconds=seconds),
-        wander(f"pushed at release, {PUSH:g} rad/s", rig, push, seconds=seconds),
-        wander(f"out of level by {math.degrees(TILT):g}°", leaning, seconds=seconds),
-        wander("spring, level", anchored, seconds=seconds, remedy=True),
-        wander("spring, pushed at release", anchored, push, seconds=seconds, remedy=True),
-        wander(f"spring, out of level by {math.degrees(TILT):g}°", both, seconds=seconds, remedy=True),
+        *(wander(name, on, how, seconds=seconds) for name, on, how in cases),
+        *(wander(name, anchored(on), how, seconds=seconds, remedy=True) for name, on, how in held),
     )

@@ -14,15 +14,13 @@ import numpy as np
 
 from upright.identification.model import Fit
 from upright.identification.study import Study
-from upright.lab.drift import SPRING, TILT
-from upright.lab.twin import COUNTS, Release, Twin, acquire
-from upright.physics import Furuta
+from upright.lab.drift import SPRING, TILT, anchored
+from upright.lab.twin import MOTOR_AND_BELT, Release, Twin, acquire
+from upright.lab.weighing import Known
 from upright.records import Record
 from upright.report.experiment import Recovered
 
 FRICTION = ("b_1", "b_1c", "b_2", "b_2c")
-_UNITS = {name: Furuta.quantity(name).unit for name in Furuta.names()}
-
 Progress = Callable[[str, float], None]
 """Told which step is at work and how far it is, 0 to 1."""
 
@@ -52,38 +50,46 @@ class Answer:
 
 
 def logs(rig: Twin) -> dict[str, Record]:
-    """The releases of the experiment by the name of their file: level, out of level, and anchored by a spring."""
-    leaning = rig.changed(tilt_y=math.sin(TILT))
-    return {
-        "release_90.csv": acquire(rig, shot=1),
-        "release_60.csv": acquire(rig, Release(angle=math.radians(-60)), shot=2),
-        "release_90_tilted.csv": acquire(leaning, shot=3),
-        "release_60_tilted.csv": acquire(leaning, Release(angle=math.radians(-60)), shot=4),
-        "release_90_spring.csv": acquire(leaning.changed(k_psi=SPRING), shot=5),
-        "release_60_spring.csv": acquire(leaning.changed(k_psi=SPRING), Release(angle=math.radians(-60)), shot=6),
-    }
+    """The releases of the experiment by the name of their file: level, out of level, and anchored by a spring.
+
+    A cart does without the last two: a lean too small to see does not move what sticks.
+    """
+    low = Release(angle=math.radians(-60))
+    out = {"release_90.csv": acquire(rig, shot=1), "release_60.csv": acquire(rig, low, shot=2)}
+    if rig.base == "psi":
+        leaning = rig.changed(tilt_y=math.sin(TILT))
+        out["release_90_tilted.csv"] = acquire(leaning, shot=3)
+        out["release_60_tilted.csv"] = acquire(leaning, low, shot=4)
+        out["release_90_spring.csv"] = acquire(anchored(leaning), shot=5)
+        out["release_60_spring.csv"] = acquire(anchored(leaning), low, shot=6)
+    return out
 
 
-def bench(rig: Twin) -> dict[str, tuple[float, float]]:
+def bench(rig: Twin, weighed: Known | None = None) -> dict[str, tuple[float, float]]:
     """What was measured beforehand: value and standard uncertainty [SI].
 
-    The disk's inertia comes from experiment 1, the lengths from a ruler and from balancing the rod on an edge; the
-    rod's axial inertia, 0.2 % of the disk's, from a drawing.
+    The inertia of disk or cart comes from experiment 1a (`weighed`; 1 % without it), the lengths from a ruler and from
+    balancing the rod on an edge; the rod's axial inertia, 0.2 % of the disk's, from a drawing.
     """
     rng = np.random.default_rng([rig.seed, 41])
-    spread = {"J_d": 0.01 * rig.truth.J_d, "l_cg": 0.5e-3, "r": 0.3e-3}
-    measured = {n: (getattr(rig.truth, n) + rng.normal(0, s), s) for n, s in spread.items()}
-    return {**measured, "J_a": (rig.truth.J_a, 0.0)}
+    truth = rig.truth.parameters()
+    body = "J_d" if rig.base == "psi" else "m_c"
+    spread = {body: 0.01 * truth[body], "l_cg": 0.5e-3, "r": 0.3e-3}
+    measured = {n: (truth[n] + rng.normal(0, s), s) for n, s in spread.items() if n in truth}
+    if weighed and weighed.name == body:
+        off = MOTOR_AND_BELT if body == "J_d" else 0.0
+        measured[body] = (weighed.value - off, weighed.stderr)
+    return measured | ({"J_a": (truth["J_a"], 0.0)} if "J_a" in truth else {})
 
 
-def questions(rig: Twin) -> tuple[Question, ...]:
+def questions(rig: Twin, weighed: Known | None = None) -> tuple[Question, ...]:
     """The fits of the experiment, all from guesses that are 30 % off."""
     rng = np.random.default_rng([rig.seed, 42])
     guess = {n: getattr(rig.truth, n) * rng.choice([0.7, 1.3]) for n in ("m_p", "J_p", *FRICTION)}
-    known = bench(rig)
-    blind = {n: v for n, v in known.items() if n not in ("J_d", "J_a")}
+    known = bench(rig, weighed)
+    scale = {"J_d": 1.3, "J_a": 0.7, "m_c": 1.3}
+    blind = {n: v for n, v in known.items() if n not in scale}
     tilt = {"tilt_x": (-0.1, 0.1), "tilt_y": (-0.1, 0.1)}
-    spring = {**known, "k_psi": (SPRING, 0.01 * SPRING)}
 
     def ask(name: str, title: str, log: str, known: Mapping[str, tuple[float, float]], **more: float) -> Question:
         return Question(
@@ -96,16 +102,16 @@ def questions(rig: Twin) -> tuple[Question, ...]:
             bounds={n: b for n, b in tilt.items() if n in more},
         )
 
-    return (
+    free = {n: share * known[n][0] for n, share in scale.items() if n in known}
+    both = (
         ask("free_swing", "Large free swing of a level rig", "", known),
-        ask(
-            "no_scale",
-            "The same swing, no inertia given",
-            "",
-            blind,
-            J_d=1.3 * known["J_d"][0],
-            J_a=0.7 * known["J_a"][0],
-        ),
+        ask("no_scale", "The same swing, no inertia given", "", blind, **free),
+    )
+    if rig.base != "psi":
+        return both
+    spring = {**known, "k_psi": (SPRING["psi"], 0.01 * SPRING["psi"])}
+    return (
+        *both,
         # no friction term helps a model that cannot lean, so none is tried one by one
         replace(
             ask("level_model", "A rig out of level, explained as if it were level", "_tilted", known),
@@ -124,46 +130,48 @@ def study_text(q: Question, rig: Twin) -> str:
     """The question as a study file."""
     lines = [
         f'title = "{q.title}"',
-        f'source = "digital twin of ECP 205 + A51, seed {rig.seed}: simulated, no rig was touched"',
+        f'source = "digital twin of {rig.name}, seed {rig.seed}: simulated, no rig was touched"',
         "",
         "[rig]",
-        'plant = "furuta"',
+        f'plant = "{"furuta" if rig.base == "psi" else "cart-pendulum"}"',
         "",
         "[parameters]",
     ]
     for name, (value, spread) in q.known.items():
-        number = _with_unit(name, value)
+        number = _with_unit(rig, name, value)
         lines.append(
-            f"{name} = {{ value = {number}, uncertainty = {_with_unit(name, spread)} }}"
+            f"{name} = {{ value = {number}, uncertainty = {_with_unit(rig, name, spread)} }}"
             if spread
             else f"{name} = {number}"
         )
     for name, guess in q.asked.items():
         low, high = q.bounds.get(name, (0.0, math.inf))
         limits = f", min = {low:g}" + (f", max = {high:g}" if math.isfinite(high) else "")
-        lines.append(f"{name} = {{ guess = {_with_unit(name, guess)}{limits} }}")
-    for name in ("psi", "theta"):
-        lines += ["", f"[sensors.{name}]", f'column = "{name}"', 'unit = "counts"', f"counts_per_rev = {COUNTS}"]
+        lines.append(f"{name} = {{ guess = {_with_unit(rig, name, guess)}{limits} }}")
+    for c, counts in zip(rig.truth.coordinates, rig.counts, strict=True):
+        scale = f"counts_per_rev = {counts * 2 * math.pi:.10g}" if c.unit == "rad" else f"counts_per_m = {counts:.10g}"
+        lines += ["", f"[sensors.{c.name}]", f'column = "{c.name}"', 'unit = "counts"', scale]
     for role, file in (("fit", q.fitted), ("predict", q.predicted)):
         if file:
             lines += ["", "[[runs]]", f'label = "{file.removesuffix(".csv").replace("_", " ")}"', f'file = "{file}"']
             lines += [f'role = "{role}"']
-    lines += ["", "[defaults]", "initial = { psi_dot = 0.0, theta_dot = 0.0 }  # released from rest"]
+    lines += ["", "[defaults]", f"initial = {{ {rig.base}_dot = 0.0, theta_dot = 0.0 }}  # released from rest"]
     lines += [f"unknown = {list(q.unknown)}".replace("'", '"')]
     return "\n".join(lines) + "\n"
 
 
-def _with_unit(name: str, value: float) -> str:
-    return f'"{value:.6g} {_UNITS[name]}"' if _UNITS[name] != "1" else f"{value:.6g}"
+def _with_unit(rig: Twin, name: str, value: float) -> str:
+    unit = type(rig.truth).quantity(name).unit
+    return f'"{value:.6g} {unit}"' if unit != "1" else f"{value:.6g}"
 
 
-def write(rig: Twin, folder: Path) -> tuple[tuple[Question, Path], ...]:
+def write(rig: Twin, folder: Path, weighed: Known | None = None) -> tuple[tuple[Question, Path], ...]:
     """Write logs and studies; gives back each question with its study file."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, record in logs(rig).items():
         record.to_csv(folder / name)
     made: list[tuple[Question, Path]] = []
-    for q in questions(rig):
+    for q in questions(rig, weighed):
         path = folder / f"{q.name}.toml"
         path.write_text(study_text(q, rig), encoding="utf-8")
         made.append((q, path))

@@ -7,12 +7,14 @@ Nothing about the A51 is published, so its rod and weight are plausible brass pa
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.physics import Furuta
+from upright.control.rig import Rig
+from upright.errors import BadInput
+from upright.physics import CartPendulum, Furuta
 from upright.records import Provenance, Record
 
 COUNTS = 16_000
@@ -62,39 +64,44 @@ NOMINAL = Furuta(
 """The rig as designed."""
 
 
+MOTOR_AND_BELT = 5e-4
+"""Inertia that the disk loses with its drive belt [kg m^2], by the maker's guide."""
+_BELT_OFF = {"b_1": 0.3, "b_1c": 0.1875}  # share of the friction that the disk's own bearings have
+
+
 @dataclass(frozen=True, kw_only=True)
 class Twin:
-    """One rig of the make: its true parameters and the seed they were drawn with."""
+    """A pendulum rig for free swings: its true parameters, counts per m or rad, and the seed it was drawn with."""
 
-    truth: Furuta
+    truth: Furuta | CartPendulum
     seed: int
+    name: str = "ECP 205 + A51"
+    counts: tuple[float, ...] = (COUNTS / (2 * math.pi),) * 2
+
+    @property
+    def base(self) -> str:
+        """Coordinate of what carries the pendulum: ``"psi"`` or ``"x"``."""
+        return self.truth.coordinates[0].name
 
     def changed(self, **parameters: float) -> Twin:
         """The same rig after a change, such as ``tilt_y`` when it is out of level or ``k_psi`` when anchored."""
-        return Twin(truth=self.truth.replace(**parameters), seed=self.seed)
+        return replace(self, truth=self.truth.replace(**parameters))
 
 
-def twin(seed: int = 0) -> Twin:
-    """A rig of the make; parts differ by a percent or two, friction by a seventh, as between real rigs.
-
-    Seed 0 is the rig as designed.
-    """
-    if seed == 0:
-        return Twin(truth=NOMINAL, seed=seed)
-    rng = np.random.default_rng([seed, 4])
-    parts = BrassPendulum(
-        length=0.330 * rng.normal(1, 0.01),
-        weight_thickness=6e-3 * rng.normal(1, 0.02),
-        weight_at=0.200 * rng.normal(1, 0.02),
-    )
-    dry = {name: getattr(NOMINAL, name) * math.exp(rng.normal(0, 0.14)) for name in ("b_1", "b_1c", "b_2", "b_2c")}
-    size = {"r": 0.150 * rng.normal(1, 0.01), "J_d": 7.2e-3 * rng.normal(1, 0.02)}
-    return Twin(truth=NOMINAL.replace(**parts.parameters(), **dry, **size), seed=seed)
+def freed(rig: Rig) -> Twin:
+    """A pendulum rig with its drive out of the way: a disk's belt is taken off, a cart pulls its silent motor along."""
+    plant = rig.plant
+    if isinstance(plant, Furuta):
+        own = {name: share * getattr(plant, name) for name, share in _BELT_OFF.items()}
+        plant = plant.replace(J_d=plant.J_d - MOTOR_AND_BELT, **own)
+    elif not isinstance(plant, CartPendulum):
+        raise BadInput(f"a free swing needs a pendulum on a cart or a disk, and {rig.name} has none.")
+    return Twin(truth=plant, seed=rig.seed, name=rig.name.split(",")[0], counts=rig.counts)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Release:
-    """How the pendulum was let go: angle held at [rad], and what the hand gave the disk by mistake [rad/s]."""
+    """How the pendulum was let go: angle held at [rad], and the speed a hand gave its base by mistake [SI]."""
 
     angle: float = math.pi / 2
     push: float = 0.0
@@ -103,11 +110,11 @@ class Release:
 def motion(
     rig: Twin, release: Release | None = None, *, seconds: float, every: int = 8
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """What really happens after a release: time (N,) [s] and states (N, 4) [rad, rad/s]."""
+    """What really happens after a release: time (N,) [s] and states (N, 4) [SI]."""
     from upright.simulation import simulate
 
     release = release or Release()
-    x0 = rig.truth.state(psi_dot=release.push, theta=release.angle)
+    x0 = rig.truth.state("hanging", **{f"{rig.base}_dot": release.push, "theta": release.angle})
     rows = round(seconds / SERVO / every) + 1
     x = simulate(rig.truth, {}, x0, None, SERVO, samples=rows, every=every)[:, :, 0]
     return np.linspace(0.0, (rows - 1) * every * SERVO, rows), x
@@ -122,7 +129,7 @@ def acquire(
     ----------
     rig : Twin
     release : Release, optional
-        From horizontal, disk at rest, when omitted; no hand holds an angle better than a degree.
+        From horizontal, its base at rest, when omitted; no hand holds an angle better than a degree.
     seconds : float
     every : int
         Servo periods per logged sample.
@@ -132,21 +139,22 @@ def acquire(
     Returns
     -------
     Record
-        Columns ``psi`` and ``theta`` in counts.
+        Columns ``psi`` (or ``x``) and ``theta`` in counts.
     """
     rng = np.random.default_rng([rig.seed, 40, shot])
     release = release or Release()
     meant = Release(angle=release.angle + rng.normal(0, 0.01), push=release.push)
     t, x = motion(rig, meant, seconds=seconds, every=every)
-    counts = np.round(x[:, 0::2] * (COUNTS / (2 * math.pi)))  # zeroed where both joints rest
+    counts = np.round(x[:, 0::2] * np.array(rig.counts))  # zeroed where both joints rest
+    names = tuple(c.name for c in rig.truth.coordinates)
     return Record(
         t=t,
-        signals={"psi": counts[:, 0], "theta": counts[:, 1]},
-        units={"psi": "counts", "theta": "counts"},
-        outputs=("psi", "theta"),
+        signals={n: counts[:, i] for i, n in enumerate(names)},
+        units=dict.fromkeys(names, "counts"),
+        outputs=names,
         provenance=Provenance(
             reader="twin",
-            rig=f"digital twin of ECP 205 + A51, seed {rig.seed}",
+            rig=f"digital twin of {rig.name}, seed {rig.seed}",
             notes=("This log was simulated; no rig was touched.",),
         ),
     )

@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from upright.report.drawing import (
     BLUE,
     CYCLE,
@@ -31,7 +29,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Wander:
-    """Path of one disk after a release.
+    """Path of one disk, or cart, after a release.
 
     Attributes
     ----------
@@ -40,11 +38,11 @@ class Wander:
     remedy : bool
         Whether the spring was on.
     t, psi, centre : (N,) arrays
-        Time [s], angle [rad], and the line about which it swings [rad].
+        Time [s], angle [rad] or place [m], and the line about which it swings.
     slope : float
-        Drift [rad/s]: slope of the straight line closest to the path.
+        Drift [rad/s or m/s]: slope of the straight line closest to the path.
     end : float
-        Where the disk is in the last seconds, from its angle at the release [rad].
+        Where it is in the last seconds, from where it was at the release.
     """
 
     name: str
@@ -69,14 +67,15 @@ class Recovered:
 
 
 @styled
-def drift_figure(paths: Sequence[Wander]) -> Figure:
-    """Angle of the disk over time, free disks on the left and anchored ones on the right, one scale for both."""
+def drift_figure(paths: Sequence[Wander], body: str = "disk") -> Figure:
+    """Angle of the disk (or place of the cart) over time, free on the left, anchored on the right, one scale."""
+    factor, what = (180 / math.pi, "angle of the disk [°]") if body == "disk" else (100.0, f"place of the {body} [cm]")
     drawing = figure(3.3, margins=(0.62, 0.1, 0.3, 0.42))
     free, held = drawing.subplots(1, 2, sharey=True, gridspec_kw={"wspace": 0.06})
-    for ax, remedy, title in ((free, False, "disk free"), (held, True, "disk anchored by a soft spring")):
+    for ax, remedy, title in ((free, False, f"{body} free"), (held, True, f"{body} anchored by a soft spring")):
         for path, (colour, line) in zip((p for p in paths if p.remedy == remedy), CYCLE, strict=False):
-            ax.plot(*decimated(path.t, np.degrees(path.psi), 300), color=colour, linewidth=0.6, alpha=0.45)
-            ax.plot(*decimated(path.t, np.degrees(path.centre), 150), color=colour, linestyle=line, linewidth=1.9)
+            ax.plot(*decimated(path.t, factor * path.psi, 300), color=colour, linewidth=0.6, alpha=0.45)
+            ax.plot(*decimated(path.t, factor * path.centre, 150), color=colour, linestyle=line, linewidth=1.9)
             ax.plot([], [], color=colour, linestyle=line, linewidth=1.9, label=path.name)
         ax.set_title(title)
         ax.set_xlabel("time [s]")
@@ -84,7 +83,7 @@ def drift_figure(paths: Sequence[Wander]) -> Figure:
         ax.margins(x=0)
     low, high = free.get_ylim()
     free.set_ylim(low, high + 0.25 * (high - low))  # room for the legend
-    free.set_ylabel("angle of the disk [°]")
+    free.set_ylabel(what)
     return drawing
 
 
