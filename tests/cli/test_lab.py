@@ -1,18 +1,93 @@
-"""Does `upright lab` bring a newcomer from nothing to a report?"""
+"""Does `upright lab` bring a newcomer from nothing to a report, and take up what was left?"""
 
 import json
 import re
+import shlex
 
 import pytest
 from typer.testing import CliRunner
 
 from upright.cli import app
+from upright.lab import laboratory
+from upright.lab.experiments import EXPERIMENTS
+
+
+def upright(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+@pytest.fixture(scope="module")
+def weighed(tmp_path_factory):
+    """The shortest experiment, by the command line."""
+    folder = tmp_path_factory.mktemp("lab") / "new"
+    return folder, upright("lab", "-e", "1a", "--rig", "rectilinear", "--seed", 2, "--json", "-o", folder)
+
+
+def test_json_is_for_programs(weighed):
+    folder, outcome = weighed
+    told = json.loads(outcome.stdout, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+    assert outcome.exit_code == 0
+    assert (told["seed"], told["rig"], told["missing"], told["interrupted"]) == (2, "rectilinear", [], False)
+    (experiment,) = told["experiments"].values()
+    assert experiment["state"] == "done"
+    assert set(experiment["numbers"]["k"]) == {"value", "stderr", "interval", "truth", "inside"}
+    assert told["report"] == str(folder / "report.html")
+
+
+def test_the_same_again_takes_up_what_is_there(weighed):
+    folder, outcome = weighed
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    log = next((folder / "1a").glob("*.csv"))
+    log.unlink()  # nothing is measured again, so it does not come back
+    again = json.loads(upright("lab", "-e", "1a", "--rig", "rectilinear", "--seed", 2, "--json", "-o", folder).stdout)
+    assert again["experiments"]["1a"]["state"] == "kept"
+    assert again["experiments"]["1a"]["numbers"] == json.loads(outcome.stdout)["experiments"]["1a"]["numbers"]
+    assert (folder / "report.html").read_text(encoding="utf-8") == page
+    assert not log.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["--seed", "-1"], "at least 0"),
+        (["--seed", "x"], "Invalid value"),
+        (["-o", "FILE"], "is a file"),
+        (["--rig", "furutta"], "did you mean 'furuta'?"),
+        (["--experiment", "5"], "there is no experiment '5'; take one of 1, 1a"),
+        (["--experiment", "4", "--rig", "torsional"], "for --rig furuta or linear; torsional has experiments 1a"),
+    ],
+)
+def test_wrong_calls_are_answered_in_a_sentence(tmp_path, arguments, says):
+    (tmp_path / "FILE").write_text("", encoding="utf-8")
+    arguments = [str(tmp_path / "FILE") if a == "FILE" else a for a in arguments]
+    if "-o" not in arguments:
+        arguments += ["-o", str(tmp_path / "new")]
+    outcome = upright("lab", *arguments)
+    assert outcome.exit_code == 2
+    assert says in outcome.stderr
+    assert "Traceback" not in outcome.output
+    assert not (tmp_path / "new").exists()
+
+
+def test_whatever_is_asked_comes_after_what_it_stands_on():
+    for make in ("", "linear", "furuta", "rectilinear", "torsional"):
+        for e in EXPERIMENTS:
+            if make and make not in e.makes:
+                continue
+            for name in (e.key, e.part_of):
+                order = [x.key for x in laboratory.choose([name], make)]
+                assert e.key in order
+                there = {x.key: x for x in EXPERIMENTS}
+                on = make or e.makes[0]
+                for need in e.needs:
+                    if on in there[need].makes and on == (make or there[need].makes[0]):
+                        assert order.index(need) < order.index(e.key)
 
 
 @pytest.fixture(scope="module")
 def spoken(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("lab") / "new"
-    return folder, CliRunner().invoke(app, ["lab", "-o", str(folder)])
+    folder = tmp_path_factory.mktemp("lab") / "a b"
+    return folder, upright("lab", "-o", folder)
 
 
 @pytest.mark.slow
@@ -21,39 +96,19 @@ def test_it_ends_with_the_report_and_what_to_try_next(spoken):
     assert outcome.exit_code == 0, outcome.output
     assert (folder / "report.html").is_file()
     assert re.search(r"Report: .*report\.html", outcome.stdout)
-    for command in ("upright identify", "upright predict", "upright show", "upright lab --seed 1"):
+    for e in EXPERIMENTS:
+        assert f"Experiment {e.key}, {e.title}" in outcome.stdout
+    for command in ("upright lab --seed 1", "upright lab --rig linear", "upright init"):
         assert command in outcome.stdout
 
 
 @pytest.mark.slow
-def test_what_it_proposes_works(spoken, tmp_path, monkeypatch):
-    _, outcome = spoken
+def test_what_the_report_proposes_works(spoken, tmp_path, monkeypatch):
+    folder, _ = spoken
+    told = json.loads(upright("lab", "-o", folder, "--json").stdout)
     monkeypatch.chdir(tmp_path)
-    lines = [line.split() for line in outcome.stdout.splitlines() if line.startswith("    upright ")]
-    tried = [line[1:] for line in lines if line[1] in ("identify", "predict", "show")]
-    assert len(tried) == 3
-    for line in tried:
-        again = CliRunner().invoke(app, line)
-        assert again.exit_code == 0, (line, again.output)
-
-
-@pytest.mark.slow
-def test_json_is_for_programs(tmp_path):
-    outcome = CliRunner().invoke(app, ["lab", "-o", str(tmp_path / "a b"), "--seed", "1", "--json"])
-    told = json.loads(outcome.stdout)
-    assert told["seed"] == 1
-    assert told["fits"]["free_swing"]["trusted"]
-    assert set(told["parameters"]["m_p"]) == {"truth", "value", "interval", "inside"}
-
-
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [(["--seed", "-1"], "at least 0"), (["--seed", "x"], "Invalid value"), (["-o", "FILE"], "is a file")],
-)
-def test_wrong_calls_are_answered_in_a_sentence(tmp_path, arguments, says):
-    (tmp_path / "FILE").write_text("", encoding="utf-8")
-    arguments = [str(tmp_path / "FILE") if a == "FILE" else a for a in arguments]
-    outcome = CliRunner().invoke(app, ["lab", *arguments])
-    assert outcome.exit_code == 2
-    assert says in outcome.stderr
-    assert "Traceback" not in outcome.output
+    proposed = [shlex.split(line)[1:] for e in told["experiments"].values() for line in e["steps"]]
+    assert len(proposed) >= 2 * len(EXPERIMENTS)
+    for arguments in proposed:
+        again = CliRunner().invoke(app, arguments)
+        assert again.exit_code == 0, (arguments, again.output)

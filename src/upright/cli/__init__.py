@@ -19,7 +19,7 @@ from typer.core import TyperGroup
 from upright.errors import UprightError
 
 COMMANDS = {
-    "lab": "Run an experiment of the paper on the simulated rig, from release to report.",
+    "lab": "Run the experiments of the paper on simulated rigs, and report what they say.",
     "show": "Print and draw what a log holds: columns, sample rate, quanta, gaps, lying columns.",
     "doctor": "Say in plain sentences what looks wrong with a log, on which evidence, and what to do.",
     "init": "Write a commented study file from a log, filled in with what could be recognised.",

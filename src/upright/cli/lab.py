@@ -1,4 +1,4 @@
-"""What does the paper's experiment 4 look like when nothing is at hand but this program?"""
+"""What does the whole paper look like when nothing is at hand but this program?"""
 
 from __future__ import annotations
 
@@ -13,48 +13,72 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from upright.errors import BadInput
+from upright.errors import BadInput, nearest
 
 if TYPE_CHECKING:
-    from upright.lab.experiment import Experiment
+    from upright.lab.laboratory import Session
 
 INTERRUPTED = 130
 
 
 def lab(
-    out: Annotated[
-        Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for logs, studies and report.")
-    ] = Path("upright-lab"),
+    experiment: Annotated[
+        list[str] | None,
+        typer.Option("--experiment", "-e", metavar="1|1a|1b|2|3|4", help="Only this one, and what it stands on."),
+    ] = None,
+    rig: Annotated[
+        str, typer.Option("--rig", metavar="KIND", help="linear, furuta, rectilinear or torsional; else the paper's.")
+    ] = "",
     seed: Annotated[int, typer.Option(help="Which rig of the make; 0 is the one as designed.")] = 0,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", metavar="DIR", help="Folder; upright-lab[-KIND][-SEED] without it.")
+    ] = None,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Make again what the folder holds already.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON instead of sentences.")] = False,
 ) -> None:
-    """Run the paper's experiment 4, a large free swing, on the simulated rig, from release to report.
+    r"""Run the experiments of the paper on simulated rigs: identify, flip, design, hold, track, swing, and report.
 
-    The pendulum of an ECP 205 with the A51 is lifted to horizontal and released; both encoders are logged, the rig's
-    numbers are found from guesses 30 % off, and the wandering of the disk is explained: a push at the release, a rig
-    out of level, and the soft spring that cures both. Everything is written to DIR: logs (CSV), studies (TOML) for
-    `upright identify`, fit.json and report.html. Ctrl-C keeps and reports what is there.
+    1a weighs the rig with known added masses, 1b fits its frequency response hanging, 2 holds it upright with gains
+    from that fit, 3 tracks through a flexible shaft, 4 lets the pendulum swing freely. Every log, study and fit is
+    written to DIR for the ordinary commands, and one report.html tells it all (report.pdf with the pdf extra).
+    Ctrl-C keeps and reports what is there; the same command goes on from there.
+
+    \b
+    upright lab
+    upright lab --rig linear --seed 3
+    upright lab --experiment 1b --experiment 2 -o out
     """
+    from upright.lab.makes import MAKES
+
     if seed < 0:
         raise BadInput(f"--seed needs a whole number of at least 0, got {seed}.")
-    if out.exists() and not out.is_dir():
-        raise BadInput(f"results need a folder, but {out} is a file; name another with -o.")
-    from upright.identification.fitfile import write_fit
-    from upright.lab import experiment, page
+    if rig and rig not in MAKES:
+        raise BadInput(f"--rig is one of {', '.join(MAKES)}, got '{rig}'; {nearest(rig, MAKES)}")
+    folder = out or Path("-".join(["upright-lab", *([rig] if rig else []), *([str(seed)] if seed else [])]))
+    if folder.exists() and not folder.is_dir():
+        raise BadInput(f"results need a folder, but {folder} is a file; name another with -o.")
+    from datetime import date
 
+    from upright.lab import laboratory, laboratory_page
+    from upright.report.book import write_book
+    from upright.report.pdf import write_pdf
+
+    laboratory.choose(experiment or (), rig)  # says what is wrong with the call before anything is written
     with _ctrl_c() as pressed, _progress(quiet=as_json) as tell:
-        done = experiment.run(seed, out, tell, stopped=lambda: pressed.times > 0)
+        session = laboratory.run(
+            experiment or (), rig, seed, folder, tell, stopped=lambda: pressed.times > 0, fresh=fresh
+        )
         pressed.patient = True
-        tell("writing the report", 0.95)
-        if "free_swing" in done.answers:
-            first = done.answers["free_swing"]
-            write_fit(first.fit, first.study, out / "fit.json")
-        report = page.write(done)
+        tell("writing the report", 1.0)
+        told = laboratory_page.book(session, date.today())
+        report = write_book(folder / "report.html", told)
+        pdf = write_pdf(folder / "report.pdf", told)
     if as_json:
-        typer.echo(json.dumps(page.summary(done, report), indent=2, ensure_ascii=False, allow_nan=False))
+        summary = laboratory_page.summary(session, report, pdf)
+        typer.echo(json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False))
     else:
-        _say(done, report)
-    if done.interrupted or pressed.times:
+        _say(session, report, pdf)
+    if session.interrupted or pressed.times:
         raise typer.Exit(INTERRUPTED)
 
 
@@ -68,7 +92,7 @@ class _Pressed:
 
 @contextmanager
 def _ctrl_c() -> Generator[_Pressed]:
-    """Count Ctrl-C besides raising it, for the time of the experiment."""
+    """Count Ctrl-C besides raising it, for the time of the experiments."""
     pressed = _Pressed()
 
     def note(_signal: int, _frame: object) -> None:
@@ -103,38 +127,30 @@ def _progress(*, quiet: bool) -> Generator[Callable[[str, float], None]]:
         yield lambda step, share: bar.update(task, description=step, completed=share)
 
 
-def _say(done: Experiment, report: Path) -> None:
-    """Numbers, verdict, where the report is and what to try next."""
-    from rich.table import Table
-
+def _say(session: Session, report: Path, pdf: Path | None) -> None:
+    """Verdicts, key numbers, where the report is and what to try next."""
     from upright.cli.terminal import console
-    from upright.lab import page
-    from upright.lab.free_swing import recovered
-    from upright.report.symbols import number, unit
+    from upright.lab import laboratory_page
 
     screen = console()
-    if "free_swing" in done.answers:
-        title = "Numbers of the rig, from guesses 30 % off"
-        table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
-        for heading in ("", "truth", "estimate", "95 % interval", "unit", ""):
-            table.add_column(heading, justify="right" if heading in ("truth", "estimate") else "left", no_wrap=True)
-        for f in recovered(done.rig, done.answers["free_swing"].fit):
-            interval = f"{number(f.interval[0])} to {number(f.interval[1])}"
-            cells = (
-                f.name,
-                number(f.truth),
-                number(f.value),
-                interval,
-                unit(f.unit),
-                "inside" if f.inside else "outside",
-            )
-            table.add_row(*cells)
-        screen.print(table)
-    screen.print(f"\n{page.verdict(done)}", soft_wrap=True, markup=False)
-    if done.interrupted:
-        screen.print("\nStopped by Ctrl-C; the report holds what was there by then.", soft_wrap=True)
-    screen.print(
-        f"\nReport: {report} (open it in a browser; {done.seconds:.1f} s)\nWhat next:", soft_wrap=True, markup=False
-    )
-    for sentence, command in page.next_steps(done):
-        screen.print(f"- {sentence}\n    {command}", soft_wrap=True, markup=False)
+
+    def say(text: str) -> None:
+        screen.print(text, soft_wrap=True, markup=False)
+
+    for t in session.told:
+        kept = ", as kept from an earlier run" if t.state == "kept" else ""
+        say(f"Experiment {t.experiment.key}, {t.chapter.title} ({t.rig}{kept}; {t.seconds:.1f} s)")
+        say(f"    {t.chapter.verdict} {t.chapter.detail}".rstrip())
+        for f in t.chapter.findings:
+            interval = f", 95 % interval {f.interval}" if f.interval else ""
+            say(f"    {f.what}: {f.value}{interval}" + (f"; truth {f.truth}" if f.truth else ""))
+    for e in session.missing:
+        say(f"Experiment {e.key}, {e.title}: not run")
+    if session.interrupted:
+        say("\nStopped by Ctrl-C; the report holds what was there by then, and the same command goes on from there.")
+    say(f"\nReport: {report} (open it in a browser; {session.seconds:.1f} s)")
+    say(f"PDF: {pdf}" if pdf else "PDF: pip install 'upright[pdf]' and run the same again; nothing is computed twice.")
+    say("What next:")
+    steps = [t.chapter.steps[0] for t in session.told if t.chapter.steps]
+    for step in (*laboratory_page.next_steps(session), *steps):
+        say(f"- {step.sentence}\n    {step.command}")

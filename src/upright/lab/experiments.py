@@ -1,0 +1,94 @@
+"""Which experiments are there, on which rigs, and which stands on which?"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from upright.control.rig import Rig
+from upright.lab.weighing import Known
+from upright.report.chapter import Chapter
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """What an experiment is given: the rig, its own folder, what earlier experiments said and where they wrote."""
+
+    rig: Rig
+    seed: int
+    folder: Path
+    earlier: Mapping[str, Chapter]
+    folders: Mapping[str, Path]
+    progress: Progress
+    stopped: Callable[[], bool]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """One experiment of the paper.
+
+    Attributes
+    ----------
+    key : str
+        As it is asked for and as its folder is named.
+    part_of : str
+        Asking for this brings it as well: ``1`` means 1a and 1b.
+    title : str
+    makes : tuple of str
+        Rigs it can be run on; the first is the paper's.
+    needs : tuple of str
+        Experiments whose numbers it takes, where the rig has them.
+    seconds : float
+        How long it takes about, for the progress bar.
+    tell : callable
+        Runs it; the chapter, and whether it is whole.
+    """
+
+    key: str
+    part_of: str
+    title: str
+    makes: tuple[str, ...]
+    needs: tuple[str, ...]
+    seconds: float
+    tell: Callable[[Task], tuple[Chapter, bool]]
+
+
+def _weigh(task: Task) -> tuple[Chapter, bool]:
+    from upright.lab import weighing, weighing_page
+
+    return weighing_page.chapter(weighing.run(task.rig, task.seed, task.folder, task.progress)), True
+
+
+def _swing(task: Task) -> tuple[Chapter, bool]:
+    from upright.identification.fitfile import write_fit
+    from upright.lab import release, release_page
+
+    known = {k.name: k for k in known_from(task.earlier.get("1a"))}
+    done = release.run(
+        task.rig, task.seed, task.folder, task.progress, task.stopped, weighed=known.get("J_d") or known.get("m_c")
+    )
+    if "free_swing" in done.answers:
+        first = done.answers["free_swing"]
+        write_fit(first.fit, first.study, task.folder / "fit.json")
+    return release_page.chapter(done), not done.interrupted
+
+
+def known_from(chapter: Chapter | None) -> tuple[Known, ...]:
+    """What experiment 1a hands on, as its chapter tells it."""
+    handed = chapter.numbers.get("handed_on", {}) if chapter else {}
+    return tuple(Known(name=name, value=w["value"], stderr=w["stderr"]) for name, w in handed.items())
+
+
+PENDULUMS = ("furuta", "linear")
+EXPERIMENTS: tuple[Experiment, ...] = (
+    Experiment(
+        key="1a", part_of="1", title="Stiffness and inertia from added loads", needs=(), seconds=1.5, tell=_weigh,
+        makes=("furuta", "linear", "rectilinear", "torsional"),
+    ),
+    Experiment(key="4", part_of="4", title="Large free swing", makes=PENDULUMS, needs=("1a",), seconds=9.0,
+               tell=_swing),
+)  # fmt: skip
+"""In the order in which they are run and told."""

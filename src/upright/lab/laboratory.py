@@ -1,0 +1,191 @@
+"""How are all experiments run under one roof, and taken up again where they were left?"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from upright.errors import BadInput, UprightError
+from upright.lab.experiments import EXPERIMENTS, Experiment, Progress, Task
+from upright.lab.kept import keep, kept, made_of
+from upright.lab.makes import make_rig
+from upright.report.chapter import Chapter
+
+
+@dataclass(frozen=True, kw_only=True)
+class Told:
+    """An experiment with its chapter.
+
+    Attributes
+    ----------
+    experiment : Experiment
+    make, rig : str
+        Kind of rig, and its name.
+    chapter : Chapter
+    state : str
+        ``"done"``, ``"kept"`` from an earlier run, ``"stopped"`` half-way, or ``"failed"``.
+    seconds : float
+    """
+
+    experiment: Experiment
+    make: str
+    rig: str
+    chapter: Chapter
+    state: str
+    seconds: float
+
+
+@dataclass(kw_only=True, eq=False)
+class Session:
+    """What has been told so far; it is filled experiment by experiment, so that an interrupted one can be reported."""
+
+    make: str
+    seed: int
+    folder: Path
+    asked: tuple[Experiment, ...]
+    told: list[Told] = field(default_factory=list[Told])
+    interrupted: bool = False
+    seconds: float = 0.0
+
+    @property
+    def missing(self) -> tuple[Experiment, ...]:
+        """What was asked for and not begun."""
+        return tuple(e for e in self.asked if e.key not in {t.experiment.key for t in self.told})
+
+
+def choose(asked: Sequence[str], make: str) -> tuple[Experiment, ...]:
+    """The experiments asked for, with those whose numbers they take; all that the rig has when none is named.
+
+    Raises
+    ------
+    BadInput
+        When there is no such experiment, or not on this rig.
+    """
+    there = [e for e in EXPERIMENTS if not make or make in e.makes]
+    wanted: set[str] = set()
+    for name in asked:
+        found = [e for e in EXPERIMENTS if name in (e.key, e.part_of)]
+        if not found:
+            valid = dict.fromkeys(n for e in EXPERIMENTS for n in (e.part_of, e.key))
+            raise BadInput(f"there is no experiment '{name}'; take one of {', '.join(sorted(valid))}.")
+        if not any(e in there for e in found):
+            raise BadInput(
+                f"experiment {name} is for --rig {' or '.join(found[0].makes)}; "
+                f"{make} has experiments {', '.join(e.key for e in there)}."
+            )
+        wanted |= {e.key for e in found if e in there}
+    if not asked:
+        wanted = {e.key for e in there}
+    for e in reversed(there):  # who builds on another comes after it
+        if e.key in wanted:
+            wanted |= {n for n in e.needs if _make(e, make) in _find(n).makes and _same_rig(e, _find(n), make)}
+    return tuple(e for e in there if e.key in wanted)
+
+
+def _find(key: str) -> Experiment:
+    return next(e for e in EXPERIMENTS if e.key == key)
+
+
+def _make(e: Experiment, make: str) -> str:
+    return make or e.makes[0]
+
+
+def _same_rig(one: Experiment, other: Experiment, make: str) -> bool:
+    return _make(one, make) == _make(other, make)
+
+
+def run(
+    asked: Sequence[str],
+    make: str,
+    seed: int,
+    folder: Path,
+    progress: Progress | None = None,
+    stopped: Callable[[], bool] = lambda: False,
+    *,
+    fresh: bool = False,
+) -> Session:
+    """Run experiments on a seeded rig; Ctrl-C stops and keeps what is there.
+
+    Parameters
+    ----------
+    asked : sequence of str
+        Experiments by name, all when empty.
+    make : str
+        Kind of rig; empty for the one on which the paper did each.
+    seed : int
+        Which rig of the make.
+    folder : Path
+        Takes a folder for each experiment. What is there and still holds is not made again.
+    progress : callable, optional
+        Told the step at work and the share of the whole.
+    stopped : callable, optional
+        Whether Ctrl-C was pressed, for what has swallowed it.
+    fresh : bool
+        Make everything again.
+
+    Raises
+    ------
+    BadInput
+        When there is no such experiment, or not on this rig.
+    """  # fmt: skip
+    began = time.perf_counter()
+    session = Session(make=make, seed=seed, folder=folder, asked=choose(asked, make))
+    digests: dict[str, str] = {}
+    whole = sum(e.seconds for e in session.asked)
+    behind = 0.0
+    for e in session.asked:
+        needs = [n for n in e.needs if n in digests and _same_rig(e, _find(n), make)]
+        digests[e.key] = made_of(e.key, _make(e, make), seed, needs=[digests[n] for n in needs])
+
+        def tell(step: str, share: float, e: Experiment = e, behind: float = behind) -> None:
+            if progress:
+                progress(f"experiment {e.key}: {step}", (behind + e.seconds * min(share, 1.0)) / whole)
+
+        try:
+            session.told.append(_one(session, e, digests[e.key], needs, tell, stopped, fresh))
+            session.interrupted = session.told[-1].state == "stopped"
+        except KeyboardInterrupt:
+            session.interrupted = True
+        if session.interrupted:
+            break
+        behind += e.seconds
+    session.seconds = time.perf_counter() - began
+    return session
+
+
+def _one(
+    session: Session, e: Experiment, digest: str, needs: Sequence[str], progress: Progress,
+    stopped: Callable[[], bool], fresh: bool,
+) -> Told:  # fmt: skip
+    """One experiment, from an earlier run where that still holds."""
+    began = time.perf_counter()
+    make = _make(e, session.make)
+    rig, folder = make_rig(make, session.seed), session.folder / e.key
+    folder.mkdir(parents=True, exist_ok=True)
+    progress("starting", 0.0)
+    state, chapter = "kept", None if fresh else kept(folder, digest)
+    if chapter is None:
+        task = Task(
+            rig=rig, seed=session.seed, folder=folder, progress=progress, stopped=stopped,
+            earlier={t.experiment.key: t.chapter for t in session.told if t.experiment.key in needs},
+            folders={n: session.folder / n for n in needs},
+        )  # fmt: skip
+        try:
+            chapter, whole = e.tell(task)
+            state = "done" if whole and not stopped() else "stopped"
+        except UprightError as error:
+            state, chapter = "failed", _failed(e, error)
+        if state == "done":
+            keep(folder, digest, chapter)
+    return Told(
+        experiment=e, make=make, rig=rig.name, chapter=chapter, state=state, seconds=time.perf_counter() - began
+    )
+
+
+def _failed(e: Experiment, error: UprightError) -> Chapter:
+    return Chapter(
+        key=e.key, title=e.title, question="", verdict="This experiment could not be finished.", detail=str(error),
+        sound=False, parts=(),
+    )  # fmt: skip
