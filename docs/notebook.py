@@ -121,9 +121,13 @@ def _shown(value: Any) -> dict[str, Any]:
     data: dict[str, Any] = {}
     metadata: dict[str, Any] = {}
     if isinstance(value, Figure):
+        told = _told(value)
         data["image/png"] = _png(value)
-        metadata["image/png"] = {"width": round(WIDTH * min(1.0, value.get_figwidth() / 7.4))}
-        data["text/plain"] = ["a picture"]
+        metadata["image/png"] = {
+            "alt": told,
+            "width": round(WIDTH * min(1.0, value.get_figwidth() / 7.4)),
+        }
+        data["text/plain"] = [told]
     else:
         for kind, method in (
             ("text/html", "_repr_html_"),
@@ -148,6 +152,21 @@ def _png(drawing: Any) -> str:
     small = io.BytesIO()
     few.save(small, format="png", optimize=True)
     return base64.b64encode(small.getvalue()).decode("ascii") + "\n"
+
+
+def _told(drawing: Any) -> str:
+    """What a picture shows, for who cannot see it: titles, and what is drawn over what."""
+    panels: list[str] = []
+    for axes in drawing.axes:
+        titles = (axes.get_title(loc) for loc in ("left", "center", "right"))
+        over = (
+            " over ".join(filter(None, (axes.get_ylabel(), axes.get_xlabel())))
+            if axes.axison
+            else ""
+        )
+        panels.append(": ".join(filter(None, (", ".join(filter(None, titles)), over))))
+    words = "; ".join(dict.fromkeys(filter(None, panels))) or "a drawing"
+    return "Picture. " + " ".join(re.sub(r"\\math\w+|[${}\\]", "", words).split())
 
 
 def _lines(text: str) -> list[str]:

@@ -11,12 +11,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from upright.lab import drift, free_swing
-from upright.lab.twin import twin
+from upright.lab.makes import make_rig
+from upright.lab.twin import freed
 from upright.physics import Furuta
 from upright.report.drawing import save
 from upright.report.figures import fit_figure
 
-rig = twin(seed=int(sys.argv[1]) if sys.argv[1:] else 0)
+# A rig of the make with its drive belt off, so that the disk turns freely.
+rig = freed(make_rig("furuta", seed=int(sys.argv[1]) if sys.argv[1:] else 0))
 
 # Six releases are logged as the encoders count them; each question is a study that `upright identify` takes too.
 with TemporaryDirectory() as folder:

@@ -1,6 +1,8 @@
 """Does everything that is shown also run? Scripts, plants and studies in examples/, commands in the pages."""
 
 import ast
+import importlib.util
+import json
 import os
 import re
 import shlex
@@ -19,6 +21,7 @@ from upright.simulation import simulate
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"
+NOTEBOOKS = sorted((ROOT / "docs").glob("*.ipynb"))
 PAGES = [
     ROOT / "README.md",
     ROOT / "CONTRIBUTING.md",
@@ -60,6 +63,26 @@ def told(script: Path) -> str:
 def marked(script: Path):
     """A script that works on DATA, the folder of public logs, needs them."""
     return pytest.param(script, id=script.name, marks=[pytest.mark.real_data] if "DATA" in told(script) else [])
+
+
+def sources(path: Path) -> str:
+    """Python of a script, or of a notebook's cells."""
+    text = path.read_text(encoding="utf-8")
+    if path.suffix == ".py":
+        return text
+    cells = [cell["source"] for cell in json.loads(text)["cells"] if cell["cell_type"] == "code"]
+    return "\n".join("".join(lines) for lines in cells)
+
+
+@pytest.mark.parametrize("path", [*SCRIPTS, *NOTEBOOKS], ids=name_of)
+def test_what_is_imported_exists(path):
+    """Long before the slow tests run it all."""
+    for node in ast.walk(ast.parse(sources(path))):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == "upright":
+            module = importlib.import_module(node.module)
+            for alias in node.names:
+                found = hasattr(module, alias.name) or importlib.util.find_spec(f"{node.module}.{alias.name}")
+                assert found, f"{path.name} imports {alias.name} from {node.module}, which has no such thing"
 
 
 @pytest.mark.slow
