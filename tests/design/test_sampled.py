@@ -19,6 +19,7 @@ from upright.design import (
     place,
     place_sampled,
     prefilter,
+    shaken,
 )
 from upright.design.loop import closed, command_noise, loop_gain
 from upright.design.sampled import to_s, to_z
@@ -171,6 +172,26 @@ def test_kalman_filter_of_a_tracked_target(index):
     alpha = 1 - r**2
     beta = 2 * (2 - alpha) - 4 * math.sqrt(1 - alpha)
     np.testing.assert_allclose(gain, [alpha, beta / T], rtol=1e-9)
+
+
+def test_a_shaken_double_integrator_is_one_whose_command_is_noise():
+    model = hold(DOUBLE_INTEGRATOR, 0.1)
+    np.testing.assert_allclose(shaken(model, 3.0), 9.0 * model.B @ model.B.T, rtol=1e-12)
+
+
+def test_a_filter_that_expects_pushes_anywhere_corrects_faster_than_the_zeros_of_the_drive():
+    """Noise in the command alone, however loud, leaves observer poles at mirrored zeros (Kwakernaak and Sivan, Linear
+    Optimal Control Systems, 1972): here that of the arm's answer, the pendulum about a held arm.
+    """
+    model = hold(UPRIGHT, 0.001)
+    zero = math.sqrt(RIG.m_p * RIG.g * RIG.l_cg / (RIG.J_p + RIG.m_p * RIG.l_cg**2))
+    count = COUNT / math.sqrt(12)
+    by_command, anywhere = (
+        -to_s(np.linalg.eigvals(kalman(model, process, count).A), 0.001).real.max()
+        for process in (100.0, shaken(model, 100.0 * np.abs(UPRIGHT.B[1::2, 0])))
+    )
+    assert by_command < 1.1 * zero
+    assert anywhere > 10 * zero
 
 
 def test_kalman_filter_of_a_random_walk():

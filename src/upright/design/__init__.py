@@ -5,7 +5,7 @@ from upright.design.lqr import dlqr, locus, lqr, weight_for_effort
 from upright.design.placement import Placement, place
 from upright.design.sampled import Sampled, hold
 from upright.design.tracking import prefilter
-from upright.design.velocity import Estimator, difference, filtered, kalman
+from upright.design.velocity import Estimator, difference, filtered, kalman, shaken
 
 __all__ = [
     "Estimator",
@@ -25,5 +25,6 @@ __all__ = [
     "place",
     "place_sampled",
     "prefilter",
+    "shaken",
     "weight_for_effort",
 ]

@@ -142,6 +142,28 @@ def kalman(model: Sampled, process: ArrayLike, noise: ArrayLike) -> Estimator:
     return observer(model, gain, "Kalman filter")
 
 
+def shaken(model: Sampled, accelerations: ArrayLike) -> Array:
+    """Covariance of what shakes every coordinate by itself, for `kalman`: a white acceleration held over a period.
+
+    A force that enters like the command alone is a poor guess where bodies are also pushed by hands and dry friction:
+    the filter then corrects a push on the pendulum no faster than the plant's own zeros let it.
+
+    Parameters
+    ----------
+    model : Sampled
+        Whose first states are coordinates, each followed by its velocity.
+    accelerations : float or array, shape (p,)
+        Standard deviation of the acceleration of each coordinate [m/s^2 or rad/s^2].
+    """
+    p = model.C.shape[0]
+    found = np.zeros_like(model.A)
+    for i, a in enumerate(np.broadcast_to(np.asarray(accelerations, dtype=np.float64), (p,)).tolist()):
+        moved = np.zeros(found.shape[0])
+        moved[2 * i : 2 * i + 2] = model.period**2 / 2, model.period
+        found += a**2 * np.outer(moved, moved)
+    return found
+
+
 def stationary(A: Array, B: Array) -> Array:
     """Covariance that unit white noise keeps up, ``P = A P A' + B B'``, by doubling; A must be stable.
 

@@ -151,7 +151,7 @@ def design_for(rig: RigFile, wish: Wish) -> Designed:
                 )
             R = design.weight_for_effort(model.A, model.B, weights, start, wish.limit)
         K = design.lqr(model.A, model.B, weights, R)
-    estimators = _estimators(sampled, wish)
+    estimators = _estimators(sampled, wish, np.abs(model.B[1::2, 0]))
     estimator = estimators[("plain", "filtered", "kalman").index(wish.speed)]
     wanted = placement.asked if placement is not None else poles_of(model.A - model.B @ K)
     gains = None if wish.speed == "kalman" else design.place_sampled(sampled, estimator, wanted)
@@ -181,14 +181,14 @@ def _tilt(rig: RigFile) -> Array:
     return x
 
 
-def _estimators(sampled: Sampled, wish: Wish) -> Sequence[Estimator]:
+def _estimators(sampled: Sampled, wish: Wish, reach: Array) -> Sequence[Estimator]:
     quantum = wish.quantum or (2 * math.pi / 16_000,) * sampled.C.shape[0]
-    # a tenth of the limit, or of the unit, as a white force: what the model does not know
-    shaken = 0.1 * (wish.limit or 1.0)
+    # every coordinate by itself as much as a tenth of the limit, or of the unit, would: what the model does not know
+    shaking = design.shaken(sampled, 0.1 * (wish.limit or 1.0) * reach)
     return (
         design.difference(sampled),
         design.filtered(sampled, wish.memory),
-        design.kalman(sampled, shaken, np.array(quantum) / math.sqrt(12)),
+        design.kalman(sampled, shaking, np.array(quantum) / math.sqrt(12)),
     )
 
 
