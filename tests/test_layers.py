@@ -43,6 +43,7 @@ DOORS = {
     "mpmath": "design",
     "matplotlib": "report",
     "jinja2": "report",
+    "typst": "report",
     "pint": "units",
     "typer": "cli",
 }

@@ -43,8 +43,8 @@ def chapter(done: FreeSwing) -> Chapter:
         key="4",
         title="Large free swing",
         question=QUESTION.format(body=done.body),
-        verdict="The rig is known." if _sound(done, fit) else "Read with care.",
-        detail=("Interrupted: this is what was there by then. " if done.interrupted else "") + verdict(done),
+        verdict=verdict(done),
+        detail=detail(done),
         sound=_sound(done, fit),
         parts=tuple(parts),
         steps=_steps(done),
@@ -64,13 +64,18 @@ def _sound(done: FreeSwing, fit: Fit | None) -> bool:
 
 
 def verdict(done: FreeSwing) -> str:
-    """What the experiment showed, in a few sentences."""
+    """What the fit showed, in a sentence."""
     if "free_swing" not in done.answers:
         return "The experiment was stopped before the first fit."
     fit = done.answers["free_swing"].fit
     found = recovered(done.rig, fit)
     inside = sum(f.inside for f in found)
-    said = f"{inside} of {len(found)} numbers of the rig lie in their 95 % interval; {_followed(fit)}."
+    return f"{inside} of {len(found)} numbers of the rig lie in their 95 % interval; {_followed(fit)}."
+
+
+def detail(done: FreeSwing) -> str:
+    """What else the experiment showed, as far as it came."""
+    said = "Interrupted: this is what was there by then." if done.interrupted else ""
     if "no_scale" in done.answers:
         unseen = done.answers["no_scale"].fit.unseen
         said += " Without a known inertia the same data fix only ratios" + (", and the fit says so." if unseen else ".")
@@ -94,7 +99,7 @@ def verdict(done: FreeSwing) -> str:
             f" A push of {PUSH['x']:g} m/s at the release leaves the cart {100 * abs(free.end):.1f} cm away,"
             f" where dry friction holds it; a soft spring brings it back to {100 * abs(held.end):.1f} cm."
         )
-    return said
+    return said.strip()
 
 
 def _followed(fit: Fit) -> str:

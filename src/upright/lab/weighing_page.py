@@ -109,10 +109,11 @@ def _numbers(w: Weighed, true: float | None) -> dict[str, Any]:
 
 def _steps(done: Weighing) -> tuple[Step, ...]:
     unit_of = units_of(done.campaign.on.kind)["inertia"]
-    added = " ".join(f'--added "{done.campaign.added[label]:.6g} {unit_of}"' for label in done.files)
-    files = " ".join(typed(done.folder / file) for file in done.files.values())
+    first = {label: file for label, file in done.files.items() if label.endswith("run 1")}
+    added = " ".join(f'--added "{done.campaign.added[label]:.6g} {unit_of}"' for label in first)
+    files = " ".join(typed(done.folder / file) for file in first.values())
     return (
-        Step(sentence="Weigh the body again from its logs, as you would your own.",
+        Step(sentence="Weigh the body again from one log of each loading, as you would your own.",
              command=f"upright loadings {files} {added} -o {typed(done.folder / 'again')}"),
         Step(sentence="See which masses would have told most.",
              command=f"upright plan-inertias --rig {done.campaign.on.kind}"),

@@ -1,0 +1,139 @@
+"""Do the chapters of several experiments make one report, on a screen and on paper?"""
+
+import re
+from html import unescape
+from html.parser import HTMLParser
+
+import pytest
+from markupsafe import Markup
+
+from upright.report import pdf
+from upright.report.advice import Step
+from upright.report.book import Book, Told, write_book
+from upright.report.chapter import Chapter, Finding
+from upright.report.document import picture
+from upright.report.drawing import figure
+from upright.report.mathml import symbol
+from upright.report.sections import Part, Table
+from upright.report.storing import as_plain, from_plain
+
+HOSTILE = '<script>alert(1)</script> & "quotes" *bold* #let x = 1 $y$ \\ `raw` @ref ~ [b] // no'
+
+
+def drawn(name):
+    drawing = figure(2.0, 3.7)
+    axes = drawing.subplots()
+    axes.plot([0, 1, 2], [0, 1, 4], label="curve")
+    axes.set_title("torque [N m]")
+    axes.legend()
+    return picture(drawing, name, caption="A curve.", description="It rises.")
+
+
+def chapter(key, *, sound=True):
+    table = Table(
+        caption=f"Table of {HOSTILE}",
+        headings=("symbol", "value"),
+        rows=((Markup(symbol("J_d")), "7.2·10⁻³"), (HOSTILE, "1")),
+        numbers=(1,),
+    )
+    motion = Markup(
+        '<math display="block"><mtable><mtr><mtd><mi>θ</mi></mtd><mtd><mo>=</mo></mtd>'
+        "<mtd><mfrac><mn>1</mn><msqrt><mi>k</mi></msqrt></mfrac></mtd></mtr></mtable></math>"
+    )
+    return Chapter(
+        key=key, title=f"Chapter {key}", question=f"Why {key}?", verdict=f"Verdict of {key} stands.",
+        detail=HOSTILE, sound=sound,
+        parts=(
+            Part(title="Data", sentences=(HOSTILE,), tables=(table,), pictures=(drawn("same"),)),
+            Part(title="Fit", formulas=(motion,), pictures=(drawn("other"),)),
+        ),
+        steps=(Step(sentence="Do it again.", command='upright lab -o "a b"'),),
+        findings=(Finding(what="pole [rad/s]", value="7.98", interval="7.9 to 8.1", truth="7.97"),),
+        numbers={"pole": 7.98},
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def book():
+    return Book(
+        title="Report",
+        facts=(("Rig", HOSTILE), ("Made", "2006-06-18")),
+        chapters=(
+            Told(chapter=chapter("1a"), rig="cart"),
+            Told(chapter=chapter("4", sound=False), rig="disk"),
+        ),
+        notes=("Stopped by Ctrl-C.",),
+        missing=(("3", "Tracking"),),
+        steps=(Step(sentence="Next.", command="upright lab --seed 1"),),
+    )
+
+
+class Page(HTMLParser):
+    """Ids, links, references and what stands in the text."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.ids, self.links, self.tags, self.said = [], [], [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        values = dict(attrs)
+        self.ids += [values["id"]] if "id" in values else []
+        self.links += [v for k, v in attrs if k in ("href", "xlink:href") and v.startswith("#")]
+
+    def handle_data(self, data):
+        self.said.append(data)
+
+
+@pytest.fixture(scope="module")
+def page(book, tmp_path_factory):
+    return write_book(tmp_path_factory.mktemp("book") / "report.html", book).read_text(encoding="utf-8")
+
+
+def test_every_id_is_the_only_one_and_every_link_leads_somewhere(page):
+    read = Page(page)
+    assert len(set(read.ids)) == len(read.ids)
+    assert {link[1:] for link in read.links} <= set(read.ids)
+    assert set(re.findall(r"url\(#([^)]+)\)", page)) <= set(read.ids)
+    assert len(read.links) > 10
+
+
+def test_nothing_a_person_wrote_becomes_markup_and_nothing_is_fetched(page):
+    read = Page(page)
+    assert "script" not in read.tags
+    assert "".join(read.said).count(HOSTILE) >= 7  # cover, and per chapter detail, sentence, cell
+    assert "http" not in unescape(page)
+
+
+def test_the_cover_says_what_was_run_what_it_showed_and_what_is_missing(page):
+    cover = " ".join(" ".join(Page(page[: page.index("Question")]).said).split())
+    for needed in ("Verdict of 1a stands.", "with reservations", "3 Tracking", "not run", "7.9 to 8.1", "Stopped by"):
+        assert needed in cover
+
+
+def test_on_paper_it_says_the_same(book, tmp_path):
+    pypdf = pytest.importorskip("pypdf")
+    pytest.importorskip("typst")
+    path = pdf.write_pdf(tmp_path / "report.pdf", book)
+    pages = pypdf.PdfReader(path).pages
+    assert len(pages) >= 3  # cover, and each chapter from a page of its own
+    text = " ".join(" ".join(p.extract_text() for p in pages).split())
+    for needed in ("Verdict of 1a stands.", "Verdict of 4 stands.", "not run", "7.9 to 8.1", "upright lab --seed 1"):
+        assert needed in text
+    assert "torque [N m]" in text  # words in pictures stay words
+    assert text.replace(" ", "").count(HOSTILE.replace(" ", "")) >= 7
+
+
+def test_without_the_extra_there_is_no_pdf(book, tmp_path, monkeypatch):
+    monkeypatch.setattr(pdf, "find_spec", lambda name: None)
+    assert pdf.write_pdf(tmp_path / "report.pdf", book) is None
+    assert not (tmp_path / "report.pdf").exists()
+
+
+def test_a_chapter_is_read_as_it_was_kept(book):
+    first = book.chapters[0].chapter
+    again = from_plain(as_plain(first))
+    assert as_plain(again) == as_plain(first)
+    assert isinstance(again.parts[0].tables[0].rows[0][0], Markup)
+    assert not isinstance(again.parts[0].sentences[0], Markup)
