@@ -156,14 +156,14 @@ def _matrix(entries: tuple[str, ...], scope: dict[str, float], rows: int, column
 
 def _motion(derived: Derived, scope: Mapping[str, Any]) -> tuple[Matrix, Matrix]:
     """Mass matrix and force vector at one point."""
-    scope = _resolved(derived, scope)
+    scope = resolved(derived, scope)
     n = len(derived.coordinates)
     M = np.zeros((n, n))
     M[np.triu_indices(n)] = [float(evaluate(e, scope)) for e in derived.mass]
     return M + np.triu(M, 1).T, np.array([float(evaluate(e, scope)) for e in derived.force])
 
 
-def _resolved(derived: Derived, scope: Mapping[str, Any]) -> dict[str, Any]:
+def resolved(derived: Derived, scope: Mapping[str, Any]) -> dict[str, Any]:
     """The scope with the intermediate results in it."""
     scope = dict(scope)
     for i, lump in enumerate(derived.lumps):
@@ -195,7 +195,7 @@ def small_motions(derived: Derived, values: Mapping[str, Any], lanes: int) -> tu
     """
     n, m = len(derived.coordinates), len(derived.inputs)
     still = {**{f"{c}_dot": 0.0 for c in derived.coordinates}, **dict.fromkeys(derived.inputs, 0.0)}
-    scope = _resolved(derived, {**still, **values})
+    scope = resolved(derived, {**still, **values})
 
     def matrix(entries: tuple[str, ...], columns: int) -> Matrix:
         rows = [np.broadcast_to(evaluate(e, scope), (lanes,)) for e in entries]
