@@ -1,0 +1,202 @@
+"""What does the response say about the rig? Both fits, the numbers with their errors, and the pole to be held."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from upright.errors import NotIdentifiable
+from upright.identification.fitfile import write_fit
+from upright.identification.frequency.fitting import Squares, Told, Way, least_squares, simplex_dB, usable
+from upright.identification.frequency.response import FrequencyResponse
+from upright.identification.model import Estimate, Fit, Pole, Rig
+from upright.identification.own import quantile
+from upright.identification.poles import poles
+from upright.identification.study import Study
+
+GROWS = 0.5
+"""Real part [1/s] from which a pole counts as unstable; free coordinates sit at 0."""
+POOR = 9.0
+"""Chi square per degree of freedom above which the model does not explain the response."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Answer:
+    """Everything that follows from one measured response.
+
+    Attributes
+    ----------
+    rig : Rig
+        What was known and asked.
+    at : str
+        Equilibrium about which it was measured.
+    data, used : FrequencyResponse
+        All that was measured, and the points fitted.
+    left_out : tuple of str
+        Why the others were not.
+    simplex : Way
+    squares : Squares
+    fit : Fit
+        For `fit.json`: estimates with covariance, poles at every equilibrium, verdict.
+    key : tuple of (str, str, Pole)
+        Equilibrium, what the pole is, and the pole that a design has to know best.
+    simplex_pole : complex
+        The same by the simplex [1/s].
+    """
+
+    rig: Rig
+    at: str
+    data: FrequencyResponse
+    used: FrequencyResponse
+    left_out: tuple[str, ...]
+    simplex: Way
+    squares: Squares
+    fit: Fit
+    key: tuple[str, str, Pole]
+    simplex_pole: complex
+
+
+def explain(
+    rig: Rig, at: str, data: FrequencyResponse, *, seed: int = 0, tell: Told | None = None,
+    stopped: Callable[[], bool] = lambda: False,
+) -> Answer:  # fmt: skip
+    """Fit a response in both ways.
+
+    Parameters
+    ----------
+    rig : Rig
+        Plant with its numbers: to estimate from a guess, known, or known within an uncertainty, which then counts as
+        one measurement more. Masses, forces and the drive's gain scale together: one of them must be known.
+    at : str
+        Equilibrium about which it was measured.
+    data : FrequencyResponse
+    seed : int
+        Of the starts of least squares.
+    tell : callable, optional
+        Told the step at work and its share done.
+    stopped : callable
+        Asked between the fits.
+
+    Raises
+    ------
+    NotIdentifiable
+        When too few frequencies can be used.
+    """
+    kept, left_out = usable(data, dry=_has_dry(rig))
+    used = data.only(kept)
+    if len(used) < 4:
+        raise NotIdentifiable(f"{len(used)} usable frequencies are too few for a fit. {' '.join(left_out)}")
+    squares = least_squares(rig, at, used, seed=seed, tell=tell)
+    if stopped():
+        raise KeyboardInterrupt
+    simplex = simplex_dB(rig, at, used, tell=tell)
+    q = quantile(squares.freedom + len(squares.names), len(squares.names))
+    values = squares.way.values
+    found = poles(rig, values, list(squares.names), squares.covariance, q)
+    key = _key(found, at)
+    fit = _fit(rig, squares, found, key, q, left_out)
+    other = poles(rig, simplex.values, [], np.zeros((0, 0)), q)
+    there = next((p for p in other.get(key[0], ()) if _what(p) == key[1]), None)
+    reached = complex(there.real.value, there.imag.value) if there is not None else complex(math.nan, math.nan)
+    return Answer(
+        rig=rig, at=at, data=data, used=used, left_out=left_out, simplex=simplex, squares=squares, fit=fit, key=key,
+        simplex_pole=reached,
+    )  # fmt: skip
+
+
+def _has_dry(rig: Rig) -> bool:
+    return any(rig.parameters[j.coulomb].value > 0 for j in rig.plant.joints if j.coulomb in rig.parameters)
+
+
+def _what(p: Pole) -> str:
+    if p.real.value > GROWS and p.imag.value == 0:
+        return "unstable pole"
+    return "mode" if p.imag.value > 0 else ""
+
+
+def _key(found: Mapping[str, tuple[Pole, ...]], at: str) -> tuple[str, str, Pole]:
+    """The pole by which it falls, or the mode that swings fastest where it was measured."""
+    falling = [(name, p) for name, ps in found.items() for p in ps if _what(p) == "unstable pole"]
+    if falling:
+        name, p = max(falling, key=lambda pair: pair[1].real.value)
+        return name, "unstable pole", p
+    here = found.get(at, ())
+    if not here:
+        raise NotIdentifiable("The fitted rig has no equilibrium to stand at; check what was taken as known.")
+    swinging = [p for p in here if _what(p) == "mode"]
+    p = max(swinging or here, key=lambda p: (p.imag.value, p.real.value))
+    return at, _what(p), p
+
+
+def key_value(key: tuple[str, str, Pole]) -> Estimate:
+    """The number of the key pole that is told: its real part when it grows, its frequency when it swings."""
+    return key[2].real if key[1] == "unstable pole" else key[2].imag
+
+
+def digits(number: Estimate) -> int:
+    """Significant digits that show an interval's ends apart."""
+    width = number.interval[1] - number.interval[0]
+    if not (0 < width < math.inf) or number.value == 0:
+        return 4
+    return int(np.clip(math.ceil(math.log10(abs(number.value) / width)) + 2, 3, 8))
+
+
+def _fit(
+    rig: Rig, squares: Squares, found: Mapping[str, tuple[Pole, ...]], key: tuple[str, str, Pole], q: float,
+    left_out: tuple[str, ...],
+) -> Fit:  # fmt: skip
+    sigma = np.sqrt(np.maximum(np.diag(squares.covariance), 0.0))
+    estimates: dict[str, Estimate] = {}
+    for name, s in zip(squares.names, sigma.tolist(), strict=True):
+        value = squares.way.values[name]
+        low, high = value - q * s, value + q * s
+        weak = high - low > abs(value)
+        bound = value < 1e-6 * rig.parameters[name].value
+        status = "at bound" if bound else "weak" if weak else "firm"
+        estimates[name] = Estimate(
+            value=value, stderr=s, interval=(max(low, 0.0), high), unit=rig.parameters[name].unit, status=status
+        )
+    size = np.maximum(sigma, 1e-300)
+    told, trusted = verdict(squares, key)
+    return Fit(
+        rig=rig, estimates=estimates, per_run={}, runs={}, verdict=told, trusted=trusted,
+        method="least squares on the complex response", evaluations=squares.way.evaluations,
+        seconds=squares.way.seconds, cost=squares.misfit * squares.freedom, names=squares.names,
+        correlation=squares.covariance / np.outer(size, size), warnings=left_out, poles=found,
+    )  # fmt: skip
+
+
+def verdict(squares: Squares, key: tuple[str, str, Pole]) -> tuple[str, bool]:
+    """What was found, and whether to build on it."""
+    at, what, _ = key
+    number = key_value(key)
+    unit = "1/s" if what == "unstable pole" else "rad/s"
+    low, high = number.interval
+    name = f"The unstable pole at '{at}'" if what == "unstable pole" else f"The fastest mode at '{at}'"
+    d = digits(number)
+    said = f"{name} is {number.value:.{d}g} {unit}, 95 % interval {low:.{d}g} to {high:.{d}g}."
+    if squares.misfit > POOR:
+        return (
+            f"The model leaves {math.sqrt(squares.misfit):.1f} times the errors stated unexplained, and intervals are "
+            f"widened by that: a part of the rig is missing in it. {said}"
+        ), False
+    if 2 * squares.reached < squares.starts:
+        few = f"Only {squares.reached} of {squares.starts} starts reached this minimum; there may be a lower one."
+        return f"{few} {said}", False
+    share = (high - low) / 2 / abs(number.value)
+    if share > 0.05:
+        return f"{said} That is {100 * share:.2g} % either way, too wide to design from: measure closer to it.", False
+    return said, True
+
+
+def write_answer(answer: Answer, folder: Path, plant: str, title: str, source: str = "") -> tuple[Path, dict[str, Any]]:
+    """Write `frequency.csv` and `fit.json`, which `upright design` reads."""
+    folder.mkdir(parents=True, exist_ok=True)
+    answer.data.to_csv(folder / "frequency.csv")
+    study = Study(path=folder / "frequency.csv", plant=plant, rig=answer.rig, runs=(), title=title, source=source)
+    return folder / "fit.json", write_fit(answer.fit, study, folder / "fit.json")

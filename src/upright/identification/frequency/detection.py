@@ -1,0 +1,183 @@
+"""What is in this signal at a frequency that is known, and when has the rest died away?
+
+Least squares of sines, cosines, their harmonics and a drift over whole periods: the synchronous detector of a
+frequency analyser, with its errors.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.errors import BadInput
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+HARMONICS = 31
+EDGES = 4096
+"""Instants per period at which a speed's sign is looked at."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tone:
+    """What is at one frequency and at its harmonics, for signals in columns.
+
+    Attributes
+    ----------
+    omega : float
+        [rad/s]
+    lines : (H, m) complex array
+        Peak and phase at the frequency and its harmonics: ``y = Re sum lines[k-1] exp(i k omega t)``.
+    variance : (m,) array
+        Mean square error of the first line.
+    noise : (m,) array
+        Variance of what is left over.
+    """
+
+    omega: float
+    lines: Complex
+    variance: Array
+    noise: Array
+
+    @property
+    def distortion(self) -> Array:
+        """Root of the harmonics' power over the first line's."""
+        return np.sqrt(np.sum(np.abs(self.lines[1:]) ** 2, axis=0)) / np.maximum(np.abs(self.lines[0]), 1e-300)
+
+    @property
+    def coherence(self) -> Array:
+        """Share of the power, harmonics aside, that is at the frequency itself."""
+        power = np.abs(self.lines[0]) ** 2 / 2
+        return power / np.maximum(power + self.noise, 1e-300)
+
+    @cached_property
+    def _phase(self) -> Array:
+        return 2 * math.pi * (np.arange(EDGES) + 0.5) / EDGES
+
+    def _speed(self, count: int) -> Array:
+        """Speed over one period (EDGES, m) from so many lines."""
+        k = np.arange(1, count + 1)
+        return (np.exp(1j * np.outer(self._phase, k)) @ (1j * k[:, None] * self.omega * self.lines[:count])).real
+
+    @property
+    def still(self) -> Array:
+        """Share of the period at less than a twentieth of the highest speed; 0.032 for a sine."""
+        speed = np.abs(self._speed(self.lines.shape[0]))
+        return np.mean(speed <= 0.05 * speed.max(axis=0), axis=0)
+
+    @property
+    def dry(self) -> Complex:
+        """Viscous equivalent of unit Coulomb friction: the sign of the speed over the speed, at the first line.
+
+        Where dry friction turns round, the speed has a kink, and instants of turning from few harmonics err as one
+        over their number; half as many tell by how much.
+        """
+        first = 1j * self.omega * self.lines[0]
+        count = self.lines.shape[0]
+        wave = 2 / EDGES * np.exp(-1j * self._phase)
+        sign = wave @ np.sign(self._speed(count))
+        if count > 6:
+            sign = 2 * sign - wave @ np.sign(self._speed(count // 2))
+        return np.where(first == 0, 0, sign / np.where(first == 0, 1, first))
+
+
+def detect(t: Array, y: Array, omega: float, *, quantum: Array | float = 0.0, blocks: int = 0) -> Tone:
+    """What the signals hold at `omega`.
+
+    Parameters
+    ----------
+    t : (N,) array
+        Time [s], whole periods of `omega`.
+    y : (N, m) array
+        Signals.
+    omega : float
+        [rad/s]
+    quantum : float or (m,) array
+        Resolution of the signals: rounding repeats from period to period, so that only one period averages it.
+    blocks : int
+        Parts whose first lines are compared for the variance; the number of whole periods, 16 at most, when 0.
+
+    Raises
+    ------
+    BadInput
+        When there is less than one period, or too few samples per period.
+    """
+    y = y[:, None] if y.ndim == 1 else y
+    span = float(t[-1] - t[0]) * t.size / (t.size - 1)
+    periods = span * omega / (2 * math.pi)
+    per_period = t.size / periods
+    if periods < 0.99 or per_period < 4:
+        raise BadInput(
+            f"A sine of {omega:.4g} rad/s needs at least one period with four samples, got {periods:.3g} periods of "
+            f"{per_period:.3g} samples; log faster or longer."
+        )
+    count = int(max(1, min(HARMONICS, math.floor(0.45 * per_period))))
+    middle = float(t.mean())
+    drift = (t - middle) / max(span, 1e-300)
+    waves: Complex = np.exp(1j * np.outer(t, omega * np.arange(1, count + 1)))
+    columns = np.column_stack([np.ones_like(t), drift, np.real(waves), np.imag(waves)])
+    solution = np.linalg.lstsq(columns, y, rcond=None)[0]
+    rest = y - columns @ solution
+    lines = solution[2 : 2 + count] - 1j * solution[2 + count :]
+    free = max(1, t.size - columns.shape[1])
+    noise = np.sum(rest**2, axis=0) / free
+    variance = 4 * noise / t.size
+    parts = blocks or int(min(16, math.floor(periods + 0.01)))
+    if parts > 1:
+        cuts = np.linspace(0, t.size, parts + 1).astype(int)
+        # what each part has at the frequency beyond the whole: slow changes and beats show here
+        own = np.array([2 * np.conj(waves[a:b, 0]) @ rest[a:b] / (b - a) for a, b in pairwise(cuts)])
+        variance = np.maximum(variance, np.sum(np.abs(own) ** 2, axis=0) / (parts - 1) / parts)
+    rounding = 4 * np.asarray(quantum) ** 2 / 12 / per_period
+    return Tone(omega=omega, lines=lines, variance=np.maximum(variance, rounding), noise=noise)
+
+
+def by_period(y: Array, length: int, period: float) -> Complex:
+    """First line of every whole period: `y` (N, m) with `length` samples of `period` seconds in one, drift taken out.
+
+    Returns
+    -------
+    (K, m) complex array
+    """
+    whole = y.shape[0] // length
+    phase = 2 * math.pi * np.arange(length) / length
+    drift = (np.arange(length) - (length - 1) / 2) * period
+    columns = np.column_stack([np.cos(phase), np.sin(phase), np.ones(length), drift])
+    solve = np.linalg.pinv(columns)[:2]
+    parts = np.einsum("cl,klm->kcm", solve, y[: whole * length].reshape(whole, length, -1))
+    return parts[:, 0] - 1j * parts[:, 1]
+
+
+def settled(lines: Complex, *, tolerance: float = 2e-3, noise: Array | float = 0.0, window: int = 5) -> int | None:
+    """First period at which what remains of the transient is below `tolerance` of the line, or below `noise`.
+
+    The differences of successive periods shrink by a common complex factor rho; ``d rho/(1 - rho)`` of them remains.
+
+    Parameters
+    ----------
+    lines : (K, m) complex array
+        First line of each period.
+    tolerance : float
+        Relative.
+    noise : float or (m,) array
+        Absolute: rounding shows no smaller transient.
+    window : int
+        Periods looked at at once.
+    """
+    for last in range(window, lines.shape[0] + 1):
+        part = lines[last - window : last]
+        steps = np.diff(part, axis=0)
+        power = np.maximum(np.sum(np.abs(steps[:-1]) ** 2, axis=0), 1e-300)
+        factor = np.sum(steps[1:] * np.conj(steps[:-1]), axis=0) / power
+        factor *= np.minimum(1.0, 0.98 / np.maximum(np.abs(factor), 1e-300))
+        scatter = np.sqrt(np.mean(np.abs(steps) ** 2, axis=0))
+        remains = scatter * np.maximum(1.0, np.abs(factor / (1 - factor)))
+        if np.all(remains <= np.maximum(tolerance * np.abs(part[-1]), 3 * np.asarray(noise))):
+            return last
+    return None

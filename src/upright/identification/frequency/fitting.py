@@ -1,0 +1,214 @@
+"""Which numbers make the model answer as the rig did? The paper's simplex, and least squares, side by side.
+
+The simplex walks on the squared dB of the magnitude, linear model, the far output first and then all. Least squares
+uses the phase too, weighs every point by its error, knows what dry friction did at that amplitude, and starts several
+times.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.errors import NotIdentifiable
+from upright.identification.frequency.balance import Balance
+from upright.identification.frequency.coordinates import Coordinates, coordinates
+from upright.identification.frequency.response import FrequencyResponse
+from upright.identification.model import Rig
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+STICKS = 0.12
+"""Share of the period nearly at rest, 0.032 for a sine, above which a joint sticks and its friction is not known."""
+FLOOR = 1e-4
+"""Relative error that no response is better than: gains of converters, the period's clock."""
+FRICTION = 0.006
+"""How well dry friction's share of a response follows from the turning of encoders: from twins."""
+SPREAD = 0.35
+"""Standard deviation of the logarithm of starts."""
+Told = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Way:
+    """What one method found: all numbers by name, its model (F, n), and what it cost.
+
+    `squares_dB` is the sum of squared magnitude errors [dB^2], `evaluations` counts models.
+    """
+
+    name: str
+    values: Mapping[str, float]
+    model: Complex
+    squares_dB: float
+    evaluations: int
+    seconds: float
+    stages: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Squares:
+    """Least squares: the way, its unknowns with covariance, and how well it fits.
+
+    Attributes
+    ----------
+    way : Way
+    names : tuple of str
+        Unknowns, those known within a tolerance included.
+    covariance : (n, n) array
+        Of their values [SI].
+    misfit : float
+        Chi square per degree of freedom by stated errors; errors are widened by its root when it is above 1.
+    freedom : int
+        Degrees of freedom.
+    sigma : (F, n) array
+        Relative error of real and of imaginary part by which points were weighed.
+    starts : int
+    reached : int
+        How many of the starts ended at the same minimum.
+    """
+
+    way: Way
+    names: tuple[str, ...]
+    covariance: Array
+    misfit: float
+    freedom: int
+    sigma: Array
+    starts: int
+    reached: int
+
+
+def usable(data: FrequencyResponse, *, dry: bool = True) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+    """Frequencies to fit, and sentences about those left out: joints that stick, points drowned in noise."""
+    noisy = data.coherence.min(axis=1) < 0.5
+    stuck = (data.still.max(axis=1) > STICKS) & dry
+    told: list[str] = []
+    for mask, why in ((stuck, "a joint sticks there for part of each period"), (noisy & ~stuck, "it is mostly noise")):
+        if mask.any():
+            told.append(f"Left out at {', '.join(f'{w:.3g}' for w in data.omega[mask])} rad/s: {why}.")
+    return ~(noisy | stuck), tuple(told)
+
+
+def simplex_dB(rig: Rig, at: str, data: FrequencyResponse, *, tell: Told | None = None, limit: int = 4000) -> Way:
+    """The paper's way: Nelder and Mead on squared dB of the linear model, far output first, then all outputs."""
+    from scipy.optimize import minimize
+
+    began = time.perf_counter()
+    balance = Balance(plant=rig.plant, at=at, data=data, linear=True)
+    space = coordinates(rig, magnitude=True)
+    measured = data.magnitude_dB
+    stages: list[str] = []
+
+    def squares(z: Array, columns: list[int]) -> float:
+        with np.errstate(all="ignore"):
+            model = 20 * np.log10(np.abs(balance.response(space.values(z))[0]))
+        cost = float(np.sum((model - measured)[:, columns] ** 2))
+        return cost if math.isfinite(cost) else 1e300
+
+    z = space.start
+    every = list(range(len(data.outputs)))
+    for columns in ([every[-1]], every) if len(every) > 1 else (every,):
+        names = " and ".join(data.outputs[c] for c in columns)
+        cost = math.inf
+        for _ in range(2):  # a collapsed simplex is spread once more
+            corners = np.vstack([z, z + 0.2 * np.eye(z.size)])
+            options = {"initial_simplex": corners, "maxfev": limit, "adaptive": True, "xatol": 1e-4, "fatol": 1e-4}
+            found = minimize(squares, z, args=(columns,), method="Nelder-Mead", options=options)
+            z, cost = np.asarray(found.x), float(found.fun)
+        stages.append(f"{names}: {cost:.4g} dB², {balance.evaluations[0]} models so far")
+        if tell is not None:
+            tell(f"simplex on {names}", 1.0)
+    return _way("simplex on dB", balance, space, z, data, began, tuple(stages))
+
+
+def least_squares(
+    rig: Rig, at: str, data: FrequencyResponse, *, seed: int = 0, starts: int = 6, tell: Told | None = None,
+) -> Squares:  # fmt: skip
+    """Complex response, weighed, dry friction at the amplitudes measured; several starts, the best walked to its end.
+
+    Raises
+    ------
+    NotIdentifiable
+        When there are fewer data than unknowns.
+    """
+    from scipy import optimize
+
+    walk: Any = optimize.least_squares
+    began = time.perf_counter()
+    balance = Balance(plant=rig.plant, at=at, data=data)
+    space = coordinates(rig)
+    if 2 * data.response.size <= space.start.size:
+        raise NotIdentifiable(
+            f"{space.start.size} unknowns need more than {data.response.size} complex points; measure more frequencies."
+        )
+    sigma = _sigma(data, None, None)
+
+    def residual(z: Array) -> Array:
+        return _residuals(balance.response(space.values(z)), data, sigma, z[None], space)[0]
+
+    def jacobian(z: Array) -> Array:
+        steps = 1e-5 * np.eye(z.size)
+        lanes = np.vstack([z + steps, z - steps])
+        both = _residuals(balance.response(space.lanes(lanes), len(lanes)), data, sigma, lanes, space)
+        return (both[: z.size] - both[z.size :]).T / 2e-5
+
+    rng = np.random.default_rng([seed, 71])
+    ends: list[tuple[float, Array]] = []
+    for i in range(starts):
+        z = space.start if i == 0 else space.scattered(rng, SPREAD)
+        found = walk(residual, z, jac=jacobian, bounds=(space.lower, np.inf), x_scale="jac", max_nfev=40)
+        ends.append((float(found.cost), np.asarray(found.x)))
+        if tell is not None:
+            tell("least squares, several starts", (i + 1) / starts)
+    cost, z = min(ends, key=lambda end: end[0])
+    reached = sum(c < 1.02 * cost + 1.0 for c, _ in ends)
+    for _ in range(2):  # weights that know how much of the response dry friction takes
+        values = space.values(z)
+        without = replace(balance, plain_friction=True).response(values)[0]
+        sigma = _sigma(data, balance.response(values)[0], without)
+        found = walk(residual, z, jac=jacobian, bounds=(space.lower, np.inf), x_scale="jac", max_nfev=40)
+        z = np.asarray(found.x)
+    J, rows = jacobian(z), 2 * data.response.size
+    r = residual(z)[:rows]
+    free = max(1, rows - space.start.size + space.priors)
+    misfit = float(r @ r) / free
+    P = np.linalg.pinv(J[:rows].T @ J[:rows] / max(1.0, misfit) + J[rows:].T @ J[rows:])
+    slope = space.slope(z)
+    return Squares(
+        way=_way("least squares", balance, space, z, data, began, ()), names=space.names,
+        covariance=P * np.outer(slope, slope), misfit=misfit, freedom=free, sigma=sigma, starts=starts, reached=reached,
+    )  # fmt: skip
+
+
+def _residuals(model: Complex, data: FrequencyResponse, sigma: Array, z: Array, space: Coordinates) -> Array:
+    """Weighed errors of the logarithm, real parts, imaginary parts and then what was known, shape (lanes, rows)."""
+    with np.errstate(all="ignore"):
+        off = np.log(model / data.response)
+    off = np.where(np.isfinite(off), off, 1e3) / sigma
+    lanes = off.shape[0]
+    return np.hstack([off.real.reshape(lanes, -1), off.imag.reshape(lanes, -1), space.known(z)])
+
+
+def _sigma(data: FrequencyResponse, model: Complex | None, without: Complex | None) -> Array:
+    """Relative error of real and of imaginary part (F, n)."""
+    own = np.hypot(data.error, FLOOR)
+    if model is None or without is None:
+        return np.hypot(own, 0.01)
+    return np.hypot(own, FRICTION * np.minimum(np.abs(np.log(model / without)), 1.0))
+
+
+def _way(
+    name: str, balance: Balance, space: Coordinates, z: Array, data: FrequencyResponse, began: float,
+    stages: tuple[str, ...],
+) -> Way:  # fmt: skip
+    values = space.values(z)
+    model = balance.response(values)[0]
+    squares = float(np.sum((20 * np.log10(np.abs(model)) - data.magnitude_dB) ** 2))
+    return Way(name=name, values=values, model=model, squares_dB=squares, evaluations=balance.evaluations[0],
+               seconds=time.perf_counter() - began, stages=stages)  # fmt: skip

@@ -1,0 +1,219 @@
+"""What did the rig answer, frequency by frequency, how surely, and how much of it was not a sine?"""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from upright.errors import BadInput
+from upright.records import PathLike
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+def _none() -> Array:
+    return np.zeros(0)
+
+
+def _none_complex() -> Complex:
+    return np.zeros(0, dtype=np.complex128)
+
+
+MARK = "# upright frequency response"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FrequencyResponse:
+    """Measured response of one or several outputs to one command.
+
+    Attributes
+    ----------
+    omega : (F,) array
+        Angular frequencies [rad/s], increasing.
+    response : (F, n) complex array
+        Output per unit of command; phase positive when the output leads.
+    outputs : tuple of str
+        Names of the n outputs.
+    units : tuple of str
+        Units of the outputs, then of the command.
+    input : str
+        Name of the command.
+    variance : (F, n) array
+        Mean square of the response's error, real and imaginary part together; 0 where nobody says.
+    coherence : (F, n) array
+        Share of the output's power, harmonics aside, that follows the command; 1 where nobody says.
+    distortion : (F, n) array
+        Root of the power at harmonics over that at the frequency itself; 0 where nobody says.
+    drive : (F,) complex array
+        Command at this frequency, its peak and phase.
+    dry : (F, n) complex array
+        Viscous friction to which one unit of Coulomb friction of that coordinate came in this motion [s/rad or s/m]:
+        ``4/(pi V)`` for a sine of speed V (describing function); 0 where it is left out.
+    still : (F, n) array
+        Share of the period at less than a twentieth of the highest speed: 0.032 for a sine, more where a joint sticks.
+    together : bool
+        Whether all frequencies were driven at once (multisine), or one after the other.
+    hold : float
+        Time for which the converter holds a command [s].
+    notes : tuple of str
+        What the measurement has to say.
+    """
+
+    omega: Array
+    response: Complex
+    outputs: tuple[str, ...]
+    units: tuple[str, ...] = ()
+    input: str = "u"
+    variance: Array = field(default_factory=_none)
+    coherence: Array = field(default_factory=_none)
+    distortion: Array = field(default_factory=_none)
+    drive: Complex = field(default_factory=_none_complex)
+    dry: Complex = field(default_factory=_none_complex)
+    still: Array = field(default_factory=_none)
+    together: bool = False
+    hold: float = 0.0
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        omega = np.array(self.omega, dtype=np.float64)
+        response = np.array(self.response, dtype=np.complex128)
+        if omega.ndim != 1 or omega.size < 1 or np.any(omega <= 0) or np.any(np.diff(omega) <= 0):
+            raise BadInput("A frequency response needs frequencies above 0 that increase; sort them, and leave out 0.")
+        if response.shape != (omega.size, len(self.outputs)):
+            raise BadInput(
+                f"A response at {omega.size} frequencies of {len(self.outputs)} outputs needs shape "
+                f"({omega.size}, {len(self.outputs)}), got {response.shape}."
+            )
+        if not np.isfinite(response).all():
+            raise BadInput("A response must be finite; leave out the frequencies at which it is not known.")
+        object.__setattr__(self, "omega", omega)
+        object.__setattr__(self, "response", response)
+        units = self.units or ("",) * (len(self.outputs) + 1)
+        if len(units) != len(self.outputs) + 1:
+            raise BadInput(f"{len(self.outputs)} outputs and a command need as many units, got {len(units)}.")
+        object.__setattr__(self, "units", units)
+        for name, default in (("variance", 0.0), ("coherence", 1.0), ("distortion", 0.0), ("dry", 0.0), ("still", 0.0)):
+            kind = np.complex128 if name == "dry" else np.float64
+            self._fill(name, response.shape, kind, default)
+        self._fill("drive", omega.shape, np.complex128, 1.0)
+
+    def _fill(self, name: str, shape: tuple[int, ...], kind: Any, default: float) -> None:
+        given = np.array(getattr(self, name), dtype=kind)
+        value = given if given.size else np.full(shape, default, dtype=kind)
+        if value.shape != shape:
+            raise BadInput(f"{name} of a frequency response needs shape {shape}, got {value.shape}.")
+        object.__setattr__(self, name, value)
+
+    def __len__(self) -> int:
+        return self.omega.size
+
+    @property
+    def magnitude_dB(self) -> Array:
+        """Magnitude (F, n) [dB]."""
+        return 20 * np.log10(np.abs(self.response))
+
+    @property
+    def error(self) -> Array:
+        """Standard deviation of the relative error of the magnitude, and of the phase [rad], shape (F, n)."""
+        return np.sqrt(self.variance / 2) / np.abs(self.response)
+
+    def only(self, kept: ArrayLike) -> FrequencyResponse:
+        """The same at some of the frequencies: a mask or indices."""
+        at = np.asarray(kept)
+        names = ("omega", "response", "variance", "coherence", "distortion", "drive", "dry", "still")
+        return replace(self, **{n: getattr(self, n)[at] for n in names})
+
+    def to_control(self) -> Any:
+        """`control.FrequencyResponseData` with named signals; variances and what else was measured stay behind."""
+        import control
+
+        return control.FrequencyResponseData(
+            self.response.T[:, None, :], self.omega, inputs=[self.input], outputs=list(self.outputs)
+        )
+
+    @staticmethod
+    def from_control(data: Any) -> FrequencyResponse:
+        """Response of a `control.FrequencyResponseData` with one input, of which only the response is known."""
+        values = np.asarray(data.frdata)
+        if values.shape[1] != 1:
+            raise BadInput(f"One command is needed, the data has {values.shape[1]}; take them one by one.")
+        return FrequencyResponse(
+            omega=np.asarray(data.omega), response=values[:, 0, :].T, outputs=tuple(map(str, data.output_labels)),
+            input=str(data.input_labels[0]),
+        )  # fmt: skip
+
+    def to_csv(self, path: PathLike) -> None:
+        """Write text that `from_csv` reads back bit for bit."""
+        about = {"outputs": self.outputs, "units": self.units, "input": self.input, "together": self.together,
+                 "hold": self.hold, "notes": self.notes}  # fmt: skip
+        names = ["omega", "drive_re", "drive_im"]
+        columns: list[Array] = [self.omega, *_parts(self.drive)]
+        for j, y in enumerate(self.outputs):
+            names += [f"{y}_re", f"{y}_im", f"{y}_variance", f"{y}_coherence", f"{y}_distortion", f"{y}_still"]
+            names += [f"{y}_dry_re", f"{y}_dry_im"]
+            columns += _parts(self.response[:, j])
+            columns += [part[:, j] for part in (self.variance, self.coherence, self.distortion, self.still)]
+            columns += _parts(self.dry[:, j])
+        with open(path, "w", encoding="utf-8", newline="") as file:
+            file.write(f"{MARK} 1\n# {json.dumps(about)}\n")
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(names)
+            writer.writerows([repr(v) for v in row] for row in np.column_stack(columns).tolist())
+
+    @staticmethod
+    def from_csv(path: PathLike) -> FrequencyResponse:
+        """Response of text written by `to_csv`."""
+        try:
+            with open(path, encoding="utf-8", newline="") as file:
+                mark, about = file.readline(), file.readline()
+                names = next(csv.reader([file.readline()]), [])
+                if not mark.startswith(MARK):
+                    raise ValueError(f"it does not begin with '{MARK}'")
+                table = np.loadtxt(file, delimiter=",", ndmin=2, comments=None)
+            told = json.loads(about[2:])
+            column = dict(zip(names, table.T, strict=True))
+            outputs = tuple(str(y) for y in told["outputs"])
+
+            def both(name: str) -> Complex:
+                return column[f"{name}_re"] + 1j * column[f"{name}_im"]
+
+            def each(name: str) -> Array:
+                return np.column_stack([column[f"{y}_{name}"] for y in outputs])
+
+            return FrequencyResponse(
+                omega=column["omega"], response=np.column_stack([both(y) for y in outputs]), outputs=outputs,
+                units=tuple(told["units"]), input=str(told["input"]), variance=each("variance"),
+                coherence=each("coherence"), distortion=each("distortion"), still=each("still"), drive=both("drive"),
+                dry=np.column_stack([both(f"{y}_dry") for y in outputs]), together=bool(told["together"]),
+                hold=float(told["hold"]), notes=tuple(told["notes"]),
+            )  # fmt: skip
+        except (OSError, ValueError, KeyError, TypeError, StopIteration) as error:
+            if isinstance(error, BadInput):
+                raise
+            raise BadInput(f"'{path}' must be a frequency response written by upright, but: {error}.") from None
+
+
+def _parts(values: Complex) -> list[Array]:
+    return [np.real(values), np.imag(values)]
+
+
+def is_response(path: PathLike) -> bool:
+    """Whether a file is a frequency response written by `FrequencyResponse.to_csv`."""
+    try:
+        with open(path, encoding="utf-8") as file:
+            return file.readline().startswith(MARK)
+    except (OSError, UnicodeDecodeError):
+        return False
+
+
+def describing(omega: Array, amplitude: Array) -> Complex:
+    """Viscous equivalent ``4/(pi omega A)`` of unit Coulomb friction for sines of amplitude A (F, n) at omega (F,)."""
+    speed = np.abs(omega)[:, None] * np.abs(amplitude)
+    return np.asarray(4 / (math.pi * np.maximum(speed, 1e-300)), dtype=np.complex128)
