@@ -1,0 +1,209 @@
+"""How is a rig asked frequency by frequency? Stepped sines on a twin, each as strong as motion and drive allow.
+
+A probe at every frequency shows what a volt does there; the sweep then asks for the amplitude that keeps clear of
+stiction, of the encoders' resolution, of the drive's limit and of the ends of travel. Each sine goes on until its
+transient has died away, told from the data, and is then measured over whole periods.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.control import Rig
+from upright.identification.frequency.detection import Tone, by_period, detect, settled
+from upright.identification.frequency.response import FrequencyResponse
+from upright.records import Provenance, Record
+
+Array = NDArray[np.float64]
+
+EVERY = 4  # servo periods per logged sample
+REACH: Mapping[str, float] = {
+    "psi": 0.6,
+    "theta": 0.18,
+    "x": 0.025,
+    "x_1": 0.02,
+    "x_2": 0.02,
+    "theta_1": 0.4,
+    "theta_2": 0.4,
+}
+"""Amplitude asked of each coordinate [m or rad]: pendulum nearly linear, carts clear of their stops."""
+SPEED: Mapping[str, float] = {"psi": 3.0}
+"""Speed not to be exceeded: an arm whose mean square speed comes near g/l flings its hanging pendulum out."""
+SHARE = 0.8
+"""Of the drive's limit."""
+RISE = 4.0
+"""A command grows so slowly that it hardly starts the free swing [s], three periods at least."""
+PROBES = 6
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Dwell:
+    """One frequency: what was asked, how long it took to settle, what was logged after that."""
+
+    omega: float
+    amplitude: float
+    settle: float
+    """Until the transient had died away [s]; NaN when it had not."""
+    record: Record
+    tone: Tone
+    command: Tone
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sweep:
+    """Stepped sines on one rig; `seconds` is the time it took at the rig."""
+
+    dwells: tuple[Dwell, ...]
+    response: FrequencyResponse
+    seconds: float
+
+    def log(self) -> Record:
+        """What was measured, sine after sine, in one log; between two, while the next settles, nothing is kept."""
+        parts: list[Array] = []
+        begin = 0.0
+        for d in self.dwells:
+            begin += d.settle if math.isfinite(d.settle) else float(d.record.t[0])
+            parts.append(begin + d.record.t - d.record.t[0])
+            begin = float(parts[-1][-1]) + d.record.period
+        first = self.dwells[0].record
+        columns = {n: np.concatenate([d.record[n] for d in self.dwells]) for n in first.names}
+        return first.replace(t=np.concatenate(parts), signals=columns)
+
+
+def grid(low: float, high: float, count: int, period: float) -> NDArray[np.int64]:
+    """Logged samples per period of `count` frequencies between `low` and `high` [rad/s], evenly on a log scale."""
+    length = np.round(2 * math.pi / np.geomspace(low, high, count) / period).astype(np.int64)
+    return np.unique(length)[::-1]
+
+
+def sines(rig: Rig, lengths: NDArray[np.int64], amplitude: Array, seconds: float) -> tuple[Array, Array]:
+    """Commands (N, lanes) and what the encoders show of them (N, coordinates, lanes), logged every `EVERY` periods."""
+    from upright.simulation import simulate
+
+    lanes, tick = lengths.size, rig.period * EVERY
+    rows = round(seconds / tick)
+    k = np.arange(rows * EVERY)
+    phase = 2 * math.pi * k[:, None] / (EVERY * lengths)
+    ramp = np.minimum(1.0, k[:, None] / (EVERY * np.maximum(3 * lengths, RISE / tick)))
+    u = amplitude * (1 - np.cos(math.pi * ramp)) / 2 * np.sin(phase)
+    if rig.converter:
+        u = np.round(u / rig.converter) * rig.converter
+    pad = 16  # what a late drive looks back on
+    tape = np.zeros((lanes, pad + rows * EVERY))
+    tape[:, pad:] = u.T
+    start = pad + np.arange(lanes) * tape.shape[1]
+    x = simulate(
+        rig.plant, rig.drive, rig.plant.state(), tape.ravel(), rig.period, samples=rows, every=EVERY, start=start
+    )
+    shown = x[:, 0::2] * rig.shown[None, :, None]
+    counts = 1 / rig.quantum[None, :, None]
+    return u[::EVERY], np.round(shown * counts) / counts
+
+
+def stepped_sine(
+    rig: Rig, guess: Rig, *, low: float, high: float, count: int = 28, seconds: float = 40.0, periods: int = 6,
+    reach: Mapping[str, float] = REACH,
+) -> Sweep:  # fmt: skip
+    """Sweep a rig from `low` to `high` [rad/s].
+
+    Parameters
+    ----------
+    rig : Rig
+        The twin.
+    guess : Rig
+        The rig as designed: all that is known when the first amplitude is chosen.
+    low, high : float
+        [rad/s]
+    count : int
+        Frequencies, rounded to whole logged samples per period.
+    seconds : float
+        Longest time spent on one of them.
+    periods : int
+        Least number of whole periods that are measured.
+    reach : mapping
+        Amplitude asked of each coordinate [m or rad].
+    """
+    tick = rig.period * EVERY
+    lengths = grid(low, high, count, tick)
+    omega = 2 * math.pi / (lengths * tick)
+    names = tuple(c.name for c in rig.plant.coordinates)
+    goal = np.array([[min(reach.get(n, 0.3), SPEED.get(n, math.inf) / w) for n in names] for w in omega])
+    expected = np.abs(guess.linear(next(iter(guess.plant.equilibria))).response(omega)[:, :, 0])
+    amplitude = np.minimum(SHARE * rig.limit, np.min(goal / expected, axis=1))
+    amplitude = _probed(rig, lengths, amplitude, goal, seconds / 2)
+    u, y = sines(rig, lengths, amplitude, seconds)
+    dwells = tuple(
+        _dwell(rig, float(omega[i]), int(n), u[:, i], y[:, :, i], float(amplitude[i]), periods, names)
+        for i, n in enumerate(lengths)
+    )
+    response = collect(dwells, rig)
+    spent = sum((d.settle if math.isfinite(d.settle) else seconds) + float(np.ptp(d.record.t)) for d in dwells)
+    return Sweep(dwells=dwells, response=response, seconds=spent)
+
+
+def _probed(rig: Rig, lengths: NDArray[np.int64], amplitude: Array, goal: Array, seconds: float) -> Array:
+    """Commands that come closest to the motion asked for, closed in from both sides because friction makes it jump."""
+    low, high = np.zeros(lengths.size), np.full(lengths.size, SHARE * rig.limit)
+    best, miss = amplitude, np.full(lengths.size, math.inf)
+    for _ in range(PROBES):
+        y = sines(rig, lengths, amplitude, seconds)[1]
+        seen = np.array([_peak(y[:, :, i], int(n), rig.period * EVERY) for i, n in enumerate(lengths)])
+        over = np.max(np.maximum(seen, rig.quantum) / goal, axis=1)  # above 1: more than was asked
+        off = np.abs(np.log(over))
+        best, miss = np.where(off < miss, amplitude, best), np.minimum(off, miss)
+        low, high = np.where(over < 1, amplitude, low), np.where(over < 1, high, amplitude)
+        step = amplitude * np.clip(1 / over, 0.5, 1.5)
+        amplitude = np.where((step > low) & (step < high), step, np.where(low > 0, np.sqrt(low * high), high / 2))
+    return best
+
+
+def _peak(y: Array, length: int, tick: float) -> Array:
+    """Amplitude over the last periods."""
+    lines = np.abs(by_period(y, length, tick))
+    return np.median(lines[-min(4, len(lines)) :], axis=0)
+
+
+def _dwell(
+    rig: Rig, omega: float, length: int, u: Array, y: Array, amplitude: float, periods: int, names: tuple[str, ...]
+) -> Dwell:
+    tick = rig.period * EVERY
+    lines = by_period(y, length, tick)
+    rounding = rig.quantum / math.sqrt(12) * math.sqrt(4 / length)
+    wanted = max(periods, math.ceil(1.0 / (length * tick)))
+    at = settled(lines[: len(lines) - wanted], noise=rounding)
+    first = (len(lines) - wanted if at is None else at) * length
+    part = slice(first, first + wanted * length)
+    t = np.arange(y.shape[0]) * tick
+    columns = {"u": u[part], **{n: y[part, j] for j, n in enumerate(names)}}
+    units = {"u": rig.unit, **{c.name: c.unit for c in rig.plant.coordinates}}
+    record = Record(t=t[part], signals=columns, units=units, inputs=("u",), outputs=names,
+                    provenance=Provenance(reader="twin", rig=f"digital twin of {rig.name}, seed {rig.seed}",
+                                          notes=("This log was simulated; no rig was touched.",)))  # fmt: skip
+    return Dwell(
+        omega=omega, amplitude=amplitude, settle=math.nan if at is None else first * tick, record=record,
+        tone=detect(record.t, record.y, omega, quantum=rig.quantum),
+        command=detect(record.t, record.u, omega, quantum=rig.converter),
+    )  # fmt: skip
+
+
+def collect(dwells: tuple[Dwell, ...], rig: Rig) -> FrequencyResponse:
+    """Response of sines measured one after the other."""
+    drive = np.array([d.command.lines[0, 0] for d in dwells])
+    late = [f"{d.omega:.3g}" for d in dwells if not math.isfinite(d.settle)]
+    notes = (f"Not settled at {', '.join(late)} rad/s.",) if late else ()
+    return FrequencyResponse(
+        omega=np.array([d.omega for d in dwells]),
+        response=np.asarray([d.tone.lines[0] for d in dwells], dtype=np.complex128) / drive[:, None],
+        outputs=dwells[0].record.outputs, input="u",
+        units=(*(c.unit for c in rig.plant.coordinates), rig.unit),
+        variance=np.array([d.tone.variance for d in dwells]) / np.abs(drive[:, None]) ** 2,
+        coherence=np.array([d.tone.coherence for d in dwells]),
+        distortion=np.array([d.tone.distortion for d in dwells]),
+        drive=drive, dry=np.array([d.tone.dry for d in dwells]),
+        still=np.array([d.tone.still for d in dwells]), hold=rig.period, notes=notes,
+    )  # fmt: skip
