@@ -36,7 +36,8 @@ def write_pdf(path: Path, book: Book) -> Path | None:
     files["book.json"] = json.dumps(content, ensure_ascii=False).encode()
     files["main.typ"] = (Path(__file__).parent / "templates" / "book.typ").read_bytes()
     fonts = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
-    made: Any = typst.compile(files, font_paths=[str(fonts)], ignore_system_fonts=True)
+    to_pdf: Any = typst.compile  # its stub knows no files by name
+    made: bytes = to_pdf(files, font_paths=[str(fonts)], ignore_system_fonts=True)
     path.parent.mkdir(parents=True, exist_ok=True)
     half = path.with_name(f".{path.name}.part")
     half.write_bytes(made)
