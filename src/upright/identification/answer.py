@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification import assumptions
-from upright.identification.chain import Log, count
+from upright.identification.chain import Log
 from upright.identification.descent import Descent
 from upright.identification.doubt import doubted
 from upright.identification.model import NOISE, Estimate, Fit, Rig, Run, RunScore
@@ -18,7 +18,7 @@ from upright.identification.own import estimate, own_estimates, quantile
 from upright.identification.poles import poles
 from upright.identification.pose import pose
 from upright.identification.problem import Problem
-from upright.identification.profile import profile, settled
+from upright.identification.profile import AFFORDED, profile, settled, work
 from upright.identification.scoring import predict, score
 from upright.identification.seeing import Sight, hidden, look, sentences
 from upright.identification.statistics import Spread, assess
@@ -131,7 +131,7 @@ def _estimates(
     value = problem.value(x)
     q = quantile(spread.samples, x.size)
     shared: dict[str, Estimate] = {}
-    budget = 2.0e7  # residuals that profiles may cost altogether
+    budget = AFFORDED
     for i, u in enumerate(problem.unknowns):
         if u.runs != SHARED:
             continue
@@ -146,7 +146,7 @@ def _estimates(
         wide = interval[1] - interval[0] > abs(plain.value)
         near = spread.pinned[i] or interval[0] <= u.lower < plain.value or interval[1] >= u.upper > plain.value
         if u.asked and (wide or near) and not u.name.startswith(NOISE):  # of a level its size is enough
-            cost = 40.0 * count(problem) * (x.size + 1) / 16
+            cost = work(problem, x.size)
             if cost < budget and not interrupted:
                 budget -= cost
                 interval = profile(problem, x, i, spread, q, report=log.report)

@@ -14,20 +14,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.chain import Log, carried, count, placed
+from upright.identification.chain import Log, carried, placed
 from upright.identification.descent import Descent, descend
 from upright.identification.model import Estimate, Rig
 from upright.identification.own import estimate, quantile
 from upright.identification.pose import pose, settle_steps
 from upright.identification.problem import Problem
-from upright.identification.profile import profile, settled
+from upright.identification.profile import AFFORDED, profile, settled, work
 from upright.identification.statistics import Spread, assess, pseudo_inverse
 from upright.identification.unknowns import SHARED
 
 Array = NDArray[np.float64]
-
-AFFORDED = 2.0e7
-"""Residuals that the profile of one term may cost."""
 
 
 def doubted(
@@ -113,7 +110,7 @@ def _intervals(
             continue
         v, sigma = float(value[i]), math.sqrt(max(float(spread.covariance[i, i]), 0.0))
         interval = estimate(problem, u, v, sigma, q).interval
-        if u.name in left_out and spread.pinned[i] and 40.0 * count(problem) * (found.x.size + 1) / 16 < AFFORDED:
+        if u.name in left_out and spread.pinned[i] and work(problem, found.x.size) < AFFORDED:
             plain = Estimate(value=v, stderr=sigma, interval=interval, unit="", status="")
             interval = settled(profile(problem, found.x, i, spread, q, report=log.report), plain, log=u.log)
         interval = max(interval[0], u.lower), min(interval[1], u.upper)

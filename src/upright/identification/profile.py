@@ -13,6 +13,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.identification.chain import count
 from upright.identification.descent import Report, descend
 from upright.identification.model import Estimate
 from upright.identification.problem import Problem
@@ -54,6 +55,15 @@ def profile(
     if u.log:
         return (math.exp(ends[0]) if ends[0] > -700 else 0.0), math.exp(min(ends[1], 700.0))
     return ends[0], ends[1]
+
+
+AFFORDED = 2.0e7
+"""Residuals that the profiles of one fit may cost altogether."""
+
+
+def work(problem: Problem, sought: int) -> float:
+    """Residuals that one profile costs, give or take: some 40 simulations, 16 lanes of `sought` numbers at a time."""
+    return 40.0 * count(problem) * (sought + 1) / 16
 
 
 def settled(found: tuple[float, float], plain: Estimate, *, log: bool) -> tuple[float, float]:
