@@ -17,7 +17,7 @@ from rich.table import Table
 
 from benchmarks.measure import Line
 
-NAMES = ("trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "doctor", "rigs", "real", "startup")
+NAMES = ("trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "lab", "doctor", "rigs", "real", "startup")
 LIBRARIES = ("upright", "numpy", "scipy", "numba", "control", "casadi", "jax", "mujoco")
 
 

@@ -3,13 +3,15 @@
 import json
 import re
 import shlex
+import signal
 
 import pytest
 from typer.testing import CliRunner
 
 from upright.cli import app
 from upright.lab import laboratory
-from upright.lab.experiments import EXPERIMENTS
+from upright.lab.experiments import EXPERIMENTS, Experiment
+from upright.report.chapter import Chapter
 
 
 def upright(*arguments):
@@ -82,6 +84,46 @@ def test_whatever_is_asked_comes_after_what_it_stands_on():
                 for need in e.needs:
                     if on in there[need].makes and on == (make or there[need].makes[0]):
                         assert order.index(need) < order.index(e.key)
+
+
+def stopped_by(swallow):
+    """Two experiments, in the second of which Ctrl-C is pressed; a fit may swallow it to keep its best."""
+
+    def told(key):
+        return Chapter(key=key, title=f"Number {key}", question="?", verdict=f"{key} is known.", detail="", sound=True,
+                       parts=())  # fmt: skip
+
+    def press(task):
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            if not swallow:
+                raise
+        return told("2"), True
+
+    def one(key, tell):
+        return Experiment(key=key, part_of=key, title=f"Number {key}", makes=("furuta",), needs=(), seconds=1,
+                          tell=tell)  # fmt: skip
+
+    return (one("1", lambda task: (told("1"), True)), one("2", press), one("3", lambda task: (told("3"), True)))
+
+
+@pytest.mark.parametrize("swallow", [False, True])
+def test_ctrl_c_keeps_and_reports_what_is_there(tmp_path, monkeypatch, swallow):
+    monkeypatch.setattr(laboratory, "EXPERIMENTS", stopped_by(swallow))
+    before = signal.getsignal(signal.SIGINT)
+    outcome = upright("lab", "-o", tmp_path)
+    assert outcome.exit_code == 130
+    assert "Traceback" not in outcome.output
+    assert signal.getsignal(signal.SIGINT) is before
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "1 is known." in page
+    assert "Stopped by Ctrl-C" in page
+    assert ("2 is known." in page) == swallow
+    assert "Experiment 3, Number 3: not run" in outcome.stdout
+    assert "upright lab" in outcome.stdout.split("What next")[1]
+    again = json.loads(upright("lab", "-o", tmp_path, "--experiment", "1", "--json").stdout)
+    assert again["experiments"]["1"]["state"] == "kept"
 
 
 @pytest.fixture(scope="module")

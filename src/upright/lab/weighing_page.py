@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
+from markupsafe import Markup
+
 from upright.identification.loadings import Weighed
 from upright.lab.loadings import truth
 from upright.lab.weighing import Known, Weighing
 from upright.report.advice import Step
 from upright.report.chapter import Chapter, Finding
 from upright.report.loadings_told import QUESTION, loading_parts, sound, units_of
+from upright.report.mathml import symbol
 from upright.report.sections import Part, Table
 from upright.report.symbols import measured, number, typed, unit
 
@@ -41,7 +44,8 @@ def chapter(done: Weighing) -> Chapter:
         caption="What the later experiments take from here",
         headings=("symbol", "truth of the twin", "value", "std. error", "unit"),
         rows=tuple(
-            (k.name, number(_truth(done, k)), *measured(k.value, k.stderr), units[k.name]) for k in done.known
+            (Markup(symbol(k.name)), number(_truth(done, k)), *measured(k.value, k.stderr), units[k.name])
+            for k in done.known
         ),
         numbers=(1, 2, 3),
     )  # fmt: skip

@@ -11,7 +11,9 @@ from markupsafe import Markup
 from upright.report.advice import Step
 from upright.report.chapter import Chapter
 from upright.report.document import Picture, render
+from upright.report.mathml import symbol
 
+_SYMBOL = re.compile(r"([A-Za-z]+_[A-Za-z0-9]+)\b(.*)", re.DOTALL)
 _ID = re.compile(r'\b(id="|url\(#|href="#)')
 
 
@@ -65,8 +67,16 @@ class Book:
     def findings(self) -> tuple[tuple[str, str, str, str, str], ...]:
         """Experiment, quantity, value, interval and truth, for the table on the cover."""
         return tuple(
-            (t.chapter.key, f.what, f.value, f.interval, f.truth) for t in self.chapters for f in t.chapter.findings
+            (t.chapter.key, _named(f.what), f.value, f.interval, f.truth)
+            for t in self.chapters
+            for f in t.chapter.findings
         )
+
+
+def _named(what: str) -> str:
+    """A quantity with its symbol set: ``J_d [kg m²]``."""
+    symbolic = _SYMBOL.fullmatch(what)
+    return Markup(symbol(symbolic[1])) + symbolic[2] if symbolic else what
 
 
 def write_book(path: Path, book: Book) -> Path:

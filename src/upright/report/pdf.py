@@ -63,7 +63,7 @@ def _book(book: Book, files: dict[str, bytes]) -> dict[str, Any]:
         "findings": {
             "caption": "Key numbers with 95 % intervals, beside the truth that only a twin can tell",
             "headings": ["from", "quantity", "value", "95 % interval", "truth"],
-            "rows": [list(row) for row in book.findings],
+            "rows": [[said(cell) for cell in row] for row in book.findings],
             "numbers": [2, 3, 4],
         },
         "steps": [{"sentence": s.sentence, "command": s.command} for s in book.steps],
