@@ -67,7 +67,7 @@ def chapter(done: Weighing) -> Chapter:
         parts=(
             Part(title="The body", sentences=(_BODY[done.make], *_limits(done))),
             *parts,
-            Part(title="Verdict", sentences=(_LATER[done.make],), tables=(handed,)),
+            Part(title="What is handed on", sentences=(_LATER[done.make],), tables=(handed,)),
         ),
         steps=_steps(done),
         findings=tuple(
