@@ -115,7 +115,7 @@ def trial(
     )[:, :, 0]  # fmt: skip
     n = x0.size
     x, u, t = found[:, :n], found[:, n], np.arange(count, dtype=np.float64) * rig.period
-    return Trial(rig=rig, at=at, t=t, x=x, u=u, rest=held, record=_logged(rig, t, x, u, reference))
+    return Trial(rig=rig, at=at, t=t, x=x, u=u, rest=held, record=logged(rig, t, x, u, reference))
 
 
 def readings(rig: Rig, q: ArrayLike) -> Array:
@@ -153,12 +153,13 @@ def at_work(rig: Rig, law: Feedback | Law, x0: ArrayLike, rest: ArrayLike, refer
         np.asarray(m, dtype=np.float64) * (shown[:, None] if np.ndim(m) == 3 else shown) for m in (law.B, law.D)
     )  # fmt: skip
     return Law(
-        A=law.A, B=B, C=law.C, D=D, references=references, quantum=rig.quantum / rig.shown,
+        A=law.A, B=B, C=law.C, D=D, references=references, quantum=np.abs(rig.quantum / rig.shown),
         command_quantum=rig.converter, initial=initial, windup=windup,
     )  # fmt: skip
 
 
-def _logged(rig: Rig, t: Array, x: Array, u: Array, reference: ArrayLike | None) -> Record:
+def logged(rig: Rig, t: Array, x: Array, u: Array, reference: ArrayLike | None = None) -> Record:
+    """What a program at the rig could log of states x, shape (N, states), and commands u, shape (N,)."""
     seen = readings(rig, x[:, 0::2])
     names = [c.name for c in rig.plant.coordinates]
     signals = {name: seen[:, i] for i, name in enumerate(names)} | {"u": u}
