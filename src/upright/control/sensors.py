@@ -4,7 +4,8 @@ A command that swings the model to about 100 degrees is put out blindly, then th
 compared with the motion of the model, whose numbers may move as far as they are known: s of ``reading = s motion`` is
 what an encoder shows over what is true. Nothing but physics can fix it: the period of a large swing tells its true
 amplitude (a pendulum at 90 degrees is 18 % slower than at 10), momentum what the driven body does for that swing, and
-the sign of the drive that of both.
+the sign of the drive that of both. How the driven body drifts meanwhile says nothing: a rig out of level, a command's
+offset and dry friction all make it.
 """
 
 from __future__ import annotations
@@ -20,7 +21,6 @@ from upright.control.ascent import swing_up
 from upright.control.rig import Rig
 from upright.control.swing_up import SwingUp
 from upright.control.trial import SUBSTEPS, logged
-from upright.physics import Plant
 from upright.records import Record
 from upright.simulation import simulate
 
@@ -36,7 +36,7 @@ SURE = 4.0
 """Standard errors by which a scale must be off as well."""
 KNOWN = {"m": 0.02, "l": 0.02, "r": 0.02, "J": 0.03, "b": 0.2}
 """How well a plant's numbers are known where no fit says so, by their first letter; relative standard errors."""
-GAIN_KNOWN = 0.03
+GAIN_KNOWN, LAG_KNOWN = 0.03, 0.5
 _EVERY = 8
 
 
@@ -93,11 +93,14 @@ def sentence(name: str, value: float, error: float, explained: float) -> str:
             f"The motion of {name} is not that of the model ({100 * explained:.0f} % explained), whatever its scale: "
             "look for a slipping encoder, a cable or a number of the model that is far off; do not close the loop."
         )
-    turned = ", the wrong way round" if value < 0 else ""
-    return (
-        f"The encoder of {name} shows {abs(value):.3g} (± {2 * error:.2g}) times what is true{turned}: multiply its "
-        f"counts per unit by {value:.4g}, or mend its wiring, before the loop is closed."
-    )
+    size = f"{abs(value):.4g} (± {2 * error:.1g}) times what is true"
+    if value > 0:
+        what, remedy = f"shows {size}", f"multiply its counts per unit by {value:.4g}"
+    elif abs(value + 1.0) <= TOLERATED:
+        what, remedy = "counts the wrong way round", "swap its two channels"
+    else:
+        what, remedy = f"counts the wrong way round, {size}", f"multiply its counts per unit by {value:.4g}"
+    return f"The encoder of {name} {what}: {remedy} before the loop is closed."
 
 
 def probe(model: Rig, law: SwingUp) -> Array:
@@ -134,63 +137,70 @@ def scales(model: Rig, log: Record, known: Mapping[str, float] | None = None) ->
     """
     names = tuple(c.name for c in model.plant.coordinates)
     shown = np.column_stack([log[n] for n in names])[::_EVERY]
-    told = _known(model.plant, known or {})
+    told = _known(model, known or {})
     moving, size = tuple(told), np.array(list(told.values()))
-    command = log["u"]
-    z = np.zeros(size.size)
-    at = _motion(model, command, moving, z[None])[:, :, 0]
-    s = _projected(shown, at)
-    quarters = max(8.0, 2.0 * float(np.sum(np.diff(np.sign(at[:, 1])) != 0)))
-    step = 0.3
-    cost = math.inf
-    for _ in range(8):
-        trials = np.vstack([z, z + step * np.eye(size.size)]) * size
-        y = _motion(model, command, moving, trials)
+    p, m, command = len(names), size.size, log["u"]
+    drift = np.linspace(0.0, 1.0, len(shown))[:, None] ** np.arange(1, 4)
+    z, step, J = np.zeros(m), 0.3, np.zeros((0, 0))
+    s, wander, at = np.ones(p), np.zeros(3), shown
+    for turn in range(8):
+        y = _motion(model, command, moving, np.vstack([z, z + step * np.eye(m)]) * size)
         at, slopes = y[:, :, 0], (y[:, :, 1:] - y[:, :, :1]) / step
+        if turn == 0:
+            s, wander = _projected(shown, at, drift)
         left = shown - s * at
+        left[:, 0] -= drift @ wander
+        quarters = max(8.0, 2.0 * float(np.sum(np.diff(np.sign(at[:, 1])) != 0)))
         sigma = np.maximum(np.sqrt(np.mean(left**2, axis=0)), model.quantum) * math.sqrt(len(shown) / quarters)
-        J = [np.zeros((len(shown), len(names) + size.size)) for _ in names]
-        for i, block in enumerate(J):
-            block[:, i], block[:, len(names) :] = at[:, i] / sigma[i], s[i] * slopes[:, i] / sigma[i]
-        whole = np.vstack([*J, np.eye(len(names) + size.size)[len(names) :]])
-        rest = np.concatenate([*(left / sigma).T, -z])
-        move = np.linalg.lstsq(whole, rest, rcond=None)[0]
-        s, z = s + move[: len(names)], np.clip(z + move[len(names) :], -4.0, 4.0)
-        before, cost = cost, float(np.abs(move[len(names) :]).max())
-        if cost < 1e-2 or (cost > 0.9 * before > 0 and cost < 0.1):
+        # unknown: scales, drift of the driven body, numbers of the model in units of what is known of them
+        J = np.zeros((p * len(shown) + m, p + 3 + m))
+        for i in range(p):
+            rows = slice(i * len(shown), (i + 1) * len(shown))
+            J[rows, i], J[rows, p + 3 :] = at[:, i] / sigma[i], s[i] * slopes[:, i] / sigma[i]
+            if i == 0:
+                J[rows, p : p + 3] = drift / sigma[i]
+        J[p * len(shown) :, p + 3 :] = np.eye(m)
+        move = np.linalg.lstsq(J, np.concatenate([*(left / sigma).T, -z]), rcond=None)[0]
+        s, wander, z = s + move[:p], wander + move[p : p + 3], np.clip(z + move[p + 3 :], -4.0, 4.0)
+        if np.abs(move[p + 3 :]).max() < 1e-2:
             break
     at = _motion(model, command, moving, (z * size)[None])[:, :, 0]
-    s = _projected(shown, at)
-    covariance = np.linalg.inv(whole.T @ whole)
+    s, wander = _projected(shown, at, drift)
+    motion = s * at
+    motion[:, 0] += drift @ wander
     spread = np.maximum(np.mean((shown - shown.mean(axis=0)) ** 2, axis=0), model.quantum**2)
     return Scales(
-        names=names, value=s, error=np.sqrt(np.diag(covariance)[: len(names)]),
-        explained=1.0 - np.mean((shown - s * at) ** 2, axis=0) / spread, t=log.t[::_EVERY], shown=shown, motion=s * at,
+        names=names, value=s, error=np.sqrt(np.diag(np.linalg.inv(J.T @ J))[:p]),
+        explained=1.0 - np.mean((shown - motion) ** 2, axis=0) / spread, t=log.t[::_EVERY], shown=shown, motion=motion,
     )  # fmt: skip
 
 
-def _known(plant: Plant, known: Mapping[str, float]) -> dict[str, float]:
-    out = {"gain": known.get("gain", GAIN_KNOWN)}
-    for name, value in plant.parameters().items():
+def _known(model: Rig, known: Mapping[str, float]) -> dict[str, float]:
+    """Relative standard errors of the numbers that may move."""
+    out = {"gain": known.get("gain", GAIN_KNOWN)} | ({"lag": LAG_KNOWN} if model.lag else {})
+    for name, value in model.plant.parameters().items():
         if value != 0.0 and name != "g" and (size := known.get(name, KNOWN.get(name[0], 0.0))) > 0.0:
             out[name] = size
     return out
 
 
-def _projected(shown: Array, motion: Array) -> Array:
-    return np.sum(shown * motion, axis=0) / np.maximum(np.sum(motion**2, axis=0), 1e-300)
+def _projected(shown: Array, motion: Array, drift: Array) -> tuple[Array, Array]:
+    """Scales that bring the motion nearest to what is shown, and the drift of the driven body."""
+    first = np.linalg.lstsq(np.column_stack([motion[:, 0], drift]), shown[:, 0], rcond=None)[0]
+    rest = np.sum(shown[:, 1:] * motion[:, 1:], axis=0) / np.maximum(np.sum(motion[:, 1:] ** 2, axis=0), 1e-300)
+    return np.array([first[0], *rest]), np.array(first[1:])
 
 
 def _motion(model: Rig, command: Array, names: Sequence[str], logs: Array) -> Array:
     """Coordinates of the model, shape (N, coordinates, lanes), for logarithms of factors, shape (lanes, names)."""
-    values = model.plant.parameters() | {"gain": model.gain}
-    params = {n: values[n] * np.exp(logs[:, i]) for i, n in enumerate(names)}
-    drive = {**model.drive, "actuator.gain": params.pop("gain")}
+    values = model.plant.parameters() | {"gain": model.gain, "lag": model.lag}
+    lanes = max(2, len(logs))  # two, so that one kernel serves all
+    params = {n: np.resize(values[n] * np.exp(logs[:, i]), lanes) for i, n in enumerate(names)}
+    drive = dict(model.drive) | {f"actuator.{n}": params.pop(n) for n in ("gain", "lag") if n in params}
     rows = -(-command.size // _EVERY)
-    start = np.tile(model.plant.state("hanging"), (max(2, len(logs)), 1))  # two, so that one kernel serves all
-    doubled = {n: np.resize(v, len(start)) for n, v in (params | {"actuator.gain": drive["actuator.gain"]}).items()}
+    start = np.tile(model.plant.state("hanging"), (lanes, 1))
     x = simulate(
-        model.plant, {**drive, **doubled}, start, command, model.period, samples=rows, every=_EVERY, substeps=SUBSTEPS
+        model.plant, drive | params, start, command, model.period, samples=rows, every=_EVERY, substeps=SUBSTEPS
     )
     return x[:, 0::2, : len(logs)]
 
@@ -204,6 +214,6 @@ def lifted(rig: Rig, shown: float) -> str:
     if off <= math.radians(10):
         return ""
     return (
-        f"The encoder of theta shows {math.degrees(shown):.0f} degrees for half a turn, {abs(shown) / math.pi:.3g} times "
-        "what is true; the loop stays open. Correct its counts per turn, or zero it where the pendulum hangs."
+        f"The encoder of theta shows {math.degrees(shown):.0f} degrees for half a turn, {abs(shown) / math.pi:.3g} "
+        "times what is true; the loop stays open. Correct its counts per turn, or zero it where the pendulum hangs."
     )

@@ -1,0 +1,155 @@
+"""Is a lying encoder found, named and measured, while sound ones on odd rigs are left in peace?"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.linalg import solve_discrete_are
+from scipy.special import ellipk
+
+from upright import design
+from upright.control import design_swing_up, trial
+from upright.control.score import FALLEN
+from upright.control.sensors import lifted, probe, put_out, scales
+from upright.control.trial import readings
+from upright.control.watch import ODDS, UNKNOWN, Suspicion, Watch
+from upright.lab.makes import make_rig
+
+MAKES = ("furuta", "linear")
+
+
+@cache
+def command(make):
+    return probe(make_rig(make), design_swing_up(make_rig(make)))
+
+
+def checked(rig, make):
+    return scales(make_rig(make), put_out(rig, command(make)))
+
+
+@pytest.mark.parametrize("make", MAKES)
+@pytest.mark.parametrize("shown", [(1.0, -1.0), (-1.0, 1.0), (1.0, 0.5), (4.0, 1.0), (1.1, 0.9)])
+def test_what_an_encoder_shows_over_what_is_true_is_found_hanging(make, shown):
+    rig = replace(make_rig(make, 7), scales=shown)  # another rig than the model
+    found = checked(rig, make)
+    assert np.abs(found.value / shown - 1).max() < 0.01
+    names = [c.name for c in rig.plant.coordinates]
+    assert found.wrong == tuple(n for n, s in zip(names, shown, strict=True) if s != 1.0)
+    for name, s in zip(names, shown, strict=True):
+        assert (f"encoder of {name}" in found.verdict) == (s != 1.0)
+    assert ("the wrong way round" in found.verdict) == (min(shown) < 0)
+
+
+ODD = {
+    "offset of the command": lambda r: replace(r, offset=0.02),
+    "a lazy amplifier": lambda r: replace(r, lag=0.01),
+    "twice the dry friction": lambda r: r.changed(b_1c=2 * r.plant.b_1c),
+    "a stronger drive": lambda r: replace(r, gain=1.06 * r.gain),
+    "a longer rod": lambda r: r.changed(l_cg=1.05 * r.plant.l_cg),
+}
+
+
+@pytest.mark.parametrize("make", MAKES)
+@pytest.mark.parametrize("odd", ODD)
+def test_an_odd_rig_is_not_a_lying_encoder(make, odd):
+    assert checked(ODD[odd](make_rig(make, 3)), make).sound
+
+
+def test_a_drive_of_twice_the_strength_is_not_blamed_on_a_scale():
+    found = checked(replace(make_rig("furuta"), gain=2 * make_rig("furuta").gain), "furuta")
+    assert not found.sound
+    assert "is not that of the model" in found.verdict
+
+
+def test_half_a_turn_by_hand_tells_counts_per_turn():
+    rig = make_rig("furuta")
+    upright = [0.0, math.pi]
+    assert lifted(rig, float(readings(rig, upright)[1])) == ""
+    assert "90 degrees for half a turn, 0.5 times" in lifted(rig, readings(replace(rig, scales=(1, 0.5)), upright)[1])
+
+
+def test_a_large_swing_is_slower_by_what_the_elliptic_integral_says():
+    """What the module says of 90 and 10 degrees: T = 4 K(sin^2(A/2))/omega."""
+    period = [ellipk(math.sin(a / 2) ** 2) for a in (math.radians(90), math.radians(10))]
+    assert period[0] / period[1] - 1 == pytest.approx(0.18, abs=0.005)
+
+
+@cache
+def loop(make):
+    """Watch, and the law it watches: set 1 of Table 1."""
+    rig = make_rig(make)
+    model = rig.linear("inverted")
+    sampled = design.hold(model, rig.period, (rig.delay + rig.lag) / rig.period)
+    estimator = design.filtered(sampled, 0.8)
+    K = design.place_sampled(sampled, estimator, [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220])
+    return Watch(rig), design.feedback(estimator, K)
+
+
+def watched(make, shown, seed=3, seconds=2.5):
+    watch, law = loop(make)
+    rig = replace(make_rig(make, seed), scales=shown)
+    rest = readings(rig, [0.0, math.pi])
+    run = trial(rig, law, at="inverted", start=[0.0, 0.0, 0.05, 0.0], seconds=seconds, rest=rest)
+    seen = np.column_stack([run.record[c.name] for c in rig.plant.coordinates]) - rest
+    return watch.over(seen, run.u), run
+
+
+@pytest.mark.parametrize("make", MAKES)
+def test_the_watch_speaks_before_the_fall(make):
+    first = make_rig(make).plant.coordinates[0].name
+    for shown, what in (
+        ((1.0, -1.0), Suspicion(name="theta", factor=-1.0)),
+        ((-1.0, 1.0), Suspicion(name=first, factor=-1.0)),
+        ((1.0, 0.5), Suspicion(name="theta", factor=0.5)),
+        ((4.0, 1.0), Suspicion(name=first, factor=4.0)),
+    ):
+        alarm, run = watched(make, shown)
+        fallen = np.flatnonzero(np.abs(run.deviation[:, 1]) > FALLEN)
+        k = int(alarm.sample[0])
+        assert 0 <= k < 0.75 * fallen[0]
+        assert abs(run.deviation[k, 1]) < math.radians(12)
+        assert alarm.what[0] == what
+    alarm, run = watched(make, (1.0, 1.0))
+    assert alarm.sample[0] == -1
+    assert np.abs(run.deviation[-1, 1]) < 0.02
+
+
+def test_the_filters_settle_on_the_riccati_gain():
+    rig = make_rig("linear")
+    watch, _ = loop("linear")
+    s = design.hold(rig.linear("inverted"), rig.period, (rig.delay + rig.lag) / rig.period)
+    W = design.shaken(s, UNKNOWN * rig.limit * np.abs(rig.linear("inverted").B[1::2, 0]))
+    W[4:, 4:] += 1e-12 * np.eye(len(W) - 4)  # commands are known; scipy wants to be asked of something that moves
+    P = solve_discrete_are(s.A.T, s.C.T, W, np.diag(rig.quantum**2 / 12))
+    gain = np.linalg.solve(s.C @ P @ s.C.T + np.diag(rig.quantum**2 / 12), s.C @ P).T
+    # 0.35 s of settling leave this of the start, on which the filters of a falling body forget slowest
+    assert np.allclose(watch.gains[-1, 0], gain, rtol=0.01, atol=1e-5 * np.abs(gain).max())
+
+
+def test_sound_sensors_are_seldom_suspected():
+    """Ville's inequality: where the model is right, no suspicion ever gets c times as likely more often than 1/c."""
+    rig, runs, c = make_rig("furuta"), 200, 20.0
+    watch = Watch(rig, forgotten=math.inf)
+    s = design.hold(rig.linear("inverted"), rig.period, (rig.delay + rig.lag) / rig.period)
+    rng = np.random.default_rng(11)
+    sway = UNKNOWN * rig.limit * np.abs(rig.linear("inverted").B[1::2, 0])
+    x = np.zeros((runs, s.A.shape[0]))
+    x[:, :4] = rng.normal(size=(runs, 4))
+    highest = np.full((runs, len(watch.suspicions)), -np.inf)
+    for k in range(150):
+        y = x @ s.C.T + rng.normal(size=(runs, 2)) * rig.quantum / math.sqrt(12)
+        u = 2.0 * math.sin(0.1 * k)
+        watch.see(y, u)
+        highest = np.maximum(highest, watch.likelihood - watch.likelihood[:, :1])
+        a = sway * rng.normal(size=(runs, 2))
+        x = x @ s.A.T + u * s.B[:, 0]
+        x[:, 0:4:2] += a * rig.period**2 / 2
+        x[:, 1:4:2] += a * rig.period
+    often = np.mean(highest[:, 1:] > math.log(c), axis=0)
+    # three standard deviations of a share of 1/c over these runs
+    assert np.all(often <= 1 / c + 3 * math.sqrt((1 - 1 / c) / c / runs))
+    assert math.log(ODDS) > math.log(c)
