@@ -20,7 +20,7 @@ from typing import Any
 
 WIDTH = 720  # pixels of a picture on the page
 _SHARP = 1.25  # stored pixels to one on the page
-_COLOURS = 64
+_COLOURS = 80
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 _LANGUAGE = {
     "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
@@ -148,7 +148,11 @@ def _png(drawing: Any) -> str:
 
     raw = io.BytesIO()
     drawing.savefig(raw, format="png", dpi=_SHARP * WIDTH / 7.4, facecolor="white")
-    few = Image.open(raw).convert("RGB").quantize(_COLOURS, dither=Image.Dither.NONE)
+    few = (
+        Image.open(raw)
+        .convert("RGB")
+        .quantize(_COLOURS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    )
     small = io.BytesIO()
     few.save(small, format="png", optimize=True)
     return base64.b64encode(small.getvalue()).decode("ascii") + "\n"
