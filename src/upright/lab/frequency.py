@@ -7,7 +7,7 @@ only relative to each other. The unstable pole does not depend on that scale.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from upright.identification.model import Parameter
 from upright.identification.model import Rig as Asked
 from upright.lab.makes import Make, make_rig
 from upright.lab.sweeps import Sweep, stepped_sine
+from upright.lab.weighing import Known
 
 Progress = Callable[[str, float], None]
 
@@ -110,9 +111,17 @@ def asked(make: str, known: Mapping[str, float], *, tolerance: Mapping[str, floa
 
 
 def run(
-    make: Make, seed: int, folder: Path, progress: Progress | None = None, stopped: Callable[[], bool] = lambda: False
+    make: Make,
+    seed: int,
+    folder: Path,
+    progress: Progress | None = None,
+    stopped: Callable[[], bool] = lambda: False,
+    *,
+    weighed: Sequence[Known] = (),
 ) -> Result:
     """Sweep one rig of a make, fit it, and leave `frequency.csv`, `sweep.csv` and `fit.json` in a folder.
+
+    `weighed` is what experiment 1a found; it joins what the bench says.
 
     Raises
     ------
@@ -129,7 +138,9 @@ def run(
         raise KeyboardInterrupt
     tell("fitting what it answered", 0.3)
     at = next(iter(rig.plant.equilibria))
-    rest = asked(make, bench(rig, make))
+    known = bench(rig, make) | {k.name: k.value for k in weighed}
+    tolerance = {**BENCH[make], **{k.name: k.stderr / k.value for k in weighed}}
+    rest = asked(make, known, tolerance=tolerance)
     answer = explain(rest, at, sweep.response, seed=seed, tell=lambda step, share: tell(step, 0.3), stopped=stopped)
     tell("writing the log and the fit", 0.9)
     write_answer(answer, folder, PLANT[make], f"Frequency response of {rig.name}, seed {seed}")
