@@ -34,6 +34,9 @@ class StepFigures:
     settling_2, settling_5 : float
         After which it stays within 2 or 5 % of the change about its rest; inf where the record ends before it is
         known to stay.
+    arrival : float
+        After which it stays within 5 % of the step asked for about the reference itself; inf where friction or
+        swinging keep it from there.
     error : float
         Reference less rest.
     resolution : float
@@ -46,6 +49,7 @@ class StepFigures:
     overshoot: float
     settling_2: float
     settling_5: float
+    arrival: float
     error: float
     resolution: float
 
@@ -88,6 +92,8 @@ def step_figures(t: ArrayLike, y: ArrayLike, *, before: float, reference: float,
     if time.ndim != 1 or time.shape != signal.shape or time.size < 20:
         raise BadInput(f"a step needs times and positions, 20 or more of each, got {time.shape} and {signal.shape}.")
     tail = max(3, math.ceil(TAIL * time.size))
+    if reference == before:
+        raise BadInput(f"a step goes somewhere else; it was at {before:g} and should stay there.")
     rest = float(np.median(signal[-tail:]))
     change = rest - before
     if abs(change) <= max(quantum, 1e-12 * float(np.abs(signal).max())):
@@ -106,6 +112,7 @@ def step_figures(t: ArrayLike, y: ArrayLike, *, before: float, reference: float,
         overshoot=beyond if beyond > resolution else 0.0,
         settling_2=_settled(clock, share, max(0.02, resolution), tail),
         settling_5=_settled(clock, share, max(0.05, resolution), tail),
+        arrival=_settled(clock, (signal - before) / (reference - before), max(0.05, resolution), tail),
         error=reference - rest,
         resolution=resolution,
     )
