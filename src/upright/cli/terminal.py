@@ -156,7 +156,9 @@ def on_terminal(content: Any) -> Any:
     """A table of a page (`report.sections.Table`) for the terminal."""
     from rich.table import Table
 
-    table = Table(title=f"\n{content.caption}", title_justify="left", box=None, pad_edge=False, header_style="bold")
+    table = Table(
+        title=f"\n{_plain(content.caption)}", title_justify="left", box=None, pad_edge=False, header_style="bold"
+    )
     for i, heading in enumerate(content.headings):
         table.add_column(_plain(heading), justify="right" if i in content.numbers else "left")
     for row in content.rows:
