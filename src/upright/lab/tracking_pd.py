@@ -1,0 +1,110 @@
+"""How good can PD control of the near encoder be? Searched as hard as a student with a weekend would, and harder.
+
+What it cannot do follows from the model: with the near body driven and measured, only kd damps, and the poles' real
+parts add up to ``-kd/m_1``. Too stiff a kp holds the near body fast, and the far one swings on its spring.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright import design
+from upright.control import Rig
+from upright.control.steps import step_figures
+from upright.control.trial import SUBSTEPS, at_work
+from upright.errors import BadInput
+from upright.lab.tracking_laws import AT, MEMORY, Tracker, tracker
+from upright.physics import Linear
+from upright.simulation import Law, simulate
+
+Array = NDArray[np.float64]
+
+DWELL = 2.0
+"""How long each is watched [s]."""
+
+
+def near_pd(rig: Rig, name: str, kp: float, kd: float) -> Tracker:
+    """PD on the driven body's encoder, with the reference of the far one."""
+    return tracker(rig, name, _gains(rig, 0, kp, kd), kp)
+
+
+def far_pd(rig: Rig, name: str, kp: float, kd: float) -> Tracker:
+    """PD on the far body's encoder."""
+    return tracker(rig, name, _gains(rig, len(rig.plant.coordinates) - 1, kp, kd), kp)
+
+
+def _gains(rig: Rig, body: int, kp: float, kd: float) -> Array:
+    K = np.zeros(2 * len(rig.plant.coordinates))
+    K[2 * body : 2 * body + 2] = kp, kd
+    return K
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Search:
+    """PD laws on the near encoder, tried on one rig: gains, and when the far body arrived and settled [s]."""
+
+    kp: Array
+    kd: Array
+    arrival: Array
+    settling: Array
+
+
+def tune(rig: Rig, step: float, most: float) -> tuple[Tracker, Search]:
+    """The PD on the near encoder that brings the far body soonest within 5 % of the reference, and keeps it there.
+
+    Every pair of gains of a grid runs on the rig in the kernel, with friction, encoders, converter and limit; then a
+    finer grid about the best. `most` is the largest command allowed, which bounds kp.
+    """
+    kp, rate = np.geomspace(0.03, 1.0, 18) * most / step, np.geomspace(8e-3, 0.25, 18)
+    rows, best = np.empty((0, 4)), np.zeros(4)
+    for _ in range(2):
+        pairs = np.array([(p, p * r) for p in kp for r in rate])
+        rows = np.vstack([rows, np.column_stack([pairs, tried(rig, pairs, step)])])
+        order = np.lexsort((rows[:, 3], rows[:, 2]))  # where friction keeps every one away: the soonest at rest
+        best = rows[order[0]]
+        kp = np.minimum(best[0] * np.geomspace(0.8, 1.25, 9), most / step)
+        rate = best[1] / best[0] * np.geomspace(0.8, 1.25, 9)
+    found = Search(kp=rows[:, 0], kd=rows[:, 1], arrival=rows[:, 2], settling=rows[:, 3])
+    return near_pd(rig, "PD, tuned", float(best[0]), float(best[1])), found
+
+
+def tried(rig: Rig, pairs: Array, step: float) -> Array:
+    """Arrival and settling to 5 % of many PD laws at once, shape (pairs, 2)."""
+    c = len(rig.plant.coordinates)
+    estimator = design.filtered(design.hold(rig.linear(AT), rig.period, 0.0), MEMORY)
+    laws = [design.feedback(estimator, _gains(rig, 0, kp, kd), kp) for kp, kd in pairs.tolist()]
+    A, B, C, D = (np.stack([getattr(law, n) for law in laws], axis=-1) for n in "ABCD")
+    many = Law(A, B, C, D, references=np.append(np.zeros(c), step)[None])
+    count = round(DWELL / rig.period)
+    start = rig.plant.state(AT)
+    given = at_work(rig, many, start, np.zeros(c))
+    x = simulate(
+        rig.plant, rig.drive, start, None, rig.period, samples=count, substeps=SUBSTEPS, loop=given
+    )[:, 2 * c - 2]  # fmt: skip
+    t, out = np.arange(count, dtype=np.float64) * rig.period, np.full((len(laws), 2), np.inf)
+    for i, y in enumerate(x.T):
+        try:
+            found = step_figures(t, y, before=0.0, reference=step, quantum=float(rig.quantum[-1]))
+        except BadInput:  # friction held it where it was
+            continue
+        out[i] = found.arrival, found.settling_5
+    return out
+
+
+def best_decay(model: Linear, kp: Array, *, most: float = 0.3) -> Array:
+    """For each kp the fastest decay [1/s] that any kd = kp times up to `most` [s] gives the slowest pole."""
+    rate = np.geomspace(4e-3, most, 300)
+    K = np.zeros((kp.size, rate.size, 1, model.A.shape[0]))
+    K[..., 0, 0], K[..., 0, 1] = kp[:, None], kp[:, None] * rate
+    poles = np.linalg.eigvals(model.A - model.B @ K)
+    return -poles.real.max(axis=-1).min(axis=-1)
+
+
+def root_locus(model: Linear, body: int, rate: float, kp: Array) -> NDArray[np.complex128]:
+    """Poles of PD control of one body's position over kp, kd = kp times `rate`, shape (kp, states)."""
+    K = np.zeros((kp.size, 1, model.A.shape[0]))
+    K[:, 0, 2 * body], K[:, 0, 2 * body + 1] = kp, kp * rate
+    return np.linalg.eigvals(model.A - model.B @ K).astype(np.complex128)
