@@ -31,6 +31,7 @@ COMMANDS = {
     "plan-inertias": "Say which masses, where and how often, give the tightest stiffness for the fewest runs.",
     "reproduce": "Regenerate the pole tables of the paper from a few numbers, and show its misprints.",
     "survey": "Evaluate ratings before and after a course; check printed means and percentages.",
+    "track": "Make the far inertia of a flexible shaft follow a step, by state feedback and by PD.",
     "predict": "Score other runs with a model that was fitted before.",
 }
 
