@@ -185,19 +185,34 @@ def differences(stored: Notebook, fresh: Notebook) -> Iterator[str]:
     for a, b in zip(stored["cells"], fresh["cells"], strict=True):
         if a["cell_type"] != "code":
             continue
-        where = f"cell {b['execution_count']}"
-        if [sorted(o.get("data", {})) for o in a["outputs"]] != [
-            sorted(o.get("data", {})) for o in b["outputs"]
-        ]:
+        where, before, now = (
+            f"cell {b['execution_count']}",
+            _said(a["outputs"]),
+            _said(b["outputs"]),
+        )
+        if [kinds for kinds, _ in before] != [kinds for kinds, _ in now]:
             yield f"{where} shows other kinds of things than are stored."
             continue
-        for one, other in zip(a["outputs"], b["outputs"], strict=True):
-            before, now = _text(one), _text(other)
-            if not alike(before, now):
-                yield f"{where} says\n{now}\nand what is stored is\n{before}"
+        for (_, one), (_, other) in zip(before, now, strict=True):
+            if not alike(one, other):
+                yield f"{where} says\n{other}\nand what is stored is\n{one}"
+
+
+def _said(outputs: list[dict[str, Any]]) -> list[tuple[list[str], str]]:
+    """Kinds and text of each output; what was printed is one, in how many pieces it may have come."""
+    said: list[tuple[list[str], str]] = []
+    for output in outputs:
+        kinds = sorted(output.get("data", {}))
+        if said and not kinds and not said[-1][0]:
+            said[-1] = ([], said[-1][1] + _text(output))
+        else:
+            said.append((kinds, _text(output)))
+    return said
 
 
 def _text(output: dict[str, Any]) -> str:
+    if len(output.get("data", "?")) > 1:
+        return ""  # a picture or a formula
     return "".join(output.get("text") or output["data"]["text/plain"])
 
 
