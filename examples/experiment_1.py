@@ -1,0 +1,53 @@
+"""Experiment 1 from Python: weigh the disk of a Furuta pendulum, sweep the hanging rig, know how fast it will fall.
+
+    python examples/experiment_1.py 1
+
+The number is the seed: which rig of the make, 0 when left out. The picture of the weighing goes to experiment_1a.png,
+that of the sweep to experiment_1b.png.
+"""
+
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from upright.lab import frequency, weighing
+from upright.lab.makes import make_rig
+from upright.report.drawing import CYCLE, figure, save, styled
+from upright.report.loadings import line_figure
+
+seed = int(sys.argv[1]) if sys.argv[1:] else 0
+rig = make_rig("furuta", seed)
+
+with TemporaryDirectory() as folder:
+    weighed = weighing.run(rig, seed, Path(folder))
+    swept = frequency.run("furuta", seed, Path(folder), weighed=weighed.known)
+
+line = weighed.campaign.found
+print(f"(a) {line.verdict}")
+for known in weighed.known:
+    print(f"    {known.name} = {known.value:.4g} ± {known.stderr:.2g}, truth {getattr(rig.plant, known.name):.4g}")
+
+answer, truth = swept.answer, swept.truth
+print(f"(b) {answer.fit.verdict}")
+for name, found in answer.fit.estimates.items():
+    low, high = found.interval
+    print(f"    {name:15}{found.value:9.3g}  ({low:.3g} to {high:.3g} {found.unit}), truth {truth[name]:.3g}")
+pole = rig.plant.linear("inverted").poles()[0].real
+print(f"    The pole by the simplex on dB: {answer.simplex_pole.real:.3f} 1/s; truth {pole:.3f} 1/s")
+
+
+@styled
+def picture():
+    drawing, data = figure(2.8), answer.used
+    for axes, name, measured, model in zip(
+        drawing.subplots(1, 2), data.outputs, abs(data.response.T), abs(answer.squares.way.model.T), strict=True
+    ):
+        axes.semilogy(data.omega, measured, "ko", markersize=3, label="measured")
+        axes.semilogy(data.omega, model, color=CYCLE[0][0], label="least squares")
+        axes.set(xlabel="frequency [rad/s]", ylabel=f"{name} over the command [rad/V]")
+    axes.legend()
+    return drawing
+
+
+print("Pictures:", save(line_figure(line, "kg m^2"), Path("experiment_1a.png")), end=" ")
+print(save(picture(), Path("experiment_1b.png")))
