@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -71,20 +72,20 @@ def track(
                 line(stage, share, float("nan"), 0)
 
         if model is None:
-            from dataclasses import replace
-
             from upright.lab.makes import make_rig
 
             twin = make_rig(kind, seed)
             twin = twin if limit is None else replace(twin, limit=limit)
             done = tracking.run(twin, seed, out, tell, which=which, poles=own, step=size)
         else:
-            done = tracking.follow(model, model, out, None, None, tell, which=which, poles=own, step=size)
+            home = source.parent if source is not None and source.is_file() else source or out
+            done = tracking.follow(model, model, home, None, None, tell, which=which, poles=own, step=size)
     told = chapter(done)
     out.mkdir(parents=True, exist_ok=True)
     text = json.dumps(content_of(done) | {"verdict": told.verdict}, indent=2, ensure_ascii=False, allow_nan=False)
     (out / "track.json").write_text(text + "\n", encoding="utf-8")
-    page = write_chapter(out / "track.html", told)
+    titled = replace(told, title=f"Experiment 3: {told.title.lower()}, {done.rig.name}")
+    page = write_chapter(out / "track.html", titled)
     if as_json:
         typer.echo(text)
     else:

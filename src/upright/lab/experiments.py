@@ -76,6 +76,13 @@ def _swing(task: Task) -> tuple[Chapter, bool]:
     return release_page.chapter(done), not done.interrupted
 
 
+def _track(task: Task) -> tuple[Chapter, bool]:
+    from upright.lab import tracking, tracking_page
+
+    done = tracking.run(task.rig, task.seed, task.folder, task.progress, task.stopped)
+    return tracking_page.chapter(done), not done.interrupted
+
+
 def known_from(chapter: Chapter | None) -> tuple[Known, ...]:
     """What experiment 1a hands on, as its chapter tells it."""
     handed = chapter.numbers.get("handed_on", {}) if chapter else {}
@@ -88,6 +95,8 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         key="1a", part_of="1", title="Stiffness and inertia from added loads", needs=(), seconds=1.5, tell=_weigh,
         makes=("furuta", "linear", "rectilinear", "torsional"),
     ),
+    Experiment(key="3", part_of="3", title="Tracking through a flexible shaft", makes=("rectilinear", "torsional"),
+               needs=(), seconds=3.0, tell=_track),
     Experiment(key="4", part_of="4", title="Large free swing", makes=PENDULUMS, needs=("1a",), seconds=9.0,
                tell=_swing),
 )  # fmt: skip

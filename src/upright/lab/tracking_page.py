@@ -6,6 +6,7 @@ import math
 
 from upright.lab import tracking_parts as parts_of
 from upright.lab import tracking_tables as tables
+from upright.lab.paper.tables import TABLE_2
 from upright.lab.tracking import Tracking
 from upright.lab.tracking_laws import AT
 from upright.lab.tracking_log import FIT, STUDY
@@ -15,7 +16,7 @@ from upright.lab.tracking_runs import Outcome
 from upright.lab.tracking_tables import length, milli, share
 from upright.report.advice import Step
 from upright.report.chapter import Chapter, Finding
-from upright.report.symbols import number, plain
+from upright.report.symbols import figures, number, plain, typed
 
 KEY = "3"
 
@@ -27,10 +28,10 @@ def verdict(done: Tracking) -> str:
     head = f"A step of {length(done, size)} is followed by {who} within effort, travel and twist"
     if bad:
         head = f"A step of {length(done, size)} is too much for {', '.join(map(_beyond, bad))}"
-    figures, effort = best.found.figures, share(best.found.effort.share, 0)
-    if figures is None:
+    got, effort = best.found.figures, share(best.found.effort.share, 0)
+    if got is None:
         return f"{head}."
-    head += f"; {best.law.name} takes {effort} of the drive's limit and {_arrives(figures.arrival)}."
+    head += f"; {best.law.name} takes {effort} of the drive's limit and {_arrives(got.arrival)}."
     if done.pd is None or done.stiff is None or done.pd.found.figures is None:
         return head
     pd, stiff = done.pd.found, done.stiff.found.figures
@@ -74,7 +75,7 @@ def chapter(done: Tracking) -> Chapter:
     detail = "Seen on the twin: no rig was touched." if done.simulated else (
         "Foreseen on the fitted numbers; no rig was touched.")  # fmt: skip
     return Chapter(
-        key=KEY, title=f"Experiment 3: tracking through a flexible shaft, {done.rig.name}",
+        key=KEY, title="Tracking through a flexible shaft",
         question=f"Can the drive at one end of a flexible shaft make the other end, {far}, follow a step, within its "
         "effort and the shaft's travel, and what does it take beyond PD control of its own end?",
         verdict=verdict(done), detail=detail + told, sound=sound(done), parts=tuple(parts), steps=_steps(done),
@@ -88,10 +89,11 @@ def _findings(done: Tracking) -> tuple[Finding, ...]:
         swing = max((p for at in done.fit.poles.values() for p in at), key=lambda p: p.imag.value, default=None)
         if swing is not None and swing.imag.value > 0:
             low, high = swing.imag.interval
-            true = max(done.true.linear(AT).poles().imag)
+            digits = figures(swing.imag.value, swing.imag.stderr)
+            true = float(max(done.true.linear(AT).poles().imag))
             out.append(
-                Finding(what="flexible mode [rad/s]", value=number(swing.imag.value),
-                        interval=f"{number(low)} to {number(high)}", truth=number(float(true)))
+                Finding(what="flexible mode [rad/s]", value=number(swing.imag.value, digits),
+                        interval=f"{number(low, digits)} to {number(high, digits)}", truth=number(true, digits))
             )  # fmt: skip
     f = best.found.figures
     if f is not None:
@@ -102,19 +104,21 @@ def _findings(done: Tracking) -> tuple[Finding, ...]:
 
 
 def _steps(done: Tracking) -> tuple[Step, ...]:
-    folder = done.folder.name or "."
-    own = Step(
-        sentence="Ask for poles of your own.",
-        command=f'upright track {folder}/{FIT} --poles "-10+-20j, -25+-10j"',
-    )
+    fit = typed(done.folder / FIT)
+    own = Step(sentence="Ask for poles of your own.", command=f'upright track {fit} --poles "-10+-20j, -25+-10j"')
     if done.fit is None:
         return (own,)
+    model = done.rig.plant.coordinates
+    counts = "" if model[0].unit == "rad" else f" --counts {done.rig.counts[0]:.6g}"
     return (
-        Step(sentence="Repeat the fit from its files.", command=f"upright identify {folder}/{STUDY} -o {folder}/again"),
+        Step(
+            sentence="Repeat the fit from its files.",
+            command=f"upright identify {typed(done.folder / STUDY)} -o {typed(done.folder / 'again')}",
+        ),
         own,
         Step(
             sentence="See margins and noise of one set.",
-            command=f"upright design {folder}/{FIT} --at {AT} --track {done.rig.plant.coordinates[-1].name} "
-            f'--period "{1e3 * done.rig.period:g} ms" --poles "-9.6046+-25.516j, -60.124, -22.841"',
+            command=f"upright design {fit} --at {AT} --track {model[-1].name} --period "
+            f'"{1e3 * done.rig.period:g} ms"{counts} --poles "{TABLE_2[-1]}"',
         ),
-    )  # fmt: skip
+    )
