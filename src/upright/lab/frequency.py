@@ -17,7 +17,8 @@ from upright.control import Rig
 from upright.identification.frequency.answer import Answer, explain, write_answer
 from upright.identification.model import Parameter
 from upright.identification.model import Rig as Asked
-from upright.lab.makes import Make, make_rig
+from upright.lab.broadband import ask
+from upright.lab.makes import MAKES, PLANTS, Make, make_rig
 from upright.lab.sweeps import Sweep, stepped_sine
 from upright.lab.weighing import Known
 
@@ -61,8 +62,11 @@ class Result:
     sweep : Sweep
     answer : Answer
     folder : Path
-        Holds `frequency.csv`, `sweep.csv`, `fit.json`.
+        Holds `frequency.csv`, `sweep.csv` and `fit.json`.
+    kind : str
+        How it was asked: sines, multisine or sweep.
     seconds : float
+        Time at the computer [s].
     """
 
     rig: Rig
@@ -70,6 +74,7 @@ class Result:
     sweep: Sweep
     answer: Answer
     folder: Path
+    kind: str
     seconds: float
 
     @property
@@ -111,42 +116,69 @@ def asked(make: str, known: Mapping[str, float], *, tolerance: Mapping[str, floa
 
 
 def run(
-    make: Make,
+    rig: Rig | Make,
     seed: int,
     folder: Path,
     progress: Progress | None = None,
     stopped: Callable[[], bool] = lambda: False,
     *,
     weighed: Sequence[Known] = (),
+    kind: str = "sines",
 ) -> Result:
     """Sweep one rig of a make, fit it, and leave `frequency.csv`, `sweep.csv` and `fit.json` in a folder.
 
-    `weighed` is what experiment 1a found; it joins what the bench says.
+    Parameters
+    ----------
+    rig : Rig or str
+        A rig of a make, or the make of which `seed` is taken.
+    seed : int
+    folder : Path
+    progress, stopped : callables
+        Told the step at work and the share done; asked between two steps whether to stop.
+    weighed : sequence of Known
+        What experiment 1a found; it joins what the bench says.
+    kind : {"sines", "multisine", "sweep"}
 
     Raises
     ------
     KeyboardInterrupt
-        When `stopped` says so between two steps.
+        When `stopped` says so.
     """
     began = time.perf_counter()
     tell = progress or (lambda step, share: None)
-    rig = make_rig(make, seed)
-    tell("sweeping the rig", 0.0)
+    rig = make_rig(rig, seed) if isinstance(rig, str) else rig
+    make = make_of(rig)
     low, high = BAND[make]
-    sweep = stepped_sine(rig, make_rig(make), low=low, high=high)
+    tell("sweeping the rig", 0.0)
+    if kind == "sines":
+        sweep = stepped_sine(rig, make_rig(make), low=low, high=high)
+    else:
+        sweep = ask(rig, make_rig(make), kind, low=low, high=high, seed=seed)
     if stopped():
         raise KeyboardInterrupt
-    tell("fitting what it answered", 0.3)
+    said, tolerance = bench(rig, make), dict(BENCH[make])
+    for k in weighed:
+        said[k.name], tolerance[k.name] = k.value, k.stderr / k.value
     at = next(iter(rig.plant.equilibria))
-    known = bench(rig, make) | {k.name: k.value for k in weighed}
-    tolerance = {**BENCH[make], **{k.name: k.stderr / k.value for k in weighed}}
-    rest = asked(make, known, tolerance=tolerance)
-    answer = explain(rest, at, sweep.response, seed=seed, tell=lambda step, share: tell(step, 0.3), stopped=stopped)
+
+    def follow(step: str, share: float) -> None:
+        tell(step, 0.3 + (0.25 * share if "least" in step else 0.4))
+
+    answer = explain(
+        asked(make, said, tolerance=tolerance), at, sweep.response, seed=seed, tell=follow, stopped=stopped
+    )
     tell("writing the log and the fit", 0.9)
-    write_answer(answer, folder, PLANT[make], f"Frequency response of {rig.name}, seed {seed}")
-    sweep.log().to_csv(folder / "sweep.csv")
+    write_answer(answer, folder, PLANT[make], f"Frequency response of {rig.name}, seed {rig.seed}")
+    sweep.log.to_csv(folder / "sweep.csv")
     tell("done", 1.0)
-    return Result(rig=rig, make=make, sweep=sweep, answer=answer, folder=folder, seconds=time.perf_counter() - began)
+    return Result(
+        rig=rig, make=make, sweep=sweep, answer=answer, folder=folder, kind=kind, seconds=time.perf_counter() - began,
+    )  # fmt: skip
+
+
+def make_of(rig: Rig) -> Make:
+    """Make of a rig."""
+    return next(make for make in MAKES if type(PLANTS[make]) is type(rig.plant))
 
 
 PLANT: Mapping[str, str] = {

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.control import Rig
-from upright.identification.frequency.detection import Tone, by_period, detect, settled
+from upright.identification.frequency.detection import Tone, by_period, detect, overtones, settled
 from upright.identification.frequency.response import FrequencyResponse
 from upright.records import Provenance, Record
 
@@ -56,23 +56,35 @@ class Dwell:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sweep:
-    """Stepped sines on one rig; `seconds` is the time it took at the rig."""
+    """A rig asked by frequencies.
+
+    Attributes
+    ----------
+    dwells : tuple of Dwell
+        Sines, one after the other; empty when all were asked at once.
+    response : FrequencyResponse
+    seconds : float
+        Time at the rig.
+    log : Record
+        What was measured, in one log; between two sines, while the next settles, nothing is kept.
+    """
 
     dwells: tuple[Dwell, ...]
     response: FrequencyResponse
     seconds: float
+    log: Record
 
-    def log(self) -> Record:
-        """What was measured, sine after sine, in one log; between two, while the next settles, nothing is kept."""
-        parts: list[Array] = []
-        begin = 0.0
-        for d in self.dwells:
-            begin += d.settle if math.isfinite(d.settle) else float(d.record.t[0])
-            parts.append(begin + d.record.t - d.record.t[0])
-            begin = float(parts[-1][-1]) + d.record.period
-        first = self.dwells[0].record
-        columns = {n: np.concatenate([d.record[n] for d in self.dwells]) for n in first.names}
-        return first.replace(t=np.concatenate(parts), signals=columns)
+
+def _joined(dwells: tuple[Dwell, ...]) -> Record:
+    parts: list[Array] = []
+    begin = 0.0
+    for d in dwells:
+        begin += d.settle if math.isfinite(d.settle) else float(d.record.t[0])
+        parts.append(begin + d.record.t - d.record.t[0])
+        begin = float(parts[-1][-1]) + d.record.period
+    first = dwells[0].record
+    columns = {n: np.concatenate([d.record[n] for d in dwells]) for n in first.names}
+    return first.replace(t=np.concatenate(parts), signals=columns)
 
 
 def grid(low: float, high: float, count: int, period: float) -> NDArray[np.int64]:
@@ -143,7 +155,7 @@ def stepped_sine(
     )
     response = collect(dwells, rig)
     spent = sum((d.settle if math.isfinite(d.settle) else seconds) + float(np.ptp(d.record.t)) for d in dwells)
-    return Sweep(dwells=dwells, response=response, seconds=spent)
+    return Sweep(dwells=dwells, response=response, seconds=spent, log=_joined(dwells))
 
 
 def _probed(rig: Rig, lengths: NDArray[np.int64], amplitude: Array, goal: Array, seconds: float) -> Array:
@@ -205,5 +217,6 @@ def collect(dwells: tuple[Dwell, ...], rig: Rig) -> FrequencyResponse:
         coherence=np.array([d.tone.coherence for d in dwells]),
         distortion=np.array([d.tone.distortion for d in dwells]),
         drive=drive, dry=np.array([d.tone.dry for d in dwells]),
-        still=np.array([d.tone.still for d in dwells]), hold=rig.period, notes=notes,
+        still=np.array([d.tone.still for d in dwells]),
+        overtones=overtones([d.tone for d in dwells]), hold=rig.period, notes=notes,
     )  # fmt: skip

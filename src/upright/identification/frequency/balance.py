@@ -26,8 +26,8 @@ from upright.physics.linear import small_motions
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-INSTANTS = 24
-"""Per period of a sine: products of up to seven sines are projected exactly."""
+INSTANTS = 32
+"""Per period of a sine; a product of up to six of its overtones is projected exactly."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,8 +89,14 @@ class Balance:
             q, v, a = (np.einsum("fn,ft->nt", f * lines, turn).real[:, None] for f in _orders(w))
             return q, v, a, 2 / count * np.conj(turn)
         turn = np.exp(2j * math.pi * np.arange(INSTANTS) / INSTANTS)
+        heard = np.zeros((w.size, lines.shape[1], self.data.overtones.shape[2]), dtype=np.complex128)
+        heard[:, self.columns] = self.data.overtones
         q, v, a = ((f * lines).T[:, :, None] * turn for f in _orders(w))
-        return q.real, v.real, a.real, 2 / INSTANTS * np.conj(turn)[None, :]
+        for k in range(heard.shape[2]):
+            one = heard[:, :, k].T[:, :, None] * turn ** (k + 2)
+            s = 1j * (k + 2) * w[None, :, None]
+            q, v, a = q + one, v + s * one, a + s**2 * one
+        return np.real(q), np.real(v), np.real(a), 2 / INSTANTS * np.conj(turn)[None, :]
 
     def response(self, values: Mapping[str, Any], lanes: int = 1) -> Complex:
         """Response (lanes, F, n) of plants with these numbers, `actuator.*` included, each a number or (lanes,)."""

@@ -7,6 +7,7 @@ frequency analyser, with its errors.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import BadInput
+from upright.identification.frequency.turning import sign_line
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -38,12 +40,16 @@ class Tone:
         Mean square error of the first line.
     noise : (m,) array
         Variance of what is left over.
+    t, y : arrays (N,) and (N, m)
+        Time [s] and the signals without their drift.
     """
 
     omega: float
     lines: Complex
     variance: Array
     noise: Array
+    t: Array
+    y: Array
 
     @property
     def distortion(self) -> Array:
@@ -57,33 +63,28 @@ class Tone:
         return power / np.maximum(power + self.noise, 1e-300)
 
     @cached_property
-    def _phase(self) -> Array:
-        return 2 * math.pi * (np.arange(EDGES) + 0.5) / EDGES
-
-    def _speed(self, count: int) -> Array:
-        """Speed over one period (EDGES, m) from so many lines."""
-        k = np.arange(1, count + 1)
-        return (np.exp(1j * np.outer(self._phase, k)) @ (1j * k[:, None] * self.omega * self.lines[:count])).real
+    def _speed(self) -> Array:
+        """Speed at `EDGES` instants of one period (EDGES, m)."""
+        k = np.arange(1, self.lines.shape[0] + 1)
+        spectrum = np.zeros((EDGES // 2 + 1, self.lines.shape[1]), dtype=np.complex128)
+        spectrum[1 : k.size + 1] = 1j * self.omega * k[:, None] * self.lines * EDGES / 2
+        return np.fft.irfft(spectrum, EDGES, axis=0)
 
     @property
     def still(self) -> Array:
         """Share of the period at less than a twentieth of the highest speed; 0.032 for a sine."""
-        speed = np.abs(self._speed(self.lines.shape[0]))
-        return np.mean(speed <= 0.05 * speed.max(axis=0), axis=0)
+        return np.mean(np.abs(self._speed) <= 0.05 * np.abs(self._speed).max(axis=0), axis=0)
 
-    @property
+    @cached_property
     def dry(self) -> Complex:
-        """Viscous equivalent of unit Coulomb friction: the sign of the speed over the speed, at the first line.
-
-        Where dry friction turns round, the speed has a kink, and instants of turning from few harmonics err as one
-        over their number; half as many tell by how much.
-        """
+        """Viscous equivalent of unit Coulomb friction: the sign of the speed over the speed, at the first line."""
+        sign = np.fft.rfft(np.sign(self._speed), axis=0)[1] * 2 / EDGES
+        k = np.arange(1, self.lines.shape[0] + 1)[:, None]
+        bent = np.sum(np.abs(k * self.lines)[1:] ** 2, axis=0) > 0.04 * np.abs(self.lines[0]) ** 2
+        for j in np.flatnonzero(~bent):  # no parabola about an extreme where harmonics make a fifth of the speed
+            turned = sign_line(self.t, self.y[:, j], self.omega, self._speed[:, j])
+            sign[j] = sign[j] if turned is None else turned
         first = 1j * self.omega * self.lines[0]
-        count = self.lines.shape[0]
-        wave = 2 / EDGES * np.exp(-1j * self._phase)
-        sign = wave @ np.sign(self._speed(count))
-        if count > 6:
-            sign = 2 * sign - wave @ np.sign(self._speed(count // 2))
         return np.where(first == 0, 0, sign / np.where(first == 0, 1, first))
 
 
@@ -135,7 +136,20 @@ def detect(t: Array, y: Array, omega: float, *, quantum: Array | float = 0.0, bl
         own = np.array([2 * np.conj(waves[a:b, 0]) @ rest[a:b] / (b - a) for a, b in pairwise(cuts)])
         variance = np.maximum(variance, np.sum(np.abs(own) ** 2, axis=0) / (parts - 1) / parts)
     rounding = 4 * np.asarray(quantum) ** 2 / 12 / per_period
-    return Tone(omega=omega, lines=lines, variance=np.maximum(variance, rounding), noise=noise)
+    return Tone(
+        omega=omega,
+        lines=lines,
+        variance=np.maximum(variance, rounding),
+        noise=noise,
+        t=t,
+        y=y - columns[:, :2] @ solution[:2],
+    )
+
+
+def overtones(tones: Sequence[Tone], most: int = 4) -> Complex:
+    """Lines at 2, 3, ... times the frequency (F, m, H), as many as all tones have."""
+    count = min([most, *(tone.lines.shape[0] - 1 for tone in tones)])
+    return np.array([tone.lines[1 : 1 + count].T for tone in tones])
 
 
 def by_period(y: Array, length: int, period: float) -> Complex:

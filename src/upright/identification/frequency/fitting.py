@@ -27,9 +27,9 @@ Complex = NDArray[np.complex128]
 
 STICKS = 0.12
 """Share of the period nearly at rest, 0.032 for a sine, above which a joint sticks and its friction is not known."""
-FLOOR = 1e-4
-"""Relative error that no response is better than: gains of converters, the period's clock."""
-FRICTION = 0.006
+FLOOR = 5e-4
+"""Relative error that no response is better than: what the wait for settling leaves, gains of converters, the clock."""
+FRICTION = 0.001
 """How well dry friction's share of a response follows from the turning of encoders: from twins."""
 SPREAD = 0.35
 """Standard deviation of the logarithm of starts."""

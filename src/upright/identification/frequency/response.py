@@ -58,6 +58,8 @@ class FrequencyResponse:
         ``4/(pi V)`` for a sine of speed V (describing function); 0 where it is left out.
     still : (F, n) array
         Share of the period at less than a twentieth of the highest speed: 0.032 for a sine, more where a joint sticks.
+    overtones : (F, n, H) complex array
+        Outputs at 2, 3, ... times the frequency, peak and phase; empty where nobody says.
     together : bool
         Whether all frequencies were driven at once (multisine), or one after the other.
     hold : float
@@ -77,6 +79,7 @@ class FrequencyResponse:
     drive: Complex = field(default_factory=_none_complex)
     dry: Complex = field(default_factory=_none_complex)
     still: Array = field(default_factory=_none)
+    overtones: Complex = field(default_factory=_none_complex)
     together: bool = False
     hold: float = 0.0
     notes: tuple[str, ...] = ()
@@ -103,6 +106,11 @@ class FrequencyResponse:
             kind = np.complex128 if name == "dry" else np.float64
             self._fill(name, response.shape, kind, default)
         self._fill("drive", omega.shape, np.complex128, 1.0)
+        heard = np.array(self.overtones, dtype=np.complex128)
+        heard = heard if heard.ndim == 3 else np.zeros((*response.shape, 0), dtype=np.complex128)
+        if heard.shape[:2] != response.shape:
+            raise BadInput(f"overtones of a response need shape {response.shape} and one axis more, got {heard.shape}.")
+        object.__setattr__(self, "overtones", heard)
 
     def _fill(self, name: str, shape: tuple[int, ...], kind: Any, default: float) -> None:
         given = np.array(getattr(self, name), dtype=kind)
@@ -127,7 +135,7 @@ class FrequencyResponse:
     def only(self, kept: ArrayLike) -> FrequencyResponse:
         """The same at some of the frequencies: a mask or indices."""
         at = np.asarray(kept)
-        names = ("omega", "response", "variance", "coherence", "distortion", "drive", "dry", "still")
+        names = ("omega", "response", "variance", "coherence", "distortion", "drive", "dry", "still", "overtones")
         return replace(self, **{n: getattr(self, n)[at] for n in names})
 
     def to_control(self) -> Any:
@@ -161,6 +169,9 @@ class FrequencyResponse:
             columns += _parts(self.response[:, j])
             columns += [part[:, j] for part in (self.variance, self.coherence, self.distortion, self.still)]
             columns += _parts(self.dry[:, j])
+            for k in range(self.overtones.shape[2]):
+                names += [f"{y}_{k + 2}_re", f"{y}_{k + 2}_im"]
+                columns += _parts(self.overtones[:, j, k])
         with open(path, "w", encoding="utf-8", newline="") as file:
             file.write(f"{MARK} 1\n# {json.dumps(about)}\n")
             writer = csv.writer(file, lineterminator="\n")
@@ -187,7 +198,10 @@ class FrequencyResponse:
             def each(name: str) -> Array:
                 return np.column_stack([column[f"{y}_{name}"] for y in outputs])
 
+            heard = sum(f"{outputs[0]}_{k}_re" in column for k in range(2, 100))
+            overtones = [np.column_stack([both(f"{y}_{k + 2}") for y in outputs]) for k in range(heard)]
             return FrequencyResponse(
+                overtones=np.stack(overtones, axis=2) if heard else _none_complex(),
                 omega=column["omega"], response=np.column_stack([both(y) for y in outputs]), outputs=outputs,
                 units=tuple(told["units"]), input=str(told["input"]), variance=each("variance"),
                 coherence=each("coherence"), distortion=each("distortion"), still=each("still"), drive=both("drive"),

@@ -1,0 +1,125 @@
+"""How is experiment 1b told? What was asked, what came back, both fits side by side, and the pole to be held."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from upright.identification.found import Estimate
+from upright.identification.frequency.answer import Answer, digits, key_value
+from upright.lab.frequency import BENCH, Result
+from upright.report.advice import Step
+from upright.report.chapter import Chapter, Finding
+from upright.report.frequency_told import answer_parts, numbers, quality_picture, simplex_sentence
+from upright.report.sections import Part
+from upright.report.symbols import number, typed
+
+QUESTION = (
+    "What does the rig answer to a sine, and which numbers of its equations does that fix, the pole by which it falls "
+    "upright among them?"
+)
+_ASKED = {
+    "sines": "one sine after the other",
+    "multisine": "all frequencies at once, periods averaged",
+    "sweep": "a sweep up and down, windows averaged",
+}
+
+
+def chapter(done: Result) -> Chapter:
+    """Experiment 1b as a chapter."""
+    answer = done.answer
+    true = true_key(done)
+    number_of = key_value(answer.key)
+    inside = number_of.interval[0] <= true <= number_of.interval[1]
+    off = 100 * abs(number_of.value / true - 1)
+    detail = (
+        f"The twin's own is {number(true, 6)}: {off:.2g} % off, {'inside' if inside else 'outside'} the interval. "
+        f"{simplex_sentence(answer)}"
+    )
+    return Chapter(
+        key="1b",
+        title="Frequency response of the hanging rig" if "inverted" in done.rig.plant.equilibria
+        else "Frequency response",
+        question=QUESTION,
+        verdict=answer.fit.verdict,
+        detail=detail,
+        sound=answer.fit.trusted,
+        parts=(
+            Part(title="What was asked", sentences=_campaign(done), pictures=(quality_picture(answer.data),)),
+            *answer_parts(answer, truth=done.truth, known=_bench(done)),
+        ),
+        steps=steps(answer, done.folder, done.make),
+        findings=(_finding(answer, number_of, true),),
+        numbers=numbers(answer, truth=done.truth, key=true) | {"at_the_rig": done.sweep.seconds, "seconds": done.seconds},
+    )  # fmt: skip
+
+
+def true_key(done: Result) -> float:
+    """The key number of the twin itself."""
+    at, what, _ = done.answer.key
+    poles = done.rig.plant.linear(at).poles()
+    if what == "unstable pole":
+        return float(poles[0].real)
+    return float(poles.imag.max())
+
+
+def _finding(answer: Answer, found: Estimate, true: float) -> Finding:
+    d = digits(found)
+    of = "1/s" if answer.key[1] == "unstable pole" else "rad/s"
+    return Finding(
+        what=f"{answer.key[1]}, {answer.key[0]} [{of}]", value=number(found.value, d),
+        interval=f"{number(found.interval[0], d)} to {number(found.interval[1], d)}", truth=number(true, d),
+    )  # fmt: skip
+
+
+def _campaign(done: Result) -> tuple[str, ...]:
+    data = done.answer.data
+    settle = np.array([d.settle for d in done.sweep.dwells])
+    waited = settle[np.isfinite(settle)]
+    told = [
+        f"{len(data)} frequencies from {data.omega[0]:.3g} to {data.omega[-1]:.3g} rad/s, {_ASKED[done.kind]}, in "
+        f"{done.sweep.seconds / 60:.0f} minutes at the rig. Commands were chosen, from probes, to move every coordinate well "
+        "above stiction and encoder steps, and to stay within the drive's limit and the travel."
+    ]
+    if waited.size:
+        late = settle.size - waited.size
+        rest = f"; {late} had not settled after 40 s, and what beats there counts as their error" if late else ""
+        told.append(
+            "Each sine was awaited until what was left of its transient, told from the data, had died away: "
+            f"{waited.min():.0f} to {waited.max():.0f} s{rest}."
+        )
+    else:
+        told += data.notes
+    return tuple(told)
+
+
+def _bench(done: Result) -> str:
+    names = ", ".join(f"{n} to {100 * s:g} %" for n, s in BENCH[done.make].items())
+    return (
+        f"Known from the bench: {names}. A response sees masses, frictions and the drive's gain only relative to each "
+        "other, so the bench fixes the scale; the unstable pole does not depend on it."
+        if done.answer.key[1] == "unstable pole"
+        else f"Known from the bench: {names}; it fixes the scale of masses, stiffness, frictions and gain."
+    )
+
+
+def steps(answer: Answer, folder: Path, make: str) -> tuple[Step, ...]:
+    """What to do next with the fit."""
+    fit = typed(folder / "fit.json")
+    if answer.key[1] == "unstable pole":
+        gains = f'upright design {fit} --at {answer.key[0]} --poles "-4.15+-1.63j, -16.9, -3.2"'
+    else:
+        gains = f"upright design {fit} --lqr 1,0,1,0 --limit 5"
+    log = typed(folder / "sweep.csv")
+    return (
+        Step(sentence="Find gains for these numbers, and what their errors do to the loop.", command=gains),
+        Step(
+            sentence="Estimate the response again from the log, as you would from your own.",
+            command=f"upright frequency {log} --rig {make} -o again",
+        ),
+        Step(
+            sentence="Ask all frequencies at once, and see what that saves and costs.",
+            command=f"upright frequency --rig {make} --ask multisine",
+        ),
+    )
