@@ -51,7 +51,8 @@ def chapter(done: Result) -> Chapter:
         ),
         steps=steps(answer, done.folder, done.make),
         findings=(_finding(answer, number_of, true),),
-        numbers=numbers(answer, truth=done.truth, key=true) | {"at_the_rig": done.sweep.seconds, "seconds": done.seconds},
+        numbers=numbers(answer, truth=done.truth, key=true)
+        | {"at_the_rig": done.sweep.seconds, "seconds": done.seconds},
     )  # fmt: skip
 
 
@@ -79,8 +80,8 @@ def _campaign(done: Result) -> tuple[str, ...]:
     waited = settle[np.isfinite(settle)]
     told = [
         f"{len(data)} frequencies from {data.omega[0]:.3g} to {data.omega[-1]:.3g} rad/s, {_ASKED[done.kind]}, in "
-        f"{done.sweep.seconds / 60:.0f} minutes at the rig. Commands were chosen, from probes, to move every coordinate well "
-        "above stiction and encoder steps, and to stay within the drive's limit and the travel."
+        f"{done.sweep.seconds / 60:.0f} minutes at the rig. Commands were chosen, from probes, to move every coordinate "
+        "well above stiction and encoder steps, and to stay within the drive's limit and the travel."
     ]
     if waited.size:
         late = settle.size - waited.size
