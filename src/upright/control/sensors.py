@@ -81,7 +81,7 @@ class Scales:
         """What the encoders are worth, in a sentence or two."""
         rows = dict(zip(self.names, zip(self.value, self.error, self.explained, strict=True), strict=True))
         if self.sound:
-            figures = ", ".join(f"{n} {v:.3f} ± {2 * e:.3f}" for n, (v, e, _) in rows.items())
+            figures = ", ".join(f"{n} {v:.4f} ± {2 * e:.1g}" for n, (v, e, _) in rows.items())
             return f"The encoders show what is true ({figures} of it, 95 %)."
         return " ".join(sentence(n, *rows[n]) for n in self.wrong)
 
@@ -188,7 +188,7 @@ def _projected(shown: Array, motion: Array, drift: Array) -> tuple[Array, Array]
     """Scales that bring the motion nearest to what is shown, and the drift of the driven body."""
     first = np.linalg.lstsq(np.column_stack([motion[:, 0], drift]), shown[:, 0], rcond=None)[0]
     rest = np.sum(shown[:, 1:] * motion[:, 1:], axis=0) / np.maximum(np.sum(motion[:, 1:] ** 2, axis=0), 1e-300)
-    return np.array([first[0], *rest]), np.array(first[1:])
+    return np.array([first[0], *rest], dtype=np.float64), np.asarray(first[1:], dtype=np.float64)
 
 
 def _motion(model: Rig, command: Array, names: Sequence[str], logs: Array) -> Array:
