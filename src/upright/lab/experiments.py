@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from upright.control.rig import Rig
+from upright.lab.makes import Make
 from upright.lab.weighing import Known
 from upright.report.chapter import Chapter
 
@@ -15,8 +16,9 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """What an experiment is given: the rig, its own folder, what earlier experiments said and where they wrote."""
+    """What an experiment is given: rig and folder, what finished ones it builds on said and where they wrote."""
 
+    make: Make
     rig: Rig
     seed: int
     folder: Path
@@ -37,7 +39,7 @@ class Experiment:
     part_of : str
         Asking for this brings it as well: ``1`` means 1a and 1b.
     title : str
-    makes : tuple of str
+    makes : tuple of Make
         Rigs it can be run on; the first is the paper's.
     needs : tuple of str
         Experiments whose numbers it takes, where the rig has them.
@@ -50,7 +52,7 @@ class Experiment:
     key: str
     part_of: str
     title: str
-    makes: tuple[str, ...]
+    makes: tuple[Make, ...]
     needs: tuple[str, ...]
     seconds: float
     tell: Callable[[Task], tuple[Chapter, bool]]
@@ -89,15 +91,19 @@ def known_from(chapter: Chapter | None) -> tuple[Known, ...]:
     return tuple(Known(name=name, value=w["value"], stderr=w["stderr"]) for name, w in handed.items())
 
 
-PENDULUMS = ("furuta", "linear")
+PENDULUMS: tuple[Make, ...] = ("furuta", "linear")
+SHAFTS: tuple[Make, ...] = ("rectilinear", "torsional")
 EXPERIMENTS: tuple[Experiment, ...] = (
     Experiment(
-        key="1a", part_of="1", title="Stiffness and inertia from added loads", needs=(), seconds=1.5, tell=_weigh,
-        makes=("furuta", "linear", "rectilinear", "torsional"),
+        key="1a", part_of="1", title="Stiffness and inertia from added loads", makes=(*PENDULUMS, *SHAFTS), needs=(),
+        seconds=1.5, tell=_weigh,
     ),
-    Experiment(key="3", part_of="3", title="Tracking through a flexible shaft", makes=("rectilinear", "torsional"),
-               needs=(), seconds=3.0, tell=_track),
-    Experiment(key="4", part_of="4", title="Large free swing", makes=PENDULUMS, needs=("1a",), seconds=9.0,
-               tell=_swing),
+    Experiment(
+        key="3", part_of="3", title="Tracking through a flexible shaft", makes=SHAFTS, needs=(), seconds=5.0,
+        tell=_track,
+    ),
+    Experiment(
+        key="4", part_of="4", title="Large free swing", makes=PENDULUMS, needs=("1a",), seconds=9.0, tell=_swing,
+    ),
 )  # fmt: skip
 """In the order in which they are run and told."""

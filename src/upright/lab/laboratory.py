@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from upright.errors import BadInput, UprightError
 from upright.lab.experiments import EXPERIMENTS, Experiment, Progress, Task
 from upright.lab.kept import keep, kept, made_of
-from upright.lab.makes import make_rig
+from upright.lab.makes import Make, make_rig
 from upright.report.chapter import Chapter
 
 
@@ -88,8 +88,9 @@ def _find(key: str) -> Experiment:
     return next(e for e in EXPERIMENTS if e.key == key)
 
 
-def _make(e: Experiment, make: str) -> str:
-    return make or e.makes[0]
+def _make(e: Experiment, make: str) -> Make:
+    of: dict[str, Make] = {m: m for m in e.makes}
+    return of.get(make, e.makes[0])
 
 
 def _same_rig(one: Experiment, other: Experiment, make: str) -> bool:
@@ -168,12 +169,17 @@ def _one(
     state, chapter = "kept", None if fresh else kept(folder, digest)
     if chapter is None:
         task = Task(
-            rig=rig, seed=session.seed, folder=folder, progress=progress, stopped=stopped,
-            earlier={t.experiment.key: t.chapter for t in session.told if t.experiment.key in needs},
+            make=make, rig=rig, seed=session.seed, folder=folder, progress=progress, stopped=stopped,
+            earlier={
+                t.experiment.key: t.chapter
+                for t in session.told
+                if t.experiment.key in needs and t.state in ("done", "kept")
+            },
             folders={n: session.folder / n for n in needs},
         )  # fmt: skip
         try:
             chapter, whole = e.tell(task)
+            chapter = replace(chapter, key=e.key, title=e.title)
             state = "done" if whole and not stopped() else "stopped"
         except UprightError as error:
             state, chapter = "failed", _failed(e, error)

@@ -16,6 +16,7 @@ from upright.control.rig import Rig
 from upright.errors import BadInput
 from upright.lab import loadings
 from upright.lab.loadings import MASS_RADIUS, RADIUS, Campaign, Kind, Progress
+from upright.lab.makes import Make
 from upright.physics import CartPendulum, Furuta
 from upright.physics.loads import added_inertia, added_mass
 
@@ -54,14 +55,14 @@ class Weighing:
     """Experiment 1a on a rig: the swings with their line, and what they say about the rig as it is used later."""
 
     rig: Rig
-    make: str
+    make: Make
     folder: Path
     files: dict[str, str]
     campaign: Campaign
     known: tuple[Known, ...]
 
 
-def make_of(rig: Rig) -> str:
+def make_of(rig: Rig) -> Make:
     """Which of the four makes a rig is."""
     if isinstance(rig.plant, Furuta):
         return "furuta"
