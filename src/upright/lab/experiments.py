@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from upright.control.rig import Rig
+from upright.errors import BadInput
 from upright.lab.makes import Make
 from upright.lab.weighing import Known
 from upright.report.chapter import Chapter
@@ -78,6 +79,27 @@ def _swing(task: Task) -> tuple[Chapter, bool]:
     return release_page.chapter(done), not done.interrupted
 
 
+def _sweep(task: Task) -> tuple[Chapter, bool]:
+    from upright.lab import frequency, frequency_page
+
+    done = frequency.run(
+        task.rig, task.seed, task.folder, task.progress, task.stopped, weighed=known_from(task.earlier.get("1a"))
+    )
+    return frequency_page.chapter(done), True
+
+
+def _swing_up(task: Task) -> tuple[Chapter, bool]:
+    from upright.lab import swing_up, swing_up_page
+    from upright.lab.believed import believed
+    from upright.lab.rig_file import read_rig_file
+
+    found = read_rig_file(_fitted(task), seed=task.seed)
+    done = swing_up.run(
+        believed(found), task.rig, task.seed, task.folder, task.progress, task.stopped, known=swing_up.known_of(found)
+    )
+    return swing_up_page.chapter(done), not task.stopped()
+
+
 def _track(task: Task) -> tuple[Chapter, bool]:
     from upright.lab import tracking, tracking_page
 
@@ -91,12 +113,26 @@ def known_from(chapter: Chapter | None) -> tuple[Known, ...]:
     return tuple(Known(name=name, value=w["value"], stderr=w["stderr"]) for name, w in handed.items())
 
 
+def _fitted(task: Task) -> Path:
+    if "1b" not in task.earlier:
+        raise BadInput("It stands on the fit of experiment 1b, which could not be finished; its chapter says why.")
+    return task.folders["1b"]
+
+
 PENDULUMS: tuple[Make, ...] = ("furuta", "linear")
 SHAFTS: tuple[Make, ...] = ("rectilinear", "torsional")
 EXPERIMENTS: tuple[Experiment, ...] = (
     Experiment(
         key="1a", part_of="1", title="Stiffness and inertia from added loads", makes=(*PENDULUMS, *SHAFTS), needs=(),
         seconds=1.5, tell=_weigh,
+    ),
+    Experiment(
+        key="1b", part_of="1", title="Frequency response, hanging", makes=(*PENDULUMS, *SHAFTS), needs=("1a",),
+        seconds=5.0, tell=_sweep,
+    ),
+    Experiment(
+        key="2b", part_of="2", title="Swinging up and catching", makes=PENDULUMS, needs=("1b",), seconds=3.0,
+        tell=_swing_up,
     ),
     Experiment(
         key="3", part_of="3", title="Tracking through a flexible shaft", makes=SHAFTS, needs=(), seconds=5.0,
