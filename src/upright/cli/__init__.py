@@ -27,6 +27,7 @@ COMMANDS = {
     "identify": "Fit a rig's parameters to its logs as a study file says; write estimates and report.",
     "ladder": "Grow a model only while it predicts better what it has not seen.",
     "design": "Find the gains that hold a rig, and what they are worth in the loop a computer runs.",
+    "regulate": "Hold an identified rig upright; say beforehand what each pole set will come to.",
     "swing-up": "Swing a hanging pendulum up by its own drive and catch it, once its encoders are trusted.",
     "loadings": "Find stiffness and bare inertia from step responses with known added masses.",
     "plan-inertias": "Say which masses, where and how often, give the tightest stiffness for the fewest runs.",

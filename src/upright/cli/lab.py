@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import signal
 import threading
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -64,7 +64,9 @@ def lab(
     from upright.report.pdf import write_pdf
 
     laboratory.choose(experiment or (), rig)  # says what is wrong with the call before anything is written
-    with _ctrl_c() as pressed, _progress(quiet=as_json) as tell:
+    from upright.cli.terminal import step_bar
+
+    with _ctrl_c() as pressed, step_bar(quiet=as_json) as tell:
         session = laboratory.run(
             experiment or (), rig, seed, folder, tell, stopped=lambda: pressed.times > 0, fresh=fresh
         )
@@ -108,23 +110,6 @@ def _ctrl_c() -> Generator[_Pressed]:
         yield pressed
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-@contextmanager
-def _progress(*, quiet: bool) -> Generator[Callable[[str, float], None]]:
-    """Bar on stderr; nothing when `quiet` or when nobody watches."""
-    from upright.cli.terminal import console
-
-    screen = console(error=True)
-    if quiet or not screen.is_terminal:
-        yield lambda step, share: None
-        return
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (BarColumn(bar_width=24), TimeElapsedColumn(), TextColumn("{task.description}", markup=False))
-    with Progress(*columns, console=screen, transient=True, refresh_per_second=8) as bar:
-        task = bar.add_task("starting (the first time, equations are compiled)", total=1.0)
-        yield lambda step, share: bar.update(task, description=step, completed=share)
 
 
 def _say(session: Session, report: Path, pdf: Path | None) -> None:

@@ -52,6 +52,21 @@ def progress_line(*, quiet: bool = False) -> Generator[Progress | None]:
         yield follow
 
 
+@contextmanager
+def step_bar(*, quiet: bool) -> Generator[Callable[[str, float], None]]:
+    """Bar on stderr; nothing when `quiet` or when nobody watches."""
+    screen = console(error=True)
+    if quiet or not screen.is_terminal:
+        yield lambda step, share: None
+        return
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (BarColumn(bar_width=24), TimeElapsedColumn(), TextColumn("{task.description}", markup=False))
+    with Progress(*columns, console=screen, transient=True, refresh_per_second=8) as bar:
+        task = bar.add_task("starting (the first time, equations are compiled)", total=1.0)
+        yield lambda step, share: bar.update(task, description=step, completed=share)
+
+
 def print_fit(fit: Fit, files: Sequence[Path], study: str, crossed: CrossValidation | None = None) -> None:
     """Parameters, scores, verdict, warnings, files and next steps; `study` as the command line names it."""
     from rich.table import Table

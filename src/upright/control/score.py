@@ -32,7 +32,7 @@ class Scores:
     ran_out : array, shape (lanes,)
         Time at which the driven coordinate came to the end of its travel [s]; inf when it never did.
     settled : array, shape (lanes,)
-        Time from which the watched coordinate stayed within its band to the end [s]; inf when it did not.
+        Time from which the watched coordinate stayed within its band to the end [s]; inf when it did not, or was lost.
     peaks : array, shape (coordinates, lanes)
         Largest deviation of each coordinate [m or rad].
     final : array, shape (coordinates, lanes)
@@ -130,7 +130,7 @@ def scores(
     # after the last sample outside
     after = t.size - np.argmax(~inside[::-1], axis=0)
     settled = np.where(inside.all(axis=0), t[0], t[np.minimum(after, t.size - 1)])
-    lost = np.isfinite(fell) | ~inside[-1]
+    lost = np.isfinite(fell) | np.isfinite(ran_out) | ~inside[-1]
     end = away[-max(2, t.size // 3) :]
     full = before & (np.abs(u) >= rig.limit * (1 - 1e-9))
     return Scores(

@@ -11,6 +11,7 @@ from upright.errors import BadInput
 from upright.lab.makes import Make
 from upright.lab.weighing import Known
 from upright.report.chapter import Chapter
+from upright.report.symbols import typed
 
 Progress = Callable[[str, float], None]
 
@@ -63,6 +64,20 @@ def _weigh(task: Task) -> tuple[Chapter, bool]:
     from upright.lab import weighing, weighing_page
 
     return weighing_page.chapter(weighing.run(task.rig, task.seed, task.folder, task.progress)), True
+
+
+def _hold(task: Task) -> tuple[Chapter, bool]:
+    from upright.lab import regulation, regulation_page
+    from upright.lab.rig_file import read_rig_file
+
+    folder = task.folders.get("1b", task.folder / "identified")
+    if not (folder / "fit.json").is_file():
+        regulation.identified(task.make, task.seed, folder, task.progress)
+    file = read_rig_file(folder / "fit.json", seed=task.seed)
+    done = regulation.run(
+        file, task.rig, task.seed, task.folder, task.progress, task.stopped, source=typed(folder / "fit.json")
+    )
+    return regulation_page.chapter(done), not done.interrupted
 
 
 def _swing(task: Task) -> tuple[Chapter, bool]:
@@ -129,6 +144,9 @@ EXPERIMENTS: tuple[Experiment, ...] = (
     Experiment(
         key="1b", part_of="1", title="Frequency response, hanging", makes=(*PENDULUMS, *SHAFTS), needs=("1a",),
         seconds=5.0, tell=_sweep,
+    ),
+    Experiment(
+        key="2", part_of="2", title="Holding it upright", makes=PENDULUMS, needs=("1b",), seconds=4.0, tell=_hold,
     ),
     Experiment(
         key="2b", part_of="2", title="Swinging up and catching", makes=PENDULUMS, needs=("1b",), seconds=3.0,

@@ -23,8 +23,9 @@ from upright.design.loop import closed, command_noise
 from upright.design.requests import poles_of, read_poles
 from upright.errors import BadInput
 from upright.lab.believed import allowed, believed, make_of
+from upright.lab.makes import Make
 from upright.lab.paper.tables import TABLE_1
-from upright.lab.rig_file import RigFile
+from upright.lab.rig_file import RigFile, read_rig_file
 from upright.physics import Linear
 
 Array = NDArray[np.float64]
@@ -106,6 +107,9 @@ class Regulation:
         For the recommended set, on the truth, or on the model where there is no truth.
     uncertain : bool
         Whether the identification told of its uncertainty.
+    source : str
+        What `upright regulate` is given to do this again.
+    seed : int
     interrupted : bool
     seconds : float
         Computing time.
@@ -118,7 +122,7 @@ class Regulation:
     attempts: tuple[Attempt, ...]
     ways: tuple[Way, ...]
     uncertain: bool
-    folder: Path
+    source: str
     seed: int
     interrupted: bool = False
     seconds: float = 0.0
@@ -129,9 +133,19 @@ class Regulation:
         return max(self.attempts, key=lambda a: (round(a.before.words["regulates"], 2), a.before.push))
 
 
+def identified(make: Make, seed: int, folder: Path, progress: Progress | None = None) -> RigFile:
+    """What experiment 1b makes of a rig of the make; its logs and `fit.json` go into the folder."""
+    from upright.lab import frequency
+
+    if make not in STARTS:
+        raise BadInput(f"there is nothing to hold upright on the make '{make}'; take one of {', '.join(STARTS)}.")
+    frequency.run(make, seed, folder, progress)
+    return read_rig_file(folder / "fit.json", seed=seed)
+
+
 def run(
     file: RigFile, truth: Rig | None, seed: int, folder: Path, progress: Progress | None = None,
-    stopped: Callable[[], bool] = lambda: False, wish: Wish | None = None,
+    stopped: Callable[[], bool] = lambda: False, wish: Wish | None = None, source: str = "FIT",
 ) -> Regulation:  # fmt: skip
     """Design for the rig as identified, say what will come, and run on the rig itself.
 
@@ -150,6 +164,8 @@ def run(
     stopped : callable, optional
         Asked after every set whether to stop there.
     wish : Wish, optional
+    source : str
+        How a command line would name the fit.
     """
     began = time.perf_counter()
     wish, tell = wish or Wish(), progress or (lambda step, share: None)
@@ -172,7 +188,7 @@ def run(
             break
     done = Regulation(
         rig=rig, truth=truth, task=task, wish=wish, attempts=tuple(attempts), ways=(), uncertain=bool(file.others),
-        folder=folder, seed=seed, interrupted=interrupted,
+        source=source, seed=seed, interrupted=interrupted,
     )  # fmt: skip
     tell("comparing the ways to the velocities", len(wish.poles) / (len(wish.poles) + 1))
     ways = () if interrupted else tuple(_ways(done, model, sampled))

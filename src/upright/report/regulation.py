@@ -1,0 +1,168 @@
+"""What does holding a rig upright look like: the runs, what was told of them, and is such telling calibrated?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.control import Trial, score
+from upright.control.preflight import WORDS
+from upright.report.drawing import BLACK, BLUE, GREY, ORANGE, SKY, VERMILLION, decimated, figure, styled
+from upright.report.symbols import axis, mathtext
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+COLOURS: Mapping[str, tuple[str, str]] = {
+    "regulates": (SKY, ""),
+    "saturates": (ORANGE, "///"),
+    "too weak": ("#d9d9d9", "..."),
+    "falls": (VERMILLION, "xxx"),
+}
+"""Fill and hatching of every end of a run, so that grey print tells them apart."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Panel:
+    """One column of a picture: a name, the run as expected and, where there was one, the run as it went."""
+
+    name: str
+    told: Trial
+    came: Trial | None
+
+
+@styled
+def runs_figure(panels: Sequence[Panel], seconds: float) -> Figure:
+    """Deviations and command over the first seconds, one column per pole set; a cross where a run was lost."""
+    first = panels[0].told
+    coordinates = first.rig.plant.coordinates
+    order = [*range(len(coordinates))][::-1]  # the pendulum on top
+    drawing = figure(1.45 * (len(order) + 1) + 0.7)
+    axes: Any = drawing.subplots(len(order) + 1, len(panels), sharex=True, sharey="row", squeeze=False)
+    for column, panel in enumerate(panels):
+        runs = [(panel.told, "told", ORANGE, "--", 2.0)]
+        runs += [(panel.came, "came", BLUE, "-", 1.1)] if panel.came is not None else []
+        for run, name, colour, line, width in runs:
+            found = score(run)
+            lost = min(found.fell, found.ran_out)
+            shown = run.t <= min(seconds, lost)
+            for row, i in enumerate(order):
+                turn = 180 / math.pi if coordinates[i].unit == "rad" else 100.0
+                t, y = decimated(run.t[shown], turn * run.deviation[shown, i], 250)
+                axes[row, column].plot(t, y, color=colour, linestyle=line, linewidth=width, label=name)
+                if lost <= seconds:
+                    axes[row, column].plot(t[-1], y[-1], "x", color=colour, markersize=6, markeredgewidth=width)
+            t, u = decimated(run.t[shown], run.u[shown], 250)
+            axes[-1, column].plot(t, u, color=colour, linestyle=line, linewidth=width)
+        for side in (-1, 1):
+            axes[-1, column].axhline(side * first.rig.limit, color=GREY, linestyle=":", linewidth=1.0)
+        axes[0, column].set_title(panel.name)
+        axes[-1, column].set_xlabel("time [s]")
+    for row, i in enumerate(order):
+        turned = coordinates[i].unit == "rad"
+        axes[row, 0].set_ylabel(axis(mathtext(coordinates[i].name), "deg" if turned else "cm"))
+        if coordinates[i].name == first.rig.plant.inputs[0].on and math.isfinite(first.rig.travel):
+            _ends(axes[row], first.rig.travel * (180 / math.pi if turned else 100.0))
+    axes[-1, 0].set_ylabel(axis("command", first.rig.unit))
+    axes[-1, 0].text(
+        0.98 * seconds, first.rig.limit, "limit", ha="right", va="bottom", fontsize=7.5, color=GREY
+    )  # fmt: skip
+    low, high = axes[-1, 0].get_ylim()
+    axes[-1, 0].set_ylim(low * 1.15, high * 1.15)
+    axes[0, -1].legend(loc="upper right")
+    drawing.align_ylabels(axes[:, 0])
+    return drawing
+
+
+def _ends(row: Any, travel: float) -> None:
+    """Where the travel ends, if that is in sight."""
+    seen = max(abs(v) for v in row[0].get_ylim())
+    for ax in row:
+        for side in (-1, 1):
+            if seen > 0.8 * travel:
+                ax.axhline(side * travel, color=GREY, linestyle=":", linewidth=1.0)
+    if seen > 0.8 * travel:
+        row[0].text(0.0, travel, "end of travel", va="bottom", fontsize=7.5, color=GREY)
+
+
+@styled
+def chances_figure(told: Mapping[str, Mapping[str, float]], came: Mapping[str, str]) -> Figure:
+    """Share of the rigs allowed that come to each end, one bar per pole set, with what came written beside."""
+    drawing = figure(0.42 * len(told) + 1.1)
+    ax: Any = drawing.subplots()
+    names = list(told)
+    left = np.zeros(len(names))
+    for w in WORDS:
+        share = np.array([100 * told[n][w] for n in names])
+        colour, hatch = COLOURS[w]
+        ax.barh(names, share, left=left, color=colour, hatch=hatch, edgecolor=BLACK, linewidth=0.6, label=w)
+        left += share
+    for i, n in enumerate(names):
+        if came.get(n):
+            ax.text(101.5, i, f"came: {came[n]}", va="center", fontsize=8.5)
+    ax.invert_yaxis()
+    ax.set_xlim(0, 100)
+    ax.grid(axis="y", visible=False)
+    ax.set_xlabel("share of the rigs that the identification allows [%]")
+    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=len(WORDS))
+    return drawing
+
+
+@styled
+def ways_figure(ways: Mapping[str, Trial], seconds: float = 0.8) -> Figure:
+    """The command while the rig comes back, one panel for each way to the velocities."""
+    drawing = figure(1.9)
+    axes: Any = drawing.subplots(1, len(ways), sharex=True, sharey=True, squeeze=False)[0]
+    for ax, (name, run) in zip(axes, ways.items(), strict=True):
+        shown = run.t <= seconds
+        ax.plot(run.t[shown], run.u[shown], color=BLUE, linewidth=0.7, drawstyle="steps-post")
+        ax.set_title(name, fontsize=8.5)
+        ax.set_xlabel("time [s]")
+    axes[0].set_ylabel(axis("command", next(iter(ways.values())).rig.unit))
+    return drawing
+
+
+@styled
+def reliability_figure(chances: Array, came: NDArray[np.bool_], *, bins: int = 10) -> Figure:
+    """How often what was told with a chance came true, with 95 % Wilson intervals, and how often each was told."""
+    drawing = figure(4.6, width=5.0)
+    grid: Any = drawing.add_gridspec(2, 1, height_ratios=(4, 1))
+    ax: Any = drawing.add_subplot(grid[0])
+    below: Any = drawing.add_subplot(grid[1], sharex=ax)
+    ax.plot([0, 100], [0, 100], color=GREY, linewidth=0.8, label="as told")
+    edges = np.linspace(0, 1, bins + 1)
+    place = np.clip(np.digitize(chances, edges) - 1, 0, bins - 1)
+    for b in range(bins):
+        inside = place == b
+        if not inside.any():
+            continue
+        low, high = wilson(int(came[inside].sum()), int(inside.sum()))
+        mean, share = 100 * float(chances[inside].mean()), 100 * float(came[inside].mean())
+        ax.errorbar(
+            mean, share, yerr=[[share - 100 * low], [100 * high - share]], fmt="o", color=BLUE, capsize=2.5,
+            markersize=5, label="came, with 95 % interval" if b == place.min() else None,
+        )  # fmt: skip
+    below.hist(100 * chances, bins=(100 * edges).tolist(), color=SKY, edgecolor=BLACK, linewidth=0.6)
+    ax.set_ylabel("came true [%]")
+    ax.set_xlim(0, 100)
+    ax.set_ylim(-3, 103)
+    ax.tick_params(labelbottom=False)
+    below.set_ylabel("twins")
+    below.set_xlabel("chance told before the run [%]")
+    ax.legend(loc="upper left")
+    return drawing
+
+
+def wilson(hits: int, of: int, z: float = 1.96) -> tuple[float, float]:
+    """Interval of a share (E. B. Wilson, 1927)."""
+    share, spread = hits / of, z**2 / of
+    middle = (share + spread / 2) / (1 + spread)
+    half = z / (1 + spread) * math.sqrt(share * (1 - share) / of + spread / (4 * of))
+    return max(middle - half, 0.0), min(middle + half, 1.0)
