@@ -136,6 +136,6 @@ def _say(session: Session, report: Path, pdf: Path | None) -> None:
     say(f"\nReport: {report} (open it in a browser; {session.seconds:.1f} s)")
     say(f"PDF: {pdf}" if pdf else "PDF: pip install 'upright[pdf]' and run the same again; nothing is computed twice.")
     say("What next:")
-    steps = [t.chapter.steps[0] for t in session.told if t.chapter.steps]
-    for step in (*laboratory_page.next_steps(session), *steps):
+    for step in laboratory_page.next_steps(session):
         say(f"- {step.sentence}\n    {step.command}")
+    say("Each chapter of the report ends with the commands that repeat its steps.")
