@@ -66,34 +66,6 @@ def _weigh(task: Task) -> tuple[Chapter, bool]:
     return weighing_page.chapter(weighing.run(task.rig, task.seed, task.folder, task.progress)), True
 
 
-def _hold(task: Task) -> tuple[Chapter, bool]:
-    from upright.lab import regulation, regulation_page
-    from upright.lab.rig_file import read_rig_file
-
-    folder = task.folders.get("1b", task.folder / "identified")
-    if not (folder / "fit.json").is_file():
-        regulation.identified(task.make, task.seed, folder, task.progress)
-    file = read_rig_file(folder / "fit.json", seed=task.seed)
-    done = regulation.run(
-        file, task.rig, task.seed, task.folder, task.progress, task.stopped, source=typed(folder / "fit.json")
-    )
-    return regulation_page.chapter(done), not done.interrupted
-
-
-def _swing(task: Task) -> tuple[Chapter, bool]:
-    from upright.identification.fitfile import write_fit
-    from upright.lab import release, release_page
-
-    known = {k.name: k for k in known_from(task.earlier.get("1a"))}
-    done = release.run(
-        task.rig, task.seed, task.folder, task.progress, task.stopped, weighed=known.get("J_d") or known.get("m_c")
-    )
-    if "free_swing" in done.answers:
-        first = done.answers["free_swing"]
-        write_fit(first.fit, first.study, task.folder / "fit.json")
-    return release_page.chapter(done), not done.interrupted
-
-
 def _sweep(task: Task) -> tuple[Chapter, bool]:
     from upright.lab import frequency, frequency_page
 
@@ -101,6 +73,16 @@ def _sweep(task: Task) -> tuple[Chapter, bool]:
         task.rig, task.seed, task.folder, task.progress, task.stopped, weighed=known_from(task.earlier.get("1a"))
     )
     return frequency_page.chapter(done), True
+
+
+def _hold(task: Task) -> tuple[Chapter, bool]:
+    from upright.lab import regulation, regulation_page
+    from upright.lab.rig_file import read_rig_file
+
+    fit = _fitted(task)
+    found = read_rig_file(fit, seed=task.seed)
+    done = regulation.run(found, task.rig, task.seed, task.folder, task.progress, task.stopped, source=typed(fit))
+    return regulation_page.chapter(done), not done.interrupted
 
 
 def _swing_up(task: Task) -> tuple[Chapter, bool]:
@@ -122,16 +104,30 @@ def _track(task: Task) -> tuple[Chapter, bool]:
     return tracking_page.chapter(done), not done.interrupted
 
 
-def known_from(chapter: Chapter | None) -> tuple[Known, ...]:
-    """What experiment 1a hands on, as its chapter tells it."""
-    handed = chapter.numbers.get("handed_on", {}) if chapter else {}
-    return tuple(Known(name=name, value=w["value"], stderr=w["stderr"]) for name, w in handed.items())
+def _swing(task: Task) -> tuple[Chapter, bool]:
+    from upright.identification.fitfile import write_fit
+    from upright.lab import release, release_page
+
+    known = {k.name: k for k in known_from(task.earlier.get("1a"))}
+    done = release.run(
+        task.rig, task.seed, task.folder, task.progress, task.stopped, weighed=known.get("J_d") or known.get("m_c")
+    )
+    if "free_swing" in done.answers:
+        first = done.answers["free_swing"]
+        write_fit(first.fit, first.study, task.folder / "fit.json")
+    return release_page.chapter(done), not done.interrupted
 
 
 def _fitted(task: Task) -> Path:
     if "1b" not in task.earlier:
         raise BadInput("It stands on the fit of experiment 1b, which could not be finished; its chapter says why.")
-    return task.folders["1b"]
+    return task.folders["1b"] / "fit.json"
+
+
+def known_from(chapter: Chapter | None) -> tuple[Known, ...]:
+    """What experiment 1a hands on, as its chapter tells it."""
+    handed = chapter.numbers.get("handed_on", {}) if chapter else {}
+    return tuple(Known(name=name, value=w["value"], stderr=w["stderr"]) for name, w in handed.items())
 
 
 PENDULUMS: tuple[Make, ...] = ("furuta", "linear")
