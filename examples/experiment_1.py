@@ -12,7 +12,9 @@ from tempfile import TemporaryDirectory
 
 from upright.lab import frequency, weighing
 from upright.lab.makes import make_rig
-from upright.report.drawing import CYCLE, figure, save, styled
+from upright.report.drawing import save
+from upright.report.frequency import bode_figure
+from upright.report.frequency_told import curves
 from upright.report.loadings import line_figure
 
 seed = int(sys.argv[1]) if sys.argv[1:] else 0
@@ -35,19 +37,5 @@ for name, found in answer.fit.estimates.items():
 pole = rig.plant.linear("inverted").poles()[0].real
 print(f"    The pole by the simplex on dB: {answer.simplex_pole.real:.3f} 1/s; truth {pole:.3f} 1/s")
 
-
-@styled
-def picture():
-    drawing, data = figure(2.8), answer.used
-    for axes, name, measured, model in zip(
-        drawing.subplots(1, 2), data.outputs, abs(data.response.T), abs(answer.squares.way.model.T), strict=True
-    ):
-        axes.semilogy(data.omega, measured, "ko", markersize=3, label="measured")
-        axes.semilogy(data.omega, model, color=CYCLE[0][0], label="least squares")
-        axes.set(xlabel="frequency [rad/s]", ylabel=f"{name} over the command [rad/V]")
-    axes.legend()
-    return drawing
-
-
-print("Pictures:", save(line_figure(line, "kg m^2"), Path("experiment_1a.png")), end=" ")
-print(save(picture(), Path("experiment_1b.png")))
+bode = bode_figure(answer.data, answer, fine=curves(answer))
+print("Pictures:", save(line_figure(line, "kg m^2"), Path("experiment_1a.png")), save(bode, Path("experiment_1b.png")))
