@@ -32,7 +32,7 @@ def bode_figure(
     """
     n = len(data.outputs)
     rows = 4 if answer is not None else 2
-    drawing = figure(1.0 + (5.6 if answer is not None else 3.9), margins=(0.78, 0.08, 0.5, 0.45))
+    drawing = figure(1.0 + (5.6 if answer is not None else 3.9), margins=(0.9, 0.08, 0.5, 0.45))
     heights = [3, 2.4, 1.1, 1.1][:rows]
     shape = {"height_ratios": heights, "hspace": 0.14, "wspace": 0.22}
     panels: Any = drawing.subplots(rows, n, sharex=True, squeeze=False, gridspec_kw=shape)
