@@ -33,6 +33,9 @@ AWAY = 0.7
 """Angle from upright [rad] at which the pendulum counts as fallen and is swung up again."""
 FADE = 0.01
 """Time constant with which the step of the command at the handover fades [s]."""
+LEARN, PAUSE = 0.04, 0.2
+"""By how much of `weight` more energy is asked for when a swing turned short of upright, less when it went over, since
+the model's energy is that of another rig; at most ten times, and no sooner again than this [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,12 +158,12 @@ class SwingUp:
         numbers |= vars(b) | {n: getattr(self, n) for n in PARAMETERS if n in vars(self)}
         numbers |= {
             "scale_q": scale_q, "scale_theta": scale_theta, "near": NEAR, "away": AWAY, "allowed": self.travel,
-            "fade": math.exp(-self.period / FADE),
+            "fade": math.exp(-self.period / FADE), "learn": LEARN, "pause": PAUSE,
         }  # fmt: skip
         mode = zero + (HOLDING if holding else SWINGING)
         return Rule(
             function=swing_and_hold, parameters=[numbers[n] for n in PARAMETERS],
-            initial=np.array([at[..., 0], at[..., 1], speeds[..., 0], speeds[..., 1], mode, zero]),
+            initial=np.array([at[..., 0], at[..., 1], speeds[..., 0], speeds[..., 1], mode, zero, zero, zero - 1.0]),
             quantum=np.abs(rig.quantum / rig.shown), command_quantum=rig.converter,
         )  # fmt: skip
 

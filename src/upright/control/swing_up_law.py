@@ -17,7 +17,7 @@ MODE = 4
 PARAMETERS = (
     "period", "memory", "scale_q", "scale_theta",
     "M", "spin", "kappa", "J", "weight", "viscous", "dry", "gain", "limit",
-    "reach", "sharp", "centre", "damp",
+    "reach", "sharp", "learn", "pause", "centre", "damp",
     "k0", "k1", "k2", "k3",
     "p00", "p01", "p02", "p03", "p11", "p12", "p13", "p22", "p23", "p33",
     "size", "near", "fast", "away", "fade", "allowed",
@@ -28,10 +28,12 @@ step from sample to sample; the travel."""
 
 
 def swing_and_hold(t: float, y: Any, r: Any, z: Any, p: Any) -> tuple[Any, Any]:
-    """One sample, as a `simulation.Rule`; it remembers readings, speeds, what it is doing, and the fading step."""
+    """One sample, as a `simulation.Rule`; it remembers readings, speeds, what it is doing, the handover's
+    fading step, how much more energy than the model's it asks for, and when it last changed that.
+    """
     (period, memory, scale_q, scale_theta, M, spin, kappa, J, weight, viscous, dry, gain, limit, reach, sharp,
-     centre, damp, k0, k1, k2, k3, p00, p01, p02, p03, p11, p12, p13, p22, p23, p33, size, near, fast, away,
-     fade, allowed) = p  # fmt: skip
+     learn, pause, centre, damp, k0, k1, k2, k3, p00, p01, p02, p03, p11, p12, p13, p22, p23, p33, size, near, fast,
+     away, fade, allowed) = p  # fmt: skip
     q, theta = y[0] * scale_q, y[1] * scale_theta
     v = memory * z[2] + (1.0 - memory) * (q - z[0]) / period
     w = memory * z[3] + (1.0 - memory) * (theta - z[1]) / period
@@ -43,7 +45,15 @@ def swing_and_hold(t: float, y: Any, r: Any, z: Any, p: Any) -> tuple[Any, Any]:
     )  # fmt: skip
     hold = min(max(0.0 - (k0 * q + k1 * v + k2 * phi + k3 * w), 0.0 - limit), limit)
     # acceleration of the pivot along with the swing; at rest either side will do
-    missing = weight * (1.0 + c) - 0.5 * J * w * w
+    missing = weight * (1.0 + z[6] + c) - 0.5 * J * w * w
+    # a swing that has the energy and turns short of upright needs more; one that went over needs less
+    aim, event = z[6], z[7]
+    before = z[1] - pi - 2.0 * pi * floor((z[1] - pi) / (2.0 * pi) + 0.5)
+    if t - event > pause and c < 0.0 and missing < 5.0 * learn * weight:
+        if w * z[3] < 0.0:
+            aim, event = min(aim + learn, 10.0 * learn), t
+        elif phi * before < 0.0:
+            aim, event = max(aim - learn, 0.0 - 10.0 * learn), t
     along = -1.0 if kappa * c * w > 0.0 else 1.0
     a = min(max(sharp * missing / weight, -1.0), 1.0) * reach * along - centre * q - damp * v
     # the force for it, both rows of eq. (3)
@@ -55,11 +65,11 @@ def swing_and_hold(t: float, y: Any, r: Any, z: Any, p: Any) -> tuple[Any, Any]:
     if mode < 0.5:
         u = swing
         if value <= size and abs(phi) <= near and abs(v) <= fast:
-            mode, bump = 1.0, swing - hold  # the feedback begins where the pump ends
+            mode, bump, aim = 1.0, swing - hold, 0.0  # the feedback begins where the pump ends
     else:
         u = hold + bump
         if abs(phi) > away:
             mode, bump, u = 0.0, 0.0, swing
     if abs(q) > allowed or z[4] > 1.5:
         mode, u = 2.0, 0.0
-    return (min(max(u, 0.0 - limit), limit),), (q, theta, v, w, mode, bump)
+    return (min(max(u, 0.0 - limit), limit),), (q, theta, v, w, mode, bump, aim, event)
