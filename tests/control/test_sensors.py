@@ -17,6 +17,7 @@ from upright.control.score import FALLEN
 from upright.control.sensors import lifted, probe, put_out, scales
 from upright.control.trial import readings
 from upright.control.watch import ODDS, UNKNOWN, Suspicion, Watch
+from upright.control.watch import watched as guarded
 from upright.lab.makes import make_rig
 
 MAKES = ("furuta", "linear")
@@ -153,3 +154,22 @@ def test_sound_sensors_are_seldom_suspected():
     # three standard deviations of a share of 1/c over these runs
     assert np.all(often <= 1 / c + 3 * math.sqrt((1 - 1 / c) / c / runs))
     assert math.log(ODDS) > math.log(c)
+
+
+@pytest.mark.slow
+def test_a_watched_drive_stops_pushing():
+    """The same run up to the alarm, no command after it, and then no more energy than a falling pendulum has."""
+    watch, law = loop("linear")
+    rig = replace(make_rig("linear", 3), scales=(1.0, -1.0))
+    rest = readings(rig, [0.0, math.pi])
+    how = {"start": [0.0, 0.0, 0.05, 0.0], "seconds": 1.0, "rest": rest}
+    alone = trial(rig, law, at="inverted", **how)
+    run, alarm = guarded(watch, rig, law, **how)
+    k = int(alarm.sample[0]) + 1
+    assert 0 < k < 200
+    assert np.allclose(run.x[: k + 1], alone.x[: k + 1], rtol=0, atol=1e-9)
+    assert np.all(run.u[k:] == 0.0)
+    energy = rig.plant.energy(run.x[k + 2 * math.ceil(rig.lag / rig.period) :])
+    lost = np.diff(energy)
+    assert lost.max() < 1e-4 * np.ptp(energy)  # friction only takes, once the drive's lag is over
+    assert np.abs(run.x[:, 1]).max() < 0.5 * np.abs(alone.x[:, 1]).max()

@@ -6,6 +6,7 @@ one. The rig is nonlinear and has dry friction.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,6 +70,7 @@ def trial(
     reference: ArrayLike | None = None,
     pushes: ArrayLike | None = None,
     rest: ArrayLike | None = None,
+    off: float = math.inf,
 ) -> Trial:
     """Run a law on a rig.
 
@@ -92,6 +94,8 @@ def trial(
     rest : array, shape (coordinates,), optional
         What the law takes for the readings at the equilibrium; without it the plant's own numbers, which the encoders
         show when they were zeroed where the coordinates are zero and are scaled as said.
+    off : float
+        When the drive is switched off [s].
 
     Raises
     ------
@@ -110,11 +114,13 @@ def trial(
         late = np.zeros(count)
         kicks = np.asarray(pushes, dtype=np.float64)[:count]
         late[: kicks.size] = kicks
+    drive = dict(rig.drive) if math.isinf(off) else {**rig.drive, "actuator.end": off}
     found = simulate(
-        rig.plant, rig.drive, x0, late, rig.period, samples=count, substeps=SUBSTEPS, loop=given
+        rig.plant, drive, x0, late, rig.period, samples=count, substeps=SUBSTEPS, loop=given
     )[:, :, 0]  # fmt: skip
     n = x0.size
-    x, u, t = found[:, :n], found[:, n], np.arange(count, dtype=np.float64) * rig.period
+    x, t = found[:, :n], np.arange(count, dtype=np.float64) * rig.period
+    u = np.where(t < off, found[:, n], 0.0)
     return Trial(rig=rig, at=at, t=t, x=x, u=u, rest=held, record=logged(rig, t, x, u, reference))
 
 

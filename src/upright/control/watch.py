@@ -18,6 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from upright import design
 from upright.control.rig import Rig
+from upright.control.trial import Trial, trial
+from upright.design import Feedback
 
 Array = NDArray[np.float64]
 
@@ -74,6 +76,33 @@ class Alarm:
     odds: Array
 
 
+def watched(
+    watch: Watch, rig: Rig, law: Feedback, *, start: ArrayLike, seconds: float, rest: ArrayLike | None = None
+) -> tuple[Trial, Alarm]:
+    """Run a law on a rig beside a watch that switches the drive off, one sample after it has spoken.
+
+    The run is made twice: until the watch speaks both are the same, sample for sample.
+
+    Parameters
+    ----------
+    watch : Watch
+    rig : Rig
+        As it truly is.
+    law : Feedback
+    start, seconds, rest
+        As of `trial`.
+    """
+
+    def run(off: float) -> Trial:
+        return trial(rig, law, at=watch.at, start=start, seconds=seconds, rest=rest, off=off)
+
+    free = run(math.inf)
+    seen = np.column_stack([free.record[c.name] for c in rig.plant.coordinates]) - free.rest
+    alarm = watch.over(seen, free.u)
+    k = int(alarm.sample[0])
+    return (free if k < 0 else run((k + 1) * rig.period)), alarm
+
+
 class Watch:
     """Bank of Kalman filters about an equilibrium, for one loop or many lanes of it, fed sample by sample."""
 
@@ -87,7 +116,7 @@ class Watch:
         forgotten: float = FORGOTTEN,
     ) -> None:
         names = [c.name for c in model.plant.coordinates]
-        self.model = model
+        self.model, self.at = model, at
         self.suspicions = (Suspicion(), *(Suspicion(name=n, factor=f) for f in FACTORS for n in names))
         linear = model.linear(at)
         sampled = design.hold(linear, model.period, (model.delay + model.lag) / model.period)
