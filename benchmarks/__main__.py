@@ -17,7 +17,10 @@ from rich.table import Table
 
 from benchmarks.measure import Line
 
-NAMES = ("trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "lab", "doctor", "rigs", "real", "startup")
+NAMES = (
+    "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "swing_up", "lab", "doctor", "rigs", "real",
+    "startup",
+)  # fmt: skip
 LIBRARIES = ("upright", "numpy", "scipy", "numba", "control", "casadi", "jax", "mujoco")
 
 
