@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 from upright.cli import app
 from upright.physics import Furuta
+from upright.report.symbols import number
 from upright.simulation import Law, simulate
 
 RIG = Furuta(m_p=0.135, l_cg=0.19, r=0.16, J_d=0.011, J_p=6e-4, b_1=6e-4)
@@ -102,6 +103,28 @@ def test_least_cost_uses_up_the_limit(study, tmp_path):
     assert "as the effort gets cheaper" in (tmp_path / "design.html").read_text(encoding="utf-8")
 
 
+def test_every_encoder_has_its_own_counts(study, tmp_path):
+    """Noise of a plain difference is its step over T sqrt 6, coordinate by coordinate."""
+    outcome = design(study, "--poles", POLES, "--counts", "psi=4000, theta=20000", "--speed", "plain", "-o", tmp_path)
+    assert outcome.exit_code == 0, outcome.stderr
+    page = (tmp_path / "design.html").read_text(encoding="utf-8")
+    for counts in (4000, 20000):
+        assert number(2 * math.pi / counts / (1e-3 * math.sqrt(6)), 2) in page
+
+
+def test_a_lag_takes_effort_and_margin(study, tmp_path):
+    told = []
+    for lag in ("0 ms", "8 ms"):
+        design(study, "--poles", POLES, "--lag", lag, "-o", tmp_path)
+        told.append(json.loads((tmp_path / "design.json").read_text(encoding="utf-8")))
+    assert told[1]["lag"] == pytest.approx(8e-3)
+    assert told[1]["margins"]["delay"] < told[0]["margins"]["delay"]
+    assert told[1]["peak_command"] == told[0]["peak_command"]  # continuous feedback knows no drive
+    assert told[1]["peak_command_sampled"] > told[0]["peak_command_sampled"]
+    # 1 ms and a fast law: nearly continuous
+    assert told[0]["peak_command_sampled"] == pytest.approx(told[0]["peak_command"], rel=0.05)
+
+
 def test_sampled_gains_meet_the_poles_in_the_loop_as_it_runs(study, tmp_path):
     slow = ("--period", "10 ms", "--poles", "-4.1484+-1.6341j, -16.8545, -3.222", "-o", tmp_path)
     design(study, *slow, "--sampled")
@@ -123,6 +146,8 @@ def test_sampled_gains_meet_the_poles_in_the_loop_as_it_runs(study, tmp_path):
         (["--lqr", "1,0,1,0"], "--limit"),
         (["--lqr", "1,0,1,0", "--limit", "0.01"], "takes at least"),
         (["--lqr", "1,0", "--effort-weight", "1"], "must be 4 weights"),
+        (["--poles", POLES, "--counts", "phi=4000"], "got 'phi'; did you mean 'psi'?"),
+        (["--poles", POLES, "--counts", "psi=none"], "--counts takes numbers above 0"),
         (["--poles", POLES, "--period", "10"], "Expected a value in s"),
     ],
 )

@@ -243,6 +243,29 @@ def test_margins_agree_with_python_control():
     assert found.modulus == pytest.approx(min(sm), rel=1e-3)
 
 
+def test_a_lag_before_an_integrator_in_closed_form():
+    """f' = (u - f)/a, x' = f over a held command: exponentials by hand."""
+    h, a = 0.3, 0.2
+    e = math.exp(-h / a)
+    model = hold(linear([[0]], [[1]], [[1]]), h, lag=a)
+    np.testing.assert_allclose(model.A, [[1, a * (1 - e)], [0, e]], atol=1e-15)
+    np.testing.assert_allclose(model.B, [[h - a * (1 - e)], [1 - e]], atol=1e-15)
+    assert model.remembered == 1
+    late = hold(linear([[0]], [[1]], [[1]]), h, 1.0, lag=a)
+    np.testing.assert_allclose(late.A[:2], np.hstack([model.A, model.B]), atol=1e-15)
+
+
+def test_sampled_gains_make_up_for_a_lag():
+    model = hold(UPRIGHT, 0.002, 1.0, lag=0.004)
+    estimator = filtered(model, 0.5)
+    law = feedback(estimator, place_sampled(model, estimator, SET_1))
+    found = to_s(np.linalg.eigvals(closed(model, law)), model.period)
+    for pole in SET_1:
+        assert np.abs(found - pole).min() < 1e-6
+    plain = feedback(estimator, place(UPRIGHT.A, UPRIGHT.B, SET_1).K)
+    assert margins(UPRIGHT, model, plain).delay < margins(UPRIGHT, hold(UPRIGHT, 0.002, 1.0), plain).delay
+
+
 @pytest.mark.slow
 def test_margin_of_delay_is_the_phase_margin_over_the_crossover():
     """One lag and a gain, fast sampled: delay = phase margin / crossover (Astrom and Murray, section 10.3)."""
@@ -285,6 +308,7 @@ def test_poles_in_s_and_z_go_together():
     [
         (lambda: hold(UPRIGHT, 0.0), "period above 0"),
         (lambda: hold(UPRIGHT, 0.01, -1.0), "delay must be"),
+        (lambda: hold(UPRIGHT, 0.01, lag=-1.0), "lag must be"),
         (lambda: filtered(hold(UPRIGHT, 0.01), 1.0), "memory must be"),
         (lambda: kalman(hold(UPRIGHT, 0.01), 1.0, 0.0), "noise above 0"),
         (lambda: feedback(difference(hold(UPRIGHT, 0.01)), [[1, 2, 3, 4, 5]]), "shape"),

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from upright.control import trial
-from upright.design import place, prefilter
+from upright.design import hold, place, prefilter
+from upright.design.loop import swing
 from upright.identification.estimate import identify
 from upright.identification.study import load_study
 from upright.lab import tracking_pd as pd
@@ -34,6 +35,18 @@ def test_the_far_body_ends_at_the_reference_without_friction():
             blur = np.abs(law.K[::2]) @ rig.quantum / law.k_pf + rig.converter / law.k_pf
             assert done.x[-1, 2] == pytest.approx(step, abs=blur)
             assert np.abs(done.u).max() == pytest.approx(law.k_pf * step, abs=rig.converter)
+
+
+def test_the_sampled_model_with_delay_and_lag_moves_as_the_kernel():
+    """Without friction and rounding the loop is linear: two substeps of Runge-Kutta are right to 1e-6 of the start."""
+    rig = replace(make_rig("rectilinear").changed(**FRICTIONLESS), counts=(1e12, 1e12), converter=0.0)
+    law = paper_sets(rig, (4,))[0].law
+    start = np.array([1e-3, 0.0, -2e-3, 0.02])
+    sampled = hold(rig.linear(AT), rig.period, rig.delay / rig.period, rig.lag)
+    states, commands = swing(sampled, law, start, 400)
+    done = trial(rig, law, at=AT, start=start, seconds=399 * rig.period)
+    np.testing.assert_allclose(done.x, states[:, :4], atol=1e-6 * np.abs(states[:, :4]).max())
+    np.testing.assert_allclose(done.u, commands[:, 0], atol=1e-5 * np.abs(commands).max())
 
 
 def held(rig, law, offset, force):

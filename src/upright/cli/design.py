@@ -31,7 +31,11 @@ def design(
     delay: Annotated[float, typer.Option(metavar="SAMPLES", help="Computing a command takes so long.")] = 1.0,
     speed: Annotated[str, typer.Option(help="Velocities by plain or filtered difference, or kalman.")] = "filtered",
     memory: Annotated[float, typer.Option(help="a of the filtered difference, 0 to 1.")] = 0.5,
-    counts: Annotated[float, typer.Option(help="Encoder counts per turn, or per metre of a cart.")] = 16_000.0,
+    lag: Annotated[str, typer.Option(metavar="TIME", help="Lag of the drive; the fit's if left out.")] = "",
+    counts: Annotated[
+        str,
+        typer.Option(metavar="LIST", help='Encoder counts per turn or metre: one number, or "x=226629, theta=16000".'),
+    ] = "16000",
     track: Annotated[str, typer.Option(metavar="COORDINATE", help="Coordinate that follows a reference.")] = "",
     sampled: Annotated[bool, typer.Option("--sampled", help="Gains whose sampled loop has the poles asked.")] = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the rigs drawn from the fit's covariance.")] = 0,
@@ -58,8 +62,6 @@ def design(
         raise BadInput('give either --poles "-4+-2j, -10, -3" or --lqr "1,0,1,0" (weights of the states).')
     if speed not in ("plain", "filtered", "kalman"):
         raise BadInput(f"--speed is plain, filtered or kalman, got '{speed}'.")
-    if not counts > 0:
-        raise BadInput(f"--counts must be above 0, got {counts:g}.")
     rig = read_rig_file(source, seed=seed)
     here = at or list(rig.plant.equilibria)[-1]
     if here not in rig.plant.equilibria:
@@ -71,6 +73,7 @@ def design(
         R=effort_weight,
         period=parse(period, "s"),
         delay=delay,
+        lag=parse(lag, "s") if lag else None,
         speed=speed,
         memory=memory,
         quantum=_quanta(rig, counts),
@@ -98,10 +101,29 @@ def _numbers(text: str) -> tuple[float, ...]:
         raise BadInput(f'weights are numbers separated by commas, as in "1,0,1,0", got {text[:60]!r}.') from None
 
 
-def _quanta(rig: RigFile, counts: float) -> tuple[float, ...]:
+def _quanta(rig: RigFile, counts: str) -> tuple[float, ...]:
+    """Step of every encoder [m or rad]; coordinates that the list does not name have 16000 counts."""
     from math import tau
 
-    return tuple((tau if c.unit == "rad" else 1.0) / counts for c in rig.plant.coordinates)
+    names = [c.name for c in rig.plant.coordinates]
+    per = dict.fromkeys(names, 16_000.0)
+    for part in counts.split(","):
+        name, equals, value = part.rpartition("=")
+        name = name.strip()
+        if equals and name not in per:
+            raise BadInput(
+                f"--counts names coordinates as in \"{names[0]}=16000\", got '{name}'; {nearest(name, names)}"
+            )
+        try:
+            number = float(value)
+        except ValueError:
+            number = 0.0
+        if not 0 < number < 1e15:
+            raise BadInput(
+                f"--counts takes numbers above 0, got '{part.strip()[:40]}'; write 16000 or \"{names[0]}=16000\"."
+            )
+        per |= {name: number} if equals else dict.fromkeys(names, number)
+    return tuple((tau if c.unit == "rad" else 1.0) / per[c.name] for c in rig.plant.coordinates)
 
 
 def _start(rig: RigFile, text: str) -> tuple[float, ...]:

@@ -162,7 +162,7 @@ def margins(plant: Linear, model: Sampled, law: Feedback) -> Margins:
         return _stable(closed(model, law, g))
 
     def by_delay(more: float) -> bool:
-        return _stable(closed(hold(plant, model.period, model.delay + more), law))
+        return _stable(closed(hold(plant, model.period, model.delay + more, model.lag), law))
 
     most = _edge(by_gain, np.geomspace(1, 1e4, 161))
     least = _edge(by_gain, np.geomspace(1, 1e-4, 161))
@@ -181,6 +181,30 @@ def margins(plant: Linear, model: Sampled, law: Feedback) -> Margins:
         delay=delay * model.period if delay < 400 else np.inf,
         modulus=float(np.abs(1 + L).min()),
     )
+
+
+def swing(model: Sampled, law: Feedback, start: ArrayLike, samples: int) -> tuple[Array, Array]:
+    """States (samples, n) and commands (samples, m) of the sampled loop, let go at rest in the law's eyes.
+
+    Parameters
+    ----------
+    model : Sampled
+    law : Feedback
+    start : array, shape (n,)
+        Deviation of the model's states; drive and commands on their way are at zero.
+    samples : int
+    """
+    A, (_, D) = closed(model, law), law.around()
+    out = np.hstack([D @ model.C, law.C])
+    n = model.A.shape[0]
+    state = np.zeros(A.shape[0])
+    state[: n - model.remembered] = start
+    state[n:] = law.begin @ (model.C @ state[:n])
+    rows = np.empty((samples, A.shape[0]))
+    for k in range(samples):
+        rows[k] = state
+        state = A @ state
+    return rows[:, :n], rows @ out.T
 
 
 def loop_gain(model: Sampled, law: Feedback, omega: ArrayLike) -> Roots:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,12 +25,15 @@ class Sampled:
     Attributes
     ----------
     A, B, C : arrays, shape (n, n), (n, m) and (p, n)
-        The states are those of the model, then the commands that are still on their way: the last, the one before.
+        The states are those of the model, then what a drive with lag gives, then the commands that are still on
+        their way: the last, the one before.
     period : float
         Time between samples [s].
     delay : float
         How late a command acts [samples], whole or not.
     states : tuple of str
+    lag : float
+        Time constant of the drive [s]; 0 for none.
     """
 
     A: Array
@@ -39,14 +42,15 @@ class Sampled:
     period: float
     delay: float
     states: tuple[str, ...]
+    lag: float = 0.0
 
     @property
     def remembered(self) -> int:
-        """How many states are commands on their way."""
-        return math.ceil(self.delay - 1e-12) * self.B.shape[1]
+        """How many states are not the model's: what the drive gives, and commands on their way."""
+        return (math.ceil(self.delay - 1e-12) + (self.lag > 0)) * self.B.shape[1]
 
 
-def hold(model: Linear, period: float, delay: float = 0.0) -> Sampled:
+def hold(model: Linear, period: float, delay: float = 0.0, lag: float = 0.0) -> Sampled:
     """A linear model behind a zero-order hold, exactly: one matrix exponential (two for part of a sample's delay).
 
     Parameters
@@ -56,16 +60,21 @@ def hold(model: Linear, period: float, delay: float = 0.0) -> Sampled:
         Time between samples [s].
     delay : float
         How late a command acts [samples]: computation, converters, drive. Not only whole ones.
+    lag : float
+        Time constant with which the drive follows its command [s].
 
     Raises
     ------
     BadInput
-        When the period is not positive, or the delay negative or beyond 1000 samples.
+        When the period is not positive, the delay negative or beyond 1000 samples, or the lag negative.
     """
     if not (math.isfinite(period) and period > 0):
         raise BadInput(f"a sampled model needs a period above 0 s, got {period:g}; give it in seconds.")
     if not 0 <= delay <= 1000:
         raise BadInput(f"the delay must be between 0 and 1000 samples, got {delay:g}; give it in samples.")
+    if not (math.isfinite(lag) and lag >= 0):
+        raise BadInput(f"the drive's lag must be at least 0 s, got {lag:g}; give it in seconds.")
+    model = _lagged(model, lag) if lag > 0 else model
     n, m = model.B.shape
     whole = math.floor(delay + 1e-12)
     part = max(delay - whole, 0.0) if delay - whole > 1e-12 else 0.0
@@ -85,7 +94,16 @@ def hold(model: Linear, period: float, delay: float = 0.0) -> Sampled:
         A[n + m :, n:-m] = np.eye((memories - 1) * m)
     ago_names = tuple(f"{u} {k} ago" for k in range(1, memories + 1) for u in model.inputs)
     C = np.hstack([model.C, np.zeros((model.C.shape[0], memories * m))])
-    return Sampled(A=A, B=B, C=C, period=period, delay=delay, states=(*model.states, *ago_names))
+    return Sampled(A=A, B=B, C=C, period=period, delay=delay, states=(*model.states, *ago_names), lag=lag)
+
+
+def _lagged(model: Linear, lag: float) -> Linear:
+    """The model behind ``lag f' + f = u`` for every input, f its new states."""
+    n, m = model.B.shape
+    A = np.block([[model.A, model.B], [np.zeros((m, n)), -np.eye(m) / lag]])
+    B = np.vstack([np.zeros((n, m)), np.eye(m) / lag])
+    C = np.hstack([model.C, np.zeros((model.C.shape[0], m))])
+    return replace(model, A=A, B=B, C=C, states=(*model.states, *(f"{u} given" for u in model.inputs)))
 
 
 def to_z(poles: ArrayLike, period: float) -> Roots:

@@ -126,7 +126,9 @@ def as_json(done: Designed) -> dict[str, Any]:
         "margins": None
         if way.margins is None
         else {k: _finite(getattr(way.margins, k)) for k in ("least_gain", "most_gain", "phase", "delay", "modulus")},
+        "lag": done.sampled.lag,
         "peak_command": done.peak,
+        "peak_command_sampled": _finite(done.peak_sampled),
         "chance_over_the_fit": done.chance,
         "law": {
             **{name: getattr(done.law, name).tolist() for name in "ABCD"},
@@ -138,6 +140,15 @@ def as_json(done: Designed) -> dict[str, Any]:
 
 def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
+
+
+def _effort(done: Designed) -> str:
+    if not math.isfinite(done.peak_sampled):
+        return ""
+    return (
+        f" The start asked for takes {number(done.peak_sampled, 3)} {done.rig.unit} at most, "
+        f"{number(done.peak, 3)} {done.rig.unit} by the continuous model."
+    )
 
 
 def next_steps(done: Designed, source: str, folder: str) -> list[Step]:
@@ -220,8 +231,8 @@ def write(done: Designed, path: Path, source: str) -> Path:
         Part(
             title="The loop as it runs",
             sentences=(
-                f"Period {1e3 * done.wish.period:.4g} ms, command {done.sampled.delay:.3g} samples late, "
-                "velocities made from rounded encoders.",
+                f"Period {1e3 * done.wish.period:.4g} ms, command {done.sampled.delay:.3g} samples late, drive's lag "
+                f"{1e3 * done.sampled.lag:.3g} ms, velocities made from rounded encoders." + _effort(done),
             ),
             tables=(way_table(done),),
         ),

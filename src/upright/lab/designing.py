@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from upright import design
 from upright.design import Estimator, Feedback, Margins, Placement, Sampled
-from upright.design.loop import closed, command_noise
+from upright.design.loop import closed, command_noise, swing
 from upright.design.lqr import motion
 from upright.design.requests import poles_of
 from upright.design.sampled import to_s
@@ -27,6 +27,7 @@ Roots = NDArray[np.complex128]
 class Wish:
     """What is asked of the loop; SI units, the limit in the command's.
 
+    `lag` is the drive's [s], that of the rig's file when None.
     `poles` [1/s] or `weights` (diagonal of Q, with `R`, or with the limit and `start` from which R follows).
     `speed` is ``"plain"``, ``"filtered"`` or ``"kalman"``; `memory` is the filter's. With `sampled`, the gains are
     those whose sampled loop has the poles asked.
@@ -38,6 +39,7 @@ class Wish:
     R: float | None = None
     period: float = 1e-3
     delay: float = 1.0
+    lag: float | None = None
     speed: str = "filtered"
     memory: float = 0.5
     quantum: tuple[float, ...] = ()
@@ -62,6 +64,7 @@ class Way:
 class Designed:
     """Gains and what they are worth.
 
+    `peak` is the largest command that the start takes with continuous feedback, `peak_sampled` in the loop as it runs.
     K are the gains in force: the `continuous` ones of placement or least cost (`placement` is None then), or the
     `sampled_gains`, whose poles are met in the loop as it runs.
     """
@@ -80,6 +83,7 @@ class Designed:
     ways: tuple[Way, ...]
     k_pf: float | None
     peak: float
+    peak_sampled: float
     swing: tuple[Array, Array, Array]
     chance: float | None
     cloud: Roots = field(default_factory=lambda: np.zeros(0, dtype=np.complex128))
@@ -106,7 +110,6 @@ class Designed:
                 (f"distance to -1 is only {m.modulus:.2f}", m.modulus < 0.4),
                 (f"a gain {100 * (1 - m.least_gain):.0f} % weaker lets it fall", m.least_gain > 0.7),
                 (f"it bears only {1e3 * m.delay:.2g} ms more delay", m.delay < self.wish.period),
-                (f"the drive's lag of {1e3 * self.rig.lag:.3g} ms is not in the model", self.rig.lag > 0),
                 (f"{100 * (1 - chance):.0f} % of the rigs that the fit allows fall", self.chance is not None
                  and self.chance < 0.99),
             )
@@ -116,10 +119,10 @@ class Designed:
         limit = self.wish.limit
         if limit is None:
             return f"{head}."
-        share = self.peak / limit
+        share = self.peak_sampled / limit
         if share > 1:
             return (
-                f"{head}. The start asked for needs {self.peak:.3g} {unit}, {100 * share:.0f} % of the limit: "
+                f"{head}. The start asked for needs {self.peak_sampled:.3g} {unit}, {100 * share:.0f} % of the limit: "
                 f"the drive saturates; up to {100 / share:.0f} % of that start it does not."
             )
         return f"{head}; the start asked for takes {100 * share:.0f} % of the drive's limit."
@@ -137,7 +140,8 @@ def design_for(rig: RigFile, wish: Wish) -> Designed:
     start = np.array(wish.start) if wish.start else _tilt(rig)
     if model.B.shape[1] != 1:
         raise BadInput(f"upright design is for one input, and this plant has {model.B.shape[1]}; use design.place.")
-    sampled = design.hold(model, wish.period, wish.delay + rig.late / wish.period)
+    lag = rig.lag if wish.lag is None else wish.lag
+    sampled = design.hold(model, wish.period, wish.delay + rig.late / wish.period, lag)
     placement, R = None, wish.R
     if wish.poles is not None:
         placement = design.place(model.A, model.B, wish.poles)
@@ -164,14 +168,23 @@ def design_for(rig: RigFile, wish: Wish) -> Designed:
             raise BadInput(f"nothing called '{wish.track}' is measured; --track one of {', '.join(model.outputs)}.")
         k_pf = design.prefilter(model.A, model.B, model.C[model.outputs.index(wish.track)], used)
     law = design.feedback(estimator, used, k_pf or 0.0)
-    swing = motion(model.A, model.B, K, start)
+    back = motion(model.A, model.B, K, start)
     ways = tuple(_way(model, sampled, e, used, wish) for e in estimators)
     cloud, chance = _cloud(rig, wish, sampled, law)
     return Designed(
         rig=rig, wish=wish, model=model, sampled=sampled, K=used, continuous=K, placement=placement,
         sampled_gains=gains, R=R, law=law, poles=to_s(poles_of(closed(sampled, law)), wish.period), ways=ways,
-        k_pf=k_pf, peak=float(np.abs(swing[2]).max()), swing=swing, chance=chance, cloud=cloud,
+        k_pf=k_pf, peak=float(np.abs(back[2]).max()), peak_sampled=_peak(sampled, law, start, float(back[0][-1])),
+        swing=back, chance=chance, cloud=cloud,
     )  # fmt: skip
+
+
+def _peak(sampled: Sampled, law: Feedback, start: Array, seconds: float) -> float:
+    """Largest command of the loop as it runs; infinite when it falls."""
+    if np.abs(poles_of(closed(sampled, law))).max() >= 1:
+        return math.inf
+    samples = min(max(round(seconds / sampled.period), 100), 20_000)
+    return float(np.abs(swing(sampled, law, start, samples)[1]).max())
 
 
 def _tilt(rig: RigFile) -> Array:
@@ -209,7 +222,7 @@ def _way(model: Linear, sampled: Sampled, estimator: Estimator, K: Array, wish: 
 def _cloud(rig: RigFile, wish: Wish, nominal: Sampled, law: Feedback) -> tuple[Roots, float | None]:
     """Poles [1/s] of the loop with these gains on every rig that the fit allows, and the share that stands."""
     rows = [
-        poles_of(closed(design.hold(m, wish.period, nominal.delay), law)) for m in rig.spread(wish.at)
+        poles_of(closed(design.hold(m, wish.period, nominal.delay, nominal.lag), law)) for m in rig.spread(wish.at)
     ]  # fmt: skip
     if not rows:
         return np.zeros(0, dtype=np.complex128), None

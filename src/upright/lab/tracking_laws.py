@@ -162,8 +162,8 @@ def with_sum(rig: Rig, base: Tracker, name: str) -> Tracker:
 
 
 def closed_by(rig: Rig, law: Feedback | Law) -> Array:
-    """Matrix of the sampled loop of a law on a rig, about rest; drive's lag and dry friction left out."""
-    sampled = design.hold(rig.linear(AT), rig.period, rig.delay / rig.period)
+    """Matrix of the sampled loop of a law on a rig, about rest; dry friction and rounding left out."""
+    sampled = design.hold(rig.linear(AT), rig.period, rig.delay / rig.period, rig.lag)
     c = len(rig.plant.coordinates)
     A, B, C, D = (np.asarray(getattr(law, n), dtype=np.float64) for n in "ABCD")
     top = np.hstack([sampled.A + sampled.B @ D[:, :c] @ sampled.C, sampled.B @ C])
