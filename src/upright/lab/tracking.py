@@ -157,7 +157,7 @@ def follow(
     check(which, poles)
     laws = list(paper_sets(model, which))
     if poles is not None:
-        laws.append(by_poles(model, "own poles", poles))
+        laws.append(by_poles(model, "own set", poles))
     chosen = choose(model, laws, step)
     tell("stepping", 0.35)
     done = Tracking(
