@@ -145,6 +145,17 @@ def test_it_ends_with_the_report_and_what_to_try_next(spoken):
 
 
 @pytest.mark.slow
+def test_every_table_of_the_report_is_a_rectangle(spoken):
+    folder, _ = spoken
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    tables = re.findall(r"<table.*?</table>", page, flags=re.DOTALL)
+    assert len(tables) > 2 * len(EXPERIMENTS)
+    for table in tables:
+        cells = {len(re.findall(r"<t[hd]\b", row)) for row in re.findall(r"<tr>.*?</tr>", table, flags=re.DOTALL)}
+        assert len(cells) == 1, table[:200]
+
+
+@pytest.mark.slow
 def test_what_the_report_proposes_works(spoken, tmp_path, monkeypatch):
     folder, _ = spoken
     told = json.loads(upright("lab", "-o", folder, "--json").stdout)

@@ -138,7 +138,7 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         seconds=1.5, tell=_weigh,
     ),
     Experiment(
-        key="1b", part_of="1", title="Frequency response, hanging", makes=(*PENDULUMS, *SHAFTS), needs=("1a",),
+        key="1b", part_of="1", title="Frequency response", makes=(*PENDULUMS, *SHAFTS), needs=("1a",),
         seconds=5.0, tell=_sweep,
     ),
     Experiment(

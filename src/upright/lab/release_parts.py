@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from upright.identification.model import Fit
 from upright.lab.drift import PUSH, SPRING, TILT
 from upright.lab.release import FreeSwing
 from upright.report.certainty import directions_figure
@@ -89,7 +90,7 @@ def level_part(done: FreeSwing) -> list[Part]:
     pictures: list[Picture] = []
     for a in answers:
         lean = a.fit.estimates.get("tilt_y")
-        scores = [percent(v) for s in a.fit.runs.values() for v in s.fit_percent.values()]
+        scores = [percent(_worst(a.fit, role, name)) for role in ("fit", "predict") for name in ("psi", "theta")]
         rows.append((a.question.title, *scores, f"{math.degrees(math.asin(lean.value)):.4f}°" if lean else ""))
         label, score = next((n, s) for n, s in a.fit.runs.items() if s.role == "fit")
         fits = ", ".join(f"{n} {percent(v)}" for n, v in score.fit_percent.items())
@@ -111,3 +112,8 @@ def level_part(done: FreeSwing) -> list[Part]:
         Part(title="Is the rig level?", sentences=(f"{told}and with the spring on.", *said), tables=(table,),
              pictures=tuple(pictures))
     ]  # fmt: skip
+
+
+def _worst(fit: Fit, role: str, name: str) -> float:
+    """Fit percent of a signal; what an outlier has cut into several runs counts by the worst."""
+    return min(score.fit_percent[name] for score in fit.runs.values() if score.role == role)
