@@ -145,3 +145,9 @@ def test_pages_show_options_that_exist(page):
 def test_pages_link_to_files_that_exist(page):
     for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text(encoding="utf-8")):
         assert (page.parent / target).exists(), f"{page.name} links to {target}"
+
+
+def test_the_index_of_the_pages_leaves_none_out():
+    shown = re.findall(r"\]\(([^)#:]+)\)", (ROOT / "docs" / "README.md").read_text(encoding="utf-8"))
+    pages = {path.name for pattern in ("*.md", "*.ipynb") for path in (ROOT / "docs").glob(pattern)}
+    assert pages - {"README.md"} <= set(shown), "docs/README.md should lead to every page of docs/"
