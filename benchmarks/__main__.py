@@ -18,8 +18,8 @@ from rich.table import Table
 from benchmarks.measure import Line
 
 NAMES = (
-    "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "swing_up", "tracking", "lab", "doctor", "rigs",
-    "real", "startup",
+    "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "frequency", "swing_up", "tracking", "lab",
+    "doctor", "rigs", "real", "startup",
 )  # fmt: skip
 LIBRARIES = ("upright", "numpy", "scipy", "numba", "control", "casadi", "jax", "mujoco")
 

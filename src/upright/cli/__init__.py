@@ -30,6 +30,7 @@ COMMANDS = {
     "regulate": "Hold an identified rig upright; say beforehand what each pole set will come to.",
     "swing-up": "Swing a hanging pendulum up by its own drive and catch it, once its encoders are trusted.",
     "loadings": "Find stiffness and bare inertia from step responses with known added masses.",
+    "frequency": "Measure a frequency response, or read one from logs, and fit the rig to it.",
     "plan-inertias": "Say which masses, where and how often, give the tightest stiffness for the fewest runs.",
     "reproduce": "Regenerate the pole tables of the paper from a few numbers, and show its misprints.",
     "survey": "Evaluate ratings before and after a course; check printed means and percentages.",

@@ -9,9 +9,17 @@ import numpy as np
 from upright.identification.found import Estimate
 from upright.identification.frequency.answer import Answer, digits, key_value
 from upright.lab.frequency import BENCH, Result
+from upright.lab.frequency_log import Found
 from upright.report.advice import Step
 from upright.report.chapter import Chapter, Finding
-from upright.report.frequency_told import answer_parts, numbers, quality_picture, simplex_sentence
+from upright.report.frequency_told import (
+    answer_parts,
+    bode_picture,
+    numbers,
+    quality_picture,
+    response_numbers,
+    simplex_sentence,
+)
 from upright.report.sections import Part
 from upright.report.symbols import number, typed
 
@@ -80,8 +88,8 @@ def _campaign(done: Result) -> tuple[str, ...]:
     waited = settle[np.isfinite(settle)]
     told = [
         f"{len(data)} frequencies from {data.omega[0]:.3g} to {data.omega[-1]:.3g} rad/s, {_ASKED[done.kind]}, in "
-        f"{done.sweep.seconds / 60:.0f} minutes at the rig. Commands were chosen, from probes, to move every coordinate "
-        "well above stiction and encoder steps, and to stay within the drive's limit and the travel."
+        f"{done.sweep.seconds / 60:.0f} minutes at the rig. Commands were chosen, from probes, to move every "
+        "coordinate well above stiction and encoder steps, and to stay within the drive's limit and the travel."
     ]
     if waited.size:
         late = settle.size - waited.size
@@ -112,15 +120,53 @@ def steps(answer: Answer, folder: Path, make: str) -> tuple[Step, ...]:
         gains = f'upright design {fit} --at {answer.key[0]} --poles "-4.15+-1.63j, -16.9, -3.2"'
     else:
         gains = f"upright design {fit} --lqr 1,0,1,0 --limit 5"
-    log = typed(folder / "sweep.csv")
+    log, hold = typed(folder / "sweep.csv"), answer.data.hold
     return (
         Step(sentence="Find gains for these numbers, and what their errors do to the loop.", command=gains),
         Step(
             sentence="Estimate the response again from the log, as you would from your own.",
-            command=f"upright frequency {log} --rig {make} -o again",
+            command=f'upright frequency {log} --rig {make} --hold "{1e3 * hold:.4g} ms" -o again',
         ),
         Step(
             sentence="Ask all frequencies at once, and see what that saves and costs.",
             command=f"upright frequency --rig {make} --ask multisine",
         ),
     )
+
+
+def of_log(found: Found) -> Chapter:
+    """What logs of one's own say, in the same frame."""
+    data, answer = found.response, found.answer
+    span = f"{data.omega[0]:.3g} to {data.omega[-1]:.3g} rad/s"
+    asked = (f"{len(data)} frequencies from {span} in {', '.join(found.sources)}.", *data.notes)
+    first = Part(title="What was asked", sentences=asked, pictures=(quality_picture(data),))
+    if answer is None:
+        poor = data.coherence.min(axis=1) < 0.5
+        verdict = (
+            f"Where most of the power follows the command ({len(data) - int(poor.sum())} of {len(data)} frequencies), "
+            f"magnitudes are known to {number(100 * float(np.median(data.error[~poor])), 2)} % (median standard error)."
+            if not poor.all()
+            else "Nowhere does half of the power follow the command: this log tells no response."
+        )
+        return Chapter(
+            key="1b", title="Frequency response", question="What does the rig answer, frequency by frequency?",
+            verdict=verdict, detail="", sound=not poor.all(),
+            parts=(first, Part(title="Response", pictures=(bode_picture(data),))),
+            steps=(
+                Step(sentence="Fit it: name the make, and what of it is known.",
+                     command=f"upright frequency {typed(found.folder / 'frequency.csv')} --rig linear"),
+                Step(sentence="Take it to python-control.",
+                     command="FrequencyResponse.from_csv('frequency.csv').to_control()"),
+            ),
+            numbers=response_numbers(data),
+        )  # fmt: skip
+    return Chapter(
+        key="1b", title="Frequency response of a rig", question=QUESTION, verdict=answer.fit.verdict,
+        detail=simplex_sentence(answer), sound=answer.fit.trusted, parts=(first, *answer_parts(answer)),
+        steps=(
+            Step(sentence="Find gains for these numbers, and what their errors do to the loop.",
+                 command=f"upright design {typed(found.folder / 'fit.json')} --lqr 1,0,1,0 --limit 5"),
+            Step(sentence="Fit a log of a free swing too, and see whether both agree.", command="upright init LOG"),
+        ),
+        numbers=numbers(answer) | {"response": response_numbers(data)},
+    )  # fmt: skip

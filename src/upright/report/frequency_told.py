@@ -179,3 +179,33 @@ def numbers(answer: Answer, *, truth: Mapping[str, float] | None = None, key: fl
 
 def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
+
+
+def response_numbers(data: FrequencyResponse) -> dict[str, Any]:
+    """A response as plain values."""
+    return {
+        "omega": data.omega.tolist(),
+        "outputs": {
+            name: {
+                "magnitude_dB": data.magnitude_dB[:, j].tolist(),
+                "phase_deg": [math.degrees(math.atan2(z.imag, z.real)) for z in data.response[:, j].tolist()],
+                "error_percent": (100 * data.error[:, j]).tolist(),
+                "coherence": data.coherence[:, j].tolist(),
+                "distortion": data.distortion[:, j].tolist(),
+            }
+            for j, name in enumerate(data.outputs)
+        },
+    }
+
+
+def response_table(told: Mapping[str, Any]) -> Table:
+    """A response, output by output, from `response_numbers`."""
+    rows = tuple(
+        (name, number(w, 4), number(o["magnitude_dB"][k], 4), number(o["phase_deg"][k], 4),
+         number(o["error_percent"][k], 2), number(o["coherence"][k], 4))
+        for name, o in told["outputs"].items() for k, w in enumerate(told["omega"])
+    )  # fmt: skip
+    return Table(
+        caption="Response", headings=("", "rad/s", "dB", "deg", "error [%]", "coherence"), rows=rows,
+        numbers=(1, 2, 3, 4, 5),
+    )  # fmt: skip

@@ -12,6 +12,7 @@ import numpy as np
 
 from upright.errors import NotIdentifiable
 from upright.identification.fitfile import write_fit
+from upright.identification.frequency.balance import Balance
 from upright.identification.frequency.fitting import Squares, Told, Way, least_squares, simplex_dB, usable
 from upright.identification.frequency.response import FrequencyResponse
 from upright.identification.model import Estimate, Fit, Pole, Rig
@@ -87,10 +88,13 @@ def explain(
     NotIdentifiable
         When too few frequencies can be used.
     """
+    Balance(plant=rig.plant, at=at, data=data)  # are its outputs coordinates of this plant?
     kept, left_out = usable(data, dry=_has_dry(rig))
     used = data.only(kept)
     if len(used) < 4:
-        raise NotIdentifiable(f"{len(used)} usable frequencies are too few for a fit. {' '.join(left_out)}")
+        raise NotIdentifiable(
+            f"{len(used)} usable frequencies are too few for a fit; measure more. {' '.join(left_out)}"
+        )
     squares = least_squares(rig, at, used, seed=seed, tell=tell)
     if stopped():
         raise KeyboardInterrupt

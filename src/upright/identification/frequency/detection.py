@@ -113,7 +113,7 @@ def detect(t: Array, y: Array, omega: float, *, quantum: Array | float = 0.0, bl
     span = float(t[-1] - t[0]) * t.size / (t.size - 1)
     periods = span * omega / (2 * math.pi)
     per_period = t.size / periods
-    if periods < 0.99 or per_period < 4:
+    if periods < 0.9 or per_period < 4:
         raise BadInput(
             f"A sine of {omega:.4g} rad/s needs at least one period with four samples, got {periods:.3g} periods of "
             f"{per_period:.3g} samples; log faster or longer."

@@ -84,17 +84,14 @@ def response_of(
 
 def sines_in(t: Array, u: Array) -> list[tuple[int, int, float]]:
     """Stretches (first, last, omega) of a command that are one sine each, three periods or more."""
-    level = (u.max() + u.min()) / 2
-    v = u - level
-    threshold = 0.02 * float(np.ptp(u))
-    up: list[tuple[int, float]] = []
-    armed = False
-    for k in range(1, v.size):
-        armed = armed or v[k] < -min(threshold, 0.3 * float(np.abs(v[max(0, k - 50) : k + 1]).max()))
-        if armed and v[k - 1] < 0 <= v[k]:
-            share = v[k - 1] / (v[k - 1] - v[k])
-            up.append((k, float(t[k - 1] + share * (t[k] - t[k - 1]))))
-            armed = False
+    v = u - (u.max() + u.min()) / 2
+    at = np.flatnonzero((v[:-1] < 0) & (v[1:] >= 0)) + 1
+    if at.size < 3:
+        return []
+    lows, highs = np.minimum.reduceat(v, at), np.maximum.reduceat(v, at)
+    whole = np.concatenate([[True], -lows[:-1] > 0.3 * highs[:-1]])  # a ripple about zero is no period
+    share = v[at - 1] / (v[at - 1] - v[at])
+    up = list(zip(at[whole].tolist(), (t[at - 1] + share * (t[at] - t[at - 1]))[whole].tolist(), strict=True))
     out: list[tuple[int, int, float]] = []
     i = 0
     while i < len(up) - 1:
@@ -161,18 +158,28 @@ def _units(record: Record, outputs: Sequence[str], command: str) -> tuple[str, .
 def _sweep(
     records: Sequence[Record], command: str, outputs: Sequence[str], quanta: Array, hold: float
 ) -> FrequencyResponse:
-    """H1 from Hann windows, half overlapped: cross spectrum over spectrum of the command."""
+    """H1: cross spectrum over spectrum of the command, of whole repeats, or of Hann windows half overlapped.
+
+    Repeats are tapered at their end alone, where the motion may not have died away: elsewhere a taper would weigh the
+    answer, which lingers, less or more than the sweep it answers.
+    """
     shortest = min(len(r) for r in records)
-    length = shortest if len(records) >= 4 else max(64, 2 * (shortest // 9))
-    taper = 0.5 - 0.5 * np.cos(2 * math.pi * (np.arange(length) + 0.5) / length)
+    whole = len(records) >= 4
+    length = shortest if whole else max(64, 2 * (shortest // 9))
+    k = (np.arange(length) + 0.5) / length
+    taper = (
+        np.where(k < 0.85, 1.0, 0.5 + 0.5 * np.cos(math.pi * (k - 0.85) / 0.15)) if whole else np.sin(math.pi * k) ** 2
+    )
     inputs: list[Complex] = []
     answers: list[Complex] = []
     levels: list[float] = []
     for r in records:
         for a in range(0, len(r) - length + 1, max(1, length // 2)):
             part = slice(a, a + length)
-            u = r[command][part] - np.mean(r[command][part])
-            y = np.column_stack([_detrended(r.t[part], r[n][part]) for n in outputs])
+            u = r[command][part] - (r[command][0] if whole else np.mean(r[command][part]))
+            y = np.column_stack(
+                [r[n][part] - r[n][part][0] if whole else _detrended(r.t[part], r[n][part]) for n in outputs]
+            )
             inputs.append(np.fft.rfft(taper * u))
             answers.append(np.fft.rfft(taper[:, None] * y, axis=0))
             levels.append(float(np.sqrt(2 * np.mean(u**2))))
@@ -190,7 +197,7 @@ def _sweep(
     coherence = np.abs(cross) ** 2 / np.maximum(power[:, None] * total, 1e-300)
     # windows that hardly hold a frequency do not count as averages of it; neighbours overlap by half
     count = power**2 / np.maximum(np.sum(np.abs(U) ** 4, axis=0), 1e-300)
-    if len(records) < 4:
+    if not whole:
         count = np.maximum(count * 0.7, 1.0)
     G = cross / np.maximum(power[:, None], 1e-300)
     unexplained = np.clip(1 - coherence, 0, None) / np.maximum(coherence, 1e-12)
