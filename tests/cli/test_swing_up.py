@@ -32,7 +32,12 @@ def test_the_pendulum_gets_up_and_the_page_is_written(tmp_path):
 def test_a_lying_encoder_ends_it_with_a_sentence(tmp_path):
     outcome = upright("swing-up", "--rig", "linear", "--lie", "theta=-1", "-o", tmp_path)
     assert outcome.exit_code == 3
-    assert "encoder of theta counts the wrong way round: swap its two channels" in outcome.stdout
+    words = "encoder of theta counts the wrong way round: swap its two channels"
+    assert words in outcome.stdout
+    again = upright("swing-up", "--rig", "linear", "--check", tmp_path / "sensors.csv", "-o", tmp_path)
+    assert again.exit_code == 3
+    assert words in again.stdout
+    assert (tmp_path / "encoders.html").is_file()
 
 
 def test_what_cannot_be_done_is_said_in_a_sentence(tmp_path):

@@ -9,10 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from upright.errors import BadInput, NotIdentifiable
+from upright.lab.encoders import asked
 from upright.lab.makes import make_rig
 from upright.lab.rig_file import RigFile
 from upright.lab.swing_up import LIES, known_of, run
-from upright.lab.swing_up_page import chapter
+from upright.lab.swing_up_page import chapter, check_chapter
 from upright.physics import Furuta
 from upright.records import Record
 from upright.report.chapter import write_chapter
@@ -63,6 +65,26 @@ def test_no_loop_is_closed_on_a_lying_encoder(tmp_path):
     assert not told.sound
     assert "No loop was closed. The encoder of theta shows 2" in told.verdict
     assert not (tmp_path / "swing_up.csv").exists()
+
+
+def test_a_log_of_one_s_own_is_checked_in_any_unit(done):
+    model, log = done.model, Record.from_csv(done.folder / "sensors.csv")
+    counts = {"psi": np.round(log["psi"] / model.quantum[0]), "theta": np.degrees(log["theta"]) * 2, "u": log["u"]}
+    found = asked(model, log.replace(signals=counts, units={"psi": "counts", "theta": "deg", "u": "V"}))
+    assert found.value == pytest.approx([1.0, 2.0], rel=0.01)
+    assert found.wrong == ("theta",)
+    told = check_chapter(model, found, "own.csv")
+    assert not told.sound
+    assert "encoder of theta shows 2" in told.verdict
+    with pytest.raises(BadInput, match="needs a column 'psi'"):
+        asked(
+            make_rig("furuta"), log.replace(signals={n: log[n] for n in ("theta", "u")}, outputs=("theta",), units={})
+        )
+    with pytest.raises(BadInput, match="'psi' is in m"):
+        asked(model, log.replace(units={"psi": "m", "theta": "rad", "u": "V"}))
+    small = {"psi": log["psi"], "theta": log["theta"], "u": 0.1 * log["u"]}
+    with pytest.raises(NotIdentifiable, match="drive it to 40 or more"):
+        asked(model, log.replace(signals=small))
 
 
 def test_what_a_fit_knows_is_the_spread_of_the_rigs_that_it_allows():

@@ -11,6 +11,8 @@ import typer
 from upright.errors import BadInput, nearest
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from upright.control import Rig
 
 
@@ -28,6 +30,10 @@ def swing_up(
     lie: Annotated[
         str, typer.Option(metavar="NAME=FACTOR", help='An encoder shows a multiple of what is true: "theta=2".')
     ] = "",
+    check: Annotated[
+        Path | None,
+        typer.Option(metavar="LOG", help="Only say what this log of a hanging, driven rig tells of its encoders."),
+    ] = None,
     out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Logs, page, JSON.")] = Path("swing-up"),
     as_json: Annotated[bool, typer.Option("--json", help="Print the numbers instead of sentences.")] = False,
 ) -> None:
@@ -37,6 +43,11 @@ def swing_up(
     with numbers of its own. Logs can be shown, identified and predicted as any other.
 
     upright swing-up --rig linear --seed 3
+
+    With your own rig: drive it from rest, hanging, until it swings to 60 degrees or
+    more, let it coast, and have its encoders checked (columns u, theta, psi or x).
+
+    upright swing-up out/fit.json --check swings.csv
     """
     from upright.lab import swing_up as experiment
     from upright.lab import swing_up_page
@@ -59,6 +70,9 @@ def swing_up(
         if rig and rig != make:
             raise BadInput(f"the fit is of the make {make}, and --rig says {rig}; leave --rig out.")
         model = believed(file)
+    if check is not None:
+        _check(model, check, known, out, as_json)
+        return
     done = experiment.run(
         model, _lying(make_rig(make, seed), lie), seed, out, known=known, seconds=seconds, travel=travel
     )
@@ -71,6 +85,22 @@ def swing_up(
     else:
         _say(done.check.verdict, told.verdict, page, [(s.sentence, s.command) for s in told.steps])
     if not done.caught:
+        raise typer.Exit(3)
+
+
+def _check(model: Rig, log: Path, known: Mapping[str, float] | None, out: Path, as_json: bool) -> None:
+    from upright.lab import swing_up_page
+    from upright.lab.encoders import asked
+    from upright.readers import read
+    from upright.report.chapter import write_chapter
+
+    told = swing_up_page.check_chapter(model, asked(model, read(log), known), log.name)
+    page = write_chapter(out / "encoders.html", told)
+    if as_json:
+        typer.echo(json.dumps(told.numbers, indent=2, ensure_ascii=False, allow_nan=False))
+    else:
+        _say(told.verdict, "", page, [(s.sentence, s.command) for s in told.steps])
+    if not told.sound:
         raise typer.Exit(3)
 
 
@@ -98,7 +128,8 @@ def _say(sensors: str, verdict: str, page: Path, steps: list[tuple[str, str]]) -
 
     screen = console()
     screen.print(f"Encoders: {sensors}", soft_wrap=True, markup=False)
-    screen.print(f"\nVerdict: {verdict}", soft_wrap=True, markup=False)
+    if verdict:
+        screen.print(f"\nVerdict: {verdict}", soft_wrap=True, markup=False)
     screen.print(f"\nReport: {page}\nWhat next:", soft_wrap=True, markup=False)
     for sentence, command in steps:
         screen.print(f"- {sentence}\n    {command}", soft_wrap=True, markup=False)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +37,8 @@ SURE = 4.0
 KNOWN = {"m": 0.02, "l": 0.02, "r": 0.02, "J": 0.03, "b": 0.2}
 """How well a plant's numbers are known where no fit says so, by their first letter; relative standard errors."""
 GAIN_KNOWN, LAG_KNOWN = 0.03, 0.5
-_EVERY = 8
+_FINE = 1e-3  # s in which `SUBSTEPS` suffice
+_SEEN = 7e-3  # s between the samples that are looked at
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -131,12 +132,14 @@ def scales(model: Rig, log: Record, known: Mapping[str, float] | None = None) ->
     ----------
     model : Rig
     log : Record
-        Readings by coordinate and ``u``, from rest, at the servo's samples.
+        Readings by coordinate [m or rad] and ``u``, from rest, evenly sampled.
     known : mapping of str to float, optional
         Relative standard error of a parameter, or of ``"gain"``; `KNOWN` where omitted.
     """
     names = tuple(c.name for c in model.plant.coordinates)
-    shown = np.column_stack([log[n] for n in names])[::_EVERY]
+    model = replace(model, period=log.period)
+    every = max(1, round(_SEEN / model.period))
+    shown = np.column_stack([log[n] for n in names])[::every]
     told = _known(model, known or {})
     moving, size = tuple(told), np.array(list(told.values()))
     p, m, command = len(names), size.size, log["u"]
@@ -144,7 +147,7 @@ def scales(model: Rig, log: Record, known: Mapping[str, float] | None = None) ->
     z, step, J = np.zeros(m), 0.3, np.zeros((0, 0))
     s, wander, at = np.ones(p), np.zeros(3), shown
     for turn in range(8):
-        y = _motion(model, command, moving, np.vstack([z, z + step * np.eye(m)]) * size)
+        y = _motion(model, command, every, moving, np.vstack([z, z + step * np.eye(m)]) * size)
         at, slopes = y[:, :, 0], (y[:, :, 1:] - y[:, :, :1]) / step
         if turn == 0:
             s, wander = _projected(shown, at, drift)
@@ -164,14 +167,14 @@ def scales(model: Rig, log: Record, known: Mapping[str, float] | None = None) ->
         s, wander, z = s + move[:p], wander + move[p : p + 3], np.clip(z + move[p + 3 :], -4.0, 4.0)
         if np.abs(move[p + 3 :]).max() < 1e-2:
             break
-    at = _motion(model, command, moving, (z * size)[None])[:, :, 0]
+    at = _motion(model, command, every, moving, (z * size)[None])[:, :, 0]
     s, wander = _projected(shown, at, drift)
     motion = s * at
     motion[:, 0] += drift @ wander
     spread = np.maximum(np.mean((shown - shown.mean(axis=0)) ** 2, axis=0), model.quantum**2)
     return Scales(
         names=names, value=s, error=np.sqrt(np.diag(np.linalg.inv(J.T @ J))[:p]),
-        explained=1.0 - np.mean((shown - motion) ** 2, axis=0) / spread, t=log.t[::_EVERY], shown=shown, motion=motion,
+        explained=1.0 - np.mean((shown - motion) ** 2, axis=0) / spread, t=log.t[::every], shown=shown, motion=motion,
     )  # fmt: skip
 
 
@@ -191,16 +194,17 @@ def _projected(shown: Array, motion: Array, drift: Array) -> tuple[Array, Array]
     return np.array([first[0], *rest], dtype=np.float64), np.asarray(first[1:], dtype=np.float64)
 
 
-def _motion(model: Rig, command: Array, names: Sequence[str], logs: Array) -> Array:
+def _motion(model: Rig, command: Array, every: int, names: Sequence[str], logs: Array) -> Array:
     """Coordinates of the model, shape (N, coordinates, lanes), for logarithms of factors, shape (lanes, names)."""
     values = model.plant.parameters() | {"gain": model.gain, "lag": model.lag}
     lanes = max(2, len(logs))  # two, so that one kernel serves all
     params = {n: np.resize(values[n] * np.exp(logs[:, i]), lanes) for i, n in enumerate(names)}
     drive = dict(model.drive) | {f"actuator.{n}": params.pop(n) for n in ("gain", "lag") if n in params}
-    rows = -(-command.size // _EVERY)
+    rows = -(-command.size // every)
+    substeps = max(1, round(SUBSTEPS * model.period / _FINE))
     start = np.tile(model.plant.state("hanging"), (lanes, 1))
     x = simulate(
-        model.plant, drive | params, start, command, model.period, samples=rows, every=_EVERY, substeps=SUBSTEPS
+        model.plant, drive | params, start, command, model.period, samples=rows, every=every, substeps=substeps
     )
     return x[:, 0::2, : len(logs)]
 

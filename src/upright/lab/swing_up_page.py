@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from upright.control import Rig
+from upright.control.sensors import Scales
 from upright.lab.swing_up import HELD, LIES, TILT, Lie, Swung
 from upright.report.advice import Step
 from upright.report.chapter import Chapter, Finding
@@ -32,7 +34,7 @@ def chapter(done: Swung) -> Chapter:
 
 def parts(done: Swung) -> tuple[Part, ...]:
     """Sensors, swing-up, lies; as far as the experiment has them."""
-    out = [sensor_part(done)]
+    out = [sensor_part(done.model, done.check)]
     if done.ascent is not None:
         out.append(swing_part(done))
     if done.lies:
@@ -40,9 +42,29 @@ def parts(done: Swung) -> tuple[Part, ...]:
     return tuple(out)
 
 
-def sensor_part(done: Swung) -> Part:
+def check_chapter(model: Rig, check: Scales, log: str) -> Chapter:
+    """What a log of a hanging rig says of its encoders, by itself."""
+    again = Step(sentence="Mend what is said above, log the hanging rig again, and check again.")
+    onward = Step(sentence="The encoders may be trusted: find the gains that hold the rig.",
+                  command='upright design FIT.json --at inverted --poles "-4.15+-1.63j, -16.9, -3.2"')  # fmt: skip
+    return Chapter(
+        key="2", title=f"Encoders of {model.name} in {log}", question="Do the encoders show what is true?",
+        verdict=check.verdict, detail="", sound=check.sound, parts=(sensor_part(model, check),),
+        steps=(onward if check.sound else again,), numbers={"sensors": check_numbers(check), "verdict": check.verdict},
+    )  # fmt: skip
+
+
+def check_numbers(check: Scales) -> dict[str, Any]:
+    """Scales as plain values."""
+    each = zip(check.names, check.value, check.error, check.explained, strict=True)
+    return {
+        n: {"scale": float(v), "stderr": float(e), "explained": float(x), "sound": n not in check.wrong}
+        for n, v, e, x in each
+    }
+
+
+def sensor_part(model: Rig, check: Scales) -> Part:
     """What the hanging rig says of its encoders."""
-    check = done.check
     rows = tuple(
         (name, number(v, 5), number(2 * e, 2), percent(100 * x), "to be mended" if name in check.wrong else "sound")
         for name, v, e, x in zip(check.names, check.value, check.error, check.explained, strict=True)
@@ -52,8 +74,8 @@ def sensor_part(done: Swung) -> Part:
         headings=("coordinate", "scale", "± (95 %)", "explained", ""),
     )  # fmt: skip
     drawing = picture(
-        check_figure(check, tuple(c.unit for c in done.model.plant.coordinates)), "scales",
-        caption="Commands that swing the model to 100 degrees, put out blindly, then coasting. Wide: shown; dashed: "
+        check_figure(check, tuple(c.unit for c in model.plant.coordinates)), "scales",
+        caption="Swings of the hanging rig under known commands, then coasting. Wide: shown; dashed: "
         "the model's motion times the scale found.",
         description=check.verdict,
     )  # fmt: skip
@@ -168,19 +190,14 @@ def steps(done: Swung) -> tuple[Step, ...]:
 def numbers(done: Swung) -> dict[str, Any]:
     """The same as plain values."""
     run, law = done.ascent, done.law
-    check = {
-        n: {"scale": float(v), "stderr": float(e), "explained": float(x), "sound": n not in done.check.wrong}
-        for n, v, e, x in zip(
-            done.check.names, done.check.value, done.check.error, done.check.explained, strict=True
-        )
-    }  # fmt: skip
     up = None if run is None else {
         "upright_after": _finite(run.up), "held": done.caught, "half_swings": run.swings,
         "handovers": list(run.handovers), "falls": list(run.falls), "tripped": _finite(run.tripped),
         "peak_command": run.peak, "share_saturated": run.saturated, "travel": run.travel,
     }  # fmt: skip
     return {
-        "rig": done.truth.name, "seed": done.truth.seed, "verdict": done.verdict, "sensors": check, "swing_up": up,
+        "rig": done.truth.name, "seed": done.truth.seed, "verdict": done.verdict,
+        "sensors": check_numbers(done.check), "swing_up": up,
         "law": {
             "K": law.K.tolist(), "P": law.P.tolist(), "size": law.size, "sure": law.sure, "reach": law.reach,
             "limit": law.limit, "travel": law.travel, "held_for": HELD, "body": dict(vars(law.body)),
