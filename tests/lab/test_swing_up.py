@@ -99,3 +99,12 @@ def test_what_a_fit_knows_is_the_spread_of_the_rigs_that_it_allows():
     assert known["gain"] == pytest.approx(spread)
     assert known["b_1"] == 0.2  # friction differs from day to day, however well one day knows it
     assert "l_cg" not in known
+
+
+def test_a_friction_that_the_fit_puts_at_its_bound_still_lets_the_encoders_be_asked():
+    plant = make_rig("furuta").plant
+    some = np.random.default_rng(5)
+    others = tuple((plant.replace(b_2=abs(some.normal(0, 1.5e-5))), 0.65) for _ in range(50))
+    file = RigFile(plant=plant.replace(b_2=1e-21), name="furuta", gain=0.65, unit="V", late=0.0, lag=0.0, others=others)
+    # factors of the model's numbers are exp(z size): a size of 1e16 is no number any more
+    assert max(known_of(file).values()) < 5

@@ -138,7 +138,8 @@ def known_of(file: RigFile) -> Mapping[str, float]:
     for name, value in file.plant.parameters().items():
         drawn = np.array([plant.parameters()[name] for plant, _ in file.others])
         if value and drawn.size and np.ptp(drawn) > 0:
-            out[name] = max(float(np.std(drawn)) / abs(value), KNOWN["b"] if name.startswith("b") else 2e-3)
+            spread = max(float(np.std(drawn)) / abs(value), KNOWN["b"] if name.startswith("b") else 2e-3)
+            out[name] = min(spread, 1.0)  # a friction that the fit puts at its bound is not known at all
     gains = np.array([gain for _, gain in file.others])
     if gains.size and np.ptp(gains) > 0:
         out["gain"] = max(float(np.std(gains)) / abs(file.gain), 2e-3)
