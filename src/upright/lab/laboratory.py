@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
 from upright.errors import BadInput, UprightError
 from upright.lab.experiments import EXPERIMENTS, Experiment, Progress, Task
 from upright.lab.kept import keep, kept, made_of
@@ -182,7 +184,9 @@ def _one(
             chapter = replace(chapter, key=e.key, title=e.title)
             state = "done" if whole and not stopped() else "stopped"
         except UprightError as error:
-            state, chapter = "failed", _failed(e, error)
+            state, chapter = "failed", _failed(e, str(error))
+        except (ArithmeticError, np.linalg.LinAlgError) as error:
+            state, chapter = "failed", _failed(e, f"Its numbers broke down ({error}), which is a fault of the program.")
         if state == "done":
             keep(folder, digest, chapter)
     return Told(
@@ -190,8 +194,8 @@ def _one(
     )
 
 
-def _failed(e: Experiment, error: UprightError) -> Chapter:
+def _failed(e: Experiment, why: str) -> Chapter:
     return Chapter(
-        key=e.key, title=e.title, question="", verdict="This experiment could not be finished.", detail=str(error),
+        key=e.key, title=e.title, question="", verdict="This experiment could not be finished.", detail=why,
         sound=False, parts=(),
     )  # fmt: skip
