@@ -17,7 +17,7 @@ from upright.identification.study import load_study
 from upright.lab import tracking_pd as pd
 from upright.lab.makes import make_rig
 from upright.lab.tracking import RESERVE, run
-from upright.lab.tracking_laws import AT, EXTRA, paper_sets, tracker, with_sum
+from upright.lab.tracking_laws import AT, EXTRA, closed_by, paper_sets, tracker, with_sum
 from upright.lab.tracking_log import KINDS, SHAFTS, pulses
 from upright.physics import chain
 
@@ -98,11 +98,19 @@ def test_pd_of_the_near_encoder_decays_no_faster_than_half_the_root_of_k_over_m_
         bound = 0.5 * math.sqrt(k / m_1)
         model = chain(2, "rectilinear")(m_1=m_1, m_2=m_2, k_12=k).linear(AT)
         kp = k * m_1 / m_2 * np.geomspace(0.05, 20, 41)
-        assert pd.best_decay(model, kp, most=50.0).max() <= bound * (1 + 1e-9)
+        assert pd.best_decay(pd.continuous(model), kp, most=50.0).max() <= bound * (1 + 1e-9)
         best = np.array([[k * m_1 / m_2, 2 * math.sqrt(k * m_1), 0, 0]])
         poles = np.poly(model.A - model.B @ best)
         quadratic = [1, math.sqrt(k / m_1), k / m_2]
         np.testing.assert_allclose(poles, np.polymul(quadratic, quadratic), rtol=1e-9)
+
+
+def test_the_loop_is_linear_in_the_gains():
+    """What the search over kp and kd takes for the loop is the loop of the law."""
+    rig = make_rig("torsional", 1)
+    A, P, D = pd.sampled(rig)
+    law = pd.near_pd(rig, "", 3.0, 0.4).law
+    np.testing.assert_allclose(A + 3.0 * P + 0.4 * D, closed_by(rig, law), rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -78,8 +78,7 @@ def track(
             twin = twin if limit is None else replace(twin, limit=limit)
             done = tracking.run(twin, seed, out, tell, which=which, poles=own, step=size)
         else:
-            home = source.parent if source is not None and source.is_file() else source or out
-            done = tracking.follow(model, model, home, None, None, tell, which=which, poles=own, step=size)
+            done = tracking.follow(model, model, source or out, None, None, tell, which=which, poles=own, step=size)
     told = chapter(done)
     out.mkdir(parents=True, exist_ok=True)
     text = json.dumps(content_of(done) | {"verdict": told.verdict}, indent=2, ensure_ascii=False, allow_nan=False)

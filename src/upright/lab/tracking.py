@@ -53,7 +53,7 @@ class Tracking:
     rig, model, true : Rig
         On the day of the trials, as the fit sees it, and when it was measured; all the same where only a fit was given.
     folder : Path
-        Holds logs, study and fit.
+        Holds logs, study and fit; the fit itself where only that was given.
     study, fit : Study and Fit, or None where a fit was given.
     step : Chosen
     sets : tuple of Outcome

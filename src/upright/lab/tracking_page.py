@@ -104,7 +104,7 @@ def _findings(done: Tracking) -> tuple[Finding, ...]:
 
 
 def _steps(done: Tracking) -> tuple[Step, ...]:
-    fit = typed(done.folder / FIT)
+    fit = typed(done.folder if done.fit is None else done.folder / FIT)
     own = Step(sentence="Ask for poles of your own.", command=f'upright track {fit} --poles "-10+-20j, -25+-10j"')
     if done.fit is None:
         return (own,)

@@ -16,7 +16,7 @@ from upright.control import Rig
 from upright.control.steps import step_figures
 from upright.control.trial import SUBSTEPS, at_work
 from upright.errors import BadInput
-from upright.lab.tracking_laws import AT, MEMORY, Tracker, tracker
+from upright.lab.tracking_laws import AT, MEMORY, Tracker, closed_by, state_law, tracker
 from upright.physics import Linear
 from upright.simulation import Law, simulate
 
@@ -94,13 +94,33 @@ def tried(rig: Rig, pairs: Array, step: float) -> Array:
     return out
 
 
-def best_decay(model: Linear, kp: Array, *, most: float = 0.3) -> Array:
-    """For each kp the fastest decay [1/s] that any kd = kp times up to `most` [s] gives the slowest pole."""
-    rate = np.geomspace(4e-3, most, 300)
-    K = np.zeros((kp.size, rate.size, 1, model.A.shape[0]))
-    K[..., 0, 0], K[..., 0, 1] = kp[:, None], kp[:, None] * rate
-    poles = np.linalg.eigvals(model.A - model.B @ K)
-    return -poles.real.max(axis=-1).min(axis=-1)
+def continuous(model: Linear) -> tuple[Array, Array, Array]:
+    """Matrix of the loop ``A + kp P + kd D`` of PD control of the near body, without computer."""
+    P, D = (-model.B @ row[None] for row in np.eye(model.A.shape[0])[:2])
+    return model.A, P, D
+
+
+def sampled(rig: Rig) -> tuple[Array, Array, Array]:
+    """The same as it runs: held, late, lagging, with filtered differences."""
+    A, P, D = (closed_by(rig, state_law(rig, _gains(rig, 0, *g), 0.0)) for g in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
+    return A, P - A, D - A
+
+
+def best_decay(loop: tuple[Array, Array, Array], kp: Array, *, period: float = 0.0, most: float = 0.3) -> Array:
+    """For each kp the fastest decay [1/s] that any kd = kp times up to `most` [s] gives the slowest pole.
+
+    `period` is that of a sampled loop; 0 for a continuous one.
+    """
+    A, P, D = (m[None, None] for m in loop)
+    rate = np.broadcast_to(np.geomspace(4e-3, most, 60), (kp.size, 60))
+    decay = np.empty(0)
+    for finer in (0.11, 0.008):
+        kps = kp[:, None, None, None]
+        poles = np.linalg.eigvals(A + kps * (P + rate[..., None, None] * D))
+        slow = poles.real.max(axis=-1) if period == 0 else np.log(np.abs(poles).max(axis=-1)) / period
+        best = np.take_along_axis(rate, slow.argmin(axis=1)[:, None], axis=1)
+        decay, rate = -slow.min(axis=1), best * np.exp(np.linspace(-finer, finer, 25))
+    return decay
 
 
 def root_locus(model: Linear, body: int, rate: float, kp: Array) -> NDArray[np.complex128]:

@@ -9,7 +9,7 @@ import numpy as np
 from upright.lab.tracking import Tracking
 from upright.lab.tracking_laws import AT
 from upright.lab.tracking_parts import described, frame, strongest, trace
-from upright.lab.tracking_pd import best_decay, root_locus
+from upright.lab.tracking_pd import best_decay, root_locus, sampled
 from upright.lab.tracking_runs import BEFORE, DWELL
 from upright.lab.tracking_tables import share
 from upright.report.document import Picture, picture
@@ -26,6 +26,8 @@ def why(done: Tracking, near: str, far: str) -> Part:
     best, pd, stiff = strongest(done), done.pd, done.stiff
     p = done.model.plant.parameters()
     inertia = p.get("m_1", p.get("J_1", 1.0))
+    other = p.get("m_2", p.get("J_2", 1.0))
+    force = "N m/rad" if done.rig.plant.coordinates[-1].unit == "rad" else "N/m"
     bound = 0.5 * math.sqrt(p["k_12"] / inertia)
     compared = [best, *((done.summed,) if done.summed else ()), pd, stiff, done.far]
     trips = done.far.found.tripped
@@ -39,9 +41,10 @@ def why(done: Tracking, near: str, far: str) -> Part:
             "limit. For a step alone it would do.",
             "But it has one damper for two modes. Without natural damping no kp and kd let every pole decay faster "
             f"than half the root of k/inertia 1, {number(bound, 3)} 1/s here, and it gets there only at kp·gain = k "
-            f"(inertia 1)/(inertia 2), no stiffer than the shaft. Stiffer, {near} is held fast and {far} swings on "
-            f"its spring: as stiff as {best.law.name}, the slowest pole decays with {number(stiff.law.decay, 2)} 1/s "
-            f"at a damping ratio of {number(stiff.law.damping, 2)}, against {number(best.law.decay, 3)} 1/s and "
+            f"(inertia 1)/(inertia 2), {number(p['k_12'] * inertia / other, 3)} {force}, where {best.law.name} has "
+            f"{number(best.law.stiffness, 3)}. Stiffer, {near} is held fast and {far} swings on its spring: as stiff "
+            f"as {best.law.name}, the slowest pole decays with {number(stiff.law.decay, 2)} 1/s at a damping ratio of "
+            f"{number(stiff.law.damping, 2)}, against {number(best.law.decay, 3)} 1/s and "
             f"{number(best.law.damping, 2)}. State feedback is fast and stiff at once: it alone uses the far encoder.",
             f"PD control of the far encoder with the same gains {end}: between drive and far body lies no zero, the "
             "phase of the flexible mode is turned by half a turn, and kd drives what it should damp (without natural "
@@ -68,10 +71,11 @@ def _reasons(done: Tracking, bound: float) -> list[Picture]:
     model, pd = done.model.linear(AT), done.pd.law
     p = done.model.plant.parameters()
     of = done.rig.plant.coordinates[-1].unit
-    kp = np.geomspace(0.2 * pd.k_pf, 2.5 * strongest(done).law.k_pf, 60)
+    kp = np.geomspace(0.2 * pd.k_pf, 2.5 * strongest(done).law.k_pf, 40)
     points = {o.law.name: (o.law.stiffness, o.law.decay) for o in (*done.sets, done.pd, done.stiff)}
     bargain = Bargain(
-        stiffness=kp * done.model.gain, decay=best_decay(model, kp), bound=bound, shaft=p["k_12"], points=points,
+        stiffness=kp * done.model.gain, bound=bound, shaft=p["k_12"], points=points,
+        decay=best_decay(sampled(done.model), kp, period=done.model.period),
         unit=f"{'N m' if of == 'rad' else 'N'}/{of}",
     )  # fmt: skip
     rate = float(pd.K[1]) / pd.k_pf
@@ -87,7 +91,7 @@ def _reasons(done: Tracking, bound: float) -> list[Picture]:
         picture(
             bargain_figure(bargain), "track-bargain",
             caption="Fast against stiff. PD of the near encoder has what lies under the curve; state feedback stands "
-            "outside of it. Dashed: the most that PD can have without natural damping.",
+            "outside of it. All as the loops run; dashed: the most that PD can have without natural damping and delay.",
             description="Decay of the slowest pole over static force per error.",
         ),
         picture(
