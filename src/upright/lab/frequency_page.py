@@ -21,7 +21,7 @@ from upright.report.frequency_told import (
     simplex_sentence,
 )
 from upright.report.sections import Part
-from upright.report.symbols import number, typed
+from upright.report.symbols import number, typed, unit
 
 QUESTION = (
     "What does the rig answer to a sine, and which numbers of its equations does that fix, the pole by which it falls "
@@ -58,7 +58,7 @@ def chapter(done: Result) -> Chapter:
             *answer_parts(answer, truth=done.truth, known=_bench(done)),
         ),
         steps=steps(answer, done.folder, done.make),
-        findings=(_finding(answer, number_of, true),),
+        findings=(_finding(answer, number_of, true), *_found(done)),
         numbers=numbers(answer, truth=done.truth, key=true)
         | {"at_the_rig": done.sweep.seconds, "seconds": done.seconds},
     )  # fmt: skip
@@ -80,6 +80,22 @@ def _finding(answer: Answer, found: Estimate, true: float) -> Finding:
         what=f"{answer.key[1]}, {answer.key[0]} [{of}]", value=number(found.value, d),
         interval=f"{number(found.interval[0], d)} to {number(found.interval[1], d)}", truth=number(true, d),
     )  # fmt: skip
+
+
+def _found(done: Result) -> list[Finding]:
+    """Inertia of the pendulum and gain of the drive, which nobody weighs."""
+    out: list[Finding] = []
+    for name, what in (("J_p", "J_p"), ("actuator.gain", "gain of the drive")):
+        e = done.answer.fit.estimates.get(name)
+        if e is None:
+            continue
+        d = digits(e)
+        low, high = (number(x, d) for x in e.interval)
+        out.append(
+            Finding(what=f"{what} [{unit(e.unit)}]", value=number(e.value, d), interval=f"{low} to {high}",
+                    truth=number(done.truth[name], d))
+        )  # fmt: skip
+    return out
 
 
 def _campaign(done: Result) -> tuple[str, ...]:
@@ -105,6 +121,10 @@ def _campaign(done: Result) -> tuple[str, ...]:
 
 def _bench(done: Result) -> str:
     names = ", ".join(f"{n} to {100 * s:g} %" for n, s in BENCH[done.make].items())
+    weighed = {n: p for n, p in done.answer.rig.parameters.items() if p.uncertainty and n not in BENCH[done.make]}
+    if weighed:
+        shares = ", ".join(f"{n} to {100 * p.uncertainty / p.value:.2g} %" for n, p in weighed.items())
+        names += f"; from experiment 1a: {shares}"
     return (
         f"Known from the bench: {names}. A response sees masses, frictions and the drive's gain only relative to each "
         "other, so the bench fixes the scale; the unstable pole does not depend on it."
