@@ -133,7 +133,7 @@ def quality_figure(data: FrequencyResponse) -> Figure:
     amplitude = np.abs(data.response * data.drive[:, None])
     shown = (
         (np.maximum(1 - data.coherence, 1e-9), "1 − coherence"),
-        (np.maximum(data.distortion, 1e-6), "harmonics over fundamental"),
+        (data.distortion, "harmonics over fundamental"),
         (np.maximum(100 * data.error, 1e-5), "standard error [%]"),
         (amplitude, "amplitude"),
     )
@@ -141,9 +141,14 @@ def quality_figure(data: FrequencyResponse) -> Figure:
         for j, name in enumerate(data.outputs):
             mark, colour = marks[j % len(marks)]
             of = f" [{unit(data.units[j])}]" if label == "amplitude" and unit(data.units[j]) else ""
-            axes.plot(data.omega, values[:, j], mark, color=colour, markersize=3.5, label=plain(name) + of)
-        axes.set_yscale("log")
+            if values.any():
+                axes.plot(data.omega, values[:, j], mark, color=colour, markersize=3.5, label=plain(name) + of)
         axes.set_ylabel(label)
+        if values.any():
+            axes.set_yscale("log")
+        else:
+            axes.set_yticks([])
+            axes.text(0.5, 0.5, "not told by a sweep", transform=axes.transAxes, ha="center", color=GREY)
     panels[0, 0].legend(loc="best")
     panels[1, 1].plot(data.omega, np.abs(data.drive), "x", color=BLACK, markersize=4,
                       label=f"command [{unit(data.units[-1])}]" if unit(data.units[-1]) else "command")  # fmt: skip

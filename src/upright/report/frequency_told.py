@@ -41,6 +41,7 @@ def answer_parts(answer: Answer, *, truth: Mapping[str, float] | None = None, kn
                 "The simplex walks on squared dB of the linear model, the far output first and then all. Least squares "
                 "uses the phase too, weighs points by their errors, and knows what dry friction amounted to in the "
                 "motion that was measured (its describing function, from the turning points of the encoders).",
+                f"Walk of the simplex: {'; '.join(answer.simplex.stages)}.",
             ),
             tables=(way_table(answer),),
         ),
