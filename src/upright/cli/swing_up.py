@@ -49,6 +49,7 @@ def swing_up(
 
     upright swing-up out/fit.json --check swings.csv
     """
+    from upright.cli.terminal import typed
     from upright.lab import swing_up as experiment
     from upright.lab import swing_up_page
     from upright.lab.believed import believed, make_of
@@ -71,10 +72,17 @@ def swing_up(
             raise BadInput(f"the fit is of the make {make}, and --rig says {rig}; leave --rig out.")
         model = believed(file)
     if check is not None:
-        _check(model, check, known, out, as_json)
+        _check(model, check, known, out, as_json, typed(source) if source else "FIT.json")
         return
     done = experiment.run(
-        model, _lying(make_rig(make, seed), lie), seed, out, known=known, seconds=seconds, travel=travel
+        model,
+        _lying(make_rig(make, seed), lie),
+        seed,
+        out,
+        known=known,
+        seconds=seconds,
+        travel=travel,
+        source=typed(source) if source else "",
     )
     told = swing_up_page.chapter(done)
     page = write_chapter(out / "swing_up.html", told)
@@ -88,13 +96,13 @@ def swing_up(
         raise typer.Exit(3)
 
 
-def _check(model: Rig, log: Path, known: Mapping[str, float] | None, out: Path, as_json: bool) -> None:
+def _check(model: Rig, log: Path, known: Mapping[str, float] | None, out: Path, as_json: bool, source: str) -> None:
     from upright.lab import swing_up_page
     from upright.lab.encoders import asked
     from upright.readers import read
     from upright.report.chapter import write_chapter
 
-    told = swing_up_page.check_chapter(model, asked(model, read(log), known), log.name)
+    told = swing_up_page.check_chapter(model, asked(model, read(log), known), log.name, source)
     page = write_chapter(out / "encoders.html", told)
     if as_json:
         typer.echo(json.dumps(told.numbers, indent=2, ensure_ascii=False, allow_nan=False))

@@ -90,10 +90,12 @@ def _swing_up(task: Task) -> tuple[Chapter, bool]:
     from upright.lab.believed import believed
     from upright.lab.rig_file import read_rig_file
 
-    found = read_rig_file(_fitted(task), seed=task.seed)
+    fit = _fitted(task)
+    found = read_rig_file(fit, seed=task.seed)
     done = swing_up.run(
-        believed(found), task.rig, task.seed, task.folder, task.progress, task.stopped, known=swing_up.known_of(found)
-    )
+        believed(found), task.rig, task.seed, task.folder, task.progress, task.stopped, known=swing_up.known_of(found),
+        source=typed(fit),
+    )  # fmt: skip
     return swing_up_page.chapter(done), not task.stopped()
 
 

@@ -89,8 +89,8 @@ class Swung:
     ascent : Ascent or None
         None when the encoders lie: then no loop is closed.
     lies : tuple of Lie
-    identified : bool
-        Whether the model comes from a fit.
+    source : str
+        File that the model comes from, as typed; empty for the data sheet.
     folder : Path
     seconds : float
         Computing time.
@@ -103,7 +103,7 @@ class Swung:
     law: SwingUp
     ascent: Ascent | None
     lies: tuple[Lie, ...]
-    identified: bool
+    source: str
     folder: Path
     seconds: float = 0.0
 
@@ -123,6 +123,8 @@ class Swung:
         took = f"with at most {a.peak:.2g} of {self.law.limit:.3g} {unit} and {far} of travel"
         if math.isfinite(a.tripped):
             return f"The end of the travel switched the drive off after {a.tripped:.2f} s; allow more or pump less."
+        if not a.handovers:
+            return f"The pendulum was not caught in {float(a.trial.t[-1]):.3g} s, {took}; allow more time or travel."
         if not self.caught:
             return f"The pendulum did not stand for {HELD:g} s: it fell {len(a.falls)} times, {took}."
         again = f" at the {len(a.handovers)}. catch" if len(a.handovers) > 1 else ""
@@ -158,6 +160,7 @@ def run(
     seconds: float = SECONDS,
     travel: float | None = None,
     lies: bool = True,
+    source: str = "",
 ) -> Swung:
     """Check the encoders of a hanging rig, swing it up and hold it; then try what lying encoders would have done.
 
@@ -182,6 +185,8 @@ def run(
     travel : float, optional
         How far the driven body may go [m or rad]; what the rig says when omitted.
     lies : bool
+    source : str
+        File that the model comes from, as typed.
     """
     began = time.perf_counter()
     tell = progress or (lambda step, share: None)
@@ -201,7 +206,7 @@ def run(
         ascent.trial.record.to_csv(folder / "swing_up.csv")
     return Swung(
         model=model, truth=truth, log=log, check=check, law=law, ascent=ascent, lies=tried,
-        identified=known is not None, folder=folder, seconds=time.perf_counter() - began,
+        source=source, folder=folder, seconds=time.perf_counter() - began,
     )  # fmt: skip
 
 

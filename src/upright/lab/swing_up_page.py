@@ -24,9 +24,9 @@ QUESTION = (
 
 def chapter(done: Swung) -> Chapter:
     """The whole of it as a chapter of experiment 2."""
-    source = "numbers identified hanging" if done.identified else "the numbers of the make as designed"
+    source = "numbers identified hanging" if done.source else "the numbers of the make as designed"
     return Chapter(
-        key="2", title=f"Swing-up and catch: {done.truth.name}, seed {done.truth.seed}", question=QUESTION,
+        key="2b", title=f"Swing-up and catch: {done.truth.name}, seed {done.truth.seed}", question=QUESTION,
         verdict=done.verdict, detail=f"Law and check were made from {source}; they met a rig with numbers of its own.",
         sound=done.caught, parts=parts(done), steps=steps(done), findings=findings(done), numbers=numbers(done),
     )  # fmt: skip
@@ -42,13 +42,13 @@ def parts(done: Swung) -> tuple[Part, ...]:
     return tuple(out)
 
 
-def check_chapter(model: Rig, check: Scales, log: str) -> Chapter:
+def check_chapter(model: Rig, check: Scales, log: str, source: str = "FIT.json") -> Chapter:
     """What a log of a hanging rig says of its encoders, by itself."""
     again = Step(sentence="Mend what is said above, log the hanging rig again, and check again.")
     onward = Step(sentence="The encoders may be trusted: find the gains that hold the rig.",
-                  command='upright design FIT.json --at inverted --poles "-4.15+-1.63j, -16.9, -3.2"')  # fmt: skip
+                  command=f"upright regulate {source}")  # fmt: skip
     return Chapter(
-        key="2", title=f"Encoders of {model.name} in {log}", question="Do the encoders show what is true?",
+        key="2b", title=f"Encoders of {model.name} in {log}", question="Do the encoders show what is true?",
         verdict=check.verdict, detail="", sound=check.sound, parts=(sensor_part(model, check),),
         steps=(onward if check.sound else again,), numbers={"sensors": check_numbers(check), "verdict": check.verdict},
     )  # fmt: skip
@@ -146,7 +146,7 @@ def lie_part(done: Swung) -> Part:
         tables=(
             Table(
                 caption="Encoders that show a multiple of what is true", rows=rows, numbers=(1, 2, 3, 4, 6),
-                headings=("coordinate", "lie", "found hanging", "watch speaks [s]", "at [°]", "and says", "fall [s]"),
+                headings=("coordinate", "lie", "found hanging", "watch speaks [ms]", "at [°]", "and says", "fall [ms]"),
             ),
         ),
     )  # fmt: skip
@@ -155,9 +155,9 @@ def lie_part(done: Swung) -> Part:
 def _row(lie: Lie) -> tuple[str, ...]:
     spoke = math.isfinite(lie.spoke)
     return (
-        lie.name, f"{lie.factor:g}".replace("-", "−"), number(lie.found, 4), number(lie.spoke, 2) if spoke else "–",
+        lie.name, f"{lie.factor:g}".replace("-", "−"), number(lie.found, 4), f"{1e3 * lie.spoke:.0f}" if spoke else "–",
         number(math.degrees(lie.tilt), 2) if spoke else "–", lie.said or "–",
-        number(lie.fell, 3) if math.isfinite(lie.fell) else "stands",
+        f"{1e3 * lie.fell:.0f}" if math.isfinite(lie.fell) else "stands",
     )  # fmt: skip
 
 
@@ -175,13 +175,13 @@ def findings(done: Swung) -> tuple[Finding, ...]:
 def steps(done: Swung) -> tuple[Step, ...]:
     """What to do next."""
     make = "furuta" if done.law.body.spin > 0 else "linear"
-    base = f"upright swing-up --rig {make} --seed {done.truth.seed}"
+    base = f"upright swing-up {done.source or f'--rig {make}'} --seed {done.truth.seed}"
     if not done.check.sound:
         return (Step(sentence="Mend the encoder, then try again.", command=base),)
     out = [Step(sentence="See what happens when an encoder lies.", command=f'{base} --lie "theta=2"')]
     if not done.caught:
         out.append(Step(sentence="Allow more travel.", command=f"{base} --travel {2 * done.law.travel:g}"))
-    if not done.identified:
+    if not done.source:
         out.append(Step(sentence="Design from an identification instead of the data sheet.",
                         command=f"upright swing-up FIT.json --seed {done.truth.seed}"))  # fmt: skip
     return tuple(out)

@@ -35,7 +35,7 @@ def ascent_figure(run: Ascent, *, after: float = 2.5) -> Figure:
     last = min(float(trial.t[-1]), (run.up if np.isfinite(run.up) else float(trial.t[-1])) + after)
     seen = trial.t <= last
     t = trial.t[seen]
-    drawing = figure(6.0)
+    drawing = figure(6.0, margins=(0.75, 0.1, 0.1, 0.5))
     axes: list[Any] = drawing.subplots(4, 1, sharex=True, gridspec_kw={"height_ratios": [1.3, 1.3, 1, 1]}).tolist()
     name, unit = rig.plant.coordinates[0].name, rig.plant.coordinates[0].unit
     degrees = np.degrees(trial.record["theta"][seen])
@@ -90,7 +90,8 @@ def portrait_figure(run: Ascent) -> Figure:
     """Speed over angle from hanging, every turn laid over the last; the separatrix is the energy aimed at."""
     angle = np.degrees(np.mod(run.trial.record["theta"] + np.pi, 2 * np.pi) - np.pi)
     speed = run.speeds[:, 1]
-    drawing = figure(3.8, 6.2)
+    shown = slice(None, None, 6)  # five milliseconds
+    drawing = figure(3.8, margins=(0.75, 2.4, 0.1, 0.75))
     ax: Any = drawing.subplots()
     grid = np.linspace(-180, 180, 400)
     edge = 2 * run.law.body.omega * np.cos(np.radians(grid) / 2)  # E = 0: theta'^2 = 2 omega^2 (1 + cos theta)
@@ -99,7 +100,7 @@ def portrait_figure(run: Ascent) -> Figure:
         ax.plot(grid, side * edge, color=GREY, linestyle="--", linewidth=0.9, label=label)
     for mode, colour, name in ((SWINGING, BLUE, "pump"), (HOLDING, VERMILLION, "feedback")):
         on = run.mode == mode
-        ax.plot(*_broken(np.where(on, angle, np.nan), speed), color=colour, label=name)
+        ax.plot(*_broken(np.where(on, angle, np.nan)[shown], speed[shown]), color=colour, label=name)
     for when in run.handovers:
         k = int(np.searchsorted(run.trial.t, when))
         label = "handover" if when == run.handovers[0] else None
@@ -121,7 +122,7 @@ def _broken(angle: Array, speed: Array) -> tuple[Array, Array]:
 @styled
 def check_figure(found: Scales, units: tuple[str, ...]) -> Figure:
     """What the encoders of the hanging rig showed, and the model's motion times the scales found."""
-    drawing = figure(1.4 * len(found.names) + 1.0)
+    drawing = figure(1.4 * len(found.names) + 1.0, margins=(0.75, 0.1, 0.1, 0.5))
     axes: list[Any] = drawing.subplots(len(found.names), 1, sharex=True, squeeze=False)[:, 0].tolist()
     for i, (ax, name, unit) in enumerate(zip(axes, found.names, units, strict=True)):
         ax.plot(found.t, found.shown[:, i], color=BLUE, linewidth=2.6, alpha=0.45, label="shown")
