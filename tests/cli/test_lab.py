@@ -164,4 +164,5 @@ def test_what_the_report_proposes_works(spoken, tmp_path, monkeypatch):
     assert len(proposed) >= 2 * len(EXPERIMENTS)
     for arguments in proposed:
         again = CliRunner().invoke(app, arguments)
-        assert again.exit_code == 0, (arguments, again.output)
+        wanted = 3 if "--lie" in arguments else 0  # 3: the answer is no, as it should be where an encoder lies
+        assert again.exit_code == wanted, (arguments, again.output)
