@@ -18,7 +18,8 @@ from upright.lab import tracking_pd as pd
 from upright.lab.makes import make_rig
 from upright.lab.tracking import RESERVE, run
 from upright.lab.tracking_laws import AT, EXTRA, closed_by, paper_sets, tracker, with_sum
-from upright.lab.tracking_log import KINDS, SHAFTS, pulses
+from upright.lab.tracking_log import KINDS, SHAFTS, fitted, pulses, weigh
+from upright.lab.weighing import Known
 from upright.physics import chain
 
 FRICTIONLESS = {"f_1c": 0.0, "f_2c": 0.0}
@@ -192,6 +193,19 @@ def test_the_fit_is_repeated_from_its_files(tmp_path):
     written = json.loads((tmp_path / "fit.json").read_text(encoding="utf-8"))["parameters"]
     for name, e in again.estimates.items():
         assert written[name]["value"] == pytest.approx(e.value, rel=1e-9)
+
+
+@pytest.mark.parametrize("scale", [0.5, 1.0])
+def test_the_loop_does_not_depend_on_the_scale_of_the_inertias(tmp_path, scale):
+    """Only ratios are seen: an inertia said to be half as large halves gain, springs and friction, and no gain in V."""
+    rig = make_rig("torsional", 6)
+    told = Known(name="J_1", value=scale * rig.plant.J_1, stderr=1e-3 * rig.plant.J_1)
+    _, fit = weigh(rig, 6, tmp_path, weighed=(told,))
+    model = fitted(rig, fit)
+    assert model.gain == pytest.approx(scale * rig.gain, rel=5e-3)
+    assert model.plant.k_12 == pytest.approx(scale * rig.plant.k_12, rel=5e-3)
+    (found,), (true,) = paper_sets(model, (4,)), paper_sets(rig, (4,))
+    assert found.k_pf == pytest.approx(true.k_pf, rel=5e-3)
 
 
 @pytest.mark.slow

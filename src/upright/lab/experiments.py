@@ -102,7 +102,9 @@ def _swing_up(task: Task) -> tuple[Chapter, bool]:
 def _track(task: Task) -> tuple[Chapter, bool]:
     from upright.lab import tracking, tracking_page
 
-    done = tracking.run(task.rig, task.seed, task.folder, task.progress, task.stopped)
+    done = tracking.run(
+        task.rig, task.seed, task.folder, task.progress, task.stopped, weighed=known_from(task.earlier.get("1a"))
+    )
     return tracking_page.chapter(done), not done.interrupted
 
 
@@ -151,7 +153,7 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         tell=_swing_up,
     ),
     Experiment(
-        key="3", part_of="3", title="Tracking through a flexible shaft", makes=SHAFTS, needs=(), seconds=5.0,
+        key="3", part_of="3", title="Tracking through a flexible shaft", makes=SHAFTS, needs=("1a",), seconds=5.0,
         tell=_track,
     ),
     Experiment(

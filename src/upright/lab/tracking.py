@@ -24,6 +24,7 @@ from upright.lab.tracking_laws import Tracker, by_poles, check, paper_sets, with
 from upright.lab.tracking_log import fitted, weigh
 from upright.lab.tracking_pd import Search, far_pd, near_pd, tune
 from upright.lab.tracking_runs import PUSH, Outcome, outcome, twist_of
+from upright.lab.weighing import Known
 
 Array = NDArray[np.float64]
 
@@ -96,7 +97,7 @@ class Tracking:
 def run(
     rig: str | Rig, seed: int, folder: Path, progress: Progress | None = None,
     stopped: Callable[[], bool] = lambda: False, *, which: Sequence[int] = (1, 2, 3, 4),
-    poles: NDArray[np.complex128] | None = None, step: float | None = None,
+    poles: NDArray[np.complex128] | None = None, step: float | None = None, weighed: Sequence[Known] = (),
 ) -> Tracking:  # fmt: skip
     """Run the experiment on a twin.
 
@@ -118,12 +119,14 @@ def run(
         Poles [1/s] of one further set.
     step : float, optional
         Size of the step [m or rad], chosen when omitted.
+    weighed : sequence of Known
+        What experiment 1a leaves known of the shaft.
     """
     check(which, poles)
     began, tell = time.perf_counter(), progress or (lambda what, share: None)
     true = make_rig(INSTEAD.get(rig, rig), seed) if isinstance(rig, str) else rig
     tell("pulsing the shaft", 0.0)
-    study, fit = weigh(true, seed, folder, lambda what, share: tell(what, 0.05 + 0.25 * share))
+    study, fit = weigh(true, seed, folder, lambda what, share: tell(what, 0.05 + 0.25 * share), weighed)
     done = follow(
         another_day(true, seed),
         fitted(true, fit),

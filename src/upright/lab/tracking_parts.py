@@ -44,13 +44,22 @@ def data(done: Tracking) -> list[Part]:
             title="Fit",
             sentences=(
                 f"{fit.verdict} Other pulses are predicted: {scores}.",
-                "The drive's gain is taken from its maker, to 2 %: masses, springs and friction follow it in "
-                "proportion, poles, gains in volts and everything below do not.",
+                _scale(done.fit.rig.parameters["actuator.gain"].estimate),
             ),
             formulas=(Markup(motion(fit)),),
             tables=(tables.fit_table(done),),
         ),
     ]
+
+
+def _scale(weighed: bool) -> str:
+    whence = "The drive's gain is taken from its maker, to 2 %"
+    if weighed:
+        whence = "What experiment 1a weighed fixes the scale, and the drive's gain follows from it"
+    return (
+        f"{whence}: masses, springs, friction and gain go up and down together, poles, gains in volts and everything "
+        "below stay."
+    )
 
 
 def gains(done: Tracking, far: str) -> Part:
