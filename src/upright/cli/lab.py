@@ -24,7 +24,7 @@ INTERRUPTED = 130
 def lab(
     experiment: Annotated[
         list[str] | None,
-        typer.Option("--experiment", "-e", metavar="1|1a|1b|2|3|4", help="Only this one, and what it stands on."),
+        typer.Option("--experiment", "-e", metavar="1|1a|1b|2|2b|3|4", help="Only this one, and what it stands on."),
     ] = None,
     rig: Annotated[
         str, typer.Option("--rig", metavar="KIND", help="linear, furuta, rectilinear or torsional; else the paper's.")
@@ -39,8 +39,10 @@ def lab(
     r"""Run the experiments of the paper on simulated rigs: identify, flip, design, hold, track, swing, and report.
 
     1a weighs the rig with known added masses, 1b fits its frequency response hanging, 2 holds it upright with gains
-    from that fit, 3 tracks through a flexible shaft, 4 lets the pendulum swing freely. Every log, study and fit is
-    written to DIR for the ordinary commands, and one report.html tells it all (report.pdf with the pdf extra).
+    from that fit, 2b swings it up and catches it, 3 tracks through a flexible shaft, 4 lets the pendulum swing freely.
+
+    Every log, study and fit is written to DIR for the ordinary commands, and one report.html tells it all (report.pdf
+    with the pdf extra).
     Ctrl-C keeps and reports what is there; the same command goes on from there.
 
     \b
