@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import control
@@ -152,6 +153,15 @@ def test_other_rigs_of_the_makes_are_known_as_well(tmp_path):
         inside.append(found.interval[0] <= truth <= found.interval[1])
         assert done.answer.fit.trusted
     assert sum(inside) >= 4  # six honest 95 % intervals miss three times once in 450 times
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("make", ["furuta", "linear"])
+def test_an_encoder_of_another_scale_is_told(make, tmp_path):
+    """theta/psi holds g, and the bench knows r: 10 % more counts per turn fit no pendulum of that size."""
+    done = run(replace(make_rig(make), scales=(1.0, 1.1)), 0, tmp_path)
+    assert not done.answer.fit.trusted
+    assert "scale" in done.answer.fit.verdict
 
 
 @pytest.mark.slow

@@ -52,9 +52,14 @@ class Coordinates:
         return (z[:, rows] - self.expected[rows]) / self.tolerance[rows]
 
     @property
+    def bounded(self) -> tuple[str, ...]:
+        """Names of those known within a tolerance."""
+        return tuple(n for n, t in zip(self.names, self.tolerance.tolist(), strict=True) if math.isfinite(t))
+
+    @property
     def priors(self) -> int:
         """How many of the unknowns are known within a tolerance."""
-        return int(np.isfinite(self.tolerance).sum())
+        return len(self.bounded)
 
     def scattered(self, rng: np.random.Generator, spread: float) -> Array:
         """Another start: every unknown off by a factor, those known by their tolerance."""

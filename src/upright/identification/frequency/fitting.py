@@ -70,6 +70,8 @@ class Squares:
         Degrees of freedom.
     sigma : (F, n) array
         Relative error of real and of imaginary part by which points were weighed.
+    surprise : mapping of str to float
+        Of what was known within a tolerance: how many of these it ended away.
     starts : int
     reached : int
         How many of the starts ended at the same minimum.
@@ -81,6 +83,7 @@ class Squares:
     misfit: float
     freedom: int
     sigma: Array
+    surprise: Mapping[str, float]
     starts: int
     reached: int
 
@@ -193,7 +196,9 @@ def least_squares(
     slope = space.slope(z)
     return Squares(
         way=_way("least squares", balance, space, z, data, began, ()), names=space.names,
-        covariance=P * np.outer(slope, slope), misfit=misfit, freedom=free, sigma=sigma, starts=starts, reached=reached,
+        covariance=P * np.outer(slope, slope), misfit=misfit, freedom=free, sigma=sigma,
+        surprise=dict(zip(space.bounded, space.known(z[None])[0].tolist(), strict=True)),
+        starts=starts, reached=reached,
     )  # fmt: skip
 
 
