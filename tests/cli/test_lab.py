@@ -126,6 +126,16 @@ def test_ctrl_c_keeps_and_reports_what_is_there(tmp_path, monkeypatch, swallow):
     assert again["experiments"]["1"]["state"] == "kept"
 
 
+def test_without_the_pdf_extra_a_sentence_says_how_to_get_it(tmp_path, monkeypatch):
+    monkeypatch.setattr(laboratory, "EXPERIMENTS", stopped_by(swallow=False)[:1])
+    assert "report.pdf" in upright("lab", "-o", tmp_path).stdout
+    monkeypatch.setattr("upright.report.pdf.find_spec", lambda name: None)
+    outcome = upright("lab", "-o", tmp_path / "other")
+    assert outcome.exit_code == 0
+    assert "pip install 'upright[pdf]'" in outcome.stdout
+    assert not (tmp_path / "other" / "report.pdf").exists()
+
+
 @pytest.fixture(scope="module")
 def spoken(tmp_path_factory):
     folder = tmp_path_factory.mktemp("lab") / "a b"

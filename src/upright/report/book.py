@@ -17,6 +17,14 @@ _SYMBOL = re.compile(r"([A-Za-z]+_[A-Za-z0-9]+)\b(.*)", re.DOTALL)
 _ID = re.compile(r'\b(id="|url\(#|href="#)')
 
 
+READING = (
+    "A verdict is sound when what it says may be built on; with reservations, when its chapter says what stands in the "
+    "way. Intervals are meant to hold the truth in 95 of 100 rigs. Data go one way: later experiments take what earlier ones found, "
+    "with its errors, and no fit sees the twin's truth, which is printed beside the result only to judge it."
+)
+"""How the cover is meant."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Told:
     """A chapter with the rig it is about; `finished` is false where the experiment was stopped or failed."""
@@ -81,7 +89,9 @@ def _named(what: str) -> str:
 
 def write_book(path: Path, book: Book) -> Path:
     """Write the report as one self-contained page; one that exists is replaced at once or not at all."""
-    text = render("book.html", title=book.title, book=replace(book, chapters=tuple(map(_own, book.chapters))))
+    text = render(
+        "book.html", title=book.title, reading=READING, book=replace(book, chapters=tuple(map(_own, book.chapters)))
+    )
     path.parent.mkdir(parents=True, exist_ok=True)
     half = path.with_name(f".{path.name}.part")
     half.write_text(text, encoding="utf-8", errors="replace")

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 from markupsafe import Markup
 
-from upright.report.book import Book, Told
+from upright.report.book import READING, Book, Told
 from upright.report.document import Picture
 from upright.report.sections import Part, Table
 
@@ -52,6 +52,7 @@ def _book(book: Book, files: dict[str, bytes]) -> dict[str, Any]:
     return {
         "title": book.title,
         "foot": next((fact for name, fact in book.facts if name == "Made"), ""),
+        "reading": READING,
         "notes": list(book.notes),
         "facts": [list(fact) for fact in book.facts],
         "glance": {
