@@ -60,6 +60,15 @@ def test_an_odd_rig_is_not_a_lying_encoder(make, odd):
     assert checked(ODD[odd](make_rig(make, 3)), make).sound
 
 
+@pytest.mark.parametrize(("make", "travel"), [("linear", 0.1), ("furuta", 1.0)])
+def test_a_short_rail_is_kept_to_and_asked_all_the_same(make, travel):
+    model, rig = make_rig(make), replace(make_rig(make, 1), scales=(1.1, 1.0))
+    blind = probe(model, design_swing_up(model, travel=travel))
+    log = put_out(model, blind)
+    assert np.abs(log[log.outputs[0]]).max() < travel
+    assert scales(model, put_out(rig, blind)).value == pytest.approx([1.1, 1.0], rel=0.01)
+
+
 def test_a_drive_of_twice_the_strength_is_not_blamed_on_a_scale():
     found = checked(replace(make_rig("furuta"), gain=2 * make_rig("furuta").gain), "furuta")
     assert not found.sound

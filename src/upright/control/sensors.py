@@ -17,10 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.control.ascent import swing_up
 from upright.control.rig import Rig
 from upright.control.swing_up import SwingUp
-from upright.control.trial import SUBSTEPS, logged
+from upright.control.trial import SUBSTEPS, logged, trial
 from upright.records import Record
 from upright.simulation import simulate
 
@@ -28,8 +27,8 @@ Array = NDArray[np.float64]
 
 SWING = math.radians(100)
 """Angle to which the model is swung [rad]."""
-COAST = 4.0
-"""How long the rig is watched coasting [s]."""
+PUMP, COAST = 2.5, 4.0
+"""How long the rig may be driven blindly, and is watched coasting [s]."""
 TOLERATED = 0.05
 """Error of a scale that is not spoken of; a loop bears a gain wrong by as much."""
 SURE = 4.0
@@ -105,11 +104,19 @@ def sentence(name: str, value: float, error: float, explained: float) -> str:
 
 
 def probe(model: Rig, law: SwingUp) -> Array:
-    """Commands, shape (N,), that swing the model to `SWING`, then nothing for `COAST`."""
-    run = swing_up(model, law, seconds=6.0)
-    there = np.flatnonzero(run.energy > -law.body.weight * (1.0 + math.cos(SWING)))
-    pumped = int(there[0]) if there.size else run.energy.size // 2
-    return np.concatenate([run.trial.u[:pumped], np.zeros(round(COAST / model.period))])
+    """Commands, shape (N,), that swing the model to `SWING`, as far as that takes no longer than `PUMP`; then none."""
+    x0 = model.plant.state("hanging")
+    rule = law.rule(model, x0)
+    run = trial(model, rule, at="inverted", start=x0 - model.plant.state("inverted"), seconds=PUMP)
+    energy = law.body.energy(run.x[:, 2], run.x[:, 3])
+    there = np.flatnonzero(energy > -law.body.weight * (1.0 + math.cos(SWING)))
+    pumped = int(there[0]) if there.size else run.u.size
+    name = model.plant.coordinates[0].name
+    while True:  # coasting, the driven body goes on; on the model it stays within the travel
+        command = np.concatenate([run.u[:pumped], np.zeros(round(COAST / model.period))])
+        if pumped < 100 or np.abs(put_out(model, command)[name]).max() < 0.9 * law.travel:
+            return command
+        pumped = round(0.85 * pumped)
 
 
 def put_out(rig: Rig, command: Array) -> Record:
@@ -146,27 +153,31 @@ def scales(model: Rig, log: Record, known: Mapping[str, float] | None = None) ->
     drift = np.linspace(0.0, 1.0, len(shown))[:, None] ** np.arange(1, 4)
     z, step, J = np.zeros(m), 0.3, np.zeros((0, 0))
     s, wander, at = np.ones(p), np.zeros(3), shown
-    for turn in range(8):
+    part = math.ceil(0.4 * len(shown))
+    for turn in range(12):  # first the beginning, then all: errors of the model grow with time
         y = _motion(model, command, every, moving, np.vstack([z, z + step * np.eye(m)]) * size)
         at, slopes = y[:, :, 0], (y[:, :, 1:] - y[:, :, :1]) / step
         if turn == 0:
-            s, wander = _projected(shown, at, drift)
+            s, wander = _projected(shown[:part], at[:part], drift[:part])
         left = shown - s * at
         left[:, 0] -= drift @ wander
+        left[part:] = 0.0
         quarters = max(8.0, 2.0 * float(np.sum(np.diff(np.sign(at[:, 1])) != 0)))
-        sigma = np.maximum(np.sqrt(np.mean(left**2, axis=0)), model.quantum) * math.sqrt(len(shown) / quarters)
+        sigma = np.maximum(np.sqrt(np.mean(left[:part] ** 2, axis=0)), model.quantum) * math.sqrt(len(shown) / quarters)
         # unknown: scales, drift of the driven body, numbers of the model in units of what is known of them
         J = np.zeros((p * len(shown) + m, p + 3 + m))
         for i in range(p):
-            rows = slice(i * len(shown), (i + 1) * len(shown))
-            J[rows, i], J[rows, p + 3 :] = at[:, i] / sigma[i], s[i] * slopes[:, i] / sigma[i]
+            rows = slice(i * len(shown), i * len(shown) + part)
+            J[rows, i], J[rows, p + 3 :] = at[:part, i] / sigma[i], s[i] * slopes[:part, i] / sigma[i]
             if i == 0:
-                J[rows, p : p + 3] = drift / sigma[i]
+                J[rows, p : p + 3] = drift[:part] / sigma[i]
         J[p * len(shown) :, p + 3 :] = np.eye(m)
         move = np.linalg.lstsq(J, np.concatenate([*(left / sigma).T, -z]), rcond=None)[0]
         s, wander, z = s + move[:p], wander + move[p : p + 3], np.clip(z + move[p + 3 :], -4.0, 4.0)
-        if np.abs(move[p + 3 :]).max() < 1e-2:
+        if part == len(shown) and np.abs(move[p + 3 :]).max() < 1e-2:
             break
+        if turn >= 4 or np.abs(move[p + 3 :]).max() < 0.1:
+            part = len(shown)
     at = _motion(model, command, every, moving, (z * size)[None])[:, :, 0]
     s, wander = _projected(shown, at, drift)
     motion = s * at
