@@ -74,6 +74,23 @@ def test_every_picture_and_table_of_a_notebook_is_introduced(path):
     assert "ccc" not in kinds
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("inertia(rod, J_a, J_p, J_p)", "inertia(rod, J_p, J_p, J_p)"),  # its first exercise: the rod as printed
+        ("(theta, arm.y)", "(-theta, arm.y)"),  # the rod turned the other way
+        ("place.dt(ground)", "place.dt(arm)"),  # a velocity as the arm sees it
+    ],
+)
+def test_the_derivation_of_eq_3_notices_a_mistake(right, wrong):
+    notebook = read(ROOT / "docs" / "experiment_4.ipynb")
+    sources = ["".join(cell["source"]) for cell in cells(notebook)]
+    assert sum(right in source for source in sources) == 1
+    with pytest.raises(CellFailed, match=r"cell 7 raises AssertionError"):
+        executed(of(*(source.replace(right, wrong) for source in sources)))
+
+
 def test_cells_share_their_names_and_show_print_picture_and_last_value():
     import base64
 
