@@ -19,8 +19,8 @@ _ID = re.compile(r'\b(id="|url\(#|href="#)')
 
 READING = (
     "A verdict is sound when what it says may be built on; with reservations, when its chapter says what stands in the "
-    "way. Intervals are meant to hold the truth in 95 of 100 rigs. Data go one way: later experiments take what earlier "
-    "ones found, with its errors. No fit sees the twin's truth, which is printed beside the result only to judge it."
+    "way. Intervals are meant to hold the truth in 95 of 100 rigs. Data go one way: later experiments take what "
+    "earlier ones found, with its errors. No fit sees the twin's truth, which stands beside the result to judge it."
 )
 """How the cover is meant."""
 
