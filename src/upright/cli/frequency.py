@@ -41,8 +41,8 @@ def frequency(
         list[str] | None, typer.Option(metavar="NAME=VALUE", help='As in "m_p=135 g +- 0.2 %"; fixes the scale.')
     ] = None,
     hold: Annotated[str, typer.Option(metavar="TIME", help="How long a command is held; one sample.")] = "",
-    low: Annotated[float | None, typer.Option("--from", metavar="W", help="Least frequency [rad/s].")] = None,
-    high: Annotated[float | None, typer.Option("--to", metavar="W", help="Greatest frequency [rad/s].")] = None,
+    low: Annotated[float | None, typer.Option("--from", metavar="W", help="Least frequency, in rad/s.")] = None,
+    high: Annotated[float | None, typer.Option("--to", metavar="W", help="Greatest frequency, in rad/s.")] = None,
     data: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder of a study's logs.")] = None,
     out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for results.")] = Path("frequency"),
     as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON instead of tables.")] = False,
