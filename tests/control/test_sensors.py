@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,13 +14,17 @@ from scipy.linalg import solve_discrete_are
 from scipy.special import ellipk
 
 from upright import design
-from upright.control import design_swing_up, trial
+from upright.control import Rig, design_swing_up, trial
 from upright.control.score import FALLEN
 from upright.control.sensors import lifted, probe, put_out, scales
 from upright.control.trial import readings
 from upright.control.watch import ODDS, UNKNOWN, Suspicion, Watch
 from upright.control.watch import watched as guarded
+from upright.lab.encoders import asked
 from upright.lab.makes import make_rig
+from upright.physics import Furuta
+from upright.readers import read
+from upright.records import Record
 
 MAKES = ("furuta", "linear")
 
@@ -182,3 +188,29 @@ def test_a_watched_drive_stops_pushing():
     lost = np.diff(energy)
     assert lost.max() < 1e-4 * np.ptp(energy)  # friction only takes, once the drive's lag is over
     assert np.abs(run.x[:, 1]).max() < 0.5 * np.abs(alone.x[:, 1]).max()
+
+
+@pytest.mark.slow
+@pytest.mark.real_data
+@pytest.mark.parametrize("volts", [2, 4])
+def test_a_real_encoder_that_counts_the_other_way_is_found(volts):
+    """A public direct-drive Furuta pendulum, hanging, shaken by a sine (examples/studies/furuta_sines.toml, whose fit
+    gives these numbers): its two encoders count in opposite senses of fig. 3a."""
+    plant = Furuta(
+        m_p=9.801e-3, l_cg=96.608e-3, r=93.525e-3, J_d=1.35e-4, J_p=1.476e-5, b_1=1.37e-2, b_2=1.96e-5, b_1c=5.9e-3,
+        tilt_x=0.051, tilt_y=0.022,
+    )  # fmt: skip
+    rig = Rig(name="furuta_diy", plant=plant, gain=0.0526, lag=9e-3, limit=12.0, counts=(4000.0, 4000.0), period=2e-3)
+    folder = Path(os.environ["UPRIGHT_REAL_DATA"]) / "furuta_diy_odrive"
+    log = read(folder / f"hardware_sin_response_{volts}V_1s.csv")
+    t = np.arange(log.t[0], log.t[-1], log.period)
+    held = np.searchsorted(log.t, t, side="right") - 1
+    signals = {"u": np.nan_to_num(log["/effort_control/data.0"])[held]}
+    for i, name in enumerate(("psi", "theta")):
+        signals[name] = np.interp(t, log.t, log[f"/joint_states/joint{i}/position"])
+    units = {"psi": "rad", "theta": "rad", "u": "V"}
+    found = asked(rig, Record(t=t - t[0], signals=signals, units=units, inputs=("u",), outputs=("psi", "theta")))
+    assert found.wrong == ("theta",)
+    assert "theta counts the wrong way round" in found.verdict
+    assert np.all(np.abs(found.value - [1.0, -1.0]) < 3 * found.error)
+    assert found.explained.min() > 0.99
