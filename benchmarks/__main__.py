@@ -19,7 +19,7 @@ from benchmarks.measure import Line
 
 NAMES = (
     "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "frequency", "swing_up", "tracking", "lab",
-    "doctor", "rigs", "real", "startup",
+    "doctor", "rigs", "regulation", "real", "startup",
 )  # fmt: skip
 LIBRARIES = ("upright", "numpy", "scipy", "numba", "control", "casadi", "jax", "mujoco")
 
@@ -78,11 +78,14 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--quick", action="store_true", help="fewer rounds and smaller shares, under two minutes")
     parser.add_argument("--full", action="store_true", help="run what is otherwise estimated from its parts")
     parser.add_argument(
-        "--markdown", type=Path, metavar="FILE", help="write the table of `real` or `rigs` for publication"
+        "--markdown",
+        type=Path,
+        metavar="FILE",
+        help="write the table of `real`, `rigs` or `regulation` for publication",
     )
     asked = parser.parse_args(arguments)
-    if asked.markdown and asked.names not in (["real"], ["rigs"]):
-        parser.error("--markdown writes the table of one benchmark: name real or rigs")
+    if asked.markdown and asked.names not in (["real"], ["rigs"], ["regulation"]):
+        parser.error("--markdown writes the table of one benchmark: name real, rigs or regulation")
     if unknown := set(asked.names) - set(NAMES):
         parser.error(f"no benchmark is called {', '.join(sorted(unknown))}; there are {', '.join(NAMES)}")
 
@@ -92,7 +95,7 @@ def main(arguments: list[str] | None = None) -> int:
     missed = 0
     for name in asked.names or NAMES:
         markdown = {"markdown": asked.markdown}
-        extra = {"fit": {"full": asked.full}, "real": markdown, "rigs": markdown}.get(name, {})
+        extra = {"fit": {"full": asked.full}, "real": markdown, "rigs": markdown, "regulation": markdown}.get(name, {})
         module = importlib.import_module(f"benchmarks.{name}")
         lines: list[Line] = module.run(quick=asked.quick, progress=lambda text: told.print(f"[dim]{text}[/]"), **extra)
         console.print(table(name, (module.__doc__ or "").splitlines()[0], lines))

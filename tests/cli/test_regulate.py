@@ -52,6 +52,7 @@ def test_numbers_for_a_program_are_finite_json(fit, tmp_path):
     assert before["chance"] == 0.0  # on a rail of 20 cm no pole set brings 40 degrees back
     assert before["tilt"] < 0.7
     assert said["sets"]["your poles"]["after"] is None
+    assert said["verdict"].startswith("None is to be trusted with this start")
 
 
 @pytest.mark.parametrize(

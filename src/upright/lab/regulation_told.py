@@ -16,8 +16,9 @@ from upright.report.symbols import plain
 def verdict(done: Regulation) -> str:
     """Which set to take, and whether things came as told."""
     best = done.best
-    sure = f"{100 * best.before.words['regulates']:.0f} % of the rigs that the identification allows regulate with it"
-    head = f"Take {best.name}: {sure}."
+    share = best.before.words["regulates"]
+    sure = f"{100 * share:.0f} % of the rigs that the identification allows regulate with it"
+    head = f"{'Take' if share >= 0.5 else 'None is to be trusted with this start; best is'} {best.name}: {sure}."
     if done.truth is None:
         return head + " Nothing was run: this is what the model says."
     as_told = [a for a in done.attempts if a.word == a.before.word]

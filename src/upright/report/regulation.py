@@ -138,7 +138,7 @@ def reliability_figure(chances: Array, came: NDArray[np.bool_], *, bins: int = 1
     below: Any = drawing.add_subplot(grid[1], sharex=ax)
     ax.plot([0, 100], [0, 100], color=GREY, linewidth=0.8, label="as told")
     edges = np.linspace(0, 1, bins + 1)
-    place = np.clip(np.digitize(chances, edges) - 1, 0, bins - 1)
+    place = np.clip((chances * bins + 1e-9).astype(int), 0, bins - 1)
     for b in range(bins):
         inside = place == b
         if not inside.any():
@@ -149,7 +149,9 @@ def reliability_figure(chances: Array, came: NDArray[np.bool_], *, bins: int = 1
             mean, share, yerr=[[share - 100 * low], [100 * high - share]], fmt="o", color=BLUE, capsize=2.5,
             markersize=5, label="came, with 95 % interval" if b == place.min() else None,
         )  # fmt: skip
-    below.hist(100 * chances, bins=(100 * edges).tolist(), color=SKY, edgecolor=BLACK, linewidth=0.6)
+    below.bar(
+        100 * edges[:-1], np.bincount(place, minlength=bins), 100 / bins, align="edge", color=SKY, edgecolor=BLACK
+    )
     ax.set_ylabel("came true [%]")
     ax.set_xlim(0, 100)
     ax.set_ylim(-3, 103)

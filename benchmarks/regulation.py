@@ -1,0 +1,295 @@
+"""Does a chance told before a run mean what it says? 500 random twins, told from an identification, then run.
+
+Every twin is another pendulum on a cart or Furuta, its numbers some percent off the design. It is identified by itself:
+half a volt up and down for 2 s while it hangs, both encoders logged every 8 ms with noise of 0.05 to 2 degrees on top,
+and Gauss-Newton on the nonlinear model with dry friction for six numbers and the drive's gain; the covariance is what
+that noise leaves, with the spread of the make's friction known beforehand. Noise is all that is wrong there, so that
+the covariance is honest; twins identified by frequency response, as in experiment 1b, are looked at apart.
+Poles are one of Table 1's sets, velocities come from plain or filtered differences or a Kalman filter, the limit is 2
+to 5 V and the command up to 4 ms late. The start (tilt and tap in some proportion) lies about the edge of what the
+identified model recovers. The chance comes from 200 rigs drawn from the covariance, each with its own dry friction of
+the day and its own error of the hand; then the law runs on the true rig, with true friction of its day and one hand.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.measure import Line
+
+if TYPE_CHECKING:
+    from upright.control import Rig
+
+NAME = "regulation"
+IMAGE = Path("docs/images/regulation_reliability.png")
+Array = NDArray[np.float64]
+SOUGHT = {
+    "furuta": ("J_d", "J_p", "b_1", "b_2", "b_1c", "b_2c"),
+    "linear": ("m_c", "J_p", "b_1", "b_2", "b_1c", "b_2c"),
+}
+GAIN = "actuator.gain"
+EVERY, SECONDS = 9, 2.0
+STEP = 3e-3  # of differences; finer ones see the moments at which joints stick jump from sample to sample
+LANES = 200
+OFF = 0.05
+"""Relative spread of the numbers sought, on top of that of the make."""
+BINS = 10
+
+
+@dataclass(frozen=True)
+class Told:
+    """One twin: the chance told, and whether it was held."""
+
+    chance: float
+    held: bool
+
+
+def identify(truth: Rig, seed: int) -> tuple[Rig, tuple[str, ...], Array] | None:
+    """Best numbers and their covariance, in logarithms, from a log of the hanging rig; None when the search strays."""
+    from upright.lab.makes import make_rig
+    from upright.simulation import simulate
+
+    rng = np.random.default_rng([seed, 61])
+    make = "furuta" if "psi" in truth.plant.state_names() else "linear"
+    names = (*SOUGHT[make], GAIN)
+    rows = round(SECONDS / truth.period / EVERY) + 1
+    size = 0.5 if make == "furuta" else 0.8
+    u = size * np.sign(np.sin(2 * np.pi * np.arange(rows * EVERY) * truth.period / 0.35))
+    x0 = np.zeros(4)
+
+    def shown(rig: Rig, parameters: Mapping[str, Array], count: int) -> Array:
+        x = simulate(rig.plant, {**rig.drive, **parameters}, x0, u, rig.period, samples=count, every=EVERY)
+        return x[:, 0::2]
+
+    noise = math.radians(0.05 * 40 ** rng.random())
+    spread = np.array([noise if c.unit == "rad" else 0.2 * noise for c in truth.plant.coordinates])
+    step = truth.quantum
+    log = np.round(shown(truth, {}, rows)[:, :, 0] / step) * step + rng.normal(size=(rows, 2)) * spread
+    error = np.hypot(spread, step / math.sqrt(12))
+    model = make_rig(make)
+    model = replace(model, period=truth.period, delay=truth.delay, lag=truth.lag, limit=truth.limit)
+    known = {n: getattr(truth.plant, n) for n in ("m_p", "l_cg", "r") if n in truth.plant.names()}  # from the bench
+    model = model.changed(**known)
+    start = {n: model.gain if n == GAIN else getattr(model.plant, n) for n in names}
+    # the make is known: friction differs by a seventh from rig to rig, and by what `setting` adds
+    prior = np.array([1 / math.hypot(0.14, OFF) if n.startswith("b_") else 1.0 for n in names])
+    p, cost, residual, J = np.zeros(len(names)), np.inf, np.zeros(1), np.eye(len(names))
+    for horizon in (rows // 4, rows // 2, rows):  # the whole at once has false valleys
+        damp, cost, tried = 1e-3, np.inf, p
+        for _ in range(40):
+            lanes = np.vstack([tried, tried + STEP * np.eye(p.size), tried - STEP * np.eye(p.size)])
+            values = {n: start[n] * np.exp(lanes[:, i]) for i, n in enumerate(names)}
+            y = shown(model, values, horizon) / error[:, None]
+            off = np.concatenate([(log[:horizon] / error - y[:, :, 0]).ravel(), -prior * tried])
+            now = float(off @ off)
+            if now <= cost:
+                gained, p, cost, damp, residual = cost - now, tried, now, damp / 5, off
+                slope = (y[:, :, 1 : p.size + 1] - y[:, :, p.size + 1 :]) / (2 * STEP)
+                J = np.vstack([slope.reshape(-1, p.size), np.diag(prior)])
+                if gained < 1e-2:  # of a chi square
+                    break
+            else:
+                damp *= 10
+            H = J.T @ J
+            tried = p + np.clip(np.linalg.solve(H + damp * np.diag(np.diag(H)), J.T @ residual), -0.5, 0.5)
+    if not cost / residual.size < 1.3:
+        return None
+    covariance = np.linalg.inv(J.T @ J)
+    best = {n: start[n] * math.exp(v) for n, v in zip(names, p, strict=True)}
+    gain = best.pop(GAIN)
+    return replace(model, plant=model.plant.replace(**best), gain=gain), names, covariance
+
+
+def drawn(
+    rig: Rig, names: tuple[str, ...], covariance: Array, rng: np.random.Generator, lanes: int
+) -> dict[str, Array]:  # fmt: skip
+    """Parameters of rigs that an identification allows, in logarithms Gaussian."""
+    moves = rng.multivariate_normal(np.zeros(len(names)), covariance, size=lanes)
+    value = {n: rig.gain if n == GAIN else getattr(rig.plant, n) for n in names}
+    return {n: value[n] * np.exp(moves[:, i]) for i, n in enumerate(names)}
+
+
+def setting(make: str, seed: int) -> tuple[Rig, np.random.Generator]:
+    """The true rig, with its drive of this seed, and what is drawn besides."""
+    from upright.lab.makes import make_rig
+
+    rng = np.random.default_rng([seed, 60])
+    truth = make_rig(make, seed)
+    off = {n: getattr(truth.plant, n) * math.exp(rng.normal(0, OFF)) for n in SOUGHT[make]}
+    truth = truth.changed(**off)
+    limit, delay = rng.uniform(2.0, 5.0), truth.delay + rng.choice([0.0, 1e-3, 2e-3, 3e-3])
+    return replace(truth, limit=float(limit), delay=float(delay)), rng
+
+
+def of_the_day(rig: Rig, others: Mapping[str, Array], rng: np.random.Generator, lanes: int) -> dict[str, Array]:
+    """The same rigs, each with the dry friction of its day."""
+    from upright.lab.believed import DAILY
+
+    today = {n: np.exp(rng.normal(0, DAILY, lanes)) * others.get(n, getattr(rig.plant, n)) for n in ("b_1c", "b_2c")}
+    return {**others, **today}
+
+
+def hands(start: Array, rng: np.random.Generator, lanes: int) -> Array:
+    """Starts as a hand gives them."""
+    from upright.lab.regulation import HAND
+
+    return start + rng.normal(size=(lanes, 4)) * np.array([0, 0, *HAND])
+
+
+def one(make: str, seed: int, *, swept: Path | None = None) -> Told | None:
+    """One twin from identification to outcome; `swept` is a folder for one identified as in experiment 1b."""
+    from upright import design
+    from upright.control.many import outcomes
+    from upright.design.requests import read_poles
+    from upright.lab.believed import allowed, believed
+    from upright.lab.makes import make_rig
+    from upright.lab.regulation import SETS, SPEEDS, estimator, identified
+
+    truth, rng = setting(make, seed)
+    if swept is None:
+        found = identify(truth, seed)
+        if found is None:
+            return None
+        rig, names, covariance = found
+        others = of_the_day(rig, drawn(rig, names, covariance, rng, LANES), rng, LANES)
+    else:
+        truth = replace(make_rig(make, seed), limit=truth.limit)
+        file = identified(make, seed, swept)
+        rig = replace(believed(file), limit=truth.limit)
+        others = allowed(file, rig, LANES, seed)
+    model = rig.linear("inverted")
+    sampled = design.hold(model, rig.period, rig.delay / rig.period)
+    poles = read_poles(SETS[f"set {rng.integers(1, 5)}"])
+    way = estimator(model, sampled, rig, SPEEDS[rng.integers(3)], 0.5)
+    law = design.feedback(way, design.place(model.A, model.B, poles).K)
+    angle = rng.uniform(0, math.pi / 2)
+    outwards = np.array([0, 0, 0.7 * math.cos(angle), 6.0 * math.sin(angle)])
+    steps = np.linspace(0, 1.0, 129)[1:]
+    held = outcomes(rig, law, at="inverted", starts=steps[:, None] * outwards, seconds=2.0).held
+    edge = steps[-1] if held.all() else steps[int(np.argmin(held))]
+    start = outwards * edge * math.exp(rng.normal(-0.01, 0.045))
+    task = {"at": "inverted", "seconds": 3.0}
+    told = outcomes(rig, law, starts=hands(start, rng, LANES), parameters=others, **task)
+    came = outcomes(truth, law, starts=hands(start, rng, 1), parameters=of_the_day(truth, {}, rng, 1), **task)
+    return Told(float(np.mean(told.held)), bool(came.held[0]))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Calibration:
+    """Brier score and Murphy's parts of it (1973), over bins of equal width.
+
+    brier = reliability - resolution + uncertainty, but for what varies inside a bin; `expected` is the score of
+    chances that are right, `z` is Spiegelhalter's (1986), standard normal then.
+    """
+
+    brier: float
+    expected: float
+    reliability: float
+    resolution: float
+    uncertainty: float
+    z: float
+
+    @property
+    def skill(self) -> float:
+        """Share of the uncertainty that the chances take away."""
+        return 1 - self.brier / self.uncertainty
+
+
+def calibration(chances: Array, came: NDArray[np.bool_]) -> Calibration:
+    """How good chances were, given what came."""
+    base = float(came.mean())
+    place = np.clip((chances * BINS + 1e-9).astype(int), 0, BINS - 1)
+    reliability = resolution = 0.0
+    for b in range(BINS):
+        inside = place == b
+        if inside.any():
+            share = float(came[inside].mean())
+            reliability += inside.mean() * (chances[inside].mean() - share) ** 2
+            resolution += inside.mean() * (share - base) ** 2
+    spread = np.sum((1 - 2 * chances) ** 2 * chances * (1 - chances))
+    return Calibration(
+        brier=float(np.mean((chances - came) ** 2)), expected=float(np.mean(chances * (1 - chances))),
+        reliability=float(reliability), resolution=float(resolution), uncertainty=base * (1 - base),
+        z=float(np.sum((came - chances) * (1 - 2 * chances)) / math.sqrt(spread)) if spread else 0.0,
+    )  # fmt: skip
+
+
+def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None = None) -> list[Line]:
+    """Brier score and its parts, for the twins and for those identified as in experiment 1b."""
+    from tempfile import TemporaryDirectory
+
+    lines: list[Line] = []
+    rows: list[str] = []
+    for what, count in (("identified by steps", 60 if quick else 500), ("identified as in 1b", 6 if quick else 40)):
+        progress(f"{NAME}: {count} twins {what}")
+        began = time.process_time()
+        told: list[Told | None] = []
+        for i in range(count):
+            make, seed = ("furuta", "linear")[i % 2], 1 + i // 2
+            if what == "identified as in 1b":
+                with TemporaryDirectory() as folder:
+                    told.append(one(make, seed, swept=Path(folder)))
+            else:
+                told.append(one(make, seed))
+        each = (time.process_time() - began) / count
+        kept = [t for t in told if t is not None]
+        chances, came = np.array([t.chance for t in kept]), np.array([t.held for t in kept])
+        found = calibration(chances, came)
+        lines.append(
+            Line(
+                benchmark=NAME, contender=what, seconds=(each,) * 3, error=found.brier,
+                note=f"Brier {found.brier:.3f}, {found.expected:.3f} if calibrated; skill {found.skill:.2f}; "
+                f"Spiegelhalter z {found.z:+.2f}; {100 * came.mean():.0f} % of {len(kept)} held, "
+                f"told {100 * chances.mean():.0f} %",
+            )
+        )  # fmt: skip
+        rows += table(what, found, chances, came, count - len(kept))
+        if markdown is not None and what == "identified by steps":
+            from upright.report.drawing import save
+            from upright.report.regulation import reliability_figure
+
+            save(reliability_figure(chances, came, bins=BINS), IMAGE)
+    if markdown is not None:
+        markdown.write_text(page(rows), encoding="utf-8")
+    return lines
+
+
+def table(what: str, found: Calibration, chances: Array, came: NDArray[np.bool_], strayed: int) -> list[str]:
+    """Two tables of one kind of twins."""
+    place = np.clip((chances * BINS + 1e-9).astype(int), 0, BINS - 1)
+    lost = f"; for {strayed} more the identification said that it had failed" if strayed else ""
+    out = [
+        "", f"## {chances.size} twins {what}{lost}", "", "| | |", "|---|---|",
+        f"| Brier score | {found.brier:.4f} |", f"| the same if the chances are right | {found.expected:.4f} |",
+        f"| reliability (0 is best) | {found.reliability:.4f} |", f"| resolution | {found.resolution:.4f} |",
+        f"| uncertainty: the score of always telling {100 * came.mean():.1f} % | {found.uncertainty:.4f} |",
+        f"| skill over that | {100 * found.skill:.1f} % |",
+        f"| Spiegelhalter's z (within ±1.96 for 95 % of right chances) | {found.z:+.2f} |",
+        "", "| chance told | twins | mean told | came true |", "|---|---|---|---|",
+    ]  # fmt: skip
+    for b in range(BINS):
+        inside = place == b
+        if inside.any():
+            told, true = 100 * chances[inside].mean(), 100 * came[inside].mean()
+            bounds = f"{100 * b // BINS} to {100 * (b + 1) // BINS} %"
+            out.append(f"| {bounds} | {inside.sum()} | {told:.1f} % | {true:.1f} % |")
+    return out
+
+
+def page(rows: list[str]) -> str:
+    """The published tables."""
+    told = (__doc__ or "").strip().splitlines()
+    head = [
+        f"# Calibration: {told[0]}", "",
+        "Written by `python -m benchmarks regulation --markdown benchmarks/regulation.md`.", *told[2:], "",
+        f"![What came, against the chance told](../{IMAGE.as_posix()})",
+    ]  # fmt: skip
+    return "\n".join([*head, *rows]) + "\n"
