@@ -29,7 +29,9 @@ def bench(monkeypatch):
         makes = ("furuta", "linear") if key != "3" else ("rectilinear",)
         return Experiment(key=key, part_of=key[0], title=f"Small {key}", makes=makes, needs=needs, seconds=1, tell=tell)
 
-    monkeypatch.setattr(laboratory, "EXPERIMENTS", (small("1"), small("2", ("1",)), small("3", ("1",))))
+    all_of_them = (small("1"), small("2", ("1",)), small("3", ("1",)))
+    for module in (laboratory, laboratory_page):
+        monkeypatch.setattr(module, "EXPERIMENTS", all_of_them)
     return ran, trouble
 
 
@@ -86,6 +88,21 @@ def test_what_was_made_of_something_else_is_made_again(bench, tmp_path, change):
     laboratory.run(("1", "2"), "", 0, tmp_path)
     again = laboratory.run(("1", "2"), call["make"], call["seed"], tmp_path, fresh=fresh)
     assert [t.state for t in again.told] == ["done", "done"]
+
+
+def test_one_experiment_again_does_not_cost_the_others_their_place(bench, tmp_path):
+    ran, trouble = bench
+    laboratory.run((), "", 0, tmp_path)
+    again = laboratory.run(("2",), "", 0, tmp_path, fresh=True)
+    assert [(t.experiment.key, t.state) for t in again.told] == [("1", "done"), ("2", "done"), ("3", "kept")]
+    assert laboratory_page.command(again) == "upright lab"
+    trouble["2"] = KeyboardInterrupt()
+    stopped = laboratory.run(("2",), "", 0, tmp_path, fresh=True)
+    assert stopped.interrupted
+    assert [t.experiment.key for t in stopped.told] == ["1", "2", "3"]  # 2 as it was kept: it still holds
+    alone = laboratory.run(("1",), "", 1, tmp_path)
+    assert laboratory_page.command(alone) == "upright lab --experiment 1 --seed 1"
+    assert ran == ["1", "2", "3", "1", "2", "1", "2", "1"]
 
 
 def test_a_torn_file_is_made_again(bench, tmp_path):

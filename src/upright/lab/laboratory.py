@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -65,7 +65,7 @@ def choose(asked: Sequence[str], make: str) -> tuple[Experiment, ...]:
     BadInput
         When there is no such experiment, or not on this rig.
     """
-    there = [e for e in EXPERIMENTS if not make or make in e.makes]
+    there = _there(make)
     wanted: set[str] = set()
     for name in asked:
         found = [e for e in EXPERIMENTS if name in (e.key, e.part_of)]
@@ -82,21 +82,23 @@ def choose(asked: Sequence[str], make: str) -> tuple[Experiment, ...]:
         wanted = {e.key for e in there}
     for e in reversed(there):  # who builds on another comes after it
         if e.key in wanted:
-            wanted |= {n for n in e.needs if _make(e, make) in _find(n).makes and _same_rig(e, _find(n), make)}
+            wanted |= set(_needs(e, make))
     return tuple(e for e in there if e.key in wanted)
 
 
-def _find(key: str) -> Experiment:
-    return next(e for e in EXPERIMENTS if e.key == key)
+def _there(make: str) -> list[Experiment]:
+    """Experiments that a rig can have; all for the paper's."""
+    return [e for e in EXPERIMENTS if not make or make in e.makes]
+
+
+def _needs(e: Experiment, make: str) -> list[str]:
+    """What it takes numbers from: earlier experiments on the same rig."""
+    return [n.key for n in _there(make) if n.key in e.needs and _make(n, make) == _make(e, make)]
 
 
 def _make(e: Experiment, make: str) -> Make:
     of: dict[str, Make] = {m: m for m in e.makes}
     return of.get(make, e.makes[0])
-
-
-def _same_rig(one: Experiment, other: Experiment, make: str) -> bool:
-    return _make(one, make) == _make(other, make)
 
 
 def run(
@@ -135,36 +137,54 @@ def run(
     """  # fmt: skip
     began = time.perf_counter()
     session = Session(make=make, seed=seed, folder=folder, asked=choose(asked, make))
-    digests: dict[str, str] = {}
+    digests = _digests(make, seed)
     whole = sum(e.seconds for e in session.asked)
     behind = 0.0
     for e in session.asked:
-        needs = [n for n in e.needs if n in digests and _same_rig(e, _find(n), make)]
-        digests[e.key] = made_of(e.key, _make(e, make), seed, needs=[digests[n] for n in needs])
 
         def tell(step: str, share: float, e: Experiment = e, behind: float = behind) -> None:
             if progress:
                 progress(f"experiment {e.key}: {step}", (behind + e.seconds * min(share, 1.0)) / whole)
 
         try:
-            session.told.append(_one(session, e, digests[e.key], needs, tell, stopped, fresh))
+            session.told.append(_one(session, e, digests[e.key], tell, stopped, fresh))
             session.interrupted = session.told[-1].state == "stopped"
         except KeyboardInterrupt:
             session.interrupted = True
         if session.interrupted:
             break
         behind += e.seconds
+    session.told = _with_kept(session, digests)
     session.seconds = time.perf_counter() - began
     return session
 
 
+def _digests(make: str, seed: int) -> dict[str, str]:
+    """What each experiment that this rig can have is made of."""
+    digests: dict[str, str] = {}
+    for e in _there(make):
+        digests[e.key] = made_of(e.key, _make(e, make), seed, needs=[digests[n] for n in _needs(e, make)])
+    return digests
+
+
+def _with_kept(session: Session, digests: Mapping[str, str]) -> list[Told]:
+    """What was told, and what else is there from an earlier run on the same rig."""
+    told = {t.experiment.key: t for t in session.told}
+    for e in _there(session.make):
+        found = None if e.key in told else kept(session.folder / e.key, digests[e.key])
+        if found:
+            make = _make(e, session.make)
+            name = make_rig(make, session.seed).name
+            told[e.key] = Told(experiment=e, make=make, rig=name, chapter=found, state="kept", seconds=0.0)
+    return [told[e.key] for e in _there(session.make) if e.key in told]
+
+
 def _one(
-    session: Session, e: Experiment, digest: str, needs: Sequence[str], progress: Progress,
-    stopped: Callable[[], bool], fresh: bool,
-) -> Told:  # fmt: skip
+    session: Session, e: Experiment, digest: str, progress: Progress, stopped: Callable[[], bool], fresh: bool
+) -> Told:
     """One experiment, from an earlier run where that still holds."""
     began = time.perf_counter()
-    make = _make(e, session.make)
+    make, needs = _make(e, session.make), _needs(e, session.make)
     rig, folder = make_rig(make, session.seed), session.folder / e.key
     folder.mkdir(parents=True, exist_ok=True)
     progress("starting", 0.0)

@@ -53,8 +53,9 @@ def command(session: Session, seed: int | None = None) -> str:
     if session.make:
         shown.append(f"--rig {session.make}")
     there = [e for e in EXPERIMENTS if not session.make or session.make in e.makes]
-    if len(session.asked) < len(there):
-        shown += [f"--experiment {e.key}" for e in session.asked]
+    told = {e.key for e in session.asked} | {t.experiment.key for t in session.told}
+    if len(told) < len(there):
+        shown += [f"--experiment {e.key}" for e in there if e.key in told]
     if seed:
         shown.append(f"--seed {seed}")
     return " ".join(shown)
