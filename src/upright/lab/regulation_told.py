@@ -17,7 +17,7 @@ def verdict(done: Regulation) -> str:
     """Which set to take, and whether things came as told."""
     best = done.best
     share = best.before.words["regulates"]
-    sure = f"{100 * share:.0f} % of the rigs that the identification allows regulate with it"
+    sure = f"{round(share * done.wish.draws)} of {done.wish.draws} rigs that the identification allows regulate with it"
     head = f"{'Take' if share >= 0.5 else 'None is to be trusted with this start; best is'} {best.name}: {sure}."
     if done.truth is None:
         return head + " Nothing was run: this is what the model says."
@@ -34,7 +34,7 @@ def verdict(done: Regulation) -> str:
 def detail(done: Regulation) -> str:
     """How far that can be trusted."""
     spread = (
-        f"{done.wish.draws} rigs were drawn from the fit's covariance, dry friction as it may be on the day, and "
+        f"The {done.wish.draws} rigs were drawn from the fit's covariance, dry friction as it may be on the day, and "
         "started as a hand does it."
         if done.uncertain
         else "The fit tells of no uncertainty, so only dry friction and the hand vary: the chances are too sure."
