@@ -216,6 +216,8 @@ def _sigma(data: FrequencyResponse, model: Complex | None, without: Complex | No
     own = np.hypot(data.error, FLOOR)
     if model is None or without is None:
         return np.hypot(own, 0.01)
+    if data.together:  # what stands on lines not asked stands on those asked as well
+        own = np.hypot(own, data.distortion)
     return np.hypot(own, FRICTION * np.minimum(np.abs(np.log(model / without)), 1.0))
 
 

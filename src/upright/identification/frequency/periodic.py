@@ -24,9 +24,10 @@ DRAWS = 200
 
 
 def odd_lines(low: float, high: float, count: int, base: float) -> NDArray[np.int64]:
-    """Odd multiples of `base` [rad/s], about evenly spaced on a log scale between two frequencies."""
+    """Odd multiples of `base` [rad/s], about evenly spaced on a log scale; every fourth is left silent, to be heard."""
     wanted = np.geomspace(low, high, count) / base
-    return np.unique(2 * np.floor(wanted / 2).astype(np.int64) + 1)
+    lines = np.unique(2 * np.floor(wanted / 2).astype(np.int64) + 1)
+    return lines[np.arange(lines.size) % 4 != 2]
 
 
 def multisine(lines: NDArray[np.int64], amplitude: Array, length: int, *, seed: int = 0) -> Array:
@@ -120,10 +121,12 @@ def _level(y: Array) -> Array:
 
 
 def _between(mean: Complex, lines: NDArray[np.int64]) -> Array:
-    """What stands on lines not asked, as root of its power near each line over the line's own size."""
-    others = np.ones(mean.shape[0], dtype=bool)
+    """What stands on odd lines not asked, as root of its power near each line over the line's own size.
+
+    Dry friction and geometry are odd: as much of them stands on the lines that were asked.
+    """
+    others = np.arange(mean.shape[0]) % 2 == 1
     others[lines] = False
-    others[0] = False
     where = np.flatnonzero(others)
     power = np.abs(mean) ** 2
     near = np.array([power[where[np.argsort(np.abs(where - k))[:4]]].mean(axis=0) for k in lines])
