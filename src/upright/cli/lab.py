@@ -66,6 +66,7 @@ def lab(
     from upright.report.pdf import write_pdf
 
     laboratory.choose(experiment or (), rig)  # says what is wrong with the call before anything is written
+    _say_first_time()
     from upright.cli.terminal import step_bar
 
     with _ctrl_c() as pressed, step_bar(quiet=as_json) as tell:
@@ -84,6 +85,18 @@ def lab(
         _say(session, report, pdf)
     if session.interrupted or pressed.times:
         raise typer.Exit(INTERRUPTED)
+
+
+def _say_first_time() -> None:
+    """Why the first run takes longer, where nothing is compiled yet."""
+    from upright.simulation.compiled import folder
+
+    if len(list(folder().glob("*.py"))) < 10:  # the whole laboratory needs 15
+        typer.echo(
+            "The first time, the equations of motion are compiled for this machine, about two minutes; afterwards the "
+            "laboratory takes some 20 s.",
+            err=True,
+        )
 
 
 @dataclass
