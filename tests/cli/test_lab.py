@@ -155,7 +155,7 @@ def spoken(tmp_path_factory):
 def test_it_ends_with_the_report_and_what_to_try_next(spoken):
     folder, outcome = spoken
     assert outcome.exit_code == 0, outcome.output
-    assert (folder / "report.html").is_file()
+    assert (folder / "report.html").stat().st_size < 5_000_000  # can be mailed
     assert re.search(r"Report: .*report\.html", outcome.stdout)
     for e in EXPERIMENTS:
         assert f"Experiment {e.key}, {e.title}" in outcome.stdout
