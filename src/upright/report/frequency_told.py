@@ -103,7 +103,7 @@ def _unseen(answer: Answer) -> set[str]:
 
 def _meaning(answer: Answer, name: str) -> str:
     p = answer.rig.parameters[name]
-    return p.meaning + ("" if p.estimate else ", known from the bench")
+    return p.meaning + ("" if p.estimate else ", known beforehand")
 
 
 def _interval(e: Estimate) -> str:
