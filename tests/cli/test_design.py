@@ -55,6 +55,7 @@ def fit_file(folder: Path, stderr: float) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_the_gains_hold_the_nonlinear_rig(study, tmp_path):
     outcome = design(study, "--poles", POLES, "--limit", "0.6", "-o", tmp_path)
     assert outcome.exit_code == 0, outcome.stderr
@@ -73,6 +74,7 @@ def test_the_gains_hold_the_nonlinear_rig(study, tmp_path):
     assert "open loop" in page
 
 
+@pytest.mark.slow
 def test_gains_from_a_fit_are_in_the_command_s_unit(study, tmp_path):
     """0.5 N m/V: twice the gains in volts."""
     design(study, "--poles", POLES, "-o", tmp_path / "force")
@@ -84,6 +86,7 @@ def test_gains_from_a_fit_are_in_the_command_s_unit(study, tmp_path):
     assert volts["chance_over_the_fit"] == 1.0
 
 
+@pytest.mark.slow
 def test_the_chance_of_standing_is_that_of_a_gain_within_its_margin(tmp_path):
     """Gain normal about 0.5 with 0.35: stands above the gain margin, so with the chance of the normal law.
 
@@ -96,6 +99,7 @@ def test_the_chance_of_standing_is_that_of_a_gain_within_its_margin(tmp_path):
     assert "of the rigs that the fit allows fall" in " ".join(outcome.stdout.split())
 
 
+@pytest.mark.slow
 def test_least_cost_uses_up_the_limit(study, tmp_path):
     outcome = design(study, "--lqr", "1,0,1,0", "--limit", "0.5", "--start", "theta=4 deg", "--json", "-o", tmp_path)
     assert outcome.exit_code == 0, outcome.stderr
@@ -103,6 +107,7 @@ def test_least_cost_uses_up_the_limit(study, tmp_path):
     assert "as the effort gets cheaper" in (tmp_path / "design.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_every_encoder_has_its_own_counts(study, tmp_path):
     """Noise of a plain difference is its step over T sqrt 6, coordinate by coordinate."""
     outcome = design(study, "--poles", POLES, "--counts", "psi=4000, theta=20000", "--speed", "plain", "-o", tmp_path)
@@ -112,6 +117,7 @@ def test_every_encoder_has_its_own_counts(study, tmp_path):
         assert number(2 * math.pi / counts / (1e-3 * math.sqrt(6)), 2) in page
 
 
+@pytest.mark.slow
 def test_a_lag_takes_effort_and_margin(study, tmp_path):
     told = []
     for lag in ("0 ms", "8 ms"):

@@ -31,6 +31,7 @@ def fit(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_set_is_told_and_run(fit, tmp_path):
     outcome = regulate(fit, "--seed", 0, "--set", 3, "--seconds", 2, "-o", tmp_path / "out")
     assert outcome.exit_code == 0, outcome.stderr
@@ -42,6 +43,7 @@ def test_a_set_is_told_and_run(fit, tmp_path):
     assert "Holding it upright" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_numbers_for_a_program_are_finite_json(fit, tmp_path):
     outcome = regulate(
         fit, "--poles", "-5+-2j, -20, -3", "--tilt", "40 deg", "--seconds", 2, "--json", "-o", tmp_path / "out"

@@ -42,6 +42,7 @@ def test_every_finding_carries_its_evidence_and_its_picture():
             assert finding.sentence.endswith(".")
 
 
+@pytest.mark.slow
 def test_only_what_a_rig_tells_is_left_out_without_one():
     d = batch("rectilinear-2", "sign", 5, seed=6)[0]
     alone = examine(d.record)

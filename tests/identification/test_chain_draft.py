@@ -54,6 +54,7 @@ def test_an_assumed_gain_fixes_the_scale_and_starts_are_of_the_right_size(drafte
         assert 0.5 < given[name].value / truth < 2, name
 
 
+@pytest.mark.slow
 def test_a_draft_explains_its_log_without_a_change(drafted):
     one, two = spun_up()
     _, study = drafted(t=T, target_value=VOLTS, enc1=one, enc2=two)

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 
 from upright.identification import Parameter, Rig, Run, identify
 from upright.physics import find
@@ -13,6 +14,7 @@ TRUTH = {"J_1": 0.010, "J_2": 0.009, "k_12": 2.3, "c_1": 0.005, "c_12": 5e-4, "f
 SWING = 2 * math.pi / math.sqrt(TRUTH["k_12"] * (1 / TRUTH["J_1"] + 1 / TRUTH["J_2"]))
 
 
+@pytest.mark.slow
 def test_the_end_of_a_push_is_found_from_one_swing_too_early():
     t = np.arange(3001) * 2e-3
     u = np.where((t > 0.2) & (t < 5.0), 0.5, 0.0)[:, None]

@@ -37,6 +37,7 @@ def asked(*names: str, off: float = 1.0) -> Rig:
     return Rig(plant=Torsional2, parameters=parameters)
 
 
+@pytest.mark.slow
 def test_a_trip_is_seen_without_a_model_and_to_a_few_samples():
     for end in (1.7, 2.531, 3.4):
         (trip,) = find_trips(asked(), spin_up(actuator={"end": end}))
@@ -54,6 +55,7 @@ def test_a_late_begin_is_seen():
     assert trip.at == pytest.approx(1.8, abs=5e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "actuator", [{}, {"knee": 10.0, "fade": 5e-3}, {"lag": 0.02, "slope": 2e-3}, {"damping": 0.0, "standby": 0.0}]
 )
@@ -86,6 +88,7 @@ def test_a_sine_that_trips_is_seen():
     assert trip.at == pytest.approx(end, abs=0.02)
 
 
+@pytest.mark.slow
 def test_a_fit_says_that_a_drive_went_off_and_what_to_declare():
     fit = identify(asked("f_1c", off=0.7), [spin_up(actuator={"end": 2.5}, label="silent")])
     (said,) = [w for w in fit.warnings if "went off" in w or "gone off" in w]
@@ -107,6 +110,7 @@ def tripped():
     return identify(asked(*names, off=0.7), runs), names
 
 
+@pytest.mark.slow
 def test_the_moment_of_a_trip_is_estimated_with_the_friction(tripped):
     fit, _ = tripped
     for label, end in (("trips at 2.5 s", 2.5), ("trips at 1.9 s", 1.9)):

@@ -13,6 +13,7 @@ from upright.physics import chain
 KINDS = ("rectilinear", "torsional")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_twins_are_weighed_within_one_percent(kind):
     """Twelve rigs here, a hundred in `python -m benchmarks loadings`."""

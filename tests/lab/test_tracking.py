@@ -25,6 +25,7 @@ from upright.physics import chain
 FRICTIONLESS = {"f_1c": 0.0, "f_2c": 0.0}
 
 
+@pytest.mark.slow
 def test_the_far_body_ends_at_the_reference_without_friction():
     """Final value theorem: k_pf makes the static gain one, whatever poles, seed and encoders."""
     for kind in KINDS:
@@ -114,6 +115,7 @@ def test_the_loop_is_linear_in_the_gains():
     np.testing.assert_allclose(A + 3.0 * P + 0.4 * D, closed_by(rig, law), rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_sum_makes_up_for_a_push_and_follows_the_step_as_before(kind):
     rig = make_rig(kind, 2).changed(**FRICTIONLESS)
@@ -131,6 +133,7 @@ def test_a_sum_makes_up_for_a_push_and_follows_the_step_as_before(kind):
     assert ends[1] == pytest.approx(step, abs=abs(ends[0] - step) * 3 * math.exp(3 * EXTRA) + 2 * rig.quantum[1])
 
 
+@pytest.mark.slow
 def test_disks_move_as_carts_do_in_other_units():
     """m - J, k - k_t, c - c_t, F - T: with factors that are powers of two even the rounding is the same."""
     carts = make_rig("rectilinear", 5)
@@ -164,6 +167,7 @@ def test_pulses_stay_within_travel_and_twist():
                 assert np.abs(q[:, 0] - q[:, 1]).max() < SHAFTS[kind].twist
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_four_sets_follow_and_the_fourth_comes_close_to_the_limit(kind, tmp_path):
     done = run(kind, 4, tmp_path)

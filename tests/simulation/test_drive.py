@@ -24,6 +24,7 @@ def piecewise(t, v0, pieces):
     return v
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("start", "zero", "end", "tolerance"),
     [
@@ -135,6 +136,7 @@ def test_order_of_convergence_away_from_kinks(block):
     assert np.log(error[0] / error[2]) / np.log(9) > 3.8, error
 
 
+@pytest.mark.slow
 def test_a_tripped_joint_slides_to_a_stop_where_it_should(block):
     F, F_c, end = 2.0, 0.7, 0.5077
     p = {**BLOCK, "F_c": F_c, "actuator.gain": F, "actuator.end": end}
@@ -145,6 +147,7 @@ def test_a_tripped_joint_slides_to_a_stop_where_it_should(block):
         assert (x[1] == 0.0).all()
 
 
+@pytest.mark.slow
 def test_a_braking_drive_and_dry_friction_stop_a_block_together(block):
     # v' = -d v - F_c ends at t = ln(1 + d v0/F_c)/d, after v0/d - F_c/d^2 ln(1 + d v0/F_c)
     v0, d, F_c = 2.0, 1.5, 0.4
@@ -155,6 +158,7 @@ def test_a_braking_drive_and_dry_friction_stop_a_block_together(block):
     assert np.count_nonzero(x[:, 1]) == math.ceil(log / d / 0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("moved", [False, True])
 def test_the_drive_brakes_an_arm_whose_pendulum_is_held(rotary, moved):
     # J psi'' = T - D psi' with the pendulum hanging still
@@ -172,6 +176,7 @@ def test_the_drive_brakes_an_arm_whose_pendulum_is_held(rotary, moved):
     assert np.allclose(x[:, 1, 0], T / 0.03 * -np.expm1(-rate * t), rtol=0, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_moments_count_from_the_first_sample_of_the_record(block):
     u = np.random.default_rng(0).standard_normal(120)
     p = {**BLOCK, "k": 20.0, "F_c": 0.05, "actuator.lag": 0.03, "actuator.start": 0.203, "actuator.end": 0.777}
@@ -239,6 +244,7 @@ def wound(t, x0, pieces, k, c, relaxation):
     return out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("relaxation", [1e-3, 0.08, 5.0])
 def test_braking_builds_up_and_fades_as_the_current_of_a_winding(block, relaxation):
     k, c, D, F, dt, n, off = 80.0, 0.3, 2.0, 1.5, 0.01, 201, 0.9
