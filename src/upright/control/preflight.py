@@ -17,7 +17,7 @@ from upright.control.many import outcomes
 from upright.control.rig import Rig
 from upright.control.score import Score, Scores, score
 from upright.control.trial import Trial, trial
-from upright.design import Feedback, Margins, Sampled, margins
+from upright.design import Feedback, Margins, Sampled, hold, margins
 from upright.design.loop import closed, command_noise
 from upright.design.requests import poles_of
 from upright.errors import BadInput
@@ -115,7 +115,8 @@ def preflight(
     rig : Rig
         As identified.
     model, sampled : Linear, Sampled
-        Its linear model about the equilibrium, and the same as the law was designed on.
+        Its linear model about the equilibrium, and the same as the law was designed on; margins and noise count the
+        rig's lag as well.
     law : Feedback
     task : Task
     parameters : mapping of str to array, shape (lanes,)
@@ -125,7 +126,8 @@ def preflight(
     seed : int
         Of the hand's errors.
     """
-    stands = bool(np.abs(poles_of(closed(sampled, law))).max() < 1)
+    driven = hold(model, sampled.period, sampled.delay, rig.lag)  # whatever the law was designed on
+    stands = bool(np.abs(poles_of(closed(driven, law))).max() < 1)
     run = trial(rig, law, at=task.at, start=task.start, seconds=task.seconds)
     starts = task.starts(lanes, np.random.default_rng([seed, 52]))
     drawn = outcomes(rig, law, at=task.at, starts=starts, seconds=task.seconds, parameters=parameters)
@@ -134,8 +136,8 @@ def preflight(
     tilted, tapped = last.copy(), last.copy()
     tilted[-2], tapped[-1] = 1.0, 1.0
     return Preflight(
-        margins=margins(model, sampled, law) if stands else None,
-        noise=command_noise(sampled, law, rig.quantum) if stands else None,
+        margins=margins(model, driven, law) if stands else None,
+        noise=command_noise(driven, law, rig.quantum) if stands else None,
         run=run,
         score=score(run),
         tilt=largest(rig, law, task.at, tilted, most=np.pi / 2) if stands else 0.0,
