@@ -230,18 +230,19 @@ def _attempt(
 
 def _ways(done: Regulation, model: Linear, sampled: Sampled) -> list[Way]:
     on, K = done.truth or done.rig, done.best.placement.K
+    driven = design.hold(model, sampled.period, sampled.delay, done.rig.lag)
     out: list[Way] = []
     for speed in SPEEDS:
         way = estimator(model, sampled, done.rig, speed, done.wish.memory)
         law = design.feedback(way, K)
-        stands = bool(np.abs(poles_of(closed(sampled, law))).max() < 1)
+        stands = bool(np.abs(poles_of(closed(driven, law))).max() < 1)
         start = actual_start(done.task, done.seed)
         went = trial(on, law, at=done.task.at, start=start, seconds=done.task.seconds)
         out.append(
             Way(
                 name=way.name,
-                noise=command_noise(sampled, law, done.rig.quantum) if stands else None,
-                margins=design.margins(model, sampled, law) if stands else None,
+                noise=command_noise(driven, law, done.rig.quantum) if stands else None,
+                margins=design.margins(model, driven, law) if stands else None,
                 run=went,
                 score=score(went),
                 restless=float(np.sqrt(np.mean(np.diff(went.u[went.t <= 1.0]) ** 2))),
