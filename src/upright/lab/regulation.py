@@ -236,8 +236,7 @@ def _ways(done: Regulation, model: Linear, sampled: Sampled) -> list[Way]:
         way = estimator(model, sampled, done.rig, speed, done.wish.memory)
         law = design.feedback(way, K)
         stands = bool(np.abs(poles_of(closed(driven, law))).max() < 1)
-        start = actual_start(done.task, done.seed)
-        went = trial(on, law, at=done.task.at, start=start, seconds=done.task.seconds)
+        went = trial(on, law, at=done.task.at, start=actual_start(done.task, done.seed), seconds=done.task.seconds)
         out.append(
             Way(
                 name=way.name,
