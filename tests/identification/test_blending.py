@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 
 from upright.identification import Parameter, Rig, Run, identify
 from upright.physics import find
@@ -23,6 +24,7 @@ def spin_up() -> Run:
                unknown=(), initial=dict.fromkeys(PLANT.state_names(), 0.0))  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_shaft_is_found_although_the_friction_is_another():
     # the model has no dry friction, the rig has: no viscous friction makes up for it, and both disks are led astray
     asked = {"J_1", "J_2", "k_12", "c_1", "c_12"}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from upright.identification.estimate import identify
 from upright.identification.model import Parameter, Rig, Run
@@ -16,6 +17,7 @@ DRIVE = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_spin_up_tells_when_the_drive_tripped_and_how_it_brakes() -> None:
     dt, n = 0.01, 500
     t = np.arange(n) * dt

@@ -33,6 +33,7 @@ def fitted(**known: float) -> Fit:
     return identify(rig(Furuta, TRUTH | known, guesses), [noisy(run, 1e-4, seed=1)])
 
 
+@pytest.mark.slow
 def test_the_right_model_keeps_both_frictions() -> None:
     fit = fitted()
     for name in FRICTION:

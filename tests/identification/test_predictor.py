@@ -146,6 +146,7 @@ def test_restarts_know_the_past_alone() -> None:
     assert np.all(np.any(before[:, ~seen] != after[:, ~seen], axis=0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [3, 4])
 def test_the_pole_of_a_balanced_pendulum_lies_in_its_interval(seed: int) -> None:
     fit = identify(rig(Furuta, VALUES, GUESSES), [balanced(seed)], method="least-squares")

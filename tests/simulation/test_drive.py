@@ -188,6 +188,7 @@ def test_moments_count_from_the_first_sample_of_the_record(block):
         assert np.allclose(x[:, :, i], whole[s : s + 31], rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_drive_at_its_defaults_does_nothing(block):
     p = {**BLOCK, "k": 5.0, "F_c": 0.1}
     u = np.sin(np.arange(80) * 0.2)
@@ -212,6 +213,7 @@ def test_a_lane_whose_drive_is_not_a_number_says_so(block, name):
     assert np.isfinite(x[:, :, 1]).all()
 
 
+@pytest.mark.slow
 def test_a_loop_that_trips_leaves_the_plant_to_itself(block):
     dt, K, n, trip = 0.02, np.array([6.0, 1.2]), 100, 50
     p = {**BLOCK, "m": 0.8, "k": 12.0, "c": 0.4, "actuator.damping": 0.6, "actuator.end": trip * dt}

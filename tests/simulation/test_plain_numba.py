@@ -14,6 +14,7 @@ from upright.simulation.source import direct, source
 FRICTION = {**FURUTA, "b_1c": 0.2, "b_2c": 0.02}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lanes", [1, 20])
 def test_plain_text_gives_the_same_motion(rotary, lanes):
     x0 = np.random.default_rng(7).uniform(-1.0, 1.0, (4, lanes))

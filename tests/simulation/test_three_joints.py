@@ -59,6 +59,7 @@ def by_events(x, v, force, t_end):
     raise AssertionError("too many changes of mode")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lanes", [1, 17])
 @pytest.mark.parametrize(
     ("x", "v", "force"),

@@ -80,6 +80,7 @@ def test_a_slower_servo_is_recovered_at_its_own_rate() -> None:
     assert found.gains["kd"].value == pytest.approx(0.1, rel=1e-7)
 
 
+@pytest.mark.slow
 def test_rows_that_miss_samples_of_the_servo_are_no_exact_law() -> None:
     found = found_in(closed_loop(Pid(kp=4.0, kd=0.2, period=T / 5), every=5))
     assert found.quality in ("partial", "poor")
@@ -94,6 +95,7 @@ def test_junk_in_the_first_row_does_no_harm() -> None:
     assert found.quality == "exact"
 
 
+@pytest.mark.slow
 def test_two_channels_and_a_feedforward_are_told_apart() -> None:
     generator = np.random.default_rng(3)
     a, b = np.cumsum(generator.normal(size=(2, 3000)), axis=1) * 0.01
@@ -116,6 +118,7 @@ def test_the_law_found_goes_on_where_the_log_stops() -> None:
     np.testing.assert_allclose(later[3:], whole["u"][3:], atol=1e-6 * np.ptp(whole["u"]))
 
 
+@pytest.mark.slow
 def test_noise_is_no_law() -> None:
     record = closed_loop(Pid(kp=3.0))
     noise = np.random.default_rng(2).normal(size=record.t.size)
@@ -138,6 +141,7 @@ def test_an_open_loop_is_no_law() -> None:
     assert found.quality == "poor"
 
 
+@pytest.mark.slow
 def test_a_law_with_a_dead_zone_is_not_called_exact() -> None:
     pid = Pid(kp=3.0)
     found = found_in(closed_loop(lambda y, r: 0.0 if abs(r - y) < 0.2 else pid(y, r)))
