@@ -22,7 +22,8 @@ def _identifier(name: str, power: str = "") -> str:
     upright = ' mathvariant="normal"' if len(stem) > 1 else ""
     out = f"<mi{upright}>{escape(stem)}</mi>"
     if dot:
-        out = f'<mover accent="true">{out}<mo>{"¨" if twice else "˙"}</mo></mover>'
+        # not as an accent: browsers without a mathematical font would draw the dots into the letter
+        out = f"<mover>{out}<mo>{'¨' if twice else '˙'}</mo></mover>"
     below = f"<mtext>{escape(below)}</mtext>" if below else ""
     if below and power:
         return f"<msubsup>{out}{below}{power}</msubsup>"
