@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from upright.identification.model import RunScore
+from upright.identification.model.model import RunScore
 
 SMOOTHED = 0.05
 """Seconds over which a speed is taken, by parabolas through the counts."""
@@ -51,7 +51,7 @@ class Asked:
         return self.signal == "twist" or self.signal.removeprefix("speed of ") in score.fit_percent
 
     def _of(self, score: RunScore) -> float:
-        from upright.identification.scoring import fit_percent
+        from upright.identification.inference.scoring import fit_percent
 
         if self.horizon is not None:
             return score.ahead[self.horizon][self.signal]

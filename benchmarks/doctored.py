@@ -198,9 +198,9 @@ def _record(
 ) -> Doctored:  # fmt: skip
     """Sensors, log and fault of one motion."""
     from upright.doctor import Known
-    from upright.identification.columns import Drive, Sensor
-    from upright.identification.model import ACTUATOR, Parameter
+    from upright.identification.model.model import ACTUATOR, Parameter
     from upright.records import Provenance, Record
+    from upright.study.columns import Drive, Sensor
 
     names = [c.name for c in cls.coordinates]
     encoders = rng.random() < 0.7

@@ -21,8 +21,8 @@ NAME = "frequency"
 def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     """Errors of the pole by least squares and by the paper's simplex, and how often intervals hold."""
     from upright.identification.frequency.answer import key_value
-    from upright.lab.frequency import run as sweep
-    from upright.lab.frequency_page import true_key
+    from upright.lab.frequency_1b.chapter import true_key
+    from upright.lab.frequency_1b.run import run as sweep
 
     lines: list[Line] = []
     seeds = range(1, 9 if quick else 51)

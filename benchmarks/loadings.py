@@ -18,7 +18,7 @@ NAME = "loadings"
 
 def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     """Median errors and how often the intervals hold, per kind of rig and quantity."""
-    from upright.lab.loadings import run as weigh
+    from upright.lab.weighing_1a.twin import run as weigh
 
     lines: list[Line] = []
     seeds = range(1, 26 if quick else 101)

@@ -17,7 +17,7 @@ import numpy as np
 from benchmarks.measure import Line
 
 NAME = "nist"
-CERTIFIED = Path(__file__).parents[1] / "tests" / "identification" / "nist_strd.json"
+CERTIFIED = Path(__file__).parents[1] / "tests" / "identification" / "search" / "nist_strd.json"
 
 
 def problems() -> list[dict[str, Any]]:
@@ -40,7 +40,7 @@ def digits(found: np.ndarray, certified: list[float]) -> float:
 
 def results() -> Iterator[tuple[str, str, float, float, int, float]]:
     """Name, start, digits of parameters and of standard errors, evaluations, seconds."""
-    from upright.identification.curve import fit_curve
+    from upright.identification.search.curve import fit_curve
 
     for problem in problems():
         for start in ("start1", "start2"):

@@ -60,7 +60,7 @@ def ensemble(p: np.ndarray, x0: np.ndarray, *, samples: int, stick_slip: bool) -
 def study() -> tuple[Any, Any]:
     """Rig and run of the synthetic fit: eight unknowns, two encoders."""
     from benchmarks import fit as asked
-    from upright.identification.model import Parameter, Rig, Run
+    from upright.identification.model.model import Parameter, Rig, Run
     from upright.physics import Furuta
     from upright.simulation import simulate
 
@@ -91,8 +91,8 @@ def study() -> tuple[Any, Any]:
 def search() -> Callable[[], np.ndarray]:
     """Levenberg-Marquardt over the growing horizon, nothing else; estimates as `benchmarks.fit.TRUTH`."""
     from benchmarks import fit as asked
-    from upright.identification.descent import grow
-    from upright.identification.pose import pose
+    from upright.identification.problem.pose import pose
+    from upright.identification.search.descent import grow
 
     rig, run = study()
 

@@ -50,7 +50,7 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
 
 
 def _result(name: str, data: str, rounds: int) -> Result:
-    from upright.identification.crossval import cross_validate
+    from upright.identification.ladder.crossval import cross_validate
 
     study, fit, _ = _timed(name, data)  # compiles what is not compiled yet
     taken = [_timed(name, data)[2] for _ in range(rounds)]
@@ -62,7 +62,7 @@ def _result(name: str, data: str, rounds: int) -> Result:
 def _timed(name: str, data: str) -> tuple[Any, Any, float]:
     """A study, its fit and the seconds from study file to verdict."""
     from upright.identification.estimate import identify
-    from upright.identification.study import load_study
+    from upright.study.load import load_study
 
     start = time.perf_counter()
     study = load_study(STUDIES / f"{name}.toml", data=data)

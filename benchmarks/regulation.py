@@ -54,7 +54,7 @@ class Told:
 
 def identify(truth: Rig, seed: int) -> tuple[Rig, tuple[str, ...], Array] | None:
     """Best numbers and their covariance, in logarithms, from a log of the hanging rig; None when the search strays."""
-    from upright.lab.makes import make_rig
+    from upright.lab.rigs.makes import make_rig
     from upright.simulation import simulate
 
     rng = np.random.default_rng([seed, 61])
@@ -119,7 +119,7 @@ def drawn(
 
 def setting(make: str, seed: int) -> tuple[Rig, np.random.Generator]:
     """The true rig, with its drive of this seed, and what is drawn besides."""
-    from upright.lab.makes import make_rig
+    from upright.lab.rigs.makes import make_rig
 
     rng = np.random.default_rng([seed, 60])
     truth = make_rig(make, seed)
@@ -131,7 +131,7 @@ def setting(make: str, seed: int) -> tuple[Rig, np.random.Generator]:
 
 def of_the_day(rig: Rig, others: Mapping[str, Array], rng: np.random.Generator, lanes: int) -> dict[str, Array]:
     """The same rigs, each with the dry friction of its day."""
-    from upright.lab.believed import DAILY
+    from upright.lab.rigs.believed import DAILY
 
     today = {n: np.exp(rng.normal(0, DAILY, lanes)) * others.get(n, getattr(rig.plant, n)) for n in ("b_1c", "b_2c")}
     return {**others, **today}
@@ -139,7 +139,7 @@ def of_the_day(rig: Rig, others: Mapping[str, Array], rng: np.random.Generator, 
 
 def hands(start: Array, rng: np.random.Generator, lanes: int) -> Array:
     """Starts as a hand gives them."""
-    from upright.lab.regulation import HAND
+    from upright.lab.regulation_2.run import HAND
 
     return start + rng.normal(size=(lanes, 4)) * np.array([0, 0, *HAND])
 
@@ -149,9 +149,9 @@ def one(make: str, seed: int, *, swept: Path | None = None) -> Told | None:
     from upright import design
     from upright.control.many import outcomes
     from upright.design.requests import read_poles
-    from upright.lab.believed import allowed, believed
-    from upright.lab.makes import make_rig
-    from upright.lab.regulation import SETS, SPEEDS, estimator, identified
+    from upright.lab.regulation_2.run import SETS, SPEEDS, estimator, identified
+    from upright.lab.rigs.believed import allowed, believed
+    from upright.lab.rigs.makes import make_rig
 
     truth, rng = setting(make, seed)
     if swept is None:
@@ -253,8 +253,8 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
         )  # fmt: skip
         rows += table(what, found, chances, came, count - len(kept))
         if markdown is not None and what == "identified by steps":
+            from upright.lab.regulation_2.figures import reliability_figure
             from upright.report.drawing import save
-            from upright.report.regulation import reliability_figure
 
             save(reliability_figure(chances, came, bins=BINS), IMAGE)
     if markdown is not None:

@@ -40,7 +40,7 @@ def _up(make: str, count: int, scatter: float) -> Line:
     """Twins whose numbers lie `scatter` times as far from the model's as a make's do."""
     from upright.control import design_swing_up
     from upright.control.ascent import UPRIGHT
-    from upright.lab.makes import make_rig
+    from upright.lab.rigs.makes import make_rig
     from upright.simulation import simulate
 
     model, rigs = make_rig(make), [make_rig(make, seed) for seed in range(1, count + 1)]
@@ -80,7 +80,7 @@ def _sensors(make: str, count: int) -> list[Line]:
     from upright.control.sensors import probe, put_out, scales
     from upright.control.trial import readings
     from upright.control.watch import Suspicion, Watch
-    from upright.lab.makes import make_rig
+    from upright.lab.rigs.makes import make_rig
 
     model = make_rig(make)
     names = [c.name for c in model.plant.coordinates]

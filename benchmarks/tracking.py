@@ -21,10 +21,10 @@ NAME = "tracking"
 
 def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     """Spread of the step figures per kind of rig and law, and how many stay within effort, travel and twist."""
-    from upright.lab.makes import make_rig
-    from upright.lab.tracking import run as track
-    from upright.lab.tracking_log import KINDS
-    from upright.lab.tracking_runs import attempt
+    from upright.lab.rigs.makes import make_rig
+    from upright.lab.tracking_3.run import run as track
+    from upright.lab.tracking_3.shaft import KINDS
+    from upright.lab.tracking_3.trials import attempt
 
     lines: list[Line] = []
     seeds = range(1, 13 if quick else 101)

@@ -10,12 +10,13 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from upright.lab import frequency, weighing
-from upright.lab.makes import make_rig
+from upright.lab.frequency_1b import run as frequency
+from upright.lab.frequency_1b.figures import bode_figure
+from upright.lab.frequency_1b.tables import curves
+from upright.lab.rigs.makes import make_rig
+from upright.lab.weighing_1a import run as weighing
+from upright.lab.weighing_1a.figures import line_figure
 from upright.report.drawing import save
-from upright.report.frequency import bode_figure
-from upright.report.frequency_told import curves
-from upright.report.loadings import line_figure
 
 seed = int(sys.argv[1]) if sys.argv[1:] else 0
 rig = make_rig("furuta", seed)

@@ -14,10 +14,11 @@ import numpy as np
 
 from upright.control import design_swing_up
 from upright.control.ascent import swing_up
-from upright.lab import frequency, regulation
-from upright.lab.believed import believed
-from upright.lab.makes import make_rig
-from upright.lab.rig_file import read_rig_file
+from upright.lab.frequency_1b import run as frequency
+from upright.lab.regulation_2 import run as regulation
+from upright.lab.rigs.believed import believed
+from upright.lab.rigs.makes import make_rig
+from upright.lab.rigs.rig_file import read_rig_file
 from upright.report.drawing import CYCLE, figure, save, styled
 
 seed = int(sys.argv[1]) if sys.argv[1:] else 0

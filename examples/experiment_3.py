@@ -9,10 +9,10 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from upright.lab import tracking
-from upright.lab.tracking_parts import frame, trace
+from upright.lab.tracking_3 import run as tracking
+from upright.lab.tracking_3.figures import steps_figure
+from upright.lab.tracking_3.parts import frame, trace
 from upright.report.drawing import save
-from upright.report.tracking import steps_figure
 
 seed = int(sys.argv[1]) if sys.argv[1:] else 0
 

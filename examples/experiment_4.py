@@ -10,9 +10,10 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from upright.lab import drift, free_swing
-from upright.lab.makes import make_rig
-from upright.lab.twin import freed
+from upright.lab.free_swing_4 import drift
+from upright.lab.free_swing_4 import studies as free_swing
+from upright.lab.rigs.makes import make_rig
+from upright.lab.rigs.twin import freed
 from upright.physics import Furuta
 from upright.report.drawing import save
 from upright.report.figures import fit_figure

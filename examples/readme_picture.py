@@ -9,9 +9,9 @@ import argparse
 from pathlib import Path
 
 from upright.identification.estimate import identify
-from upright.identification.study import load_study
 from upright.report.drawing import save
 from upright.report.figures import fit_figure
+from upright.study.load import load_study
 
 ask = argparse.ArgumentParser(description=__doc__.splitlines()[0])
 ask.add_argument("study", type=Path)

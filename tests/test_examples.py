@@ -120,7 +120,7 @@ def test_a_plant_from_a_file_stays_where_it_hangs(path, name):
 @pytest.mark.real_data
 @pytest.mark.parametrize("path", STUDIES, ids=name_of)
 def test_a_study_finds_its_logs_and_says_whose_they_are(path, monkeypatch):
-    from upright.identification.study import load_study
+    from upright.study.load import load_study
 
     study = load_study(path, data=os.environ["UPRIGHT_REAL_DATA"])
     assert study.runs

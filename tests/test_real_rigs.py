@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from benchmarks.asked import ASKED, studies
-from upright.identification.crossval import cross_validate
 from upright.identification.estimate import identify
-from upright.identification.study import load_study
+from upright.identification.ladder.crossval import cross_validate
+from upright.study.load import load_study
 
 STUDIES = Path(__file__).parents[1] / "examples" / "studies"
 MODES = {"ecp205_spinup": 3.55}

@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from upright.cli import app
-from upright.identification.study_keys import SECTIONS
+from upright.study.keys import SECTIONS
 
 LENGTH, G = 0.35, 9.81
 W = math.sqrt(G / LENGTH)
@@ -113,7 +113,7 @@ def test_json_on_the_terminal_is_the_file(bench):
 def test_ctrl_c_keeps_and_writes_the_best_so_far(bench, monkeypatch):
     from dataclasses import replace
 
-    from upright.identification import estimate
+    from upright.identification import identify as estimate
 
     whole = estimate.identify
     monkeypatch.setattr(estimate, "identify", lambda *a, **k: replace(whole(*a, **k), interrupted=True))

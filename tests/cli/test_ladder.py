@@ -11,8 +11,8 @@ from typer.testing import CliRunner
 
 from tests.identification.twins import PENDULUM, noisy, swing
 from upright.cli import app
-from upright.identification import climb
-from upright.identification.study import load_study
+from upright.identification.ladder import grow as climb
+from upright.study.load import load_study
 
 pytestmark = pytest.mark.slow
 

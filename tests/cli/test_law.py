@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from typer.testing import CliRunner
 
-from tests.identification.laws.programs import Pid, closed_loop
+from tests.closed_loop.programs import Pid, closed_loop
 from upright.cli import app
 
 

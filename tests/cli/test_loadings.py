@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from upright.cli import app
-from upright.lab.loadings import acquire, rig
+from upright.lab.weighing_1a.twin import acquire, rig
 
 pytestmark = pytest.mark.slow
 

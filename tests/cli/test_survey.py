@@ -10,7 +10,7 @@ from scipy.stats import binomtest
 from typer.testing import CliRunner
 
 from upright.cli import app
-from upright.report.survey import wilson
+from upright.survey.page import wilson
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "survey"
 

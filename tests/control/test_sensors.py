@@ -20,8 +20,8 @@ from upright.control.sensors import lifted, probe, put_out, scales
 from upright.control.trial import readings
 from upright.control.watch import ODDS, UNKNOWN, Suspicion, Watch
 from upright.control.watch import watched as guarded
-from upright.lab.encoders import asked
-from upright.lab.makes import make_rig
+from upright.lab.rigs.encoders import asked
+from upright.lab.rigs.makes import make_rig
 from upright.physics import Furuta
 from upright.readers import read
 from upright.records import Record

@@ -14,9 +14,9 @@ from tests.paper.test_errata import possible
 from upright.cli import app
 from upright.design import lqr
 from upright.design.factorization import effort_ratios, recover_locus
-from upright.lab.paper import tables
-from upright.lab.paper.errata import printed_inverted
-from upright.lab.paper.reproduce import reproduce
+from upright.paper import tables
+from upright.paper.errata import printed_inverted
+from upright.paper.reproduce import reproduce
 from upright.physics import Furuta, chain
 
 

@@ -10,7 +10,7 @@ import pytest
 from tests.identification.twins import PENDULUM, noisy, rig, swing
 from tests.report.conftest import make_swing
 from upright.identification.estimate import predict
-from upright.identification.scoring import fit_percent
+from upright.identification.inference.scoring import fit_percent
 from upright.physics import Pendulum
 from upright.report.figures import fit_figure
 from upright.report.tables import score_rows

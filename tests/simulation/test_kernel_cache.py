@@ -14,14 +14,14 @@ import pytest
 
 from tests.simulation.conftest import BLOCK
 from upright.simulation import choose, simulate
-from upright.simulation.compiled import called, folder, kernel, written
-from upright.simulation.flavour import Layout
+from upright.simulation.kernel.compiled import called, folder, kernel, written
+from upright.simulation.kernel.flavour import Layout
 
 MOTION = """
 from upright.physics import chain
 from upright.simulation import choose, simulate
-from upright.simulation.compiled import kernel
-from upright.simulation.flavour import Layout
+from upright.simulation.kernel.compiled import kernel
+from upright.simulation.kernel.flavour import Layout
 
 plant, values = chain(1)(m_1=1.0, k_1=20.0), {friction}
 x = simulate(plant, values, [0.3, 0.0], None, 0.01, samples=101)

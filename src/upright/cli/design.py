@@ -11,8 +11,8 @@ import typer
 from upright.errors import BadInput, nearest
 
 if TYPE_CHECKING:
-    from upright.lab.designing import Designed
-    from upright.lab.rig_file import RigFile
+    from upright.lab.designing.run import Designed
+    from upright.lab.rigs.rig_file import RigFile
 
 
 def design(
@@ -51,9 +51,9 @@ def design(
     upright design out/fit.json --at inverted --poles "-4.15+-1.63j, -16.9, -3.2"
     """
     from upright.design.requests import read_poles
-    from upright.lab import design_page
-    from upright.lab.designing import Wish, design_for
-    from upright.lab.rig_file import read_rig_file
+    from upright.lab.designing import page as design_page
+    from upright.lab.designing.run import Wish, design_for
+    from upright.lab.rigs.rig_file import read_rig_file
     from upright.units import parse
 
     if out.exists() and not out.is_dir():
@@ -150,7 +150,7 @@ def _say(done: Designed, files: tuple[Path, Path], source: Path) -> None:
     from rich.markup import escape
 
     from upright.cli.terminal import console, on_terminal, typed
-    from upright.lab import design_page
+    from upright.lab.designing import page as design_page
 
     screen = console()
     for table in (design_page.gain_table(done), design_page.pole_table(done), design_page.way_table(done)):

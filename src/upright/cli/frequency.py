@@ -76,9 +76,9 @@ def frequency(
 def _twin(make: str, seed: int, ask: str, out: Path, as_json: bool) -> None:
     from upright.cli.terminal import progress_line
     from upright.errors import nearest
-    from upright.lab.frequency import run
-    from upright.lab.frequency_page import chapter
-    from upright.lab.makes import MAKES, make_rig
+    from upright.lab.frequency_1b.chapter import chapter
+    from upright.lab.frequency_1b.run import run
+    from upright.lab.rigs.makes import MAKES, make_rig
     from upright.report.chapter import write_chapter
 
     if make not in MAKES:
@@ -99,8 +99,8 @@ def _read(
     sources: list[Path], out: Path, data: Path | None, as_json: bool, *, rig: str, command: str, kind: str, seed: int,
     hold: str, signals: dict[str, str], counts: dict[str, str], known: dict[str, str], band: tuple[float, float],
 ) -> None:  # fmt: skip
-    from upright.lab.frequency_log import Wish, look
-    from upright.lab.frequency_page import of_log
+    from upright.lab.frequency_1b.chapter import of_log
+    from upright.lab.frequency_1b.own_log import Wish, look
     from upright.report.chapter import write_chapter
     from upright.units import parse
 
@@ -138,7 +138,7 @@ def _count(name: str, text: str) -> float:
 
 def _known(name: str, text: str, make: str) -> tuple[float, float]:
     """Value and standard uncertainty [SI]."""
-    from upright.lab.makes import PLANTS
+    from upright.lab.rigs.makes import PLANTS
     from upright.units import parse
 
     plant = next((p for m, p in PLANTS.items() if m == make), None)
@@ -161,7 +161,7 @@ def _known(name: str, text: str, make: str) -> tuple[float, float]:
 
 def _say(told: Chapter, answer: Answer | None, files: tuple[Path, ...], as_json: bool, truth: Any) -> None:
     from upright.cli.terminal import console, on_terminal
-    from upright.report.frequency_told import parameter_table, pole_table, response_table, way_table
+    from upright.lab.frequency_1b.tables import parameter_table, pole_table, response_table, way_table
 
     if as_json:
         content = {"verdict": told.verdict, "sound": told.sound, **told.numbers, "files": [str(f) for f in files]}

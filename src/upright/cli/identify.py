@@ -16,7 +16,7 @@ METHODS = ("auto", "simplex", "least-squares")
 
 def _keys(asked: bool) -> None:
     if asked:
-        from upright.identification.study_keys import reference
+        from upright.study.keys import reference
 
         typer.echo(reference())
         raise typer.Exit
@@ -92,7 +92,7 @@ def identify(
         raise BadInput(
             f"the study {study} does not exist; `upright init LOG -o {typed(study.name)}` writes one from a log"
         )
-    from upright.identification.study import load_study
+    from upright.study.load import load_study
 
     folder = out if out is not None else study.with_name(f"{study.stem}-fit")
     if folder.exists() and not folder.is_dir():
@@ -110,9 +110,9 @@ def identify(
         )
     if not any(run.role == "fit" for run in asked.runs):
         raise BadInput(f'{study}: every run has role = "predict"; at least one needs role = "fit"')
-    from upright.identification.crossval import cross_validate
     from upright.identification.estimate import identify as estimate
-    from upright.identification.fitfile import write_fit
+    from upright.identification.ladder.crossval import cross_validate
+    from upright.study.fit_file import write_fit
 
     with progress_line(quiet=as_json) as progress:
         fit = estimate(asked.rig, asked.runs, method=method, progress=progress)

@@ -46,9 +46,9 @@ def init(
         study = study / f"{log.stem}.toml"
     if study.exists() and not force:
         raise BadInput(f"{study} exists already; name another file with -o, or replace it with --force")
-    from upright.identification.draft import draft
     from upright.physics import find
     from upright.readers import inspect, read
+    from upright.study.draft.pendulum import draft
 
     if plant:
         find(plant)

@@ -50,7 +50,7 @@ def lab(
     upright lab --rig linear --seed 3
     upright lab --experiment 1b --experiment 2 -o out
     """
-    from upright.lab.makes import MAKES
+    from upright.lab.rigs.makes import MAKES
 
     if seed < 0:
         raise BadInput(f"--seed needs a whole number of at least 0, got {seed}.")
@@ -89,7 +89,7 @@ def lab(
 
 def _say_first_time() -> None:
     """Why the first run takes longer, where nothing is compiled yet."""
-    from upright.simulation.compiled import folder
+    from upright.simulation.kernel.compiled import folder
 
     if len(list(folder().glob("*.py"))) < 10:  # the whole laboratory needs 15
         typer.echo(

@@ -52,9 +52,9 @@ def ladder(
     stopped by Ctrl-C.
     """
     from upright.cli.terminal import progress_line, typed
-    from upright.identification.climb import climb
-    from upright.identification.ladderfile import can_be_trimmed, chosen_study, write_ladder
-    from upright.identification.study import load_study
+    from upright.identification.ladder.grow import climb
+    from upright.study.ladder_file import can_be_trimmed, chosen_study, write_ladder
+    from upright.study.load import load_study
 
     if not study.exists():
         raise BadInput(

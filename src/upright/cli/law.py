@@ -11,7 +11,7 @@ import typer
 from upright.errors import BadInput
 
 if TYPE_CHECKING:
-    from upright.identification.laws import Recovery
+    from upright.closed_loop import Recovery
     from upright.records import Record
 
 
@@ -39,8 +39,8 @@ def law(
 
     upright law run.csv --command u --measured theta --reference target
     """
-    from upright.identification.laws import recover
-    from upright.identification.laws.telling import as_json
+    from upright.closed_loop import recover
+    from upright.closed_loop.telling import as_json
     from upright.readers import read
     from upright.report.laws import save_law
 
@@ -69,7 +69,7 @@ def _print(log: Path, record: Record, found: Recovery, files: tuple[Path, ...]) 
     from rich.table import Table
 
     from upright.cli.terminal import console
-    from upright.identification.laws.telling import recovering, written
+    from upright.closed_loop.telling import recovering, written
 
     screen = console()
     law = found.law

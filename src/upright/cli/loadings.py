@@ -12,7 +12,7 @@ import typer
 from upright.errors import BadInput, NotIdentifiable
 
 if TYPE_CHECKING:
-    from upright.identification.loadings import Loaded, Loadings
+    from upright.identification.loadings.fit import Loaded, Loadings
     from upright.records import Record
 
 _MASSES = re.compile(r"\s*(\d+)\s+at\s+(.+)")
@@ -61,10 +61,10 @@ def loadings(
             f"Every log needs its --added, in the same order: {len(logs or ())} logs came with {len(added or ())};"
             ' write --added "0 kg" for the bare one, or try --twin rectilinear.'
         )
-    from upright.identification.loadings import swings, weigh
+    from upright.identification.loadings.fit import swings, weigh
+    from upright.lab.weighing_1a.page import write_loadings
     from upright.readers import read
     from upright.report.advice import Step
-    from upright.report.loadings_told import write_loadings
     from upright.units import parse
 
     values = [inertia(text) for text in added or ()]
@@ -108,9 +108,9 @@ def loadings(
 
 
 def _twin(kind: str, seed: int, out: Path, as_json: bool) -> None:
-    from upright.lab.loadings import run, truth, write_logs
+    from upright.lab.weighing_1a.page import write_loadings
+    from upright.lab.weighing_1a.twin import run, truth, write_logs
     from upright.report.advice import Step
-    from upright.report.loadings_told import write_loadings
 
     if kind != "rectilinear" and kind != "torsional":
         raise BadInput(f"--twin is rectilinear or torsional, got '{kind}'.")
@@ -166,7 +166,7 @@ def _tell(
     from rich.table import Table
 
     from upright.cli.terminal import console
-    from upright.report.loadings_told import rows
+    from upright.lab.weighing_1a.page import rows
 
     if as_json:
         named = {"k": found.k, "bare": found.bare, "damping": found.damping}

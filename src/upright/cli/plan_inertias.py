@@ -12,7 +12,7 @@ import typer
 from upright.errors import BadInput, nearest
 
 if TYPE_CHECKING:
-    from upright.identification.planning import Loading, Plan
+    from upright.identification.loadings.planning import Loading, Plan
 
 UNITS = {"rectilinear": "kg", "torsional": "kg m^2"}
 FLAT = 0.1
@@ -42,7 +42,7 @@ def plan_inertias(
 
     upright plan-inertias --rig torsional --error "0.3 %" --radius "4 cm" --radius "9 cm"
     """
-    from upright.identification.planning import best
+    from upright.identification.loadings.planning import best
     from upright.units import parse
 
     if rig not in UNITS:
@@ -60,7 +60,7 @@ def plan_inertias(
     wanted = _share(target, "--target") if target else None
     chosen = choose({n: p[0].k for n, p in plans.items()}, wanted)
     if out is not None:
-        from upright.report.loadings import save_plans
+        from upright.lab.weighing_1a.figures import save_plans
 
         save_plans(plans, chosen, out)
     if as_json:
@@ -71,7 +71,7 @@ def plan_inertias(
 
 def loadings(rig: str, radius: list[str] | None) -> list[Loading]:
     """What can be added to a cart, or to a disk on the bolt circles given."""
-    from upright.identification.planning import Loading
+    from upright.identification.loadings.planning import Loading
     from upright.physics.loads import added_inertia, added_mass
     from upright.units import parse
 

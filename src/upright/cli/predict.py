@@ -33,8 +33,8 @@ def predict(
     upright predict swing-fit/fit.json other_day.toml
     """
     from upright.cli.terminal import console, print_scores
-    from upright.identification.fitfile import read_fit
-    from upright.identification.study import load_study
+    from upright.study.fit_file import read_fit
+    from upright.study.load import load_study
 
     for file, what in ((model, "the model"), (study, "the study")):
         if not file.exists():
@@ -49,7 +49,7 @@ def predict(
             f"{study}: the plant '{asked.plant}' has no parameter {missing[0]}, and {model} is a '{fitted.plant}';"
             " both must be the same plant"
         )
-    from upright.identification.scoring import predict as score
+    from upright.identification.inference.scoring import predict as score
 
     rig = replace(asked.rig, substeps=fitted.substeps)
     scores = score(fitted.values, rig, [replace(run, role="predict") for run in asked.runs], groups=fitted.groups)

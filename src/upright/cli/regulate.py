@@ -11,9 +11,9 @@ import typer
 from upright.errors import BadInput
 
 if TYPE_CHECKING:
-    from upright.lab.makes import Make
-    from upright.lab.regulation import Regulation, Wish
-    from upright.lab.rig_file import RigFile
+    from upright.lab.regulation_2.run import Regulation, Wish
+    from upright.lab.rigs.makes import Make
+    from upright.lab.rigs.rig_file import RigFile
 
 
 def regulate(
@@ -47,9 +47,10 @@ def regulate(
     upright regulate out/fit.json --seed 3 --set 2 --tilt "20 deg"
     """
     from upright.cli.terminal import step_bar
-    from upright.lab import regulation, regulation_page
-    from upright.lab.makes import make_rig
-    from upright.lab.rig_file import read_rig_file
+    from upright.lab.regulation_2 import chapter as regulation_page
+    from upright.lab.regulation_2 import run as regulation
+    from upright.lab.rigs.makes import make_rig
+    from upright.lab.rigs.rig_file import read_rig_file
     from upright.report.chapter import write_chapter
     from upright.report.symbols import typed
 
@@ -85,7 +86,7 @@ def regulate(
 
 def _wish(which: str, poles: str, speed: str, memory: float, tilt: str, push: str, seconds: float) -> Wish:
     from upright.design.requests import read_poles
-    from upright.lab.regulation import SETS, Wish
+    from upright.lab.regulation_2.run import SETS, Wish
     from upright.units import parse
 
     if which and poles:
@@ -103,7 +104,8 @@ def _say(done: Regulation, chapter: Any, report: Path) -> None:
     from rich.markup import escape
 
     from upright.cli.terminal import console, on_terminal
-    from upright.lab import regulation_page, regulation_told
+    from upright.lab.regulation_2 import chapter as regulation_page
+    from upright.lab.regulation_2 import sentences as regulation_told
 
     screen = console()
     tables = [regulation_page.gain_table(done), regulation_page.told_table(done)]

@@ -26,8 +26,8 @@ def reproduce(
     from rich.markup import escape
 
     from upright.cli.terminal import console, on_terminal, typed
-    from upright.lab.paper import page
-    from upright.lab.paper.reproduce import reproduce as again
+    from upright.paper import page
+    from upright.paper.reproduce import reproduce as again
 
     if out.exists() and not out.is_dir():
         raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")

@@ -31,8 +31,8 @@ def survey(
     upright survey ratings.csv -o out
     upright survey means.csv --n 53
     """
-    from upright.report.survey import told, write_survey
     from upright.survey import Ratings, read
+    from upright.survey.page import told, write_survey
 
     if out.exists() and not out.is_dir():
         raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")

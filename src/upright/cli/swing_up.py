@@ -50,11 +50,11 @@ def swing_up(
     upright swing-up out/fit.json --check swings.csv
     """
     from upright.cli.terminal import typed
-    from upright.lab import swing_up as experiment
-    from upright.lab import swing_up_page
-    from upright.lab.believed import believed, make_of
-    from upright.lab.makes import make_rig
-    from upright.lab.rig_file import read_rig_file
+    from upright.lab.rigs.believed import believed, make_of
+    from upright.lab.rigs.makes import make_rig
+    from upright.lab.rigs.rig_file import read_rig_file
+    from upright.lab.swing_up_2b import chapter as swing_up_page
+    from upright.lab.swing_up_2b import run as experiment
     from upright.report.chapter import write_chapter
 
     if out.exists() and not out.is_dir():
@@ -97,8 +97,8 @@ def swing_up(
 
 
 def _check(model: Rig, log: Path, known: Mapping[str, float] | None, out: Path, as_json: bool, source: str) -> None:
-    from upright.lab import swing_up_page
-    from upright.lab.encoders import asked
+    from upright.lab.rigs.encoders import asked
+    from upright.lab.swing_up_2b import chapter as swing_up_page
     from upright.readers import read
     from upright.report.chapter import write_chapter
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from upright.report.symbols import typed
 
 if TYPE_CHECKING:
-    from upright.identification.crossval import CrossValidation
-    from upright.identification.model import Fit, RunScore
+    from upright.identification.ladder.crossval import CrossValidation
+    from upright.identification.model.model import Fit, RunScore
 
 Progress = Callable[[str, float, float, int], None]
 

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from upright.control import Rig
-    from upright.lab.tracking import Tracking
-    from upright.lab.tracking_log import Kind
+    from upright.lab.tracking_3.run import Tracking
+    from upright.lab.tracking_3.shaft import Kind
     from upright.report.advice import Step
 
 INTERRUPTED = 130
@@ -51,9 +51,9 @@ def track(
     """
     from upright.cli.terminal import progress_line
     from upright.design.requests import read_poles
-    from upright.lab import tracking
-    from upright.lab.tracking_page import chapter
-    from upright.lab.tracking_tables import as_json as content_of
+    from upright.lab.tracking_3 import run as tracking
+    from upright.lab.tracking_3.chapter import chapter
+    from upright.lab.tracking_3.tables import as_json as content_of
     from upright.report.chapter import write_chapter
     from upright.units import parse
 
@@ -72,7 +72,7 @@ def track(
                 line(stage, share, float("nan"), 0)
 
         if model is None:
-            from upright.lab.makes import make_rig
+            from upright.lab.rigs.makes import make_rig
 
             twin = make_rig(kind, seed)
             twin = twin if limit is None else replace(twin, limit=limit)
@@ -102,7 +102,7 @@ def _which(text: str) -> tuple[int, ...]:
 
 def _kind(source: Path | None, make: str, limit: float | None) -> tuple[Kind, Rig | None]:
     """Kind of rig, and the rig that a fit describes, with what the make says of drive and encoders."""
-    from upright.lab.tracking_log import KINDS, from_file
+    from upright.lab.tracking_3.shaft import KINDS, from_file
 
     if limit is not None and not limit > 0:
         raise BadInput(f"--limit must be above 0, got {limit:g}.")
@@ -118,7 +118,7 @@ def _say(done: Tracking, verdict: str, files: tuple[Path, Path], steps: Sequence
     from rich.markup import escape
 
     from upright.cli.terminal import console, on_terminal
-    from upright.lab import tracking_tables as tables
+    from upright.lab.tracking_3 import tables
 
     screen = console()
     if done.fit is not None:

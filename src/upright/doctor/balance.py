@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from upright.doctor.motion import Motion
-from upright.identification.accelerations import mass_and_force
+from upright.identification.search.inverse_start import mass_and_force
 from upright.records import Array
 
 FLOOR = 0.004

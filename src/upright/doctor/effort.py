@@ -8,7 +8,7 @@ from upright.doctor.case import Case
 from upright.doctor.channels import clipped
 from upright.doctor.findings import Finding
 from upright.doctor.sensors import whole
-from upright.identification.recognition import drive_column
+from upright.study.draft.recognise import drive_column
 
 HELD = 0.2
 """A body that moves less than this part of the largest motion was held."""

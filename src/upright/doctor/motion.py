@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from upright.doctor.case import Case
 from upright.errors import BadInput
-from upright.identification.columns import Grid
-from upright.identification.smoothing import dominant_period, middle, savitzky_golay
 from upright.physics import Plant
 from upright.records import Array
+from upright.signals.smoothing import dominant_period, middle, savitzky_golay
+from upright.study.columns import Grid
 
 LOUD = 0.01
 """Share of an acceleration's variance that may be noise; smoothing reaches no further than it takes to get there."""

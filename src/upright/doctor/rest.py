@@ -9,8 +9,8 @@ from upright.doctor.case import Case
 from upright.doctor.effort import HELD
 from upright.doctor.findings import Curve, Finding, Panel
 from upright.doctor.sensors import whole
-from upright.identification.smoothing import dominant_period
 from upright.records import Array
+from upright.signals.smoothing import dominant_period
 
 
 def examine_rest(case: Case) -> list[Finding]:

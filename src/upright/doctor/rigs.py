@@ -11,12 +11,12 @@ import numpy as np
 
 from upright.doctor.case import Case, Place
 from upright.errors import BadInput
-from upright.identification.columns import Drive, Sensor
-from upright.identification.model import Parameter
-from upright.identification.recognition import Recognised, drive_column, recognise
+from upright.identification.model.model import Parameter
 from upright.physics import Plant, find
 from upright.readers.inspection import Inspection
 from upright.records import Array, Record
+from upright.study.columns import Drive, Sensor
+from upright.study.draft.recognise import Recognised, drive_column, recognise
 
 COUNTERS = (2 * math.pi, 360.0, 65536.0, 4294967296.0)
 """Turns that counters are known to make, in rad, deg and counts."""
@@ -57,7 +57,7 @@ def read_known(text: str, log: str = "") -> Known:
     """
     path = Path(text)
     if path.suffix == ".json" or (path.is_dir() and (path / "fit.json").is_file()):
-        from upright.identification.fitfile import read_fit
+        from upright.study.fit_file import read_fit
 
         fit = read_fit(path / "fit.json" if path.is_dir() else path)
         parameters = {n: Parameter(name=n, value=v) for n, v in fit.values.items()}
@@ -73,9 +73,9 @@ def read_known(text: str, log: str = "") -> Known:
 
 
 def _study(path: Path, log: str) -> Known:
-    from upright.identification.study_rig import read_plant, read_rig
-    from upright.identification.study_sensors import drive_unit, read_drives, read_sensors
-    from upright.identification.study_text import Section, StudyText
+    from upright.study.rig import read_plant, read_rig
+    from upright.study.sensors import drive_unit, read_drives, read_sensors
+    from upright.study.text import Section, StudyText
 
     text = StudyText(path)
     study = text.root()

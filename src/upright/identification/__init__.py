@@ -1,11 +1,11 @@
-"""What its parameters are: studies of logs, fits of a plant to them, and how sure that is. ::
+"""What its parameters are: fits of a plant to logs, and how sure that is. ::
 
-    study = load_study("study.toml")
+    study = upright.study.load_study("study.toml")
     fit = identify(study.rig, study.runs)
     print(fit.verdict, fit.estimates["J_p"].interval)
     ahead = predict(fit, study.rig, other.runs)
 
-The names are fetched when they are first used, so that reading a study does not wait for the solver.
+The names are fetched when they are first used, so that a reader of fits does not wait for the solver.
 """
 
 from __future__ import annotations
@@ -14,11 +14,10 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from upright.identification.curve import CurveFit, fit_curve
     from upright.identification.estimate import METHODS, fit_percent, identify, predict
     from upright.identification.lmfit_border import to_lmfit
-    from upright.identification.model import Estimate, Feedback, Fit, Parameter, Rig, Run, RunScore
-    from upright.identification.study import Study, load_study
+    from upright.identification.model.model import Estimate, Feedback, Fit, Parameter, Rig, Run, RunScore
+    from upright.identification.search.curve import CurveFit, fit_curve
 
 __all__ = [
     "METHODS",
@@ -30,21 +29,18 @@ __all__ = [
     "Rig",
     "Run",
     "RunScore",
-    "Study",
     "fit_curve",
     "fit_percent",
     "identify",
-    "load_study",
     "predict",
     "to_lmfit",
 ]
 
 _HOMES = {
-    "curve": ("CurveFit", "fit_curve"),
     "estimate": ("METHODS", "fit_percent", "identify", "predict"),
     "lmfit_border": ("to_lmfit",),
-    "model": ("Estimate", "Feedback", "Fit", "Parameter", "Rig", "Run", "RunScore"),
-    "study": ("Study", "load_study"),
+    "model.model": ("Estimate", "Feedback", "Fit", "Parameter", "Rig", "Run", "RunScore"),
+    "search.curve": ("CurveFit", "fit_curve"),
 }
 
 

@@ -12,21 +12,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import BadInput
-from upright.identification.answer import answer
-from upright.identification.chain import Log, better, carried, closed_form_starts, count, explain, placed, weigh_priors
-from upright.identification.conventions import doubts
-from upright.identification.descent import Descent, Report, grow
-from upright.identification.ladder import choose
-from upright.identification.model import Fit, Rig, Run
-from upright.identification.moments import other_moments
-from upright.identification.pose import pose, unresolved
-from upright.identification.predictor_setup import with_noise
-from upright.identification.problem import Problem
-from upright.identification.rungs import without
-from upright.identification.scoring import fit_percent, predict
-from upright.identification.simplex import simplex
-from upright.identification.trips import located, untold
-from upright.identification.watch import watched
+from upright.identification.checks.conventions import doubts
+from upright.identification.checks.refit import watched
+from upright.identification.checks.trips import located, untold
+from upright.identification.inference.answer import answer
+from upright.identification.inference.scoring import fit_percent, predict
+from upright.identification.ladder.friction import choose
+from upright.identification.ladder.rungs import without
+from upright.identification.model.model import Fit, Rig, Run
+from upright.identification.problem.pose import pose, unresolved
+from upright.identification.problem.predictor_setup import with_noise
+from upright.identification.problem.problem import Problem
+from upright.identification.search.descent import Descent, Report, grow
+from upright.identification.search.moments import other_moments
+from upright.identification.search.simplex import simplex
+from upright.identification.search.strategy import (
+    Log,
+    better,
+    carried,
+    closed_form_starts,
+    count,
+    explain,
+    placed,
+    weigh_priors,
+)
 
 __all__ = ["METHODS", "fit_percent", "identify", "predict"]
 
@@ -138,7 +147,7 @@ def _resumed(rig: Rig, seen: Sequence[Run], log: Log) -> tuple[Rig, Problem, Arr
 
 
 def _half(problem: Problem) -> float:
-    from upright.identification.descent import first_horizon
+    from upright.identification.search.descent import first_horizon
 
     return min(problem.duration, 2 * first_horizon(problem))
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from upright.identification.model import Fit
+from upright.identification.model.model import Fit
 
 
 def to_lmfit(fit: Fit) -> Any:

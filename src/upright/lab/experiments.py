@@ -8,8 +8,8 @@ from pathlib import Path
 
 from upright.control.rig import Rig
 from upright.errors import BadInput
-from upright.lab.makes import Make
-from upright.lab.weighing import Known
+from upright.lab.rigs.makes import Make
+from upright.lab.weighing_1a.run import Known
 from upright.report.chapter import Chapter
 from upright.report.symbols import typed
 
@@ -61,13 +61,15 @@ class Experiment:
 
 
 def _weigh(task: Task) -> tuple[Chapter, bool]:
-    from upright.lab import weighing, weighing_page
+    from upright.lab.weighing_1a import chapter as weighing_page
+    from upright.lab.weighing_1a import run as weighing
 
     return weighing_page.chapter(weighing.run(task.rig, task.seed, task.folder, task.progress)), True
 
 
 def _sweep(task: Task) -> tuple[Chapter, bool]:
-    from upright.lab import frequency, frequency_page
+    from upright.lab.frequency_1b import chapter as frequency_page
+    from upright.lab.frequency_1b import run as frequency
 
     done = frequency.run(
         task.rig, task.seed, task.folder, task.progress, task.stopped, weighed=known_from(task.earlier.get("1a"))
@@ -76,8 +78,9 @@ def _sweep(task: Task) -> tuple[Chapter, bool]:
 
 
 def _hold(task: Task) -> tuple[Chapter, bool]:
-    from upright.lab import regulation, regulation_page
-    from upright.lab.rig_file import read_rig_file
+    from upright.lab.regulation_2 import chapter as regulation_page
+    from upright.lab.regulation_2 import run as regulation
+    from upright.lab.rigs.rig_file import read_rig_file
 
     fit = _fitted(task)
     found = read_rig_file(fit, seed=task.seed)
@@ -86,9 +89,10 @@ def _hold(task: Task) -> tuple[Chapter, bool]:
 
 
 def _swing_up(task: Task) -> tuple[Chapter, bool]:
-    from upright.lab import swing_up, swing_up_page
-    from upright.lab.believed import believed
-    from upright.lab.rig_file import read_rig_file
+    from upright.lab.rigs.believed import believed
+    from upright.lab.rigs.rig_file import read_rig_file
+    from upright.lab.swing_up_2b import chapter as swing_up_page
+    from upright.lab.swing_up_2b import run as swing_up
 
     fit = _fitted(task)
     found = read_rig_file(fit, seed=task.seed)
@@ -100,7 +104,8 @@ def _swing_up(task: Task) -> tuple[Chapter, bool]:
 
 
 def _track(task: Task) -> tuple[Chapter, bool]:
-    from upright.lab import tracking, tracking_page
+    from upright.lab.tracking_3 import chapter as tracking_page
+    from upright.lab.tracking_3 import run as tracking
 
     done = tracking.run(
         task.rig, task.seed, task.folder, task.progress, task.stopped, weighed=known_from(task.earlier.get("1a"))
@@ -109,8 +114,9 @@ def _track(task: Task) -> tuple[Chapter, bool]:
 
 
 def _swing(task: Task) -> tuple[Chapter, bool]:
-    from upright.identification.fitfile import write_fit
-    from upright.lab import release, release_page
+    from upright.lab.free_swing_4 import chapter as release_page
+    from upright.lab.free_swing_4 import run as release
+    from upright.study.fit_file import write_fit
 
     known = {k.name: k for k in known_from(task.earlier.get("1a"))}
     done = release.run(

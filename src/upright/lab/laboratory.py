@@ -12,7 +12,7 @@ import numpy as np
 from upright.errors import BadInput, UprightError
 from upright.lab.experiments import EXPERIMENTS, Experiment, Progress, Task
 from upright.lab.kept import keep, kept, made_of
-from upright.lab.makes import Make, make_rig
+from upright.lab.rigs.makes import Make, make_rig
 from upright.report.chapter import Chapter
 
 

@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from upright.exchange import KEY, rebuild
 from upright.readers import mat5
 from upright.readers.mat5 import Cells
 from upright.readers.source import Source
 from upright.readers.timebase import rebuild as rebuild_time
 from upright.readers.timebase import time_scale
 from upright.records import Array, Record
+from upright.records.exchange import KEY, rebuild
 
 _STEP_NAMES = ("dt", "ts", "t_s", "h", "period", "sampletime")
 

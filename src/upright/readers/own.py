@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import csv
 
-from upright.exchange import CSV_MARK as MARK
-from upright.exchange import rebuild
 from upright.readers.source import Source
 from upright.readers.table import numbers
 from upright.records import Record
+from upright.records.exchange import CSV_MARK as MARK
+from upright.records.exchange import rebuild
 
 __all__ = ["MARK", "read"]
 

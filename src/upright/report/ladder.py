@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from upright.identification.grown import Ladder, Step
-from upright.identification.repeats import Repeats
+from upright.identification.ladder.repeats import Repeats
+from upright.identification.ladder.result import Ladder, Step
 from upright.report.advice import Step as Advice
 from upright.report.document import Picture, picture, render
 from upright.report.drawing import BLACK, BLUE, VERMILLION, figure, styled

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from upright.identification.laws import Recovery
+from upright.closed_loop import Recovery
 from upright.records import Array, Record
 from upright.report.drawing import BLUE, GREY, VERMILLION, decimated, figure, styled
 

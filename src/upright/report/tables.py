@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 from markupsafe import Markup
 
-from upright.identification.crossval import CrossValidation
-from upright.identification.model import Estimate, Fit, Parameter, Pole, RunScore
+from upright.identification.ladder.crossval import CrossValidation
+from upright.identification.model.model import Estimate, Fit, Parameter, Pole, RunScore
 from upright.report.mathml import symbol
 from upright.report.symbols import figures, measured, number, percent, plain, unit
 
@@ -78,7 +78,7 @@ def parameter_rows(fit: Fit) -> list[ParameterRow]:
 
 
 def _default(name: str) -> float:
-    from upright.identification.model import ACTUATOR
+    from upright.identification.model.model import ACTUATOR
 
     return ACTUATOR[name][1] if name in ACTUATOR else 0.0
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from upright.simulation.actuator import ACTUATOR, ACTUATOR_DEFAULTS
-from upright.simulation.flavour import Flavour, choose
+from upright.simulation.kernel.actuator import ACTUATOR, ACTUATOR_DEFAULTS
+from upright.simulation.kernel.flavour import Flavour, choose
 from upright.simulation.law import Law
 from upright.simulation.parts import Held, Loop
 from upright.simulation.rule import Rule

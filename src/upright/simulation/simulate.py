@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from upright.errors import BadInput
 from upright.physics.derived import Derived
 from upright.physics.plant import Plant
-from upright.simulation.flavour import choose
+from upright.simulation.kernel.flavour import choose
 from upright.simulation.law import Law
 from upright.simulation.parts import Held, Loop
 from upright.simulation.rule import Rule

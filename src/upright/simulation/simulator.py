@@ -3,7 +3,7 @@
 The one place that steps a plant. Classical Runge-Kutta with `substeps` steps per sample; dry friction sticks and slips
 at moments found inside the step. The input is held between samples. Per lane it runs through limit, offset, gain,
 delay, lag: ``force = gain * lag(delay(clip(u, limit) + offset)) - slope * speed``; before the first sample of the
-record it is what it is there. What else a drive does stands in `upright.simulation.drive`. Delay, lag and what switches
+record it is what it is there. What else a drive does stands in `kernel.drive`. Delay, lag and what switches
 keep mean and first moment of the input within a substep exactly, so that the motion depends continuously on them.
 """
 
@@ -20,15 +20,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput
 from upright.physics.derived import Derived
-from upright.simulation.actuator import ACTUATOR, ACTUATOR_DEFAULTS
-from upright.simulation.blocks import aligned, padded, recorded, share
-from upright.simulation.compiled import kernel
-from upright.simulation.flavour import Flavour, Layout, lay_out
-from upright.simulation.lanes import room
+from upright.simulation.kernel.actuator import ACTUATOR, ACTUATOR_DEFAULTS
+from upright.simulation.kernel.blocks import aligned, padded, recorded, share
+from upright.simulation.kernel.compiled import kernel
+from upright.simulation.kernel.flavour import Flavour, Layout, lay_out
+from upright.simulation.kernel.lanes import room
+from upright.simulation.kernel.source import WIDTH, direct
 from upright.simulation.law import Law
 from upright.simulation.parts import Held, Loop
 from upright.simulation.rule import Rule, compiling
-from upright.simulation.source import WIDTH, direct
 
 Array = NDArray[np.float64]
 _NONE = np.zeros((1, 0, 0))

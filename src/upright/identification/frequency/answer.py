@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 
 from upright.errors import NotIdentifiable
-from upright.identification.fitfile import write_fit
 from upright.identification.frequency.balance import Balance
 from upright.identification.frequency.fitting import Squares, Told, Way, least_squares, simplex_dB, usable
 from upright.identification.frequency.response import FrequencyResponse
-from upright.identification.model import Estimate, Fit, Pole, Rig
-from upright.identification.own import quantile
-from upright.identification.poles import poles
-from upright.identification.study import Study
+from upright.identification.inference.per_run import quantile
+from upright.identification.inference.poles import poles
+from upright.identification.model.model import Estimate, Fit, Pole, Rig
+from upright.study.fit_file import write_fit
+from upright.study.load import Study
 
 GROWS = 0.5
 """Real part [1/s] from which a pole counts as unstable; free coordinates sit at 0."""

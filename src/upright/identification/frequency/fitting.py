@@ -20,7 +20,7 @@ from upright.errors import NotIdentifiable
 from upright.identification.frequency.balance import Balance
 from upright.identification.frequency.coordinates import Coordinates, coordinates
 from upright.identification.frequency.response import FrequencyResponse
-from upright.identification.model import Rig
+from upright.identification.model.model import Rig
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

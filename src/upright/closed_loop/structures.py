@@ -1,0 +1,184 @@
+"""How is a law written in a program? PID with its kinds of derivative, sums of such laws, state feedback."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.closed_loop.law import SampledLaw, Windup
+from upright.errors import BadInput
+
+Array = NDArray[np.float64]
+On = Literal["error", "measurement"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Filter:
+    """Difference quotient of a sampled signal, smoothed.
+
+    ``d[k] = pole d[k-1] + (1 - pole) ((1 - second) s[k] + second s[k-1])`` of the quotients
+    ``s[k] = (x[k] - x[k-1])/T``.
+    """
+
+    pole: float = 0.0
+    second: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.pole < 1:
+            raise BadInput(f"the pole of a difference's filter must lie in [0, 1), got {self.pole:g}.")
+
+    @classmethod
+    def of(cls, derivative: Literal["difference"] | float, period: float) -> Filter:
+        """Plain differences, or those through a low pass of the time constant `derivative` [s].
+
+        The low pass is Euler's backward one, ``d[k] = d[k-1] + T/(T + tau) (s[k] - d[k-1])``.
+        """
+        if derivative == "difference":
+            return cls()
+        tau = float(derivative)
+        if not 0 <= tau < math.inf:
+            raise BadInput(f"the time constant of a derivative must be at least 0 s, got {tau:g}.")
+        return cls(pole=tau / (tau + period))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Channel:
+    """One measured signal and what the law makes of it.
+
+    ``kp e + ki sum(e) T + kd D(e)``, ``e = reference - measured``; with `on` "measurement" the difference is of
+    ``-measured`` alone. Without a reference it is taken as zero.
+    """
+
+    measured: str
+    reference: str = ""
+    kp: float = 0.0
+    ki: float = 0.0
+    kd: float = 0.0
+    on: On = "error"
+    filter: Filter = Filter()
+
+
+def pid(
+    kp: float = 0.0,
+    ki: float = 0.0,
+    kd: float = 0.0,
+    *,
+    period: float,
+    derivative: Literal["difference"] | float | Filter = "difference",
+    on: On = "error",
+    measured: str = "y",
+    reference: str = "r",
+    limit: float = math.inf,
+    delay: float = 0.0,
+    windup: Windup = "free",
+    quantum: float = 0.0,
+) -> SampledLaw:
+    """A PID law; `derivative` is "difference", the time constant [s] of its low pass, or a `Filter`.
+
+    The sum of the I part includes the present sample; the difference takes the signals before the first sample as
+    zero, the reference too.
+    """
+    smooth = derivative if isinstance(derivative, Filter) else Filter.of(derivative, period)
+    channel = Channel(measured=measured, reference=reference, kp=kp, ki=ki, kd=kd, on=on, filter=smooth)
+    return joined([channel], period=period, limit=limit, delay=delay, windup=windup, quantum=quantum)
+
+
+def joined(
+    channels: Sequence[Channel],
+    *,
+    period: float,
+    bias: float = 0.0,
+    limit: float = math.inf,
+    delay: float = 0.0,
+    windup: Windup = "free",
+    quantum: float = 0.0,
+) -> SampledLaw:
+    """Sum of several PID laws, one per channel, and a constant."""
+    measured = tuple(dict.fromkeys(c.measured for c in channels))
+    references = tuple(dict.fromkeys(c.reference for c in channels if c.reference))
+    inputs = (*measured, *references)
+    rows: list[tuple[dict[int, float], Array, float, float]] = []  # memory row, its drive, output gain, initial
+    D = np.zeros(len(inputs))
+    for c in channels:
+        e = np.zeros(len(inputs))
+        e[inputs.index(c.measured)] = -1.0
+        s = e.copy()
+        if c.reference:
+            e[inputs.index(c.reference)] += 1.0
+        s = e if c.on == "error" else s
+        D += c.kp * e
+        if c.ki:
+            rows.append(({len(rows): 1.0}, period * e, c.ki, 0.0))
+            D += c.ki * period * e
+        if c.kd:
+            a, b = c.filter.pole, c.filter.second
+            gain = (1 - a) * (1 - b) / period
+            second = (1 - a) * b / period
+            at = len(rows)
+            # x[k-1], then what the quotients of the past still give to d[k]
+            rows.append(({}, s, -c.kd * gain, 0.0))
+            rows.append(({at: -(a * gain + second), at + 1: a}, (a * gain + second) * s, c.kd, 0.0))
+            D += c.kd * gain * s
+    if bias:
+        rows.append(({len(rows): 1.0}, np.zeros(len(inputs)), 1.0, bias))
+    n = len(rows)
+    A = np.zeros((n, n))
+    for i, (row, _, _, _) in enumerate(rows):
+        for j, value in row.items():
+            A[i, j] = value
+    return SampledLaw(
+        A=A, B=np.array([r[1] for r in rows]).reshape(n, len(inputs)), C=np.array([r[2] for r in rows]), D=D,
+        measured=measured, references=references, period=period, limit=limit, delay=delay, windup=windup,
+        quantum=quantum, initial=np.array([r[3] for r in rows]),
+    )  # fmt: skip
+
+
+def memory(
+    channels: Sequence[Channel],
+    first: Mapping[str, float],
+    *,
+    constant: float = 0.0,
+    smoothed: Mapping[str, float] | None = None,
+) -> Array:
+    """Memory of `joined` before a first sample: differences see no jump there.
+
+    Parameters
+    ----------
+    first : mapping of str to float
+        Signals at the first sample, by name.
+    constant : float
+        What the sums (the first of them) have put out before, or the bias of a law without sums.
+    smoothed : mapping of str to float
+        What the low pass of a measured signal's difference still gives out, times its gain, 0 if left out.
+    """
+    out: list[float] = []
+    sums = [c for c in channels if c.ki]
+    for c in channels:
+        if c.ki:
+            out.append(constant / c.ki if c is sums[0] else 0.0)
+        if c.kd:
+            out.append(-first[c.measured] + (first[c.reference] if c.reference and c.on == "error" else 0.0))
+            out.append((smoothed or {}).get(c.measured, 0.0) / c.kd)
+    return np.array([*out, constant] if constant and not sums else out)
+
+
+def state_feedback(
+    gains: Mapping[str, tuple[float, float]], *, period: float, k_pf: float = 0.0, pole: float = 0.0
+) -> SampledLaw:
+    """``u = k_pf r - K x``: gains of position and velocity per coordinate, velocities from filtered differences.
+
+    Differences take the positions before the first sample as zero.
+    """
+    channels = [
+        Channel(measured=name, kp=position, kd=velocity, filter=Filter(pole=pole))
+        for name, (position, velocity) in gains.items()
+    ]
+    law = joined(channels, period=period)
+    return replace(
+        law, B=np.column_stack([law.B, np.zeros(law.C.size)]), D=np.append(law.D, k_pf), references=("reference",)
+    )

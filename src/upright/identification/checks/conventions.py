@@ -1,0 +1,55 @@
+"""Is a sensor reversed, or its zero upright? A reversed sign scores about -100 %, so it is looked for first.
+
+Every convention is tried on the measured accelerations, which need no simulation.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+
+from upright.identification.model.model import Rig, Run
+from upright.identification.search.inverse_start import regress, samples_of
+
+CLEAR = 0.5
+"""Another convention is named when it leaves less than this share of the variance that the declared one leaves."""
+
+
+def doubts(rig: Rig, runs: Sequence[Run]) -> tuple[str, ...]:
+    """Sentences on signs and zeros that would explain the accelerations far better than the declared ones."""
+    declared = _unexplained(rig, runs, {}, {})
+    if not 0.1 < declared < math.inf:
+        return ()
+    measured = sorted({c for run in runs for c in run.measured if c not in run.held})
+    angles = {c.name for c in rig.plant.coordinates if c.unit == "rad"}
+    driven = any(run.u.size and run.u.any() for run in runs)
+    best, found = declared, ({}, {})
+    for signs in itertools.product((1.0, -1.0), repeat=len(measured)):
+        for turned in itertools.product((0.0, math.pi), repeat=len(measured)):
+            flips = dict(zip(measured, signs, strict=True))
+            turns = {c: t for c, t in zip(measured, turned, strict=True) if t and c in angles}
+            if len(turns) != sum(1 for t in turned if t) or not (turns or -1.0 in signs):
+                continue
+            if not driven and not turns and all(s < 0 for s in signs):
+                continue
+            left = _unexplained(rig, runs, flips, turns)
+            fewer = sum(s < 0 for s in flips.values()) + len(turns)
+            if left < best * (0.98 if fewer else 1.0):
+                best, found = left, (flips, turns)
+    if best > CLEAR * min(declared, 1.0):  # what explains next to nothing is no better convention
+        return ()
+    flips, turns = found
+    said = [f"set sign = -1 for {c} (its sign looks reversed)" for c, s in flips.items() if s < 0]
+    said += [f"add an offset of pi to {c} (its zero looks upright)" for c in turns]
+    now, then = 100 * (1 - min(declared, 1.0)), 100 * (1 - best)
+    what = " and ".join(said)
+    return (
+        f"The conventions look wrong: {what}; the accelerations are then explained to {then:.0f} % "
+        f"instead of {now:.0f} %.",
+    )
+
+
+def _unexplained(rig: Rig, runs: Sequence[Run], flips: Mapping[str, float], turns: Mapping[str, float]) -> float:
+    samples = samples_of(rig, runs, most=2000, flips=flips, turns=turns)
+    return regress(rig, samples).unexplained if samples else math.inf

@@ -1,0 +1,154 @@
+"""Which numbers rest on one that was assumed, and what do the data say without it?
+
+A log in volts and counts fixes inertia per gain, not inertia. Take the gain as 1 and say so
+(``gain = { value = "1 N m/V", assumed = true }``): what is proportional to it is told in volts, seconds and counts as
+well, and what does not feel it (frequencies, damping ratios, speeds) is firm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.identification.inference.covariance import pseudo_inverse
+from upright.identification.model.model import Assumption, Estimate, Rig, Run
+from upright.identification.model.unknowns import SHARED, shared_unknowns
+from upright.identification.problem.pose import settle_steps
+from upright.identification.problem.problem import Problem
+
+Array = NDArray[np.float64]
+
+NEGLIGIBLE = 0.02
+"""Percent per percent below which a number does not rest on an assumed one; a whole number is met as closely."""
+
+
+def assumptions(
+    rig: Rig, problem: Problem, x: Array, pinned: NDArray[np.bool_], estimates: Mapping[str, Estimate]
+) -> tuple[Assumption, ...]:
+    """How every estimate of an optimum `x` would follow each assumed number, and its value without it.
+
+    The optimum moves by ``d theta/d g = -(J'J)^-1 J'J_g`` when g does (implicit function theorem); nothing is fitted
+    again.
+    """
+    names = [n for n, p in rig.parameters.items() if p.assumed and p.value != 0]
+    if not names:
+        return ()
+    loose = {
+        n: replace(p, uncertainty=abs(p.value)) if n in names else replace(p, uncertainty=0.0, estimate=False)
+        for n, p in rig.parameters.items()
+    }
+    extra = shared_unknowns(replace(rig, parameters=loose))
+    steps = np.array([1e-6 * u.scale for u in extra])
+    wider = replace(
+        problem, unknowns=[*problem.unknowns, *extra], steps=np.concatenate([problem.steps, steps]),
+        solvers={}, memory=np.empty(0),
+    )  # fmt: skip
+    z = np.concatenate([x, [u.inside(u.value) for u in extra]])
+    A = settle_steps(wider, z, math.inf).matrix
+    free = np.flatnonzero(~pinned)
+    slopes = np.zeros((x.size, len(extra)))
+    slopes[free] = -pseudo_inverse(A[np.ix_(free, free)]) @ A[np.ix_(free, np.arange(x.size, z.size))]
+    value = problem.value(x)
+    found: list[Assumption] = []
+    for k, g in enumerate(extra):
+        per_relative = 1.0 if g.log else g.value  # of the assumed number
+        follows = {
+            u.name: float(slopes[i, k] * per_relative / (1.0 if u.log else value[i]))
+            for i, u in enumerate(problem.unknowns)
+            if u.runs == SHARED and u.asked and i in free and value[i] != 0
+        }
+        p = rig.parameters[g.name]
+        without = _without(p.name, p.value, p.unit, follows, estimates, [t.run for t in problem.tracks], rig)
+        found.append(Assumption(name=p.name, value=p.value, unit=p.unit, follows=follows, without=without))
+    return tuple(found)
+
+
+def proportional(a: Assumption) -> list[str]:
+    """Names that grow as the assumed number does."""
+    return [n for n, e in a.follows.items() if abs(e - 1) < NEGLIGIBLE]
+
+
+def untouched(a: Assumption) -> list[str]:
+    """Names that do not feel the assumed number."""
+    return [n for n, e in a.follows.items() if abs(e) < NEGLIGIBLE]
+
+
+def sentences(found: Sequence[Assumption]) -> tuple[str, ...]:
+    """What rests on which assumed number, and what would make it known."""
+    said: list[str] = []
+    for a in found:
+        along, firm = proportional(a), untouched(a)
+        other = [f"{n} by {e:+.2g} %" for n, e in a.follows.items() if n not in along and n not in firm]
+        parts = [f"{a.name} = {a.value:g} {a.unit} is assumed, not known"]
+        if along:
+            parts.append(f"{', '.join(along)} {'is' if len(along) == 1 else 'are'} proportional to it, ratios are firm")
+        if other:
+            parts.append(f"for every percent of it {', '.join(other)} would follow")
+        if firm:
+            parts.append(f"{', '.join(firm)} {'does' if len(firm) == 1 else 'do'} not depend on it")
+        said.append("; ".join(parts) + ".")
+    return tuple(said)
+
+
+def _without(
+    name: str, value: float, unit: str, follows: Mapping[str, float], estimates: Mapping[str, Estimate],
+    runs: Sequence[Run], rig: Rig,
+) -> dict[str, Estimate]:  # fmt: skip
+    """Estimates per assumed gain, in units of the command, seconds, and counts where every encoder has one quantum."""
+    if name != "actuator.gain":
+        return {}
+    force, _, command = unit.partition("/")
+    quanta = {q for run in runs for q in run.quantum}
+    quantum = quanta.pop() if len(quanta) == 1 else 0.0
+    out: dict[str, Estimate] = {}
+    for n, e in follows.items():
+        power = per_length(rig.parameters[n].unit, force) if abs(e - 1) < NEGLIGIBLE else None
+        if power is None or n not in estimates:
+            continue
+        time, length = power
+        factor = quantum**-length / value if quantum > 0 else 1.0 / value
+        e_si = estimates[n]
+        out[n] = replace(
+            e_si,
+            value=e_si.value * factor,
+            stderr=e_si.stderr * factor,
+            interval=(e_si.interval[0] * factor, e_si.interval[1] * factor),
+            unit=_written(command or "1", time, length, "count" if quantum > 0 else force_length(force)),
+        )
+    return out
+
+
+def force_length(force: str) -> str:
+    """What a force of this unit moves along: metres, or radians for a torque."""
+    return "rad" if force == "N m" else "m"
+
+
+def per_length(unit: str, force: str) -> tuple[int, int] | None:
+    """Powers of seconds and of lengths (metres, or radians for a torque) left when a unit is divided by a force.
+
+    None when the unit is not a force times such powers: an inertia of 1 kg m^2 is 1 N m s^2/rad.
+    """
+    unit = {"kg": "N s^2/m", "kg m^2": "N m s^2/rad", "kg/m": "N s^2/m^2"}.get(unit, unit)
+    along = force_length(force)
+    above, _, below = unit.partition("/")
+    if above != force and not above.startswith(f"{force} "):
+        return None
+    powers = {"s": 0, along: 0}
+    for text, sign in ((above.removeprefix(force), 1), (below.strip("()"), -1)):
+        for token in text.split():
+            base, _, power = token.partition("^")
+            if base not in powers:
+                return None
+            powers[base] += sign * int(power or 1)
+    return powers["s"], powers[along]
+
+
+def _written(command: str, time: int, length: int, along: str) -> str:
+    """Unit of a ratio: V s^2/count."""
+    top = [command, *(f"s^{time}" if time > 1 else "s" for _ in range(time > 0))]
+    below = [f"{along}^{-length}" if length < -1 else along for _ in range(length < 0)]
+    return " ".join(top) + (f"/{below[0]}" if below else "")

@@ -1,0 +1,82 @@
+"""How fast does it fall, and how sure is that? Poles at every equilibrium of a fitted plant, with their intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.errors import ImpossiblePhysics, NotIdentifiable
+from upright.identification.model.model import Estimate, Pole, Rig
+
+Array = NDArray[np.float64]
+
+STEP = 1e-4
+"""Share of a standard error by which parameters are moved to see how the poles follow."""
+
+
+def poles(
+    rig: Rig, values: Mapping[str, float], names: list[str], covariance: Array, quantile: float
+) -> dict[str, tuple[Pole, ...]]:
+    """Poles [1/s] at each equilibrium, the fastest growing first, friction viscous only and back-EMF included.
+
+    First-order propagation (delta method) of the covariance of the numbers sought. Of a conjugate pair the one above
+    the real axis is told. Equilibria that the fitted plant does not have are left out.
+
+    Parameters
+    ----------
+    values : mapping of str to float
+        Every parameter of plant and actuator.
+    names : list of str
+        Which of them are uncertain.
+    covariance : (names, names) array
+        Theirs.
+    quantile : float
+        Standard errors from the estimate to the end of an interval.
+    """
+    found: dict[str, tuple[Pole, ...]] = {}
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    if not np.isfinite(covariance).all():
+        return found
+    for at in rig.plant.equilibria:
+        try:
+            here = _poles(rig, values, at)
+            slope = np.zeros((here.size, len(names)), dtype=np.complex128)
+            for i, name in enumerate(names):
+                if (step := STEP * float(sigma[i])) > 0:
+                    moved = _poles(rig, {**values, name: values[name] + step}, at)
+                    nearest = np.abs(moved[None, :] - here[:, None]).argmin(axis=1)
+                    slope[:, i] = (moved[nearest] - here) / step
+        except (ImpossiblePhysics, NotIdentifiable):
+            continue
+        errors = [
+            np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", part, covariance, part), 0.0))
+            for part in (slope.real, slope.imag)
+        ]
+        found[at] = tuple(
+            Pole(
+                real=_estimate(float(p.real), float(errors[0][k]), quantile, "1/s"),
+                imag=_estimate(float(p.imag), float(errors[1][k]), quantile, "rad/s"),
+            )
+            for k, p in enumerate(here)
+            if p.imag >= 0
+        )
+    return found
+
+
+def _estimate(value: float, stderr: float, quantile: float, unit: str) -> Estimate:
+    interval = (value - quantile * stderr, value + quantile * stderr)
+    return Estimate(value=value, stderr=stderr, interval=interval, unit=unit, status="firm")
+
+
+def _poles(rig: Rig, values: Mapping[str, float], at: str) -> NDArray[np.complex128]:
+    """Poles with the actuator's loss per speed as damping of the coordinates that it drives."""
+    linear = rig.plant(**{n: values[n] for n in rig.plant.names()}).linear(at)
+    A = linear.A.copy()
+    driven = {c.name: i for i, c in enumerate(rig.plant.coordinates)}
+    for k, source in enumerate(rig.plant.inputs):
+        i = driven[source.on]
+        A[:, 2 * i + 1] -= linear.B[:, k] * values.get("actuator.slope", 0.0)
+    found = np.linalg.eigvals(A).astype(np.complex128)
+    return found[np.lexsort((found.imag, -found.real))]

@@ -1,0 +1,179 @@
+"""How much of a run does the model explain? Fit percent per signal, for runs it has seen and runs it has not."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from upright.identification.checks.trips import located
+from upright.identification.ladder.friction import first_part
+from upright.identification.model.model import Fit, Rig, Run, RunScore
+from upright.identification.problem.pose import pose
+from upright.identification.problem.predictor_setup import Ahead, with_noise
+from upright.identification.problem.problem import Problem
+from upright.identification.problem.tracks import Track
+from upright.identification.search.descent import Report, grow
+from upright.identification.search.strategy import better, weigh_priors
+
+Array = NDArray[np.float64]
+
+
+def fit_percent(y: ArrayLike, simulated: ArrayLike) -> float:
+    """``100 (1 - |y - yhat| / |y - mean y|)``: 100 is exact, 0 no better than the mean, never below -1000.
+
+    A signal that does not move scores 100 when it is met exactly and 0 otherwise.
+    """
+    y, simulated = np.asarray(y, dtype=np.float64), np.asarray(simulated, dtype=np.float64)
+    moved = float(np.linalg.norm(y - y.mean()))
+    missed = float(np.linalg.norm(y - simulated))
+    if moved == 0:
+        return 100.0 if missed == 0 else 0.0
+    score = 100 * (1 - missed / moved)
+    return max(-1000.0, score) if math.isfinite(score) else -1000.0
+
+
+def score(problem: Problem, index: int, x: Array) -> RunScore:
+    """Score of one run for coordinates `x`; windows restarted from measured states are laid end to end."""
+    track = problem.tracks[index]
+    if track.ahead:
+        return _score_ahead(problem, index, x, track.ahead)
+    run = track.run
+    free = [k for k, c in enumerate(run.measured) if c not in run.held]
+    y = problem.simulate(index, x[:, None], track.length)[:, :, :, 0]
+    if not track.windowed:
+        t, measured, simulated = run.t, track.y, y[:, 0, :]
+    else:
+        # every sample once: a window's last sample is the next one's first and belongs to the prediction
+        rows = (track.restarts[None, :] + np.arange(track.length)[:, None])[1:]
+        measured = np.moveaxis(track.y[rows], 1, 0).reshape(-1, len(run.measured))
+        simulated = np.moveaxis(y[1:], 1, 0).reshape(-1, len(run.measured))
+        t = run.t[0] + track.dt * rows.T.reshape(-1)
+    skip = int(np.searchsorted(t, run.t[0] + run.score_from - 1e-9)) if run.score_from > 0 else 0
+    percents = {run.measured[k]: fit_percent(measured[skip:, k], simulated[skip:, k]) for k in free}
+    naive = held_speed(track) if track.windowed else np.zeros((0, len(run.measured)))
+    return RunScore(
+        role=run.role, fit_percent=percents, horizon=next(iter(run.horizons), None), t=t, y=measured,
+        simulated=simulated, measured=run.measured, score_from=run.score_from,
+        naive={run.measured[k]: fit_percent(measured[skip:, k], naive[skip:, k]) for k in free if len(naive)},
+    )  # fmt: skip
+
+
+def _score_ahead(problem: Problem, index: int, x: Array, plan: Ahead) -> RunScore:
+    """Score of a run that a filter predicts: what was foreseen exactly so far ahead, restart by restart."""
+    track = problem.tracks[index]
+    run = track.run
+    free = [k for k, c in enumerate(run.measured) if c not in run.held]
+    weight = plan.weight[:, None, None]
+    foreseen = problem.simulate(index, x[:, None], track.length)[..., 0] / weight
+    measured = track.targets(track.length) / weight
+    q, v = problem.filtered(index, x)
+    naive = q + v * (track.dt * np.array(plan.samples))[:, None, None]
+
+    def percents(h: int, y: Array) -> dict[str, float]:
+        return {run.measured[k]: fit_percent(measured[h, :, k], y[h, :, k]) for k in free}
+
+    return RunScore(
+        role=run.role, fit_percent=percents(0, foreseen), horizon=run.horizons[0],
+        t=run.t[track.restarts + plan.samples[0]], y=measured[0], simulated=foreseen[0], measured=run.measured,
+        naive=percents(0, naive), ahead={h: percents(i, foreseen) for i, h in enumerate(run.horizons)},
+    )  # fmt: skip
+
+
+def held_speed(track: Track) -> Array:
+    """Outputs (samples, outputs) of windows laid end to end, if every measured speed lasted: a prediction by no model.
+
+    It starts from the same measured states as the model does.
+    """
+    q, v = (track.x0[:, np.add(track.columns, k)] for k in (0, 1))
+    ahead = track.dt * np.arange(1, track.length)
+    return (q[:, None] + v[:, None] * ahead[:, None]).reshape(-1, len(track.columns))
+
+
+def with_values(rig: Rig, values: Mapping[str, float]) -> Rig:
+    """The rig with every number known: `values` by name, the rest as it stands."""
+    parameters = {
+        n: replace(p, value=float(values.get(n, p.value)), estimate=False, uncertainty=0.0)
+        for n, p in rig.parameters.items()
+    }
+    return replace(rig, parameters=parameters)
+
+
+def predict(
+    fitted: Fit | Mapping[str, float],
+    rig: Rig,
+    runs: Sequence[Run],
+    *,
+    groups: Mapping[str, Mapping[str, float]] | None = None,
+    progress: Report | None = None,
+) -> dict[str, RunScore]:
+    """Scores of runs that a fitted model has not seen, by label.
+
+    Parameters
+    ----------
+    fitted : Fit or mapping of str to float
+        The model, or its parameters by name.
+    rig : Rig
+        Where parameters that were not fitted come from.
+    runs : sequence of Run
+        What differs from run to run (initial state, declared offsets and factors) is estimated from the run itself:
+        from what comes before `score_from` when that is set, from all of it otherwise; the scores say what
+        (`RunScore.adapted`). The parameters stay as they are, and so does what a group of runs shares when the group
+        was fitted.
+    groups : mapping, optional
+        What groups of runs share, by label and name; those of a `Fit` when omitted.
+    progress : callable, optional
+        Called with stage, fraction done, cost and number of simulations.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        When somebody interrupts: half a prediction is none.
+    """
+    values = {n: e.value for n, e in fitted.estimates.items()} if isinstance(fitted, Fit) else dict(fitted)
+    if groups is None and isinstance(fitted, Fit):
+        groups = {label: {n: e.value for n, e in group.items()} for label, group in fitted.groups.items()}
+    known = with_values(with_noise(rig, runs), values)
+    return {run.label: _predict(known, run, groups or {}, progress) for run in runs}
+
+
+def _either_side(problem: Problem) -> list[Array]:
+    """Starts with a gain of the run's own that is somewhat smaller, and larger, than is typical.
+
+    A shaft that swings gives the cost of a free run a valley for every swing that a gain a few percent off adds.
+    """
+    starts: list[Array] = []
+    for i, u in enumerate(problem.unknowns):
+        if u.prior is None or u.name != "gain" or problem.tracks[0].windowed:
+            continue
+        for side in (-1.0, 1.0):
+            x = problem.start
+            x[i] += side * min(u.prior[1], 0.1)
+            starts.append(np.clip(x, problem.lower, problem.upper))
+    return starts
+
+
+def _predict(rig: Rig, run: Run, groups: Mapping[str, Mapping[str, float]], progress: Report | None) -> RunScore:
+    run = located(rig, run)
+    before = replace(run, score_from=0.0)
+    upto = run.score_from if run.score_from > 0 else math.inf
+    if run.score_from > 0 and run.horizon is not None:
+        before, upto = first_part(before, run.score_from / (run.period * run.t.size)), math.inf
+    problem = pose(rig, [before], given=groups)
+    x = problem.start
+    if x.size:
+        found = grow(problem, x, report=progress, upto=upto)
+        for other in _either_side(problem):
+            found = better(found, grow(problem, other, report=progress, upto=upto))
+        if found.interrupted:
+            raise KeyboardInterrupt
+        if math.isinf(upto):  # else what is scored must not weigh
+            found = weigh_priors(problem, found)
+        x = found.x
+    whole = pose(rig, [run], thin=False, given=groups)
+    sought = [u.name for u in problem.unknowns if u.lower < u.upper]
+    adapted = dict.fromkeys("initial" if name.startswith("initial.") else name for name in sought)
+    return replace(score(whole, 0, x), adapted=tuple(adapted))

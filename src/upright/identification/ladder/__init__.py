@@ -1,0 +1,1 @@
+"""Models of growing richness, each kept only if it predicts better."""

@@ -1,0 +1,140 @@
+"""Which models are nested in the one that was asked for? Rungs of a ladder, poorest first.
+
+A rung adds terms to what the rungs below estimate; below it a term is held where it does nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import MISSING, dataclass, fields, replace
+
+from upright.errors import BadInput, nearest
+from upright.identification.model.model import ACTUATOR, Rig, Run
+from upright.identification.model.unknowns import friction_names
+from upright.physics import Plant
+
+DRIVE = (
+    ("offset of the drive", ("actuator.offset",)),
+    ("lag of the drive", ("actuator.lag", "actuator.delay")),
+    ("damping by the drive", ("actuator.slope", "actuator.damping", "actuator.standby", "actuator.relaxation")),
+    ("torque that falls with speed", ("actuator.knee", "actuator.fade")),
+    ("end of the drive", ("actuator.start", "actuator.end")),
+)
+"""Terms of the drive in the order in which they are tried."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rung:
+    """One step of a ladder.
+
+    Attributes
+    ----------
+    name : str
+        In tables and pictures.
+    adds : tuple of str
+        Parameters estimated from this rung on; below it they are held where they do nothing.
+    drops : tuple of str
+        Parameters that this rung does without, added by a rung below.
+    unknown : tuple of str
+        What is estimated run by run from this rung on, as in `Run.unknown`.
+    """
+
+    name: str
+    adds: tuple[str, ...] = ()
+    drops: tuple[str, ...] = ()
+    unknown: tuple[str, ...] = ()
+
+
+def neutral(plant: type[Plant], name: str) -> float:
+    """Value at which a parameter does nothing: the default of the plant or of the actuator, zero without one."""
+    if name in ACTUATOR:
+        return ACTUATOR[name][1]
+    default = next((f.default for f in fields(plant) if f.name == name), 0.0)  # type: ignore[arg-type]
+    return 0.0 if default is MISSING else float(default)  # type: ignore[arg-type]
+
+
+def without(rig: Rig, names: Collection[str]) -> Rig:
+    """The rig with some parameters known to do nothing."""
+    parameters = {
+        n: replace(p, value=neutral(rig.plant, n), estimate=False, uncertainty=0.0) if n in names else p
+        for n, p in rig.parameters.items()
+    }
+    return replace(rig, parameters=parameters)
+
+
+def at(rig: Rig, rungs: Sequence[Rung], kept: Sequence[Rung]) -> Rig:
+    """The rig of a place on the ladder: of all that `rungs` add only what the `kept` ones do."""
+    added = {n for rung in rungs for n in (*rung.adds, *rung.drops)}
+    estimated = {n for n in added if not any(n in rung.adds for rung in rungs)}  # asked from the beginning
+    for rung in kept:
+        estimated |= set(rung.adds)
+        estimated -= set(rung.drops)
+    return without(rig, added - estimated)
+
+
+def runs_at(runs: Sequence[Run], kept: Sequence[Rung]) -> list[Run]:
+    """The runs with what the kept rungs estimate run by run."""
+    more = tuple(n for rung in kept for n in rung.unknown)
+    return [replace(run, unknown=tuple(dict.fromkeys((*run.unknown, *more)))) for run in runs]
+
+
+def friction_rungs(rig: Rig) -> list[Rung]:
+    """Nested friction models within the terms that the rig asks to estimate, poorest first.
+
+    A term that must not be zero, since its lower bound is above, is part of them all.
+    """
+    asked = [n for n in rig.estimated if rig.parameters[n].lower <= 0]
+    joints = rig.plant.derived().joints
+    kinds = [
+        ("Coulomb friction", {j.coulomb for j in joints}),
+        ("quadratic drag", {j.quadratic for j in joints}),
+        ("stiction", {n for j in joints for n in (j.stiction, j.stribeck_speed)}),
+        ("presliding", {j.presliding for j in joints}),
+    ]
+    steps = [(name, tuple(n for n in asked if n in terms)) for name, terms in kinds]
+    return [Rung(name="viscous friction"), *(Rung(name=name, adds=adds) for name, adds in steps if adds)]
+
+
+def default_rungs(rig: Rig, runs: Sequence[Run]) -> list[Rung]:
+    """Every ladder that the rig's questions allow: friction first, then the drive, then friction that differs per run.
+
+    The last one needs two runs and some friction.
+    """
+    friction = friction_rungs(rig)
+    found = friction if len(friction) > 1 else [Rung(name="as asked")]
+    for name, terms in DRIVE:
+        adds = tuple(n for n in rig.estimated if n in terms)
+        if adds:
+            found.append(Rung(name=name, adds=adds))
+    seen = [run for run in runs if run.role == "fit"]
+    told = any("friction" in (*run.unknown, *run.shared) for run in seen)
+    if len(seen) > 1 and not told and any(_present(rig, n) for n in friction_names(rig)):
+        found.append(Rung(name="friction of each run", unknown=("friction",)))
+    return found
+
+
+def _present(rig: Rig, name: str) -> bool:
+    p = rig.parameters.get(name)
+    return p is not None and (p.estimate or (p.value != 0 and math.isfinite(p.value)))
+
+
+def check(rig: Rig, rungs: Sequence[Rung]) -> None:
+    """Refuse rungs that add what nobody asked for, or the same term twice.
+
+    Raises
+    ------
+    BadInput
+    """
+    added: set[str] = set()
+    for rung in rungs:
+        for n in (*rung.adds, *rung.drops):
+            if n not in rig.estimated:
+                raise BadInput(
+                    f"rung '{rung.name}' names {n}, which nothing asks for; give it a guess, or name another: "
+                    f"{nearest(n, rig.estimated)}"
+                )
+        twice = [n for n in rung.adds if n in added]
+        if twice:
+            raise BadInput(f"rung '{rung.name}' adds {twice[0]} a second time; name it in one rung only")
+        added |= set(rung.adds)

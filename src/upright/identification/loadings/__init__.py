@@ -1,0 +1,1 @@
+"""Stiffness and inertia from step responses with known loadings."""

@@ -1,0 +1,1 @@
+"""From runs and unknowns to residuals and their derivatives."""

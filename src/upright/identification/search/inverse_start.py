@@ -1,0 +1,229 @@
+"""Which numbers agree with the measured accelerations? An answer without a single simulation.
+
+The model's accelerations, computed from the smoothed motion, are compared with the measured ones; both have gone
+through the same smoothing. Masses and forces that only scale together are left where the guess put them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.identification.model.model import Rig, Run
+from upright.identification.model.unknowns import Unknown, base_values, shared_unknowns
+from upright.identification.problem.normal import Normal, finite
+from upright.identification.search.descent import descend
+from upright.identification.search.drive_force import effort
+from upright.physics.plant import Plant, evaluate
+from upright.signals.smoothing import (
+    dominant_period,
+    middle,
+    savitzky_golay,
+    smoothing_width,
+    spread,
+)
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sample:
+    """Smoothed motion of one run: `q`, `v`, `a`, (coordinates, N) each, commands `u` (inputs, N), free coordinates.
+
+    `fades` are speeds [SI] below which the sign of a speed is not believed; `width` samples were smoothed over.
+    """
+
+    run: Run
+    dt: float
+    q: Array
+    v: Array
+    a: Array
+    u: Array
+    free: tuple[int, ...]
+    fades: Array
+    width: int
+    edge: int
+    period: float
+
+
+def observe(rig: Rig, run: Run, *, flips: Mapping[str, float] | None = None,
+            turns: Mapping[str, float] | None = None) -> Sample | None:  # fmt: skip
+    """Smoothed motion of a run, None when a coordinate that moves freely was not measured.
+
+    `flips` multiplies measured coordinates, `turns` is added to them: what if the sensor's convention were another?
+    """
+    plant, dt, n = rig.plant, run.period, run.t.size
+    coordinates = [c.name for c in plant.coordinates]
+    free = tuple(i for i, c in enumerate(coordinates) if c not in run.held)
+    if not free or any(coordinates[i] not in run.measured for i in free) or n < 30:
+        return None
+    quantum = dict(zip(run.measured, run.quantum or (0.0,) * len(run.measured), strict=True))
+    signal = {c: run.y[:, k] for k, c in enumerate(run.measured)}
+    period = min(dominant_period(signal[coordinates[i]], dt) for i in free)
+    width = max(smoothing_width(signal[coordinates[i]], dt, period, quantum[coordinates[i]]) for i in free)
+    q, v, a = np.zeros((3, len(coordinates), n))
+    fades = np.zeros(len(coordinates))
+    edge = 0
+    for i, c in enumerate(coordinates):
+        if c in run.held and np.ndim(run.held[c]) == 0:
+            q[i] = float(run.held[c])
+            continue
+        y = np.asarray(run.held[c]) if c in run.held else signal[c]
+        motion = savitzky_golay((flips or {}).get(c, 1.0) * y + (turns or {}).get(c, 0.0), dt, width)
+        q[i], v[i], a[i], edge = motion.q, motion.v, motion.a, motion.edge
+        fades[i] = 0.02 * spread(motion.v)
+    since = run.t - run.t[0]
+    acting = (since >= run.guesses.get("input_start", -math.inf)) & (since < run.guesses.get("input_end", math.inf))
+    u = np.where(acting, run.u.T, 0.0)
+    if run.loop is not None:
+        u = u + run.loop.follow(q.T, coordinates)[0]
+    return Sample(run=run, dt=dt, q=q, v=v, a=a, u=u, free=free, fades=fades, width=width, edge=edge, period=period)
+
+
+def samples_of(
+    rig: Rig,
+    runs: Sequence[Run],
+    *,
+    most: int = 6000,
+    flips: Mapping[str, float] | None = None,
+    turns: Mapping[str, float] | None = None,
+) -> list[Sample]:
+    """Smoothed motion of every run that allows it, long runs thinned to at most `most` samples."""
+    found: list[Sample] = []
+    for run in runs:
+        k = -(-run.t.size // most)
+        thin = run
+        if k > 1:
+            held = {n: v[::k] if isinstance(v, np.ndarray) else v for n, v in run.held.items()}
+            thin = replace(
+                run, t=run.t[::k], u=run.u[::k], y=run.y[::k], held=held, loop=run.loop and run.loop.thinned(k)
+            )
+        sample = observe(rig, thin, flips=flips, turns=turns)
+        if sample is not None:
+            found.append(sample)
+    return found
+
+
+def mass_and_force(
+    plant: type[Plant], values: Mapping[str, float], q: Array, v: Array, u: Array
+) -> tuple[Array, Array]:
+    """Mass matrices (N, n, n) and generalized forces (N, n) at positions and speeds (n, N) and forces `u` (inputs, N).
+
+    As derived: no dry friction, no drag.
+    """
+    derived = plant.derived_for(values)
+    scope: dict[str, Any] = dict(values)
+    for i, c in enumerate(derived.coordinates):
+        scope[c], scope[f"{c}_dot"] = q[i], v[i]
+    scope.update(zip(derived.inputs, u, strict=True))
+    for i, lump in enumerate(derived.lumps):
+        scope[f"k{i}"] = evaluate(lump, scope)
+    for s, c, argument in derived.trig:
+        angle = evaluate(argument, scope)
+        scope[s], scope[c] = np.sin(angle), np.cos(angle)
+    for name, step in derived.steps:
+        scope[name] = evaluate(step, scope)
+    n = len(derived.coordinates)
+    M = np.empty((q.shape[1], n, n))
+    f = np.empty((q.shape[1], n))
+    place = 0
+    for i in range(n):
+        for j in range(i, n):
+            M[:, i, j] = M[:, j, i] = evaluate(derived.mass[place], scope)
+            place += 1
+        f[:, i] = evaluate(derived.force[i], scope)
+    return M, f
+
+
+def model_accelerations(plant: type[Plant], values: Mapping[str, float], sample: Sample) -> Array:
+    """Accelerations (free coordinates, N) of the model at the measured states, those of held coordinates given."""
+    M, f = mass_and_force(plant, values, sample.q, sample.v, effort(values, sample, plant))
+    n = f.shape[1]
+    for joint in plant.derived_for(values).joints:
+        i = joint.coordinate
+        v = sample.v[i]
+        if joint.coulomb and sample.fades[i] > 0:
+            f[:, i] -= values[joint.coulomb] * np.tanh(v / sample.fades[i])
+        if joint.quadratic:
+            f[:, i] -= values[joint.quadratic] * v * np.abs(v)
+    free = list(sample.free)
+    held = [i for i in range(n) if i not in free]
+    if held:
+        f = f - np.einsum("tij,jt->ti", M[:, :, held], sample.a[held])
+        M, f = M[:, free][:, :, free], f[:, free]
+    return np.asarray(np.linalg.solve(M, f[:, :, None])[:, :, 0].T, dtype=np.float64)
+
+
+def disagreement(rig: Rig, values: Mapping[str, float], sample: Sample) -> Array:
+    """Weighted difference (free coordinates, T) between the model's accelerations and the measured ones."""
+    a = model_accelerations(rig.plant, {**values, **sample.run.known}, sample)
+    smooth = _same_smoothing(a, sample.width)
+    edge = min(sample.edge, a.shape[1] // 4)
+    here = slice(edge, a.shape[1] - edge)
+    measured = sample.a[list(sample.free)]
+    return (smooth[:, here] - measured[:, here]) / np.array([[spread(row)] for row in measured])
+
+
+def _same_smoothing(a: Array, width: int) -> Array:
+    """Rows of `a` through the polynomials that smoothed the motion; the ends are not used."""
+    from scipy.ndimage import correlate1d
+
+    return correlate1d(a, middle(width - (1 - width % 2)), axis=1, mode="nearest")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Agreement:
+    """Numbers that agree best with the accelerations, and the share of their variance left unexplained, 0 to 1."""
+
+    values: dict[str, float]
+    unexplained: float
+
+
+def regress(rig: Rig, samples: list[Sample], start: Mapping[str, float] | None = None) -> Agreement:
+    """Least squares on the accelerations over the numbers to estimate."""
+    unknowns = [u for u in shared_unknowns(rig) if u.asked]
+    base = base_values(rig) | dict(start or {})
+    size = len(unknowns)
+    count = sum((s.q.shape[1] - 2 * min(s.edge, s.q.shape[1] // 4)) * len(s.free) for s in samples)
+
+    def values(x: Array) -> dict[str, float]:
+        return base | {u.name: math.exp(z) if u.log else float(z) for u, z in zip(unknowns, x, strict=True)}
+
+    def residual(x: Array) -> Array:
+        try:
+            with np.errstate(all="ignore"):
+                return np.concatenate([disagreement(rig, values(x), s).ravel() for s in samples])
+        except np.linalg.LinAlgError:
+            return np.full(count, np.inf)
+
+    def normal(x: Array) -> Normal:
+        r = residual(x)
+        if not finite(r):
+            return Normal(math.inf, np.zeros((size, size)), np.zeros(size))
+        J = np.empty((r.size, size))
+        for j, u in enumerate(unknowns):
+            z = x.copy()
+            step = 1e-5 * (1.0 if u.log else max(abs(float(x[j])), u.scale))
+            z[j] += step
+            J[:, j] = (residual(z) - r) / step
+        if not finite(J):
+            return Normal(math.inf, np.zeros((size, size)), np.zeros(size))
+        # a faint pull towards the start keeps numbers that the accelerations cannot see where they were
+        pull = np.array([1e-3 * math.sqrt(r.size) / u.scale for u in unknowns])
+        away = pull * (x - x0)
+        return Normal(float(r @ r + away @ away), J.T @ J + np.diag(pull**2), J.T @ r + pull * away)
+
+    x0 = np.array([_inside(u, base[u.name]) for u in unknowns])
+    lower, upper = (np.array([u.bounds[k] for u in unknowns]) for k in (0, 1))
+    found = descend(normal, x0, lower, upper, tolerance=1e-5, limit=40)
+    r = residual(found.x)
+    return Agreement(values=values(found.x), unexplained=float(np.mean(r * r)) if finite(r) else math.inf)
+
+
+def _inside(u: Unknown, value: float) -> float:
+    return math.log(value) if u.log and value > 0 else min(max(value, u.lower), u.upper)

@@ -1,0 +1,56 @@
+"""What would the paper have done? Nelder and Mead's simplex on the sum of squares, made to start from any guess.
+
+It copes where stiction makes the cost a staircase, and costs 5 to 40 times more than least squares (DESIGN 9).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.identification.problem.problem import Problem
+from upright.identification.search.descent import Report
+
+Array = NDArray[np.float64]
+
+
+def simplex(
+    problem: Problem, x: Array, *, horizon: float = math.inf, limit: int = 2000, report: Report | None = None,
+    keep: Callable[[Array], None] | None = None,
+) -> tuple[Array, float]:  # fmt: skip
+    """Best coordinates within `horizon` seconds and their cost, after at most `limit` simulations.
+
+    Every improvement is handed to `keep`, should somebody interrupt.
+    The first simplex reaches 10 % of each number, or 10 % of its scale when it is zero.
+    """
+    from scipy.optimize import minimize
+
+    size = np.array([1.0 if u.log else max(abs(z), u.scale) for u, z in zip(problem.unknowns, x, strict=True)])
+    lower, upper = problem.lower, problem.upper
+    best = [x.copy(), problem.cost(x, horizon)]
+    count = 0
+
+    def cost(z: Array) -> float:
+        nonlocal count
+        here = np.clip(x + z * size, lower, upper)
+        value = problem.cost(here, horizon)
+        count += 1
+        if value < best[1]:
+            best[0], best[1] = here, value
+            if keep is not None:
+                keep(here)
+            if report is not None and count % 20 == 0:
+                report("simplex", count / limit, value, problem.evaluations)
+        return value if math.isfinite(value) else 1e300
+
+    corners = np.vstack([np.zeros(x.size), 0.1 * np.eye(x.size)])
+    # a first step away from a bound rather than into it
+    for i in range(x.size):
+        if x[i] + 0.1 * size[i] > upper[i]:
+            corners[1 + i, i] = -0.1
+    options = {"initial_simplex": corners, "maxfev": limit, "adaptive": True, "xatol": 1e-6, "fatol": 1e-9 * best[1]}
+    minimize(cost, np.zeros(x.size), method="Nelder-Mead", options=options)
+    return np.asarray(best[0]), float(best[1])

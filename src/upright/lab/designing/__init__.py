@@ -1,0 +1,1 @@
+"""From an identified rig to gains, and what they are worth."""

@@ -1,0 +1,1 @@
+"""Experiment 1b: the frequency response of the hanging rig."""

@@ -1,0 +1,1 @@
+"""Experiment 2: hold the pendulum upright."""

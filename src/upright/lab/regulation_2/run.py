@@ -1,0 +1,250 @@
+"""How does experiment 2 go? Hold the rig upright with the numbers it was identified by, and say beforehand what comes.
+
+Gains come from the identified model, the verdict per pole set from the rigs that its covariance allows; then the law
+runs on the rig itself, here the twin's truth, and what came is put beside what was told.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright import design
+from upright.control import Rig, Score, Trial, score, trial
+from upright.control.preflight import Preflight, Task, preflight, word
+from upright.design import Estimator, Feedback, Margins, Placement, Sampled
+from upright.design.loop import closed, command_noise
+from upright.design.requests import poles_of, read_poles
+from upright.errors import BadInput
+from upright.lab.rigs.believed import allowed, believed, make_of
+from upright.lab.rigs.makes import Make
+from upright.lab.rigs.rig_file import RigFile, read_rig_file
+from upright.paper.tables import TABLE_1
+from upright.physics import Linear
+
+Array = NDArray[np.float64]
+Roots = NDArray[np.complex128]
+Progress = Callable[[str, float], None]
+
+SPEEDS = ("plain", "filtered", "kalman")
+STARTS = {"furuta": (math.radians(12), 2.2), "linear": (math.radians(12), 1.5)}
+"""Tilt [rad] and speed [rad/s] with which a clumsy hand lets go."""
+HAND = (0.01, 0.1)
+"""What a hand gets wrong: half a degree, and 0.1 rad/s."""
+DRAWS = 200
+SETS = {f"set {i}": text for i, text in enumerate(TABLE_1, start=1)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wish:
+    """What is asked: poles by name [1/s], the way to the velocities, and the start (the make's own when None)."""
+
+    poles: Mapping[str, Roots] = field(default_factory=lambda: {n: read_poles(text) for n, text in SETS.items()})
+    speed: str = "filtered"
+    memory: float = 0.5
+    tilt: float | None = None
+    push: float | None = None
+    seconds: float = 6.0
+    draws: int = DRAWS
+
+    def __post_init__(self) -> None:
+        if self.speed not in SPEEDS:
+            raise BadInput(f"velocities come from {', '.join(SPEEDS)}, got '{self.speed}'.")
+        if not 0 < self.seconds <= 120:
+            raise BadInput(f"a run takes more than 0 and at most 120 s, got {self.seconds:g} s.")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Attempt:
+    """One pole set: gains, what was told beforehand, and what came of it; None where nothing was run."""
+
+    name: str
+    placement: Placement
+    law: Feedback
+    before: Preflight
+    after: Trial | None
+    score: Score | None
+
+    @property
+    def word(self) -> str:
+        """What it came to, in one of `preflight.WORDS`; empty when nothing was run."""
+        return "" if self.score is None else word(self.score)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Way:
+    """One way to the velocities, with the recommended set's gains."""
+
+    name: str
+    noise: float | None
+    margins: Margins | None
+    run: Trial
+    score: Score
+    restless: float
+    """Root mean square of the command's changes from sample to sample over the first second [the command's unit]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Regulation:
+    """What the experiment found.
+
+    Attributes
+    ----------
+    rig : Rig
+        As identified.
+    truth : Rig or None
+        The rig on which the laws ran.
+    task : Task
+    wish : Wish
+    attempts : tuple of Attempt
+    ways : tuple of Way
+        For the recommended set, on the truth, or on the model where there is no truth.
+    uncertain : bool
+        Whether the identification told of its uncertainty.
+    source : str
+        What `upright regulate` is given to do this again.
+    seed : int
+    interrupted : bool
+    seconds : float
+        Computing time.
+    """
+
+    rig: Rig
+    truth: Rig | None
+    task: Task
+    wish: Wish
+    attempts: tuple[Attempt, ...]
+    ways: tuple[Way, ...]
+    uncertain: bool
+    source: str
+    seed: int
+    interrupted: bool = False
+    seconds: float = 0.0
+
+    @property
+    def best(self) -> Attempt:
+        """The set to recommend beforehand: the surest to regulate, of equals the one that bears the hardest tap."""
+        return max(self.attempts, key=lambda a: (round(a.before.words["regulates"], 2), a.before.push))
+
+
+def identified(make: Make, seed: int, folder: Path, progress: Progress | None = None) -> RigFile:
+    """What experiment 1b makes of a rig of the make; its logs and `fit.json` go into the folder."""
+    from upright.lab.frequency_1b import run as frequency
+
+    if make not in STARTS:
+        raise BadInput(f"there is nothing to hold upright on the make '{make}'; take one of {', '.join(STARTS)}.")
+    frequency.run(make, seed, folder, progress)
+    return read_rig_file(folder / "fit.json", seed=seed)
+
+
+def run(
+    file: RigFile, truth: Rig | None, seed: int, folder: Path, progress: Progress | None = None,
+    stopped: Callable[[], bool] = lambda: False, wish: Wish | None = None, source: str = "FIT",
+) -> Regulation:  # fmt: skip
+    """Design for the rig as identified, say what will come, and run on the rig itself.
+
+    Parameters
+    ----------
+    file : RigFile
+        What was identified, hanging.
+    truth : Rig, optional
+        The rig; without it nothing is run and only what is expected is told.
+    seed : int
+        Of the hand's errors and of the rigs drawn.
+    folder : Path
+        Takes the logs of the runs.
+    progress : callable, optional
+        Told the step at work and the share done.
+    stopped : callable, optional
+        Asked after every set whether to stop there.
+    wish : Wish, optional
+    source : str
+        How a command line would name the fit.
+    """
+    began = time.perf_counter()
+    wish, tell = wish or Wish(), progress or (lambda step, share: None)
+    make = make_of(file)
+    if make not in STARTS:
+        raise BadInput(f"there is nothing to hold upright on the make '{make}'; take one of {', '.join(STARTS)}.")
+    rig = believed(file)
+    model = rig.linear("inverted")
+    sampled = design.hold(model, rig.period, rig.delay / rig.period)
+    tilt, push = (w if w is not None else s for w, s in zip((wish.tilt, wish.push), STARTS[make], strict=True))
+    task = Task(start=(0.0, 0.0, tilt, push), hand=(0.0, 0.0, *HAND), seconds=wish.seconds)
+    others = allowed(file, rig, wish.draws, seed)
+    attempts: list[Attempt] = []
+    interrupted = False
+    for i, (name, poles) in enumerate(wish.poles.items()):
+        tell(f"regulating with {name}", i / (len(wish.poles) + 1))
+        attempts.append(_attempt(name, poles, rig, truth, model, sampled, task, others, wish, seed))
+        if stopped():
+            interrupted = True
+            break
+    done = Regulation(
+        rig=rig, truth=truth, task=task, wish=wish, attempts=tuple(attempts), ways=(), uncertain=bool(file.others),
+        source=source, seed=seed, interrupted=interrupted,
+    )  # fmt: skip
+    tell("comparing the ways to the velocities", len(wish.poles) / (len(wish.poles) + 1))
+    ways = () if interrupted else tuple(_ways(done, model, sampled))
+    for a in done.attempts:
+        if a.after is not None:
+            folder.mkdir(parents=True, exist_ok=True)
+            a.after.record.to_csv(folder / f"regulation_{a.name.replace(' ', '_')}.csv")
+    return replace(done, ways=ways, seconds=time.perf_counter() - began)
+
+
+def estimator(model: Linear, sampled: Sampled, rig: Rig, speed: str, memory: float) -> Estimator:
+    """A way to the velocities for a rig's encoders."""
+    if speed == "kalman":
+        # every coordinate by itself as much as a tenth of the limit would: pushes, friction, what the model leaves out
+        shaking = design.shaken(sampled, 0.1 * rig.limit * np.abs(model.B[1::2, 0]))
+        return design.kalman(sampled, shaking, rig.quantum / math.sqrt(12))
+    return design.filtered(sampled, memory if speed == "filtered" else 0.0)
+
+
+def actual_start(task: Task, seed: int) -> Array:
+    """Where the hand really let go."""
+    return task.starts(1, np.random.default_rng([seed, 54]))[0]
+
+
+def _attempt(
+    name: str, poles: Roots, rig: Rig, truth: Rig | None, model: Linear, sampled: Sampled, task: Task,
+    others: Mapping[str, Array], wish: Wish, seed: int,
+) -> Attempt:  # fmt: skip
+    placed = design.place(model.A, model.B, poles)
+    law = design.feedback(estimator(model, sampled, rig, wish.speed, wish.memory), placed.K)
+    told = preflight(rig, model, sampled, law, task, parameters=others, lanes=wish.draws, seed=seed)
+    after = None
+    if truth is not None:
+        after = trial(truth, law, at=task.at, start=actual_start(task, seed), seconds=task.seconds)
+    return Attempt(
+        name=name, placement=placed, law=law, before=told, after=after, score=None if after is None else score(after)
+    )  # fmt: skip
+
+
+def _ways(done: Regulation, model: Linear, sampled: Sampled) -> list[Way]:
+    on, K = done.truth or done.rig, done.best.placement.K
+    driven = design.hold(model, sampled.period, sampled.delay, done.rig.lag)
+    out: list[Way] = []
+    for speed in SPEEDS:
+        way = estimator(model, sampled, done.rig, speed, done.wish.memory)
+        law = design.feedback(way, K)
+        stands = bool(np.abs(poles_of(closed(driven, law))).max() < 1)
+        went = trial(on, law, at=done.task.at, start=actual_start(done.task, done.seed), seconds=done.task.seconds)
+        out.append(
+            Way(
+                name=way.name,
+                noise=command_noise(driven, law, done.rig.quantum) if stands else None,
+                margins=design.margins(model, driven, law) if stands else None,
+                run=went,
+                score=score(went),
+                restless=float(np.sqrt(np.mean(np.diff(went.u[went.t <= 1.0]) ** 2))),
+            )
+        )
+    return out

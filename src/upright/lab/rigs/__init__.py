@@ -1,0 +1,1 @@
+"""The rigs of the laboratory: twins, makes, and rigs known from a fit."""

@@ -1,0 +1,1 @@
+"""Experiment 2b: swing the pendulum up and catch it."""

@@ -1,0 +1,1 @@
+"""Experiment 3: follow a step through a flexible shaft."""

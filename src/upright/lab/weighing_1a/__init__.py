@@ -1,0 +1,1 @@
+"""Experiment 1a: stiffness and inertia of the first body."""

@@ -1,0 +1,165 @@
+"""How do swings, line and plans of experiment 1a look?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from upright.identification.loadings.fit import Loaded, Loadings
+from upright.identification.loadings.planning import Plan
+from upright.records import Record
+from upright.report.document import Picture, picture
+from upright.report.drawing import BLUE, CYCLE, GREY, VERMILLION, decimated, figure, save, styled
+from upright.report.symbols import unit
+from upright.signals.free_swing import Decay
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MOST_PANELS = 6
+
+
+@styled
+def line_figure(found: Loadings, what: str) -> Figure:
+    """Points of the line with their 95 % bars, the line down to where it meets zero, and what it leaves."""
+    a = np.array([s.added for s in found.swings])
+    drawing = figure(4.4)
+    top, left = drawing.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [3, 1.5]})
+    over = np.array([-found.bare.value, 1.08 * float(a.max())])
+    model = (found.bare.value + a) / found.k.value
+    top.plot(over, (found.bare.value + over) / found.k.value, color=BLUE, label="line, slope 1/k")
+    top.errorbar(a, found.y, 1.96 * found.y_error, fmt="o", color=VERMILLION, markersize=4, capsize=2, label="swings")
+    top.axvline(0, color=GREY, linewidth=0.8)
+    top.plot([-found.bare.value], [0], marker="s", color=BLUE, linestyle="none", label="minus the bare inertia")
+    top.set_ylabel("1/ω$_n$² [s²]")
+    top.set_ylim(bottom=0)
+    top.legend(loc="upper left")
+    left.axhline(0, color=BLUE)
+    left.errorbar(a, 100 * (found.y / model - 1), 196 * found.y_error / model, fmt="o", color=VERMILLION, markersize=4,
+                  capsize=2)  # fmt: skip
+    left.set_ylabel("off the line [%]")
+    left.set_xlabel(f"added inertia [{unit(what)}]")
+    drawing.align_ylabels([top, left])
+    return drawing
+
+
+@styled
+def swing_figure(swings: Sequence[tuple[Loaded, Record, str]]) -> Figure:
+    """Signal, extremes found, and the recursion's extremes, one panel per log."""
+    drawing = figure(0.6 + 1.25 * len(swings))
+    panels: list[Any] = drawing.subplots(len(swings), 1, squeeze=False)[:, 0].tolist()
+    for axes, (loaded, record, signal) in zip(panels, swings, strict=True):
+        d = loaded.decay
+        near = (record.t > d.t[0] - 2 / d.omega_d) & (record.t < d.t[-1] + 8 / d.omega_d)
+        axes.axhspan(d.centre - d.delta, d.centre + d.delta, color="#eeeeee")
+        axes.plot(*decimated(record.t[near], record[signal][near]), color=BLUE, linewidth=1.0, label="log")
+        axes.plot(d.t, d.x, "o", color=VERMILLION, markersize=4.5, fillstyle="none", label="extremes")
+        axes.plot(d.t, d.model, "+", color="black", markersize=6, label="recursion")
+        axes.set_title(f"{loaded.label}: {d.omega_n:.4g} rad/s, damping ratio {d.zeta:.3f}").set_parse_math(False)
+        unit_of = record.units.get(signal, "")
+        axes.set_ylabel(f"{signal[:14]}\n[{unit_of}]" if unit_of else signal[:14]).set_parse_math(False)
+    panels[0].legend(loc="upper right", ncols=3)
+    panels[-1].set_xlabel("time [s]")
+    return drawing
+
+
+@styled
+def decrement_figure(swings: Sequence[Loaded]) -> Figure:
+    """How far each extreme lies from the centre, on a logarithmic scale: dry friction bends the straight line."""
+    drawing = figure(3.0)
+    axes = drawing.subplots()
+    for (colour, style), loaded in zip(CYCLE, swings, strict=False):
+        d = loaded.decay
+        scale = abs(d.x[0] - d.centre)
+        axes.plot(np.abs(d.x - d.centre) / scale, color=colour, marker="o", linestyle="none", markersize=4)
+        axes.plot(np.abs(d.model - d.centre) / scale, color=colour, linestyle=style, label=loaded.label)
+        axes.plot(viscous(d) / scale, color=colour, linewidth=0.7, alpha=0.6)
+    axes.set_yscale("log")
+    axes.set_xlabel("half swings")
+    axes.set_ylabel("height over the first")
+    for text in axes.legend(loc="lower left").get_texts():
+        text.set_parse_math(False)
+    return drawing
+
+
+def viscous(d: Decay) -> Any:
+    """Heights above the centre that viscous friction alone would leave."""
+    return abs(d.x[0] - d.centre) * d.rho ** np.arange(d.x.size)
+
+
+@styled
+def plan_figure(plans: Mapping[int, tuple[Plan, Plan]], chosen: int) -> Figure:
+    """Errors that the best plans promise over the number of runs."""
+    drawing = figure(3.0)
+    axes = drawing.subplots()
+    runs = sorted(plans)
+    names = ("stiffness, planned for it", "bare inertia, then", "stiffness, planned for both", "bare inertia, then")
+    curves = [[100 * getattr(plans[n][i], what) for n in runs] for i in (0, 1) for what in ("k", "bare")]
+    for (colour, style), name, curve in zip(CYCLE, names, curves, strict=False):
+        axes.plot(runs, curve, color=colour, linestyle=style, marker="o", markersize=3.5, label=name)
+    axes.axvline(chosen, color=GREY, linewidth=0.8, linestyle=":")
+    axes.set_xlabel("runs")
+    axes.set_ylabel("standard error [%]")
+    axes.set_ylim(bottom=0)
+    axes.set_xticks(runs)
+    axes.legend(loc="upper right")
+    return drawing
+
+
+def save_plans(plans: Mapping[int, tuple[Plan, Plan]], chosen: int, path: Path) -> Path:
+    """Write `plan_figure` to a file."""
+    return save(plan_figure(plans, chosen), path)
+
+
+def units_of(kind: str) -> dict[str, str]:
+    """Units of what is found, for added masses in kg or inertias in kg m^2."""
+    torsional = kind == "torsional"
+    return {
+        "inertia": "kg m^2" if torsional else "kg",
+        "stiffness": "N m/rad" if torsional else "N/m",
+        "damping": "N m s/rad" if torsional else "N s/m",
+    }
+
+
+def loading_pictures(
+    found: Loadings, logs: Mapping[str, Record], signals: Mapping[str, str], kind: str
+) -> list[Picture]:
+    """Line, one swing of each loading, and their decrements; `logs` and `signals` by the label of the log."""
+    first: dict[float, Loaded] = {}
+    for s in found.swings:
+        first.setdefault(s.added, s)
+    shown = [first[a] for a in sorted(first)][:MOST_PANELS]
+    with_logs = [(s, logs[_log(s)], signals[_log(s)]) for s in shown if _log(s) in logs]
+    out = [
+        picture(
+            line_figure(found, units_of(kind)["inertia"]), "line",
+            caption="1/ω² over the added inertia. The slope is 1/k, the line meets zero at minus the bare inertia. "
+            "Bars: 95 % intervals of single swings.",
+            description=f"{len(found.swings)} points about a line; {found.verdict}",
+        )
+    ]  # fmt: skip
+    if with_logs:
+        out.append(
+            picture(
+                swing_figure(with_logs), "swings",
+                caption="One swing of each loading. Rings: extremes, from the exact shape about each; crosses: the "
+                "recursion of a spring with viscous and dry friction. Grey: where dry friction can hold the body.",
+                description=f"{len(with_logs)} decaying swings with their extremes marked.",
+            )
+        )  # fmt: skip
+    out.append(
+        picture(
+            decrement_figure(shown), "decrements",
+            caption="Height of the extremes above the centre. A straight thin line is what the viscous part alone "
+            "would leave; dry friction bends the decrement downwards.",
+            description="Logarithmic decay of the heights, one curve per loading.",
+        )
+    )  # fmt: skip
+    return out
+
+
+def _log(s: Loaded) -> str:
+    return s.label.rsplit(", step ", 1)[0]

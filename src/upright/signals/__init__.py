@@ -1,0 +1,1 @@
+"""What sampled signals tell without a model of the rig: speeds, turning points, spikes, decay."""

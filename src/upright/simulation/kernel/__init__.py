@@ -1,0 +1,1 @@
+"""The writer of compiled code: text of the kernel, piece by piece."""

@@ -1,0 +1,242 @@
+"""Which terms does this motion need, so that the kernel computes nothing else?
+
+A flavour is what is fixed when a kernel is compiled; everything else (parameters, states, inputs, modes) is data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+
+from upright.errors import BadInput, nearest
+from upright.physics.derived import Derived
+from upright.simulation.kernel.actuator import ACTUATOR, ACTUATOR_DEFAULTS
+from upright.simulation.law import Law
+from upright.simulation.parts import Loop
+from upright.simulation.rule import Rule, Written
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flavour:
+    """Terms compiled into a kernel; numbers are indices of coordinates.
+
+    Attributes
+    ----------
+    dry : tuple of int
+        Joints that stick and slip, exactly.
+    drag : tuple of int
+        Joints with quadratic drag.
+    stribeck : tuple of int
+        Joints whose sliding friction falls from the stiction to the Coulomb level with speed.
+    dahl : tuple of int
+        Joints that deflect before they slide (Dahl); these do not stick.
+    held : tuple of int
+        Coordinates whose motion is prescribed.
+    dynamic : bool
+        The actuator has lag, delay, a torque-speed slope or one of the following.
+    gate : bool
+        The drive is alive from a start to an end only.
+    damping : bool
+        The drive brakes while it is alive.
+    relaxation : bool
+        Its braking builds up and fades.
+    curve : bool
+        The drive's force falls beyond a speed.
+    loop : bool
+        A sampled controller computes the input.
+    law : tuple of int, optional
+        States and references of the controller when it is a `Law`.
+    rule : Written, optional
+        The controller when it is a `Rule`.
+    record : bool
+        The motion is returned, not only what it reduces to.
+    """
+
+    dry: tuple[int, ...] = ()
+    drag: tuple[int, ...] = ()
+    stribeck: tuple[int, ...] = ()
+    dahl: tuple[int, ...] = ()
+    held: tuple[int, ...] = ()
+    dynamic: bool = False
+    gate: bool = False
+    damping: bool = False
+    relaxation: bool = False
+    curve: bool = False
+    loop: bool = False
+    law: tuple[int, int] | None = None
+    record: bool = True
+    rule: Written | None = field(default=None, repr=False)  # its text stands in the kernel as it is
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layout:
+    """Names and places that the parts of the generated text agree on."""
+
+    derived: Derived
+    flavour: Flavour
+    plain: bool = False
+
+    @cached_property
+    def n(self) -> int:
+        """Number of coordinates."""
+        return len(self.derived.coordinates)
+
+    @cached_property
+    def nu(self) -> int:
+        """Number of inputs."""
+        return len(self.derived.inputs)
+
+    @cached_property
+    def free(self) -> tuple[int, ...]:
+        """Coordinates that obey the equations of motion."""
+        return tuple(i for i in range(self.n) if i not in self.flavour.held)
+
+    @cached_property
+    def velocities(self) -> tuple[str, ...]:
+        """Names of the velocities."""
+        return tuple(f"{q}_dot" for q in self.derived.coordinates)
+
+    @cached_property
+    def drives(self) -> tuple[int, ...]:
+        """Coordinate on which each input acts first."""
+        column = [[self.derived.gain[i * self.nu + j] != "0" for i in range(self.n)] for j in range(self.nu)]
+        return tuple(c.index(True) if True in c else 0 for c in column)
+
+    @cached_property
+    def constants(self) -> tuple[str, ...]:
+        """Names of what is computed once per lane."""
+        f = self.flavour
+        joints = sorted({*f.dry, *f.dahl})
+        names = [f"k{i}" for i in range(len(self.derived.lumps))]
+        names += [f"_Fc{i}" for i in joints] + [f"_Fs{i}" for i in joints]
+        names += [f"_cq{i}" for i in f.drag] + [f"_iv{i}" for i in f.stribeck] + [f"_id{i}" for i in f.dahl]
+        names += [f"{c}{j}" for c in ["_sl"] * f.dynamic + ["_kn", "_fd"] * f.curve for j in range(self.nu)]
+        return tuple(names)
+
+    @cached_property
+    def numbers(self) -> tuple[str, ...]:
+        """Names of a law's numbers, matrix by matrix and row by row, then its state."""
+        if self.flavour.rule is not None:
+            return self.flavour.rule.numbers
+        states, references = self.flavour.law or (0, 0)
+        z, u, w = range(states), range(self.nu), range(self.n + references)
+        sizes = (("A", z, z), ("B", z, w), ("C", u, z), ("D", u, w))
+        return tuple(
+            [f"l{c}{i}_{j}" for c, rows, columns in sizes for i in rows for j in columns] + [f"z{i}" for i in z]
+        )
+
+    @cached_property
+    def references(self) -> int:
+        """Number of references of a law or rule."""
+        return self.flavour.rule.references if self.flavour.rule else (self.flavour.law or (0, 0))[1]
+
+    @cached_property
+    def rows(self) -> dict[str, int]:
+        """Place of each per-lane number in the working array."""
+        f, n, nu = self.flavour, range(self.n), range(self.nu)
+        names = [f"q{i}" for i in n] + [f"v{i}" for i in n] + [f"y{i}" for i in f.dahl] + [f"s{i}" for i in f.dry]
+        names += [f"oq{i}" for i in n] + [f"ov{i}" for i in n] + [f"oy{i}" for i in f.dahl]
+        names += [f"{c}{j}" for c in ("ua", "um", "ub", "gain", "off", "lim", "ff", "cn") for j in nu]
+        if f.dynamic:
+            names += [f"{c}{j}" for c in ("co", "fo", "w", "e", "ep", "th", "df") for j in nu] + ["di"]
+            more = ["gs", "ge"] * f.gate + ["ona", "onm", "onb"] * (f.gate and f.curve)
+            more += ["dc", "ds", "zn", "zo", "dma", "dmm", "dmb"] * f.damping
+            more += ["csa", "csm", "csb"] * (f.damping and f.curve)
+            more += ["bk", "vp", "rt", "re", "rh", "bka", "bkm", "bkb"] * f.relaxation
+            names += [f"{c}{j}" for c in more for j in nu]
+        if f.law is not None or f.rule is not None:
+            names += [*self.numbers, *(f"ref{c}" for c in range(self.references))]
+        elif f.loop:
+            names += [f"{c}{i}" for c in ("yp", "vf", "tg") for i in n]
+            names += [f"K{j}_{i}" for j in nu for i in range(2 * self.n)] + ["kr", "ref"]
+        if not f.record:
+            names += [f"{c}{i}" for c in ("mx", "er") for i in n] + [f"{c}{j}" for c in ("sat",) for j in nu]
+        names += [f"h{c}{i}{s}" for i in f.held for s in "amb" for c in "qva"] + [f"hb{i}" for i in f.held]
+        return {name: i for i, name in enumerate([*names, *self.constants, "flag"])}
+
+
+@lru_cache(maxsize=64)
+def _known(derived: Derived) -> frozenset[str]:
+    return frozenset({*derived.parameters, *(f"actuator.{a}" for a in ACTUATOR)})
+
+
+@lru_cache(maxsize=64)
+def lay_out(derived: Derived, flavour: Flavour, plain: bool = False) -> Layout:
+    """Layout of a kernel, worked out once."""
+    return Layout(derived=derived, flavour=flavour, plain=plain)
+
+
+def choose(
+    derived: Derived,
+    params: Mapping[str, Any],
+    *,
+    free: Collection[str] = (),
+    held: Collection[str] = (),
+    loop: bool | Loop | Law | Rule | None = False,
+    record: bool = True,
+) -> Flavour:
+    """Smallest flavour that computes what `params` ask for.
+
+    Parameters
+    ----------
+    derived : Derived
+        Equations of the plant.
+    params : mapping of str to float or array
+        Values by name; a term is left out when its parameters are zero or missing in every lane.
+    free : collection of str
+        Parameters that will be varied later, so that their terms stay in although they are zero now.
+    held : collection of str
+        Coordinates whose motion is prescribed.
+    loop : bool, Loop, Law or Rule, optional
+        Controller that computes the input; True stands for a `Loop` without delay.
+    record : bool
+        The motion is returned.
+
+    Raises
+    ------
+    BadInput
+        When a held coordinate or a named parameter does not exist.
+    """
+    known = _known(derived)
+    for name in (*params, *free):
+        if name not in known:
+            raise BadInput(f"{derived.name} has no parameter '{name}'; {nearest(name, known)}")
+    for name in held:
+        if name not in derived.coordinates:
+            raise BadInput(f"{derived.name} has no coordinate '{name}' to hold; {nearest(name, derived.coordinates)}")
+
+    def on(name: str) -> bool:
+        if not name or name in free:
+            return bool(name)
+        idle = ACTUATOR_DEFAULTS.get(name.removeprefix("actuator."), 0.0)
+        value = params.get(name, idle)
+        return value != idle if isinstance(value, float) else bool(np.any(np.asarray(value) != idle))
+
+    moving = [j for j in derived.joints if derived.coordinates[j.coordinate] not in held]
+    gate, damping, curve, dynamic = (
+        any(on(f"actuator.{a}") for a in names)
+        for names in (("start", "end"), ("damping", "standby"), ("fade",), ("lag", "delay", "slope"))
+    )
+    curve = (curve or damping) and on("actuator.knee")
+    relaxation = damping and on("actuator.relaxation")
+    rough = [j for j in moving if on(j.coulomb) or on(j.stiction)]
+    return Flavour(
+        dry=tuple(j.coordinate for j in rough if not on(j.presliding)),
+        dahl=tuple(j.coordinate for j in rough if on(j.presliding)),
+        stribeck=tuple(j.coordinate for j in rough if on(j.stribeck_speed)),
+        drag=tuple(j.coordinate for j in moving if on(j.quadratic)),
+        held=tuple(i for i, c in enumerate(derived.coordinates) if c in held),
+        dynamic=dynamic or gate or damping or curve or (not isinstance(loop, bool | None) and loop.delay > 0.0),
+        gate=gate,
+        damping=damping,
+        relaxation=relaxation,
+        curve=curve,
+        loop=loop is not None and loop is not False,
+        law=loop.sizes if isinstance(loop, Law) else None,
+        rule=loop.sizes if isinstance(loop, Rule) else None,
+        record=record,
+    )

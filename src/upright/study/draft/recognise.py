@@ -1,0 +1,218 @@
+"""What can a study take from a log before anybody has said what the rig is? Plant, columns, windows, rest levels."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from upright.errors import BadInput
+from upright.physics import Plant, find
+from upright.readers.inspection import Column, Inspection
+from upright.records import Record
+from upright.study.draft.rest_and_motion import (
+    coupling,
+    moves_against,
+    moving_window,
+    rest_level,
+    swing_frequency,
+    zero_reading,
+)
+
+_RATE = re.compile(r"velocity|speed|rate|_dot\b|omega|\bqd|accel", re.IGNORECASE)
+_EFFORT = re.compile(r"effort|volt|current|torque|force|plant_input|cmd|duty|^(u|v|i)$", re.IGNORECASE)
+REFERENCE = re.compile(r"target|reference|\bref\b|commanded|set.?point", re.IGNORECASE)
+_ARM = re.compile(r"arm|psi|joint0|base|motor", re.IGNORECASE)
+_CART = re.compile(r"cart|pos|^[xz]\d?$|distance|displacement", re.IGNORECASE)
+_DISK = re.compile(r"disk|disc|theta\s*_?[123]\b", re.IGNORECASE)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recognised:
+    """What a log shows.
+
+    Attributes
+    ----------
+    plant : str
+        Plant that fits the columns.
+    columns : mapping of str to Column
+        Column per coordinate of the plant.
+    rest : mapping of str to float
+        Reading of each at rest, in the column's unit.
+    drive : Column or None
+        What commands the rig.
+    reversed : bool
+        Whether a positive command first moves the driven column down.
+    mirrored : bool
+        Whether the pendulum's column counts against the coordinate, judged by how the hinge's motion throws it.
+    window : tuple of float
+        Where something happens [s].
+    frequency : float
+        Of the slowest swing of the last coordinate [rad/s]; 0 when it does not swing.
+    doubts : tuple of str
+        Sentences about what was guessed.
+    """
+
+    plant: str
+    columns: dict[str, Column]
+    rest: dict[str, float]
+    drive: Column | None
+    reversed: bool
+    mirrored: bool
+    window: tuple[float, float]
+    frequency: float
+    doubts: tuple[str, ...]
+
+
+def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
+    """What can be told from a record and its inspection; `plant` overrides the guess.
+
+    Raises
+    ------
+    BadInput
+        When nothing in the log moves.
+    """
+    found = places(record, seen)
+    if not found:
+        raise BadInput(
+            f"{seen.file}: no column moves like an angle, a position or a count; `upright show` lists what there is"
+        )
+    drive = drive_column(record, seen)
+    doubts: list[str] = []
+    if not plant:
+        plant, doubt = _plant(found, drive)
+        doubts += [doubt] if doubt else []
+    columns, missing = _assign(find(plant), found)
+    doubts += [f"No column was found for {name}; lock it, leave it unmeasured or name its column." for name in missing]
+    last = record[list(columns.values())[-1].name]
+    pushed = plant in ("cart-pendulum", "furuta") and len(columns) > 1
+    window = moving_window(record, seen, [record[c.name] for c in columns.values()], drive, pushed=pushed)
+    inside = (record.t >= window[0]) & (record.t <= window[1])
+    rest = {name: zero_reading(record, seen, c, drive, window) for name, c in columns.items()}
+    centre = rest[list(columns)[-1]]
+    driven = record[next(iter(columns.values())).name]
+    mirrored = False
+    if pushed and all(c.guess == "rad" or name == "x" for name, c in columns.items()):
+        thrown = coupling(record.t[inside], driven[inside], last[inside] - centre)
+        mirrored = thrown * (1 if plant == "furuta" else -1) < 0
+    return Recognised(
+        plant=plant,
+        columns=columns,
+        rest=rest,
+        drive=drive,
+        reversed=drive is not None and moves_against(record.t, record[drive.name], driven),
+        mirrored=mirrored,
+        window=window,
+        frequency=swing_frequency(record.t[inside], last[inside] - centre),
+        doubts=tuple(doubts),
+    )
+
+
+def places(record: Record, seen: Inspection) -> list[Column]:
+    """Columns that measure a place and move, without speeds, drives, clocks and liars."""
+    kinds = ("rad", "m", "counts", "deg", "mm", "")
+    found = [c for c in seen.columns if not (c.drive or c.constant or _lies(c, seen)) and c.guess in kinds]
+    found = [c for c in found if not _RATE.search(c.name) and not _is_speed(record, c.name, [o.name for o in found])]
+    found = [_as_angle(record, c, seen) for c in found]
+    found = [c for c in found if c.guess] or found
+    span = {c.name: c.high - c.low for c in found}
+    largest = {unit: max(span[c.name] for c in found if c.guess == unit) for unit in {c.guess for c in found}}
+    return [c for c in found if span[c.name] > 0.01 * largest[c.guess]]  # a locked arm still moves by some mrad
+
+
+def _lies(c: Column, seen: Inspection) -> bool:
+    """Whether a column is not what it is called; of two equal ones, the reference or the later one lies."""
+    names = [o.name for o in seen.columns]
+    earlier = [f"the same as '{o.name}'" for o in seen.columns[: names.index(c.name)] if not o.drive]
+    return any(not lie.startswith("the same as") or lie in earlier for lie in c.lies)
+
+
+def _is_speed(record: Record, name: str, others: list[str]) -> bool:
+    """Whether a column is the slope of another one."""
+    step = max(record.t.size // 5000, 1)
+    x = record[name]
+    for other in others:
+        if other != name:
+            slope = np.gradient(record[other], record.t)
+            width = max(step, 5)
+            a, b = (np.convolve(v, np.ones(width) / width, "valid")[::step] for v in (slope, x))
+            if a.std() > 0 and b.std() > 0 and np.corrcoef(a, b)[0, 1] > 0.97:
+                return True
+    return False
+
+
+def _as_angle(record: Record, c: Column, seen: Inspection) -> Column:
+    """A nameless column that comes to rest half a turn from zero is an angle."""
+    if c.guess or c.high - c.low < 0.3:
+        return c
+    rest = rest_level(record[c.name], seen, record.t)
+    return replace(c, guess="rad") if abs(abs(rest) - math.pi) < 0.1 else c
+
+
+def in_dac_counts(c: Column) -> bool:
+    """Whether a column holds the command in counts of ECP's converter."""
+    return any(lie.startswith("the command in DAC counts") for lie in c.lies)
+
+
+def drive_column(record: Record, seen: Inspection) -> Column | None:
+    """What commands the rig: the column in converter counts, else one called like an effort, else one that looks so."""
+    dac = next((c for c in seen.columns if in_dac_counts(c)), None)
+    if dac is not None:
+        return dac
+    candidates = [c for c in seen.columns if c.drive and not c.constant]
+    candidates = [c for c in candidates if all(lie.startswith("the first samples are outliers") for lie in c.lies)]
+    candidates = [c for c in candidates if not REFERENCE.search(c.name)]
+    effort = [c for c in candidates if _EFFORT.search(c.name)]
+    return (effort or candidates or [None])[0]
+
+
+def _plant(places: list[Column], drive: Column | None) -> tuple[str, str]:
+    """Plant whose coordinates look like these columns, and how sure that is."""
+    lengths = [c for c in places if c.guess in ("m", "mm")]
+    counts = [c for c in places if c.guess in ("counts", "")]
+    angles = [c for c in places if c.guess in ("rad", "deg")]
+    bodies = min(len(counts), 3)
+    if counts and not angles and not lengths:
+        kind = "torsional" if any(_DISK.search(c.name) for c in counts) else "rectilinear"
+        other = "rectilinear" if kind == "torsional" else "torsional"
+        what = f"Counts of {bodies} encoder{'s' if bodies > 1 else ''} were"
+        if not all(c.guess for c in counts):
+            first = next(c.name for c in counts if not c.guess)
+            what = f"Column '{first}' says neither unit nor kind; it was"
+        angle = "" if bodies > 1 else "; an angle that hangs would be --plant pendulum"
+        return (
+            f"{kind}-{bodies}",
+            f"{what} taken for a {kind} chain; {other}-{bodies} looks the same{angle}.",
+        )
+    if lengths and angles:
+        return "cart-pendulum", ""
+    if len(angles) >= 2:
+        if all(_DISK.search(c.name) for c in angles):
+            return f"torsional-{min(len(angles), 3)}", "Several angles were taken for disks on a shaft."
+        return "furuta", "Two angles were taken for arm and pendulum of a Furuta pendulum."
+    if lengths:
+        return f"rectilinear-{min(len(lengths), 3)}", "Positions were taken for carts on springs."
+    doubt = "One angle was taken for a pendulum on a fixed pivot." if drive is not None else ""
+    return "pendulum", doubt
+
+
+def _assign(plant: type[Plant], places: list[Column]) -> tuple[dict[str, Column], list[str]]:
+    """Column per coordinate: by name, then by kind and order."""
+    left, out, missing = list(places), dict[str, Column](), list[str]()
+    for coordinate in plant.coordinates:
+        kinds = ("rad", "deg") if coordinate.unit == "rad" else ("m", "mm")
+        fitting = [c for c in left if c.guess in kinds] or [c for c in left if c.guess in ("counts", "")]
+        pattern = {"psi": _ARM, "x": _CART}.get(coordinate.name)
+        best = next((c for c in fitting if c.name == coordinate.name), None)
+        best = best or next((c for c in fitting if pattern and pattern.search(c.name)), None)
+        best = best or (fitting[0] if fitting else None)
+        if best is None:
+            missing.append(coordinate.name)
+        else:
+            out[coordinate.name] = best
+            left.remove(best)
+    if not out:
+        raise BadInput(f"no column looks like {plant.coordinates[0].meaning}; choose another --plant")
+    return out, missing

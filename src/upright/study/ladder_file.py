@@ -1,0 +1,161 @@
+"""What did the ladder find, for programs and for the next fit? `ladder.json`, and the study of the chosen model."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Collection, Sequence
+from pathlib import Path
+from typing import Any
+
+from upright.identification.ladder.result import Ladder, Step
+from upright.identification.ladder.rungs import neutral
+from upright.identification.model.model import ACTUATOR
+from upright.study.load import Study
+from upright.study.text import StudyText
+
+FORMAT = 1
+
+
+def write_ladder(ladder: Ladder, study: Study, path: Path) -> dict[str, Any]:
+    """Write `ladder.json` and return what it holds."""
+    content = as_json(ladder, study)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_suffix(".part")  # a reader never meets half a file
+    part.write_text(json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")
+    os.replace(part, path)
+    return content
+
+
+def as_json(ladder: Ladder, study: Study) -> dict[str, Any]:
+    """Content of `ladder.json`: plain dicts, lists, text and finite numbers."""
+    from upright import __version__
+
+    return {
+        "format": FORMAT,
+        "title": study.title,
+        "plant": study.plant,
+        "held_out": ladder.held_out,
+        "chosen": [s.rung.name for s in ladder.kept],
+        "left_out": list(ladder.left_out),
+        "stopped": ladder.stopped,
+        "interrupted": ladder.interrupted,
+        "seconds": round(ladder.seconds, 3),
+        "steps": [_step(s) for s in ladder.steps],
+        "repeats": [
+            {
+                "runs": list(group.labels),
+                "ceiling": {n: _finite(v) for n, v in group.ceiling.items()},
+                "range": {n: [_finite(min(v)), _finite(max(v))] for n, v in group.percents.items()},
+            }
+            for group in ladder.repeats
+        ],
+        "warnings": list(ladder.warnings),
+        "provenance": {
+            "upright": __version__,
+            "study": study.path.name,
+            "study_sha256": study.sha256,
+            "source": study.source,
+            "runs": {run.label: run.source for run in study.runs},
+        },
+    }
+
+
+def _step(s: Step) -> dict[str, Any]:
+    c = s.comparison
+    return {
+        "name": s.rung.name,
+        "adds": list(s.rung.adds),
+        "drops": list(s.rung.drops),
+        "unknown": list(s.rung.unknown),
+        "kept": s.kept,
+        "reason": s.reason,
+        "fit_percent": _finite(s.fit_percent),
+        "predicted_percent": _finite(s.predicted_percent),
+        "fitted": {run: {n: _finite(v) for n, v in own.items()} for run, own in s.fitted.items()},
+        "predicted": {run: {n: _finite(v) for n, v in own.items()} for run, own in s.predicted.items()},
+        "gain": None if c is None else _finite(c.gain),
+        "scatter": None if c is None else _finite(c.scatter),
+        "cost": _finite(s.cost),
+        "parameters": s.parameters,
+        "per_run": s.own,
+        "values": {n: _finite(v) for n, v in s.values.items()},
+        "seconds": round(s.seconds, 3),
+    }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def chosen_study(study: Study, ladder: Ladder) -> str:
+    """Text of the study with the terms that the ladder refused known to do nothing, and without its rungs.
+
+    What kept rungs estimate run by run is written beside the runs, as a line to add.
+    """
+    text = StudyText(study.path)
+    lines = text.text.splitlines()
+    cut = _lines_of_ladder(lines)
+    told = {_line(text, n) for n in ladder.left_out}
+    out = [f"# {study.path.name} as far as the ladder kept it; files are where the study's own are: use --data."]
+    for number, line in enumerate(lines, start=1):
+        if number in cut:
+            continue
+        if number in told:
+            out += [f"# not kept: {line.strip()}", *_nothing(study, ladder.left_out, text, number)]
+        else:
+            out.append(line)
+    own = tuple(n for s in ladder.kept for n in s.rung.unknown)
+    if own:
+        out.append(f"# The ladder kept, run by run: add {', '.join(own)} to unknown of each of [[runs]].")
+    return "\n".join(out).rstrip() + "\n"
+
+
+def _place(name: str) -> tuple[str, str]:
+    return ("actuator", name.partition(".")[2]) if name in ACTUATOR else ("parameters", name)
+
+
+def _line(text: StudyText, name: str) -> int:
+    return text.line(_place(name))
+
+
+def _nothing(study: Study, names: Collection[str], text: StudyText, number: int) -> list[str]:
+    """A line for a parameter that must have a value, though it does nothing."""
+    found = next(n for n in names if _line(text, n) == number)
+    plant = study.rig.plant
+    if found in ACTUATOR or _has_default(study, found):
+        return []
+    return [f"{found} = {neutral(plant, found):g}"]
+
+
+def _has_default(study: Study, name: str) -> bool:
+    from dataclasses import MISSING, fields
+
+    return any(f.name == name and f.default is not MISSING for f in fields(study.rig.plant))  # type: ignore[arg-type]
+
+
+def _lines_of_ladder(lines: Sequence[str]) -> set[int]:
+    """Numbers of the lines of [[ladder]] tables, up to the next table."""
+    inside, found = False, set[int]()
+    for number, line in enumerate(lines, start=1):
+        if line.lstrip().startswith("["):
+            inside = line.replace(" ", "").startswith("[[ladder]]")
+        if inside:
+            found.add(number)
+    return found
+
+
+def can_be_trimmed(study: Study, ladder: Ladder) -> bool:
+    """Whether the text can say what the ladder chose: every refused term stands on a line of its own.
+
+    A plant that is found beside the study would not be found beside its copy.
+    """
+    text = StudyText(study.path)
+    places = [_line(text, n) for n in ladder.left_out]
+    lines = text.text.splitlines()
+    alone = all(
+        lines[number - 1].lstrip().split("=")[0].strip().strip("\"'") == _place(name)[1]
+        for number, name in zip(places, ladder.left_out, strict=True)
+    )
+    return alone and len(set(places)) == len(places) and ":" not in study.plant

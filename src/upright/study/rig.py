@@ -1,0 +1,198 @@
+"""What is known about the rig, and what is asked? [rig], [parameters] and [actuator] of a study."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from upright.errors import BadInput, ImpossiblePhysics
+from upright.identification.model.model import ACTUATOR, NEVER_NEGATIVE, Parameter, Rig
+from upright.physics import Plant, find
+from upright.quantities import Quantity
+from upright.study.columns import in_unit
+from upright.study.keys import names
+from upright.study.text import Section, show
+
+
+def read_plant(study: Section) -> type[Plant]:
+    """Plant that [rig] names."""
+    rig = study.section("rig")
+    if "rig" not in study:
+        raise study.error("rig", 'a study needs a table [rig] with plant = "furuta" or another plant')
+    rig.check(names("rig"))
+    name = rig.text_of("plant", "cart-pendulum")
+    with study.text.at(("rig", "plant")):
+        return find(name, study.text.path.parent)
+
+
+def read_rig(study: Section, plant: type[Plant], drive_unit: str, fixed: Mapping[str, float] | None = None) -> Rig:
+    """Rig of a study.
+
+    Parameters
+    ----------
+    study : Section
+        The whole study.
+    plant : type of Plant
+        From `read_plant`.
+    drive_unit : str
+        Unit of the command, which the actuator's gain is stated per; "" when unknown.
+    fixed : mapping of str to float, optional
+        Values [SI] of a model fitted before; they replace what the study says, and nothing is estimated.
+    """
+    section, actuator = study.section("parameters"), study.section("actuator")
+    section.check(plant.names(), f"parameter of {plant.__name__} called")
+    actuator.check(names("actuator"))
+    parameters: dict[str, Parameter] = {}
+    for name in plant.names():
+        what = plant.quantity(name)
+        if fixed is not None and name in fixed:
+            parameters[name] = Parameter(name=name, value=fixed[name], unit=what.unit, meaning=what.meaning)
+        elif name in section:
+            parameters[name] = read_parameter(section, name, name, what)
+        else:
+            parameters[name] = _default(study, plant, name)
+    for name, (meaning, default) in ACTUATOR.items():
+        key = name.partition(".")[2]
+        what = Quantity(
+            unit=actuator_unit(plant, key, drive_unit),
+            meaning=meaning,
+            lower=0.0 if name in NEVER_NEGATIVE else -math.inf,
+            open_lower=key == "knee",
+        )
+        if fixed is not None and name in fixed:
+            parameters[name] = Parameter(name=name, value=fixed[name], unit=what.unit, meaning=meaning)
+        elif key in actuator:
+            parameters[name] = read_parameter(actuator, key, name, what)
+        else:
+            parameters[name] = Parameter(name=name, value=default, unit=what.unit, meaning=meaning)
+    return Rig(plant=plant, parameters=parameters, substeps=study.section("rig").whole("substeps", 1))
+
+
+def _default(study: Section, plant: type[Plant], name: str) -> Parameter:
+    """A parameter the study does not mention, at the plant's default."""
+    from dataclasses import MISSING, fields
+
+    what = plant.quantity(name)
+    value = next(f.default for f in fields(plant) if f.name == name)  # type: ignore[arg-type]
+    if value is MISSING:
+        raise study.error(
+            "parameters",
+            f"{plant.__name__} needs {name} ({what.meaning}, in {what.unit}) under [parameters]: known, as in"
+            f' {name} = "1 {what.unit}", or asked, as in {name} = {{ guess = "1 {what.unit}" }}',
+        )
+    return Parameter(name=name, value=float(value), unit=what.unit, meaning=what.meaning)  # type: ignore[arg-type]
+
+
+def actuator_unit(plant: type[Plant], key: str, drive_unit: str) -> str:
+    """Unit of one actuator number; the gain's is the input's force per unit of the command."""
+    force = plant.inputs[0].unit if plant.inputs else "1"
+    place = next((c.unit for c in plant.coordinates if plant.inputs and c.name == plant.inputs[0].on), "1")
+    drive = drive_unit or "1"
+    if key == "gain":
+        return force if drive == "1" else per(force, drive)
+    if key in ("offset", "limit"):
+        return drive
+    if key in ("lag", "delay", "start", "end", "relaxation"):
+        return "s"
+    return f"{place}/s" if key == "knee" else per(force, f"{place}/s")
+
+
+def per(above: str, below: str) -> str:
+    """Unit of a ratio; a speed below is written as time above, N s/m."""
+    if below.endswith("/s"):
+        return f"{above} s/{below[:-2]}"
+    top = above if " " not in above else f"({above})"
+    return f"{top}/({below})" if " " in below or "/" in below else f"{top}/{below}"
+
+
+def read_parameter(section: Section, key: str, name: str, what: Quantity) -> Parameter:
+    """One parameter in any of its forms: a number, known with uncertainty, or to estimate."""
+    value = section.values[key]
+    if not isinstance(value, dict):
+        number = _number(section, (key,), value, what)
+        _check(section, (key,), name, number, what)
+        return Parameter(name=name, value=number, unit=what.unit, meaning=what.meaning)
+    table = section.section(key)
+    table.check(names("value"))
+    if ("value" in table) == ("guess" in table):
+        raise section.error(
+            key,
+            f"{name} needs either value (known) or guess (to estimate), got {show(value)};"
+            f' for instance {key} = {{ guess = "1 {what.unit}", min = 0 }}',
+        )
+    estimate = "guess" in table
+    for wrong in ("min", "max") if not estimate else ("uncertainty", "assumed"):
+        if wrong in table:
+            raise table.error(
+                wrong,
+                f"{name} is {'estimated from a guess' if estimate else 'known'}, so {wrong} has no meaning here;"
+                f" {'write value instead of guess' if estimate else 'write guess instead of value to estimate it'}",
+            )
+    main = "guess" if estimate else "value"
+    number = _number(section, (key, main), table.values[main], what)
+    _check(section, (key, main), name, number, what)
+    if not estimate:
+        sigma = _uncertainty(section, key, table.values.get("uncertainty", 0.0), number, what)
+        assumed = table.flag("assumed")
+        if assumed and sigma > 0:
+            raise table.error("assumed", f"{name} has an uncertainty, so it is known about, not assumed; leave one out")
+        return Parameter(
+            name=name, value=number, unit=what.unit, meaning=what.meaning, uncertainty=sigma, assumed=assumed
+        )
+    lower, upper = (
+        _number(section, (key, bound), table.values[bound], what) if bound in table else default
+        for bound, default in (("min", what.lower), ("max", what.upper))
+    )
+    if not lower <= number <= upper or lower == upper:
+        raise table.error(main, f"{name} starts at {number:g} {what.unit}, outside its bounds {lower:g} to {upper:g}")
+    return Parameter(
+        name=name,
+        value=number,
+        unit=what.unit,
+        meaning=what.meaning,
+        estimate=True,
+        lower=max(lower, what.lower),
+        upper=min(upper, what.upper),
+    )
+
+
+def _number(section: Section, keys: tuple[str, ...], value: Any, what: Quantity) -> float:
+    with section.text.at((*section.place(keys[0]), *keys[1:])):
+        if isinstance(value, bool) or not isinstance(value, int | float | str):
+            raise BadInput(f'{keys[0]} must be a number or text such as "1.5 {what.unit}", got {show(value)}')
+        return in_unit(value, what.unit)
+
+
+def _check(section: Section, keys: tuple[str, ...], name: str, value: float, what: Quantity) -> None:
+    infinite = math.isinf(value) and name in ACTUATOR and value == ACTUATOR[name][1]
+    with section.text.at((*section.place(keys[0]), *keys[1:])):
+        try:
+            if not infinite:
+                what.check(name, value)
+        except ImpossiblePhysics as error:
+            raise BadInput(str(error)) from None
+
+
+def _uncertainty(section: Section, key: str, value: Any, number: float, what: Quantity) -> float:
+    if isinstance(value, str) and value.strip().endswith("%"):
+        try:
+            sigma = abs(number) * float(value.strip().rstrip("%")) / 100
+        except ValueError:
+            raise section.error(key, f'uncertainty must be like "2 mm" or "1 %", got {show(value)}') from None
+    else:
+        sigma = _number(section, (key, "uncertainty"), value, what)
+    if not 0 <= sigma < math.inf:
+        raise section.error(key, f"the uncertainty of {key} must be zero or more, got {show(value)}")
+    return sigma
+
+
+def known_values(section: Section, plant: type[Plant]) -> dict[str, float]:
+    """Parameters of a run that are known and differ, by name [SI]."""
+    section.check(plant.names(), f"parameter of {plant.__name__} called")
+    out: dict[str, float] = {}
+    for name in section.values:
+        what = plant.quantity(name)
+        out[name] = _number(section, (name,), section.values[name], what)
+        _check(section, (name,), name, out[name], what)
+    return out

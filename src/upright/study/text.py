@@ -1,0 +1,193 @@
+"""On which line of the study does it say that?
+
+`tomllib` gives values without places. `StudyText` reads the same text once more for where each key stands, and
+`Section` hands out the values of one table, so that every complaint names file, line and the nearest valid name.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Generator, Iterable
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from upright import units
+from upright.errors import BadInput, UprightError, nearest
+from upright.study.lines import KeyPath, key_lines
+
+
+class StudyText:
+    """Text of a study with its values and the line of each key.
+
+    Raises
+    ------
+    BadInput
+        When the file is missing, no text, or no TOML.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            self.text = path.read_text(encoding="utf-8-sig")
+        except UnicodeDecodeError:
+            raise BadInput(
+                f"{path} is not text, and a study is a TOML file; to make one from a log: upright init {path}"
+            ) from None
+        try:
+            self.values: dict[str, Any] = tomllib.loads(self.text)
+        except tomllib.TOMLDecodeError as error:
+            message = str(error)
+            at = re.search(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)", message)
+            line = at.group(1) if at and at.group(1) else self.text.count("\n") + 1
+            what = re.sub(r"\s*\(at .*\)$", "", message)
+            raise BadInput(
+                f"{path}, line {line}: this is no TOML ({what[:1].lower()}{what[1:]}); text stands in quotes, as in"
+                ' plant = "furuta", and each key on its own line. Is this a log? Then: upright init LOG'
+            ) from None
+        self.lines = key_lines(self.text)
+
+    def line(self, path: KeyPath) -> int:
+        """Line of a key, or of the nearest table around it that the text names."""
+        while path and path not in self.lines:
+            path = path[:-1]
+        return self.lines.get(path, 1)
+
+    def error(self, path: KeyPath, sentence: str) -> BadInput:
+        """The complaint about one key."""
+        return BadInput(f"{self.path}, line {self.line(path)}: {sentence}")
+
+    @contextmanager
+    def at(self, path: KeyPath) -> Generator[None]:
+        """Put file and line before whatever the block complains about."""
+        try:
+            yield
+        except UprightError as error:
+            if str(error).startswith(str(self.path)):
+                raise
+            raise self.error(path, str(error)) from None
+        except FileNotFoundError as error:
+            raise self.error(path, f"the file {error.filename} does not exist") from None
+
+    def root(self) -> Section:
+        """The whole study as a section."""
+        return Section(self, (), self.values)
+
+
+class Section:
+    """One table of the study; asks for its values by name, form and unit, and knows where each one stands."""
+
+    def __init__(self, text: StudyText, path: KeyPath, values: Any) -> None:
+        self.text, self.path = text, path
+        if not isinstance(values, dict):
+            raise text.error(path, f"'{self.name}' must be a table of keys, got {show(values)}")
+        self.values: dict[str, Any] = values
+        self.places: dict[str, KeyPath] = {}
+
+    @property
+    def name(self) -> str:
+        """How the study writes this table, such as ``sensors.theta``."""
+        return ".".join(str(part) for part in self.path if isinstance(part, str)) or "the study"
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.values
+
+    def place(self, key: str) -> KeyPath:
+        """Path of a key in the study."""
+        return self.places.get(key, (*self.path, key))
+
+    def over(self, base: Section) -> Section:
+        """Join this table with what it leaves out taken from `base`; each key keeps its line."""
+        both = Section(self.text, self.path if self.values else base.path, {**base.values, **self.values})
+        both.places = {k: base.place(k) for k in base.values} | {k: self.place(k) for k in self.values}
+        return both
+
+    def error(self, key: str, sentence: str) -> BadInput:
+        """The complaint about one key of this table."""
+        return self.text.error(self.place(key), sentence)
+
+    def check(self, valid: Iterable[str], what: str = "key") -> None:
+        """Refuse the first key that is none of `valid`."""
+        valid = tuple(valid)
+        for key in self.values:
+            if key not in valid:
+                place = f"[{self.name}]" if self.path else "a study"
+                raise self.error(key, f"{place} has no {what} '{key}'; {nearest(key, valid)}")
+
+    def section(self, key: str) -> Section:
+        """Table under `key`, empty when absent."""
+        return Section(self.text, self.place(key), self.values.get(key, {}))
+
+    def text_of(self, key: str, example: str) -> str:
+        """Text under `key`."""
+        value = self.values.get(key)
+        if not isinstance(value, str) or not value.strip():
+            got = "nothing" if key not in self.values else show(value)
+            raise self.error(key, f'[{self.name}] needs {key} as text, such as {key} = "{example}", got {got}')
+        return value
+
+    def names(self, key: str, valid: Iterable[str], default: tuple[str, ...] = ()) -> tuple[str, ...]:
+        """List of names under `key`, each one of `valid`; a single name may stand alone."""
+        if key not in self.values:
+            return default
+        value, valid = self.values[key], tuple(valid)
+        items = [value] if isinstance(value, str) else value
+        if not isinstance(items, list):
+            raise self.error(key, f'{key} must be a list of names, such as {key} = ["{valid[0]}"], got {show(value)}')
+        for item in items:
+            if item not in valid:
+                raise self.error(key, f"{key} lists {show(item)}; {nearest(str(item), valid)}")
+        return tuple(dict.fromkeys(items))
+
+    def number(self, key: str, unit: str, default: float | None = None) -> float:
+        """Number under `key` in SI, dimension checked; a plain number is SI already."""
+        if key not in self.values:
+            if default is None:
+                raise self.error(key, f"[{self.name}] needs {key}, a number in {unit}")
+            return default
+        with self.text.at(self.place(key)):
+            return si(self.values[key], unit, key)
+
+    def positive(self, key: str, unit: str, default: float) -> float:
+        """Number above zero."""
+        value = self.number(key, unit, default)
+        if not value > 0:
+            raise self.error(key, f"{key} must be above zero, got {show(self.values[key])}")
+        return value
+
+    def flag(self, key: str) -> bool:
+        """True or false, false when left out."""
+        value = self.values.get(key, False)
+        if not isinstance(value, bool):
+            raise self.error(key, f"{key} must be true or false, got {show(value)}")
+        return value
+
+    def whole(self, key: str, default: int) -> int:
+        """Whole number, at least 1."""
+        value = self.values.get(key, default)
+        if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+            raise self.error(key, f"{key} must be a whole number, 1 or more, got {show(value)}")
+        return value
+
+
+def si(value: Any, unit: str, what: str) -> float:
+    """Value in SI of a number or of text such as ``"2 mm"``; `unit` says which dimension is needed."""
+    if isinstance(value, str):
+        return units.parse(value, unit)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise BadInput(f'{what} must be a number or text with a unit, such as "1.5 {unit}", got {show(value)}')
+    if not abs(float(value)) < 1e300:
+        raise BadInput(f"{what} must be a finite number, got {value}")
+    return float(value)
+
+
+def show(value: Any) -> str:
+    """A value as the study wrote it, short."""
+    if isinstance(value, str):
+        return f'"{value}"' if len(value) < 40 else f'"{value[:37]}..."'
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, dict):
+        return "a table {" + ", ".join(list(value)[:4]) + "}"
+    return str(value) if len(str(value)) < 40 else f"{str(value)[:37]}..."

@@ -1,0 +1,115 @@
+"""Does a sampled law compute what a program of a few lines computes, alone and in the compiled loop?"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.closed_loop.programs import Pid, T
+from upright.closed_loop import Feedback, Filter, SampledLaw, pid, state_feedback
+from upright.errors import BadInput
+from upright.identification.model.model import Parameter, Rig, Run
+from upright.identification.problem.tracks import motions, prepare, simulator
+from upright.physics import find
+
+LAWS = {
+    "plain": ({"kp": 4.0, "ki": 3.0, "kd": 0.2}, {}),
+    "filtered": ({"kp": 4.0, "ki": 3.0, "kd": 0.2, "tau": 0.01}, {"derivative": 0.01}),
+    "two taps": (
+        {"kp": 4.0, "ki": 3.0, "kd": 0.2, "second": 0.8, "on": "measurement"},
+        {"derivative": Filter(second=0.8), "on": "measurement"},
+    ),
+    "held": ({"kp": 4.0, "ki": 30.0, "kd": 0.2, "limit": 3.0, "hold": True}, {"limit": 3.0, "windup": "hold"}),
+}
+
+
+def pair(name: str) -> tuple[Pid, SampledLaw]:
+    program, law = LAWS[name]
+    gains = {k: program[k] for k in ("kp", "ki", "kd")}
+    return Pid(**program), pid(**gains, period=T, **law)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_a_law_is_the_program_line_by_line(name: str) -> None:
+    program, law = pair(name)
+    generator = np.random.default_rng(5)
+    y, r = np.cumsum(generator.normal(size=(2, 400)), axis=1) * 0.05
+    y[0] = r[0] = 0.0  # both start from zero: the program with its first sample, the law with what was before
+    expected = [program(a, b) for a, b in zip(y, r, strict=True)]
+    np.testing.assert_allclose(law.commands(y, r), expected, atol=1e-10)
+
+
+def test_feedback_of_states_differences_the_positions() -> None:
+    law = state_feedback({"x": (2.0, 0.1), "theta": (30.0, 2.5)}, period=T, k_pf=2.0, pole=0.9)
+    generator = np.random.default_rng(6)
+    y, r = generator.normal(size=(300, 2)), generator.normal(size=300)
+    v, last, expected = np.zeros(2), np.zeros(2), []
+    for now, target in zip(y, r, strict=True):
+        v, last = 0.9 * v + 0.1 * (now - last) / T, now
+        expected.append(2.0 * target - 2.0 * now[0] - 0.1 * v[0] - 30.0 * now[1] - 2.5 * v[1])
+    np.testing.assert_allclose(law.commands(y, r), expected, atol=1e-9)
+
+
+def test_a_law_between_other_units_gives_the_same_commands() -> None:
+    law = pid(4.0, 3.0, 0.2, period=T)
+    counts = np.round(np.random.default_rng(7).normal(size=200) * 1000)
+    in_radians = law.on([500.0], [30.0], -0.5, ("psi",))
+    assert in_radians.references == ("r", "1")
+    reference = np.column_stack([np.full(200, 100.0), np.ones(200)])
+    np.testing.assert_allclose(
+        in_radians.commands((counts - 30.0) / 500.0, reference), -0.5 * law.commands(counts, np.full(200, 100.0))
+    )
+
+
+@pytest.mark.parametrize("every", [1, 4])
+@pytest.mark.parametrize("name", LAWS)
+def test_the_compiled_loop_runs_the_law(name: str, every: int) -> None:
+    """Cart on a spring under the law, against a program that steps the cart by its matrix exponential."""
+    from scipy.linalg import expm
+
+    program, law = pair(name)
+    n, m, k, c = 300, 0.5, 8.0, 0.3
+    motion = expm(np.array([[0, 1, 0], [-k / m, -c / m, 1 / m], [0, 0, 0]]) * T)
+    x, states, commands = np.zeros(2), [], []
+    for _ in range(n * every):
+        u = program(x[0], 1.0)
+        states.append(x)
+        commands.append(u)
+        x = motion[:2, :2] @ x + motion[:2, 2] * u
+    values = {"m_1": m, "k_1": k, "c_1": c}
+    rig = Rig(
+        plant=find("rectilinear-1"), parameters={n: Parameter(name=n, value=v) for n, v in values.items()}, substeps=4
+    )
+    # the program sees its first sample as no step of the reference, so must the law
+    start = np.zeros(law.C.size)
+    if "measurement" not in LAWS[name][0].values():
+        start[1] = 1.0
+    loop = Feedback(law=replace(law, measured=("x_1",), initial=start), references=np.ones((1, 1)), every=every)
+    y = np.array(states)[::every, :1]
+    run = Run(
+        label="loop", role="predict", t=np.arange(n) * T * every, u=np.zeros((n, 1)), y=y, measured=("x_1",), loop=loop
+    )
+    track = prepare(rig, run, thin=False)
+    every_value = {**{n: p.value for n, p in rig.parameters.items()}}
+    solver = simulator(rig, track, every_value, ())
+    found = motions(solver, track, every_value, np.zeros((2, 1, 1)), samples=n)[:, :, 0]
+    np.testing.assert_allclose(found[:, :2], np.array(states)[::every], atol=1e-6)
+    np.testing.assert_allclose(found[:, 2], np.array(commands)[::every], atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("fields", "sentence"),
+    [
+        ({"A": np.eye(2)}, "needs A"),
+        ({"period": 0.0}, "sample period"),
+        ({"limit": -1.0}, "limit above zero"),
+        ({"D": np.array([np.nan, 1.0])}, "finite numbers"),
+        ({"initial": np.zeros(3)}, "starts with 1 values"),
+    ],
+)
+def test_a_law_that_fits_nothing_is_refused(fields: dict, sentence: str) -> None:
+    good = {"A": [[1.0]], "B": [[-1.0, 1.0]], "C": [2.0], "D": [-1.0, 1.0], "period": T}
+    with pytest.raises(BadInput, match=sentence):
+        SampledLaw(**{**good, **fields}, measured=("y",), references=("r",))

@@ -1,0 +1,163 @@
+"""Is the law that a program ran found in the log it left? Loops with known programs, and logs without a law."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.closed_loop.programs import Pid, T, closed_loop
+from upright.closed_loop import recover
+from upright.errors import BadInput, NotIdentifiable
+from upright.records import Record
+
+STRUCTURES = {
+    "P": {"kp": 3.0},
+    "PI": {"kp": 3.0, "ki": 2.0},
+    "PD; plain difference of the error": {"kp": 4.0, "kd": 0.2},
+    "PD; plain difference of the measurement": {"kp": 4.0, "kd": 0.2, "on": "measurement"},
+    "PID; plain difference of the error": {"kp": 4.0, "ki": 3.0, "kd": 0.2},
+    "PID; plain difference of the measurement": {"kp": 4.0, "ki": 3.0, "kd": 0.2, "on": "measurement"},
+    "PID; filtered difference of the error": {"kp": 4.0, "ki": 3.0, "kd": 0.2, "tau": 0.013},
+    "PID; filtered difference of the measurement": {"kp": 4.0, "ki": 3.0, "kd": 0.2, "tau": 0.004, "on": "measurement"},
+    "PID; two-tap difference of the measurement": {"kp": 4.0, "ki": 3.0, "kd": 0.2, "second": 0.8, "on": "measurement"},
+    "PD; two-tap difference of the error": {"kp": 4.0, "kd": 0.1, "second": 0.5},
+}
+
+
+def found_in(record: Record, **asked):
+    return recover(record, measured=["y"], references=["r"], command="u", **asked)
+
+
+@pytest.mark.parametrize(("structure", "program"), STRUCTURES.items(), ids=STRUCTURES)
+def test_every_structure_is_found_exactly(structure: str, program: dict) -> None:
+    found = found_in(closed_loop(Pid(**program)))
+    assert found.structure == structure
+    assert found.quality == "exact"
+    for name in ("kp", "ki", "kd"):
+        if program.get(name):
+            assert found.gains[name].value == pytest.approx(program[name], rel=1e-7)
+        else:
+            assert name not in found.gains
+    if program.get("tau"):
+        assert found.gains["tau"].value == pytest.approx(program["tau"], rel=1e-6)
+    if program.get("second"):
+        assert found.gains["second tap"].value == pytest.approx(program["second"], rel=1e-6)
+
+
+@pytest.mark.parametrize(("structure", "program"), STRUCTURES.items(), ids=STRUCTURES)
+def test_rounded_commands_bound_the_gains_on_both_sides(structure: str, program: dict) -> None:
+    found = found_in(closed_loop(Pid(**program), count=1e-3, step=0.01))
+    assert found.quantum == pytest.approx(0.01)
+    assert found.largest <= found.quantum
+    for name in ("kp", "ki", "kd"):
+        # every gain of the interval puts out every rounded command, so the program's own must be among them
+        if program.get(name) and not program.get("tau"):
+            low, high = found.gains[name].interval
+            assert low <= program[name] <= high
+            assert high - low < 0.05 * program[name]
+
+
+@pytest.mark.parametrize("hold", [False, True], ids=["free", "held"])
+def test_a_limit_is_estimated_and_tells_what_the_sum_did_meanwhile(hold: bool) -> None:
+    found = found_in(closed_loop(Pid(kp=4.0, ki=5.0, kd=0.2, limit=2.5, hold=hold)))
+    assert found.quality == "exact"
+    assert found.law.limit == pytest.approx(2.5)
+    assert found.law.windup == ("hold" if hold else "free")
+    assert 0.01 < found.saturated < 0.5
+    assert {n: g.value for n, g in found.gains.items()} == pytest.approx({"kp": 4.0, "ki": 5.0, "kd": 0.2}, rel=1e-6)
+
+
+def test_a_command_that_comes_a_sample_late_is_told() -> None:
+    found = found_in(closed_loop(Pid(kp=3.0, kd=0.1), late=True))
+    assert found.structure == "PD; plain difference of the error; one sample late"
+    assert found.quality == "exact"
+
+
+def test_a_slower_servo_is_recovered_at_its_own_rate() -> None:
+    found = found_in(closed_loop(Pid(kp=2.0, kd=0.1, period=5 * T), hold=5))
+    assert found.law.period == pytest.approx(5 * T)
+    assert found.quality == "exact"
+    assert found.gains["kd"].value == pytest.approx(0.1, rel=1e-7)
+
+
+@pytest.mark.slow
+def test_rows_that_miss_samples_of_the_servo_are_no_exact_law() -> None:
+    found = found_in(closed_loop(Pid(kp=4.0, kd=0.2, period=T / 5), every=5))
+    assert found.quality in ("partial", "poor")
+    assert "not the whole law" in found.sentence or "no linear law" in found.sentence
+
+
+def test_junk_in_the_first_row_does_no_harm() -> None:
+    record = closed_loop(Pid(kp=4.0, ki=3.0))
+    spoilt = record["u"].copy()
+    spoilt[0] = 1e5
+    found = found_in(Record(t=record.t, signals={**record.signals, "u": spoilt}))
+    assert found.quality == "exact"
+
+
+@pytest.mark.slow
+def test_two_channels_and_a_feedforward_are_told_apart() -> None:
+    generator = np.random.default_rng(3)
+    a, b = np.cumsum(generator.normal(size=(2, 3000)), axis=1) * 0.01
+    f = np.sin(np.arange(3000) * 0.01)
+    first, second = Pid(kp=6.0, kd=1.8, tau=0.02), Pid(kp=30.0, kd=2.5, tau=0.02)
+    u = np.array([first(x, 0.0) + second(y, 0.0) for x, y in zip(a, b, strict=True)]) + 0.7 * f
+    record = Record(t=np.arange(3000) * T, signals={"a": a, "b": b, "f": f, "u": u})
+    found = recover(record, measured=["a", "b"], command="u", feedforward=["f"])
+    assert found.quality == "exact"
+    assert found.structure == "PD of a and b; filtered difference of the error"
+    values = {name: gain.value for name, gain in found.gains.items()}
+    expected = {"kp a": 6.0, "kd a": 1.8, "kp b": 30.0, "kd b": 2.5, "tau": 0.02, "factor f": 0.7}
+    assert values == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_law_found_goes_on_where_the_log_stops() -> None:
+    whole = closed_loop(Pid(kp=4.0, ki=3.0, kd=0.2, tau=0.01), rows=3000)
+    found = found_in(whole.window(0, 2000 * T))
+    later = found.law.commands(whole["y"], whole["r"])
+    np.testing.assert_allclose(later[3:], whole["u"][3:], atol=1e-6 * np.ptp(whole["u"]))
+
+
+@pytest.mark.slow
+def test_noise_is_no_law() -> None:
+    record = closed_loop(Pid(kp=3.0))
+    noise = np.random.default_rng(2).normal(size=record.t.size)
+    try:
+        found = found_in(Record(t=record.t, signals={**record.signals, "u": noise}))
+    except NotIdentifiable:
+        return
+    assert found.quality == "poor"
+    assert "no linear law" in found.sentence
+
+
+def test_an_open_loop_is_no_law() -> None:
+    """A square wave pushes the cart and the reference rests: what the cart does cannot tell the wave's corners."""
+    wave = iter(np.where(np.arange(4000) % 1000 < 500, 0.2, -0.2))
+    record = closed_loop(lambda y, r: float(next(wave)))
+    try:
+        found = recover(record, measured=["y"], command="u")
+    except NotIdentifiable:
+        return
+    assert found.quality == "poor"
+
+
+@pytest.mark.slow
+def test_a_law_with_a_dead_zone_is_not_called_exact() -> None:
+    pid = Pid(kp=3.0)
+    found = found_in(closed_loop(lambda y, r: 0.0 if abs(r - y) < 0.2 else pid(y, r)))
+    assert found.quality in ("partial", "poor")
+
+
+def test_mistakes_are_answered_with_what_is_there() -> None:
+    record = closed_loop(Pid(kp=3.0), rows=300)
+    with pytest.raises(BadInput, match="no column 'Y'"):
+        recover(record, measured=["Y"], command="u")
+    with pytest.raises(BadInput, match="at least one measured column"):
+        recover(record, measured=[], command="u")
+    with pytest.raises(BadInput, match="1 measured columns take as many references at most, got 2"):
+        recover(record, measured=["y"], references=["r", "r"], command="u")
+    still = Record(t=record.t, signals={**record.signals, "u": np.zeros(300)})
+    with pytest.raises(NotIdentifiable, match="stays at 0"):
+        found_in(still)
+    with pytest.raises(NotIdentifiable, match="at least 60"):
+        found_in(record.window(0, 40 * T))

@@ -1,0 +1,122 @@
+"""Stretches that something else than the input moved are named with their time, and left out; clean ones are not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from tests.identification.twins import PENDULUM, noisy, rig, swing
+from upright.identification.checks.outliers import BUMPED, SELF_EXCITED, SPIKES, TOUCHED, outliers
+from upright.identification.checks.refit import without
+from upright.identification.checks.spikes import spikes
+from upright.identification.estimate import identify
+from upright.physics import Pendulum
+from upright.simulation import simulate
+
+GUESSES = {"J_p": 2.6e-3, "b_2": 1.4e-3, "b_2c": 2.6e-3}
+
+
+def swings(seed: int, count: int = 3):
+    """Clean noisy swings from different angles."""
+    return [noisy(swing(angle=0.9 + 0.4 * k, label=f"swing {k}"), 1e-3, 10 * seed + k) for k in range(count)]
+
+
+def pushed(run, at: float, speed: float):
+    """The run as it goes on when a finger changes the pendulum's speed by `speed` [rad/s] at the time `at` [s]."""
+    plant, dt, n = Pendulum(**PENDULUM), run.period, run.t.size
+    x = simulate(plant, {}, [run.y[0, 0], 0.0], None, dt, samples=n, substeps=2)[:, :, 0]
+    i = round(at / dt)
+    x[i:] = simulate(plant, {}, x[i] + [0.0, speed], None, dt, samples=n - i, substeps=2)[:, :, 0]
+    return replace(run, y=x[:, [0]])
+
+
+def found(fit, runs):
+    """Reasons and times by run, of the model that came out."""
+    return [(o.run, o.reason, o.start, o.stop) for o in outliers(fit, fit.rig, runs)]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_clean_swings_raise_no_alarm(seed):
+    runs = swings(seed)
+    fit = identify(rig(Pendulum, PENDULUM, GUESSES), runs)
+    assert found(fit, runs) == []
+    assert not any("Outlier" in w for w in fit.warnings)
+    assert without(runs, ()) == runs
+
+
+def test_three_lost_counts_are_named_and_taken_out():
+    runs = swings(7)
+    y = runs[1].y.copy()
+    at = [211, 500, 803]
+    y[at, 0] += [0.4, -0.3, 0.35]
+    clean, runs[1] = runs[1], replace(runs[1], y=y)
+    fit = identify(rig(Pendulum, PENDULUM, GUESSES), runs)
+    (told,) = [o for o in outliers(fit, fit.rig, runs) if o.reason == SPIKES]
+    assert (told.run, told.start, told.stop) == ("swing 1", pytest.approx(2.11), pytest.approx(8.03))
+    assert all(f"{i * 0.01:.4g} s" in told.evidence for i in at)
+    assert any("swing 1" in w and SPIKES in w for w in fit.warnings)
+    # as if they had never been, but for the noise of three samples
+    other = identify(rig(Pendulum, PENDULUM, GUESSES), [runs[0], clean, runs[2]])
+    for n in GUESSES:
+        assert fit.estimates[n].value == pytest.approx(other.estimates[n].value, abs=0.05 * other.estimates[n].stderr)
+
+
+def test_a_finger_is_named_with_its_time_and_left_out():
+    runs = swings(3)
+    runs[2] = noisy(pushed(runs[2], 5.03, 1.5), 1e-3, 99)
+    fit = identify(rig(Pendulum, PENDULUM, GUESSES), runs)
+    ((run, reason, start, stop),) = found(fit, runs)
+    assert (run, reason) == ("swing 2", BUMPED)
+    assert start <= 5.03 <= stop
+    assert stop - start < 1.5  # half a swing takes 0.6 s
+    for n in GUESSES:
+        low, high = fit.estimates[n].interval
+        assert low < PENDULUM[n] < high, n
+    assert "swing 2" in fit.verdict
+    assert {"swing 0", "swing 1", "swing 2"} <= set(fit.runs)
+    assert all(s.role == "fit" for label, s in fit.runs.items() if label != "swing 2")
+    # the finger would have bent the answer
+    bent = identify(rig(Pendulum, PENDULUM, GUESSES), runs, watch=False)
+    off = {n: abs(f.estimates[n].value - PENDULUM[n]) for f in (bent,) for n in GUESSES}
+    assert any(off[n] > 5 * abs(fit.estimates[n].value - PENDULUM[n]) for n in GUESSES)
+
+
+def test_a_hand_at_the_end_is_named():
+    runs = swings(4)
+    runs[0] = noisy(pushed(runs[0], 9.7, 1.5), 1e-3, 98)
+    fit = identify(rig(Pendulum, PENDULUM, GUESSES), runs)
+    ((run, reason, start, _),) = found(fit, runs)
+    assert (run, reason) == ("swing 0", TOUCHED.format("end"))
+    assert start <= 9.7
+
+
+def test_a_swing_that_feeds_itself_is_named():
+    # the same pendulum, driven by its own speed: scipy's integration of theta'' = -w^2 sin(theta) + 0.24 theta'
+    runs = swings(5)
+    p = PENDULUM
+    w_2 = p["m_p"] * 9.81 * p["l_cg"] / (p["J_p"] + p["m_p"] * p["l_cg"] ** 2)
+    s = solve_ivp(
+        lambda _, x: [x[1], -w_2 * np.sin(x[0]) + 0.24 * x[1]], (0, 10), [0.3, 0], t_eval=runs[1].t, rtol=1e-9
+    )
+    growing = s.y[0]
+    runs[1] = noisy(replace(runs[1], y=growing[:, None]), 1e-3, 97)
+    fit = identify(rig(Pendulum, PENDULUM, GUESSES), runs)
+    ((run, reason, start, stop),) = found(fit, runs)
+    assert (run, reason) == ("swing 1", SELF_EXCITED)
+    assert 0 < start < 8.5 < stop  # once the swing is large enough to count
+    for n in GUESSES:
+        low, high = fit.estimates[n].interval
+        assert low < PENDULUM[n] < high, n
+
+
+def test_a_fast_motion_is_no_spike():
+    # 20 samples a period: at every turn the middle of five samples is off by (1 - cos(2 pi/20)) of the amplitude
+    x = np.sin(2 * np.pi * np.arange(400) / 20)
+    assert spikes(x).size == 0
+    steps = np.where(np.arange(400) // 50 % 2, 1.0, -1.0)
+    assert spikes(steps).size == 0
+    x[100] += 2.0
+    assert spikes(x).tolist() == [100]

@@ -1,0 +1,171 @@
+"""Drives that go off although the log says on: found from the motion alone, then estimated with the rest."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from upright.identification.checks.trips import find_trip, find_trips, located
+from upright.identification.estimate import identify, predict
+from upright.identification.model.model import Parameter, Rig, Run
+from upright.physics.oscillators import Torsional2
+from upright.simulation import simulate
+
+COUNT = 2 * np.pi / 16000
+DISKS = {"J_1": 2e-3, "J_2": 1.5e-3, "k_12": 0.4, "c_1": 1e-4, "c_2": 5e-5, "f_1c": 8e-3, "f_2c": 3e-3}
+DRIVE = {"actuator.gain": 0.2, "actuator.damping": 1.2e-3, "actuator.standby": 6e-4}
+
+
+def spin_up(*, seconds: float = 6.0, dt: float = 2e-3, volts: float = 0.5, **fields) -> Run:
+    """Two disks, at rest until 1 s, volts until 4 s, in whole counts; `actuator` may hold more about the drive."""
+    drive = DRIVE | {f"actuator.{n}": v for n, v in fields.pop("actuator", {}).items()}
+    n = round(seconds / dt)
+    t = np.arange(n) * dt
+    u = np.where((t >= 1.0) & (t < 4.0), volts, 0.0)[:, None]
+    y = simulate(Torsional2(**DISKS), drive, [0.0] * 4, u, dt, samples=n)[:, [0, 2], 0]
+    run = {"label": "spin-up", "role": "fit", "measured": ("theta_1", "theta_2"), "quantum": (COUNT, COUNT)} | fields
+    return Run(t=t, u=u, y=np.round(y / COUNT) * COUNT, **run)
+
+
+def asked(*names: str, off: float = 1.0) -> Rig:
+    """The two disks with guesses of some numbers, `off` times the truth."""
+    parameters = {n: Parameter(name=n, value=v) for n, v in (DISKS | DRIVE).items()}
+    parameters |= {n: Parameter(name=n, value=off * parameters[n].value, estimate=True) for n in names}
+    return Rig(plant=Torsional2, parameters=parameters)
+
+
+@pytest.mark.slow
+def test_a_trip_is_seen_without_a_model_and_to_a_few_samples():
+    for end in (1.7, 2.531, 3.4):
+        (trip,) = find_trips(asked(), spin_up(actuator={"end": end}))
+        assert not trip.late
+        assert trip.logged == pytest.approx(4.0, abs=1e-9)
+        # counts over the smoothing leave about a sample, 2 ms
+        assert trip.at == pytest.approx(end, abs=5e-3)
+        assert trip.after < trip.before
+
+
+def test_a_late_begin_is_seen():
+    (trip,) = find_trips(asked(), spin_up(actuator={"start": 1.8}))
+    assert trip.late
+    assert trip.logged == pytest.approx(1.0, abs=1e-9)
+    assert trip.at == pytest.approx(1.8, abs=5e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "actuator", [{}, {"knee": 10.0, "fade": 5e-3}, {"lag": 0.02, "slope": 2e-3}, {"damping": 0.0, "standby": 0.0}]
+)
+def test_friction_brakes_and_a_torque_speed_curve_are_no_trip(actuator):
+    assert find_trips(asked(), spin_up(actuator=actuator)) == []
+
+
+def test_neither_a_sine_nor_a_held_disk_is_a_trip():
+    dt, n = 2e-3, 3000
+    t = np.arange(n) * dt
+    for u, held in ((0.3 * np.sin(2 * np.pi * 0.8 * t), False), (np.where(t < 4.0, 0.5, 0.0), True)):
+        from upright.simulation import Held
+
+        locked = {"theta_2": Held()} if held else None
+        y = simulate(Torsional2(**DISKS), DRIVE, [0.0] * 4, u[:, None], dt, samples=n, held=locked)[:, 0, 0]
+        y = np.round(y / COUNT) * COUNT
+        assert find_trip(t, u, y, quantum=COUNT) is None
+        assert find_trip(t, u, y, quantum=COUNT, late=True) is None
+
+
+def test_a_sine_that_trips_is_seen():
+    dt, n, end = 2e-3, 3000, 3.3
+    t = np.arange(n) * dt
+    u = 0.5 * np.sin(2 * np.pi * 0.8 * t)
+    p = DRIVE | {"actuator.end": end}
+    y = simulate(Torsional2(**DISKS), p, [0.0] * 4, u[:, None], dt, samples=n)[:, [0, 2], 0]
+    y = np.round(y / COUNT) * COUNT
+    trip = find_trip(t, u, y[:, 0], [y[:, 1]], quantum=COUNT)
+    assert trip is not None
+    assert trip.at == pytest.approx(end, abs=0.02)
+
+
+@pytest.mark.slow
+def test_a_fit_says_that_a_drive_went_off_and_what_to_declare():
+    fit = identify(asked("f_1c", off=0.7), [spin_up(actuator={"end": 2.5}, label="silent")])
+    (said,) = [w for w in fit.warnings if "went off" in w or "gone off" in w]
+    assert "'silent'" in said
+    assert "2.5" in said
+    assert 'unknown = ["initial", "input_end"]' in said
+
+
+@pytest.fixture(scope="module")
+def tripped():
+    """Two runs that trip and one that does not, everything 30 % off."""
+    own = {"unknown": ("initial", "input_end")}
+    runs = [
+        spin_up(actuator={"end": 2.5}, label="trips at 2.5 s", **own),
+        spin_up(actuator={"end": 1.9}, label="trips at 1.9 s", volts=0.4, **own),
+        spin_up(label="stays on", volts=0.3),
+    ]
+    names = ("J_1", "J_2", "k_12", "c_1", "c_2", "f_1c", "f_2c", "actuator.damping", "actuator.standby")
+    return identify(asked(*names, off=0.7), runs), names
+
+
+@pytest.mark.slow
+def test_the_moment_of_a_trip_is_estimated_with_the_friction(tripped):
+    fit, _ = tripped
+    for label, end in (("trips at 2.5 s", 2.5), ("trips at 1.9 s", 1.9)):
+        e = fit.per_run[label]["input_end"]
+        assert e.unit == "s"
+        assert e.status == "firm"
+        # four standard errors: one miss in 16,000
+        assert abs(e.value - end) < 4 * e.stderr + 1e-4
+        assert e.stderr < 5e-3
+    assert "input_end" not in fit.per_run["stays on"]
+    assert not [w for w in fit.warnings if "gone off" in w]
+
+
+def test_a_tripping_rig_is_recovered_from_counts(tripped):
+    fit, names = tripped
+    truth = DISKS | DRIVE
+    for name in names:
+        e = fit.estimates[name]
+        assert abs(e.value - truth[name]) < 4 * e.stderr + 2e-3 * truth[name], name
+    for name in ("J_1", "J_2", "k_12", "f_1c", "actuator.damping", "actuator.standby"):
+        assert fit.estimates[name].value == pytest.approx(truth[name], rel=0.1), name
+    assert min(v for s in fit.runs.values() for v in s.fit_percent.values()) > 99
+
+
+def test_where_no_trip_is_seen_the_search_begins_at_the_logged_end():
+    run = located(asked(), spin_up(unknown=("input_end",)))
+    assert run.guesses["input_end"] == pytest.approx(4.0, abs=2 * run.period)  # volts until the sample before 4 s
+
+
+def test_a_prediction_finds_its_own_trip_and_says_so(tripped):
+    fit, _ = tripped
+    run = spin_up(actuator={"end": 3.1}, label="other", volts=0.45, unknown=("initial", "input_end"), role="predict")
+    told = predict(fit, fit.rig, [run])["other"]
+    assert told.adapted == ("initial", "input_end")
+    assert min(told.fit_percent.values()) > 99
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize(
+    ("name", "end"),
+    [
+        # read off the speed by eye: where it turns from rising to falling
+        ("Jan211424", 8.26), ("Jan211450", 5.63), ("Jan211520", 5.82), ("21-Jan-2025 15_18_23", 5.53),
+        ("Jan211453", None), ("Jan211506", None), ("Jan141428", None), ("28-Jan-2025 14_36_10", None),
+    ],
+)  # fmt: skip
+def test_silent_trips_of_a_real_drive_are_found(name, end):
+    from upright.readers import read
+
+    record = read(Path(os.environ["UPRIGHT_REAL_DATA"]) / "ecp205_torsional_ucsd" / f"{name}.mat")
+    t = np.linspace(record.t[0], record.t[-1], record.t.size)
+    u, y, other = (np.asarray(record[c], dtype=float) for c in ("target_value", "cart1pos", "cart2pos"))
+    trip = find_trip(t, u, -y, [other], quantum=1.0)
+    if end is None:
+        assert trip is None
+    else:
+        assert trip is not None
+        assert t[0] + trip.at == pytest.approx(end, abs=0.03)

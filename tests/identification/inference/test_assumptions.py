@@ -1,0 +1,125 @@
+"""What is proportional to an assumed gain scales with it, what is not stays; without it the data speak in volts."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from upright.errors import BadInput
+from upright.identification import Parameter, Rig, Run, identify
+from upright.identification.inference.assumptions import per_length, proportional, untouched
+from upright.physics import find
+from upright.simulation import simulate
+from upright.study import load_study
+
+DISK = find("torsional-1")
+TRUTH = {"J_1": 2.4e-3, "k_1": 0.9, "c_1": 6e-3, "f_1c": 4e-3}
+GAIN, QUANTUM, DT = 0.4, 2 * math.pi / 16000, 2e-3
+
+
+def steps(gain: float = GAIN, added: float = 0.0, label: str = "step") -> Run:
+    """A disk on a spring, three steps of 1 V, read by an encoder."""
+    t = np.arange(2501) * DT
+    u = np.where((t > 0.2) & (t < 1.8), 1.0, np.where((t > 3.0) & (t < 4.0), -0.6, 0.0))[:, None]
+    values = TRUTH | {"actuator.gain": gain}
+    plant = DISK(**TRUTH, a_1=added)
+    x = simulate(plant, {"actuator.gain": values["actuator.gain"]}, [0.0, 0.0], u, DT, samples=t.size)
+    y = QUANTUM * np.round(x[:, [0], 0] / QUANTUM)
+    return Run(
+        label=label, role="fit", t=t, u=u, y=y, measured=(DISK.coordinates[0].name,), quantum=(QUANTUM,),
+        known={"a_1": added}, unknown=(), initial=dict.fromkeys(DISK.state_names(), 0.0),
+    )  # fmt: skip
+
+
+def rig(gain: Parameter) -> Rig:
+    """The disk with wrong guesses of everything but the gain."""
+    parameters = {
+        n: Parameter(name=n, value=1.3 * TRUTH.get(n, 0.0), unit=DISK.quantity(n).unit, estimate=n in TRUTH)
+        for n in DISK.names()
+        if n in TRUTH
+    }
+    return Rig(plant=DISK, parameters=parameters | {"actuator.gain": gain})
+
+
+def gained(**fields) -> Parameter:
+    return Parameter(name="actuator.gain", unit="N m/V", **fields)
+
+
+def test_numbers_per_assumed_gain_are_those_of_the_true_rig():
+    fit = identify(rig(gained(value=1.0, assumed=True)), [steps()])
+    (a,) = fit.assumptions
+    assert set(proportional(a)) == set(TRUTH)
+    # per V and count: inertia and stiffness carry 1/count, a Coulomb torque does not
+    per_count = {"J_1": QUANTUM, "k_1": QUANTUM, "c_1": QUANTUM, "f_1c": 1.0}
+    units = {"J_1": "V s^2/count", "k_1": "V/count", "c_1": "V s/count", "f_1c": "V"}
+    for name, e in a.without.items():
+        truth = TRUTH[name] / GAIN * per_count[name]
+        assert e.unit == units[name]
+        assert abs(e.value - truth) < 4 * e.stderr  # four numbers, so two standard errors would often fail
+        assert e.stderr < 1e-3 * truth
+    assert "is assumed, not known" in fit.verdict
+
+
+def test_an_assumed_gain_changes_what_is_proportional_and_nothing_else():
+    one, two = (identify(rig(gained(value=g, assumed=True)), [steps()]) for g in (1.0, 3.0))
+    for name in TRUTH:
+        assert abs(two.estimates[name].value / one.estimates[name].value / 3.0 - 1) < 1e-3
+        a, b = one.assumptions[0].without[name], two.assumptions[0].without[name]
+        assert abs(a.value / b.value - 1) < 1e-3
+
+
+def test_one_known_added_inertia_gives_the_gain():
+    fit = identify(rig(gained(value=1.0, estimate=True)), [steps(), steps(added=2e-3, label="loaded")])
+    for name, truth in {**TRUTH, "actuator.gain": GAIN}.items():
+        e = fit.estimates[name]
+        assert abs(e.value - truth) < 4 * e.stderr
+        assert e.stderr < 1e-2 * truth
+        assert e.status == "firm"
+    assert not fit.assumptions
+
+
+def test_what_an_assumed_length_does_not_touch_is_named():
+    pendulum = find("pendulum")
+    t = np.arange(1001) * 0.01
+    truth = pendulum(m_p=0.2, l_cg=0.3, J_p=2e-3, b_2=2e-3)
+    x = simulate(truth, {}, [1.0, 0.0], None, 0.01, samples=t.size)
+    run = Run(label="swing", role="fit", t=t, u=np.zeros((t.size, 1)), y=x[:, [0], 0], measured=("theta",))
+    numbers = {
+        "m_p": Parameter(name="m_p", value=0.2, unit="kg", assumed=True),
+        "l_cg": Parameter(name="l_cg", value=0.3, unit="m"),
+        "J_p": Parameter(name="J_p", value=3e-3, unit="kg m^2", estimate=True),
+        "b_2": Parameter(name="b_2", value=3e-3, unit="N m s/rad", estimate=True),
+    }
+    fit = identify(Rig(plant=pendulum, parameters=numbers), [run])
+    (a,) = fit.assumptions
+    assert set(proportional(a)) == {"J_p", "b_2"}
+    assert untouched(a) == []
+    heavier = replace(numbers["m_p"], value=0.22)
+    other = identify(Rig(plant=pendulum, parameters=numbers | {"m_p": heavier}), [run])
+    for name in ("J_p", "b_2"):
+        assert abs(other.estimates[name].value / fit.estimates[name].value / 1.1 - 1) < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("unit", "force", "expected"),
+    [
+        ("kg", "N", (2, -1)), ("N s/m", "N", (1, -1)), ("N/m", "N", (0, -1)), ("N", "N", (0, 0)),
+        ("N s^2/m^2", "N", (2, -2)), ("kg m^2", "N m", (2, -1)), ("N m s^2/rad^2", "N m", (2, -2)),
+        ("N m", "N m", (0, 0)), ("rad/s", "N m", None), ("m", "N", None),
+    ],
+)  # fmt: skip
+def test_units_divided_by_a_force(unit, force, expected):
+    assert per_length(unit, force) == expected
+
+
+def test_a_guess_cannot_be_assumed(tmp_path):
+    text = """
+    [rig]
+    plant = "torsional-1"
+    [parameters]
+    J_1 = { guess = "1e-3 kg m^2", assumed = true }
+    """
+    (tmp_path / "s.toml").write_text(text)
+    with pytest.raises(BadInput, match="assumed has no meaning"):
+        load_study(tmp_path / "s.toml")

@@ -1,0 +1,117 @@
+"""The walk downhill ends where other solvers and closed forms say."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tests.identification.twins import PENDULUM, noisy, rig, swing
+from upright.identification.inference.scoring import fit_percent
+from upright.identification.problem.normal import Normal, products
+from upright.identification.problem.pose import pose
+from upright.identification.search.descent import descend, grow
+from upright.identification.search.simplex import simplex
+from upright.physics import Pendulum
+
+
+def linear(A: np.ndarray, b: np.ndarray):
+    def evaluate(x: np.ndarray) -> Normal:
+        r = A @ x - b
+        return Normal(float(r @ r), A.T @ A, A.T @ r)
+
+    return evaluate
+
+
+def test_linear_least_squares_is_the_normal_equations() -> None:
+    generator = np.random.default_rng(0)
+    A, b = generator.normal(size=(50, 4)) * [1, 1e3, 1e-3, 1], generator.normal(size=50)
+    free = np.full(4, np.inf)
+    found = descend(linear(A, b), np.zeros(4), -free, free, tolerance=1e-14)
+    assert found.converged
+    # damping leaves a thousandth of the last step, itself a square root of the tolerance
+    assert found.x == pytest.approx(np.linalg.lstsq(A, b, rcond=None)[0], rel=1e-4)
+
+
+def test_bounds_are_those_of_scipy() -> None:
+    from scipy.optimize import lsq_linear
+
+    generator = np.random.default_rng(1)
+    for _ in range(20):
+        A, b = generator.normal(size=(12, 5)), generator.normal(size=12)
+        lower, upper = np.full(5, -0.1), np.full(5, 0.15)
+        found = descend(linear(A, b), np.zeros(5), lower, upper, tolerance=1e-14, limit=200)
+        expected = lsq_linear(A, b, (lower, upper), tol=1e-14)
+        assert found.normal.cost == pytest.approx(2 * expected.cost, rel=1e-6)
+
+
+def test_rosenbrock_valley_is_followed_to_its_end() -> None:
+    def evaluate(x: np.ndarray) -> Normal:
+        r = np.array([10 * (x[1] - x[0] ** 2), 1 - x[0]])
+        J = np.array([[-20 * x[0], 10.0], [-1.0, 0.0]])
+        return Normal(float(r @ r), J.T @ J, J.T @ r)
+
+    free = np.full(2, np.inf)
+    found = descend(evaluate, np.array([-1.2, 1.0]), -free, free, tolerance=1e-12, limit=200)
+    assert found.x == pytest.approx([1.0, 1.0], abs=1e-6)
+
+
+def test_scipy_finds_the_same_optimum() -> None:
+    """Oracle: trust-region least squares on the same residuals, its own differences, from the same start."""
+    from scipy.optimize import least_squares
+
+    problem = pose(rig(Pendulum, PENDULUM, {"J_p": 2.4e-3, "b_2": 1.8e-3, "b_2c": 2.2e-3}), [noisy(swing(), 2e-3, 5)])
+    found = grow(problem, problem.start, tolerance=1e-12)
+    scale = np.array([u.scale for u in problem.unknowns])
+
+    def residual(z: np.ndarray) -> np.ndarray:
+        rows = problem.rows(0, z * scale)
+        assert rows is not None
+        return np.concatenate([rows.residual.ravel(), problem.prior_rows(z * scale)[0]])
+
+    oracle = least_squares(residual, problem.start / scale, xtol=1e-12, ftol=1e-12, gtol=1e-12, diff_step=1e-6)
+    assert found.normal.cost == pytest.approx(2 * oracle.cost, rel=1e-6)
+    spread = np.sqrt(np.diag(np.linalg.inv(found.normal.matrix)) * found.normal.cost / problem.tracks[0].y.size)
+    assert np.all(np.abs(found.x - oracle.x * scale) < 0.02 * spread)
+
+
+def test_simplex_ends_near_the_same_optimum() -> None:
+    problem = pose(rig(Pendulum, PENDULUM, {"b_2": 1.5e-3, "b_2c": 2.4e-3}), [noisy(swing(seconds=4.0), 2e-3, 6)])
+    x, cost = simplex(problem, problem.start, limit=1500)
+    assert cost == pytest.approx(grow(problem, x).normal.cost, rel=1e-3)
+
+
+def test_products_in_blocks_are_the_plain_products() -> None:
+    generator = np.random.default_rng(2)
+    J, r = generator.normal(size=(7001, 5)), generator.normal(size=7001)
+    A, g, cost = products(J, r)
+    assert pytest.approx(J.T @ J) == A
+    assert g == pytest.approx(J.T @ r)
+    assert cost == pytest.approx(r @ r)
+
+
+def test_fit_percent_by_hand() -> None:
+    """y = (0, 2, 4): mean 2, |y - mean| = sqrt 8; an error of 1 in one sample leaves 100 (1 - 1/sqrt 8)."""
+    y = np.array([0.0, 2.0, 4.0])
+    assert fit_percent(y, y) == 100.0
+    assert fit_percent(y, [1.0, 2.0, 4.0]) == pytest.approx(100 * (1 - 1 / math.sqrt(8)))
+    assert fit_percent(y, [2.0, 2.0, 2.0]) == pytest.approx(0.0)
+    assert fit_percent(y - 2, 2 - y) == pytest.approx(-100.0)
+    assert fit_percent(y, [math.nan] * 3) == -1000.0
+    assert fit_percent([1.0, 1.0], [1.0, 1.0]) == 100.0
+    assert fit_percent([1.0, 1.0], [1.0, 2.0]) == 0.0
+
+
+def test_squares_of_lanes_are_those_of_the_residuals_laid_out() -> None:
+    """The fast sum of a free run against the plain product of residuals and Jacobian of `rows`."""
+    asked = rig(Pendulum, PENDULUM, {"J_p": 2.4e-3, "b_2": 1.8e-3, "b_2c": 2.2e-3})
+    problem = pose(asked, [noisy(swing(unknown=("initial", "offset")), 2e-3, 5)])
+    rows = problem.rows(0, problem.start)
+    assert rows is not None
+    r, J = rows.residual.reshape(-1), rows.jacobian.reshape(-1, problem.start.size)
+    prior, slope = problem.prior_rows(problem.start)
+    found = problem.normal(problem.start)
+    assert found.cost == pytest.approx(r @ r + prior @ prior, rel=1e-12)
+    assert found.gradient == pytest.approx(J.T @ r + slope.T @ prior, rel=1e-9)
+    assert found.matrix == pytest.approx(J.T @ J + slope.T @ slope, rel=1e-9)

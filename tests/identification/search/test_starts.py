@@ -1,0 +1,107 @@
+"""Closed-form starts are within a few percent of the truth, without a simulation."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, shaken, swing
+from upright.errors import NotIdentifiable
+from upright.identification.model.unknowns import base_values
+from upright.identification.search.friction_start import decrement, friction_from_energy, turning_points
+from upright.identification.search.inverse_start import observe, regress
+from upright.physics import Furuta, Pendulum
+from upright.signals.smoothing import dominant_period, first_order, savitzky_golay
+
+
+def test_energy_lost_between_turns_gives_all_three_frictions() -> None:
+    asked = rig(Pendulum, PENDULUM, {"b_2": 1.0, "b_2c": 1.0, "b_2q": 1.0})
+    run = noisy(swing(angle=2.5, seconds=15.0, dt=2e-3), 1e-4, seed=0)
+    sample = observe(asked, run)
+    assert sample is not None
+    found = friction_from_energy(asked, [sample], base_values(asked))
+    # the swing decays by a factor of ten, which separates the three integrals to some percent
+    assert found == pytest.approx({n: PENDULUM[n] for n in ("b_2", "b_2c", "b_2q")}, rel=0.08)
+
+
+def test_coulomb_alone_takes_a_straight_line_from_the_amplitude() -> None:
+    """Small swing with dry friction only: the amplitude falls by 2 b_2c/(m g l) per half swing."""
+    values = {**PENDULUM, "b_2": 0.0, "b_2q": 0.0, "J_p": 0.0}
+    run = swing(values, angle=0.3, seconds=8.0, dt=1e-3)
+    motion = savitzky_golay(run.y[:, 0], 1e-3, 41)
+    turns = turning_points(motion.q, motion.v, least=0.01)
+    falls = -np.diff(np.abs(motion.q[turns]))
+    assert falls == pytest.approx(np.full(falls.size, 2 * 2e-3 / (0.2 * 9.81 * 0.3)), rel=0.02)
+
+
+def test_period_and_decrement_of_a_viscous_swing() -> None:
+    """theta'' + 2 z w theta' + w^2 theta = 0: period 2 pi/(w sqrt(1 - z^2)), decrement 2 pi z/sqrt(1 - z^2)."""
+    w, z = 6.0, 0.02
+    t = np.arange(0, 12, 1e-3)
+    wd = w * math.sqrt(1 - z**2)
+    q = np.exp(-z * w * t) * np.cos(wd * t)
+    v = np.gradient(q, t)
+    period, delta = decrement(q, v, 1e-3)
+    assert period == pytest.approx(2 * math.pi / wd, rel=1e-3)
+    assert delta == pytest.approx(2 * math.pi * z / math.sqrt(1 - z**2), rel=0.01)
+
+
+def test_a_motion_without_turns_has_no_decrement() -> None:
+    with pytest.raises(NotIdentifiable, match="at least 4 times"):
+        decrement(np.linspace(0, 1, 100), np.ones(100), 0.01)
+
+
+@pytest.mark.parametrize("factor", [0.3, 1.0, 3.0])
+def test_accelerations_give_the_furuta_from_any_guess(factor: float) -> None:
+    names = ("J_d", "l_cg", "b_1", "b_1c")
+    asked = rig(Furuta, FURUTA, {n: factor * FURUTA[n] for n in names})
+    sample = observe(asked, noisy(shaken(), 1e-5, seed=1))
+    assert sample is not None
+    found = regress(asked, [sample])
+    assert found.unexplained < 0.01
+    for n in ("J_d", "l_cg", "b_1"):
+        assert found.values[n] == pytest.approx(FURUTA[n], rel=0.06)
+
+
+def test_dominant_period_of_a_sine_is_its_period() -> None:
+    t = np.arange(0, 10, 0.01)
+    # a Hann window over ten periods widens the line by one tenth
+    assert dominant_period(np.sin(2 * np.pi * t), 0.01) == pytest.approx(1.0, rel=0.05)
+
+
+def test_smoothing_polynomials_are_exact_for_polynomials() -> None:
+    t = np.arange(200) * 0.01
+    motion = savitzky_golay(t**4 - 2 * t**2, 0.01, 21)
+    assert motion.q == pytest.approx(t**4 - 2 * t**2, abs=1e-10)
+    assert motion.v == pytest.approx(4 * t**3 - 4 * t, abs=1e-8)
+    assert motion.a == pytest.approx(12 * t**2 - 4, abs=1e-5)
+
+
+def test_first_order_lag_is_the_filter_of_scipy() -> None:
+    from scipy.signal import lfilter
+
+    for n in (1, 2, 129, 1000):
+        u = np.random.default_rng(n).normal(size=n)
+        expected = lfilter([0.0, 0.07], [1.0, -0.93], u, zi=[u[0]])[0]
+        assert first_order(u, 0.93) == pytest.approx(expected, abs=1e-12)
+
+
+def test_nothing_heavy_is_imported_to_fit() -> None:
+    """scipy.signal alone takes longer to import than a free swing takes to fit."""
+    import subprocess
+    import sys
+
+    code = (
+        "import sys\n"
+        "from tests.identification.twins import PENDULUM, rig, swing\n"
+        "from upright.identification.estimate import identify\n"
+        "from upright.physics import Pendulum\n"
+        "guesses = {'J_p': 3e-3, 'b_2': 1e-3, 'b_2c': 1e-3}\n"
+        "identify(rig(Pendulum, PENDULUM, guesses), [swing(seconds=3.0)])\n"
+        "heavy = ('scipy.signal', 'scipy.stats', 'sympy', 'pandas', 'matplotlib', 'control')\n"
+        "print([m for m in heavy if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,104 @@
+"""Do the peaks of a swing tell what made it, with viscous and dry friction, rounding and an offset?"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tests.signals.swings import swing
+from upright.errors import NotIdentifiable
+from upright.signals.free_swing import decay, recursion, turns
+
+
+def test_the_recursion_gives_the_extremes_that_scipy_integrates():
+    m, k, c, f, centre = 0.8, 390.0, 1.2, 1.5, 0.03
+    _, _, extremes = swing(m, k, c, f, x0=0.1, centre=centre)
+    sigma = c / (2 * m)
+    rho = math.exp(-math.pi * sigma / math.sqrt(k / m - sigma**2))
+    x = extremes[:, 1]
+    up = np.arange(x.size) % 2 == 0
+    assert x.size > 6
+    assert np.allclose(recursion(np.array([x[0], rho, centre, f / k]), up), x, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("f", [0.0, 0.2, 0.8])
+@pytest.mark.parametrize("quantum", [0.0, 1e-4])
+def test_frequency_and_both_frictions_are_recovered(f, quantum):
+    m, k, c, centre = 0.8, 390.0, 1.2, 0.0123
+    t, y, extremes = swing(m, k, c, f, x0=0.05, centre=centre, quantum=quantum)
+    found = decay(t, y, quantum=quantum)
+    assert 4 <= found.t.size < extremes.shape[0]  # the first and the last rest are no turns
+    n = found.t.size
+    # a few errors of least squares on n heights; a rounding of 1e-4 in 0.05 leaves 0.1 % of frequency at most
+    assert found.omega_n == pytest.approx(math.sqrt(k / m), rel=1e-5 if quantum == 0 else 1e-3)
+    assert abs(found.sigma - c / (2 * m)) < max(5 * found.sigma_error, 2e-3)
+    assert abs(found.delta - f / k) < max(5 * found.delta_error, 1e-6)
+    assert abs(found.centre - centre) < max(quantum, 1e-6)
+    assert np.allclose(found.t, extremes[1 : n + 1, 0], rtol=0, atol=2e-5 if quantum == 0 else 2e-3)
+
+
+def test_dry_friction_alone_takes_four_delta_off_the_amplitude_every_period():
+    """The textbook's linear envelope."""
+    m, k, f = 0.5, 200.0, 0.4
+    t, y, _ = swing(m, k, 0.0, f, x0=0.05)
+    found = decay(t, y)
+    assert np.allclose(np.abs(found.x[:-2]) - np.abs(found.x[2:]), 4 * f / k, rtol=1e-6)
+    assert found.decrement == pytest.approx(0.0, abs=1e-4)
+
+
+def test_viscous_friction_alone_shows_the_textbook_decrement():
+    m, k, c = 0.5, 200.0, 1.0
+    t, y, _ = swing(m, k, c, 0.0, x0=0.05)
+    found = decay(t, y)
+    zeta = c / (2 * math.sqrt(k * m))
+    assert found.zeta == pytest.approx(zeta, rel=1e-4)
+    assert found.decrement == pytest.approx(2 * math.pi * zeta / math.sqrt(1 - zeta**2), rel=1e-4)
+    assert found.decrement == pytest.approx(math.log(found.x[0] / found.x[2]), rel=1e-4)
+
+
+def test_reading_the_decrement_as_viscous_would_be_wrong_where_friction_is_dry():
+    t, y, _ = swing(0.8, 390.0, 1.2, 0.8, x0=0.05)
+    found = decay(t, y)
+    naive = math.log(abs((found.x[0] - found.centre) / (found.x[2] - found.centre)))
+    assert naive > 1.3 * found.decrement
+
+
+def test_stated_errors_are_those_seen_over_repetitions():
+    m, k, c, f, noise = 0.8, 390.0, 1.2, 0.2, 2e-4
+    rows = []
+    for seed in range(60):
+        t, y, _ = swing(m, k, c, f, x0=0.05, noise=noise, seed=seed)
+        found = decay(t, y, quantum=noise * 2)
+        rows.append(((found.omega_n - math.sqrt(k / m)) / found.omega_error, (found.delta - f / k) / found.delta_error))
+    scatter = np.std(rows, axis=0)
+    # 60 draws know a standard deviation to 9 %; scatter accounts take the larger of two, so errors may be too large
+    assert (scatter < 1.3).all()
+    assert (scatter > 0.4).all()
+
+
+def test_two_modes_are_not_taken_for_one_swing():
+    t = np.arange(0, 3, 2e-3)
+    y = np.exp(-0.3 * t) * (np.cos(20 * t) + 0.9 * np.cos(47 * t))
+    with pytest.raises(NotIdentifiable, match="not one decaying swing"):
+        decay(t, y)
+
+
+def test_too_few_turns_are_said():
+    t, y, _ = swing(0.8, 390.0, 12.0, 0.5, x0=0.05)
+    with pytest.raises(NotIdentifiable, match="at least 4 extremes"):
+        decay(t, y)
+
+
+def test_a_slow_log_is_said_to_be_slow():
+    t, y, _ = swing(0.8, 390.0, 1.2, 0.2, x0=0.05, rate=40)
+    with pytest.raises(NotIdentifiable, match="log at least"):
+        decay(t, y)
+
+
+def test_turns_ignore_what_is_smaller_than_asked():
+    t = np.linspace(0, 4 * math.pi, 2001)
+    ripple = np.sin(t) + 0.01 * np.sin(40 * t)
+    found = t[turns(ripple, 0.1)]
+    assert np.allclose(found, (np.arange(4) + 0.5) * math.pi, rtol=0, atol=0.1)  # the ripple's own period is 0.16

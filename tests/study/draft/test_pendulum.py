@@ -1,0 +1,161 @@
+"""Is the study that a log drafts one that a person would have written? Logs come from closed forms."""
+
+import math
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from upright.errors import BadInput
+from upright.readers import inspect, read
+from upright.study.draft.pendulum import draft
+from upright.study.load import load_study
+
+G = 9.81
+LENGTH = 0.35
+W = math.sqrt(G / LENGTH)
+T = np.arange(4000) * 0.01
+# a small swing loses amplitude in a straight line under dry friction, and then rests
+ENVELOPE = np.clip(0.2 - 0.008 * T, 0.0, None)
+SWING = ENVELOPE * np.cos(W * T)
+ENC1, ENC2 = np.round(4000 * SWING), np.round(3000 * ENVELOPE * np.sin(1.7 * W * T))
+
+
+def test_one_angle_is_a_pendulum_of_the_length_its_period_tells(drafted):
+    _, study = drafted(theta=SWING)
+    assert study.plant == "pendulum"
+    assert study.rig.parameters["l_cg"].value == pytest.approx(LENGTH, rel=0.01)
+    assert {"l_cg", "b_2", "b_2c"} <= set(study.rig.estimated)
+
+
+def test_a_swing_about_half_a_turn_hangs_there(drafted):
+    _, study = drafted(theta=math.pi + SWING)
+    np.testing.assert_allclose(study.runs[0].y[:, 0], np.interp(study.runs[0].t, T, SWING), atol=2e-3)
+
+
+def test_degrees_and_nameless_columns_about_half_a_turn_are_angles(drafted):
+    _, study = drafted(c1=math.pi + 3 * SWING, c2=np.gradient(3 * SWING, T))
+    assert study.plant == "pendulum"
+
+
+def test_encoder_counts_are_found_in_radians(drafted):
+    step = 2 * math.pi / 4000
+    _, study = drafted(theta=np.round(SWING / step) * step)
+    assert study.runs[0].quantum == pytest.approx((step,), rel=1e-6)
+
+
+def test_the_part_before_the_release_and_the_rest_are_left_out(drafted):
+    before = np.full(300, SWING[0])
+    t = np.arange(300 + T.size) * 0.01
+    _, study = drafted(t=t, theta=np.concatenate([before, SWING]))
+    assert 2.9 < study.runs[0].t[0] < 3.1 + 2 * math.pi / W  # within a period of the release at 3 s
+    assert study.runs[-1].t[-1] < 3 + 26  # dry friction stops it 25 s after the release
+
+
+def test_a_long_swing_keeps_its_tail_for_prediction(drafted):
+    _, study = drafted(theta=SWING)
+    assert [run.role for run in study.runs] == ["fit", "predict"]
+
+
+def test_a_cart_and_an_angle_with_volts_are_a_driven_cart_pendulum(drafted):
+    v = np.where((T > 1) & (T < 20), np.sign(np.sin(T)), 0.0)
+    x = np.where(T > 1, 0.1 * (1 - np.cos(T - 1)), 0.0)
+    text, study = drafted(v=v, x=x, theta=np.where(T > 1, 0.1 * np.sin(W * (T - 1)), 0.0))
+    assert study.plant == "cart-pendulum"
+    assert study.runs[0].measured == ("x", "theta")
+    assert 'column = "v"' in text
+    assert "actuator.gain" in study.rig.estimated
+    assert "sign = -1   # the first" not in text
+
+
+def test_a_drive_that_moves_its_body_backwards_is_reversed(drafted):
+    v = np.where((T > 1) & (T < 20), 1.0, 0.0)
+    x = np.where(T > 1, -0.1 * (1 - np.cos(T - 1)), 0.0)
+    text, study = drafted(v=v, x=x, theta=np.where(T > 1, 0.1 * np.sin(W * (T - 1)), 0.0))
+    assert "sign = -1   # the first" in text
+    assert study.runs[0].u.min() == -1.0
+
+
+def test_a_moving_cart_without_a_drive_is_prescribed_by_its_own_motion(drafted):
+    x = np.where(T > 1, 0.1 * (1 - np.exp(-(T - 1))), 0.0)
+    _, study = drafted(x=x, theta=np.where(T > 1, SWING, 0.0))
+    assert list(study.runs[0].held) == ["x"]
+    assert study.runs[0].measured == ("theta",)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_pendulum_that_is_thrown_the_wrong_way_is_mirrored(drafted, sign):
+    # steady answer of theta'' = -x''/l - w^2 theta to x = a sin(nu t), with a start at rest left out
+    nu, a = 3.0, 0.02
+    theta = a * nu**2 / LENGTH / (W**2 - nu**2) * np.sin(nu * T) + 0.05 * np.cos(W * T)
+    text, _ = drafted(x=a * np.sin(nu * T), theta=sign * theta)
+    assert ("\nsign = -1   # it is thrown" in text) == (sign == -1)
+
+
+def test_an_arm_that_hardly_moves_is_no_second_coordinate(drafted):
+    _, study = drafted(psi=1e-4 * np.sin(T), theta=SWING)
+    assert study.plant == "pendulum"
+
+
+def test_two_encoders_in_counts_are_a_chain(drafted):
+    _, study = drafted(enc1=ENC1, enc2=ENC2)
+    assert study.plant == "rectilinear-2"
+    assert study.runs[0].measured == ("x_1", "x_2")
+
+
+def test_the_plant_may_be_named(drafted):
+    _, study = drafted(plant="torsional-2", enc1=ENC1, enc2=ENC2)
+    assert study.runs[0].measured == ("theta_1", "theta_2")
+
+
+def test_what_the_log_does_not_show_is_marked(drafted):
+    text, _ = drafted(enc1=np.round(4000 * SWING))
+    assert "counts_per_m" in [line.split(" =")[0] for line in text.splitlines() if "MEASURE" in line]
+
+
+def test_a_log_in_which_nothing_moves_is_refused_with_a_sentence(drafted):
+    with pytest.raises(BadInput, match="no column moves"):
+        drafted(theta=np.zeros_like(T), x=np.ones_like(T))
+
+
+def test_file_and_column_names_survive_any_characters(drafted):
+    _, study = drafted(name='a "quoted" log.csv', theta=SWING)
+    assert study.runs[0].label.startswith('a "quoted" log')
+
+
+@pytest.mark.real_data
+@pytest.mark.slow
+def test_every_real_log_drafts_a_study_that_loads(tmp_path):
+    folder = Path(os.environ["UPRIGHT_REAL_DATA"])
+    logs = [p for p in folder.rglob("*") if p.suffix in (".csv", ".mat", ".txt") and "README" not in p.name]
+    refused = []
+    for log in logs:
+        try:
+            record = read(log)
+            text = draft(record, inspect(record), log, tmp_path / "study.toml")
+        except BadInput as error:
+            refused.append(f"{log.name}: {error}")
+            continue
+        (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+        assert load_study(tmp_path / "study.toml").runs, log.name
+    assert len(refused) <= 2, refused  # the authors' own parameters are a .mat file too, and no log
+    assert len(logs) > 50
+
+
+def test_a_command_in_converter_counts_drives_in_volts(drafted):
+    # ECP's front end: 409 counts are 0.5 V
+    command = np.where((T > 5) & (T < 10), -409.0, 0.0)
+    text, study = drafted(target_value=command, cart1pos=ENC1, cart2pos=ENC2)
+    assert 'column = "target_value"' in text
+    run = study.runs[0]
+    assert {round(float(v), 3) for v in np.unique(run.u)} == {-0.499, 0.0}
+
+
+def test_a_nameless_column_that_only_switches_is_the_command(drafted):
+    # a cart pushed to and fro by -4 A and 4 A, switched far more often than once in a hundred samples
+    current = np.where(np.mod(T, 0.6) < 0.3, 4.0, -4.0)
+    text, study = drafted(c1=current, c2=0.3 + 0.01 * np.sin(2 * np.pi * T / 0.6) + 1e-4 * np.sin(40 * T))
+    assert study.plant == "rectilinear-1"
+    assert '[drive]\ncolumn = "c1"' in text
+    assert "Column 'c2' says neither unit nor kind" in text

@@ -1,0 +1,116 @@
+"""Does a study take laws as programs had them, recover them from the log, and refuse what is none?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.closed_loop.programs import Pid, T, closed_loop
+from upright.errors import BadInput
+from upright.identification.model.model import Run
+from upright.study import load_study
+
+STUDY = """
+[rig]
+plant = "rectilinear-1"
+[parameters]
+m_1 = "1 kg"
+k_1 = 0
+c_1 = {{ guess = "3 N s/m" }}
+[actuator]
+gain = "20 N/V"
+[drive]
+column = "u"
+unit = "V"
+sign = -1
+scale = 0.5
+[sensors.x_1]
+column = "y"
+unit = "m"
+scale = 0.01
+sign = -1
+offset = 0.25
+[[runs]]
+file = "log.csv"
+{loop}
+"""
+RECORD = closed_loop(Pid(kp=4.0, ki=3.0, kd=0.2, tau=0.01), rows=1500)
+RECOVER = 'loop = { kind = "recover", reference = "r" }'
+WRITTEN = 'loop = { kind = "pid", kp = 4, ki = 3, kd = 0.2, tau = "10 ms", reference = "r", units = "log" }'
+
+
+def run_of(folder: Path, loop: str, **changes: np.ndarray) -> Run:
+    table = {"t": RECORD.t, **RECORD.signals, **changes}
+    np.savetxt(
+        folder / "log.csv", np.column_stack(list(table.values())), "%.12g", ",", header=",".join(table), comments=""
+    )
+    (folder / "study.toml").write_text(STUDY.format(loop=loop), encoding="utf-8")
+    return load_study(folder / "study.toml").runs[0]
+
+
+@pytest.mark.parametrize("loop", [RECOVER, WRITTEN], ids=["recovered", "written"])
+def test_a_law_of_the_logs_columns_commands_in_the_drives_unit(tmp_path: Path, loop: str) -> None:
+    """Whatever sign, scale and offset the sensor and the drive have, the commands are those of the log."""
+    run = run_of(tmp_path, loop)
+    u, _ = run.loop.follow(run.y, run.measured)
+    np.testing.assert_allclose(u[3:], -0.5 * RECORD["u"][3:], atol=1e-6)
+
+
+def test_a_recovered_law_is_told_with_the_run(tmp_path: Path) -> None:
+    assert "loop recovered from the log: PID; filtered difference of the error" in run_of(tmp_path, RECOVER).source
+
+
+def test_the_loops_sign_replaces_the_drives(tmp_path: Path) -> None:
+    run = run_of(tmp_path, WRITTEN.replace('units = "log"', 'units = "log", sign = 1'))
+    u, _ = run.loop.follow(run.y, run.measured)
+    np.testing.assert_allclose(u[3:], 0.5 * RECORD["u"][3:], atol=1e-6)
+
+
+def test_gains_in_si_have_units(tmp_path: Path) -> None:
+    run = run_of(tmp_path, 'loop = { kind = "pid", kp = "2 V/cm", kd = "1 V s/m", reference = "1 cm" }')
+    u, _ = run.loop.follow(np.array([[0.0], [0.001]]), ("x_1",))
+    first = run.y[0, 0]  # the difference sees no jump at the run's own first sample
+    np.testing.assert_allclose(u, [200 * 0.01 - (0.0 - first) / T, 200 * 0.009 - 0.001 / T])
+
+
+def test_matrices_state_any_law(tmp_path: Path) -> None:
+    """A sum written out: z+ = z + T (r - y), u = 5 (z + T (r - y)) + 2 (r - y)."""
+    loop = f"loop = {{ kind = 'general', A = [[1.0]], B = [[{-T}, {T}]], C = [5.0], D = [{-5 * T - 2}, {5 * T + 2}],"
+    run = run_of(tmp_path, loop + " measured = 'x_1', reference = 0.3 }")
+    y = np.array([0.1, 0.2, 0.0])
+    u, _ = run.loop.follow(y[:, None], ("x_1",))
+    np.testing.assert_allclose(u, 5 * T * np.cumsum(0.3 - y) + 2 * (0.3 - y))
+
+
+def test_a_law_faster_than_the_rows_needs_its_period(tmp_path: Path) -> None:
+    run = run_of(tmp_path, WRITTEN.replace("kp = 4", 'kp = 4, period = "0.4 ms"'))
+    assert run.loop.every == 5
+    assert run.loop.law.period == pytest.approx(T / 5)
+
+
+@pytest.mark.parametrize(
+    ("loop", "sentence"),
+    [
+        ('loop = { kind = "pip" }', "did you mean 'pid'"),
+        ('loop = { kind = "pid", reference = "r" }', "needs kp, ki or kd"),
+        ('loop = { kind = "pid", kp = 1, on = "y" }', 'on must be "error" or "measurement"'),
+        ('loop = { kind = "pid", kp = 1, taps = [1, 1] }', "two numbers that sum to 1"),
+        ('loop = { kind = "pid", kp = 1, period = "3 ms" }', "whole number of times"),
+        ('loop = { kind = "pid", kp = [1, 2] }', "2 values for 1 measured"),
+        ('loop = { kind = "pid", kp = 1, units = "counts" }', 'units must be "SI" or "log"'),
+        ('loop = { kind = "general", A = [[1.0]], D = [1.0] }', "a law with 0 memories"),
+        ('loop = { kind = "recover", reference = 3 }', "must name columns"),
+    ],
+)
+def test_a_wrong_loop_is_answered_with_line_and_remedy(tmp_path: Path, loop: str, sentence: str) -> None:
+    with pytest.raises(BadInput, match="line 23") as complaint:
+        run_of(tmp_path, loop)
+    assert sentence in str(complaint.value)
+
+
+def test_a_poor_law_is_refused(tmp_path: Path) -> None:
+    noise = np.random.default_rng(1).normal(size=RECORD.t.size)
+    with pytest.raises(BadInput, match=r"no law could be recovered from 'u'|does not depend on"):
+        run_of(tmp_path, RECOVER, u=noise)
