@@ -17,48 +17,30 @@ from benchmarks import baseline, problem
 from benchmarks.measure import Contender, Line, Target, compare
 
 NAME = "fit"
-UNKNOWN = ("J_d", "l_cg", "J_p", "b_1", "b_2", "b_1c", "b_2c")
-WHERE = [problem.NAMES.index(name) for name in UNKNOWN]
-TRUTH = np.array([*problem.RIG[WHERE], problem.RELEASE[1]])
-START = TRUTH * (1 + 0.3 * np.array([1, -1, 1, -1, 1, -1, 1, -1]))
-HORIZONS = (1_000, problem.STEPS)
-TORQUE = 0.02 * np.sin(2 * math.pi * 0.7 * problem.PERIOD * np.arange(problem.STEPS))
 SIMPLEX = {"xatol": 1e-6, "fatol": 1e-10, "adaptive": True, "maxfev": 20_000, "maxiter": 20_000}
-
-
-def rig(unknown: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Ten parameters and the initial state for eight values of the unknowns."""
-    p, x0 = problem.RIG.copy(), problem.RELEASE.copy()
-    p[WHERE], x0[1] = unknown[:-1], unknown[-1]
-    return p, x0
-
-
-def counts(states: np.ndarray) -> np.ndarray:
-    """What two encoders make of psi and theta."""
-    return np.floor(states[:, :2] / problem.QUANTUM + 0.5) * problem.QUANTUM
 
 
 def relative_error(unknown: np.ndarray) -> float:
     """Largest relative error of the eight."""
-    return float(np.abs(unknown / TRUTH - 1).max())
+    return float(np.abs(unknown / problem.TRUTH - 1).max())
 
 
 def simplex(swing: Callable[[np.ndarray, int], np.ndarray], measured: np.ndarray) -> tuple[np.ndarray, list[int]]:
     """Nelder-Mead on the logarithms; eight estimates and the evaluations over each horizon."""
     from scipy.optimize import minimize
 
-    z, used = np.zeros(len(START)), []
-    for steps in HORIZONS:
+    z, used = np.zeros(len(problem.START)), []
+    for steps in problem.HORIZONS:
 
         def cost(z: np.ndarray, steps: int = steps) -> float:
-            total = float(((swing(START * np.exp(z), steps) - measured[: steps + 1]) ** 2).sum())
+            total = float(((swing(problem.START * np.exp(z), steps) - measured[: steps + 1]) ** 2).sum())
             return total if math.isfinite(total) else 1e30
 
         first = np.vstack([z, z + 0.1 * np.eye(len(z))])
         found = minimize(cost, z, method="Nelder-Mead", options={**SIMPLEX, "initial_simplex": first})
         z = found.x
         used.append(int(found.nfev))
-    return START * np.exp(z), used
+    return problem.START * np.exp(z), used
 
 
 def in_c() -> Callable[[np.ndarray, int], np.ndarray]:
@@ -66,8 +48,8 @@ def in_c() -> Callable[[np.ndarray, int], np.ndarray]:
     c = baseline.compiled(lanes=False)
 
     def swing(unknown: np.ndarray, steps: int) -> np.ndarray:
-        p, x0 = rig(unknown)
-        return c.trajectory(p, x0, h=problem.PERIOD, steps=steps, friction=True, torque=TORQUE)[:, :2]
+        p, x0 = problem.rig(unknown)
+        return c.trajectory(p, x0, h=problem.PERIOD, steps=steps, friction=True, torque=problem.TORQUE)[:, :2]
 
     return swing
 
@@ -77,7 +59,7 @@ def with_solve_ivp() -> Callable[[np.ndarray, int], np.ndarray]:
     from scipy.integrate import solve_ivp
 
     def swing(unknown: np.ndarray, steps: int) -> np.ndarray:
-        p, x0 = rig(unknown)
+        p, x0 = problem.rig(unknown)
         k = tuple(map(float, problem.lumps(p)))
         t = np.linspace(0, steps * problem.PERIOD, steps + 1)
 
@@ -94,11 +76,11 @@ def with_solve_ivp() -> Callable[[np.ndarray, int], np.ndarray]:
 def estimated_over_solve_ivp(evaluations: list[int]) -> Line:
     """Cost of an evaluation over each horizon, times how many the simplex needed over the same cost in C."""
     swing, taken = with_solve_ivp(), []
-    for steps in HORIZONS:
+    for steps in problem.HORIZONS:
         each = []
         for _ in range(3):
             start = time.process_time()
-            swing(TRUTH, steps)
+            swing(problem.TRUTH, steps)
             each.append(time.process_time() - start)
         taken.append(float(np.median(each)))
     seconds = float(np.dot(taken, evaluations))
@@ -130,7 +112,7 @@ def ours(*, whole: bool) -> Contender:
 def run(*, quick: bool, full: bool, progress: Callable[[str], None]) -> list[Line]:
     """Ours, the simplex over compiled C, the simplex over solve_ivp."""
     swing, evaluations = in_c(), [0, 0]
-    measured = counts(swing(TRUTH, problem.STEPS))
+    measured = problem.counts(swing(problem.TRUTH, problem.STEPS))
 
     def simplex_in_c() -> np.ndarray:
         found, evaluations[:] = simplex(swing, measured)

@@ -59,15 +59,14 @@ def ensemble(p: np.ndarray, x0: np.ndarray, *, samples: int, stick_slip: bool) -
 
 def study() -> tuple[Any, Any]:
     """Rig and run of the synthetic fit: eight unknowns, two encoders."""
-    from benchmarks import fit as asked
     from upright.identification.model.model import Parameter, Rig, Run
     from upright.physics import Furuta
     from upright.simulation import simulate
 
     true = parameters(problem.RIG, stick_slip=True)
     start = problem.RELEASE[list(ORDER)]
-    states = simulate(Furuta, true, start, asked.TORQUE, problem.PERIOD, samples=problem.STEPS + 1)[:, ORDER, 0]
-    guesses = dict(zip(asked.UNKNOWN, asked.START, strict=False))
+    states = simulate(Furuta, true, start, problem.TORQUE, problem.PERIOD, samples=problem.STEPS + 1)[:, ORDER, 0]
+    guesses = dict(zip(problem.UNKNOWN, problem.START, strict=False))
     rig = Rig(
         plant=Furuta,
         parameters={
@@ -79,8 +78,8 @@ def study() -> tuple[Any, Any]:
         label="swing",
         role="fit",
         t=np.arange(problem.STEPS + 1) * problem.PERIOD,
-        u=np.append(asked.TORQUE, asked.TORQUE[-1])[:, None],
-        y=asked.counts(states),
+        u=np.append(problem.TORQUE, problem.TORQUE[-1])[:, None],
+        y=problem.counts(states),
         measured=("psi", "theta"),
         quantum=(problem.QUANTUM,) * 2,
         initial={"psi": 0.0, "psi_dot": 0.0, "theta_dot": 0.0},
@@ -89,8 +88,7 @@ def study() -> tuple[Any, Any]:
 
 
 def search() -> Callable[[], np.ndarray]:
-    """Levenberg-Marquardt over the growing horizon, nothing else; estimates as `benchmarks.fit.TRUTH`."""
-    from benchmarks import fit as asked
+    """Levenberg-Marquardt over the growing horizon, nothing else; estimates as `problem.TRUTH`."""
     from upright.identification.problem.pose import pose
     from upright.identification.search.descent import grow
 
@@ -99,14 +97,13 @@ def search() -> Callable[[], np.ndarray]:
     def estimate() -> np.ndarray:
         posed = pose(rig, [run])
         found = dict(zip([u.name for u in posed.unknowns], posed.value(grow(posed, posed.start).x), strict=True))
-        return np.array([found[name] for name in (*asked.UNKNOWN, "initial.theta")])
+        return np.array([found[name] for name in (*problem.UNKNOWN, "initial.theta")])
 
     return estimate
 
 
 def fit() -> Callable[[], np.ndarray]:
     """All that `upright identify` does once the files are read: search, errors, correlations, verdict."""
-    from benchmarks import fit as asked
     from upright.identification.estimate import identify
 
     rig, run = study()
@@ -114,6 +111,6 @@ def fit() -> Callable[[], np.ndarray]:
     def estimate() -> np.ndarray:
         found = identify(rig, [run], method="least-squares")
         released = found.per_run["swing"]["initial.theta"].value
-        return np.array([*(found.estimates[name].value for name in asked.UNKNOWN), released])
+        return np.array([*(found.estimates[name].value for name in problem.UNKNOWN), released])
 
     return estimate

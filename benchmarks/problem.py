@@ -24,6 +24,14 @@ CUTOFF = 50.0  # Hz, of the filtered differentiator
 KEEP = math.exp(-2 * math.pi * CUTOFF * PERIOD)
 LIMIT = 0.4  # N m
 
+#: The fit: eight unknowns, their truth, where the search starts, over which steps, under which torque.
+UNKNOWN = ("J_d", "l_cg", "J_p", "b_1", "b_2", "b_1c", "b_2c")
+WHERE = [NAMES.index(name) for name in UNKNOWN]
+TRUTH = np.array([*RIG[WHERE], RELEASE[1]])
+START = TRUTH * (1 + 0.3 * np.array([1, -1, 1, -1, 1, -1, 1, -1]))
+HORIZONS = (1_000, STEPS)
+TORQUE = 0.02 * np.sin(2 * math.pi * 0.7 * PERIOD * np.arange(STEPS))
+
 
 def without_dry_friction(p: np.ndarray) -> np.ndarray:
     """Same rig(s), Coulomb levels zero."""
@@ -109,3 +117,15 @@ def ensemble(n: int = LOOPS, *, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
     x0 = np.zeros((4, n))
     x0[1] = math.pi + random.uniform(-0.25, 0.25, n)
     return np.ascontiguousarray(p), x0
+
+
+def rig(unknown: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ten parameters and the initial state for eight values of the unknowns."""
+    p, x0 = RIG.copy(), RELEASE.copy()
+    p[WHERE], x0[1] = unknown[:-1], unknown[-1]
+    return p, x0
+
+
+def counts(states: np.ndarray) -> np.ndarray:
+    """What two encoders make of psi and theta."""
+    return np.floor(states[:, :2] / QUANTUM + 0.5) * QUANTUM

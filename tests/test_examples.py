@@ -16,7 +16,7 @@ import pytest
 from typer.testing import CliRunner
 
 from upright.cli import COMMANDS, app
-from upright.physics import Plant, find, linearize
+from upright.physics import Plant, find
 from upright.simulation import simulate
 
 ROOT = Path(__file__).parents[1]
@@ -111,7 +111,7 @@ def test_a_plant_from_a_file_stays_where_it_hangs(path, name):
     assert issubclass(plant, Plant)
     rig = plant(**{f.name: 0.1 for f in fields(plant) if f.default is MISSING})
     place = next(iter(plant.equilibria))
-    assert np.all(np.isfinite(linearize(rig, place).A))
+    assert np.all(np.isfinite(rig.linear(place).A))
     x0 = np.zeros(len(plant.state_names()))
     motion = simulate(rig, {}, x0, None, 1e-3, samples=201)
     np.testing.assert_allclose(motion[:, :, 0], np.broadcast_to(x0, (201, x0.size)), atol=1e-12)

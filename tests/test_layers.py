@@ -9,39 +9,63 @@ import pytest
 import upright
 
 SOURCE = Path(upright.__file__).parent
+BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 
-BASE = {"errors", "quantities", "units"}
-MAY_IMPORT = {
-    "errors": set(),
-    "quantities": {"errors"},
-    "units": {"errors", "quantities"},
-    "records": BASE,
-    "readers": BASE | {"records"},
-    "physics": {"errors", "quantities"},
-    "design": BASE | {"physics"},
-    "simulation": {"errors", "quantities", "physics"},
-    "identification": BASE | {"records", "readers", "physics", "simulation"},
-    "survey": BASE,
-    "control": BASE | {"records", "physics", "design", "simulation"},
-    "doctor": BASE | {"records", "readers", "physics", "simulation", "identification"},
-    "report": BASE
-    | {"survey", "records", "readers", "physics", "design", "simulation", "control", "identification", "doctor"},
-    "lab": BASE | {"records", "readers", "physics", "design", "simulation", "control", "identification", "report"},
-    "cli": BASE
-    | {"survey", "records", "readers", "physics", "design", "simulation", "control", "identification", "doctor"}
-    | {"report", "lab"},
-    "__main__": {"cli"},
-    "__init__": BASE | {"records", "readers", "physics", "simulation", "identification", "doctor", "report", "lab"},
+# Rooms from the ground up: each imports from those above its own line only. Rooms on one line do not see each other.
+FLOORS = """
+errors progress
+quantities
+units
+signals
+records
+readers
+physics
+law
+simulation.parts
+simulation.kernel
+simulation
+design
+closed_loop
+identification.model
+identification.problem
+identification.search
+identification.inference
+identification.checks identification.frequency identification.loadings
+identification.ladder
+identification
+study
+study.draft
+control
+report
+doctor survey
+paper
+lab.rigs
+lab.designing lab.weighing_1a
+lab.frequency_1b
+lab.regulation_2
+lab.swing_up_2b lab.tracking_3 lab.free_swing_4
+lab
+cli
+__main__
+"""
+FLOOR = {room: floor for floor, line in enumerate(FLOORS.split("\n")) for room in line.split()}
+# What a room has no business to know although it stands above it.
+BLIND = {
+    "physics": {"units", "signals", "records", "readers"},
+    "law": {"units", "signals", "records", "readers", "physics"},
+    "simulation.kernel": {"units", "signals", "records", "readers"},
+    "simulation": {"units", "signals", "records", "readers"},
+    "design": {"signals", "records", "readers", "simulation", "simulation.kernel"},
+    "control": {"readers", "identification", "study"},
+    "survey": {"records", "readers", "physics", "simulation", "identification", "study", "control"},
 }
-SAME_LAYER = {"exchange": "records"}  # a Record's ways to and from other tools: one layer in two files
 # A heavy library has one door, opened when it is first needed.
 DOORS = {
     "sympy": "physics",
     "numba": "simulation",
-    "scipy.optimize": "identification",
+    "scipy.optimize": "identification closed_loop",
     "lmfit": "identification",
     "mpmath": "design",
-    "matplotlib": "report",
     "jinja2": "report",
     "typst": "report",
     "pint": "units",
@@ -62,44 +86,102 @@ def imports(tree: ast.AST, package: list[str]) -> Iterator[tuple[int, str]]:
                 yield node.lineno, f"{origin}.{alias.name}"
 
 
-def layer_of(name: str) -> str:
-    """Layer that a dotted name of ours belongs to: `upright.physics.plant.Plant` -> `physics`."""
-    first = [*name.split("."), "__init__"][1]
-    first = SAME_LAYER.get(first, first)
-    is_module = first in MAY_IMPORT or (SOURCE / first).is_dir() or (SOURCE / f"{first}.py").is_file()
-    return first if is_module else "__init__"  # a name defined in upright/__init__.py
+def room_of(name: str) -> str:
+    """Room that a dotted name of ours stands in, the innermost that has a floor; "" for the front door itself."""
+    parts = name.split(".")[1:]
+    for n in range(len(parts), 0, -1):
+        if ".".join(parts[:n]) in FLOOR:
+            return ".".join(parts[:n])
+    return ""
 
 
 def wrong_arrows(source: str, module: str) -> list[str]:
-    """Sentences about the imports of one module, named as in `upright.physics.plant`, that point back."""
-    layer = module.split(".")[1]
-    layer = SAME_LAYER.get(layer, layer)
-    if layer not in MAY_IMPORT:
-        return [f"{module}: '{layer}' is no layer; give it a place in MAY_IMPORT"]
+    """Sentences about the imports of one module, named as in `upright.physics.plant`, that point up or aside."""
+    room = room_of(module)
+    if not room:
+        return [f"{module} stands in no room; give it a floor in FLOORS"]
     found = []
     for line, name in imports(ast.parse(source), module.split(".")[:-1]):
-        if name == "upright" or name.startswith("upright."):
-            to = layer_of(name)
-            if to not in MAY_IMPORT[layer] | {layer} and name != "upright.__version__":
-                found.append(f"{module}:{line}: {layer} may not import {name}")
+        to = room_of(name) if name.startswith("upright.") else ""
+        if to and to != room and (FLOOR[to] >= FLOOR[room] or to in BLIND.get(room, ())):
+            found.append(f"{module}:{line}: {room} may not import {name}")
+        elif not to and (name == "upright" or name.startswith("upright.")) and name != "upright.__version__":
+            found.append(f"{module}:{line}: the front door is for users; import {name} from its room")
         for library, door in DOORS.items():
-            if f"{name}.".startswith(f"{library}.") and layer != door:
+            if f"{name}.".startswith(f"{library}.") and room.split(".")[0] not in door.split():
                 found.append(f"{module}:{line}: only {door} may import {library}")
     return found
 
 
-def module_name(path: Path) -> str:
-    parts = path.relative_to(SOURCE.parent).with_suffix("").parts
-    return ".".join(parts)
+def module_name(path: Path, root: Path = SOURCE) -> str:
+    parts = path.relative_to(root.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-@pytest.mark.parametrize("path", sorted(SOURCE.rglob("*.py")), ids=module_name)
-def test_no_import_points_back(path):
+def circles(root: Path) -> list[list[str]]:
+    """Modules that import each other, whether at once or when a function is called."""
+    files = {module_name(path, root): path for path in root.rglob("*.py")}
+    arrows: dict[str, set[str]] = {}
+    for module, path in files.items():
+        package = module.split(".") if path.name == "__init__.py" else module.split(".")[:-1]
+        names = {name for _, name in imports(ast.parse(path.read_text(encoding="utf-8")), package)}
+        arrows[module] = {n if n in files else n.rpartition(".")[0] for n in names} & files.keys() - {module}
+    order: dict[str, int] = {}
+    stack: list[str] = []
+    found: list[list[str]] = []
+
+    def visit(module: str) -> int:  # Tarjan's strongly connected components
+        lowest = order[module] = len(order)
+        stack.append(module)
+        for other in sorted(arrows[module]):
+            if other not in order:
+                lowest = min(lowest, visit(other))
+            elif other in stack:
+                lowest = min(lowest, order[other])
+        if lowest == order[module]:
+            circle = stack[stack.index(module) :]
+            del stack[stack.index(module) :]
+            if len(circle) > 1:
+                found.append(sorted(circle))
+        return lowest
+
+    for module in sorted(arrows):
+        if module not in order:
+            visit(module)
+    return found
+
+
+FILES = sorted(path for path in SOURCE.rglob("*.py") if path != SOURCE / "__init__.py")
+
+
+@pytest.mark.parametrize("path", FILES, ids=module_name)
+def test_no_import_points_up(path):
     assert wrong_arrows(path.read_text(encoding="utf-8"), module_name(path)) == []
 
 
+@pytest.mark.parametrize("root", [SOURCE, BENCHMARKS], ids=lambda root: root.name)
+def test_no_two_modules_import_each_other(root):
+    assert circles(root) == []
+
+
+def test_a_circle_is_found(tmp_path):
+    house = tmp_path / "house"
+    house.mkdir()
+    (house / "a.py").write_text("from house import b")
+    (house / "b.py").write_text("def later():\n    from house.c import thing")
+    (house / "c.py").write_text("import house.a")
+    (house / "d.py").write_text("import house.a")
+    assert circles(house) == [["house.a", "house.b", "house.c"]]
+
+
+def test_no_folder_is_a_heap():
+    """More than about a dozen files side by side means that a concept is missing a name; 16 is the limit."""
+    crowded = {folder: len(list(folder.glob("*.py"))) for folder in {path.parent for path in FILES}}
+    assert {module_name(folder / "x").rpartition(".")[0]: n for folder, n in crowded.items() if n > 16} == {}
+
+
 def test_no_file_is_called_after_a_drawer():
-    drawers = {"utils", "util", "misc", "manager", "helpers", "common"}
+    drawers = {"utils", "util", "misc", "manager", "helpers"}
     assert [module_name(p) for p in SOURCE.rglob("*") if p.stem in drawers] == []
 
 
@@ -107,23 +189,25 @@ def test_no_file_is_called_after_a_drawer():
     ("source", "module"),
     [
         ("import upright.simulation", "upright.physics.plant"),
-        ("from upright.report import figures", "upright.identification.fit"),
+        ("from upright.report import figures", "upright.identification.estimate"),
         ("from upright import records", "upright.physics.plant"),
-        ("def later():\n    from upright.cli import app", "upright.lab.free_swing_4.run"),
+        ("from upright import identify", "upright.cli.model.identify"),
+        ("def later():\n    from upright.cli import app", "upright.lab.laboratory"),
         ("from ..simulation import simulate", "upright.physics.plant"),
-        ("import sympy as sp", "upright.simulation.kernel"),
-        ("def later():\n    from sympy import sin", "upright.lab.free_swing_4.run"),
-        ("from scipy import optimize", "upright.simulation.kernel"),
+        ("from upright.identification.estimate import identify", "upright.identification.problem.problem"),
+        ("from upright.lab.tracking_3 import run", "upright.lab.free_swing_4.run"),
+        ("import sympy as sp", "upright.simulation.kernel.source"),
+        ("def later():\n    from sympy import sin", "upright.lab.laboratory"),
+        ("from scipy import optimize", "upright.simulation.kernel.source"),
         ("import scipy.optimize", "upright.report.figures"),
         ("from scipy.optimize import brentq", "upright.physics.plant"),
         ("import lmfit", "upright.report.tables"),
-        ("from matplotlib import pyplot", "upright.identification.fit"),
         ("import numba", "upright.physics.derived"),
         ("import pint", "upright.study.load"),
         ("x = 1", "upright.drawer.thing"),
     ],
 )
-def test_an_arrow_that_points_back_is_refused(source, module):
+def test_an_arrow_that_points_up_is_refused(source, module):
     assert len(wrong_arrows(source, module)) == 1
 
 
@@ -132,11 +216,12 @@ def test_an_arrow_that_points_back_is_refused(source, module):
     [
         ("from upright.errors import BadInput", "upright.physics.plant"),
         ("from .lagrange import derive", "upright.physics.plant"),
-        ("from ..physics import find", "upright.simulation.kernel"),
+        ("from ..physics import find", "upright.simulation.simulate"),
         ("import scipy.linalg", "upright.physics.linear"),
         ("from upright import __version__", "upright.report.document"),
-        ("def later():\n    from upright.lab import release", "upright.cli.lab"),
+        ("def later():\n    from upright.lab import laboratory", "upright.cli.course.lab"),
         ("import sympy", "upright.physics.lagrange"),
+        ("from upright.identification.problem.problem import Problem", "upright.identification.search.descent"),
     ],
 )
 def test_an_arrow_that_points_down_is_welcome(source, module):

@@ -21,9 +21,9 @@ def show_that_raises(monkeypatch):
         def show() -> None:
             raise error
 
-        stand_in = ModuleType("upright.cli.show")
+        stand_in = ModuleType("upright.cli.log.show")
         stand_in.show = show
-        monkeypatch.setitem(sys.modules, "upright.cli.show", stand_in)
+        monkeypatch.setitem(sys.modules, "upright.cli.log.show", stand_in)
         outcome = CliRunner().invoke(app, ["show"])
         return outcome.exit_code, outcome.stderr
 
@@ -91,13 +91,13 @@ def test_what_goes_wrong_is_one_sentence_and_an_exit_code(show_that_raises, erro
 def test_upright_debug_shows_where_it_happened(show_that_raises, monkeypatch):
     monkeypatch.setenv("UPRIGHT_DEBUG", "1")
     runner_result = CliRunner()
-    stand_in = ModuleType("upright.cli.show")
+    stand_in = ModuleType("upright.cli.log.show")
 
     def show() -> None:
         raise BadInput("needed a log")
 
     stand_in.show = show
-    monkeypatch.setitem(sys.modules, "upright.cli.show", stand_in)
+    monkeypatch.setitem(sys.modules, "upright.cli.log.show", stand_in)
     assert isinstance(runner_result.invoke(app, ["show"]).exception, BadInput)
 
 

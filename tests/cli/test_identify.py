@@ -113,7 +113,7 @@ def test_json_on_the_terminal_is_the_file(bench):
 def test_ctrl_c_keeps_and_writes_the_best_so_far(bench, monkeypatch):
     from dataclasses import replace
 
-    from upright.identification import identify as estimate
+    from upright.identification import estimate
 
     whole = estimate.identify
     monkeypatch.setattr(estimate, "identify", lambda *a, **k: replace(whole(*a, **k), interrupted=True))

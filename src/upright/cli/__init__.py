@@ -1,6 +1,6 @@
 """Which commands does the tool answer to, and how does it say that something went wrong?
 
-Each command lives in its own file, `upright/cli/NAME.py`, as a function called NAME (with _ for -). The file is
+Each command lives in its own file, `upright/cli/GROUP/NAME.py`, as a function called NAME (with _ for -). The file is
 imported when the command runs, so that listing the commands loads no numerical library.
 """
 
@@ -18,25 +18,34 @@ from typer.core import TyperGroup
 
 from upright.errors import UprightError
 
-COMMANDS = {
-    "lab": "Run the experiments of the paper on simulated rigs, and report what they say.",
-    "show": "Print and draw what a log holds: columns, sample rate, quanta, gaps, lying columns.",
-    "doctor": "Say in plain sentences what looks wrong with a log, on which evidence, and what to do.",
-    "init": "Write a commented study file from a log, filled in with what could be recognised.",
-    "law": "Recover the control law from a closed-loop log: structure, gains, limit, what is left.",
-    "identify": "Fit a rig's parameters to its logs as a study file says; write estimates and report.",
-    "ladder": "Grow a model only while it predicts better what it has not seen.",
-    "design": "Find the gains that hold a rig, and what they are worth in the loop a computer runs.",
-    "regulate": "Hold an identified rig upright; say beforehand what each pole set will come to.",
-    "swing-up": "Swing a hanging pendulum up by its own drive and catch it, once its encoders are trusted.",
-    "loadings": "Find stiffness and bare inertia from step responses with known added masses.",
-    "frequency": "Measure a frequency response, or read one from logs, and fit the rig to it.",
-    "plan-inertias": "Say which masses, where and how often, give the tightest stiffness for the fewest runs.",
-    "reproduce": "Regenerate the pole tables of the paper from a few numbers, and show its misprints.",
-    "survey": "Evaluate ratings before and after a course; check printed means and percentages.",
-    "track": "Make the far inertia of a flexible shaft follow a step, by state feedback and by PD.",
-    "predict": "Score other runs with a model that was fitted before.",
+GROUPS = {
+    "Log": {
+        "show": "Print and draw what a log holds: columns, sample rate, quanta, gaps, lying columns.",
+        "doctor": "Say in plain sentences what looks wrong with a log, on which evidence, and what to do.",
+        "init": "Write a commented study file from a log, filled in with what could be recognised.",
+        "law": "Recover the control law from a closed-loop log: structure, gains, limit, what is left.",
+    },
+    "Model": {
+        "identify": "Fit a rig's parameters to its logs as a study file says; write estimates and report.",
+        "predict": "Score other runs with a model that was fitted before.",
+        "ladder": "Grow a model only while it predicts better what it has not seen.",
+        "frequency": "Measure a frequency response, or read one from logs, and fit the rig to it.",
+        "loadings": "Find stiffness and bare inertia from step responses with known added masses.",
+        "plan-inertias": "Say which masses, where and how often, give the tightest stiffness for the fewest runs.",
+    },
+    "Control": {
+        "design": "Find the gains that hold a rig, and what they are worth in the loop a computer runs.",
+        "regulate": "Hold an identified rig upright; say beforehand what each pole set will come to.",
+        "swing-up": "Swing a hanging pendulum up by its own drive and catch it, once its encoders are trusted.",
+        "track": "Make the far inertia of a flexible shaft follow a step, by state feedback and by PD.",
+    },
+    "Course": {
+        "lab": "Run the experiments of the paper on simulated rigs, and report what they say.",
+        "reproduce": "Regenerate the pole tables of the paper from a few numbers, and show its misprints.",
+        "survey": "Evaluate ratings before and after a course; check printed means and percentages.",
+    },
 }
+COMMANDS = {name: line for commands in GROUPS.values() for name, line in commands.items()}
 
 SETTINGS = {"help_option_names": ["-h", "--help"]}
 USER_ERROR, BUG, INTERRUPTED = 2, 1, 130
@@ -60,7 +69,8 @@ class LazyGroup(TyperGroup):
 
 def _load(name: str) -> Any:
     module = name.replace("-", "_")
-    function = getattr(import_module(f"upright.cli.{module}"), module)
+    group = next(group for group, commands in GROUPS.items() if name in commands)
+    function = getattr(import_module(f"upright.cli.{group.lower()}.{module}"), module)
     text = function.__doc__ or COMMANDS[name]
     one = typer.Typer(add_completion=False, rich_markup_mode="rich", context_settings=SETTINGS)
     # Docstrings are raw, for rich's escapes; \b keeps the line breaks of a paragraph.
@@ -147,8 +157,9 @@ def _upright(
     """From one Lagrangian to a fitted real rig: a log goes in, a trusted nonlinear model comes out."""
 
 
-for _name, _help in COMMANDS.items():
-    app.command(_name, help=_help)(lambda: None)
+for _group, _commands in GROUPS.items():
+    for _name, _help in _commands.items():
+        app.command(_name, help=_help, rich_help_panel=_group)(lambda: None)
 
 
 def main() -> None:

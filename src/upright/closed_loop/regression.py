@@ -134,7 +134,7 @@ def refine(at: Callable[[float], Columns], u: Array, rows: Rows, pole: float) ->
 
 def errors(regression: Regression, u: Array, used: Rows) -> Array:
     """Covariance (p + 1, p + 1) of gains and pole, residuals with a memory allowed for."""
-    from upright.identification.inference.covariance import automatic_span, long_run
+    from upright.signals.memory import automatic_span, long_run
 
     X = regression.found.X[used]
     both = np.column_stack([X, regression.found.slope[used] @ regression.gains])

@@ -19,7 +19,6 @@ from upright.closed_loop.regressors import Family, Signals
 from upright.errors import BadInput, NotIdentifiable
 from upright.readers.quantum import find
 from upright.records import Record
-from upright.study.columns import column
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
@@ -78,7 +77,7 @@ def recover(
         raise BadInput('a law needs at least one measured column, such as measured = ["theta"].')
     if len(references) > len(measured):
         raise BadInput(f"{len(measured)} measured columns take as many references at most, got {len(references)}.")
-    u = column(record, command)
+    u = record[command]
     hold, first = held_for(u)
     rows = np.arange(first, u.size, hold)
     if rows.size < 60:
@@ -86,9 +85,9 @@ def recover(
     u = u[rows]
     if np.ptp(u[_JUNK:]) == 0:
         raise NotIdentifiable(f"the command '{command}' stays at {u[-1]:g}: nothing closed a loop here.")
-    y = [column(record, name)[rows] for name in measured]
-    r = [column(record, name)[rows] for name in references]
-    extra = tuple((name, column(record, name)[rows]) for name in feedforward)
+    y = [record[name][rows] for name in measured]
+    r = [record[name][rows] for name in references]
+    extra = tuple((name, record[name][rows]) for name in feedforward)
     period = float(record.t[-1] - record.t[0]) / (record.t.size - 1) * hold
     tried: list[tuple[Found, Regression]] = []
     for n in (1, 2, 5, 10) if every is None else (every,):

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from upright.doctor.motion import Motion
-from upright.identification.search.inverse_start import mass_and_force
+from upright.physics.evaluate import mass_and_force
 from upright.records import Array
 
 FLOOR = 0.004
@@ -73,7 +73,8 @@ class Balance:
         h, n = factors.shape
         size = m.t.size
         q, v, a = ((factors.T[:, :, None] * x[:, None, :]).reshape(n, h * size) for x in (m.q, m.v, m.a))
-        M, f = mass_and_force(m.plant, self.values, q, v, np.zeros((len(m.plant.inputs), h * size)))
+        states = {n: x for i, c in enumerate(self.names) for n, x in ((c, q[i]), (f"{c}_dot", v[i]))}
+        M, f = mass_and_force(m.plant.derived_for(self.values), {**self.values, **states})
         tau = (np.einsum("tij,jt->ti", M, a) - f).reshape(h, size, n)
         inertial = (np.einsum("tii->ti", M) * a.T).reshape(h, size, n)
         rows = list(m.rows)

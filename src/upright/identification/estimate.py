@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from upright.errors import BadInput
 from upright.identification.checks.conventions import doubts
 from upright.identification.checks.refit import watched
-from upright.identification.checks.trips import located, untold
 from upright.identification.inference.answer import answer
 from upright.identification.inference.scoring import fit_percent, predict
 from upright.identification.ladder.friction import choose
@@ -23,6 +22,7 @@ from upright.identification.model.model import Fit, Rig, Run
 from upright.identification.problem.pose import pose, unresolved
 from upright.identification.problem.predictor_setup import with_noise
 from upright.identification.problem.problem import Problem
+from upright.identification.problem.trips import located, untold
 from upright.identification.search.descent import Descent, Report, grow
 from upright.identification.search.moments import other_moments
 from upright.identification.search.simplex import simplex

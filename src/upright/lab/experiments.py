@@ -10,10 +10,9 @@ from upright.control.rig import Rig
 from upright.errors import BadInput
 from upright.lab.rigs.makes import Make
 from upright.lab.weighing_1a.run import Known
+from upright.progress import Progress
 from upright.report.chapter import Chapter
 from upright.report.symbols import typed
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, kw_only=True)

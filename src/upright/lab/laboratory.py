@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from upright.errors import BadInput, UprightError
-from upright.lab.experiments import EXPERIMENTS, Experiment, Progress, Task
+from upright.lab.experiments import EXPERIMENTS, Experiment, Task
 from upright.lab.kept import keep, kept, made_of
 from upright.lab.rigs.makes import Make, make_rig
+from upright.progress import Progress
 from upright.report.chapter import Chapter
 
 

@@ -9,12 +9,12 @@ import numpy as np
 
 from upright.design.factorization import Locus
 from upright.design.requests import matched, written
-from upright.lab.designing.figures import Poles, locus_figure, pole_map
 from upright.paper.reproduce import Regenerated, Reproduced
 from upright.paper.tables import STUDENTS
 from upright.report.advice import Step
 from upright.report.document import picture
 from upright.report.drawing import BLACK, BLUE, VERMILLION
+from upright.report.poles import Poles, locus_figure, pole_map
 from upright.report.sections import Part, Table, write_sections
 from upright.report.symbols import number
 from upright.survey.answers_figure import answers_figure

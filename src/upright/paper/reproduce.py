@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from upright.design import place
 from upright.design.factorization import Locus, effort_ratios, recover_locus
 from upright.design.requests import matched, poles_of
-from upright.lab.rigs.twin import NOMINAL
 from upright.paper import tables
 from upright.paper.errata import Erratum, errata, impossible_means, printed_inverted
+from upright.physics import Furuta
 
 Array = NDArray[np.float64]
 Roots = NDArray[np.complex128]
@@ -73,12 +73,12 @@ class Reproduced:
         return f"All {count} poles of Tables 1 and 2 come again, {how}; {shown} of 6 errata are shown."
 
 
-def reproduce(seed: int = 0) -> Reproduced:
-    """Tables 1 and 2 again, and the errata; `seed` draws the rigs on which formulas are tried."""
+def reproduce(furuta: Furuta, seed: int = 0) -> Reproduced:
+    """Tables 1 and 2 again, and the errata: `furuta` gets gains by eq. (2) as printed, `seed` draws rigs to try on."""
     first = _again("Table 1: Furuta pendulum, inverted", tables.TABLE_1, free=(2,))
     second = _again("Table 2: two carts, ECP 210", tables.TABLE_2, free=(3, 2, 1))
-    model, asked = NOMINAL.linear("inverted"), first.printed[0]
-    A, b = printed_inverted(NOMINAL)
+    model, asked = furuta.linear("inverted"), first.printed[0]
+    A, b = printed_inverted(furuta)
     closed = poles_of(model.A - model.B @ place(A, b, asked).K)
     return Reproduced(
         tables=(first, second),

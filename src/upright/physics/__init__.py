@@ -9,11 +9,12 @@ from pathlib import Path
 
 from upright.errors import BadInput, UprightError, nearest
 from upright.physics.derived import Derived, DryJoint
-from upright.physics.linear import Linear, linearize
+from upright.physics.linear import Linear
 from upright.physics.loads import added_inertia, added_mass
 from upright.physics.oscillators import chain
 from upright.physics.pendulums import CartPendulum, Furuta, Pendulum
-from upright.physics.plant import Coordinate, Input, Joint, Plant
+from upright.physics.plant import Plant
+from upright.physics.statement import Coordinate, Input, Joint
 
 __all__ = [
     "BUILT_IN",
@@ -31,7 +32,6 @@ __all__ = [
     "added_mass",
     "chain",
     "find",
-    "linearize",
 ]
 
 BUILT_IN: dict[str, type[Plant]] = {

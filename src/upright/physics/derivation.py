@@ -13,10 +13,10 @@ from sympy.printing.pycode import PythonCodePrinter
 
 from upright.physics.derived import Derived, DryJoint
 from upright.physics.lagrange import energies, motion, symbols
-from upright.physics.plant import Plant
+from upright.physics.statement import Statement
 
 
-def derive(cls: type[Plant], *, without: frozenset[str] = frozenset()) -> Derived:
+def derive(cls: type[Statement], *, without: frozenset[str] = frozenset()) -> Derived:
     """Derive a plant's equations of motion from its energies.
 
     Raises

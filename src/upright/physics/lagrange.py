@@ -14,10 +14,10 @@ from typing import Any
 import sympy as sp
 
 from upright.errors import BadInput, nearest
-from upright.physics.plant import Plant
+from upright.physics.statement import Statement
 
 
-def symbols(cls: type[Plant]) -> tuple[SimpleNamespace, list[Any], list[Any], list[Any]]:
+def symbols(cls: type[Statement]) -> tuple[SimpleNamespace, list[Any], list[Any], list[Any]]:
     """Real symbols of parameters (by name), coordinates, velocities and inputs."""
     p = SimpleNamespace(**{n: sp.Symbol(n, real=True) for n in cls.names()})
     q = [sp.Symbol(c.name, real=True) for c in cls.coordinates]
@@ -26,7 +26,7 @@ def symbols(cls: type[Plant]) -> tuple[SimpleNamespace, list[Any], list[Any], li
     return p, q, v, u
 
 
-def energies(cls: type[Plant]) -> tuple[Any, Any, Any]:
+def energies(cls: type[Statement]) -> tuple[Any, Any, Any]:
     """T, V and D as the plant states them, checked.
 
     Raises
@@ -65,7 +65,7 @@ def energies(cls: type[Plant]) -> tuple[Any, Any, Any]:
     return T, V, D
 
 
-def _check_inertia(cls: type[Plant], M: Any) -> None:
+def _check_inertia(cls: type[Statement], M: Any) -> None:
     """Every motion needs an inertia; tried at arbitrary values, since a determinant in symbols can be long."""
     values = {s: (1 + sp.sqrt(2 + i)).evalf(30) for i, s in enumerate(sorted(M.free_symbols, key=str))}
     sample = M.evalf(30, subs=values)
@@ -76,7 +76,7 @@ def _check_inertia(cls: type[Plant], M: Any) -> None:
     raise BadInput(f"{cls.__name__}: {what}, so its acceleration is undefined; give it a mass or leave it out.")
 
 
-def motion(cls: type[Plant], *, without: Collection[str] = ()) -> tuple[Any, Any]:
+def motion(cls: type[Statement], *, without: Collection[str] = ()) -> tuple[Any, Any]:
     """Mass matrix M and force vector f of ``M a = f(q, v, u)``, as SymPy matrices, dry friction left out.
 
     Parameters named in `without` are zero.
@@ -95,13 +95,13 @@ def motion(cls: type[Plant], *, without: Collection[str] = ()) -> tuple[Any, Any
     return sp.hessian(T, v), f
 
 
-def linear(cls: type[Plant], at: str, *, without: Collection[str] = ()) -> tuple[Any, Any]:
+def linear(cls: type[Statement], at: str, *, without: Collection[str] = ()) -> tuple[Any, Any]:
     """Matrices A, B about a named equilibrium, states in the paper's order, as simplified SymPy matrices."""
     determinant, A, B = over_determinant(cls, at, without=without)
     return tuple((m / determinant).applyfunc(sp.simplify) for m in (A, B))  # type: ignore[return-value]
 
 
-def over_determinant(cls: type[Plant], at: str, *, without: Collection[str] = ()) -> tuple[Any, Any, Any]:
+def over_determinant(cls: type[Statement], at: str, *, without: Collection[str] = ()) -> tuple[Any, Any, Any]:
     """Determinant of the mass matrix (the paper's D_2), and A, B multiplied by it, about a named equilibrium."""
     _, q, v, u = symbols(cls)
     M, f = motion(cls, without=without)
@@ -121,7 +121,7 @@ def over_determinant(cls: type[Plant], at: str, *, without: Collection[str] = ()
     return determinant, A, B
 
 
-def latex(cls: type[Plant]) -> str:
+def latex(cls: type[Statement]) -> str:
     """Equations of motion as a LaTeX ``align`` block, velocities dotted, optional parameters left out."""
     _, q, v, _ = symbols(cls)
     equations: Any = [m.applyfunc(lambda e: sp.trigsimp(sp.expand(e))) for m in motion(cls, without=cls.optional)]
@@ -133,7 +133,7 @@ def latex(cls: type[Plant]) -> str:
     return "\\begin{align}\n" + " \\\\\n".join(rows) + "\n\\end{align}"
 
 
-def latex_linear(cls: type[Plant], at: str) -> str:
+def latex_linear(cls: type[Statement], at: str) -> str:
     """Linear model about a named equilibrium as a LaTeX ``align`` block, the common denominator D written once.
 
     Optional parameters are left out.

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import ImpossiblePhysics, NotIdentifiable
-from upright.physics.plant import Plant, evaluate
-
-if TYPE_CHECKING:
-    from upright.physics.derived import Derived
+from upright.physics.derived import Derived
+from upright.physics.evaluate import mass_and_force, small_motions
+from upright.physics.statement import Statement
 
 Matrix = NDArray[np.float64]
 Roots = NDArray[np.complex128]
@@ -102,7 +100,7 @@ def _polynomial(roots: Roots, near: float) -> Matrix:
     return np.atleast_1d(np.poly(np.where(np.abs(roots) <= near, 0.0, roots))).real.astype(np.float64)
 
 
-def linearize(plant: Plant, at: str | None = None) -> Linear:
+def linearize(plant: Statement, derived: Derived, at: str | None = None) -> Linear:
     """Linear model about a named equilibrium; with the rig out of level, about the equilibrium nearest to it.
 
     Raises
@@ -112,108 +110,24 @@ def linearize(plant: Plant, at: str | None = None) -> Linear:
     ImpossiblePhysics
         When the mass matrix there is not positive definite.
     """
-    derived = plant.derived_for(plant.parameters())
     point = _rest(plant, derived, plant.equilibrium(at))
-    scope = {**plant.parameters(), **point}
-    n, m = len(derived.coordinates), len(derived.inputs)
-    mass = _mass(derived, scope)
+    mass, damping, stiffness, gain = small_motions(derived, {**plant.parameters(), **point})
     if np.linalg.eigvalsh(mass).min() <= 0:
         raise ImpossiblePhysics(
             f"{type(plant).__name__} needs a positive definite mass matrix, got {mass.tolist()}; check its inertias."
         )
-    solve = np.linalg.solve(
-        mass,
-        np.hstack(
-            [
-                -_matrix(derived.stiffness, scope, n, n),
-                -_matrix(derived.damping, scope, n, n),
-                _matrix(derived.gain, scope, n, m),
-            ]
-        ),
-    )
+    n, m = gain.shape
+    solve = np.linalg.solve(mass, np.hstack([-stiffness, -damping, gain]))
     A, B, C = np.zeros((2 * n, 2 * n)), np.zeros((2 * n, m)), np.zeros((n, 2 * n))
-    for i in range(n):
-        A[2 * i, 2 * i + 1] = 1.0
-        C[i, 2 * i] = 1.0
-        A[2 * i + 1, 0::2] = solve[i, :n]
-        A[2 * i + 1, 1::2] = solve[i, n : 2 * n]
-        B[2 * i + 1] = solve[i, 2 * n :]
+    A[0::2, 1::2] = C[:, 0::2] = np.eye(n)
+    A[1::2, 0::2], A[1::2, 1::2], B[1::2] = solve[:, :n], solve[:, n : 2 * n], solve[:, 2 * n :]
     return Linear(
-        A=A,
-        B=B,
-        C=C,
-        mass=mass,
-        point=point,
-        states=plant.state_names(),
-        inputs=derived.inputs,
+        A=A, B=B, C=C, mass=mass, point=point, states=plant.state_names(), inputs=derived.inputs,
         outputs=derived.coordinates,
-    )
+    )  # fmt: skip
 
 
-def _matrix(entries: tuple[str, ...], scope: dict[str, float], rows: int, columns: int) -> Matrix:
-    return np.array([float(evaluate(e, scope)) for e in entries], dtype=np.float64).reshape(rows, columns)
-
-
-def _motion(derived: Derived, scope: Mapping[str, Any]) -> tuple[Matrix, Matrix]:
-    """Mass matrix and force vector at one point."""
-    scope = resolved(derived, scope)
-    n = len(derived.coordinates)
-    M = np.zeros((n, n))
-    M[np.triu_indices(n)] = [float(evaluate(e, scope)) for e in derived.mass]
-    return M + np.triu(M, 1).T, np.array([float(evaluate(e, scope)) for e in derived.force])
-
-
-def resolved(derived: Derived, scope: Mapping[str, Any]) -> dict[str, Any]:
-    """The scope with the intermediate results in it."""
-    scope = dict(scope)
-    for i, lump in enumerate(derived.lumps):
-        scope[f"k{i}"] = evaluate(lump, scope)
-    for s, c, argument in derived.trig:
-        a = evaluate(argument, scope)
-        scope[s], scope[c] = np.sin(a), np.cos(a)
-    for name, step in derived.steps:
-        scope[name] = evaluate(step, scope)
-    return scope
-
-
-def small_motions(derived: Derived, values: Mapping[str, Any], lanes: int) -> tuple[Matrix, Matrix, Matrix, Matrix]:
-    """Matrices of ``M a + D v + K q = G u`` about a point at rest, for many sets of numbers.
-
-    Parameters
-    ----------
-    derived : Derived
-        Equations of the plant.
-    values : mapping
-        Parameters and the coordinates of the point by name, each a number or an array (lanes,).
-    lanes : int
-        Number of sets.
-
-    Returns
-    -------
-    tuple of arrays
-        M, D and K (lanes, n, n) and G (lanes, n, inputs).
-    """
-    n, m = len(derived.coordinates), len(derived.inputs)
-    still = {**{f"{c}_dot": 0.0 for c in derived.coordinates}, **dict.fromkeys(derived.inputs, 0.0)}
-    scope = resolved(derived, {**still, **values})
-
-    def matrix(entries: tuple[str, ...], columns: int) -> Matrix:
-        rows = [np.broadcast_to(evaluate(e, scope), (lanes,)) for e in entries]
-        return np.array(rows, dtype=np.float64).reshape(n, columns, lanes).transpose(2, 0, 1).copy()
-
-    M = np.zeros((lanes, n, n))
-    i, j = np.triu_indices(n)
-    M[:, i, j] = np.array([np.broadcast_to(evaluate(e, scope), (lanes,)) for e in derived.mass]).T
-    M[:, j, i] = M[:, i, j]
-    return M, matrix(derived.damping, n), matrix(derived.stiffness, n), matrix(derived.gain, m)
-
-
-def _mass(derived: Derived, scope: dict[str, float]) -> Matrix:
-    still = {**{f"{c}_dot": 0.0 for c in derived.coordinates}, **dict.fromkeys(derived.inputs, 0.0)}
-    return _motion(derived, {**still, **scope})[0]
-
-
-def _rest(plant: Plant, derived: Derived, point: dict[str, float]) -> dict[str, float]:
+def _rest(plant: Statement, derived: Derived, point: dict[str, float]) -> dict[str, float]:
     """Nearest true equilibrium to a nominal one; a coordinate that floats there is also tried from either side."""
     aside = [{**point, name: value + d} for name, value in point.items() for d in (0.5, -0.5)]
     for start in (point, *aside):
@@ -225,14 +139,12 @@ def _rest(plant: Plant, derived: Derived, point: dict[str, float]) -> dict[str, 
     )
 
 
-def _newton(plant: Plant, derived: Derived, point: dict[str, float]) -> dict[str, float] | None:
+def _newton(plant: Statement, derived: Derived, point: dict[str, float]) -> dict[str, float] | None:
     """Newton's steps, none longer than 0.3, to where no force is left."""
-    still = {**{f"{c}_dot": 0.0 for c in derived.coordinates}, **dict.fromkeys(derived.inputs, 0.0)}
-    n = len(point)
     for _ in range(50):
-        scope = {**plant.parameters(), **still, **point}
-        force = _motion(derived, scope)[1]
-        stiffness = _matrix(derived.stiffness, scope, n, n)
+        scope = {**plant.parameters(), **point}
+        force = mass_and_force(derived, scope)[1]
+        stiffness = small_motions(derived, scope)[2]
         scale = np.abs(stiffness).max(axis=1, initial=0.0)
         if np.all(np.abs(force) <= 1e-12 * scale):
             return point

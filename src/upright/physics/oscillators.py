@@ -11,7 +11,8 @@ from functools import cache
 from typing import Any
 
 from upright.errors import BadInput
-from upright.physics.plant import Coordinate, Input, Joint, Plant
+from upright.physics.plant import Plant
+from upright.physics.statement import Coordinate, Input, Joint
 from upright.quantities import quantity
 
 _UNITS = {

@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from upright.physics.plant import Coordinate, Input, Joint, Plant
+from upright.physics.plant import Plant
+from upright.physics.statement import Coordinate, Input, Joint
 from upright.quantities import quantity
 
 _G = 9.81

@@ -1,4 +1,4 @@
-"""What is a plant? Its energies, its inputs, its joints and where it can rest; everything else follows.
+"""What follows from what a plant states: equations of motion, energies, linear models.
 
 A subclass states kinetic energy, potential energy and Rayleigh's dissipation once (see `pendulums.py`).
 """
@@ -6,107 +6,22 @@ A subclass states kinetic energy, potential energy and Rayleigh's dissipation on
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upright.errors import BadInput, nearest
-from upright.physics.declaration import declare
 from upright.physics.derived import Derived
-from upright.quantities import Quantity, quantities, quantity
-
-if TYPE_CHECKING:
-    from upright.physics.linear import Linear
-
-
-@dataclass(frozen=True)
-class Coordinate:
-    """A generalized coordinate: symbol, unit (``"rad"`` or ``"m"``), meaning."""
-
-    name: str
-    unit: str
-    meaning: str
+from upright.physics.evaluate import evaluate
+from upright.physics.linear import Linear, linearize
+from upright.physics.statement import Statement
 
 
-@dataclass(frozen=True)
-class Input:
-    """A force, torque or voltage that acts on one coordinate, in the direction of its velocity."""
-
-    name: str
-    unit: str
-    meaning: str
-    on: str
-
-
-@dataclass(frozen=True)
-class Joint:
-    """Dry friction on one coordinate: which parameters set its terms; "" leaves a term out.
-
-    `coulomb` is the sliding level, `quadratic` the drag per speed squared, `stiction` the break-away level,
-    `stribeck_speed` the speed at which stiction fades into sliding, `presliding` Dahl's length.
-    """
-
-    on: str
-    coulomb: str = ""
-    quadratic: str = ""
-    stiction: str = ""
-    stribeck_speed: str = ""
-    presliding: str = ""
-
-
-@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(quantity,))
-class Plant:
-    """Base of every plant; a subclass becomes a frozen, keyword-only dataclass whose fields are its parameters.
-
-    Raises
-    ------
-    BadInput
-        When the class is made and does not state a plant; see `declaration.py`.
-    ImpossiblePhysics
-        When a plant is built with a parameter outside the bounds its `quantity` states.
-    """
-
-    coordinates: ClassVar[tuple[Coordinate, ...]] = ()
-    inputs: ClassVar[tuple[Input, ...]] = ()
-    joints: ClassVar[tuple[Joint, ...]] = ()
-    equilibria: ClassVar[Mapping[str, Mapping[str, float]]] = {"rest": {}}
-    optional: ClassVar[tuple[str, ...]] = ()
-    """Parameters whose terms are left out of the equations when they are zero, to keep them cheap."""
-
-    def __init_subclass__(cls, **kwargs: Any) -> None:
-        super().__init_subclass__(**kwargs)
-        declare(cls, Plant)
-
-    def __post_init__(self) -> None:
-        for name, what in quantities(self).items():
-            what.check(name, float(getattr(self, name)))
-
-    @staticmethod
-    def energies(p: Any, q: Any, v: Any) -> tuple[Any, Any, Any]:
-        """Kinetic energy T, potential energy V, Rayleigh's dissipation D, as SymPy expressions."""
-        raise BadInput("a plant states its energies(p, q, v) -> T, V, D, but this one has none; add the method.")
-
-    # what follows from the statement
-
-    @classmethod
-    def names(cls) -> tuple[str, ...]:
-        """Names of the parameters, in order."""
-        return tuple(quantities(cls))
-
-    @classmethod
-    def quantity(cls, name: str) -> Quantity:
-        """Unit, meaning and bounds of one parameter."""
-        return quantities(cls)[name]
-
-    @classmethod
-    def state_names(cls) -> tuple[str, ...]:
-        """Names of the states in the paper's order: each coordinate followed by its velocity."""
-        return tuple(s for c in cls.coordinates for s in (c.name, f"{c.name}_dot"))
+class Plant(Statement, abstract=True):
+    """Base of every plant: what is known of a rig, from its own statement."""
 
     @classmethod
     def derived(cls, *, without: frozenset[str] = frozenset()) -> Derived:
@@ -120,49 +35,6 @@ class Plant:
     def derived_for(cls, parameters: Mapping[str, Any]) -> Derived:
         """Equations without the optional terms when they are all zero in `parameters` (scalars or arrays)."""
         return cls.derived(without=frozenset(n for n in cls.optional if not np.any(parameters.get(n, 0.0))))
-
-    def parameters(self) -> dict[str, float]:
-        """Values of the parameters by name."""
-        return {f.name: float(getattr(self, f.name)) for f in fields(self)}  # type: ignore[arg-type]
-
-    def replace(self, **changes: float) -> Self:
-        """The same plant with other values.
-
-        Raises
-        ------
-        BadInput
-            When a name is not a parameter of this plant.
-        """
-        for name in changes:
-            if name not in self.names():
-                raise BadInput(f"{type(self).__name__} has no parameter '{name}'; {nearest(name, self.names())}")
-        return replace(self, **changes)  # type: ignore[type-var]
-
-    def state(self, at: str | None = None, **values: float) -> NDArray[np.float64]:
-        """State vector at a named equilibrium with some states set by name.
-
-        Parameters
-        ----------
-        at : str, optional
-            Name of the equilibrium to start from, the first one when omitted.
-        **values : float
-            States by name, such as ``theta=1.2`` or ``psi_dot=0.1``.
-        """
-        x = np.zeros(2 * len(self.coordinates))
-        for name, value in self.equilibrium(at).items():
-            x[self.state_names().index(name)] = value
-        for name, value in values.items():
-            if name not in self.state_names():
-                raise BadInput(f"{type(self).__name__} has no state '{name}'; {nearest(name, self.state_names())}")
-            x[self.state_names().index(name)] = value
-        return x
-
-    def equilibrium(self, at: str | None = None) -> dict[str, float]:
-        """Coordinates [rad or m] of a named equilibrium, every coordinate listed."""
-        at = next(iter(self.equilibria)) if at is None else at
-        if at not in self.equilibria:
-            raise BadInput(f"{type(self).__name__} has no equilibrium '{at}'; {nearest(at, self.equilibria)}")
-        return {c.name: float(self.equilibria[at].get(c.name, 0.0)) for c in self.coordinates}
 
     def energy(self, x: ArrayLike) -> NDArray[np.float64]:
         """Kinetic plus potential energy [J] of states `x`, shape (..., states)."""
@@ -180,21 +52,7 @@ class Plant:
 
     def linear(self, at: str | None = None) -> Linear:
         """State space about an equilibrium, friction viscous only; see `upright.physics.linear`."""
-        from upright.physics.linear import linearize
-
-        return linearize(self, at)
-
-
-def evaluate(expression: str, scope: Mapping[str, Any]) -> NDArray[np.float64]:
-    """Value of a derived expression; names are looked up in `scope`, elementwise on arrays."""
-    functions = {"sin": np.sin, "cos": np.cos, "sqrt": np.sqrt, "tan": np.tan, "exp": np.exp, "pi": np.pi}
-    value = eval(_code(expression), {"__builtins__": {}, **functions}, dict(scope))  # our own text
-    return np.asarray(value, dtype=np.float64) + 0.0
-
-
-@cache
-def _code(expression: str) -> Any:
-    return compile(expression, "<derived>", "eval")
+        return linearize(self, self.derived_for(self.parameters()), at)
 
 
 @cache

@@ -16,10 +16,9 @@ import numpy as np
 from upright.readers import mat5
 from upright.readers.mat5 import Cells
 from upright.readers.source import Source
-from upright.readers.timebase import rebuild as rebuild_time
-from upright.readers.timebase import time_scale
+from upright.readers.timebase import rebuild, time_scale
 from upright.records import Array, Record
-from upright.records.exchange import KEY, rebuild
+from upright.records.exchange import KEY
 
 _STEP_NAMES = ("dt", "ts", "t_s", "h", "period", "sampletime")
 
@@ -53,7 +52,7 @@ def read(source: Source) -> Record:
             f"time must increase from sample to sample, but sample {row + 1} is at {t[row]:.9g} s after"
             f" {t[row - 1]:.9g} s; remove the sample or read each run on its own"
         )
-    t, note = rebuild_time(t)
+    t, note = rebuild(t)
     notes = [*filter(None, [note]), *found.notes, *_settings(content)]
     return Record(t=t, signals=found.signals, provenance=source.provenance("matlab", *notes))
 
@@ -177,7 +176,7 @@ def _own(source: Source, content: dict[str, Any]) -> Record:
     labels = [item if isinstance(item, str) else "" for item in names.items]
     if table.ndim != 2 or table.shape != (t.size, len(labels)):
         raise source.bad(f"expected {t.size} samples of {len(labels)} signals, got {_shape(table)}; write it again")
-    return rebuild(t.ravel(), dict(zip(labels, table.T, strict=True)), about)
+    return Record.rebuild(t.ravel(), dict(zip(labels, table.T, strict=True)), about)
 
 
 def _settings(content: dict[str, Any]) -> list[str]:

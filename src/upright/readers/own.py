@@ -8,7 +8,6 @@ from upright.readers.source import Source
 from upright.readers.table import numbers
 from upright.records import Record
 from upright.records.exchange import CSV_MARK as MARK
-from upright.records.exchange import rebuild
 
 __all__ = ["MARK", "read"]
 
@@ -25,4 +24,4 @@ def read(source: Source) -> Record:
     if not names or names[0] != "t" or len(set(names)) < len(names):
         raise source.bad("expected names that differ, the first of them 't'", line=3)
     table = numbers(source, "\n".join(lines[3:]), names=names, delimiter=",", first_line=4)
-    return rebuild(table[:, 0], dict(zip(names[1:], table.T[1:], strict=True)), lines[1][2:])
+    return Record.rebuild(table[:, 0], dict(zip(names[1:], table.T[1:], strict=True)), lines[1][2:])

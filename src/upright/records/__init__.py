@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
-from upright.records.record import LARGEST, Array, PathLike, Provenance, Record
+from upright.records.exchange import Array, PathLike
+from upright.records.provenance import Provenance
+from upright.records.record import LARGEST, Record
 
 __all__ = ["LARGEST", "Array", "PathLike", "Provenance", "Record"]

@@ -6,45 +6,22 @@ reads it, reports draw it. It is checked when built, so nobody checks again.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from upright.errors import BadInput, nearest
-
-Array = NDArray[np.float64]
-PathLike = str | os.PathLike[str]
+from upright.records.exchange import Array, Exchange
+from upright.records.provenance import Provenance
 
 # No laboratory instrument writes a number this large, and its square would overflow in a fit.
 LARGEST = 1e30
 
 
-@dataclass(frozen=True, kw_only=True)
-class Provenance:
-    """Where a record came from.
-
-    `window` is empty, or (first, last) time in s of the part kept; `notes` are sentences about what
-    the reader did or found, in order.
-    """
-
-    file: str = ""
-    sha256: str = ""
-    reader: str = ""
-    rig: str = ""
-    window: tuple[float, ...] = ()
-    notes: tuple[str, ...] = ()
-
-    def note(self, *sentences: str) -> Provenance:
-        """Same provenance with sentences added."""
-        return replace(self, notes=(*self.notes, *sentences))
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Record:
+class Record(Exchange):
     """Signals sampled at the same instants.
 
     Parameters
@@ -111,8 +88,18 @@ class Record:
         return self.t.size
 
     def __getitem__(self, name: str) -> Array:
-        """Samples (N,) of one column, in the unit of the log."""
-        self._known(name, self.signals, "a look-up")
+        """Samples (N,) of one column, in the unit of the log.
+
+        Raises
+        ------
+        BadInput
+            When there is no such column, with its nearest name.
+        """
+        if name not in self.signals:
+            raise BadInput(
+                f"{self.provenance.file or 'the log'} has no column '{name}'; {nearest(name, self.signals)}"
+                f" (it holds {', '.join(self.signals)})"
+            )
         return self.signals[name]
 
     @property
@@ -159,67 +146,6 @@ class Record:
     def replace(self, **changes: Any) -> Record:
         """Record with some fields changed, checked again."""
         return replace(self, **changes)
-
-    # To other tools and back; each import waits until it is wanted.
-    def to_pandas(self) -> Any:
-        """`pandas.DataFrame` indexed by time [s]; units and provenance in ``attrs``."""
-        return _exchange().to_pandas(self)
-
-    @staticmethod
-    def from_pandas(frame: Any) -> Record:
-        """Record of a data frame whose index is time [s]."""
-        return _exchange().from_pandas(frame)
-
-    def to_xarray(self) -> Any:
-        """`xarray.Dataset` with coordinate ``t`` [s]; each variable carries its ``units``."""
-        return _exchange().to_xarray(self)
-
-    @staticmethod
-    def from_xarray(dataset: Any) -> Record:
-        """Record of a dataset with one coordinate ``t`` [s]."""
-        return _exchange().from_xarray(dataset)
-
-    def to_control(self) -> Any:
-        """`control.TimeResponseData` of inputs and outputs; other columns and units are left behind."""
-        return _exchange().to_control(self)
-
-    @staticmethod
-    def from_control(response: Any) -> Record:
-        """Record of a single-trace response of python-control."""
-        return _exchange().from_control(response)
-
-    def to_csv(self, path: PathLike) -> None:
-        """Write text that `from_csv` reads back bit for bit; two comment lines hold units and provenance."""
-        _exchange().to_csv(self, path)
-
-    @staticmethod
-    def from_csv(path: PathLike) -> Record:
-        """Record written by `to_csv`; logs of others are for `upright.readers.read`."""
-        return _exchange().from_csv(path)
-
-    def to_mat(self, path: PathLike) -> None:
-        """Write MATLAB version 5: ``t``, matrix ``signals``, cells ``names`` and ``units``."""
-        _exchange().to_mat(self, path)
-
-    @staticmethod
-    def from_mat(path: PathLike) -> Record:
-        """Record written by `to_mat`; logs of others are for `upright.readers.read`."""
-        return _exchange().from_mat(path)
-
-    def to_parquet(self, path: PathLike) -> None:
-        """Write Parquet, one column per signal; units and provenance in the schema's metadata."""
-        _exchange().to_parquet(self, path)
-
-    @staticmethod
-    def from_parquet(path: PathLike) -> Record:
-        """Record of a Parquet file with a column ``t`` [s]."""
-        return _exchange().from_parquet(path)
-
-
-def _exchange() -> Any:
-    from upright.records import exchange
-
-    return exchange
 
 
 def _column(what: str, values: Any) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput
-from upright.simulation.law import shared
+from upright.law.linear import shared
 
 Array = NDArray[np.float64]
 

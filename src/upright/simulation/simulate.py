@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput
+from upright.law.linear import Law
+from upright.law.rule import Rule
 from upright.physics.derived import Derived
 from upright.physics.plant import Plant
 from upright.simulation.kernel.flavour import choose
-from upright.simulation.law import Law
 from upright.simulation.parts import Held, Loop
-from upright.simulation.rule import Rule
 from upright.simulation.simulator import Simulator
 
 Array = NDArray[np.float64]

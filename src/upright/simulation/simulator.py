@@ -19,6 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput
+from upright.law.linear import Law
+from upright.law.rule import Rule, compiling
 from upright.physics.derived import Derived
 from upright.simulation.kernel.actuator import ACTUATOR, ACTUATOR_DEFAULTS
 from upright.simulation.kernel.blocks import aligned, padded, recorded, share
@@ -26,9 +28,7 @@ from upright.simulation.kernel.compiled import kernel
 from upright.simulation.kernel.flavour import Flavour, Layout, lay_out
 from upright.simulation.kernel.lanes import room
 from upright.simulation.kernel.source import WIDTH, direct
-from upright.simulation.law import Law
 from upright.simulation.parts import Held, Loop
-from upright.simulation.rule import Rule, compiling
 
 Array = NDArray[np.float64]
 _NONE = np.zeros((1, 0, 0))

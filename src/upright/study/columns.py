@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright import units
-from upright.errors import BadInput, nearest
+from upright.errors import BadInput
 from upright.physics import Coordinate
 from upright.records import Record
 from upright.study import expressions
@@ -69,7 +69,7 @@ class Sensor:
 
     def line(self, record: Record) -> tuple[float, float]:
         """Coordinate [SI] per unit of the column, sign included, and the reading at which the coordinate is zero."""
-        unit = self.column_unit(record, column(record, self.column))
+        unit = self.column_unit(record, record[self.column])
         factor = self.factor(unit)
         zero = self.offset
         if isinstance(zero, str) and unit and not units.same_dimension(unit, self.coordinate.unit):
@@ -83,7 +83,7 @@ class Sensor:
 
     def read(self, record: Record) -> tuple[Array, float, tuple[str, ...]]:
         """Coordinate (N,) [SI] at the record's own instants, its resolution [SI], and what was noticed."""
-        readings = column(record, self.column)
+        readings = record[self.column]
         factor, zero = self.line(record)
         values = factor * (readings - zero)
         notes: tuple[str, ...] = ()
@@ -111,22 +111,6 @@ class Drive:
         if not self.what:
             return np.zeros(record.t.size)
         return self.sign * self.scale * expressions.evaluate(self.what, record.signals, record.t)
-
-
-def column(record: Record, name: str) -> Array:
-    """One column by name.
-
-    Raises
-    ------
-    BadInput
-        When the log has no such column, with its nearest name.
-    """
-    if name not in record.signals:
-        raise BadInput(
-            f"{record.provenance.file or 'the log'} has no column '{name}'; {nearest(name, record.signals)}"
-            f" (it holds {', '.join(record.signals)})"
-        )
-    return record.signals[name]
 
 
 def in_unit(value: float | str, unit: str) -> float:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from upright.errors import BadInput
+from upright.identification.frequency.answer import Answer
 from upright.identification.ladder.crossval import CrossValidation
 from upright.identification.model.model import ACTUATOR, Estimate, Fit
 from upright.study.load import Study
@@ -191,3 +192,11 @@ def _groups(path: Path, content: Any) -> dict[str, dict[str, float]]:
         return {label: {n: float(e["value"]) for n, e in group.items()} for label, group in content.items()}
     except (AttributeError, KeyError, TypeError, ValueError):
         raise BadInput(f"{path}: groups must hold estimates by group and name; identify again") from None
+
+
+def write_response_fit(answer: Answer, folder: Path, plant: str, title: str, source: str = "") -> None:
+    """Write `frequency.csv` and `fit.json`, which `upright design` reads."""
+    folder.mkdir(parents=True, exist_ok=True)
+    answer.data.to_csv(folder / "frequency.csv")
+    study = Study(path=folder / "frequency.csv", plant=plant, rig=answer.rig, runs=(), title=title, source=source)
+    write_fit(answer.fit, study, folder / "fit.json")

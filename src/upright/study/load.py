@@ -135,9 +135,7 @@ def _log(run: Section, folder: Path, logs: dict[tuple[str, str, str], Record]) -
 
 
 def _retimed(record: Record, time: str) -> Record:
-    from upright.study.columns import column
-
-    return record.replace(t=column(record, time))
+    return record.replace(t=record[time])
 
 
 def _instead(file: Path, folder: Path) -> str:

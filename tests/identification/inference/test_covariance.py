@@ -7,10 +7,11 @@ import pytest
 
 from tests.identification.twins import PENDULUM, noisy, rig, swing
 from upright.identification.estimate import identify
-from upright.identification.inference.covariance import assess, automatic_span, long_run
+from upright.identification.inference.covariance import assess
 from upright.identification.problem.pose import pose
 from upright.identification.search.descent import grow
 from upright.physics import Pendulum
+from upright.signals.memory import automatic_span, long_run
 
 SEEDS = 80
 

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.checks.spikes import merged, without_spikes
-from upright.identification.inference.scoring import with_values
 from upright.identification.model.model import Fit, Rig, Run
 from upright.identification.problem.pose import pose
 from upright.signals.smoothing import dominant_period
@@ -84,7 +83,7 @@ def outliers(fit: Fit, rig: Rig, runs: Sequence[Run]) -> tuple[Outlier, ...]:
     """
     found: list[Outlier] = []
     seen: list[Stretches] = []
-    known = with_values(rig, {n: e.value for n, e in fit.estimates.items()})
+    known = rig.with_values({n: e.value for n, e in fit.estimates.items()})
     for run in runs:
         clean, spikes = without_spikes(run)
         if spikes:

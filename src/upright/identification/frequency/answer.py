@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,8 +15,6 @@ from upright.identification.frequency.response import FrequencyResponse
 from upright.identification.inference.per_run import quantile
 from upright.identification.inference.poles import poles
 from upright.identification.model.model import Estimate, Fit, Pole, Rig
-from upright.study.fit_file import write_fit
-from upright.study.load import Study
 
 GROWS = 0.5
 """Real part [1/s] from which a pole counts as unstable; free coordinates sit at 0."""
@@ -205,11 +201,3 @@ def verdict(squares: Squares, key: tuple[str, str, Pole]) -> tuple[str, bool]:
     if share > 0.05:
         return f"{said} That is {100 * share:.2g} % either way, too wide to design from: measure closer to it.", False
     return said, True
-
-
-def write_answer(answer: Answer, folder: Path, plant: str, title: str, source: str = "") -> tuple[Path, dict[str, Any]]:
-    """Write `frequency.csv` and `fit.json`, which `upright design` reads."""
-    folder.mkdir(parents=True, exist_ok=True)
-    answer.data.to_csv(folder / "frequency.csv")
-    study = Study(path=folder / "frequency.csv", plant=plant, rig=answer.rig, runs=(), title=title, source=source)
-    return folder / "fit.json", write_fit(answer.fit, study, folder / "fit.json")

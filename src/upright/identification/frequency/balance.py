@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from upright.errors import BadInput, nearest
 from upright.identification.frequency.response import FrequencyResponse
 from upright.physics import Plant
-from upright.physics.inverse import at_rest, needed
-from upright.physics.linear import small_motions
+from upright.physics.evaluate import needed_force, small_motions
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -104,10 +103,8 @@ class Balance:
         derived = self.plant.derived_for(values)
         w, data = self.data.omega, self.data
         point = {c.name: float(self.plant.equilibria[self.at].get(c.name, 0.0)) for c in self.plant.coordinates}
-        if lanes == 1:
-            M, D, K, G = (part[None] for part in at_rest(derived, point)(values))
-        else:
-            M, D, K, G = small_motions(derived, {**values, **point}, lanes)
+        parts = small_motions(derived, {**values, **point}, (lanes,) if lanes > 1 else ())
+        M, D, K, G = (part.reshape(lanes, *part.shape[-2:]) for part in parts)
         driven = int(np.argmax(np.abs(G[0, :, 0])))
         D[:, driven, driven] += values.get("actuator.slope", 0.0)
         s = 1j * w[None, :, None, None]
@@ -140,7 +137,7 @@ class Balance:
         q, v, a, project = self._motion
         wide = {n: np.reshape(x, (-1, 1, 1)) if np.ndim(x) else x for n, x in values.items()}
         still = np.array([point[c] for c in derived.coordinates])
-        tau = needed(derived, wide, q[:, None] + still[:, None, None, None], v[:, None], a[:, None])
+        tau = needed_force(derived, wide, q[:, None] + still[:, None, None, None], v[:, None], a[:, None])
         if self.data.together:
             first = np.einsum(
                 "nlt,ft->lfn", np.broadcast_to(tau[:, :, 0], (tau.shape[0], lanes, tau.shape[3])), project

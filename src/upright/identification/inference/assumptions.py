@@ -14,9 +14,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.inference.covariance import pseudo_inverse
 from upright.identification.model.model import Assumption, Estimate, Rig, Run
 from upright.identification.model.unknowns import SHARED, shared_unknowns
+from upright.identification.problem.normal import pseudo_inverse
 from upright.identification.problem.pose import settle_steps
 from upright.identification.problem.problem import Problem
 

@@ -7,19 +7,16 @@ from the data (Andrews 1991); with several runs it is compared with the spread f
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.problem.normal import Rows
+from upright.identification.problem.normal import Rows, pseudo_inverse
 from upright.identification.problem.problem import Problem
+from upright.signals.memory import automatic_span, long_run, lost_share, memory
 
 Array = NDArray[np.float64]
-
-NULL = 1e-6
-"""Singular values of the scaled Jacobian below this share of the largest are zero: finite differences are no better."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,77 +48,6 @@ class Spread:
     memory: float
     samples: float
     pinned: NDArray[np.bool_]
-
-
-def long_run(scores: Array, span: int) -> Array:
-    """Sum (p, p) of the autocovariances of scores (T, p), Bartlett's weights out to `span` samples."""
-    pad = np.zeros((span, scores.shape[1]))
-    total = np.cumsum(np.concatenate([pad, scores, pad]), axis=0)
-    window = total[span:] - total[:-span]
-    return window.T @ window / span
-
-
-def automatic_span(scores: Array) -> int:
-    """Samples out to which autocovariances count, by Andrews' rule for first-order memory, column by column."""
-    n = scores.shape[0]
-    rho = _first_order(scores)
-    alpha = 4 * rho**2 / ((1 - rho) ** 2 * (1 + rho) ** 2)
-    longest = float(np.max(alpha, initial=0.0))
-    return max(1, min(int(1.1447 * (longest * n) ** (1 / 3)) + 1, n // 4))
-
-
-def lost_share(scores: Array, span: int) -> float:
-    """Share of the long-run sum that Bartlett's weights lose when memory is first-order, at most one half."""
-    rho = float(np.max(_first_order(scores), initial=0.0))
-    return min(0.5, 2 * rho / ((1 - rho**2) * span))
-
-
-def _first_order(scores: Array) -> Array:
-    """First-order autocorrelation of every column, between 0 and just below 1."""
-    before, after = scores[:-1], scores[1:]
-    power = np.einsum("tp,tp->p", before, before)
-    rho = np.einsum("tp,tp->p", before, after) / np.where(power > 0, power, 1.0)
-    return np.clip(rho, 0.0, 1 - 1.0 / scores.shape[0])
-
-
-def memory(residual: Array, dt: float) -> float:
-    """Seconds in which the autocorrelation of residuals (T, outputs) falls below 1/e, the longest over outputs."""
-    longest = 0.0
-    for e in residual.T:
-        if not np.any(e):
-            continue
-        n = 1 << (2 * e.size - 1).bit_length()
-        spectrum = np.abs(np.fft.rfft(e, n)) ** 2
-        r = np.fft.irfft(spectrum)[: e.size]
-        below = np.flatnonzero(r < r[0] / math.e)
-        longest = max(longest, float(below[0] if below.size else e.size) * dt)
-    return longest
-
-
-def loudness(problem: Problem, x: Array) -> float:
-    """Weighted residual that one independent observation carries: its deviation times the root of its memory.
-
-    What was known beforehand is weighed against the data in this unit.
-    """
-    squares, samples = 0.0, 0
-    for index, track in enumerate(problem.tracks):
-        y = problem.simulate(index, x[:, None], track.length)[:, :, :, 0]
-        e = np.moveaxis((y - track.targets(track.length)) * track.weights, 1, 0)
-        e = e.reshape(len(e), -1) if track.ahead else e.reshape(-1, len(track.columns))
-        alike = max(1.0, 2 * memory(e, track.spacing) / track.spacing - 1)
-        squares += alike * float(np.sum(e * e))
-        samples += e.shape[0] * max(1, int(np.count_nonzero(track.weights)) * (track.length if track.ahead else 1))
-    return math.sqrt(squares / max(samples, 1))
-
-
-def pseudo_inverse(A: Array) -> Array:
-    """Inverse of a Gauss-Newton matrix in the directions that it sees; columns scaled to one first."""
-    d = np.sqrt(np.maximum(np.diag(A), 0.0))
-    s = np.where(d > 0, 1 / np.where(d > 0, d, 1.0), 0.0)
-    w, V = np.linalg.eigh(A * s[:, None] * s)
-    keep = w > NULL**2 * max(float(w[-1]), 0.0) if w.size else np.zeros(0, dtype=bool)
-    inverse = (V[:, keep] / w[keep]) @ V[:, keep].T
-    return inverse * s[:, None] * s
 
 
 def assess(problem: Problem, x: Array, *, clusters: bool = True) -> Spread:

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.inference.covariance import NULL, Spread, pseudo_inverse
+from upright.identification.inference.covariance import Spread
 from upright.identification.model.model import NOISE
 from upright.identification.model.unknowns import SHARED
+from upright.identification.problem.normal import NULL, pseudo_inverse
 from upright.identification.problem.problem import Problem
 
 Array = NDArray[np.float64]

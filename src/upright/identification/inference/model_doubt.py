@@ -14,11 +14,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.inference.covariance import Spread, assess, pseudo_inverse
+from upright.identification.inference.covariance import Spread, assess
 from upright.identification.inference.per_run import estimate, quantile
 from upright.identification.inference.profile import AFFORDED, profile, settled, work
 from upright.identification.model.model import Estimate, Rig
 from upright.identification.model.unknowns import SHARED
+from upright.identification.problem.normal import pseudo_inverse
 from upright.identification.problem.pose import pose, settle_steps
 from upright.identification.problem.problem import Problem
 from upright.identification.search.descent import Descent, descend

@@ -13,9 +13,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.inference.covariance import Spread, pseudo_inverse
+from upright.identification.inference.covariance import Spread
 from upright.identification.model.model import Estimate
 from upright.identification.model.unknowns import FAR
+from upright.identification.problem.normal import pseudo_inverse
 from upright.identification.problem.problem import Problem
 from upright.identification.search.descent import Report, descend
 from upright.identification.search.strategy import count

@@ -9,13 +9,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upright.identification.checks.trips import located
-from upright.identification.ladder.friction import first_part
 from upright.identification.model.model import Fit, Rig, Run, RunScore
 from upright.identification.problem.pose import pose
 from upright.identification.problem.predictor_setup import Ahead, with_noise
 from upright.identification.problem.problem import Problem
-from upright.identification.problem.tracks import Track
+from upright.identification.problem.track import Track
+from upright.identification.problem.trips import located
 from upright.identification.search.descent import Report, grow
 from upright.identification.search.strategy import better, weigh_priors
 
@@ -93,15 +92,6 @@ def held_speed(track: Track) -> Array:
     return (q[:, None] + v[:, None] * ahead[:, None]).reshape(-1, len(track.columns))
 
 
-def with_values(rig: Rig, values: Mapping[str, float]) -> Rig:
-    """The rig with every number known: `values` by name, the rest as it stands."""
-    parameters = {
-        n: replace(p, value=float(values.get(n, p.value)), estimate=False, uncertainty=0.0)
-        for n, p in rig.parameters.items()
-    }
-    return replace(rig, parameters=parameters)
-
-
 def predict(
     fitted: Fit | Mapping[str, float],
     rig: Rig,
@@ -136,7 +126,7 @@ def predict(
     values = {n: e.value for n, e in fitted.estimates.items()} if isinstance(fitted, Fit) else dict(fitted)
     if groups is None and isinstance(fitted, Fit):
         groups = {label: {n: e.value for n, e in group.items()} for label, group in fitted.groups.items()}
-    known = with_values(with_noise(rig, runs), values)
+    known = with_noise(rig, runs).with_values(values)
     return {run.label: _predict(known, run, groups or {}, progress) for run in runs}
 
 
@@ -161,7 +151,7 @@ def _predict(rig: Rig, run: Run, groups: Mapping[str, Mapping[str, float]], prog
     before = replace(run, score_from=0.0)
     upto = run.score_from if run.score_from > 0 else math.inf
     if run.score_from > 0 and run.horizon is not None:
-        before, upto = first_part(before, run.score_from / (run.period * run.t.size)), math.inf
+        before, upto = before.first_part(run.score_from / (run.period * run.t.size)), math.inf
     problem = pose(rig, [before], given=groups)
     x = problem.start
     if x.size:

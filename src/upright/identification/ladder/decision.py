@@ -18,8 +18,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.inference.covariance import memory
 from upright.identification.model.model import RunScore
+from upright.signals.memory import memory
 
 Array = NDArray[np.float64]
 

@@ -8,29 +8,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.inference.covariance import loudness
 from upright.identification.ladder.decision import by_chance
 from upright.identification.ladder.rungs import at, friction_rungs
-from upright.identification.model.model import Rig, Run
+from upright.identification.model.model import SEEN, Rig, Run
 from upright.identification.model.unknowns import SHARED
 from upright.identification.problem.normal import finite
 from upright.identification.problem.pose import pose
-from upright.identification.problem.problem import Problem
+from upright.identification.problem.problem import Problem, loudness
 from upright.identification.search.descent import first_horizon, grow
 from upright.identification.search.strategy import Log, better, closed_form_starts, explain, placed
 
 Array = NDArray[np.float64]
-
-SEEN = 2 / 3
-"""Share of every run that the rungs are fitted on; the rest judges them."""
-
-LEAST_RUN = 200
-"""Runs with fewer samples are not cut."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,16 +41,6 @@ def places(rig: Rig) -> list[Place]:
     return [Place(name=r.name, adds=r.adds, rig=at(rig, ladder, ladder[: k + 1])) for k, r in enumerate(ladder)]
 
 
-def first_part(run: Run, share: float = SEEN) -> Run:
-    """The beginning of a run; a short run whole."""
-    n = int(run.t.size * share)
-    if n < LEAST_RUN * share:
-        return run
-    held = {c: v[:n] if isinstance(v, np.ndarray) else v for c, v in run.held.items()}
-    loop = None if run.loop is None else run.loop.first(n)
-    return replace(run, t=run.t[:n], u=run.u[:n], y=run.y[:n], held=held, loop=loop)
-
-
 def choose(rig: Rig, runs: Sequence[Run], log: Log) -> tuple[Rig, list[Array], tuple[str, ...]]:
     """Rig of the rung that predicts best, coordinates to start the final fit from, terms left out."""
     ladder = places(rig)
@@ -68,7 +51,7 @@ def choose(rig: Rig, runs: Sequence[Run], log: Log) -> tuple[Rig, list[Array], t
         return rig, [min(starts, key=lambda x: problem.cost(x, first_horizon(problem)))], ()
     if len(ladder) == 1:
         return rig, [problem.start, *(placed(problem, s) for s in closed_form_starts(rig, runs))], ()
-    seen = [first_part(run) for run in runs]
+    seen = [run.first_part() for run in runs]
     best = (math.inf, 0, problem.start, "")
     costs: list[float] = []
     loud: list[float] = []

@@ -14,17 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import BadInput
-from upright.identification.inference.covariance import loudness
 from upright.identification.inference.scoring import score
 from upright.identification.ladder.crossval import Values, leave_one_out, placed_at, values_at
 from upright.identification.ladder.decision import by_chance, compare, percents
-from upright.identification.ladder.friction import LEAST_RUN, SEEN, first_part
 from upright.identification.ladder.repeats import at_ceiling, repeats
 from upright.identification.ladder.result import Ladder, Step, reason
 from upright.identification.ladder.rungs import Rung, at, check, default_rungs, neutral, runs_at
-from upright.identification.model.model import Rig, Run, RunScore
+from upright.identification.model.model import LEAST_RUN, SEEN, Rig, Run, RunScore
 from upright.identification.problem.pose import pose
-from upright.identification.problem.problem import Problem
+from upright.identification.problem.problem import Problem, loudness
 from upright.identification.search.descent import CREEP, Descent, Report, descend, grow
 from upright.identification.search.strategy import (
     POOR,
@@ -73,7 +71,7 @@ def climb(
     seen = [run for run in runs if run.role == "fit"]
     rungs = list(rungs) if rungs else default_rungs(rig, seen)
     check(rig, rungs)
-    if not seen or (len(seen) == 1 and first_part(seen[0]) is seen[0]):
+    if not seen or (len(seen) == 1 and seen[0].first_part() is seen[0]):
         raise BadInput(
             f"a ladder has to hold something out: two runs with role 'fit', or one of {LEAST_RUN} samples or more"
         )
@@ -138,7 +136,7 @@ class _Climb:
         rig = at(self.rig, self.rungs, kept)
         runs = runs_at(self.runs, kept)
         single = len(runs) == 1
-        shown = [first_part(run) for run in runs] if single else runs
+        shown = [run.first_part() for run in runs] if single else runs
 
         def tell(stage: str, fraction: float, cost: float, evaluations: int) -> None:
             if self.progress is not None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -39,6 +39,12 @@ ACTUATOR = {
 _SIZES = ("limit", "lag", "delay", "damping", "standby", "knee", "fade", "relaxation")
 NEVER_NEGATIVE = tuple(f"actuator.{a}" for a in _SIZES)
 """Those that make no sense below zero."""
+
+SEEN = 2 / 3
+"""Share of every run that models are fitted on where its rest judges them."""
+
+LEAST_RUN = 200
+"""Runs with fewer samples are not cut."""
 
 NOISE = "noise."
 """Before the name of a coordinate: root of the density of a random force on it, which a Kalman filter allows for."""
@@ -145,6 +151,15 @@ class Run:
         """Sample period [s]."""
         return float((self.t[-1] - self.t[0]) / (self.t.size - 1))
 
+    def first_part(self, share: float = SEEN) -> Run:
+        """The beginning of the run; a short run whole."""
+        n = int(self.t.size * share)
+        if n < LEAST_RUN * share:
+            return self
+        held = {c: v[:n] if isinstance(v, np.ndarray) else v for c, v in self.held.items()}
+        loop = None if self.loop is None else self.loop.first(n)
+        return replace(self, t=self.t[:n], u=self.u[:n], y=self.y[:n], held=held, loop=loop)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Rig:
@@ -158,6 +173,14 @@ class Rig:
     def estimated(self) -> tuple[str, ...]:
         """Names of the parameters to estimate, in order."""
         return tuple(n for n, p in self.parameters.items() if p.estimate)
+
+    def with_values(self, values: Mapping[str, float]) -> Rig:
+        """The rig with every number known: `values` by name, the rest as it stands."""
+        parameters = {
+            n: replace(p, value=float(values.get(n, p.value)), estimate=False, uncertainty=0.0)
+            for n, p in self.parameters.items()
+        }
+        return replace(self, parameters=parameters)
 
 
 @dataclass(frozen=True, kw_only=True)

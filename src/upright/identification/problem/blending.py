@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.problem.tracks import Track
+from upright.identification.problem.track import Track
 
 Array = NDArray[np.float64]
 

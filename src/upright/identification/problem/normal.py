@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+NULL = 1e-6
+"""Singular values of the scaled Jacobian below this share of the largest are zero: finite differences are no better."""
+
 
 @dataclass(frozen=True)
 class Normal:
@@ -95,3 +98,13 @@ def gram(both: Array) -> Array:
     with np.errstate(over="ignore", invalid="ignore"):
         total = np.matmul(blocks.transpose(0, 2, 1), blocks).sum(axis=0) + both[whole:].T @ both[whole:]
     return total if finite(total) else np.full_like(total, math.inf)
+
+
+def pseudo_inverse(A: Array) -> Array:
+    """Inverse of a Gauss-Newton matrix in the directions that it sees; columns scaled to one first."""
+    d = np.sqrt(np.maximum(np.diag(A), 0.0))
+    s = np.where(d > 0, 1 / np.where(d > 0, d, 1.0), 0.0)
+    w, V = np.linalg.eigh(A * s[:, None] * s)
+    keep = w > NULL**2 * max(float(w[-1]), 0.0) if w.size else np.zeros(0, dtype=bool)
+    inverse = (V[:, keep] / w[keep]) @ V[:, keep].T
+    return inverse * s[:, None] * s

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from upright.identification.model.model import Rig, Run
 from upright.identification.model.nuisance_names import SPREADS
 from upright.identification.model.unknowns import Unknown, matters
-from upright.identification.problem.tracks import Track
+from upright.identification.problem.track import Track
 from upright.signals.smoothing import State
 
 Array = NDArray[np.float64]

@@ -14,7 +14,7 @@ from upright.identification.problem.blending import moving_alike
 from upright.identification.problem.normal import Normal
 from upright.identification.problem.nuisances import run_unknowns
 from upright.identification.problem.problem import Problem
-from upright.identification.problem.tracks import prepare
+from upright.identification.problem.track import prepare
 
 Array = NDArray[np.float64]
 

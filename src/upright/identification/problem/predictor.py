@@ -14,18 +14,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.model.model import NOISE
 from upright.identification.problem.predictor_setup import Ahead
-from upright.physics.linear import small_motions
+from upright.identification.problem.track import Track
+from upright.physics.evaluate import small_motions
 from upright.simulation import Simulator
-
-if TYPE_CHECKING:
-    from upright.identification.problem.tracks import Track
 
 Array = NDArray[np.float64]
 
@@ -149,7 +146,7 @@ def discrete_model(
 
     d = solver.derived
     point = {c: float(_plan(track).level[2 * i]) for i, c in enumerate(d.coordinates)}
-    M, D, K, G = small_motions(d, {**values, **point}, lanes)
+    M, D, K, G = small_motions(d, {**values, **point}, (lanes,))
     n = len(d.coordinates)
     for i in np.flatnonzero(G.any(axis=(0, 2))):
         D[:, i, i] += values["actuator.slope"]  # back-EMF

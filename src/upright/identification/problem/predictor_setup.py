@@ -135,7 +135,7 @@ def _level(rig: Rig, run: Run) -> Array:
 def with_noise(rig: Rig, runs: Sequence[Run]) -> Rig:
     """The rig with the levels of process noise that filters of these runs need, to estimate unless it has them."""
     from upright.identification.model.unknowns import base_values
-    from upright.physics.linear import small_motions
+    from upright.physics.evaluate import small_motions
 
     filtered = [run for run in runs if run.restart == "kalman" and run.horizon is not None]
     moving = {c for run in filtered for c in run.measured if c not in run.held}
@@ -145,13 +145,13 @@ def with_noise(rig: Rig, runs: Sequence[Run]) -> Rig:
     run = filtered[0]
     values: dict[str, float] = {**base_values(rig), **run.known}
     level = dict(zip(rig.plant.state_names(), _level(rig, run), strict=True))
-    M, _, _, _ = small_motions(rig.plant.derived(), {**values, **level}, 1)
+    M, _, _, _ = small_motions(rig.plant.derived(), {**values, **level})
     found = dict(rig.parameters)
     for i, c in enumerate(rig.plant.coordinates):
         if c.name not in moving or f"{NOISE}{c.name}" in found:
             continue
         y = next(r.y[:, r.measured.index(c.name)] for r in filtered if c.name in r.measured)
-        force = float(M[0, i, i]) * float(np.std(y)) / run.horizons[0] ** 2
+        force = float(M[i, i]) * float(np.std(y)) / run.horizons[0] ** 2
         found[f"{NOISE}{c.name}"] = Parameter(
             name=f"{NOISE}{c.name}", value=EASE * force * math.sqrt(run.horizons[0]) or 1e-9,
             unit=f"{'N m' if c.unit == 'rad' else 'N'} s^(1/2)", estimate=True, lower=0.0,

@@ -18,7 +18,9 @@ from upright.identification.problem.normal import Normal, Rows, finite, mixed, p
 from upright.identification.problem.nuisances import CHANGES, Dressed, dress, known_beforehand
 from upright.identification.problem.predictor import restart_states
 from upright.identification.problem.restarts import PERTURBATION, Restart, settle
-from upright.identification.problem.tracks import Track, motions, outputs, simulator
+from upright.identification.problem.simulated import motions, outputs, simulator
+from upright.identification.problem.track import Track
+from upright.signals.memory import memory
 from upright.simulation import Simulator
 
 Array = NDArray[np.float64]
@@ -239,3 +241,19 @@ class Problem:
             with np.errstate(over="ignore"):
                 total += float(np.sum(e * e))
         return total if math.isfinite(total) else math.inf
+
+
+def loudness(problem: Problem, x: Array) -> float:
+    """Weighted residual that one independent observation carries: its deviation times the root of its memory.
+
+    What was known beforehand is weighed against the data in this unit.
+    """
+    squares, samples = 0.0, 0
+    for index, track in enumerate(problem.tracks):
+        y = problem.simulate(index, x[:, None], track.length)[:, :, :, 0]
+        e = np.moveaxis((y - track.targets(track.length)) * track.weights, 1, 0)
+        e = e.reshape(len(e), -1) if track.ahead else e.reshape(-1, len(track.columns))
+        alike = max(1.0, 2 * memory(e, track.spacing) / track.spacing - 1)
+        squares += alike * float(np.sum(e * e))
+        samples += e.shape[0] * max(1, int(np.count_nonzero(track.weights)) * (track.length if track.ahead else 1))
+    return math.sqrt(squares / max(samples, 1))

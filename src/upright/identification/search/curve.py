@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput
-from upright.identification.inference.covariance import pseudo_inverse
-from upright.identification.problem.normal import Normal
+from upright.identification.problem.normal import Normal, pseudo_inverse
 from upright.identification.search.descent import Descent, descend
 
 Array = NDArray[np.float64]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,36 +11,44 @@ from numpy.typing import NDArray
 from upright.physics.plant import Plant
 from upright.signals.smoothing import first_order
 
-if TYPE_CHECKING:
-    from upright.identification.search.inverse_start import Sample
-
 Array = NDArray[np.float64]
 
 
-def effort(values: Mapping[str, float], sample: Sample, plant: type[Plant]) -> Array:
-    """Force of every input (inputs, N), actuator and its delays included."""
-    out = np.empty_like(sample.u)
-    n = sample.u.shape[1]
+def drive_force(plant: type[Plant], values: Mapping[str, float], u: Array, v: Array, dt: float) -> Array:
+    """Force of every input (inputs, N), actuator and its delays included.
+
+    Parameters
+    ----------
+    plant : class of a plant
+    values : mapping
+        The actuator's numbers by name, such as ``"actuator.gain"``.
+    u, v : array, shape (inputs, N) and (coordinates, N)
+        Commands and speeds at the samples.
+    dt : float
+        Sample time [s].
+    """
+    out = np.empty_like(u)
+    n = u.shape[1]
     a = {name.removeprefix("actuator."): v for name, v in values.items() if name.startswith("actuator.")}
-    late, lag = a["delay"] / sample.dt, a["lag"]
-    t = np.arange(n) * sample.dt
+    late, lag = a["delay"] / dt, a["lag"]
+    t = np.arange(n) * dt
     # a switch inside a sample counts by its share
-    alive = np.clip((a["end"] - t) / sample.dt, 0.0, 1.0)
-    on = np.maximum(alive - np.clip((a["start"] - t) / sample.dt, 0.0, 1.0), 0.0)
+    alive = np.clip((a["end"] - t) / dt, 0.0, 1.0)
+    on = np.maximum(alive - np.clip((a["start"] - t) / dt, 0.0, 1.0), 0.0)
     for k, drive in enumerate(plant.inputs):
-        v = sample.v[[c.name for c in plant.coordinates].index(drive.on)]
-        command = np.clip(sample.u[k], -a["limit"], a["limit"]) + a["offset"]
-        commanded = sample.u[k] != 0.0
+        speed = v[[c.name for c in plant.coordinates].index(drive.on)]
+        command = np.clip(u[k], -a["limit"], a["limit"]) + a["offset"]
+        commanded = u[k] != 0.0
         if late > 0:
             command = np.interp(np.arange(n) - late, np.arange(n), command)
         if lag > 0:
-            command = first_order(command, math.exp(-sample.dt / lag))
+            command = first_order(command, math.exp(-dt / lag))
         force = a["gain"] * command
-        beyond = np.maximum(np.sign(force) * v - a["knee"], 0.0)
-        braked = v - np.sign(force) * beyond * on * commanded
+        beyond = np.maximum(np.sign(force) * speed - a["knee"], 0.0)
+        braked = speed - np.sign(force) * beyond * on * commanded
         force = np.sign(force) * np.maximum(np.abs(force) - a["fade"] * beyond, 0.0)
         braking = (a["damping"] * on * commanded + a["standby"] * alive) * braked
         if a["relaxation"] > 0:
-            braking = first_order(braking, math.exp(-sample.dt / a["relaxation"]))
-        out[k] = force * on - a["slope"] * v - braking
+            braking = first_order(braking, math.exp(-dt / a["relaxation"]))
+        out[k] = force * on - a["slope"] * speed - braking
     return out

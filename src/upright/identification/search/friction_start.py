@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.model.model import Rig
-from upright.identification.search.drive_force import effort
+from upright.identification.search.drive_force import drive_force
 from upright.identification.search.inverse_start import Sample
-from upright.physics.plant import evaluate
+from upright.physics.evaluate import evaluate
 
 Array = NDArray[np.float64]
 
@@ -79,7 +79,7 @@ def friction_from_energy(rig: Rig, samples: list[Sample], values: Mapping[str, f
             scope[c], scope[f"{c}_dot"] = s.q[i], s.v[i]  # type: ignore[assignment]
         energy = np.broadcast_to(evaluate(derived.kinetic, scope) + evaluate(derived.potential, scope), s.q.shape[1:])
         drives = [list(derived.coordinates).index(d.on) for d in plant.inputs]
-        power = np.einsum("kt,kt->t", effort(here, s, plant), s.v[drives])
+        power = np.einsum("kt,kt->t", drive_force(plant, here, s.u, s.v, s.dt), s.v[drives])
         cuts = _cuts(s)
         if cuts.size < 5:
             continue

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +17,9 @@ from upright.identification.model.model import Rig, Run
 from upright.identification.model.unknowns import Unknown, base_values, shared_unknowns
 from upright.identification.problem.normal import Normal, finite
 from upright.identification.search.descent import descend
-from upright.identification.search.drive_force import effort
-from upright.physics.plant import Plant, evaluate
+from upright.identification.search.drive_force import drive_force
+from upright.physics.evaluate import mass_and_force
+from upright.physics.plant import Plant
 from upright.signals.smoothing import (
     dominant_period,
     middle,
@@ -109,42 +109,14 @@ def samples_of(
     return found
 
 
-def mass_and_force(
-    plant: type[Plant], values: Mapping[str, float], q: Array, v: Array, u: Array
-) -> tuple[Array, Array]:
-    """Mass matrices (N, n, n) and generalized forces (N, n) at positions and speeds (n, N) and forces `u` (inputs, N).
-
-    As derived: no dry friction, no drag.
-    """
-    derived = plant.derived_for(values)
-    scope: dict[str, Any] = dict(values)
-    for i, c in enumerate(derived.coordinates):
-        scope[c], scope[f"{c}_dot"] = q[i], v[i]
-    scope.update(zip(derived.inputs, u, strict=True))
-    for i, lump in enumerate(derived.lumps):
-        scope[f"k{i}"] = evaluate(lump, scope)
-    for s, c, argument in derived.trig:
-        angle = evaluate(argument, scope)
-        scope[s], scope[c] = np.sin(angle), np.cos(angle)
-    for name, step in derived.steps:
-        scope[name] = evaluate(step, scope)
-    n = len(derived.coordinates)
-    M = np.empty((q.shape[1], n, n))
-    f = np.empty((q.shape[1], n))
-    place = 0
-    for i in range(n):
-        for j in range(i, n):
-            M[:, i, j] = M[:, j, i] = evaluate(derived.mass[place], scope)
-            place += 1
-        f[:, i] = evaluate(derived.force[i], scope)
-    return M, f
-
-
 def model_accelerations(plant: type[Plant], values: Mapping[str, float], sample: Sample) -> Array:
     """Accelerations (free coordinates, N) of the model at the measured states, those of held coordinates given."""
-    M, f = mass_and_force(plant, values, sample.q, sample.v, effort(values, sample, plant))
+    derived = plant.derived_for(values)
+    force = drive_force(plant, values, sample.u, sample.v, sample.dt)
+    states = {n: x for i, c in enumerate(derived.coordinates) for n, x in ((c, sample.q[i]), (f"{c}_dot", sample.v[i]))}
+    M, f = mass_and_force(derived, {**values, **states, **dict(zip(derived.inputs, force, strict=True))})
     n = f.shape[1]
-    for joint in plant.derived_for(values).joints:
+    for joint in derived.joints:
         i = joint.coordinate
         v = sample.v[i]
         if joint.coulomb and sample.fades[i] > 0:

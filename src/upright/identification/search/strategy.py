@@ -13,11 +13,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.inference.covariance import loudness, pseudo_inverse
 from upright.identification.model.model import Rig, Run
 from upright.identification.model.unknowns import SHARED
+from upright.identification.problem.normal import pseudo_inverse
 from upright.identification.problem.pose import settle_steps
-from upright.identification.problem.problem import Problem
+from upright.identification.problem.problem import Problem, loudness
 from upright.identification.search.descent import Descent, Report, descend, first_horizon, grow
 from upright.identification.search.friction_start import friction_from_energy
 from upright.identification.search.inverse_start import regress, samples_of

@@ -10,11 +10,11 @@ import numpy as np
 
 from upright.design.lqr import locus
 from upright.design.requests import written
-from upright.lab.designing.figures import Poles, locus_figure, pole_map, swing_figure
 from upright.lab.designing.run import Designed, Way
 from upright.report.advice import Step
 from upright.report.document import Picture, picture
 from upright.report.drawing import BLACK, BLUE, VERMILLION
+from upright.report.poles import Poles, locus_figure, pole_map, swing_figure
 from upright.report.sections import Part, Table, write_sections
 from upright.report.symbols import number, percent, plain
 from upright.report.symbols import unit as raised

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from upright.control.rig import Rig
 from upright.lab.free_swing_4 import drift, energy
 from upright.lab.free_swing_4 import studies as free_swing
-from upright.lab.free_swing_4.studies import Answer, Progress
+from upright.lab.free_swing_4.studies import Answer
 from upright.lab.rigs.twin import SERVO, Twin, freed, motion
 from upright.lab.weighing_1a.run import Known
+from upright.progress import Progress
 
 Array = NDArray[np.float64]
 

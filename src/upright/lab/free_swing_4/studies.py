@@ -6,7 +6,7 @@ Every step leaves files that anyone can work on: logs (CSV) and study files (TOM
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -17,12 +17,11 @@ from upright.lab.free_swing_4.drift import SPRING, TILT, anchored
 from upright.lab.free_swing_4.figures import Recovered
 from upright.lab.rigs.twin import MOTOR_AND_BELT, Release, Twin, acquire
 from upright.lab.weighing_1a.run import Known
+from upright.progress import Progress
 from upright.records import Record
 from upright.study.load import Study
 
 FRICTION = ("b_1", "b_1c", "b_2", "b_2c")
-Progress = Callable[[str, float], None]
-"""Told which step is at work and how far it is, 0 to 1."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from upright.errors import BadInput, nearest
-from upright.identification.frequency.answer import Answer, explain, write_answer
+from upright.identification.frequency.answer import Answer, explain
 from upright.identification.frequency.fitting import Told
 from upright.identification.frequency.response import FrequencyResponse, is_response
 from upright.identification.frequency.spectra import response_of
@@ -17,6 +17,7 @@ from upright.identification.model.model import Rig as Asked
 from upright.lab.frequency_1b.run import BENCH, PLANT, asked
 from upright.lab.rigs.makes import MAKES
 from upright.records import Record
+from upright.study.fit_file import write_response_fit
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,7 +106,7 @@ def look(
         return Found(sources=names, response=response, answer=None, folder=folder)
     at = next(iter(rest.plant.equilibria))
     answer = explain(rest, at, response, seed=wish.seed, tell=tell)
-    write_answer(answer, folder, plant, "Frequency response", ", ".join(names))
+    write_response_fit(answer, folder, plant, "Frequency response", ", ".join(names))
     return Found(sources=names, response=response, answer=answer, folder=folder)
 
 

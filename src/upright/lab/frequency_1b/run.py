@@ -14,15 +14,15 @@ from pathlib import Path
 import numpy as np
 
 from upright.control import Rig
-from upright.identification.frequency.answer import Answer, explain, write_answer
+from upright.identification.frequency.answer import Answer, explain
 from upright.identification.model.model import Parameter
 from upright.identification.model.model import Rig as Asked
 from upright.lab.frequency_1b.broadband import ask
 from upright.lab.frequency_1b.sweeps import Sweep, stepped_sine
 from upright.lab.rigs.makes import MAKES, PLANTS, Make, make_rig
 from upright.lab.weighing_1a.run import Known
-
-Progress = Callable[[str, float], None]
+from upright.progress import Progress
+from upright.study.fit_file import write_response_fit
 
 BAND: Mapping[str, tuple[float, float]] = {
     "linear": (5.0, 45.0),
@@ -168,7 +168,7 @@ def run(
         asked(make, said, tolerance=tolerance), at, sweep.response, seed=seed, tell=follow, stopped=stopped
     )
     tell("writing the log and the fit", 0.9)
-    write_answer(answer, folder, PLANT[make], f"Frequency response of {rig.name}, seed {rig.seed}")
+    write_response_fit(answer, folder, PLANT[make], f"Frequency response of {rig.name}, seed {rig.seed}")
     sweep.log.to_csv(folder / "sweep.csv")
     tell("done", 1.0)
     return Result(

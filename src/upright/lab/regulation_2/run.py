@@ -27,10 +27,10 @@ from upright.lab.rigs.makes import Make
 from upright.lab.rigs.rig_file import RigFile, read_rig_file
 from upright.paper.tables import TABLE_1
 from upright.physics import Linear
+from upright.progress import Progress
 
 Array = NDArray[np.float64]
 Roots = NDArray[np.complex128]
-Progress = Callable[[str, float], None]
 
 SPEEDS = ("plain", "filtered", "kalman")
 STARTS = {"furuta": (math.radians(12), 2.2), "linear": (math.radians(12), 1.5)}

@@ -23,10 +23,10 @@ from upright.control.sensors import KNOWN, Scales, probe, put_out, scales
 from upright.control.trial import readings
 from upright.control.watch import Suspicion, Watch
 from upright.lab.rigs.rig_file import RigFile
+from upright.progress import Progress
 from upright.records import Record
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
 
 HELD = 5.0
 """How long the pendulum must stand before it counts as caught [s]."""

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from upright.control import Rig
 from upright.identification.model.model import Fit
-from upright.lab.free_swing_4.studies import Progress
 from upright.lab.rigs.makes import make_rig
 from upright.lab.tracking_3.laws import Tracker, by_poles, check, paper_sets, with_sum
 from upright.lab.tracking_3.pd import Search, far_pd, near_pd, tune
 from upright.lab.tracking_3.shaft import fitted, weigh
 from upright.lab.tracking_3.trials import PUSH, Outcome, outcome, twist_of
 from upright.lab.weighing_1a.run import Known
+from upright.progress import Progress
 from upright.study.load import Study
 
 Array = NDArray[np.float64]

@@ -16,9 +16,10 @@ from upright.control.rig import Rig
 from upright.errors import BadInput
 from upright.lab.rigs.makes import Make
 from upright.lab.weighing_1a import twin as loadings
-from upright.lab.weighing_1a.twin import MASS_RADIUS, RADIUS, Campaign, Kind, Progress
+from upright.lab.weighing_1a.twin import MASS_RADIUS, RADIUS, Campaign, Kind
 from upright.physics import CartPendulum, Furuta
 from upright.physics.loads import added_inertia, added_mass
+from upright.progress import Progress
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,6 @@ Both stick: dry friction, encoder counts, converter steps and amplifier limits a
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -19,10 +18,10 @@ from upright.identification.loadings.fit import Loaded, Loadings, swings, weigh
 from upright.lab.rigs.twin import COUNTS, SERVO
 from upright.physics import Plant, chain
 from upright.physics.loads import added_inertia, added_mass
+from upright.progress import Progress
 from upright.records import Provenance, Record
 
 Kind = Literal["rectilinear", "torsional"]
-Progress = Callable[[str, float], None]
 
 PIECES = 4  # 500 g masses that come with a rig
 RADIUS = 0.065  # m, bolt circle on the disk

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from upright.errors import BadInput, nearest
+from upright.law.linear import Law
+from upright.law.rule import Rule, Written
 from upright.physics.derived import Derived
 from upright.simulation.kernel.actuator import ACTUATOR, ACTUATOR_DEFAULTS
-from upright.simulation.law import Law
 from upright.simulation.parts import Loop
-from upright.simulation.rule import Rule, Written
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from upright.identification.checks.trips import find_trip
+from upright.identification.problem.trips import find_trip
 from upright.signals.smoothing import savitzky_golay
 from upright.signals.trip_regression import smoothing_width_for
 from upright.study.columns import Array

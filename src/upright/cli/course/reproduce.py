@@ -26,12 +26,13 @@ def reproduce(
     from rich.markup import escape
 
     from upright.cli.terminal import console, on_terminal, typed
+    from upright.lab.rigs.twin import NOMINAL
     from upright.paper import page
     from upright.paper.reproduce import reproduce as again
 
     if out.exists() and not out.is_dir():
         raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
-    done = again(seed)
+    done = again(NOMINAL, seed)
     written = page.write(done, out / "reproduce.html")
     if as_json:
         typer.echo(json.dumps(page.as_json(done), indent=2, ensure_ascii=False, allow_nan=False))

@@ -57,7 +57,7 @@ def doctor(
     record, mended = read_mended(log, reader=reader)
     diagnosis = examine(record, known, before=mended)
     if html is not None:
-        from upright.report.doctor import write_diagnosis
+        from upright.doctor.page import write_diagnosis
 
         write_diagnosis(diagnosis, html)
     if as_json:

@@ -1,17 +1,15 @@
-"""How does one run become lanes? Its data on the grid of the solver, and many sets of numbers simulated at once."""
+"""How is one run made ready for the solver? Its data on a uniform grid, its windows, and where they start."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.closed_loop.simulated import controller, finely, limited, remembering
 from upright.errors import BadInput
-from upright.identification.model.model import NOISE, Rig, Run
-from upright.identification.problem.predictor import predicted
+from upright.identification.model.model import Rig, Run
 from upright.identification.problem.predictor_setup import Ahead, look_ahead
 from upright.identification.problem.restarts import worth
 from upright.signals.smoothing import (
@@ -23,7 +21,7 @@ from upright.signals.smoothing import (
     spread,
 )
 from upright.signals.trip_regression import smoothing_width_for
-from upright.simulation import Held, Simulator, choose
+from upright.simulation import Held
 
 Array = NDArray[np.float64]
 
@@ -180,69 +178,3 @@ def prepare(rig: Rig, run: Run, *, thin: bool) -> Track:
         variance=variance,
         ahead=ahead,
     )
-
-
-def simulator(rig: Rig, track: Track, values: Mapping[str, float | Array], free: Collection[str]) -> Simulator:
-    """Solver of one run; terms whose parameters are in `free` stay although they are zero now."""
-    derived = rig.plant.derived_for({**values, **dict.fromkeys(free, 1.0)})
-    free = [n for n in free if n in derived.parameters or n.startswith("actuator.")]
-    loop = track.run.loop
-    every = 1 if loop is None else loop.every
-    held = {n: finely(h, every) for n, h in track.held.items()}
-    law = None if loop is None else controller(loop, track.run, rig.plant)
-    stepped = {n: v for n, v in values.items() if not n.startswith(NOISE)}
-    flavour = choose(derived, limited(stepped, loop), free=free, held=tuple(held), loop=law)
-    return Simulator(derived=derived, flavour=flavour, dt=track.dt / every, substeps=rig.substeps, loop=law, held=held)
-
-
-def motions(
-    solver: Simulator, track: Track, values: Mapping[str, float | Array], x0: Array, *, samples: int,
-    memory: Array | None = None,
-) -> Array:  # fmt: skip
-    """Simulated states (samples, states, W times lanes); a view of `memory` when it is given, see `Simulator.run`."""
-    states, windows, lanes = x0.shape
-    if windows > 1:
-        values = {n: np.tile(v, windows) if isinstance(v, np.ndarray) else v for n, v in values.items()}
-    loop, start, every, u = track.run.loop, None, 1, track.u
-    if loop is not None:
-        values, every, u = limited(values, loop), loop.every, np.repeat(track.u, loop.every, axis=0)
-        if windows > 1:
-            solver = remembering(solver, track.run, track.restarts, lanes)
-    if windows > 1:
-        start = np.repeat(track.restarts * every, lanes)
-    table = solver.table(values, windows * lanes)
-    first = x0.reshape(states, windows * lanes)
-    return solver.run(table, first, u, samples=samples, start=start, every=every, memory=memory)
-
-
-def outputs(
-    solver: Simulator, track: Track, values: Mapping[str, float | Array], x0: Array, offsets: Array,
-    scales: Array | None = None, *, samples: int,
-) -> Array:  # fmt: skip
-    """Simulated outputs (samples, W, outputs, lanes) as the sensors show them.
-
-    Parameters
-    ----------
-    values : mapping
-        Every parameter, a number or one per lane, (lanes,).
-    x0 : (states, W, lanes) array
-        First states of the windows.
-    offsets, scales : (outputs, lanes) arrays
-        Sensor offsets and gains, the latter 1 when omitted.
-    """
-    if track.ahead:
-        y = predicted(solver, track, values, offsets, scales, samples=samples)
-        return y * track.ahead.weight[:samples, None, None, None]
-    _, windows, lanes = x0.shape
-    out = motions(solver, track, values, x0, samples=samples)
-    if windows == 1:
-        y = np.empty((samples, 1, len(track.columns), lanes))
-        for k, column in enumerate(track.columns):
-            if scales is None:
-                np.add(out[:, column], offsets[k], out=y[:, 0, k])
-            else:
-                np.multiply(out[:, column], scales[k], out=y[:, 0, k])
-                y[:, 0, k] += offsets[k]
-        return y
-    y = np.moveaxis(out[:, list(track.columns), :].reshape(samples, len(track.columns), windows, lanes), 1, 2)
-    return y + offsets if scales is None else y * scales + offsets

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from upright.physics import CartPendulum, Furuta, chain
-from upright.physics.inverse import at_rest, needed
-from upright.physics.linear import small_motions
+from upright.physics.evaluate import needed_force, small_motions
 
 PLANTS = [
     Furuta(m_p=0.135, l_cg=0.184, r=0.15, J_d=7.2e-3, J_p=6e-4, J_a=2e-5, b_1=2e-3, b_2=4e-5),
@@ -33,7 +32,7 @@ def test_power_needed_is_energy_gained_and_lost(plant):
         return plant.energy(np.column_stack([q[0], v[0], q[1], v[1]]))
 
     q, v, a = motion(t)
-    tau = needed(plant.derived_for(plant.parameters()), plant.parameters(), q, v, a)
+    tau = needed_force(plant.derived_for(plant.parameters()), plant.parameters(), q, v, a)
     gained = (energy(t + h) - energy(t - h)) / (2 * h)
     lost = plant.power_lost(np.column_stack([q[0], v[0], q[1], v[1]]))
     assert np.sum(tau * v, axis=0) == pytest.approx(gained + lost, abs=1e-7 * np.abs(gained).max())
@@ -41,9 +40,12 @@ def test_power_needed_is_energy_gained_and_lost(plant):
 
 @pytest.mark.parametrize("plant", PLANTS, ids=lambda p: type(p).__name__)
 @pytest.mark.parametrize("turn", [0.0, math.pi])
-def test_both_roads_to_small_motions_agree(plant, turn):
+def test_small_motions_of_many_rigs_are_those_of_each(plant, turn):
     derived = plant.derived_for(plant.parameters())
     point = {c: (turn if c == "theta" else 0.0) for c in derived.coordinates}
-    slow = small_motions(derived, {**plant.parameters(), **point}, 1)
-    for one, many in zip(at_rest(derived, point)(plant.parameters()), slow, strict=True):
-        assert one == pytest.approx(many[0], abs=1e-12)
+    some = {n: v * np.array([1.0, 1.1, 0.7]) for n, v in plant.parameters().items()}
+    lanes = small_motions(derived, {**some, **point}, (3,))
+    for k in range(3):
+        one = small_motions(derived, {**{n: float(v[k]) for n, v in some.items()}, **point})
+        for alone, among in zip(one, lanes, strict=True):
+            assert alone == pytest.approx(among[k], abs=1e-12)

@@ -1,0 +1,1 @@
+"""A loop: gains, and what becomes of them at the rig."""

@@ -1,0 +1,1 @@
+"""A course: the experiments on twins, the paper's tables, the survey."""

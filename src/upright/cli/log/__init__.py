@@ -1,0 +1,1 @@
+"""A log: look at it, doubt it, draft its study, find its law."""

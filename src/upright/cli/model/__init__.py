@@ -1,0 +1,1 @@
+"""A model: identify it, test it, grow it."""

@@ -1,0 +1,126 @@
+"""What are a plant's equations worth at these states? The one evaluator of derived text, on numbers or arrays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from upright.physics.derived import Derived
+
+Array = NDArray[np.float64]
+Scope = Mapping[str, Any]
+Program = Callable[[Scope], tuple[tuple[Any, ...], ...]]
+
+
+def evaluate(expression: str, scope: Scope) -> Array:
+    """Value of one derived expression; names are looked up in `scope`, elementwise on arrays."""
+    value = eval(_code(expression), {"__builtins__": {}, **_functions(np)}, dict(scope))  # our own text
+    return np.asarray(value, dtype=np.float64) + 0.0
+
+
+def mass_and_force(derived: Derived, scope: Scope) -> tuple[Array, Array]:
+    """Mass matrix (..., n, n) and generalized forces (..., n) of ``M a = f``, without dry friction and drag.
+
+    Parameters
+    ----------
+    derived : Derived
+        Equations of the plant.
+    scope : mapping
+        Parameters, coordinates, velocities (``theta_dot``) and inputs by name, each a number or an array that
+        broadcasts with the others; what is not named is zero.
+    """
+    mass, force = _program(derived, ("mass", "force"), _scalar(scope))(scope)
+    n = len(derived.coordinates)
+    values = np.broadcast_arrays(*mass, *force)
+    M = np.empty((*values[0].shape, n, n))
+    for (i, j), place in _places(n).items():
+        M[..., i, j] = M[..., j, i] = values[place]
+    return M, np.stack(values[len(mass) :], axis=-1)
+
+
+def small_motions(derived: Derived, scope: Scope, shape: tuple[int, ...] = ()) -> tuple[Array, Array, Array, Array]:
+    """M, D, K (*shape, n, n) and G (*shape, n, inputs) of ``M a + D v + K q = G u`` about a point at rest.
+
+    Parameters
+    ----------
+    derived : Derived
+        Equations of the plant.
+    scope : mapping
+        Parameters and the coordinates of the point by name, each a number or an array that broadcasts to `shape`.
+    shape : tuple of int, optional
+        As above.
+    """
+    n, m = len(derived.coordinates), len(derived.inputs)
+    parts = _program(derived, ("mass", "damping", "stiffness", "gain"), _scalar(scope))(scope)
+
+    def matrix(entries: tuple[Any, ...], columns: int) -> Array:
+        if not shape:
+            return np.array(entries, dtype=np.float64).reshape(n, columns)
+        rows = np.array([np.broadcast_to(e, shape) for e in entries], dtype=np.float64).reshape(n, columns, *shape)
+        return np.moveaxis(rows, (0, 1), (-2, -1)).copy()
+
+    place = _places(n)
+    mass = tuple(parts[0][place[min(i, j), max(i, j)]] for i in range(n) for j in range(n))
+    return matrix(mass, n), matrix(parts[1], n), matrix(parts[2], n), matrix(parts[3], m)
+
+
+def needed_force(derived: Derived, scope: Scope, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
+    """Generalized forces (n, ...) of a motion beyond what gravity, springs and viscous friction give, ``M a - f``.
+
+    Parameters
+    ----------
+    derived : Derived
+        Equations of the plant.
+    scope : mapping
+        Parameters by name, each a number or an array that broadcasts with the motion.
+    q, v, a : (n, ...) arrays
+        Coordinates, speeds and accelerations.
+    """
+    q, v, a = (np.asarray(x, dtype=np.float64) for x in (q, v, a))
+    states = {c: q[i] for i, c in enumerate(derived.coordinates)}
+    speeds = {f"{c}_dot": v[i] for i, c in enumerate(derived.coordinates)}
+    mass, force = _program(derived, ("mass", "force"), False)({**scope, **states, **speeds})
+    n = len(derived.coordinates)
+    place = _places(n)
+    rows = [sum(mass[place[min(r, c), max(r, c)]] * a[c] for c in range(n)) - force[r] for r in range(n)]
+    return np.array(np.broadcast_arrays(*rows))
+
+
+@cache
+def _places(n: int) -> dict[tuple[int, int], int]:
+    """Where an entry of the upper triangle stands in its row by row list."""
+    return {(i, j): k for k, (i, j) in enumerate((i, j) for i in range(n) for j in range(i, n))}
+
+
+def _scalar(scope: Scope) -> bool:
+    return all(isinstance(value, float | int) for value in scope.values())
+
+
+def _functions(library: Any) -> dict[str, Any]:
+    return {name: getattr(library, name) for name in ("sin", "cos", "sqrt", "tan", "exp", "log", "pi")}
+
+
+@cache
+def _code(expression: str) -> Any:
+    return compile(expression, "<derived>", "eval")
+
+
+@cache
+def _program(derived: Derived, parts: tuple[str, ...], scalar: bool) -> Program:
+    """All expressions of some parts of the equations, compiled together; `scalar` ones know no arrays but are fast."""
+    names = (*derived.parameters, *derived.coordinates, *(f"{c}_dot" for c in derived.coordinates), *derived.inputs)
+    lines = [f"    {name} = p.get({name!r}, 0.0)" for name in names]
+    lines += [f"    k{i} = {text}" for i, text in enumerate(derived.lumps)]
+    for s, c, argument in derived.trig:
+        lines += [f"    {s} = sin({argument})", f"    {c} = cos({argument})"]
+    lines += [f"    {name} = {text}" for name, text in derived.steps]
+    results = ["(" + "".join(f"{text}, " for text in getattr(derived, part)) + ")" for part in parts]
+    text = "\n".join(["def run(p):", *lines, f"    return {', '.join(results)}"])
+    scope = _functions(math if scalar else np)
+    exec(compile(text, f"<{derived.name}>", "exec"), scope)  # our own text
+    return scope["run"]

@@ -1,0 +1,12 @@
+"""How far has a long piece of work come? The one callback by which it tells."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+Progress = Callable[[str, float], None]
+"""Called with what is being done, in words, and the share of the whole that is done."""
+
+
+def silent(step: str, share: float) -> None:
+    """Take note of nothing; what runs when nobody asked to be told."""

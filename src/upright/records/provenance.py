@@ -1,0 +1,25 @@
+"""Where did a record come from, and what was done to it on the way?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True, kw_only=True)
+class Provenance:
+    """Where a record came from.
+
+    `window` is empty, or (first, last) time in s of the part kept; `notes` are sentences about what
+    the reader did or found, in order.
+    """
+
+    file: str = ""
+    sha256: str = ""
+    reader: str = ""
+    rig: str = ""
+    window: tuple[float, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def note(self, *sentences: str) -> Provenance:
+        """Same provenance with sentences added."""
+        return replace(self, notes=(*self.notes, *sentences))
