@@ -10,11 +10,13 @@ import numpy as np
 
 from upright.errors import NotIdentifiable
 from upright.identification.frequency.balance import Balance
-from upright.identification.frequency.fitting import Squares, Told, Way, least_squares, simplex_dB, usable
+from upright.identification.frequency.fitting import Squares, Way, least_squares, simplex_dB, usable
 from upright.identification.frequency.response import FrequencyResponse
-from upright.identification.inference.per_run import quantile
+from upright.identification.inference.covariance import student
 from upright.identification.inference.poles import poles
-from upright.identification.model.model import Estimate, Fit, Pole, Rig
+from upright.identification.model.fit import Estimate, Fit, Pole
+from upright.identification.model.rig import Rig
+from upright.progress import Progress, silent
 
 GROWS = 0.5
 """Real part [1/s] from which a pole counts as unstable; free coordinates sit at 0."""
@@ -61,7 +63,7 @@ class Answer:
 
 
 def explain(
-    rig: Rig, at: str, data: FrequencyResponse, *, seed: int = 0, tell: Told | None = None,
+    rig: Rig, at: str, data: FrequencyResponse, *, seed: int = 0, tell: Progress = silent,
     stopped: Callable[[], bool] = lambda: False,
 ) -> Answer:  # fmt: skip
     """Fit a response in both ways.
@@ -97,7 +99,7 @@ def explain(
     if stopped():
         raise KeyboardInterrupt
     simplex = simplex_dB(rig, at, used, tell=tell)
-    q = quantile(squares.freedom + len(squares.names), len(squares.names))
+    q = student(squares.freedom)
     values = squares.way.values
     found = poles(rig, values, list(squares.names), squares.covariance, q)
     key = _key(found, at)

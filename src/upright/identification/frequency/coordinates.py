@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import BadInput
-from upright.identification.model.model import Parameter, Rig
+from upright.identification.model.rig import Parameter, Rig
 
 Array = NDArray[np.float64]
 

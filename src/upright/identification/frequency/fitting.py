@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,7 +20,8 @@ from upright.errors import NotIdentifiable
 from upright.identification.frequency.balance import Balance
 from upright.identification.frequency.coordinates import Coordinates, coordinates
 from upright.identification.frequency.response import FrequencyResponse
-from upright.identification.model.model import Rig
+from upright.identification.model.rig import Rig
+from upright.progress import Progress, silent
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -34,7 +35,6 @@ FRICTION = 0.001
 SPREAD = 0.35
 """Standard deviation of the logarithm of starts."""
 RESTARTS = 3
-Told = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -99,7 +99,7 @@ def usable(data: FrequencyResponse, *, dry: bool = True) -> tuple[NDArray[np.boo
     return ~(noisy | stuck), tuple(told)
 
 
-def simplex_dB(rig: Rig, at: str, data: FrequencyResponse, *, tell: Told | None = None, limit: int = 1500) -> Way:
+def simplex_dB(rig: Rig, at: str, data: FrequencyResponse, *, tell: Progress = silent, limit: int = 1500) -> Way:
     """The paper's way: Nelder and Mead on squared dB of the linear model, far output first, then all outputs."""
     from scipy.optimize import minimize
 
@@ -132,8 +132,7 @@ def simplex_dB(rig: Rig, at: str, data: FrequencyResponse, *, tell: Told | None 
         z, cost = walk(z, columns)
         names = " and ".join(data.outputs[c] for c in columns)
         stages.append(f"{names}: {cost:.4g} dB², {balance.evaluations[0]} models so far")
-        if tell is not None:
-            tell(f"simplex on {names}", 1.0)
+        tell(f"simplex on {names}", 1.0)
     if cost > measured.size:  # an error of 1 dB on the whole: the far output alone has led astray
         again, less = walk(space.start, every)
         z = again if less < cost else z
@@ -142,7 +141,7 @@ def simplex_dB(rig: Rig, at: str, data: FrequencyResponse, *, tell: Told | None 
 
 
 def least_squares(
-    rig: Rig, at: str, data: FrequencyResponse, *, seed: int = 0, starts: int = 6, tell: Told | None = None,
+    rig: Rig, at: str, data: FrequencyResponse, *, seed: int = 0, starts: int = 6, tell: Progress = silent,
 ) -> Squares:  # fmt: skip
     """Complex response, weighed, dry friction at the amplitudes measured; several starts, the best walked to its end.
 
@@ -178,8 +177,7 @@ def least_squares(
         z = space.start if i == 0 else space.scattered(rng, SPREAD)
         found = walk(residual, z, jac=jacobian, bounds=(space.lower, np.inf), x_scale="jac", max_nfev=40)
         ends.append((float(found.cost), np.asarray(found.x)))
-        if tell is not None:
-            tell("least squares, several starts", (i + 1) / starts)
+        tell("least squares, several starts", (i + 1) / starts)
     cost, z = min(ends, key=lambda end: end[0])
     reached = sum(c < 1.02 * cost + 1.0 for c, _ in ends)
     for _ in range(2):  # weights that know how much of the response dry friction takes

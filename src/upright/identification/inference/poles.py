@@ -1,4 +1,4 @@
-"""How fast does it fall, and how sure is that? Poles at every equilibrium of a fitted plant, with their intervals."""
+"""Poles at every equilibrium of a fitted plant, with their intervals."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import ImpossiblePhysics, NotIdentifiable
-from upright.identification.model.model import Estimate, Pole, Rig
+from upright.identification.model.fit import Estimate, Pole
+from upright.identification.model.rig import Rig
 
 Array = NDArray[np.float64]
 
@@ -66,8 +67,8 @@ def poles(
 
 
 def _estimate(value: float, stderr: float, quantile: float, unit: str) -> Estimate:
-    interval = (value - quantile * stderr, value + quantile * stderr)
-    return Estimate(value=value, stderr=stderr, interval=interval, unit=unit, status="firm")
+    half = quantile * stderr
+    return Estimate(value=value, stderr=stderr, interval=(value - half, value + half), unit=unit)
 
 
 def _poles(rig: Rig, values: Mapping[str, float], at: str) -> NDArray[np.complex128]:

@@ -1,4 +1,4 @@
-"""How much of a run does the model explain? Fit percent per signal, for runs it has seen and runs it has not."""
+"""Scores of runs: the fit percent of each signal, for runs that were fitted and runs that are predicted."""
 
 from __future__ import annotations
 
@@ -9,14 +9,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upright.identification.model.model import Fit, Rig, Run, RunScore
-from upright.identification.problem.pose import pose
-from upright.identification.problem.predictor_setup import Ahead, with_noise
-from upright.identification.problem.problem import Problem
-from upright.identification.problem.track import Track
+from upright.identification.model.fit import Fit, RunScore
+from upright.identification.model.rig import Rig
+from upright.identification.model.runs import Run
+from upright.identification.problem.formulation import formulate
+from upright.identification.problem.predictor import with_noise
+from upright.identification.problem.residuals import Problem
+from upright.identification.problem.tracks import FilterPlan, Track
 from upright.identification.problem.trips import located
-from upright.identification.search.descent import Report, grow
-from upright.identification.search.strategy import better, weigh_priors
+from upright.identification.search.descent import SearchLog, descend_progressively
+from upright.identification.search.strategy import better, rescale_priors
+from upright.progress import Progress, silent
 
 Array = NDArray[np.float64]
 
@@ -61,7 +64,7 @@ def score(problem: Problem, index: int, x: Array) -> RunScore:
     )  # fmt: skip
 
 
-def _score_ahead(problem: Problem, index: int, x: Array, plan: Ahead) -> RunScore:
+def _score_ahead(problem: Problem, index: int, x: Array, plan: FilterPlan) -> RunScore:
     """Score of a run that a filter predicts: what was foreseen exactly so far ahead, restart by restart."""
     track = problem.tracks[index]
     run = track.run
@@ -98,7 +101,7 @@ def predict(
     runs: Sequence[Run],
     *,
     groups: Mapping[str, Mapping[str, float]] | None = None,
-    progress: Report | None = None,
+    progress: Progress = silent,
 ) -> dict[str, RunScore]:
     """Scores of runs that a fitted model has not seen, by label.
 
@@ -116,7 +119,7 @@ def predict(
     groups : mapping, optional
         What groups of runs share, by label and name; those of a `Fit` when omitted.
     progress : callable, optional
-        Called with stage, fraction done, cost and number of simulations.
+        Told the stage, its cost and its number of simulations, and the share done.
 
     Raises
     ------
@@ -146,24 +149,24 @@ def _either_side(problem: Problem) -> list[Array]:
     return starts
 
 
-def _predict(rig: Rig, run: Run, groups: Mapping[str, Mapping[str, float]], progress: Report | None) -> RunScore:
+def _predict(rig: Rig, run: Run, groups: Mapping[str, Mapping[str, float]], progress: Progress) -> RunScore:
     run = located(rig, run)
     before = replace(run, score_from=0.0)
     upto = run.score_from if run.score_from > 0 else math.inf
     if run.score_from > 0 and run.horizon is not None:
         before, upto = before.first_part(run.score_from / (run.period * run.t.size)), math.inf
-    problem = pose(rig, [before], given=groups)
-    x = problem.start
+    problem = formulate(rig, [before], given=groups)
+    x, log = problem.start, SearchLog(progress=progress)
     if x.size:
-        found = grow(problem, x, report=progress, upto=upto)
+        found = descend_progressively(problem, x, log, upto=upto)
         for other in _either_side(problem):
-            found = better(found, grow(problem, other, report=progress, upto=upto))
+            found = better(found, descend_progressively(problem, other, log, upto=upto))
         if found.interrupted:
             raise KeyboardInterrupt
         if math.isinf(upto):  # else what is scored must not weigh
-            found = weigh_priors(problem, found)
+            found = rescale_priors(problem, found)
         x = found.x
-    whole = pose(rig, [run], thin=False, given=groups)
+    whole = formulate(rig, [run], thin=False, given=groups)
     sought = [u.name for u in problem.unknowns if u.lower < u.upper]
     adapted = dict.fromkeys("initial" if name.startswith("initial.") else name for name in sought)
     return replace(score(whole, 0, x), adapted=tuple(adapted))

@@ -1,151 +1,118 @@
-"""How rich a friction does the rig have? Viscous, with Coulomb, with drag, with presliding: each rung must earn itself.
+"""Choice of the friction model inside a fit: viscous, with Coulomb, with drag, with stiction, with presliding.
 
-A rung is kept only if, fitted on the first part of every run, it predicts the held-out rest better than the poorer
-one. Richer rungs start from where the poorer one ended, or they can end with a larger cost (seen: 1083 against 314).
+The rungs are those with which every ladder begins; `growth` climbs them one by one, refits all runs for each and asks
+whether the held-out error falls by more than chance. Inside a fit there is no time for that: every rung is fitted once
+to the first part of every run, all of them are tried, and the one with the least squared error over the rest is taken.
+Richer rungs start from where the poorer one ended, or they can end with a larger cost (seen: 1083 against 314).
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.ladder.decision import by_chance
-from upright.identification.ladder.rungs import at, friction_rungs
-from upright.identification.model.model import SEEN, Rig, Run
-from upright.identification.model.unknowns import SHARED
-from upright.identification.problem.normal import finite
-from upright.identification.problem.pose import pose
-from upright.identification.problem.problem import Problem, loudness
-from upright.identification.search.descent import first_horizon, grow
-from upright.identification.search.strategy import Log, better, closed_form_starts, explain, placed
+from upright.identification.ladder.decision import by_chance, stalled
+from upright.identification.ladder.rungs import friction_rungs, rig_at
+from upright.identification.model.rig import Rig
+from upright.identification.model.runs import FITTED_SHARE, Run
+from upright.identification.problem.formulation import formulate
+from upright.identification.problem.normal_equations import finite
+from upright.identification.problem.residuals import noise_level
+from upright.identification.search.descent import SearchLog, descend_progressively, first_horizon
+from upright.identification.search.strategy import better, closed_form_starts, search
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Place:
-    """A friction model: its name, the terms it adds, and the rig with all terms of higher rungs at zero."""
+class Candidate:
+    """A friction model fitted to the first part of every run.
 
-    name: str
-    adds: tuple[str, ...]
+    `values` are its numbers by key, those of single runs that ended at a bound left out, `noise` the level of its
+    residuals, `held_out` its mean squared residual over what it has not seen.
+    """
+
     rig: Rig
+    cost: float
+    noise: float
+    values: dict[str, float]
+    held_out: float
 
 
-def places(rig: Rig) -> list[Place]:
-    """Nested friction models within the terms that the rig asks to estimate, poorest first."""
-    ladder = friction_rungs(rig)
-    return [Place(name=r.name, adds=r.adds, rig=at(rig, ladder, ladder[: k + 1])) for k, r in enumerate(ladder)]
-
-
-def choose(rig: Rig, runs: Sequence[Run], log: Log) -> tuple[Rig, list[Array], tuple[str, ...]]:
-    """Rig of the rung that predicts best, coordinates to start the final fit from, terms left out."""
-    ladder = places(rig)
-    problem = pose(rig, runs)
+def choose_friction(rig: Rig, runs: Sequence[Run], log: SearchLog) -> tuple[Rig, list[Array]]:
+    """Rig of the friction that predicts best, and coordinates to start the final fit from."""
+    rungs = friction_rungs(rig)
     # levels of friction and of noise are sought together, dearly; whether friction predicts better a study may ask
-    if any(t.ahead for t in problem.tracks):
-        starts = [problem.start, *(placed(problem, s) for s in closed_form_starts(rig, runs))]
-        return rig, [min(starts, key=lambda x: problem.cost(x, first_horizon(problem)))], ()
-    if len(ladder) == 1:
-        return rig, [problem.start, *(placed(problem, s) for s in closed_form_starts(rig, runs))], ()
+    filtered = any(run.filtered for run in runs)
+    if filtered or len(rungs) == 1:
+        problem = formulate(rig, runs)
+        starts = [problem.start, *(problem.place(s) for s in closed_form_starts(rig, runs))]
+        if filtered:
+            starts = [min(starts, key=lambda x: problem.cost(x, first_horizon(problem)))]
+        return rig, starts
     seen = [run.first_part() for run in runs]
-    best = (math.inf, 0, problem.start, "")
-    costs: list[float] = []
-    loud: list[float] = []
-    tried: list[dict[str, float]] = []
-    values: dict[str, float] = {}
-    own: dict[tuple[tuple[int, ...], str], float] = {}
-    for k, rung in enumerate(ladder):
-        part = pose(rung.rig, seen)
-        starts = [placed(part, s) for s in closed_form_starts(rung.rig, seen)]
-        candidates = [_carry(part, values, own, rig, set(rung.adds))] if k else [part.start]
-        candidates += starts if k == 0 else starts[:1]
-        found = explain(part, candidates, log, patient=k == 0)
-        if k and found.normal.cost > costs[-1] and not found.interrupted:
+    tried: list[Candidate] = []
+    for k, rung in enumerate(rungs):
+        here = rig_at(rig, rungs, rungs[: k + 1])
+        part = formulate(here, seen)
+        starts = [part.place(s) for s in closed_form_starts(here, seen)]
+        if tried:
+            starts = [part.place(tried[-1].values | rung.seeds(rig)), *starts[:1]]
+        else:
+            starts = [part.start, *starts]
+        found = search(part, starts, log, patient=not tried)
+        if tried and found.normal.cost > tried[-1].cost and not found.interrupted:
             # another start looked better over the first seconds and led astray; the poorer fit's end cannot
-            other = grow(part, candidates[0], report=log.report, history=log.history, horizon=math.inf)
-            found = better(found, other)
+            found = better(found, descend_progressively(part, starts[0], log, horizon=np.inf))
         if found.interrupted:
             raise KeyboardInterrupt
-        costs.append(found.normal.cost)
-        loud.append(loudness(part, found.x))
-        if k and costs[k] > costs[k - 1] * (1 + 1e-6):
-            log.warnings.append(
-                f"With {rung.name} the first part of the runs was fitted worse (cost {costs[k]:.6g}) than without it "
-                f"({costs[k - 1]:.6g}); a richer model that contains the poorer one never should be, so the search "
-                "stalled; try better guesses."
-            )
-        v = part.value(found.x)
-        values = {u.name: float(v[i]) for i, u in enumerate(part.unknowns) if u.runs == SHARED}
-        tried.append(values)
-        own = {
-            (u.runs, u.name): float(v[i])
-            for i, u in enumerate(part.unknowns)
-            if u.runs != SHARED and u.lower < v[i] < u.upper
-        }
-        missed = _held_out(rung.rig, runs, part, found.x)
-        log.history.append((f"{rung.name}: held-out cost", missed, part.evaluations))
-        if missed < best[0]:
-            whole = pose(rung.rig, runs)
-            best = (missed, k, _carry(whole, values, own, rig, set()), rung.name)
-    chosen = ladder[best[1]]
-    out = tuple(n for rung in ladder[best[1] + 1 :] for n in rung.adds)
-    _compare(chosen, out, tried, costs, loud, best[1], log)
-    return chosen.rig, [best[2]], out
+        cost = found.normal.cost
+        if tried and cost > tried[-1].cost * (1 + 1e-6):
+            log.warnings.append(stalled(rung.name, cost, tried[-1].cost))
+        level, v = noise_level(part, found.x), part.value(found.x)
+        values = {part.key(i): float(v[i]) for i, u in enumerate(part.unknowns) if u.shared or u.lower < v[i] < u.upper}
+        held_out = _held_out(here, runs, found.x)
+        log.note(f"{rung.name}: held-out cost", held_out, part)
+        tried.append(Candidate(rig=here, cost=cost, noise=level, values=values, held_out=held_out))
+    k = min(range(len(tried)), key=lambda i: tried[i].held_out)
+    _note_rival(tried[k:], [n for rung in rungs[k + 1 :] for n in rung.adds], log)
+    return tried[k].rig, [formulate(tried[k].rig, runs).place(tried[k].values)]
 
 
-def _compare(
-    chosen: Place, out: tuple[str, ...], tried: list[dict[str, float]], costs: list[float], loud: list[float], k: int,
-    log: Log,
-) -> None:  # fmt: skip
+def _note_rival(tried: Sequence[Candidate], left_out: Sequence[str], log: SearchLog) -> None:
     """Note what a richer model would have said otherwise, where it explains its part of the runs better.
 
     That the rest is predicted worse then means that something else is missing, not that the richer model is wrong.
-    `loud` are the residuals' loudness, rung by rung.
+    The chosen model comes first.
     """
-    rival = min(range(k, len(costs)), key=lambda i: costs[i])
-    if rival == k or costs[k] - costs[rival] <= by_chance(len(out), loud[rival]):
+    chosen, rival = tried[0], min(tried, key=lambda c: c.cost)
+    if chosen.cost - rival.cost <= by_chance(len(left_out), rival.noise):
         return
     for n in chosen.rig.estimated:
-        a, b = tried[k].get(n, 0.0), tried[rival].get(n, 0.0)
+        a, b = chosen.values.get(n, 0.0), rival.values.get(n, 0.0)
         if abs(a - b) > 0.5 * max(abs(a), abs(b)):
             log.rivals[n] = b
     if log.rivals:
         log.warnings.append(
-            f"The first part of the runs is explained better with {', '.join(out)} (cost {costs[rival]:.3g} against "
-            f"{costs[k]:.3g}), the rest is predicted better without, so something else is missing from the model; "
+            f"The first part of the runs is explained better with {', '.join(left_out)} (cost {rival.cost:.3g} against "
+            f"{chosen.cost:.3g}), the rest is predicted better without, so something else is missing from the model; "
             f"until it is found, the intervals of {', '.join(log.rivals)} hold what both models say."
         )
 
 
-def _carry(
-    problem: Problem, values: dict[str, float], own: dict[tuple[tuple[int, ...], str], float], rig: Rig, new: set[str]
-) -> Array:
-    """Coordinates that continue a poorer fit; terms that are new begin at a tenth of their guess, or at zero."""
-    start = dict(values)
-    for n in new:
-        start[n] = 0.1 * rig.parameters[n].value if n in rig.parameters else 0.0
-    x = placed(problem, start)
-    for i, u in enumerate(problem.unknowns):
-        if (u.runs, u.name) in own:
-            x[i] = u.inside(own[u.runs, u.name])
-    return x
-
-
-def _held_out(rig: Rig, runs: Sequence[Run], part: Problem, x: Array) -> float:
+def _held_out(rig: Rig, runs: Sequence[Run], x: Array) -> float:
     """Mean squared residual of what the fit on the first parts has not seen."""
-    whole = pose(rig, runs)
-    whole.steps = part.steps
+    whole = formulate(rig, runs)
     total, samples = 0.0, 0
     for index, track in enumerate(whole.tracks):
-        e = whole.missed(index, x)
+        e = whole.residuals(index, x)
         if track.windowed:
-            e = e[int(SEEN * track.restarts.size) :]
+            e = e[int(FITTED_SHARE * track.restarts.size) :]
         else:
-            e = e[0].reshape(-1, len(track.columns))[int(SEEN * track.length) :]
+            e = e[0].reshape(-1, len(track.columns))[int(FITTED_SHARE * track.length) :]
         # one run that slips a cycle should not outvote all others
         total += float(np.sum(np.minimum(e * e, 4.0))) if finite(e) else 4.0 * e.size
         samples += e.size

@@ -1,6 +1,7 @@
-"""How well does the rig repeat itself? What one run says about another of the same command; no model has to do better.
+"""How well a rig repeats itself: what one run says about another of the same command.
 
-Above this ceiling there is nothing left to explain, only what the rig does differently every time.
+No model has to do better: above this ceiling there is nothing left to explain, only what the rig does differently
+every time.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from numpy.typing import NDArray
 
 from upright.identification.inference.scoring import fit_percent
 from upright.identification.ladder.decision import scatter
-from upright.identification.model.model import Run, RunScore
+from upright.identification.model.fit import RunScore
+from upright.identification.model.runs import Run
 
 Array = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""Which numbers make a formula meet the data? The estimator's walk and its errors, without a plant.
+"""Curve fitting: a formula met to data by the descent that fits rigs, with standard errors.
 
 For whatever is a formula rather than a motion: a decay, a frequency response, a line through squared periods.
 """
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput
-from upright.identification.problem.normal import Normal, pseudo_inverse
+from upright.identification.problem.normal_equations import Normal, pseudo_inverse
 from upright.identification.search.descent import Descent, descend
 
 Array = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Which numbers agree with the measured accelerations? An answer without a single simulation.
+"""Start values from inverse dynamics: numbers that agree with the measured accelerations, without a simulation.
 
 The model's accelerations, computed from the smoothed motion, are compared with the measured ones; both have gone
 through the same smoothing. Masses and forces that only scale together are left where the guess put them.
@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model.model import Rig, Run
-from upright.identification.model.unknowns import Unknown, base_values, shared_unknowns
-from upright.identification.problem.normal import Normal, finite
+from upright.identification.model.rig import Rig, base_values
+from upright.identification.model.runs import Run
+from upright.identification.model.unknowns import Unknown, shared_unknowns
+from upright.identification.problem.normal_equations import Normal, finite
 from upright.identification.search.descent import descend
 from upright.identification.search.drive_force import drive_force
 from upright.physics.evaluate import mass_and_force
@@ -62,7 +63,7 @@ def observe(rig: Rig, run: Run, *, flips: Mapping[str, float] | None = None,
     free = tuple(i for i, c in enumerate(coordinates) if c not in run.held)
     if not free or any(coordinates[i] not in run.measured for i in free) or n < 30:
         return None
-    quantum = dict(zip(run.measured, run.quantum or (0.0,) * len(run.measured), strict=True))
+    quantum = dict(zip(run.measured, run.quanta, strict=True))
     signal = {c: run.y[:, k] for k, c in enumerate(run.measured)}
     period = min(dominant_period(signal[coordinates[i]], dt) for i in free)
     width = max(smoothing_width(signal[coordinates[i]], dt, period, quantum[coordinates[i]]) for i in free)

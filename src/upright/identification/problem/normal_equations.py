@@ -1,4 +1,4 @@
-"""What does a sum of squares look like from here? Its value, gradient and Gauss-Newton matrix."""
+"""Normal equations of least squares: the sum of squares, its gradient ``J'r`` and its Gauss-Newton matrix ``J'J``."""
 
 from __future__ import annotations
 
@@ -82,22 +82,20 @@ def mixed(
 
 
 def products(J: Array, r: Array) -> tuple[Array, Array, float]:
-    """``J'J``, ``J'r`` and ``r'r`` in blocks too small for a linear-algebra library to wake its threads for.
+    """``J'J``, ``J'r`` and ``r'r``, infinite where they have run away.
 
-    On a busy machine waiting for those threads costs more than the products themselves.
+    In blocks too small for a linear-algebra library to wake its threads for: on a busy machine waiting for those
+    threads costs more than the products themselves.
     """
-    total = gram(np.concatenate([J, r[:, None]], axis=1))
-    return total[:-1, :-1], total[:-1, -1], float(total[-1, -1])
-
-
-def gram(both: Array) -> Array:
-    """``B'B`` of a tall array (T, p), infinite where it has run away."""
+    both = np.concatenate([J, r[:, None]], axis=1)
     rows = max(64, 200_000 // max(1, both.shape[1]) ** 2)
     whole = both.shape[0] // rows * rows
     blocks = both[:whole].reshape(-1, rows, both.shape[1])
     with np.errstate(over="ignore", invalid="ignore"):
         total = np.matmul(blocks.transpose(0, 2, 1), blocks).sum(axis=0) + both[whole:].T @ both[whole:]
-    return total if finite(total) else np.full_like(total, math.inf)
+    if not finite(total):
+        total = np.full_like(total, math.inf)
+    return total[:-1, :-1], total[:-1, -1], float(total[-1, -1])
 
 
 def pseudo_inverse(A: Array) -> Array:

@@ -1,50 +1,54 @@
-"""How far are the simulated runs from the measured ones, and how does that change with every number sought?
+"""Residuals of simulated runs against measured ones, with their Jacobian and their Gauss-Newton model.
 
-All perturbed numbers of a run are simulated side by side in the lanes of one call (DESIGN 2).
-Residuals are in units of each signal's spread over its run, so that a fit percent is driven, not a unit.
+All perturbed numbers of a run are simulated side by side in the lanes of one call, which costs little more than one
+simulation. Residuals are in units of each signal's spread over its run, so that a fit percent is driven, not a unit.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model.model import Rig
-from upright.identification.model.unknowns import SHARED, Unknown
-from upright.identification.problem.normal import Normal, Rows, finite, mixed, products, squares
-from upright.identification.problem.nuisances import CHANGES, Dressed, dress, known_beforehand
+from upright.identification.model.rig import Rig, base_values
+from upright.identification.model.unknowns import Unknown, friction_names
+from upright.identification.problem.normal_equations import Normal, Rows, finite, mixed, products, squares
+from upright.identification.problem.nuisances import CHANGES, Setting, prior_residuals, setting
 from upright.identification.problem.predictor import restart_states
 from upright.identification.problem.restarts import PERTURBATION, Restart, settle
 from upright.identification.problem.simulated import motions, outputs, simulator
-from upright.identification.problem.track import Track
+from upright.identification.problem.tracks import Track
 from upright.signals.memory import memory
 from upright.simulation import Simulator
 
 Array = NDArray[np.float64]
 
 
+STEP = 1e-5
+"""A perturbed number moves the weighted outputs by about this much, root mean square."""
+
+
 @dataclass
 class Problem:
     """Rig, runs and the numbers sought; counts its simulations in `evaluations`.
 
-    `steps` (sought,) are the perturbations, `noise` the residual that one sigma of prior knowledge is worth,
-    `blends` (outputs, outputs) by run what weighs errors of outputs that err together, in place of the track's weights.
+    `steps` (sought,) are the perturbations, `noise` the residual that one sigma of prior knowledge is worth.
     """
 
     rig: Rig
     tracks: list[Track]
     unknowns: list[Unknown]
-    base: dict[str, float]
-    friction: tuple[str, ...]
     steps: Array
     noise: float = 0.1
     evaluations: int = 0
-    solvers: dict[int, Simulator] = field(default_factory=dict[int, Simulator])
-    memory: Array = field(default_factory=lambda: np.empty(0))
-    blends: dict[int, Array] = field(default_factory=dict[int, Array])
+    _solvers: dict[int, Simulator] = field(init=False, default_factory=dict[int, Simulator])
+    _memory: Array = field(init=False, default_factory=lambda: np.empty(0))
+
+    def __post_init__(self) -> None:
+        self.base, self._friction = base_values(self.rig), friction_names(self.rig)
 
     @property
     def lower(self) -> Array:
@@ -59,7 +63,7 @@ class Problem:
     @property
     def start(self) -> Array:
         """Coordinates of the start (sought,)."""
-        return np.array([u.inside(u.value) for u in self.unknowns])
+        return np.array([u.coordinate(u.value) for u in self.unknowns])
 
     @property
     def duration(self) -> float:
@@ -68,7 +72,7 @@ class Problem:
 
     def sought_in(self, index: int) -> NDArray[np.int64]:
         """Places of the numbers that matter in one run."""
-        return np.array([i for i, u in enumerate(self.unknowns) if u.runs == SHARED or index in u.runs], dtype=np.int64)
+        return np.array([i for i, u in enumerate(self.unknowns) if u.shared or index in u.runs], dtype=np.int64)
 
     def value(self, x: Array) -> Array:
         """Values (sought,) or (sought, lanes) of coordinates."""
@@ -77,45 +81,76 @@ class Problem:
         out[log] = np.exp(np.minimum(x[log], 300.0))
         return out
 
+    def key(self, index: int) -> str:
+        """Name of one number sought; of one that not all runs share, with its group or its run before it.
+
+        Problems that explain other runs, or other models, know it by the same key.
+        """
+        u = self.unknowns[index]
+        if u.shared:
+            return u.name
+        home = f"group {u.group}" if u.group else self.tracks[u.runs[0]].run.label
+        return f"{home}: {u.name}"
+
+    def values_at(self, x: Array) -> dict[str, float]:
+        """Every number sought at coordinates `x`, by its key."""
+        return {self.key(i): float(v) for i, v in enumerate(self.value(x))}
+
+    def shared_at(self, x: Array) -> dict[str, float]:
+        """The numbers that all runs share at coordinates `x`, by name."""
+        return {u.name: float(v) for u, v in zip(self.unknowns, self.value(x), strict=True) if u.shared}
+
+    def place(self, values: Mapping[str, float], x: Array | None = None) -> Array:
+        """Coordinates of the `values` that are given by key; the others as in `x`, or at their start."""
+        x = self.start if x is None else x.copy()
+        for i, u in enumerate(self.unknowns):
+            value = values.get(self.key(i))
+            if value is not None and (not u.log or value > 0):
+                x[i] = u.coordinate(value)
+        return np.clip(x, self.lower, self.upper)
+
+    def count(self, horizon: float = math.inf) -> int:
+        """Number of residuals within `horizon` seconds."""
+        return sum(
+            self.samples(i, horizon) * t.restarts.size * max(1, int(np.count_nonzero(t.weights)))
+            for i, t in enumerate(self.tracks)
+        )
+
     def simulate(self, index: int, x: Array, samples: int, shift: Array | None = None) -> Array:
         """Outputs (samples, W, outputs, lanes) of one run for coordinates `x` (sought, lanes).
 
         `shift` (states, W, lanes or 1) is added to the states at which windows start.
         """
-        d = self._dressed(index, x)
+        d = self._setting(index, x)
         x0 = d.x0 if shift is None else d.x0 + shift
         self.evaluations += 1
         return outputs(self.solver(index), self.tracks[index], d.values, x0, d.offsets, d.scales, samples=samples)
 
     def filtered(self, index: int, x: Array) -> tuple[Array, Array]:
         """Positions and speeds (W, outputs), as the sensors would show them, that a filter knows at the restarts."""
-        track, d = self.tracks[index], self._dressed(index, x[:, None])
+        track, d = self.tracks[index], self._setting(index, x[:, None])
         at = restart_states(self.solver(index), track, d.values, d.offsets, d.scales)[..., 0]
         q, v = (at[np.add(track.columns, k)].T for k in (0, 1))
         gain = 1.0 if d.scales is None else d.scales[:, 0]
         return q * gain + d.offsets[:, 0], v * gain
 
-    def _dressed(self, index: int, x: Array) -> Dressed:
+    def _setting(self, index: int, x: Array) -> Setting:
         """What one run is simulated with, for coordinates `x` (sought, lanes)."""
         track, v = self.tracks[index], self.value(x)
         values: dict[str, float | Array] = {**self.base, **track.run.known}
-        values |= {u.name: v[i] for i, u in enumerate(self.unknowns) if u.runs == SHARED}
+        values |= {u.name: v[i] for i, u in enumerate(self.unknowns) if u.shared}
         own = {u.name: v[i] for i, u in enumerate(self.unknowns) if index in u.runs}
-        return dress(self.rig, track, values, own, self.friction, x.shape[1])
-
-    def blend(self, index: int) -> Array:
-        """What errors (..., outputs) of one run are weighed with, ``W e``: (outputs, outputs)."""
-        return self.blends.get(index, np.diag(self.tracks[index].weights))
+        return setting(self.rig, track, values, own, self._friction, x.shape[1])
 
     def solver(self, index: int) -> Simulator:
         """Solver of one run, made once."""
-        if index not in self.solvers:
+        if index not in self._solvers:
             track = self.tracks[index]
-            free = [u.name for u in self.unknowns if u.runs == SHARED]
+            free = [u.name for u in self.unknowns if u.shared]
             own = {u.name for u in self.unknowns if index in u.runs}
             free += [p for n, p in CHANGES.items() if n in own]
-            self.solvers[index] = simulator(self.rig, track, {**self.base, **track.run.known}, free)
-        return self.solvers[index]
+            self._solvers[index] = simulator(self.rig, track, {**self.base, **track.run.known}, free)
+        return self._solvers[index]
 
     def samples(self, index: int, horizon: float) -> int:
         """Samples of one run within `horizon` seconds, at least two."""
@@ -130,9 +165,9 @@ class Problem:
         lanes[sought, 1 + here] += self.steps[sought]
         if central:
             lanes[sought, 1 + m + here] -= self.steps[sought]
-        restart = self.restart(index, x) if track.doubtful.size else None
+        restart = self.restart(index, x) if track.uncertain.size else None
         y = self.simulate(index, lanes, n, None if restart is None else restart.shift)
-        W = self.blend(index)
+        W = track.weighting
         target = track.targets(n)
         skip = 0 if track.windowed else min(track.first, n - 1)
         residual = (y[skip:, :, :, 0] - target[skip:]) @ W.T
@@ -149,25 +184,26 @@ class Problem:
             r, J = restart.rows(r.reshape(track.restarts.size, -1), J.reshape(track.restarts.size, -1, m))
         return Rows(r.reshape(-1, k), J.reshape(-1, k, m), sought)
 
-    def missed(self, index: int, x: Array, horizon: float = math.inf) -> Array:
+    def residuals(self, index: int, x: Array, horizon: float = math.inf) -> Array:
         """Residuals (W, samples) of every window of one run, each from the restart that suits it; no Jacobian."""
         track = self.tracks[index]
-        if track.doubtful.size:
+        if track.uncertain.size:
             restart = self.restart(index, x)
             return np.concatenate([restart.residual, restart.price], axis=1)
         n = self.samples(index, horizon)
         skip = 0 if track.windowed else min(track.first, n - 1)
         y = self.simulate(index, x[:, None], n)[skip:, :, :, 0]
-        return np.moveaxis((y - track.targets(n)[skip:]) @ self.blend(index).T, 1, 0).reshape(track.restarts.size, -1)
+        return np.moveaxis((y - track.targets(n)[skip:]) @ track.weighting.T, 1, 0).reshape(track.restarts.size, -1)
 
     def restart(self, index: int, x: Array) -> Restart:
         """Where the windows of one run are best restarted, for coordinates `x`."""
         track = self.tracks[index]
-        places = track.doubtful
+        places = track.uncertain
+        variance = track.variance[:, places]
         sizes = PERTURBATION * track.start.spread[places]
         targets = track.targets(track.length)
         lanes = np.repeat(x[:, None], 1 + places.size, axis=1)
-        W = self.blend(index)
+        W = track.weighting
 
         def respond(d: Array) -> tuple[Array, Array]:
             shift = np.zeros((track.x0.shape[1], track.restarts.size, 1 + places.size))
@@ -178,19 +214,19 @@ class Problem:
             slope = np.moveaxis(W @ ((y[..., 1:] - y[..., :1]) / sizes), 1, 0)
             return residual, slope.reshape(*residual.shape, -1)
 
-        d, residual, slope = settle(respond, track.doubt)
+        d, residual, slope = settle(respond, variance)
         shift = np.zeros((track.x0.shape[1], track.restarts.size, 1))
         shift[places] = d.T[:, :, None]
-        return Restart(shift=shift, residual=residual, slope=slope, change=d, variance=track.doubt)
+        return Restart(shift=shift, residual=residual, slope=slope, change=d, variance=variance)
 
-    def normal(self, x: Array, horizon: float = math.inf, *, central: bool = False) -> Normal:
+    def normal(self, x: Array, horizon: float = math.inf) -> Normal:
         """Cost and its Gauss-Newton model at coordinates `x`; the cost is infinite when a simulation ran away."""
         size = x.size
         A, g, cost = np.zeros((size, size)), np.zeros(size), 0.0
         for index in range(len(self.tracks)):
             sought = self.sought_in(index)
-            if central or self.tracks[index].windowed:
-                rows = self.rows(index, x, horizon, central=central)
+            if self.tracks[index].windowed:
+                rows = self.rows(index, x, horizon)
                 if rows is None:
                     return Normal(math.inf, A, g)
                 squares = products(rows.jacobian.reshape(-1, sought.size), rows.residual.reshape(-1))
@@ -211,39 +247,60 @@ class Problem:
         track, n = self.tracks[index], self.samples(index, horizon)
         lanes = np.repeat(x[:, None], 1 + sought.size, axis=1)
         lanes[sought, 1 + np.arange(sought.size)] += self.steps[sought]
-        d = self._dressed(index, lanes)
+        d = self._setting(index, lanes)
         self.evaluations += 1
         rows = len(d.x0) + track.u.shape[1]  # a loop records its commands as well
-        if self.memory.size < (most := n * rows * (lanes.shape[1] + 15)):
-            self.memory = np.empty(most)
-        motion = motions(self.solver(index), track, d.values, d.x0, samples=n, memory=self.memory)
+        if self._memory.size < (most := n * rows * (lanes.shape[1] + 15)):
+            self._memory = np.empty(most)
+        motion = motions(self.solver(index), track, d.values, d.x0, samples=n, memory=self._memory)
         skip = min(track.first, n - 1)
         seen = [motion[skip:, c] for c in track.columns]
-        W = self.blends.get(index)
-        if W is None:
+        if track.principal is None:
             G = squares(seen, track.y[skip:n], d.offsets, track.weights, d.scales)
         else:
-            G = squares(*mixed(seen, track.y[skip:n], d.offsets, d.scales, W))
+            G = squares(*mixed(seen, track.y[skip:n], d.offsets, d.scales, track.principal))
         h = self.steps[sought]
         with np.errstate(over="ignore", invalid="ignore"):  # a lane that ran away makes the cost infinite
             return G[1:, 1:] / np.outer(h, h), G[1:, 0] / h, float(G[0, 0])
 
+    def settle_steps(self, x: Array, horizon: float = math.inf) -> Normal:
+        """Choose perturbations that move the outputs by about `STEP`, so that no guess of a size is needed.
+
+        The model at `x` comes back, found with perturbations not far from those.
+        """
+        for _ in range(4):
+            before = self.steps
+            here = self.normal(x, horizon)
+            self.rescale_steps(here, horizon)
+            if np.all((self.steps < 30 * before) & (self.steps > before / 30)):
+                return here
+        return self.normal(x, horizon)
+
+    def rescale_steps(self, normal: Normal, horizon: float) -> None:
+        """Choose perturbations by the effects found at an earlier evaluation within `horizon` seconds."""
+        samples = sum(self.samples(i, horizon) * t.restarts.size for i, t in enumerate(self.tracks))
+        effect = np.sqrt(np.maximum(np.diag(normal.matrix), 0.0) / samples)
+        wanted = np.where(effect > 0, STEP / np.maximum(effect, 1e-300), 100 * self.steps)
+        wanted = np.clip(wanted, self.steps * 1e-4, self.steps * 1e4)
+        scale = np.array([u.scale for u in self.unknowns])
+        self.steps = np.clip(wanted, 1e-9 * scale, 1e-3 * scale)
+
     def prior_rows(self, x: Array) -> tuple[Array, Array]:
         """Residuals and Jacobian of what was known beforehand, worth `noise` per sigma."""
-        return known_beforehand(self.unknowns, x, self.noise)
+        return prior_residuals(self.unknowns, x, self.noise)
 
     def cost(self, x: Array, horizon: float = math.inf) -> float:
         """Sum of squares alone, one lane per run."""
         r, _ = self.prior_rows(x)
         total = float(r @ r)
         for index in range(len(self.tracks)):
-            e = self.missed(index, x, horizon)
+            e = self.residuals(index, x, horizon)
             with np.errstate(over="ignore"):
                 total += float(np.sum(e * e))
         return total if math.isfinite(total) else math.inf
 
 
-def loudness(problem: Problem, x: Array) -> float:
+def noise_level(problem: Problem, x: Array) -> float:
     """Weighted residual that one independent observation carries: its deviation times the root of its memory.
 
     What was known beforehand is weighed against the data in this unit.
