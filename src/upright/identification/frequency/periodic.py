@@ -1,4 +1,4 @@
-"""What does a periodic multisine tell? Many frequencies at once, averaged over periods.
+"""Periodic multisines: their design, and the response at many frequencies at once, averaged over periods.
 
 Phases are random, the best of many draws by crest factor. Only odd multiples of the base are asked, so that what dry
 friction and geometry add falls on lines of its own as well as on those asked.

@@ -1,4 +1,4 @@
-"""What frequency response does this log hold? Sines one after the other, a periodic multisine, or a sweep.
+"""The frequency response that a log holds: sines one after the other, a periodic multisine, or a sweep.
 
 Sines are detected synchronously; of a periodic command whole periods are averaged, and what differs between them is
 noise; anything else is cut into overlapping windows whose cross spectra are averaged (Welch), repeats together.
@@ -137,17 +137,27 @@ def _sines(
             kept.append(f)
         elif float(f[1].variance.sum()) < float(kept[-1][1].variance.sum()):
             kept[-1] = f
-    drive = np.array([c.lines[0, 0] for _, _, c in kept])
+    return from_tones(
+        [x for _, x, _ in kept], [c for _, _, c in kept], outputs=outputs, units=_units(records[0], outputs, command),
+        command=command, hold=hold, notes=notes,
+    )  # fmt: skip
+
+
+def from_tones(
+    tones: Sequence[Tone], commands: Sequence[Tone], *, outputs: Sequence[str], units: Sequence[str],
+    command: str = "u", hold: float, notes: Sequence[str] = (),
+) -> FrequencyResponse:  # fmt: skip
+    """Response of sines measured one after the other, each detected in the outputs and in the command."""
+    drive = np.array([c.lines[0, 0] for c in commands])
     return FrequencyResponse(
-        omega=np.array([w for w, _, _ in kept]),
-        response=np.asarray([x.lines[0] for _, x, _ in kept], dtype=np.complex128) / drive[:, None],
-        outputs=tuple(outputs), units=_units(records[0], outputs, command), input=command,
-        variance=np.array([x.variance for _, x, _ in kept]) / np.abs(drive[:, None]) ** 2,
-        coherence=np.array([x.coherence for _, x, _ in kept]),
-        distortion=np.array([x.distortion for _, x, _ in kept]), drive=drive,
-        dry=np.array([x.dry for _, x, _ in kept]), still=np.array([x.still for _, x, _ in kept]),
-        overtones=overtones([x for _, x, _ in kept]), hold=hold,
-        notes=tuple(notes),
+        omega=np.array([x.omega for x in tones]),
+        response=np.asarray([x.lines[0] for x in tones], dtype=np.complex128) / drive[:, None],
+        outputs=tuple(outputs), units=tuple(units), input=command,
+        variance=np.array([x.variance for x in tones]) / np.abs(drive[:, None]) ** 2,
+        coherence=np.array([x.coherence for x in tones]),
+        distortion=np.array([x.distortion for x in tones]), drive=drive,
+        dry=np.array([x.dry for x in tones]), still=np.array([x.still for x in tones]),
+        overtones=overtones(tones), hold=hold, notes=tuple(notes),
     )  # fmt: skip
 
 
