@@ -89,7 +89,7 @@ def study() -> tuple[Any, Any]:
 
 def search() -> Callable[[], np.ndarray]:
     """Levenberg-Marquardt over the growing horizon, nothing else; estimates as `problem.TRUTH`."""
-    from upright.identification.problem.formulation import formulate
+    from upright.identification.problem.residuals import formulate
     from upright.identification.search.descent import descend_progressively
 
     rig, run = study()

@@ -17,18 +17,16 @@ from upright.identification.checks.refit import watched
 from upright.identification.inference.assumptions import assumptions, sentences
 from upright.identification.inference.covariance import Optimum, assess
 from upright.identification.inference.identifiability import Identifiability, identifiability
-from upright.identification.inference.intervals import run_estimates, shared_estimates
-from upright.identification.inference.model_uncertainty import widened, with_model_uncertainty
+from upright.identification.inference.intervals import run_estimates, shared_estimates, widened, with_model_uncertainty
 from upright.identification.inference.poles import poles
 from upright.identification.inference.scoring import fit_percent, predict, score
 from upright.identification.inference.verdict import GOOD, judge
-from upright.identification.ladder.friction import choose_friction
+from upright.identification.ladder.growth import choose_friction
 from upright.identification.model.fit import Estimate, Fit, Pole, RunScore
 from upright.identification.model.rig import Rig
 from upright.identification.model.runs import Run
-from upright.identification.problem.formulation import formulate, unresolved
 from upright.identification.problem.predictor import with_noise
-from upright.identification.problem.residuals import Problem
+from upright.identification.problem.residuals import Problem, formulate, unresolved
 from upright.identification.problem.trips import located, untold
 from upright.identification.search.descent import Descent, SearchLog, descend_progressively, first_horizon
 from upright.identification.search.moments import other_moments

@@ -8,7 +8,7 @@ import pytest
 from tests.identification.twins import PENDULUM, noisy, rig, swing
 from upright.identification.estimate import identify
 from upright.identification.inference.covariance import assess
-from upright.identification.problem.formulation import formulate
+from upright.identification.problem.residuals import formulate
 from upright.identification.search.descent import descend_progressively
 from upright.physics import Pendulum
 from upright.signals.memory import automatic_span, long_run

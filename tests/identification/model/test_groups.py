@@ -9,7 +9,7 @@ import pytest
 
 from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, shaken, swing
 from upright.identification.estimate import identify, predict
-from upright.identification.problem.formulation import formulate
+from upright.identification.problem.residuals import formulate
 from upright.physics import Furuta, Pendulum
 
 GUESSES = {"J_p": 2.6e-3, "b_2": 1.4e-3, "b_2c": 2.6e-3}

@@ -8,7 +8,7 @@ import pytest
 from tests.identification.twins import PENDULUM, rig, shaken, swing
 from upright.identification import Run
 from upright.identification.estimate import identify
-from upright.identification.problem.formulation import formulate
+from upright.identification.problem.residuals import formulate
 from upright.identification.problem.restarts import Restart, settle, smoothed_variance
 from upright.physics import Pendulum
 

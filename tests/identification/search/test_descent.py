@@ -9,8 +9,8 @@ import pytest
 
 from tests.identification.twins import PENDULUM, noisy, rig, swing
 from upright.identification.inference.scoring import fit_percent
-from upright.identification.problem.formulation import formulate
 from upright.identification.problem.normal_equations import Normal, products
+from upright.identification.problem.residuals import formulate
 from upright.identification.search.descent import descend, descend_progressively
 from upright.identification.search.simplex import simplex
 from upright.physics import Pendulum

@@ -18,7 +18,7 @@ from upright.identification.checks.spikes import merged, without_spikes
 from upright.identification.model.fit import Fit
 from upright.identification.model.rig import Rig
 from upright.identification.model.runs import Run
-from upright.identification.problem.formulation import formulate
+from upright.identification.problem.residuals import formulate
 from upright.signals.smoothing import dominant_period
 
 Array = NDArray[np.float64]

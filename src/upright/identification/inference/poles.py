@@ -57,18 +57,13 @@ def poles(
         ]
         found[at] = tuple(
             Pole(
-                real=_estimate(float(p.real), float(errors[0][k]), quantile, "1/s"),
-                imag=_estimate(float(p.imag), float(errors[1][k]), quantile, "rad/s"),
+                real=Estimate.within(float(p.real), float(a), quantile * float(a), "1/s"),
+                imag=Estimate.within(float(p.imag), float(b), quantile * float(b), "rad/s"),
             )
-            for k, p in enumerate(here)
+            for p, a, b in zip(here, *errors, strict=True)
             if p.imag >= 0
         )
     return found
-
-
-def _estimate(value: float, stderr: float, quantile: float, unit: str) -> Estimate:
-    half = quantile * stderr
-    return Estimate(value=value, stderr=stderr, interval=(value - half, value + half), unit=unit)
 
 
 def _poles(rig: Rig, values: Mapping[str, float], at: str) -> NDArray[np.complex128]:

@@ -12,9 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from upright.identification.model.fit import Fit, RunScore
 from upright.identification.model.rig import Rig
 from upright.identification.model.runs import Run
-from upright.identification.problem.formulation import formulate
 from upright.identification.problem.predictor import with_noise
-from upright.identification.problem.residuals import Problem
+from upright.identification.problem.residuals import Problem, formulate
 from upright.identification.problem.tracks import FilterPlan, Track
 from upright.identification.problem.trips import located
 from upright.identification.search.descent import SearchLog, descend_progressively

@@ -17,7 +17,7 @@ from upright.identification.inference.scoring import predict
 from upright.identification.model.fit import Fit, RunScore
 from upright.identification.model.rig import Rig
 from upright.identification.model.runs import Run
-from upright.identification.problem.formulation import formulate
+from upright.identification.problem.residuals import formulate
 from upright.identification.search.descent import SearchLog, descend_progressively
 from upright.progress import Progress, part, silent
 

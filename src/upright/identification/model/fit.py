@@ -29,6 +29,11 @@ class Estimate:
     unit: str = ""
     status: str = "firm"
 
+    @classmethod
+    def within(cls, value: float, stderr: float, half: float, unit: str = "") -> Estimate:
+        """An estimate with an interval of `half` its width on either side."""
+        return cls(value=value, stderr=stderr, interval=(value - half, value + half), unit=unit)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Pole:

@@ -1,4 +1,4 @@
-"""Residuals of simulated runs against measured ones, with their Jacobian and their Gauss-Newton model.
+"""The problem of explaining runs: residuals of simulated runs against measured ones, and their Gauss-Newton model.
 
 All perturbed numbers of a run are simulated side by side in the lanes of one call, which costs little more than one
 simulation. Residuals are in units of each signal's spread over its run, so that a fit percent is driven, not a unit.
@@ -7,25 +7,29 @@ simulation. Residuals are in units of each signal's spread over its run, so that
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.model.rig import Rig, base_values
-from upright.identification.model.unknowns import Unknown, friction_names
+from upright.identification.model.runs import Run
+from upright.identification.model.unknowns import Unknown, friction_names, shared_unknowns
 from upright.identification.problem.normal_equations import Normal, Rows, finite, mixed, products, squares
-from upright.identification.problem.nuisances import CHANGES, Setting, prior_residuals, setting
+from upright.identification.problem.nuisances import CHANGES, Setting, prior_residuals, run_unknowns, setting
 from upright.identification.problem.predictor import restart_states
 from upright.identification.problem.restarts import PERTURBATION, Restart, settle
 from upright.identification.problem.simulated import motions, outputs, simulator
-from upright.identification.problem.tracks import Track
+from upright.identification.problem.tracks import Track, prepare
 from upright.signals.memory import memory
 from upright.simulation import Simulator
 
 Array = NDArray[np.float64]
 
+
+ROUNDING = 12**-0.5
+"""Standard deviation of the rounding to steps of one."""
 
 STEP = 1e-5
 """A perturbed number moves the weighted outputs by about this much, root mean square."""
@@ -298,6 +302,60 @@ class Problem:
             with np.errstate(over="ignore"):
                 total += float(np.sum(e * e))
         return total if math.isfinite(total) else math.inf
+
+
+def formulate(
+    rig: Rig, runs: Sequence[Run], *, thin: bool = True, given: Mapping[str, Mapping[str, float]] | None = None
+) -> Problem:
+    """Set up the problem of explaining `runs`.
+
+    `thin` drops samples of free runs that their period does not need; `given` holds what is known of a group of runs,
+    by its label and name.
+    """
+    tracks = [prepare(rig, run, thin=thin) for run in runs]
+    unknowns = resolved(rig, runs, shared_unknowns(rig))
+    for u in (u for i, track in enumerate(tracks) for u in run_unknowns(rig, i, track.run, track.start)):
+        place = next((i for i, o in enumerate(unknowns) if u.group and (o.name, o.group) == (u.name, u.group)), None)
+        if place is not None:
+            unknowns[place] = replace(unknowns[place], runs=(*unknowns[place].runs, *u.runs))
+        elif (value := (given or {}).get(u.group, {}).get(u.name)) is not None:
+            unknowns.append(replace(u, value=value, lower=value, upper=value))
+        else:
+            unknowns.append(u)
+    return Problem(rig=rig, tracks=tracks, unknowns=unknowns, steps=np.array([1e-6 * u.scale for u in unknowns]))
+
+
+def resolved(rig: Rig, runs: Sequence[Run], unknowns: Sequence[Unknown]) -> list[Unknown]:
+    """The numbers sought, presliding lengths no shorter than `ROUNDING` of the finest encoder step that sees them.
+
+    The effect of shorter ones on the outputs comes from where the steps of the integration happen to fall: differences
+    of simulations then are noise, and a matrix of such differences promises intervals far too narrow.
+    """
+    least = _shortest(rig, runs)
+    return [
+        replace(u, lower=least[u.name], value=max(u.value, least[u.name]))
+        if u.asked and u.name in least and u.lower < least[u.name] <= u.upper
+        else u
+        for u in unknowns
+    ]
+
+
+def unresolved(problem: Problem, x: Array) -> tuple[str, ...]:
+    """Presliding lengths at coordinates `x` that the encoder does not tell from plain Coulomb friction."""
+    least = _shortest(problem.rig, [track.run for track in problem.tracks])
+    return tuple(
+        u.name
+        for u, value in zip(problem.unknowns, problem.value(x), strict=True)
+        if u.asked and u.name in least and u.lower == least[u.name] and value <= u.lower * (1 + 1e-6)
+    )
+
+
+def _shortest(rig: Rig, runs: Sequence[Run]) -> dict[str, float]:
+    """Least presliding length worth telling, by its name."""
+    derived = rig.plant.derived()
+    seen = [pair for run in runs for pair in zip(run.measured, run.quantum, strict=False)]
+    steps = {c: min((quantum for name, quantum in seen if name == c), default=0.0) for c in derived.coordinates}
+    return {j.presliding: ROUNDING * steps[derived.coordinates[j.coordinate]] for j in derived.joints if j.presliding}
 
 
 def noise_level(problem: Problem, x: Array) -> float:
