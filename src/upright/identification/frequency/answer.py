@@ -32,26 +32,11 @@ POOR = 9.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Answer:
-    """Everything that follows from one measured response.
+    """Everything that follows from one response, measured `at` an equilibrium of a rig as it was known and asked.
 
-    Attributes
-    ----------
-    rig : Rig
-        What was known and asked.
-    at : str
-        Equilibrium about which it was measured.
-    data, used : FrequencyResponse
-        All that was measured, and the points fitted.
-    left_out : tuple of str
-        Why the others were not.
-    simplex : Way
-    squares : Squares
-    fit : Fit
-        For `fit.json`: estimates with covariance, poles at every equilibrium, verdict.
-    key : tuple of (str, str, Pole)
-        Equilibrium, what the pole is, and the pole that a design has to know best.
-    simplex_pole : complex
-        The same by the simplex [1/s].
+    `used` are the points of the `data` that were fitted, `left_out` says why the others were not. `fit` is for
+    `fit.json`: estimates with covariance, poles at every equilibrium, verdict. `key` is the pole that a design has to
+    know best, after its equilibrium and what it is, `simplex_pole` the same by the simplex [1/s].
     """
 
     rig: Rig

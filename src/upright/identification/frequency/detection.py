@@ -37,20 +37,11 @@ NEAR = 0.03
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Tone:
-    """What is at one frequency and at its harmonics, for signals in columns.
+    """What is at one frequency [rad/s] and at its harmonics, for signals in columns.
 
-    Attributes
-    ----------
-    omega : float
-        [rad/s]
-    lines : (H, m) complex array
-        Peak and phase at the frequency and its harmonics: ``y = Re sum lines[k-1] exp(i k omega t)``.
-    variance : (m,) array
-        Mean square error of the first line.
-    noise : (m,) array
-        Variance of what is left over.
-    t, y : arrays (N,) and (N, m)
-        Time [s] and the signals without their drift.
+    `lines` (H, m) are peak and phase there, ``y = Re sum lines[k-1] exp(i k omega t)``, `variance` (m,) is the mean
+    square error of the first line, `noise` (m,) the variance of what is left over. `t` (N,) and `y` (N, m) are time [s]
+    and the signals without their drift.
     """
 
     omega: float

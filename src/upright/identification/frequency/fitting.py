@@ -54,26 +54,12 @@ class Way:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Squares:
-    """Least squares: the way, its unknowns with covariance, and how well it fits.
+    """Least squares: the way, the names of its unknowns, those known within a tolerance included, and how well it fits.
 
-    Attributes
-    ----------
-    way : Way
-    names : tuple of str
-        Unknowns, those known within a tolerance included.
-    covariance : (n, n) array
-        Of their values [SI].
-    misfit : float
-        Chi square per degree of freedom by stated errors; errors are widened by its root when it is above 1.
-    freedom : int
-        Degrees of freedom.
-    sigma : (F, n) array
-        Relative error of real and of imaginary part by which points were weighed.
-    surprise : mapping of str to float
-        Of what was known within a tolerance: how many of these it ended away.
-    starts : int
-    reached : int
-        How many of the starts ended at the same minimum.
+    `covariance` (n, n) is that of their values [SI]. `misfit` is chi square per degree of freedom by stated errors,
+    which are widened by its root when it is above 1; `sigma` (F, n) the relative error of real and of imaginary part by
+    which points were weighed. `surprise` says of what was known within a tolerance how many of these it ended away,
+    `reached` how many of the starts ended at the same minimum.
     """
 
     way: Way

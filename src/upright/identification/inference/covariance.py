@@ -21,27 +21,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Optimum:
-    """Coordinates at which the cost is least, and how sure they are.
+    """Coordinates `x` (n,) at which the cost of a problem is least, and how sure they are.
 
-    Attributes
-    ----------
-    problem : Problem
-    x : (n,) array
-        Coordinates in which the numbers are sought.
-    covariance : (n, n) array
-        Of the coordinates; zero rows where a bound holds a number.
-    white : (n,) array
-        Variances that uncorrelated residuals would give.
-    matrix : (n, n) array
-        Gauss-Newton matrix, prior knowledge included.
-    variance : float
-        Variance of one weighted residual.
-    memory : float
-        Seconds after which residuals have forgotten themselves (autocorrelation below 1/e).
-    samples : float
-        Number of independent scores the sandwich rests on.
-    pinned : (n,) array of bool
-        Numbers held by a bound.
+    `covariance` (n, n) has zero rows for numbers that are `pinned` (n,), held by a bound; `white` (n,) are the
+    variances that uncorrelated residuals would give, `matrix` (n, n) is Gauss-Newton's, prior knowledge included. One
+    weighted residual has the `variance`; residuals have forgotten themselves after `memory` seconds (autocorrelation
+    below 1/e), which leaves so many independent `samples`.
     """
 
     problem: Problem

@@ -40,11 +40,10 @@ def fit_percent(y: ArrayLike, simulated: ArrayLike) -> float:
 def score(problem: Problem, index: int, x: Array) -> RunScore:
     """Score of one run for coordinates `x`; windows restarted from measured states are laid end to end."""
     track = problem.tracks[index]
-    if track.ahead:
-        return _score_ahead(problem, index, x, track.ahead)
     run = track.run
-    free = [k for k, c in enumerate(run.measured) if c not in run.held]
-    y = problem.simulate(index, x[:, None], track.length)[:, :, :, 0]
+    y = problem.simulate(index, x[:, None], track.length)[..., 0]
+    if track.ahead:
+        return _score_ahead(problem, index, x, y, track.ahead)
     if not track.windowed:
         t, measured, simulated = run.t, track.y, y[:, 0, :]
     else:
@@ -54,34 +53,33 @@ def score(problem: Problem, index: int, x: Array) -> RunScore:
         simulated = np.moveaxis(y[1:], 1, 0).reshape(-1, len(run.measured))
         t = run.t[0] + track.dt * rows.T.reshape(-1)
     skip = int(np.searchsorted(t, run.t[0] + run.score_from - 1e-9)) if run.score_from > 0 else 0
-    percents = {run.measured[k]: fit_percent(measured[skip:, k], simulated[skip:, k]) for k in free}
-    naive = held_speed(track) if track.windowed else np.zeros((0, len(run.measured)))
     return RunScore(
-        role=run.role, fit_percent=percents, horizon=next(iter(run.horizons), None), t=t, y=measured,
-        simulated=simulated, measured=run.measured, score_from=run.score_from,
-        naive={run.measured[k]: fit_percent(measured[skip:, k], naive[skip:, k]) for k in free if len(naive)},
+        role=run.role, fit_percent=_percents(run, measured[skip:], simulated[skip:]),
+        horizon=next(iter(run.horizons), None), t=t, y=measured, simulated=simulated, measured=run.measured,
+        score_from=run.score_from,
+        naive=_percents(run, measured[skip:], held_speed(track)[skip:]) if track.windowed else {},
     )  # fmt: skip
 
 
-def _score_ahead(problem: Problem, index: int, x: Array, plan: FilterPlan) -> RunScore:
+def _score_ahead(problem: Problem, index: int, x: Array, y: Array, plan: FilterPlan) -> RunScore:
     """Score of a run that a filter predicts: what was foreseen exactly so far ahead, restart by restart."""
     track = problem.tracks[index]
     run = track.run
-    free = [k for k, c in enumerate(run.measured) if c not in run.held]
     weight = plan.weight[:, None, None]
-    foreseen = problem.simulate(index, x[:, None], track.length)[..., 0] / weight
-    measured = track.targets(track.length) / weight
-    q, v = problem.filtered(index, x)
-    naive = q + v * (track.dt * np.array(plan.samples))[:, None, None]
-
-    def percents(h: int, y: Array) -> dict[str, float]:
-        return {run.measured[k]: fit_percent(measured[h, :, k], y[h, :, k]) for k in free}
-
+    foreseen, measured = y / weight, track.targets(track.length) / weight
+    position, speed = problem.filtered(index, x)
+    naive = position + speed * (track.dt * plan.samples[0])
+    ahead = {h: _percents(run, measured[i], foreseen[i]) for i, h in enumerate(run.horizons)}
     return RunScore(
-        role=run.role, fit_percent=percents(0, foreseen), horizon=run.horizons[0],
+        role=run.role, fit_percent=ahead[run.horizons[0]], horizon=run.horizons[0],
         t=run.t[track.restarts + plan.samples[0]], y=measured[0], simulated=foreseen[0], measured=run.measured,
-        naive=percents(0, naive), ahead={h: percents(i, foreseen) for i, h in enumerate(run.horizons)},
+        naive=_percents(run, measured[0], naive), ahead=ahead,
     )  # fmt: skip
+
+
+def _percents(run: Run, y: Array, simulated: Array) -> dict[str, float]:
+    """Fit percent of every signal that moved freely."""
+    return {run.measured[k]: fit_percent(y[:, k], simulated[:, k]) for k in run.free}
 
 
 def held_speed(track: Track) -> Array:

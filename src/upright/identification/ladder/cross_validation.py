@@ -27,18 +27,11 @@ SETTLED = 1e-5
 
 @dataclass(frozen=True, kw_only=True)
 class CrossValidation:
-    """Every run as fitted among all, and as predicted by a fit of the others.
+    """Every run as fitted among all, and as predicted by a fit of the others, by its label.
 
-    Attributes
-    ----------
-    fitted, predicted : mapping of str to RunScore
-        By run label; `predicted` lacks the runs that an interrupted search did not come to.
-    values : mapping of str to mapping of str to float
-        Parameters of the fit without a run, by the run's label.
-    blind : mapping of str to tuple of str
-        Parameters that the others could not see, by the label of the run left out: they keep what that run said, so
-        that its prediction is none of theirs.
-    interrupted : bool
+    `values` are the parameters of the fit without the run, `blind` those that the others could not see: they keep what
+    the run itself said, so that its prediction is none of theirs. Runs that an interrupted search did not come to are
+    missing but for `fitted`.
     """
 
     fitted: Mapping[str, RunScore]

@@ -40,16 +40,9 @@ LOST = 11.0
 class Comparison:
     """Held-out improvement of one model over another.
 
-    Attributes
-    ----------
-    gain : float
-        Mean decrease of the logarithm of the error; positive when the richer model predicts better.
-    scatter : float
-        What the gain has to exceed: its standard error times Student's factor.
-    pairs : int
-        How many paired differences stand behind both.
-    between : str
-        What the pairs are, ``"runs"`` or ``"stretches"``.
+    `gain` is the mean decrease of the logarithm of the error, positive when the richer model predicts better, `scatter`
+    what it has to exceed: its standard error times Student's factor. `pairs` differences `between` runs or stretches
+    stand behind both.
     """
 
     gain: float

@@ -49,25 +49,11 @@ TYPICAL = ("friction", "gain")
 
 @dataclass(frozen=True, kw_only=True)
 class RungResult:
-    """What one rung came to.
+    """What one rung came to: whether it was kept, and the reason in a sentence.
 
-    Attributes
-    ----------
-    rung : Rung
-    kept : bool
-    reason : str
-        Why, in a sentence.
-    fitted, predicted : mapping of str to mapping of str to float
-        Fit percent by run and signal.
-    cost : float
-        Sum of squares of the fit.
-    parameters, own : int
-        Numbers sought for the rig, and for single runs.
-    values : mapping of str to float
-        Of the parameters sought, by name.
-    seconds : float
-    comparison : Comparison or None
-        With the best rung below; None for the first.
+    `fitted` and `predicted` are fit percents by run and signal, `cost` the sum of squares of the fit, `parameters` and
+    `own` how many numbers were sought for the rig and for single runs, `values` those of the rig by name. `comparison`
+    is with the best rung below, None for the first.
     """
 
     rung: Rung
@@ -97,25 +83,9 @@ class RungResult:
 class Ladder:
     """A model grown as far as it predicts better.
 
-    Attributes
-    ----------
-    steps : tuple of RungResult
-        In the order tried.
-    rig, runs : Rig, tuple of Run
-        Of the chosen model: what was refused is known to do nothing.
-    held_out : str
-        How prediction was judged, in words.
-    repeats : tuple of Repeats
-        Runs that repeat one another.
-    stopped : str
-        Why the ladder ended, in a sentence.
-    scores : mapping of str to RunScore
-        Predictions of the chosen model.
-    left_out : tuple of str
-        Parameters asked for that the chosen model does without.
-    warnings : tuple of str
-    interrupted : bool
-    seconds : float
+    `steps` are in the order tried, `rig` and `runs` those of the chosen model: what was refused is known to do nothing
+    and named in `left_out`. `scores` are its predictions, `held_out` says how they were judged and `stopped` why the
+    ladder ended; `repeats` are runs that repeat one another.
     """
 
     steps: tuple[RungResult, ...]

@@ -28,17 +28,11 @@ SAME = 0.02
 
 @dataclass(frozen=True, kw_only=True)
 class Repeats:
-    """Runs that repeat one another.
+    """Runs that repeat one another, by their labels.
 
-    Attributes
-    ----------
-    labels : tuple of str
-        Of the runs.
-    percents : mapping of str to tuple of float
-        By signal: fit percent of every run by every other one, without what a model may adapt as well: the offset at
-        the start, or the one that suits best where runs estimate their own offset.
-    errors : mapping of str to float
-        By run: mean over the others and the signals of the logarithm of the error, as `log_error` has it.
+    `percents` are by signal the fit percent of every run by every other one, without what a model may adapt as well:
+    the offset at the start, or the one that suits best where runs estimate their own offset. `errors` are by run the
+    mean of `log_error` over the others and the signals.
     """
 
     labels: tuple[str, ...]

@@ -26,18 +26,10 @@ DRIVE = (
 
 @dataclass(frozen=True, kw_only=True)
 class Rung:
-    """One step of a ladder.
+    """One step of a ladder, by its name in tables and pictures.
 
-    Attributes
-    ----------
-    name : str
-        In tables and pictures.
-    adds : tuple of str
-        Parameters estimated from this rung on; below it they are held where they do nothing.
-    drops : tuple of str
-        Parameters that this rung does without, added by a rung below.
-    unknown : tuple of str
-        What is estimated run by run from this rung on, as in `Run.unknown`.
+    From this rung on the parameters that it `adds` are estimated, below it they are held where they do nothing; it does
+    without those that it `drops`, and what is `unknown` is estimated run by run, as in `Run.unknown`.
     """
 
     name: str

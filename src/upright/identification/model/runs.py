@@ -123,6 +123,11 @@ class Run:
         return self.quantum or (0.0,) * len(self.measured)
 
     @property
+    def free(self) -> list[int]:
+        """Columns of `y` whose coordinates moved freely."""
+        return [k for k, c in enumerate(self.measured) if c not in self.held]
+
+    @property
     def period(self) -> float:
         """Sample period [s]."""
         return float((self.t[-1] - self.t[0]) / (self.t.size - 1))
@@ -132,6 +137,9 @@ class Run:
         n = int(self.t.size * share)
         if n < LEAST_RUN * share:
             return self
-        held = {c: v[:n] if isinstance(v, np.ndarray) else v for c, v in self.held.items()}
-        loop = None if self.loop is None else self.loop.first(n)
-        return replace(self, t=self.t[:n], u=self.u[:n], y=self.y[:n], held=held, loop=loop)
+        return replace(self.samples(slice(n)), loop=self.loop and self.loop.first(n))
+
+    def samples(self, part: slice) -> Run:
+        """Some of the samples; a law that closed the loop stays as it was."""
+        held = {c: v[part] if isinstance(v, np.ndarray) else v for c, v in self.held.items()}
+        return replace(self, t=self.t[part], u=self.u[part], y=self.y[part], held=held)

@@ -26,26 +26,12 @@ FAR = 1e9
 
 @dataclass(frozen=True, kw_only=True)
 class Unknown:
-    """One number sought.
+    """One number sought: ``"J_p"``, ``"actuator.gain"``; for some runs ``"initial.theta_dot"``, ``"offset.theta"``, ...
 
-    Attributes
-    ----------
-    name : str
-        ``"J_p"``, ``"actuator.gain"``; for some runs ``"initial.theta_dot"``, ``"offset.theta"``, ``"friction"``, ...
-    runs : tuple of int
-        Places of the runs it belongs to, or `SHARED` for all.
-    value, lower, upper : float
-        Start and bounds, SI.
-    log : bool
-        Whether its logarithm is the coordinate in which it is sought.
-    scale : float
-        A change that would matter, in that coordinate.
-    prior : tuple of float or None
-        Mean and standard deviation known beforehand, in that coordinate.
-    asked : bool
-        Whether the answer was asked for; a known number with an uncertainty is sought but not asked.
-    group : str
-        Label of the runs that share it, empty for a number of one run or of all.
+    `runs` are the places of the runs it belongs to, or `SHARED` for all, `group` the label of those that share it,
+    empty for a number of one run or of all. Start and bounds are in SI; the coordinate in which it is sought is its
+    logarithm if `log`. In that coordinate `scale` is a change that would matter and `prior` the mean and standard
+    deviation known beforehand. A known number with an uncertainty is sought but not `asked`.
     """
 
     name: str

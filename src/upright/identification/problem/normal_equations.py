@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +22,27 @@ class Normal:
     cost: float
     matrix: Array
     gradient: Array
+
+    @classmethod
+    def lost(cls, size: int) -> Normal:
+        """What is said of a point from where the model runs away: an infinite cost."""
+        return cls(math.inf, np.zeros((size, size)), np.zeros(size))
+
+    @classmethod
+    def by_differences(
+        cls, residual: Callable[[Array], Array], x: Array, steps: Array, *, central: bool = False
+    ) -> Normal:
+        """Normal equations of a function's values (T,), its Jacobian by differences over `steps` (n,)."""
+        with np.errstate(all="ignore"):  # a walk that has left for where the model is not finite is called back
+            r = residual(x)
+            if not finite(r):
+                return cls.lost(x.size)
+            J = np.empty((r.size, x.size))
+            for i, step in enumerate(np.diag(steps)):
+                behind = residual(x - step) if central else r
+                J[:, i] = (residual(x + step) - behind) / (steps[i] * (1 + central))
+            normal = cls(float(r @ r), J.T @ J, J.T @ r)
+        return normal if math.isfinite(normal.cost) and finite(normal.matrix) else cls.lost(x.size)
 
 
 @dataclass(frozen=True)

@@ -232,19 +232,19 @@ class Problem:
             if self.tracks[index].windowed:
                 rows = self.rows(index, x, horizon)
                 if rows is None:
-                    return Normal(math.inf, A, g)
+                    return Normal.lost(size)
                 squares = products(rows.jacobian.reshape(-1, sought.size), rows.residual.reshape(-1))
             else:
                 squares = self._squares(index, x, horizon, sought)
             if not math.isfinite(squares[2]):
-                return Normal(math.inf, A, g)
+                return Normal.lost(size)
             cost += squares[2]
             A[np.ix_(sought, sought)] += squares[0]
             g[sought] += squares[1]
         r, J = self.prior_rows(x)
         cost += float(r @ r)
         normal = Normal(cost, A + J.T @ J, g + J.T @ r)
-        return normal if finite(normal.matrix) else Normal(math.inf, A, g)
+        return normal if finite(normal.matrix) else Normal.lost(size)
 
     def _squares(self, index: int, x: Array, horizon: float, sought: NDArray[np.int64]) -> tuple[Array, Array, float]:
         """``J'J``, ``J'r`` and ``r'r`` of a free run, in the lanes as they come: the same numbers as from `rows`."""

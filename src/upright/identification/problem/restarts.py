@@ -54,16 +54,9 @@ def smoothed_variance(samples: int, width: int, dt: float, starts: NDArray[np.in
 class Restart:
     """Windows restarted where it suits them best, at a price.
 
-    Attributes
-    ----------
-    shift : (states, W, 1) array
-        Change of their first states.
-    residual : (W, R) array
-        Weighted residuals then.
-    slope : (W, R, S) array
-        Their change per unit of the S doubtful states.
-    change, variance : (W, S) arrays
-        Change of the doubtful states; their variance over that of a residual, 0 for a state that is known.
+    `shift` (states, W, 1) is the change of their first states, `residual` (W, R) the weighted residuals then and
+    `slope` (W, R, S) their change per unit of the S uncertain states; `change` (W, S) is that of these states and
+    `variance` (W, S) theirs over that of a residual, 0 for a state that is known.
     """
 
     shift: Array

@@ -59,24 +59,12 @@ A cable or a bearing pulls a little differently from second to second; what last
 
 @dataclass(frozen=True, kw_only=True)
 class FilterPlan:
-    """How a run is predicted by a filter.
+    """How a run is predicted by a filter, so many `samples` ahead, fewest first.
 
-    Attributes
-    ----------
-    samples : tuple of int
-        Samples ahead, fewest first.
-    warm : int
-        Samples that the filter follows before its state is used.
-    equilibrium : (states,) array
-        Where the plant stands: the equilibrium nearest to the record, at its mean where that leaves a choice.
-    sensor : (outputs,) array
-        Variance of a measurement.
-    initial : (states,) array
-        Variance of the states that a filter begins with.
-    drift : (inputs,) array
-        Variance of the drift of each command that a filter begins with.
-    weight : (H,) array
-        What a residual at each horizon counts.
+    The filter follows `warm` samples before its state is used. The plant stands at the `equilibrium` (states,) nearest
+    to the record, at its mean where that leaves a choice. Variances are those of a measurement, `sensor` (outputs,),
+    and of the states and drifts of the commands that a filter begins with, `initial` (states,) and `drift` (inputs,). A
+    residual at each horizon counts by `weight` (H,).
     """
 
     samples: tuple[int, ...]
@@ -193,8 +181,7 @@ def prepare(rig: Rig, run: Run, *, thin: bool) -> Track:
     names = rig.plant.state_names()
     period_s, n = run.period, run.t.size
     columns = tuple(names.index(c) for c in run.measured)
-    free = [k for k, c in enumerate(run.measured) if c not in run.held]
-    periods = [dominant_period(run.y[:, k], period_s) for k in free if np.ptp(run.y[:, k]) > 3 * run.quanta[k]]
+    periods = [dominant_period(run.y[:, k], period_s) for k in run.free if np.ptp(run.y[:, k]) > 3 * run.quanta[k]]
     period = min(periods, default=n * period_s)
 
     stride = 1

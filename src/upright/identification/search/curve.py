@@ -96,23 +96,12 @@ def fit_curve(
     count = 0
 
     def residual(z: Array) -> Array:
-        with np.errstate(all="ignore"):
-            return (np.asarray(model(z), dtype=np.float64) - target) * weight
+        return (np.asarray(model(z), dtype=np.float64) - target) * weight
 
     def evaluate(z: Array) -> Normal:
         nonlocal count
         count += 1
-        r = residual(z)
-        J = np.empty((r.size, z.size))
-        for i, h in enumerate(STEP * np.where(z == 0.0, 1e-3, np.abs(z))):
-            e = np.zeros(z.size)
-            e[i] = h
-            with np.errstate(all="ignore"):  # a walk that has left for where the model is not finite is called back
-                J[:, i] = (residual(z + e) - residual(z - e)) / (2 * h)
-        with np.errstate(all="ignore"):
-            normal = Normal(float(r @ r), J.T @ J, J.T @ r)
-        whole = math.isfinite(normal.cost) and bool(np.isfinite(normal.matrix).all())
-        return normal if whole else Normal(math.inf, np.zeros((z.size,) * 2), np.zeros(z.size))
+        return Normal.by_differences(residual, z, STEP * np.where(z == 0.0, 1e-3, np.abs(z)), central=True)
 
     if not math.isfinite(evaluate(x).cost):
         raise BadInput(f"the model is not finite at the start {x.tolist()}; start elsewhere.")
