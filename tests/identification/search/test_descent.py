@@ -70,7 +70,7 @@ def test_scipy_finds_the_same_optimum() -> None:
     def residual(z: np.ndarray) -> np.ndarray:
         rows = problem.rows(0, z * scale)
         assert rows is not None
-        return np.concatenate([rows.residual.ravel(), problem.prior_rows(z * scale)[0]])
+        return np.concatenate([rows[0].ravel(), problem.prior_rows(z * scale)[0]])
 
     oracle = least_squares(residual, problem.start / scale, xtol=1e-12, ftol=1e-12, gtol=1e-12, diff_step=1e-6)
     assert found.normal.cost == pytest.approx(2 * oracle.cost, rel=1e-6)
@@ -111,7 +111,7 @@ def test_squares_of_lanes_are_those_of_the_residuals_laid_out() -> None:
     problem = formulate(asked, [noisy(swing(unknown=("initial", "offset")), 2e-3, 5)])
     rows = problem.rows(0, problem.start)
     assert rows is not None
-    r, J = rows.residual.reshape(-1), rows.jacobian.reshape(-1, problem.start.size)
+    r, J = rows[0].reshape(-1), rows[1].reshape(-1, problem.start.size)
     prior, slope = problem.prior_rows(problem.start)
     found = problem.normal(problem.start)
     assert found.cost == pytest.approx(r @ r + prior @ prior, rel=1e-12)

@@ -78,10 +78,10 @@ def assess(problem: Problem, x: Array) -> Optimum:
         if rows is None:
             continue
         runs += 1
-        r, J = rows.residual, rows.jacobian
-        p = rows.sought.size
-        here = np.ix_(rows.sought, rows.sought)
-        flat = J.reshape(-1, p)
+        r, J = rows
+        sought = problem.sought_in(index)
+        here = np.ix_(sought, sought)
+        flat = J.reshape(-1, sought.size)
         A[here] += flat.T @ flat
         scores = np.einsum("tk,tkp->tp", r, J)
         span = automatic_span(scores)

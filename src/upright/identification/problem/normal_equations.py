@@ -45,15 +45,6 @@ class Normal:
         return normal if math.isfinite(normal.cost) and finite(normal.matrix) else cls.lost(x.size)
 
 
-@dataclass(frozen=True)
-class Rows:
-    """Residuals (T, outputs) of one run, windows one after another, and their Jacobian (T, outputs, sought here)."""
-
-    residual: Array
-    jacobian: Array
-    sought: NDArray[np.int64]
-
-
 def finite(values: Array) -> bool:
     """Whether all values are finite, told by their sum: one pass without a temporary."""
     with np.errstate(over="ignore", invalid="ignore"):

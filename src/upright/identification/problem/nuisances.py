@@ -6,7 +6,7 @@ A nuisance belongs to one run, or to all runs that give it the same label in `Ru
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -145,21 +145,3 @@ def setting(
         for name in friction:
             values[name] = values[name] * own["friction"]
     return Setting(values=values, x0=x0, offsets=offsets, scales=scales)
-
-
-def prior_residuals(unknowns: Sequence[Unknown], x: Array, noise: float) -> tuple[Array, Array]:
-    """Residuals and Jacobian of what was known of coordinates `x` beforehand, worth `noise` per sigma.
-
-    What is known of a first coordinate is a reading, so where the sensor's offset is sought too, their sum is held
-    against it. Held against the coordinate alone it would fight the offset (seen: 34 sigma on a cart whose spring was
-    slack 6 mm from zero, which bent everything else).
-    """
-    known = [(i, u, u.prior) for i, u in enumerate(unknowns) if u.prior is not None]
-    place = {(u.name, run): i for i, u in enumerate(unknowns) for run in u.runs}
-    r, J = np.zeros(len(known)), np.zeros((len(known), x.size))
-    for row, (i, u, (mean, sigma)) in enumerate(known):
-        kind, _, which = u.name.partition(".")
-        parts = [i] if kind != "initial" else [i, place.get((f"offset.{which}", u.runs[0]), i)]
-        J[row, parts] = noise / sigma
-        r[row] = noise * (float(np.sum(x[list(dict.fromkeys(parts))])) - mean) / sigma
-    return r, J

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from upright.identification.model.rig import Rig, base_values
 from upright.identification.model.runs import Run
 from upright.identification.model.unknowns import Unknown, friction_names, shared_unknowns
-from upright.identification.problem.normal_equations import Normal, Rows, finite, mixed, products, squares
-from upright.identification.problem.nuisances import CHANGES, Setting, prior_residuals, run_unknowns, setting
+from upright.identification.problem.normal_equations import Normal, finite, mixed, products, squares
+from upright.identification.problem.nuisances import CHANGES, Setting, run_unknowns, setting
 from upright.identification.problem.predictor import restart_states
 from upright.identification.problem.restarts import PERTURBATION, Restart, settle
 from upright.identification.problem.simulated import motions, outputs, simulator
@@ -115,10 +115,7 @@ class Problem:
 
     def count(self, horizon: float = math.inf) -> int:
         """Number of residuals within `horizon` seconds."""
-        return sum(
-            self.samples(i, horizon) * t.restarts.size * max(1, int(np.count_nonzero(t.weights)))
-            for i, t in enumerate(self.tracks)
-        )
+        return sum(t.within(horizon) * t.restarts.size * max(1, int(np.count_nonzero(t.weights))) for t in self.tracks)
 
     def simulate(self, index: int, x: Array, samples: int, shift: Array | None = None) -> Array:
         """Outputs (samples, W, outputs, lanes) of one run for coordinates `x` (sought, lanes).
@@ -156,37 +153,35 @@ class Problem:
             self._solvers[index] = simulator(self.rig, track, {**self.base, **track.run.known}, free)
         return self._solvers[index]
 
-    def samples(self, index: int, horizon: float) -> int:
-        """Samples of one run within `horizon` seconds, at least two."""
-        return self.tracks[index].within(horizon)
+    def _lanes(self, x: Array, sought: NDArray[np.int64], *, central: bool = False) -> Array:
+        """Coordinates (sought, lanes) with every number moved by its step, to both sides when `central`."""
+        move = np.zeros((x.size, sought.size))
+        move[sought, np.arange(sought.size)] = self.steps[sought]
+        return x[:, None] + np.hstack([np.zeros((x.size, 1)), move, *([-move] if central else [])])
 
-    def rows(self, index: int, x: Array, horizon: float = math.inf, *, central: bool = False) -> Rows | None:
-        """Residuals and Jacobian of one run, None when the simulation ran away."""
+    def rows(
+        self, index: int, x: Array, horizon: float = math.inf, *, central: bool = False
+    ) -> tuple[Array, Array] | None:
+        """Residuals (T, outputs) of one run, windows one after another, and their Jacobian (T, outputs, sought in it).
+
+        None when the simulation ran away.
+        """
         track, sought = self.tracks[index], self.sought_in(index)
-        n, m = self.samples(index, horizon), sought.size
-        lanes = np.repeat(x[:, None], 2 * m + 1 if central else m + 1, axis=1)
-        here = np.arange(m)
-        lanes[sought, 1 + here] += self.steps[sought]
-        if central:
-            lanes[sought, 1 + m + here] -= self.steps[sought]
+        n, m = track.within(horizon), sought.size
         restart = self.restart(index, x) if track.uncertain.size else None
-        y = self.simulate(index, lanes, n, None if restart is None else restart.shift)
-        W = track.weighting
-        target = track.targets(n)
-        skip = 0 if track.windowed else min(track.first, n - 1)
-        residual = (y[skip:, :, :, 0] - target[skip:]) @ W.T
+        y = self.simulate(index, self._lanes(x, sought, central=central), n, restart.shift if restart else None)
+        residual = track.errors(y[..., 0])
         if not finite(residual):
             return None
+        y = y[min(track.first, n - 1) :]
         with np.errstate(over="ignore", invalid="ignore"):  # a lane that ran away makes the cost infinite
-            if central:
-                slope = W @ ((y[skip:, :, :, 1 : m + 1] - y[skip:, :, :, m + 1 :]) / (2 * self.steps[sought]))
-            else:
-                slope = W @ ((y[skip:, :, :, 1:] - y[skip:, :, :, :1]) / self.steps[sought])
+            behind = y[..., m + 1 :] if central else y[..., :1]
+            slope = track.weighting @ ((y[..., 1 : m + 1] - behind) / (self.steps[sought] * (1 + central)))
         k = len(track.columns) * (n if track.ahead else 1)  # all horizons of one restart stand in one row
         r, J = np.moveaxis(residual, 1, 0), np.moveaxis(slope, 1, 0)  # windows one after another
         if restart is not None:
             r, J = restart.rows(r.reshape(track.restarts.size, -1), J.reshape(track.restarts.size, -1, m))
-        return Rows(r.reshape(-1, k), J.reshape(-1, k, m), sought)
+        return r.reshape(-1, k), J.reshape(-1, k, m)
 
     def residuals(self, index: int, x: Array, horizon: float = math.inf) -> Array:
         """Residuals (W, samples) of every window of one run, each from the restart that suits it; no Jacobian."""
@@ -194,10 +189,8 @@ class Problem:
         if track.uncertain.size:
             restart = self.restart(index, x)
             return np.concatenate([restart.residual, restart.price], axis=1)
-        n = self.samples(index, horizon)
-        skip = 0 if track.windowed else min(track.first, n - 1)
-        y = self.simulate(index, x[:, None], n)[skip:, :, :, 0]
-        return np.moveaxis((y - track.targets(n)[skip:]) @ track.weighting.T, 1, 0).reshape(track.restarts.size, -1)
+        y = self.simulate(index, x[:, None], track.within(horizon))[..., 0]
+        return np.moveaxis(track.errors(y), 1, 0).reshape(track.restarts.size, -1)
 
     def restart(self, index: int, x: Array) -> Restart:
         """Where the windows of one run are best restarted, for coordinates `x`."""
@@ -205,17 +198,15 @@ class Problem:
         places = track.uncertain
         variance = track.variance[:, places]
         sizes = PERTURBATION * track.start.spread[places]
-        targets = track.targets(track.length)
         lanes = np.repeat(x[:, None], 1 + places.size, axis=1)
-        W = track.weighting
 
         def respond(d: Array) -> tuple[Array, Array]:
             shift = np.zeros((track.x0.shape[1], track.restarts.size, 1 + places.size))
             shift[places] = d.T[:, :, None]
             shift[places, :, 1 + np.arange(places.size)] += sizes[:, None]
             y = self.simulate(index, lanes, track.length, shift)
-            residual = np.moveaxis((y[..., 0] - targets) @ W.T, 1, 0).reshape(len(d), -1)
-            slope = np.moveaxis(W @ ((y[..., 1:] - y[..., :1]) / sizes), 1, 0)
+            residual = np.moveaxis(track.errors(y[..., 0]), 1, 0).reshape(len(d), -1)
+            slope = np.moveaxis(track.weighting @ ((y[..., 1:] - y[..., :1]) / sizes), 1, 0)
             return residual, slope.reshape(*residual.shape, -1)
 
         d, residual, slope = settle(respond, variance)
@@ -233,7 +224,7 @@ class Problem:
                 rows = self.rows(index, x, horizon)
                 if rows is None:
                     return Normal.lost(size)
-                squares = products(rows.jacobian.reshape(-1, sought.size), rows.residual.reshape(-1))
+                squares = products(rows[1].reshape(-1, sought.size), rows[0].reshape(-1))
             else:
                 squares = self._squares(index, x, horizon, sought)
             if not math.isfinite(squares[2]):
@@ -248,13 +239,11 @@ class Problem:
 
     def _squares(self, index: int, x: Array, horizon: float, sought: NDArray[np.int64]) -> tuple[Array, Array, float]:
         """``J'J``, ``J'r`` and ``r'r`` of a free run, in the lanes as they come: the same numbers as from `rows`."""
-        track, n = self.tracks[index], self.samples(index, horizon)
-        lanes = np.repeat(x[:, None], 1 + sought.size, axis=1)
-        lanes[sought, 1 + np.arange(sought.size)] += self.steps[sought]
-        d = self._setting(index, lanes)
+        track, n = self.tracks[index], self.tracks[index].within(horizon)
+        d = self._setting(index, self._lanes(x, sought))
         self.evaluations += 1
         rows = len(d.x0) + track.u.shape[1]  # a loop records its commands as well
-        if self._memory.size < (most := n * rows * (lanes.shape[1] + 15)):
+        if self._memory.size < (most := n * rows * (sought.size + 16)):
             self._memory = np.empty(most)
         motion = motions(self.solver(index), track, d.values, d.x0, samples=n, memory=self._memory)
         skip = min(track.first, n - 1)
@@ -282,7 +271,7 @@ class Problem:
 
     def rescale_steps(self, normal: Normal, horizon: float) -> None:
         """Choose perturbations by the effects found at an earlier evaluation within `horizon` seconds."""
-        samples = sum(self.samples(i, horizon) * t.restarts.size for i, t in enumerate(self.tracks))
+        samples = sum(t.within(horizon) * t.restarts.size for t in self.tracks)
         effect = np.sqrt(np.maximum(np.diag(normal.matrix), 0.0) / samples)
         wanted = np.where(effect > 0, STEP / np.maximum(effect, 1e-300), 100 * self.steps)
         wanted = np.clip(wanted, self.steps * 1e-4, self.steps * 1e4)
@@ -290,8 +279,21 @@ class Problem:
         self.steps = np.clip(wanted, 1e-9 * scale, 1e-3 * scale)
 
     def prior_rows(self, x: Array) -> tuple[Array, Array]:
-        """Residuals and Jacobian of what was known beforehand, worth `noise` per sigma."""
-        return prior_residuals(self.unknowns, x, self.noise)
+        """Residuals and Jacobian of what was known beforehand of coordinates `x`, worth `noise` per sigma.
+
+        What is known of a first coordinate is a reading, so where the sensor's offset is sought too, their sum is held
+        against it. Held against the coordinate alone it would fight the offset (seen: 34 sigma on a cart whose spring
+        was slack 6 mm from zero, which bent everything else).
+        """
+        known = [(i, u, u.prior) for i, u in enumerate(self.unknowns) if u.prior is not None]
+        place = {(u.name, run): i for i, u in enumerate(self.unknowns) for run in u.runs}
+        r, J = np.zeros(len(known)), np.zeros((len(known), x.size))
+        for row, (i, u, (mean, sigma)) in enumerate(known):
+            kind, _, which = u.name.partition(".")
+            parts = {i} if kind != "initial" else {i, place.get((f"offset.{which}", u.runs[0]), i)}
+            J[row, list(parts)] = self.noise / sigma
+            r[row] = self.noise * (float(np.sum(x[list(parts)])) - mean) / sigma
+        return r, J
 
     def cost(self, x: Array, horizon: float = math.inf) -> float:
         """Sum of squares alone, one lane per run."""

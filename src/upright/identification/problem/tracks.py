@@ -167,6 +167,11 @@ class Track:
             return self.length
         return max(2, min(self.length, int(horizon / self.dt) + 1))
 
+    def errors(self, y: Array) -> Array:
+        """Weighted errors (samples, W, outputs) of simulated outputs, of a free run from the first that counts on."""
+        skip = min(self.first, len(y) - 1)
+        return (y[skip:] - self.targets(len(y))[skip:]) @ self.weighting.T
+
     def targets(self, samples: int) -> Array:
         """Measured outputs (samples, W, outputs) that windows cut to `samples` are compared with."""
         if self.ahead:
@@ -251,7 +256,7 @@ def prepare(rig: Rig, run: Run, *, thin: bool) -> Track:
         period=period,
         start=start,
         held=held,
-        first=int(np.ceil(run.score_from / dt)),
+        first=0 if run.horizon is not None else int(np.ceil(run.score_from / dt)),
         variance=variance,
         ahead=ahead,
     )
