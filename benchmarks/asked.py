@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from upright.identification.model.model import RunScore
+from upright.identification import RunScore
 
 SMOOTHED = 0.05
 """Seconds over which a speed is taken, by parabolas through the counts."""

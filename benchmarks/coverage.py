@@ -35,8 +35,8 @@ def noise(samples: int, memory: float, generator: np.random.Generator) -> np.nda
 
 def held(seconds: float, memory: float, seeds: Sequence[int]) -> np.ndarray:
     """Whether each interval held the truth (seeds, unknowns)."""
+    from upright.identification import Parameter, Rig, Run
     from upright.identification.estimate import identify
-    from upright.identification.model.model import Parameter, Rig, Run
     from upright.physics import Pendulum
     from upright.simulation import simulate
 

@@ -198,7 +198,8 @@ def _record(
 ) -> Doctored:  # fmt: skip
     """Sensors, log and fault of one motion."""
     from upright.doctor import Known
-    from upright.identification.model.model import ACTUATOR, Parameter
+    from upright.identification import Parameter
+    from upright.identification.model.rig import ACTUATOR
     from upright.records import Provenance, Record
     from upright.study.columns import Drive, Sensor
 

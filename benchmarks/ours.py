@@ -59,7 +59,7 @@ def ensemble(p: np.ndarray, x0: np.ndarray, *, samples: int, stick_slip: bool) -
 
 def study() -> tuple[Any, Any]:
     """Rig and run of the synthetic fit: eight unknowns, two encoders."""
-    from upright.identification.model.model import Parameter, Rig, Run
+    from upright.identification import Parameter, Rig, Run
     from upright.physics import Furuta
     from upright.simulation import simulate
 
@@ -89,15 +89,17 @@ def study() -> tuple[Any, Any]:
 
 def search() -> Callable[[], np.ndarray]:
     """Levenberg-Marquardt over the growing horizon, nothing else; estimates as `problem.TRUTH`."""
-    from upright.identification.problem.pose import pose
-    from upright.identification.search.descent import grow
+    from upright.identification.problem.residuals import formulate
+    from upright.identification.search.descent import descend_progressively
 
     rig, run = study()
 
     def estimate() -> np.ndarray:
-        posed = pose(rig, [run])
-        found = dict(zip([u.name for u in posed.unknowns], posed.value(grow(posed, posed.start).x), strict=True))
-        return np.array([found[name] for name in (*problem.UNKNOWN, "initial.theta")])
+        posed = formulate(rig, [run])
+        found = dict(
+            zip([u.name for u in posed.unknowns], posed.value(descend_progressively(posed, posed.start).x), strict=True)
+        )
+        return np.array([found[name] for name in (*problem.UNKNOWN, "swing: initial.theta")])
 
     return estimate
 

@@ -50,7 +50,7 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
 
 
 def _result(name: str, data: str, rounds: int) -> Result:
-    from upright.identification.ladder.crossval import cross_validate
+    from upright.identification.ladder.cross_validation import cross_validate
 
     study, fit, _ = _timed(name, data)  # compiles what is not compiled yet
     taken = [_timed(name, data)[2] for _ in range(rounds)]

@@ -70,8 +70,8 @@ def command(force: float, samples: int, generator: np.random.Generator) -> np.nd
 
 def outcome(make: Make, seed: int) -> tuple[dict[str, bool], dict[str, str], bool]:
     """Whether each interval held the truth, its status, and whether the fit is trusted, of one rig."""
+    from upright.identification import Parameter, Rig, Run
     from upright.identification.estimate import identify
-    from upright.identification.model.model import Parameter, Rig, Run
     from upright.physics import find
     from upright.simulation import simulate
 

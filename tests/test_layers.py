@@ -194,7 +194,7 @@ def test_no_file_is_called_after_a_drawer():
         ("from upright import identify", "upright.cli.model.identify"),
         ("def later():\n    from upright.cli import app", "upright.lab.laboratory"),
         ("from ..simulation import simulate", "upright.physics.plant"),
-        ("from upright.identification.estimate import identify", "upright.identification.problem.problem"),
+        ("from upright.identification.estimate import identify", "upright.identification.problem.residuals"),
         ("from upright.lab.tracking_3 import run", "upright.lab.free_swing_4.run"),
         ("import sympy as sp", "upright.simulation.kernel.source"),
         ("def later():\n    from sympy import sin", "upright.lab.laboratory"),
@@ -221,7 +221,7 @@ def test_an_arrow_that_points_up_is_refused(source, module):
         ("from upright import __version__", "upright.report.document"),
         ("def later():\n    from upright.lab import laboratory", "upright.cli.course.lab"),
         ("import sympy", "upright.physics.lagrange"),
-        ("from upright.identification.problem.problem import Problem", "upright.identification.search.descent"),
+        ("from upright.identification.problem.residuals import Problem", "upright.identification.search.descent"),
     ],
 )
 def test_an_arrow_that_points_down_is_welcome(source, module):

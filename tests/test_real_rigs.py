@@ -13,7 +13,7 @@ import pytest
 
 from benchmarks.asked import ASKED, studies
 from upright.identification.estimate import identify
-from upright.identification.ladder.crossval import cross_validate
+from upright.identification.ladder.cross_validation import cross_validate
 from upright.study.load import load_study
 
 STUDIES = Path(__file__).parents[1] / "examples" / "studies"

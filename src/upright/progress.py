@@ -10,3 +10,12 @@ Progress = Callable[[str, float], None]
 
 def silent(step: str, share: float) -> None:
     """Take note of nothing; what runs when nobody asked to be told."""
+
+
+def part(progress: Progress, start: float, stop: float, what: str) -> Progress:
+    """Progress of one part, called `what`, of a longer piece of work of which it takes the shares `start` to `stop`."""
+
+    def tell(step: str, share: float) -> None:
+        progress(f"{what}: {step}", start + (stop - start) * share)
+
+    return tell

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from tests.identification.twins import PENDULUM, noisy, swing
 from upright.cli import app
-from upright.identification.ladder import grow as climb
+from upright.identification.ladder import growth as climb
 from upright.study.load import load_study
 
 pytestmark = pytest.mark.slow

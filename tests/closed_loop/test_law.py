@@ -10,9 +10,9 @@ import pytest
 from tests.closed_loop.programs import Pid, T
 from upright.closed_loop import Feedback, Filter, SampledLaw, pid, state_feedback
 from upright.errors import BadInput
-from upright.identification.model.model import Parameter, Rig, Run
+from upright.identification import Parameter, Rig, Run
 from upright.identification.problem.simulated import motions, simulator
-from upright.identification.problem.track import prepare
+from upright.identification.problem.tracks import prepare
 from upright.physics import find
 
 LAWS = {

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from tests.identification.twins import PENDULUM, noisy, rig, swing
+from upright.identification import to_lmfit
 from upright.identification.estimate import identify
-from upright.identification.lmfit_border import to_lmfit
 from upright.physics import Pendulum
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from upright.identification.model.model import Parameter, Rig, Run
+from upright.identification import Parameter, Rig, Run
 from upright.physics import Furuta, Pendulum
 from upright.simulation import simulate
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from upright.identification.model.model import Estimate, Fit, Parameter, Rig, RunScore
+from upright.identification import Estimate, Fit, Parameter, Rig, RunScore
 from upright.physics import Furuta
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from upright.identification.model.model import Estimate
+from upright.identification import Estimate
 from upright.report.advice import next_steps
 
 

@@ -8,7 +8,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from upright.identification.model.model import Estimate
+from upright.identification import Estimate
 from upright.report import write_fit_report
 
 VOID = {"meta", "link", "br", "hr", "img", "input"}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from upright.identification.model.model import Estimate
+from upright.identification import Estimate
 from upright.report.advice import next_steps
 from upright.report.tables import run_rows, score_rows
 

@@ -9,7 +9,7 @@ import pytest
 
 from tests.closed_loop.programs import Pid, T, closed_loop
 from upright.errors import BadInput
-from upright.identification.model.model import Run
+from upright.identification import Run
 from upright.study import load_study
 
 STUDY = """

@@ -7,13 +7,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from upright.progress import Progress, silent
 from upright.report.symbols import typed
 
 if TYPE_CHECKING:
-    from upright.identification.ladder.crossval import CrossValidation
-    from upright.identification.model.model import Fit, RunScore
-
-Progress = Callable[[str, float, float, int], None]
+    from upright.identification import Fit, RunScore
+    from upright.identification.ladder.cross_validation import CrossValidation
 
 
 def console(*, error: bool = False) -> Any:
@@ -27,29 +26,24 @@ def console(*, error: bool = False) -> Any:
 
 
 @contextmanager
-def progress_line(*, quiet: bool = False) -> Generator[Progress | None]:
+def progress_line(*, quiet: bool = False) -> Generator[Progress]:
     """One line on stderr that follows the search; nothing when `quiet` or when nobody watches."""
     screen = console(error=True)
     if quiet or not screen.is_terminal:
-        yield None
+        yield silent
         return
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bar
 
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
-        TextColumn("cost {task.fields[cost]}, {task.fields[evaluations]} evaluations"),
         TimeElapsedColumn(),
         TextColumn("Ctrl-C keeps the best so far"),
     )
     with Bar(*columns, console=screen, transient=True, refresh_per_second=8) as bar:
-        task = bar.add_task("starting", total=1.0, cost="", evaluations=0)
-
-        def follow(stage: str, fraction: float, cost: float, evaluations: int) -> None:
-            bar.update(task, description=stage, completed=fraction, cost=f"{cost:.6g}", evaluations=evaluations)
-
-        yield follow
+        task = bar.add_task("starting", total=1.0)
+        yield lambda step, share: bar.update(task, description=step, completed=share)
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from upright.identification.model.model import Parameter
+from upright.identification import Parameter
 from upright.physics import Plant
 from upright.readers.inspection import Column, Inspection
 from upright.records import Array, Record

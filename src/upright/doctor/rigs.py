@@ -11,7 +11,7 @@ import numpy as np
 
 from upright.doctor.case import Case, Place
 from upright.errors import BadInput
-from upright.identification.model.model import Parameter
+from upright.identification import Parameter
 from upright.physics import Plant, find
 from upright.readers.inspection import Inspection
 from upright.records import Array, Record

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from upright.identification.estimate import METHODS, fit_percent, identify, predict
-    from upright.identification.lmfit_border import to_lmfit
-    from upright.identification.model.model import Estimate, Feedback, Fit, Parameter, Rig, Run, RunScore
+    from upright.identification.model.fit import Estimate, Fit, RunScore, to_lmfit
+    from upright.identification.model.rig import Parameter, Rig
+    from upright.identification.model.runs import Feedback, Run
     from upright.identification.search.curve import CurveFit, fit_curve
 
 __all__ = [
@@ -38,8 +39,9 @@ __all__ = [
 
 _HOMES = {
     "estimate": ("METHODS", "fit_percent", "identify", "predict"),
-    "lmfit_border": ("to_lmfit",),
-    "model.model": ("Estimate", "Feedback", "Fit", "Parameter", "Rig", "Run", "RunScore"),
+    "model.fit": ("Estimate", "Fit", "RunScore", "to_lmfit"),
+    "model.rig": ("Parameter", "Rig"),
+    "model.runs": ("Feedback", "Run"),
     "search.curve": ("CurveFit", "fit_curve"),
 }
 

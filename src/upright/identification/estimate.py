@@ -1,4 +1,4 @@
-"""Which numbers explain these runs, how sure is that, and what can they not tell?"""
+"""Identification of a rig from its runs: the numbers that explain them, how sure these are, and what stays unseen."""
 
 from __future__ import annotations
 
@@ -11,31 +11,28 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.errors import BadInput
+from upright.errors import BadInput, nearest
 from upright.identification.checks.conventions import doubts
 from upright.identification.checks.refit import watched
-from upright.identification.inference.answer import answer
-from upright.identification.inference.scoring import fit_percent, predict
-from upright.identification.ladder.friction import choose
-from upright.identification.ladder.rungs import without
-from upright.identification.model.model import Fit, Rig, Run
-from upright.identification.problem.pose import pose, unresolved
-from upright.identification.problem.predictor_setup import with_noise
-from upright.identification.problem.problem import Problem
+from upright.identification.inference.assumptions import assumptions, sentences
+from upright.identification.inference.covariance import Optimum, assess
+from upright.identification.inference.identifiability import Identifiability, identifiability
+from upright.identification.inference.intervals import run_estimates, shared_estimates, widened, with_model_uncertainty
+from upright.identification.inference.poles import poles
+from upright.identification.inference.scoring import fit_percent, predict, score
+from upright.identification.inference.verdict import GOOD, judge
+from upright.identification.ladder.growth import choose_friction
+from upright.identification.model.fit import Estimate, Fit, Pole, RunScore
+from upright.identification.model.rig import Rig
+from upright.identification.model.runs import Run
+from upright.identification.problem.predictor import with_noise
+from upright.identification.problem.residuals import Problem, formulate, unresolved
 from upright.identification.problem.trips import located, untold
-from upright.identification.search.descent import Descent, Report, grow
+from upright.identification.search.descent import Descent, SearchLog, descend_progressively, first_horizon
 from upright.identification.search.moments import other_moments
 from upright.identification.search.simplex import simplex
-from upright.identification.search.strategy import (
-    Log,
-    better,
-    carried,
-    closed_form_starts,
-    count,
-    explain,
-    placed,
-    weigh_priors,
-)
+from upright.identification.search.strategy import POOR, better, closed_form_starts, rescale_priors, search
+from upright.progress import Progress, silent
 
 __all__ = ["METHODS", "fit_percent", "identify", "predict"]
 
@@ -47,7 +44,7 @@ the guess over a growing horizon. `simplex`: the paper's, then polished by least
 
 
 def identify(
-    rig: Rig, runs: Sequence[Run], *, method: str = "auto", progress: Report | None = None, watch: bool = True
+    rig: Rig, runs: Sequence[Run], *, method: str = "auto", progress: Progress = silent, watch: bool = True
 ) -> Fit:
     """Estimate a rig's parameters from its runs.
 
@@ -61,7 +58,7 @@ def identify(
     method : {"auto", "least-squares", "simplex"}
         See `METHODS`.
     progress : callable, optional
-        Called with stage, fraction done, cost and number of simulations.
+        Told the stage, its cost and its number of simulations, and the share done.
     watch : bool
         Whether stretches that something else than the input moved are named, and left out in a second fit.
 
@@ -78,89 +75,178 @@ def identify(
     """
     began = time.perf_counter()
     rig = with_noise(rig, runs)
-    seen = [located(rig, run) for run in runs if run.role == "fit"]
-    _check(rig, seen, method)
-    log = Log(report=progress, doubts=cache(lambda: doubts(rig, seen)))
-    log.warnings += untold(rig, seen)
-    left_out: tuple[str, ...] = ()
-    chosen = rig
-    problem = pose(rig, seen)
-    found: Descent | None = None
+    fitted = [located(rig, run) for run in runs if run.role == "fit"]
+    _check(rig, fitted, method)
+    log = SearchLog(progress=progress, conventions=cache(lambda: doubts(rig, fitted)))
+    log.warnings += untold(rig, fitted)
     try:
-        if method == "auto":
-            chosen, candidates, left_out = choose(rig, seen, log)
-            if chosen is not rig:
-                problem = pose(chosen, seen)
-            found = explain(problem, candidates, log)
-        elif method == "simplex":
-            x, limit = problem.start, 200 * problem.start.size
-            for horizon in (_half(problem), math.inf):
-                x, cost = simplex(problem, x, horizon=horizon, limit=limit, report=progress, keep=log.keep(problem))
-                log.history.append(("simplex", cost, problem.evaluations))
-            found = grow(problem, x, report=progress, history=log.history, horizon=math.inf)
-        else:
-            found = grow(problem, problem.start, report=progress, history=log.history)
-            log.best = problem, found.x
-            if found.normal.cost > 0.04 * count(problem) and not found.interrupted:
-                starts = [placed(problem, s) for s in closed_form_starts(rig, seen)]
-                other = explain(problem, starts, log, patient=False) if starts else found
-                found = better(found, other)
-        found = other_moments(problem, found, log)
-        plain = () if found.interrupted else unresolved(problem, found.x)
-        if plain:  # kept at their bound they would bias everything else
-            log.unresolved = plain
-            left_out += plain
-            chosen, wider = without(chosen, plain), (problem, found.x)
-            problem = pose(chosen, seen)
-            found = grow(problem, carried(*wider, problem), report=progress, history=log.history, horizon=math.inf)
-        found = weigh_priors(problem, found)
-        if found.interrupted:  # perhaps over a part of the runs
-            found = replace(found, normal=problem.normal(found.x))
+        problem, found = _search(rig, fitted, method, log)
     except KeyboardInterrupt:
-        chosen, problem, x = _resumed(rig, seen, log)
-        left_out = tuple(n for n in rig.estimated if n not in chosen.estimated)
+        problem, x = _best_so_far(rig, fitted, log)
         found = Descent(x=x, normal=problem.normal(x), converged=False, interrupted=True)
 
-    def told(found: Descent) -> Fit:
-        return answer(
-            rig, chosen, runs, problem, found,
-            log=log, method=method, left_out=left_out, seconds=lambda: time.perf_counter() - began,
-        )  # fmt: skip
+    def conclude(found: Descent) -> Fit:
+        fit = _conclude(rig, runs, problem, found, log)
+        return replace(fit, method=method, seconds=time.perf_counter() - began)
 
     try:
-        fit = told(found)
+        fit = conclude(found)
         if not watch or fit.interrupted:
             return fit
         return watched(fit, rig, runs, lambda kept: identify(rig, kept, method=method, progress=progress, watch=False))
     except KeyboardInterrupt:  # intervals and predictions may take long too; without them an answer is near
-        return told(replace(found, interrupted=True))
+        return conclude(replace(found, interrupted=True))
 
 
-def _resumed(rig: Rig, seen: Sequence[Run], log: Log) -> tuple[Rig, Problem, Array]:
-    """Rig, problem and coordinates of the best so far, which may be of a part of the runs."""
+def _search(rig: Rig, runs: Sequence[Run], method: str, log: SearchLog) -> tuple[Problem, Descent]:
+    """The problem whose model was chosen, and where its cost is least."""
+    problem = formulate(rig, runs)
+    if method == "auto":
+        chosen, candidates = choose_friction(rig, runs, log)
+        if chosen is not rig:
+            problem = formulate(chosen, runs)
+        found = search(problem, candidates, log)
+    elif method == "simplex":
+        x = problem.start
+        for horizon in (min(problem.duration, 2 * first_horizon(problem)), math.inf):
+            x, cost = simplex(problem, x, log, horizon=horizon, limit=200 * x.size, keep=True)
+            log.note("simplex", cost, problem)
+        found = descend_progressively(problem, x, log, horizon=math.inf)
+    else:
+        found = descend_progressively(problem, problem.start, log)
+        log.best = problem, found.x
+        if found.normal.cost > POOR * problem.count() and not found.interrupted:
+            starts = [problem.place(s) for s in closed_form_starts(rig, runs)]
+            other = search(problem, starts, log, patient=False) if starts else found
+            found = better(found, other)
+    found = other_moments(problem, found, log)
+    log.unresolved = () if found.interrupted else unresolved(problem, found.x)
+    if log.unresolved:  # kept at their bound they would bias everything else
+        whole = formulate(problem.rig.without(log.unresolved), runs)
+        found = descend_progressively(whole, whole.place(problem.values_at(found.x)), log, horizon=math.inf)
+        problem = whole
+    found = rescale_priors(problem, found)
+    if found.interrupted:  # perhaps over a part of the runs
+        found = replace(found, normal=problem.normal(found.x))
+    return problem, found
+
+
+def _best_so_far(rig: Rig, runs: Sequence[Run], log: SearchLog) -> tuple[Problem, Array]:
+    """Problem and coordinates of the best so far, which may be of a part of the runs."""
     if log.best is None:
-        problem = pose(rig, seen)
-        return rig, problem, problem.start
+        problem = formulate(rig, runs)
+        return problem, problem.start
     part, x = log.best
-    problem = pose(part.rig, seen)
-    return part.rig, problem, carried(part, x, problem)
+    problem = formulate(part.rig, runs)
+    return problem, problem.place(part.values_at(x))
 
 
-def _half(problem: Problem) -> float:
-    from upright.identification.search.descent import first_horizon
-
-    return min(problem.duration, 2 * first_horizon(problem))
-
-
-def _check(rig: Rig, seen: Sequence[Run], method: str) -> None:
-    from upright.errors import nearest
-
+def _check(rig: Rig, runs: Sequence[Run], method: str) -> None:
     if method not in METHODS:
         raise BadInput(f"the method must be one of {', '.join(METHODS)}, got '{method}'; {nearest(method, METHODS)}")
-    if not seen:
+    if not runs:
         raise BadInput("an identification needs at least one run with role 'fit', none came; set it for one run.")
     if not rig.estimated:
         raise BadInput("nothing is asked: no parameter is to be estimated; give at least one a guess.")
-    for run in seen:
+    for run in runs:
         if run.t.size < 10:
             raise BadInput(f"run '{run.label}' has {run.t.size} samples, at least 10 are needed; widen its window.")
+
+
+def _conclude(asked: Rig, runs: Sequence[Run], problem: Problem, found: Descent, log: SearchLog) -> Fit:
+    """Everything known about an optimum; of an interrupted search only what takes no time, so no predictions."""
+    best = assess(problem, found.x)
+    seen = identifiability(best)
+    warnings = list(log.warnings)
+    estimates = shared_estimates(best, seen.hidden, log, profiles=not found.interrupted)
+    per_run, groups = run_estimates(best)
+    for name, value in log.rivals.items():
+        e = widened(estimates[name], (value, value))
+        estimates[name] = replace(e, status="weak" if e.status == "firm" else e.status)
+    left_out = [n for n in asked.estimated if n not in problem.rig.estimated]
+    for name in left_out:
+        unit = asked.parameters[name].unit
+        estimates[name] = Estimate(value=0.0, stderr=0.0, interval=(0.0, 0.0), unit=unit, status="left out")
+        warnings.append(
+            f"{name} was left out: shorter than the encoder's rounding, it is plain Coulomb friction."
+            if name in log.unresolved
+            else f"{name} was left out: with it the held-out part of the runs is not predicted better."
+        )
+    estimates = {n: estimates[n] for n in asked.parameters if n in estimates}
+    if not found.interrupted:
+        estimates = with_model_uncertainty(estimates, best, asked, left_out, log)
+    scored = [run for run in runs if run.role == "fit" or not found.interrupted]
+    scores = _scores(best, scored, estimates, groups, log)
+    if len(scored) < len(runs):
+        warnings.append("What was held out is not predicted, because the search was interrupted.")
+    unseen = seen.sentences({n: p.unit for n, p in asked.parameters.items()})
+    worst = min((p for s in scores.values() if s.role == "fit" for p in s.fit_percent.values()), default=100.0)
+    conventions = tuple(log.conventions()) if worst < GOOD else ()
+    verdict, trusted = judge(
+        runs=scores,
+        estimates=estimates,
+        unseen=unseen,
+        conventions=conventions,
+        converged=found.converged,
+        interrupted=found.interrupted,
+        memory=best.memory,
+        period=min(t.period for t in problem.tracks),
+    )
+    assumed = () if found.interrupted else assumptions(best, estimates)
+    return Fit(
+        rig=asked,
+        estimates=estimates,
+        per_run=per_run,
+        groups=groups,
+        runs=scores,
+        verdict=" ".join([verdict, *sentences(assumed)]),
+        trusted=trusted,
+        method="",
+        evaluations=problem.evaluations,
+        seconds=0.0,
+        cost=found.normal.cost,
+        names=seen.names,
+        correlation=_correlation(best, seen),
+        singular_values=seen.singular_values,
+        directions=seen.directions,
+        unseen=unseen,
+        warnings=(*warnings, *conventions),
+        history=tuple(log.history),
+        interrupted=found.interrupted,
+        poles={} if seen.hidden else _poles(best),  # a pole may depend on what the data cannot see
+        assumptions=assumed,
+    )
+
+
+def _scores(
+    best: Optimum, runs: Sequence[Run], estimates: dict[str, Estimate], groups: dict[str, dict[str, Estimate]],
+    log: SearchLog,
+) -> dict[str, RunScore]:  # fmt: skip
+    problem, rig = best.problem, best.problem.rig
+    fitted = [run for run in runs if run.role == "fit"]
+    thinned = any(t.y.shape[0] < t.run.t.size for t in problem.tracks)
+    whole = formulate(rig, fitted, thin=False) if thinned else problem
+    found = {run.label: score(whole, i, best.x) for i, run in enumerate(fitted)}
+    values = {n: e.value for n, e in estimates.items()}
+    known = {label: {n: e.value for n, e in group.items()} for label, group in groups.items()}
+    found |= predict(values, rig, [r for r in runs if r.role != "fit"], groups=known, progress=log.progress)
+    return {run.label: found[run.label] for run in runs}
+
+
+def _correlation(best: Optimum, seen: Identifiability) -> Array:
+    """Correlation (names, names) of the shared numbers in the order of `seen.names`."""
+    places = [i for i in best.shared if best.problem.unknowns[i].name in seen.names]
+    C = best.covariance[np.ix_(places, places)]
+    d = np.sqrt(np.maximum(np.diag(C), 0.0))
+    s = np.where(d > 0, 1 / np.where(d > 0, d, 1.0), 0.0)
+    R = C * s[:, None] * s
+    np.fill_diagonal(R, 1.0)
+    return R
+
+
+def _poles(best: Optimum) -> dict[str, tuple[Pole, ...]]:
+    unknowns = best.problem.unknowns
+    values = best.problem.base | best.problem.shared_at(best.x)
+    slope = np.array([values[unknowns[i].name] if unknowns[i].log else 1.0 for i in best.shared])
+    C = best.covariance[np.ix_(best.shared, best.shared)] * np.outer(slope, slope)
+    return poles(best.problem.rig, values, [unknowns[i].name for i in best.shared], C, best.quantile)

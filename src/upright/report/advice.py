@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from upright.identification.model.model import Fit
-from upright.identification.model.nuisance_names import SPREADS
+from upright.identification import Fit
+from upright.identification.model.runs import SPREADS
 from upright.report.figures import autocorrelation
 from upright.report.symbols import percent, plain
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from upright.identification.model.model import Estimate, Fit
+from upright.identification import Estimate, Fit
 from upright.report.drawing import BLACK, BLUE, GREY, VERMILLION, Array, figure, styled
 from upright.report.symbols import mathtext, number
 

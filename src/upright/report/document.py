@@ -12,9 +12,9 @@ from typing import Any
 
 from markupsafe import Markup
 
+from upright.identification import Fit
 from upright.identification.inference.assumptions import sentences
-from upright.identification.ladder.crossval import CrossValidation
-from upright.identification.model.model import Fit
+from upright.identification.ladder.cross_validation import CrossValidation
 from upright.report.advice import next_steps
 from upright.report.drawing import svg
 from upright.report.equations import equations

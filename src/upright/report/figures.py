@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from upright.identification.model.model import RunScore
+from upright.identification import RunScore
 from upright.physics import Plant
 from upright.report.drawing import (
     BLACK,

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from upright.identification.ladder.growth import Ladder, RungResult
 from upright.identification.ladder.repeats import Repeats
-from upright.identification.ladder.result import Ladder, Step
 from upright.report.advice import Step as Advice
 from upright.report.document import Picture, picture, render
 from upright.report.drawing import BLACK, BLUE, VERMILLION, figure, styled
@@ -67,7 +67,7 @@ def ladder_rows(ladder: Ladder) -> list[LadderRow]:
     ]
 
 
-def terms(step: Step) -> str:
+def terms(step: RungResult) -> str:
     """What a rung changes: names it adds, drops, and lets differ from run to run."""
     rung = step.rung
     said = [", ".join(rung.adds)] if rung.adds else []
@@ -134,7 +134,7 @@ def _ceiling(ladder: Ladder) -> float:
     return float(np.mean(values)) if values else math.nan
 
 
-def _label(step: Step) -> str:
+def _label(step: RungResult) -> str:
     lines = [""]
     for word in step.rung.name.split():
         if lines[-1] and len(lines[-1]) + len(word) > 12:

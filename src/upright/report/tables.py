@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 
 from markupsafe import Markup
 
-from upright.identification.ladder.crossval import CrossValidation
-from upright.identification.model.model import Estimate, Fit, Parameter, Pole, RunScore
+from upright.identification import Estimate, Fit, Parameter, RunScore
+from upright.identification.ladder.cross_validation import CrossValidation
+from upright.identification.model.fit import Pole
 from upright.report.mathml import symbol
 from upright.report.symbols import figures, measured, number, percent, plain, unit
 
@@ -78,7 +79,7 @@ def parameter_rows(fit: Fit) -> list[ParameterRow]:
 
 
 def _default(name: str) -> float:
-    from upright.identification.model.model import ACTUATOR
+    from upright.identification.model.rig import ACTUATOR
 
     return ACTUATOR[name][1] if name in ACTUATOR else 0.0
 

@@ -15,9 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from upright.errors import BadInput
+from upright.identification import Estimate, Fit
 from upright.identification.frequency.answer import Answer
-from upright.identification.ladder.crossval import CrossValidation
-from upright.identification.model.model import ACTUATOR, Estimate, Fit
+from upright.identification.ladder.cross_validation import CrossValidation
+from upright.identification.model.rig import ACTUATOR
 from upright.study.load import Study
 
 FORMAT = 1

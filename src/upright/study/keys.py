@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from upright.identification.model.model import ACTUATOR
-from upright.identification.model.nuisance_names import FOR_GROUPS, PER_RUN
+from upright.identification.model.rig import ACTUATOR
+from upright.identification.model.runs import FOR_GROUPS, PER_RUN
 
 
 class Key(NamedTuple):

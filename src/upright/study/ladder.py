@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from upright.identification.ladder.rungs import Rung
-from upright.identification.model.model import ACTUATOR
-from upright.identification.model.nuisance_names import PER_RUN
+from upright.identification.model.rig import ACTUATOR
+from upright.identification.model.runs import PER_RUN
 from upright.physics import Plant
 from upright.study.keys import names
 from upright.study.text import Section

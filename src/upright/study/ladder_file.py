@@ -9,9 +9,8 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
-from upright.identification.ladder.result import Ladder, Step
-from upright.identification.ladder.rungs import neutral
-from upright.identification.model.model import ACTUATOR
+from upright.identification.ladder.growth import Ladder, RungResult
+from upright.identification.model.rig import ACTUATOR, neutral
 from upright.study.load import Study
 from upright.study.text import StudyText
 
@@ -62,7 +61,7 @@ def as_json(ladder: Ladder, study: Study) -> dict[str, Any]:
     }
 
 
-def _step(s: Step) -> dict[str, Any]:
+def _step(s: RungResult) -> dict[str, Any]:
     c = s.comparison
     return {
         "name": s.rung.name,

@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from upright.errors import BadInput, nearest
+from upright.identification import Rig, Run
 from upright.identification.ladder.rungs import Rung
-from upright.identification.model.model import NOISE, Rig, Run
-from upright.identification.problem.predictor_setup import with_noise
+from upright.identification.model.rig import NOISE
+from upright.identification.problem.predictor import with_noise
 from upright.records import Record
 from upright.study.keys import names
 from upright.study.ladder import read_ladder

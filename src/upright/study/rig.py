@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from upright.errors import BadInput, ImpossiblePhysics
-from upright.identification.model.model import ACTUATOR, NEVER_NEGATIVE, Parameter, Rig
+from upright.identification import Parameter, Rig
+from upright.identification.model.rig import ACTUATOR, NEVER_NEGATIVE
 from upright.physics import Plant, find
 from upright.quantities import Quantity
 from upright.study.columns import in_unit

@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 
 from upright.errors import BadInput, nearest
-from upright.identification.model.model import Run
-from upright.identification.model.nuisance_names import FOR_GROUPS, PER_RUN, SPREADS
+from upright.identification import Run
+from upright.identification.model.runs import FOR_GROUPS, PER_RUN, SPREADS
 from upright.physics import Plant
 from upright.records import Record
 from upright.study.columns import Array, Grid

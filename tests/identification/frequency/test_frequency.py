@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from upright.errors import BadInput, NotIdentifiable
+from upright.identification import Parameter, Rig
 from upright.identification.frequency.answer import explain
 from upright.identification.frequency.balance import Balance
 from upright.identification.frequency.detection import by_period, detect, settled
 from upright.identification.frequency.fitting import least_squares, simplex_dB
 from upright.identification.frequency.response import FrequencyResponse, describing
-from upright.identification.model.model import Parameter, Rig
 from upright.physics import CartPendulum, Furuta, chain
 from upright.simulation import simulate
 

@@ -8,8 +8,8 @@ import pytest
 from tests.identification.twins import PENDULUM, noisy, rig, swing
 from upright.identification.estimate import identify
 from upright.identification.inference.covariance import assess
-from upright.identification.problem.pose import pose
-from upright.identification.search.descent import grow
+from upright.identification.problem.residuals import formulate
+from upright.identification.search.descent import descend_progressively
 from upright.physics import Pendulum
 from upright.signals.memory import automatic_span, long_run
 
@@ -55,8 +55,8 @@ def test_white_errors_would_be_too_small() -> None:
     clean = swing(seconds=20.0, dt=0.005)
     ratios = []
     for seed in range(12):
-        problem = pose(rig(Pendulum, PENDULUM, {"b_2": 2e-3, "b_2c": 2e-3}), [noisy(clean, 5e-3, seed, 0.9)])
-        spread = assess(problem, grow(problem, problem.start).x)
+        problem = formulate(rig(Pendulum, PENDULUM, {"b_2": 2e-3, "b_2c": 2e-3}), [noisy(clean, 5e-3, seed, 0.9)])
+        spread = assess(problem, descend_progressively(problem, problem.start).x)
         ratios.append(np.sqrt(np.diag(spread.covariance) / spread.white)[:2])
     expected = np.sqrt((1 + 0.9) / (1 - 0.9))
     assert np.median(ratios) == pytest.approx(expected, rel=0.3)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tests.identification.twins import rig, swing
+from upright.identification import Run
 from upright.identification.estimate import identify
-from upright.identification.model.model import Run
 from upright.physics import Pendulum
 
 TRUTH = {"m_p": 0.2, "l_cg": 0.3, "J_p": 2e-3, "b_2": 2e-3, "b_2c": 4e-3}

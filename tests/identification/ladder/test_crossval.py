@@ -11,11 +11,11 @@ from scipy import stats
 
 from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, shaken, swing
 from upright.errors import BadInput
+from upright.identification import Run, RunScore
 from upright.identification.estimate import identify
-from upright.identification.ladder.crossval import Left, cross_validate, leave_one_out
+from upright.identification.ladder.cross_validation import HeldOut, cross_validate, leave_one_out
 from upright.identification.ladder.decision import by_chance, compare, scatter
 from upright.identification.ladder.repeats import repeats, same
-from upright.identification.model.model import Run, RunScore
 from upright.physics import Furuta, Pendulum
 
 QUESTION = rig(Pendulum, {**PENDULUM, "b_2q": 0.0, "b_2c": 0.0}, {"J_p": 3e-3, "b_2": 1e-3})
@@ -25,11 +25,8 @@ RUNS = [
 ]
 
 
-def left(runs: list[Run]) -> dict[str, Left]:
-    found: dict[str, Left] = {}
-    start = {("", "J_p"): 2.2e-3, ("", "b_2"): 1.8e-3}
-    leave_one_out(QUESTION, runs, start, found=lambda _, one: found.update({one.label: one}))
-    return found
+def left(runs: list[Run]) -> dict[str, HeldOut]:
+    return {one.label: one for one in leave_one_out(QUESTION, runs, {"J_p": 2.2e-3, "b_2": 1.8e-3})}
 
 
 def test_the_run_that_is_left_out_has_no_say():
@@ -49,7 +46,7 @@ def test_every_run_is_predicted_as_well_as_it_is_fitted_when_the_model_is_right(
 
 
 def test_what_was_computed_survives_an_interruption():
-    def stop(stage: str, fraction: float, cost: float, evaluations: int) -> None:
+    def stop(stage: str, share: float) -> None:
         if stage == "without 1.0":
             raise KeyboardInterrupt
 
@@ -65,8 +62,7 @@ def test_a_parameter_that_one_run_alone_sees_is_named():
     free = shaken(seconds=2.0, label="free")
     locked = replace(shaken(seconds=2.0, label="locked"), held={"theta": 0.0}, measured=("psi",), y=free.y[:, :1])
     question = rig(Furuta, FURUTA, {"J_d": 7e-3, "b_2": 1e-4})
-    found: dict[str, Left] = {}
-    leave_one_out(question, [free, locked], {}, found=lambda _, one: found.update({one.label: one}))
+    found = {one.label: one for one in leave_one_out(question, [free, locked], {})}
     assert found["free"].blind == ("b_2",)
     assert found["locked"].blind == ()
 

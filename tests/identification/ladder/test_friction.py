@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from tests.identification.twins import PENDULUM, noisy, rig
+from upright.identification import Fit, Run
 from upright.identification.estimate import identify
 from upright.identification.ladder.rungs import friction_rungs
-from upright.identification.model.model import Fit, Run
 from upright.physics import Furuta, Pendulum
 from upright.simulation import simulate
 

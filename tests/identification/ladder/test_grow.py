@@ -11,10 +11,9 @@ import pytest
 
 from tests.identification.twins import PENDULUM, noisy, rig, swing
 from upright.errors import BadInput
-from upright.identification.ladder.grow import climb
-from upright.identification.ladder.result import Ladder
+from upright.identification import Rig, Run
+from upright.identification.ladder.growth import Ladder, climb
 from upright.identification.ladder.rungs import Rung, default_rungs
-from upright.identification.model.model import Rig, Run
 from upright.physics import Pendulum, find
 from upright.simulation import simulate
 from upright.study.load import load_study
@@ -126,7 +125,7 @@ def test_friction_of_each_run_is_offered_only_where_there_are_runs_and_friction(
 
 
 def test_an_interrupted_climb_keeps_the_rungs_so_far():
-    def stop(stage: str, fraction: float, cost: float, evaluations: int) -> None:
+    def stop(stage: str, share: float) -> None:
         if stage.startswith("quadratic drag"):
             raise KeyboardInterrupt
 

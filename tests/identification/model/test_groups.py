@@ -9,7 +9,7 @@ import pytest
 
 from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, shaken, swing
 from upright.identification.estimate import identify, predict
-from upright.identification.problem.pose import pose
+from upright.identification.problem.residuals import formulate
 from upright.physics import Furuta, Pendulum
 
 GUESSES = {"J_p": 2.6e-3, "b_2": 1.4e-3, "b_2c": 2.6e-3}
@@ -125,9 +125,9 @@ def test_a_fit_file_keeps_what_groups_share(two_days, tmp_path):
 def test_what_is_known_of_the_first_state_is_what_the_sensor_read(offset):
     """At the truth a sensor's unknown zero leaves nothing to hold against the first state."""
     run = swing(seconds=2.0, unknown=("initial", "offset"))
-    problem = pose(rig(Pendulum, PENDULUM, GUESSES), [replace(run, y=run.y + offset)])
+    problem = formulate(rig(Pendulum, PENDULUM, GUESSES), [replace(run, y=run.y + offset)])
     truth = {"initial.theta": 1.5, "initial.theta_dot": 0.0, "offset.theta": offset}
-    x = np.array([u.inside(truth.get(u.name, u.value)) for u in problem.unknowns])
+    x = np.array([u.coordinate(truth.get(u.name, u.value)) for u in problem.unknowns])
     r, J = problem.prior_rows(x)
     assert r.size == 2
     # the reading was smoothed before it was known: within a tenth of a sigma of the samples

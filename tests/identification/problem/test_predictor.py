@@ -11,13 +11,12 @@ from scipy.linalg import expm, solve_discrete_are
 
 from tests.identification.twins import rig
 from upright.errors import BadInput
+from upright.identification import Rig, Run
 from upright.identification.estimate import identify
 from upright.identification.inference.scoring import predict
-from upright.identification.model.model import NOISE, Rig, Run
-from upright.identification.problem.pose import pose
-from upright.identification.problem.predictor import discrete_model, gains, restart_states
-from upright.identification.problem.predictor_setup import with_noise
-from upright.identification.problem.problem import Problem
+from upright.identification.model.rig import NOISE
+from upright.identification.problem.predictor import discrete_model, gains, restart_states, with_noise
+from upright.identification.problem.residuals import Problem, formulate
 from upright.physics import Furuta
 from upright.simulation import Loop, simulate
 
@@ -63,7 +62,7 @@ def posed(run: Run, levels: dict[str, float], **changes: float) -> Problem:
         n: replace(p, value=levels.get(n, p.value), estimate=False) if n.startswith(NOISE) else p
         for n, p in known.parameters.items()
     }
-    return pose(replace(known, parameters=parameters), [run])
+    return formulate(replace(known, parameters=parameters), [run])
 
 
 LEVELS = {"noise.psi": 5e-5, "noise.theta": 4e-6, "noise.T": 0.01}
@@ -115,7 +114,7 @@ def test_a_filter_without_friction_is_the_textbook_kalman_filter() -> None:
     A = np.zeros((5, 5))
     A[:4, :4], A[:4, 4:] = linear.A, linear.B * VALUES["actuator.gain"]
     C, R = np.eye(5)[[0, 2]], np.diag(plan.sensor)
-    P = np.diag([*plan.doubt, *plan.drift])
+    P = np.diag([*plan.initial, *plan.drift])
     x = np.array([run.y[0, 0], 0.0, run.y[0, 1] - np.pi, 0.0, 0.0])
     for k in range(1, int(track.restarts[0]) + 1):
         x = Phi[0] @ x + Phi[0][:, 4] * run.u[k - 1, 0] - np.eye(5)[4] * run.u[k - 1, 0]
@@ -182,9 +181,9 @@ def test_a_prediction_with_true_numbers_errs_as_its_covariance_says() -> None:
 
 def test_a_list_of_horizons_needs_the_filter() -> None:
     with pytest.raises(BadInput, match="several horizons"):
-        pose(true_rig(), [balanced(0, seconds=3.0, restart="smooth")])
+        formulate(true_rig(), [balanced(0, seconds=3.0, restart="smooth")])
 
 
 def test_a_record_shorter_than_its_warming_up_is_refused() -> None:
     with pytest.raises(BadInput, match=r"warms up for 0\.8 s"):
-        pose(with_noise(true_rig(), [balanced(0, seconds=3.0)]), [balanced(0, seconds=0.9)])
+        formulate(with_noise(true_rig(), [balanced(0, seconds=3.0)]), [balanced(0, seconds=0.9)])

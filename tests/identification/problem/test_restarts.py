@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tests.identification.twins import PENDULUM, rig, shaken, swing
+from upright.identification import Run
 from upright.identification.estimate import identify
-from upright.identification.model.model import Run
-from upright.identification.problem.pose import pose
-from upright.identification.problem.restarts import Restart, settle, worth
+from upright.identification.problem.residuals import formulate
+from upright.identification.problem.restarts import Restart, settle, smoothed_variance
 from upright.physics import Pendulum
 
 
@@ -37,7 +37,7 @@ def test_restarts_find_the_states_that_were_true() -> None:
     run = swing(angle=2.0, horizon=1.0)
     noisy = counted(run, 500)
     truth = rig(Pendulum, PENDULUM, {"b_2": PENDULUM["b_2"]})
-    problem = pose(truth, [noisy])
+    problem = formulate(truth, [noisy])
     found = problem.restart(0, problem.start)
     track = problem.tracks[0]
     exact = run.y[track.restarts, 0]
@@ -84,7 +84,7 @@ def test_worth_of_a_smoothed_state_is_its_variance(at: int) -> None:
     generator = np.random.default_rng(7)
     motions = [savitzky_golay(generator.normal(size=61), 0.01, 15) for _ in range(4000)]
     measured = [np.var([m.q[at] for m in motions]), np.var([m.v[at] for m in motions])]
-    claimed = worth(61, 15, 0.01, np.array([at]))[0] / 4.0  # without the allowance for what smoothing bends
+    claimed = smoothed_variance(61, 15, 0.01, np.array([at]))[0] / 4.0  # without the allowance for what smoothing bends
     np.testing.assert_allclose(claimed, measured, rtol=0.15)
 
 

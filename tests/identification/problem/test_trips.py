@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from upright.identification import Parameter, Rig, Run
 from upright.identification.estimate import identify, predict
-from upright.identification.model.model import Parameter, Rig, Run
 from upright.identification.problem.trips import find_trip, find_trips, located
 from upright.physics.oscillators import Torsional2
 from upright.simulation import simulate

@@ -9,9 +9,9 @@ import pytest
 
 from tests.identification.twins import PENDULUM, noisy, rig, swing
 from upright.identification.inference.scoring import fit_percent
-from upright.identification.problem.normal import Normal, products
-from upright.identification.problem.pose import pose
-from upright.identification.search.descent import descend, grow
+from upright.identification.problem.normal_equations import Normal, products
+from upright.identification.problem.residuals import formulate
+from upright.identification.search.descent import descend, descend_progressively
 from upright.identification.search.simplex import simplex
 from upright.physics import Pendulum
 
@@ -61,14 +61,16 @@ def test_scipy_finds_the_same_optimum() -> None:
     """Oracle: trust-region least squares on the same residuals, its own differences, from the same start."""
     from scipy.optimize import least_squares
 
-    problem = pose(rig(Pendulum, PENDULUM, {"J_p": 2.4e-3, "b_2": 1.8e-3, "b_2c": 2.2e-3}), [noisy(swing(), 2e-3, 5)])
-    found = grow(problem, problem.start, tolerance=1e-12)
+    problem = formulate(
+        rig(Pendulum, PENDULUM, {"J_p": 2.4e-3, "b_2": 1.8e-3, "b_2c": 2.2e-3}), [noisy(swing(), 2e-3, 5)]
+    )
+    found = descend_progressively(problem, problem.start, tolerance=1e-12)
     scale = np.array([u.scale for u in problem.unknowns])
 
     def residual(z: np.ndarray) -> np.ndarray:
         rows = problem.rows(0, z * scale)
         assert rows is not None
-        return np.concatenate([rows.residual.ravel(), problem.prior_rows(z * scale)[0]])
+        return np.concatenate([rows[0].ravel(), problem.prior_rows(z * scale)[0]])
 
     oracle = least_squares(residual, problem.start / scale, xtol=1e-12, ftol=1e-12, gtol=1e-12, diff_step=1e-6)
     assert found.normal.cost == pytest.approx(2 * oracle.cost, rel=1e-6)
@@ -77,9 +79,9 @@ def test_scipy_finds_the_same_optimum() -> None:
 
 
 def test_simplex_ends_near_the_same_optimum() -> None:
-    problem = pose(rig(Pendulum, PENDULUM, {"b_2": 1.5e-3, "b_2c": 2.4e-3}), [noisy(swing(seconds=4.0), 2e-3, 6)])
+    problem = formulate(rig(Pendulum, PENDULUM, {"b_2": 1.5e-3, "b_2c": 2.4e-3}), [noisy(swing(seconds=4.0), 2e-3, 6)])
     x, cost = simplex(problem, problem.start, limit=1500)
-    assert cost == pytest.approx(grow(problem, x).normal.cost, rel=1e-3)
+    assert cost == pytest.approx(descend_progressively(problem, x).normal.cost, rel=1e-3)
 
 
 def test_products_in_blocks_are_the_plain_products() -> None:
@@ -106,10 +108,10 @@ def test_fit_percent_by_hand() -> None:
 def test_squares_of_lanes_are_those_of_the_residuals_laid_out() -> None:
     """The fast sum of a free run against the plain product of residuals and Jacobian of `rows`."""
     asked = rig(Pendulum, PENDULUM, {"J_p": 2.4e-3, "b_2": 1.8e-3, "b_2c": 2.2e-3})
-    problem = pose(asked, [noisy(swing(unknown=("initial", "offset")), 2e-3, 5)])
+    problem = formulate(asked, [noisy(swing(unknown=("initial", "offset")), 2e-3, 5)])
     rows = problem.rows(0, problem.start)
     assert rows is not None
-    r, J = rows.residual.reshape(-1), rows.jacobian.reshape(-1, problem.start.size)
+    r, J = rows[0].reshape(-1), rows[1].reshape(-1, problem.start.size)
     prior, slope = problem.prior_rows(problem.start)
     found = problem.normal(problem.start)
     assert found.cost == pytest.approx(r @ r + prior @ prior, rel=1e-12)

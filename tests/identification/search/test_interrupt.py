@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tests.identification.twins import PENDULUM, noisy, rig, swing
+from upright.identification import Fit
 from upright.identification.estimate import METHODS, identify
-from upright.identification.model.model import Fit
 from upright.physics import Pendulum
 
 GUESSES = {"J_p": 3e-3, "b_2": 1e-3, "b_2c": 1e-3, "b_2q": 2e-3}
@@ -21,7 +21,7 @@ class Stopped:
     def __init__(self, at: int) -> None:
         self.at, self.calls = at, 0
 
-    def __call__(self, stage: str, fraction: float, cost: float, evaluations: int) -> None:
+    def __call__(self, stage: str, share: float) -> None:
         self.calls += 1
         if self.calls == self.at:
             raise KeyboardInterrupt

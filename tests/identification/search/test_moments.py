@@ -31,10 +31,9 @@ def test_the_end_of_a_push_is_found_from_one_swing_too_early():
 
 
 def test_another_valley_is_reached_from_the_one_beside_it():
-    from upright.identification.problem.pose import pose
-    from upright.identification.search.descent import descend
+    from upright.identification.problem.residuals import formulate
+    from upright.identification.search.descent import SearchLog, descend
     from upright.identification.search.moments import other_moments
-    from upright.identification.search.strategy import Log
 
     t = np.arange(3001) * 2e-3
     u = np.where((t > 0.2) & (t < 5.0), 0.5, 0.0)[:, None]
@@ -43,11 +42,11 @@ def test_another_valley_is_reached_from_the_one_beside_it():
     run = Run(label="trip", role="fit", t=t, u=u, y=x[:, ::2, 0], measured=("theta_1", "theta_2"),
               unknown=("input_end",), initial=dict.fromkeys(PLANT.state_names(), 0.0))  # fmt: skip
     parameters = {n: Parameter(name=n, value=v, estimate=n == "c_12", lower=0.0) for n, v in TRUTH.items()}
-    problem = pose(Rig(plant=PLANT, parameters=parameters), [run])
+    problem = formulate(Rig(plant=PLANT, parameters=parameters), [run])
     place = next(i for i, u in enumerate(problem.unknowns) if u.name == "input_end")
     start = problem.start
     start[place] = end - SWING
     stuck = descend(problem.normal, start, problem.lower, problem.upper)
     assert abs(stuck.x[place] - end) > 0.5 * SWING  # a descent alone stays in the valley it began in
-    found = other_moments(problem, stuck, Log())
+    found = other_moments(problem, stuck, SearchLog())
     assert abs(found.x[place] - end) < 1e-3

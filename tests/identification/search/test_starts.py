@@ -9,7 +9,7 @@ import pytest
 
 from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, shaken, swing
 from upright.errors import NotIdentifiable
-from upright.identification.model.unknowns import base_values
+from upright.identification.model.rig import base_values
 from upright.identification.search.friction_start import decrement, friction_from_energy, turning_points
 from upright.identification.search.inverse_start import observe, regress
 from upright.physics import Furuta, Pendulum

@@ -12,8 +12,7 @@ import pytest
 
 from upright.errors import NotIdentifiable
 from upright.identification.frequency.answer import key_value
-from upright.identification.frequency.periodic import chirp, multisine, odd_lines, repetition
-from upright.identification.frequency.spectra import response_of, sines_in
+from upright.identification.frequency.spectra import chirp, multisine, odd_lines, repetition, response_of, sines_in
 from upright.lab.frequency_1b.chapter import chapter, true_key
 from upright.lab.frequency_1b.run import run
 from upright.lab.frequency_1b.sweeps import REACH, SHARE

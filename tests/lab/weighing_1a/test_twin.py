@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from upright.identification import Parameter, Rig, Run
 from upright.identification.estimate import identify
-from upright.identification.model.model import Parameter, Rig, Run
 from upright.lab.weighing_1a.twin import MAKES, acquire, nominal_piece, rig, run
 from upright.physics import chain
 

@@ -65,12 +65,7 @@ def track(
     size = parse(step, "rad" if kind == "torsional" else "m") if step else None
     if size is not None and not size > 0:
         raise BadInput(f"--step needs a size above 0, got '{step}'.")
-    with progress_line(quiet=as_json) as line:
-
-        def tell(stage: str, share: float) -> None:
-            if line is not None:
-                line(stage, share, float("nan"), 0)
-
+    with progress_line(quiet=as_json) as tell:
         if model is None:
             from upright.lab.rigs.makes import make_rig
 

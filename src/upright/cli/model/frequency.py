@@ -83,12 +83,7 @@ def _twin(make: str, seed: int, ask: str, out: Path, as_json: bool) -> None:
 
     if make not in MAKES:
         raise BadInput(f"--rig is one of {', '.join(MAKES)}, got '{make}'; {nearest(make, MAKES)}")
-    with progress_line(quiet=as_json) as line:
-
-        def tell(step: str, share: float) -> None:
-            if line is not None:
-                line(step, share, float("nan"), 0)
-
+    with progress_line(quiet=as_json) as tell:
         done = run(make_rig(make, seed), seed, out, tell, kind=ask)
     told = chapter(done)
     page = write_chapter(out / "report.html", told)

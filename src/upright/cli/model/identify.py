@@ -111,7 +111,7 @@ def identify(
     if not any(run.role == "fit" for run in asked.runs):
         raise BadInput(f'{study}: every run has role = "predict"; at least one needs role = "fit"')
     from upright.identification.estimate import identify as estimate
-    from upright.identification.ladder.crossval import cross_validate
+    from upright.identification.ladder.cross_validation import cross_validate
     from upright.study.fit_file import write_fit
 
     with progress_line(quiet=as_json) as progress:

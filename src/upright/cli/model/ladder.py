@@ -52,7 +52,7 @@ def ladder(
     stopped by Ctrl-C.
     """
     from upright.cli.terminal import progress_line, typed
-    from upright.identification.ladder.grow import climb
+    from upright.identification.ladder.growth import climb
     from upright.study.ladder_file import can_be_trimmed, chosen_study, write_ladder
     from upright.study.load import load_study
 

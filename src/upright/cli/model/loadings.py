@@ -12,7 +12,7 @@ import typer
 from upright.errors import BadInput, NotIdentifiable
 
 if TYPE_CHECKING:
-    from upright.identification.loadings.fit import Loaded, Loadings
+    from upright.identification.loadings import Loaded, Loadings
     from upright.records import Record
 
 _MASSES = re.compile(r"\s*(\d+)\s+at\s+(.+)")
@@ -61,7 +61,7 @@ def loadings(
             f"Every log needs its --added, in the same order: {len(logs or ())} logs came with {len(added or ())};"
             ' write --added "0 kg" for the bare one, or try --twin rectilinear.'
         )
-    from upright.identification.loadings.fit import swings, weigh
+    from upright.identification.loadings import fit_loadings, swings
     from upright.lab.weighing_1a.page import write_loadings
     from upright.readers import read
     from upright.report.advice import Step
@@ -90,7 +90,7 @@ def loadings(
         found += [s for s in told if not free or s.command == 0]
     if left_out and len({s.added for s in found}) < 2:
         raise NotIdentifiable(left_out[0])
-    weighed = weigh(found, tolerance=parse(tolerance, "1"))
+    weighed = fit_loadings(found, tolerance=parse(tolerance, "1"))
     steps = [
         Step(
             sentence="Fit the same logs with the equations of motion; give m_1 and k_1 these values as guesses.",

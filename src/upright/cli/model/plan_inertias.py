@@ -12,7 +12,7 @@ import typer
 from upright.errors import BadInput, nearest
 
 if TYPE_CHECKING:
-    from upright.identification.loadings.planning import Loading, Plan
+    from upright.identification.loadings import Loading, Plan
 
 UNITS = {"rectilinear": "kg", "torsional": "kg m^2"}
 FLAT = 0.1
@@ -42,7 +42,7 @@ def plan_inertias(
 
     upright plan-inertias --rig torsional --error "0.3 %" --radius "4 cm" --radius "9 cm"
     """
-    from upright.identification.loadings.planning import best
+    from upright.identification.loadings import plan_loadings
     from upright.units import parse
 
     if rig not in UNITS:
@@ -55,7 +55,8 @@ def plan_inertias(
     if runs < levels:
         raise BadInput(f"--runs needs at least as many as --levels, got {runs} for {levels}; plan more runs.")
     plans = {
-        n: best(choice, n, bare=m_0, error=e, tolerance=g, piece=piece, levels=levels) for n in range(levels, runs + 1)
+        n: plan_loadings(choice, n, bare=m_0, error=e, tolerance=g, piece=piece, levels=levels)
+        for n in range(levels, runs + 1)
     }
     wanted = _share(target, "--target") if target else None
     chosen = choose({n: p[0].k for n, p in plans.items()}, wanted)
@@ -71,7 +72,7 @@ def plan_inertias(
 
 def loadings(rig: str, radius: list[str] | None) -> list[Loading]:
     """What can be added to a cart, or to a disk on the bolt circles given."""
-    from upright.identification.loadings.planning import Loading
+    from upright.identification.loadings import Loading
     from upright.physics.loads import added_inertia, added_mass
     from upright.units import parse
 

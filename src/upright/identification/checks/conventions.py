@@ -9,7 +9,8 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 
-from upright.identification.model.model import Rig, Run
+from upright.identification.model.rig import Rig
+from upright.identification.model.runs import Run
 from upright.identification.search.inverse_start import regress, samples_of
 
 CLEAR = 0.5

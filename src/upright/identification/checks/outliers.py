@@ -15,8 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.checks.spikes import merged, without_spikes
-from upright.identification.model.model import Fit, Rig, Run
-from upright.identification.problem.pose import pose
+from upright.identification.model.fit import Fit
+from upright.identification.model.rig import Rig
+from upright.identification.model.runs import Run
+from upright.identification.problem.residuals import formulate
 from upright.signals.smoothing import dominant_period
 
 Array = NDArray[np.float64]
@@ -118,24 +120,23 @@ def half_swings(known: Rig, run: Run, own: Mapping[str, float]) -> Stretches | N
 
 def _restarted(known: Rig, run: Run, own: Mapping[str, float], seconds: float, free: Sequence[int]) -> Stretches:
     """A run restarted every so many seconds, its coordinates `free`."""
-    problem = pose(known, [replace(run, horizon=seconds, restart="smooth", score_from=0.0)], thin=False)
-    x = np.array([u.inside(own.get(u.name, u.value)) for u in problem.unknowns])
+    problem = formulate(known, [replace(run, horizon=seconds, restart="smooth", score_from=0.0)], thin=False)
+    x = np.array([u.coordinate(own.get(u.name, u.value)) for u in problem.unknowns])
     track = problem.tracks[0]
     # started where it suits the stretch, as far as the measurement leaves that open: near upright a slip of a
     # thousandth is no bump
-    shift = problem.restart(0, x).shift if track.doubtful.size else None
+    shift = problem.restart(0, x).shift if track.uncertain.size else None
     y = problem.simulate(0, x[:, None], track.length, shift)[:, :, free, 0]
     measured = track.targets(track.length)[:, :, free]
     with np.errstate(over="ignore", invalid="ignore"):
         missed = np.sqrt(np.mean((y - measured) ** 2, axis=0))
     start = run.t[track.restarts]
     u = track.u[track.restarts[None, :] + np.arange(track.length - 1)[:, None]]
-    quantum = run.quantum or (0.0,) * len(run.measured)
     return Stretches(
         run=replace(run, y=run.y[:, free], measured=tuple(run.measured[k] for k in free)),
         start=start, stop=start + (track.length - 1) * track.dt,
         missed=np.where(np.isfinite(missed), missed, math.inf), moved=np.ptp(measured, axis=0),
-        constant=np.all(u == u[:1], axis=(0, 2)), quantum=np.array([quantum[k] for k in free]),
+        constant=np.all(u == u[:1], axis=(0, 2)), quantum=np.array([run.quanta[k] for k in free]),
     )  # fmt: skip
 
 

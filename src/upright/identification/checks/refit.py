@@ -13,7 +13,9 @@ import numpy as np
 from upright.identification.checks.outliers import SELF_EXCITED, SPIKES, Outlier, cut, outliers
 from upright.identification.checks.spikes import without_spikes
 from upright.identification.inference.scoring import predict
-from upright.identification.model.model import Fit, Rig, Run
+from upright.identification.model.fit import Fit
+from upright.identification.model.rig import Rig
+from upright.identification.model.runs import Run
 
 WORTH = 1 / 3
 """What is left of a run is fitted when it is this share of it, and"""

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model.model import Run
+from upright.identification.model.runs import Run
 
 Array = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""What does the response say about the rig? Both fits, the numbers with their errors, and the pole to be held."""
+"""What a frequency response says about a rig: both fits, the numbers with their errors, and the pole to be held."""
 
 from __future__ import annotations
 
@@ -7,14 +7,20 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from upright.errors import NotIdentifiable
 from upright.identification.frequency.balance import Balance
-from upright.identification.frequency.fitting import Squares, Told, Way, least_squares, simplex_dB, usable
+from upright.identification.frequency.fitting import Squares, Way, least_squares, simplex_dB, usable
 from upright.identification.frequency.response import FrequencyResponse
-from upright.identification.inference.per_run import quantile
+from upright.identification.inference.covariance import student
 from upright.identification.inference.poles import poles
-from upright.identification.model.model import Estimate, Fit, Pole, Rig
+from upright.identification.model.fit import Estimate, Fit, Pole
+from upright.identification.model.rig import Rig
+from upright.progress import Progress, silent
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 GROWS = 0.5
 """Real part [1/s] from which a pole counts as unstable; free coordinates sit at 0."""
@@ -26,26 +32,11 @@ POOR = 9.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Answer:
-    """Everything that follows from one measured response.
+    """Everything that follows from one response, measured `at` an equilibrium of a rig as it was known and asked.
 
-    Attributes
-    ----------
-    rig : Rig
-        What was known and asked.
-    at : str
-        Equilibrium about which it was measured.
-    data, used : FrequencyResponse
-        All that was measured, and the points fitted.
-    left_out : tuple of str
-        Why the others were not.
-    simplex : Way
-    squares : Squares
-    fit : Fit
-        For `fit.json`: estimates with covariance, poles at every equilibrium, verdict.
-    key : tuple of (str, str, Pole)
-        Equilibrium, what the pole is, and the pole that a design has to know best.
-    simplex_pole : complex
-        The same by the simplex [1/s].
+    `used` are the points of the `data` that were fitted, `left_out` says why the others were not. `fit` is for
+    `fit.json`: estimates with covariance, poles at every equilibrium, verdict. `key` is the pole that a design has to
+    know best, after its equilibrium and what it is, `simplex_pole` the same by the simplex [1/s].
     """
 
     rig: Rig
@@ -61,7 +52,7 @@ class Answer:
 
 
 def explain(
-    rig: Rig, at: str, data: FrequencyResponse, *, seed: int = 0, tell: Told | None = None,
+    rig: Rig, at: str, data: FrequencyResponse, *, seed: int = 0, tell: Progress = silent,
     stopped: Callable[[], bool] = lambda: False,
 ) -> Answer:  # fmt: skip
     """Fit a response in both ways.
@@ -97,7 +88,7 @@ def explain(
     if stopped():
         raise KeyboardInterrupt
     simplex = simplex_dB(rig, at, used, tell=tell)
-    q = quantile(squares.freedom + len(squares.names), len(squares.names))
+    q = student(squares.freedom)
     values = squares.way.values
     found = poles(rig, values, list(squares.names), squares.covariance, q)
     key = _key(found, at)
@@ -201,3 +192,28 @@ def verdict(squares: Squares, key: tuple[str, str, Pole]) -> tuple[str, bool]:
     if share > 0.05:
         return f"{said} That is {100 * share:.2g} % either way, too wide to design from: measure closer to it.", False
     return said, True
+
+
+def curves(answer: Answer) -> tuple[tuple[Array, Complex], tuple[Array, Complex]]:
+    """Frequencies and responses (F, n) of least squares and of the simplex on a close grid.
+
+    Least squares knows dry friction at the amplitudes measured; between frequencies these are taken from both sides.
+    """
+    data = answer.used
+    w = np.geomspace(data.omega[0], data.omega[-1], 240)
+    dry = np.column_stack([_between(w, data.omega, data.dry[:, j]) for j in range(len(data.outputs))])
+    close = FrequencyResponse(
+        omega=w, response=np.ones((w.size, len(data.outputs)), dtype=np.complex128), outputs=data.outputs,
+        drive=np.full(w.size, 1e-9, dtype=np.complex128), dry=dry, hold=data.hold,
+    )  # fmt: skip
+    squares = Balance(plant=answer.rig.plant, at=answer.at, data=close)
+    simplex = Balance(plant=answer.rig.plant, at=answer.at, data=close, linear=True)
+    return (w, squares.response(answer.squares.way.values)[0]), (w, simplex.response(answer.simplex.values)[0])
+
+
+def _between(w: Array, at: Array, values: Complex) -> Complex:
+    """Sizes by their logarithm, phases as they are."""
+    safe = np.where(np.abs(values) > 0, values, 1e-300)
+    size = np.interp(np.log(w), np.log(at), np.log(np.abs(safe)))
+    phase = np.interp(np.log(w), np.log(at), np.unwrap(np.angle(safe)))
+    return np.asarray(np.exp(size + 1j * phase), dtype=np.complex128)

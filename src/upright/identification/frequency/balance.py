@@ -1,4 +1,4 @@
-"""What would this rig answer, given how it moved? The first harmonic of the equations of motion, dry friction included.
+"""Harmonic balance: the response that the equations of motion give, dry friction and amplitude included.
 
 A periodic motion q(t) that was measured is put into the equations: what they need beyond their linear part, and what
 dry friction takes, is projected on the frequency. With ``Z = -omega^2 M + i omega D + K`` of small motions and N the

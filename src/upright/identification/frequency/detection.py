@@ -1,7 +1,10 @@
-"""What is in this signal at a frequency that is known, and when has the rest died away?
+"""Synchronous detection: what a signal holds at a known frequency, and when the rest has died away.
 
-Least squares of sines, cosines, their harmonics and a drift over whole periods: the synchronous detector of a
-frequency analyser, with its errors.
+Least squares of sines, cosines, their harmonics and a drift over whole periods, as a frequency analyser does it, with
+its errors. Where the motion turns, dry friction changes sign and bends it differently before and after; about an
+extreme the position is therefore taken as a parabola on either side, with one apex and two curvatures. All periods are
+laid over each other there, so that an encoder's steps average out; what a few harmonics would say errs as one over
+their number.
 """
 
 from __future__ import annotations
@@ -11,12 +14,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import BadInput
-from upright.identification.frequency.turning import sign_line
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -24,24 +27,21 @@ Complex = NDArray[np.complex128]
 HARMONICS = 31
 EDGES = 4096
 """Instants per period at which a speed's sign is looked at."""
+REACH = 0.11
+"""Share of a period about an extreme in which its shape is fitted."""
+BINS = 120
+"""Parts of that share of a period over which more samples are averaged."""
+NEAR = 0.03
+"""Share of a period by which an apex may lie off its first guess."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Tone:
-    """What is at one frequency and at its harmonics, for signals in columns.
+    """What is at one frequency [rad/s] and at its harmonics, for signals in columns.
 
-    Attributes
-    ----------
-    omega : float
-        [rad/s]
-    lines : (H, m) complex array
-        Peak and phase at the frequency and its harmonics: ``y = Re sum lines[k-1] exp(i k omega t)``.
-    variance : (m,) array
-        Mean square error of the first line.
-    noise : (m,) array
-        Variance of what is left over.
-    t, y : arrays (N,) and (N, m)
-        Time [s] and the signals without their drift.
+    `lines` (H, m) are peak and phase there, ``y = Re sum lines[k-1] exp(i k omega t)``, `variance` (m,) is the mean
+    square error of the first line, `noise` (m,) the variance of what is left over. `t` (N,) and `y` (N, m) are time [s]
+    and the signals without their drift.
     """
 
     omega: float
@@ -195,3 +195,67 @@ def settled(lines: Complex, *, tolerance: float = 2e-3, noise: Array | float = 0
         if np.all(remains <= np.maximum(tolerance * np.abs(part[-1]), 3 * np.asarray(noise))):
             return last
     return None
+
+
+def sign_line(t: Array, y: Array, omega: float, guess: Array) -> complex | None:
+    """First line of the speed's sign, from where a signal without drift turns; None when that cannot be told.
+
+    Parameters
+    ----------
+    t, y : (N,) arrays
+        Time [s] and position, drift taken out.
+    omega : float
+        [rad/s]
+    guess : (P,) array
+        Speed at P instants of one period from phase 0 on: its two changes of sign are where the search begins.
+    """
+    change = np.flatnonzero(np.sign(guess) != np.sign(np.roll(guess, -1)))
+    if change.size != 2:
+        return None
+    phase = np.mod(omega * t, 2 * math.pi)
+    found: list[float] = []
+    for k in change:
+        apex = _apex(phase, y, 2 * math.pi * (k + 0.5) / guess.size)
+        if apex is None:
+            return None
+        found.append(apex)
+    rising = found if guess[(change[0] + 1) % guess.size] > 0 else found[::-1]
+    low, high = rising  # speed above zero from the least position on to the greatest
+    return complex(2 / math.pi * 1j * (np.exp(-1j * high) - np.exp(-1j * low)))
+
+
+def _apex(phase: Array, y: Array, near: float) -> float | None:
+    """Phase of an extreme: the best of a grid, refined; None when it lies at the end of the grid."""
+    from scipy.optimize import minimize_scalar
+    from scipy.stats import binned_statistic
+
+    away = np.mod(phase - near + math.pi, 2 * math.pi) - math.pi
+    reach = 2 * math.pi * (REACH + NEAR)
+    there = np.abs(away) < reach
+    x, z = away[there], y[there]
+    if x.size > BINS:
+        x, z = binned_statistic(x, [x, z], "mean", BINS, range=(-reach, reach)).statistic
+        x, z = x[np.isfinite(x)], z[np.isfinite(x)]
+    if x.size < 12:
+        return None
+    scale = 2 * math.pi * REACH
+
+    def misfit(shift: float) -> float:
+        s = (x - shift) / scale
+        inside = np.abs(s) < 1
+        s, w = s[inside], z[inside]
+        left, right = np.where(s < 0, s, 0.0), np.where(s >= 0, s, 0.0)
+        columns = np.column_stack([np.ones_like(s), left**2, right**2, left**3, right**3])
+        try:
+            solution = np.linalg.solve(columns.T @ columns, columns.T @ w)
+        except np.linalg.LinAlgError:  # no sample on one side
+            return math.inf
+        return float(np.mean((w - columns @ solution) ** 2))
+
+    grid = 2 * math.pi * NEAR * np.linspace(-1, 1, 13)
+    best = int(np.argmin([misfit(float(g)) for g in grid]))
+    if best in (0, grid.size - 1):
+        return None
+    bounds = (float(grid[best - 1]), float(grid[best + 1]))
+    refined: Any = minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-6})
+    return near + float(refined.x)

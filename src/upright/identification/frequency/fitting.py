@@ -1,4 +1,4 @@
-"""Which numbers make the model answer as the rig did? The paper's simplex, and least squares, side by side.
+"""Fits of a frequency response: the paper's simplex, and least squares, side by side.
 
 The simplex walks on the squared dB of the magnitude, linear model, the far output first and then all. Least squares
 uses the phase too, weighs every point by its error, knows what dry friction did at that amplitude, and starts several
@@ -9,18 +9,18 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.errors import NotIdentifiable
+from upright.errors import BadInput, NotIdentifiable
 from upright.identification.frequency.balance import Balance
-from upright.identification.frequency.coordinates import Coordinates, coordinates
 from upright.identification.frequency.response import FrequencyResponse
-from upright.identification.model.model import Rig
+from upright.identification.model.rig import Parameter, Rig
+from upright.progress import Progress, silent
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -34,7 +34,6 @@ FRICTION = 0.001
 SPREAD = 0.35
 """Standard deviation of the logarithm of starts."""
 RESTARTS = 3
-Told = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -55,26 +54,12 @@ class Way:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Squares:
-    """Least squares: the way, its unknowns with covariance, and how well it fits.
+    """Least squares: the way, the names of its unknowns, those known within a tolerance included, and how well it fits.
 
-    Attributes
-    ----------
-    way : Way
-    names : tuple of str
-        Unknowns, those known within a tolerance included.
-    covariance : (n, n) array
-        Of their values [SI].
-    misfit : float
-        Chi square per degree of freedom by stated errors; errors are widened by its root when it is above 1.
-    freedom : int
-        Degrees of freedom.
-    sigma : (F, n) array
-        Relative error of real and of imaginary part by which points were weighed.
-    surprise : mapping of str to float
-        Of what was known within a tolerance: how many of these it ended away.
-    starts : int
-    reached : int
-        How many of the starts ended at the same minimum.
+    `covariance` (n, n) is that of their values [SI]. `misfit` is chi square per degree of freedom by stated errors,
+    which are widened by its root when it is above 1; `sigma` (F, n) the relative error of real and of imaginary part by
+    which points were weighed. `surprise` says of what was known within a tolerance how many of these it ended away,
+    `reached` how many of the starts ended at the same minimum.
     """
 
     way: Way
@@ -88,6 +73,97 @@ class Squares:
     reached: int
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Coordinates:
+    """Unknowns of a search, one number z each: ``value = size exp(z)``, or ``size z`` for those that may vanish.
+
+    `names` include those known within a `tolerance` [in z], which are rows of the least squares; the others have an
+    infinite one. `base` holds every number of the rig.
+    """
+
+    names: tuple[str, ...]
+    size: Array
+    log: NDArray[np.bool_]
+    tolerance: Array
+    base: Mapping[str, float]
+
+    @property
+    def start(self) -> Array:
+        """The guesses (n,), which are also what is expected of those known within a tolerance."""
+        return np.where(self.log, 0.0, 1.0)
+
+    @property
+    def lower(self) -> Array:
+        """Lower bounds (n,)."""
+        return np.where(self.log, -np.inf, 0.0)
+
+    @property
+    def bounded(self) -> tuple[str, ...]:
+        """Names of those known within a tolerance."""
+        return tuple(n for n, t in zip(self.names, self.tolerance.tolist(), strict=True) if math.isfinite(t))
+
+    def sizes(self, z: Array) -> Array:
+        """Values of those sought, in the shape of z."""
+        with np.errstate(over="ignore"):
+            return self.size * np.where(self.log, np.exp(np.minimum(z, 50.0)), z)
+
+    def values(self, z: Array) -> dict[str, Any]:
+        """Every number of the rig at one point (n,), or at many (lanes, n): those sought are arrays then."""
+        return {**self.base, **dict(zip(self.names, self.sizes(z).T, strict=True))}
+
+    def slope(self, z: Array) -> Array:
+        """Change of the values with z."""
+        return np.where(self.log, self.sizes(z), self.size)
+
+    def known(self, z: Array) -> Array:
+        """Weighed distance (lanes, rows) from what was known."""
+        rows = np.isfinite(self.tolerance)
+        return (z[:, rows] - self.start[rows]) / self.tolerance[rows]
+
+    def scattered(self, rng: np.random.Generator, spread: float) -> Array:
+        """Another start: every unknown off by a factor, those known by their tolerance."""
+        noise = rng.normal(size=self.size.size)
+        off = np.where(np.isfinite(self.tolerance), self.tolerance, spread) * noise
+        moved = np.where(self.log, self.start + off, self.start * np.exp(off))
+        return np.maximum(moved, np.where(self.log, -np.inf, 1e-3 * np.abs(self.start)))
+
+
+def coordinates(rig: Rig, *, magnitude: bool = False) -> Coordinates:
+    """Coordinates of a rig's unknowns.
+
+    `magnitude` takes those that the magnitude of a linear model shows, all by their logarithm: no dry friction, no
+    delay, nothing that is known within a tolerance.
+
+    Raises
+    ------
+    BadInput
+        When nothing is sought, or a guess is no size.
+    """
+    dry = {n for j in rig.plant.joints for n in (j.coulomb, j.quadratic, j.stiction, j.stribeck_speed, j.presliding)}
+    found: list[tuple[Parameter, bool]] = []
+    base = {n: p.value for n, p in rig.parameters.items()}
+    for name, p in rig.parameters.items():
+        if magnitude and name in dry:
+            base[name] = 0.0
+        if not p.estimate and (p.uncertainty <= 0 or magnitude):
+            continue
+        if magnitude and (name in dry or name in ("actuator.delay", "actuator.lag")):
+            continue
+        always = name == "actuator.gain" or (name in rig.plant.names() and rig.plant.quantity(name).open_lower)
+        if not (p.value > 0 and math.isfinite(p.value)):
+            raise BadInput(f"{name} is sought and needs a guess above 0, got {p.value:g}; give its order of magnitude.")
+        found.append((p, always or magnitude))
+    if not found:
+        raise BadInput("nothing is sought; name at least one parameter to estimate.")
+    return Coordinates(
+        names=tuple(p.name for p, _ in found),
+        size=np.array([p.value for p, _ in found]),
+        log=np.array([log for _, log in found]),
+        tolerance=np.array([p.uncertainty / p.value if p.uncertainty > 0 else math.inf for p, _ in found]),
+        base=base,
+    )
+
+
 def usable(data: FrequencyResponse, *, dry: bool = True) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
     """Frequencies to fit, and sentences about those left out: joints that stick, points drowned in noise."""
     noisy = data.coherence.min(axis=1) < 0.5
@@ -99,7 +175,7 @@ def usable(data: FrequencyResponse, *, dry: bool = True) -> tuple[NDArray[np.boo
     return ~(noisy | stuck), tuple(told)
 
 
-def simplex_dB(rig: Rig, at: str, data: FrequencyResponse, *, tell: Told | None = None, limit: int = 1500) -> Way:
+def simplex_dB(rig: Rig, at: str, data: FrequencyResponse, *, tell: Progress = silent, limit: int = 1500) -> Way:
     """The paper's way: Nelder and Mead on squared dB of the linear model, far output first, then all outputs."""
     from scipy.optimize import minimize
 
@@ -132,8 +208,7 @@ def simplex_dB(rig: Rig, at: str, data: FrequencyResponse, *, tell: Told | None 
         z, cost = walk(z, columns)
         names = " and ".join(data.outputs[c] for c in columns)
         stages.append(f"{names}: {cost:.4g} dB², {balance.evaluations[0]} models so far")
-        if tell is not None:
-            tell(f"simplex on {names}", 1.0)
+        tell(f"simplex on {names}", 1.0)
     if cost > measured.size:  # an error of 1 dB on the whole: the far output alone has led astray
         again, less = walk(space.start, every)
         z = again if less < cost else z
@@ -142,7 +217,7 @@ def simplex_dB(rig: Rig, at: str, data: FrequencyResponse, *, tell: Told | None 
 
 
 def least_squares(
-    rig: Rig, at: str, data: FrequencyResponse, *, seed: int = 0, starts: int = 6, tell: Told | None = None,
+    rig: Rig, at: str, data: FrequencyResponse, *, seed: int = 0, starts: int = 6, tell: Progress = silent,
 ) -> Squares:  # fmt: skip
     """Complex response, weighed, dry friction at the amplitudes measured; several starts, the best walked to its end.
 
@@ -169,7 +244,7 @@ def least_squares(
     def jacobian(z: Array) -> Array:
         steps = 1e-5 * np.eye(z.size)
         lanes = np.vstack([z + steps, z - steps])
-        both = _residuals(balance.response(space.lanes(lanes), len(lanes)), data, sigma, lanes, space)
+        both = _residuals(balance.response(space.values(lanes), len(lanes)), data, sigma, lanes, space)
         return (both[: z.size] - both[z.size :]).T / 2e-5
 
     rng = np.random.default_rng([seed, 71])
@@ -178,8 +253,7 @@ def least_squares(
         z = space.start if i == 0 else space.scattered(rng, SPREAD)
         found = walk(residual, z, jac=jacobian, bounds=(space.lower, np.inf), x_scale="jac", max_nfev=40)
         ends.append((float(found.cost), np.asarray(found.x)))
-        if tell is not None:
-            tell("least squares, several starts", (i + 1) / starts)
+        tell("least squares, several starts", (i + 1) / starts)
     cost, z = min(ends, key=lambda end: end[0])
     reached = sum(c < 1.02 * cost + 1.0 for c, _ in ends)
     for _ in range(2):  # weights that know how much of the response dry friction takes
@@ -190,7 +264,7 @@ def least_squares(
         z = np.asarray(found.x)
     J, rows = jacobian(z), 2 * data.response.size
     r = residual(z)[:rows]
-    free = max(1, rows - space.start.size + space.priors)
+    free = max(1, rows - space.start.size + len(space.bounded))
     misfit = float(r @ r) / free
     P = np.linalg.pinv(J[:rows].T @ J[:rows] / max(1.0, misfit) + J[rows:].T @ J[rows:])
     slope = space.slope(z)

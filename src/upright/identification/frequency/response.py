@@ -1,4 +1,4 @@
-"""What did the rig answer, frequency by frequency, how surely, and how much of it was not a sine?"""
+"""A measured frequency response: values, errors, how much of the motion was not a sine; and its file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which numbers rest on one that was assumed, and what do the data say without it?
+"""Assumed numbers: what rests on each, and what the data say without it.
 
 A log in volts and counts fixes inertia per gain, not inertia. Take the gain as 1 and say so
 (``gain = { value = "1 N m/V", assumed = true }``): what is proportional to it is told in volts, seconds and counts as
@@ -7,18 +7,18 @@ well, and what does not feel it (frequencies, damping ratios, speeds) is firm.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model.model import Assumption, Estimate, Rig, Run
-from upright.identification.model.unknowns import SHARED, shared_unknowns
-from upright.identification.problem.normal import pseudo_inverse
-from upright.identification.problem.pose import settle_steps
-from upright.identification.problem.problem import Problem
+from upright.identification.inference.covariance import Optimum
+from upright.identification.model.fit import Assumption, Estimate
+from upright.identification.model.rig import Parameter
+from upright.identification.model.unknowns import shared_unknowns
+from upright.identification.problem.normal_equations import pseudo_inverse
+from upright.identification.problem.residuals import Problem
 
 Array = NDArray[np.float64]
 
@@ -26,43 +26,38 @@ NEGLIGIBLE = 0.02
 """Percent per percent below which a number does not rest on an assumed one; a whole number is met as closely."""
 
 
-def assumptions(
-    rig: Rig, problem: Problem, x: Array, pinned: NDArray[np.bool_], estimates: Mapping[str, Estimate]
-) -> tuple[Assumption, ...]:
-    """How every estimate of an optimum `x` would follow each assumed number, and its value without it.
+def assumptions(best: Optimum, estimates: Mapping[str, Estimate]) -> tuple[Assumption, ...]:
+    """How every estimate would follow each assumed number, and its value without it.
 
     The optimum moves by ``d theta/d g = -(J'J)^-1 J'J_g`` when g does (implicit function theorem); nothing is fitted
     again.
     """
-    names = [n for n, p in rig.parameters.items() if p.assumed and p.value != 0]
+    problem, x, value = best.problem, best.x, best.values
+    names = [n for n, p in problem.rig.parameters.items() if p.assumed and p.value != 0]
     if not names:
         return ()
     loose = {
         n: replace(p, uncertainty=abs(p.value)) if n in names else replace(p, uncertainty=0.0, estimate=False)
-        for n, p in rig.parameters.items()
+        for n, p in problem.rig.parameters.items()
     }
-    extra = shared_unknowns(replace(rig, parameters=loose))
+    extra = shared_unknowns(replace(problem.rig, parameters=loose))
     steps = np.array([1e-6 * u.scale for u in extra])
-    wider = replace(
-        problem, unknowns=[*problem.unknowns, *extra], steps=np.concatenate([problem.steps, steps]),
-        solvers={}, memory=np.empty(0),
-    )  # fmt: skip
-    z = np.concatenate([x, [u.inside(u.value) for u in extra]])
-    A = settle_steps(wider, z, math.inf).matrix
-    free = np.flatnonzero(~pinned)
+    wider = replace(problem, unknowns=[*problem.unknowns, *extra], steps=np.concatenate([problem.steps, steps]))
+    z = np.concatenate([x, [u.coordinate(u.value) for u in extra]])
+    A = wider.settle_steps(z).matrix
+    free = np.flatnonzero(~best.pinned)
     slopes = np.zeros((x.size, len(extra)))
     slopes[free] = -pseudo_inverse(A[np.ix_(free, free)]) @ A[np.ix_(free, np.arange(x.size, z.size))]
-    value = problem.value(x)
     found: list[Assumption] = []
     for k, g in enumerate(extra):
         per_relative = 1.0 if g.log else g.value  # of the assumed number
         follows = {
             u.name: float(slopes[i, k] * per_relative / (1.0 if u.log else value[i]))
             for i, u in enumerate(problem.unknowns)
-            if u.runs == SHARED and u.asked and i in free and value[i] != 0
+            if u.shared and u.asked and i in free and value[i] != 0
         }
-        p = rig.parameters[g.name]
-        without = _without(p.name, p.value, p.unit, follows, estimates, [t.run for t in problem.tracks], rig)
+        p = problem.rig.parameters[g.name]
+        without = _without(p, follows, estimates, problem)
         found.append(Assumption(name=p.name, value=p.value, unit=p.unit, follows=follows, without=without))
     return tuple(found)
 
@@ -95,28 +90,27 @@ def sentences(found: Sequence[Assumption]) -> tuple[str, ...]:
 
 
 def _without(
-    name: str, value: float, unit: str, follows: Mapping[str, float], estimates: Mapping[str, Estimate],
-    runs: Sequence[Run], rig: Rig,
-) -> dict[str, Estimate]:  # fmt: skip
+    assumed: Parameter, follows: Mapping[str, float], estimates: Mapping[str, Estimate], problem: Problem
+) -> dict[str, Estimate]:
     """Estimates per assumed gain, in units of the command, seconds, and counts where every encoder has one quantum."""
-    if name != "actuator.gain":
+    if assumed.name != "actuator.gain":
         return {}
-    force, _, command = unit.partition("/")
-    quanta = {q for run in runs for q in run.quantum}
+    force, _, command = assumed.unit.partition("/")
+    quanta = {q for track in problem.tracks for q in track.run.quantum}
     quantum = quanta.pop() if len(quanta) == 1 else 0.0
     out: dict[str, Estimate] = {}
-    for n, e in follows.items():
-        power = per_length(rig.parameters[n].unit, force) if abs(e - 1) < NEGLIGIBLE else None
+    for n, share in follows.items():
+        power = per_length(problem.rig.parameters[n].unit, force) if abs(share - 1) < NEGLIGIBLE else None
         if power is None or n not in estimates:
             continue
         time, length = power
-        factor = quantum**-length / value if quantum > 0 else 1.0 / value
-        e_si = estimates[n]
+        factor = quantum**-length / assumed.value if quantum > 0 else 1.0 / assumed.value
+        e = estimates[n]
         out[n] = replace(
-            e_si,
-            value=e_si.value * factor,
-            stderr=e_si.stderr * factor,
-            interval=(e_si.interval[0] * factor, e_si.interval[1] * factor),
+            e,
+            value=e.value * factor,
+            stderr=e.stderr * factor,
+            interval=(e.interval[0] * factor, e.interval[1] * factor),
             unit=_written(command or "1", time, length, "count" if quantum > 0 else force_length(force)),
         )
     return out

@@ -1,4 +1,4 @@
-"""How fast does it fall, and how sure is that? Poles at every equilibrium of a fitted plant, with their intervals."""
+"""Poles at every equilibrium of a fitted plant, with their intervals."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import ImpossiblePhysics, NotIdentifiable
-from upright.identification.model.model import Estimate, Pole, Rig
+from upright.identification.model.fit import Estimate, Pole
+from upright.identification.model.rig import Rig
 
 Array = NDArray[np.float64]
 
@@ -56,18 +57,13 @@ def poles(
         ]
         found[at] = tuple(
             Pole(
-                real=_estimate(float(p.real), float(errors[0][k]), quantile, "1/s"),
-                imag=_estimate(float(p.imag), float(errors[1][k]), quantile, "rad/s"),
+                real=Estimate.within(float(p.real), float(a), quantile * float(a), "1/s"),
+                imag=Estimate.within(float(p.imag), float(b), quantile * float(b), "rad/s"),
             )
-            for k, p in enumerate(here)
+            for p, a, b in zip(here, *errors, strict=True)
             if p.imag >= 0
         )
     return found
-
-
-def _estimate(value: float, stderr: float, quantile: float, unit: str) -> Estimate:
-    interval = (value - quantile * stderr, value + quantile * stderr)
-    return Estimate(value=value, stderr=stderr, interval=interval, unit=unit, status="firm")
 
 
 def _poles(rig: Rig, values: Mapping[str, float], at: str) -> NDArray[np.complex128]:

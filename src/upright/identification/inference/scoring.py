@@ -1,4 +1,4 @@
-"""How much of a run does the model explain? Fit percent per signal, for runs it has seen and runs it has not."""
+"""Scores of runs: the fit percent of each signal, for runs that were fitted and runs that are predicted."""
 
 from __future__ import annotations
 
@@ -9,14 +9,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upright.identification.model.model import Fit, Rig, Run, RunScore
-from upright.identification.problem.pose import pose
-from upright.identification.problem.predictor_setup import Ahead, with_noise
-from upright.identification.problem.problem import Problem
-from upright.identification.problem.track import Track
+from upright.identification.model.fit import Fit, RunScore
+from upright.identification.model.rig import Rig
+from upright.identification.model.runs import Run
+from upright.identification.problem.predictor import with_noise
+from upright.identification.problem.residuals import Problem, formulate
+from upright.identification.problem.tracks import FilterPlan, Track
 from upright.identification.problem.trips import located
-from upright.identification.search.descent import Report, grow
-from upright.identification.search.strategy import better, weigh_priors
+from upright.identification.search.descent import SearchLog, descend_progressively
+from upright.identification.search.strategy import better, rescale_priors
+from upright.progress import Progress, silent
 
 Array = NDArray[np.float64]
 
@@ -38,11 +40,10 @@ def fit_percent(y: ArrayLike, simulated: ArrayLike) -> float:
 def score(problem: Problem, index: int, x: Array) -> RunScore:
     """Score of one run for coordinates `x`; windows restarted from measured states are laid end to end."""
     track = problem.tracks[index]
-    if track.ahead:
-        return _score_ahead(problem, index, x, track.ahead)
     run = track.run
-    free = [k for k, c in enumerate(run.measured) if c not in run.held]
-    y = problem.simulate(index, x[:, None], track.length)[:, :, :, 0]
+    y = problem.simulate(index, x[:, None], track.length)[..., 0]
+    if track.ahead:
+        return _score_ahead(problem, index, x, y, track.ahead)
     if not track.windowed:
         t, measured, simulated = run.t, track.y, y[:, 0, :]
     else:
@@ -52,34 +53,33 @@ def score(problem: Problem, index: int, x: Array) -> RunScore:
         simulated = np.moveaxis(y[1:], 1, 0).reshape(-1, len(run.measured))
         t = run.t[0] + track.dt * rows.T.reshape(-1)
     skip = int(np.searchsorted(t, run.t[0] + run.score_from - 1e-9)) if run.score_from > 0 else 0
-    percents = {run.measured[k]: fit_percent(measured[skip:, k], simulated[skip:, k]) for k in free}
-    naive = held_speed(track) if track.windowed else np.zeros((0, len(run.measured)))
     return RunScore(
-        role=run.role, fit_percent=percents, horizon=next(iter(run.horizons), None), t=t, y=measured,
-        simulated=simulated, measured=run.measured, score_from=run.score_from,
-        naive={run.measured[k]: fit_percent(measured[skip:, k], naive[skip:, k]) for k in free if len(naive)},
+        role=run.role, fit_percent=_percents(run, measured[skip:], simulated[skip:]),
+        horizon=next(iter(run.horizons), None), t=t, y=measured, simulated=simulated, measured=run.measured,
+        score_from=run.score_from,
+        naive=_percents(run, measured[skip:], held_speed(track)[skip:]) if track.windowed else {},
     )  # fmt: skip
 
 
-def _score_ahead(problem: Problem, index: int, x: Array, plan: Ahead) -> RunScore:
+def _score_ahead(problem: Problem, index: int, x: Array, y: Array, plan: FilterPlan) -> RunScore:
     """Score of a run that a filter predicts: what was foreseen exactly so far ahead, restart by restart."""
     track = problem.tracks[index]
     run = track.run
-    free = [k for k, c in enumerate(run.measured) if c not in run.held]
     weight = plan.weight[:, None, None]
-    foreseen = problem.simulate(index, x[:, None], track.length)[..., 0] / weight
-    measured = track.targets(track.length) / weight
-    q, v = problem.filtered(index, x)
-    naive = q + v * (track.dt * np.array(plan.samples))[:, None, None]
-
-    def percents(h: int, y: Array) -> dict[str, float]:
-        return {run.measured[k]: fit_percent(measured[h, :, k], y[h, :, k]) for k in free}
-
+    foreseen, measured = y / weight, track.targets(track.length) / weight
+    position, speed = problem.filtered(index, x)
+    naive = position + speed * (track.dt * plan.samples[0])
+    ahead = {h: _percents(run, measured[i], foreseen[i]) for i, h in enumerate(run.horizons)}
     return RunScore(
-        role=run.role, fit_percent=percents(0, foreseen), horizon=run.horizons[0],
+        role=run.role, fit_percent=ahead[run.horizons[0]], horizon=run.horizons[0],
         t=run.t[track.restarts + plan.samples[0]], y=measured[0], simulated=foreseen[0], measured=run.measured,
-        naive=percents(0, naive), ahead={h: percents(i, foreseen) for i, h in enumerate(run.horizons)},
+        naive=_percents(run, measured[0], naive), ahead=ahead,
     )  # fmt: skip
+
+
+def _percents(run: Run, y: Array, simulated: Array) -> dict[str, float]:
+    """Fit percent of every signal that moved freely."""
+    return {run.measured[k]: fit_percent(y[:, k], simulated[:, k]) for k in run.free}
 
 
 def held_speed(track: Track) -> Array:
@@ -98,7 +98,7 @@ def predict(
     runs: Sequence[Run],
     *,
     groups: Mapping[str, Mapping[str, float]] | None = None,
-    progress: Report | None = None,
+    progress: Progress = silent,
 ) -> dict[str, RunScore]:
     """Scores of runs that a fitted model has not seen, by label.
 
@@ -116,7 +116,7 @@ def predict(
     groups : mapping, optional
         What groups of runs share, by label and name; those of a `Fit` when omitted.
     progress : callable, optional
-        Called with stage, fraction done, cost and number of simulations.
+        Told the stage, its cost and its number of simulations, and the share done.
 
     Raises
     ------
@@ -146,24 +146,24 @@ def _either_side(problem: Problem) -> list[Array]:
     return starts
 
 
-def _predict(rig: Rig, run: Run, groups: Mapping[str, Mapping[str, float]], progress: Report | None) -> RunScore:
+def _predict(rig: Rig, run: Run, groups: Mapping[str, Mapping[str, float]], progress: Progress) -> RunScore:
     run = located(rig, run)
     before = replace(run, score_from=0.0)
     upto = run.score_from if run.score_from > 0 else math.inf
     if run.score_from > 0 and run.horizon is not None:
         before, upto = before.first_part(run.score_from / (run.period * run.t.size)), math.inf
-    problem = pose(rig, [before], given=groups)
-    x = problem.start
+    problem = formulate(rig, [before], given=groups)
+    x, log = problem.start, SearchLog(progress=progress)
     if x.size:
-        found = grow(problem, x, report=progress, upto=upto)
+        found = descend_progressively(problem, x, log, upto=upto)
         for other in _either_side(problem):
-            found = better(found, grow(problem, other, report=progress, upto=upto))
+            found = better(found, descend_progressively(problem, other, log, upto=upto))
         if found.interrupted:
             raise KeyboardInterrupt
         if math.isinf(upto):  # else what is scored must not weigh
-            found = weigh_priors(problem, found)
+            found = rescale_priors(problem, found)
         x = found.x
-    whole = pose(rig, [run], thin=False, given=groups)
+    whole = formulate(rig, [run], thin=False, given=groups)
     sought = [u.name for u in problem.unknowns if u.lower < u.upper]
     adapted = dict.fromkeys("initial" if name.startswith("initial.") else name for name in sought)
     return replace(score(whole, 0, x), adapted=tuple(adapted))

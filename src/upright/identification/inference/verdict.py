@@ -1,10 +1,10 @@
-"""Is the model to be trusted, and why? The answer in sentences."""
+"""The verdict: whether the model is to be trusted, and why, in sentences."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from upright.identification.model.model import Estimate, RunScore
+from upright.identification.model.fit import Estimate, RunScore
 
 GOOD = 80.0
 """Fit percent below which a run counts as not explained."""

@@ -1,4 +1,4 @@
-"""Has a richer model earned its place? Held-out errors of two models, compared run by run or stretch by stretch.
+"""The decision whether a richer model has earned its place: held-out errors compared run by run or stretch by stretch.
 
 The measure is the logarithm of the error (what is missed over how much the signal moves, as in the fit percent), so
 that halving an error counts the same wherever it happens. A richer model is kept when the mean of the paired
@@ -11,14 +11,14 @@ luck: the fit itself, too, has to be closer than chance makes it (`by_chance`).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model.model import RunScore
+from upright.identification.model.fit import RunScore
 from upright.signals.memory import memory
 
 Array = NDArray[np.float64]
@@ -40,16 +40,9 @@ LOST = 11.0
 class Comparison:
     """Held-out improvement of one model over another.
 
-    Attributes
-    ----------
-    gain : float
-        Mean decrease of the logarithm of the error; positive when the richer model predicts better.
-    scatter : float
-        What the gain has to exceed: its standard error times Student's factor.
-    pairs : int
-        How many paired differences stand behind both.
-    between : str
-        What the pairs are, ``"runs"`` or ``"stretches"``.
+    `gain` is the mean decrease of the logarithm of the error, positive when the richer model predicts better, `scatter`
+    what it has to exceed: its standard error times Student's factor. `pairs` differences `between` runs or stretches
+    stand behind both.
     """
 
     gain: float
@@ -94,15 +87,14 @@ def compare(poorer: Sequence[RunScore], richer: Sequence[RunScore], quanta: Sequ
     return Comparison(gain=float(gains.mean()), scatter=scatter(gains), pairs=gains.size, between=between)
 
 
-def by_chance(terms: int, loud: float) -> float:
+def by_chance(terms: int, noise: float) -> float:
     """By how much `terms` more numbers that mean nothing lower the cost of a fit, but for one time in twenty.
 
-    Chi squared, as many degrees as terms, in units of the squared loudness of one independent residual
-    (`statistics.loudness`).
+    Chi squared, as many degrees as terms, in units of the squared `noise_level` of one independent residual.
     """
     from scipy.special import chdtri
 
-    return float(chdtri(terms, CHANCE)) * loud**2 if terms > 0 else 0.0
+    return float(chdtri(terms, CHANCE)) * noise**2 if terms > 0 else 0.0
 
 
 def scatter(gains: Array) -> float:
@@ -159,6 +151,27 @@ def _stretch_gains(poorer: RunScore, richer: RunScore, quanta: Array) -> Array:
     return np.array([[_signal_gain(poorer, richer, k, cut, quanta[k]) for k in free] for cut in cuts]).mean(axis=1)
 
 
-def percents(scores: Mapping[str, RunScore]) -> dict[str, dict[str, float]]:
-    """Fit percent by run and signal."""
-    return {label: dict(s.fit_percent) for label, s in scores.items()}
+def reason(comparison: Comparison | None, cost: float, before: float, *, lucky: bool = False) -> str:
+    """Why a rung is kept or refused, in a sentence; `cost` and `before` are of its fit and the poorer one's.
+
+    A `lucky` fit is no closer than numbers that mean nothing would make it.
+    """
+    if comparison is None:
+        return "The first rung: where the ladder starts."
+    said = comparison.sentence()
+    if lucky:
+        return f"Refused: the fit is no closer than chance makes it; {said}."
+    if comparison.better:
+        return f"Kept: {said}."
+    closer = 1 - math.sqrt(cost / before) if before > 0 else 0.0
+    if comparison.gain <= 0 and closer > 0.03:
+        return f"Refused: {said}, although the fit is {100 * closer:.3g} % closer: it explains what does not come back."
+    return f"Refused: {said}."
+
+
+def stalled(name: str, cost: float, before: float) -> str:
+    """The warning that a richer model was fitted worse than the poorer one that it contains."""
+    return (
+        f"With {name} the runs were fitted worse (cost {cost:.6g} against {before:.6g}); a richer model that contains "
+        "the poorer one never should be, so the search stalled; try better guesses."
+    )

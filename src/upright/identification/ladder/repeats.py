@@ -1,6 +1,7 @@
-"""How well does the rig repeat itself? What one run says about another of the same command; no model has to do better.
+"""How well a rig repeats itself: what one run says about another of the same command.
 
-Above this ceiling there is nothing left to explain, only what the rig does differently every time.
+No model has to do better: above this ceiling there is nothing left to explain, only what the rig does differently
+every time.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from numpy.typing import NDArray
 
 from upright.identification.inference.scoring import fit_percent
 from upright.identification.ladder.decision import scatter
-from upright.identification.model.model import Run, RunScore
+from upright.identification.model.fit import RunScore
+from upright.identification.model.runs import Run
 
 Array = NDArray[np.float64]
 
@@ -26,17 +28,11 @@ SAME = 0.02
 
 @dataclass(frozen=True, kw_only=True)
 class Repeats:
-    """Runs that repeat one another.
+    """Runs that repeat one another, by their labels.
 
-    Attributes
-    ----------
-    labels : tuple of str
-        Of the runs.
-    percents : mapping of str to tuple of float
-        By signal: fit percent of every run by every other one, without what a model may adapt as well: the offset at
-        the start, or the one that suits best where runs estimate their own offset.
-    errors : mapping of str to float
-        By run: mean over the others and the signals of the logarithm of the error, as `log_error` has it.
+    `percents` are by signal the fit percent of every run by every other one, without what a model may adapt as well:
+    the offset at the start, or the one that suits best where runs estimate their own offset. `errors` are by run the
+    mean of `log_error` over the others and the signals.
     """
 
     labels: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""Which models are nested in the one that was asked for? Rungs of a ladder, poorest first.
+"""Rungs: models nested in the one that was asked for, poorest first.
 
 A rung adds terms to what the rungs below estimate; below it a term is held where it does nothing.
 """
@@ -6,13 +6,13 @@ A rung adds terms to what the rungs below estimate; below it a term is held wher
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
-from dataclasses import MISSING, dataclass, fields, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from upright.errors import BadInput, nearest
-from upright.identification.model.model import ACTUATOR, Rig, Run
+from upright.identification.model.rig import Rig, neutral
+from upright.identification.model.runs import Run
 from upright.identification.model.unknowns import friction_names
-from upright.physics import Plant
 
 DRIVE = (
     ("offset of the drive", ("actuator.offset",)),
@@ -26,18 +26,10 @@ DRIVE = (
 
 @dataclass(frozen=True, kw_only=True)
 class Rung:
-    """One step of a ladder.
+    """One step of a ladder, by its name in tables and pictures.
 
-    Attributes
-    ----------
-    name : str
-        In tables and pictures.
-    adds : tuple of str
-        Parameters estimated from this rung on; below it they are held where they do nothing.
-    drops : tuple of str
-        Parameters that this rung does without, added by a rung below.
-    unknown : tuple of str
-        What is estimated run by run from this rung on, as in `Run.unknown`.
+    From this rung on the parameters that it `adds` are estimated, below it they are held where they do nothing; it does
+    without those that it `drops`, and what is `unknown` is estimated run by run, as in `Run.unknown`.
     """
 
     name: str
@@ -45,32 +37,20 @@ class Rung:
     drops: tuple[str, ...] = ()
     unknown: tuple[str, ...] = ()
 
-
-def neutral(plant: type[Plant], name: str) -> float:
-    """Value at which a parameter does nothing: the default of the plant or of the actuator, zero without one."""
-    if name in ACTUATOR:
-        return ACTUATOR[name][1]
-    default = next((f.default for f in fields(plant) if f.name == name), 0.0)  # type: ignore[arg-type]
-    return 0.0 if default is MISSING else float(default)  # type: ignore[arg-type]
+    def seeds(self, rig: Rig) -> dict[str, float]:
+        """Values of what it adds: a tenth of the way from where each term does nothing to its guess."""
+        found = {n: (neutral(rig.plant, n), rig.parameters[n].value) for n in self.adds}
+        return {n: low + 0.1 * (guess - low) if math.isfinite(low) else guess for n, (low, guess) in found.items()}
 
 
-def without(rig: Rig, names: Collection[str]) -> Rig:
-    """The rig with some parameters known to do nothing."""
-    parameters = {
-        n: replace(p, value=neutral(rig.plant, n), estimate=False, uncertainty=0.0) if n in names else p
-        for n, p in rig.parameters.items()
-    }
-    return replace(rig, parameters=parameters)
-
-
-def at(rig: Rig, rungs: Sequence[Rung], kept: Sequence[Rung]) -> Rig:
+def rig_at(rig: Rig, rungs: Sequence[Rung], kept: Sequence[Rung]) -> Rig:
     """The rig of a place on the ladder: of all that `rungs` add only what the `kept` ones do."""
     added = {n for rung in rungs for n in (*rung.adds, *rung.drops)}
     estimated = {n for n in added if not any(n in rung.adds for rung in rungs)}  # asked from the beginning
     for rung in kept:
         estimated |= set(rung.adds)
         estimated -= set(rung.drops)
-    return without(rig, added - estimated)
+    return rig.without(added - estimated)
 
 
 def runs_at(runs: Sequence[Run], kept: Sequence[Rung]) -> list[Run]:

@@ -1,4 +1,4 @@
-"""Which numbers are sought? Parameters that all runs share, and what may differ from run to run.
+"""The numbers sought: parameters that all runs share, each with the coordinate in which it is searched.
 
 Numbers that can only be positive are sought by their logarithm, so that masses never change sign on the way;
 levels of friction are sought as they are, because zero must be reachable.
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model.model import ACTUATOR, NEVER_NEGATIVE, NOISE, Parameter, Rig
+from upright.identification.model.rig import NEVER_NEGATIVE, NOISE, Parameter, Rig, base_values
 
 Array = NDArray[np.float64]
 
@@ -26,26 +26,12 @@ FAR = 1e9
 
 @dataclass(frozen=True, kw_only=True)
 class Unknown:
-    """One number sought.
+    """One number sought: ``"J_p"``, ``"actuator.gain"``; for some runs ``"initial.theta_dot"``, ``"offset.theta"``, ...
 
-    Attributes
-    ----------
-    name : str
-        ``"J_p"``, ``"actuator.gain"``; for some runs ``"initial.theta_dot"``, ``"offset.theta"``, ``"friction"``, ...
-    runs : tuple of int
-        Places of the runs it belongs to, or `SHARED` for all.
-    value, lower, upper : float
-        Start and bounds, SI.
-    log : bool
-        Whether its logarithm is the coordinate in which it is sought.
-    scale : float
-        A change that would matter, in that coordinate.
-    prior : tuple of float or None
-        Mean and standard deviation known beforehand, in that coordinate.
-    asked : bool
-        Whether the answer was asked for; a known number with an uncertainty is sought but not asked.
-    group : str
-        Label of the runs that share it, empty for a number of one run or of all.
+    `runs` are the places of the runs it belongs to, or `SHARED` for all, `group` the label of those that share it,
+    empty for a number of one run or of all. Start and bounds are in SI; the coordinate in which it is sought is its
+    logarithm if `log`. In that coordinate `scale` is a change that would matter and `prior` the mean and standard
+    deviation known beforehand. A known number with an uncertainty is sought but not `asked`.
     """
 
     name: str
@@ -59,7 +45,12 @@ class Unknown:
     asked: bool = True
     group: str = ""
 
-    def inside(self, value: float) -> float:
+    @property
+    def shared(self) -> bool:
+        """Whether all runs share it."""
+        return self.runs == SHARED
+
+    def coordinate(self, value: float) -> float:
         """Coordinate in which the number is sought."""
         return math.log(value) if self.log else value
 
@@ -74,19 +65,14 @@ class Unknown:
 
 def shared_unknowns(rig: Rig) -> list[Unknown]:
     """Parameters to estimate, and known ones that carry an uncertainty."""
-    found: list[Unknown] = []
-    for p in rig.parameters.values():
-        if p.estimate or p.uncertainty > 0:
-            found.append(_shared(rig, p))
-    return found
+    return [_shared(rig, p) for p in rig.parameters.values() if p.estimate or p.uncertainty > 0]
 
 
 def _shared(rig: Rig, p: Parameter) -> Unknown:
-    lower, upper = p.lower, p.upper
+    lower, upper = rig.bounds(p.name)
     positive = False
     if p.name in rig.plant.names():
         q = rig.plant.quantity(p.name)
-        lower, upper = max(lower, q.lower), min(upper, q.upper)
         positive = q.open_lower and q.lower == 0
     elif p.name in (*NEVER_NEGATIVE, "actuator.slope"):
         lower = max(lower, 0.0)
@@ -141,29 +127,3 @@ def matters(rig: Rig, coordinate: str) -> bool:
     scope[coordinate] += 1.0
     moved = [float(evaluate(text, scope)) for text in (derived.kinetic, derived.potential)]
     return not np.allclose(energies, moved, rtol=1e-12, atol=0.0)
-
-
-def base_values(rig: Rig) -> dict[str, float]:
-    """Value of every parameter of plant and actuator, defaults filled in.
-
-    Raises
-    ------
-    BadInput
-        When the plant needs a parameter that the rig does not name.
-    """
-    from dataclasses import MISSING, fields
-
-    from upright.errors import BadInput
-
-    values = {n: default for n, (_, default) in ACTUATOR.items()}
-    for f in fields(rig.plant):  # type: ignore[arg-type]
-        if f.default is not MISSING:
-            values[f.name] = float(f.default)
-    values |= {n: p.value for n, p in rig.parameters.items()}
-    missing = [n for n in rig.plant.names() if n not in values]
-    if missing:
-        raise BadInput(
-            f"{rig.plant.__name__} needs a value or a guess of {', '.join(missing)}, none came; "
-            f"add {'it' if len(missing) == 1 else 'them'} to the parameters of the rig."
-        )
-    return values

@@ -1,4 +1,4 @@
-"""What differs from run to run? Each nuisance with where its search starts, and what it does to a simulated run.
+"""Nuisances, which differ from run to run: where the search for each starts, and what it does to a simulated run.
 
 A nuisance belongs to one run, or to all runs that give it the same label in `Run.shared`.
 """
@@ -6,16 +6,16 @@ A nuisance belongs to one run, or to all runs that give it the same label in `Ru
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model.model import Rig, Run
-from upright.identification.model.nuisance_names import SPREADS
+from upright.identification.model.rig import Rig
+from upright.identification.model.runs import SPREADS, Run
 from upright.identification.model.unknowns import Unknown, matters
-from upright.identification.problem.track import Track
+from upright.identification.problem.tracks import Track
 from upright.signals.smoothing import State
 
 Array = NDArray[np.float64]
@@ -39,18 +39,15 @@ def run_unknowns(rig: Rig, index: int, run: Run, start: State) -> list[Unknown]:
     wanted = {*run.unknown, *run.shared}
 
     def add(name: str, value: float, scale: float, prior: tuple[float, float] | None = None,
-            lower: float = -math.inf, upper: float = math.inf) -> None:  # fmt: skip
+            lower: float = -math.inf, upper: float = math.inf, *, log: bool = False) -> None:  # fmt: skip
         found.append(
-            Unknown(name=name, runs=(index,), value=value, lower=lower, upper=upper, log=False, scale=scale,
+            Unknown(name=name, runs=(index,), value=value, lower=lower, upper=upper, log=log, scale=scale,
                     prior=prior, group=run.shared.get(name, ""))
         )  # fmt: skip
 
     def factor(name: str) -> None:
         sigma = run.spread.get(name, SPREADS[name.partition(".")[0]])
-        found.append(
-            Unknown(name=name, runs=(index,), value=1.0, lower=0.0, upper=math.inf, log=True, scale=1.0,
-                    prior=(0.0, sigma), group=run.shared.get(name, ""))
-        )  # fmt: skip
+        add(name, 1.0, 1.0, (0.0, sigma), lower=0.0, log=True)
 
     names = rig.plant.state_names()
     if "initial" in wanted and run.horizon is None:
@@ -101,7 +98,7 @@ def _commanded(run: Run) -> NDArray[np.bool_]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Dressed:
+class Setting:
     """What one run is simulated with: parameters by name, first states (states, W, lanes), and what its sensors make
     of the motion, ``y = scale q + offset``, each (outputs, lanes); a scale of None is 1.
     """
@@ -112,10 +109,10 @@ class Dressed:
     scales: Array | None
 
 
-def dress(
+def setting(
     rig: Rig, track: Track, values: dict[str, float | Array], own: Mapping[str, Array], friction: tuple[str, ...],
     lanes: int,
-) -> Dressed:  # fmt: skip
+) -> Setting:  # fmt: skip
     """Put a run's own numbers `own` (name to (lanes,)) into the parameters `values` and its first states.
 
     `friction` names the parameters that a friction factor multiplies.
@@ -147,22 +144,4 @@ def dress(
     if "friction" in own:
         for name in friction:
             values[name] = values[name] * own["friction"]
-    return Dressed(values=values, x0=x0, offsets=offsets, scales=scales)
-
-
-def known_beforehand(unknowns: Sequence[Unknown], x: Array, noise: float) -> tuple[Array, Array]:
-    """Residuals and Jacobian of what was known of coordinates `x` beforehand, worth `noise` per sigma.
-
-    What is known of a first coordinate is a reading, so where the sensor's offset is sought too, their sum is held
-    against it. Held against the coordinate alone it would fight the offset (seen: 34 sigma on a cart whose spring was
-    slack 6 mm from zero, which bent everything else).
-    """
-    known = [(i, u, u.prior) for i, u in enumerate(unknowns) if u.prior is not None]
-    place = {(u.name, run): i for i, u in enumerate(unknowns) for run in u.runs}
-    r, J = np.zeros(len(known)), np.zeros((len(known), x.size))
-    for row, (i, u, (mean, sigma)) in enumerate(known):
-        kind, _, which = u.name.partition(".")
-        parts = [i] if kind != "initial" else [i, place.get((f"offset.{which}", u.runs[0]), i)]
-        J[row, parts] = noise / sigma
-        r[row] = noise * (float(np.sum(x[list(dict.fromkeys(parts))])) - mean) / sigma
-    return r, J
+    return Setting(values=values, x0=x0, offsets=offsets, scales=scales)

@@ -1,4 +1,4 @@
-"""Where will it be a moment ahead? Predictions from the past alone, for a plant that would fall without its loop.
+"""Predictions from the past alone, by a Kalman filter, for a plant that would fall without its loop.
 
 A constant-gain extended Kalman filter (Safonov and Athans 1978) follows the record: the compiled kernel predicts one
 sample, friction, stops and delays included, and the innovation corrects the state by the gain of the linear model about
@@ -14,13 +14,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model.model import NOISE
-from upright.identification.problem.predictor_setup import Ahead
-from upright.identification.problem.track import Track
+from upright.identification.model.rig import NOISE, Parameter, Rig, base_values
+from upright.identification.model.runs import Run
+from upright.identification.problem.tracks import DRIFT, FilterPlan, Track, nearest_equilibrium
 from upright.physics.evaluate import small_motions
 from upright.simulation import Simulator
 
@@ -31,6 +32,9 @@ STRETCH = 2
 
 SETTLED = 1e-6
 """Relative change of the covariance per sample below which the gain counts as settled."""
+
+EASE = 0.05
+"""Share of a coordinate's own forces with which the search for the random force begins."""
 
 
 def predicted(
@@ -47,7 +51,7 @@ def predicted(
         Sensor offsets and gains, the latter 1 when omitted.
     """
     x = restart_states(solver, track, values, offsets, scales)
-    states = len(_plan(track).level)
+    states = len(_plan(track).equilibrium)
     _, windows, lanes = x.shape
     ahead = _plan(track).samples[:samples]
     every = math.gcd(*ahead)
@@ -83,9 +87,9 @@ def restart_states(
     if scales is not None:
         measured /= scales[:, None]
 
-    states = len(plan.level)
+    states = len(plan.equilibrium)
     x = np.zeros((states + len(still), count, lanes))
-    x[:states] = plan.level[:, None, None]
+    x[:states] = plan.equilibrium[:, None, None]
     x[columns] = measured[:, begin]
     place = np.full(last + 1, -1)
     place[track.restarts] = np.arange(track.restarts.size)
@@ -115,7 +119,7 @@ def gains(solver: Simulator, track: Track, values: Mapping[str, float | Array], 
     C[np.arange(len(track.columns)), list(track.columns)] = 1.0
     R = np.diag(plan.sensor)
     P = np.zeros((lanes, n, n))
-    P[:, range(n), range(n)] = np.concatenate([plan.doubt, plan.drift])
+    P[:, range(n), range(n)] = np.concatenate([plan.initial, plan.drift])
     found: list[Array] = [np.zeros((lanes, n, len(C)))]
     for _ in range(1, steps):
         ahead = Phi @ P @ Phi.transpose(0, 2, 1) + Q
@@ -145,7 +149,7 @@ def discrete_model(
     from scipy.linalg import expm
 
     d = solver.derived
-    point = {c: float(_plan(track).level[2 * i]) for i, c in enumerate(d.coordinates)}
+    point = {c: float(_plan(track).equilibrium[2 * i]) for i, c in enumerate(d.coordinates)}
     M, D, K, G = small_motions(d, {**values, **point}, (lanes,))
     n = len(d.coordinates)
     for i in np.flatnonzero(G.any(axis=(0, 2))):
@@ -194,6 +198,39 @@ def _table(
     return solver.table(tiled, times * lanes), np.array(rows, dtype=np.int64)
 
 
-def _plan(track: Track) -> Ahead:
+def _plan(track: Track) -> FilterPlan:
     assert track.ahead is not None
     return track.ahead
+
+
+def with_noise(rig: Rig, runs: Sequence[Run]) -> Rig:
+    """The rig with the levels of process noise that filters of these runs need, to estimate unless it has them."""
+    filtered = [run for run in runs if run.filtered]
+    moving = {c for run in filtered for c in run.measured if c not in run.held}
+    driven = {i.name for run in filtered for k, i in enumerate(rig.plant.inputs) if np.ptp(run.u[:, k]) > 0}
+    if all(f"{NOISE}{c}" in rig.parameters for c in moving | driven):
+        return rig
+    run = filtered[0]
+    values: dict[str, float] = {**base_values(rig), **run.known}
+    level = dict(zip(rig.plant.state_names(), nearest_equilibrium(rig, run), strict=True))
+    M, _, _, _ = small_motions(rig.plant.derived(), {**values, **level})
+    found = dict(rig.parameters)
+    for i, c in enumerate(rig.plant.coordinates):
+        if c.name not in moving or f"{NOISE}{c.name}" in found:
+            continue
+        y = next(r.y[:, r.measured.index(c.name)] for r in filtered if c.name in r.measured)
+        force = float(M[i, i]) * float(np.std(y)) / run.horizons[0] ** 2
+        found[f"{NOISE}{c.name}"] = Parameter(
+            name=f"{NOISE}{c.name}", value=EASE * force * math.sqrt(run.horizons[0]) or 1e-9,
+            unit=f"{'N m' if c.unit == 'rad' else 'N'} s^(1/2)", estimate=True, lower=0.0,
+            meaning=f"random force on {c.name}, root of its density",
+        )  # fmt: skip
+    for k, i in enumerate(rig.plant.inputs):
+        if i.name in driven and f"{NOISE}{i.name}" not in found:
+            size = max(float(np.std(r.u[:, k])) for r in filtered)
+            unit = rig.parameters["actuator.offset"].unit if "actuator.offset" in rig.parameters else "1"
+            found[f"{NOISE}{i.name}"] = Parameter(
+                name=f"{NOISE}{i.name}", value=0.1 * DRIFT * size, unit=f"{unit} s^(-1/2)", estimate=True, lower=0.0,
+                meaning=f"drift of the command of {i.name}, root of its variance per time",
+            )  # fmt: skip
+    return replace(rig, parameters=found)

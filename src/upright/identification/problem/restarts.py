@@ -1,4 +1,4 @@
-"""How much of a misfit is the fault of the place where the prediction was restarted?
+"""Restarted predictions whose initial error is eliminated by variable projection.
 
 A window starts from a measured state, and near upright a slip of a thousandth grows a thousandfold in a second: such
 windows say little about friction, and everything about the encoder. Left alone they outvote the rest (seen: a fall
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-DOUBT = 4.0
+BENDING = 4.0
 """Factor on the variance of a smoothed state, for what smoothing bends."""
 
 PERTURBATION = 1e-5
@@ -30,7 +30,7 @@ ENOUGH = 1e-6
 """Relative gain of the cost below which restarts have settled."""
 
 
-def worth(samples: int, width: int, dt: float, starts: NDArray[np.int64], *, order: int = 4) -> Array:
+def smoothed_variance(samples: int, width: int, dt: float, starts: NDArray[np.int64], *, order: int = 4) -> Array:
     """Variances (W, 2) of smoothed position and speed at some samples, for unit variance of the measured signal.
 
     Polynomials of `order` over `width` samples centred on the restart, one-sided at the ends of the record.
@@ -47,23 +47,16 @@ def worth(samples: int, width: int, dt: float, starts: NDArray[np.int64], *, ord
         C = np.linalg.pinv(np.vander(s - place, order + 1, increasing=True))
         out[row, 0] = C[0] @ C[0]
         out[row, 1] = C[1] @ C[1] / (max(m - 1, 1) * dt) ** 2 if order else 0.0
-    return DOUBT * out
+    return BENDING * out
 
 
 @dataclass(frozen=True, kw_only=True)
 class Restart:
     """Windows restarted where it suits them best, at a price.
 
-    Attributes
-    ----------
-    shift : (states, W, 1) array
-        Change of their first states.
-    residual : (W, R) array
-        Weighted residuals then.
-    slope : (W, R, S) array
-        Their change per unit of the S doubtful states.
-    change, variance : (W, S) arrays
-        Change of the doubtful states; their variance over that of a residual, 0 for a state that is known.
+    `shift` (states, W, 1) is the change of their first states, `residual` (W, R) the weighted residuals then and
+    `slope` (W, R, S) their change per unit of the S uncertain states; `change` (W, S) is that of these states and
+    `variance` (W, S) theirs over that of a residual, 0 for a state that is known.
     """
 
     shift: Array

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from upright.closed_loop.feedback import Feedback
 from upright.closed_loop.preparation import finer
 from upright.errors import BadInput
-from upright.identification.model.model import NOISE, Rig, Run
+from upright.identification.model.rig import NOISE, Rig
+from upright.identification.model.runs import Run
 from upright.identification.problem.predictor import predicted
-from upright.identification.problem.track import Track
+from upright.identification.problem.tracks import Track
 from upright.physics import Plant
 from upright.simulation import Held, Law, Simulator, choose
 

@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model.model import Rig, Run
+from upright.identification.model.rig import Rig
+from upright.identification.model.runs import Run
 from upright.signals.trip_regression import LEAST, Regression, smoothing_width_for
 
 Array = NDArray[np.float64]
@@ -81,7 +82,7 @@ def _moments(rig: Rig, run: Run) -> tuple[list[Trip], bool]:
     on = rig.plant.inputs[0].on
     if on not in run.measured or on in run.held or not np.any(run.u[:, 0]):
         return found, plain
-    quantum = dict(zip(run.measured, run.quantum or (0.0,) * len(run.measured), strict=True))
+    quantum = dict(zip(run.measured, run.quanta, strict=True))
     signals = {c: run.y[:, k] for k, c in enumerate(run.measured)}
     signals |= {c: v for c, v in run.held.items() if isinstance(v, np.ndarray)}
     others = [signals[c.name] for c in rig.plant.coordinates if c.name in signals and c.name != on]

@@ -1,4 +1,4 @@
-"""Which numbers make a formula meet the data? The estimator's walk and its errors, without a plant.
+"""Curve fitting: a formula met to data by the descent that fits rigs, with standard errors.
 
 For whatever is a formula rather than a motion: a decay, a frequency response, a line through squared periods.
 """
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput
-from upright.identification.problem.normal import Normal, pseudo_inverse
+from upright.identification.problem.normal_equations import Normal, pseudo_inverse
 from upright.identification.search.descent import Descent, descend
 
 Array = NDArray[np.float64]
@@ -96,23 +96,12 @@ def fit_curve(
     count = 0
 
     def residual(z: Array) -> Array:
-        with np.errstate(all="ignore"):
-            return (np.asarray(model(z), dtype=np.float64) - target) * weight
+        return (np.asarray(model(z), dtype=np.float64) - target) * weight
 
     def evaluate(z: Array) -> Normal:
         nonlocal count
         count += 1
-        r = residual(z)
-        J = np.empty((r.size, z.size))
-        for i, h in enumerate(STEP * np.where(z == 0.0, 1e-3, np.abs(z))):
-            e = np.zeros(z.size)
-            e[i] = h
-            with np.errstate(all="ignore"):  # a walk that has left for where the model is not finite is called back
-                J[:, i] = (residual(z + e) - residual(z - e)) / (2 * h)
-        with np.errstate(all="ignore"):
-            normal = Normal(float(r @ r), J.T @ J, J.T @ r)
-        whole = math.isfinite(normal.cost) and bool(np.isfinite(normal.matrix).all())
-        return normal if whole else Normal(math.inf, np.zeros((z.size,) * 2), np.zeros(z.size))
+        return Normal.by_differences(residual, z, STEP * np.where(z == 0.0, 1e-3, np.abs(z)), central=True)
 
     if not math.isfinite(evaluate(x).cost):
         raise BadInput(f"the model is not finite at the start {x.tolist()}; start elsewhere.")

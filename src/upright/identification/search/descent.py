@@ -1,25 +1,22 @@
-"""How does one walk downhill? Levenberg-Marquardt with bounds, over a horizon that grows as the model earns it."""
+"""Levenberg-Marquardt descent within bounds, over a horizon that grows as the model earns it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.problem.normal import Normal
-from upright.identification.problem.pose import rescale_steps, settle_steps
-from upright.identification.problem.problem import Problem
+from upright.identification.problem.normal_equations import Normal
+from upright.identification.problem.residuals import Problem
+from upright.progress import Progress, silent
 
 Array = NDArray[np.float64]
 
 CREEP = 1e-3
 """A walk that gained less than this share in its last ten steps counts as settled when its evaluations run out."""
-
-Report = Callable[[str, float, float, int], None]
-"""Called with stage, fraction done, cost, evaluations."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,6 +27,32 @@ class Descent:
     normal: Normal
     converged: bool
     interrupted: bool = False
+
+
+@dataclass
+class SearchLog:
+    """What happened on the way: stages with their cost and simulations, and the best so far should one interrupt.
+
+    `best` holds the problem last worked on and where in it the search stood, `rivals` values of another model that the
+    data do not refuse, `unresolved` lengths below the rounding. `conventions` says which signs and zeros look wrong;
+    asked only when a fit is poor, since no search mends a reversed sign.
+    """
+
+    progress: Progress = silent
+    history: list[tuple[str, float, int]] = field(default_factory=list[tuple[str, float, int]])
+    best: tuple[Problem, Array] | None = None
+    warnings: list[str] = field(default_factory=list[str])
+    rivals: dict[str, float] = field(default_factory=dict[str, float])
+    unresolved: tuple[str, ...] = ()
+    conventions: Callable[[], Sequence[str]] = tuple
+
+    def tell(self, stage: str, share: float, cost: float, problem: Problem) -> None:
+        """Report progress, with the cost reached and the simulations made."""
+        self.progress(f"{stage}, cost {cost:.6g}, {problem.evaluations} evaluations", share)
+
+    def note(self, stage: str, cost: float, problem: Problem) -> None:
+        """Add a stage to the history."""
+        self.history.append((stage, cost, problem.evaluations))
 
 
 def descend(
@@ -160,43 +183,50 @@ def first_horizon(problem: Problem) -> float:
     return max((1.5 * t.period for t in free), default=max(shortest, default=math.inf))
 
 
-def grow(
+def descend_progressively(
     problem: Problem,
     x: Array,
+    log: SearchLog | None = None,
     *,
-    report: Report | None = None,
-    history: list[tuple[str, float, int]] | None = None,
     horizon: float | None = None,
     upto: float = math.inf,
     tolerance: float = 1e-6,
 ) -> Descent:
     """Descend over a horizon that grows to the whole of the runs, at least doubling, at most to where it still follows.
 
-    Fitting long records at once stalls or costs 5 to 30 times more (DESIGN 2).
+    Fitting long records at once stalls or costs 5 to 30 times more.
+
+    Parameters
+    ----------
+    problem, x : Problem, (sought,) array
+        What is minimized, and from where.
+    log : SearchLog, optional
+        Where the stages are noted.
+    horizon, upto : float
+        Seconds to begin with, `first_horizon` when omitted, and to end with.
+    tolerance : float
+        As for `descend`, in the last stage.
     """
+    log = SearchLog() if log is None else log
     whole = min(problem.duration, upto)
     h = min(whole, first_horizon(problem) if horizon is None else horizon)
     x = np.clip(x, problem.lower, problem.upper)
-    here: Normal | None = settle_steps(problem, x, h)
+    here: Normal | None = problem.settle_steps(x, h)
     while True:
         last = h >= whole
         name = "whole runs" if last else f"first {h:.3g} s"
-
-        def tell(cost: float, h: float = h, name: str = name) -> None:
-            if report is not None:
-                report(name, h / whole if math.isfinite(whole) else 1.0, cost, problem.evaluations)
-
+        share = h / whole if math.isfinite(whole) else 1.0
         found = descend(
             lambda z, h=h: problem.normal(z, h), x, problem.lower, problem.upper,
-            tolerance=tolerance if last else 1e-3, limit=60 if last else 25, report=tell, here=here,
+            tolerance=tolerance if last else 1e-3, limit=60 if last else 25, here=here,
+            report=lambda cost, name=name, share=share: log.tell(name, share, cost, problem),
         )  # fmt: skip
         x = found.x
-        if history is not None:
-            history.append((name, found.normal.cost, problem.evaluations))
+        log.note(name, found.normal.cost, problem)
         if last or found.interrupted:
             return found
         try:
-            rescale_steps(problem, found.normal, h)
+            problem.rescale_steps(found.normal, h)
             followed = reach(problem, x)
         except KeyboardInterrupt:
             return replace(found, converged=False, interrupted=True)

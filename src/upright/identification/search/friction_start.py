@@ -12,7 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model.model import Rig
+from upright.identification.model.rig import Rig
 from upright.identification.search.drive_force import drive_force
 from upright.identification.search.inverse_start import Sample
 from upright.physics.evaluate import evaluate

@@ -1,4 +1,4 @@
-"""Which numbers agree with the measured accelerations? An answer without a single simulation.
+"""Start values from inverse dynamics: numbers that agree with the measured accelerations, without a simulation.
 
 The model's accelerations, computed from the smoothed motion, are compared with the measured ones; both have gone
 through the same smoothing. Masses and forces that only scale together are left where the guess put them.
@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model.model import Rig, Run
-from upright.identification.model.unknowns import Unknown, base_values, shared_unknowns
-from upright.identification.problem.normal import Normal, finite
+from upright.identification.model.rig import Rig, base_values
+from upright.identification.model.runs import Run
+from upright.identification.model.unknowns import Unknown, shared_unknowns
+from upright.identification.problem.normal_equations import Normal, finite
 from upright.identification.search.descent import descend
 from upright.identification.search.drive_force import drive_force
 from upright.physics.evaluate import mass_and_force
@@ -62,7 +63,7 @@ def observe(rig: Rig, run: Run, *, flips: Mapping[str, float] | None = None,
     free = tuple(i for i, c in enumerate(coordinates) if c not in run.held)
     if not free or any(coordinates[i] not in run.measured for i in free) or n < 30:
         return None
-    quantum = dict(zip(run.measured, run.quantum or (0.0,) * len(run.measured), strict=True))
+    quantum = dict(zip(run.measured, run.quanta, strict=True))
     signal = {c: run.y[:, k] for k, c in enumerate(run.measured)}
     period = min(dominant_period(signal[coordinates[i]], dt) for i in free)
     width = max(smoothing_width(signal[coordinates[i]], dt, period, quantum[coordinates[i]]) for i in free)
@@ -99,10 +100,7 @@ def samples_of(
         k = -(-run.t.size // most)
         thin = run
         if k > 1:
-            held = {n: v[::k] if isinstance(v, np.ndarray) else v for n, v in run.held.items()}
-            thin = replace(
-                run, t=run.t[::k], u=run.u[::k], y=run.y[::k], held=held, loop=run.loop and run.loop.thinned(k)
-            )
+            thin = replace(run.samples(slice(None, None, k)), loop=run.loop and run.loop.thinned(k))
         sample = observe(rig, thin, flips=flips, turns=turns)
         if sample is not None:
             found.append(sample)
@@ -156,12 +154,14 @@ class Agreement:
     unexplained: float
 
 
-def regress(rig: Rig, samples: list[Sample], start: Mapping[str, float] | None = None) -> Agreement:
+def regress(rig: Rig, samples: list[Sample]) -> Agreement:
     """Least squares on the accelerations over the numbers to estimate."""
     unknowns = [u for u in shared_unknowns(rig) if u.asked]
-    base = base_values(rig) | dict(start or {})
-    size = len(unknowns)
+    base = base_values(rig)
     count = sum((s.q.shape[1] - 2 * min(s.edge, s.q.shape[1] // 4)) * len(s.free) for s in samples)
+    x0 = np.array([_coordinate(u, base[u.name]) for u in unknowns])
+    scale = np.array([u.scale for u in unknowns])
+    log = np.array([u.log for u in unknowns], dtype=bool)
 
     def values(x: Array) -> dict[str, float]:
         return base | {u.name: math.exp(z) if u.log else float(z) for u, z in zip(unknowns, x, strict=True)}
@@ -173,29 +173,18 @@ def regress(rig: Rig, samples: list[Sample], start: Mapping[str, float] | None =
         except np.linalg.LinAlgError:
             return np.full(count, np.inf)
 
-    def normal(x: Array) -> Normal:
-        r = residual(x)
-        if not finite(r):
-            return Normal(math.inf, np.zeros((size, size)), np.zeros(size))
-        J = np.empty((r.size, size))
-        for j, u in enumerate(unknowns):
-            z = x.copy()
-            step = 1e-5 * (1.0 if u.log else max(abs(float(x[j])), u.scale))
-            z[j] += step
-            J[:, j] = (residual(z) - r) / step
-        if not finite(J):
-            return Normal(math.inf, np.zeros((size, size)), np.zeros(size))
+    def pulled(x: Array) -> Array:
         # a faint pull towards the start keeps numbers that the accelerations cannot see where they were
-        pull = np.array([1e-3 * math.sqrt(r.size) / u.scale for u in unknowns])
-        away = pull * (x - x0)
-        return Normal(float(r @ r + away @ away), J.T @ J + np.diag(pull**2), J.T @ r + pull * away)
+        return np.concatenate([residual(x), 1e-3 * math.sqrt(count) * (x - x0) / scale])
 
-    x0 = np.array([_inside(u, base[u.name]) for u in unknowns])
+    def normal(x: Array) -> Normal:
+        return Normal.by_differences(pulled, x, 1e-5 * np.where(log, 1.0, np.maximum(np.abs(x), scale)))
+
     lower, upper = (np.array([u.bounds[k] for u in unknowns]) for k in (0, 1))
     found = descend(normal, x0, lower, upper, tolerance=1e-5, limit=40)
     r = residual(found.x)
     return Agreement(values=values(found.x), unexplained=float(np.mean(r * r)) if finite(r) else math.inf)
 
 
-def _inside(u: Unknown, value: float) -> float:
+def _coordinate(u: Unknown, value: float) -> float:
     return math.log(value) if u.log and value > 0 else min(max(value, u.lower), u.upper)

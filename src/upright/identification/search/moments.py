@@ -11,10 +11,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.problem.pose import settle_steps
-from upright.identification.problem.problem import Problem
-from upright.identification.search.descent import Descent, descend
-from upright.identification.search.strategy import Log
+from upright.identification.problem.residuals import Problem
+from upright.identification.search.descent import Descent, SearchLog, descend
 
 Array = NDArray[np.float64]
 
@@ -27,7 +25,7 @@ WORTH = 1e-3
 """Share of the cost that another moment has to save before the descent is taken up from there."""
 
 
-def other_moments(problem: Problem, found: Descent, log: Log) -> Descent:
+def other_moments(problem: Problem, found: Descent, log: SearchLog) -> Descent:
     """The optimum after every sought moment was tried on a grid, the other numbers following from the best place."""
     for _ in range(3):
         if found.interrupted:
@@ -35,9 +33,9 @@ def other_moments(problem: Problem, found: Descent, log: Log) -> Descent:
         x = _moved(problem, found.x, found.normal.cost)
         if x is None:
             return found
-        settle_steps(problem, x, np.inf)
+        problem.settle_steps(x)
         other = descend(problem.normal, x, problem.lower, problem.upper, tolerance=1e-6, limit=60)
-        log.history.append(("another moment", other.normal.cost, problem.evaluations))
+        log.note("another moment", other.normal.cost, problem)
         if other.interrupted or not other.normal.cost < found.normal.cost:
             return replace(found, interrupted=other.interrupted)
         found = other
@@ -67,6 +65,6 @@ def _costs(problem: Problem, index: int, lanes: Array) -> Array:
     y = problem.simulate(index, lanes, track.length)[track.first :]
     target = track.targets(track.length)[track.first :]
     with np.errstate(over="ignore", invalid="ignore"):
-        e = problem.blend(index) @ (y - target[..., None])
+        e = track.weighting @ (y - target[..., None])
         total = np.sum(e * e, axis=(0, 1, 2))
     return np.where(np.isfinite(total), total, np.inf)

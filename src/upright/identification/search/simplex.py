@@ -1,33 +1,33 @@
-"""What would the paper have done? Nelder and Mead's simplex on the sum of squares, made to start from any guess.
+"""Nelder and Mead's simplex on the sum of squares, made to start from any guess: the paper's way.
 
-It copes where stiction makes the cost a staircase, and costs 5 to 40 times more than least squares (DESIGN 9).
+It copes where stiction makes the cost a staircase, and costs 5 to 40 times more than least squares.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.problem.problem import Problem
-from upright.identification.search.descent import Report
+from upright.identification.problem.residuals import Problem
+from upright.identification.search.descent import SearchLog
 
 Array = NDArray[np.float64]
 
 
 def simplex(
-    problem: Problem, x: Array, *, horizon: float = math.inf, limit: int = 2000, report: Report | None = None,
-    keep: Callable[[Array], None] | None = None,
+    problem: Problem, x: Array, log: SearchLog | None = None, *, horizon: float = math.inf, limit: int = 2000,
+    keep: bool = False,
 ) -> tuple[Array, float]:  # fmt: skip
     """Best coordinates within `horizon` seconds and their cost, after at most `limit` simulations.
 
-    Every improvement is handed to `keep`, should somebody interrupt.
+    To `keep`, every improvement becomes the best of the `log`, should somebody interrupt.
     The first simplex reaches 10 % of each number, or 10 % of its scale when it is zero.
     """
     from scipy.optimize import minimize
 
+    log = SearchLog() if log is None else log
     size = np.array([1.0 if u.log else max(abs(z), u.scale) for u, z in zip(problem.unknowns, x, strict=True)])
     lower, upper = problem.lower, problem.upper
     best = [x.copy(), problem.cost(x, horizon)]
@@ -40,10 +40,10 @@ def simplex(
         count += 1
         if value < best[1]:
             best[0], best[1] = here, value
-            if keep is not None:
-                keep(here)
-            if report is not None and count % 20 == 0:
-                report("simplex", count / limit, value, problem.evaluations)
+            if keep:
+                log.best = problem, here
+            if count % 20 == 0:
+                log.tell("simplex", count / limit, value, problem)
         return value if math.isfinite(value) else 1e300
 
     corners = np.vstack([np.zeros(x.size), 0.1 * np.eye(x.size)])

@@ -8,7 +8,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from upright.identification.model.model import Fit
+from upright.identification import Fit
 from upright.lab.free_swing_4.drift import PUSH, TILT
 from upright.lab.free_swing_4.figures import Recovered, truth_figure
 from upright.lab.free_swing_4.parts import blind_part, drift_part, energy_part, level_part

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from upright.identification.model.model import Fit
+from upright.identification import Fit
 from upright.lab.free_swing_4.drift import PUSH, SPRING, TILT
 from upright.lab.free_swing_4.figures import drift_figure, energy_figure
 from upright.lab.free_swing_4.run import FreeSwing

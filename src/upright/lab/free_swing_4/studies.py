@@ -12,12 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
-from upright.identification.model.model import Fit
+from upright.identification import Fit
 from upright.lab.free_swing_4.drift import SPRING, TILT, anchored
 from upright.lab.free_swing_4.figures import Recovered
 from upright.lab.rigs.twin import MOTOR_AND_BELT, Release, Twin, acquire
 from upright.lab.weighing_1a.run import Known
-from upright.progress import Progress
+from upright.progress import Progress, part, silent
 from upright.records import Record
 from upright.study.load import Study
 
@@ -177,17 +177,13 @@ def write(rig: Twin, folder: Path, weighed: Known | None = None) -> tuple[tuple[
     return tuple(made)
 
 
-def answer(q: Question, study: Path, progress: Progress | None = None) -> Answer:
+def answer(q: Question, study: Path, progress: Progress = silent) -> Answer:
     """Fit one question from its files, as `upright identify` would."""
     from upright.identification.estimate import identify
     from upright.study.load import load_study
 
     loaded = load_study(study)
-
-    def tell(stage: str, done: float, cost: float, evaluations: int) -> None:
-        if progress:
-            progress(f"{q.title}: {stage}", done)
-
+    tell = part(progress, 0.0, 1.0, q.title)
     return Answer(question=q, study=loaded, fit=identify(loaded.rig, loaded.runs, method=q.method, progress=tell))
 
 

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from upright.control import Rig
 from upright.errors import BadInput
-from upright.identification.frequency.periodic import chirp, multisine, odd_lines
-from upright.identification.frequency.spectra import response_of
+from upright.identification.frequency.spectra import chirp, multisine, odd_lines, response_of
 from upright.lab.frequency_1b.sweeps import EVERY, REACH, SHARE, Sweep
 from upright.records import Provenance, Record
 

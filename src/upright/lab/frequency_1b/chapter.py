@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from upright.identification import Estimate
 from upright.identification.frequency.answer import Answer, digits, key_value
-from upright.identification.model.estimates import Estimate
 from upright.lab.frequency_1b.own_log import Found
 from upright.lab.frequency_1b.run import BENCH, Result
 from upright.lab.frequency_1b.tables import (

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from upright.errors import BadInput, nearest
+from upright.identification import Rig as Asked
 from upright.identification.frequency.answer import Answer, explain
-from upright.identification.frequency.fitting import Told
 from upright.identification.frequency.response import FrequencyResponse, is_response
 from upright.identification.frequency.spectra import response_of
-from upright.identification.model.model import Rig as Asked
 from upright.lab.frequency_1b.run import BENCH, PLANT, asked
 from upright.lab.rigs.makes import MAKES
+from upright.progress import Progress, silent
 from upright.records import Record
 from upright.study.fit_file import write_response_fit
 
@@ -68,7 +68,7 @@ class Found:
 
 
 def look(
-    sources: Sequence[Path], wish: Wish, folder: Path, *, data: Path | None = None, tell: Told | None = None
+    sources: Sequence[Path], wish: Wish, folder: Path, *, data: Path | None = None, tell: Progress = silent
 ) -> Found:
     """Response of the sources, fitted when plant and numbers are named; writes `frequency.csv` and `fit.json`.
 

@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from upright.control import Rig
+from upright.identification import Parameter
+from upright.identification import Rig as Asked
 from upright.identification.frequency.answer import Answer, explain
-from upright.identification.model.model import Parameter
-from upright.identification.model.model import Rig as Asked
 from upright.lab.frequency_1b.broadband import ask
 from upright.lab.frequency_1b.sweeps import Sweep, stepped_sine
 from upright.lab.rigs.makes import MAKES, PLANTS, Make, make_rig

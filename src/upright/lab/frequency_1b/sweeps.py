@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.control import Rig
-from upright.identification.frequency.detection import Tone, by_period, detect, overtones, settled
+from upright.identification.frequency.detection import Tone, by_period, detect, settled
 from upright.identification.frequency.response import FrequencyResponse
+from upright.identification.frequency.spectra import from_tones
 from upright.records import Provenance, Record
 
 Array = NDArray[np.float64]
@@ -205,18 +206,9 @@ def _dwell(
 
 def collect(dwells: tuple[Dwell, ...], rig: Rig) -> FrequencyResponse:
     """Response of sines measured one after the other."""
-    drive = np.array([d.command.lines[0, 0] for d in dwells])
     late = [f"{d.omega:.3g}" for d in dwells if not math.isfinite(d.settle)]
     notes = (f"Not settled at {', '.join(late)} rad/s.",) if late else ()
-    return FrequencyResponse(
-        omega=np.array([d.omega for d in dwells]),
-        response=np.asarray([d.tone.lines[0] for d in dwells], dtype=np.complex128) / drive[:, None],
-        outputs=dwells[0].record.outputs, input="u",
-        units=(*(c.unit for c in rig.plant.coordinates), rig.unit),
-        variance=np.array([d.tone.variance for d in dwells]) / np.abs(drive[:, None]) ** 2,
-        coherence=np.array([d.tone.coherence for d in dwells]),
-        distortion=np.array([d.tone.distortion for d in dwells]),
-        drive=drive, dry=np.array([d.tone.dry for d in dwells]),
-        still=np.array([d.tone.still for d in dwells]),
-        overtones=overtones([d.tone for d in dwells]), hold=rig.period, notes=notes,
+    return from_tones(
+        [d.tone for d in dwells], [d.command for d in dwells], outputs=dwells[0].record.outputs,
+        units=(*(c.unit for c in rig.plant.coordinates), rig.unit), hold=rig.period, notes=notes,
     )  # fmt: skip

@@ -6,10 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from upright.identification.frequency.answer import Answer, digits, key_value
-from upright.identification.frequency.curves import curves
+from upright.identification import Estimate
+from upright.identification.frequency.answer import Answer, curves, digits, key_value
 from upright.identification.frequency.response import FrequencyResponse
-from upright.identification.model.estimates import Estimate
 from upright.lab.frequency_1b.figures import bode_figure, quality_figure
 from upright.report.document import Picture, picture
 from upright.report.sections import Part, Table

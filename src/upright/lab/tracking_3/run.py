@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.control import Rig
-from upright.identification.model.model import Fit
+from upright.identification import Fit
 from upright.lab.rigs.makes import make_rig
 from upright.lab.tracking_3.laws import Tracker, by_poles, check, paper_sets, with_sum
 from upright.lab.tracking_3.pd import Search, far_pd, near_pd, tune

@@ -6,7 +6,7 @@ about where they began; pauses between them let dry friction show.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -15,9 +15,10 @@ import numpy as np
 
 from upright.control import Rig
 from upright.errors import BadInput
-from upright.identification.model.model import Fit
+from upright.identification import Fit
 from upright.lab.weighing_1a.run import Known
 from upright.physics import Plant, chain
+from upright.progress import Progress, part, silent
 from upright.records import Provenance, Record
 from upright.study.load import Study
 
@@ -184,7 +185,7 @@ def study_text(rig: Rig, seed: int, weighed: Sequence[Known] = ()) -> str:
 
 
 def weigh(
-    rig: Rig, seed: int, folder: Path, tell: Callable[[str, float], None] | None = None, weighed: Sequence[Known] = ()
+    rig: Rig, seed: int, folder: Path, tell: Progress = silent, weighed: Sequence[Known] = ()
 ) -> tuple[Study, Fit]:  # fmt: skip
     """Pulse a rig, write logs and study, and fit it as `upright identify` would; writes `fit.json` too."""
     from upright.identification.estimate import identify
@@ -197,12 +198,7 @@ def weigh(
     path = folder / STUDY
     path.write_text(study_text(rig, seed, weighed), encoding="utf-8")
     study = load_study(path)
-
-    def report(stage: str, share: float, cost: float, evaluations: int) -> None:
-        if tell:
-            tell(f"fitting the shaft: {stage}", share)
-
-    fit = identify(study.rig, study.runs, progress=report)
+    fit = identify(study.rig, study.runs, progress=part(tell, 0.0, 1.0, "fitting the shaft"))
     write_fit(fit, study, folder / FIT)
     return study, fit
 

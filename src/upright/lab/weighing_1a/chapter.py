@@ -6,7 +6,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from upright.identification.loadings.fit import Weighed
+from upright.identification import Estimate
 from upright.lab.weighing_1a.page import QUESTION, loading_parts, sound, units_of
 from upright.lab.weighing_1a.run import Known, Weighing
 from upright.lab.weighing_1a.twin import truth
@@ -104,7 +104,7 @@ def _sentence(done: Weighing, k: Known) -> str:
     return f"{k.name} lies {100 * off:.2g} % from the twin's, {'inside' if inside else 'outside'} its 95 % interval."
 
 
-def _numbers(w: Weighed, true: float | None) -> dict[str, Any]:
+def _numbers(w: Estimate, true: float | None) -> dict[str, Any]:
     out: dict[str, Any] = {"value": w.value, "stderr": w.stderr, "interval": list(w.interval)}
     if true is not None:
         out |= {"truth": true, "inside": w.interval[0] <= true <= w.interval[1]}

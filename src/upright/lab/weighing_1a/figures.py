@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from upright.identification.loadings.fit import Loaded, Loadings
-from upright.identification.loadings.planning import Plan
+from upright.identification.loadings import Loaded, Loadings, Plan
 from upright.records import Record
 from upright.report.document import Picture, picture
 from upright.report.drawing import BLUE, CYCLE, GREY, VERMILLION, decimated, figure, save, styled

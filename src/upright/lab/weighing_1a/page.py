@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup
 
-from upright.identification.loadings.fit import Loadings
+from upright.identification.loadings import Loadings
 from upright.lab.weighing_1a.figures import loading_pictures, units_of
 from upright.records import Record
 from upright.report.advice import Step

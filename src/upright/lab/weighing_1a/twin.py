@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from upright.errors import NotIdentifiable
-from upright.identification.loadings.fit import Loaded, Loadings, swings, weigh
+from upright.identification.loadings import Loaded, Loadings, fit_loadings, swings
 from upright.lab.rigs.twin import COUNTS, SERVO
 from upright.physics import Plant, chain
 from upright.physics.loads import added_inertia, added_mass
@@ -182,7 +182,7 @@ def weigh_body(
                 loaded += swings(record, added=count * piece, label=name, signal=column, command="u", quantum=1.0)
             except NotIdentifiable as error:
                 left_out.append(str(error))
-    found = weigh(loaded, tolerance=MAKES[on.kind].tolerance, piece=piece)
+    found = fit_loadings(loaded, tolerance=MAKES[on.kind].tolerance, piece=piece)
     return Campaign(on=on, logs=logs, added=added, found=found, left_out=tuple(left_out))
 
 

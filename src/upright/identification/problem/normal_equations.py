@@ -1,9 +1,9 @@
-"""What does a sum of squares look like from here? Its value, gradient and Gauss-Newton matrix."""
+"""Normal equations of least squares: the sum of squares, its gradient ``J'r`` and its Gauss-Newton matrix ``J'J``."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,14 +23,26 @@ class Normal:
     matrix: Array
     gradient: Array
 
+    @classmethod
+    def lost(cls, size: int) -> Normal:
+        """What is said of a point from where the model runs away: an infinite cost."""
+        return cls(math.inf, np.zeros((size, size)), np.zeros(size))
 
-@dataclass(frozen=True)
-class Rows:
-    """Residuals (T, outputs) of one run, windows one after another, and their Jacobian (T, outputs, sought here)."""
-
-    residual: Array
-    jacobian: Array
-    sought: NDArray[np.int64]
+    @classmethod
+    def by_differences(
+        cls, residual: Callable[[Array], Array], x: Array, steps: Array, *, central: bool = False
+    ) -> Normal:
+        """Normal equations of a function's values (T,), its Jacobian by differences over `steps` (n,)."""
+        with np.errstate(all="ignore"):  # a walk that has left for where the model is not finite is called back
+            r = residual(x)
+            if not finite(r):
+                return cls.lost(x.size)
+            J = np.empty((r.size, x.size))
+            for i, step in enumerate(np.diag(steps)):
+                behind = residual(x - step) if central else r
+                J[:, i] = (residual(x + step) - behind) / (steps[i] * (1 + central))
+            normal = cls(float(r @ r), J.T @ J, J.T @ r)
+        return normal if math.isfinite(normal.cost) and finite(normal.matrix) else cls.lost(x.size)
 
 
 def finite(values: Array) -> bool:
@@ -82,22 +94,20 @@ def mixed(
 
 
 def products(J: Array, r: Array) -> tuple[Array, Array, float]:
-    """``J'J``, ``J'r`` and ``r'r`` in blocks too small for a linear-algebra library to wake its threads for.
+    """``J'J``, ``J'r`` and ``r'r``, infinite where they have run away.
 
-    On a busy machine waiting for those threads costs more than the products themselves.
+    In blocks too small for a linear-algebra library to wake its threads for: on a busy machine waiting for those
+    threads costs more than the products themselves.
     """
-    total = gram(np.concatenate([J, r[:, None]], axis=1))
-    return total[:-1, :-1], total[:-1, -1], float(total[-1, -1])
-
-
-def gram(both: Array) -> Array:
-    """``B'B`` of a tall array (T, p), infinite where it has run away."""
+    both = np.concatenate([J, r[:, None]], axis=1)
     rows = max(64, 200_000 // max(1, both.shape[1]) ** 2)
     whole = both.shape[0] // rows * rows
     blocks = both[:whole].reshape(-1, rows, both.shape[1])
     with np.errstate(over="ignore", invalid="ignore"):
         total = np.matmul(blocks.transpose(0, 2, 1), blocks).sum(axis=0) + both[whole:].T @ both[whole:]
-    return total if finite(total) else np.full_like(total, math.inf)
+    if not finite(total):
+        total = np.full_like(total, math.inf)
+    return total[:-1, :-1], total[:-1, -1], float(total[-1, -1])
 
 
 def pseudo_inverse(A: Array) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from upright.errors import BadInput
-from upright.identification.loadings.planning import Loading, best
+from upright.identification.loadings import Loading, plan_loadings
 
 MASSES = [Loading(label=f"{a:g} kg", added=a) for a in (0.0, 0.5, 1.0, 1.5, 2.0)]
 
@@ -15,7 +15,7 @@ MASSES = [Loading(label=f"{a:g} kg", added=a) for a in (0.0, 0.5, 1.0, 1.5, 2.0)
 def test_two_loadings_share_the_runs_by_elfvings_rule(runs):
     """For a slope, runs go to the ends in proportion to their errors, here to m_0 + a."""
     bare = 0.77
-    plan, _ = best(MASSES, runs, bare=bare, error=1e-3, levels=2)
+    plan, _ = plan_loadings(MASSES, runs, bare=bare, error=1e-3, levels=2)
     assert [w.added for w in plan.loadings] == [0.0, 2.0]
     ideal = runs * (bare + 2.0) / (2 * bare + 2.0)
     assert abs(plan.runs[1] - ideal) <= 1  # whole runs
@@ -24,7 +24,7 @@ def test_two_loadings_share_the_runs_by_elfvings_rule(runs):
 @pytest.mark.parametrize("tolerance", [0.0, 5e-3])
 def test_a_plan_promises_what_repeated_experiments_scatter(tolerance):
     bare, k, error, runs = 0.77, 390.0, 2e-3, 6
-    plan, _ = best(MASSES, runs, bare=bare, error=error, tolerance=tolerance, piece=0.5)
+    plan, _ = plan_loadings(MASSES, runs, bare=bare, error=error, tolerance=tolerance, piece=0.5)
     rng = np.random.default_rng(3)
     nominal = np.repeat([w.added for w in plan.loadings], plan.runs)
     found = []
@@ -43,7 +43,7 @@ def test_a_plan_promises_what_repeated_experiments_scatter(tolerance):
 
 def test_no_random_design_beats_the_best():
     bare, error, runs = 0.77, 2e-3, 8
-    for_k, for_both = best(MASSES, runs, bare=bare, error=error)
+    for_k, for_both = plan_loadings(MASSES, runs, bare=bare, error=error)
     rng = np.random.default_rng(4)
     for _ in range(2000):
         a = rng.choice([w.added for w in MASSES], size=runs)
@@ -56,12 +56,12 @@ def test_no_random_design_beats_the_best():
 
 
 def test_more_runs_never_promise_less():
-    k = [best(MASSES, n, bare=0.77, error=2e-3, tolerance=2e-3, piece=0.5)[0].k for n in range(3, 10)]
+    k = [plan_loadings(MASSES, n, bare=0.77, error=2e-3, tolerance=2e-3, piece=0.5)[0].k for n in range(3, 10)]
     assert (np.diff(k) < 0).all()
 
 
 def test_what_cannot_be_planned_is_said():
     with pytest.raises(BadInput, match="2 different loadings"):
-        best(MASSES, 2, bare=0.77, error=1e-3)
+        plan_loadings(MASSES, 2, bare=0.77, error=1e-3)
     with pytest.raises(BadInput, match="positive"):
-        best(MASSES, 4, bare=0.77, error=0.0)
+        plan_loadings(MASSES, 4, bare=0.77, error=0.0)

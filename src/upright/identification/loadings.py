@@ -1,19 +1,23 @@
-"""How stiff is the spring and how heavy the bare body? Step responses with known added inertias.
+"""Experiment 1a: stiffness and bare inertia from swings with known inertias added, and which of these to add.
 
-``1/omega_n^2 = (m_0 + a)/k`` is a line over the added inertia a: its slope is 1/k, its intercept m_0/k.
+``1/omega_n^2 = (m_0 + a)/k`` is a line over the added inertia a: its slope is 1/k, its intercept m_0/k. A frequency
+measured to a relative error e gives a point of the line to ``2 e (m_0 + a)/k``: heavy loadings are the less certain
+ones. Of designs all are compared; Elfving's rule for two loadings, runs in proportion to those errors, is what the
+search must find.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import BadInput, NotIdentifiable
+from upright.identification.model.fit import Estimate
 from upright.records import Record
 from upright.signals.free_swing import Decay, decay
 
@@ -21,6 +25,9 @@ Array = NDArray[np.float64]
 
 NORMAL = 1.959963984540054
 """97.5 % quantile of the normal distribution."""
+
+MOST = 20_000
+"""Designs compared for one number of runs."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -33,39 +40,21 @@ class Loaded:
     command: float = 0.0
 
 
-@dataclass(frozen=True, kw_only=True)
-class Weighed:
-    """A number with its standard error and 95 % interval."""
-
-    value: float
-    stderr: float
-    interval: tuple[float, float]
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Loadings:
-    """What the line says.
+    """What the line says of some swings.
 
-    Attributes
-    ----------
-    swings : tuple of Loaded
-    k, bare : Weighed
-        Stiffness [N/m or N m/rad] and inertia of the bare body [kg or kg m^2].
-    damping : Weighed
-        Viscous friction ``2 sigma k/omega_n^2`` [N s/m or N m s/rad], over all swings.
-    y, y_error : (N,) arrays
-        ``1/omega_n^2`` [s^2] of each swing and its standard error, repeats considered.
-    repeat : float
-        Relative scatter of `y` among swings with the same loading; NaN without repeats.
-    misfit : float
-        Chi square per degree of freedom about the line; NaN with two swings.
-    verdict : str
+    Stiffness `k` [N/m or N m/rad], inertia of the `bare` body [kg or kg m^2] and viscous friction
+    ``2 sigma k/omega_n^2`` as `damping` [N s/m or N m s/rad], over all swings. `y` and `y_error` (N,) are
+    ``1/omega_n^2`` [s^2] of each swing and its standard error, repeats considered; `repeat` is the relative scatter of
+    `y` among swings with the same loading, NaN without repeats, `misfit` chi square per degree of freedom about the
+    line, NaN with two swings.
     """
 
     swings: tuple[Loaded, ...]
-    k: Weighed
-    bare: Weighed
-    damping: Weighed
+    k: Estimate
+    bare: Estimate
+    damping: Estimate
     y: Array
     y_error: Array
     repeat: float
@@ -127,7 +116,7 @@ def swings(
     return tuple(found)
 
 
-def weigh(loaded: Sequence[Loaded], *, tolerance: float = 0.0, piece: float = 0.0) -> Loadings:
+def fit_loadings(loaded: Sequence[Loaded], *, tolerance: float = 0.0, piece: float = 0.0) -> Loadings:
     """Stiffness and bare inertia from swings with known added inertias.
 
     Parameters
@@ -173,11 +162,12 @@ def weigh(loaded: Sequence[Loaded], *, tolerance: float = 0.0, piece: float = 0.
             "The period does not grow with the added inertia, so no stiffness follows; check which log has which load."
         )
     dof = a.size - 2
-    widths = _widths(chi, dof)
-    stiffness = _about(1 / slope, math.sqrt(P[1, 1]) / slope**2, widths)
-    bare = intercept / slope
+    width, half = _widths(chi, dof)
+    stated = math.sqrt(P[1, 1]) / slope**2
+    stiffness = Estimate.within(1 / slope, stated * width, stated * half)
     gradient = np.array([1 / slope, -intercept / slope**2])
-    inertia = _about(bare, math.sqrt(float(gradient @ P @ gradient)), widths)
+    stated = math.sqrt(float(gradient @ P @ gradient))
+    inertia = Estimate.within(intercept / slope, stated * width, stated * half)
     return Loadings(
         swings=tuple(loaded),
         k=stiffness,
@@ -211,12 +201,7 @@ def _widths(chi: float, dof: int) -> tuple[float, float]:
     return max(1.0, scatter), max(NORMAL, float(t.ppf(0.975, dof)) * scatter)
 
 
-def _about(value: float, stated: float, widths: tuple[float, float]) -> Weighed:
-    half = stated * widths[1]
-    return Weighed(value=value, stderr=stated * widths[0], interval=(value - half, value + half))
-
-
-def _damping(loaded: Sequence[Loaded], k: Weighed) -> Weighed:
+def _damping(loaded: Sequence[Loaded], k: Estimate) -> Estimate:
     """``c = k (2 sigma/omega_n^2)``, the bracket a weighted mean over swings; both errors count."""
     square = np.array([s.decay.omega_n for s in loaded]) ** 2
     g = 2 * np.array([s.decay.sigma for s in loaded]) / square
@@ -225,10 +210,10 @@ def _damping(loaded: Sequence[Loaded], k: Weighed) -> Weighed:
     stated, half = (w / math.sqrt(float(weight.sum())) for w in _widths(float(weight @ (g - mean) ** 2), g.size - 1))
     reach = math.hypot(k.value * half, mean * (k.interval[1] - k.value))
     stderr = math.hypot(k.value * stated, mean * k.stderr)
-    return Weighed(value=k.value * mean, stderr=stderr, interval=(k.value * mean - reach, k.value * mean + reach))
+    return Estimate.within(k.value * mean, stderr, reach)
 
 
-def _verdict(levels: int, dof: int, chi: float, k: Weighed, bare: Weighed) -> str:
+def _verdict(levels: int, dof: int, chi: float, k: Estimate, bare: Estimate) -> str:
     if bare.interval[0] <= 0:
         return "The bare body's inertia cannot be told from nothing: its interval reaches zero. Add less, or repeat."
     if levels == 2:
@@ -240,11 +225,109 @@ def _verdict(levels: int, dof: int, chi: float, k: Weighed, bare: Weighed) -> st
             f"The points scatter {math.sqrt(chi / dof):.1f} times as much as their errors say, and the intervals are "
             "widened by that; is an added inertia wrong, or does the spring stiffen?"
         )
+    to_k, to_bare = (f"{100 * (e.interval[1] - e.value) / e.value:.2g} %" for e in (k, bare))
     return (
-        f"A line explains all {levels} loadings within their errors; stiffness to {_share(k)}, bare inertia to "
-        f"{_share(bare)} (half of a 95 % interval)."
+        f"A line explains all {levels} loadings within their errors; stiffness to {to_k}, bare inertia to {to_bare} "
+        "(half of a 95 % interval)."
     )
 
 
-def _share(w: Weighed) -> str:
-    return f"{100 * (w.interval[1] - w.value) / w.value:.2g} %"
+@dataclass(frozen=True, kw_only=True)
+class Loading:
+    """What may be bolted on: its name and its inertia [kg or kg m^2]."""
+
+    label: str
+    added: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """The `loadings` that are used, lightest first, the `runs` at each, and what they promise.
+
+    `k` and `bare` are relative standard errors of stiffness and bare inertia, `both` the square root of the determinant
+    of their relative covariance: area of the ellipse that holds both.
+    """
+
+    loadings: tuple[Loading, ...]
+    runs: tuple[int, ...]
+    k: float
+    bare: float
+    both: float
+
+
+def plan_loadings(
+    choice: Sequence[Loading],
+    runs: int,
+    *,
+    bare: float,
+    error: float,
+    tolerance: float = 0.0,
+    piece: float = 0.0,
+    levels: int = 3,
+) -> tuple[Plan, Plan]:
+    """The plan with the tightest stiffness and the one with the tightest pair, among all of `runs` runs.
+
+    Parameters
+    ----------
+    choice : sequence of Loading
+        What could be added, nothing included.
+    runs : int
+    bare : float
+        Inertia of the bare body, roughly [kg or kg m^2].
+    error : float
+        Relative standard error of a frequency from one run.
+    tolerance, piece : float
+        Relative standard uncertainty of one added piece, and its inertia; the same pieces serve every loading.
+    levels : int
+        Different loadings at least: two fix a line, the third shows whether it is one.
+
+    Raises
+    ------
+    BadInput
+        When there are fewer runs or fewer different loadings than `levels`.
+    """
+    differing = sorted({w.added: w for w in reversed(choice)}.values(), key=lambda w: w.added)
+    if levels < 2 or runs < levels or len(differing) < levels:
+        raise BadInput(
+            f"A line through at least 2 different loadings is planned; got {runs} runs and {len(differing)} different"
+            f" loadings for {levels} that shall differ."
+        )
+    if bare <= 0 or error <= 0 or tolerance < 0:
+        raise BadInput("A plan needs a positive bare inertia and a positive error of one frequency, such as 0.2 %.")
+    if tolerance > 0 and piece <= 0:
+        raise BadInput("A tolerance of the pieces needs the inertia of one piece.")
+    found: list[Plan] = []
+    for used, shares in _designs(len(differing), runs, levels):
+        loadings = tuple(differing[i] for i in used)
+        k, m, both = _promise(np.array([w.added for w in loadings]), shares, bare, error, tolerance, piece)
+        for i in dict.fromkeys((int(np.argmin(k)), int(np.argmin(both)))):
+            found.append(
+                Plan(loadings=loadings, runs=tuple(shares[i].tolist()), k=float(k[i]), bare=float(m[i]),
+                     both=float(both[i]))
+            )  # fmt: skip
+    return min(found, key=lambda plan: plan.k), min(found, key=lambda plan: plan.both)
+
+
+def _designs(size: int, runs: int, levels: int) -> Generator[tuple[tuple[int, ...], NDArray[np.int64]]]:
+    """Every choice of loadings with every way to share the runs; exactly `levels` loadings where more are too many."""
+    for used in range(levels, min(size, runs) + 1):
+        if used > levels and math.comb(size, used) * math.comb(runs - 1, used - 1) > MOST:
+            return
+        cuts = list(combinations(range(1, runs), used - 1))
+        shares = np.array([np.diff([0, *cut, runs]) for cut in cuts], dtype=np.int64)
+        for chosen in combinations(range(size), used):
+            yield chosen, shares
+
+
+def _promise(
+    a: Array, shares: NDArray[np.int64], bare: float, error: float, tolerance: float, piece: float
+) -> tuple[Array, Array, Array]:
+    """Relative errors of k and bare inertia, and of both together, for each way to share the runs; k is 1 here."""
+    y = bare + a
+    own = (2 * error * y) ** 2 / shares
+    V = own[:, :, None] * np.eye(a.size) + tolerance**2 * piece * np.minimum.outer(a, a)
+    X = np.column_stack([np.ones_like(a), a])
+    P = np.linalg.inv(np.einsum("lp,nlm,mq->npq", X, np.linalg.inv(V), X))
+    J = np.array([[0.0, -1.0], [1 / bare, -1.0]])  # of ln k and ln m_0 to intercept and slope
+    C = J @ P @ J.T
+    return np.sqrt(C[:, 0, 0]), np.sqrt(C[:, 1, 1]), np.sqrt(np.linalg.det(C))

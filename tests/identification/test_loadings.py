@@ -11,7 +11,7 @@ from scipy.optimize import curve_fit
 
 from tests.signals.swings import swing
 from upright.errors import BadInput, NotIdentifiable
-from upright.identification.loadings.fit import Loaded, swings, weigh
+from upright.identification.loadings import Loaded, fit_loadings, swings
 from upright.readers import read
 from upright.records import Record
 from upright.signals.free_swing import decay
@@ -30,7 +30,7 @@ def campaign() -> list[Loaded]:
 
 
 def test_the_line_gives_what_was_put_in(campaign):
-    found = weigh(campaign)
+    found = fit_loadings(campaign)
     for what, truth in ((found.k, K), (found.bare, BARE), (found.damping, C)):
         assert abs(what.value - truth) < 3 * what.stderr
         assert what.value == pytest.approx(truth, rel=1e-2)
@@ -48,7 +48,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
             for _ in range(2):
                 noisy = decay(t, y + 1e-5 * rng.normal(size=t.size), quantum=2e-5)
                 again.append(Loaded(label="", added=a, decay=noisy))
-        found = weigh(again)
+        found = fit_loadings(again)
         held += [w.interval[0] <= v <= w.interval[1] for w, v in ((found.k, K), (found.bare, BARE), (found.damping, C))]
     # of 60 honest 95 % intervals fewer than 53 hold once in 60 times; the larger of two accounts errs on the safe side
     assert (held >= 53).all()
@@ -57,7 +57,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
 def test_errors_in_the_pieces_are_those_of_a_fit_with_their_whole_covariance(campaign):
     """scipy's curve_fit with the covariance of points whose loadings share their pieces."""
     piece, tolerance = 0.5, 5e-3
-    found = weigh(campaign, tolerance=tolerance, piece=piece)
+    found = fit_loadings(campaign, tolerance=tolerance, piece=piece)
     a = np.array([s.added for s in campaign])
     covariance = np.diag(found.y_error**2) + tolerance**2 * piece * np.minimum.outer(a, a) / found.k.value**2
     (k, bare), spread = curve_fit(lambda a, k, m: (m + a) / k, a, found.y, [300.0, 1.0], sigma=covariance,
@@ -71,7 +71,7 @@ def test_errors_in_the_pieces_are_those_of_a_fit_with_their_whole_covariance(cam
 
 def test_a_wrongly_labelled_mass_widens_the_intervals_and_is_said(campaign):
     wrong = [Loaded(label=s.label, added=1.5 if s.added == 1.0 else s.added, decay=s.decay) for s in campaign]
-    found = weigh(wrong)
+    found = fit_loadings(wrong)
     assert found.misfit > 10
     assert "is an added inertia wrong" in found.verdict
     assert found.k.interval[0] <= K <= found.k.interval[1]
@@ -79,10 +79,10 @@ def test_a_wrongly_labelled_mass_widens_the_intervals_and_is_said(campaign):
 
 def test_one_loading_fixes_nothing_and_swapped_logs_are_noticed(campaign):
     with pytest.raises(NotIdentifiable, match="two different"):
-        weigh([s for s in campaign if s.added == 0.5])
+        fit_loadings([s for s in campaign if s.added == 0.5])
     swapped = [Loaded(label=s.label, added=2.0 - s.added, decay=s.decay) for s in campaign]
     with pytest.raises(NotIdentifiable, match="does not grow"):
-        weigh(swapped)
+        fit_loadings(swapped)
 
 
 def test_a_step_on_and_off_are_two_swings():

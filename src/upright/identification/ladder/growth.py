@@ -1,0 +1,376 @@
+"""Growth of a model rung by rung, each kept only if it predicts better what it has not seen.
+
+A ladder stops early when one run predicts another no better than the model predicts both (`repeats`).
+
+Inside a fit its first rungs choose the friction model. `climb` refits all runs for every rung and asks whether the
+held-out error falls by more than chance; inside a fit there is no time for that: every rung is fitted once to the first
+part of every run, and of all of them the one with the least squared error over the rest is taken.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.errors import BadInput
+from upright.identification.inference.scoring import score
+from upright.identification.ladder.cross_validation import leave_one_out
+from upright.identification.ladder.decision import Comparison, by_chance, compare, reason, stalled
+from upright.identification.ladder.repeats import Repeats, at_ceiling, repeats
+from upright.identification.ladder.rungs import Rung, check, default_rungs, friction_rungs, rig_at, runs_at
+from upright.identification.model.fit import RunScore
+from upright.identification.model.rig import Rig, neutral
+from upright.identification.model.runs import FITTED_SHARE, LEAST_RUN, Run
+from upright.identification.problem.normal_equations import finite
+from upright.identification.problem.residuals import Problem, formulate, noise_level
+from upright.identification.search.descent import (
+    CREEP,
+    Descent,
+    SearchLog,
+    descend,
+    descend_progressively,
+    first_horizon,
+)
+from upright.identification.search.strategy import POOR, better, closed_form_starts, rescale_priors, search
+from upright.progress import Progress, part, silent
+
+Array = NDArray[np.float64]
+Percents = Mapping[str, Mapping[str, float]]
+
+TYPICAL = ("friction", "gain")
+"""What a rung lets differ from run to run is not read off a run that is being predicted: it would be no prediction."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RungResult:
+    """What one rung came to: whether it was kept, and the reason in a sentence.
+
+    `fitted` and `predicted` are fit percents by run and signal, `cost` the sum of squares of the fit, `parameters` and
+    `own` how many numbers were sought for the rig and for single runs, `values` those of the rig by name. `comparison`
+    is with the best rung below, None for the first.
+    """
+
+    rung: Rung
+    kept: bool
+    reason: str
+    fitted: Percents
+    predicted: Percents
+    cost: float
+    parameters: int
+    own: int
+    values: Mapping[str, float]
+    seconds: float
+    comparison: Comparison | None = None
+
+    @property
+    def fit_percent(self) -> float:
+        """Mean over runs and signals."""
+        return _mean(self.fitted)
+
+    @property
+    def predicted_percent(self) -> float:
+        """Mean over runs and signals."""
+        return _mean(self.predicted)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ladder:
+    """A model grown as far as it predicts better.
+
+    `steps` are in the order tried, `rig` and `runs` those of the chosen model: what was refused is known to do nothing
+    and named in `left_out`. `scores` are its predictions, `held_out` says how they were judged and `stopped` why the
+    ladder ended; `repeats` are runs that repeat one another.
+    """
+
+    steps: tuple[RungResult, ...]
+    rig: Rig
+    runs: tuple[Run, ...]
+    held_out: str
+    repeats: tuple[Repeats, ...]
+    stopped: str
+    scores: Mapping[str, RunScore]
+    left_out: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
+    interrupted: bool = False
+    seconds: float = 0.0
+
+    @property
+    def kept(self) -> tuple[RungResult, ...]:
+        """The rungs that earned their place."""
+        return tuple(s for s in self.steps if s.kept)
+
+
+def climb(rig: Rig, runs: Sequence[Run], rungs: Sequence[Rung] | None = None, *, progress: Progress = silent) -> Ladder:
+    """Grow a model rung by rung, while what was held out is predicted better by more than chance.
+
+    Every rung is fitted to all runs from where the best rung below ended, then each run is predicted from a fit of the
+    others; of a single run the last third is predicted from the first two. `decision.compare` says what better means:
+    the mean paired decrease of the logarithm of the error exceeds one standard error of it. A rung that is refused is
+    taken off again before the next one is tried, and tried once more when another was kept after it: dry friction may
+    say nothing while a lag is missing.
+
+    Parameters
+    ----------
+    rig : Rig
+        With everything that the richest model estimates.
+    runs : sequence of Run
+        Those with role ``"fit"`` decide.
+    rungs : sequence of Rung, optional
+        Poorest first; `default_rungs` when omitted.
+    progress : callable, optional
+        As for `identify`.
+
+    Raises
+    ------
+    BadInput
+        When nothing can be held out, or a rung names what was not asked.
+    """
+    seen = [run for run in runs if run.role == "fit"]
+    rungs = list(rungs) if rungs else default_rungs(rig, seen)
+    check(rig, rungs)
+    if not seen or (len(seen) == 1 and seen[0].first_part() is seen[0]):
+        raise BadInput(
+            f"a ladder has to hold something out: two runs with role 'fit', or one of {LEAST_RUN} samples or more"
+        )
+    return _Climb(rig, seen, rungs, progress).walk()
+
+
+class _Climb:
+    """One climb; what it found so far survives an interruption.
+
+    Of the model kept so far: its rungs, numbers by key, predictions of the runs, cost and weight of prior knowledge.
+    """
+
+    def __init__(self, rig: Rig, runs: list[Run], rungs: list[Rung], progress: Progress) -> None:
+        self.rig, self.runs, self.rungs, self.progress = rig, runs, rungs, progress
+        self.log = SearchLog()
+        self.steps: list[RungResult] = []
+        self.kept: list[Rung] = []
+        self.values: dict[str, float] = {}
+        self.scores: dict[str, RunScore] = {}
+        self.cost, self.noise = math.inf, math.nan
+        self.repeats = repeats(runs)
+
+    def walk(self) -> Ladder:
+        began = time.perf_counter()
+        stopped, interrupted = "Every rung was tried.", False
+        waiting = list(self.rungs)
+        try:
+            while waiting:
+                if self.try_rung(waiting.pop(0), len(waiting)):
+                    # what was refused gets another chance, last, since something else was missing then
+                    refused = [step.rung for step in self.steps if not step.kept]
+                    waiting += [r for r in dict.fromkeys(refused) if r not in (*waiting, *self.kept)]
+                if at_ceiling(self.repeats, self.scores):
+                    stopped = "The model predicts the runs as well as they predict one another: nothing is left."
+                    if waiting:
+                        stopped = f"{stopped[:-1]} ({', '.join(r.name for r in waiting)} not tried)."
+                    break
+        except KeyboardInterrupt:
+            stopped, interrupted = "It was interrupted; the rungs so far stand.", True
+        chosen = rig_at(self.rig, self.rungs, self.kept)
+        held_out = "each run predicted from a fit of the others"
+        if len(self.runs) == 1:
+            held_out = "the last third predicted from a fit of the first two thirds"
+        return Ladder(
+            steps=tuple(self.steps), rig=chosen, runs=tuple(runs_at(self.runs, self.kept)), held_out=held_out,
+            repeats=self.repeats, stopped=stopped, scores=self.scores,
+            left_out=tuple(n for n in self.rig.estimated if n not in chosen.estimated),
+            warnings=tuple(self.log.warnings), interrupted=interrupted, seconds=time.perf_counter() - began,
+        )  # fmt: skip
+
+    def try_rung(self, rung: Rung, waiting: int) -> bool:
+        """Whether a rung is kept."""
+        began, done = time.perf_counter(), len(self.steps)
+        start, stop = done / (done + 1 + waiting), (done + 1) / (done + 1 + waiting)
+        middle = start + 0.4 * (stop - start)
+        self.log.progress = part(self.progress, start, middle, rung.name)
+        kept = [*self.kept, rung]
+        rig, runs = rig_at(self.rig, self.rungs, kept), runs_at(self.runs, kept)
+        shown = [runs[0].first_part()] if len(runs) == 1 else runs
+        problem = formulate(rig, shown)
+        if self.values:  # costs of two rungs compare only where prior knowledge weighs the same
+            problem.noise = self.noise
+        found = self.fit(problem, shown, rung)
+        if found.interrupted:
+            raise KeyboardInterrupt
+        if self.values and found.normal.cost > self.cost * (1 + CREEP) and not rung.drops:
+            self.log.warnings.append(stalled(rung.name, found.normal.cost, self.cost))
+        chance = by_chance(len(problem.unknowns) - len(self.values), noise_level(problem, found.x))
+        lucky = bool(self.values) and self.cost - found.normal.cost <= chance and not rung.drops
+        cost = found.normal.cost
+        found = rescale_priors(problem, found)
+        if found.interrupted:
+            raise KeyboardInterrupt
+        whole = formulate(rig, shown, thin=False)
+        fitted = {run.label: score(whole, i, found.x) for i, run in enumerate(shown)}
+        if len(runs) == 1:
+            ahead = replace(
+                runs[0], score_from=max(runs[0].score_from, FITTED_SHARE * float(runs[0].t[-1] - runs[0].t[0]))
+            )
+            predicted = {ahead.label: score(formulate(rig, [ahead], thin=False), 0, found.x)}
+        else:
+            predicted = self.leave_out(problem, found.x, runs, kept, part(self.progress, middle, stop, rung.name))
+        comparison = None
+        if self.scores:
+            poorer, richer = ([scores[run.label] for run in runs] for scores in (self.scores, predicted))
+            comparison = compare(poorer, richer, [np.array(run.quanta) for run in runs])
+        better = comparison is None or (comparison.better and not lucky)
+        values, shared = problem.values_at(found.x), problem.shared_at(found.x)
+        self.steps.append(
+            RungResult(
+                rung=rung,
+                kept=better,
+                reason=reason(comparison, cost, self.cost, lucky=lucky),
+                fitted={label: dict(s.fit_percent) for label, s in fitted.items()},
+                predicted={label: dict(s.fit_percent) for label, s in predicted.items()},
+                cost=found.normal.cost,
+                parameters=len(shared),
+                own=len(values) - len(shared),
+                values=shared,
+                seconds=time.perf_counter() - began,
+                comparison=comparison,
+            )
+        )
+        if better:
+            self.kept, self.values, self.scores = kept, values, predicted
+            self.cost, self.noise = found.normal.cost, problem.noise
+        return better
+
+    def leave_out(
+        self, problem: Problem, x: Array, runs: list[Run], kept: list[Rung], progress: Progress
+    ) -> dict[str, RunScore]:
+        """Every run as predicted by a fit of the others."""
+        known = {n: v for n, v in self.values.items() if n in problem.rig.parameters}
+        typical = [n for r in kept for n in r.unknown if n in TYPICAL or n.startswith("scale")]
+        found = leave_one_out(
+            problem.rig, runs, problem.values_at(x), noise=problem.noise, typical=typical,
+            otherwise=known | {n: neutral(problem.rig.plant, n) for n in kept[-1].adds}, progress=progress,
+        )  # fmt: skip
+        return {one.label: one.score for one in found}
+
+    def fit(self, problem: Problem, runs: Sequence[Run], rung: Rung) -> Descent:
+        """The best fit that can be found from the end of the rung below, or from nothing."""
+        starts = closed_form_starts(problem.rig, runs)
+        if not self.values:
+            return search(problem, [problem.start, *(problem.place(s) for s in starts)], self.log)
+        candidates = [rung.seeds(self.rig)]
+        if rung.adds:
+            candidates.append({n: self.rig.parameters[n].value for n in rung.adds})
+            candidates += [{n: v for n, v in s.items() if n in rung.adds} for s in starts[:1]]
+        ends = [
+            descend_progressively(problem, problem.place(self.values | c), self.log, horizon=math.inf, tolerance=1e-3)
+            for c in candidates
+        ]
+        found = reduce(better, ends)
+        end = descend(problem.normal, found.x, problem.lower, problem.upper, tolerance=1e-6)
+        found = replace(end, interrupted=found.interrupted)
+        if found.normal.cost > POOR * problem.count() and not found.interrupted and rung.adds and starts:
+            found = better(found, search(problem, [problem.place(starts[0])], self.log, patient=False))
+        return found
+
+
+def _mean(percents: Percents) -> float:
+    values = [v for signals in percents.values() for v in signals.values()]
+    return float(np.mean(values)) if values else math.nan
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """A friction model fitted to the first part of every run.
+
+    `values` are its numbers by key, those of single runs that ended at a bound left out, `noise` the level of its
+    residuals, `held_out` its mean squared residual over what it has not seen.
+    """
+
+    rig: Rig
+    cost: float
+    noise: float
+    values: dict[str, float]
+    held_out: float
+
+
+def choose_friction(rig: Rig, runs: Sequence[Run], log: SearchLog) -> tuple[Rig, list[Array]]:
+    """Rig of the friction that predicts best, and coordinates to start the final fit from.
+
+    Richer rungs start from where the poorer one ended, or they can end with a larger cost (seen: 1083 against 314).
+    """
+    rungs = friction_rungs(rig)
+    # levels of friction and of noise are sought together, dearly; whether friction predicts better a study may ask
+    filtered = any(run.filtered for run in runs)
+    if filtered or len(rungs) == 1:
+        problem = formulate(rig, runs)
+        starts = [problem.start, *(problem.place(s) for s in closed_form_starts(rig, runs))]
+        if filtered:
+            starts = [min(starts, key=lambda x: problem.cost(x, first_horizon(problem)))]
+        return rig, starts
+    seen = [run.first_part() for run in runs]
+    tried: list[Candidate] = []
+    for k, rung in enumerate(rungs):
+        here = rig_at(rig, rungs, rungs[: k + 1])
+        part = formulate(here, seen)
+        starts = [part.place(s) for s in closed_form_starts(here, seen)]
+        if tried:
+            starts = [part.place(tried[-1].values | rung.seeds(rig)), *starts[:1]]
+        else:
+            starts = [part.start, *starts]
+        found = search(part, starts, log, patient=not tried)
+        if tried and found.normal.cost > tried[-1].cost and not found.interrupted:
+            # another start looked better over the first seconds and led astray; the poorer fit's end cannot
+            found = better(found, descend_progressively(part, starts[0], log, horizon=math.inf))
+        if found.interrupted:
+            raise KeyboardInterrupt
+        cost = found.normal.cost
+        if tried and cost > tried[-1].cost * (1 + 1e-6):
+            log.warnings.append(stalled(rung.name, cost, tried[-1].cost))
+        level, v = noise_level(part, found.x), part.value(found.x)
+        values = {part.key(i): float(v[i]) for i, u in enumerate(part.unknowns) if u.shared or u.lower < v[i] < u.upper}
+        held_out = _held_out(here, runs, found.x)
+        log.note(f"{rung.name}: held-out cost", held_out, part)
+        tried.append(Candidate(rig=here, cost=cost, noise=level, values=values, held_out=held_out))
+    k = min(range(len(tried)), key=lambda i: tried[i].held_out)
+    _note_rival(tried[k:], [n for rung in rungs[k + 1 :] for n in rung.adds], log)
+    return tried[k].rig, [formulate(tried[k].rig, runs).place(tried[k].values)]
+
+
+def _note_rival(tried: Sequence[Candidate], left_out: Sequence[str], log: SearchLog) -> None:
+    """Note what a richer model would have said otherwise, where it explains its part of the runs better.
+
+    That the rest is predicted worse then means that something else is missing, not that the richer model is wrong.
+    The chosen model comes first.
+    """
+    chosen, rival = tried[0], min(tried, key=lambda c: c.cost)
+    if chosen.cost - rival.cost <= by_chance(len(left_out), rival.noise):
+        return
+    for n in chosen.rig.estimated:
+        a, b = chosen.values.get(n, 0.0), rival.values.get(n, 0.0)
+        if abs(a - b) > 0.5 * max(abs(a), abs(b)):
+            log.rivals[n] = b
+    if log.rivals:
+        log.warnings.append(
+            f"The first part of the runs is explained better with {', '.join(left_out)} (cost {rival.cost:.3g} against "
+            f"{chosen.cost:.3g}), the rest is predicted better without, so something else is missing from the model; "
+            f"until it is found, the intervals of {', '.join(log.rivals)} hold what both models say."
+        )
+
+
+def _held_out(rig: Rig, runs: Sequence[Run], x: Array) -> float:
+    """Mean squared residual of what the fit on the first parts has not seen."""
+    whole = formulate(rig, runs)
+    total, samples = 0.0, 0
+    for index, track in enumerate(whole.tracks):
+        e = whole.residuals(index, x)
+        if track.windowed:
+            e = e[int(FITTED_SHARE * track.restarts.size) :]
+        else:
+            e = e[0].reshape(-1, len(track.columns))[int(FITTED_SHARE * track.length) :]
+        # one run that slips a cycle should not outvote all others
+        total += float(np.sum(np.minimum(e * e, 4.0))) if finite(e) else 4.0 * e.size
+        samples += e.size
+    return total / max(samples, 1)

@@ -1,1 +1,0 @@
-"""Stiffness and inertia from step responses with known loadings."""

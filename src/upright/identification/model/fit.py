@@ -1,0 +1,139 @@
+"""What a fit says: numbers with their intervals, poles, scores of the runs, and what rests on an assumption."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.identification.model.rig import Rig
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """What the data say about one number.
+
+    `status` is "firm", "weak" (interval wider than the value, or two models differ), "unseen" (the data cannot tell),
+    "at bound" or "known".
+    """
+
+    value: float
+    stderr: float
+    interval: tuple[float, float]
+    unit: str = ""
+    status: str = "firm"
+
+    @classmethod
+    def within(cls, value: float, stderr: float, half: float, unit: str = "") -> Estimate:
+        """An estimate with an interval of `half` its width on either side."""
+        return cls(value=value, stderr=stderr, interval=(value - half, value + half), unit=unit)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pole:
+    """A pole of the linear model at an equilibrium, real and imaginary part [1/s]; of a pair the upper one."""
+
+    real: Estimate
+    imag: Estimate
+
+
+@dataclass(frozen=True, kw_only=True)
+class Assumption:
+    """A number taken as given without knowing it, and what would follow it.
+
+    `follows` are percent by which each estimate would change per percent of it, `without` the estimates proportional
+    to it, per unit of the command and of the encoders.
+    """
+
+    name: str
+    value: float
+    unit: str
+    follows: Mapping[str, float]
+    without: Mapping[str, Estimate]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunScore:
+    """How well one run is explained: fit percent per signal, over which horizon, and the simulated signals.
+
+    Scores count from `score_from` seconds after the first sample on.
+    `naive` is the fit percent that holding the measured speed reaches from the same restarts, empty for a free run: a
+    horizon at which the model is hardly better tells nothing about the model.
+    `adapted` names what was estimated from the run itself: a prediction that chose its own gain is less of one.
+    `ahead` is the fit percent by horizon [s] and signal of samples predicted exactly so far ahead, from a filter that
+    knows the past alone; empty for other runs. Then `horizon`, `fit_percent` and the signals are the shortest's.
+    """
+
+    role: str
+    fit_percent: Mapping[str, float]
+    horizon: float | None
+    t: Array
+    y: Array
+    simulated: Array
+    measured: tuple[str, ...]
+    score_from: float = 0.0
+    naive: Mapping[str, float] = field(default_factory=dict[str, float])
+    adapted: tuple[str, ...] = ()
+    ahead: Mapping[float, Mapping[str, float]] = field(default_factory=dict[float, Mapping[str, float]])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fit:
+    """A rig explained by its runs.
+
+    `per_run` holds what was estimated run by run, by run label and name, `groups` what several runs share, by the
+    group's label and name; `unseen` says in sentences which combinations the data cannot see and which number would
+    fix it; `singular_values` belong to the scaled Jacobian, `directions` (rows) to them, in the order of `names`;
+    `poles` are those at every equilibrium of the fitted plant.
+    """
+
+    rig: Rig
+    estimates: Mapping[str, Estimate]
+    per_run: Mapping[str, Mapping[str, Estimate]]
+    groups: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict[str, Mapping[str, Estimate]])
+    runs: Mapping[str, RunScore]
+    verdict: str
+    trusted: bool
+    method: str
+    evaluations: int
+    seconds: float
+    cost: float
+    names: tuple[str, ...] = ()
+    correlation: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    singular_values: Array = field(default_factory=lambda: np.zeros(0))
+    directions: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    unseen: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    history: tuple[tuple[str, float, int], ...] = ()
+    interrupted: bool = False
+    assumptions: tuple[Assumption, ...] = ()
+    poles: Mapping[str, tuple[Pole, ...]] = field(default_factory=dict[str, tuple[Pole, ...]])
+
+
+def to_lmfit(fit: Fit) -> Any:
+    """`lmfit.Parameters` of a fit: known numbers do not vary, estimated ones carry bounds, error and correlation.
+
+    lmfit allows no dots in names: ``actuator.gain`` becomes ``actuator_gain``. A number the data cannot see has
+    an infinite standard error, as here.
+    """
+    from lmfit import Parameters
+
+    parameters = Parameters()
+    names = {n: n.replace(".", "_") for n in {**fit.rig.parameters, **fit.estimates}}
+    for name, key in names.items():
+        e, known = fit.estimates.get(name), fit.rig.parameters.get(name)
+        value = e.value if e is not None else known.value if known is not None else 0.0
+        lower, upper = (-math.inf, math.inf) if known is None else fit.rig.bounds(name)
+        parameters.add(key, value=value, vary=e is not None and e.status != "left out", min=lower, max=upper)
+        if e is not None:
+            parameters[key].stderr = e.stderr
+    for i, name in enumerate(fit.names):
+        row = np.asarray(fit.correlation[i])
+        parameters[names[name]].correl = {names[n]: float(row[j]) for j, n in enumerate(fit.names) if j != i}
+    return parameters

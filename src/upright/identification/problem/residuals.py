@@ -1,0 +1,376 @@
+"""The problem of explaining runs: residuals of simulated runs against measured ones, and their Gauss-Newton model.
+
+All perturbed numbers of a run are simulated side by side in the lanes of one call, which costs little more than one
+simulation. Residuals are in units of each signal's spread over its run, so that a fit percent is driven, not a unit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.identification.model.rig import Rig, base_values
+from upright.identification.model.runs import Run
+from upright.identification.model.unknowns import Unknown, friction_names, shared_unknowns
+from upright.identification.problem.normal_equations import Normal, finite, mixed, products, squares
+from upright.identification.problem.nuisances import CHANGES, Setting, run_unknowns, setting
+from upright.identification.problem.predictor import restart_states
+from upright.identification.problem.restarts import PERTURBATION, Restart, settle
+from upright.identification.problem.simulated import motions, outputs, simulator
+from upright.identification.problem.tracks import Track, prepare
+from upright.signals.memory import memory
+from upright.simulation import Simulator
+
+Array = NDArray[np.float64]
+
+
+ROUNDING = 12**-0.5
+"""Standard deviation of the rounding to steps of one."""
+
+STEP = 1e-5
+"""A perturbed number moves the weighted outputs by about this much, root mean square."""
+
+
+@dataclass
+class Problem:
+    """Rig, runs and the numbers sought; counts its simulations in `evaluations`.
+
+    `steps` (sought,) are the perturbations, `noise` the residual that one sigma of prior knowledge is worth.
+    """
+
+    rig: Rig
+    tracks: list[Track]
+    unknowns: list[Unknown]
+    steps: Array
+    noise: float = 0.1
+    evaluations: int = 0
+    _solvers: dict[int, Simulator] = field(init=False, default_factory=dict[int, Simulator])
+    _memory: Array = field(init=False, default_factory=lambda: np.empty(0))
+
+    def __post_init__(self) -> None:
+        self.base, self._friction = base_values(self.rig), friction_names(self.rig)
+
+    @property
+    def lower(self) -> Array:
+        """Lower bounds of the coordinates (sought,)."""
+        return np.array([u.bounds[0] for u in self.unknowns])
+
+    @property
+    def upper(self) -> Array:
+        """Upper bounds of the coordinates (sought,)."""
+        return np.array([u.bounds[1] for u in self.unknowns])
+
+    @property
+    def start(self) -> Array:
+        """Coordinates of the start (sought,)."""
+        return np.array([u.coordinate(u.value) for u in self.unknowns])
+
+    @property
+    def duration(self) -> float:
+        """Seconds of the longest simulation."""
+        return max(t.duration for t in self.tracks)
+
+    def sought_in(self, index: int) -> NDArray[np.int64]:
+        """Places of the numbers that matter in one run."""
+        return np.array([i for i, u in enumerate(self.unknowns) if u.shared or index in u.runs], dtype=np.int64)
+
+    def value(self, x: Array) -> Array:
+        """Values (sought,) or (sought, lanes) of coordinates."""
+        log = np.array([u.log for u in self.unknowns], dtype=bool)
+        out = x.copy()
+        out[log] = np.exp(np.minimum(x[log], 300.0))
+        return out
+
+    def key(self, index: int) -> str:
+        """Name of one number sought; of one that not all runs share, with its group or its run before it.
+
+        Problems that explain other runs, or other models, know it by the same key.
+        """
+        u = self.unknowns[index]
+        if u.shared:
+            return u.name
+        home = f"group {u.group}" if u.group else self.tracks[u.runs[0]].run.label
+        return f"{home}: {u.name}"
+
+    def values_at(self, x: Array) -> dict[str, float]:
+        """Every number sought at coordinates `x`, by its key."""
+        return {self.key(i): float(v) for i, v in enumerate(self.value(x))}
+
+    def shared_at(self, x: Array) -> dict[str, float]:
+        """The numbers that all runs share at coordinates `x`, by name."""
+        return {u.name: float(v) for u, v in zip(self.unknowns, self.value(x), strict=True) if u.shared}
+
+    def place(self, values: Mapping[str, float], x: Array | None = None) -> Array:
+        """Coordinates of the `values` that are given by key; the others as in `x`, or at their start."""
+        x = self.start if x is None else x.copy()
+        for i, u in enumerate(self.unknowns):
+            value = values.get(self.key(i))
+            if value is not None and (not u.log or value > 0):
+                x[i] = u.coordinate(value)
+        return np.clip(x, self.lower, self.upper)
+
+    def count(self, horizon: float = math.inf) -> int:
+        """Number of residuals within `horizon` seconds."""
+        return sum(t.within(horizon) * t.restarts.size * max(1, int(np.count_nonzero(t.weights))) for t in self.tracks)
+
+    def simulate(self, index: int, x: Array, samples: int, shift: Array | None = None) -> Array:
+        """Outputs (samples, W, outputs, lanes) of one run for coordinates `x` (sought, lanes).
+
+        `shift` (states, W, lanes or 1) is added to the states at which windows start.
+        """
+        d = self._setting(index, x)
+        x0 = d.x0 if shift is None else d.x0 + shift
+        self.evaluations += 1
+        return outputs(self.solver(index), self.tracks[index], d.values, x0, d.offsets, d.scales, samples=samples)
+
+    def filtered(self, index: int, x: Array) -> tuple[Array, Array]:
+        """Positions and speeds (W, outputs), as the sensors would show them, that a filter knows at the restarts."""
+        track, d = self.tracks[index], self._setting(index, x[:, None])
+        at = restart_states(self.solver(index), track, d.values, d.offsets, d.scales)[..., 0]
+        q, v = (at[np.add(track.columns, k)].T for k in (0, 1))
+        gain = 1.0 if d.scales is None else d.scales[:, 0]
+        return q * gain + d.offsets[:, 0], v * gain
+
+    def _setting(self, index: int, x: Array) -> Setting:
+        """What one run is simulated with, for coordinates `x` (sought, lanes)."""
+        track, v = self.tracks[index], self.value(x)
+        values: dict[str, float | Array] = {**self.base, **track.run.known}
+        values |= {u.name: v[i] for i, u in enumerate(self.unknowns) if u.shared}
+        own = {u.name: v[i] for i, u in enumerate(self.unknowns) if index in u.runs}
+        return setting(self.rig, track, values, own, self._friction, x.shape[1])
+
+    def solver(self, index: int) -> Simulator:
+        """Solver of one run, made once."""
+        if index not in self._solvers:
+            track = self.tracks[index]
+            free = [u.name for u in self.unknowns if u.shared]
+            own = {u.name for u in self.unknowns if index in u.runs}
+            free += [p for n, p in CHANGES.items() if n in own]
+            self._solvers[index] = simulator(self.rig, track, {**self.base, **track.run.known}, free)
+        return self._solvers[index]
+
+    def _lanes(self, x: Array, sought: NDArray[np.int64], *, central: bool = False) -> Array:
+        """Coordinates (sought, lanes) with every number moved by its step, to both sides when `central`."""
+        move = np.zeros((x.size, sought.size))
+        move[sought, np.arange(sought.size)] = self.steps[sought]
+        return x[:, None] + np.hstack([np.zeros((x.size, 1)), move, *([-move] if central else [])])
+
+    def rows(
+        self, index: int, x: Array, horizon: float = math.inf, *, central: bool = False
+    ) -> tuple[Array, Array] | None:
+        """Residuals (T, outputs) of one run, windows one after another, and their Jacobian (T, outputs, sought in it).
+
+        None when the simulation ran away.
+        """
+        track, sought = self.tracks[index], self.sought_in(index)
+        n, m = track.within(horizon), sought.size
+        restart = self.restart(index, x) if track.uncertain.size else None
+        y = self.simulate(index, self._lanes(x, sought, central=central), n, restart.shift if restart else None)
+        residual = track.errors(y[..., 0])
+        if not finite(residual):
+            return None
+        y = y[min(track.first, n - 1) :]
+        with np.errstate(over="ignore", invalid="ignore"):  # a lane that ran away makes the cost infinite
+            behind = y[..., m + 1 :] if central else y[..., :1]
+            slope = track.weighting @ ((y[..., 1 : m + 1] - behind) / (self.steps[sought] * (1 + central)))
+        k = len(track.columns) * (n if track.ahead else 1)  # all horizons of one restart stand in one row
+        r, J = np.moveaxis(residual, 1, 0), np.moveaxis(slope, 1, 0)  # windows one after another
+        if restart is not None:
+            r, J = restart.rows(r.reshape(track.restarts.size, -1), J.reshape(track.restarts.size, -1, m))
+        return r.reshape(-1, k), J.reshape(-1, k, m)
+
+    def residuals(self, index: int, x: Array, horizon: float = math.inf) -> Array:
+        """Residuals (W, samples) of every window of one run, each from the restart that suits it; no Jacobian."""
+        track = self.tracks[index]
+        if track.uncertain.size:
+            restart = self.restart(index, x)
+            return np.concatenate([restart.residual, restart.price], axis=1)
+        y = self.simulate(index, x[:, None], track.within(horizon))[..., 0]
+        return np.moveaxis(track.errors(y), 1, 0).reshape(track.restarts.size, -1)
+
+    def restart(self, index: int, x: Array) -> Restart:
+        """Where the windows of one run are best restarted, for coordinates `x`."""
+        track = self.tracks[index]
+        places = track.uncertain
+        variance = track.variance[:, places]
+        sizes = PERTURBATION * track.start.spread[places]
+        lanes = np.repeat(x[:, None], 1 + places.size, axis=1)
+
+        def respond(d: Array) -> tuple[Array, Array]:
+            shift = np.zeros((track.x0.shape[1], track.restarts.size, 1 + places.size))
+            shift[places] = d.T[:, :, None]
+            shift[places, :, 1 + np.arange(places.size)] += sizes[:, None]
+            y = self.simulate(index, lanes, track.length, shift)
+            residual = np.moveaxis(track.errors(y[..., 0]), 1, 0).reshape(len(d), -1)
+            slope = np.moveaxis(track.weighting @ ((y[..., 1:] - y[..., :1]) / sizes), 1, 0)
+            return residual, slope.reshape(*residual.shape, -1)
+
+        d, residual, slope = settle(respond, variance)
+        shift = np.zeros((track.x0.shape[1], track.restarts.size, 1))
+        shift[places] = d.T[:, :, None]
+        return Restart(shift=shift, residual=residual, slope=slope, change=d, variance=variance)
+
+    def normal(self, x: Array, horizon: float = math.inf) -> Normal:
+        """Cost and its Gauss-Newton model at coordinates `x`; the cost is infinite when a simulation ran away."""
+        size = x.size
+        A, g, cost = np.zeros((size, size)), np.zeros(size), 0.0
+        for index in range(len(self.tracks)):
+            sought = self.sought_in(index)
+            if self.tracks[index].windowed:
+                rows = self.rows(index, x, horizon)
+                if rows is None:
+                    return Normal.lost(size)
+                squares = products(rows[1].reshape(-1, sought.size), rows[0].reshape(-1))
+            else:
+                squares = self._squares(index, x, horizon, sought)
+            if not math.isfinite(squares[2]):
+                return Normal.lost(size)
+            cost += squares[2]
+            A[np.ix_(sought, sought)] += squares[0]
+            g[sought] += squares[1]
+        r, J = self.prior_rows(x)
+        cost += float(r @ r)
+        normal = Normal(cost, A + J.T @ J, g + J.T @ r)
+        return normal if finite(normal.matrix) else Normal.lost(size)
+
+    def _squares(self, index: int, x: Array, horizon: float, sought: NDArray[np.int64]) -> tuple[Array, Array, float]:
+        """``J'J``, ``J'r`` and ``r'r`` of a free run, in the lanes as they come: the same numbers as from `rows`."""
+        track, n = self.tracks[index], self.tracks[index].within(horizon)
+        d = self._setting(index, self._lanes(x, sought))
+        self.evaluations += 1
+        rows = len(d.x0) + track.u.shape[1]  # a loop records its commands as well
+        if self._memory.size < (most := n * rows * (sought.size + 16)):
+            self._memory = np.empty(most)
+        motion = motions(self.solver(index), track, d.values, d.x0, samples=n, memory=self._memory)
+        skip = min(track.first, n - 1)
+        seen = [motion[skip:, c] for c in track.columns]
+        if track.principal is None:
+            G = squares(seen, track.y[skip:n], d.offsets, track.weights, d.scales)
+        else:
+            G = squares(*mixed(seen, track.y[skip:n], d.offsets, d.scales, track.principal))
+        h = self.steps[sought]
+        with np.errstate(over="ignore", invalid="ignore"):  # a lane that ran away makes the cost infinite
+            return G[1:, 1:] / np.outer(h, h), G[1:, 0] / h, float(G[0, 0])
+
+    def settle_steps(self, x: Array, horizon: float = math.inf) -> Normal:
+        """Choose perturbations that move the outputs by about `STEP`, so that no guess of a size is needed.
+
+        The model at `x` comes back, found with perturbations not far from those.
+        """
+        for _ in range(4):
+            before = self.steps
+            here = self.normal(x, horizon)
+            self.rescale_steps(here, horizon)
+            if np.all((self.steps < 30 * before) & (self.steps > before / 30)):
+                return here
+        return self.normal(x, horizon)
+
+    def rescale_steps(self, normal: Normal, horizon: float) -> None:
+        """Choose perturbations by the effects found at an earlier evaluation within `horizon` seconds."""
+        samples = sum(t.within(horizon) * t.restarts.size for t in self.tracks)
+        effect = np.sqrt(np.maximum(np.diag(normal.matrix), 0.0) / samples)
+        wanted = np.where(effect > 0, STEP / np.maximum(effect, 1e-300), 100 * self.steps)
+        wanted = np.clip(wanted, self.steps * 1e-4, self.steps * 1e4)
+        scale = np.array([u.scale for u in self.unknowns])
+        self.steps = np.clip(wanted, 1e-9 * scale, 1e-3 * scale)
+
+    def prior_rows(self, x: Array) -> tuple[Array, Array]:
+        """Residuals and Jacobian of what was known beforehand of coordinates `x`, worth `noise` per sigma.
+
+        What is known of a first coordinate is a reading, so where the sensor's offset is sought too, their sum is held
+        against it. Held against the coordinate alone it would fight the offset (seen: 34 sigma on a cart whose spring
+        was slack 6 mm from zero, which bent everything else).
+        """
+        known = [(i, u, u.prior) for i, u in enumerate(self.unknowns) if u.prior is not None]
+        place = {(u.name, run): i for i, u in enumerate(self.unknowns) for run in u.runs}
+        r, J = np.zeros(len(known)), np.zeros((len(known), x.size))
+        for row, (i, u, (mean, sigma)) in enumerate(known):
+            kind, _, which = u.name.partition(".")
+            parts = {i} if kind != "initial" else {i, place.get((f"offset.{which}", u.runs[0]), i)}
+            J[row, list(parts)] = self.noise / sigma
+            r[row] = self.noise * (float(np.sum(x[list(parts)])) - mean) / sigma
+        return r, J
+
+    def cost(self, x: Array, horizon: float = math.inf) -> float:
+        """Sum of squares alone, one lane per run."""
+        r, _ = self.prior_rows(x)
+        total = float(r @ r)
+        for index in range(len(self.tracks)):
+            e = self.residuals(index, x, horizon)
+            with np.errstate(over="ignore"):
+                total += float(np.sum(e * e))
+        return total if math.isfinite(total) else math.inf
+
+
+def formulate(
+    rig: Rig, runs: Sequence[Run], *, thin: bool = True, given: Mapping[str, Mapping[str, float]] | None = None
+) -> Problem:
+    """Set up the problem of explaining `runs`.
+
+    `thin` drops samples of free runs that their period does not need; `given` holds what is known of a group of runs,
+    by its label and name.
+    """
+    tracks = [prepare(rig, run, thin=thin) for run in runs]
+    unknowns = resolved(rig, runs, shared_unknowns(rig))
+    for u in (u for i, track in enumerate(tracks) for u in run_unknowns(rig, i, track.run, track.start)):
+        place = next((i for i, o in enumerate(unknowns) if u.group and (o.name, o.group) == (u.name, u.group)), None)
+        if place is not None:
+            unknowns[place] = replace(unknowns[place], runs=(*unknowns[place].runs, *u.runs))
+        elif (value := (given or {}).get(u.group, {}).get(u.name)) is not None:
+            unknowns.append(replace(u, value=value, lower=value, upper=value))
+        else:
+            unknowns.append(u)
+    return Problem(rig=rig, tracks=tracks, unknowns=unknowns, steps=np.array([1e-6 * u.scale for u in unknowns]))
+
+
+def resolved(rig: Rig, runs: Sequence[Run], unknowns: Sequence[Unknown]) -> list[Unknown]:
+    """The numbers sought, presliding lengths no shorter than `ROUNDING` of the finest encoder step that sees them.
+
+    The effect of shorter ones on the outputs comes from where the steps of the integration happen to fall: differences
+    of simulations then are noise, and a matrix of such differences promises intervals far too narrow.
+    """
+    least = _shortest(rig, runs)
+    return [
+        replace(u, lower=least[u.name], value=max(u.value, least[u.name]))
+        if u.asked and u.name in least and u.lower < least[u.name] <= u.upper
+        else u
+        for u in unknowns
+    ]
+
+
+def unresolved(problem: Problem, x: Array) -> tuple[str, ...]:
+    """Presliding lengths at coordinates `x` that the encoder does not tell from plain Coulomb friction."""
+    least = _shortest(problem.rig, [track.run for track in problem.tracks])
+    return tuple(
+        u.name
+        for u, value in zip(problem.unknowns, problem.value(x), strict=True)
+        if u.asked and u.name in least and u.lower == least[u.name] and value <= u.lower * (1 + 1e-6)
+    )
+
+
+def _shortest(rig: Rig, runs: Sequence[Run]) -> dict[str, float]:
+    """Least presliding length worth telling, by its name."""
+    derived = rig.plant.derived()
+    seen = [pair for run in runs for pair in zip(run.measured, run.quantum, strict=False)]
+    steps = {c: min((quantum for name, quantum in seen if name == c), default=0.0) for c in derived.coordinates}
+    return {j.presliding: ROUNDING * steps[derived.coordinates[j.coordinate]] for j in derived.joints if j.presliding}
+
+
+def noise_level(problem: Problem, x: Array) -> float:
+    """Weighted residual that one independent observation carries: its deviation times the root of its memory.
+
+    What was known beforehand is weighed against the data in this unit.
+    """
+    squares, samples = 0.0, 0
+    for index, track in enumerate(problem.tracks):
+        y = problem.simulate(index, x[:, None], track.length)[:, :, :, 0]
+        e = np.moveaxis((y - track.targets(track.length)) * track.weights, 1, 0)
+        e = e.reshape(len(e), -1) if track.ahead else e.reshape(-1, len(track.columns))
+        alike = max(1.0, 2 * memory(e, track.spacing) / track.spacing - 1)
+        squares += alike * float(np.sum(e * e))
+        samples += e.shape[0] * max(1, int(np.count_nonzero(track.weights)) * (track.length if track.ahead else 1))
+    return math.sqrt(squares / max(samples, 1))
