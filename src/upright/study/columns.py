@@ -76,7 +76,7 @@ class Sensor:
             try:
                 zero = units.parse(zero, self.coordinate.unit) / factor  # "180 deg" of a column in counts
             except BadInput:
-                zero = in_unit(zero, unit)
+                zero = units.in_unit(zero, unit)
         elif isinstance(zero, str):
             zero = units.parse(zero, self.coordinate.unit) / units.scale(unit)
         return self.sign * factor, zero
@@ -111,13 +111,6 @@ class Drive:
         if not self.what:
             return np.zeros(record.t.size)
         return self.sign * self.scale * expressions.evaluate(self.what, record.signals, record.t)
-
-
-def in_unit(value: float | str, unit: str) -> float:
-    """Number in `unit`; text is converted, a plain number is taken to be in it."""
-    if not isinstance(value, str):
-        return float(value)
-    return units.parse(value, unit) / units.scale(unit)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,9 +10,9 @@ from upright.errors import BadInput, ImpossiblePhysics
 from upright.identification.model.model import ACTUATOR, NEVER_NEGATIVE, Parameter, Rig
 from upright.physics import Plant, find
 from upright.quantities import Quantity
-from upright.study.columns import in_unit
 from upright.study.keys import names
 from upright.study.text import Section, show
+from upright.units import in_unit, uncertainty
 
 
 def read_plant(study: Section) -> type[Plant]:
@@ -177,8 +177,8 @@ def _check(section: Section, keys: tuple[str, ...], name: str, value: float, wha
 def _uncertainty(section: Section, key: str, value: Any, number: float, what: Quantity) -> float:
     if isinstance(value, str) and value.strip().endswith("%"):
         try:
-            sigma = abs(number) * float(value.strip().rstrip("%")) / 100
-        except ValueError:
+            sigma = uncertainty(value, number, what.unit)
+        except BadInput:
             raise section.error(key, f'uncertainty must be like "2 mm" or "1 %", got {show(value)}') from None
     else:
         sigma = _number(section, (key, "uncertainty"), value, what)
