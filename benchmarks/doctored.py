@@ -200,7 +200,7 @@ def _record(
     from upright.doctor import Known
     from upright.identification.model.model import ACTUATOR, Parameter
     from upright.records import Provenance, Record
-    from upright.study.columns import Drive, Sensor
+    from upright.study.sensors import Drive, Sensor
 
     names = [c.name for c in cls.coordinates]
     encoders = rng.random() < 0.7

@@ -13,8 +13,8 @@ from upright.closed_loop import Filter, SampledLaw
 from upright.physics import Plant
 from upright.records import Record
 from upright.study import expressions
-from upright.study.columns import Drive, Grid, Sensor
 from upright.study.rig import per
+from upright.study.sensors import Drive, Grid, Sensor
 from upright.study.text import Section, show, si
 from upright.units import in_unit
 
