@@ -12,8 +12,8 @@ from upright.identification.model.model import ACTUATOR, NEVER_NEGATIVE, Paramet
 from upright.physics import Plant, find
 from upright.quantities import Quantity
 from upright.study.keys import names
-from upright.study.text import Section, show
-from upright.units import in_unit, uncertainty
+from upright.study.text import Section, show, si
+from upright.units import uncertainty
 
 
 def read_plant(study: Section) -> type[Plant]:
@@ -154,9 +154,9 @@ def read_parameter(section: Section, key: str, name: str, what: Quantity) -> Par
 
 def _number(section: Section, keys: tuple[str, ...], value: Any, what: Quantity) -> float:
     with section.text.at((*section.place(keys[0]), *keys[1:])):
-        if isinstance(value, bool) or not isinstance(value, int | float | str):
-            raise BadInput(f'{keys[0]} must be a number or text such as "1.5 {what.unit}", got {show(value)}')
-        return in_unit(value, what.unit)
+        if isinstance(value, float) and not math.isfinite(value):  # `_checked` knows where infinity has a meaning
+            return value
+        return si(value, what.unit, keys[0])
 
 
 def _checked(section: Section, keys: tuple[str, ...], name: str, value: Any, what: Quantity) -> float:

@@ -188,14 +188,12 @@ class Section:
 
 
 def si(value: Any, unit: str, what: str) -> float:
-    """Value in SI of a number or of text such as ``"2 mm"``; `unit` says which dimension is needed."""
-    if isinstance(value, str):
-        return units.parse(value, unit)
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    """Value in `unit`, one of SI or of the command, of a number or of text such as ``"2 mm"``."""
+    if isinstance(value, bool) or not isinstance(value, str | int | float):
         raise BadInput(f'{what} must be a number or text with a unit, such as "1.5 {unit}", got {show(value)}')
-    if not abs(float(value)) < 1e300:
+    if not isinstance(value, str) and not abs(float(value)) < 1e300:
         raise BadInput(f"{what} must be a finite number, got {value}")
-    return float(value)
+    return units.in_unit(value, unit)
 
 
 def show(value: Any) -> str:
