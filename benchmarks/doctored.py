@@ -201,7 +201,7 @@ def _record(
     from upright.identification import Parameter
     from upright.identification.model.rig import ACTUATOR
     from upright.records import Provenance, Record
-    from upright.study.columns import Drive, Sensor
+    from upright.study.sensors import Drive, Sensor
 
     names = [c.name for c in cls.coordinates]
     encoders = rng.random() < 0.7

@@ -22,18 +22,19 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     """Errors of the pole by least squares and by the paper's simplex, and how often intervals hold."""
     from upright.identification.frequency.answer import key_value
     from upright.lab.frequency_1b.chapter import true_key
-    from upright.lab.frequency_1b.run import run as sweep
+    from upright.lab.frequency_1b.run import run_frequency
+    from upright.lab.makes import PENDULUMS
 
     lines: list[Line] = []
     seeds = range(1, 9 if quick else 51)
     with tempfile.TemporaryDirectory() as folder:
-        for make in ("furuta", "linear"):
-            sweep(make, 0, Path(folder))  # compiles
+        for make in PENDULUMS:
+            run_frequency(make, 0, Path(folder))  # compiles
             progress(f"{NAME}: {make}")
             start = time.process_time()
             off, walked, held, numbers, cost = [], [], [], [], []
             for seed in seeds:
-                done = sweep(make, seed, Path(folder))
+                done = run_frequency(make, seed, Path(folder))
                 answer, truth = done.answer, true_key(done)
                 found = key_value(answer.key)
                 off.append(abs(found.value / truth - 1))

@@ -18,17 +18,19 @@ NAME = "loadings"
 
 def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     """Median errors and how often the intervals hold, per kind of rig and quantity."""
-    from upright.lab.weighing_1a.twin import run as weigh
+    from upright.lab.makes import OSCILLATORS
+    from upright.lab.weighing_1a.run import weigh_body
+    from upright.lab.weighing_1a.twin import drawn_twin
 
     lines: list[Line] = []
     seeds = range(1, 26 if quick else 101)
-    weigh(0)  # compiles
-    for kind in ("rectilinear", "torsional"):
+    weigh_body(drawn_twin())  # compiles
+    for kind in OSCILLATORS:
         progress(f"{NAME}: {kind}")
         start = time.process_time()
         errors, held = np.empty((len(seeds), 2)), np.empty((len(seeds), 2), dtype=bool)
         for row, seed in enumerate(seeds):
-            done = weigh(seed, kind)
+            done = weigh_body(drawn_twin(seed, kind))
             pairs = ((done.found.k, done.on.stiffness), (done.found.bare, done.on.bare))
             errors[row] = [abs(w.value / truth - 1) for w, truth in pairs]
             held[row] = [w.interval[0] <= truth <= w.interval[1] for w, truth in pairs]

@@ -31,10 +31,6 @@ if TYPE_CHECKING:
 NAME = "regulation"
 IMAGE = Path("docs/images/regulation_reliability.png")
 Array = NDArray[np.float64]
-SOUGHT = {
-    "furuta": ("J_d", "J_p", "b_1", "b_2", "b_1c", "b_2c"),
-    "linear": ("m_c", "J_p", "b_1", "b_2", "b_1c", "b_2c"),
-}
 GAIN = "actuator.gain"
 EVERY, SECONDS = 9, 2.0
 STEP = 3e-3  # of differences; finer ones see the moments at which joints stick jump from sample to sample
@@ -54,14 +50,14 @@ class Told:
 
 def identify(truth: Rig, seed: int) -> tuple[Rig, tuple[str, ...], Array] | None:
     """Best numbers and their covariance, in logarithms, from a log of the hanging rig; None when the search strays."""
-    from upright.lab.rigs.makes import make_rig
+    from upright.lab.makes import make_of, make_rig
     from upright.simulation import simulate
 
     rng = np.random.default_rng([seed, 61])
-    make = "furuta" if "psi" in truth.plant.state_names() else "linear"
-    names = (*SOUGHT[make], GAIN)
+    make = make_of(truth.plant)
+    names = (*make.sought, GAIN)
     rows = round(SECONDS / truth.period / EVERY) + 1
-    size = 0.5 if make == "furuta" else 0.8
+    size = 0.5 if make.key == "furuta" else 0.8
     u = size * np.sign(np.sin(2 * np.pi * np.arange(rows * EVERY) * truth.period / 0.35))
     x0 = np.zeros(4)
 
@@ -74,7 +70,7 @@ def identify(truth: Rig, seed: int) -> tuple[Rig, tuple[str, ...], Array] | None
     step = truth.quantum
     log = np.round(shown(truth, {}, rows)[:, :, 0] / step) * step + rng.normal(size=(rows, 2)) * spread
     error = np.hypot(spread, step / math.sqrt(12))
-    model = make_rig(make)
+    model = make_rig(make.key)
     model = replace(model, period=truth.period, delay=truth.delay, lag=truth.lag, limit=truth.limit)
     known = {n: getattr(truth.plant, n) for n in ("m_p", "l_cg", "r") if n in truth.plant.names()}  # from the bench
     model = model.changed(**known)
@@ -119,11 +115,11 @@ def drawn(
 
 def setting(make: str, seed: int) -> tuple[Rig, np.random.Generator]:
     """The true rig, with its drive of this seed, and what is drawn besides."""
-    from upright.lab.rigs.makes import make_rig
+    from upright.lab.makes import MAKES, make_rig
 
     rng = np.random.default_rng([seed, 60])
     truth = make_rig(make, seed)
-    off = {n: getattr(truth.plant, n) * math.exp(rng.normal(0, OFF)) for n in SOUGHT[make]}
+    off = {n: getattr(truth.plant, n) * math.exp(rng.normal(0, OFF)) for n in MAKES[make].sought}
     truth = truth.changed(**off)
     limit, delay = rng.uniform(2.0, 5.0), truth.delay + rng.choice([0.0, 1e-3, 2e-3, 3e-3])
     return replace(truth, limit=float(limit), delay=float(delay)), rng
@@ -131,7 +127,7 @@ def setting(make: str, seed: int) -> tuple[Rig, np.random.Generator]:
 
 def of_the_day(rig: Rig, others: Mapping[str, Array], rng: np.random.Generator, lanes: int) -> dict[str, Array]:
     """The same rigs, each with the dry friction of its day."""
-    from upright.lab.rigs.believed import DAILY
+    from upright.lab.identified import DAILY
 
     today = {n: np.exp(rng.normal(0, DAILY, lanes)) * others.get(n, getattr(rig.plant, n)) for n in ("b_1c", "b_2c")}
     return {**others, **today}
@@ -149,9 +145,9 @@ def one(make: str, seed: int, *, swept: Path | None = None) -> Told | None:
     from upright import design
     from upright.control.many import outcomes
     from upright.design.requests import read_poles
-    from upright.lab.regulation_2.run import SETS, SPEEDS, estimator, identified
-    from upright.lab.rigs.believed import allowed, believed
-    from upright.lab.rigs.makes import make_rig
+    from upright.lab.designing.run import SPEEDS, velocities
+    from upright.lab.makes import make_rig
+    from upright.lab.regulation_2.run import SETS, identify_make
 
     truth, rng = setting(make, seed)
     if swept is None:
@@ -162,13 +158,13 @@ def one(make: str, seed: int, *, swept: Path | None = None) -> Told | None:
         others = of_the_day(rig, drawn(rig, names, covariance, rng, LANES), rng, LANES)
     else:
         truth = replace(make_rig(make, seed), limit=truth.limit)
-        file = identified(make, seed, swept)
-        rig = replace(believed(file), limit=truth.limit)
-        others = allowed(file, rig, LANES, seed)
+        known = identify_make(make, seed, swept)
+        rig = replace(known.rig(), limit=truth.limit)
+        others = known.allowed(rig, LANES, seed)
     model = rig.linear("inverted")
     sampled = design.hold(model, rig.period, rig.delay / rig.period)
     poles = read_poles(SETS[f"set {rng.integers(1, 5)}"])
-    way = estimator(model, sampled, rig, SPEEDS[rng.integers(3)], 0.5)
+    way = velocities(model, sampled, SPEEDS[rng.integers(3)], 0.5, rig.limit, rig.quantum)
     law = design.feedback(way, design.place(model.A, model.B, poles).K)
     angle = rng.uniform(0, math.pi / 2)
     outwards = np.array([0, 0, 0.7 * math.cos(angle), 6.0 * math.sin(angle)])

@@ -23,8 +23,10 @@ LIES = tuple((place, factor) for factor in (-1.0, 0.5, 2.0, 4.0, 1.1, 0.9) for p
 
 def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     """Shares, times, efforts; then detections and false alarms, hanging and in the running loop."""
+    from upright.lab.makes import PENDULUMS
+
     lines: list[Line] = []
-    for make in ("furuta", "linear"):
+    for make in PENDULUMS:
         progress(f"{NAME}: {make}, up")
         lines += [_up(make, 25 if quick else 100, far) for far in (1.0, 3.0)]
         progress(f"{NAME}: {make}, encoders")
@@ -40,7 +42,7 @@ def _up(make: str, count: int, scatter: float) -> Line:
     """Twins whose numbers lie `scatter` times as far from the model's as a make's do."""
     from upright.control import design_swing_up
     from upright.control.ascent import UPRIGHT
-    from upright.lab.rigs.makes import make_rig
+    from upright.lab.makes import make_rig
     from upright.simulation import simulate
 
     model, rigs = make_rig(make), [make_rig(make, seed) for seed in range(1, count + 1)]
@@ -80,7 +82,7 @@ def _sensors(make: str, count: int) -> list[Line]:
     from upright.control.sensors import probe, put_out, scales
     from upright.control.trial import readings
     from upright.control.watch import Suspicion, Watch
-    from upright.lab.rigs.makes import make_rig
+    from upright.lab.makes import make_rig
 
     model = make_rig(make)
     names = [c.name for c in model.plant.coordinates]

@@ -21,19 +21,17 @@ NAME = "tracking"
 
 def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     """Spread of the step figures per kind of rig and law, and how many stay within effort, travel and twist."""
-    from upright.lab.rigs.makes import make_rig
-    from upright.lab.tracking_3.run import run as track
-    from upright.lab.tracking_3.shaft import KINDS
-    from upright.lab.tracking_3.trials import attempt
+    from upright.lab.makes import SHAFTS, make_rig
+    from upright.lab.tracking_3.run import attempt, run_tracking
 
     lines: list[Line] = []
     seeds = range(1, 13 if quick else 101)
-    for kind in KINDS:
+    for kind in SHAFTS:
         progress(f"{NAME}: {kind}")
         with tempfile.TemporaryDirectory() as folder:
-            first = track(kind, 0, Path(folder))  # compiles
+            first = run_tracking(kind, 0, Path(folder))  # compiles
             start = time.process_time()
-            done = [track(kind, seed, Path(folder)) for seed in seeds]
+            done = [run_tracking(kind, seed, Path(folder)) for seed in seeds]
             each = (time.process_time() - start) / len(seeds)
         for i, name in enumerate(o.law.name for o in first.sets):
             lines.append(_line(kind, name, [d.sets[i] for d in done], done, each))

@@ -10,20 +10,20 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from upright.lab.frequency_1b import run as frequency
 from upright.lab.frequency_1b.figures import bode_figure
+from upright.lab.frequency_1b.run import run_frequency
 from upright.lab.frequency_1b.tables import curves
-from upright.lab.rigs.makes import make_rig
-from upright.lab.weighing_1a import run as weighing
+from upright.lab.makes import make_rig
 from upright.lab.weighing_1a.figures import line_figure
+from upright.lab.weighing_1a.run import run_weighing
 from upright.report.drawing import save
 
 seed = int(sys.argv[1]) if sys.argv[1:] else 0
 rig = make_rig("furuta", seed)
 
 with TemporaryDirectory() as folder:
-    weighed = weighing.run(rig, seed, Path(folder))
-    swept = frequency.run("furuta", seed, Path(folder), weighed=weighed.known)
+    weighed = run_weighing(rig, seed, Path(folder))
+    swept = run_frequency("furuta", seed, Path(folder), weighed=weighed.known)
 
 line = weighed.campaign.found
 print(f"(a) {line.verdict}")

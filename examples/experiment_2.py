@@ -14,11 +14,10 @@ import numpy as np
 
 from upright.control import design_swing_up
 from upright.control.ascent import swing_up
-from upright.lab.frequency_1b import run as frequency
-from upright.lab.regulation_2 import run as regulation
-from upright.lab.rigs.believed import believed
-from upright.lab.rigs.makes import make_rig
-from upright.lab.rigs.rig_file import read_rig_file
+from upright.lab.frequency_1b.run import run_frequency
+from upright.lab.identified import read_identified
+from upright.lab.makes import make_rig
+from upright.lab.regulation_2.run import run_regulation
 from upright.report.drawing import CYCLE, figure, save, styled
 
 seed = int(sys.argv[1]) if sys.argv[1:] else 0
@@ -26,9 +25,9 @@ rig = make_rig("furuta", seed)
 
 # Hanging, the rig is swept with sines; gains and verdicts come from that fit alone, the rig is asked only afterwards.
 with TemporaryDirectory() as folder:
-    print(frequency.run("furuta", seed, Path(folder)).answer.fit.verdict)
-    identified = read_rig_file(Path(folder) / "fit.json", seed=seed)
-    done = regulation.run(identified, rig, seed, Path(folder))
+    print(run_frequency("furuta", seed, Path(folder)).answer.fit.verdict)
+    identified = read_identified(Path(folder) / "fit.json", seed=seed)
+    done = run_regulation(identified, rig, seed, Path(folder))
 
 for a in done.attempts:
     gains = ", ".join(f"{k:.3g}" for k in a.placement.K[0])
@@ -37,7 +36,7 @@ for a in done.attempts:
     print(f"  said beforehand: {a.before.word} ({share:.0f} %), came: {a.word}, {a.score.effort_peak:.1f} V at most")
 print(f"To recommend: {done.best.name}.")
 
-ascent = swing_up(rig, design_swing_up(believed(identified)), seconds=6)
+ascent = swing_up(rig, design_swing_up(identified.rig()), seconds=6)
 print(f"From hanging: {ascent.swings} half swings, upright from {ascent.up:.2f} s on, {ascent.peak:.1f} V at most.")
 
 

@@ -9,16 +9,16 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from upright.lab.tracking_3 import run as tracking
 from upright.lab.tracking_3.figures import steps_figure
 from upright.lab.tracking_3.parts import frame, trace
+from upright.lab.tracking_3.run import run_tracking
 from upright.report.drawing import save
 
 seed = int(sys.argv[1]) if sys.argv[1:] else 0
 
 # Pulses, a fit, gains for the poles of Table 2, a step as large as the drive allows, and a PD searched for comparison.
 with TemporaryDirectory() as folder:
-    done = tracking.run("rectilinear", seed, Path(folder))
+    done = run_tracking("rectilinear", seed, Path(folder))
 
 print(f"Poles of the fitted rig: {', '.join(f'{p:.2f}' for p in done.model.linear('rest').poles())} 1/s")
 print(f"Step of {1e3 * done.step.size:g} mm, {done.step.reason}.")

@@ -13,7 +13,7 @@ BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 
 # Rooms from the ground up: each imports from those above its own line only. Rooms on one line do not see each other.
 FLOORS = """
-errors progress
+errors progress json_file
 quantities
 units
 signals
@@ -39,7 +39,8 @@ control
 report
 doctor survey
 paper
-lab.rigs
+lab.makes
+lab.identified
 lab.designing lab.weighing_1a
 lab.frequency_1b
 lab.regulation_2

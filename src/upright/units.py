@@ -101,6 +101,28 @@ def parse(text: str, expected: str = "") -> float:
     return value
 
 
+def parse_if_given(text: str, expected: str) -> float | None:
+    """Value of an option in SI, None where it was left empty; see `parse`."""
+    return parse(text, expected) if text else None
+
+
+def in_unit(value: float | str, unit: str) -> float:
+    """Number in `unit`: a text is converted, a plain number is taken to be in it."""
+    return parse(value, unit) / scale(unit) if isinstance(value, str) else float(value)
+
+
+def uncertainty(text: str, value: float, unit: str) -> float:
+    """Standard uncertainty [SI] of a value, stated as ``"2 mm"`` or as a share of it, ``"1 %"``."""
+    return abs(value) * parse(text, "1") if text.strip().endswith("%") else parse(text, unit)
+
+
+def measured(text: str, unit: str) -> tuple[float, float]:
+    """Value and standard uncertainty [SI] of a text such as ``"135 g +- 0.2 %"``; 0 where none is stated."""
+    number, _, spread = re.sub(r"\+/-|±", "+-", text).partition("+-")
+    value = parse(number, unit)
+    return value, uncertainty(spread.strip(), value, unit) if spread.strip() else 0.0
+
+
 def scale(unit: str) -> float:
     """SI value (radians, counts) of one `unit`: 0.001 for ``"mm"``, pi/180 for ``"deg"``.
 

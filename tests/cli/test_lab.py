@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from upright.cli import app
 from upright.lab import laboratory
-from upright.lab.experiments import EXPERIMENTS, Experiment
+from upright.lab.laboratory import EXPERIMENTS, Experiment
 from upright.report.chapter import Chapter
 
 

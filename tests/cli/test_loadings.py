@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from upright.cli import app
-from upright.lab.weighing_1a.twin import acquire, rig
+from upright.lab.weighing_1a.twin import acquire, drawn_twin
 
 pytestmark = pytest.mark.slow
 
@@ -27,7 +27,7 @@ def said(outcome) -> str:
 def logs(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("loads")
     for count in (0, 2, 4):
-        acquire(rig(2, "torsional"), count).to_csv(folder / f"{count}.csv")
+        acquire(drawn_twin(2, "torsional"), count).to_csv(folder / f"{count}.csv")
     return folder
 
 
@@ -54,7 +54,7 @@ def test_masses_on_a_bolt_circle_are_inertias(logs, tmp_path):
     assert outcome.exit_code == 0, outcome.stderr
     found = json.loads(outcome.stdout)
     assert found["kind"] == "torsional"
-    assert found["k"]["value"] == pytest.approx(rig(2, "torsional").stiffness, rel=1e-2)
+    assert found["k"]["value"] == pytest.approx(drawn_twin(2, "torsional").stiffness, rel=1e-2)
     assert len(found["swings"]) == 3  # --free leaves the swings with the drive on aside
 
 

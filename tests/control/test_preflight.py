@@ -14,7 +14,7 @@ from upright.control.many import outcomes
 from upright.control.preflight import Task, largest, preflight, words
 from upright.design.requests import read_poles
 from upright.errors import BadInput
-from upright.lab.rigs.makes import make_rig
+from upright.lab.makes import make_rig
 from upright.paper.tables import TABLE_1
 
 RIG = make_rig("furuta")

@@ -20,8 +20,8 @@ from upright.control.sensors import lifted, probe, put_out, scales
 from upright.control.trial import readings
 from upright.control.watch import ODDS, UNKNOWN, Suspicion, Watch
 from upright.control.watch import watched as guarded
-from upright.lab.rigs.encoders import asked
-from upright.lab.rigs.makes import make_rig
+from upright.lab.makes import make_rig
+from upright.lab.swing_up_2b.run import scales_of_log
 from upright.physics import Furuta
 from upright.readers import read
 from upright.records import Record
@@ -210,7 +210,9 @@ def test_a_real_encoder_that_counts_the_other_way_is_found(volts):
     for i, name in enumerate(("psi", "theta")):
         signals[name] = np.interp(t, log.t, log[f"/joint_states/joint{i}/position"])
     units = {"psi": "rad", "theta": "rad", "u": "V"}
-    found = asked(rig, Record(t=t - t[0], signals=signals, units=units, inputs=("u",), outputs=("psi", "theta")))
+    found = scales_of_log(
+        rig, Record(t=t - t[0], signals=signals, units=units, inputs=("u",), outputs=("psi", "theta"))
+    )
     assert found.wrong == ("theta",)
     assert "theta counts the wrong way round" in found.verdict
     assert np.all(np.abs(found.value - [1.0, -1.0]) < 3 * found.error)

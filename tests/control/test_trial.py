@@ -13,7 +13,7 @@ from upright.control import Trial, score, trial
 from upright.control.trial import readings
 from upright.design.loop import closed
 from upright.errors import BadInput
-from upright.lab.rigs.makes import make_rig
+from upright.lab.makes import make_rig
 from upright.records import Record
 from upright.simulation import Law
 

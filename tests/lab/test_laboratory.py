@@ -5,7 +5,7 @@ import pytest
 
 from upright.errors import NotIdentifiable
 from upright.lab import laboratory, laboratory_page
-from upright.lab.experiments import Experiment
+from upright.lab.laboratory import Experiment
 from upright.report.chapter import Chapter, Finding
 from upright.report.sections import Part
 
@@ -40,7 +40,7 @@ def verdicts(session):
 
 
 def test_numbers_go_from_one_experiment_to_those_on_the_same_rig(bench, tmp_path):
-    said = verdicts(laboratory.run((), "", 0, tmp_path))
+    said = verdicts(laboratory.run_laboratory((), "", 0, tmp_path))
     assert said["2"].endswith("after 1")
     assert said["3"] == "3 on ECP 210, two carts, seed 0, after nothing"  # another rig than experiment 1's
 
@@ -48,7 +48,7 @@ def test_numbers_go_from_one_experiment_to_those_on_the_same_rig(bench, tmp_path
 def test_interrupted_it_keeps_what_is_finished_and_goes_on_from_there(bench, tmp_path):
     ran, trouble = bench
     trouble["2"] = KeyboardInterrupt()
-    first = laboratory.run((), "", 0, tmp_path)
+    first = laboratory.run_laboratory((), "", 0, tmp_path)
     assert first.interrupted
     assert [t.experiment.key for t in first.told] == ["1"]
     assert [e.key for e in first.missing] == ["2", "3"]
@@ -56,24 +56,24 @@ def test_interrupted_it_keeps_what_is_finished_and_goes_on_from_there(bench, tmp
     assert "Stopped by Ctrl-C" in told.notes[0]
     assert any("Go on" in s.sentence for s in told.steps)
     trouble.clear()
-    second = laboratory.run((), "", 0, tmp_path)
+    second = laboratory.run_laboratory((), "", 0, tmp_path)
     assert not second.interrupted
     assert [t.state for t in second.told] == ["kept", "done", "done"]
     assert ran == ["1", "2", "2", "3"]
 
 
 def test_a_ctrl_c_that_an_experiment_has_swallowed_is_still_obeyed(bench, tmp_path):
-    stopped = laboratory.run((), "", 0, tmp_path, stopped=lambda: True)
+    stopped = laboratory.run_laboratory((), "", 0, tmp_path, stopped=lambda: True)
     assert [t.state for t in stopped.told] == ["stopped"]
     assert stopped.interrupted
-    assert [t.state for t in laboratory.run(("1",), "", 0, tmp_path).told] == ["done"]
+    assert [t.state for t in laboratory.run_laboratory(("1",), "", 0, tmp_path).told] == ["done"]
 
 
 @pytest.mark.parametrize("kind", [NotIdentifiable, FloatingPointError, np.linalg.LinAlgError])
 def test_an_experiment_that_fails_says_why_and_the_others_go_on(bench, tmp_path, kind):
     _, trouble = bench
     trouble["2"] = kind("nothing moves; is the amplifier on?")
-    session = laboratory.run((), "", 0, tmp_path)
+    session = laboratory.run_laboratory((), "", 0, tmp_path)
     assert [t.state for t in session.told] == ["done", "failed", "done"]
     failed = session.told[1].chapter
     assert not failed.sound
@@ -85,43 +85,43 @@ def test_an_experiment_that_fails_says_why_and_the_others_go_on(bench, tmp_path,
 def test_what_was_made_of_something_else_is_made_again(bench, tmp_path, change):
     call = {"make": "", "seed": 0} | change
     fresh = call.pop("fresh", False)
-    laboratory.run(("1", "2"), "", 0, tmp_path)
-    again = laboratory.run(("1", "2"), call["make"], call["seed"], tmp_path, fresh=fresh)
+    laboratory.run_laboratory(("1", "2"), "", 0, tmp_path)
+    again = laboratory.run_laboratory(("1", "2"), call["make"], call["seed"], tmp_path, fresh=fresh)
     assert [t.state for t in again.told] == ["done", "done"]
 
 
 def test_one_experiment_again_does_not_cost_the_others_their_place(bench, tmp_path):
     ran, trouble = bench
-    laboratory.run((), "", 0, tmp_path)
-    again = laboratory.run(("2",), "", 0, tmp_path, fresh=True)
+    laboratory.run_laboratory((), "", 0, tmp_path)
+    again = laboratory.run_laboratory(("2",), "", 0, tmp_path, fresh=True)
     assert [(t.experiment.key, t.state) for t in again.told] == [("1", "done"), ("2", "done"), ("3", "kept")]
     assert laboratory_page.command(again) == "upright lab"
     trouble["2"] = KeyboardInterrupt()
-    stopped = laboratory.run(("2",), "", 0, tmp_path, fresh=True)
+    stopped = laboratory.run_laboratory(("2",), "", 0, tmp_path, fresh=True)
     assert stopped.interrupted
     assert [t.experiment.key for t in stopped.told] == ["1", "2", "3"]  # 2 as it was kept: it still holds
-    alone = laboratory.run(("1",), "", 1, tmp_path)
+    alone = laboratory.run_laboratory(("1",), "", 1, tmp_path)
     assert laboratory_page.command(alone) == "upright lab --experiment 1 --seed 1"
     assert ran == ["1", "2", "3", "1", "2", "1", "2", "1"]
 
 
 def test_a_torn_file_is_made_again(bench, tmp_path):
-    laboratory.run(("1",), "", 0, tmp_path)
+    laboratory.run_laboratory(("1",), "", 0, tmp_path)
     path = tmp_path / "1" / "chapter.json"
     path.write_text(path.read_text(encoding="utf-8")[:100], encoding="utf-8")
-    assert [t.state for t in laboratory.run(("1",), "", 0, tmp_path).told] == ["done"]
+    assert [t.state for t in laboratory.run_laboratory(("1",), "", 0, tmp_path).told] == ["done"]
 
 
 def test_what_is_kept_reads_as_it_was_written(bench, tmp_path):
-    first = laboratory.run(("1",), "", 0, tmp_path).told[0].chapter
-    again = laboratory.run(("1",), "", 0, tmp_path).told[0].chapter
+    first = laboratory.run_laboratory(("1",), "", 0, tmp_path).told[0].chapter
+    again = laboratory.run_laboratory(("1",), "", 0, tmp_path).told[0].chapter
     assert again.numbers == {"run": 1, "bad": None}  # JSON knows no NaN
     assert (again.parts, again.findings, again.verdict) == (first.parts, first.findings, first.verdict)
 
 
 def test_the_share_told_never_goes_back(bench, tmp_path):
     shares = []
-    laboratory.run((), "", 0, tmp_path, lambda step, share: shares.append(share))
+    laboratory.run_laboratory((), "", 0, tmp_path, lambda step, share: shares.append(share))
     assert shares == sorted(shares)
     assert shares[0] >= 0
     assert shares[-1] <= 1

@@ -14,7 +14,7 @@ from tests.paper.test_errata import possible
 from upright.cli import app
 from upright.design import lqr
 from upright.design.factorization import effort_ratios, recover_locus
-from upright.lab.rigs.twin import NOMINAL
+from upright.lab.makes import NOMINAL
 from upright.paper import tables
 from upright.paper.errata import printed_inverted
 from upright.paper.reproduce import reproduce

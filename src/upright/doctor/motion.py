@@ -13,7 +13,7 @@ from upright.errors import BadInput
 from upright.physics import Plant
 from upright.records import Array
 from upright.signals.smoothing import dominant_period, middle, savitzky_golay
-from upright.study.columns import Grid
+from upright.study.sensors import Grid
 
 LOUD = 0.01
 """Share of an acceleration's variance that may be noise; smoothing reaches no further than it takes to get there."""

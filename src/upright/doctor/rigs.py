@@ -15,8 +15,8 @@ from upright.identification import Parameter
 from upright.physics import Plant, find
 from upright.readers.inspection import Inspection
 from upright.records import Array, Record
-from upright.study.columns import Drive, Sensor
 from upright.study.draft.recognise import Recognised, drive_column, recognise
+from upright.study.sensors import Drive, Sensor
 
 COUNTERS = (2 * math.pi, 360.0, 65536.0, 4294967296.0)
 """Turns that counters are known to make, in rad, deg and counts."""

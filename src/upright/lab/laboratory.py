@@ -1,24 +1,181 @@
-"""How are all experiments run under one roof, and taken up again where they were left?"""
+"""The laboratory: the experiments of the paper, run under one roof and taken up again where they were left."""
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
+from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from upright.control.rig import Rig
 from upright.errors import BadInput, UprightError
-from upright.lab.experiments import EXPERIMENTS, Experiment, Task
-from upright.lab.kept import keep, kept, made_of
-from upright.lab.rigs.makes import Make, make_rig
-from upright.progress import Progress
+from upright.json_file import write_json
+from upright.lab.makes import MAKES, PENDULUMS, SHAFTS, make_rig
+from upright.lab.weighing_1a.run import Known
+from upright.progress import Progress, silent
 from upright.report.chapter import Chapter
+from upright.report.storing import as_plain, from_plain
+from upright.report.symbols import typed
+
+KEPT = "chapter.json"
+"""File of a finished experiment, taken up again as long as nothing it stands on has changed."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Told:
+class Setting:
+    """What an experiment is given: rig and folder, what finished ones it builds on said and where they wrote."""
+
+    make: str
+    rig: Rig
+    seed: int
+    folder: Path
+    earlier: Mapping[str, Chapter]
+    folders: Mapping[str, Path]
+    progress: Progress
+    stopped: Callable[[], bool]
+
+    @property
+    def weighed(self) -> tuple[Known, ...]:
+        """What experiment 1a hands on, as its chapter tells it."""
+        chapter = self.earlier.get("1a")
+        handed = chapter.numbers.get("handed_on", {}) if chapter else {}
+        return tuple(Known(name=name, value=w["value"], stderr=w["stderr"]) for name, w in handed.items())
+
+    @property
+    def fit(self) -> Path:
+        """The fit of experiment 1b."""
+        if "1b" not in self.earlier:
+            raise BadInput("It stands on the fit of experiment 1b, which could not be finished; its chapter says why.")
+        return self.folders["1b"] / "fit.json"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """One experiment of the paper.
+
+    Attributes
+    ----------
+    key : str
+        As it is asked for and as its folder is named.
+    part_of : str
+        Asking for this brings it as well: ``1`` means 1a and 1b.
+    title : str
+    makes : tuple of str
+        Rigs it can be run on; the first is the paper's.
+    needs : tuple of str
+        Experiments whose numbers it takes, where the rig has them.
+    seconds : float
+        How long it takes about, for the progress bar.
+    tell : callable
+        Runs it; the chapter, and whether it is whole.
+    """
+
+    key: str
+    part_of: str
+    title: str
+    makes: tuple[str, ...]
+    needs: tuple[str, ...]
+    seconds: float
+    tell: Callable[[Setting], tuple[Chapter, bool]]
+
+    def make(self, asked: str) -> str:
+        """Make that it is run on where one is asked for, or none."""
+        return asked if asked in self.makes else self.makes[0]
+
+
+def _weighing(at: Setting) -> tuple[Chapter, bool]:
+    from upright.lab.weighing_1a.chapter import chapter
+    from upright.lab.weighing_1a.run import run_weighing
+
+    return chapter(run_weighing(at.rig, at.seed, at.folder, at.progress)), True
+
+
+def _frequency(at: Setting) -> tuple[Chapter, bool]:
+    from upright.lab.frequency_1b.chapter import chapter
+    from upright.lab.frequency_1b.run import run_frequency
+
+    done = run_frequency(at.rig, at.seed, at.folder, at.progress, at.stopped, weighed=at.weighed)
+    return chapter(done), True
+
+
+def _regulation(at: Setting) -> tuple[Chapter, bool]:
+    from upright.lab.identified import read_identified
+    from upright.lab.regulation_2.chapter import chapter
+    from upright.lab.regulation_2.run import run_regulation
+
+    known = read_identified(at.fit, seed=at.seed)
+    done = run_regulation(known, at.rig, at.seed, at.folder, at.progress, at.stopped, source=typed(at.fit))
+    return chapter(done), not done.interrupted
+
+
+def _swing_up(at: Setting) -> tuple[Chapter, bool]:
+    from upright.lab.identified import read_identified
+    from upright.lab.swing_up_2b.chapter import chapter
+    from upright.lab.swing_up_2b.run import known_of, run_swing_up
+
+    known = read_identified(at.fit, seed=at.seed)
+    done = run_swing_up(
+        known.rig(), at.rig, at.folder, at.progress, at.stopped, known=known_of(known), source=typed(at.fit)
+    )
+    return chapter(done), not at.stopped()
+
+
+def _tracking(at: Setting) -> tuple[Chapter, bool]:
+    from upright.lab.tracking_3.chapter import chapter
+    from upright.lab.tracking_3.run import run_tracking
+
+    done = run_tracking(at.rig, at.seed, at.folder, at.progress, at.stopped, weighed=at.weighed)
+    return chapter(done), not done.interrupted
+
+
+def _free_swing(at: Setting) -> tuple[Chapter, bool]:
+    from upright.lab.free_swing_4.chapter import chapter
+    from upright.lab.free_swing_4.run import run_free_swing
+    from upright.study.fit_file import write_fit
+
+    weighed = next((k for k in at.weighed if k.name == MAKES[at.make].body), None)
+    done = run_free_swing(at.rig, at.seed, at.folder, at.progress, at.stopped, weighed=weighed)
+    if "free_swing" in done.answers:
+        first = done.answers["free_swing"]
+        write_fit(first.fit, first.study, at.folder / "fit.json")
+    return chapter(done), not done.interrupted
+
+
+EXPERIMENTS: tuple[Experiment, ...] = (
+    Experiment(
+        key="1a", part_of="1", title="Stiffness and inertia from added loads", makes=(*PENDULUMS, *SHAFTS), needs=(),
+        seconds=1.5, tell=_weighing,
+    ),
+    Experiment(
+        key="1b", part_of="1", title="Frequency response", makes=(*PENDULUMS, *SHAFTS), needs=("1a",),
+        seconds=5.0, tell=_frequency,
+    ),
+    Experiment(
+        key="2", part_of="2", title="Holding it upright", makes=PENDULUMS, needs=("1b",), seconds=4.0, tell=_regulation,
+    ),
+    Experiment(
+        key="2b", part_of="2", title="Swinging up and catching", makes=PENDULUMS, needs=("1b",), seconds=3.0,
+        tell=_swing_up,
+    ),
+    Experiment(
+        key="3", part_of="3", title="Tracking through a flexible shaft", makes=SHAFTS, needs=("1a",), seconds=5.0,
+        tell=_tracking,
+    ),
+    Experiment(
+        key="4", part_of="4", title="Large free swing", makes=PENDULUMS, needs=("1a",), seconds=9.0, tell=_free_swing,
+    ),
+)  # fmt: skip
+"""In the order in which they are run and told."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExperimentResult:
     """An experiment with its chapter.
 
     Attributes
@@ -48,7 +205,7 @@ class Session:
     seed: int
     folder: Path
     asked: tuple[Experiment, ...]
-    told: list[Told] = field(default_factory=list[Told])
+    told: list[ExperimentResult] = field(default_factory=list[ExperimentResult])
     interrupted: bool = False
     seconds: float = 0.0
 
@@ -94,20 +251,15 @@ def _there(make: str) -> list[Experiment]:
 
 def _needs(e: Experiment, make: str) -> list[str]:
     """What it takes numbers from: earlier experiments on the same rig."""
-    return [n.key for n in _there(make) if n.key in e.needs and _make(n, make) == _make(e, make)]
+    return [n.key for n in _there(make) if n.key in e.needs and n.make(make) == e.make(make)]
 
 
-def _make(e: Experiment, make: str) -> Make:
-    of: dict[str, Make] = {m: m for m in e.makes}
-    return of.get(make, e.makes[0])
-
-
-def run(
+def run_laboratory(
     asked: Sequence[str],
     make: str,
     seed: int,
     folder: Path,
-    progress: Progress | None = None,
+    progress: Progress = silent,
     stopped: Callable[[], bool] = lambda: False,
     *,
     fresh: bool = False,
@@ -135,7 +287,7 @@ def run(
     ------
     BadInput
         When there is no such experiment, or not on this rig.
-    """  # fmt: skip
+    """
     began = time.perf_counter()
     session = Session(make=make, seed=seed, folder=folder, asked=choose(asked, make))
     digests = _digests(make, seed)
@@ -144,8 +296,7 @@ def run(
     for e in session.asked:
 
         def tell(step: str, share: float, e: Experiment = e, behind: float = behind) -> None:
-            if progress:
-                progress(f"experiment {e.key}: {step}", (behind + e.seconds * min(share, 1.0)) / whole)
+            progress(f"experiment {e.key}: {step}", (behind + e.seconds * min(share, 1.0)) / whole)
 
         try:
             session.told.append(_one(session, e, digests[e.key], tell, stopped, fresh))
@@ -161,37 +312,58 @@ def run(
 
 
 def _digests(make: str, seed: int) -> dict[str, str]:
-    """What each experiment that this rig can have is made of."""
+    """Digest of what each experiment is made of: the program, its rig and seed, the experiments it builds on."""
     digests: dict[str, str] = {}
     for e in _there(make):
-        digests[e.key] = made_of(e.key, _make(e, make), seed, needs=[digests[n] for n in _needs(e, make)])
+        parts = (_program(), e.key, e.make(make), str(seed), *(digests[n] for n in _needs(e, make)))
+        digests[e.key] = sha256("\n".join(parts).encode()).hexdigest()
     return digests
 
 
-def _with_kept(session: Session, digests: Mapping[str, str]) -> list[Told]:
+@cache
+def _program() -> str:
+    """Digest of the program as it stands: another version, or a changed line, is another experiment."""
+    source = Path(__file__).parent.parent
+    digest = sha256()
+    for path in sorted(source.rglob("*.py")):
+        digest.update(path.relative_to(source).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def _kept(folder: Path, digest: str) -> Chapter | None:
+    """The chapter of an earlier run, or nothing when there is none or it was made of something else."""
+    try:
+        content: Any = json.loads((folder / KEPT).read_text(encoding="utf-8"))
+        return from_plain(content["chapter"]) if content["made_of"] == digest else None
+    except (OSError, ValueError, KeyError, TypeError):  # none, torn, or another program's: it is made again
+        return None
+
+
+def _with_kept(session: Session, digests: Mapping[str, str]) -> list[ExperimentResult]:
     """What was told, and what else is there from an earlier run on the same rig."""
     told = {t.experiment.key: t for t in session.told}
     for e in _there(session.make):
-        found = None if e.key in told else kept(session.folder / e.key, digests[e.key])
+        found = None if e.key in told else _kept(session.folder / e.key, digests[e.key])
         if found:
-            make = _make(e, session.make)
+            make = e.make(session.make)
             name = make_rig(make, session.seed).name
-            told[e.key] = Told(experiment=e, make=make, rig=name, chapter=found, state="kept", seconds=0.0)
+            told[e.key] = ExperimentResult(experiment=e, make=make, rig=name, chapter=found, state="kept", seconds=0.0)
     return [told[e.key] for e in _there(session.make) if e.key in told]
 
 
 def _one(
     session: Session, e: Experiment, digest: str, progress: Progress, stopped: Callable[[], bool], fresh: bool
-) -> Told:
+) -> ExperimentResult:
     """One experiment, from an earlier run where that still holds."""
     began = time.perf_counter()
-    make, needs = _make(e, session.make), _needs(e, session.make)
+    make, needs = e.make(session.make), _needs(e, session.make)
     rig, folder = make_rig(make, session.seed), session.folder / e.key
     folder.mkdir(parents=True, exist_ok=True)
     progress("starting", 0.0)
-    state, chapter = "kept", None if fresh else kept(folder, digest)
+    state, chapter = "kept", None if fresh else _kept(folder, digest)
     if chapter is None:
-        task = Task(
+        at = Setting(
             make=make, rig=rig, seed=session.seed, folder=folder, progress=progress, stopped=stopped,
             earlier={
                 t.experiment.key: t.chapter
@@ -201,7 +373,7 @@ def _one(
             folders={n: session.folder / n for n in needs},
         )  # fmt: skip
         try:
-            chapter, whole = e.tell(task)
+            chapter, whole = e.tell(at)
             chapter = replace(chapter, key=e.key, title=e.title)
             state = "done" if whole and not stopped() else "stopped"
         except UprightError as error:
@@ -209,8 +381,8 @@ def _one(
         except (ArithmeticError, np.linalg.LinAlgError) as error:
             state, chapter = "failed", _failed(e, f"Its numbers broke down ({error}), which is a fault of the program.")
         if state == "done":
-            keep(folder, digest, chapter)
-    return Told(
+            write_json(folder / KEPT, {"made_of": digest, "chapter": as_plain(chapter)})
+    return ExperimentResult(
         experiment=e, make=make, rig=rig.name, chapter=chapter, state=state, seconds=time.perf_counter() - began
     )
 

@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from upright import __version__
-from upright.lab.experiments import EXPERIMENTS
-from upright.lab.laboratory import Session
+from upright.json_file import plain_values
+from upright.lab.laboratory import EXPERIMENTS, Session
 from upright.report.advice import Step
 from upright.report.book import Book, Told
-from upright.report.storing import finite
 from upright.report.symbols import typed
 
 TITLE = "The laboratory: identify it hanging, hold it upright"
@@ -97,7 +96,7 @@ def summary(session: Session, report: Path, pdf: Path | None) -> dict[str, Any]:
                 "sound": t.chapter.sound,
                 "verdict": t.chapter.verdict,
                 "detail": t.chapter.detail,
-                "numbers": finite(t.chapter.numbers),
+                "numbers": plain_values(t.chapter.numbers),
                 "steps": [s.command for s in t.chapter.steps if s.command],
             }
             for t in session.told

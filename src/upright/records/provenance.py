@@ -23,3 +23,12 @@ class Provenance:
     def note(self, *sentences: str) -> Provenance:
         """Same provenance with sentences added."""
         return replace(self, notes=(*self.notes, *sentences))
+
+
+def of_twin(rig: str, seed: int) -> Provenance:
+    """Provenance of a simulated log, which says so wherever it goes."""
+    return Provenance(
+        reader="twin",
+        rig=f"digital twin of {rig}, seed {seed}",
+        notes=("This log was simulated; no rig was touched.",),
+    )

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 from markupsafe import Markup
 
+from upright.json_file import plain_values
 from upright.report.advice import Step
 from upright.report.chapter import Chapter, Finding
 from upright.report.document import Picture
@@ -28,7 +28,7 @@ def as_plain(chapter: Chapter) -> dict[str, Any]:
         "findings": [
             {"what": f.what, "value": f.value, "interval": f.interval, "truth": f.truth} for f in chapter.findings
         ],
-        "numbers": finite(chapter.numbers),
+        "numbers": plain_values(chapter.numbers),
     }
 
 
@@ -46,21 +46,6 @@ def from_plain(content: Mapping[str, Any]) -> Chapter:
         findings=tuple(Finding(**f) for f in content["findings"]),
         numbers=content["numbers"],
     )
-
-
-def finite(value: Any) -> Any:
-    """Plain values for JSON: arrays as lists, and nothing where a number is not one."""
-    if isinstance(value, Mapping):
-        return {str(k): finite(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(v) for v in value]
-    if hasattr(value, "tolist"):
-        return finite(value.tolist())
-    if isinstance(value, complex):
-        return [finite(value.real), finite(value.imag)]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value if value is None or isinstance(value, bool | int | str) else str(value)
 
 
 def _part(part: Part) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What was found, so that another program, or `upright predict`, can use it: `fit.json`.
+"""What a fit found, written to `fit.json` and read back by `upright predict` and `upright design`.
 
 JSON has no infinity: ``null`` stands for "no bound" (an interval without end, a standard error nobody can state,
 an actuator without limit).
@@ -8,17 +8,20 @@ from __future__ import annotations
 
 import json
 import math
-import os
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from upright.errors import BadInput
 from upright.identification import Estimate, Fit
 from upright.identification.frequency.answer import Answer
 from upright.identification.ladder.cross_validation import CrossValidation
 from upright.identification.model.rig import ACTUATOR
+from upright.json_file import write_json
 from upright.study.load import Study
 
 FORMAT = 1
@@ -26,7 +29,7 @@ FORMAT = 1
 
 @dataclass(frozen=True, kw_only=True)
 class FittedModel:
-    """What `upright predict` takes from a `fit.json`: the plant's name, every parameter [SI], and what groups share."""
+    """What is read of a `fit.json`: the plant's name, every parameter [SI], what groups share, and all content."""
 
     plant: str
     values: Mapping[str, float]
@@ -34,43 +37,39 @@ class FittedModel:
     verdict: str
     trusted: bool
     groups: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
+    content: Mapping[str, Any] = field(default_factory=dict[str, Any])
+
+    def unit(self, name: str) -> str:
+        """Unit of a parameter, "" where the file does not tell."""
+        return str((self.content["parameters"].get(name) or {}).get("unit") or "")
+
+    def covariance(self, among: Collection[str]) -> tuple[list[str], NDArray[np.float64]]:
+        """Those of the estimates that are `among` the names, and their covariance; zeros where the file has none."""
+        estimated = [str(n) for n in self.content.get("estimated", [])]
+        kept = [i for i, n in enumerate(estimated) if n in among]
+        names = [estimated[i] for i in kept]
+        entries = [self.content["parameters"].get(n) or {} for n in names]
+        errors = np.array([float(e.get("stderr") or 0.0) for e in entries])
+        correlation = np.array([[float(v or 0.0) for v in row] for row in self.content.get("correlation") or []])
+        if correlation.shape != (len(estimated), len(estimated)):
+            correlation = np.zeros((len(estimated), len(estimated)))
+        return names, correlation[np.ix_(kept, kept)] * np.outer(errors, errors)
 
 
 def write_fit(fit: Fit, study: Study, path: Path, crossed: CrossValidation | None = None) -> dict[str, Any]:
     """Write `fit.json` and return what it holds; `crossed` adds what each run's prediction by the others scored."""
-    content = as_json(fit, study)
-    if crossed is not None:
-        content["cross_validation"] = {
-            label: {
-                "fit_percent": {n: _finite(v) for n, v in s.fit_percent.items()},
-                "blind": list(crossed.blind[label]),
-            }
-            for label, s in crossed.predicted.items()
-        }
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_suffix(".part")  # a reader never meets half a file
-    part.write_text(json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")
-    os.replace(part, path)
-    return content
-
-
-def as_json(fit: Fit, study: Study) -> dict[str, Any]:
-    """Content of `fit.json`: plain dicts, lists, text and finite numbers."""
-    from upright import __version__
-
     known = {
         name: Estimate(
             value=p.value,
             stderr=p.uncertainty,
-            interval=_known_interval(p.value, p.uncertainty),
+            interval=(p.value - 1.96 * p.uncertainty, p.value + 1.96 * p.uncertainty),
             unit=p.unit,
             status="known",
         )
         for name, p in fit.rig.parameters.items()
     }
-    estimates = {**known, **fit.estimates}
     meanings = {name: p.meaning for name, p in fit.rig.parameters.items()}
-    return {
+    content: dict[str, Any] = {
         "format": FORMAT,
         "title": study.title,
         "plant": study.plant,
@@ -80,72 +79,61 @@ def as_json(fit: Fit, study: Study) -> dict[str, Any]:
         "method": fit.method,
         "evaluations": fit.evaluations,
         "seconds": round(fit.seconds, 4),
-        "cost": _finite(fit.cost),
+        "cost": fit.cost,
         "interrupted": fit.interrupted,
-        "parameters": {n: {**_estimate(e), "meaning": meanings.get(n, "")} for n, e in estimates.items()},
+        "parameters": {n: {**vars(e), "meaning": meanings.get(n, "")} for n, e in {**known, **fit.estimates}.items()},
         "assumed": [
             {
                 "name": a.name,
                 "value": a.value,
                 "unit": a.unit,
                 "percent_per_percent": {n: round(e, 6) for n, e in a.follows.items()},
-                "without_it": {n: _estimate(e) for n, e in a.without.items()},
+                "without_it": a.without,
             }
             for a in fit.assumptions
         ],
-        "per_run": {label: {n: _estimate(e) for n, e in own.items()} for label, own in fit.per_run.items()},
-        "groups": {label: {n: _estimate(e) for n, e in own.items()} for label, own in fit.groups.items()},
+        "per_run": fit.per_run,
+        "groups": fit.groups,
         "runs": {
             label: {
                 "role": score.role,
-                "fit_percent": {n: _finite(v) for n, v in score.fit_percent.items()},
+                "fit_percent": score.fit_percent,
                 "horizon": score.horizon,
                 "score_from": score.score_from,
-                "naive": {n: _finite(v) for n, v in score.naive.items()},
-                "adapted": list(score.adapted),
-                "ahead": [
-                    {"horizon": h, "fit_percent": {n: _finite(v) for n, v in percents.items()}}
-                    for h, percents in score.ahead.items()
-                ],
+                "naive": score.naive,
+                "adapted": score.adapted,
+                "ahead": [{"horizon": h, "fit_percent": percents} for h, percents in score.ahead.items()],
             }
             for label, score in fit.runs.items()
         },
-        "poles": {
-            at: [{"real": _estimate(p.real), "imag": _estimate(p.imag)} for p in found]
-            for at, found in fit.poles.items()
-        },
-        "unseen": list(fit.unseen),
-        "warnings": list(fit.warnings),
-        "estimated": list(fit.names),
-        "correlation": [[_finite(v) for v in row] for row in fit.correlation.tolist()],
-        "singular_values": [_finite(v) for v in fit.singular_values.tolist()],
-        "directions": [[_finite(v) for v in row] for row in fit.directions.tolist()],
-        "history": [{"stage": s, "cost": _finite(c), "evaluations": n} for s, c, n in fit.history],
-        "provenance": {
-            "upright": __version__,
-            "study": study.path.name,
-            "study_sha256": study.sha256,
-            "source": study.source,
-            "runs": {run.label: run.source for run in study.runs},
-        },
+        "poles": fit.poles,
+        "unseen": fit.unseen,
+        "warnings": fit.warnings,
+        "estimated": fit.names,
+        "correlation": fit.correlation,
+        "singular_values": fit.singular_values,
+        "directions": fit.directions,
+        "history": [{"stage": s, "cost": c, "evaluations": n} for s, c, n in fit.history],
+        "provenance": provenance(study),
     }
+    if crossed is not None:
+        content["cross_validation"] = {
+            label: {"fit_percent": s.fit_percent, "blind": crossed.blind[label]}
+            for label, s in crossed.predicted.items()
+        }
+    return write_json(path, content)
 
 
-def _known_interval(value: float, uncertainty: float) -> tuple[float, float]:
-    return value - 1.96 * uncertainty, value + 1.96 * uncertainty
+def provenance(study: Study) -> dict[str, Any]:
+    """Which program, study and logs a result came from."""
+    from upright import __version__
 
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
-
-
-def _estimate(e: Estimate) -> dict[str, Any]:
     return {
-        "value": _finite(e.value),
-        "stderr": _finite(e.stderr),
-        "interval": [_finite(e.interval[0]), _finite(e.interval[1])],
-        "unit": e.unit,
-        "status": e.status,
+        "upright": __version__,
+        "study": study.path.name,
+        "study_sha256": study.sha256,
+        "source": study.source,
+        "runs": {run.label: run.source for run in study.runs},
     }
 
 
@@ -184,6 +172,7 @@ def read_fit(path: Path) -> FittedModel:
         verdict=str(content["verdict"]),
         trusted=bool(content.get("trusted", False)),
         groups=_groups(path, content.get("groups", {})),
+        content=content,
     )
 
 

@@ -1,16 +1,16 @@
-"""What did the ladder find, for programs and for the next fit? `ladder.json`, and the study of the chosen model."""
+"""What a ladder found, for programs and for the next fit: `ladder.json`, and the study of the chosen model."""
 
 from __future__ import annotations
 
-import json
-import math
-import os
 from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
 from upright.identification.ladder.growth import Ladder, RungResult
-from upright.identification.model.rig import ACTUATOR, neutral
+from upright.identification.ladder.rungs import neutral
+from upright.identification.model.rig import ACTUATOR
+from upright.json_file import write_json
+from upright.study.fit_file import provenance
 from upright.study.load import Study
 from upright.study.text import StudyText
 
@@ -19,73 +19,49 @@ FORMAT = 1
 
 def write_ladder(ladder: Ladder, study: Study, path: Path) -> dict[str, Any]:
     """Write `ladder.json` and return what it holds."""
-    content = as_json(ladder, study)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_suffix(".part")  # a reader never meets half a file
-    part.write_text(json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")
-    os.replace(part, path)
-    return content
-
-
-def as_json(ladder: Ladder, study: Study) -> dict[str, Any]:
-    """Content of `ladder.json`: plain dicts, lists, text and finite numbers."""
-    from upright import __version__
-
-    return {
+    content = {
         "format": FORMAT,
         "title": study.title,
         "plant": study.plant,
         "held_out": ladder.held_out,
         "chosen": [s.rung.name for s in ladder.kept],
-        "left_out": list(ladder.left_out),
+        "left_out": ladder.left_out,
         "stopped": ladder.stopped,
         "interrupted": ladder.interrupted,
         "seconds": round(ladder.seconds, 3),
         "steps": [_step(s) for s in ladder.steps],
         "repeats": [
             {
-                "runs": list(group.labels),
-                "ceiling": {n: _finite(v) for n, v in group.ceiling.items()},
-                "range": {n: [_finite(min(v)), _finite(max(v))] for n, v in group.percents.items()},
+                "runs": group.labels,
+                "ceiling": group.ceiling,
+                "range": {n: [min(v), max(v)] for n, v in group.percents.items()},
             }
             for group in ladder.repeats
         ],
-        "warnings": list(ladder.warnings),
-        "provenance": {
-            "upright": __version__,
-            "study": study.path.name,
-            "study_sha256": study.sha256,
-            "source": study.source,
-            "runs": {run.label: run.source for run in study.runs},
-        },
+        "warnings": ladder.warnings,
+        "provenance": provenance(study),
     }
+    return write_json(path, content)
 
 
 def _step(s: RungResult) -> dict[str, Any]:
     c = s.comparison
     return {
-        "name": s.rung.name,
-        "adds": list(s.rung.adds),
-        "drops": list(s.rung.drops),
-        "unknown": list(s.rung.unknown),
+        **vars(s.rung),
         "kept": s.kept,
         "reason": s.reason,
-        "fit_percent": _finite(s.fit_percent),
-        "predicted_percent": _finite(s.predicted_percent),
-        "fitted": {run: {n: _finite(v) for n, v in own.items()} for run, own in s.fitted.items()},
-        "predicted": {run: {n: _finite(v) for n, v in own.items()} for run, own in s.predicted.items()},
-        "gain": None if c is None else _finite(c.gain),
-        "scatter": None if c is None else _finite(c.scatter),
-        "cost": _finite(s.cost),
+        "fit_percent": s.fit_percent,
+        "predicted_percent": s.predicted_percent,
+        "fitted": s.fitted,
+        "predicted": s.predicted,
+        "gain": None if c is None else c.gain,
+        "scatter": None if c is None else c.scatter,
+        "cost": s.cost,
         "parameters": s.parameters,
         "per_run": s.own,
-        "values": {n: _finite(v) for n, v in s.values.items()},
+        "values": s.values,
         "seconds": round(s.seconds, 3),
     }
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
 
 
 def chosen_study(study: Study, ladder: Ladder) -> str:

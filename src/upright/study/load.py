@@ -1,4 +1,4 @@
-"""What is asked of which data? A study file (TOML) becomes a rig and its runs, in SI.
+"""A study file (TOML) read into a rig, its runs and the rungs of its ladder, in SI.
 
 Every complaint is one sentence with file, line, what was expected and the nearest valid name.
 """
@@ -10,17 +10,19 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from upright.errors import BadInput, nearest
 from upright.identification import Rig, Run
 from upright.identification.ladder.rungs import Rung
-from upright.identification.model.rig import NOISE
+from upright.identification.model.rig import ACTUATOR, NOISE
+from upright.identification.model.runs import PER_RUN
 from upright.identification.problem.predictor import with_noise
+from upright.physics import Plant
 from upright.records import Record
 from upright.study.keys import names
-from upright.study.ladder import read_ladder
 from upright.study.rig import read_plant, read_rig
-from upright.study.runs import read_runs
+from upright.study.runs import read_runs, sensor_nuisances
 from upright.study.sensors import drive_unit
 from upright.study.text import Section, StudyText
 
@@ -131,12 +133,8 @@ def _log(run: Section, folder: Path, logs: dict[tuple[str, str, str], Record]) -
         with run.text.at(run.place("reader" if reader else "file")):
             record = read(file, reader=reader or None)
         with run.text.at(run.place("time")):
-            logs[key] = _retimed(record, time) if time else record
+            logs[key] = record.replace(t=record[time]) if time else record
     return logs[key]
-
-
-def _retimed(record: Record, time: str) -> Record:
-    return record.replace(t=record[time])
 
 
 def _instead(file: Path, folder: Path) -> str:
@@ -148,3 +146,25 @@ def _instead(file: Path, folder: Path) -> str:
     if close:
         return f"did you mean '{close[0]}'?"
     return f"files are looked for in {folder}, and --data DIR names another folder"
+
+
+def read_ladder(study: Section, plant: type[Plant]) -> tuple[Rung, ...]:
+    """Rungs of a study, none when it has no [[ladder]]."""
+    entries: Any = study.values.get("ladder", [])
+    if not isinstance(entries, list):
+        raise study.error("ladder", 'a ladder is a list of rungs: [[ladder]], then name = "Coulomb" below it')
+    terms = (*plant.names(), *ACTUATOR)
+    nuisances = (*PER_RUN, *sensor_nuisances(plant))
+    rungs: list[Rung] = []
+    for i, values in enumerate(entries):
+        rung = Section(study.text, ("ladder", i), values)
+        rung.check(names("ladder"))
+        rungs.append(
+            Rung(
+                name=rung.text_of("name", "Coulomb friction"),
+                adds=rung.names("adds", terms),
+                drops=rung.names("drops", terms),
+                unknown=rung.names("unknown", nuisances),
+            )
+        )
+    return tuple(rungs)

@@ -13,9 +13,10 @@ from upright.closed_loop import Filter, SampledLaw
 from upright.physics import Plant
 from upright.records import Record
 from upright.study import expressions
-from upright.study.columns import Drive, Grid, Sensor, in_unit
 from upright.study.rig import per
+from upright.study.sensors import Drive, Grid, Sensor
 from upright.study.text import Section, show, si
+from upright.units import in_unit
 
 Array = NDArray[np.float64]
 

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, fields
 from typing import Any
 
-from upright.errors import BadInput, ImpossiblePhysics
-from upright.identification import Parameter, Rig
-from upright.identification.model.rig import ACTUATOR, NEVER_NEGATIVE
+from upright.errors import BadInput
+from upright.identification.model.rig import ACTUATOR, NEVER_NEGATIVE, Parameter, Rig
 from upright.physics import Plant, find
 from upright.quantities import Quantity
-from upright.study.columns import in_unit
 from upright.study.keys import names
-from upright.study.text import Section, show
+from upright.study.text import Section, show, si
+from upright.units import uncertainty
 
 
 def read_plant(study: Section) -> type[Plant]:
@@ -44,15 +44,18 @@ def read_rig(study: Section, plant: type[Plant], drive_unit: str, fixed: Mapping
     section, actuator = study.section("parameters"), study.section("actuator")
     section.check(plant.names(), f"parameter of {plant.__name__} called")
     actuator.check(names("actuator"))
-    parameters: dict[str, Parameter] = {}
-    for name in plant.names():
-        what = plant.quantity(name)
-        if fixed is not None and name in fixed:
-            parameters[name] = Parameter(name=name, value=fixed[name], unit=what.unit, meaning=what.meaning)
-        elif name in section:
-            parameters[name] = read_parameter(section, name, name, what)
-        else:
-            parameters[name] = _default(study, plant, name)
+
+    def read(table: Section, key: str, name: str, what: Quantity, default: Callable[[], float]) -> Parameter:
+        if key in table and name not in known:
+            return read_parameter(table, key, name, what)
+        value = known[name] if name in known else default()
+        return Parameter(name=name, value=value, unit=what.unit, meaning=what.meaning)
+
+    known = fixed or {}
+    parameters = {
+        name: read(section, name, name, plant.quantity(name), lambda name=name: _default(study, plant, name))
+        for name in plant.names()
+    }
     for name, (meaning, default) in ACTUATOR.items():
         key = name.partition(".")[2]
         what = Quantity(
@@ -61,19 +64,12 @@ def read_rig(study: Section, plant: type[Plant], drive_unit: str, fixed: Mapping
             lower=0.0 if name in NEVER_NEGATIVE else -math.inf,
             open_lower=key == "knee",
         )
-        if fixed is not None and name in fixed:
-            parameters[name] = Parameter(name=name, value=fixed[name], unit=what.unit, meaning=meaning)
-        elif key in actuator:
-            parameters[name] = read_parameter(actuator, key, name, what)
-        else:
-            parameters[name] = Parameter(name=name, value=default, unit=what.unit, meaning=meaning)
+        parameters[name] = read(actuator, key, name, what, lambda default=default: default)
     return Rig(plant=plant, parameters=parameters, substeps=study.section("rig").whole("substeps", 1))
 
 
-def _default(study: Section, plant: type[Plant], name: str) -> Parameter:
-    """A parameter the study does not mention, at the plant's default."""
-    from dataclasses import MISSING, fields
-
+def _default(study: Section, plant: type[Plant], name: str) -> float:
+    """Value of a parameter that the study does not mention: the plant's default."""
     what = plant.quantity(name)
     value = next(f.default for f in fields(plant) if f.name == name)  # type: ignore[arg-type]
     if value is MISSING:
@@ -82,7 +78,7 @@ def _default(study: Section, plant: type[Plant], name: str) -> Parameter:
             f"{plant.__name__} needs {name} ({what.meaning}, in {what.unit}) under [parameters]: known, as in"
             f' {name} = "1 {what.unit}", or asked, as in {name} = {{ guess = "1 {what.unit}" }}',
         )
-    return Parameter(name=name, value=float(value), unit=what.unit, meaning=what.meaning)  # type: ignore[arg-type]
+    return float(value)  # type: ignore[arg-type]
 
 
 def actuator_unit(plant: type[Plant], key: str, drive_unit: str) -> str:
@@ -111,8 +107,7 @@ def read_parameter(section: Section, key: str, name: str, what: Quantity) -> Par
     """One parameter in any of its forms: a number, known with uncertainty, or to estimate."""
     value = section.values[key]
     if not isinstance(value, dict):
-        number = _number(section, (key,), value, what)
-        _check(section, (key,), name, number, what)
+        number = _checked(section, (key,), name, value, what)
         return Parameter(name=name, value=number, unit=what.unit, meaning=what.meaning)
     table = section.section(key)
     table.check(names("value"))
@@ -131,8 +126,7 @@ def read_parameter(section: Section, key: str, name: str, what: Quantity) -> Par
                 f" {'write value instead of guess' if estimate else 'write guess instead of value to estimate it'}",
             )
     main = "guess" if estimate else "value"
-    number = _number(section, (key, main), table.values[main], what)
-    _check(section, (key, main), name, number, what)
+    number = _checked(section, (key, main), name, table.values[main], what)
     if not estimate:
         sigma = _uncertainty(section, key, table.values.get("uncertainty", 0.0), number, what)
         assumed = table.flag("assumed")
@@ -160,26 +154,24 @@ def read_parameter(section: Section, key: str, name: str, what: Quantity) -> Par
 
 def _number(section: Section, keys: tuple[str, ...], value: Any, what: Quantity) -> float:
     with section.text.at((*section.place(keys[0]), *keys[1:])):
-        if isinstance(value, bool) or not isinstance(value, int | float | str):
-            raise BadInput(f'{keys[0]} must be a number or text such as "1.5 {what.unit}", got {show(value)}')
-        return in_unit(value, what.unit)
+        if isinstance(value, float) and not math.isfinite(value):  # `_checked` knows where infinity has a meaning
+            return value
+        return si(value, what.unit, keys[0])
 
 
-def _check(section: Section, keys: tuple[str, ...], name: str, value: float, what: Quantity) -> None:
-    infinite = math.isinf(value) and name in ACTUATOR and value == ACTUATOR[name][1]
-    with section.text.at((*section.place(keys[0]), *keys[1:])):
-        try:
-            if not infinite:
-                what.check(name, value)
-        except ImpossiblePhysics as error:
-            raise BadInput(str(error)) from None
+def _checked(section: Section, keys: tuple[str, ...], name: str, value: Any, what: Quantity) -> float:
+    number = _number(section, keys, value, what)
+    if not (math.isinf(number) and name in ACTUATOR and number == ACTUATOR[name][1]):
+        with section.text.at((*section.place(keys[0]), *keys[1:])):
+            what.check(name, number)
+    return number
 
 
 def _uncertainty(section: Section, key: str, value: Any, number: float, what: Quantity) -> float:
     if isinstance(value, str) and value.strip().endswith("%"):
         try:
-            sigma = abs(number) * float(value.strip().rstrip("%")) / 100
-        except ValueError:
+            sigma = uncertainty(value, number, what.unit)
+        except BadInput:
             raise section.error(key, f'uncertainty must be like "2 mm" or "1 %", got {show(value)}') from None
     else:
         sigma = _number(section, (key, "uncertainty"), value, what)
@@ -191,9 +183,6 @@ def _uncertainty(section: Section, key: str, value: Any, number: float, what: Qu
 def known_values(section: Section, plant: type[Plant]) -> dict[str, float]:
     """Parameters of a run that are known and differ, by name [SI]."""
     section.check(plant.names(), f"parameter of {plant.__name__} called")
-    out: dict[str, float] = {}
-    for name in section.values:
-        what = plant.quantity(name)
-        out[name] = _number(section, (name,), section.values[name], what)
-        _check(section, (name,), name, out[name], what)
-    return out
+    return {
+        name: _checked(section, (name,), name, value, plant.quantity(name)) for name, value in section.values.items()
+    }

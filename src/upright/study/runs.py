@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -13,12 +13,11 @@ from upright.identification import Run
 from upright.identification.model.runs import FOR_GROUPS, PER_RUN, SPREADS
 from upright.physics import Plant
 from upright.records import Record
-from upright.study.columns import Array, Grid
 from upright.study.keys import names
 from upright.study.loop import read_loop, state_units
 from upright.study.loop_parts import Scene
 from upright.study.rig import known_values
-from upright.study.sensors import drive_unit, read_drives, read_sensors
+from upright.study.sensors import Array, Grid, drive_unit, read_drives, read_sensors
 from upright.study.text import Section, show, si
 
 Log = Callable[[Section], Record]
@@ -101,9 +100,10 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
         )  # fmt: skip
         loop = read_loop(run, scene)
     notes += [*grid.told(), *record.provenance.notes, *([loop.told] if loop and loop.told else [])]
+    role: Any = run.choice("role", ("fit", "predict"), "fit")
     return Run(
         label=label,
-        role=_role(run),
+        role=role,
         t=grid.t,
         u=u,
         y=np.column_stack([readings[n] for n in measured]),
@@ -111,7 +111,7 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
         quantum=tuple(quanta[n] for n in measured),
         held={**locked, **{n: readings[n] for n in held_names}},
         known=known_values(run.section("known"), plant),
-        unknown=run.names("unknown", (*PER_RUN, *_sensor_names(plant)), ("initial",)),
+        unknown=run.names("unknown", (*PER_RUN, *sensor_nuisances(plant)), ("initial",)),
         shared={key: own.text_of(last, "28 Jan") for key, own, last in _nuisances(run, "shared", plant)},
         spread={key: own.positive(last, "1", 1.0) for key, own, last in _nuisances(run, "spread", plant)},
         initial=_states(run, plant),
@@ -154,15 +154,6 @@ def _window(run: Section, record: Record) -> tuple[float, float]:
     return start, stop
 
 
-def _role(run: Section) -> Literal["fit", "predict"]:
-    role: Any = run.values.get("role", "fit")
-    if role not in ("fit", "predict"):
-        raise run.error(
-            "role", f'role must be "fit" or "predict", got {show(role)}; {nearest(str(role), ("fit", "predict"))}'
-        )
-    return role
-
-
 def _locked(run: Section, plant: type[Plant]) -> dict[str, float]:
     coordinates = {c.name: c.unit for c in plant.coordinates}
     if isinstance(run.values.get("locked"), list | str):
@@ -172,13 +163,14 @@ def _locked(run: Section, plant: type[Plant]) -> dict[str, float]:
     return {name: section.number(name, coordinates[name]) for name in section.values}
 
 
-def _sensor_names(plant: type[Plant]) -> tuple[str, ...]:
+def sensor_nuisances(plant: type[Plant]) -> tuple[str, ...]:
+    """Names of what sensors may leave unknown."""
     return tuple(f"{kind}.{c.name}" for kind in ("offset", "scale") for c in plant.coordinates)
 
 
 def _nuisances(run: Section, key: str, plant: type[Plant]) -> list[tuple[str, Section, str]]:
     """Entries of a table by the name of a nuisance: name, table and key; ``scale.x`` may stand in quotes or not."""
-    valid = (*FOR_GROUPS, *_sensor_names(plant))
+    valid = (*FOR_GROUPS, *sensor_nuisances(plant))
     if key == "spread":
         valid = tuple(n for n in valid if n.partition(".")[0] in SPREADS)
     table = run.section(key)
@@ -219,12 +211,9 @@ def _horizon(run: Section, grid: Grid) -> float | tuple[float, ...] | None:
     return None if found[0] >= length else found[0]
 
 
-def _restart(run: Section) -> Literal["smooth", "kalman"]:
-    value: Any = run.values.get("restart", "kalman" if isinstance(run.values.get("horizon"), list) else "smooth")
-    if value not in ("smooth", "kalman"):
-        hint = nearest(str(value), ("smooth", "kalman"))
-        raise run.error("restart", f'restart must be "smooth" or "kalman", got {show(value)}; {hint}')
-    return value
+def _restart(run: Section) -> Any:
+    usual = "kalman" if isinstance(run.values.get("horizon"), list) else "smooth"
+    return run.choice("restart", ("smooth", "kalman"), usual)
 
 
 def _score_from(run: Section, grid: Grid) -> float:

@@ -5,11 +5,11 @@ import math
 import pytest
 
 from upright.lab.free_swing_4 import chapter as release_page
-from upright.lab.free_swing_4 import run as release
-from upright.lab.free_swing_4 import studies as free_swing
 from upright.lab.free_swing_4.drift import TILT
-from upright.lab.rigs.makes import make_rig
-from upright.lab.rigs.twin import freed
+from upright.lab.free_swing_4.release import freed
+from upright.lab.free_swing_4.run import run_free_swing
+from upright.lab.free_swing_4.studies import FRICTION, fit_question, questions, recovered, write_questions
+from upright.lab.makes import make_rig
 from upright.report.chapter import write_chapter
 
 pytestmark = pytest.mark.slow
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory):
-    return release.run(make_rig("furuta"), 0, tmp_path_factory.mktemp("lab"))
+    return run_free_swing(make_rig("furuta"), 0, tmp_path_factory.mktemp("lab"))
 
 
 def fits(answer, role):
@@ -27,7 +27,7 @@ def fits(answer, role):
 def test_the_free_swing_is_found_from_guesses_30_percent_off(done):
     answer = done.answers["free_swing"]
     for name, guess in answer.question.asked.items():
-        assert abs(guess / getattr(done.rig.truth, name) - 1) == pytest.approx(0.3)
+        assert abs(guess / getattr(done.rig.plant, name) - 1) == pytest.approx(0.3)
     assert answer.fit.trusted
     # half a count of 16000 is all that an ideal model cannot explain of swings of 0.3 and 1.5 rad
     assert min(fits(answer, "fit")) > 99.9
@@ -35,7 +35,7 @@ def test_the_free_swing_is_found_from_guesses_30_percent_off(done):
 
 
 def test_most_truths_lie_in_their_intervals(done):
-    found = free_swing.recovered(done.rig, done.answers["free_swing"].fit)
+    found = recovered(done.rig, done.answers["free_swing"].fit)
     assert len(found) == 6
     assert sum(f.inside for f in found) >= 5  # each of six does with 95 %
 
@@ -44,9 +44,9 @@ def test_intervals_hold_over_rigs_of_the_make(tmp_path):
     inside = []
     for seed in range(1, 9):
         rig = freed(make_rig("furuta", seed))
-        asked = free_swing.write(rig, tmp_path / str(seed))
+        asked = write_questions(rig, tmp_path / str(seed))
         question, path = asked[0]
-        found = free_swing.recovered(rig, free_swing.answer(question, path).fit)
+        found = recovered(rig, fit_question(question, path).fit)
         inside += [f.inside for f in found]
     # 48 numbers at 95 %; estimates of one rig share the errors of J_d, l_cg and r, so about 8 to 20 independent ones
     assert sum(inside) / len(inside) > 0.8
@@ -58,7 +58,7 @@ def test_without_an_inertia_the_scale_is_said_to_be_unseen(done):
     assert not fit.trusted
     assert fit.singular_values[-1] < 1e-6 * fit.singular_values[0]
     weights = dict(zip(fit.names, fit.directions[-1], strict=True))
-    scaled = [abs(weights[n]) for n in ("m_p", "J_d", "J_p", "J_a", *free_swing.FRICTION)]
+    scaled = [abs(weights[n]) for n in ("m_p", "J_d", "J_p", "J_a", *FRICTION)]
     # one common factor on all eight: equal weights 1/sqrt(8), the lengths none
     assert scaled == pytest.approx([1 / math.sqrt(8)] * 8, rel=0.05)
 
@@ -97,8 +97,8 @@ def test_the_page_tells_it_all_without_leaving_the_page(done):
 
 def test_a_cart_s_pendulum_is_found_too(tmp_path):
     rig = make_rig("linear", 2)
-    done = release.run(rig, 2, tmp_path)
-    found = free_swing.recovered(done.rig, done.answers["free_swing"].fit)
+    done = run_free_swing(rig, 2, tmp_path)
+    found = recovered(done.rig, done.answers["free_swing"].fit)
     assert sum(f.inside for f in found) >= 5  # each of six does with 95 %
     assert done.answers["no_scale"].fit.unseen
     assert "Why the cart wanders" in page(done)
@@ -107,7 +107,7 @@ def test_a_cart_s_pendulum_is_found_too(tmp_path):
 def test_the_studies_can_be_identified_again(done):
     from upright.study.load import load_study
 
-    for question in free_swing.questions(done.rig):
+    for question in questions(done.rig):
         study = load_study(done.folder / f"{question.name}.toml")
         assert set(study.rig.estimated) == set(question.asked)
 
@@ -117,15 +117,15 @@ def test_an_interrupted_experiment_keeps_and_tells_what_is_there(tmp_path):
         if share > 0.3:
             raise KeyboardInterrupt
 
-    done = release.run(make_rig("furuta"), 0, tmp_path, stop_at_the_second_fit)
+    done = run_free_swing(make_rig("furuta"), 0, tmp_path, stop_at_the_second_fit)
     assert done.interrupted
     assert "free_swing" in done.answers
-    assert not done.wanders
+    assert not done.drifts
     assert "Interrupted" in page(done)
 
 
 def test_a_stop_that_a_fit_has_swallowed_is_still_obeyed(tmp_path):
-    done = release.run(make_rig("furuta"), 0, tmp_path, stopped=lambda: True)
+    done = run_free_swing(make_rig("furuta"), 0, tmp_path, stopped=lambda: True)
     assert done.interrupted
     assert list(done.answers) == ["free_swing"]
 
@@ -134,5 +134,5 @@ def test_interrupted_at_once_there_is_still_a_page(tmp_path):
     def stop(step, share):
         raise KeyboardInterrupt
 
-    done = release.run(make_rig("furuta"), 0, tmp_path, stop)
+    done = run_free_swing(make_rig("furuta"), 0, tmp_path, stop)
     assert "stopped before the first fit" in page(done)

@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 
 from upright.errors import BadInput
+from upright.lab.identified import IdentifiedRig
+from upright.lab.makes import make_rig
 from upright.lab.regulation_2 import chapter as regulation_page
-from upright.lab.regulation_2 import run as regulation
 from upright.lab.regulation_2.figures import wilson
-from upright.lab.regulation_2.run import Wish
-from upright.lab.rigs.believed import allowed, believed, make_of
-from upright.lab.rigs.makes import make_rig
-from upright.lab.rigs.rig_file import RigFile
+from upright.lab.regulation_2.run import RegulationRequest, identify_make, run_regulation
 
 
 def fit_of(truth, spread=0.01, seed=0, draws=64):
@@ -29,7 +27,7 @@ def fit_of(truth, spread=0.01, seed=0, draws=64):
 
     plant, gain = draw(truth.plant, truth.gain)
     others = tuple(draw(plant, gain) for _ in range(draws))
-    return RigFile(plant=plant, name="rig", gain=gain, unit="V", late=0.0, lag=0.0, others=others if spread else ())
+    return IdentifiedRig(plant=plant, name="rig", gain=gain, unit="V", draws=others if spread else ())
 
 
 @pytest.mark.slow
@@ -37,7 +35,7 @@ def fit_of(truth, spread=0.01, seed=0, draws=64):
 def test_two_sets_regulate_and_one_does_not_as_the_paper_saw_and_as_was_told(make, tmp_path):
     """Section 4.2: typically at least two sets regulate, at least one saturates or has too little effort."""
     truth = make_rig(make)
-    done = regulation.run(fit_of(truth), truth, 0, tmp_path, wish=Wish(draws=64))
+    done = run_regulation(fit_of(truth), truth, 0, tmp_path, wish=RegulationRequest(draws=64))
     words = [a.word for a in done.attempts]
     assert words.count("regulates") >= 2
     assert {"saturates", "too weak"} & set(words)
@@ -56,8 +54,8 @@ def test_the_log_of_a_run_is_what_the_encoders_show(tmp_path):
     from upright.records import Record
 
     truth = make_rig("linear")
-    wish = Wish(poles={"set 2": Wish().poles["set 2"]}, draws=16, seconds=1.0)
-    done = regulation.run(fit_of(truth), truth, 0, tmp_path, wish=wish)
+    wish = RegulationRequest(poles={"set 2": RegulationRequest().poles["set 2"]}, draws=16, seconds=1.0)
+    done = run_regulation(fit_of(truth), truth, 0, tmp_path, wish=wish)
     log = Record.from_csv(tmp_path / "regulation_set_2.csv")
     run = done.attempts[0].after
     counts = log["theta"] * truth.counts[1]
@@ -66,8 +64,8 @@ def test_the_log_of_a_run_is_what_the_encoders_show(tmp_path):
 
 
 def test_without_a_rig_nothing_is_run(tmp_path):
-    wish = Wish(poles={"set 2": Wish().poles["set 2"]}, draws=16, seconds=1.0)
-    done = regulation.run(fit_of(make_rig("linear"), spread=0.0), None, 0, tmp_path, wish=wish)
+    wish = RegulationRequest(poles={"set 2": RegulationRequest().poles["set 2"]}, draws=16, seconds=1.0)
+    done = run_regulation(fit_of(make_rig("linear"), spread=0.0), None, 0, tmp_path, wish=wish)
     told = regulation_page.chapter(done)
     assert "Nothing was run" in told.verdict
     assert "no uncertainty" in told.detail
@@ -77,11 +75,11 @@ def test_without_a_rig_nothing_is_run(tmp_path):
 def test_what_the_fit_leaves_out_is_taken_as_said():
     said = make_rig("furuta")
     plain = fit_of(said.changed(b_1c=0.0, b_2c=0.0), spread=0.0)
-    rig = believed(plain)
+    rig = plain.rig()
     assert rig.plant.b_1c == said.plant.b_1c
     assert (rig.lag, rig.delay, rig.limit) == (said.lag, said.delay, said.limit)
-    assert make_of(plain) == "furuta"
-    drawn = allowed(plain, rig, 4000, seed=1)
+    assert plain.make.key == "furuta"
+    drawn = plain.allowed(rig, 4000, seed=1)
     assert set(drawn) == {"b_1c", "b_2c"}
     # 13 % from run to run; of 4000 draws the spread is known to one part in 90, three of which are allowed
     assert np.std(np.log(drawn["b_1c"])) == pytest.approx(0.13, rel=3 / 90)
@@ -96,9 +94,9 @@ def test_wilson_s_interval_as_newcombe_prints_it():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: Wish(speed="fast"), "plain, filtered, kalman"),
-        (lambda: Wish(seconds=math.inf), "at most 120 s"),
-        (lambda: regulation.identified("torsional", 0, None), "nothing to hold upright"),
+        (lambda: RegulationRequest(speed="fast"), "plain, filtered, kalman"),
+        (lambda: RegulationRequest(seconds=math.inf), "at most 120 s"),
+        (lambda: identify_make("torsional", 0, None), "nothing to hold upright"),
     ],
 )
 def test_what_cannot_be_is_said(call, words):

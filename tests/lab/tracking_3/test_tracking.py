@@ -13,11 +13,11 @@ from upright.control import trial
 from upright.design import hold, place, prefilter
 from upright.design.loop import swing
 from upright.identification.estimate import identify
-from upright.lab.rigs.makes import make_rig
+from upright.lab.makes import MAKES, SHAFTS, make_rig
 from upright.lab.tracking_3 import pd
 from upright.lab.tracking_3.laws import AT, EXTRA, closed_by, paper_sets, tracker, with_sum
-from upright.lab.tracking_3.run import RESERVE, run
-from upright.lab.tracking_3.shaft import KINDS, SHAFTS, fitted, pulses, weigh
+from upright.lab.tracking_3.pulses import fitted, identify_shaft, pulses
+from upright.lab.tracking_3.run import RESERVE, run_tracking
 from upright.lab.weighing_1a.run import Known
 from upright.physics import chain
 from upright.study.load import load_study
@@ -28,7 +28,7 @@ FRICTIONLESS = {"f_1c": 0.0, "f_2c": 0.0}
 @pytest.mark.slow
 def test_the_far_body_ends_at_the_reference_without_friction():
     """Final value theorem: k_pf makes the static gain one, whatever poles, seed and encoders."""
-    for kind in KINDS:
+    for kind in SHAFTS:
         rig = make_rig(kind, 3).changed(**FRICTIONLESS)
         for law in paper_sets(rig):
             step = 0.5 * rig.limit / law.k_pf
@@ -63,7 +63,7 @@ def held(rig, law, offset, force):
     return abs(done.x[-1, 2] - done.x[0, 2]), r + d
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SHAFTS)
 def test_friction_holds_the_far_body_off_up_to_the_bound_and_no_farther(kind):
     rig = make_rig(kind)
     for law in paper_sets(rig, (1, 4)):
@@ -116,7 +116,7 @@ def test_the_loop_is_linear_in_the_gains():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SHAFTS)
 def test_a_sum_makes_up_for_a_push_and_follows_the_step_as_before(kind):
     rig = make_rig(kind, 2).changed(**FRICTIONLESS)
     model = rig.linear(AT)
@@ -158,19 +158,19 @@ def test_disks_move_as_carts_do_in_other_units():
 
 
 def test_pulses_stay_within_travel_and_twist():
-    for kind in KINDS:
+    for kind in SHAFTS:
         for seed in range(12):
             rig = make_rig(kind, seed)
             for file in ("pulses.csv", "others.csv"):
                 q = pulses(rig, file).y * rig.quantum
                 assert np.abs(q).max() < rig.travel
-                assert np.abs(q[:, 0] - q[:, 1]).max() < SHAFTS[kind].twist
+                assert np.abs(q[:, 0] - q[:, 1]).max() < MAKES[kind].twist
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SHAFTS)
 def test_four_sets_follow_and_the_fourth_comes_close_to_the_limit(kind, tmp_path):
-    done = run(kind, 4, tmp_path)
+    done = run_tracking(kind, 4, tmp_path)
     truth = done.true.plant.parameters()
     for name in ("m_1", "m_2", "J_1", "J_2", "k_12"):
         if name in truth:
@@ -190,7 +190,7 @@ def test_four_sets_follow_and_the_fourth_comes_close_to_the_limit(kind, tmp_path
 
 
 def test_the_fit_is_repeated_from_its_files(tmp_path):
-    done = run("torsional", 6, tmp_path, which=(1,), stopped=lambda: True)
+    done = run_tracking("torsional", 6, tmp_path, which=(1,), stopped=lambda: True)
     assert done.interrupted
     study = load_study(tmp_path / "shaft.toml")
     again = identify(study.rig, study.runs)
@@ -204,7 +204,7 @@ def test_the_loop_does_not_depend_on_the_scale_of_the_inertias(tmp_path, scale):
     """Only ratios are seen: an inertia said to be half as large halves gain, springs and friction, and no gain in V."""
     rig = make_rig("torsional", 6)
     told = Known(name="J_1", value=scale * rig.plant.J_1, stderr=1e-3 * rig.plant.J_1)
-    _, fit = weigh(rig, 6, tmp_path, weighed=(told,))
+    _, fit = identify_shaft(rig, 6, tmp_path, weighed=(told,))
     model = fitted(rig, fit)
     assert model.gain == pytest.approx(scale * rig.gain, rel=5e-3)
     assert model.plant.k_12 == pytest.approx(scale * rig.plant.k_12, rel=5e-3)
@@ -213,7 +213,7 @@ def test_the_loop_does_not_depend_on_the_scale_of_the_inertias(tmp_path, scale):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SHAFTS)
 def test_no_pd_of_a_hundred_others_arrives_sooner_by_more_than_the_grid(kind):
     """The search's last grid has steps of 6 %; random pairs may beat it by little."""
     rig = make_rig(kind)

@@ -7,7 +7,9 @@ import pytest
 
 from upright.identification import Parameter, Rig, Run
 from upright.identification.estimate import identify
-from upright.lab.weighing_1a.twin import MAKES, acquire, nominal_piece, rig, run
+from upright.lab.makes import OSCILLATORS
+from upright.lab.weighing_1a.run import weigh_body
+from upright.lab.weighing_1a.twin import acquire, drawn_twin
 from upright.physics import chain
 
 KINDS = ("rectilinear", "torsional")
@@ -19,7 +21,7 @@ def test_twins_are_weighed_within_one_percent(kind):
     """Twelve rigs here, a hundred in `python -m benchmarks loadings`."""
     held = []
     for seed in range(1, 13):
-        done = run(seed, kind)
+        done = weigh_body(drawn_twin(seed, kind))
         for found, truth in ((done.found.k, done.on.stiffness), (done.found.bare, done.on.bare)):
             assert found.value == pytest.approx(truth, rel=1e-2)
             held.append(found.interval[0] <= truth <= found.interval[1])
@@ -31,7 +33,7 @@ def test_twins_are_weighed_within_one_percent(kind):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_log_is_what_an_encoder_shows(kind):
-    on = rig(3, kind)
+    on = drawn_twin(3, kind)
     record = acquire(on, 2, shot=1)
     again = acquire(on, 2, shot=1)
     (name,) = record.outputs
@@ -39,7 +41,7 @@ def test_a_log_is_what_an_encoder_shows(kind):
     assert np.array_equal(x, np.round(x))
     assert np.array_equal(x, again[name])
     assert not np.array_equal(x, acquire(on, 2, shot=2)[name])
-    make = MAKES[kind]
+    make = OSCILLATORS[kind]
     assert np.abs(record["u"]).max() <= make.limit
     # at the step's end friction holds the body within f/k of where the spring would have it
     plant = on.truth.parameters()
@@ -52,16 +54,16 @@ def test_travel_stays_within_the_rigs():
     """Carts of the 210 travel 3 cm; the shaft of the 205 trips at 25 degrees."""
     for kind, most in (("rectilinear", 0.03), ("torsional", np.radians(25))):
         for count in range(5):
-            record = acquire(rig(0, kind), count)
-            assert np.abs(record[record.outputs[0]]).max() / MAKES[kind].counts < most
+            record = acquire(drawn_twin(0, kind), count)
+            assert np.abs(record[record.outputs[0]]).max() / OSCILLATORS[kind].counts < most
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_least_squares_on_the_whole_motion_agrees(kind):
     """The same records, the equations of motion: no peak is looked at."""
-    done = run(5, kind)
-    make, plant = MAKES[kind], chain(1, kind)
+    done = weigh_body(drawn_twin(5, kind))
+    make, plant = OSCILLATORS[kind], chain(1, kind)
     mass = "m_1" if kind == "rectilinear" else "J_1"
     guess = {mass: 1.3 * done.on.bare, "k_1": 0.8 * done.on.stiffness, "c_1": 1.5 * make.plant.parameters()["c_1"]}
     guess |= {"f_1c": 0.7 * make.plant.parameters()["f_1c"]}
@@ -80,7 +82,7 @@ def test_least_squares_on_the_whole_motion_agrees(kind):
                 t=record.t,
                 u=record.u,
                 y=record.y / make.counts,
-                measured=(make.coordinate,),
+                measured=(name,),
                 known={"a_1": done.added[label]},
                 unknown=("initial", "offset", "friction"),
             )
@@ -93,5 +95,5 @@ def test_least_squares_on_the_whole_motion_agrees(kind):
 
 
 def test_a_piece_weighs_what_the_laboratory_says():
-    assert nominal_piece("rectilinear") == 0.5
-    assert nominal_piece("torsional") == pytest.approx(0.5 * (0.065**2 + 0.025**2 / 2))  # parallel axes
+    assert OSCILLATORS["rectilinear"].piece == 0.5
+    assert OSCILLATORS["torsional"].piece == pytest.approx(0.5 * (0.065**2 + 0.025**2 / 2))  # parallel axes

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,7 +11,7 @@ from upright.errors import BadInput, nearest
 
 if TYPE_CHECKING:
     from upright.lab.designing.run import Designed
-    from upright.lab.rigs.rig_file import RigFile
+    from upright.lab.identified import IdentifiedRig
 
 
 def design(
@@ -51,29 +50,30 @@ def design(
     upright design out/fit.json --at inverted --poles "-4.15+-1.63j, -16.9, -3.2"
     """
     from upright.design.requests import read_poles
+    from upright.json_file import json_text, write_json
     from upright.lab.designing import page as design_page
-    from upright.lab.designing.run import Wish, design_for
-    from upright.lab.rigs.rig_file import read_rig_file
-    from upright.units import parse
+    from upright.lab.designing.run import SPEEDS, DesignRequest, design_for
+    from upright.lab.identified import read_identified
+    from upright.units import parse, parse_if_given
 
     if out.exists() and not out.is_dir():
         raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
     if bool(poles) == bool(lqr):
         raise BadInput('give either --poles "-4+-2j, -10, -3" or --lqr "1,0,1,0" (weights of the states).')
-    if speed not in ("plain", "filtered", "kalman"):
+    if speed not in SPEEDS:
         raise BadInput(f"--speed is plain, filtered or kalman, got '{speed}'.")
-    rig = read_rig_file(source, seed=seed)
+    rig = read_identified(source, seed=seed)
     here = at or list(rig.plant.equilibria)[-1]
     if here not in rig.plant.equilibria:
         raise BadInput(f"'{rig.name}' has no equilibrium '{here}'; {nearest(here, rig.plant.equilibria)}")
-    wish = Wish(
+    wish = DesignRequest(
         at=here,
         poles=read_poles(poles) if poles else None,
         weights=_numbers(lqr) if lqr else None,
         R=effort_weight,
         period=parse(period, "s"),
         delay=delay,
-        lag=parse(lag, "s") if lag else None,
+        lag=parse_if_given(lag, "s"),
         speed=speed,
         memory=memory,
         quantum=_quanta(rig, counts),
@@ -83,13 +83,10 @@ def design(
         sampled=sampled,
     )
     done = design_for(rig, wish)
-    out.mkdir(parents=True, exist_ok=True)
-    content = design_page.as_json(done)
-    text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
-    (out / "design.json").write_text(text + "\n", encoding="utf-8")
+    content = write_json(out / "design.json", design_page.as_json(done))
     page = design_page.write(done, out / "design.html", str(source))
     if as_json:
-        typer.echo(text)
+        typer.echo(json_text(content))
         return
     _say(done, (out / "design.json", page), source)
 
@@ -101,7 +98,7 @@ def _numbers(text: str) -> tuple[float, ...]:
         raise BadInput(f'weights are numbers separated by commas, as in "1,0,1,0", got {text[:60]!r}.') from None
 
 
-def _quanta(rig: RigFile, counts: str) -> tuple[float, ...]:
+def _quanta(rig: IdentifiedRig, counts: str) -> tuple[float, ...]:
     """Step of every encoder [m or rad]; coordinates that the list does not name have 16000 counts."""
     from math import tau
 
@@ -126,7 +123,7 @@ def _quanta(rig: RigFile, counts: str) -> tuple[float, ...]:
     return tuple((tau if c.unit == "rad" else 1.0) / per[c.name] for c in rig.plant.coordinates)
 
 
-def _start(rig: RigFile, text: str) -> tuple[float, ...]:
+def _start(rig: IdentifiedRig, text: str) -> tuple[float, ...]:
     """Deviation, state by state; empty when none was given."""
     from upright.units import parse
 

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from upright.errors import BadInput
 
 if TYPE_CHECKING:
-    from upright.lab.regulation_2.run import Regulation, Wish
-    from upright.lab.rigs.makes import Make
-    from upright.lab.rigs.rig_file import RigFile
+    from upright.lab.regulation_2.run import Regulation, RegulationRequest
 
 
 def regulate(
@@ -47,10 +44,11 @@ def regulate(
     upright regulate out/fit.json --seed 3 --set 2 --tilt "20 deg"
     """
     from upright.cli.terminal import step_bar
+    from upright.json_file import json_text
+    from upright.lab.identified import read_identified
+    from upright.lab.makes import make_rig
     from upright.lab.regulation_2 import chapter as regulation_page
-    from upright.lab.regulation_2 import run as regulation
-    from upright.lab.rigs.makes import make_rig
-    from upright.lab.rigs.rig_file import read_rig_file
+    from upright.lab.regulation_2.run import identify_make, run_regulation
     from upright.report.chapter import write_chapter
     from upright.report.symbols import typed
 
@@ -58,45 +56,44 @@ def regulate(
         raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
     wish = _wish(which, poles, speed, memory, tilt, push, seconds)
     with step_bar(quiet=as_json) as tell:
-        file: RigFile
         if source is None:
-            make, seed = cast("Make", rig or "furuta"), seed or 0
+            make, seed = rig or "furuta", seed or 0
             tell("identifying the hanging twin", 0.0)
-            file = regulation.identified(make, seed, out / "identified", lambda step, share: tell(step, 0.6 * share))
+            known = identify_make(make, seed, out / "identified", lambda step, share: tell(step, 0.6 * share))
             name = f"--rig {make}"
         else:
-            file, name = read_rig_file(source, seed=seed or 0), typed(source)
-            make = regulation.make_of(file)
+            known, name = read_identified(source, seed=seed or 0), typed(source)
+            make = known.make.key
             if rig not in ("", make):
                 raise BadInput(f"{source} is of the make '{make}', not '{rig}'; leave --rig out.")
         truth = None if seed is None else make_rig(make, seed)
         base = 0.6 if source is None else 0.0
-        done = regulation.run(
-            file, truth, seed or 0, out, lambda step, share: tell(step, base + (1 - base) * share), wish=wish,
+        done = run_regulation(
+            known, truth, seed or 0, out, lambda step, share: tell(step, base + (1 - base) * share), wish=wish,
             source=name,
         )  # fmt: skip
         chapter = regulation_page.chapter(done)
         report = write_chapter(out / "report.html", chapter)
     if as_json:
         content: dict[str, Any] = {**chapter.numbers, "verdict": chapter.verdict, "report": str(report)}
-        typer.echo(json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False))
+        typer.echo(json_text(content))
         return
     _say(done, chapter, report)
 
 
-def _wish(which: str, poles: str, speed: str, memory: float, tilt: str, push: str, seconds: float) -> Wish:
+def _wish(which: str, poles: str, speed: str, memory: float, tilt: str, push: str, seconds: float) -> RegulationRequest:
     from upright.design.requests import read_poles
-    from upright.lab.regulation_2.run import SETS, Wish
-    from upright.units import parse
+    from upright.lab.regulation_2.run import SETS, RegulationRequest
+    from upright.units import parse_if_given
 
     if which and poles:
         raise BadInput("give either --set, a set of Table 1, or --poles of your own.")
     if which not in ("", "all") and f"set {which}" not in SETS:
         raise BadInput(f"--set is 1 to {len(SETS)}, or all, got '{which}'.")
     texts = {"your poles": poles} if poles else {n: t for n, t in SETS.items() if which in ("", "all", n[4:])}
-    return Wish(
+    return RegulationRequest(
         poles={n: read_poles(t) for n, t in texts.items()}, speed=speed, memory=memory, seconds=seconds,
-        tilt=parse(tilt, "rad") if tilt else None, push=parse(push, "rad/s") if push else None,
+        tilt=parse_if_given(tilt, "rad"), push=parse_if_given(push, "rad/s"),
     )  # fmt: skip
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -50,11 +49,11 @@ def swing_up(
     upright swing-up out/fit.json --check swings.csv
     """
     from upright.cli.terminal import typed
-    from upright.lab.rigs.believed import believed, make_of
-    from upright.lab.rigs.makes import make_rig
-    from upright.lab.rigs.rig_file import read_rig_file
+    from upright.json_file import json_text, write_json
+    from upright.lab.identified import read_identified
+    from upright.lab.makes import make_rig
     from upright.lab.swing_up_2b import chapter as swing_up_page
-    from upright.lab.swing_up_2b import run as experiment
+    from upright.lab.swing_up_2b.run import known_of, run_swing_up
     from upright.report.chapter import write_chapter
 
     if out.exists() and not out.is_dir():
@@ -66,18 +65,17 @@ def swing_up(
         make = rig or "furuta"
         model = make_rig(make)
     else:
-        file = read_rig_file(source, seed=seed)
-        make, known = make_of(file), experiment.known_of(file)
+        identified = read_identified(source, seed=seed)
+        make, known = identified.make.key, known_of(identified)
         if rig and rig != make:
             raise BadInput(f"the fit is of the make {make}, and --rig says {rig}; leave --rig out.")
-        model = believed(file)
+        model = identified.rig()
     if check is not None:
         _check(model, check, known, out, as_json, typed(source) if source else "FIT.json")
         return
-    done = experiment.run(
+    done = run_swing_up(
         model,
         _lying(make_rig(make, seed), lie),
-        seed,
         out,
         known=known,
         seconds=seconds,
@@ -86,10 +84,9 @@ def swing_up(
     )
     told = swing_up_page.chapter(done)
     page = write_chapter(out / "swing_up.html", told)
-    text = json.dumps(told.numbers, indent=2, ensure_ascii=False, allow_nan=False)
-    (out / "swing_up.json").write_text(text + "\n", encoding="utf-8")
+    write_json(out / "swing_up.json", told.numbers)
     if as_json:
-        typer.echo(text)
+        typer.echo(json_text(told.numbers))
     else:
         _say(done.check.verdict, told.verdict, page, [(s.sentence, s.command) for s in told.steps])
     if not done.caught:
@@ -97,15 +94,16 @@ def swing_up(
 
 
 def _check(model: Rig, log: Path, known: Mapping[str, float] | None, out: Path, as_json: bool, source: str) -> None:
-    from upright.lab.rigs.encoders import asked
+    from upright.json_file import json_text
     from upright.lab.swing_up_2b import chapter as swing_up_page
+    from upright.lab.swing_up_2b.run import scales_of_log
     from upright.readers import read
     from upright.report.chapter import write_chapter
 
-    told = swing_up_page.check_chapter(model, asked(model, read(log), known), log.name, source)
+    told = swing_up_page.check_chapter(model, scales_of_log(model, read(log), known), log.name, source)
     page = write_chapter(out / "encoders.html", told)
     if as_json:
-        typer.echo(json.dumps(told.numbers, indent=2, ensure_ascii=False, allow_nan=False))
+        typer.echo(json_text(told.numbers))
     else:
         _say(told.verdict, "", page, [(s.sentence, s.command) for s in told.steps])
     if not told.sound:

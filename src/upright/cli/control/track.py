@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,9 +13,7 @@ from upright.errors import BadInput
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from upright.control import Rig
     from upright.lab.tracking_3.run import Tracking
-    from upright.lab.tracking_3.shaft import Kind
     from upright.report.advice import Step
 
 INTERRUPTED = 130
@@ -51,37 +48,39 @@ def track(
     """
     from upright.cli.terminal import progress_line
     from upright.design.requests import read_poles
-    from upright.lab.tracking_3 import run as tracking
+    from upright.json_file import json_text, write_json
+    from upright.lab.makes import SHAFTS, make_rig
     from upright.lab.tracking_3.chapter import chapter
+    from upright.lab.tracking_3.pulses import rig_of_file
+    from upright.lab.tracking_3.run import follow, run_tracking
     from upright.lab.tracking_3.tables import as_json as content_of
     from upright.report.chapter import write_chapter
-    from upright.units import parse
+    from upright.units import parse_if_given
 
     if out.exists() and not out.is_dir():
         raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
     own = read_poles(poles) if poles else None
     which = _which(sets) if sets else (() if poles else (1, 2, 3, 4))
-    kind, model = _kind(source, rig, limit)
-    size = parse(step, "rad" if kind == "torsional" else "m") if step else None
+    if limit is not None and not limit > 0:
+        raise BadInput(f"--limit must be above 0, got {limit:g}.")
+    if source is None and rig not in SHAFTS:
+        raise BadInput(f"--rig is {' or '.join(SHAFTS)}, got '{rig}'.")
+    on = make_rig(rig, seed) if source is None else rig_of_file(source, limit)
+    size = parse_if_given(step, on.plant.coordinates[-1].unit)
     if size is not None and not size > 0:
         raise BadInput(f"--step needs a size above 0, got '{step}'.")
     with progress_line(quiet=as_json) as tell:
-        if model is None:
-            from upright.lab.rigs.makes import make_rig
-
-            twin = make_rig(kind, seed)
-            twin = twin if limit is None else replace(twin, limit=limit)
-            done = tracking.run(twin, seed, out, tell, which=which, poles=own, step=size)
+        if source is None:
+            on = replace(on, limit=limit or on.limit)
+            done = run_tracking(on, seed, out, tell, which=which, poles=own, step=size)
         else:
-            done = tracking.follow(model, model, source or out, None, None, tell, which=which, poles=own, step=size)
+            done = follow(on, on, source, None, None, tell, which=which, poles=own, step=size)
     told = chapter(done)
-    out.mkdir(parents=True, exist_ok=True)
-    text = json.dumps(content_of(done) | {"verdict": told.verdict}, indent=2, ensure_ascii=False, allow_nan=False)
-    (out / "track.json").write_text(text + "\n", encoding="utf-8")
+    content = write_json(out / "track.json", content_of(done) | {"verdict": told.verdict})
     titled = replace(told, title=f"Experiment 3: {told.title.lower()}, {done.rig.name}")
     page = write_chapter(out / "track.html", titled)
     if as_json:
-        typer.echo(text)
+        typer.echo(json_text(content))
     else:
         _say(done, told.verdict, (out / "track.json", page), told.steps)
     if done.interrupted:
@@ -93,20 +92,6 @@ def _which(text: str) -> tuple[int, ...]:
         return tuple(int(part) for part in text.split(","))
     except ValueError:
         raise BadInput(f'--set takes numbers of Table 2 separated by commas, as in "1,4", got {text[:40]!r}.') from None
-
-
-def _kind(source: Path | None, make: str, limit: float | None) -> tuple[Kind, Rig | None]:
-    """Kind of rig, and the rig that a fit describes, with what the make says of drive and encoders."""
-    from upright.lab.tracking_3.shaft import KINDS, from_file
-
-    if limit is not None and not limit > 0:
-        raise BadInput(f"--limit must be above 0, got {limit:g}.")
-    if source is not None:
-        return from_file(source, limit)
-    for kind in KINDS:
-        if kind == make:
-            return kind, None
-    raise BadInput(f"--rig is {' or '.join(KINDS)}, got '{make}'.")
 
 
 def _say(done: Tracking, verdict: str, files: tuple[Path, Path], steps: Sequence[Step]) -> None:

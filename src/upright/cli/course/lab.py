@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import signal
 import threading
 from collections.abc import Generator
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from upright.errors import BadInput, nearest
+from upright.errors import BadInput
 
 if TYPE_CHECKING:
     from upright.lab.laboratory import Session
@@ -50,17 +49,18 @@ def lab(
     upright lab --rig linear --seed 3
     upright lab --experiment 1b --experiment 2 -o out
     """
-    from upright.lab.rigs.makes import MAKES
+    from upright.lab.makes import make_named
 
     if seed < 0:
         raise BadInput(f"--seed needs a whole number of at least 0, got {seed}.")
-    if rig and rig not in MAKES:
-        raise BadInput(f"--rig is one of {', '.join(MAKES)}, got '{rig}'; {nearest(rig, MAKES)}")
+    if rig:
+        make_named(rig)
     folder = out or Path("-".join(["upright-lab", *([rig] if rig else []), *([str(seed)] if seed else [])]))
     if folder.exists() and not folder.is_dir():
         raise BadInput(f"results need a folder, but {folder} is a file; name another with -o.")
     from datetime import date
 
+    from upright.json_file import json_text
     from upright.lab import laboratory, laboratory_page
     from upright.report.book import write_book
     from upright.report.pdf import write_pdf
@@ -70,7 +70,7 @@ def lab(
     from upright.cli.terminal import step_bar
 
     with _ctrl_c() as pressed, step_bar(quiet=as_json) as tell:
-        session = laboratory.run(
+        session = laboratory.run_laboratory(
             experiment or (), rig, seed, folder, tell, stopped=lambda: pressed.times > 0, fresh=fresh
         )
         pressed.patient = True
@@ -80,7 +80,7 @@ def lab(
         pdf = write_pdf(folder / "report.pdf", told)
     if as_json:
         summary = laboratory_page.summary(session, report, pdf)
-        typer.echo(json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False))
+        typer.echo(json_text(summary))
     else:
         _say(session, report, pdf)
     if session.interrupted or pressed.times:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -26,7 +25,8 @@ def reproduce(
     from rich.markup import escape
 
     from upright.cli.terminal import console, on_terminal, typed
-    from upright.lab.rigs.twin import NOMINAL
+    from upright.json_file import json_text
+    from upright.lab.makes import NOMINAL
     from upright.paper import page
     from upright.paper.reproduce import reproduce as again
 
@@ -35,7 +35,7 @@ def reproduce(
     done = again(NOMINAL, seed)
     written = page.write(done, out / "reproduce.html")
     if as_json:
-        typer.echo(json.dumps(page.as_json(done), indent=2, ensure_ascii=False, allow_nan=False))
+        typer.echo(json_text(page.as_json(done)))
         return
     screen = console()
     for sentences, table in zip(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import math
 import re
 from pathlib import Path
 from typing import Annotated, Any
@@ -31,6 +29,7 @@ def survey(
     upright survey ratings.csv -o out
     upright survey means.csv --n 53
     """
+    from upright.json_file import json_text
     from upright.survey import Ratings, read
     from upright.survey.page import told, write_survey
 
@@ -52,18 +51,9 @@ def survey(
     page = write_survey(content, out, title=title, source=file.name)
     if as_json:
         whole = {"sentences": content["sentences"], "notes": content["notes"], "report": str(page), "found": data}
-        typer.echo(json.dumps(_finite(whole), indent=2, ensure_ascii=False, allow_nan=False))
+        typer.echo(json_text(whole))
         return
     _print(content, page, file, n)
-
-
-def _finite(value: Any) -> Any:
-    """The same with null for what is not a finite number."""
-    if isinstance(value, dict):
-        return {str(k): _finite(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(v) for v in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _print(content: dict[str, Any], page: Path, file: Path, n: int | None) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -47,6 +46,7 @@ def doctor(
     """
     from upright.doctor import examine, read_known
     from upright.doctor.reading import read_mended
+    from upright.json_file import json_text
 
     if html is not None and html.is_dir():
         raise BadInput(f"--html needs a file, and {html} is a folder; name one in it, such as {html / 'doctor.html'}")
@@ -61,7 +61,7 @@ def doctor(
 
         write_diagnosis(diagnosis, html)
     if as_json:
-        typer.echo(json.dumps(as_plain(diagnosis, html), indent=1, ensure_ascii=False))
+        typer.echo(json_text(as_plain(diagnosis, html)))
     else:
         _print(diagnosis, log, rig, html)
     if diagnosis.wrong:

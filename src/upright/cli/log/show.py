@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import asdict
 from pathlib import Path
@@ -30,6 +29,7 @@ def show(
 
     upright show swing.csv
     """
+    from upright.json_file import json_text
     from upright.readers import inspect, read
 
     figures: list[Path] = []
@@ -49,7 +49,7 @@ def show(
         else:
             _print(seen, written)
     if as_json:
-        typer.echo(json.dumps(found, indent=1))
+        typer.echo(json_text(found))
     else:
         _print_next(logs[0])
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -75,16 +73,14 @@ def frequency(
 
 def _twin(make: str, seed: int, ask: str, out: Path, as_json: bool) -> None:
     from upright.cli.terminal import progress_line
-    from upright.errors import nearest
     from upright.lab.frequency_1b.chapter import chapter
-    from upright.lab.frequency_1b.run import run
-    from upright.lab.rigs.makes import MAKES, make_rig
+    from upright.lab.frequency_1b.run import run_frequency
+    from upright.lab.makes import make_named
     from upright.report.chapter import write_chapter
 
-    if make not in MAKES:
-        raise BadInput(f"--rig is one of {', '.join(MAKES)}, got '{make}'; {nearest(make, MAKES)}")
+    make_named(make)
     with progress_line(quiet=as_json) as tell:
-        done = run(make_rig(make, seed), seed, out, tell, kind=ask)
+        done = run_frequency(make, seed, out, tell, kind=ask)
     told = chapter(done)
     page = write_chapter(out / "report.html", told)
     _say(told, done.answer, (out / "frequency.csv", out / "sweep.csv", out / "fit.json", page), as_json, done.truth)
@@ -95,16 +91,16 @@ def _read(
     hold: str, signals: dict[str, str], counts: dict[str, str], known: dict[str, str], band: tuple[float, float],
 ) -> None:  # fmt: skip
     from upright.lab.frequency_1b.chapter import of_log
-    from upright.lab.frequency_1b.own_log import Wish, look
+    from upright.lab.frequency_1b.from_logs import LogRequest, response_of_logs
     from upright.report.chapter import write_chapter
-    from upright.units import parse
+    from upright.units import parse_if_given
 
-    wish = Wish(
-        make=rig, command=command, signals=signals, kind=kind, seed=seed, hold=parse(hold, "s") if hold else None,
+    wish = LogRequest(
+        make=rig, command=command, signals=signals, kind=kind, seed=seed, hold=parse_if_given(hold, "s"),
         counts={n: _count(n, v) for n, v in counts.items()}, band=band if band != (0.0, float("inf")) else None,
         known={n: _known(n, v, rig) for n, v in known.items()},
     )  # fmt: skip
-    found = look(sources, wish, out, data=data)
+    found = response_of_logs(sources, wish, out, data=data)
     told = of_log(found)
     page = write_chapter(out / "report.html", told)
     files = (out / "frequency.csv", *([out / "fit.json"] if found.answer else []), page)
@@ -133,34 +129,25 @@ def _count(name: str, text: str) -> float:
 
 def _known(name: str, text: str, make: str) -> tuple[float, float]:
     """Value and standard uncertainty [SI]."""
-    from upright.lab.rigs.makes import PLANTS
-    from upright.units import parse
+    from upright.lab.makes import MAKES
+    from upright.units import measured
 
-    plant = next((p for m, p in PLANTS.items() if m == make), None)
-    if plant is None:
+    if make not in MAKES:
         raise BadInput("--known belongs to a fit; name the rig with --rig too.")
-    unit = (
-        plant.quantity(name).unit
-        if name in plant.names()
-        else "s"
-        if name in ("actuator.delay", "actuator.lag")
-        else ""
-    )
-    number, _, spread = re.sub(r"\+/-|±", "+-", text).partition("+-")
-    value = parse(number, unit)
-    spread = spread.strip()
-    if spread.endswith("%"):
-        return value, abs(value) * parse(spread, "1")
-    return value, parse(spread, unit) if spread else 0.0
+    plant = MAKES[make].plant
+    if name in plant.names():
+        return measured(text, plant.quantity(name).unit)
+    return measured(text, "s" if name in ("actuator.delay", "actuator.lag") else "")
 
 
 def _say(told: Chapter, answer: Answer | None, files: tuple[Path, ...], as_json: bool, truth: Any) -> None:
     from upright.cli.terminal import console, on_terminal
+    from upright.json_file import json_text
     from upright.lab.frequency_1b.tables import parameter_table, pole_table, response_table, way_table
 
     if as_json:
         content = {"verdict": told.verdict, "sound": told.sound, **told.numbers, "files": [str(f) for f in files]}
-        typer.echo(json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False))
+        typer.echo(json_text(content))
         return
     screen = console()
     if answer is None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -112,6 +111,7 @@ def identify(
         raise BadInput(f'{study}: every run has role = "predict"; at least one needs role = "fit"')
     from upright.identification.estimate import identify as estimate
     from upright.identification.ladder.cross_validation import cross_validate
+    from upright.json_file import json_text
     from upright.study.fit_file import write_fit
 
     with progress_line(quiet=as_json) as progress:
@@ -126,7 +126,7 @@ def identify(
     if report:
         written += _report(fit, folder, asked, crossed)
     if as_json:
-        typer.echo(json.dumps(content, indent=2, ensure_ascii=False))
+        typer.echo(json_text(content))
     else:
         again = typed(study) + (f" --data {typed(data)}" if data is not None else "")
         print_fit(fit, written, again, crossed)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -53,6 +52,7 @@ def ladder(
     """
     from upright.cli.terminal import progress_line, typed
     from upright.identification.ladder.growth import climb
+    from upright.json_file import json_text
     from upright.study.ladder_file import can_be_trimmed, chosen_study, write_ladder
     from upright.study.load import load_study
 
@@ -90,7 +90,7 @@ def ladder(
         title = f"Ladder: {asked.title or asked.path.stem.replace('_', ' ')}"
         written.append(write_ladder_report(climbed, folder, title=title, provenance=provenance, steps=steps))
     if as_json:
-        typer.echo(json.dumps(content, indent=2, ensure_ascii=False))
+        typer.echo(json_text(content))
     else:
         _print(climbed, written, steps)
     if climbed.interrupted:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -62,6 +61,7 @@ def loadings(
             ' write --added "0 kg" for the bare one, or try --twin rectilinear.'
         )
     from upright.identification.loadings import fit_loadings, swings
+    from upright.lab.makes import OSCILLATORS
     from upright.lab.weighing_1a.page import write_loadings
     from upright.readers import read
     from upright.report.advice import Step
@@ -98,8 +98,7 @@ def loadings(
         ),
         Step(
             sentence="Plan the next loadings with the error of a frequency that these swings show.",
-            command=f'upright plan-inertias --rig {kind} --bare "{weighed.bare.value:.4g}'
-            f' {"kg" if kind == "rectilinear" else "kg m^2"}"',
+            command=f'upright plan-inertias --rig {kind} --bare "{weighed.bare.value:.4g} {OSCILLATORS[kind].unit}"',
         ),
     ]
     page = write_loadings(weighed, out, kind=kind, title="Stiffness and bare inertia from added loads", logs=records,
@@ -108,17 +107,18 @@ def loadings(
 
 
 def _twin(kind: str, seed: int, out: Path, as_json: bool) -> None:
+    from upright.lab.makes import OSCILLATORS
     from upright.lab.weighing_1a.page import write_loadings
-    from upright.lab.weighing_1a.twin import run, truth, write_logs
+    from upright.lab.weighing_1a.run import weigh_body
+    from upright.lab.weighing_1a.twin import drawn_twin, truth
     from upright.report.advice import Step
 
-    if kind != "rectilinear" and kind != "torsional":
-        raise BadInput(f"--twin is rectilinear or torsional, got '{kind}'.")
-    done = run(seed, kind)
+    if kind not in OSCILLATORS:
+        raise BadInput(f"--twin is {' or '.join(OSCILLATORS)}, got '{kind}'.")
+    done = weigh_body(drawn_twin(seed, kind))
     column = next(iter(done.logs.values())).outputs[0]
-    files = write_logs(done, out)
-    unit = "kg" if kind == "rectilinear" else "kg m^2"
-    added = " ".join(f'--added "{done.added[label]:.6g} {unit}"' for label in files)
+    files = done.write_logs(out)
+    added = " ".join(f'--added "{done.added[label]:.6g} {OSCILLATORS[kind].unit}"' for label in files)
     steps = [
         Step(
             sentence="Weigh the rig again from its logs in that folder, as you would your own.",
@@ -135,11 +135,12 @@ def _twin(kind: str, seed: int, out: Path, as_json: bool) -> None:
 
 def inertia(text: str) -> tuple[float, str]:
     """Added inertia [SI] and the kind of rig it belongs to; none for a plain zero."""
+    from upright.lab.makes import MASS_RADIUS
     from upright.physics.loads import added_inertia
     from upright.units import parse, same_dimension
 
     if masses := _MASSES.fullmatch(text):
-        return added_inertia(int(masses[1]), parse(masses[2], "m"), mass_radius=0.025), "torsional"
+        return added_inertia(int(masses[1]), parse(masses[2], "m"), mass_radius=MASS_RADIUS), "torsional"
     if text.strip() in ("0", "none"):
         return 0.0, ""
     unit = text.lstrip("+-0123456789.eE ").strip()
@@ -166,6 +167,7 @@ def _tell(
     from rich.table import Table
 
     from upright.cli.terminal import console
+    from upright.json_file import json_text
     from upright.lab.weighing_1a.page import rows
 
     if as_json:
@@ -178,7 +180,7 @@ def _tell(
             {"label": s.label, "added": s.added, "omega_n": s.decay.omega_n, "stderr": s.decay.omega_error,
              "sigma": s.decay.sigma, "delta": s.decay.delta} for s in found.swings
         ]  # fmt: skip
-        typer.echo(json.dumps(content, indent=2, ensure_ascii=False))
+        typer.echo(json_text(content))
         return
     screen = console()
     title = f"From {len(found.swings)} swings"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,7 +13,6 @@ from upright.errors import BadInput, nearest
 if TYPE_CHECKING:
     from upright.identification.loadings import Loading, Plan
 
-UNITS = {"rectilinear": "kg", "torsional": "kg m^2"}
 FLAT = 0.1
 """A run more is worth it while it tightens the stiffness by this share."""
 
@@ -43,12 +41,14 @@ def plan_inertias(
     upright plan-inertias --rig torsional --error "0.3 %" --radius "4 cm" --radius "9 cm"
     """
     from upright.identification.loadings import plan_loadings
+    from upright.json_file import json_text
+    from upright.lab.makes import OSCILLATORS
     from upright.units import parse
 
-    if rig not in UNITS:
-        raise BadInput(f"--rig is rectilinear or torsional, got '{rig}'; {nearest(rig, UNITS)}")
-    choice = loadings(rig, radius)
-    m_0 = parse(bare or {"rectilinear": "0.77 kg", "torsional": "3e-3 kg m^2"}[rig], UNITS[rig])
+    if rig not in OSCILLATORS:
+        raise BadInput(f"--rig is {' or '.join(OSCILLATORS)}, got '{rig}'; {nearest(rig, OSCILLATORS)}")
+    choice, body = loadings(rig, radius), OSCILLATORS[rig]
+    m_0 = parse(bare, body.unit) if bare else body.plant.parameters()[body.inertia]
     piece = min(w.added for w in choice if w.added > 0)
     piece = piece / 2 if rig == "torsional" else piece
     e, g = _share(error, "--error"), _share(tolerance, "--tolerance")
@@ -65,14 +65,15 @@ def plan_inertias(
 
         save_plans(plans, chosen, out)
     if as_json:
-        typer.echo(json.dumps(_as_json(plans, chosen, UNITS[rig]), indent=2, ensure_ascii=False))
+        typer.echo(json_text(_as_json(plans, chosen, body.unit)))
     else:
-        _print(plans, chosen, wanted, out, rig)
+        _print(plans, chosen, wanted, out, body.unit)
 
 
 def loadings(rig: str, radius: list[str] | None) -> list[Loading]:
     """What can be added to a cart, or to a disk on the bolt circles given."""
     from upright.identification.loadings import Loading
+    from upright.lab.makes import MASS_RADIUS
     from upright.physics.loads import added_inertia, added_mass
     from upright.units import parse
 
@@ -85,7 +86,8 @@ def loadings(rig: str, radius: list[str] | None) -> list[Loading]:
     circles = [parse(r, "m") for r in radius] if radius else [0.01 * cm for cm in range(2, 10)]
     out = [Loading(label="none", added=0.0)]
     for n in (2, 4):
-        out += [Loading(label=f"{n} at {100 * r:g} cm", added=added_inertia(n, r, mass_radius=0.025)) for r in circles]
+        for r in circles:
+            out.append(Loading(label=f"{n} at {100 * r:g} cm", added=added_inertia(n, r, mass_radius=MASS_RADIUS)))
     return out
 
 
@@ -128,7 +130,7 @@ def _as_json(plans: dict[int, tuple[Plan, Plan]], chosen: int, unit: str) -> dic
     }
 
 
-def _print(plans: dict[int, tuple[Plan, Plan]], chosen: int, wanted: float | None, out: Path | None, rig: str) -> None:
+def _print(plans: dict[int, tuple[Plan, Plan]], chosen: int, wanted: float | None, out: Path | None, unit: str) -> None:
     from rich.table import Table
 
     from upright.cli.terminal import console
@@ -161,6 +163,6 @@ def _print(plans: dict[int, tuple[Plan, Plan]], chosen: int, wanted: float | Non
     screen.print("- run them, log each step, and weigh the rig with the logs", soft_wrap=True)
     heavy = c.loadings[-1].label
     screen.print(
-        f'    upright loadings bare.csv heavy.csv --added "0 {UNITS[rig]}" --added "{heavy}"',
+        f'    upright loadings bare.csv heavy.csv --added "0 {unit}" --added "{heavy}"',
         soft_wrap=True, markup=False,
     )  # fmt: skip

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -33,6 +32,7 @@ def predict(
     upright predict swing-fit/fit.json other_day.toml
     """
     from upright.cli.terminal import console, print_scores
+    from upright.json_file import json_text, write_json
     from upright.study.fit_file import read_fit
     from upright.study.load import load_study
 
@@ -59,19 +59,17 @@ def predict(
         "runs": {
             label: {
                 "role": s.role,
-                "fit_percent": dict(s.fit_percent),
+                "fit_percent": s.fit_percent,
                 "horizon": s.horizon,
-                "adapted": list(s.adapted),
+                "adapted": s.adapted,
             }
             for label, s in scores.items()
         },
     }
-    text = json.dumps(content, indent=2, ensure_ascii=False)
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        (out / "prediction.json").write_text(text + "\n", encoding="utf-8")
+        write_json(out / "prediction.json", content)
     if as_json:
-        typer.echo(text)
+        typer.echo(json_text(content))
         return
     print_scores(scores)
     if not fitted.trusted:

@@ -10,7 +10,7 @@ import numpy as np
 
 from upright.design.lqr import locus
 from upright.design.requests import written
-from upright.lab.designing.run import Designed, Way
+from upright.lab.designing.run import Designed, VelocityLoop
 from upright.report.advice import Step
 from upright.report.document import Picture, picture
 from upright.report.drawing import BLACK, BLUE, VERMILLION
@@ -81,7 +81,7 @@ def way_table(done: Designed) -> Table:
     )  # fmt: skip
 
 
-def _worth(way: Way) -> tuple[str, ...]:
+def _worth(way: VelocityLoop) -> tuple[str, ...]:
     noise = ", ".join(number(v, 2) for v in way.speed_noise)
     if way.margins is None or way.command_noise is None:
         return noise, "falls", "–", "–", "–", "–"
@@ -165,7 +165,7 @@ def next_steps(done: Designed, source: str, folder: str) -> list[Step]:
             Step(sentence="Let the drive's limit choose: the cheapest effort that comes back from this start.",
                  command=f"{base} --lqr {','.join('1' for _ in done.model.states)} --limit LIMIT")
         )  # fmt: skip
-    if not done.rig.others:
+    if not done.rig.draws:
         steps.append(
             Step(sentence="See what the uncertainty of the numbers does to the poles: design from a fit.json.",
                  command="upright identify STUDY.toml -o OUT && upright design OUT/fit.json")

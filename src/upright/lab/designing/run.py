@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from upright import design
 from upright.design import Estimator, Feedback, Margins, Placement, Sampled
@@ -16,15 +15,18 @@ from upright.design.lqr import motion
 from upright.design.requests import poles_of
 from upright.design.sampled import to_s
 from upright.errors import BadInput
-from upright.lab.rigs.rig_file import RigFile
+from upright.lab.identified import IdentifiedRig
 from upright.physics import Linear
 
 Array = NDArray[np.float64]
 Roots = NDArray[np.complex128]
 
+SPEEDS = ("plain", "filtered", "kalman")
+"""Ways to the velocities: differences of encoders, plain or through a low pass, and a Kalman filter."""
+
 
 @dataclass(frozen=True, kw_only=True)
-class Wish:
+class DesignRequest:
     """What is asked of the loop; SI units, the limit in the command's.
 
     `lag` is the drive's [s], that of the rig's file when None.
@@ -50,7 +52,7 @@ class Wish:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Way:
+class VelocityLoop:
     """One way to the velocities, with the loop that it makes; `margins` is None where the loop falls."""
 
     name: str
@@ -69,8 +71,8 @@ class Designed:
     `sampled_gains`, whose poles are met in the loop as it runs.
     """
 
-    rig: RigFile
-    wish: Wish
+    rig: IdentifiedRig
+    wish: DesignRequest
     model: Linear
     sampled: Sampled
     K: Array
@@ -80,7 +82,7 @@ class Designed:
     R: float | None
     law: Feedback
     poles: Roots
-    ways: tuple[Way, ...]
+    ways: tuple[VelocityLoop, ...]
     k_pf: float | None
     peak: float
     peak_sampled: float
@@ -89,9 +91,9 @@ class Designed:
     cloud: Roots = field(default_factory=lambda: np.zeros(0, dtype=np.complex128))
 
     @property
-    def chosen(self) -> Way:
+    def chosen(self) -> VelocityLoop:
         """The way to the velocities that was asked for."""
-        return self.ways[("plain", "filtered", "kalman").index(self.wish.speed)]
+        return self.ways[SPEEDS.index(self.wish.speed)]
 
     @property
     def verdict(self) -> str:
@@ -128,7 +130,7 @@ class Designed:
         return f"{head}; the start asked for takes {100 * share:.0f} % of the drive's limit."
 
 
-def design_for(rig: RigFile, wish: Wish) -> Designed:
+def design_for(rig: IdentifiedRig, wish: DesignRequest) -> Designed:
     """Gains as wished, and their loop as a computer runs it.
 
     Raises
@@ -141,7 +143,7 @@ def design_for(rig: RigFile, wish: Wish) -> Designed:
     if model.B.shape[1] != 1:
         raise BadInput(f"upright design is for one input, and this plant has {model.B.shape[1]}; use design.place.")
     lag = rig.lag if wish.lag is None else wish.lag
-    sampled = design.hold(model, wish.period, wish.delay + rig.late / wish.period, lag)
+    sampled = design.hold(model, wish.period, wish.delay + rig.delay / wish.period, lag)
     placement, R = None, wish.R
     if wish.poles is not None:
         placement = design.place(model.A, model.B, wish.poles)
@@ -155,8 +157,9 @@ def design_for(rig: RigFile, wish: Wish) -> Designed:
                 )
             R = design.weight_for_effort(model.A, model.B, weights, start, wish.limit)
         K = design.lqr(model.A, model.B, weights, R)
-    estimators = _estimators(sampled, wish, np.abs(model.B[1::2, 0]))
-    estimator = estimators[("plain", "filtered", "kalman").index(wish.speed)]
+    quantum = wish.quantum or (2 * math.pi / 16_000,) * sampled.C.shape[0]
+    estimators = [velocities(model, sampled, s, wish.memory, wish.limit or 1.0, quantum) for s in SPEEDS]
+    estimator = estimators[SPEEDS.index(wish.speed)]
     wanted = placement.asked if placement is not None else poles_of(model.A - model.B @ K)
     gains = None if wish.speed == "kalman" else design.place_sampled(sampled, estimator, wanted)
     if wish.sampled and gains is None:
@@ -169,7 +172,7 @@ def design_for(rig: RigFile, wish: Wish) -> Designed:
         k_pf = design.prefilter(model.A, model.B, model.C[model.outputs.index(wish.track)], used)
     law = design.feedback(estimator, used, k_pf or 0.0)
     back = motion(model.A, model.B, K, start)
-    ways = tuple(_way(model, sampled, e, used, wish) for e in estimators)
+    ways = tuple(_velocity_loop(model, sampled, e, used, quantum) for e in estimators)
     cloud, chance = _cloud(rig, wish, sampled, law)
     return Designed(
         rig=rig, wish=wish, model=model, sampled=sampled, K=used, continuous=K, placement=placement,
@@ -187,39 +190,53 @@ def _peak(sampled: Sampled, law: Feedback, start: Array, seconds: float) -> floa
     return float(np.abs(swing(sampled, law, start, samples)[1]).max())
 
 
-def _tilt(rig: RigFile) -> Array:
+def _tilt(rig: IdentifiedRig) -> Array:
     """Five degrees, or 5 cm, of the last coordinate."""
     x = np.zeros(2 * len(rig.plant.coordinates))
     x[-2] = math.radians(5) if rig.plant.coordinates[-1].unit == "rad" else 0.05
     return x
 
 
-def _estimators(sampled: Sampled, wish: Wish, reach: Array) -> Sequence[Estimator]:
-    quantum = wish.quantum or (2 * math.pi / 16_000,) * sampled.C.shape[0]
-    # every coordinate by itself as much as a tenth of the limit, or of the unit, would: what the model does not know
-    shaking = design.shaken(sampled, 0.1 * (wish.limit or 1.0) * reach)
-    return (
-        design.difference(sampled),
-        design.filtered(sampled, wish.memory),
-        design.kalman(sampled, shaking, np.array(quantum) / math.sqrt(12)),
-    )
+def velocities(
+    model: Linear, sampled: Sampled, speed: str, memory: float, limit: float, quantum: ArrayLike
+) -> Estimator:
+    """States from encoders in one of the ways of `SPEEDS`.
+
+    Parameters
+    ----------
+    model, sampled : Linear and Sampled
+        From the command to the coordinates.
+    speed : str
+    memory : float
+        Of the filtered difference.
+    limit : float
+        Largest command. For the Kalman filter every coordinate is shaken by itself as much as a tenth of it would:
+        pushes, friction, what the model leaves out.
+    quantum : float or array
+        Step of each encoder [m or rad].
+    """
+    if speed == "kalman":
+        shaking = design.shaken(sampled, 0.1 * limit * np.abs(model.B[1::2, 0]))
+        return design.kalman(sampled, shaking, np.asarray(quantum) / math.sqrt(12))
+    return design.filtered(sampled, memory if speed == "filtered" else 0.0)
 
 
-def _way(model: Linear, sampled: Sampled, estimator: Estimator, K: Array, wish: Wish) -> Way:
-    quantum = wish.quantum or (2 * math.pi / 16_000,) * sampled.C.shape[0]
+def _velocity_loop(
+    model: Linear, sampled: Sampled, estimator: Estimator, K: Array, quantum: tuple[float, ...]
+) -> VelocityLoop:
     law = design.feedback(estimator, K)
     poles = poles_of(closed(sampled, law))
     stands = bool(np.abs(poles).max() < 1)
-    return Way(
+    return VelocityLoop(
         name=estimator.name,
         speed_noise=estimator.noise(quantum)[1 : model.A.shape[0] : 2],
         command_noise=command_noise(sampled, law, quantum) if stands else None,
         margins=design.margins(model, sampled, law) if stands else None,
-        poles=to_s(poles, wish.period),
+        poles=to_s(poles, sampled.period),
     )
 
 
-def _cloud(rig: RigFile, wish: Wish, nominal: Sampled, law: Feedback) -> tuple[Roots, float | None]:
+def _cloud(rig: IdentifiedRig, wish: DesignRequest, nominal: Sampled, law: Feedback) -> tuple[Roots, float | None]:
     """Poles [1/s] of the loop with these gains on every rig that the fit allows, and the share that stands."""
     rows = [
         poles_of(closed(design.hold(m, wish.period, nominal.delay, nominal.lag), law)) for m in rig.spread(wish.at)

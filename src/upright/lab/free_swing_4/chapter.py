@@ -8,12 +8,12 @@ from typing import Any
 
 from markupsafe import Markup
 
-from upright.identification import Fit
-from upright.lab.free_swing_4.drift import PUSH, TILT
-from upright.lab.free_swing_4.figures import Recovered, truth_figure
+from upright.identification.model.fit import Fit
+from upright.lab.free_swing_4.drift import TILT
+from upright.lab.free_swing_4.figures import truth_figure
 from upright.lab.free_swing_4.parts import blind_part, drift_part, energy_part, level_part
 from upright.lab.free_swing_4.run import FreeSwing
-from upright.lab.free_swing_4.studies import recovered
+from upright.lab.free_swing_4.studies import Recovered, recovered
 from upright.report.advice import Step
 from upright.report.chapter import Chapter, Finding
 from upright.report.document import motion, picture, rest_picture, run_pictures
@@ -85,18 +85,16 @@ def detail(done: FreeSwing) -> str:
             f" {math.degrees(TILT):g}° out of level, a level model cannot follow the disk (fit {percent(level)}),"
             f" one that may lean can ({percent(tilt)})."
         )
-    if done.wanders and done.rig.base == "psi":
-        free, held = (
-            next(w for w in done.wanders if "out of level" in w.name and w.remedy == r) for r in (False, True)
-        )
+    if done.drifts and done.body == "disk":
+        free, held = (next(w for w in done.drifts if "out of level" in w.name and w.remedy == r) for r in (False, True))
         said += (
             f" That lean drags the free disk away by {math.degrees(abs(free.end)):.0f}°;"
             f" a soft spring keeps it within {math.degrees(abs(held.end)):.0f}°."
         )
-    elif done.wanders:
-        free, held = (next(w for w in done.wanders if "pushed" in w.name and w.remedy == r) for r in (False, True))
+    elif done.drifts:
+        free, held = (next(w for w in done.drifts if "pushed" in w.name and w.remedy == r) for r in (False, True))
         said += (
-            f" A push of {PUSH['x']:g} m/s at the release leaves the cart {100 * abs(free.end):.1f} cm away,"
+            f" A push of {done.make.push:g} m/s at the release leaves the cart {100 * abs(free.end):.1f} cm away,"
             f" where dry friction holds it; a soft spring brings it back to {100 * abs(held.end):.1f} cm."
         )
     return said.strip()
@@ -117,10 +115,10 @@ def _worst(fit: Fit) -> float:
 
 def _data(done: FreeSwing) -> tuple[str, ...]:
     rig = done.rig
-    pole = number(float(rig.truth.linear("inverted").poles().real.max()), 4)
+    pole = number(float(rig.plant.linear("inverted").poles().real.max()), 4)
     drive = (
         "drive belt off, so that the disk turns on its own bearings"
-        if rig.base == "psi"
+        if done.body == "disk"
         else "motor silent, pulled along by the cart"
     )
     body = f"the {done.body}'s inertia from experiment 1a" if done.weighed else f"the {done.body}'s inertia to 1 %"
@@ -169,8 +167,8 @@ def _parameters(fit: Fit, found: tuple[Recovered, ...]) -> Part:
 
 def _steps(done: FreeSwing) -> tuple[Step, ...]:
     folder: Path = done.folder
-    again, other = ("tilt_model", "level_model") if done.rig.base == "psi" else ("no_scale", "no_scale")
-    predicted = "the rig out of level" if done.rig.base == "psi" else "the study without an inertia"
+    again, other = ("tilt_model", "level_model") if done.body == "disk" else ("no_scale", "no_scale")
+    predicted = "the rig out of level" if done.body == "disk" else "the study without an inertia"
     return (
         Step(sentence="Repeat a fit from its files, change a guess or a bound, and see what moves:",
              command=f"upright identify {typed(folder / f'{again}.toml')} -o {typed(folder / 'again')}"),
@@ -198,6 +196,6 @@ def _numbers(done: FreeSwing) -> dict[str, Any]:
             }
             for name, a in answers.items()
         },
-        "drift": {w.name: {"slope": w.slope, "end": w.end} for w in done.wanders},
+        "drift": {w.name: {"slope": w.slope, "end": w.end} for w in done.drifts},
         "seconds": done.seconds,
     }

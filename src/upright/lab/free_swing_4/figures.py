@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from upright.lab.free_swing_4.drift import DriftPath
+from upright.lab.free_swing_4.studies import Recovered
 from upright.report.drawing import (
     BLUE,
     CYCLE,
@@ -27,47 +28,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Wander:
-    """Path of one disk, or cart, after a release.
-
-    Attributes
-    ----------
-    name : str
-        What was done to the rig.
-    remedy : bool
-        Whether the spring was on.
-    t, psi, centre : (N,) arrays
-        Time [s], angle [rad] or place [m], and the line about which it swings.
-    slope : float
-        Drift [rad/s or m/s]: slope of the straight line closest to the path.
-    end : float
-        Where it is in the last seconds, from where it was at the release.
-    """
-
-    name: str
-    remedy: bool
-    t: Array
-    psi: Array
-    centre: Array
-    slope: float
-    end: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class Recovered:
-    """One number: truth of the twin, what the fit says, and whether the truth lies in its interval."""
-
-    name: str
-    unit: str
-    truth: float
-    value: float
-    interval: tuple[float, float]
-    inside: bool
-
-
 @styled
-def drift_figure(paths: Sequence[Wander], body: str = "disk") -> Figure:
+def drift_figure(paths: Sequence[DriftPath], body: str = "disk") -> Figure:
     """Angle of the disk (or place of the cart) over time, free on the left, anchored on the right, one scale."""
     factor, what = (180 / math.pi, "angle of the disk [°]") if body == "disk" else (100.0, f"place of the {body} [cm]")
     drawing = figure(3.3, margins=(0.62, 0.1, 0.3, 0.42))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from upright.identification import Fit
-from upright.lab.free_swing_4.drift import PUSH, SPRING, TILT
+from upright.identification.model.fit import Fit
+from upright.lab.free_swing_4.drift import TILT
 from upright.lab.free_swing_4.figures import drift_figure, energy_figure
 from upright.lab.free_swing_4.run import FreeSwing
 from upright.report.certainty import directions_figure
@@ -52,30 +52,30 @@ def energy_part(done: FreeSwing) -> list[Part]:
 
 def drift_part(done: FreeSwing) -> list[Part]:
     """Where disk or cart go, and what keeps them."""
-    if not done.wanders:
+    if not done.drifts:
         return []
-    body, base = done.body, done.rig.base
-    factor, angle = (180 / math.pi, "°") if base == "psi" else (100.0, "cm")
+    body, push, anchor = done.body, done.make.push, done.make.anchor
+    factor, angle = (180 / math.pi, "°") if body == "disk" else (100.0, "cm")
     told = (
         f"Only friction acts about the axis of a level, free disk. Released at rest, its momentum about that axis "
         f"stays zero: the disk swings about a fixed line and creeps home as friction takes hold. A push of "
-        f"{PUSH['psi']:g} rad/s at the release gives it momentum; an axis {math.degrees(TILT):g}° out of level gives "
-        f"gravity a lever, and the arm goes looking for its lowest place. A spring of {SPRING['psi']:g} N m/rad, the "
+        f"{push:g} rad/s at the release gives it momentum; an axis {math.degrees(TILT):g}° out of level gives "
+        f"gravity a lever, and the arm goes looking for its lowest place. A spring of {anchor:g} N m/rad, the "
         "remedy the paper proposes, gives it a home."
-        if base == "psi"
+        if body == "disk"
         else "Only friction acts along a level rail. Released at rest, the momentum along it stays zero but for what "
-        f"friction rubs away: the cart swings about a line that creeps. A push of {PUSH['x']:g} m/s at the release "
-        f"carries it off, and dry friction keeps it there. A spring of {SPRING['x']:g} N/m gives it a home."
+        f"friction rubs away: the cart swings about a line that creeps. A push of {push:g} m/s at the release "
+        f"carries it off, and dry friction keeps it there. A spring of {anchor:g} N/m gives it a home."
     )
-    ends = ", ".join(f"{w.name} {factor * w.end:.1f} {angle}" for w in done.wanders)
+    ends = ", ".join(f"{w.name} {factor * w.end:.1f} {angle}" for w in done.drifts)
     shown = picture(
-        drift_figure(done.wanders, body), "drift", description=f"At the end: {ends}.",
+        drift_figure(done.drifts, body), "drift", description=f"At the end: {ends}.",
         caption=f"Path of the {body} after the same release (thin) and the line about which it swings (bold).",
     )  # fmt: skip
     table = Table(
         caption=f"Drift of the {body} over 24 s after a release from horizontal",
         headings=("rig", f"slope [{angle}/s]", f"place at the end, from the release [{angle}]"),
-        rows=tuple((w.name, number(factor * w.slope, 2), number(factor * w.end, 2)) for w in done.wanders),
+        rows=tuple((w.name, number(factor * w.slope, 2), number(factor * w.end, 2)) for w in done.drifts),
         numbers=(1, 2),
     )
     return [Part(title=f"Why the {body} wanders", sentences=(told,), pictures=(shown,), tables=(table,))]

@@ -1,4 +1,4 @@
-"""How does experiment 4 go, from release to report?"""
+"""Experiment 4, from release to fits, drift and the balance of energy."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.control.rig import Rig
-from upright.lab.free_swing_4 import drift, energy
-from upright.lab.free_swing_4 import studies as free_swing
-from upright.lab.free_swing_4.studies import Answer
-from upright.lab.rigs.twin import SERVO, Twin, freed, motion
+from upright.lab.free_swing_4.drift import DriftPath, drift_paths
+from upright.lab.free_swing_4.release import carrier, freed, motion
+from upright.lab.free_swing_4.studies import Answer, fit_question, write_questions
+from upright.lab.makes import SERVO, Make, make_of
 from upright.lab.weighing_1a.run import Known
-from upright.progress import Progress
+from upright.physics import Plant
+from upright.progress import Progress, silent
 
 Array = NDArray[np.float64]
 
@@ -35,26 +36,31 @@ class Balance:
 class FreeSwing:
     """What has been found so far; it is filled step by step, so that an interrupted one can be reported."""
 
-    rig: Twin
+    rig: Rig
     folder: Path
     weighed: Known | None = None
     answers: dict[str, Answer] = field(default_factory=dict[str, Answer])
-    wanders: tuple[drift.Wander, ...] = ()
+    drifts: tuple[DriftPath, ...] = ()
     balance: Balance | None = None
     interrupted: bool = False
     seconds: float = 0.0
 
     @property
+    def make(self) -> Make:
+        """Make of the rig."""
+        return make_of(self.rig.plant)
+
+    @property
     def body(self) -> str:
         """What carries the pendulum."""
-        return "disk" if self.rig.base == "psi" else "cart"
+        return "disk" if carrier(self.rig) == "psi" else "cart"
 
 
-def run(
+def run_free_swing(
     rig: Rig,
     seed: int,
     folder: Path,
-    progress: Progress | None = None,
+    progress: Progress = silent,
     stopped: Callable[[], bool] = lambda: False,
     *,
     weighed: Known | None = None,
@@ -75,21 +81,20 @@ def run(
         Asked after each fit whether to stop there; a fit may finish on its best so far when Ctrl-C is pressed.
     weighed : Known, optional
         Inertia of disk or cart as experiment 1a found it.
-    """  # fmt: skip
+    """
     began = time.perf_counter()
     done = FreeSwing(rig=freed(replace(rig, seed=seed)), folder=folder, weighed=weighed)
-    tell = progress or (lambda step, share: None)
     with _kept(done):
-        tell("releasing the pendulum", 0.0)
-        asked = free_swing.write(done.rig, folder, weighed)
+        progress("releasing the pendulum", 0.0)
+        asked = write_questions(done.rig, folder, weighed)
         for i, (question, path) in enumerate(asked):
             base, part = 0.05 + 0.85 * i / len(asked), 0.85 / len(asked)
-            found = free_swing.answer(question, path, lambda step, share, b=base, p=part: tell(step, b + p * share))
+            found = fit_question(question, path, lambda step, share, b=base, p=part: progress(step, b + p * share))
             done.answers[question.name] = found
             if found.fit.interrupted or stopped():
                 raise KeyboardInterrupt
-        tell("following the body that carries it", 0.9)
-        done.wanders = drift.study(done.rig)
+        progress("following the body that carries it", 0.9)
+        done.drifts = drift_paths(done.rig)
         done.balance = balance(done)
     done.seconds = time.perf_counter() - began
     return done
@@ -108,9 +113,32 @@ def balance(done: FreeSwing) -> Balance:
     fit = done.answers["free_swing"].fit
     values = {n: p.value for n, p in fit.rig.parameters.items() if n in fit.rig.plant.names()}
     values |= {n: e.value for n, e in fit.estimates.items() if n in values}
-    model = done.rig.truth.replace(**values)
-    t, x = motion(replace(done.rig, truth=model), seconds=12.0, every=1)
+    model = done.rig.plant.replace(**values)
+    t, x = motion(replace(done.rig, plant=model), seconds=12.0, every=1)
     stored = model.energy(x) - float(model.energy(model.state()))
-    taken = energy.losses(model, t, x)
+    taken = losses(model, t, x)
     every = max(1, round(0.02 / SERVO))
     return Balance(t=t[::every], stored=stored[::every], taken={n: e[::every] for n, e in taken.items()})
+
+
+def losses(plant: Plant, t: Array, x: Array) -> dict[str, Array]:
+    """Energy [J] that each kind of friction has taken since the first sample, shape (N,) each, by a readable name.
+
+    Viscous power is Rayleigh's, joint by joint where a coordinate has its own; dry friction takes F_c |v|, quadratic
+    drag c |v|^3. Stiction takes nothing while it holds. Integrated by the trapezoid rule, so the samples must be
+    close to each other.
+    """
+    taken: dict[str, Array] = {}
+    values = plant.parameters()
+    taken["viscous friction"] = _running(t, plant.power_lost(x))
+    for joint in plant.joints:
+        i = plant.state_names().index(f"{joint.on}_dot")
+        speed = np.abs(x[:, i])
+        for kind, name, power in (("Coulomb friction", joint.coulomb, speed), ("drag", joint.quadratic, speed**3)):
+            if name and values[name] > 0:
+                taken[f"{kind} of {joint.on}"] = _running(t, values[name] * power)
+    return {name: energy for name, energy in taken.items() if energy[-1] > 0}
+
+
+def _running(t: Array, power: Array) -> Array:
+    return np.concatenate([[0.0], np.cumsum(np.diff(t) * (power[1:] + power[:-1]) / 2)])

@@ -1,4 +1,4 @@
-"""Experiment 4: lift the pendulum to horizontal, let go, and find the rig's numbers in what the encoders saw.
+"""The logs, studies and fits of experiment 4: the rig's numbers, found in what the encoders saw of a release.
 
 Every step leaves files that anyone can work on: logs (CSV) and study files (TOML) that `upright identify` takes.
 """
@@ -12,14 +12,16 @@ from pathlib import Path
 
 import numpy as np
 
-from upright.identification import Fit
-from upright.lab.free_swing_4.drift import SPRING, TILT, anchored
-from upright.lab.free_swing_4.figures import Recovered
-from upright.lab.rigs.twin import MOTOR_AND_BELT, Release, Twin, acquire
+from upright.control.rig import Rig
+from upright.identification.model.fit import Fit
+from upright.lab.free_swing_4.drift import TILT, anchored
+from upright.lab.free_swing_4.release import Release, acquire, carrier
+from upright.lab.makes import MOTOR_AND_BELT, make_of
 from upright.lab.weighing_1a.run import Known
 from upright.progress import Progress, part, silent
 from upright.records import Record
 from upright.study.load import Study
+from upright.study.write import Table, counted_sensor, number, study_text, table
 
 FRICTION = ("b_1", "b_1c", "b_2", "b_2c")
 
@@ -31,7 +33,7 @@ class Question:
     name: str
     title: str
     fitted: str
-    predicted: str = ""
+    predicted: str
     known: Mapping[str, tuple[float, float]]
     asked: Mapping[str, float]
     bounds: Mapping[str, tuple[float, float]]
@@ -48,14 +50,26 @@ class Answer:
     fit: Fit
 
 
-def logs(rig: Twin) -> dict[str, Record]:
+@dataclass(frozen=True, kw_only=True)
+class Recovered:
+    """One number: truth of the twin, what the fit says, and whether the truth lies in its interval."""
+
+    name: str
+    unit: str
+    truth: float
+    value: float
+    interval: tuple[float, float]
+    inside: bool
+
+
+def logs(rig: Rig) -> dict[str, Record]:
     """The releases of the experiment by the name of their file: level, out of level, and anchored by a spring.
 
     A cart does without the last two: a lean too small to see does not move what sticks.
     """
     low = Release(angle=math.radians(-60))
     out = {"release_90.csv": acquire(rig, shot=1), "release_60.csv": acquire(rig, low, shot=2)}
-    if rig.base == "psi":
+    if carrier(rig) == "psi":
         leaning = rig.changed(tilt_y=math.sin(TILT))
         out["release_90_tilted.csv"] = acquire(leaning, shot=3)
         out["release_60_tilted.csv"] = acquire(leaning, low, shot=4)
@@ -64,15 +78,15 @@ def logs(rig: Twin) -> dict[str, Record]:
     return out
 
 
-def bench(rig: Twin, weighed: Known | None = None) -> dict[str, tuple[float, float]]:
+def bench(rig: Rig, weighed: Known | None = None) -> dict[str, tuple[float, float]]:
     """What was measured beforehand: value and standard uncertainty [SI].
 
     The inertia of disk or cart comes from experiment 1a (`weighed`; 1 % without it), the lengths from a ruler and from
     balancing the rod on an edge; the rod's axial inertia, 0.2 % of the disk's, from a drawing.
     """
     rng = np.random.default_rng([rig.seed, 41])
-    truth = rig.truth.parameters()
-    body = "J_d" if rig.base == "psi" else "m_c"
+    truth = rig.plant.parameters()
+    body = make_of(rig.plant).body
     spread = {body: 0.01 * truth[body], "l_cg": 0.5e-3, "r": 0.3e-3}
     measured = {n: (truth[n] + rng.normal(0, s), s) for n, s in spread.items() if n in truth}
     if weighed and weighed.name == body:
@@ -81,10 +95,10 @@ def bench(rig: Twin, weighed: Known | None = None) -> dict[str, tuple[float, flo
     return measured | ({"J_a": (truth["J_a"], 0.0)} if "J_a" in truth else {})
 
 
-def questions(rig: Twin, weighed: Known | None = None) -> tuple[Question, ...]:
+def questions(rig: Rig, weighed: Known | None = None) -> tuple[Question, ...]:
     """The fits of the experiment, all from guesses that are 30 % off."""
     rng = np.random.default_rng([rig.seed, 42])
-    guess = {n: getattr(rig.truth, n) * rng.choice([0.7, 1.3]) for n in ("m_p", "J_p", *FRICTION)}
+    guess = {n: getattr(rig.plant, n) * rng.choice([0.7, 1.3]) for n in ("m_p", "J_p", *FRICTION)}
     known = bench(rig, weighed)
     scale = {"J_d": 1.3, "J_a": 0.7, "m_c": 1.3}
     blind = {n: v for n, v in known.items() if n not in scale}
@@ -106,9 +120,10 @@ def questions(rig: Twin, weighed: Known | None = None) -> tuple[Question, ...]:
         ask("free_swing", "Large free swing of a level rig", "", known),
         ask("no_scale", "The same swing, no inertia given", "", blind, **free),
     )
-    if rig.base != "psi":
+    if carrier(rig) != "psi":
         return both
-    spring = {**known, "k_psi": (SPRING["psi"], 0.01 * SPRING["psi"])}
+    anchor = make_of(rig.plant).anchor
+    spring = {**known, "k_psi": (anchor, 0.01 * anchor)}
     return (
         *both,
         # no friction term helps a model that cannot lean, so none is tried one by one
@@ -125,46 +140,41 @@ def questions(rig: Twin, weighed: Known | None = None) -> tuple[Question, ...]:
     )
 
 
-def study_text(q: Question, rig: Twin) -> str:
+def question_text(q: Question, rig: Rig) -> str:
     """The question as a study file."""
-    lines = [
-        f'title = "{q.title}"',
-        f'source = "digital twin of {rig.name}, seed {rig.seed}: simulated, no rig was touched"',
-        "",
-        "[rig]",
-        f'plant = "{"furuta" if rig.base == "psi" else "cart-pendulum"}"',
-        "",
-        "[parameters]",
-    ]
+    kind, source = type(rig.plant), f"digital twin of {rig.name}, seed {rig.seed}: simulated, no rig was touched"
+
+    def wearing_unit(name: str, value: float) -> float | str:
+        unit = kind.quantity(name).unit
+        return value if unit == "1" else number(value, unit, 6)
+
+    parameters = Table("[parameters]")
     for name, (value, spread) in q.known.items():
-        number = _with_unit(rig, name, value)
-        lines.append(
-            f"{name} = {{ value = {number}, uncertainty = {_with_unit(rig, name, spread)} }}"
-            if spread
-            else f"{name} = {number}"
-        )
+        known, uncertainty = wearing_unit(name, value), wearing_unit(name, spread)
+        parameters.key(name, {"value": known, "uncertainty": uncertainty} if spread else known)
     for name, guess in q.asked.items():
         low, high = q.bounds.get(name, (0.0, math.inf))
-        limits = f", min = {low:g}" + (f", max = {high:g}" if math.isfinite(high) else "")
-        lines.append(f"{name} = {{ guess = {_with_unit(rig, name, guess)}{limits} }}")
-    for c, counts in zip(rig.truth.coordinates, rig.counts, strict=True):
-        scale = f"counts_per_rev = {counts * 2 * math.pi:.10g}" if c.unit == "rad" else f"counts_per_m = {counts:.10g}"
-        lines += ["", f"[sensors.{c.name}]", f'column = "{c.name}"', 'unit = "counts"', scale]
-    for role, file in (("fit", q.fitted), ("predict", q.predicted)):
-        if file:
-            lines += ["", "[[runs]]", f'label = "{file.removesuffix(".csv").replace("_", " ")}"', f'file = "{file}"']
-            lines += [f'role = "{role}"']
-    lines += ["", "[defaults]", f"initial = {{ {rig.base}_dot = 0.0, theta_dot = 0.0 }}  # released from rest"]
-    lines += [f"unknown = {list(q.unknown)}".replace("'", '"')]
-    return "\n".join(lines) + "\n"
+        bounds = {"min": low} | ({"max": high} if math.isfinite(high) else {})
+        parameters.key(name, {"guess": wearing_unit(name, guess), **bounds})
+    defaults = Table("[defaults]")
+    defaults.key("initial", {f"{carrier(rig)}_dot": 0.0, "theta_dot": 0.0}, "released from rest")
+    defaults.key("unknown", q.unknown)
+    return study_text(
+        (
+            table("", title=q.title, source=source),
+            table("[rig]", plant=make_of(rig.plant).plant_name),
+            parameters,
+            *(counted_sensor(c.name, c.unit, n) for c, n in zip(rig.plant.coordinates, rig.counts, strict=True)),
+            *(
+                table("[[runs]]", label=file.removesuffix(".csv").replace("_", " "), file=file, role=role)
+                for role, file in (("fit", q.fitted), ("predict", q.predicted))
+            ),
+            defaults,
+        )
+    )
 
 
-def _with_unit(rig: Twin, name: str, value: float) -> str:
-    unit = type(rig.truth).quantity(name).unit
-    return f'"{value:.6g} {unit}"' if unit != "1" else f"{value:.6g}"
-
-
-def write(rig: Twin, folder: Path, weighed: Known | None = None) -> tuple[tuple[Question, Path], ...]:
+def write_questions(rig: Rig, folder: Path, weighed: Known | None = None) -> tuple[tuple[Question, Path], ...]:
     """Write logs and studies; gives back each question with its study file."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, record in logs(rig).items():
@@ -172,12 +182,12 @@ def write(rig: Twin, folder: Path, weighed: Known | None = None) -> tuple[tuple[
     made: list[tuple[Question, Path]] = []
     for q in questions(rig, weighed):
         path = folder / f"{q.name}.toml"
-        path.write_text(study_text(q, rig), encoding="utf-8")
+        path.write_text(question_text(q, rig), encoding="utf-8")
         made.append((q, path))
     return tuple(made)
 
 
-def answer(q: Question, study: Path, progress: Progress = silent) -> Answer:
+def fit_question(q: Question, study: Path, progress: Progress = silent) -> Answer:
     """Fit one question from its files, as `upright identify` would."""
     from upright.identification.estimate import identify
     from upright.study.load import load_study
@@ -187,9 +197,9 @@ def answer(q: Question, study: Path, progress: Progress = silent) -> Answer:
     return Answer(question=q, study=loaded, fit=identify(loaded.rig, loaded.runs, method=q.method, progress=tell))
 
 
-def recovered(rig: Twin, fit: Fit) -> tuple[Recovered, ...]:
+def recovered(rig: Rig, fit: Fit) -> tuple[Recovered, ...]:
     """The estimates of a fit beside the truth that only a twin can tell."""
-    truth = rig.truth.parameters()
+    truth = rig.plant.parameters()
     return tuple(
         Recovered(
             name=n,

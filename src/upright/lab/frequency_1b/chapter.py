@@ -8,8 +8,8 @@ import numpy as np
 
 from upright.identification import Estimate
 from upright.identification.frequency.answer import Answer, digits, key_value
-from upright.lab.frequency_1b.own_log import Found
-from upright.lab.frequency_1b.run import BENCH, Result
+from upright.lab.frequency_1b.from_logs import LoggedResponse
+from upright.lab.frequency_1b.run import FrequencyRun
 from upright.lab.frequency_1b.tables import (
     answer_parts,
     bode_picture,
@@ -34,7 +34,7 @@ _ASKED = {
 }
 
 
-def chapter(done: Result) -> Chapter:
+def chapter(done: FrequencyRun) -> Chapter:
     """Experiment 1b as a chapter."""
     answer = done.answer
     true = true_key(done)
@@ -57,14 +57,14 @@ def chapter(done: Result) -> Chapter:
             Part(title="What was asked", sentences=_campaign(done), pictures=(quality_picture(answer.data),)),
             *answer_parts(answer, truth=done.truth, known=_bench(done)),
         ),
-        steps=steps(answer, done.folder, done.make),
+        steps=steps(answer, done.folder, done.make.key),
         findings=(_finding(answer, number_of, true), *_found(done)),
         numbers=numbers(answer, truth=done.truth, key=true)
         | {"at_the_rig": done.sweep.seconds, "seconds": done.seconds},
     )  # fmt: skip
 
 
-def true_key(done: Result) -> float:
+def true_key(done: FrequencyRun) -> float:
     """The key number of the twin itself."""
     at, what, _ = done.answer.key
     poles = done.rig.plant.linear(at).poles()
@@ -82,7 +82,7 @@ def _finding(answer: Answer, found: Estimate, true: float) -> Finding:
     )  # fmt: skip
 
 
-def _found(done: Result) -> list[Finding]:
+def _found(done: FrequencyRun) -> list[Finding]:
     """Inertia of the pendulum and gain of the drive, which nobody weighs."""
     out: list[Finding] = []
     for name, what in (("J_p", "J_p"), ("actuator.gain", "gain of the drive")):
@@ -98,7 +98,7 @@ def _found(done: Result) -> list[Finding]:
     return out
 
 
-def _campaign(done: Result) -> tuple[str, ...]:
+def _campaign(done: FrequencyRun) -> tuple[str, ...]:
     data = done.answer.data
     settle = np.array([d.settle for d in done.sweep.dwells])
     waited = settle[np.isfinite(settle)]
@@ -119,9 +119,9 @@ def _campaign(done: Result) -> tuple[str, ...]:
     return tuple(told)
 
 
-def _bench(done: Result) -> str:
-    names = ", ".join(f"{n} to {100 * s:g} %" for n, s in BENCH[done.make].items())
-    weighed = {n: p for n, p in done.answer.rig.parameters.items() if p.uncertainty and n not in BENCH[done.make]}
+def _bench(done: FrequencyRun) -> str:
+    names = ", ".join(f"{n} to {100 * s:g} %" for n, s in done.make.bench.items())
+    weighed = {n: p for n, p in done.answer.rig.parameters.items() if p.uncertainty and n not in done.make.bench}
     if weighed:
         shares = ", ".join(f"{n} to {100 * p.uncertainty / p.value:.2g} %" for n, p in weighed.items())
         names += f"; from experiment 1a: {shares}"
@@ -154,7 +154,7 @@ def steps(answer: Answer, folder: Path, make: str) -> tuple[Step, ...]:
     )
 
 
-def of_log(found: Found) -> Chapter:
+def of_log(found: LoggedResponse) -> Chapter:
     """What logs of one's own say, in the same frame."""
     data, answer = found.response, found.answer
     span = f"{data.omega[0]:.3g} to {data.omega[-1]:.3g} rad/s"

@@ -1,45 +1,43 @@
-"""How is a rig asked frequency by frequency? Stepped sines on a twin, each as strong as motion and drive allow.
+"""Frequency responses of a twin: stepped sines, each as strong as motion and drive allow, a multisine, or a sweep.
 
-A probe at every frequency shows what a volt does there; the sweep then asks for the amplitude that keeps clear of
-stiction, of the encoders' resolution, of the drive's limit and of the ends of travel. Each sine goes on until its
-transient has died away, told from the data, and is then measured over whole periods.
+A probe at every frequency shows what a volt does there; the stepped sines then ask for the amplitude that keeps clear
+of stiction, of the encoders' resolution, of the drive's limit and of the ends of travel. Each sine goes on until its
+transient has died away, told from the data, and is then measured over whole periods. A periodic multisine, or a sweep
+up and down, is quicker, at a price: each frequency moves the rig less, so dry friction weighs more, and what it adds
+at one frequency stands under the answer at another.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from upright.control import Rig
+from upright.errors import BadInput
 from upright.identification.frequency.detection import Tone, by_period, detect, settled
 from upright.identification.frequency.response import FrequencyResponse
-from upright.identification.frequency.spectra import from_tones
-from upright.records import Provenance, Record
+from upright.identification.frequency.spectra import chirp, from_tones, multisine, odd_lines, response_of
+from upright.lab.makes import Make, make_rig
+from upright.records import Record
+from upright.records.provenance import of_twin
 
 Array = NDArray[np.float64]
 
 EVERY = 4  # servo periods per logged sample
-REACH: Mapping[str, float] = {
-    "psi": 0.6,
-    "theta": 0.18,
-    "x": 0.025,
-    "x_1": 0.02,
-    "x_2": 0.02,
-    "theta_1": 0.4,
-    "theta_2": 0.4,
-}
-"""Amplitude asked of each coordinate [m or rad]: pendulum nearly linear, carts clear of their stops."""
-SPEED: Mapping[str, float] = {"psi": 3.0}
-"""Speed not to be exceeded: an arm whose mean square speed comes near g/l flings its hanging pendulum out."""
 SHARE = 0.8
 """Of the drive's limit."""
 RISE = 4.0
 """A command grows so slowly that it hardly starts the free swing [s], three periods at least."""
 PROBES = 6
+LENGTH = 4096
+"""Logged samples in one period of a multisine."""
+LINES = 20
+PERIODS = 10
+SWEEP = 40.0
+"""Time for one sweep, up or down [s]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -118,40 +116,31 @@ def sines(rig: Rig, lengths: NDArray[np.int64], amplitude: Array, seconds: float
     return u[::EVERY], np.round(shown * counts) / counts
 
 
-def stepped_sine(
-    rig: Rig, guess: Rig, *, low: float, high: float, count: int = 28, seconds: float = 40.0, periods: int = 6,
-    reach: Mapping[str, float] = REACH,
-) -> Sweep:  # fmt: skip
-    """Sweep a rig from `low` to `high` [rad/s].
+def stepped_sine(rig: Rig, make: Make, *, count: int = 28, seconds: float = 40.0, periods: int = 6) -> Sweep:
+    """Sweep a rig over the band of its make, sine after sine.
 
     Parameters
     ----------
     rig : Rig
         The twin.
-    guess : Rig
+    make : Make
         The rig as designed: all that is known when the first amplitude is chosen.
-    low, high : float
-        [rad/s]
     count : int
         Frequencies, rounded to whole logged samples per period.
     seconds : float
         Longest time spent on one of them.
     periods : int
         Least number of whole periods that are measured.
-    reach : mapping
-        Amplitude asked of each coordinate [m or rad].
     """
     tick = rig.period * EVERY
-    lengths = grid(low, high, count, tick)
+    lengths = grid(*make.band, count, tick)
     omega = 2 * math.pi / (lengths * tick)
-    names = tuple(c.name for c in rig.plant.coordinates)
-    goal = np.array([[min(reach.get(n, 0.3), SPEED.get(n, math.inf) / w) for n in names] for w in omega])
-    expected = np.abs(guess.linear(next(iter(guess.plant.equilibria))).response(omega)[:, :, 0])
-    amplitude = np.minimum(SHARE * rig.limit, np.min(goal / expected, axis=1))
+    goal = np.minimum(np.array(make.reach), np.array(make.fastest) / omega[:, None])
+    amplitude = np.minimum(SHARE * rig.limit, np.min(goal / _expected(make, omega), axis=1))
     amplitude = _probed(rig, lengths, amplitude, goal, seconds / 2)
     u, y = sines(rig, lengths, amplitude, seconds)
     dwells = tuple(
-        _dwell(rig, float(omega[i]), int(n), u[:, i], y[:, :, i], float(amplitude[i]), periods, names)
+        _dwell(rig, float(omega[i]), int(n), u[:, i], y[:, :, i], float(amplitude[i]), periods)
         for i, n in enumerate(lengths)
     )
     response = collect(dwells, rig)
@@ -181,9 +170,19 @@ def _peak(y: Array, length: int, tick: float) -> Array:
     return np.median(lines[-min(4, len(lines)) :], axis=0)
 
 
-def _dwell(
-    rig: Rig, omega: float, length: int, u: Array, y: Array, amplitude: float, periods: int, names: tuple[str, ...]
-) -> Dwell:
+def _log(rig: Rig, t: Array, u: Array, y: Array) -> Record:
+    names = tuple(c.name for c in rig.plant.coordinates)
+    return Record(
+        t=t,
+        signals={"u": u, **{n: y[:, j] for j, n in enumerate(names)}},
+        units={"u": rig.unit, **{c.name: c.unit for c in rig.plant.coordinates}},
+        inputs=("u",),
+        outputs=names,
+        provenance=of_twin(rig.name, rig.seed),
+    )
+
+
+def _dwell(rig: Rig, omega: float, length: int, u: Array, y: Array, amplitude: float, periods: int) -> Dwell:
     tick = rig.period * EVERY
     lines = by_period(y, length, tick)
     rounding = rig.quantum / math.sqrt(12) * math.sqrt(4 / length)
@@ -192,11 +191,7 @@ def _dwell(
     first = (len(lines) - wanted if at is None else at) * length
     part = slice(first, first + wanted * length)
     t = np.arange(y.shape[0]) * tick
-    columns = {"u": u[part], **{n: y[part, j] for j, n in enumerate(names)}}
-    units = {"u": rig.unit, **{c.name: c.unit for c in rig.plant.coordinates}}
-    record = Record(t=t[part], signals=columns, units=units, inputs=("u",), outputs=names,
-                    provenance=Provenance(reader="twin", rig=f"digital twin of {rig.name}, seed {rig.seed}",
-                                          notes=("This log was simulated; no rig was touched.",)))  # fmt: skip
+    record = _log(rig, t[part], u[part], y[part])
     return Dwell(
         omega=omega, amplitude=amplitude, settle=math.nan if at is None else first * tick, record=record,
         tone=detect(record.t, record.y, omega, quantum=rig.quantum),
@@ -212,3 +207,70 @@ def collect(dwells: tuple[Dwell, ...], rig: Rig) -> FrequencyResponse:
         [d.tone for d in dwells], [d.command for d in dwells], outputs=dwells[0].record.outputs,
         units=(*(c.unit for c in rig.plant.coordinates), rig.unit), hold=rig.period, notes=notes,
     )  # fmt: skip
+
+
+def broadband(rig: Rig, make: Make, kind: str, *, seed: int = 0) -> Sweep:
+    """Log and response of a twin asked at all frequencies of its make's band at once, from rest.
+
+    Parameters
+    ----------
+    rig : Rig
+    make : Make
+        The rig as designed, from which the command is shaped.
+    kind : {"multisine", "sweep"}
+    seed : int
+        Of the phases.
+    """
+    if kind not in ("multisine", "sweep"):
+        raise BadInput(f"a rig is asked by 'sines', a 'multisine' or a 'sweep', not by '{kind}'.")
+    tick, (low, high) = rig.period * EVERY, make.band
+    if kind == "multisine":
+        base = 2 * math.pi / (LENGTH * tick)
+        lines = odd_lines(low, high, LINES, base)
+        level = _level(make, lines * base)
+        wave = multisine(lines, level, LENGTH, seed=seed)
+        u = np.tile(wave, PERIODS)
+    else:
+        one = chirp(low, high, SWEEP, tick)
+        w = low * (high / low) ** (np.arange(one.size) / one.size)
+        one = one * _level(make, w)
+        u = np.concatenate([one, one[::-1]] * 3)
+    most = SHARE * rig.limit / float(np.abs(u).max())
+    scale = min(most, 1.0 if kind == "sweep" else 0.3)
+    for _ in range(6):  # probes: friction makes the motion less than in proportion
+        y = _moved(rig, scale * u)
+        over = float(np.max(np.ptp(y[y.shape[0] // 3 :], axis=0) / (2.5 * np.array(make.reach))))
+        scale = min(scale / float(np.clip(over, 0.4, 2.5)), most)
+    u = np.round(scale * u / rig.converter) * rig.converter if rig.converter else scale * u
+    y = _moved(rig, u)
+    record = _log(rig, np.arange(u.size, dtype=np.float64) * tick, u, y)
+    response = response_of(
+        [record],
+        command="u",
+        outputs=record.outputs,
+        kind=kind,
+        hold=tick,
+        quantum=rig.quantum.tolist(),
+        band=(low, high),
+    )
+    return Sweep(dwells=(), response=response, seconds=float(np.ptp(record.t)), log=record)
+
+
+def _expected(make: Make, omega: ArrayLike) -> Array:
+    """Motion per volt of the rig as designed, its dry friction left out, shape (frequencies, coordinates)."""
+    design = make_rig(make.key)
+    return np.abs(design.linear(next(iter(design.plant.equilibria))).response(omega)[:, :, 0])
+
+
+def _level(make: Make, omega: ArrayLike) -> Array:
+    """Relative command at each frequency: as much as the most mobile coordinate stands."""
+    return np.minimum(make.limit, np.min(np.array(make.reach) / _expected(make, omega), axis=1))
+
+
+def _moved(rig: Rig, u: Array) -> Array:
+    """What the encoders show (N, coordinates), the command held for a logged sample."""
+    from upright.simulation import simulate
+
+    held = np.repeat(u, EVERY)
+    x = simulate(rig.plant, rig.drive, rig.plant.state(), held, rig.period, samples=u.size, every=EVERY)[:, 0::2, 0]
+    return np.round(x * rig.shown / rig.quantum) * rig.quantum

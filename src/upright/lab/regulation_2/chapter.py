@@ -9,7 +9,7 @@ from upright.control import Score
 from upright.control.preflight import word
 from upright.design.requests import written
 from upright.lab.regulation_2.figures import Panel, chances_figure, runs_figure, ways_figure
-from upright.lab.regulation_2.run import SETS, Regulation, Way
+from upright.lab.regulation_2.run import SETS, Regulation, VelocityRun
 from upright.lab.regulation_2.sentences import detail, numbers, sentence, shown, verdict
 from upright.report.advice import Step
 from upright.report.chapter import Chapter, Finding
@@ -96,7 +96,7 @@ def _figures(done: Regulation, s: Score) -> tuple[str, ...]:
 def way_table(done: Regulation) -> Table:
     """Plain and filtered differences and the Kalman filter, with the same gains from the same start."""
 
-    def row(w: Way) -> tuple[str, ...]:
+    def row(w: VelocityRun) -> tuple[str, ...]:
         return (
             w.name, "falls" if w.noise is None else number(w.noise, 2), number(w.restless, 2),
             "–" if w.margins is None else number(1e3 * w.margins.delay, 3),

@@ -1,4 +1,4 @@
-"""How does experiment 2 go? Hold the rig upright with the numbers it was identified by, and say beforehand what comes.
+"""Experiment 2: the rig held upright with the numbers it was identified by, and beforehand what will come of it.
 
 Gains come from the identified model, the verdict per pole set from the rigs that its covariance allows; then the law
 runs on the rig itself, here the twin's truth, and what came is put beside what was told.
@@ -6,7 +6,6 @@ runs on the rig itself, here the twin's truth, and what came is put beside what 
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -18,23 +17,21 @@ from numpy.typing import NDArray
 from upright import design
 from upright.control import Rig, Score, Trial, score, trial
 from upright.control.preflight import Preflight, Task, preflight, word
-from upright.design import Estimator, Feedback, Margins, Placement, Sampled
+from upright.design import Feedback, Margins, Placement, Sampled
 from upright.design.loop import closed, command_noise
 from upright.design.requests import poles_of, read_poles
 from upright.errors import BadInput
-from upright.lab.rigs.believed import allowed, believed, make_of
-from upright.lab.rigs.makes import Make
-from upright.lab.rigs.rig_file import RigFile, read_rig_file
+from upright.lab.designing.run import SPEEDS, velocities
+from upright.lab.frequency_1b.run import run_frequency
+from upright.lab.identified import IdentifiedRig, read_identified
+from upright.lab.makes import PENDULUMS
 from upright.paper.tables import TABLE_1
 from upright.physics import Linear
-from upright.progress import Progress
+from upright.progress import Progress, silent
 
 Array = NDArray[np.float64]
 Roots = NDArray[np.complex128]
 
-SPEEDS = ("plain", "filtered", "kalman")
-STARTS = {"furuta": (math.radians(12), 2.2), "linear": (math.radians(12), 1.5)}
-"""Tilt [rad] and speed [rad/s] with which a clumsy hand lets go."""
 HAND = (0.01, 0.1)
 """What a hand gets wrong: half a degree, and 0.1 rad/s."""
 DRAWS = 200
@@ -42,7 +39,7 @@ SETS = {f"set {i}": text for i, text in enumerate(TABLE_1, start=1)}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wish:
+class RegulationRequest:
     """What is asked: poles by name [1/s], the way to the velocities, and the start (the make's own when None)."""
 
     poles: Mapping[str, Roots] = field(default_factory=lambda: {n: read_poles(text) for n, text in SETS.items()})
@@ -78,7 +75,7 @@ class Attempt:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Way:
+class VelocityRun:
     """One way to the velocities, with the recommended set's gains."""
 
     name: str
@@ -118,9 +115,9 @@ class Regulation:
     rig: Rig
     truth: Rig | None
     task: Task
-    wish: Wish
+    wish: RegulationRequest
     attempts: tuple[Attempt, ...]
-    ways: tuple[Way, ...]
+    ways: tuple[VelocityRun, ...]
     uncertain: bool
     source: str
     seed: int
@@ -133,25 +130,27 @@ class Regulation:
         return max(self.attempts, key=lambda a: (round(a.before.words["regulates"], 2), a.before.push))
 
 
-def identified(make: Make, seed: int, folder: Path, progress: Progress | None = None) -> RigFile:
+def identify_make(key: str, seed: int, folder: Path, progress: Progress = silent) -> IdentifiedRig:
     """What experiment 1b makes of a rig of the make; its logs and `fit.json` go into the folder."""
-    from upright.lab.frequency_1b import run as frequency
-
-    if make not in STARTS:
-        raise BadInput(f"there is nothing to hold upright on the make '{make}'; take one of {', '.join(STARTS)}.")
-    frequency.run(make, seed, folder, progress)
-    return read_rig_file(folder / "fit.json", seed=seed)
+    _check_upright(key)
+    run_frequency(key, seed, folder, progress)
+    return read_identified(folder / "fit.json", seed=seed)
 
 
-def run(
-    file: RigFile, truth: Rig | None, seed: int, folder: Path, progress: Progress | None = None,
-    stopped: Callable[[], bool] = lambda: False, wish: Wish | None = None, source: str = "FIT",
+def _check_upright(key: str) -> None:
+    if key not in PENDULUMS:
+        raise BadInput(f"there is nothing to hold upright on the make '{key}'; take one of {', '.join(PENDULUMS)}.")
+
+
+def run_regulation(
+    known: IdentifiedRig, truth: Rig | None, seed: int, folder: Path, progress: Progress = silent,
+    stopped: Callable[[], bool] = lambda: False, wish: RegulationRequest | None = None, source: str = "FIT",
 ) -> Regulation:  # fmt: skip
     """Design for the rig as identified, say what will come, and run on the rig itself.
 
     Parameters
     ----------
-    file : RigFile
+    known : IdentifiedRig
         What was identified, hanging.
     truth : Rig, optional
         The rig; without it nothing is run and only what is expected is told.
@@ -168,44 +167,33 @@ def run(
         How a command line would name the fit.
     """
     began = time.perf_counter()
-    wish, tell = wish or Wish(), progress or (lambda step, share: None)
-    make = make_of(file)
-    if make not in STARTS:
-        raise BadInput(f"there is nothing to hold upright on the make '{make}'; take one of {', '.join(STARTS)}.")
-    rig = believed(file)
+    wish, make = wish or RegulationRequest(), known.make
+    _check_upright(make.key)
+    rig = known.rig()
     model = rig.linear("inverted")
     sampled = design.hold(model, rig.period, rig.delay / rig.period)
-    tilt, push = (w if w is not None else s for w, s in zip((wish.tilt, wish.push), STARTS[make], strict=True))
+    tilt, push = (w if w is not None else s for w, s in zip((wish.tilt, wish.push), make.start, strict=True))
     task = Task(start=(0.0, 0.0, tilt, push), hand=(0.0, 0.0, *HAND), seconds=wish.seconds)
-    others = allowed(file, rig, wish.draws, seed)
+    others = known.allowed(rig, wish.draws, seed)
     attempts: list[Attempt] = []
     interrupted = False
     for i, (name, poles) in enumerate(wish.poles.items()):
-        tell(f"regulating with {name}", i / (len(wish.poles) + 1))
+        progress(f"regulating with {name}", i / (len(wish.poles) + 1))
         attempts.append(_attempt(name, poles, rig, truth, model, sampled, task, others, wish, seed))
         if stopped():
             interrupted = True
             break
     done = Regulation(
-        rig=rig, truth=truth, task=task, wish=wish, attempts=tuple(attempts), ways=(), uncertain=bool(file.others),
+        rig=rig, truth=truth, task=task, wish=wish, attempts=tuple(attempts), ways=(), uncertain=bool(known.draws),
         source=source, seed=seed, interrupted=interrupted,
     )  # fmt: skip
-    tell("comparing the ways to the velocities", len(wish.poles) / (len(wish.poles) + 1))
+    progress("comparing the ways to the velocities", len(wish.poles) / (len(wish.poles) + 1))
     ways = () if interrupted else tuple(_ways(done, model, sampled))
     for a in done.attempts:
         if a.after is not None:
             folder.mkdir(parents=True, exist_ok=True)
             a.after.record.to_csv(folder / f"regulation_{a.name.replace(' ', '_')}.csv")
     return replace(done, ways=ways, seconds=time.perf_counter() - began)
-
-
-def estimator(model: Linear, sampled: Sampled, rig: Rig, speed: str, memory: float) -> Estimator:
-    """A way to the velocities for a rig's encoders."""
-    if speed == "kalman":
-        # every coordinate by itself as much as a tenth of the limit would: pushes, friction, what the model leaves out
-        shaking = design.shaken(sampled, 0.1 * rig.limit * np.abs(model.B[1::2, 0]))
-        return design.kalman(sampled, shaking, rig.quantum / math.sqrt(12))
-    return design.filtered(sampled, memory if speed == "filtered" else 0.0)
 
 
 def actual_start(task: Task, seed: int) -> Array:
@@ -215,10 +203,10 @@ def actual_start(task: Task, seed: int) -> Array:
 
 def _attempt(
     name: str, poles: Roots, rig: Rig, truth: Rig | None, model: Linear, sampled: Sampled, task: Task,
-    others: Mapping[str, Array], wish: Wish, seed: int,
+    others: Mapping[str, Array], wish: RegulationRequest, seed: int,
 ) -> Attempt:  # fmt: skip
     placed = design.place(model.A, model.B, poles)
-    law = design.feedback(estimator(model, sampled, rig, wish.speed, wish.memory), placed.K)
+    law = design.feedback(velocities(model, sampled, wish.speed, wish.memory, rig.limit, rig.quantum), placed.K)
     told = preflight(rig, model, sampled, law, task, parameters=others, lanes=wish.draws, seed=seed)
     after = None
     if truth is not None:
@@ -228,17 +216,17 @@ def _attempt(
     )  # fmt: skip
 
 
-def _ways(done: Regulation, model: Linear, sampled: Sampled) -> list[Way]:
+def _ways(done: Regulation, model: Linear, sampled: Sampled) -> list[VelocityRun]:
     on, K = done.truth or done.rig, done.best.placement.K
     driven = design.hold(model, sampled.period, sampled.delay, done.rig.lag)
-    out: list[Way] = []
+    out: list[VelocityRun] = []
     for speed in SPEEDS:
-        way = estimator(model, sampled, done.rig, speed, done.wish.memory)
+        way = velocities(model, sampled, speed, done.wish.memory, done.rig.limit, done.rig.quantum)
         law = design.feedback(way, K)
         stands = bool(np.abs(poles_of(closed(driven, law))).max() < 1)
         went = trial(on, law, at=done.task.at, start=actual_start(done.task, done.seed), seconds=done.task.seconds)
         out.append(
-            Way(
+            VelocityRun(
                 name=way.name,
                 noise=command_noise(driven, law, done.rig.quantum) if stands else None,
                 margins=design.margins(model, driven, law) if stands else None,

@@ -7,8 +7,9 @@ from typing import Any
 
 from upright.control import Rig
 from upright.control.sensors import Scales
+from upright.lab.makes import make_of
 from upright.lab.swing_up_2b.figures import ascent_figure, check_figure, portrait_figure
-from upright.lab.swing_up_2b.run import HELD, LIES, TILT, Lie, Swung
+from upright.lab.swing_up_2b.run import HELD, LIES, TILT, Lie, SwingUpRun
 from upright.report.advice import Step
 from upright.report.chapter import Chapter, Finding
 from upright.report.document import picture
@@ -22,7 +23,7 @@ QUESTION = (
 )
 
 
-def chapter(done: Swung) -> Chapter:
+def chapter(done: SwingUpRun) -> Chapter:
     """The whole of it as a chapter of experiment 2."""
     source = "numbers identified hanging" if done.source else "the numbers of the make as designed"
     return Chapter(
@@ -32,7 +33,7 @@ def chapter(done: Swung) -> Chapter:
     )  # fmt: skip
 
 
-def parts(done: Swung) -> tuple[Part, ...]:
+def parts(done: SwingUpRun) -> tuple[Part, ...]:
     """Sensors, swing-up, lies; as far as the experiment has them."""
     out = [sensor_part(done.model, done.check)]
     if done.ascent is not None:
@@ -90,7 +91,7 @@ def sensor_part(model: Rig, check: Scales) -> Part:
     )  # fmt: skip
 
 
-def swing_part(done: Swung) -> Part:
+def swing_part(done: SwingUpRun) -> Part:
     """The way up."""
     run, law = done.ascent, done.law
     assert run is not None  # the caller asks
@@ -130,7 +131,7 @@ def swing_part(done: Swung) -> Part:
     )  # fmt: skip
 
 
-def lie_part(done: Swung) -> Part:
+def lie_part(done: SwingUpRun) -> Part:
     """Lying encoders, tried one by one."""
     rows = tuple(_row(lie) for lie in done.lies)
     caught = sum(lie.refused for lie in done.lies)
@@ -161,7 +162,7 @@ def _row(lie: Lie) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def findings(done: Swung) -> tuple[Finding, ...]:
+def findings(done: SwingUpRun) -> tuple[Finding, ...]:
     """Numbers for the cover."""
     run = done.ascent
     if run is None or not done.caught:
@@ -172,10 +173,9 @@ def findings(done: Swung) -> tuple[Finding, ...]:
     )
 
 
-def steps(done: Swung) -> tuple[Step, ...]:
+def steps(done: SwingUpRun) -> tuple[Step, ...]:
     """What to do next."""
-    make = "furuta" if done.law.body.spin > 0 else "linear"
-    base = f"upright swing-up {done.source or f'--rig {make}'} --seed {done.truth.seed}"
+    base = f"upright swing-up {done.source or f'--rig {make_of(done.truth.plant).key}'} --seed {done.truth.seed}"
     if not done.check.sound:
         return (Step(sentence="Mend the encoder, then try again.", command=base),)
     out = [Step(sentence="See what happens when an encoder lies.", command=f'{base} --lie "theta=2"')]
@@ -187,7 +187,7 @@ def steps(done: Swung) -> tuple[Step, ...]:
     return tuple(out)
 
 
-def numbers(done: Swung) -> dict[str, Any]:
+def numbers(done: SwingUpRun) -> dict[str, Any]:
     """The same as plain values."""
     run, law = done.ascent, done.law
     up = None if run is None else {

@@ -1,4 +1,4 @@
-"""From hanging to upright, how does it go? Encoders first, then pump, catch and hold; and what lying encoders do.
+"""Experiment 2b, from hanging to upright: encoders first, then pump, catch and hold; and what lying encoders do.
 
 The law is designed from what is known of the rig, a fit or the make's data sheet; it runs on the rig itself, here the
 twin's truth.
@@ -22,9 +22,11 @@ from upright.control.score import FALLEN
 from upright.control.sensors import KNOWN, Scales, probe, put_out, scales
 from upright.control.trial import readings
 from upright.control.watch import Suspicion, Watch
-from upright.lab.rigs.rig_file import RigFile
-from upright.progress import Progress
+from upright.errors import BadInput, NotIdentifiable, nearest
+from upright.lab.identified import IdentifiedRig
+from upright.progress import Progress, silent
 from upright.records import Record
+from upright.units import same_dimension, scale
 
 Array = NDArray[np.float64]
 
@@ -33,6 +35,8 @@ HELD = 5.0
 SECONDS = 12.0
 TILT = math.radians(3)
 """From which a loop with a lying encoder is switched on [rad]."""
+LEAST = math.radians(40)
+"""Swing below which the period tells too little of the amplitude [rad]: at 40 degrees it is 3 % longer."""
 LIES = (("theta", -1.0), ("theta", 0.25), ("theta", 0.5), ("theta", 2.0), ("theta", 1.1), ("", -1.0), ("", 4.0))
 """Encoders tried: a coordinate, the driven one where it is empty, and what it shows over what is true."""
 
@@ -73,7 +77,7 @@ class Lie:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Swung:
+class SwingUpRun:
     """What the experiment found.
 
     Attributes
@@ -134,26 +138,68 @@ class Swung:
         )
 
 
-def known_of(file: RigFile) -> Mapping[str, float]:
+def known_of(identified: IdentifiedRig) -> Mapping[str, float]:
     """Relative standard errors of a fit's numbers, from the rigs that it allows; friction as it may be on the day."""
     out: dict[str, float] = {}
-    for name, value in file.plant.parameters().items():
-        drawn = np.array([plant.parameters()[name] for plant, _ in file.others])
+    for name, value in identified.plant.parameters().items():
+        drawn = np.array([plant.parameters()[name] for plant, _ in identified.draws])
         if value and drawn.size and np.ptp(drawn) > 0:
             spread = max(float(np.std(drawn)) / abs(value), KNOWN["b"] if name.startswith("b") else 2e-3)
             out[name] = min(spread, 1.0)  # a friction that the fit puts at its bound is not known at all
-    gains = np.array([gain for _, gain in file.others])
+    gains = np.array([gain for _, gain in identified.draws])
     if gains.size and np.ptp(gains) > 0:
-        out["gain"] = max(float(np.std(gains)) / abs(file.gain), 2e-3)
+        out["gain"] = max(float(np.std(gains)) / abs(identified.gain), 2e-3)
     return out
 
 
-def run(
+def scales_of_log(model: Rig, log: Record, known: Mapping[str, float] | None = None) -> Scales:
+    """Scales of the encoders from a log; see `upright.control.sensors.scales`.
+
+    Parameters
+    ----------
+    model : Rig
+    log : Record
+        Columns named as the coordinates, in any unit or in counts, and the command ``u``, from rest.
+    known : mapping of str to float, optional
+        How well the model's numbers are known.
+
+    Raises
+    ------
+    BadInput
+        When a column is missing or has another dimension.
+    NotIdentifiable
+        When the model says that the commands swing the pendulum too little.
+    """
+    signals = {"u": log["u"]} if "u" in log.names else {}
+    if not signals:
+        raise BadInput(f"the check needs the command in a column 'u'; {nearest('u', log.names)}")
+    for i, c in enumerate(model.plant.coordinates):
+        if c.name not in log.names:
+            raise BadInput(f"the check needs a column '{c.name}'; {nearest(c.name, log.names)}")
+        unit = log.units.get(c.name, "") or c.unit
+        if unit == "counts":
+            size = float(model.quantum[i])
+        elif same_dimension(unit, c.unit):
+            size = scale(unit)
+        else:
+            raise BadInput(f"'{c.name}' is in {unit}, and {c.unit} or counts were needed; say so in the log's header.")
+        signals[c.name] = (log[c.name] - log[c.name][0]) * size
+    units = {c.name: c.unit for c in model.plant.coordinates} | {"u": model.unit}
+    found = scales(model, log.replace(signals=signals, units=units, inputs=("u",), outputs=tuple(signals)[1:]), known)
+    true = np.abs(found.motion[:, 1] / found.value[1]).max()
+    if true < LEAST:
+        raise NotIdentifiable(
+            f"by the model the pendulum swings to {math.degrees(true):.0f} degrees only, where its period hardly tells "
+            f"its amplitude; drive it to {math.degrees(LEAST):.0f} or more, 100 is best, then let it coast."
+        )
+    return found
+
+
+def run_swing_up(
     model: Rig,
     truth: Rig,
-    seed: int,
     folder: Path,
-    progress: Progress | None = None,
+    progress: Progress = silent,
     stopped: Callable[[], bool] = lambda: False,
     *,
     known: Mapping[str, float] | None = None,
@@ -161,17 +207,15 @@ def run(
     travel: float | None = None,
     lies: bool = True,
     source: str = "",
-) -> Swung:
+) -> SwingUpRun:
     """Check the encoders of a hanging rig, swing it up and hold it; then try what lying encoders would have done.
 
     Parameters
     ----------
     model : Rig
-        As known: as designed, or as `believed` from a fit.
+        As known: as designed, or as identified.
     truth : Rig
         The rig itself.
-    seed : int
-        Not used: a rig that hangs at rest leaves nothing to chance.
     folder : Path
         Takes ``sensors.csv`` and ``swing_up.csv``.
     progress : callable, optional
@@ -189,22 +233,21 @@ def run(
         File that the model comes from, as typed.
     """
     began = time.perf_counter()
-    tell = progress or (lambda step, share: None)
-    tell("designing swing-up and catch", 0.0)
+    progress("designing swing-up and catch", 0.0)
     law = design_swing_up(model, travel=travel)
-    tell("asking the encoders", 0.3)
+    progress("asking the encoders", 0.3)
     command = probe(model, law)
     log = put_out(truth, command)
     check = scales(model, log, known)
-    tell("swinging up", 0.4)
+    progress("swinging up", 0.4)
     ascent = swing_up(truth, law, seconds=seconds) if check.sound else None
-    tell("trying encoders that lie", 0.6)
+    progress("trying encoders that lie", 0.6)
     tried = _lies(model, truth, law, command, known) if lies and check.sound and not stopped() else ()
     folder.mkdir(parents=True, exist_ok=True)
     log.to_csv(folder / "sensors.csv")
     if ascent is not None:
         ascent.trial.record.to_csv(folder / "swing_up.csv")
-    return Swung(
+    return SwingUpRun(
         model=model, truth=truth, log=log, check=check, law=law, ascent=ascent, lies=tried,
         source=source, folder=folder, seconds=time.perf_counter() - began,
     )  # fmt: skip

@@ -8,10 +8,9 @@ from upright.lab.tracking_3 import parts as parts_of
 from upright.lab.tracking_3 import tables
 from upright.lab.tracking_3.laws import AT
 from upright.lab.tracking_3.parts import strongest
-from upright.lab.tracking_3.run import Tracking
-from upright.lab.tracking_3.shaft import FIT, STUDY
+from upright.lab.tracking_3.pulses import FIT, STUDY
+from upright.lab.tracking_3.run import Outcome, Tracking
 from upright.lab.tracking_3.tables import length, milli, share
-from upright.lab.tracking_3.trials import Outcome
 from upright.lab.tracking_3.why import why
 from upright.paper.tables import TABLE_2
 from upright.report.advice import Step

@@ -119,13 +119,6 @@ def far(model: Linear) -> Array:
     return model.C[-1]
 
 
-def near_pd(rig: Rig, name: str, kp: float, kd: float) -> Tracker:
-    """PD on the driven body's encoder, the same reference for it."""
-    K = np.zeros(2 * len(rig.plant.coordinates))
-    K[:2] = kp, kd
-    return tracker(rig, name, K, kp)
-
-
 def play(rig: Rig, K: Array, k_pf: float) -> float:
     """Largest error of the far body at rest that dry friction can hold, two bodies without springs to ground.
 

@@ -9,9 +9,8 @@ from markupsafe import Markup
 from upright.lab.tracking_3 import tables
 from upright.lab.tracking_3.figures import Frame, Panel, Trace, poles_figure, steps_figure
 from upright.lab.tracking_3.laws import AT, loop_poles
-from upright.lab.tracking_3.run import RESERVE, Tracking
+from upright.lab.tracking_3.run import BEFORE, DWELL, RESERVE, Outcome, Tracking
 from upright.lab.tracking_3.tables import length, milli, share
-from upright.lab.tracking_3.trials import BEFORE, DWELL, Outcome
 from upright.report.document import motion, picture, run_pictures
 from upright.report.sections import Part
 from upright.report.symbols import plain

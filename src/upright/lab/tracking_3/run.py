@@ -1,4 +1,4 @@
-"""Experiment 3: make the far inertia follow a step through a flexible shaft, within effort and travel.
+"""Experiment 3: the far inertia follows a step through a flexible shaft, within effort and travel.
 
 Identify, place the poles of Table 2, size the step, say beforehand what will happen, run it on the rig, and compare
 with what PD control of the driven body can do.
@@ -15,23 +15,70 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.control import Rig
-from upright.identification import Fit
-from upright.lab.rigs.makes import make_rig
-from upright.lab.tracking_3.laws import Tracker, by_poles, check, paper_sets, with_sum
+from upright.control import Rig, Trial, trial
+from upright.control.steps import Effort, StepFigures, effort, step_figures
+from upright.errors import BadInput
+from upright.identification.model.fit import Fit
+from upright.lab.identified import DAILY
+from upright.lab.makes import MAKES, make_rig
+from upright.lab.tracking_3.laws import AT, Tracker, by_poles, check, paper_sets, with_sum
 from upright.lab.tracking_3.pd import Search, far_pd, near_pd, tune
-from upright.lab.tracking_3.shaft import fitted, weigh
-from upright.lab.tracking_3.trials import PUSH, Outcome, outcome, twist_of
+from upright.lab.tracking_3.pulses import fitted, identify_shaft, shaft_make
 from upright.lab.weighing_1a.run import Known
-from upright.progress import Progress
+from upright.progress import Progress, silent
 from upright.study.load import Study
 
 Array = NDArray[np.float64]
 
 RESERVE = 0.95
 """Share of the limit that the step may take from the strongest law."""
-INSTEAD = {"linear": "rectilinear", "furuta": "torsional"}
-"""The rig without its pendulum, a second inertia on the shaft instead."""
+BEFORE, DWELL, PUSHED = 0.1, 2.0, 1.5
+"""Time before the step, at the reference, and under the push that follows [s]."""
+PUSH = -0.1
+"""Steady push on the drive that comes after the step, as a share of the limit."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StepTrial:
+    """One law on one rig: the trial and its figures.
+
+    Attributes
+    ----------
+    trial : Trial
+        As if nothing tripped.
+    figures : StepFigures or None
+        Of the far body; None where the rig trips or nothing moves.
+    effort : Effort
+        Of the step, up to the push.
+    twist, travel : float
+        Largest distance between the bodies, and from where they began, up to the push [m or rad].
+    give : float
+        How far the push moves the far body [m or rad].
+    tripped : float
+        When twist or travel is left and a person, a stop or a trip ends the run [s]; inf if never.
+    """
+
+    trial: Trial
+    figures: StepFigures | None
+    effort: Effort
+    twist: float
+    travel: float
+    give: float
+    tripped: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Outcome:
+    """A law, what the fitted model says it will do, and what the rig did."""
+
+    law: Tracker
+    foreseen: StepTrial
+    found: StepTrial
+
+    @property
+    def within(self) -> bool:
+        """Whether the rig stayed within limit, travel and twist."""
+        return math.isinf(self.found.tripped) and self.found.effort.saturated == 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,8 +141,8 @@ class Tracking:
         return self.fit is not None
 
 
-def run(
-    rig: str | Rig, seed: int, folder: Path, progress: Progress | None = None,
+def run_tracking(
+    rig: str | Rig, seed: int, folder: Path, progress: Progress = silent,
     stopped: Callable[[], bool] = lambda: False, *, which: Sequence[int] = (1, 2, 3, 4),
     poles: NDArray[np.complex128] | None = None, step: float | None = None, weighed: Sequence[Known] = (),
 ) -> Tracking:  # fmt: skip
@@ -123,17 +170,17 @@ def run(
         What experiment 1a leaves known of the shaft.
     """
     check(which, poles)
-    began, tell = time.perf_counter(), progress or (lambda what, share: None)
-    true = make_rig(INSTEAD.get(rig, rig), seed) if isinstance(rig, str) else rig
-    tell("pulsing the shaft", 0.0)
-    study, fit = weigh(true, seed, folder, lambda what, share: tell(what, 0.05 + 0.25 * share), weighed)
+    began = time.perf_counter()
+    true = make_rig(MAKES[rig].shaft if rig in MAKES else rig, seed) if isinstance(rig, str) else rig
+    progress("pulsing the shaft", 0.0)
+    study, fit = identify_shaft(true, seed, folder, lambda what, share: progress(what, 0.05 + 0.25 * share), weighed)
     done = follow(
         another_day(true, seed),
         fitted(true, fit),
         folder,
         study,
         fit,
-        tell,
+        progress,
         stopped,
         which=which,
         poles=poles,
@@ -145,24 +192,24 @@ def run(
 
 
 def another_day(rig: Rig, seed: int) -> Rig:
-    """The same rig when its dry friction has changed, by 13 % as between runs of real rigs."""
+    """The same rig when its dry friction has changed as between runs of real rigs."""
     rng = np.random.default_rng([seed, 31])
     dry = {n: rig.plant.parameters()[n] for n in ("f_1c", "f_2c")}
-    return rig.changed(**{n: v * math.exp(rng.normal(0, 0.13)) for n, v in dry.items()})
+    return rig.changed(**{n: v * math.exp(rng.normal(0, DAILY)) for n, v in dry.items()})
 
 
 def follow(
-    rig: Rig, model: Rig, folder: Path, study: Study | None, fit: Fit | None, tell: Progress,
+    rig: Rig, model: Rig, folder: Path, study: Study | None, fit: Fit | None, progress: Progress,
     stopped: Callable[[], bool] = lambda: False, *, which: Sequence[int] = (1, 2, 3, 4),
     poles: NDArray[np.complex128] | None = None, step: float | None = None,
 ) -> Tracking:  # fmt: skip
-    """Design on the model, try on the rig; see `run`."""
+    """Design on the model, try on the rig; see `run_tracking`."""
     check(which, poles)
     laws = list(paper_sets(model, which))
     if poles is not None:
         laws.append(by_poles(model, "own set", poles))
     chosen = choose(model, laws, step)
-    tell("stepping", 0.35)
+    progress("stepping", 0.35)
     done = Tracking(
         rig=rig, model=model, true=rig, folder=folder, study=study, fit=fit, step=chosen,
         sets=tuple(outcome(rig, model, law, chosen.size) for law in laws),
@@ -171,12 +218,12 @@ def follow(
         return replace(done, interrupted=True)
     strongest = laws[int(np.argmax([law.k_pf for law in laws]))]
     done = replace(done, summed=outcome(rig, model, with_sum(model, strongest, "with a sum"), chosen.size))
-    tell("tuning a PD", 0.55)
+    progress("tuning a PD", 0.55)
     pd, search = tune(model, chosen.size, RESERVE * model.limit)
     done = replace(done, pd=outcome(rig, model, pd, chosen.size), search=search)
     if stopped():
         return replace(done, interrupted=True)
-    tell("comparing", 0.9)
+    progress("comparing", 0.9)
     stiff = stiffest_damped(model, strongest.k_pf)
     far = far_pd(model, "PD, far encoder", pd.k_pf, float(pd.K[1]))
     return replace(
@@ -194,7 +241,7 @@ def choose(model: Rig, laws: Sequence[Tracker], step: float | None = None) -> Ch
     """The largest step of two digits that keeps every law within effort, twist and travel, by the linear model."""
     most = RESERVE * model.limit / max(abs(law.k_pf) for law in laws)
     unit = [outcome(model, model, law, 0.5 * most).found for law in laws]
-    twist = 0.6 * twist_of(model) * 0.5 * most / max(r.twist for r in unit)
+    twist = 0.6 * shaft_make(model.plant, model.name).twist * 0.5 * most / max(r.twist for r in unit)
     travel = 0.6 * model.travel * 0.5 * most / max(r.travel for r in unit)
     bounds = {"effort": most, "twist": twist, "travel": travel}
     what = min(bounds, key=lambda name: bounds[name])
@@ -204,3 +251,39 @@ def choose(model: Rig, laws: Sequence[Tracker], step: float | None = None) -> Ch
     if step is not None:
         size, reason = step, "as asked"
     return Chosen(size=size, reason=reason, by_effort=most, by_twist=twist, by_travel=travel)
+
+
+def outcome(rig: Rig, model: Rig, law: Tracker, step: float) -> Outcome:
+    """A law on the model and on the rig."""
+    foreseen = attempt(model, law, step)
+    return Outcome(law=law, foreseen=foreseen, found=foreseen if rig is model else attempt(rig, law, step))
+
+
+def attempt(rig: Rig, law: Tracker, step: float) -> StepTrial:
+    """Zero, the step, then a steady push while the reference stays."""
+    before, at, end = (round(s / rig.period) for s in (BEFORE, BEFORE + DWELL, BEFORE + DWELL + PUSHED))
+    pushes = np.zeros(end + 1)
+    pushes[at:] = PUSH * rig.limit
+    done = trial(
+        rig, law.law, at=AT, start=np.zeros(2 * len(rig.plant.coordinates)), seconds=end * rig.period,
+        reference=np.append(np.zeros(before), step), pushes=pushes,
+    )  # fmt: skip
+    q, twist = done.x[:, ::2], shaft_make(rig.plant, rig.name).twist
+    apart, away = np.abs(q[:, -1] - q[:, 0]), np.abs(q).max(axis=1)
+    beyond = np.flatnonzero((apart > twist) | (away > rig.travel))
+    tripped = float(done.t[beyond[0]]) if beyond.size else math.inf
+    last = min(at, int(beyond[0]) if beyond.size else at)
+    y = done.record[done.record.outputs[-1]]
+    figures = None
+    if not beyond.size:
+        try:
+            figures = step_figures(
+                done.t[before:at], y[before:at], before=0.0, reference=step, quantum=float(rig.quantum[-1])
+            )
+        except BadInput:  # friction held it where it was
+            figures = None
+    return StepTrial(
+        trial=done, figures=figures, effort=effort(done.u[before : last + 1], rig.limit, rig.converter),
+        twist=float(apart[: last + 1].max()), travel=float(away[: last + 1].max()),
+        give=math.inf if beyond.size else float(abs(np.mean(y[-50:]) - np.mean(y[at - 50 : at]))), tripped=tripped,
+    )  # fmt: skip

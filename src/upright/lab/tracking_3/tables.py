@@ -10,8 +10,7 @@ import numpy as np
 from upright.design.requests import written
 from upright.lab.tracking_3.figures import shown
 from upright.lab.tracking_3.laws import AT
-from upright.lab.tracking_3.run import Tracking
-from upright.lab.tracking_3.trials import Outcome, Run
+from upright.lab.tracking_3.run import Outcome, StepTrial, Tracking
 from upright.report.sections import Table
 from upright.report.symbols import figures, number, plain
 from upright.report.symbols import unit as raised
@@ -110,7 +109,7 @@ def step_table(done: Tracking) -> Table:
     )  # fmt: skip
 
 
-def _figures(run: Run) -> tuple[str, ...]:
+def _figures(run: StepTrial) -> tuple[str, ...]:
     effort = (number(run.effort.peak, 3), share(run.effort.share), share(run.effort.saturated, 2))
     f = run.figures
     if f is None:
@@ -146,7 +145,7 @@ def friction_table(done: Tracking) -> Table:
     )  # fmt: skip
 
 
-def _left(run: Run, size: float) -> str:
+def _left(run: StepTrial, size: float) -> str:
     if run.figures is None or not math.isfinite(run.figures.settling_2):
         return "still swings"
     return share(run.figures.error / size)
@@ -158,7 +157,7 @@ def as_json(done: Tracking) -> dict[str, Any]:
     def finite(value: float) -> float | None:
         return float(value) if math.isfinite(value) else None
 
-    def run(r: Run) -> dict[str, Any]:
+    def run(r: StepTrial) -> dict[str, Any]:
         f = r.figures
         told = ("change", "rise", "peak_time", "overshoot", "settling_2", "settling_5", "arrival", "error")
         return {

@@ -10,9 +10,8 @@ from upright.lab.tracking_3.figures import Bargain, Locus, bargain_figure, loci_
 from upright.lab.tracking_3.laws import AT
 from upright.lab.tracking_3.parts import described, frame, strongest, trace
 from upright.lab.tracking_3.pd import best_decay, root_locus, sampled
-from upright.lab.tracking_3.run import Tracking
+from upright.lab.tracking_3.run import BEFORE, DWELL, Tracking
 from upright.lab.tracking_3.tables import share
-from upright.lab.tracking_3.trials import BEFORE, DWELL
 from upright.report.document import Picture, picture
 from upright.report.sections import Part
 from upright.report.symbols import number

@@ -16,19 +16,6 @@ from upright.report.mathml import symbol
 from upright.report.sections import Part, Table
 from upright.report.symbols import measured, number, typed, unit
 
-_BODY = {
-    "furuta": "Pendulum and arm are taken off, the shaft is clamped above; the disk swings with motor and belt.",
-    "linear": "The pendulum is taken off; the cart swings between two springs to ground.",
-    "rectilinear": "Cart 2 is clamped; cart 1, its mass unbolted, swings on the spring between the two.",
-    "torsional": "Disk 2 is clamped; disk 1, its masses unbolted, swings on the shaft between the two.",
-}
-_LATER = {
-    "furuta": "With two 500 g masses at 6 cm and the arm (from its drawing) mounted, the disk of the pendulum has",
-    "linear": "The cart carries the pendulum without masses on it:",
-    "rectilinear": "With one 500 g mass bolted on, as later, cart 1 has",
-    "torsional": "With two 500 g masses at 6.5 cm bolted on, as later, disk 1 has",
-}
-
 
 def chapter(done: Weighing) -> Chapter:
     """Experiment 1a as a chapter."""
@@ -36,7 +23,7 @@ def chapter(done: Weighing) -> Chapter:
     true = truth(on)
     column = next(iter(done.campaign.logs.values())).outputs[0]
     parts = loading_parts(
-        found, kind=on.kind, logs=done.campaign.logs, signals=dict.fromkeys(done.campaign.logs, column),
+        found, kind=on.design.kind, logs=done.campaign.logs, signals=dict.fromkeys(done.campaign.logs, column),
         left_out=done.campaign.left_out, truth=true,
     )  # fmt: skip
     units = {k.name: unit(type(done.rig.plant).quantity(k.name).unit) for k in done.known}
@@ -65,9 +52,9 @@ def chapter(done: Weighing) -> Chapter:
         detail=" ".join(_sentence(done, k) for k in done.known),
         sound=sound(found),
         parts=(
-            Part(title="The body", sentences=(_BODY[done.make], *_limits(done))),
+            Part(title="The body", sentences=(done.make.mounted.bare, *_limits(done))),
             *parts,
-            Part(title="What is handed on", sentences=(_LATER[done.make],), tables=(handed,)),
+            Part(title="What is handed on", sentences=(done.make.mounted.later,), tables=(handed,)),
         ),
         steps=_steps(done),
         findings=tuple(
@@ -84,7 +71,7 @@ def chapter(done: Weighing) -> Chapter:
 
 
 def _inertia(done: Weighing) -> str:
-    return "m_0" if done.campaign.on.kind == "rectilinear" else "J_0"
+    return done.make.oscillator.inertia.replace("1", "0")
 
 
 def _limits(done: Weighing) -> tuple[str, ...]:
@@ -112,7 +99,7 @@ def _numbers(w: Estimate, true: float | None) -> dict[str, Any]:
 
 
 def _steps(done: Weighing) -> tuple[Step, ...]:
-    unit_of = units_of(done.campaign.on.kind)["inertia"]
+    unit_of = units_of(done.campaign.on.design.kind)["inertia"]
     first = {label: file for label, file in done.files.items() if label.endswith("run 1")}
     added = " ".join(f'--added "{done.campaign.added[label]:.6g} {unit_of}"' for label in first)
     files = " ".join(typed(done.folder / file) for file in first.values())
@@ -120,5 +107,5 @@ def _steps(done: Weighing) -> tuple[Step, ...]:
         Step(sentence="Weigh the body again from one log of each loading, as you would your own.",
              command=f"upright loadings {files} {added} -o {typed(done.folder / 'again')}"),
         Step(sentence="See which masses would have told most.",
-             command=f"upright plan-inertias --rig {done.campaign.on.kind}"),
+             command=f"upright plan-inertias --rig {done.campaign.on.design.kind}"),
     )  # fmt: skip

@@ -1,7 +1,7 @@
-"""What does a rig's first body weigh? Experiment 1a on the rig that the later experiments are run on.
+"""Experiment 1a: the inertia of a rig's first body, and its spring, from steps with known masses added.
 
-Its pendulum or second body is locked or taken off, its masses are unbolted, and known ones are added one by one. What
-is then mounted for the later experiments has a known inertia, so the body's inertia follows with its uncertainty.
+The rig's pendulum or second body is locked or taken off, its masses are unbolted, and known ones are added one by one.
+What is then mounted for the later experiments has a known inertia, so the body's inertia follows with its uncertainty.
 """
 
 from __future__ import annotations
@@ -13,33 +13,33 @@ from pathlib import Path
 import numpy as np
 
 from upright.control.rig import Rig
-from upright.errors import BadInput
-from upright.lab.rigs.makes import Make
-from upright.lab.weighing_1a import twin as loadings
-from upright.lab.weighing_1a.twin import MASS_RADIUS, RADIUS, Campaign, Kind
-from upright.physics import CartPendulum, Furuta
-from upright.physics.loads import added_inertia, added_mass
-from upright.progress import Progress
+from upright.errors import NotIdentifiable
+from upright.identification.loadings import Loaded, Loadings, fit_loadings, swings
+from upright.lab.makes import Make, make_of
+from upright.lab.weighing_1a.twin import LoadedTwin, acquire, drawn_twin
+from upright.progress import Progress, silent
+from upright.records import Record
 
 
-@dataclass(frozen=True, kw_only=True)
-class Mounted:
-    """What the later experiments add to the body that was weighed: its inertia [kg or kg m^2] and standard error."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Campaign:
+    """The logs of experiment 1a on one body with what follows from them."""
 
-    pieces: int
-    each: float
-    rest: float = 0.0
-    rest_error: float = 0.0
+    on: LoadedTwin
+    logs: dict[str, Record]
+    added: dict[str, float]
+    found: Loadings
+    left_out: tuple[str, ...]
+    """Why some logs did not count: friction may leave too few swings."""
 
-
-ARM = 2.9e-4
-"""Inertia of the arm that carries the pendulum, from its drawing [kg m^2]."""
-_MOUNTED = {
-    "furuta": Mounted(pieces=2, each=added_inertia(1, 0.060, mass_radius=MASS_RADIUS), rest=ARM, rest_error=0.03 * ARM),
-    "linear": Mounted(pieces=0, each=added_mass(1)),
-    "rectilinear": Mounted(pieces=1, each=added_mass(1)),
-    "torsional": Mounted(pieces=2, each=added_inertia(1, RADIUS, mass_radius=MASS_RADIUS)),
-}
+    def write_logs(self, folder: Path) -> dict[str, str]:
+        """Write every log as CSV; gives back its file by its label."""
+        folder.mkdir(parents=True, exist_ok=True)
+        files: dict[str, str] = {}
+        for label, record in self.logs.items():
+            files[label] = label.replace(" masses, run ", "x500g_run") + ".csv"
+            record.to_csv(folder / files[label])
+        return files
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,60 +63,64 @@ class Weighing:
     known: tuple[Known, ...]
 
 
-def make_of(rig: Rig) -> Make:
-    """Which of the four makes a rig is."""
-    if isinstance(rig.plant, Furuta):
-        return "furuta"
-    if isinstance(rig.plant, CartPendulum):
-        return "linear"
-    names = rig.plant.names()
-    if {"m_1", "k_12"} <= set(names):
-        return "rectilinear"
-    if {"J_1", "k_12"} <= set(names):
-        return "torsional"
-    raise BadInput(f"experiment 1a knows carts, disks and pendulums on them, and no {type(rig.plant).__name__}.")
+def weigh_body(
+    on: LoadedTwin, progress: Progress = silent, *, counts: tuple[int, ...] = (0, 1, 2, 3, 4), shots: int = 2
+) -> Campaign:
+    """Step a body with every count of masses, `shots` times each, and weigh it."""
+    logs: dict[str, Record] = {}
+    added: dict[str, float] = {}
+    loaded: list[Loaded] = []
+    left_out: list[str] = []
+    for i, count in enumerate(counts):
+        progress(f"stepping with {count} masses", i / len(counts))
+        for shot in range(shots):
+            name, inertia = f"{count} masses, run {shot + 1}", count * on.design.piece
+            record = acquire(on, count, shot=shot)
+            logs[name], added[name] = record, inertia
+            try:
+                loaded += swings(record, added=inertia, label=name, signal=record.outputs[0], command="u", quantum=1.0)
+            except NotIdentifiable as error:
+                left_out.append(str(error))
+    found = fit_loadings(loaded, tolerance=on.design.tolerance, piece=on.design.piece)
+    return Campaign(on=on, logs=logs, added=added, found=found, left_out=tuple(left_out))
 
 
-def body(rig: Rig) -> loadings.Rig:
+def first_body(rig: Rig) -> LoadedTwin:
     """The first body of a rig on a spring, its masses unbolted.
 
     A pendulum's cart sits between two springs, its disk below a clamped shaft; of two bodies the second is clamped, so
     that the spring is their own.
     """
-    make = make_of(rig)
-    kind: Kind = "rectilinear" if make in ("linear", "rectilinear") else "torsional"
-    mass = "m_1" if kind == "rectilinear" else "J_1"
-    truth, mounted = rig.plant.parameters(), _MOUNTED[make]
+    make = _make(rig)
+    design, mounted, true = make.oscillator, make.mounted, rig.plant.parameters()
     rng = np.random.default_rng([rig.seed, 12])
-    drawn = loadings.rig(rig.seed, kind)
-    tolerance = loadings.MAKES[kind].tolerance if rig.seed else 0.0
+    tolerance = design.tolerance if rig.seed else 0.0
     on = mounted.each * float(np.sum(1 + tolerance * rng.normal(size=mounted.pieces)))
     on += mounted.rest + rng.normal() * mounted.rest_error * bool(rig.seed)
-    spring = {"k_1": truth["k_12"]} if "k_12" in truth else {}
-    return replace(drawn, truth=drawn.truth.replace(**{mass: truth[_parameter(make)] - on}, **spring))
+    spring = {"k_1": true["k_12"]} if "k_12" in true else {}
+    drawn = drawn_twin(rig.seed, design.kind)
+    return replace(drawn, truth=drawn.truth.replace(**{design.inertia: true[make.body] - on}, **spring))
 
 
-def _parameter(make: str) -> str:
-    return {"furuta": "J_d", "linear": "m_c", "rectilinear": "m_1", "torsional": "J_1"}[make]
+def _make(rig: Rig) -> Make:
+    return make_of(
+        rig.plant, f"experiment 1a knows carts, disks and pendulums on them, and no {type(rig.plant).__name__}."
+    )
 
 
-def run(rig: Rig, seed: int, folder: Path, progress: Progress | None = None) -> Weighing:
+def run_weighing(rig: Rig, seed: int, folder: Path, progress: Progress = silent) -> Weighing:
     """Weigh the first body of a rig; its logs are written to `folder`."""
-    make = make_of(rig)
-    on = body(replace(rig, seed=seed))
-    done = loadings.weigh_body(on, progress)
-    found, mounted = done.found, _MOUNTED[make]
-    pieces = mounted.each * mounted.pieces
-    spread = loadings.MAKES[on.kind].tolerance * mounted.each * math.sqrt(mounted.pieces)
+    make = _make(rig)
+    done = weigh_body(first_body(replace(rig, seed=seed)), progress)
+    found, mounted = done.found, make.mounted
+    spread = make.oscillator.tolerance * mounted.each * math.sqrt(mounted.pieces)
     known = [
         Known(
-            name=_parameter(make),
-            value=found.bare.value + pieces + mounted.rest,
+            name=make.body,
+            value=found.bare.value + mounted.each * mounted.pieces + mounted.rest,
             stderr=math.hypot(found.bare.stderr, spread, mounted.rest_error),
         )
     ]
     if "k_12" in rig.plant.names():
         known.append(Known(name="k_12", value=found.k.value, stderr=found.k.stderr))
-    return Weighing(
-        rig=rig, make=make, folder=folder, files=loadings.write_logs(done, folder), campaign=done, known=tuple(known)
-    )
+    return Weighing(rig=rig, make=make, folder=folder, files=done.write_logs(folder), campaign=done, known=tuple(known))

@@ -15,8 +15,8 @@ from upright.physics import Plant
 from upright.records import Record
 from upright.signals.smoothing import savitzky_golay
 from upright.signals.trip_regression import smoothing_width_for
-from upright.study.columns import Array
 from upright.study.draft.recognise import Recognised
+from upright.study.sensors import Array
 
 SMALL = 0.6
 """Radians within which a pendulum that a loop keeps upright stays; beyond it, it falls."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from upright.readers.inspection import Column, Inspection
 from upright.records import Record
-from upright.study.columns import Array
+from upright.study.sensors import Array
 
 
 def zero_reading(

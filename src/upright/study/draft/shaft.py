@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from upright.physics import Plant, find
 from upright.readers.lies import DAC_COUNTS_PER_VOLT
 from upright.records import Record
-from upright.study.columns import Array
 from upright.study.draft.shaft_columns import Sight
 from upright.study.draft.shaft_guesses import Starts, starts
 from upright.study.rig import per
+from upright.study.sensors import Array
 
 COUNTS = {
     "rad": ("counts_per_rev", 16000.0, "ECP 205 has 16000"),

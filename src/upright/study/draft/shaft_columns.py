@@ -11,10 +11,10 @@ from upright.errors import UprightError
 from upright.physics import find
 from upright.readers.inspection import Column, Inspection
 from upright.records import Record
-from upright.study.columns import Array
 from upright.study.draft.recognise import REFERENCE, Recognised, in_dac_counts
 from upright.study.draft.shaft_events import follows, goes_dead, releases, steps
 from upright.study.draft.shaft_rest import held_bodies, waiting, zero_at
+from upright.study.sensors import Array
 
 RUNS_AWAY = 16_000
 """Counts beyond which a body is a disk: a cart of an ECP 210 has 16000 in 7 cm, and less travel than that."""

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from upright.signals.smoothing import savitzky_golay
-from upright.study.columns import Array
+from upright.study.sensors import Array
 
 HALVES = 4
 """Half swings that make a free swing: fewer may be a hand."""

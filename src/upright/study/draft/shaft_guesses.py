@@ -14,8 +14,8 @@ import numpy as np
 from upright.identification.problem.trips import find_trip
 from upright.signals.smoothing import savitzky_golay
 from upright.signals.trip_regression import smoothing_width_for
-from upright.study.columns import Array
 from upright.study.draft.rest_and_motion import swing_frequency
+from upright.study.sensors import Array
 
 RESOLVED = 0.003
 """Sample period [s] above which the braking of a drive, built up in some 30 ms, is not seen and not asked for."""

@@ -1,10 +1,10 @@
-"""Do the twins stand where the paper's tables put its rigs?"""
+"""Are the makes rigs one could build, and do they stand where the paper's tables put its rigs?"""
 
 import numpy as np
 import pytest
 
 from upright.errors import BadInput
-from upright.lab.rigs.makes import MAKES, make_rig
+from upright.lab.makes import MAKES, BrassPendulum, make_rig
 
 
 @pytest.mark.parametrize("make", ["linear", "furuta"])
@@ -36,5 +36,22 @@ def test_every_seed_is_another_rig_of_the_make(make):
 
 
 def test_an_unknown_make_is_refused():
-    with pytest.raises(BadInput, match="linear, furuta, rectilinear, torsional"):
+    with pytest.raises(BadInput, match="furuta, linear, rectilinear, torsional"):
         make_rig("spherical")
+
+
+def test_a_bare_tube_has_the_inertia_of_a_tube():
+    rod = BrassPendulum(bore=9.52e-3, weight_diameter=9.53e-3).parameters()
+    assert rod["l_cg"] == pytest.approx(0.330 / 2)
+    radius = 9.525e-3 / 2
+    assert rod["J_p"] == pytest.approx(rod["m_p"] * (0.330**2 / 12 + radius**2 / 2), rel=1e-5)  # wall of 5 um
+    assert rod["J_a"] == pytest.approx(rod["m_p"] * radius**2, rel=1e-3)
+
+
+def test_the_weight_obeys_the_parallel_axes():
+    with_weight, bare = BrassPendulum(), BrassPendulum(weight_diameter=9.53e-3)
+    p, q = with_weight.parameters(), bare.parameters()
+    weight = p["m_p"] - q["m_p"]
+    about_hinge = [x["J_p"] + x["m_p"] * x["l_cg"] ** 2 for x in (p, q)]
+    own = weight * (0.044**2 + 9.53e-3**2) / 16 + weight * 6e-3**2 / 12
+    assert about_hinge[0] - about_hinge[1] == pytest.approx(own + weight * 0.200**2, rel=1e-9)

@@ -1,27 +1,29 @@
-"""What do logs, a study or a measured response say? Experiment 1b on a rig of one's own."""
+"""A frequency response from logs, a study or a file, and its fit: experiment 1b on a rig of one's own."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from upright import units
 from upright.errors import BadInput, nearest
 from upright.identification import Rig as Asked
 from upright.identification.frequency.answer import Answer, explain
 from upright.identification.frequency.response import FrequencyResponse, is_response
 from upright.identification.frequency.spectra import response_of
-from upright.lab.frequency_1b.run import BENCH, PLANT, asked
-from upright.lab.rigs.makes import MAKES
+from upright.lab.frequency_1b.run import asked
+from upright.lab.makes import make_named
 from upright.progress import Progress, silent
 from upright.records import Record
 from upright.study.fit_file import write_response_fit
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wish:
+class LogRequest:
     """How sources are to be read; SI units.
 
     Attributes
@@ -58,7 +60,7 @@ class Wish:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Found:
+class LoggedResponse:
     """A response and, when the rig is known, what follows from it; `sources` are the files' names."""
 
     sources: tuple[str, ...]
@@ -67,20 +69,20 @@ class Found:
     folder: Path
 
 
-def look(
-    sources: Sequence[Path], wish: Wish, folder: Path, *, data: Path | None = None, tell: Progress = silent
-) -> Found:
+def response_of_logs(
+    sources: Sequence[Path], wish: LogRequest, folder: Path, *, data: Path | None = None, tell: Progress = silent
+) -> LoggedResponse:
     """Response of the sources, fitted when plant and numbers are named; writes `frequency.csv` and `fit.json`.
 
     Parameters
     ----------
     sources : sequence of Path
         One study, one response, or logs that repeat one another.
-    wish : Wish
+    wish : LogRequest
     folder : Path
     data : Path, optional
         Folder of a study's logs.
-    tell : callable, optional
+    tell : Progress
         Told the step at work.
     """
     rest: Asked | None = None
@@ -96,34 +98,28 @@ def look(
     else:
         response = _logs(sources, wish)
     if wish.make and rest is None:
-        if wish.make not in MAKES:
-            raise BadInput(f"--rig is one of {', '.join(MAKES)}, got '{wish.make}'; {nearest(wish.make, MAKES)}")
-        rest, plant = _designed(wish), PLANT[wish.make]
+        rest, plant = _designed(wish), make_named(wish.make).plant_name
     folder.mkdir(parents=True, exist_ok=True)
     names = tuple(s.name for s in sources)
     if rest is None:
         response.to_csv(folder / "frequency.csv")
-        return Found(sources=names, response=response, answer=None, folder=folder)
+        return LoggedResponse(sources=names, response=response, answer=None, folder=folder)
     at = next(iter(rest.plant.equilibria))
     answer = explain(rest, at, response, seed=wish.seed, tell=tell)
     write_response_fit(answer, folder, plant, "Frequency response", ", ".join(names))
-    return Found(sources=names, response=response, answer=answer, folder=folder)
+    return LoggedResponse(sources=names, response=response, answer=answer, folder=folder)
 
 
-def _designed(wish: Wish) -> Asked:
+def _designed(wish: LogRequest) -> Asked:
     """Numbers of a make: as designed where nothing is said, known within a tolerance where the bench usually tells."""
-    from upright.lab.rigs.makes import make_rig
-
-    design = make_rig(wish.make).plant
-    values = design.parameters()
+    make = make_named(wish.make)
+    values = make.plant.parameters()
     for name in wish.known:
         if name not in (*values, "actuator.gain", "actuator.delay", "actuator.lag"):
             raise BadInput(f"'{wish.make}' has no number '{name}'; {nearest(name, values)}")
-    said = {n: values[n] for n in BENCH[wish.make]} | {n: v for n, (v, _) in wish.known.items() if n in values}
-    tolerance = dict(BENCH[wish.make]) | {n: u / v if v else 0.0 for n, (v, u) in wish.known.items()}
-    rest = asked(wish.make, said, tolerance=tolerance)
-    from dataclasses import replace
-
+    said = {n: values[n] for n in make.bench} | {n: v for n, (v, _) in wish.known.items() if n in values}
+    tolerance = dict(make.bench) | {n: u / v if v else 0.0 for n, (v, u) in wish.known.items()}
+    rest = asked(make, said, tolerance)
     changed = {
         n: replace(rest.parameters[n], value=v, uncertainty=u, estimate=False)
         for n, (v, u) in wish.known.items() if n not in values
@@ -146,7 +142,7 @@ def _study(path: Path, data: Path | None) -> tuple[Asked, str, list[Record], lis
     return study.rig, study.plant, records, list(runs[0].quantum or [0.0] * len(runs[0].measured))
 
 
-def _logs(sources: Sequence[Path], wish: Wish) -> FrequencyResponse:
+def _logs(sources: Sequence[Path], wish: LogRequest) -> FrequencyResponse:
     from upright.readers import read
 
     records = [read(path) for path in sources]
@@ -164,9 +160,7 @@ def _logs(sources: Sequence[Path], wish: Wish) -> FrequencyResponse:
                        quantum=quantum, band=wish.band)  # fmt: skip
 
 
-def _scaled(record: Record, command: str, signals: Mapping[str, str], wish: Wish) -> Record:
-    from upright import units
-
+def _scaled(record: Record, command: str, signals: Mapping[str, str], wish: LogRequest) -> Record:
     columns = {command: record[command]}
     told = {command: record.units.get(command, "")}
     for name, column in signals.items():
@@ -187,7 +181,7 @@ def _scaled(record: Record, command: str, signals: Mapping[str, str], wish: Wish
                   provenance=record.provenance)  # fmt: skip
 
 
-def _step(x: np.ndarray[tuple[int], np.dtype[np.float64]]) -> float:
+def _step(x: NDArray[np.float64]) -> float:
     """Smallest step of a column."""
     steps = np.diff(np.unique(x))
     return float(steps.min()) if steps.size else 0.0

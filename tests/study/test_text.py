@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from upright.study.lines import key_lines
+from upright.study.text import key_lines
 
 LAID_OUT = '''# a comment = "with [brackets] { and = signs"
 title = "quoted # no comment [x] = { y"

@@ -1,56 +1,34 @@
-"""Is the twin a rig one could build, and does it move as mechanics says?"""
+"""Does a freed rig swing as mechanics says, and does its log show it?"""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
 from upright.errors import BadInput
-from upright.lab.free_swing_4 import drift, energy
-from upright.lab.rigs.makes import make_rig
-from upright.lab.rigs.twin import (
-    COUNTS,
-    MOTOR_AND_BELT,
-    NOMINAL,
-    SERVO,
-    BrassPendulum,
-    Release,
-    Twin,
-    acquire,
-    freed,
-    motion,
-)
+from upright.lab.free_swing_4 import drift
+from upright.lab.free_swing_4.release import Release, acquire, freed, motion
+from upright.lab.free_swing_4.run import losses
+from upright.lab.makes import COUNTS, MAKES, MOTOR_AND_BELT, NOMINAL, SERVO, make_rig
 
 
 def twin(seed):
     return freed(make_rig("furuta", seed))
 
 
+def with_plant(plant):
+    return replace(twin(0), plant=plant)
+
+
 FRICTIONLESS = dict.fromkeys(("b_1", "b_1c", "b_2", "b_2c"), 0.0)
-
-
-def test_a_bare_tube_has_the_inertia_of_a_tube():
-    rod = BrassPendulum(bore=9.52e-3, weight_diameter=9.53e-3).parameters()
-    assert rod["l_cg"] == pytest.approx(0.330 / 2)
-    radius = 9.525e-3 / 2
-    assert rod["J_p"] == pytest.approx(rod["m_p"] * (0.330**2 / 12 + radius**2 / 2), rel=1e-5)  # wall of 5 um
-    assert rod["J_a"] == pytest.approx(rod["m_p"] * radius**2, rel=1e-3)
-
-
-def test_the_weight_obeys_the_parallel_axes():
-    with_weight, bare = BrassPendulum(), BrassPendulum(weight_diameter=9.53e-3)
-    p, q = with_weight.parameters(), bare.parameters()
-    weight = p["m_p"] - q["m_p"]
-    about_hinge = [x["J_p"] + x["m_p"] * x["l_cg"] ** 2 for x in (p, q)]
-    own = weight * (0.044**2 + 9.53e-3**2) / 16 + weight * 6e-3**2 / 12
-    assert about_hinge[0] - about_hinge[1] == pytest.approx(own + weight * 0.200**2, rel=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_upright_it_falls_about_as_fast_as_the_paper_s_rig(seed):
     # Table 1 comes from an undamped pole of 7.981 rad/s; parts differ by a percent or two
-    rig = twin(seed).truth.replace(**FRICTIONLESS)
+    rig = twin(seed).plant.replace(**FRICTIONLESS)
     assert rig.linear("inverted").poles()[0].real == pytest.approx(7.981, rel=0.04)
     hanging = math.sqrt(rig.m_p * rig.g * rig.l_cg / (rig.J_p + rig.m_p * rig.l_cg**2))
     assert 6.4 < hanging < 7.98  # the range in which Table 1's weights are reachable
@@ -60,9 +38,9 @@ def test_seeds_are_rigs_of_their_own_that_can_be_had_again():
     assert twin(3) == twin(3)
     assert twin(3) != twin(4)
     # as designed, without motor and belt: their friction, and their inertia of 5e-4
-    assert twin(0).truth.J_d == pytest.approx(NOMINAL.J_d - MOTOR_AND_BELT)
+    assert twin(0).plant.J_d == pytest.approx(NOMINAL.J_d - MOTOR_AND_BELT)
     for name in ("m_p", "l_cg", "r", "J_p", "b_1", "b_1c", "b_2", "b_2c"):
-        assert getattr(twin(0).truth, name) == pytest.approx(getattr(NOMINAL, name))
+        assert getattr(twin(0).plant, name) == pytest.approx(getattr(NOMINAL, name))
 
 
 def test_a_log_holds_whole_counts_at_the_servo_s_beat():
@@ -82,7 +60,7 @@ def test_a_repetition_differs_as_a_hand_differs():
 
 def test_motion_agrees_with_another_integrator():
     rig = twin(2).changed(b_1c=0.0, b_2c=0.0)
-    p = rig.truth
+    p = rig.plant
     t, x = motion(rig, Release(push=0.2), seconds=3.0)
 
     def eq_3(_, state):  # eq. (3) by hand, errata corrected
@@ -104,28 +82,28 @@ def test_motion_agrees_with_another_integrator():
 def test_what_friction_took_is_what_the_motion_lost():
     rig = twin(5)
     t, x = motion(rig, seconds=6.0, every=1)
-    stored = rig.truth.energy(x)
-    taken = sum(energy.losses(rig.truth, t, x).values())
+    stored = rig.plant.energy(x)
+    taken = sum(losses(rig.plant, t, x).values())
     assert stored[0] - stored == pytest.approx(taken, abs=2e-5 * (stored[0] - stored[-1]) + 1e-9)
 
 
 def test_without_friction_nothing_is_taken():
-    rig = Twin(truth=NOMINAL.replace(**FRICTIONLESS), seed=0)
+    rig = with_plant(NOMINAL.replace(**FRICTIONLESS))
     t, x = motion(rig, seconds=2.0)
-    assert energy.losses(rig.truth, t, x) == {}
+    assert losses(rig.plant, t, x) == {}
 
 
 def test_a_level_free_disk_keeps_its_momentum():
-    rig = Twin(truth=NOMINAL.replace(**FRICTIONLESS), seed=0)
+    rig = with_plant(NOMINAL.replace(**FRICTIONLESS))
     _, x = motion(rig, Release(push=0.3), seconds=5.0)
-    p = drift.momentum(rig.truth, x)
+    p = drift.momentum(rig.plant, x)
     assert np.ptp(p) < 1e-8 * p[0]  # RK4's error over 5 s
 
 
 def test_released_at_rest_the_disk_is_where_the_pendulum_says():
     # p = 0 integrates to psi(theta): with s = sin(theta) and M_11 = a + b s^2 it is an arctangent
     p = NOMINAL.replace(**FRICTIONLESS)
-    _, x = motion(Twin(truth=p, seed=0), seconds=5.0)
+    _, x = motion(with_plant(p), seconds=5.0)
     a = p.J_d + p.m_p * p.r**2 + p.J_a
     b = p.J_p + p.m_p * p.l_cg**2 - p.J_a
     closed = lambda s: p.m_p * p.r * p.l_cg / math.sqrt(a * b) * np.arctan(s * math.sqrt(b / a))  # noqa: E731
@@ -136,7 +114,7 @@ def test_a_push_drifts_as_its_momentum_over_the_mean_inertia():
     # no friction: one swing with a small momentum p moves the disk by p times the integral of dt / M_11
     p = NOMINAL.replace(**FRICTIONLESS)
     push = 0.01
-    t, x = motion(Twin(truth=p, seed=0), Release(push=push), seconds=30.0)
+    t, x = motion(with_plant(p), Release(push=push), seconds=30.0)
     transverse, first = p.J_p + p.m_p * p.l_cg**2, p.m_p * p.r * p.l_cg
     m_11 = lambda a: p.J_d + p.m_p * p.r**2 + transverse * math.sin(a) ** 2 + p.J_a * math.cos(a) ** 2  # noqa: E731
 
@@ -155,7 +133,7 @@ def test_a_push_drifts_as_its_momentum_over_the_mean_inertia():
 def test_viscous_friction_alone_stops_a_push_after_momentum_over_friction():
     # p' = -b_1 psi' integrates to psi(end) - psi(0) = p(0) / b_1
     p = NOMINAL.replace(b_1=4e-3, b_1c=0.0, b_2=2e-3, b_2c=0.0)
-    _, x = motion(Twin(truth=p, seed=0), Release(push=0.5), seconds=60.0)
+    _, x = motion(with_plant(p), Release(push=0.5), seconds=60.0)
     assert x[-1, 0] == pytest.approx(drift.momentum(p, x)[0] / p.b_1, rel=1e-6)
 
 
@@ -163,18 +141,18 @@ def test_out_of_level_gravity_begins_with_the_lever_of_the_arm():
     # everything at rest, no friction: M (psi'', theta'') = m_p g (r, -l_cg) tilt, the sideways weight at its levers
     lean = 1e-4
     p = NOMINAL.replace(**FRICTIONLESS, tilt_y=lean)
-    t, x = motion(Twin(truth=p, seed=0), Release(angle=0.0), seconds=0.01, every=1)
+    t, x = motion(with_plant(p), Release(angle=0.0), seconds=0.01, every=1)
     torque = np.array([p.m_p * p.g * p.r * lean, -p.m_p * p.g * p.l_cg * lean])
     first = np.linalg.solve(NOMINAL.linear("hanging").mass, torque)[0]
     assert x[-1, 0] == pytest.approx(first * t[-1] ** 2 / 2, rel=0.01)  # (8 rad/s x 0.01 s)^2, what theta has moved
 
 
 def test_the_spring_brings_home_what_a_lean_drags_away():
-    wanders = {w.name: w for w in drift.study(twin(0))}
+    wanders = {w.name: w for w in drift.drift_paths(twin(0))}
     free, held = wanders["out of level by 0.25°"], wanders["spring, out of level by 0.25°"]
     assert abs(math.degrees(free.end)) > 45
     # at rest the spring's torque is gravity's: k_psi psi = m_p g r tilt; what remains still swings, hence 3 times
-    home = NOMINAL.m_p * NOMINAL.g * NOMINAL.r * math.sin(drift.TILT) / drift.SPRING["psi"]
+    home = NOMINAL.m_p * NOMINAL.g * NOMINAL.r * math.sin(drift.TILT) / MAKES["furuta"].anchor
     assert abs(held.end) < 4 * home
     assert abs(held.slope) < abs(free.slope) / 30
 
@@ -182,7 +160,7 @@ def test_the_spring_brings_home_what_a_lean_drags_away():
 def test_a_cart_s_momentum_is_what_its_release_gave_it():
     # no friction: p = (m_c + m_p) x' + m_p l_cg cos(theta) theta' is constant, so the cart drifts at p over the mass
     rig = freed(make_rig("linear")).changed(**FRICTIONLESS)
-    p = rig.truth
+    p = rig.plant
     _, x = motion(rig, Release(push=0.05), seconds=5.0)
     momentum = (p.m_c + p.m_p) * x[:, 1] + p.m_p * p.l_cg * np.cos(x[:, 2]) * x[:, 3]
     assert momentum == pytest.approx((p.m_c + p.m_p) * 0.05, rel=1e-7)  # RK4's error over 5 s

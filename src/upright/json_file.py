@@ -1,0 +1,45 @@
+"""JSON as this program hands it on: plain values, null where a number is not finite, files whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import is_dataclass
+from pathlib import Path
+from typing import Any
+
+
+def plain_values(value: Any) -> Any:
+    """Values that JSON can hold: arrays as lists, complex numbers as pairs, nothing where a number is not one.
+
+    A dataclass becomes a table of its fields, whose names are then those of a file's format.
+    """
+    if is_dataclass(value):
+        return plain_values(vars(value))
+    if isinstance(value, Mapping):
+        return {str(k): plain_values(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain_values(v) for v in value]
+    if hasattr(value, "tolist"):
+        return plain_values(value.tolist())
+    if isinstance(value, complex):
+        return plain_values([value.real, value.imag])
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if value is None or isinstance(value, bool | int | str) else str(value)
+
+
+def json_text(content: Any) -> str:
+    """Text of any values."""
+    return json.dumps(plain_values(content), indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def write_json(path: Path, content: Any) -> Any:
+    """Write values to a file, and give back what it holds; a reader never meets half of it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    text = json_text(content)
+    part = path.with_name(f".{path.name}.part")
+    part.write_text(text + "\n", encoding="utf-8")
+    part.replace(path)
+    return json.loads(text)

@@ -1,1 +1,0 @@
-"""The rigs of the laboratory: twins, makes, and rigs known from a fit."""
