@@ -1,4 +1,4 @@
-"""In which steps does a column move, and which encoder or converter makes such steps?
+"""Step in which a column moves, and the encoder or converter that makes such steps.
 
 Levels of a quantized signal are multiples of one step. The step is found from the differences of the levels
 that occur, then refined by least squares over all of them; a signal without steps answers 0.
