@@ -1,4 +1,4 @@
-"""When was each sample taken, if the log rounds its time or hides it in an epoch?
+"""Times of the samples where a log rounds them or counts them from an epoch.
 
 A clock that is rounded to 1 ms shows steps of 1 and 2 ms where every sample was 1.1275 ms after the last.
 Such a time base is rebuilt from the sample index; a true jitter is left as it is.
