@@ -11,7 +11,7 @@ from typing import Any
 import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
 
-from upright.physics.derived import Derived, DryJoint
+from upright.physics.equations import Derived, DryJoint
 from upright.physics.lagrange import energies, motion, symbols
 from upright.physics.statement import Statement
 

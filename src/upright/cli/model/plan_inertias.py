@@ -72,7 +72,7 @@ def plan_inertias(
 def loadings(rig: str, radius: list[str] | None) -> list[Loading]:
     """What can be added to a cart, or to a disk on the bolt circles given."""
     from upright.identification.loadings.planning import Loading
-    from upright.physics.loads import added_inertia, added_mass
+    from upright.physics import added_inertia, added_mass
     from upright.units import parse
 
     if rig == "rectilinear":

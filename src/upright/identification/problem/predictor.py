@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from upright.identification.model.model import NOISE
 from upright.identification.problem.predictor_setup import Ahead
 from upright.identification.problem.track import Track
-from upright.physics.evaluate import small_motions
+from upright.physics.equations import small_motions
 from upright.simulation import Simulator
 
 Array = NDArray[np.float64]

@@ -135,7 +135,7 @@ def _level(rig: Rig, run: Run) -> Array:
 def with_noise(rig: Rig, runs: Sequence[Run]) -> Rig:
     """The rig with the levels of process noise that filters of these runs need, to estimate unless it has them."""
     from upright.identification.model.unknowns import base_values
-    from upright.physics.evaluate import small_motions
+    from upright.physics.equations import small_motions
 
     filtered = [run for run in runs if run.restart == "kalman" and run.horizon is not None]
     moving = {c for run in filtered for c in run.measured if c not in run.held}

@@ -18,7 +18,7 @@ from upright.identification.model.unknowns import Unknown, base_values, shared_u
 from upright.identification.problem.normal import Normal, finite
 from upright.identification.search.descent import descend
 from upright.identification.search.drive_force import drive_force
-from upright.physics.evaluate import mass_and_force
+from upright.physics.equations import mass_and_force
 from upright.physics.plant import Plant
 from upright.signals.smoothing import (
     dominant_period,

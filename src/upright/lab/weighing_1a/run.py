@@ -17,8 +17,7 @@ from upright.errors import BadInput
 from upright.lab.rigs.makes import Make
 from upright.lab.weighing_1a import twin as loadings
 from upright.lab.weighing_1a.twin import MASS_RADIUS, RADIUS, Campaign, Kind
-from upright.physics import CartPendulum, Furuta
-from upright.physics.loads import added_inertia, added_mass
+from upright.physics import CartPendulum, Furuta, added_inertia, added_mass
 from upright.progress import Progress
 
 

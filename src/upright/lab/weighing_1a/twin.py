@@ -16,8 +16,7 @@ import numpy as np
 from upright.errors import NotIdentifiable
 from upright.identification.loadings.fit import Loaded, Loadings, swings, weigh
 from upright.lab.rigs.twin import COUNTS, SERVO
-from upright.physics import Plant, chain
-from upright.physics.loads import added_inertia, added_mass
+from upright.physics import Plant, added_inertia, added_mass, chain
 from upright.progress import Progress
 from upright.records import Provenance, Record
 
