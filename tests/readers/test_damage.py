@@ -118,7 +118,7 @@ HUGE = struct.pack("<II", 9, 0xFFFFFFF0)  # tag of 4 GB of numbers
         (matlab(element(14, start(6, 2, 1))), "a part of a variable is missing"),
     ],
     ids=["nested", "cells", "fields", "tag", "numbers", "text", "no data"],
-)  # fmt: skip
+)
 def test_a_matlab_file_that_promises_more_than_it_holds_is_refused_at_once(data: bytes, sentence: str) -> None:
     import tracemalloc
 

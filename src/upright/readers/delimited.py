@@ -60,9 +60,14 @@ def layout(source: Source) -> Table:
     body = "\n".join(lines[first:])
     comma = delimiter in (";", "\t", None) and "," in lines[first] and "." not in lines[first]
     return Table(
-        source=source, body=body, names=tuple(names), delimiter=delimiter, first_line=first + 1,
-        decimal_comma=comma, named=named,
-    )  # fmt: skip
+        source=source,
+        body=body,
+        names=tuple(names),
+        delimiter=delimiter,
+        first_line=first + 1,
+        decimal_comma=comma,
+        named=named,
+    )
 
 
 def read(source: Source) -> Record:

@@ -38,8 +38,8 @@ def recognise(names: tuple[str, ...]) -> bool:
 def read(source: Source) -> Record:
     """Record on the stamps of the busiest topic; times from its first stamp, exact to a nanosecond."""
     bag = _bag(source)
-    notes = [f"Empty column '{name}' left out." for name, column in zip(bag.names, bag.cells, strict=True)
-             if not any(column)]  # fmt: skip
+    empty = [name for name, column in zip(bag.names, bag.cells, strict=True) if not any(column)]
+    notes = [f"Empty column '{name}' left out." for name in empty]
     topics = bag.topics()
     if not topics:
         raise source.bad("expected columns beside the time, got none with a value", line=1)
