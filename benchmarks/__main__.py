@@ -97,9 +97,11 @@ def main(arguments: list[str] | None = None) -> int:
         markdown = {"markdown": asked.markdown}
         extra = {"fit": {"full": asked.full}, "real": markdown, "rigs": markdown, "regulation": markdown}.get(name, {})
         module = importlib.import_module(f"benchmarks.{name}")
-        lines: list[Line] = module.run(quick=asked.quick, progress=lambda text: told.print(f"[dim]{text}[/]"), **extra)
+        lines: list[Line] = module.run(
+            quick=asked.quick, progress=lambda text, name=name: told.print(f"[dim]{name}: {text}[/]"), **extra
+        )
         console.print(table(name, (module.__doc__ or "").splitlines()[0], lines))
-        results["lines"] += [asdict(line) | {"reached": line.reached} for line in lines]
+        results["lines"] += [{"benchmark": name} | asdict(line) | {"reached": line.reached} for line in lines]
         missed += sum(line.reached is False for line in lines)
     if asked.json:
         asked.json.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")

@@ -7,15 +7,14 @@ intervals 190 hold the truth, give or take 6 (two standard errors).
 
 from __future__ import annotations
 
+import functools
 import math
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
-from benchmarks.measure import Line
+from benchmarks.measure import Line, of_each
 
-NAME = "coverage"
 TRUTH = {"m_p": 0.2, "l_cg": 0.3, "J_p": 2e-3, "b_2": 2e-3, "b_2c": 0.0, "b_2q": 0.0}
 GUESS = {"J_p": 3e-3, "b_2": 1.5e-3}
 ANGLE, PERIOD, LOUD = 0.4, 0.02, 0.02
@@ -33,8 +32,8 @@ def noise(samples: int, memory: float, generator: np.random.Generator) -> np.nda
     return out
 
 
-def held(seconds: float, memory: float, seeds: Sequence[int]) -> np.ndarray:
-    """Whether each interval held the truth (seeds, unknowns)."""
+def held(seconds: float, memory: float, seed: int) -> list[bool]:
+    """Whether the interval of each unknown held the truth."""
     from upright.identification import Parameter, Rig, Run
     from upright.identification.estimate import identify
     from upright.physics import Pendulum
@@ -47,16 +46,12 @@ def held(seconds: float, memory: float, seeds: Sequence[int]) -> np.ndarray:
     }
     rig = Rig(plant=Pendulum, parameters=parameters)
     motion = simulate(Pendulum(**TRUTH), {}, [ANGLE, 0.0], None, PERIOD, samples=n)[:, 0, 0]
-    found = np.zeros((len(seeds), len(GUESS)), dtype=bool)
-    for row, seed in enumerate(seeds):
-        y = motion + LOUD * noise(n, memory, np.random.default_rng(seed))
-        run = Run(label="swing", role="fit", t=np.arange(n) * PERIOD, u=np.zeros((n, 1)), y=y[:, None],
-                  measured=("theta",))  # fmt: skip
-        fit = identify(rig, [run], method="least-squares")
-        for column, name in enumerate(GUESS):
-            low, high = fit.estimates[name].interval
-            found[row, column] = low <= TRUTH[name] <= high
-    return found
+    y = motion + LOUD * noise(n, memory, np.random.default_rng(seed))
+    run = Run(label="swing", role="fit", t=np.arange(n) * PERIOD, u=np.zeros((n, 1)), y=y[:, None],
+              measured=("theta",))  # fmt: skip
+    fit = identify(rig, [run], method="least-squares")
+    intervals = {name: fit.estimates[name].interval for name in GUESS}
+    return [low <= TRUTH[name] <= high for name, (low, high) in intervals.items()]
 
 
 def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
@@ -66,11 +61,10 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     for seconds in SECONDS:
         for memory in MEMORY:
             name = f"{seconds:g} s, autocorrelation {memory:g}"
-            progress(f"{NAME}: {name}")
-            start = time.process_time()
-            share = 100 * held(seconds, memory, seeds).mean(axis=0)
-            each = (time.process_time() - start) / len(seeds)
+            progress(name)
+            hits, each = of_each(functools.partial(held, seconds, memory), seeds)
+            share = 100 * np.mean(hits, axis=0)
             said = ", ".join(f"{n} {s:.1f} %" for n, s in zip(GUESS, share, strict=True))
             note = f"95 % intervals that hold the truth, {len(seeds)} records: {said}"
-            lines.append(Line(benchmark=NAME, contender=name, seconds=(each, each, each), note=note))
+            lines.append(Line(contender=name, seconds=each, note=note))
     return lines

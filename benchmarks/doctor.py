@@ -16,7 +16,6 @@ from pathlib import Path
 from benchmarks.doctored import FAULTS, PLANTS, batch
 from benchmarks.measure import Line
 
-NAME = "doctor"
 EACH, QUICK = 100, 10
 """Records per plant and fault."""
 SEED = 2026
@@ -83,7 +82,7 @@ def run(*, quick: bool, progress: Callable[[str], None], seed: int = SEED) -> li
     counts: list[Count] = []
     lines: list[Line] = []
     for fault in ("", *FAULTS):
-        progress(f"{NAME}: {fault or 'no fault'}")
+        progress(fault or "no fault")
         c = count(fault, QUICK if quick else EACH, seed)
         counts.append(c)
         share, alarms = 100 * c.hits / c.records, 100 * c.others / c.records
@@ -91,7 +90,7 @@ def run(*, quick: bool, progress: Callable[[str], None], seed: int = SEED) -> li
         found = f"found {share:.1f} % (standard error {error:.1f} %), " if fault else ""
         note = f"{c.records} records: {found}{'another' if fault else 'a'} finding in {alarms:.1f} % {c.kinds or ''}"
         each = (c.seconds, c.seconds, c.seconds)
-        lines.append(Line(benchmark=NAME, contender=fault or "no fault", seconds=each, note=note))
+        lines.append(Line(contender=fault or "no fault", seconds=each, note=note))
     if not quick:
         write_page(markdown(counts, seed))
     return lines

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import importlib
 import time
 from collections.abc import Callable
 from typing import Any
@@ -11,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks import baseline, problem
-from benchmarks.measure import Contender, Line, Target, compare
+from benchmarks.measure import Contender, Line, Target, compare, library
 
-NAME = "ensemble"
 EARLY = 200  # samples after which two correct programs still agree: later a flipped count amplifies rounding
 
 
@@ -77,14 +75,9 @@ def ours(*, stick_slip: bool) -> Contender:
     )
 
 
-def library(name: str, what: str, *size: int, share: float) -> Callable[[], Contender]:
+def slow(name: str, what: str, *size: int, share: float) -> Callable[[], Contender]:
     """One of `benchmarks.libraries`, over a `share` of the whole."""
-
-    def build() -> Contender:
-        module = importlib.import_module(f"benchmarks.libraries.with_{name}")
-        return Contender(name=what, run=module.ensemble(*size), share=share, note=scaled(share))
-
-    return build
+    return library(name, what, "ensemble", *size, share=share, note=scaled(share))
 
 
 def scaled(share: float) -> str:
@@ -102,14 +95,14 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
         "upright, no dry friction": lambda: ours(stick_slip=False),
         "upright, exact stick-slip": lambda: ours(stick_slip=True),
         "C, scalar": lambda: in_c(lanes=False, friction=False, share=0.02 if quick else 1.0),
-        "JAX, elementwise scan": library("jax", "JAX, elementwise scan", many, share=many * one),
-        "CasADi, fold + map": library("casadi", "CasADi, fold + map", few, share=few * one),
-        "MuJoCo, controller in Python": library("mujoco", "MuJoCo, controller in Python", share=one),
-        "python-control, discrete system": library(
+        "JAX, elementwise scan": slow("jax", "JAX, elementwise scan", many, share=many * one),
+        "CasADi, fold + map": slow("casadi", "CasADi, fold + map", few, share=few * one),
+        "MuJoCo, controller in Python": slow("mujoco", "MuJoCo, controller in Python", share=one),
+        "python-control, discrete system": slow(
             "control", "python-control, discrete system", problem.SAMPLES, share=one
         ),
-        "scipy, solve_ivp per sample": library(
+        "scipy, solve_ivp per sample": slow(
             "scipy", "scipy, solve_ivp per sample", EARLY, share=one * EARLY / problem.SAMPLES
         ),
     }
-    return compare(NAME, builders, rounds=3 if quick else 9, progress=progress)
+    return compare(builders, rounds=3 if quick else 9, progress=progress)

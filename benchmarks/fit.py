@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from benchmarks import baseline, problem
-from benchmarks.measure import Contender, Line, Target, compare
+from benchmarks.measure import Contender, Line, Target, compare, spread
 
-NAME = "fit"
 SIMPLEX = {"xatol": 1e-6, "fatol": 1e-10, "adaptive": True, "maxfev": 20_000, "maxiter": 20_000}
 
 
@@ -86,9 +86,8 @@ def estimated_over_solve_ivp(evaluations: list[int]) -> Line:
     seconds = float(np.dot(taken, evaluations))
     costs = " and ".join(f"{n:,} x {1e3 * s:.1f} ms" for n, s in zip(evaluations, taken, strict=True))
     return Line(
-        benchmark=NAME,
         contender="simplex over solve_ivp",
-        seconds=(seconds, seconds, seconds),
+        seconds=spread([seconds]),
         note=f"estimated: {costs}; --full runs it",
     )
 
@@ -125,11 +124,10 @@ def run(*, quick: bool, full: bool, progress: Callable[[str], None]) -> list[Lin
             name="simplex over scalar C", run=simplex_in_c, error=relative_error, note="tanh friction"
         ),
     }
-    lines = compare(NAME, builders, rounds=5 if quick else 21, progress=progress)
+    lines = compare(builders, rounds=5 if quick else 21, progress=progress)
     if full:
         slow = with_solve_ivp()
         return lines + compare(
-            NAME,
             {
                 "simplex over solve_ivp": lambda: Contender(
                     name="simplex over solve_ivp",
@@ -148,7 +146,5 @@ def run(*, quick: bool, full: bool, progress: Callable[[str], None]) -> list[Lin
 
 def with_ratio(line: Line, first: float) -> Line:
     """Line whose ratio is taken from medians, because it was not part of the rounds."""
-    from dataclasses import replace
-
     ratio = line.seconds[0] / first if line.seconds else 1.0
-    return replace(line, ratio=(ratio, ratio, ratio))
+    return replace(line, ratio=spread([ratio]))

@@ -7,15 +7,12 @@ unstable pole of the inverted rig within 1 %, and inside its 95 % interval.
 from __future__ import annotations
 
 import tempfile
-import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.measure import Line
-
-NAME = "frequency"
+from benchmarks.measure import Line, of_each
 
 
 def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
@@ -30,11 +27,10 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     with tempfile.TemporaryDirectory() as folder:
         for make in PENDULUMS:
             run_frequency(make, 0, Path(folder))  # compiles
-            progress(f"{NAME}: {make}")
-            start = time.process_time()
+            progress(make)
+            runs, each = of_each(lambda seed, make=make: run_frequency(make, seed, Path(folder)), seeds)
             off, walked, held, numbers, cost = [], [], [], [], []
-            for seed in seeds:
-                done = run_frequency(make, seed, Path(folder))
+            for done in runs:
                 answer, truth = done.answer, true_key(done)
                 found = key_value(answer.key)
                 off.append(abs(found.value / truth - 1))
@@ -42,11 +38,10 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
                 held.append(found.interval[0] <= truth <= found.interval[1])
                 numbers += [e.interval[0] <= done.truth[n] <= e.interval[1] for n, e in answer.fit.estimates.items()]
                 cost.append((answer.squares.way.seconds, answer.simplex.seconds))
-            each = (time.process_time() - start) / len(seeds)
             least, simplex = np.median(np.array(cost), axis=0)
             lines.append(
                 Line(
-                    benchmark=NAME, contender=f"{make}, least squares", seconds=(each, each, each),
+                    contender=f"{make}, least squares", seconds=each,
                     error=float(np.median(off)),
                     note=f"unstable pole inside {100 * np.mean(held):.0f} % of the 95 % intervals of {len(seeds)}"
                     f" twins, all numbers inside {100 * np.mean(numbers):.0f} %; worst error {max(off):.2g}; asked:"
@@ -55,7 +50,7 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
             )  # fmt: skip
             lines.append(
                 Line(
-                    benchmark=NAME, contender=f"{make}, simplex on dB", error=float(np.median(walked)),
+                    contender=f"{make}, simplex on dB", error=float(np.median(walked)),
                     note=f"the paper's way, dry friction taken for viscous; worst error {max(walked):.2g};"
                     f" fit {simplex:.2g} s",
                 )

@@ -12,10 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.measure import Line, Target
+from benchmarks.measure import Line, Target, spread
 from benchmarks.startup import cpu_of_children, process
 
-NAME = "lab"
 WARM = Target(most=30, of="seconds")
 
 
@@ -32,13 +31,13 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         if not quick:
-            progress(f"{NAME}: cold")
+            progress("cold")
             wall, cpu = timed(folder / "cold", 0, caches=folder / "caches")
             lines.append(_line("cold, nothing compiled", [wall], [cpu], None))
         timed(folder / "first", 0)
         walls, cpus = [], []
         for seed in range(1, 3 if quick else 6):
-            progress(f"{NAME}: seed {seed}")
+            progress(f"seed {seed}")
             wall, cpu = timed(folder / str(seed), seed)
             walls.append(wall)
             cpus.append(cpu)
@@ -49,8 +48,5 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
 
 
 def _line(name: str, walls: list[float], cpus: list[float], target: Target | None) -> Line:
-    middle, low, high = (float(np.quantile(walls, q)) for q in (0.5, 0.25, 0.75))
     note = f"{np.median(cpus):.3g} s of CPU"
-    return Line(
-        benchmark=NAME, contender=name, seconds=(middle, low, high), rounds=len(walls), target=target, note=note
-    )
+    return Line(contender=name, seconds=spread(walls), rounds=len(walls), target=target, note=note)

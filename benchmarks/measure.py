@@ -8,13 +8,18 @@ stretch; whole processes are timed by the clock on the wall.
 from __future__ import annotations
 
 import gc
+import importlib
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
+
+T = TypeVar("T")
+Spread = tuple[float, float, float]
+"""Median, lower and upper quartile."""
 
 BATCH = 0.02  # s; what is shorter is run several times in its turn, as a program in use would
 
@@ -50,12 +55,11 @@ class Contender:
 
 @dataclass(frozen=True, kw_only=True)
 class Line:
-    """One row of the table; seconds and ratios as (median, lower quartile, upper quartile)."""
+    """One row of the table."""
 
-    benchmark: str
     contender: str
-    seconds: tuple[float, float, float] | None = None
-    ratio: tuple[float, float, float] | None = None
+    seconds: Spread | None = None
+    ratio: Spread | None = None
     rounds: int = 0
     error: float | None = None
     target: Target | None = None
@@ -70,13 +74,37 @@ class Line:
         return value[0] <= self.target.most
 
 
-def spread(values: Sequence[float]) -> tuple[float, float, float]:
+def spread(values: Sequence[float]) -> Spread:
     """Median, lower and upper quartile."""
     low, middle, high = np.percentile(values, [25, 50, 75])
     return float(middle), float(low), float(high)
 
 
-def built(benchmark: str, builders: dict[str, Callable[[], Contender]]) -> tuple[list[Contender], list[Line]]:
+def of_each(work: Callable[[Any], T], which: Iterable[Any]) -> tuple[list[T], Spread]:
+    """What each came to, such as the twin of each seed, and the mean CPU seconds."""
+    start = time.process_time()
+    done = [work(one) for one in which]
+    return done, spread([(time.process_time() - start) / len(done)])
+
+
+def library(name: str, what: str, part: str, *size: int, **more: Any) -> Callable[[], Contender]:
+    """Contender that is the function `part` of a module of `benchmarks.libraries`."""
+
+    def build() -> Contender:
+        module = importlib.import_module(f"benchmarks.libraries.with_{name}")
+        return Contender(name=what, run=getattr(module, part)(*size), **more)
+
+    return build
+
+
+def page(name: str, title: str, about: str | None, body: Sequence[str]) -> str:
+    """Published page of a benchmark, opened by what its module says of itself."""
+    first, _, *rest = (about or "").strip().splitlines()
+    command = f"Written by `python -m benchmarks {name} --markdown benchmarks/{name}.md`."
+    return "\n".join([f"# {title}: {first}", "", command, *rest, *body]) + "\n"
+
+
+def built(builders: dict[str, Callable[[], Contender]]) -> tuple[list[Contender], list[Line]]:
     """Contenders that can run here, and a line with the reason for each that cannot."""
     able, unable = [], []
     for name, build in builders.items():
@@ -85,12 +113,11 @@ def built(benchmark: str, builders: dict[str, Callable[[], Contender]]) -> tuple
         except (ImportError, Unavailable) as reason:
             missing = getattr(reason, "name", None)
             note = f"left out: {f'{missing} is not installed' if missing else reason}"
-            unable.append(Line(benchmark=benchmark, contender=name, note=note))
+            unable.append(Line(contender=name, note=note))
     return able, unable
 
 
 def compare(
-    benchmark: str,
     builders: dict[str, Callable[[], Contender]],
     *,
     rounds: int,
@@ -102,14 +129,14 @@ def compare(
 
     A contender whose one run takes longer than `patience` seconds sits out all rounds but two.
     """
-    able, lines = built(benchmark, builders)
+    able, lines = built(builders)
     taken: dict[str, list[float]] = {c.name: [] for c in able}
     ratios: dict[str, list[float]] = {c.name: [] for c in able}
     errors: dict[str, float | None] = {}
     turns: dict[str, int] = {}
     batch: dict[str, int] = {}
     for contender in able:
-        progress(f"{benchmark}: {contender.name}")
+        progress(contender.name)
         result = contender.run()  # compiles, allocates, fills caches
         errors[contender.name] = contender.error(result) if contender.error else None
         del result
@@ -137,7 +164,6 @@ def compare(
     for contender in able:
         lines.append(
             Line(
-                benchmark=benchmark,
                 contender=contender.name,
                 seconds=spread(taken[contender.name]),
                 ratio=spread(ratios[contender.name]) if ratios[contender.name] else None,

@@ -7,16 +7,14 @@ Reference Datasets, nonlinear regression (public domain).
 from __future__ import annotations
 
 import json
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.measure import Line
+from benchmarks.measure import Line, of_each
 
-NAME = "nist"
 CERTIFIED = Path(__file__).parents[1] / "tests" / "identification" / "search" / "nist_strd.json"
 
 
@@ -38,30 +36,19 @@ def digits(found: np.ndarray, certified: list[float]) -> float:
     return float(np.min(-np.log10(np.maximum(np.abs(found - c) / np.abs(c), 1e-11))))
 
 
-def results() -> Iterator[tuple[str, str, float, float, int, float]]:
-    """Name, start, digits of parameters and of standard errors, evaluations, seconds."""
-    from upright.identification.search.curve import fit_curve
-
-    for problem in problems():
-        for start in ("start1", "start2"):
-            began = time.process_time()
-            fit = fit_curve(model(problem), problem["y"], problem[start])
-            seconds = time.process_time() - began
-            found = digits(fit.values, problem["certified"]), digits(fit.stderr, problem["certified_sd"])
-            yield problem["name"], start, *found, fit.evaluations, seconds
-
-
 def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     """One line per problem and start."""
-    progress(f"{NAME}: 14 problems from both starts")
-    return [
-        Line(
-            benchmark=NAME,
-            contender=f"{name}, {start}",
-            seconds=(seconds, seconds, seconds),
-            error=10**-parameters,
-            note=f"digits: parameters {parameters:.1f}, standard errors {errors:.1f}; {evaluations} evaluations"
-            + ("" if min(parameters, errors) >= 6 else " MISSED 6"),
-        )
-        for name, start, parameters, errors, evaluations, seconds in results()
-    ]
+    from upright.identification.search.curve import fit_curve
+
+    progress("14 problems from both starts")
+    lines: list[Line] = []
+    for problem in problems():
+        for start in ("start1", "start2"):
+            (fit,), seconds = of_each(lambda p, s=start: fit_curve(model(p), p["y"], p[s]), [problem])
+            parameters = digits(fit.values, problem["certified"])
+            errors = digits(fit.stderr, problem["certified_sd"])
+            note = f"digits: parameters {parameters:.1f}, standard errors {errors:.1f}; {fit.evaluations} evaluations"
+            missed = "" if min(parameters, errors) >= 6 else " MISSED 6"
+            name = f"{problem['name']}, {start}"
+            lines.append(Line(contender=name, seconds=seconds, error=10**-parameters, note=note + missed))
+    return lines

@@ -15,7 +15,6 @@ from typing import Any
 from benchmarks.asked import ASKED, Asked, studies
 from benchmarks.measure import Line, Target, spread
 
-NAME = "real"
 STUDIES = Path(__file__).parents[1] / "examples" / "studies"
 TARGET = Target(most=30.0, of="seconds")
 
@@ -39,10 +38,10 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
     """One line per study."""
     data = os.environ.get("UPRIGHT_REAL_DATA", "")
     if not data:
-        return [Line(benchmark=NAME, contender="all studies", note="left out: UPRIGHT_REAL_DATA names no folder")]
+        return [Line(contender="all studies", note="left out: UPRIGHT_REAL_DATA names no folder")]
     results: list[Result] = []
     for name in studies():
-        progress(f"{NAME}: {name}")
+        progress(name)
         results.append(_result(name, data, rounds=1 if quick else 3))
         if markdown is not None:  # what is done is kept, should somebody interrupt
             markdown.write_text(page(results), encoding="utf-8")
@@ -76,7 +75,7 @@ def _line(r: Result) -> Line:
         reached = r.reached(asked)
         told.append(f"{_what(asked)} {_span(reached, asked)} (asked {asked.least:g}{_missed(asked, reached)})")
     note = "; ".join([*told, *([] if r.fit.trusted else ["not trusted"])])
-    return Line(benchmark=NAME, contender=r.study, seconds=r.seconds, rounds=r.rounds, target=TARGET, note=note)
+    return Line(contender=r.study, seconds=r.seconds, rounds=r.rounds, target=TARGET, note=note)
 
 
 def _missed(asked: Asked, reached: dict[str, float]) -> str:

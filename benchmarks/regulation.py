@@ -14,7 +14,6 @@ the day and its own error of the hand; then the law runs on the true rig, with t
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,12 +22,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.measure import Line
+from benchmarks.measure import Line, of_each, page
 
 if TYPE_CHECKING:
     from upright.control import Rig
 
-NAME = "regulation"
 IMAGE = Path("docs/images/regulation_reliability.png")
 Array = NDArray[np.float64]
 GAIN = "actuator.gain"
@@ -225,23 +223,17 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
     lines: list[Line] = []
     rows: list[str] = []
     for what, count in (("identified by steps", 60 if quick else 500), ("identified as in 1b", 6 if quick else 40)):
-        progress(f"{NAME}: {count} twins {what}")
-        began = time.process_time()
-        told: list[Told | None] = []
-        for i in range(count):
-            make, seed = ("furuta", "linear")[i % 2], 1 + i // 2
-            if what == "identified as in 1b":
-                with TemporaryDirectory() as folder:
-                    told.append(one(make, seed, swept=Path(folder)))
-            else:
-                told.append(one(make, seed))
-        each = (time.process_time() - began) / count
+        progress(f"{count} twins {what}")
+        with TemporaryDirectory() as folder:
+            at = Path(folder) if what == "identified as in 1b" else None
+            twins = [(("furuta", "linear")[i % 2], 1 + i // 2) for i in range(count)]
+            told, each = of_each(lambda twin, at=at: one(*twin, swept=at), twins)
         kept = [t for t in told if t is not None]
         chances, came = np.array([t.chance for t in kept]), np.array([t.held for t in kept])
         found = calibration(chances, came)
         lines.append(
             Line(
-                benchmark=NAME, contender=what, seconds=(each,) * 3, error=found.brier,
+                contender=what, seconds=each, error=found.brier,
                 note=f"Brier {found.brier:.3f}, {found.expected:.3f} if calibrated; skill {found.skill:.2f}; "
                 f"Spiegelhalter z {found.z:+.2f}; {100 * came.mean():.0f} % of {len(kept)} held, "
                 f"told {100 * chances.mean():.0f} %",
@@ -254,7 +246,8 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
 
             save(reliability_figure(chances, came, bins=BINS), IMAGE)
     if markdown is not None:
-        markdown.write_text(page(rows), encoding="utf-8")
+        picture = ["", f"![What came, against the chance told](../{IMAGE.as_posix()})"]
+        markdown.write_text(page("regulation", "Calibration", __doc__, [*picture, *rows]), encoding="utf-8")
     return lines
 
 
@@ -278,14 +271,3 @@ def table(what: str, found: Calibration, chances: Array, came: NDArray[np.bool_]
             bounds = f"{100 * b // BINS} to {100 * (b + 1) // BINS} %"
             out.append(f"| {bounds} | {inside.sum()} | {told:.1f} % | {true:.1f} % |")
     return out
-
-
-def page(rows: list[str]) -> str:
-    """The published tables."""
-    told = (__doc__ or "").strip().splitlines()
-    head = [
-        f"# Calibration: {told[0]}", "",
-        "Written by `python -m benchmarks regulation --markdown benchmarks/regulation.md`.", *told[2:], "",
-        f"![What came, against the chance told](../{IMAGE.as_posix()})",
-    ]  # fmt: skip
-    return "\n".join([*head, *rows]) + "\n"

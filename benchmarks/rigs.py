@@ -10,7 +10,6 @@ take ``1.96 sqrt(0.95 * 0.05 / n)``.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,9 +18,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.coverage import noise
-from benchmarks.measure import Line
+from benchmarks.measure import Line, Spread, of_each, page
 
-NAME = "rigs"
 SECONDS, DT = 8.0, 5e-3
 
 
@@ -110,46 +108,31 @@ def outcome(make: Make, seed: int) -> tuple[dict[str, bool], dict[str, str], boo
 def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None = None) -> list[Line]:
     """Share of intervals that hold the truth by plant and kind of number."""
     each = 8 if quick else 40
-    tally: dict[tuple[str, str], list[bool]] = {}
+    every: list[bool] = []
     lines: list[Line] = []
     for place, make in enumerate(MAKES):
-        progress(f"{NAME}: {each} rigs like {make.plant}")
-        start = time.process_time()
-        trusted, firm, count = 0, 0, 0
-        for k in range(each):
-            held, status, good = outcome(make, 1000 * place + k)
-            trusted += good
-            firm += sum(s == "firm" for s in status.values())
-            count += len(status)
-            for n, h in held.items():
-                tally.setdefault((make.plant, kind(n)), []).append(h)
-        seconds = (time.process_time() - start) / each
-        for (plant, what), hits in tally.items():
-            if plant == make.plant:
-                lines.append(_line(f"{plant}: {what}", hits, seconds))
-        note = f"{trusted} of {each} fits trusted, {firm} of {count} numbers firm"
-        lines.append(Line(benchmark=NAME, contender=f"{make.plant}: fits", seconds=(seconds,) * 3, note=note))
-    lines.append(_line("all", [h for hits in tally.values() for h in hits], None))
+        progress(f"{each} rigs like {make.plant}")
+        done, seconds = of_each(lambda seed, make=make: outcome(make, seed), range(1000 * place, 1000 * place + each))
+        tally: dict[str, list[bool]] = {}
+        for held, _, _ in done:
+            for n, hit in held.items():
+                tally.setdefault(kind(n), []).append(hit)
+        lines += [_line(f"{make.plant}: {what}", hits, seconds) for what, hits in tally.items()]
+        every += [hit for hits in tally.values() for hit in hits]
+        firm = [s == "firm" for _, status, _ in done for s in status.values()]
+        trusted = sum(good for *_, good in done)
+        note = f"{trusted} of {each} fits trusted, {sum(firm)} of {len(firm)} numbers firm"
+        lines.append(Line(contender=f"{make.plant}: fits", seconds=seconds, note=note))
+    lines.append(_line("all", every, None))
     if markdown is not None:
-        markdown.write_text(page(lines, each * len(MAKES)), encoding="utf-8")
+        rows = [f"| {line.contender} | {line.note} |" for line in lines]
+        body = ["", f"| of {each * len(MAKES)} rigs | |", "|---|---|", *rows]
+        markdown.write_text(page("rigs", "Coverage", __doc__, body), encoding="utf-8")
     return lines
 
 
-def page(lines: list[Line], rigs: int) -> str:
-    """The published table."""
-    told = (__doc__ or "").strip().splitlines()
-    head = [
-        f"# Coverage: {told[0]}",
-        "",
-        "Written by `python -m benchmarks rigs --markdown benchmarks/rigs.md`.",
-        *told[2:],
-    ]
-    table = ["", f"| of {rigs} rigs | |", "|---|---|", *(f"| {line.contender} | {line.note} |" for line in lines)]
-    return "\n".join([*head, *table]) + "\n"
-
-
-def _line(name: str, hits: list[bool], seconds: float | None) -> Line:
+def _line(name: str, hits: list[bool], seconds: Spread | None) -> Line:
     share, n = 100 * float(np.mean(hits)), len(hits)
     give = 196 * math.sqrt(0.95 * 0.05 / n)
     note = f"{share:.1f} % of {n} intervals hold the truth (95 +- {give:.1f} if honest)"
-    return Line(benchmark=NAME, contender=name, seconds=None if seconds is None else (seconds,) * 3, note=note)
+    return Line(contender=name, seconds=seconds, note=note)

@@ -15,7 +15,6 @@ import numpy as np
 
 from benchmarks.measure import Contender, Line, Target, compare
 
-NAME = "startup"
 HERE = Path(__file__).parents[1]
 FIRST_RESULT = "from benchmarks import ours; print(ours.trajectory(stick_slip=True)()[-1])"
 
@@ -64,5 +63,5 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
         return Contender(name=name, run=run, target=None if most is None else Target(most=most, of="seconds"))
 
     builders = {name: lambda name=name: contender(name) for name in kinds}
-    lines = compare(NAME, builders, rounds=3 if quick else 11, clock=time.perf_counter, progress=progress)
+    lines = compare(builders, rounds=3 if quick else 11, clock=time.perf_counter, progress=progress)
     return [replace(line, note=f"{np.median(cpu[line.contender]):.2g} s of CPU") for line in lines]

@@ -14,9 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.measure import Line
+from benchmarks.measure import Line, spread
 
-NAME = "swing_up"
 SECONDS, HELD = 15.0, 5.0
 LIES = tuple((place, factor) for factor in (-1.0, 0.5, 2.0, 4.0, 1.1, 0.9) for place in (0, 1))
 
@@ -27,15 +26,15 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
 
     lines: list[Line] = []
     for make in PENDULUMS:
-        progress(f"{NAME}: {make}, up")
+        progress(f"{make}, up")
         lines += [_up(make, 25 if quick else 100, far) for far in (1.0, 3.0)]
-        progress(f"{NAME}: {make}, encoders")
+        progress(f"{make}, encoders")
         lines += _sensors(make, 48 if quick else 200)
     return lines
 
 
 def _line(make: str, what: str, seconds: float, note: str) -> Line:
-    return Line(benchmark=NAME, contender=f"{make}, {what}", seconds=(seconds,) * 3, note=note)
+    return Line(contender=f"{make}, {what}", seconds=spread([seconds]), note=note)
 
 
 def _up(make: str, count: int, scatter: float) -> Line:

@@ -7,16 +7,13 @@ more by 13 % between the pulses that identify and the step. Asked: within effort
 from __future__ import annotations
 
 import tempfile
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.measure import Line
-
-NAME = "tracking"
+from benchmarks.measure import Line, Spread, of_each
 
 
 def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
@@ -27,12 +24,10 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     lines: list[Line] = []
     seeds = range(1, 13 if quick else 101)
     for kind in SHAFTS:
-        progress(f"{NAME}: {kind}")
+        progress(kind)
         with tempfile.TemporaryDirectory() as folder:
             first = run_tracking(kind, 0, Path(folder))  # compiles
-            start = time.process_time()
-            done = [run_tracking(kind, seed, Path(folder)) for seed in seeds]
-            each = (time.process_time() - start) / len(seeds)
+            done, each = of_each(lambda seed, kind=kind, at=Path(folder): run_tracking(kind, seed, at), seeds)
         for i, name in enumerate(o.law.name for o in first.sets):
             lines.append(_line(kind, name, [d.sets[i] for d in done], done, each))
         for name, pick in (("with a sum", "summed"), ("PD, tuned", "pd"), ("PD, as stiff", "stiff")):
@@ -43,14 +38,14 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
         spread = [r.figures.overshoot if r.figures else np.inf for r in alien]
         lines.append(
             Line(
-                benchmark=NAME, contender=f"{kind}, set 4 of the rig as designed on all",
+                contender=f"{kind}, set 4 of the rig as designed on all",
                 note=f"within limits {share(sum(good), len(good))}; overshoot {between(100 * np.array(spread), '%')}",
             )
         )  # fmt: skip
     return lines
 
 
-def _line(kind: str, name: str, outcomes: Sequence[Any], done: Sequence[Any], each: float | None) -> Line:
+def _line(kind: str, name: str, outcomes: Sequence[Any], done: Sequence[Any], each: Spread | None) -> Line:
     found = [o.found for o in outcomes]
     told = [(o.foreseen.figures, o.found.figures, d) for o, d in zip(outcomes, done, strict=True)]
     figures = [f for _, f, _ in told if f is not None]
@@ -69,9 +64,7 @@ def _line(kind: str, name: str, outcomes: Sequence[Any], done: Sequence[Any], ea
         + f"; push moves {between([100 * r.give / d.step.size for r, (_, _, d) in zip(found, told, strict=True)], '%')}"
         f"; rise foretold to {100 * float(np.median(off)):.2g} % (median)"
     )
-    return Line(
-        benchmark=NAME, contender=f"{kind}, {name}", seconds=None if each is None else (each, each, each), note=note
-    )  # fmt: skip
+    return Line(contender=f"{kind}, {name}", seconds=each, note=note)
 
 
 def between(values: Any, unit: str) -> str:

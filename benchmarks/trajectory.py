@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import functools
-import importlib
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from benchmarks import baseline, problem
-from benchmarks.measure import Contender, Line, Target, compare
-
-NAME = "trajectory"
+from benchmarks.measure import Contender, Line, Target, compare, library
 
 
 @functools.cache
@@ -61,16 +58,6 @@ def ours(*, stick_slip: bool) -> Contender:
     )
 
 
-def library(name: str, what: str) -> Callable[[], Contender]:
-    """One of `benchmarks.libraries`."""
-
-    def build() -> Contender:
-        module = importlib.import_module(f"benchmarks.libraries.with_{name}")
-        return Contender(name=what, run=module.trajectory(), error=error)
-
-    return build
-
-
 def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     """All contenders; the scalar C is the reference."""
     builders: dict[str, Callable[[], Contender]] = {
@@ -79,10 +66,10 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
         "C, scalar, tanh friction": lambda: in_c(lanes=False, friction=True),
         "upright, no dry friction": lambda: ours(stick_slip=False),
         "upright, exact stick-slip": lambda: ours(stick_slip=True),
-        "JAX, jit + scan": library("jax", "JAX, jit + scan"),
-        "CasADi, mapaccum": library("casadi", "CasADi, mapaccum"),
-        "MuJoCo, rollout": library("mujoco", "MuJoCo, rollout"),
-        "scipy, solve_ivp 1e-8": library("scipy", "scipy, solve_ivp 1e-8"),
-        "python-control, 1e-8": library("control", "python-control, 1e-8"),
+        "JAX, jit + scan": library("jax", "JAX, jit + scan", "trajectory", error=error),
+        "CasADi, mapaccum": library("casadi", "CasADi, mapaccum", "trajectory", error=error),
+        "MuJoCo, rollout": library("mujoco", "MuJoCo, rollout", "trajectory", error=error),
+        "scipy, solve_ivp 1e-8": library("scipy", "scipy, solve_ivp 1e-8", "trajectory", error=error),
+        "python-control, 1e-8": library("control", "python-control, 1e-8", "trajectory", error=error),
     }
-    return compare(NAME, builders, rounds=7 if quick else 31, progress=progress)
+    return compare(builders, rounds=7 if quick else 31, progress=progress)

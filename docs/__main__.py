@@ -10,8 +10,10 @@ import argparse
 import sys
 from pathlib import Path
 
+import nbformat
+
 from docs import nomenclature
-from docs.notebook import CellFailed, differences, executed, read, write
+from docs.notebook import CellFailed, differences, executed
 
 HERE = Path(__file__).parent
 NOMENCLATURE = HERE / "nomenclature.md"
@@ -33,7 +35,7 @@ def main() -> int:
         path = HERE / f"{name}.ipynb"
         if not path.is_file():
             ask.error(f"there is no notebook {path.name} in {HERE.name}/")
-        stored = read(path)
+        stored = nbformat.read(path, as_version=4)
         try:
             fresh = executed(stored)
         except CellFailed as error:
@@ -41,7 +43,7 @@ def main() -> int:
             failed = True
             continue
         if not asked.check:
-            write(path, fresh)
+            nbformat.write(fresh, path)
             print(f"{path.name}: {path.stat().st_size / 1e3:.0f} kB")
             continue
         for sentence in differences(stored, fresh):

@@ -1,52 +1,35 @@
-"""How does a notebook come to its outputs? Its cells run in order in one namespace, as Jupyter would, but without it.
+"""Outputs of a notebook, made afresh by nbclient, and what they say that is not stored.
 
-The outputs stored are those a cell's last value offers (a picture, a formula, a table) and what it printed; nothing in
-them tells where, when or on which machine they were made.
+Nothing in what is stored tells where, when or on which machine it was made.
 """
 
 from __future__ import annotations
 
-import ast
-import base64
-import io
-import json
 import os
 import re
+import sys
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import chdir, redirect_stdout
-from pathlib import Path
+from collections.abc import Iterator
 from typing import Any
 
-WIDTH = 720  # pixels of a picture on the page
-_SHARP = 1.25  # stored pixels to one on the page
-_COLOURS = 80
+import nbformat
+from nbclient import NotebookClient
+from nbclient.exceptions import CellExecutionError
+from nbformat import NotebookNode
+
+_RICH = {"text/html", "text/markdown", "text/latex"}
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 _LANGUAGE = {
     "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
     "language_info": {"name": "python"},
 }
 
-Cell = dict[str, Any]
-Notebook = dict[str, Any]
-
 
 class CellFailed(Exception):
     """A cell that raised; says which, and shows its source."""
 
 
-def read(path: Path) -> Notebook:
-    """Notebook of a file."""
-    return json.loads(path.read_text(encoding="utf-8"))
-
-
-def write(path: Path, notebook: Notebook) -> None:
-    """Write a notebook as Jupyter does, so that both leave the same file."""
-    text = json.dumps(notebook, indent=1, ensure_ascii=False, sort_keys=True)
-    path.write_text(text + "\n", encoding="utf-8")
-
-
-def executed(notebook: Notebook) -> Notebook:
+def executed(notebook: NotebookNode) -> NotebookNode:
     """The same notebook with fresh outputs; files it writes go to a folder that is gone afterwards.
 
     Raises
@@ -54,142 +37,55 @@ def executed(notebook: Notebook) -> Notebook:
     CellFailed
         When a cell raises.
     """
-    os.environ["MPLBACKEND"] = "Agg"
-    cells: list[Cell] = []
-    outputs: list[dict[str, Any]] = []
-    scope: dict[str, Any] = {
-        "__name__": "__main__",
-        "display": lambda value: outputs.append(_shown(value)),
+    make = {"code": nbformat.v4.new_code_cell, "markdown": nbformat.v4.new_markdown_cell}
+    cells = [
+        make[cell.cell_type](cell.source, id=f"cell-{i}")
+        for i, cell in enumerate(notebook.cells, start=1)
+    ]
+    fresh = nbformat.v4.new_notebook(cells=cells)
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join(map(os.path.abspath, sys.path)),  # `docs.pictures` too
+        "MPLBACKEND": "module://matplotlib_inline.backend_inline",
+        # a debugger's word about itself and those of libraries about encodings are no output of a cell
+        "PYDEVD_DISABLE_FILE_VALIDATION": "1",
+        "PYTHONWARNDEFAULTENCODING": "",
     }
-    count = 0
-    with tempfile.TemporaryDirectory() as folder, chdir(folder):
-        for i, cell in enumerate(notebook["cells"]):
-            fresh = {
-                "cell_type": cell["cell_type"],
-                "id": f"cell-{i + 1}",
-                "metadata": {},
-                "source": cell["source"],
-            }
-            if cell["cell_type"] == "code":
-                count += 1
-                outputs.clear()
-                _run("".join(cell["source"]), scope, outputs, count)
-                fresh |= {"execution_count": count, "outputs": [dict(o) for o in outputs]}
-            cells.append(fresh)
-    return {"cells": cells, "metadata": _LANGUAGE, "nbformat": 4, "nbformat_minor": 5}
-
-
-def _run(source: str, scope: dict[str, Any], outputs: list[dict[str, Any]], count: int) -> None:
-    """Run one cell: what it prints, then what it drew, then its last value, each appended to `outputs`."""
-    body = ast.parse(source).body
-    last = body.pop() if body and isinstance(body[-1], ast.Expr) else None
-    said = io.StringIO()
-    try:
-        with redirect_stdout(said):
-            exec(compile(ast.Module(body, []), f"<cell {count}>", "exec"), scope)
-            value = (
-                eval(compile(ast.Expression(last.value), f"<cell {count}>", "eval"), scope)
-                if last
-                else None
+    with tempfile.TemporaryDirectory() as folder:
+        client = NotebookClient(
+            fresh,
+            kernel_name="python3",
+            resources={"metadata": {"path": folder}},
+            extra_arguments=["--IPKernelApp.extra_extensions=docs.pictures", "--log-level=ERROR"],
+            coalesce_streams=True,
+            record_timing=False,
+        )
+        try:
+            client.execute(env=environment)
+        except CellExecutionError as error:
+            cell = next(
+                c
+                for c in fresh.cells
+                if any(o.output_type == "error" for o in c.get("outputs", ()))
             )
-    except Exception as error:
-        raise CellFailed(
-            f"cell {count} raises {type(error).__name__}: {error}\n\n{source}"
-        ) from error
-    if said.getvalue():
-        outputs.insert(
-            0, {"name": "stdout", "output_type": "stream", "text": _lines(said.getvalue())}
-        )
-    outputs += [_shown(drawing) for drawing in _drawn()]
-    if value is not None:
-        outputs.append({**_shown(value), "execution_count": count, "output_type": "execute_result"})
+            raise CellFailed(
+                f"cell {cell.execution_count} raises {error.ename}: {error.evalue}\n\n{cell.source}"
+            ) from error
+    for output in (o for cell in fresh.cells for o in cell.get("outputs", ())):
+        if _RICH & output.get("data", {}).keys():
+            output.data["text/plain"] = "a formula or table"
+    fresh.metadata = nbformat.from_dict(_LANGUAGE)
+    return fresh
 
 
-def _drawn() -> list[Any]:
-    """Figures that pyplot holds open, which are closed."""
-    from matplotlib import pyplot
-
-    figures = [pyplot.figure(number) for number in pyplot.get_fignums()]
-    pyplot.close("all")
-    return figures
-
-
-def _shown(value: Any) -> dict[str, Any]:
-    """Output of a value in the richest form it has."""
-    from matplotlib.figure import Figure
-
-    data: dict[str, Any] = {}
-    metadata: dict[str, Any] = {}
-    if isinstance(value, Figure):
-        told = _told(value)
-        data["image/png"] = _png(value)
-        metadata["image/png"] = {
-            "alt": told,
-            "width": round(WIDTH * min(1.0, value.get_figwidth() / 7.4)),
-        }
-        data["text/plain"] = [told]
-    else:
-        for kind, method in (
-            ("text/html", "_repr_html_"),
-            ("text/markdown", "_repr_markdown_"),
-            ("text/latex", "_repr_latex_"),
-        ):
-            form: Callable[[], str | None] | None = getattr(value, method, None)
-            text = form() if form and not isinstance(value, type) else None
-            if text:
-                data[kind] = _lines(text)
-        data["text/plain"] = ["a formula or table"] if data else _lines(repr(value))
-    return {"data": data, "metadata": metadata, "output_type": "display_data"}
-
-
-def _png(drawing: Any) -> str:
-    """Base64 of a picture in few colours, which is all that curves and labels need."""
-    from PIL import Image
-
-    raw = io.BytesIO()
-    drawing.savefig(raw, format="png", dpi=_SHARP * WIDTH / 7.4, facecolor="white")
-    few = (
-        Image.open(raw)
-        .convert("RGB")
-        .quantize(_COLOURS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
-    )
-    small = io.BytesIO()
-    few.save(small, format="png", optimize=True)
-    return base64.b64encode(small.getvalue()).decode("ascii") + "\n"
-
-
-def _told(drawing: Any) -> str:
-    """What a picture shows, for who cannot see it: titles, and what is drawn over what."""
-    panels: list[str] = []
-    for axes in drawing.axes:
-        titles = (axes.get_title(loc) for loc in ("left", "center", "right"))
-        over = (
-            " over ".join(filter(None, (axes.get_ylabel(), axes.get_xlabel())))
-            if axes.axison
-            else ""
-        )
-        panels.append(": ".join(filter(None, (", ".join(filter(None, titles)), over))))
-    words = "; ".join(dict.fromkeys(filter(None, panels))) or "a drawing"
-    return "Picture. " + " ".join(re.sub(r"\\math\w+|[${}\\]", "", words).split())
-
-
-def _lines(text: str) -> list[str]:
-    return text.splitlines(keepends=True)
-
-
-def differences(stored: Notebook, fresh: Notebook) -> Iterator[str]:
+def differences(stored: NotebookNode, fresh: NotebookNode) -> Iterator[str]:
     """Sentences about cells that no longer say what is stored.
 
     A number printed was rounded, so its last digit may differ by one; pictures and formulas are only asked to be there.
     """
-    for a, b in zip(stored["cells"], fresh["cells"], strict=True):
-        if a["cell_type"] != "code":
+    for a, b in zip(stored.cells, fresh.cells, strict=True):
+        if a.cell_type != "code":
             continue
-        where, before, now = (
-            f"cell {b['execution_count']}",
-            _said(a["outputs"]),
-            _said(b["outputs"]),
-        )
+        where, before, now = f"cell {b.execution_count}", _said(a.outputs), _said(b.outputs)
         if [kinds for kinds, _ in before] != [kinds for kinds, _ in now]:
             yield f"{where} shows other kinds of things than are stored."
             continue
@@ -198,22 +94,17 @@ def differences(stored: Notebook, fresh: Notebook) -> Iterator[str]:
                 yield f"{where} says\n{other}\nand what is stored is\n{one}"
 
 
-def _said(outputs: list[dict[str, Any]]) -> list[tuple[list[str], str]]:
+def _said(outputs: list[Any]) -> list[tuple[list[str], str]]:
     """Kinds and text of each output; what was printed is one, in how many pieces it may have come."""
     said: list[tuple[list[str], str]] = []
     for output in outputs:
-        kinds = sorted(output.get("data", {}))
+        kinds = sorted(output.get("data", ()))
+        text = output.data["text/plain"] if kinds == ["text/plain"] else output.get("text", "")
         if said and not kinds and not said[-1][0]:
-            said[-1] = ([], said[-1][1] + _text(output))
+            said[-1] = ([], said[-1][1] + text)
         else:
-            said.append((kinds, _text(output)))
+            said.append((kinds, text))
     return said
-
-
-def _text(output: dict[str, Any]) -> str:
-    if len(output.get("data", "?")) > 1:
-        return ""  # a picture or a formula
-    return "".join(output.get("text") or output["data"]["text/plain"])
 
 
 def alike(stored: str, fresh: str) -> bool:

@@ -203,7 +203,7 @@ def test_no_file_is_called_after_a_drawer():
         ("import scipy.optimize", "upright.report.figures"),
         ("from scipy.optimize import brentq", "upright.physics.plant"),
         ("import lmfit", "upright.report.tables"),
-        ("import numba", "upright.physics.derived"),
+        ("import numba", "upright.physics.equations"),
         ("import pint", "upright.study.load"),
         ("x = 1", "upright.drawer.thing"),
     ],

@@ -6,10 +6,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import nbformat
 import pytest
+from nbformat.v4 import new_code_cell, new_notebook, new_output
 
 from docs import nomenclature
-from docs.notebook import CellFailed, alike, differences, executed, read
+from docs.notebook import CellFailed, alike, differences, executed
 from upright.physics import BUILT_IN
 
 ROOT = Path(__file__).parents[1]
@@ -23,16 +25,16 @@ def stem(path):
 
 
 def cells(notebook):
-    return [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    return [cell for cell in notebook.cells if cell.cell_type == "code"]
+
+
+def stored_in(path):
+    return nbformat.read(path, as_version=4)
 
 
 def of(*sources):
     """Notebook of these cells, never run."""
-    return {"cells": [{"cell_type": "code", "source": [source], "outputs": []} for source in sources]}
-
-
-def text(cell):
-    return "".join(line for output in cell["outputs"] for line in output.get("text", []))
+    return new_notebook(cells=[new_code_cell(source) for source in sources])
 
 
 @pytest.mark.slow
@@ -47,9 +49,9 @@ def test_a_notebook_runs_and_says_what_is_stored(path):
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=stem)
 def test_a_notebook_is_stored_as_it_was_run_from_top_to_bottom(path):
-    stored = read(path)
-    assert [cell["execution_count"] for cell in cells(stored)] == list(range(1, len(cells(stored)) + 1))
-    assert {output["output_type"] for cell in cells(stored) for output in cell["outputs"]} <= {
+    stored = stored_in(path)
+    assert [cell.execution_count for cell in cells(stored)] == list(range(1, len(cells(stored)) + 1))
+    assert {output.output_type for cell in cells(stored) for output in cell.outputs} <= {
         "stream",
         "display_data",
         "execute_result",
@@ -59,17 +61,17 @@ def test_a_notebook_is_stored_as_it_was_run_from_top_to_bottom(path):
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=stem)
 def test_a_notebook_is_small_and_tells_nothing_of_a_machine(path):
     assert path.stat().st_size < LARGEST
-    stored = read(path)
-    assert set(stored["metadata"]) == {"kernelspec", "language_info"}
-    assert set(stored["metadata"]["language_info"]) == {"name"}
-    said = "".join(line for cell in cells(stored) for o in cell["outputs"] for line in o.get("text", []))
+    stored = stored_in(path)
+    assert set(stored.metadata) == {"kernelspec", "language_info"}
+    assert set(stored.metadata.language_info) == {"name"}
+    said = "".join(o.get("text", "") for cell in cells(stored) for o in cell.outputs)
     assert not OWN_FOLDERS.search(said)
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=stem)
 def test_every_picture_and_table_of_a_notebook_is_introduced(path):
     """A student is never shown a cell without a sentence between it and the one before the last."""
-    kinds = "".join(cell["cell_type"][0] for cell in read(path)["cells"])
+    kinds = "".join(cell.cell_type[0] for cell in stored_in(path).cells)
     assert kinds.startswith("m")
     assert "ccc" not in kinds
 
@@ -84,8 +86,8 @@ def test_every_picture_and_table_of_a_notebook_is_introduced(path):
     ],
 )
 def test_the_derivation_of_eq_3_notices_a_mistake(right, wrong):
-    notebook = read(ROOT / "docs" / "experiment_4.ipynb")
-    sources = ["".join(cell["source"]) for cell in cells(notebook)]
+    notebook = stored_in(ROOT / "docs" / "experiment_4.ipynb")
+    sources = [cell.source for cell in cells(notebook)]
     assert sum(right in source for source in sources) == 1
     with pytest.raises(CellFailed, match=r"cell 7 raises AssertionError"):
         executed(of(*(source.replace(right, wrong) for source in sources)))
@@ -103,13 +105,14 @@ def test_cells_share_their_names_and_show_print_picture_and_last_value():
             "display(x)\nx = None\nx",
         )
     )
-    printed, drawn, figure, formula, last = (cell["outputs"] for cell in cells(fresh))
-    assert [o["output_type"] for o in printed] == ["stream", "execute_result"]
-    assert printed[1]["data"] == {"text/plain": ["21"]}
+    printed, drawn, figure, formula, last = (cell.outputs for cell in cells(fresh))
+    assert [o.output_type for o in printed] == ["stream", "execute_result"]
+    assert printed[1].data == {"text/plain": "21"}
     for output in (drawn[0], figure[-1]):
-        assert base64.b64decode(output["data"]["image/png"]).startswith(b"\x89PNG")
-    assert formula[0]["data"]["text/latex"] == ["$x$"]
-    assert [o["data"]["text/plain"] for o in last] == [["20"]]
+        assert base64.b64decode(output.data["image/png"]).startswith(b"\x89PNG")
+        assert output.metadata["image/png"]["alt"] == output.data["text/plain"]
+    assert formula[0].data == {"text/latex": "$x$", "text/plain": "a formula or table"}
+    assert [o.data["text/plain"] for o in last] == ["20"]
 
 
 def test_a_cell_that_raises_is_named():
@@ -121,13 +124,13 @@ def test_a_notebook_that_says_something_else_is_told():
     stored = executed(of("print('gain', 3.14)", "1"))
     assert list(differences(stored, stored)) == []
     other = copy.deepcopy(stored)
-    cells(other)[0]["outputs"][0]["text"] = ["gain 3.24\n"]
+    cells(other)[0].outputs[0].text = "gain 3.24\n"
     assert len(list(differences(stored, other))) == 1
     in_pieces = copy.deepcopy(stored)  # as Jupyter may store them
-    cells(in_pieces)[0]["outputs"] = [{"text": ["gain "]}, {"text": ["3.14\n"]}]
+    cells(in_pieces)[0].outputs = [new_output("stream", text=text) for text in ("gain ", "3.14\n")]
     assert list(differences(stored, in_pieces)) == []
     silent = copy.deepcopy(stored)
-    cells(silent)[1]["outputs"] = []
+    cells(silent)[1].outputs = []
     assert len(list(differences(stored, silent))) == 1
 
 

@@ -1,4 +1,4 @@
-"""What a person can get wrong, and how the program says so.
+"""Errors that a person is meant to read.
 
 Every message has three parts: what was needed, what came, and what to try.
 """

@@ -1,4 +1,4 @@
-"""What does this number mean, in which unit, and between which bounds?
+"""Unit, meaning and bounds of a parameter.
 
 A parameter says so once, in `quantity()`; tables, axis labels, forms and the
 nomenclature are generated from that line.

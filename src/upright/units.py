@@ -1,4 +1,4 @@
-"""What does "2 mm" mean inside, where everything is SI with radians?
+"""Values in SI units with radians, of texts such as "2 mm" and of units such as "mm".
 
 Values from a study, a form or the command line wear their unit and lose it here, once. Pint does the
 arithmetic on the units a laboratory uses; it is imported when the first unit is read.
@@ -78,11 +78,8 @@ def parse(text: str, expected: str = "") -> float:
     BadInput
         When there is no number, the unit is unknown, or its dimension is not the one expected.
     """
-    wanted = (
-        f"a value in {expected} such as '0.5 {expected}'" if expected not in ("", "1") else "a number with its unit"
-    )
-    if expected == "1":
-        wanted = "a pure number such as '0.5'"
+    plain = {"": "a number with its unit", "1": "a pure number such as '0.5'"}
+    wanted = plain.get(expected, f"a value in {expected} such as '0.5 {expected}'")
     match = _NUMBER.fullmatch(text)
     if match is None:
         raise BadInput(f"Expected {wanted}, got {text[:60]!r}; write the number first, then the unit.")
@@ -148,12 +145,6 @@ def known(unit: str) -> bool:
     return True
 
 
-def format_value(value: float, unit: str = "", *, digits: int = 4) -> str:
-    """Text of an SI `value` shown in `unit`: ``format_value(0.002, "mm")`` is ``"2 mm"``."""
-    shown = value / scale(unit) if unit else value
-    return f"{shown:.{digits}g} {unit}".rstrip() if unit != "1" else f"{shown:.{digits}g}"
-
-
 @lru_cache(maxsize=512)
 def _si(unit: str) -> tuple[float, str]:
     """SI factor and dimension of a unit."""
@@ -212,9 +203,7 @@ def _hint(unit: str, expected: str) -> str:
         fitting = [expected, *(u for u in fitting if u != expected)]
     folded = {re.sub(r"[\s*·^]", "", u).lower(): u for u in reversed(fitting)}
     key = re.sub(r"[\s*·^]", "", unit).lower()
-    close = (
-        [folded[key]] if key in folded else [folded[k] for k in get_close_matches(key, list(folded), n=1, cutoff=0.5)]
-    )
+    close = [key] if key in folded else get_close_matches(key, list(folded), n=1, cutoff=0.5)
     if close:
-        return f"did you mean '{close[0]}'?"
+        return f"did you mean '{folded[close[0]]}'?"
     return f"use {' or '.join(repr(u) for u in fitting[:3])}."

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+import zlib
 from pathlib import Path
 
 import pytest
@@ -66,3 +68,80 @@ def test_a_missing_file_is_answered_with_its_neighbour(tmp_path: Path) -> None:
 def test_a_last_number_that_may_be_cut_is_noted(tmp_path: Path) -> None:
     record = read_source(source(b"t,x\n0,1\n1,25\n2,3"))
     assert any("no line end" in note for note in record.provenance.notes)
+
+
+def element(kind: int, data: bytes) -> bytes:
+    """One element of a MATLAB version 5 file."""
+    return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+
+def start(code: int, *dims: int) -> bytes:
+    """What a variable begins with: its class, its dimensions, no name."""
+    return element(6, struct.pack("<II", code, 0)) + element(5, struct.pack(f"<{len(dims)}i", *dims)) + element(1, b"a")
+
+
+def matlab(*elements: bytes) -> bytes:
+    return logs.mat_vectors()[:128] + b"".join(elements)
+
+
+def packed(*pieces: bytes, repeat: int = 1) -> bytes:
+    """Compressed element of `pieces`, the last of them repeated; made piece by piece, so that the test stays small."""
+    machine = zlib.compressobj(1)
+    *first, last = pieces
+    data = b"".join([machine.compress(b"".join(first)), *(machine.compress(last) for _ in range(repeat))])
+    data += machine.flush()
+    return struct.pack("<II", 15, len(data)) + data
+
+
+def nested(depth: int) -> bytes:
+    """Cells in cells, the outermost first; 5000 of them end the interpreter where SciPy reads them."""
+    size, parts = 0, []
+    for _ in range(depth):
+        size += 8 + len(start(1, 1, 1))
+        parts.append(struct.pack("<II", 14, size - 8) + start(1, 1, 1))
+    return b"".join(reversed(parts))
+
+
+NAMES = element(5, struct.pack("<i", 8)) + element(1, b"gain\0\0\0\0" * 20)
+HUGE = struct.pack("<II", 9, 0xFFFFFFF0)  # tag of 4 GB of numbers
+
+
+@pytest.mark.parametrize(
+    ("data", "sentence"),
+    [
+        (matlab(packed(nested(100_000))), "nested too deeply"),
+        (matlab(element(14, start(1, 1 << 30, 1))), "1073741824 parts announced, 0 found"),
+        (matlab(element(14, start(2, 1 << 30, 1) + NAMES)), "21474836480 parts announced, 0 found"),
+        (matlab(element(14, start(6, 1 << 30, 1) + HUGE)), "an element of 4294967280 bytes where 0 are left"),
+        (matlab(element(14, start(6, 1 << 30, 1) + element(9, bytes(80)))), "1073741824 numbers announced, 10 found"),
+        (matlab(element(14, start(4, 1 << 30, 1) + element(16, b""))), "got only parameters"),
+        (matlab(element(14, start(6, 2, 1))), "a part of a variable is missing"),
+    ],
+    ids=["nested", "cells", "fields", "tag", "numbers", "text", "no data"],
+)
+def test_a_matlab_file_that_promises_more_than_it_holds_is_refused_at_once(data: bytes, sentence: str) -> None:
+    import tracemalloc
+
+    tracemalloc.start()
+    with pytest.raises(BadInput, match=sentence):
+        read_source(source(data))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 100e6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("size", "begin", "piece"),
+    [
+        (3_000_000_000, start(6, 1, 1), bytes(1 << 20)),
+        (48_000_048, start(1, 6_000_000, 1), struct.pack("<II", 14, 0) * 10_000),
+    ],
+    ids=["numbers", "empty cells"],
+)
+def test_a_matlab_file_that_unpacks_to_more_than_any_log_is_refused(size: int, begin: bytes, piece: bytes) -> None:
+    """A few megabytes unpack to gigabytes, or to millions of objects."""
+    data = matlab(packed(struct.pack("<II", 14, size) + begin, piece, repeat=600))
+    assert len(data) < 4e6
+    with pytest.raises(BadInput, match="unpacks to more than 512 MB"):
+        read_source(source(data))

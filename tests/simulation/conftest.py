@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from upright.physics.derived import Derived, DryJoint
+from upright.physics.equations import Derived, DryJoint
 
 
 def block_on_a_spring() -> Derived:

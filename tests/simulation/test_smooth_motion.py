@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from tests.simulation.conftest import BLOCK, FURUTA
 from upright.errors import BadInput
-from upright.physics.derived import Derived
+from upright.physics.equations import Derived
 from upright.simulation import Held, ensemble, simulate
 
 

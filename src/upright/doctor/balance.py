@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from upright.doctor.motion import Motion
-from upright.physics.evaluate import mass_and_force
+from upright.physics.equations import mass_and_force
 from upright.records import Array
 
 FLOOR = 0.004

@@ -14,7 +14,6 @@ from upright.errors import BadInput
 from upright.readers import read_source, recognise
 from upright.readers.delimited import layout
 from upright.readers.source import Source, load
-from upright.readers.table import numbers
 from upright.readers.timebase import time_scale
 from upright.records import PathLike, Record
 
@@ -34,8 +33,7 @@ def read_mended(path: PathLike, *, reader: str = "") -> tuple[Record, tuple[Find
         if "time must increase" not in str(error) or (reader or recognise(source)) != "table":
             raise
     found = layout(source)
-    table = numbers(source, found.body, names=found.names, delimiter=found.delimiter, first_line=found.first_line,
-                    decimal_comma=found.decimal_comma)  # fmt: skip
+    table = found.numbers()
     at = next((j for j, name in enumerate(found.names) if found.named and time_scale(name)), 0)
     t = table[:, at] * ((found.named and time_scale(found.names[at])) or 1.0)
     step = np.diff(t)

@@ -8,7 +8,7 @@ import numpy as np
 
 from upright.doctor.case import Case
 from upright.doctor.findings import Finding
-from upright.readers.lies import DAC_COUNTS_PER_VOLT
+from upright.readers.suspect_columns import DAC_COUNTS_PER_VOLT
 
 
 def examine_settings(case: Case) -> list[Finding]:

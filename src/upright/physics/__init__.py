@@ -8,10 +8,9 @@ import traceback
 from pathlib import Path
 
 from upright.errors import BadInput, UprightError, nearest
-from upright.physics.derived import Derived, DryJoint
+from upright.physics.equations import Derived, DryJoint
 from upright.physics.linear import Linear
-from upright.physics.loads import added_inertia, added_mass
-from upright.physics.oscillators import chain
+from upright.physics.oscillators import added_inertia, added_mass, chain
 from upright.physics.pendulums import CartPendulum, Furuta, Pendulum
 from upright.physics.plant import Plant
 from upright.physics.statement import Coordinate, Input, Joint

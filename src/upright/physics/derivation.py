@@ -1,4 +1,4 @@
-"""How is a plant told to code that knows no symbols? Its equations of motion as short text, cheap to evaluate.
+"""Equations of motion of a plant as short text, cheap to evaluate, for code that knows no symbols.
 
 Every constant combination of parameters is computed once (k0, k1, ...), every sine and cosine once (s0, c0, ...),
 what is left in common once (w0, w1, ...).
@@ -11,7 +11,7 @@ from typing import Any
 import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
 
-from upright.physics.derived import Derived, DryJoint
+from upright.physics.equations import Derived, DryJoint
 from upright.physics.lagrange import energies, motion, symbols
 from upright.physics.statement import Statement
 
@@ -53,17 +53,7 @@ def derive(cls: type[Statement], *, without: frozenset[str] = frozenset()) -> De
         kinetic=text(sp.expand(momentum_energy) if momentum_energy.is_polynomial(*v) else momentum_energy),
         potential=text(V),
         power_lost=text(sum(vi * sp.diff(D, vi) for vi in v)),
-        joints=tuple(
-            DryJoint(
-                coordinate=index[j.on],
-                coulomb=j.coulomb,
-                quadratic=j.quadratic,
-                stiction=j.stiction,
-                stribeck_speed=j.stribeck_speed,
-                presliding=j.presliding,
-            )
-            for j in cls.joints
-        ),
+        joints=tuple(DryJoint(coordinate=index[j.on], **j.parameters()) for j in cls.joints),
     )
 
 

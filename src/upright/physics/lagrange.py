@@ -1,4 +1,4 @@
-"""Which equations of motion follow from the energies? The only door to SymPy.
+"""Equations of motion in symbols, as they follow from the energies. The only door to SymPy.
 
 Euler and Lagrange: with L = T - V, ``M = d2L/dv2`` and
 ``f = dL/dq - (d2L/dv dq) v - dD/dv + Q``; terms of T that are linear in the velocities

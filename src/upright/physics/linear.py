@@ -1,4 +1,4 @@
-"""What does a plant look like close to rest?"""
+"""Linear model of a plant close to rest."""
 
 from __future__ import annotations
 
@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import ImpossiblePhysics, NotIdentifiable
-from upright.physics.derived import Derived
-from upright.physics.evaluate import mass_and_force, small_motions
+from upright.physics.equations import Derived, mass_and_force, small_motions
 from upright.physics.statement import Statement
 
 Matrix = NDArray[np.float64]
-Roots = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,54 +48,14 @@ class Linear:
         return self.C @ np.linalg.solve(s[:, None, None] * np.eye(n) - self.A, self.B[None].astype(np.complex128))
 
     def to_control(self) -> Any:
-        """The same model as a `control.StateSpace` with named signals."""
+        """The same model as a `control.StateSpace` with named signals.
+
+        ``control.ss2tf(model["psi", "T"]).minreal()`` is a transfer function of it.
+        """
         import control
 
-        return control.StateSpace(
-            self.A,
-            self.B,
-            self.C,
-            self.D,
-            states=list(self.states),
-            inputs=list(self.inputs),
-            outputs=list(self.outputs),
-        )
-
-    def transfer_functions(self) -> dict[tuple[str, str], tuple[Matrix, Matrix]]:
-        """Numerator and denominator, highest power first, by (output, input); zeros and poles that meet are cancelled.
-
-        They count as met when they are closer than 1e-6 of the fastest pole.
-        """
-        poles = self.poles()
-        near = 1e-6 * np.abs(poles).max(initial=0.0)
-        out: dict[tuple[str, str], tuple[Matrix, Matrix]] = {}
-        for i, y in enumerate(self.outputs):
-            for j, u in enumerate(self.inputs):
-                # det(sI - A + b c) = det(sI - A) + c adj(sI - A) b
-                num = np.poly(self.A - np.outer(self.B[:, j], self.C[i])).real - np.poly(self.A).real
-                num[np.abs(num) < 1e-12 * np.abs(num).max(initial=0.0)] = 0.0
-                num = np.trim_zeros(num, "f") if num.any() else np.zeros(1)
-                zeros, left = _cancel(np.roots(num).astype(np.complex128), poles, near)
-                out[y, u] = num[0] * _polynomial(zeros, near), _polynomial(left, near)
-        return out
-
-
-def _cancel(zeros: Roots, poles: Roots, near: float) -> tuple[Roots, Roots]:
-    """Zeros and poles without the pairs that lie closer than `near`."""
-    kept: list[complex] = []
-    left = list(poles)
-    for zero in zeros:
-        distance = [abs(zero - p) for p in left]
-        if distance and min(distance) <= near:
-            left.pop(int(np.argmin(distance)))
-        else:
-            kept.append(complex(zero))
-    return np.array(kept, dtype=np.complex128), np.array(left, dtype=np.complex128)
-
-
-def _polynomial(roots: Roots, near: float) -> Matrix:
-    """Monic polynomial with these roots; those closer to 0 than `near` are taken as 0."""
-    return np.atleast_1d(np.poly(np.where(np.abs(roots) <= near, 0.0, roots))).real.astype(np.float64)
+        names = {"states": list(self.states), "inputs": list(self.inputs), "outputs": list(self.outputs)}
+        return control.StateSpace(self.A, self.B, self.C, self.D, **names)
 
 
 def linearize(plant: Statement, derived: Derived, at: str | None = None) -> Linear:

@@ -1,4 +1,4 @@
-"""What shakes: a chain of inertias joined by springs; carts on a rail or disks on a shaft, one plant in two units.
+"""What shakes: a chain of inertias joined by springs, carts on a rail or disks on a shaft, and masses added to them.
 
 Body i has inertia ``m_i`` (``J_i``), a known addition ``a_i``, a spring ``k_i`` and a dashpot ``c_i`` to ground, and a
 spring ``k_ij`` and a dashpot ``c_ij`` to its neighbour. Two bodies without ground springs have one rigid mode and one
@@ -10,11 +10,12 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-from upright.errors import BadInput
+from upright.errors import BadInput, ImpossiblePhysics
 from upright.physics.plant import Plant
 from upright.physics.statement import Coordinate, Input, Joint
 from upright.quantities import quantity
 
+MASS = 0.5  # kg, one brass mass of ECP 205 and ECP 210
 _UNITS = {
     "rectilinear": ("kg", "m", "N", "N/m", "N s/m", "N s^2/m^2", "m/s", "mass", "force", "position of cart"),
     "torsional": (
@@ -113,3 +114,29 @@ for _kind in _UNITS:
 # under the names their classes carry, so that a plant can be pickled and sent to another process
 Rectilinear1, Rectilinear2, Rectilinear3 = (_BUILT_IN["rectilinear", n] for n in (1, 2, 3))
 Torsional1, Torsional2, Torsional3 = (_BUILT_IN["torsional", n] for n in (1, 2, 3))
+
+
+def added_mass(count: int, mass: float = MASS) -> float:
+    """Mass [kg] of `count` masses on a cart."""
+    if count < 0 or mass <= 0:
+        raise ImpossiblePhysics(f"masses are counted from 0 and weigh something, got {count} of {mass:g} kg.")
+    return count * mass
+
+
+def added_inertia(count: int, radius: float, *, mass: float = MASS, mass_radius: float = 0.0) -> float:
+    """Inertia [kg m^2] about the disk's axis of `count` masses bolted at `radius` [m]; parallel axes.
+
+    Parameters
+    ----------
+    count : int
+        Number of masses, all at the same radius.
+    radius : float
+        Axis of the disk to axis of a mass [m]; 0.02 to 0.09 on the ECP 205.
+    mass : float
+        One mass [kg].
+    mass_radius : float
+        Radius [m] of one cylindrical mass; 0 takes it as a point.
+    """
+    if radius < 0 or mass_radius < 0:
+        raise ImpossiblePhysics(f"a radius cannot be negative, got {radius:g} m and {mass_radius:g} m.")
+    return added_mass(count, mass) * (radius**2 + mass_radius**2 / 2)

@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upright.physics.derived import Derived
-from upright.physics.evaluate import evaluate
+from upright.physics.equations import Derived, evaluate
 from upright.physics.linear import Linear, linearize
 from upright.physics.statement import Statement
 

@@ -1,4 +1,4 @@
-"""What does a plant state? Its parameters, coordinates, inputs, joints, equilibria and energies.
+"""What a plant states: its parameters, coordinates, inputs, joints, equilibria and energies.
 
 What its author can have forgotten is said in a sentence when the class is made.
 """
@@ -52,6 +52,10 @@ class Joint:
     stiction: str = ""
     stribeck_speed: str = ""
     presliding: str = ""
+
+    def parameters(self) -> dict[str, str]:
+        """Name of the parameter, or "", by kind of friction."""
+        return {kind: name for kind, name in vars(self).items() if kind != "on"}
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(quantity,))
@@ -218,9 +222,8 @@ def _check_references(cls: type[Any]) -> None:
         known(i.on, coordinates, f"input {i.name}")
     for j in cls.joints:
         known(j.on, coordinates, "a joint")
-        for name in (j.coulomb, j.quadratic, j.stiction, j.stribeck_speed, j.presliding):
-            if name:
-                known(name, parameters, f"the joint on {j.on}")
+        for name in filter(None, j.parameters().values()):
+            known(name, parameters, f"the joint on {j.on}")
     if not cls.equilibria:
         raise BadInput(
             f'{cls.__name__} has no equilibria; write equilibria = {{"rest": {{}}}} for all coordinates at 0.'

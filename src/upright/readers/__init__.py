@@ -1,20 +1,24 @@
-"""Which program wrote this log, and what does it hold?
+"""Record of a log, whichever program wrote it, and what can be told about its columns.
 
 `read` recognises the format from the content, not from the suffix.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from upright.errors import BadInput, nearest
+from upright.readers import delimited, ecp, matlab, rosbag
+from upright.readers.inspection import Inspection, inspect_record
 from upright.readers.source import Source, load
 from upright.records import PathLike, Record
+from upright.records.exchange import CSV_MARK
 
-if TYPE_CHECKING:
-    from upright.readers.inspection import Inspection
-
-READERS = ("ecp", "table", "ros-bag", "matlab", "upright")
+READERS = {
+    "ecp": ecp.read,
+    "table": delimited.read,
+    "ros-bag": rosbag.read,
+    "matlab": matlab.read,
+    "upright": delimited.read_own,
+}
 
 __all__ = ["READERS", "inspect", "read", "recognise"]
 
@@ -40,43 +44,22 @@ def read(path: PathLike, *, reader: str | None = None) -> Record:
 def read_source(source: Source, *, reader: str | None = None) -> Record:
     """Record of content already in memory; see `read`."""
     name = reader or recognise(source)
+    if name not in READERS:
+        raise BadInput(f"There is no reader '{name}': {nearest(name, READERS)}")
     try:
-        if name == "matlab":
-            from upright.readers import matlab
-
-            return matlab.read(source)
-        if name == "ecp":
-            from upright.readers import ecp
-
-            return ecp.read(source)
-        if name == "ros-bag":
-            from upright.readers import rosbag
-
-            return rosbag.read(source)
-        if name == "upright":
-            from upright.readers import own
-
-            return own.read(source)
-        if name == "table":
-            from upright.readers import delimited
-
-            return delimited.read(source)
+        return READERS[name](source)
     except BadInput as error:
         if source.file in str(error):
             raise
         raise BadInput(f"'{source.file}': {error}") from None  # the record refused what the reader found
-    raise BadInput(f"There is no reader '{name}': {nearest(name, READERS)}")
 
 
 def recognise(source: Source) -> str:
     """Name of the reader for this content."""
-    from upright.readers import delimited, ecp, mat5, rosbag
-    from upright.readers.own import MARK
-
-    if mat5.recognise(source.data, source.file):
+    if matlab.recognise(source.data, source.file):
         return "matlab"
     text = source.text
-    if text.startswith(MARK):
+    if text.startswith(CSV_MARK):
         return "upright"
     if ecp.recognise(text):
         return "ecp"
@@ -88,6 +71,4 @@ def recognise(source: Source) -> str:
 
 def inspect(what: Record | PathLike) -> Inspection:
     """What can be told about each column and about the time base of a record or a log."""
-    from upright.readers.inspection import inspect_record
-
     return inspect_record(what if isinstance(what, Record) else read(what))

@@ -1,4 +1,4 @@
-"""What does a table of numbers hold, with or without a line of names?
+"""Record of a table of numbers, with or without a line of names; and of a record that this package wrote as text.
 
 Commas, semicolons, tabs or blanks part the cells; names stand in the line above the numbers, perhaps after
 a ``#`` or ``%``. Without names the columns are c0, c1, ... and c0 is the time when it increases.
@@ -8,32 +8,20 @@ from __future__ import annotations
 
 import csv
 import re
-from dataclasses import dataclass
 
 import numpy as np
 
 from upright.readers.source import Source
-from upright.readers.table import line_of_row, numbers
+from upright.readers.table import Table
 from upright.readers.timebase import exact_seconds, is_epoch, is_index, rebuild, time_scale
-from upright.records import Record
+from upright.records import Array, Record
+from upright.records.exchange import CSV_MARK
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?|[+-]?(?:nan|inf|infinity)"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Layout:
-    """How a table is laid out: names, delimiter, and the line (from 1) where numbers begin."""
-
-    names: tuple[str, ...]
-    delimiter: str | None
-    first_line: int
-    body: str
-    named: bool
-    decimal_comma: bool = False
-
-
-def layout(source: Source) -> Layout:
-    """Find names, delimiter and numbers.
+def layout(source: Source) -> Table:
+    """Names, delimiter and rows of a table.
 
     Raises
     ------
@@ -71,23 +59,22 @@ def layout(source: Source) -> Layout:
             )
     body = "\n".join(lines[first:])
     comma = delimiter in (";", "\t", None) and "," in lines[first] and "." not in lines[first]
-    return Layout(
-        names=tuple(names), delimiter=delimiter, first_line=first + 1, body=body, named=named, decimal_comma=comma
+    return Table(
+        source=source,
+        body=body,
+        names=tuple(names),
+        delimiter=delimiter,
+        first_line=first + 1,
+        decimal_comma=comma,
+        named=named,
     )
 
 
 def read(source: Source) -> Record:
     """Record of a table; time is the column named like it, else the first when it increases."""
     found = layout(source)
-    table = numbers(
-        source,
-        found.body,
-        names=found.names,
-        delimiter=found.delimiter,
-        first_line=found.first_line,
-        decimal_comma=found.decimal_comma,
-    )
-    at, seconds = _time_column(source, found, table)
+    table = found.numbers()
+    at, seconds = _time_column(found, table)
     notes: list[str] = []
     if not found.named:
         notes.append("The log names no columns; they are called c0, c1, ... and c0 increases, so it is the time.")
@@ -101,12 +88,15 @@ def read(source: Source) -> Record:
             source, cells, range(found.first_line, found.first_line + len(cells)), name=found.names[at], column=at + 1
         )
         notes.append(f"Time is counted from the first sample, epoch {first * 1e-9:.6f} s.")
-    _increasing(source, found, t, at)
+    source.must_increase(
+        t,
+        lambda row: {"line": found.line(row), "column": at + 1, "name": found.names[at]},
+        advice="mend or delete the row, or read each run on its own",
+    )
     index = next((table[:, j] for j, name in enumerate(found.names) if is_index(name, table[:, j])), None)
     t, note = rebuild(t, index)
-    last = found.body.rstrip(" ") if not found.body.endswith("\n") else ""
-    if last:
-        notes.append(_torn(source, found, table.shape[0]))
+    if found.body.rstrip(" ") and not found.body.endswith("\n"):
+        notes.append(_torn(found, table.shape[0]))
     signals = {name: table[:, j] for j, name in enumerate(found.names) if j != at}
     return Record(
         t=t,
@@ -114,6 +104,22 @@ def read(source: Source) -> Record:
         units={name: stated_unit(name) for name in signals},
         provenance=source.provenance("table", *filter(None, [note, *notes])),
     )
+
+
+def read_own(source: Source) -> Record:
+    """Record written by `Record.to_csv`, with the line and column of any damage."""
+    lines = source.text.split("\n")
+    if len(lines) < 4 or not lines[0].startswith(CSV_MARK) or not lines[1].startswith("# "):
+        raise source.bad(f"expected '{CSV_MARK}', a line of units and provenance, names and numbers", line=1)
+    try:
+        names = next(csv.reader([lines[2]], strict=True), [])
+    except csv.Error as error:
+        raise source.bad(f"expected a line of names, got a broken quotation ({error})", line=3) from None
+    if not names or names[0] != "t" or len(set(names)) < len(names):
+        raise source.bad("expected names that differ, the first of them 't'", line=3)
+    rows = Table(source=source, body="\n".join(lines[3:]), names=tuple(names), delimiter=",", first_line=4)
+    t, *signals = rows.numbers().T
+    return Record.rebuild(t, dict(zip(names[1:], signals, strict=True)), lines[1][2:])
 
 
 def stated_unit(name: str) -> str:
@@ -150,19 +156,19 @@ def _split(line: str, delimiter: str | None) -> list[str]:
     return [name.strip() for name in cells]
 
 
-def _time_column(source: Source, found: Layout, table: np.ndarray) -> tuple[int, float]:
+def _time_column(found: Table, table: Array) -> tuple[int, float]:
     for j, name in enumerate(found.names if found.named else ()):
         if seconds := time_scale(name):
             return j, seconds
     first = table[:, 0]
     if found.named and is_index(found.names[0], first):
-        raise source.bad(
+        raise found.source.bad(
             f"expected a time column named 't' or 'time', got only the sample index '{found.names[0]}';"
             " add the time of each sample in s",
             line=found.first_line - 1,
         )
     if found.named and first.size > 1 and not (np.diff(first) > 0).all():
-        raise source.bad(
+        raise found.source.bad(
             f"expected a time column named 't' or 'time', got: {', '.join(found.names)[:120]};"
             " name the time column or put it first",
             line=max(found.first_line - 1, 1),
@@ -170,29 +176,16 @@ def _time_column(source: Source, found: Layout, table: np.ndarray) -> tuple[int,
     return 0, 1.0
 
 
-def _increasing(source: Source, found: Layout, t: np.ndarray, at: int) -> None:
-    bad = np.flatnonzero(~(np.diff(t) > 0))
-    if bad.size:
-        row = int(bad[0]) + 1
-        raise source.bad(
-            f"time must increase from row to row, got {t[row]:.9g} s after {t[row - 1]:.9g} s;"
-            " mend or delete the row, or read each run on its own",
-            line=line_of_row(found.body, row, found.first_line),
-            column=at + 1,
-            name=found.names[at],
-        )
-
-
-def _torn(source: Source, found: Layout, rows: int) -> str:
+def _torn(found: Table, rows: int) -> str:
     """Judge a last row without line end: torn when its last number is shorter than the fixed format above it."""
     lines = [line for line in found.body.split("\n")[-8:] if line.strip()]
     ends = [line.split(found.delimiter)[-1].strip() for line in lines]
     decimals = {len(end.partition(".")[2]) for end in ends[:-1]}
     if len(ends) > 3 and len(decimals) == 1 and len(ends[-1].partition(".")[2]) not in decimals:
-        raise source.bad(
+        raise found.source.bad(
             f"expected {decimals.pop()} decimals and a line end, got {ends[-1]!r}; the last row is torn,"
             " export the log again or delete it",
-            line=line_of_row(found.body, rows - 1, found.first_line),
+            line=found.line(rows - 1),
             column=len(found.names),
             name=found.names[-1],
         )

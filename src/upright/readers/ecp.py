@@ -1,4 +1,4 @@
-"""What did the ECP Executive program export?
+"""Record of what the ECP Executive program exported.
 
 "Export Raw Data" of Models 205 and 210: a line of column names apart by two or more blanks, an empty line,
 then a MATLAB matrix between brackets, one sample per line, each but the last closed by a semicolon. Which
@@ -10,9 +10,9 @@ from __future__ import annotations
 import re
 
 from upright.readers.source import Source
-from upright.readers.table import line_of_row, numbers
+from upright.readers.table import Table
 from upright.readers.timebase import rebuild
-from upright.records import Array, Record
+from upright.records import Record
 
 
 def recognise(text: str) -> bool:
@@ -42,11 +42,11 @@ def read(source: Source) -> Record:
     first = next((i for i in range(header + 1, len(lines)) if lines[i].strip()), len(lines))
     last = next((i for i in range(len(lines) - 1, first, -1) if lines[i].strip()), first)
     body = _unwrapped(source, lines, first, last)
-    table = numbers(source, body, names=names, delimiter=None, first_line=first + 1)
-    columns = dict(zip(names, table.T, strict=True))
+    rows = Table(source=source, body=body, names=tuple(names), delimiter=None, first_line=first + 1)
+    columns = dict(zip(names, rows.numbers().T, strict=True))
+    for name, unit in (("Sample", ""), ("Time", " s")):
+        source.must_increase(columns[name], lambda row: {"line": rows.line(row)}, what=name, unit=unit)
     index, t = columns["Sample"], columns.pop("Time")
-    for name, values in (("Sample", index), ("Time", t)):
-        _must_increase(source, name, values, body, first + 1)
     t, note = rebuild(t, index)
     units = {name: "V" if "Effort" in name else "1" if name == "Sample" else "counts" for name in columns}
     return Record(t=t, signals=columns, units=units, provenance=source.provenance("ecp", *filter(None, [note])))
@@ -70,13 +70,3 @@ def _unwrapped(source: Source, lines: list[str], first: int, last: int) -> str:
             raise source.bad(sentence, line=i + 1, column=len(lines[i]) or 1)
         rows.append(row[(i == first) : -1] if row else "")
     return "\n".join(rows)
-
-
-def _must_increase(source: Source, name: str, values: Array, body: str, first_line: int) -> None:
-    for row in range(1, values.size):
-        if not values[row] > values[row - 1]:
-            raise source.bad(
-                f"{name} must increase from row to row, got {values[row]:g} after {values[row - 1]:g};"
-                " mend or delete the row",
-                line=line_of_row(body, row, first_line),
-            )

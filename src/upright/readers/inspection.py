@@ -1,4 +1,4 @@
-"""What can be told about a log before any model: is its time true, and what is each column?"""
+"""Time base and columns of a log, as far as they can be told before any model: are its times true, what is each?"""
 
 from __future__ import annotations
 
@@ -9,13 +9,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from upright.errors import BadInput, nearest
-from upright.readers import lies, quantum
-from upright.readers.guess import guess_unit, is_drive
+from upright.readers import quantum, suspect_columns
 from upright.readers.quantum import Quantum
 from upright.readers.timebase import rounding
 from upright.records import Array, Record
 
 _SHOWN = 12  # switches, gaps and rests beyond these tell nothing new
+# What names have in common, in the logs of many laboratories.
+_ANGLE = re.compile(r"theta|phi|psi|alpha|beta|angle|arm|joint.*position|pend", re.IGNORECASE)
+_RATE = re.compile(r"velocity|speed|rate|_dot|omega|qd", re.IGNORECASE)
+_COUNTS = re.compile(r"enc|count|cart\d*pos|\bpos\b", re.IGNORECASE)
+_LENGTH = re.compile(r"^(z|x|pos(ition)?|distance|displacement)\d*$", re.IGNORECASE)
+_VOLTS = re.compile(r"volt|plant_input|control_output|feedforward|^(u|v)$", re.IGNORECASE)
+_DRIVE = re.compile(
+    r"^(u|v|i)$|effort|control|command|cmd|input|volt|current|torque|target|duty|feedforward|pwm|ref", re.IGNORECASE
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,9 +149,9 @@ def _column(record: Record, name: str) -> Column:
     low, high = float(x.min()), float(x.max())
     step = quantum.find(x)
     unit = record.units[name]
-    guess = unit or ("1" if lies.sample_index(x) else guess_unit(name, x, step))
+    guess = unit or ("1" if suspect_columns.sample_index(x) else _guess_unit(name, x, step))
     constant = low == high
-    drive = is_drive(name, x, guess)
+    drive = _is_drive(name, x, guess)
     if step.counts_per_rev and guess != "rad":
         step = Quantum(step=step.step, decimals=step.decimals)
     return Column(
@@ -161,8 +169,33 @@ def _column(record: Record, name: str) -> Column:
         idle=drive and constant and low == 0,
         switches=_switches(record.t, x) if drive and not constant else (),
         stepwise=0 < int(np.count_nonzero(np.diff(x))) <= _SHOWN,
-        lies=lies.about(record, name),
+        lies=suspect_columns.lies(record, name),
     )
+
+
+def _guess_unit(name: str, values: Array, step: Quantum) -> str:
+    """Unit from name and step; empty when neither tells."""
+    whole = bool((values == np.round(values)).all()) and np.ptp(values) > 0
+    if _RATE.search(name):
+        return "" if whole else "rad/s" if _ANGLE.search(name) or "joint" in name else ""
+    if whole and (np.ptp(values) >= 20 or _COUNTS.search(name)):
+        return "counts"
+    if step.counts_per_rev:
+        return "rad"
+    if _ANGLE.search(name) and float(np.abs(values).max()) < 2000 and "effort" not in name:
+        return "rad"
+    if _VOLTS.search(name):
+        return "V"
+    return "m" if _LENGTH.search(name) else ""
+
+
+def _is_drive(name: str, values: Array, unit: str) -> bool:
+    """Whether a column drives rather than is measured: by name, or because it moves in a few steps only."""
+    if _DRIVE.search(name):
+        return True
+    changes = int(np.count_nonzero(np.diff(values)))
+    levels = np.unique(values).size
+    return unit not in ("rad", "m", "counts") and 2 <= levels <= 5 and 0 < changes <= 0.1 * values.size
 
 
 def _pinned(x: Array, level: float, step: float) -> float:

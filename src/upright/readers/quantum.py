@@ -1,4 +1,4 @@
-"""In which steps does a column move, and which encoder or converter makes such steps?
+"""Step in which a column moves, and the encoder or converter that makes such steps.
 
 Levels of a quantized signal are multiples of one step. The step is found from the differences of the levels
 that occur, then refined by least squares over all of them; a signal without steps answers 0.
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from upright.readers.timebase import decimal_step
 from upright.records import Array
 
 _MOST_LEVELS = 4000  # as many as the fit needs
@@ -35,7 +36,7 @@ class Quantum:
 
 def find(values: Array) -> Quantum:
     """Step of a column (N,)."""
-    rounding = decimal_rounding(values)
+    rounding = decimal_step(values, 7, 1e-6)
     if rounding >= 1:  # counts
         return Quantum(step=_common_divisor(values, rounding))
     levels = _levels(values, rounding)
@@ -56,19 +57,6 @@ def _common_divisor(values: Array, digit: float) -> float:
     """Greatest step of which all differences are multiples, for multiples of a digit; 0 below 3 levels."""
     whole = np.round(np.unique(values) / digit).astype(np.int64)
     return float(np.gcd.reduce(whole - whole[0])) * digit if whole.size > 2 else 0.0
-
-
-def decimal_rounding(values: Array) -> float:
-    """Coarsest power of ten from 1 to 1e-7 of which every value is a multiple; 0 when none is."""
-    top = float(np.abs(values).max())
-    for exponent in range(8):
-        step = 10.0**-exponent
-        if top > 1e15 * step:  # float64 has no more digits
-            return 0.0
-        error = np.abs(values - np.round(values / step) * step)
-        if (error <= max(1e-6 * step, 8 * np.finfo(np.float64).eps * top)).all():
-            return step
-    return 0.0
 
 
 def counts_per_rev(step: float) -> int:

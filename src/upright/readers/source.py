@@ -1,15 +1,19 @@
-"""Which file is this, is it text at all, and where in it is the mistake?"""
+"""Content of a log as bytes and as text, and sentences that say where in it a mistake is."""
 
 from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from upright.errors import BadInput
-from upright.records import PathLike, Provenance
+from upright.records import Array, PathLike, Provenance
 
 _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0e-\x1f\x7f]")
 
@@ -46,14 +50,33 @@ class Source:
         """Origin of a record that `reader` made of this file."""
         return Provenance(file=self.file, sha256=hashlib.sha256(self.data).hexdigest(), reader=reader, notes=notes)
 
-    def bad(self, sentence: str, *, line: int = 0, column: int = 0, name: str = "") -> BadInput:
-        """Error that names the file, the line and the column, both counted from 1."""
-        place = [f"'{self.file}'"]
-        if line:
-            place.append(f"line {line}")
-        if column:
-            place.append(f"column {column}" + (f" ({name})" if name else ""))
-        return BadInput(f"{', '.join(place)}: {sentence}.")
+    def bad(self, sentence: str, *, line: int = 0, column: int = 0, sample: int = 0, name: str = "") -> BadInput:
+        """Error that names the file and the place in it, all counted from 1."""
+        counted = (("line", line), ("column", column), ("sample", sample))
+        place = [f"'{self.file}'", *(f"{what} {number}" for what, number in counted if number)]
+        return BadInput(f"{', '.join(place)}{f' ({name})' if name and column else ''}: {sentence}.")
+
+    def must_increase(
+        self,
+        t: Array,
+        place: Callable[[int], dict[str, Any]],
+        *,
+        what: str = "time",
+        unit: str = " s",
+        each: str = "row",
+        advice: str = "mend or delete the row",
+        strictly: bool = True,
+    ) -> None:
+        """Refuse times (N,) that do not increase, or fall where not `strictly`; `place` finds a row counted from 0."""
+        step = np.diff(t)
+        bad = np.flatnonzero(~(step > 0) if strictly else step < 0)
+        if bad.size:
+            row = int(bad[0]) + 1
+            raise self.bad(
+                f"{what} must increase from {each} to {each}, got {t[row]:.9g}{unit} after {t[row - 1]:.9g}{unit};"
+                f" {advice}",
+                **place(row),
+            )
 
 
 def load(path: PathLike) -> Source:

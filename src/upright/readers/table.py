@@ -1,4 +1,4 @@
-"""Which numbers stand in these rows, and if one does not, in which line and column?
+"""Numbers that stand in the rows of a text, with the line and the column of the first that does not.
 
 NumPy's parser reads the whole block at once. Only when it stumbles are the rows read one by one, to say where.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,86 +17,89 @@ from upright.records import LARGEST, Array
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?", re.ASCII)
 
 
-def numbers(
-    source: Source,
-    body: str,
-    *,
-    names: Sequence[str],
-    delimiter: str | None,
-    first_line: int,
-    decimal_comma: bool = False,
-) -> Array:
-    """Table (N, len(names)) of the lines of `body`, finite and below 1e30.
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """Rows of numbers in a text, one name per column.
 
     Parameters
     ----------
     source : Source
-        For error sentences.
+        The log, for error sentences.
     body : str
         Rows separated by line feeds; blank lines are skipped.
-    names : sequence of str
+    names : tuple of str
         One per column.
     delimiter : str or None
         None stands for runs of blanks.
     first_line : int
         Line number of the first row in the file, counted from 1.
-
-    Raises
-    ------
-    BadInput
-        With line and column, when a row has too few or too many cells, or a cell is no usable number.
+    named : bool
+        Whether the log itself names its columns.
     """
-    if decimal_comma:
-        body = body.replace(",", ".")
-    if not body.strip():
-        raise source.bad("the file holds no rows of numbers; export the log again", line=first_line)
-    try:
-        table = np.loadtxt(io.StringIO(body), delimiter=delimiter, comments=None, ndmin=2)
-    except (ValueError, OverflowError, IndexError):
-        table = np.empty((0, 0))
-    if table.shape[1] != len(names) or not (np.abs(table) <= LARGEST).all():
-        table = _row_by_row(source, body, names=names, delimiter=delimiter, first_line=first_line)
-    return table
 
+    source: Source
+    body: str
+    names: tuple[str, ...]
+    delimiter: str | None
+    first_line: int
+    decimal_comma: bool = False
+    named: bool = True
 
-def _row_by_row(source: Source, body: str, *, names: Sequence[str], delimiter: str | None, first_line: int) -> Array:
-    rows: list[list[float]] = []
-    lines = body.split("\n")
-    for number, line in enumerate(lines, start=first_line):
-        if not line.strip():
-            continue
-        cells = line.split(delimiter)
-        if len(cells) != len(names):
-            torn = not any(rest.strip() for rest in lines[number - first_line + 1 :])
-            raise source.bad(
-                f"expected {len(names)} numbers, got {len(cells)}"
-                + ("; the last row is torn, export the log again or delete it" if torn else "; mend or delete the row"),
-                line=number,
+    def numbers(self) -> Array:
+        """All numbers (N, columns), finite and below 1e30.
+
+        Raises
+        ------
+        BadInput
+            With line and column, when a row has too few or too many cells, or a cell is no usable number.
+        """
+        body = self.body.replace(",", ".") if self.decimal_comma else self.body
+        if not body.strip():
+            raise self.source.bad("the file holds no rows of numbers; export the log again", line=self.first_line)
+        try:
+            table = np.loadtxt(io.StringIO(body), delimiter=self.delimiter, comments=None, ndmin=2)
+        except (ValueError, OverflowError, IndexError):
+            table = np.empty((0, 0))
+        if table.shape[1] != len(self.names) or not (np.abs(table) <= LARGEST).all():
+            table = self._row_by_row(body.split("\n"))
+        return table
+
+    def _row_by_row(self, lines: list[str]) -> Array:
+        rows: list[list[float]] = []
+        last = max(i for i, line in enumerate(lines) if line.strip())
+        for i, line in enumerate(lines):
+            if not line.strip():
+                continue
+            cells = line.split(self.delimiter)
+            if len(cells) != len(self.names):
+                advice = (
+                    "the last row is torn, export the log again or delete it" if i == last else "mend or delete the row"
+                )
+                raise self.source.bad(
+                    f"expected {len(self.names)} numbers, got {len(cells)}; {advice}", line=self.first_line + i
+                )
+            rows.append(
+                [
+                    cell(self.source, text, line=self.first_line + i, column=j, name=name)
+                    for j, (text, name) in enumerate(zip(cells, self.names, strict=True), start=1)
+                ]
             )
-        rows.append([cell(source, text, line=number, column=j + 1, name=names[j]) for j, text in enumerate(cells)])
-    return np.array(rows, dtype=np.float64)
+        return np.array(rows, dtype=np.float64)
+
+    def line(self, row: int) -> int:
+        """Line number in the file of a row of the table, both blank lines and header counted."""
+        filled = [number for number, line in enumerate(self.body.split("\n"), start=self.first_line) if line.strip()]
+        return filled[row] if row < len(filled) else self.first_line
 
 
 def cell(source: Source, text: str, *, line: int, column: int, name: str) -> float:
     """One finite number, or an error with its place."""
     plain = text.strip()
-    if not plain:
-        raise source.bad(
-            "expected a number, got an empty cell; fill it in or delete the row", line=line, column=column, name=name
-        )
     value = float(re.sub("[dD]", "e", plain)) if _NUMBER.fullmatch(plain) else float("nan")
-    if not abs(value) <= LARGEST:
-        size = "a number too large for any instrument" if value == value else "something else"
-        raise source.bad(
-            f"expected a finite number, got {size}: {plain[:40]!r}; mend or delete the row",
-            line=line,
-            column=column,
-            name=name,
-        )
-    return value
-
-
-def line_of_row(body: str, row: int, first_line: int) -> int:
-    """Line number in the file of a row of the table, both blank lines and header counted."""
-    filled = [number for number, line in enumerate(body.split("\n"), start=first_line) if line.strip()]
-    return filled[row] if row < len(filled) else first_line
+    if abs(value) <= LARGEST:
+        return value
+    size = "a number too large for any instrument" if value == value else "something else"
+    sentence = f"expected a finite number, got {size}: {plain[:40]!r}; mend or delete the row"
+    if not plain:
+        sentence = "expected a number, got an empty cell; fill it in or delete the row"
+    raise source.bad(sentence, line=line, column=column, name=name)

@@ -1,4 +1,4 @@
-"""When was each sample taken, if the log rounds its time or hides it in an epoch?
+"""Times of the samples where a log rounds them or counts them from an epoch.
 
 A clock that is rounded to 1 ms shows steps of 1 and 2 ms where every sample was 1.1275 ms after the last.
 Such a time base is rebuilt from the sample index; a true jitter is left as it is.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
+from decimal import Decimal, InvalidOperation
 
 import numpy as np
 
@@ -55,43 +56,22 @@ def exact_seconds(
 
     An epoch stamp such as 1707681595.547459602 has 19 digits; a float64 keeps 16.
     """
-    nanoseconds = _alike(cells) or [
-        _nanoseconds(source, cell, line, name, column) for cell, line in zip(cells, lines, strict=True)
-    ]
-    first = nanoseconds[0]
-    return np.array([(value - first) for value in nanoseconds], dtype=np.float64) * 1e-9, first
-
-
-def _alike(cells: Sequence[str]) -> list[int]:
-    """Nanoseconds of stamps all written with the same digits before and after the point; empty when they are not."""
-    point = cells[0].find(".") if cells else -1
-    decimals = len(cells[0]) - point - 1 if point > 0 else 0
-    joined = [cell[:point] + cell[point + 1 :] for cell in cells]
-    text = "".join(joined)
-    alike = 0 < decimals <= 9 and {len(cell) for cell in cells} == {len(cells[0])} and len(cells[0]) < 19 + 2
-    if not (alike and text.isascii() and text.isdigit() and {cell[point] for cell in cells} == {"."}):
-        return []
-    scale = 10 ** (9 - decimals)
-    return [int(digits) * scale for digits in joined]
-
-
-def _nanoseconds(source: Source, cell: str, line: int, name: str, column: int) -> int:
-    match = re.fullmatch(r"\s*([+-]?)(\d{1,15})(?:\.(\d*))?\s*", cell, re.ASCII)
-    if match is None:
+    nanoseconds: list[int] = []
+    for text, line in zip(cells, lines, strict=True):
         try:
-            value = float(cell)
-        except ValueError:
-            value = math.inf
-        if not abs(value) < 1e15:
+            value = Decimal(text.strip())
+        except InvalidOperation:
+            value = Decimal("nan")
+        if not (value.is_finite() and abs(value) < 10**15):
             raise source.bad(
-                f"expected a time stamp in s, got {cell.strip()[:40]!r}; mend or delete the row",
+                f"expected a time stamp in s, got {text.strip()[:40]!r}; mend or delete the row",
                 line=line,
                 column=column,
                 name=name,
             )
-        return round(value * 10**9)
-    value = int(match[2]) * 10**9 + int((match[3] or "").ljust(9, "0")[:9])
-    return -value if match[1] == "-" else value
+        nanoseconds.append(int(value.scaleb(9)))
+    first = nanoseconds[0]
+    return np.array([value - first for value in nanoseconds], dtype=np.float64) * 1e-9, first
 
 
 def rebuild(t: Array, index: Array | None = None) -> tuple[Array, str]:
@@ -130,9 +110,15 @@ def rebuild(t: Array, index: Array | None = None) -> tuple[Array, str]:
 
 def rounding(t: Array) -> float:
     """Coarsest of 1 s, 0.1 s ... 1 us of which every time is a multiple; 0 when none is [s]."""
-    tolerance = 8 * np.finfo(np.float64).eps * float(np.abs(t).max())
-    for exponent in range(7):
-        step = 10.0**-exponent
-        if (np.abs(t - np.round(t / step) * step) <= max(tolerance, 1e-9 * step)).all():
+    return decimal_step(t, 6, 1e-9)
+
+
+def decimal_step(values: Array, digits: int, tolerance: float) -> float:
+    """Coarsest of 1, 0.1, ... 10^-digits of which every value is a multiple within `tolerance`; 0 when none is."""
+    exact = 8 * np.finfo(np.float64).eps * float(np.abs(values).max())
+    for step in (10.0**-n for n in range(digits + 1)):
+        if exact > 2 * step:  # float64 has no more digits
+            return 0.0
+        if (np.abs(values - np.round(values / step) * step) <= max(exact, tolerance * step)).all():
             return step
     return 0.0

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from upright.errors import BadInput
 from upright.law.linear import Law
 from upright.law.rule import Rule
-from upright.physics.derived import Derived
+from upright.physics.equations import Derived
 from upright.physics.plant import Plant
 from upright.simulation.kernel.flavour import choose
 from upright.simulation.parts import Held, Loop

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from upright.errors import BadInput
 from upright.law.linear import Law
 from upright.law.rule import Rule, compiling
-from upright.physics.derived import Derived
+from upright.physics.equations import Derived
 from upright.simulation.kernel.actuator import ACTUATOR, ACTUATOR_DEFAULTS
 from upright.simulation.kernel.blocks import aligned, padded, recorded, share
 from upright.simulation.kernel.compiled import kernel

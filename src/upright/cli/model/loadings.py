@@ -136,7 +136,7 @@ def _twin(kind: str, seed: int, out: Path, as_json: bool) -> None:
 def inertia(text: str) -> tuple[float, str]:
     """Added inertia [SI] and the kind of rig it belongs to; none for a plain zero."""
     from upright.lab.makes import MASS_RADIUS
-    from upright.physics.loads import added_inertia
+    from upright.physics.oscillators import added_inertia
     from upright.units import parse, same_dimension
 
     if masses := _MASSES.fullmatch(text):

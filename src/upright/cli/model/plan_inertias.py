@@ -74,7 +74,7 @@ def loadings(rig: str, radius: list[str] | None) -> list[Loading]:
     """What can be added to a cart, or to a disk on the bolt circles given."""
     from upright.identification.loadings import Loading
     from upright.lab.makes import MASS_RADIUS
-    from upright.physics.loads import added_inertia, added_mass
+    from upright.physics.oscillators import added_inertia, added_mass
     from upright.units import parse
 
     if rig == "rectilinear":

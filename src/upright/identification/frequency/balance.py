@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from upright.errors import BadInput, nearest
 from upright.identification.frequency.response import FrequencyResponse
 from upright.physics import Plant
-from upright.physics.evaluate import needed_force, small_motions
+from upright.physics.equations import needed_force, small_motions
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -115,7 +115,7 @@ def matters(rig: Rig, coordinate: str) -> bool:
 
     A constant error of the sensor cannot be told from the place where the run began otherwise.
     """
-    from upright.physics.evaluate import evaluate
+    from upright.physics.equations import evaluate
 
     derived = rig.plant.derived()
     values = base_values(rig)

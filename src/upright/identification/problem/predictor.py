@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from upright.identification.model.rig import NOISE, Parameter, Rig, base_values
 from upright.identification.model.runs import Run
 from upright.identification.problem.tracks import DRIFT, FilterPlan, Track, nearest_equilibrium
-from upright.physics.evaluate import small_motions
+from upright.physics.equations import small_motions
 from upright.simulation import Simulator
 
 Array = NDArray[np.float64]

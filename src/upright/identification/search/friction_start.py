@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from upright.identification.model.rig import Rig
 from upright.identification.search.drive_force import drive_force
 from upright.identification.search.inverse_start import Sample
-from upright.physics.evaluate import evaluate
+from upright.physics.equations import evaluate
 
 Array = NDArray[np.float64]
 

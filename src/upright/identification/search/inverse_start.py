@@ -19,7 +19,7 @@ from upright.identification.model.unknowns import Unknown, shared_unknowns
 from upright.identification.problem.normal_equations import Normal, finite
 from upright.identification.search.descent import descend
 from upright.identification.search.drive_force import drive_force
-from upright.physics.evaluate import mass_and_force
+from upright.physics.equations import mass_and_force
 from upright.physics.plant import Plant
 from upright.signals.smoothing import (
     dominant_period,

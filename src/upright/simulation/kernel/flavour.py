@@ -15,7 +15,7 @@ import numpy as np
 from upright.errors import BadInput, nearest
 from upright.law.linear import Law
 from upright.law.rule import Rule, Written
-from upright.physics.derived import Derived
+from upright.physics.equations import Derived
 from upright.simulation.kernel.actuator import ACTUATOR, ACTUATOR_DEFAULTS
 from upright.simulation.parts import Loop
 

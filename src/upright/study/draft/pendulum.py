@@ -9,7 +9,7 @@ import numpy as np
 
 from upright.physics import Plant, find
 from upright.readers.inspection import Column, Inspection
-from upright.readers.lies import DAC_COUNTS_PER_VOLT
+from upright.readers.suspect_columns import DAC_COUNTS_PER_VOLT
 from upright.records import Record
 from upright.study.draft.pendulum_upright import (
     Standing,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.physics import Plant, find
-from upright.readers.lies import DAC_COUNTS_PER_VOLT
+from upright.readers.suspect_columns import DAC_COUNTS_PER_VOLT
 from upright.records import Record
 from upright.study.draft.shaft_columns import Sight
 from upright.study.draft.shaft_guesses import Starts, starts

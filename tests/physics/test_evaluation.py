@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from upright.physics import CartPendulum, Furuta, chain
-from upright.physics.evaluate import needed_force, small_motions
+from upright.physics.equations import needed_force, small_motions
 
 PLANTS = [
     Furuta(m_p=0.135, l_cg=0.184, r=0.15, J_d=7.2e-3, J_p=6e-4, J_a=2e-5, b_1=2e-3, b_2=4e-5),

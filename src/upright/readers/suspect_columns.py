@@ -1,4 +1,4 @@
-"""Which columns are not what their name says?
+"""Columns of a log that are not what their name says.
 
 Each test answers a sentence, or nothing. They come from logs of real rigs: a "Control Effort" that holds the
 reference, a "Commanded Pos" that follows the encoder, a "velocity" that somebody differenced from the position.
@@ -16,7 +16,7 @@ _SAME = 0.75  # share of the changes explained; a sensor of its own, beside a po
 _ROUGH = 0.5  # neighbouring changes of a quotient must differ that much: steps of an encoder, not a smooth curve
 
 
-def about(record: Record, name: str) -> tuple[str, ...]:
+def lies(record: Record, name: str) -> tuple[str, ...]:
     """Sentences about one column of a record."""
     x = record.signals[name]
     if np.ptp(x) == 0:
