@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from upright.errors import BadInput
 from upright.identification.estimate import identify
 from upright.readers import inspect, read
-from upright.study.draft.pendulum import draft
+from upright.study.draft.draft import draft
 from upright.study.load import load_study
 
 DT = 0.002
@@ -68,6 +69,11 @@ def test_the_plant_may_be_named_against_the_guess(drafted):
     one, two = spun_up()
     _, study = drafted(plant="rectilinear-2", t=T, target_value=VOLTS, enc1=one, enc2=two)
     assert study.plant == "rectilinear-2"
+
+
+def test_a_plant_with_more_bodies_than_columns_is_refused_with_a_sentence(drafted):
+    with pytest.raises(BadInput, match=r"torsional-3 has 3 bodies, and 2 columns .*enc1, enc2"):
+        drafted(plant="torsional-3", t=T, target_value=VOLTS, **dict(zip(("enc1", "enc2"), spun_up(), strict=True)))
 
 
 def test_carts_that_return_to_their_springs_are_carts(drafted):
