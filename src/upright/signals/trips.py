@@ -34,6 +34,9 @@ POOR = 0.3
 SLOW = 0.2
 """Share of the largest speed that a body needs when its drive trips; dry friction explains what stops slower."""
 
+RESTS = 0.5
+"""Seconds for which a body rests against a command that moved it before, when its drive is dead."""
+
 LEAST = 30
 """Independent stretches (record over smoothing) that a record needs before anything is said about it."""
 
@@ -231,7 +234,7 @@ def trip_or_misfit(
 
 
 def _linear(
-    u: Array, y: Array, others: Sequence[Array], dt: float, width: int, *, late: bool
+    u: Array, y: Array, others: Sequence[Array], dt: float, width: int, *, late: bool, moving: bool = True
 ) -> tuple[Array, Regression | None]:
     """Speed (N,) of `y`, and the regression of its acceleration on positions and speeds; None with little motion."""
     motion = savitzky_golay(y, dt, width, order=3)
@@ -246,10 +249,10 @@ def _linear(
     # damping that is there with the command on goes with it
     switched = np.stack([u, motion.v * (u != 0)], axis=1)
     half = width // 2
-    moving = np.abs(motion.v) > STUCK * float(np.abs(motion.v).max())
+    tells = np.abs(motion.v) > STUCK * float(np.abs(motion.v).max())
     # a body that sticks hides what pushes it, but under a constant command it cannot set out late
-    moving |= late and not np.ptp(u[u != 0])
-    rows = half + np.flatnonzero(moving[half : y.size - half])
+    tells |= not moving or (late and not np.ptp(u[u != 0]))
+    rows = half + np.flatnonzero(tells[half : y.size - half])
     rows = rows[:: max(1, rows.size // ROWS)]
     if rows.size < LEAST:
         return motion.v, None
@@ -277,33 +280,33 @@ def _uncertainty(costs: Mapping[int, float], at: int, independent: float) -> flo
     return max(1.0, float(max(inside))) / 2
 
 
-def goes_dead(t: Array, u: Array, x: Array, at: int) -> bool:
-    """Whether the drive no longer answers after sample `at`, judged by how it answered before.
+def goes_dead(t: Array, u: Array, y: Array, at: int) -> bool:
+    """Whether a drive no longer answers after sample `at`, judged by how it answered before.
 
-    The acceleration is regressed on command, place, speed and its sign before `at`, with one constant. Where it moves
-    afterwards, or rests against a command that moved it before, either the command explains it or it does not.
+    Where the body moves afterwards, or rests against a command that moved it before, either the command explains it
+    or it does not. `u` and `y` (N,) are the command and what it drives.
     """
-    if at < 50 or t.size - at < 50:
-        return False
     dt = float(t[-1] - t[0]) / (t.size - 1)
     width = max(7, int(0.06 / dt) | 1)
-    both = [savitzky_golay(part, dt, width) for part in (x[:at], x[at:])]
-    pushed = [savitzky_golay(part, dt, width).q for part in (u[:at], u[at:])]
-    tables = [np.column_stack([c, m.q, m.v, np.sign(m.v), np.ones_like(c)]) for c, m in zip(pushed, both, strict=True)]
-    fast = 0.05 * max(float(np.abs(m.v).max()) for m in both)
-    before = np.abs(both[0].v) > fast
-    if before.sum() < 3 * width:
+    speed, table = _linear(u, y, (), dt, width, late=False, moving=False)
+    if table is None:
         return False
-    slopes, *_ = np.linalg.lstsq(tables[0][before], both[0].a[before], rcond=None)
-    if slopes[0] == 0:
+    push = table.whole[:, 0]
+    columns = np.column_stack([push, table.base])
+    fast = np.abs(speed[table.rows]) > 0.05 * float(np.abs(speed).max())
+    before, after = table.rows < at - width // 2, table.rows >= at + width // 2
+    apart = dt * float(np.median(np.diff(table.rows)))
+    enough = 3 * width * dt / apart
+    if np.count_nonzero(before & fast) < enough or not after.any():
         return False
-    after = np.abs(both[1].v) > fast
-    dead = slopes * np.array([0.0, 1.0, 1.0, 1.0, 0.0])
-    level = abs(slopes[3] / slopes[0])
-    resting = ~after & (np.abs(pushed[1] + slopes[1] / slopes[0] * both[1].q) > 2 * level + 0.1 * np.ptp(pushed[0]))
-    if resting.sum() > 0.5 / dt:
+    slopes = np.linalg.lstsq(columns[before & fast], table.target[before & fast], rcond=None)[0]
+    force, _, dry, _, spring = slopes
+    if force == 0:
+        return False
+    pull = push + spring / force * table.base[:, 3]
+    against = np.abs(pull) > 2 * abs(dry / force) + 0.1 * np.ptp(push[after])
+    if apart * np.count_nonzero(after & ~fast & against) > RESTS:
         return True
-    if after.sum() < 3 * width:
-        return False
-    missed = [float(np.sum((both[1].a[after] - tables[1][after] @ s) ** 2)) for s in (slopes, dead)]
-    return missed[1] < 0.5 * missed[0]
+    alive = table.target[after & fast] - columns[after & fast] @ slopes
+    dead = alive + force * push[after & fast]
+    return dead.size > enough and float(dead @ dead) < 0.5 * float(alive @ alive)

@@ -156,6 +156,24 @@ def test_a_reference_without_its_command_is_said(drafted):
     assert not np.any(study.runs[0].u)
 
 
+@pytest.mark.real_data
+@pytest.mark.parametrize(
+    ("log", "dead"),
+    [
+        ("ecp205_torsional_ucsd/Jan281509.mat", True),  # its disks rest against the output after 10 s
+        ("ecp210_rectilinear_ucsd_1khz/21-Feb-2025 10_26_38.mat", True),  # swings freely at a constant output
+        # simulated with the drive on, both carts are explained better than with it off
+        ("ecp210_rectilinear_ucsd_export/Closed_Loop/closed_loop_kp.csv", False),
+        ("ecp210_rectilinear_ucsd_export/Closed_Loop/closed_loop_less_weight1.csv", False),
+    ],
+)  # fmt: skip
+def test_a_loop_that_lives_on_is_told_from_a_dead_drive(log, dead, tmp_path):
+    path = Path(os.environ["UPRIGHT_REAL_DATA"]) / log
+    record = read(path)
+    text = draft(record, inspect(record), path, tmp_path / "study.toml")
+    assert ("no longer moves the bodies" in text) == dead
+
+
 REAL = {  # file: plant, held or locked, least fit percent of every signal
     "ecp205_torsional_ucsd/Jan141428.mat": ("torsional-2", ["theta_2"], 90),
     "ecp205_torsional_ucsd/Jan211520.mat": ("torsional-2", [], 90),
