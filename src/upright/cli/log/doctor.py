@@ -46,7 +46,7 @@ def doctor(
     cannot be read.
     """
     from upright.doctor import examine, read_known
-    from upright.doctor.reading import read_mended
+    from upright.doctor.clock import read_mended
 
     if html is not None and html.is_dir():
         raise BadInput(f"--html needs a file, and {html} is a folder; name one in it, such as {html / 'doctor.html'}")
