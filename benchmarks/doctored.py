@@ -197,7 +197,7 @@ def _record(
     reference: np.ndarray | None, own: dict[str, float], gain: float, rng: np.random.Generator,
 ) -> Doctored:  # fmt: skip
     """Sensors, log and fault of one motion."""
-    from upright.doctor import Known
+    from upright.doctor import KnownRig
     from upright.identification import Parameter
     from upright.identification.model.rig import ACTUATOR
     from upright.records import Provenance, Record
@@ -249,7 +249,7 @@ def _record(
             known[n] = Parameter(name=n, value=value * off)
     known |= {n: Parameter(name=n, value=default) for n, (_, default) in ACTUATOR.items()}
     known["actuator.gain"] = Parameter(name="actuator.gain", value=gain * (1 + KNOWN_TO * rng.normal()))
-    rig = Known(name=plant, plant=cls, parameters=known, sensors=sensors, drive=Drive(what="`u`"))
+    rig = KnownRig(name=plant, plant=cls, parameters=known, sensors=sensors, drive=Drive(what="`u`"))
     units = {n: s.unit for n, s in sensors.items()}
     record = Record(t=t, signals=columns, units=units, provenance=Provenance(file="log.csv", reader="table"))
     return Doctored(record=record, known=rig, fault=fault, plant=plant, how=how, channel=channel)

@@ -9,7 +9,8 @@ import pytest
 
 from tests.signals.swings import swing
 from upright.errors import NotIdentifiable
-from upright.signals.free_swing import decay, recursion, turns
+from upright.signals.free_swing import decay, recursion
+from upright.signals.turning import turning_points
 
 
 def test_the_recursion_gives_the_extremes_that_scipy_integrates():
@@ -100,5 +101,5 @@ def test_a_slow_log_is_said_to_be_slow():
 def test_turns_ignore_what_is_smaller_than_asked():
     t = np.linspace(0, 4 * math.pi, 2001)
     ripple = np.sin(t) + 0.01 * np.sin(40 * t)
-    found = t[turns(ripple, 0.1)]
+    found = t[turning_points(ripple, 0.1)]
     assert np.allclose(found, (np.arange(4) + 0.5) * math.pi, rtol=0, atol=0.1)  # the ripple's own period is 0.16

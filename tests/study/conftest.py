@@ -5,7 +5,7 @@ import pytest
 
 from tests.study.crane_log import THETA, T, X
 from upright.readers import inspect, read
-from upright.study.draft.pendulum import draft
+from upright.study.draft.draft import draft
 from upright.study.load import load_study
 
 

@@ -7,8 +7,8 @@ for finding in diagnosis.findings:
 
 from __future__ import annotations
 
+from upright.doctor.case import KnownRig, read_known
 from upright.doctor.examine import examine
 from upright.doctor.findings import KINDS, Curve, Diagnosis, Finding, Panel
-from upright.doctor.rigs import Known, read_known
 
-__all__ = ["KINDS", "Curve", "Diagnosis", "Finding", "Known", "Panel", "examine", "read_known"]
+__all__ = ["KINDS", "Curve", "Diagnosis", "Finding", "KnownRig", "Panel", "examine", "read_known"]

@@ -11,14 +11,12 @@ from upright.doctor.balance import Balance
 from upright.doctor.case import Case
 from upright.doctor.findings import Curve, Finding, Panel
 from upright.doctor.motion import Motion
-from upright.doctor.sensors import whole
 from upright.doctor.structure import driven_row
 from upright.records import Array
+from upright.signals.trips import Regression
 
 LEAST = 0.7
 """Of what may stay unexplained before a trip, this part must be exceeded with all of the effort."""
-TRIES = 60
-"""Instants that are tried as the end of the effort."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,54 +43,38 @@ def push_of(motion: Motion, balance: Balance | None) -> Push | None:
     """What the effort explains; None without an effort on a measured body."""
     if not np.ptp(motion.u) > 0:
         return None
-    if np.count_nonzero(swift(motion, 0)) < 40:
-        return None
-    row = driven_row(motion, swift(motion, 0))
-    if row is None:
+    driven, here = 0, swift(motion, 0)
+    row = driven_row(motion, here)
+    if np.count_nonzero(here) < 40 or row is None:
         return None
     target, others = row
     if balance is not None:
-        k = motion.rows.index(balance.driven)
+        driven, here = balance.driven, swift(motion, balance.driven)
+        k = motion.rows.index(driven)
         tau, _ = balance.needed(np.ones((1, len(balance.names))))
-        driven = balance.driven
-        here = swift(motion, driven)
         target, others = tau[0, k][here], balance.friction[k][here]
-    else:
-        driven, here = 0, swift(motion, 0)
-    Q = np.linalg.qr(others)[0]
-    rest = target - Q @ (Q.T @ target)
-    size = float(np.sum((target - target.mean()) ** 2)) + 1e-300
-    u, t = motion.u[here], motion.t[here]
+    u, t, rows = motion.u[here], motion.t[here], motion.samples[here]
     live = np.flatnonzero(np.abs(u) > 0.02 * float(np.abs(u).max()))
     if live.size < 8:
         return None
-    first, last = int(live[0]), int(live[-1])
-    ends = np.unique(np.linspace(first, last + 1, TRIES).astype(int))
-    early = np.where(np.arange(t.size)[None] < ends[:, None], u, 0.0)
-    early_left = early - (early @ Q) @ Q.T
-    power = np.einsum("ht,ht->h", early_left, early_left)
-    gain = (early_left @ rest) / np.where(power > 0, power, 1.0)
-    left = np.sum((rest - gain[:, None] * early_left) ** 2, axis=1) / size
-    k = int(np.argmin(left))
-    late = u - early[k]
-    late_left = late - Q @ (Q.T @ late)
-    both = np.column_stack([early_left[k], late_left])
+    table = Regression(rows=rows, target=target, base=others, switched=motion.command[:, None], weights=motion.weights)
+    end, costs = table.search(int(rows[live[0]]), int(rows[live[-1]]) + 1, forward=False)
+    early = table.before(end)
+    late = table.whole - early
     after = 1.0
-    if float(late_left @ late_left) > 1e-9 * float(u @ u):
-        g, *_ = np.linalg.lstsq(both, rest, rcond=None)
-        acts = float(np.sum((rest - both @ g) ** 2)) / size < 0.6 * float(left[k])
-        after = float(g[1] / g[0]) if g[0] and acts else 0.0
+    if float(np.sum(late**2)) > 1e-9 * float(u @ u):
+        left, g = table.explain(np.hstack([early, late]))
+        after = float(g[1] / g[0]) if g[0] and left < 0.6 * costs[end] else 0.0
     speed = motion.v[driven][here]
     sliding = np.abs(speed) > 0.1 * float(np.abs(speed).max())
-    energy = float(np.sum(late[sliding] ** 2)) / float(u @ u)
     return Push(
-        without=float(rest @ rest) / size,
-        full=float(left[-1]),
-        cut=float(left[k]),
-        end=float(t[min(int(ends[k]), t.size - 1)]),
+        without=table.explain(early[:, :0])[0],
+        full=table.explain(table.whole)[0],
+        cut=costs[end],
+        end=float(motion.t[0] + (end - motion.samples[0]) * motion.dt),
         after=after,
-        late=energy,
-        rest=rest,
+        late=float(np.sum(late[sliding] ** 2)) / float(u @ u),
+        rest=table.rest,
         t=t,
         u=u,
     )
@@ -106,10 +88,6 @@ def swift(motion: Motion, i: int) -> NDArray[np.bool_]:
 def examine_push(case: Case, push: Push, *, most: float) -> list[Finding]:
     """A silent trip, when the effort before it leaves less than `most` unexplained."""
     t, end = case.record.t, push.end
-    panel = Panel(label="what effort must explain\n(scaled)", curves=(
-        Curve(name="needed", t=push.t, y=push.rest / (float(np.abs(push.rest).max()) or 1.0)),
-        Curve(name=f"'{case.drive}'", t=push.t, y=push.u / (float(np.abs(push.u).max()) or 1.0)),
-    ))  # fmt: skip
     driven = next(iter(case.places.values())).column
     tripped = (
         push.cut < most and push.cut < 0.5 * push.full and push.cut < 0.5 * push.without and abs(push.after) < 0.45
@@ -131,7 +109,7 @@ def examine_push(case: Case, push: Push, *, most: float) -> list[Finding]:
                           100 * push.full, "unexplained with the first part [%]": 100 * push.cut},
                 advice="Ask for the end of the effective input, or end the window there.",
                 key='unknown = ["initial", "input_end"]',
-                panels=(*whole(case, driven, case.drive), panel),
+                panels=(*case.over_time(driven, case.drive), _panel(case, push)),
                 marks=(end,),
             )
         ]  # fmt: skip
@@ -144,10 +122,6 @@ def examine_uselessness(case: Case, push: Push) -> list[Finding]:
         return []
     driven = next(iter(case.places.values())).column
     explains = 100 * (1 - push.full / push.without)
-    panel = Panel(label="what effort must explain\n(scaled)", curves=(
-        Curve(name="needed", t=push.t, y=push.rest / (float(np.abs(push.rest).max()) or 1.0)),
-        Curve(name=f"'{case.drive}'", t=push.t, y=push.u / (float(np.abs(push.u).max()) or 1.0)),
-    ))  # fmt: skip
     return [
         Finding(
             kind="effort",
@@ -158,6 +132,14 @@ def examine_uselessness(case: Case, push: Push) -> list[Finding]:
             evidence={"left to explain [%]": 100 * push.without, "explained by it [%]": explains},
             advice="Look for the column the controller put out; a reference or a set value is no effort.",
             key='[drive]\ncolumn = "..."',
-            panels=(*whole(case, driven, case.drive), panel),
+            panels=(*case.over_time(driven, case.drive), _panel(case, push)),
         )
     ]
+
+
+def _panel(case: Case, push: Push) -> Panel:
+    """What the effort must explain beside the effort, each as a share of its largest value."""
+    return Panel(label="what effort must explain\n(scaled)", curves=(
+        Curve(name="needed", t=push.t, y=push.rest / (float(np.abs(push.rest).max()) or 1.0)),
+        Curve(name=f"'{case.drive}'", t=push.t, y=push.u / (float(np.abs(push.u).max()) or 1.0)),
+    ))  # fmt: skip

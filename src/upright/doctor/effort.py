@@ -1,13 +1,15 @@
-"""Is the effort column what drove the rig? References, converter counts, limits, motion that came before."""
+"""Efforts that did not drive the rig as logged: references, converter counts, limits, settings, motion before them."""
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
-from upright.doctor.case import Case
-from upright.doctor.channels import clipped
+from upright.doctor.case import Case, unit_of
 from upright.doctor.findings import Finding
-from upright.doctor.sensors import whole
+from upright.doctor.sensors import clipped
+from upright.readers.suspect_columns import DAC_COUNTS_PER_VOLT
 from upright.study.draft.recognise import drive_column
 
 HELD = 0.2
@@ -24,8 +26,8 @@ def examine_effort(case: Case) -> list[Finding]:
 def _lies(case: Case) -> list[Finding]:
     """Columns that are not what their name says, as the reader's inspection found."""
     found: list[Finding] = []
-    chosen = drive_column(case.record, case.seen)
-    for c in case.seen.columns:
+    chosen = drive_column(case.record, case.inspection)
+    for c in case.inspection.columns:
         for lie in c.lies:
             kind, severity, advice, key = "", "warning", "", ""
             if "not the effort" in lie:
@@ -58,7 +60,7 @@ def _lies(case: Case) -> list[Finding]:
                     evidence={"lowest [1]": c.low, "highest [1]": c.high},
                     advice=advice,
                     key=key,
-                    panels=whole(case, c.name, *driven),
+                    panels=case.over_time(c.name, *driven),
                 )
             )  # fmt: skip
     return found
@@ -83,7 +85,7 @@ def _copies(case: Case) -> list[Finding]:
                     sentence=f"'{case.drive}' repeats the position '{c.name}' (times {gain:.6g}): no effort.",
                     evidence={"factor [1]": gain},
                     advice="Log the controller's output, or simulate the loop.",
-                    panels=whole(case, case.drive, c.name),
+                    panels=case.over_time(case.drive, c.name),
                 )
             ]
     return []
@@ -103,7 +105,7 @@ def _constant(case: Case) -> list[Finding]:
             evidence={"value [1]": float(case.u[0])},
             advice="Log the effort as applied; for a free motion say so.",
             key="drive = 0",
-            panels=whole(case, case.drive, *[c.name for c in case.measured][:1]),
+            panels=case.over_time(case.drive, *[c.name for c in case.measured][:1]),
         )
     ]
 
@@ -111,7 +113,7 @@ def _constant(case: Case) -> list[Finding]:
 def _limited(case: Case) -> list[Finding]:
     """Effort cut off at its limit."""
     found: list[Finding] = []
-    for c in case.seen.columns:
+    for c in case.inspection.columns:
         asked = any(word in c.name.casefold() for word in ("command", "target", "ref"))
         if not c.drive or c.constant or c.stepwise or asked:
             continue
@@ -120,7 +122,7 @@ def _limited(case: Case) -> list[Finding]:
             continue
         ends = " and ".join(f"{v:.5g}" for v in (low, high) if v == v)
         limit = max(abs(v) for v in (low, high) if v == v)
-        unit = c.unit or c.guess
+        unit = unit_of(c)
         found.append(
             Finding(
                 kind="saturation",
@@ -131,7 +133,7 @@ def _limited(case: Case) -> list[Finding]:
                 evidence={"share [%]": 100 * share, f"limit [{unit or 1}]": limit},
                 advice="Tell the model the limit; ask for less where linear behaviour is wanted.",
                 key=f"[actuator]\nlimit = {limit:.6g}",
-                panels=whole(case, c.name),
+                panels=case.over_time(c.name),
             )
         )
     return found
@@ -147,15 +149,11 @@ def _early(case: Case) -> list[Finding]:
     if command <= still:
         return []
     first, who = len(t), ""
-    largest: dict[str, float] = {}
-    for c in case.measured:
-        unit = c.unit or c.guess
-        largest[unit] = max(largest.get(unit, 0.0), float(np.ptp(case.record[c.name])))
     for c in case.measured:
         x = case.record[c.name]
         span = float(np.ptp(x))
         if (
-            (case.chained and span < HELD * largest[c.unit or c.guess])
+            (case.chained and case.beside(c) < HELD)
             or span == 0
             or np.ptp(x[:still]) > max(0.005 * span, 2 * c.quantum.step)
         ):
@@ -176,7 +174,38 @@ def _early(case: Case) -> list[Finding]:
             evidence={"motion [s]": float(t[first]), "command [s]": float(t[command])},
             advice="Begin the window after the first command.",
             key=f'window = [{t[command]:.5g}, "end"]',
-            panels=whole(case, who, case.drive),
+            panels=case.over_time(who, case.drive),
             marks=(float(t[first]), float(t[command])),
+        )
+    ]
+
+
+def examine_settings(case: Case) -> list[Finding]:
+    """Settings in ``runParameters`` that the data contradict: ECP's MATLAB front end shifts its fields."""
+    note = next((n for n in case.inspection.notes if n.startswith("runParameters:")), "")
+    fields = {m[1]: float(m[2]) for m in re.finditer(r"(\w+) = (-?\d+(?:\.\d+)?(?:e-?\d+)?)", note)}
+    if not {"Amplitude", "Reps"} <= fields.keys():
+        return []
+    dac = [c for c in case.inspection.columns if any(lie.startswith("the command in DAC") for lie in c.lies)]
+    stored, repetitions = fields["Amplitude"], fields["Reps"]
+    if not dac:
+        return []
+    levels = np.unique(case.record[dac[0].name])
+    ran = float(levels[np.argmax(np.abs(levels))]) / DAC_COUNTS_PER_VOLT
+    evidence = {"stored amplitude [V]": stored, "stored repetitions [1]": repetitions, "ran [V]": round(ran, 3)}
+    if abs(stored - ran) < 0.01 or ran == 0:
+        return []
+    shifted = abs(repetitions - ran) < 0.01
+    return [
+        Finding(
+            kind="settings",
+            columns=("runParameters",),
+            severity="warning",
+            sentence="The fields of runParameters are shifted: "
+            f"'Reps' holds the step of {repetitions:g} V and 'Amplitude' the repetitions ({stored:g})."
+            if shifted
+            else f"runParameters says {stored:g} V, but '{dac[0].name}' ran {ran:.3g} V.",
+            evidence=evidence,
+            advice=f"Trust '{dac[0].name}', not the settings.",
         )
     ]

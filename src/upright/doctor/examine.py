@@ -7,17 +7,16 @@ from dataclasses import replace
 import numpy as np
 
 from upright.doctor.balance import Balance
-from upright.doctor.case import Case
+from upright.doctor.case import Case, KnownRig, case_of
 from upright.doctor.clock import examine_clock
 from upright.doctor.drive import examine_push, examine_uselessness, push_of
-from upright.doctor.effort import examine_effort
+from upright.doctor.effort import examine_effort, examine_settings
 from upright.doctor.findings import KINDS, SEVERITIES, Diagnosis, Finding
-from upright.doctor.forces import against_form, against_gain, against_numbers, found_terms, values_of
+from upright.doctor.forces import against_form, against_gain, against_numbers, values_of
 from upright.doctor.motion import Motion, motion_of
 from upright.doctor.rest import examine_rest
-from upright.doctor.rigs import Known, case_of
 from upright.doctor.sensors import examine_sensors
-from upright.doctor.settings import examine_settings
+from upright.doctor.structure import terms
 from upright.readers.inspection import inspect_record
 from upright.records import Record
 
@@ -25,13 +24,13 @@ HOPELESS = frozenset({"dead", "stuck", "gap", "doubled", "jitter"})
 """Findings after which equations of motion are not asked, because they would only say the same again."""
 
 
-def examine(record: Record, known: Known | None = None, *, before: tuple[Finding, ...] = ()) -> Diagnosis:
+def examine(record: Record, known: KnownRig | None = None, *, before: tuple[Finding, ...] = ()) -> Diagnosis:
     """Everything that looks wrong with a record.
 
     Parameters
     ----------
     record : Record
-    known : Known, optional
+    known : KnownRig, optional
         Its rig, from `read_known`; what needs one is left out without.
     before : tuple of Finding
         What was found, and mended, while the log was read.
@@ -40,12 +39,12 @@ def examine(record: Record, known: Known | None = None, *, before: tuple[Finding
     -------
     Diagnosis
     """
-    seen = inspect_record(record)
-    case = case_of(record, seen, known)
+    inspection = inspect_record(record)
+    case = case_of(record, inspection, known)
     found = [*before, *examine_clock(case)]
     sensors, mended = examine_sensors(case)
     if mended is not None:
-        case = replace(case_of(mended, seen, known), drive=case.drive, u=case.u)
+        case = replace(case_of(mended, inspection, known), drive=case.drive, u=case.u)
     found += [*sensors, *examine_effort(case), *examine_rest(case), *examine_settings(case)]
     unchecked = _unchecked(case, known)
     forces, reasons = _forces(case, known, found)
@@ -55,21 +54,21 @@ def examine(record: Record, known: Known | None = None, *, before: tuple[Finding
     unchecked |= reasons
     order = {s: i for i, s in enumerate(SEVERITIES)}
     return Diagnosis(
-        file=seen.file,
+        file=inspection.file,
         rig=known.name if known else "",
         samples=len(record),
-        duration=seen.time.duration,
+        duration=inspection.time.duration,
         findings=tuple(sorted(found, key=lambda f: order[f.severity])),
         checked=tuple(k for k in KINDS if k not in unchecked and (k != "settings" or _settings(case))),
         unchecked=unchecked,
     )
 
 
-def _unchecked(case: Case, known: Known | None) -> dict[str, str]:
+def _unchecked(case: Case, known: KnownRig | None) -> dict[str, str]:
     """What this record cannot tell, whatever the rig."""
     out: dict[str, str] = {}
     if not case.drive:
-        idle = [c.name for c in case.seen.columns if c.idle]
+        idle = [c.name for c in case.inspection.columns if c.idle]
         no = f"'{idle[0]}' is zero throughout" if idle else "the log has no effort column that could be recognised"
         out |= dict.fromkeys(("effort", "trip", "early"), no)
     elif not case.driven:
@@ -82,10 +81,10 @@ def _unchecked(case: Case, known: Known | None) -> dict[str, str]:
 
 
 def _settings(case: Case) -> bool:
-    return any(n.startswith("runParameters") for n in case.seen.notes)
+    return any(n.startswith("runParameters") for n in case.inspection.notes)
 
 
-def _forces(case: Case, known: Known | None, found: list[Finding]) -> tuple[list[Finding], dict[str, str]]:
+def _forces(case: Case, known: KnownRig | None, found: list[Finding]) -> tuple[list[Finding], dict[str, str]]:
     """What effort and motion say about each other, and why they do not where they do not."""
     if known is None:
         return [], {}
@@ -115,9 +114,9 @@ def _forces(case: Case, known: Known | None, found: list[Finding]) -> tuple[list
         motion = replace(motion, u=np.where(motion.t < push.end, motion.u, 0.0))
         conventions = against_numbers(case, Balance(motion, *numbers)) if not isinstance(numbers, str) else []
     if balance is None:
-        terms = [x for x in found_terms(motion) if not (lying and x.who[0] == "effort")]
-        conventions = against_form(case, motion, terms)
-        if not terms:
+        signed = [x for x in terms(motion) if not (lying and x.who[0] == "effort")]
+        conventions = against_form(case, motion, signed)
+        if not signed:
             reasons["sign"] = "the record holds no motion whose sign is known"
     out += [*trip, *conventions]
     rough = any(f.kind in HOPELESS for f in found)  # accelerations are then too uneven to blame the effort
@@ -133,5 +132,5 @@ def _forces(case: Case, known: Known | None, found: list[Finding]) -> tuple[list
 def _in_dac(case: Case) -> bool:
     """Whether the effort is one in converter counts, which acts all the same."""
     return any(
-        lie.startswith("the command in DAC") for c in case.seen.columns if c.name == case.drive for lie in c.lies
+        lie.startswith("the command in DAC") for c in case.inspection.columns if c.name == case.drive for lie in c.lies
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,9 +11,7 @@ from upright.doctor.balance import Balance, Explanation
 from upright.doctor.case import Case
 from upright.doctor.findings import Curve, Finding, Panel
 from upright.doctor.motion import Motion
-from upright.doctor.sensors import whole
-from upright.doctor.structure import MATTERS, Term, terms
-from upright.records import Array
+from upright.doctor.structure import MATTERS, Term
 
 DOUBT, CLEAR, BETTER = 0.02, 0.15, 3.5
 """A convention is doubted from this unexplained share on; another one must leave less than `CLEAR`, or next to nothing
@@ -87,7 +86,7 @@ def against_gain(case: Case, balance: Balance) -> list[Finding]:
             evidence={"unexplained [%]": left, "correlation with the motion [%]": 100 * alike},
             advice="Look for the column the controller put out; a reference or a set value is no effort.",
             key='[drive]\ncolumn = "..."',
-            panels=(*whole(case, driven.column, case.drive), _force_panel(balance, now, "as declared")),
+            panels=(*case.over_time(driven.column, case.drive), _force_panel(balance, now, "as declared")),
         )
     ]
 
@@ -97,7 +96,7 @@ def _mistaken(case: Case, balance: Balance, now: Explanation, alike: list[Explan
     reversed_, size = best.factor < 0, abs(best.factor)
     kind = "sign" if reversed_ and 0.75 < size < 1.33 else "scale"
     shown = f"{size:.3g}"
-    cause = next((text for f, text in CAUSES.items() if abs(size / f - 1) < 0.06 or abs(size * f - 1) < 0.0), "")
+    cause = next((text for f, text in CAUSES.items() if abs(size / f - 1) < 0.06), "")
 
     def name(e: Explanation) -> str:
         return f"the effort '{case.drive}'" if e.who == "effort" else f"'{case.places[e.who].column}'"
@@ -200,13 +199,12 @@ def _why(x: Term) -> str:
 def _finding(case: Case, motion: Motion, x: Term, who: str, sentence: str) -> Finding:
     table = "drive" if who == "effort" else f"sensors.{who}"
     name = case.drive if who == "effort" else case.places[who].column
-    order = np.argsort(x.alone)
     body = next(c for c in motion.plant.coordinates if c.name == x.who[1])
     curves = (
         Curve(name="acceleration, all else taken out", t=x.t, y=x.target),
         Curve(name=f"{x.text}, all else taken out (times its slope)", t=x.t, y=x.slope * x.alone),
     )
-    slope = float(np.polyfit(x.alone[order], x.target[order], 1)[0])
+    slope = float(np.polyfit(x.alone, x.target, 1)[0])
     return Finding(
         kind="sign",
         columns=(name,),
@@ -216,7 +214,7 @@ def _finding(case: Case, motion: Motion, x: Term, who: str, sentence: str) -> Fi
         advice=f"Set the sign of '{name}'.",
         key=f"[{table}]\nsign = -1",
         panels=(
-            *whole(case, *dict.fromkeys([case.places[x.who[1]].column, case.drive])),
+            *case.over_time(*dict.fromkeys([case.places[x.who[1]].column, case.drive])),
             Panel(label=f"acceleration\nof {body.name} [{body.unit}/s^2]", curves=curves),
         ),
     )
@@ -229,18 +227,10 @@ def _upside_down(case: Case, motion: Motion, x: Term) -> Finding:
         case, motion, x, who,
         f"'{column}' is pulled away from its zero by gravity: its zero is upright, or the pendulum is held by a loop.",
     )  # fmt: skip
-    turn: Array = case.places[who].y
-    from dataclasses import replace
-
     return replace(
         finding,
         severity="warning",
         advice="If zero is upright, say so.",
         key=f'[sensors.{who}]\noffset = "180 deg"',
-        evidence={**finding.evidence, "largest angle [rad]": float(np.abs(turn).max())},
+        evidence={**finding.evidence, "largest angle [rad]": float(np.abs(case.places[who].y).max())},
     )
-
-
-def found_terms(motion: Motion) -> list[Term]:
-    """Terms with a known sign, none for a plant of the user's own."""
-    return terms(motion) or []

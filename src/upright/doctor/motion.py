@@ -13,6 +13,7 @@ from upright.errors import BadInput
 from upright.physics import Plant
 from upright.records import Array
 from upright.signals.smoothing import dominant_period, middle, savitzky_golay
+from upright.signals.stretches import pieces
 from upright.study.sensors import Grid
 
 LOUD = 0.01
@@ -37,7 +38,10 @@ class Motion:
     u: Array
     fades: Array
     rows: tuple[int, ...]
-    width: float
+    samples: NDArray[np.int64]
+    dt: float
+    command: Array
+    weights: Array
 
     def slides(self, i: int) -> NDArray[np.bool_]:
         """Samples (N,) at which a body moves; while it sticks, friction may hide any force."""
@@ -55,7 +59,8 @@ def motion_of(case: Case) -> Motion | str:
         missing = []  # a body without a column was held, or is at least not told of
     if missing:
         return f"no column measures {', '.join(missing)}"
-    start, stop = longest_piece(case.record.t)
+    steps = np.diff(case.record.t)
+    start, stop = pieces(steps > 5 * float(np.median(steps)))[0]  # the longest without a gap
     t = case.record.t[start:stop]
     try:
         grid = Grid.of(t)
@@ -90,9 +95,12 @@ def motion_of(case: Case) -> Motion | str:
         v=v,
         a=a,
         u=correlate1d(u, middle(width), mode="nearest")[inner],
+        samples=np.arange(n)[inner],
+        dt=dt,
+        command=u,
+        weights=middle(width),
         fades=np.maximum(0.02 * np.std(v, axis=1), 1e-9),
         rows=tuple(coordinates.index(c) for c in moving),
-        width=width * dt,
     )
 
 
@@ -124,12 +132,3 @@ def curvature(width: int) -> float:
         * float(np.linalg.norm(np.linalg.pinv(np.vander(s / (width // 2), 5, increasing=True))[2]))
         / (width // 2) ** 2
     )
-
-
-def longest_piece(t: Array) -> tuple[int, int]:
-    """First sample of the longest stretch without a gap, and the one after its last."""
-    steps = np.diff(t)
-    cuts = np.flatnonzero(steps > 5 * float(np.median(steps))) + 1
-    edges = np.concatenate(([0], cuts, [t.size]))
-    k = int(np.argmax(np.diff(edges)))
-    return int(edges[k]), int(edges[k + 1])

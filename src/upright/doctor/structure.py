@@ -40,8 +40,8 @@ class Term:
     t: Array
 
 
-def terms(motion: Motion) -> list[Term] | None:
-    """Terms with a known sign; None for a plant whose form is not known here."""
+def terms(motion: Motion) -> list[Term]:
+    """Terms with a known sign, none for a plant of the user's own, whose form is not known here."""
     plant, q, v, a = motion.plant, motion.q, motion.v, motion.a
     names = [c.name for c in plant.coordinates]
     one = np.ones(motion.t.size)
@@ -76,7 +76,7 @@ def terms(motion: Motion) -> list[Term] | None:
                     known[names[j], names[i]] = ("spring", 1.0, q[j] if _own(motion, i) else q[j] - q[i])
             found += _row(motion.t, names, here, a[i], known, [*friction, *_own(motion, i)])
         else:
-            return None
+            return []
     return found
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import NotIdentifiable
+from upright.signals.turning import turning_points
 
 Array = NDArray[np.float64]
 
@@ -98,7 +99,7 @@ def decay(t: Array, x: Array, *, quantum: float = 0.0) -> Decay:
     NotIdentifiable
         When fewer than four extremes can be seen, or they are not those of one decaying swing.
     """
-    at = turns(x, max(4 * quantum, LOUDEST * float(np.ptp(x))))
+    at = turning_points(x, max(4 * quantum, LOUDEST * float(np.ptp(x))))
     if at.size < FEWEST:
         raise NotIdentifiable(
             f"A decrement needs at least {FEWEST} extremes, and this swing shows {at.size};"
@@ -133,27 +134,6 @@ def decay(t: Array, x: Array, *, quantum: float = 0.0) -> Decay:
         omega_error=math.hypot(omega_d * omega_d_error, sigma * sigma_error) / omega_n,
         sigma_error=sigma_error, delta_error=math.sqrt(covariance[3, 3]),
     )  # fmt: skip
-
-
-def turns(x: Array, least: float) -> NDArray[np.int64]:
-    """Samples at which a signal turns back by at least `least`; neither its first nor its last rest is one."""
-    found: list[int] = []
-    low = high = 0
-    direction = 0
-    for i, value in enumerate(x.tolist()):
-        if value > x[high]:
-            high = i
-        if value < x[low]:
-            low = i
-        if direction >= 0 and value <= x[high] - least:
-            if direction > 0:
-                found.append(high)
-            direction, low = -1, i
-        elif direction <= 0 and value >= x[low] + least:
-            if direction < 0:
-                found.append(low)
-            direction, high = 1, i
-    return np.array(found, dtype=np.int64)
 
 
 def _maxima(x: Array, at: NDArray[np.int64]) -> NDArray[np.bool_]:

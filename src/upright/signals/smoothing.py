@@ -126,6 +126,28 @@ def end_errors(y: Array, q: Array, dt: float, width: int, *, order: int = 4) -> 
     return noise * float(np.sqrt(C[0, 0])), noise * float(np.sqrt(C[1, 1])) / ((m - 1) * dt)
 
 
+ROUGH = 0.1
+"""Noise of a smoothed acceleration as a share of its spread, at most; the smoothing is as narrow as this allows."""
+
+
+def acceleration_width(y: Array, dt: float, quantum: float) -> int:
+    """Samples over which a cubic gives an acceleration that counts and noise do not drown; odd."""
+    rough = float(np.median(np.abs(np.diff(y, 2)))) / (0.6745 * np.sqrt(6))
+    noise = max(quantum / np.sqrt(12), rough)
+    width = 9
+    while width < y.size // 8:
+        a = savitzky_golay(y, dt, width, order=3).a
+        if noise * noise_gain(width, order=3) / dt**2 < ROUGH * float(np.std(a)):
+            break
+        width = int(width * 1.3) | 1
+    return width
+
+
+def noise_gain(width: int, *, order: int = 4) -> float:
+    """Standard deviation of the acceleration in the middle of a window, in units of noise per sample period squared."""
+    return 2 * float(np.linalg.norm(_polynomials(width, order)[0][2]))
+
+
 def smoothing_width(y: Array, dt: float, period: float, quantum: float) -> int:
     """Samples over which a polynomial of order 4 may be fitted: an eighth of a period, at least 15 steps of motion."""
     width = int(round(period / 8 / dt))

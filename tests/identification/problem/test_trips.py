@@ -10,8 +10,9 @@ import pytest
 
 from upright.identification import Parameter, Rig, Run
 from upright.identification.estimate import identify, predict
-from upright.identification.problem.trips import find_trip, find_trips, located
+from upright.identification.problem.trips import find_trips, located
 from upright.physics.oscillators import Torsional2
+from upright.signals.trips import find_trip
 from upright.simulation import simulate
 
 COUNT = 2 * np.pi / 16000

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
 from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, shaken, swing
-from upright.errors import NotIdentifiable
 from upright.identification.model.rig import base_values
-from upright.identification.search.friction_start import decrement, friction_from_energy, turning_points
+from upright.identification.search.friction_start import friction_from_energy, turning_points
 from upright.identification.search.inverse_start import observe, regress
 from upright.physics import Furuta, Pendulum
 from upright.signals.smoothing import dominant_period, first_order, savitzky_golay
@@ -31,26 +28,9 @@ def test_coulomb_alone_takes_a_straight_line_from_the_amplitude() -> None:
     values = {**PENDULUM, "b_2": 0.0, "b_2q": 0.0, "J_p": 0.0}
     run = swing(values, angle=0.3, seconds=8.0, dt=1e-3)
     motion = savitzky_golay(run.y[:, 0], 1e-3, 41)
-    turns = turning_points(motion.q, motion.v, least=0.01)
+    turns = turning_points(motion.q, 0.01)
     falls = -np.diff(np.abs(motion.q[turns]))
     assert falls == pytest.approx(np.full(falls.size, 2 * 2e-3 / (0.2 * 9.81 * 0.3)), rel=0.02)
-
-
-def test_period_and_decrement_of_a_viscous_swing() -> None:
-    """theta'' + 2 z w theta' + w^2 theta = 0: period 2 pi/(w sqrt(1 - z^2)), decrement 2 pi z/sqrt(1 - z^2)."""
-    w, z = 6.0, 0.02
-    t = np.arange(0, 12, 1e-3)
-    wd = w * math.sqrt(1 - z**2)
-    q = np.exp(-z * w * t) * np.cos(wd * t)
-    v = np.gradient(q, t)
-    period, delta = decrement(q, v, 1e-3)
-    assert period == pytest.approx(2 * math.pi / wd, rel=1e-3)
-    assert delta == pytest.approx(2 * math.pi * z / math.sqrt(1 - z**2), rel=0.01)
-
-
-def test_a_motion_without_turns_has_no_decrement() -> None:
-    with pytest.raises(NotIdentifiable, match="at least 4 times"):
-        decrement(np.linspace(0, 1, 100), np.ones(100), 0.01)
 
 
 @pytest.mark.parametrize("factor", [0.3, 1.0, 3.0])

@@ -9,7 +9,7 @@ import pytest
 
 from upright.errors import BadInput
 from upright.readers import inspect, read
-from upright.study.draft.pendulum import draft
+from upright.study.draft.draft import draft
 from upright.study.load import load_study
 
 G = 9.81

@@ -45,7 +45,7 @@ def doctor(
     cannot be read.
     """
     from upright.doctor import examine, read_known
-    from upright.doctor.reading import read_mended
+    from upright.doctor.clock import read_mended
     from upright.json_file import json_text
 
     if html is not None and html.is_dir():

@@ -48,7 +48,7 @@ def init(
         raise BadInput(f"{study} exists already; name another file with -o, or replace it with --force")
     from upright.physics import find
     from upright.readers import inspect, read
-    from upright.study.draft.pendulum import draft
+    from upright.study.draft.draft import draft
 
     if plant:
         find(plant)

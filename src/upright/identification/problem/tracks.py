@@ -19,13 +19,13 @@ from upright.identification.model.runs import Run
 from upright.identification.problem.restarts import smoothed_variance
 from upright.signals.smoothing import (
     State,
+    acceleration_width,
     dominant_period,
     end_errors,
     savitzky_golay,
     smoothing_width,
     spread,
 )
-from upright.signals.trip_regression import smoothing_width_for
 from upright.simulation import Held
 
 Array = NDArray[np.float64]
@@ -234,7 +234,7 @@ def prepare(rig: Rig, run: Run, *, thin: bool) -> Track:
             # a low quartile of its steps, since resampling leaves parts of a count as well
             steps = np.abs(np.diff(array))
             count = float(np.percentile(steps[steps > 0], 25)) if np.any(steps) else 0.0
-            width = smoothing_width_for(array, period_s, count)
+            width = acceleration_width(array, period_s, count)
             motion = savitzky_golay(array, period_s, width, order=3, derivatives=1)
             x[:, i], x[:, i + 1] = motion.q, motion.v
             held[c] = Held(q=motion.q[::stride])

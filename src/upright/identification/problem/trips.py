@@ -1,68 +1,16 @@
-"""When did the drive go off, whatever the log says?
-
-An amplifier that trips leaves the logged command where it was, and the body coasts. The acceleration of the driven
-coordinate tells: it is regressed on the command, speeds, the sign of the speed (dry friction) and positions, once with
-the command as logged and once with a command that ends earlier, for every moment at which it may have ended. All
-have gone through the same smoothing, so the moment is sharper than the smoothing is wide. No model is needed.
-"""
+"""Runs whose drive went off, or came on, at another moment than logged: told, and guessed where it is asked."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from upright.identification.model.rig import Rig
 from upright.identification.model.runs import Run
-from upright.signals.trip_regression import LEAST, Regression, smoothing_width_for
-
-Array = NDArray[np.float64]
-
-CLEAR = 0.5, 0.1
-"""A trip is believed when it leaves less than this share of what the logged command leaves unexplained.
-
-First when the command has one level, then when it has several: a law's command follows the motion, and both are
-then easily mistaken for each other (no closed-loop log of the ECP 205 and 210 goes below 0.17).
-"""
-
-POOR = 0.3
-"""Share of the acceleration's variance that may stay unexplained with a trip; what explains less explains nothing."""
-
-SLOW = 0.2
-"""Share of the largest speed that a body needs when its drive trips; dry friction explains what stops slower."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Trip:
-    """A command that acted for a shorter time than was logged.
-
-    Attributes
-    ----------
-    at : float
-        When it really ended (or began) [s from the run's first sample].
-    error : float
-        Its standard uncertainty [s].
-    logged : float
-        When the log says it ended (or began) [s from the run's first sample].
-    late : bool
-        Whether the command began late instead of ending early.
-    before, after : float
-        Mean acceleration of the driven coordinate just before and after [SI].
-    unexplained, otherwise : float
-        Share of the acceleration's variance left unexplained with the trip, and with the command as logged.
-    """
-
-    at: float
-    error: float
-    logged: float
-    late: bool
-    before: float
-    after: float
-    unexplained: float
-    otherwise: float
+from upright.signals.trips import CLEAR, Trip, trip_or_misfit
 
 
 def find_trips(rig: Rig, run: Run) -> list[Trip]:
@@ -89,76 +37,10 @@ def _moments(rig: Rig, run: Run) -> tuple[list[Trip], bool]:
     gain = rig.parameters["actuator.gain"].value if "actuator.gain" in rig.parameters else 1.0
     for late in (False, True):
         u = cut(run, found).u[:, 0] * math.copysign(1.0, gain)
-        trip, otherwise = _sought(run.t, u, signals[on], others, quantum=quantum[on], late=late)
+        trip, otherwise = trip_or_misfit(run.t, u, signals[on], others, quantum=quantum[on], late=late)
         found += [trip] if trip is not None else []
         plain = plain or (not late and trip is None and otherwise < CLEAR[1])
     return found, plain
-
-
-def find_trip(
-    t: Array, u: Array, y: Array, others: Sequence[Array] = (), *, quantum: float = 0.0, late: bool = False
-) -> Trip | None:
-    """Early end, or late begin, of the effect of a command, None when the motion shows none.
-
-    Parameters
-    ----------
-    t, u, y : (N,) arrays
-        Uniform time [s], logged command, measured coordinate that it drives; a positive command pushes it up.
-    others : sequence of (N,) arrays
-        Coordinates that pull at it.
-    quantum : float
-        Resolution of `y`.
-    late : bool
-        Ask for a late begin instead of an early end.
-    """
-    return _sought(t, u, y, others, quantum=quantum, late=late)[0]
-
-
-def _sought(
-    t: Array, u: Array, y: Array, others: Sequence[Array], *, quantum: float, late: bool
-) -> tuple[Trip | None, float]:
-    """What `find_trip` says, and what is left unexplained with the command as logged, infinite if nobody can say."""
-    live = np.flatnonzero(u)
-    if t.size < 100 or live.size < 10:
-        return None, math.inf
-    dt = float(t[-1] - t[0]) / (t.size - 1)
-    width = smoothing_width_for(y, dt, quantum)
-    if t.size < LEAST * width:
-        return None, math.inf
-    table = Regression.of(u, y, others, dt, width, late=late)
-    if table is None:
-        return None, math.inf
-    first, last = int(live[0]), int(live[-1]) + 1
-    low, high = first + width // 4, last - width // 4
-    if low >= high:
-        return None, math.inf
-    costs: dict[int, float] = {}
-    at, step = 0, high - low
-    while step > 1:  # three combs, each ten times finer than the one before
-        step = max(1, step // (100 if not costs else 10))
-        around = (
-            range(low, high, step) if not costs else range(max(low, at - 10 * step), min(high, at + 10 * step), step)
-        )
-        costs |= {m: table.missed(m, late=late) for m in around}
-        at = min(costs, key=lambda m: costs[m])
-    least = costs[at]
-    logged = table.missed(first if late else last, late=late, backwards=True)
-    hardly = abs(table.speed[at]) < SLOW * float(np.abs(table.speed).max()) and not late
-    if not (least < (CLEAR[1] if table.levels else CLEAR[0]) * logged and least < POOR) or hardly:
-        return None, logged
-    before, after = table.around(at, first if not late else last, last if not late else first)
-    trip = Trip(
-        at=at * dt, error=_uncertainty(costs, at, t.size / width) * dt,
-        logged=(first if late else last) * dt, late=late, before=before, after=after,
-        unexplained=least, otherwise=logged,
-    )  # fmt: skip
-    return trip, logged
-
-
-def _uncertainty(costs: Mapping[int, float], at: int, independent: float) -> float:
-    """Samples within which the misfit is no larger than chance allows, half the range of two deviations."""
-    inside = [abs(m - at) for m, cost in costs.items() if cost < costs[at] * (1 + 4 / independent)]
-    return max(1.0, float(max(inside))) / 2
 
 
 def doubt(run: Run, trip: Trip) -> str:

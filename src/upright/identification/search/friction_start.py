@@ -1,8 +1,7 @@
-"""What do the turning points of a swing tell? Period, decrement and friction, by arithmetic.
+"""Friction from the energy that a swing loses between its turning points, by arithmetic.
 
-Between two turning points the energy falls by Coulomb's level times the path, the viscous coefficient times the
-integral of the squared speed, and the drag times the integral of the cubed speed: a linear regression gives
-friction within a few percent (DESIGN 9).
+It falls by Coulomb's level times the path, the viscous coefficient times the integral of the squared speed, and the
+drag times the integral of the cubed speed: a linear regression gives friction within a few percent.
 """
 
 from __future__ import annotations
@@ -16,39 +15,9 @@ from upright.identification.model.rig import Rig
 from upright.identification.search.drive_force import drive_force
 from upright.identification.search.inverse_start import Sample
 from upright.physics.equations import evaluate
+from upright.signals.turning import turning_points
 
 Array = NDArray[np.float64]
-
-
-def turning_points(q: Array, v: Array, *, least: float) -> NDArray[np.int64]:
-    """Samples at which a motion (N,) turns, swings of less than `least` from one to the next left out."""
-    turns = np.flatnonzero((v[:-1] > 0) != (v[1:] > 0))
-    kept: list[int] = []
-    for i in turns:
-        if not kept or abs(q[i] - q[kept[-1]]) >= least:
-            kept.append(int(i))
-    return np.array(kept, dtype=np.int64)
-
-
-def decrement(q: Array, v: Array, dt: float) -> tuple[float, float]:
-    """Period [s] and logarithmic decrement per period of a decaying swing (N,), medians over its half swings.
-
-    Raises
-    ------
-    NotIdentifiable
-        When the motion turns fewer than four times.
-    """
-    from upright.errors import NotIdentifiable
-
-    turns = turning_points(q, v, least=0.02 * float(np.ptp(q)))
-    if turns.size < 4:
-        raise NotIdentifiable(
-            f"a decrement needs a swing that turns at least 4 times, this one turns {turns.size} times; "
-            "take a longer window."
-        )
-    swings = np.abs(np.diff(q[turns]))
-    period = 2 * float(np.median(np.diff(turns))) * dt
-    return period, 2 * float(np.median(np.log(swings[:-1] / swings[1:])))
 
 
 def friction_from_energy(rig: Rig, samples: list[Sample], values: Mapping[str, float]) -> dict[str, float]:
@@ -114,7 +83,9 @@ def _cuts(s: Sample) -> NDArray[np.int64]:
     edge = min(s.edge, n // 4)
     if len(s.free) == 1:
         i = s.free[0]
-        cuts = turning_points(s.q[i], s.v[i], least=0.01 * float(np.ptp(s.q[i])))
+        cuts = turning_points(s.q[i], 0.01 * float(np.ptp(s.q[i])))
+        cuts = cuts[cuts > 0]
+        cuts -= (s.v[i][cuts] > 0) != (s.v[i][cuts - 1] > 0)  # the last sample on the way there
         return cuts[(cuts >= edge) & (cuts < n - edge)]
     return np.arange(edge, n - edge, max(1, int(s.period / 2 / s.dt)), dtype=np.int64)
 

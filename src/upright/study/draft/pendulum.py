@@ -1,239 +1,293 @@
-"""Which study would a person write for this log? A commented TOML file with what could be recognised filled in."""
+"""Draft of a study of pendulums and of plants of the user's own: which numbers are taken as known, which are asked.
+
+A pendulum that stands falls away from where it is, one that hangs falls back: the sign of its acceleration per angle
+tells, once what its hinge throws at it is taken into account. One that a loop keeps upright is predicted over short
+horizons, and its numbers start from accelerations.
+"""
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
+import math
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, field, fields, replace
 
 import numpy as np
 
 from upright.physics import Plant, find
-from upright.readers.inspection import Column, Inspection
+from upright.readers.inspection import Inspection
 from upright.readers.suspect_columns import DAC_COUNTS_PER_VOLT
 from upright.records import Record
-from upright.study.draft.pendulum_upright import (
-    Standing,
-    standing,
-    upright_defaults,
-    upright_recognised,
-    upright_starts,
+from upright.signals.smoothing import acceleration_width, savitzky_golay
+from upright.study.draft.recognise import Recognised, in_dac_counts
+from upright.study.draft.tables import (
+    command_unit,
+    drive_table,
+    no_drive_table,
+    parameters_left_at_zero,
+    rig_table,
+    run_tables,
+    sensor_table,
 )
-from upright.study.draft.recognise import Recognised, in_dac_counts, recognise
-from upright.study.draft.shaft import chain_parts, names, quoted
-from upright.study.draft.shaft_columns import look
 from upright.study.rig import per
+from upright.study.sensors import Array
+from upright.study.write import Table, number
 
-_G = 9.81
-_MANY = 40_000  # samples beyond which a coarser grid is proposed
+G = 9.81
+MANY = 40_000
+"""Samples beyond which a coarser grid is proposed."""
+
+SMALL = 0.6
+"""Radians within which a pendulum that a loop keeps upright stays; beyond it, it falls."""
+
+BUSY = 0.8
+"""Share of the time in which the effort of a balancing loop is at work."""
+
+SMOOTHED = 0.06, 0.2
+"""Seconds over which accelerations are taken, at least and at most, as counts demand; all goes through the same."""
+
+MASS = 0.1
+"""Of a pendulum that nobody weighed [kg]."""
+
+SCALE = "MEASURE: sets the scale of all forces"
+SIMPLE = "with 0, l_cg is the length of the simple pendulum of equal period"
 
 
-def draft(record: Record, seen: Inspection, log: Path, study: Path, *, plant: str = "") -> str:
-    """Text of a study of one log.
+@dataclass(frozen=True, kw_only=True)
+class Balanced:
+    """A pendulum that a loop keeps upright.
 
-    Parameters
-    ----------
-    record, seen : Record, Inspection
-        The log.
-    log, study : Path
-        Its file, and where the study will be written: the file is named relative to that.
-    plant : str, optional
-        Overrides the plant that the columns suggest.
+    `rate` [rad/s]: square root of its acceleration per angle; `throw`: its acceleration per that of the first
+    coordinate; `pull`: acceleration of the first coordinate per unit of effort; `centre`: reading upright.
     """
-    found = recognise(record, seen, plant)
-    file = os.path.relpath(log.resolve(), study.resolve().parent).replace(os.sep, "/")
-    if found.plant.startswith(("rectilinear", "torsional")):
-        where = "/".join(log.resolve().parts[-3:])
-        sight = look(record, seen, found, named=bool(plant), path=where)
-        return "\n".join([_head(log, sight.found), *chain_parts(record, sight, file, log.stem)])
-    kind = find(found.plant)
-    how = standing(record, found)
-    found = upright_recognised(found, how) if how else found
-    parts = [
-        _head(log, found),
-        _rig(record, found, kind),
-        _parameters(record, found, kind, how),
-        _drive(record, found, kind, how),
-        *(_sensor(record, seen, found, kind, name) for name in found.columns),
-        _runs(found, kind, file, log.stem, how),
-    ]
-    return "\n".join(part for part in parts if part)
+
+    rate: float
+    throw: float
+    pull: float
+    centre: float
+
+    @property
+    def length(self) -> float:
+        """Of the simple pendulum of equal rate [m]."""
+        return G / self.rate**2
+
+    def arm(self) -> float:
+        """Of the axis of a rotary pendulum from that of its arm [m], in keeping with the length."""
+        return min(max(abs(self.throw), 0.3), 3.0) * self.length
+
+    def inertia(self, plant: str) -> float:
+        """That the effort moves, with the pendulum's mass taken for `MASS` [kg or kg m^2]."""
+        return 5 * MASS if plant == "cart-pendulum" else 2 * MASS * self.arm() ** 2
+
+    def gain(self, plant: str) -> float:
+        """Force per unit of effort that moves this inertia as was seen."""
+        return max(abs(self.pull), 1e-6) * self.inertia(plant)
 
 
-def _head(log: Path, found: Recognised) -> str:
-    lines = [
-        f"# Study of {log.name}, drafted by `upright init`. Check it, then: upright identify THIS_FILE -o OUT",
-        "# A number in quotes wears its unit; { guess = ... } asks for it; a plain text or number is known.",
-        "# Lines marked MEASURE hold placeholders. All keys: `upright identify --keys`.",
-        *(f"# GUESSED: {doubt}" for doubt in found.doubts),
-        f'title = "{quoted(log.stem)}"',
-    ]
-    return "\n".join(lines) + "\n"
+@dataclass(frozen=True, kw_only=True)
+class Starts:
+    """Numbers of a plant in SI: `known` with the reason, `asked` from a guess on, `uncertain` with how much [%]."""
+
+    known: Mapping[str, tuple[float, str]]
+    asked: Mapping[str, float]
+    uncertain: Mapping[str, tuple[float, str]] = field(default_factory=dict[str, tuple[float, str]])
 
 
-def _rig(record: Record, found: Recognised, plant: type[Plant]) -> str:
-    lines = ["[rig]", f'plant = "{found.plant}"   # {_doc(plant)}']
-    count = (found.window[1] - found.window[0]) / record.period
-    if count > _MANY and found.frequency:
-        coarse = max(1, int(2 * np.pi / found.frequency / 200 / record.period)) * record.period
-        lines.append(f'period = "{coarse * 1e3:.6g} ms"   # the log has a sample every {record.period * 1e3:.4g} ms')
-    return "\n".join(lines) + "\n"
+def pendulum_tables(
+    record: Record, seen: Inspection, found: Recognised, file: str, label: str
+) -> tuple[Recognised, list[Table]]:
+    """What is recognised in the end, and the tables of a study about it."""
+    plant = find(found.plant)
+    balanced = balance_of(record, found)
+    if balanced:
+        found = recognised_upright(found, balanced)
+    starts = starts_upright(balanced, found.plant) if balanced else starts_hanging(found, plant)
+    tables = [_rig(record, found, plant), _parameters(plant, starts), *_drive(found, plant, balanced)]
+    tables += [_sensor(seen, found, plant, name) for name in found.columns]
+    return found, [*tables, _defaults(found, plant, balanced), *_runs(found, file, label)]
 
 
-def _doc(plant: type[Plant]) -> str:
-    coordinates = ", ".join(f"{c.name} [{c.unit}] {c.meaning}" for c in plant.coordinates)
-    return f"coordinates: {coordinates}"
+def balance_of(record: Record, found: Recognised) -> Balanced | None:
+    """How a pendulum is balanced, None when it hangs, or swings, or nothing works to keep it up."""
+    if found.plant not in ("cart-pendulum", "furuta") or found.drive is None or len(found.columns) < 2:
+        return None
+    first, last = (record[c.name] * _si(c.guess) for c in found.columns.values())
+    u = record[found.drive.name]
+    centre = float(np.median(last))
+    tilt = last - centre
+    if np.abs(tilt).max() > SMALL or np.mean(np.abs(u) > 1e-3 * np.abs(u).max()) < BUSY:
+        return None
+    dt = float(record.t[-1] - record.t[0]) / (record.t.size - 1)
+    steps = [(c.quantum.step or 0.0) * _si(c.guess) for c in found.columns.values()]
+    wide = max(acceleration_width(x, dt, step) for x, step in zip((first, tilt), steps, strict=True))
+    width = max(7, int(min(max(wide, SMOOTHED[0] / dt), SMOOTHED[1] / dt)) | 1)
+    if record.t.size < 30 * width:
+        return None
+    arm, pendulum = (savitzky_golay(x, dt, width) for x in (first, tilt))
+    push = savitzky_golay(u, dt, width).q
+    inside = slice(width, -width)
+    (throw, away), left = _regression(pendulum.a, [arm.a, pendulum.q], inside)
+    (pull, *_), _ = _regression(arm.a, [push, pendulum.q, arm.v, np.sign(arm.v), np.ones_like(push)], inside)
+    if away <= 0 or left > 0.9 * _regression(pendulum.a, [arm.a], inside)[1]:
+        return None
+    return Balanced(rate=math.sqrt(away), throw=throw, pull=pull, centre=centre)
 
 
-def _parameters(record: Record, found: Recognised, plant: type[Plant], how: Standing | None) -> str:
-    known, asked, about = upright_starts(how, found.plant) if how else (*_starts(record, found, plant), {})
-    lines = ["[parameters]"]
-    rest: list[str] = []
-    for name in plant.names():
-        what = plant.quantity(name)
-        unit = "" if what.unit == "1" else f" {what.unit}"
-        if name in known:
-            value, why = known[name]
-            lines.append(f'{name} = "{value:.4g}{unit}"   # {what.meaning}; {why}')
-        elif name in about:
-            value, doubt = about[name]
-            lines.append(
-                f'{name} = {{ value = "{value:.3g}{unit}", uncertainty = "{doubt}" }}   # {what.meaning}; MEASURE'
-            )
-        elif name in asked:
-            lines.append(f'{name} = {{ guess = "{asked[name]:.3g}{unit}" }}   # {what.meaning}')
-        elif name != "g":
-            rest.append(f'# {name} = {{ guess = "0{unit}" }}   # {what.meaning}')
-    return "\n".join([*lines, "# left at zero until asked for:", *rest]) + "\n" if rest else "\n".join(lines) + "\n"
+def recognised_upright(found: Recognised, balanced: Balanced) -> Recognised:
+    """What was recognised, with signs and the reading of the pendulum's zero, half a turn from upright.
+
+    Hanging, an arm throws its pendulum forward and a cart backward (fig. 3a and eq. (A1)); upright it is the reverse.
+    """
+    throw = balanced.throw * (1 if found.plant == "furuta" else -1)
+    mirrored = throw > 0
+    last = list(found.columns)[-1]
+    scale = _si(found.columns[last].guess)
+    zero = (balanced.centre + (math.pi if mirrored else -math.pi)) / scale
+    return replace(
+        found, reversed=balanced.pull < 0, mirrored=mirrored, rest={**found.rest, last: zero},
+        window=found.window, frequency=balanced.rate,
+        doubts=(*found.doubts, "The pendulum falls away from where it is kept: it was taken for balanced upright, and"
+                " is predicted 50 and 200 ms ahead.") ,
+    )  # fmt: skip
 
 
-def _starts(
-    record: Record, found: Recognised, plant: type[Plant]
-) -> tuple[dict[str, tuple[float, str]], dict[str, float]]:
-    """What is taken as known, and why; what is asked, and where the search starts."""
+def starts_upright(balanced: Balanced, plant: str) -> Starts:
+    """Numbers of a balanced pendulum on a cart or an arm."""
+    known = {"m_p": (MASS, SCALE), "J_p": (0.0, SIMPLE)}
+    inertia = balanced.inertia(plant)
+    asked = {"l_cg": balanced.length, "b_1": 2 * inertia, "b_1c": 0.02 * balanced.gain(plant)}
+    if plant == "cart-pendulum":
+        return Starts(known=known | {"m_c": (inertia, "MEASURE")}, asked=asked)
+    return Starts(known=known, asked=asked | {"J_d": inertia / 2, "k_psi": 2 * inertia},
+                  uncertain={"r": (balanced.arm(), "30 %")})  # fmt: skip
+
+
+def starts_hanging(found: Recognised, plant: type[Plant]) -> Starts:
+    """Numbers of a pendulum that swings about where it hangs; of any other plant, its first parameter as known."""
     w = found.frequency or 6.0
-    length = _G / w**2
-    scale = "MEASURE: sets the scale of all forces; a swing alone sees only ratios"
+    length = G / w**2
+    known = {"m_p": (1.0, f"{SCALE}; a swing alone sees only ratios"), "J_p": (0.0, SIMPLE)}
     if found.plant == "pendulum":
-        return (
-            {"m_p": (1.0, scale), "J_p": (0.0, "with 0, l_cg is the length of the simple pendulum of equal period")},
-            {"l_cg": length, "b_2": 0.002 * w * length**2, "b_2c": 0.002 * _G * length, "b_2q": 0.002 * length**2},
-        )
+        friction = {"b_2": 0.002 * w * length**2, "b_2c": 0.002 * G * length, "b_2q": 0.002 * length**2}
+        return Starts(known=known, asked={"l_cg": length, **friction})
     if found.plant in ("cart-pendulum", "furuta"):
-        m, wanted = 0.1, {"l_cg": length, "b_2": 0.002 * w * 0.1 * length**2, "b_2c": 0.001 * _G * 0.1 * length}
-        known = {"m_p": (m, scale), "J_p": (0.0, "with 0, l_cg is the length of the simple pendulum of equal period")}
-        first = plant.coordinates[0].name
+        known["m_p"] = (MASS, known["m_p"][1])
+        asked = {"l_cg": length, "b_2": 0.002 * w * MASS * length**2, "b_2c": 0.001 * G * MASS * length}
+        driven = found.drive is not None and plant.coordinates[0].name in found.columns
         if found.plant == "cart-pendulum":
             known["m_c"] = (1.0, "MEASURE")
-            inertia = 1.1
         else:
             known["r"] = (0.1, "MEASURE")
-            inertia = 2e-3
-            wanted |= {"J_d": 1e-3} if found.drive and first in found.columns else {}
-            known |= {} if "J_d" in wanted else {"J_d": (1e-3, "MEASURE; not seen while the arm is held or locked")}
-        if found.drive and first in found.columns:
-            wanted |= {"b_1": inertia * 1.0, "b_1c": inertia * 0.1}
-        return known, wanted
-    from dataclasses import MISSING, fields
-
+            if driven:
+                asked["J_d"] = 1e-3
+            else:
+                known["J_d"] = (1e-3, "MEASURE; not seen while the arm is held or locked")
+        if driven:
+            asked |= {"b_1": INERTIA[found.plant] * 1.0, "b_1c": INERTIA[found.plant] * 0.1}
+        return Starts(known=known, asked=asked)
     required = [f.name for f in fields(plant) if f.default is MISSING]  # type: ignore[arg-type]
-    return dict.fromkeys(required[:1], (1.0, "MEASURE")), dict.fromkeys(required[1:], 1.0)
+    return Starts(known=dict.fromkeys(required[:1], (1.0, "MEASURE")), asked=dict.fromkeys(required[1:], 1.0))
 
 
-def _swing(record: Record, found: Recognised) -> float:
-    """Amplitude of the first coordinate in SI, roughly."""
-    c = next(iter(found.columns.values()))
-    per = {"counts": 4e-6 if found.plant.startswith("rect") else 4e-4, "mm": 1e-3, "deg": 0.017}.get(c.guess, 1.0)
-    return (c.high - c.low) / 2 * per
+INERTIA = {"furuta": 2e-3, "cart-pendulum": 1.1}
+"""What the drive moves, where the search begins [kg m^2, kg]."""
 
 
-def _drive(record: Record, found: Recognised, plant: type[Plant], how: Standing | None) -> str:
+def _rig(record: Record, found: Recognised, plant: type[Plant]) -> Table:
+    period = 0.0
+    if (found.window[1] - found.window[0]) / record.period > MANY and found.frequency:
+        period = max(1, int(2 * np.pi / found.frequency / 200 / record.period)) * record.period
+    return rig_table(found.plant, plant, record, period)
+
+
+def _parameters(plant: type[Plant], starts: Starts) -> Table:
+    table = Table("[parameters]")
+    left: list[str] = []
+    for name in plant.names():
+        what = plant.quantity(name)
+        if name in starts.known:
+            value, why = starts.known[name]
+            table.key(name, number(value, what.unit, 4), f"{what.meaning}; {why}")
+        elif name in starts.uncertain:
+            value, percent = starts.uncertain[name]
+            table.key(name, {"value": number(value, what.unit), "uncertainty": percent}, f"{what.meaning}; MEASURE")
+        elif name in starts.asked:
+            table.key(name, {"guess": number(starts.asked[name], what.unit)}, what.meaning)
+        elif name != "g":
+            left.append(name)
+    parameters_left_at_zero(table, plant, left)
+    return table
+
+
+def _drive(found: Recognised, plant: type[Plant], balanced: Balanced | None) -> list[Table]:
     if found.drive is None or not plant.inputs:
-        return '# [drive]\n# column = "..."   # no column drives: the runs are free\n' if plant.inputs else ""
-    c, force = found.drive, plant.inputs[0]
-    unit = "V" if in_dac_counts(c) else c.unit or c.guess
-    gain_unit = per(force.unit, unit) if unit else force.unit
-    low, high = c.low, c.high
-    lines = ["[drive]", f'column = "{quoted(c.name)}"   # {low:.4g} to {high:.4g} {unit}'.rstrip()]
-    lines += [f'unit = "{unit}"'] if unit else ['# unit = "V"']
-    if in_dac_counts(c):
-        lines[1] = lines[1].removesuffix(" V") + " DAC counts"
-        lines.append(f"scale = {1 / DAC_COUNTS_PER_VOLT:.6g}   # {DAC_COUNTS_PER_VOLT:g} counts per V")
-    lines += ["sign = -1   # the first command moves the column down"] if found.reversed else []
-    driven = next(iter(found.columns))
-    guess = how.gain(found.plant) if how else _gain(record, found)
+        return [no_drive_table()] if plant.inputs else []
+    unit, scale = command_unit(found.drive)
+    force, driven = plant.inputs[0], next(iter(found.columns))
+    guess = balanced.gain(found.plant) if balanced else _gain(found)
     speed = next(f"{k.unit}/s" for k in plant.coordinates if k.name == force.on)
-    lines += [
-        "",
-        "[actuator]",
-        f'gain = {{ guess = "{guess:.3g} {gain_unit}", min = 0 }}   # {force.meaning} per command; moves {driven} up',
-        f'# slope = {{ guess = "0 {per(force.unit, speed)}" }}   # force lost per speed',
-        '# lag = { guess = "5 ms", max = "0.1 s" }',
-        f'{"" if how else "# "}delay = {{ guess = "1 ms", max = "10 ms" }}',
-    ]
-    return "\n".join(lines) + "\n"
+    actuator = Table("[actuator]")
+    gain = {"guess": number(guess, per(force.unit, unit) if unit else force.unit), "min": 0}
+    actuator.key("gain", gain, f"{force.meaning} per command; moves {driven} up")
+    actuator.key("slope", {"guess": number(0, per(force.unit, speed))}, "force lost per speed", off=True)
+    actuator.key("lag", {"guess": "5 ms", "max": "0.1 s"}, off=True)
+    actuator.key("delay", {"guess": "1 ms", "max": "10 ms"}, off=balanced is None)
+    return [drive_table(found.drive, unit, scale, reversed_=found.reversed), actuator]
 
 
-def _gain(record: Record, found: Recognised) -> float:
+def _gain(found: Recognised) -> float:
     """Force per command of the right size: what the start inertia needs to swing as far as was seen."""
     assert found.drive is not None
-    inertia = {"furuta": 2e-3, "cart-pendulum": 1.1}.get(found.plant, 1.0)
+    c = next(iter(found.columns.values()))
+    swing = (c.high - c.low) / 2 * {"counts": 4e-4, "mm": 1e-3, "deg": 0.017}.get(c.guess, 1.0)
     u = max(abs(found.drive.low), abs(found.drive.high)) or 1.0
     u /= DAC_COUNTS_PER_VOLT if in_dac_counts(found.drive) else 1.0
-    w = found.frequency or 6.0
-    return max(inertia * _swing(record, found) * w**2 / u, 1e-9)
+    return max(INERTIA.get(found.plant, 1.0) * swing * (found.frequency or 6.0) ** 2 / u, 1e-9)
 
 
-def _sensor(record: Record, seen: Inspection, found: Recognised, plant: type[Plant], name: str) -> str:
-    c: Column = found.columns[name]
+def _sensor(seen: Inspection, found: Recognised, plant: type[Plant], name: str) -> Table:
+    c = found.columns[name]
     coordinate = next(k for k in plant.coordinates if k.name == name)
-    lines = [f"[sensors.{name}]", f'column = "{quoted(c.name)}"   # {c.low:.6g} to {c.high:.6g} {c.guess}'.rstrip()]
-    if c.guess:
-        lines.append(f'unit = "{c.guess}"' + ("" if c.unit else "   # guessed; the log does not say"))
-    if c.guess == "counts":
-        ecp = seen.reader == "ecp" or any(word in c.name.lower() for word in ("enc", "pos"))
-        if coordinate.unit == "rad":
-            counts, why = (16000, "ECP rigs have 16000") if ecp else (4096, "see the encoder")
-            lines.append(f"counts_per_rev = {counts}   # MEASURE: {why}")
-        else:
-            lines.append("counts_per_m = 226629   # MEASURE: ECP 210 has 16000 counts per 7.06 cm")
-    elif c.quantum.counts_per_rev and coordinate.unit == "rad":
-        lines.append(f"counts_per_rev = {c.quantum.counts_per_rev}   # from the column's steps")
-    elif c.quantum.step and c.guess in ("rad", "m"):
-        lines.append(f'resolution = "{c.quantum.step:.4g} {c.guess}"   # from the column\'s steps')
-    zero = found.rest[name]
-    lines.append(f"offset = {zero:.6g}   # reading at which {name} is zero, here where it {_how(found)}")
-    if found.mirrored and name == plant.coordinates[-1].name:
-        lines.append("sign = -1   # it is thrown the other way than the plant's angle")
-    else:
-        lines.append("# sign = -1   # when the column counts the other way")
-    return "\n".join(lines) + "\n"
+    ecp = seen.reader == "ecp" or any(word in c.name.lower() for word in ("enc", "pos"))
+    counts = (16000, "ECP rigs have 16000") if ecp else (4096, "see the encoder")
+    if coordinate.unit != "rad":
+        counts = (226629, "ECP 210 has 16000 counts per 7.06 cm")
+    mirrored = found.mirrored and name == plant.coordinates[-1].name
+    return sensor_table(coordinate, c, found.rest[name], counts, driven=found.drive is not None, mirrored=mirrored)
 
 
-def _how(found: Recognised) -> str:
-    return "lay before the first command" if found.drive is not None else "comes to rest"
-
-
-def _runs(found: Recognised, plant: type[Plant], file: str, stem: str, how: Standing | None) -> str:
-    start, stop = found.window
+def _defaults(found: Recognised, plant: type[Plant], balanced: Balanced | None) -> Table:
+    table = Table("[defaults]")
     missing = [c.name for c in plant.coordinates if c.name not in found.columns]
-    shared: list[str] = []
     if missing:
-        shared.append(f"locked = {names(missing)}   # no column was found; give them a sensor if they move")
-    first = plant.coordinates[0].name
+        table.key("locked", missing, "no column was found; give them a sensor if they move")
     if found.drive is None and not missing and found.plant in ("cart-pendulum", "furuta"):
-        shared.append(f'held = ["{first}"]   # its measured motion is prescribed, since no column says what drove it')
-    unknown = ["initial", "offset"] if found.drive is None else ["initial"]
-    shared.append(upright_defaults(plant) if how else f"unknown = {names(unknown)}   # estimated for each run alone")
-    swings = found.frequency * (stop - start) / (2 * np.pi)
+        why = "its measured motion is prescribed, since no column says what drove it"
+        table.key("held", [plant.coordinates[0].name], why)
+    if balanced:
+        table.key("horizon", ["50 ms", "200 ms"], "a free run of an unstable plant tells nothing")
+        unknown = [f"offset.{plant.coordinates[-1].name}", "input_offset"]
+        table.key("unknown", unknown, "where the counter was zeroed; what leans on the first body")
+    else:
+        unknown = ["initial"] if found.drive is not None else ["initial", "offset"]
+        table.key("unknown", unknown, "estimated for each run alone")
+    return table
+
+
+def _runs(found: Recognised, file: str, label: str) -> list[Table]:
+    """One run; a long free swing keeps its tail for prediction."""
+    start, stop = found.window
     split = start + 0.6 * (stop - start)
-    runs = [(stem, start, stop, "fit")]
-    if found.drive is None and swings > 12:
-        runs = [(f"{stem} start", start, split, "fit"), (f"{stem} tail", split, stop, "predict")]
-    parts = ["[defaults]\n" + "\n".join(shared) + "\n"]
-    for label, a, b, role in runs:
-        note = "fitted" if role == "fit" else "scored, never seen by the estimator"
-        parts.append(
-            f'[[runs]]\nlabel = "{quoted(label)}"\nfile = "{quoted(file)}"\n'
-            f'window = [{a:.5g}, {b:.5g}]   # s\nrole = "{role}"   # {note}\n'
-        )
-    return "\n".join(parts)
+    if found.drive is None and found.frequency * (stop - start) / (2 * np.pi) > 12:
+        return run_tables(file, [(f"{label} start", start, split, "fit"), (f"{label} tail", split, stop, "predict")])
+    return run_tables(file, [(label, start, stop, "fit")])
+
+
+def _si(unit: str) -> float:
+    return {"deg": math.pi / 180, "mm": 1e-3, "counts": 2 * math.pi / 4096}.get(unit, 1.0)
+
+
+def _regression(a: Array, columns: list[Array], inside: slice) -> tuple[list[float], float]:
+    """Slopes of `a` on columns, and the sum of squares that they leave."""
+    table = np.column_stack(columns)[inside]
+    slopes, *_ = np.linalg.lstsq(table, a[inside], rcond=None)
+    return [float(s) for s in slopes], float(np.sum((a[inside] - table @ slopes) ** 2))

@@ -1,19 +1,20 @@
-"""What does the log of a chain show: carts or disks, who is held, what drives it, in which stretches?"""
+"""What the log of a chain shows: carts or disks, who is held, what drives it, in which stretches, where is zero."""
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
-from upright.errors import UprightError
+from upright.errors import BadInput, UprightError
 from upright.physics import find
 from upright.readers.inspection import Column, Inspection
 from upright.records import Record
+from upright.signals.trips import goes_dead
+from upright.signals.turning import turning_points
 from upright.study.draft.recognise import REFERENCE, Recognised, in_dac_counts
-from upright.study.draft.shaft_events import follows, goes_dead, releases, steps
-from upright.study.draft.shaft_rest import held_bodies, waiting, zero_at
 from upright.study.sensors import Array
 
 RUNS_AWAY = 16_000
@@ -22,13 +23,25 @@ RUNS_AWAY = 16_000
 STAYS = 0.3
 """Share of its travel from where it began at which a body without ground spring is left lying."""
 
+HELD = 0.2
+"""Share of its neighbour's travel below which a body is held by hand."""
+
+STILL = 0.005
+"""Share of its travel by which a body that lies still may creep."""
+
+HALVES = 4
+"""Half swings that make a free swing: fewer may be a hand."""
+
+STEADY = 0.25
+"""Share by which the half periods of one free swing may differ; dry friction leaves them equal."""
+
 _NAMES_DISKS = re.compile(r"tors|dis[ck]|shaft|(?<!\d)205", re.IGNORECASE)
 _NAMES_CARTS = re.compile(r"rectilinear|(?<!\d)210", re.IGNORECASE)
 _GAINS_ZERO = re.compile(r"P_gain = 0\b(?!\.).*I_gain = 0\b(?!\.).*D_gain = 0\b(?!\.)")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sight:
+class ChainLog:
     """What a log of carts or disks shows.
 
     Attributes
@@ -45,7 +58,7 @@ class Sight:
         The law that made the command of reference and motion, as a study writes it; "" when it could not be told.
     windows : tuple of (float, float)
         Stretches that speak about the plant [s].
-    waiting : tuple of str
+    still : tuple of str
         Coordinates that lie still before the first command.
     """
 
@@ -55,10 +68,20 @@ class Sight:
     reference: Column | None
     loop: str
     windows: tuple[tuple[float, float], ...]
-    waiting: tuple[str, ...] = ()
+    still: tuple[str, ...] = ()
+
+    @property
+    def fixed(self) -> tuple[str, ...]:
+        """Coordinates that do not move freely."""
+        return (*self.held, *self.locked)
+
+    @property
+    def disks(self) -> bool:
+        """Whether these are disks on a shaft, not carts."""
+        return self.found.plant.startswith("tors")
 
 
-def look(record: Record, seen: Inspection, found: Recognised, *, named: bool, path: str = "") -> Sight:
+def read_chain(record: Record, seen: Inspection, found: Recognised, *, named: bool, path: str = "") -> ChainLog:
     """What a log shows of a chain.
 
     `named`: the plant was given and is not to be changed; `path` of the log may say what the rig is.
@@ -84,13 +107,18 @@ def look(record: Record, seen: Inspection, found: Recognised, *, named: bool, pa
         told = [told[0].partition(";")[0].replace("rectilinear", kind).replace("torsional", kind)] if told else []
         told = [d.removesuffix(".") + f", since {why}; otherwise --plant {other}-{len(columns)}." for d in told]
     names = [c.name for c in find(plant).coordinates]
+    if len(names) != len(columns):
+        raise BadInput(
+            f"{plant} has {len(names)} bodies, and {len(columns)} column{'s' * (len(columns) != 1)} of this log may"
+            f" measure one ({', '.join(c.name for c in columns)}); choose another --plant, or write the study by hand"
+        )
     windows, loop = [_driven(record, seen, at, disks=plant.startswith("tors"))], ""
     if drive is None:
         windows = releases(t, most) or [found.window]
     elif reference is not None:
         loop, about_law = _law(record, drive, reference, columns[0], names[0])
         doubts.append(about_law)
-        back, begin = steps(asked)[-1], max(at - int(1.0 / record.period), 0)
+        back, begin = int(np.flatnonzero(np.diff(asked))[-1]) + 1, max(at - int(1.0 / record.period), 0)
         if back > at and goes_dead(t[begin:], u[begin:], first[begin:], back - begin):
             windows = [(windows[0][0], float(t[back - 1]))]
             doubts.append(
@@ -109,9 +137,9 @@ def look(record: Record, seen: Inspection, found: Recognised, *, named: bool, pa
         found, plant=plant, columns=dict(zip(names, columns, strict=True)), rest=rest, drive=drive,
         reversed=reversed_, mirrored=False, window=windows[0], doubts=(*told, *doubts),
     )  # fmt: skip
-    return Sight(
+    return ChainLog(
         found=found, held=held, locked=locked, reference=reference, loop=loop, windows=tuple(windows),
-        waiting=waiting(record, found.columns, at) if drive is not None else (),
+        still=still_bodies(record, found.columns, at) if drive is not None else (),
     )  # fmt: skip
 
 
@@ -213,3 +241,95 @@ def _law(record: Record, drive: Column, reference: Column, body: Column, coordin
             " command as recorded drives the bodies. If you know the law, write it as loop."
         )
     return text, f"A loop was closed: '{drive.name}' is {law.structure}; it is simulated with the bodies."
+
+
+def held_bodies(
+    record: Record, columns: list[Column], names: list[str], windows: list[tuple[float, float]]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Coordinates held by hand, and locked ones."""
+    inside = np.zeros(record.t.size, dtype=bool)
+    for a, b in windows:
+        inside |= (record.t >= a) & (record.t <= b)
+    travel = [float(np.ptp(record[c.name][inside])) for c in columns]
+    step = [max(c.quantum.step or 0.0, 1e-9 * max(travel)) for c in columns]
+    still, locked = list[str](), list[str]()
+    for name, far, least in zip(names, travel, step, strict=True):
+        if far <= 2 * least:
+            locked.append(name)
+        elif far < HELD * max(travel):
+            still.append(name)
+    return tuple(still), tuple(locked)
+
+
+def still_bodies(record: Record, columns: dict[str, Column], at: int) -> tuple[str, ...]:
+    """Coordinates that lie still for 0.2 s before the first command; a log that begins with it began at rest."""
+    before = slice(max(at - int(0.2 / record.period), 0), at + 1)
+    return tuple(
+        name
+        for name, c in columns.items()
+        if float(np.ptp(record[c.name][before])) <= max(3 * (c.quantum.step or 0.0), STILL * (c.high - c.low))
+    )
+
+
+def zero_at(record: Record, c: Column, window: tuple[float, float], at: int, *, driven: bool) -> float:
+    """Reading at which a coordinate is zero: before the first command, else where the first stretch ends."""
+    x, t = record[c.name], record.t
+    if driven:
+        return float(np.median(x[max(0, at - 50) : at])) if at >= 5 else float(x[0])
+    late = (t <= window[1]) & (t >= window[1] - 0.3 * (window[1] - window[0]))
+    return (float(x[late].max()) + float(x[late].min())) / 2
+
+
+def releases(t: Array, x: Array) -> list[tuple[float, float]]:
+    """Stretches (start, stop) [s] in which a body swings freely and only loses amplitude.
+
+    A hand pulls, holds and lets go; what follows are half swings of equal length, each smaller than the one before.
+    A stretch begins where the body has left the hand by a quarter of the first half swing.
+    """
+    turns = turning_points(x, 0.03 * float(np.ptp(x)), ends=True).tolist()
+    if len(turns) < HALVES:
+        return []
+    at = [_leaves(x, a, b) for a, b in pairwise(turns)]
+    length = np.array([t[b] - t[a] for a, b in zip(at, turns[1:], strict=True)])
+    size = np.array([abs(x[b] - x[a]) for a, b in pairwise(turns)])
+    out: list[tuple[float, float]] = []
+    i = 0
+    while i < size.size - HALVES + 1:
+        j = i
+        while j + 1 < size.size and size[j + 1] < 1.02 * size[j] and _steady(length[i : j + 2]):
+            j += 1
+        if j - i + 1 >= HALVES:
+            half = float(np.median(length[i : j + 1]))
+            follows = float(t[at[j + 1]]) if j + 1 < size.size else float(t[-1])
+            last = float(t[turns[j + 1]])
+            out.append((float(t[at[i]]) + 0.25 * half, min(last + half, follows, float(t[-1]))))
+            i = j + 1
+        else:
+            i += 1
+    longest = max(out, key=lambda span: span[1] - span[0], default=(0.0, 0.0))
+    # the body swings with one period; what is much faster is a hand that shakes
+    return [span for span in out if span[1] - span[0] > 0.3 * (longest[1] - longest[0])]
+
+
+def _leaves(x: Array, a: int, b: int) -> int:
+    """Last sample near the turning point a before the way to b: a held body leaves late."""
+    near = np.flatnonzero(np.abs(x[a : b + 1] - x[a]) < 0.02 * abs(x[b] - x[a]))
+    return a + int(near[-1])
+
+
+def _steady(lengths: Array) -> bool:
+    """Whether half periods are equal but for the first, which a hand may have lengthened."""
+    middle = float(np.median(lengths))
+    return bool(np.all(np.abs(lengths - middle) < STEADY * middle))
+
+
+def follows(t: Array, u: Array, x: Array, at: int) -> bool:
+    """Whether a body goes up when the command goes up, judged by the first motion after sample `at`."""
+    stop = min(at + max(int(2.0 / float(np.median(np.diff(t)))), 5), t.size)
+    moved = x[at:stop] - x[at]
+    far = np.flatnonzero(np.abs(moved) > 0.03 * np.ptp(x))
+    if not far.size:
+        return True
+    before = float(u[at - 2]) if at > 2 else 0.0
+    push = float(np.mean(u[at + 1 : at + 1 + max(int(far[0]), 1)])) - before
+    return bool(moved[far[0]] * push >= 0)

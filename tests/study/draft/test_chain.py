@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from upright.errors import BadInput
 from upright.identification.estimate import identify
 from upright.readers import inspect, read
-from upright.study.draft.pendulum import draft
+from upright.study.draft.draft import draft
 from upright.study.load import load_study
 
 DT = 0.002
@@ -68,6 +69,11 @@ def test_the_plant_may_be_named_against_the_guess(drafted):
     one, two = spun_up()
     _, study = drafted(plant="rectilinear-2", t=T, target_value=VOLTS, enc1=one, enc2=two)
     assert study.plant == "rectilinear-2"
+
+
+def test_a_plant_with_more_bodies_than_columns_is_refused_with_a_sentence(drafted):
+    with pytest.raises(BadInput, match=r"torsional-3 has 3 bodies, and 2 columns .*enc1, enc2"):
+        drafted(plant="torsional-3", t=T, target_value=VOLTS, **dict(zip(("enc1", "enc2"), spun_up(), strict=True)))
 
 
 def test_carts_that_return_to_their_springs_are_carts(drafted):
@@ -148,6 +154,24 @@ def test_a_reference_without_its_command_is_said(drafted):
     text, study = drafted(t=T, cart1pos=y, target_value=reference)
     assert "no column holds the command" in text
     assert not np.any(study.runs[0].u)
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize(
+    ("log", "dead"),
+    [
+        ("ecp205_torsional_ucsd/Jan281509.mat", True),  # its disks rest against the output after 10 s
+        ("ecp210_rectilinear_ucsd_1khz/21-Feb-2025 10_26_38.mat", True),  # swings freely at a constant output
+        # simulated with the drive on, both carts are explained better than with it off
+        ("ecp210_rectilinear_ucsd_export/Closed_Loop/closed_loop_kp.csv", False),
+        ("ecp210_rectilinear_ucsd_export/Closed_Loop/closed_loop_less_weight1.csv", False),
+    ],
+)  # fmt: skip
+def test_a_loop_that_lives_on_is_told_from_a_dead_drive(log, dead, tmp_path):
+    path = Path(os.environ["UPRIGHT_REAL_DATA"]) / log
+    record = read(path)
+    text = draft(record, inspect(record), path, tmp_path / "study.toml")
+    assert ("no longer moves the bodies" in text) == dead
 
 
 REAL = {  # file: plant, held or locked, least fit percent of every signal

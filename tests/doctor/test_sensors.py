@@ -7,7 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from upright.doctor.channels import clipped, doubled_rows, frozen_from, jumps
+from upright.doctor.clock import doubled_rows
+from upright.doctor.sensors import clipped, frozen_from
+from upright.signals.spikes import jumps
 
 T = np.arange(2000) * 2e-3
 STEP = 2 * math.pi / 4096

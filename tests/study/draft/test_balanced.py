@@ -10,7 +10,7 @@ from scipy.linalg import solve_continuous_are
 
 from upright.identification.estimate import identify
 from upright.readers import inspect, read
-from upright.study.draft.pendulum import draft
+from upright.study.draft.draft import draft
 from upright.study.load import load_study
 
 G, LENGTH, ARM = 9.81, 0.086, 0.085

@@ -1,0 +1,160 @@
+"""Samples that a body with inertia cannot produce: single outliers, lasting jumps, turns of a counter.
+
+A body cannot jump, whatever it is; a lost count, a transmission error or a flash on an optical disk can.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.signals.stretches import stretches
+
+Array = NDArray[np.float64]
+
+FAR = 12.0
+"""A spike stands out by this factor over what the largest ordinary samples do, and"""
+
+LEAST = 0.02
+"""by this share of how much the signal varies."""
+
+WIDTH = 2
+"""Samples in a row that still count as a spike."""
+
+REACH = 6
+"""Changes to either side that tell how a body moved around a sample."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Jumps:
+    """Samples at which a column jumps: whole turns of its counter, lasting steps, single outliers.
+
+    `wraps` and `steps` are samples before which the jump lies, `spikes` the outlying samples themselves; sizes are in
+    the column's unit.
+    """
+
+    wraps: NDArray[np.int64]
+    modulus: float
+    steps: NDArray[np.int64]
+    step_sizes: Array
+    spikes: NDArray[np.int64]
+    spike_sizes: Array
+
+    def __bool__(self) -> bool:
+        return bool(self.wraps.size or self.steps.size or self.spikes.size)
+
+    def mended(self, x: Array) -> Array:
+        """The column (N,) without them."""
+        out = x.copy()
+        for i, size in zip(self.steps.tolist(), self.step_sizes.tolist(), strict=True):
+            out[i:] -= size
+        for i in self.wraps.tolist():
+            out[i:] -= self.modulus * np.sign(x[i] - x[i - 1])
+        return without(out, self.spikes)
+
+
+def spikes(x: Array, quantum: float = 0.0) -> NDArray[np.int64]:
+    """Places of single samples of a signal (N,) that jump away and back.
+
+    They are compared with the upper percent of what a running median of five takes away, so that neither noise nor
+    fast motion, which bends at every turn, counts.
+    """
+    padded = np.concatenate([x[:1].repeat(2), x, x[-1:].repeat(2)])
+    calm = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
+    off = np.abs(x - calm)
+    usual = float(np.quantile(off, 0.99))
+    far = off > max(FAR * usual, LEAST * float(np.std(calm)), 4 * quantum, 1e-300)
+    keep: list[int] = []
+    for first, last in stretches(far):
+        here = np.arange(first, last + 1)
+        # a spike also moves the median of its neighbours, by what the signal does in one sample
+        high = here[off[here] > 0.5 * off[here].max()]
+        if high.size <= WIDTH and here.size <= WIDTH + 4 and _returns(x, int(high[0]), int(high[-1])):
+            keep += [int(i) for i in high]
+    return np.array(keep, dtype=np.int64)
+
+
+def _returns(x: Array, first: int, last: int) -> bool:
+    """Whether a signal comes back from samples `first` to `last` by about as much as it went there."""
+    away = x[first] - x[max(first - 1, 0)]
+    back = x[last] - x[min(last + 1, x.size - 1)]
+    return abs(away - back) < 0.4 * max(abs(away), abs(back)) or first == 0 or last == x.size - 1
+
+
+def without(x: Array, at: NDArray[np.int64]) -> Array:
+    """A signal (N,) with samples replaced by straight lines between their neighbours."""
+    out = x.copy()
+    beside = np.setdiff1d(np.arange(x.size), at)
+    out[at] = np.interp(at, beside, x[beside])
+    return out
+
+
+def jumps(t: Array, x: Array, quantum: float, moduli: Sequence[float] = ()) -> Jumps:
+    """Jumps of a column (N,) at instants `t` (N,), in steps of `quantum`; `moduli` are turns its counter may make.
+
+    A change counts as a lasting jump when it differs from the changes around it by four times their own spread, by
+    more than noise and quantum allow, and by more than a few missed samples would explain.
+    """
+    nothing = np.zeros(0, np.int64)
+    if x.size < 4 * REACH:
+        return Jumps(wraps=nothing, modulus=0.0, steps=nothing, step_sizes=x[:0], spikes=nothing, spike_sizes=x[:0])
+    dt = np.diff(t)
+    ratio = dt / float(np.median(dt))
+    peaks = spikes(x, quantum)
+    peaks = peaks[np.pad(ratio, 1, constant_values=1.0)[peaks + np.array([[0], [1]])].max(axis=0) < 1.5]
+    calm = without(x, peaks)
+    heights = x[peaks] - calm[peaks]
+    d = np.diff(calm)
+    around = _around(d / ratio)
+    usual = np.median(around, axis=0) * ratio
+    off = d - usual
+    spread = (around.max(axis=0) - around.min(axis=0)) * np.maximum(ratio, 1.0)
+    noise = 1.4826 * float(np.median(np.abs(off)))
+    far = np.abs(off) > 4 * spread + max(8 * noise, 6 * quantum, 2e-4 * float(np.ptp(calm)))
+    # a reading that came late is caught up at once: what jumps was missing just before, or is missing just after
+    caught = np.abs(np.convolve(off, np.ones(2 * REACH + 1), "same")) < 0.35 * np.abs(off)
+    steps = np.flatnonzero(far & ~caught & (np.abs(off) > 4 * np.abs(usual))) + 1
+    sizes = off[steps - 1]
+    turn = _modulus(calm, steps, sizes, spread, moduli)
+    wrapped, there = (np.abs(np.abs(size) - turn) < 0.1 * turn for size in (sizes, heights))
+    # noise at the edge of a counter turns it there and back
+    return Jumps(
+        wraps=np.sort(np.concatenate([steps[wrapped], peaks[there], peaks[there] + 1])),
+        modulus=turn, steps=steps[~wrapped], step_sizes=sizes[~wrapped],
+        spikes=peaks[~there], spike_sizes=heights[~there],
+    )  # fmt: skip
+
+
+def _around(d: Array) -> Array:
+    """Changes 2 to `REACH` samples before and after each change, (2 (REACH - 1), N - 1); ends repeat the nearest."""
+    at = np.arange(d.size)
+    offsets = np.array([o for o in range(-REACH, REACH + 1) if abs(o) > 1])[:, None]
+    place = at + offsets
+    return d[np.where((place < 0) | (place >= d.size), at - offsets, place)]
+
+
+def _modulus(x: Array, steps: NDArray[np.int64], sizes: Array, spread: Array, moduli: Sequence[float]) -> float:
+    """Turn of the counter that the jumps amount to; 0 when they do not."""
+    if not steps.size:
+        return 0.0
+    span = float(np.ptp(x))
+    slack = spread[steps - 1] + 0.02 * np.abs(sizes)
+    for turn in moduli:
+        if (np.abs(np.abs(sizes) - turn) < np.minimum(slack, 0.1 * turn)).any():
+            return turn
+    # an unknown counter: jumps from one end of everything that was read to the other
+    largest = float(np.abs(sizes).max())
+    low, high = float(x.min()), float(x.max())
+    whole = 0
+    for i, size in zip(steps.tolist(), sizes.tolist(), strict=True):
+        before, after = float(x[i - 1]), float(x[i])
+        ends = (before - low, high - after) if size > 0 else (high - before, after - low)
+        whole += abs(size) > 0.9 * span and max(ends) < 0.05 * span
+    alike = (np.abs(np.abs(sizes) - largest) < 0.05 * largest).all()
+    power = math.log2(largest) if largest > 0 else 0.0
+    round_count = abs(power - round(power)) < 0.02 and largest >= 200
+    return largest if whole == sizes.size and alike and (whole > 1 or round_count) else 0.0

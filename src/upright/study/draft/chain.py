@@ -1,0 +1,335 @@
+"""Draft of a study of carts on springs or disks on a shaft, and where the search for its numbers starts.
+
+Nobody measured how hard the drive pushes: 1 N/V (N m/V) is assumed, and masses, springs and friction follow from the
+motion: each body's acceleration is regressed on what acts on it, all through the same smoothing. With a gain of 1 (or,
+for a free swing, an inertia of 1) the slopes are the numbers of the plant, roughly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from upright.physics import Plant, find
+from upright.readers.inspection import Column
+from upright.readers.suspect_columns import DAC_COUNTS_PER_VOLT
+from upright.records import Record
+from upright.signals.smoothing import acceleration_width, savitzky_golay
+from upright.signals.trips import find_trip
+from upright.study.draft.chain_log import ChainLog
+from upright.study.draft.recognise import swing_frequency
+from upright.study.draft.tables import (
+    command_unit,
+    drive_table,
+    no_drive_table,
+    parameters_left_at_zero,
+    rig_table,
+    run_tables,
+    sensor_table,
+)
+from upright.study.rig import per
+from upright.study.sensors import Array
+from upright.study.write import Table, number
+
+COUNTS = {"rad": (16000, "ECP 205 has 16000"), "m": (226629, "ECP 210 has 16000 counts per 7.06 cm")}
+"""Of an encoder, per turn or metre, and whose."""
+
+SI = {"mm": 1e-3, "deg": float(np.pi / 180)}
+
+REACH = 10.0
+"""Volts that ECP's converter can put out; its log shows what the program asked for."""
+
+RESOLVED = 0.003
+"""Sample period [s] above which the braking of a drive, built up in some 30 ms, is not seen and not asked for."""
+
+PASSES = 0.1
+"""Share of its range that a converter's amplifier may pass when more is asked than the range; where a search begins."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Starts:
+    """Where the search for each number of a chain begins, in SI.
+
+    `numbers` by the plant's own names; `braked` [force per speed]: damping that acts with the volts on alone, 0 when
+    they never go off; `trips`: whether the drive went off although it is logged as on; `limit`: of the command, 0 where
+    it stays within reach; `fastest`: angular frequency [rad/s] of the fastest swing.
+    """
+
+    numbers: dict[str, float]
+    braked: float
+    trips: bool
+    limit: float
+    fastest: float
+
+
+def chain_tables(record: Record, log: ChainLog, file: str, label: str) -> list[Table]:
+    """Tables of a study."""
+    plant = find(log.found.plant)
+    start = _starts_of(record, log, plant)
+    several = len(log.windows) > 1
+    runs = [(f"{label} {i + 1}" if several else label, a, b, "fit") for i, (a, b) in enumerate(log.windows)]
+    return [
+        _rig(record, log, plant, start),
+        _parameters(log, plant, start),
+        *_drive(log, plant, start),
+        *(_sensor(log, plant, name) for name in log.found.columns),
+        _defaults(log, start),
+        *run_tables(file, runs),
+    ]
+
+
+def _unit(plant: type[Plant], name: str) -> str:
+    return next(k.unit for k in plant.coordinates if k.name == name)
+
+
+def _factor(log: ChainLog, plant: type[Plant], name: str) -> float:
+    """SI per unit of a column."""
+    c = log.found.columns[name]
+    if c.guess == "counts":
+        return 2 * np.pi / COUNTS["rad"][0] if _unit(plant, name) == "rad" else 1 / COUNTS["m"][0]
+    return SI.get(c.guess, 1.0)
+
+
+def _volts(c: Column) -> tuple[str, float]:
+    """Unit of the command and its factor on the column: a loop's output in counts is the converter's."""
+    unit, scale = command_unit(c)
+    return ("V", 1 / DAC_COUNTS_PER_VOLT) if c.guess == "counts" else (unit or "V", scale)
+
+
+def _starts_of(record: Record, log: ChainLog, plant: type[Plant]) -> Starts:
+    a, b = log.windows[0]
+    rows = (record.t >= a) & (record.t <= b)
+    columns, drive = log.found.columns, log.found.drive
+    factors = {n: _factor(log, plant, n) for n in columns}
+    u, reach = None, np.inf
+    if drive is not None:
+        scale = _volts(drive)[1]
+        u = record[drive.name][rows] * (-scale if log.found.reversed else scale)
+        reach = REACH if scale != 1.0 else np.inf
+    return starts(
+        record.t[rows],
+        u,
+        [(record[c.name][rows] - log.found.rest[n]) * factors[n] for n, c in columns.items()],
+        [n not in log.fixed for n in columns],
+        disks=log.disks,
+        quanta=[(c.quantum.step or 0.0) * factors[n] for n, c in columns.items()],
+        loop=log.reference is not None,
+        reach=reach,
+    )
+
+
+def _rig(record: Record, log: ChainLog, plant: type[Plant], start: Starts) -> Table:
+    every = int(2 * np.pi / start.fastest / 120 / record.period)
+    coarse = not log.loop and every > 1
+    return rig_table(log.found.plant, plant, record, min(every, 4) * record.period if coarse else 0.0)
+
+
+def _parameters(log: ChainLog, plant: type[Plant], start: Starts) -> Table:
+    driven, carts = log.found.drive is not None, not log.disks
+    stuck = [c.name in log.fixed for c in plant.coordinates]
+    table = Table("[parameters]")
+    left: list[str] = []
+    scaled = driven
+    for name in plant.names():
+        what = plant.quantity(name)
+        value = start.numbers.get(name)
+        body = int(tail[-1]) - 1 if (tail := name.rstrip("cqs"))[-1].isdigit() else -1
+        inertia = name[:2] in ("m_", "J_")
+        if inertia and stuck[body]:
+            table.key(name, number(value or 1.0, what.unit), f"{what.meaning}; held, so it does not matter")
+        elif inertia and not scaled:
+            scaled = True
+            assumed = {"value": number(value or 1.0, what.unit), "assumed": True}
+            table.key(name, assumed, f"{what.meaning}; MEASURE: a free swing sees only ratios")
+        elif carts and name == "k_12" and driven and len(stuck) == 2 and stuck[1]:
+            why = "MEASURE: with body 2 held, only k_1 + k_12 is seen"
+            table.key(name, number(start.numbers["k_1"] / 2, what.unit), f"{what.meaning}; {why}")
+        elif carts and name == "k_1" and stuck[0] and len(stuck) > 1:
+            table.key(name, number(0, what.unit), f"{what.meaning}; pulls at the hand")
+        elif name.startswith("delta_") and not driven and not stuck[body]:
+            # a free swing ends in small reversals, which tell how far a body moves before its friction is whole
+            coordinate = plant.coordinates[body].name
+            c = log.found.columns[coordinate]
+            least = max(3 * (c.quantum.step or 0.0), 1e-4 * (c.high - c.low)) * _factor(log, plant, coordinate)
+            guess = {"guess": number(5 * least, what.unit, 2), "min": number(least, what.unit, 2)}
+            table.key(name, guess, what.meaning)
+        elif value is not None:
+            half = 0.5 if carts and name == "k_1" and len(stuck) == 2 and stuck[1] else 1.0
+            table.key(name, {"guess": number(half * value, what.unit), "min": 0}, what.meaning)
+        else:
+            left.append(name)
+    parameters_left_at_zero(table, plant, left)
+    return table
+
+
+def _drive(log: ChainLog, plant: type[Plant], start: Starts) -> list[Table]:
+    c, force = log.found.drive, plant.inputs[0]
+    if c is None:
+        return [no_drive_table()]
+    unit, scale = _volts(c)
+    damping = per(force.unit, f"{_unit(plant, force.on)}/s")
+    actuator = Table("[actuator]")
+    why = f"{force.meaning} per command: nobody measured it, so masses, springs and friction are per that"
+    actuator.key("gain", {"value": f"1 {per(force.unit, unit)}", "assumed": True}, why)
+    braked = {"guess": number(start.braked, damping), "min": 0}
+    actuator.key("damping", braked, "of the drive while commanded", off=not start.braked)
+    if start.braked:
+        relaxation = {"guess": "30 ms", "min": 0, "max": "2 s"}
+        actuator.key("relaxation", relaxation, "time in which that builds up and fades")
+    if start.limit:
+        actuator.key("limit", {"guess": number(start.limit, unit), "min": 0}, "the bodies feel no more than that")
+    actuator.key("delay", {"guess": "2 ms", "max": "50 ms"}, off=not log.disks or bool(log.loop))
+    return [drive_table(c, unit, scale, reversed_=log.found.reversed), actuator]
+
+
+def _sensor(log: ChainLog, plant: type[Plant], name: str) -> Table:
+    coordinate = next(k for k in plant.coordinates if k.name == name)
+    counts, whose = COUNTS[coordinate.unit]
+    told = f"{whose}; what is said in V, s and counts does not depend on it"
+    driven = log.found.drive is not None
+    return sensor_table(coordinate, log.found.columns[name], log.found.rest[name], (counts, told), driven=driven)
+
+
+def _defaults(log: ChainLog, start: Starts) -> Table:
+    table = Table("[defaults]")
+    if log.held:
+        table.key("held", log.held, "their measured motion is prescribed")
+    if log.locked:
+        table.key("locked", log.locked)
+    still = [n for n in log.still if n not in log.fixed]
+    if still:
+        table.key("initial", {f"{n}_dot": 0 for n in still}, "they wait for the first command")
+    unknown = ["initial"]
+    if "ki =" in log.loop:
+        unknown.append("input_offset")  # what the loop had summed up before the window
+    elif not log.disks or log.fixed:
+        unknown.append("offset")
+    unknown += ["friction"] if len(log.windows) > 2 else []
+    unknown += ["input_end"] if start.trips else []
+    table.key("unknown", unknown, "estimated for each run alone")
+    if log.loop:
+        table.line(log.loop, "read off the log")
+    return table
+
+
+def starts(
+    t: Array,
+    u: Array | None,
+    bodies: list[Array],
+    free: list[bool],
+    *,
+    disks: bool,
+    quanta: list[float],
+    loop: bool,
+    reach: float = np.inf,
+) -> Starts:
+    """Starts for a chain.
+
+    Parameters
+    ----------
+    t : (N,) array
+        Time of one stretch [s].
+    u : (N,) array or None
+        Command, signed so that it pushes body 1 up; None in free motion.
+    bodies : list of (N,) arrays
+        Coordinates, zero at rest [SI].
+    free : list of bool
+        Which of them nobody holds.
+    disks : bool
+        Whether no spring ties body 1 to ground.
+    quanta : list of float
+        Resolution of each [SI].
+    loop : bool
+        Whether `u` follows from the motion: trips are not looked for.
+    reach : float
+        Largest command that can be put out at all.
+    """
+    dt = float(t[-1] - t[0]) / (t.size - 1)
+    k = max((i for i, f in enumerate(free) if f), key=lambda i: float(np.ptp(bodies[i])))
+    width = min(acceleration_width(bodies[k], dt, quanta[k]), max(t.size // 12, 9) | 1)
+    motion = [savitzky_golay(y, dt, width) for y in bodies]
+    command = u if u is not None else np.zeros(t.size)
+    limit = PASSES * reach if np.abs(command).max() > reach else 0.0
+    command = np.clip(command, -limit, limit) if limit else command
+    switches = 0.1 < float(np.mean(command != 0)) < 0.95 and not loop and dt < RESOLVED
+    w = _frequency(t, bodies, free)
+    m = "J" if disks else "m"
+    numbers: dict[str, float] = {}
+    inertia, braked = 1.0, 0.0
+    for i, own in enumerate(motion):
+        n = str(i + 1)
+        if not free[i]:
+            numbers[f"{m}_{n}"] = inertia
+            continue
+        driven = i == 0 and u is not None
+        fast = np.abs(own.v) > 0.02 * np.abs(own.v).max()
+        columns = {"friction": -np.sign(own.v) * fast, "c": -own.v}
+        if i > 0:
+            columns["k_left"] = motion[i - 1].q - own.q
+        if i + 1 < len(motion) and free[i + 1]:
+            columns["k_right"] = motion[i + 1].q - own.q
+        if i == 0 and (not disks or len(motion) == 1 or not free[1]):
+            columns["k"] = -own.q
+        if driven:
+            columns["u"] = savitzky_golay(command, dt, width).q
+            if switches:
+                columns["on"] = -savitzky_golay(np.where(command != 0, own.v, 0.0), dt, width).q
+        columns["constant"] = np.ones(t.size)
+        edge = slice(own.edge, -own.edge or None)
+        slope, error = _regress({name: c[edge] for name, c in columns.items()}, own.a[edge], width)
+        if driven:
+            clear = slope["u"] > 2 * error["u"] and not limit
+            inertia = 1 / slope["u"] if clear else _by_first_motion(t, command, bodies[0])
+            if switches:  # braking that builds up late looks like none, so it is asked wherever the volts go off
+                braked = inertia * max(slope["on"], 0.2 * abs(slope["c"]), 0.1 * w)
+        if i > 0 and numbers.get(f"k_{i}{n}") and slope["k_left"] > 0:
+            inertia = numbers[f"k_{i}{n}"] / slope["k_left"]
+        numbers[f"{m}_{n}"] = inertia
+        springs = {"k_right": f"k_{n}{i + 2}", "k_left": f"k_{i}{n}", "k": "k_12" if disks else "k_1"}
+        for side, spring in springs.items():
+            if side in slope and not (side == "k_left" and spring in numbers):
+                numbers[spring] = inertia * (slope[side] if slope[side] > 0 else w**2)
+        numbers[f"c_{n}"] = inertia * max(slope["c"], 0.01 * w)
+        numbers[f"f_{n}c"] = inertia * max(slope["friction"], 0.01 * w * float(np.abs(own.v).max()))
+    trips = False
+    if u is not None and not loop and free[0]:
+        others = [y for y, f in zip(bodies[1:], free[1:], strict=True) if f]
+        trips = find_trip(t, u, bodies[0], others, quantum=quanta[0]) is not None
+    return Starts(numbers=numbers, braked=braked, trips=trips, limit=limit, fastest=w)
+
+
+def _frequency(t: Array, bodies: list[Array], free: list[bool]) -> float:
+    """Angular frequency of the fastest swing that is seen, in the bodies or between them; 6 rad/s when none is."""
+    from scipy.ndimage import uniform_filter1d
+
+    signals = [y for y, f in zip(bodies, free, strict=True) if f]
+    signals += [b - a for a, b in pairwise(signals)]
+    fastest = max(swing_frequency(t, y - uniform_filter1d(y, y.size // 5, mode="nearest")) for y in signals)
+    return fastest if fastest > 0 else 6.0
+
+
+def _by_first_motion(t: Array, u: Array, x: Array) -> float:
+    """Inertia that a constant push gives the first motion: x = u t^2/(2 m)."""
+    at = int(np.argmax(u != 0))
+    far = np.flatnonzero(np.abs(x[at:] - x[at]) > 0.1 * float(np.ptp(x)))
+    if not far.size or far[0] < 2:
+        return 1.0
+    stop = at + int(far[0])
+    push = abs(float(np.mean(u[at:stop])))
+    return max(push, 1e-9) * float(t[stop] - t[at]) ** 2 / 2 / max(abs(float(x[stop] - x[at])), 1e-12)
+
+
+def _regress(columns: dict[str, Array], a: Array, width: int) -> tuple[dict[str, float], dict[str, float]]:
+    """Slopes and their standard errors, with as many independent samples as there are smoothing widths."""
+    table = np.column_stack(list(columns.values()))
+    size = np.linalg.norm(table, axis=0)
+    size[size == 0] = 1.0
+    table /= size
+    slopes, *_ = np.linalg.lstsq(table, a, rcond=1e-9)
+    left = a - table @ slopes
+    variance = float(left @ left) / max(a.size / width - slopes.size, 1.0)
+    errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(table.T @ table)) * variance, 0.0))
+    slope, error = (dict(zip(columns, (x / size).tolist(), strict=True)) for x in (slopes, errors))
+    return slope, error

@@ -1,0 +1,101 @@
+"""Tables that every drafted study has, whatever its plant: rig, drive, sensors, runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from upright.physics import Plant
+from upright.physics.statement import Coordinate
+from upright.readers.inspection import Column
+from upright.readers.suspect_columns import DAC_COUNTS_PER_VOLT
+from upright.records import Record
+from upright.study.draft.recognise import in_dac_counts
+from upright.study.write import Table
+
+ROLES = {"fit": "fitted", "predict": "scored, never seen by the estimator"}
+
+
+def rig_table(name: str, plant: type[Plant], record: Record, period: float = 0.0) -> Table:
+    """Plant and its coordinates, and a `period` [s] coarser than the log's when there is one."""
+    table = Table("[rig]")
+    coordinates = ", ".join(f"{c.name} [{c.unit}] {c.meaning}" for c in plant.coordinates)
+    table.key("plant", name, f"coordinates: {coordinates}")
+    if period:
+        table.key("period", f"{period * 1e3:.6g} ms", f"the log has a sample every {record.period * 1e3:.4g} ms")
+    return table
+
+
+def parameters_left_at_zero(table: Table, plant: type[Plant], names: Iterable[str]) -> None:
+    """Add parameters that nobody asks for yet, commented out."""
+    names = list(names)
+    if names:
+        table.line("# left at zero until asked for:")
+    for name in names:
+        what = plant.quantity(name)
+        unit = "" if what.unit == "1" else f" {what.unit}"
+        table.key(name, {"guess": f"0{unit}"}, what.meaning, off=True)
+
+
+def command_unit(c: Column) -> tuple[str, float]:
+    """Unit of a command and its factor on the column; the unit is empty when nobody says."""
+    return ("V", 1 / DAC_COUNTS_PER_VOLT) if in_dac_counts(c) else (c.unit or c.guess, 1.0)
+
+
+def no_drive_table() -> Table:
+    """What to fill in when a column drives after all."""
+    table = Table("# [drive]")
+    table.key("column", "...", "no column drives: the runs are free", off=True)
+    return table
+
+
+def drive_table(c: Column, unit: str, scale: float, *, reversed_: bool) -> Table:
+    """The command's column; `reversed_`: it first moves the driven body down."""
+    table = Table("[drive]")
+    raw = unit if scale == 1.0 else "DAC counts"
+    table.key("column", c.name, f"{c.low:.4g} to {c.high:.4g} {raw}".rstrip())
+    table.key("unit", unit or "V", off=not unit)
+    if scale != 1.0:
+        table.key("scale", scale, f"{DAC_COUNTS_PER_VOLT:g} counts per V")
+    if reversed_:
+        table.key("sign", -1, "the first command moves the column down")
+    return table
+
+
+def sensor_table(
+    coordinate: Coordinate, c: Column, zero: float, counts: tuple[int, str], *, driven: bool, mirrored: bool = False
+) -> Table:
+    """One sensor; `zero` is the reading at rest, `counts` its counts per turn or metre if it counts, and their source.
+
+    `mirrored`: it counts against the coordinate.
+    """
+    name, turns = coordinate.name, coordinate.unit == "rad"
+    table = Table(f"[sensors.{name}]")
+    table.key("column", c.name, f"{c.low:.6g} to {c.high:.6g} {c.guess}".rstrip())
+    if c.guess:
+        table.key("unit", c.guess, "" if c.unit else "guessed; the log does not say")
+    if c.guess == "counts":
+        table.key("counts_per_rev" if turns else "counts_per_m", counts[0], f"MEASURE: {counts[1]}")
+    elif c.quantum.counts_per_rev and turns:
+        table.key("counts_per_rev", c.quantum.counts_per_rev, "from the column's steps")
+    elif c.quantum.step and c.guess in ("rad", "m"):
+        table.key("resolution", f"{c.quantum.step:.4g} {c.guess}", "from the column's steps")
+    where = "lay before the first command" if driven else "comes to rest"
+    table.key("offset", zero, f"reading at which {name} is zero, here where it {where}")
+    if mirrored:
+        table.key("sign", -1, "it is thrown the other way than the plant's angle")
+    else:
+        table.key("sign", -1, "when the column counts the other way", off=True)
+    return table
+
+
+def run_tables(file: str, runs: Iterable[tuple[str, float, float, str]]) -> list[Table]:
+    """Runs of one log by label, first and last second, and role."""
+    tables: list[Table] = []
+    for label, start, stop, role in runs:
+        table = Table("[[runs]]")
+        table.key("label", label)
+        table.key("file", file)
+        table.key("window", [start, stop], "s", digits=5)
+        table.key("role", role, ROLES[role])
+        tables.append(table)
+    return tables
