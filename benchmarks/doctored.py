@@ -111,7 +111,7 @@ def excitation(how: str, t: np.ndarray, w: float, rng: np.random.Generator) -> n
 def batch(plant: str, fault: str, n: int, seed: int) -> list[Doctored]:
     """Records of one plant with one fault ("" for none), `n` of them."""
     from upright.physics import find
-    from upright.simulation import Loop, simulate
+    from upright.simulation import simulate, state_feedback
 
     rng = np.random.default_rng([seed, PLANTS.index(plant), sorted(["", *FAULTS]).index(fault)])
     cls = find(plant)
@@ -151,7 +151,7 @@ def batch(plant: str, fault: str, n: int, seed: int) -> list[Doctored]:
         if loop:
             K, r = feedback(plant, cls, p, force, w, gain, rng)
             shape = excitation("steps", t, 1.0, rng)
-            extra = {"loop": Loop(K=K, k_pf=K[0, 0] * r, reference=shape)}
+            extra = {"loop": state_feedback(K, dt, k_pf=K[0, 0] * r, references=shape)}
             u, logged = np.zeros((1, samples)), np.zeros((lanes, samples))
             hows = ["loop"] * lanes
         parameters = {
@@ -166,7 +166,7 @@ def batch(plant: str, fault: str, n: int, seed: int) -> list[Doctored]:
         for i in range(lanes):
             y = motion[:, : 2 * len(cls.coordinates) : 2, i]
             command = motion[:, -1, i] if loop else logged[i]
-            reference = extra["loop"].reference * r[i] if loop else None
+            reference = shape * r[i] if loop else None
             own = {k: float(v[i]) for k, v in p.items()}
             made = _record(cls, plant, fault, hows[i], t, y, command, reference, own, float(gain[i]), rng)
             out.append(made)

@@ -40,12 +40,14 @@ def trajectory(*, stick_slip: bool) -> Callable[[], np.ndarray]:
 def ensemble(p: np.ndarray, x0: np.ndarray, *, samples: int, stick_slip: bool) -> Callable[[], np.ndarray]:
     """n closed loops; last states (4, n)."""
     from upright.physics import Furuta
-    from upright.simulation import Loop
     from upright.simulation import ensemble as loops
+    from upright.simulation import state_feedback
 
     values = parameters(p, stick_slip=stick_slip) | {"actuator.limit": problem.LIMIT}
     start = np.ascontiguousarray(x0[list(ORDER)].T)
-    loop = Loop(K=problem.gains()[list(ORDER)], target=[0.0, np.pi], quantum=[problem.QUANTUM] * 2, alpha=problem.KEEP)
+    loop = state_feedback(
+        problem.gains()[list(ORDER)], problem.PERIOD, memory=problem.KEEP, target=[0.0, np.pi], quantum=problem.QUANTUM
+    )
 
     def run() -> np.ndarray:
         done = loops(

@@ -16,14 +16,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from upright.identification.estimate import METHODS, fit_percent, identify, predict
     from upright.identification.lmfit_border import to_lmfit
-    from upright.identification.model.model import Estimate, Feedback, Fit, Parameter, Rig, Run, RunScore
+    from upright.identification.model.model import Estimate, Fit, Parameter, Rig, Run, RunScore
     from upright.identification.search.curve import CurveFit, fit_curve
 
 __all__ = [
     "METHODS",
     "CurveFit",
     "Estimate",
-    "Feedback",
     "Fit",
     "Parameter",
     "Rig",
@@ -39,7 +38,7 @@ __all__ = [
 _HOMES = {
     "estimate": ("METHODS", "fit_percent", "identify", "predict"),
     "lmfit_border": ("to_lmfit",),
-    "model.model": ("Estimate", "Feedback", "Fit", "Parameter", "Rig", "Run", "RunScore"),
+    "model.model": ("Estimate", "Fit", "Parameter", "Rig", "Run", "RunScore"),
     "search.curve": ("CurveFit", "fit_curve"),
 }
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from upright.law.linear import Law
+from upright.law.linear import Law, state_feedback
 from upright.law.rule import Rule
+from upright.simulation.held import Held
 from upright.simulation.kernel.actuator import ACTUATOR, ACTUATOR_DEFAULTS
 from upright.simulation.kernel.flavour import Flavour, choose
-from upright.simulation.parts import Held, Loop
 from upright.simulation.simulate import Ensemble, ensemble, simulate
 from upright.simulation.simulator import Simulator
 
@@ -17,10 +17,10 @@ __all__ = [
     "Flavour",
     "Held",
     "Law",
-    "Loop",
     "Rule",
     "Simulator",
     "choose",
     "ensemble",
     "simulate",
+    "state_feedback",
 ]

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.closed_loop.feedback import Feedback
+from upright.closed_loop.loop import ClosedLoop
 from upright.identification.model.estimates import Assumption, Estimate, Pole, RunScore
 from upright.physics import Plant
 
@@ -112,7 +112,7 @@ class Run:
         the state of a Kalman filter that knows the past alone; see `upright.identification.problem.predictor`.
     score_from : float
         Seconds after the first sample before which the run is simulated but not scored (a held-out tail).
-    loop : Feedback or None
+    loop : ClosedLoop or None
         The law that closed the loop, when it is simulated too.
     repeats, source : str
         Label of the runs that repeat this one, when their commands do not show it; file, window and hash.
@@ -135,7 +135,7 @@ class Run:
     horizon: float | tuple[float, ...] | None = None
     restart: Literal["smooth", "kalman"] = "smooth"
     score_from: float = 0.0
-    loop: Feedback | None = None
+    loop: ClosedLoop | None = None
     repeats: str = ""
     source: str = ""
 
@@ -157,8 +157,7 @@ class Run:
         if n < LEAST_RUN * share:
             return self
         held = {c: v[:n] if isinstance(v, np.ndarray) else v for c, v in self.held.items()}
-        loop = None if self.loop is None else self.loop.first(n)
-        return replace(self, t=self.t[:n], u=self.u[:n], y=self.y[:n], held=held, loop=loop)
+        return replace(self, t=self.t[:n], u=self.u[:n], y=self.y[:n], held=held)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -100,9 +100,8 @@ def samples_of(
         thin = run
         if k > 1:
             held = {n: v[::k] if isinstance(v, np.ndarray) else v for n, v in run.held.items()}
-            thin = replace(
-                run, t=run.t[::k], u=run.u[::k], y=run.y[::k], held=held, loop=run.loop and run.loop.thinned(k)
-            )
+            loop = run.loop and replace(run.loop, every=k * run.loop.every)
+            thin = replace(run, t=run.t[::k], u=run.u[::k], y=run.y[::k], held=held, loop=loop)
         sample = observe(rig, thin, flips=flips, turns=turns)
         if sample is not None:
             found.append(sample)

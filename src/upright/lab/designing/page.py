@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from upright.design import spelled_out
 from upright.design.lqr import locus
 from upright.design.requests import written
 from upright.lab.designing.run import Designed, Way
@@ -131,7 +132,7 @@ def as_json(done: Designed) -> dict[str, Any]:
         "peak_command_sampled": _finite(done.peak_sampled),
         "chance_over_the_fit": done.chance,
         "law": {
-            **{name: getattr(done.law, name).tolist() for name in "ABCD"},
+            **{name: matrix.tolist() for name, matrix in spelled_out(done.law).items()},
             "inputs": "readings, readings at rest, reference",
         },
         "verdict": done.verdict,

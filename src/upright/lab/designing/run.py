@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright import design
-from upright.design import Estimator, Feedback, Margins, Placement, Sampled
+from upright.design import Estimator, Margins, Placement, Sampled
 from upright.design.loop import closed, command_noise, swing
 from upright.design.lqr import motion
 from upright.design.requests import poles_of
 from upright.design.sampled import to_s
 from upright.errors import BadInput
 from upright.lab.rigs.rig_file import RigFile
+from upright.law import Law
 from upright.physics import Linear
 
 Array = NDArray[np.float64]
@@ -78,7 +79,7 @@ class Designed:
     placement: Placement | None
     sampled_gains: Array | None
     R: float | None
-    law: Feedback
+    law: Law
     poles: Roots
     ways: tuple[Way, ...]
     k_pf: float | None
@@ -179,7 +180,7 @@ def design_for(rig: RigFile, wish: Wish) -> Designed:
     )  # fmt: skip
 
 
-def _peak(sampled: Sampled, law: Feedback, start: Array, seconds: float) -> float:
+def _peak(sampled: Sampled, law: Law, start: Array, seconds: float) -> float:
     """Largest command of the loop as it runs; infinite when it falls."""
     if np.abs(poles_of(closed(sampled, law))).max() >= 1:
         return math.inf
@@ -219,7 +220,7 @@ def _way(model: Linear, sampled: Sampled, estimator: Estimator, K: Array, wish: 
     )
 
 
-def _cloud(rig: RigFile, wish: Wish, nominal: Sampled, law: Feedback) -> tuple[Roots, float | None]:
+def _cloud(rig: RigFile, wish: Wish, nominal: Sampled, law: Law) -> tuple[Roots, float | None]:
     """Poles [1/s] of the loop with these gains on every rig that the fit allows, and the share that stands."""
     rows = [
         poles_of(closed(design.hold(m, wish.period, nominal.delay, nominal.lag), law)) for m in rig.spread(wish.at)

@@ -18,13 +18,14 @@ from numpy.typing import NDArray
 from upright import design
 from upright.control import Rig, Score, Trial, score, trial
 from upright.control.preflight import Preflight, Task, preflight, word
-from upright.design import Estimator, Feedback, Margins, Placement, Sampled
+from upright.design import Estimator, Margins, Placement, Sampled
 from upright.design.loop import closed, command_noise
 from upright.design.requests import poles_of, read_poles
 from upright.errors import BadInput
 from upright.lab.rigs.believed import allowed, believed, make_of
 from upright.lab.rigs.makes import Make
 from upright.lab.rigs.rig_file import RigFile, read_rig_file
+from upright.law import Law
 from upright.paper.tables import TABLE_1
 from upright.physics import Linear
 from upright.progress import Progress
@@ -66,7 +67,7 @@ class Attempt:
 
     name: str
     placement: Placement
-    law: Feedback
+    law: Law
     before: Preflight
     after: Trial | None
     score: Score | None
