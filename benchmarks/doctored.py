@@ -198,7 +198,8 @@ def _record(
 ) -> Doctored:  # fmt: skip
     """Sensors, log and fault of one motion."""
     from upright.doctor import Known
-    from upright.identification.model.model import ACTUATOR, Parameter
+    from upright.identification.model.model import Parameter
+    from upright.physics.actuator import ACTUATOR
     from upright.records import Provenance, Record
     from upright.study.columns import Drive, Sensor
 
@@ -246,7 +247,7 @@ def _record(
         if n in ("g",) or n.startswith(("m_", "l_", "J_", "r", "k_", "a_", "tilt")):
             off = 1.0 if n == "g" else 1 + KNOWN_TO * rng.normal()
             known[n] = Parameter(name=n, value=value * off)
-    known |= {n: Parameter(name=n, value=default) for n, (_, default) in ACTUATOR.items()}
+    known |= {n: Parameter(name=n, value=what.default) for n, what in ACTUATOR.items()}
     known["actuator.gain"] = Parameter(name="actuator.gain", value=gain * (1 + KNOWN_TO * rng.normal()))
     rig = Known(name=plant, plant=cls, parameters=known, sensors=sensors, drive=Drive(what="`u`"))
     units = {n: s.unit for n, s in sensors.items()}

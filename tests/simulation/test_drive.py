@@ -10,9 +10,9 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from tests.simulation.conftest import BLOCK, FURUTA
-from upright.simulation import ACTUATOR_DEFAULTS, Simulator, choose, ensemble, simulate, state_feedback
+from upright.simulation import ACTUATOR, Simulator, choose, ensemble, simulate, state_feedback
 
-IDLE = {f"actuator.{name}": value for name, value in ACTUATOR_DEFAULTS.items()}
+IDLE = {name: what.default for name, what in ACTUATOR.items()}
 
 
 def piecewise(t, v0, pieces):

@@ -78,9 +78,9 @@ def parameter_rows(fit: Fit) -> list[ParameterRow]:
 
 
 def _default(name: str) -> float:
-    from upright.identification.model.model import ACTUATOR
+    from upright.physics.actuator import ACTUATOR
 
-    return ACTUATOR[name][1] if name in ACTUATOR else 0.0
+    return ACTUATOR[name].default if name in ACTUATOR else 0.0
 
 
 def without_rows(fit: Fit) -> list[ParameterRow]:

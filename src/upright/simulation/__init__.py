@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from upright.law.linear import Law, state_feedback
 from upright.law.rule import Rule
+from upright.physics.actuator import ACTUATOR
 from upright.simulation.held import Held
-from upright.simulation.kernel.actuator import ACTUATOR, ACTUATOR_DEFAULTS
 from upright.simulation.kernel.flavour import Flavour, choose
 from upright.simulation.simulate import Ensemble, ensemble, simulate
 from upright.simulation.simulator import Simulator
 
 __all__ = [
     "ACTUATOR",
-    "ACTUATOR_DEFAULTS",
     "Ensemble",
     "Flavour",
     "Held",

@@ -21,9 +21,9 @@ from numpy.typing import ArrayLike, NDArray
 from upright.errors import BadInput
 from upright.law.linear import Law
 from upright.law.rule import Rule, Written, compiling
+from upright.physics.actuator import ACTUATOR
 from upright.physics.derived import Derived
 from upright.simulation.held import Held
-from upright.simulation.kernel.actuator import ACTUATOR, ACTUATOR_DEFAULTS
 from upright.simulation.kernel.blocks import aligned, padded, recorded, share
 from upright.simulation.kernel.compiled import kernel
 from upright.simulation.kernel.flavour import Flavour, Layout, lay_out
@@ -91,8 +91,7 @@ class Simulator:
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the rows of `params`: the plant's parameters, then each actuator quantity for every input."""
-        actuator = [f"actuator.{a}" for a in ACTUATOR for _ in self.derived.inputs]
-        return (*self.derived.parameters, *actuator)
+        return (*self.derived.parameters, *(name for name in ACTUATOR for _ in self.derived.inputs))
 
     @cached_property
     def _layout(self) -> Layout:
@@ -126,7 +125,7 @@ class Simulator:
         """Rows of `names` from values by name, shape (rows, lanes); what is missing takes its default or zero."""
         out = np.zeros((len(self.names), lanes))
         for r, name in enumerate(self.names):
-            out[r] = params.get(name, ACTUATOR_DEFAULTS.get(name.removeprefix("actuator."), 0.0))  # type: ignore[arg-type]
+            out[r] = params.get(name, ACTUATOR[name].default if name in ACTUATOR else 0.0)  # type: ignore[arg-type]
         return out
 
     def run(

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from upright.identification.ladder.rungs import Rung
-from upright.identification.model.model import ACTUATOR
 from upright.identification.model.nuisance_names import PER_RUN
 from upright.physics import Plant
+from upright.physics.actuator import ACTUATOR
 from upright.study.keys import names
 from upright.study.text import Section
 

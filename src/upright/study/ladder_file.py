@@ -11,7 +11,7 @@ from typing import Any
 
 from upright.identification.ladder.result import Ladder, Step
 from upright.identification.ladder.rungs import neutral
-from upright.identification.model.model import ACTUATOR
+from upright.physics.actuator import ACTUATOR
 from upright.study.load import Study
 from upright.study.text import StudyText
 

@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from upright.errors import BadInput, ImpossiblePhysics
-from upright.identification.model.model import ACTUATOR, NEVER_NEGATIVE, Parameter, Rig
+from upright.identification.model.model import Parameter, Rig
 from upright.physics import Plant, find
+from upright.physics.actuator import ACTUATOR
 from upright.quantities import Quantity
 from upright.study.columns import in_unit
 from upright.study.keys import names
@@ -52,20 +53,20 @@ def read_rig(study: Section, plant: type[Plant], drive_unit: str, fixed: Mapping
             parameters[name] = read_parameter(section, name, name, what)
         else:
             parameters[name] = _default(study, plant, name)
-    for name, (meaning, default) in ACTUATOR.items():
+    for name, number in ACTUATOR.items():
         key = name.partition(".")[2]
         what = Quantity(
-            unit=actuator_unit(plant, key, drive_unit),
-            meaning=meaning,
-            lower=0.0 if name in NEVER_NEGATIVE else -math.inf,
+            unit=actuator_unit(plant, name, drive_unit),
+            meaning=number.meaning,
+            lower=0.0 if number.never_negative else -math.inf,
             open_lower=key == "knee",
         )
         if fixed is not None and name in fixed:
-            parameters[name] = Parameter(name=name, value=fixed[name], unit=what.unit, meaning=meaning)
+            parameters[name] = Parameter(name=name, value=fixed[name], unit=what.unit, meaning=what.meaning)
         elif key in actuator:
             parameters[name] = read_parameter(actuator, key, name, what)
         else:
-            parameters[name] = Parameter(name=name, value=default, unit=what.unit, meaning=meaning)
+            parameters[name] = Parameter(name=name, value=number.default, unit=what.unit, meaning=what.meaning)
     return Rig(plant=plant, parameters=parameters, substeps=study.section("rig").whole("substeps", 1))
 
 
@@ -84,18 +85,18 @@ def _default(study: Section, plant: type[Plant], name: str) -> Parameter:
     return Parameter(name=name, value=float(value), unit=what.unit, meaning=what.meaning)  # type: ignore[arg-type]
 
 
-def actuator_unit(plant: type[Plant], key: str, drive_unit: str) -> str:
+def actuator_unit(plant: type[Plant], name: str, drive_unit: str) -> str:
     """Unit of one actuator number; the gain's is the input's force per unit of the command."""
     force = plant.inputs[0].unit if plant.inputs else "1"
     place = next((c.unit for c in plant.coordinates if plant.inputs and c.name == plant.inputs[0].on), "1")
     drive = drive_unit or "1"
-    if key == "gain":
-        return force if drive == "1" else per(force, drive)
-    if key in ("offset", "limit"):
-        return drive
-    if key in ("lag", "delay", "start", "end", "relaxation"):
-        return "s"
-    return f"{place}/s" if key == "knee" else per(force, f"{place}/s")
+    return {
+        "force per command": force if drive == "1" else per(force, drive),
+        "command": drive,
+        "time": "s",
+        "speed": f"{place}/s",
+        "force per speed": per(force, f"{place}/s"),
+    }[ACTUATOR[name].unit]
 
 
 def per(above: str, below: str) -> str:
@@ -165,7 +166,7 @@ def _number(section: Section, keys: tuple[str, ...], value: Any, what: Quantity)
 
 
 def _check(section: Section, keys: tuple[str, ...], name: str, value: float, what: Quantity) -> None:
-    infinite = math.isinf(value) and name in ACTUATOR and value == ACTUATOR[name][1]
+    infinite = math.isinf(value) and name in ACTUATOR and value == ACTUATOR[name].default
     with section.text.at((*section.place(keys[0]), *keys[1:])):
         try:
             if not infinite:

@@ -10,9 +10,10 @@ from collections.abc import Collection, Sequence
 from dataclasses import MISSING, dataclass, fields, replace
 
 from upright.errors import BadInput, nearest
-from upright.identification.model.model import ACTUATOR, Rig, Run
+from upright.identification.model.model import Rig, Run
 from upright.identification.model.unknowns import friction_names
 from upright.physics import Plant
+from upright.physics.actuator import ACTUATOR
 
 DRIVE = (
     ("offset of the drive", ("actuator.offset",)),
@@ -49,7 +50,7 @@ class Rung:
 def neutral(plant: type[Plant], name: str) -> float:
     """Value at which a parameter does nothing: the default of the plant or of the actuator, zero without one."""
     if name in ACTUATOR:
-        return ACTUATOR[name][1]
+        return ACTUATOR[name].default
     default = next((f.default for f in fields(plant) if f.name == name), 0.0)  # type: ignore[arg-type]
     return 0.0 if default is MISSING else float(default)  # type: ignore[arg-type]
 

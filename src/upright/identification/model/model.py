@@ -19,27 +19,6 @@ from upright.physics import Plant
 
 Array = NDArray[np.float64]
 
-ACTUATOR = {
-    "actuator.gain": ("force per unit of command", 1.0),
-    "actuator.offset": ("added to the command", 0.0),
-    "actuator.limit": ("largest command that passes", math.inf),
-    "actuator.lag": ("first-order lag", 0.0),
-    "actuator.delay": ("dead time", 0.0),
-    "actuator.slope": ("force lost per speed (back-EMF)", 0.0),
-    "actuator.start": ("when the drive comes alive, from the run's first sample", -math.inf),
-    "actuator.end": ("when the drive trips, from the run's first sample; no force after it", math.inf),
-    "actuator.damping": ("damping while the drive is alive and its command is not zero", 0.0),
-    "actuator.standby": ("damping until the drive trips, whatever its command", 0.0),
-    "actuator.knee": ("speed in the force's direction beyond which fade acts and braking grows no more", math.inf),
-    "actuator.fade": ("force lost per speed beyond the knee, down to no force", 0.0),
-    "actuator.relaxation": ("time in which damping and standby build up and fade", 0.0),
-}
-"""Numbers every actuator has, besides the plant's own parameters: meaning and default."""
-
-_SIZES = ("limit", "lag", "delay", "damping", "standby", "knee", "fade", "relaxation")
-NEVER_NEGATIVE = tuple(f"actuator.{a}" for a in _SIZES)
-"""Those that make no sense below zero."""
-
 SEEN = 2 / 3
 """Share of every run that models are fitted on where its rest judges them."""
 

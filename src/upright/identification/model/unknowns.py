@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model.model import ACTUATOR, NEVER_NEGATIVE, NOISE, Parameter, Rig
+from upright.identification.model.model import NOISE, Parameter, Rig
+from upright.physics.actuator import ACTUATOR
 
 Array = NDArray[np.float64]
 
@@ -88,7 +89,7 @@ def _shared(rig: Rig, p: Parameter) -> Unknown:
         q = rig.plant.quantity(p.name)
         lower, upper = max(lower, q.lower), min(upper, q.upper)
         positive = q.open_lower and q.lower == 0
-    elif p.name in (*NEVER_NEGATIVE, "actuator.slope"):
+    elif p.name == "actuator.slope" or (p.name in ACTUATOR and ACTUATOR[p.name].never_negative):
         lower = max(lower, 0.0)
         positive = p.name == "actuator.knee"
     elif p.name.startswith(NOISE):
@@ -155,7 +156,7 @@ def base_values(rig: Rig) -> dict[str, float]:
 
     from upright.errors import BadInput
 
-    values = {n: default for n, (_, default) in ACTUATOR.items()}
+    values = {n: what.default for n, what in ACTUATOR.items()}
     for f in fields(rig.plant):  # type: ignore[arg-type]
         if f.default is not MISSING:
             values[f.name] = float(f.default)

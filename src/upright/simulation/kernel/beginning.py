@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from upright.simulation.kernel.actuator import ACTUATOR
+from upright.physics.actuator import ACTUATOR
 from upright.simulation.kernel.drive import begin
 from upright.simulation.kernel.writer import Writer
 
@@ -49,7 +49,7 @@ def start(w: Writer) -> None:
 def _actuator(w: Writer, j: int, first: int) -> None:
     """Lag, delay and slope of input `j`; the lag starts from what the input was before."""
     p, loop, nu = w.p, w.p.flavour.loop, w.p.nu
-    row = {name: first + k * nu + j for k, name in enumerate(ACTUATOR)}
+    row = {name.removeprefix("actuator."): first + k * nu + j for k, name in enumerate(ACTUATOR)}
     w.add(
         f"{{_sl{j}}} = P[{row['slope']}, _m]",
         f"_tau = P[{row['lag']}, _m]",

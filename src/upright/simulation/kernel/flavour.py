@@ -15,8 +15,8 @@ import numpy as np
 from upright.errors import BadInput, nearest
 from upright.law.linear import Law, Structure
 from upright.law.rule import Rule, Written
+from upright.physics.actuator import ACTUATOR
 from upright.physics.derived import Derived
-from upright.simulation.kernel.actuator import ACTUATOR, ACTUATOR_DEFAULTS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,7 +145,7 @@ class Layout:
 
 @lru_cache(maxsize=64)
 def _known(derived: Derived) -> frozenset[str]:
-    return frozenset({*derived.parameters, *(f"actuator.{a}" for a in ACTUATOR)})
+    return frozenset({*derived.parameters, *ACTUATOR})
 
 
 @lru_cache(maxsize=64)
@@ -196,7 +196,7 @@ def choose(
     def on(name: str) -> bool:
         if not name or name in free:
             return bool(name)
-        idle = ACTUATOR_DEFAULTS.get(name.removeprefix("actuator."), 0.0)
+        idle = ACTUATOR[name].default if name in ACTUATOR else 0.0
         value = params.get(name, idle)
         return value != idle if isinstance(value, float) else bool(np.any(np.asarray(value) != idle))
 
