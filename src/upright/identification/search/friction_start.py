@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.model.model import Rig
-from upright.identification.search.drive_force import drive_force
 from upright.identification.search.inverse_start import Sample
 from upright.physics.evaluate import evaluate
+from upright.simulation.drive import drive_force
 
 Array = NDArray[np.float64]
 

@@ -17,7 +17,6 @@ from upright.identification.model.model import Rig, Run
 from upright.identification.model.unknowns import Unknown, base_values, shared_unknowns
 from upright.identification.problem.normal import Normal, finite
 from upright.identification.search.descent import descend
-from upright.identification.search.drive_force import drive_force
 from upright.physics.evaluate import mass_and_force
 from upright.physics.plant import Plant
 from upright.signals.smoothing import (
@@ -27,6 +26,7 @@ from upright.signals.smoothing import (
     smoothing_width,
     spread,
 )
+from upright.simulation.drive import drive_force
 
 Array = NDArray[np.float64]
 
