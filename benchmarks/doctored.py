@@ -110,8 +110,9 @@ def excitation(how: str, t: np.ndarray, w: float, rng: np.random.Generator) -> n
 
 def batch(plant: str, fault: str, n: int, seed: int) -> list[Doctored]:
     """Records of one plant with one fault ("" for none), `n` of them."""
+    from upright.law import state_feedback
     from upright.physics import find
-    from upright.simulation import simulate, state_feedback
+    from upright.simulation import simulate
 
     rng = np.random.default_rng([seed, PLANTS.index(plant), sorted(["", *FAULTS]).index(fault)])
     cls = find(plant)

@@ -39,9 +39,9 @@ def trajectory(*, stick_slip: bool) -> Callable[[], np.ndarray]:
 
 def ensemble(p: np.ndarray, x0: np.ndarray, *, samples: int, stick_slip: bool) -> Callable[[], np.ndarray]:
     """n closed loops; last states (4, n)."""
+    from upright.law import state_feedback
     from upright.physics import Furuta
     from upright.simulation import ensemble as loops
-    from upright.simulation import state_feedback
 
     values = parameters(p, stick_slip=stick_slip) | {"actuator.limit": problem.LIMIT}
     start = np.ascontiguousarray(x0[list(ORDER)].T)

@@ -11,7 +11,8 @@ from scipy.signal import cont2discrete
 from tests.simulation.conftest import BLOCK, FURUTA
 from tests.simulation.test_smooth_motion import lagrange
 from upright.errors import BadInput
-from upright.simulation import ensemble, simulate, state_feedback
+from upright.law import state_feedback
+from upright.simulation import ensemble, simulate
 
 SPRING = {**BLOCK, "m": 0.8, "k": 12.0, "c": 0.4}
 A = np.array([[0.0, 1.0], [-12.0 / 0.8, -0.4 / 0.8]])

@@ -10,7 +10,8 @@ from scipy.linalg import expm
 
 from tests.simulation.conftest import BLOCK, FURUTA
 from upright.errors import BadInput
-from upright.simulation import Law, Simulator, choose, ensemble, simulate, state_feedback
+from upright.law import Law, state_feedback
+from upright.simulation import Simulator, choose, ensemble, simulate
 
 SPRING = {**BLOCK, "m": 0.8, "k": 12.0, "c": 0.4}
 A = np.array([[0.0, 1.0], [-12.0 / 0.8, -0.4 / 0.8]])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from upright.law.linear import Law, state_feedback
-from upright.law.rule import Rule
 from upright.physics.actuator import ACTUATOR
 from upright.simulation.held import Held
 from upright.simulation.kernel.flavour import Flavour, choose
@@ -15,11 +13,8 @@ __all__ = [
     "Ensemble",
     "Flavour",
     "Held",
-    "Law",
-    "Rule",
     "Simulator",
     "choose",
     "ensemble",
     "simulate",
-    "state_feedback",
 ]

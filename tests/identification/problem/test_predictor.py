@@ -18,8 +18,9 @@ from upright.identification.problem.pose import pose
 from upright.identification.problem.predictor import discrete_model, gains, restart_states
 from upright.identification.problem.predictor_setup import with_noise
 from upright.identification.problem.problem import Problem
+from upright.law import state_feedback
 from upright.physics import Furuta
-from upright.simulation import simulate, state_feedback
+from upright.simulation import simulate
 
 VALUES = {
     "m_p": 0.024, "l_cg": 0.0645, "r": 0.085, "J_d": 1.1e-4, "J_p": 3.3e-5, "b_1": 2.5e-4, "b_1c": 3e-4, "g": 9.81,

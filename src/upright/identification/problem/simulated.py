@@ -13,8 +13,9 @@ from upright.errors import BadInput
 from upright.identification.model.model import NOISE, Rig, Run
 from upright.identification.problem.predictor import predicted
 from upright.identification.problem.track import Track
+from upright.law import Law
 from upright.physics import Plant
-from upright.simulation import Held, Law, Simulator, choose
+from upright.simulation import Held, Simulator, choose
 
 Array = NDArray[np.float64]
 

@@ -172,7 +172,7 @@ def next_steps(done: Designed, source: str, folder: str) -> list[Step]:
                  command="upright identify STUDY.toml -o OUT && upright design OUT/fit.json")
         )  # fmt: skip
     steps.append(
-        Step(sentence=f"Simulate it: simulation.Law takes A, B, C and D of law in {folder}/design.json, its "
+        Step(sentence=f"Simulate it: upright.law.Law takes A, B, C and D of law in {folder}/design.json, its "
              "references being the positions at rest and then the reference.")
     )  # fmt: skip
     return steps
