@@ -110,8 +110,9 @@ def excitation(how: str, t: np.ndarray, w: float, rng: np.random.Generator) -> n
 
 def batch(plant: str, fault: str, n: int, seed: int) -> list[Doctored]:
     """Records of one plant with one fault ("" for none), `n` of them."""
+    from upright.law import state_feedback
     from upright.physics import find
-    from upright.simulation import Loop, simulate
+    from upright.simulation import simulate
 
     rng = np.random.default_rng([seed, PLANTS.index(plant), sorted(["", *FAULTS]).index(fault)])
     cls = find(plant)
@@ -151,7 +152,7 @@ def batch(plant: str, fault: str, n: int, seed: int) -> list[Doctored]:
         if loop:
             K, r = feedback(plant, cls, p, force, w, gain, rng)
             shape = excitation("steps", t, 1.0, rng)
-            extra = {"loop": Loop(K=K, k_pf=K[0, 0] * r, reference=shape)}
+            extra = {"loop": state_feedback(K, dt, k_pf=K[0, 0] * r, references=shape)}
             u, logged = np.zeros((1, samples)), np.zeros((lanes, samples))
             hows = ["loop"] * lanes
         parameters = {
@@ -166,7 +167,7 @@ def batch(plant: str, fault: str, n: int, seed: int) -> list[Doctored]:
         for i in range(lanes):
             y = motion[:, : 2 * len(cls.coordinates) : 2, i]
             command = motion[:, -1, i] if loop else logged[i]
-            reference = extra["loop"].reference * r[i] if loop else None
+            reference = shape * r[i] if loop else None
             own = {k: float(v[i]) for k, v in p.items()}
             made = _record(cls, plant, fault, hows[i], t, y, command, reference, own, float(gain[i]), rng)
             out.append(made)
@@ -199,7 +200,7 @@ def _record(
     """Sensors, log and fault of one motion."""
     from upright.doctor import KnownRig
     from upright.identification import Parameter
-    from upright.identification.model.rig import ACTUATOR
+    from upright.physics.actuator import ACTUATOR
     from upright.records import Provenance, Record
     from upright.study.sensors import Drive, Sensor
 
@@ -247,7 +248,7 @@ def _record(
         if n in ("g",) or n.startswith(("m_", "l_", "J_", "r", "k_", "a_", "tilt")):
             off = 1.0 if n == "g" else 1 + KNOWN_TO * rng.normal()
             known[n] = Parameter(name=n, value=value * off)
-    known |= {n: Parameter(name=n, value=default) for n, (_, default) in ACTUATOR.items()}
+    known |= {n: Parameter(name=n, value=what.default) for n, what in ACTUATOR.items()}
     known["actuator.gain"] = Parameter(name="actuator.gain", value=gain * (1 + KNOWN_TO * rng.normal()))
     rig = KnownRig(name=plant, plant=cls, parameters=known, sensors=sensors, drive=Drive(what="`u`"))
     units = {n: s.unit for n, s in sensors.items()}

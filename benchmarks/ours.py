@@ -39,13 +39,15 @@ def trajectory(*, stick_slip: bool) -> Callable[[], np.ndarray]:
 
 def ensemble(p: np.ndarray, x0: np.ndarray, *, samples: int, stick_slip: bool) -> Callable[[], np.ndarray]:
     """n closed loops; last states (4, n)."""
+    from upright.law import state_feedback
     from upright.physics import Furuta
-    from upright.simulation import Loop
     from upright.simulation import ensemble as loops
 
     values = parameters(p, stick_slip=stick_slip) | {"actuator.limit": problem.LIMIT}
     start = np.ascontiguousarray(x0[list(ORDER)].T)
-    loop = Loop(K=problem.gains()[list(ORDER)], target=[0.0, np.pi], quantum=[problem.QUANTUM] * 2, alpha=problem.KEEP)
+    loop = state_feedback(
+        problem.gains()[list(ORDER)], problem.PERIOD, memory=problem.KEEP, target=[0.0, np.pi], quantum=problem.QUANTUM
+    )
 
     def run() -> np.ndarray:
         done = loops(

@@ -21,7 +21,6 @@ records
 readers
 physics
 law
-simulation.parts
 simulation.kernel
 simulation
 design

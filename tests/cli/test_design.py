@@ -12,9 +12,10 @@ from scipy.stats import norm
 from typer.testing import CliRunner
 
 from upright.cli import app
+from upright.law import Law
 from upright.physics import Furuta
 from upright.report.symbols import number
-from upright.simulation import Law, simulate
+from upright.simulation import simulate
 
 RIG = Furuta(m_p=0.135, l_cg=0.19, r=0.16, J_d=0.011, J_p=6e-4, b_1=6e-4)
 STUDY = """

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from tests.closed_loop.programs import Pid, T
-from upright.closed_loop import Feedback, Filter, SampledLaw, pid, state_feedback
+from upright.closed_loop import ClosedLoop, Filter, pid
 from upright.errors import BadInput
 from upright.identification import Parameter, Rig, Run
 from upright.identification.problem.simulated import motions, simulator
 from upright.identification.problem.tracks import prepare
+from upright.law import Law, state_feedback
 from upright.physics import find
 
 LAWS = {
@@ -26,10 +27,14 @@ LAWS = {
 }
 
 
-def pair(name: str) -> tuple[Pid, SampledLaw]:
+def pair(name: str) -> tuple[Pid, Law]:
     program, law = LAWS[name]
     gains = {k: program[k] for k in ("kp", "ki", "kd")}
     return Pid(**program), pid(**gains, period=T, **law)
+
+
+def commands(law: Law, y: np.ndarray, r: np.ndarray) -> np.ndarray:
+    return replace(law, references=r).follow(y)[0][:, 0]
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -39,28 +44,26 @@ def test_a_law_is_the_program_line_by_line(name: str) -> None:
     y, r = np.cumsum(generator.normal(size=(2, 400)), axis=1) * 0.05
     y[0] = r[0] = 0.0  # both start from zero: the program with its first sample, the law with what was before
     expected = [program(a, b) for a, b in zip(y, r, strict=True)]
-    np.testing.assert_allclose(law.commands(y, r), expected, atol=1e-10)
+    np.testing.assert_allclose(commands(law, y, r), expected, atol=1e-10)
 
 
 def test_feedback_of_states_differences_the_positions() -> None:
-    law = state_feedback({"x": (2.0, 0.1), "theta": (30.0, 2.5)}, period=T, k_pf=2.0, pole=0.9)
+    law = state_feedback([2.0, 0.1, 30.0, 2.5], T, k_pf=2.0, memory=0.9, begin=None)
     generator = np.random.default_rng(6)
     y, r = generator.normal(size=(300, 2)), generator.normal(size=300)
     v, last, expected = np.zeros(2), np.zeros(2), []
     for now, target in zip(y, r, strict=True):
         v, last = 0.9 * v + 0.1 * (now - last) / T, now
         expected.append(2.0 * target - 2.0 * now[0] - 0.1 * v[0] - 30.0 * now[1] - 2.5 * v[1])
-    np.testing.assert_allclose(law.commands(y, r), expected, atol=1e-9)
+    np.testing.assert_allclose(commands(law, y, r), expected, atol=1e-9)
 
 
 def test_a_law_between_other_units_gives_the_same_commands() -> None:
     law = pid(4.0, 3.0, 0.2, period=T)
     counts = np.round(np.random.default_rng(7).normal(size=200) * 1000)
-    in_radians = law.on([500.0], [30.0], -0.5, ("psi",))
-    assert in_radians.references == ("r", "1")
-    reference = np.column_stack([np.full(200, 100.0), np.ones(200)])
+    in_radians, reference = law.in_units([500.0], [30.0], -0.5), np.full(200, 100.0)
     np.testing.assert_allclose(
-        in_radians.commands((counts - 30.0) / 500.0, reference), -0.5 * law.commands(counts, np.full(200, 100.0))
+        commands(in_radians, (counts - 30.0) / 500.0, reference), -0.5 * commands(law, counts, reference)
     )
 
 
@@ -84,10 +87,10 @@ def test_the_compiled_loop_runs_the_law(name: str, every: int) -> None:
         plant=find("rectilinear-1"), parameters={n: Parameter(name=n, value=v) for n, v in values.items()}, substeps=4
     )
     # the program sees its first sample as no step of the reference, so must the law
-    start = np.zeros(law.C.size)
+    start = np.zeros(len(law.A))
     if "measurement" not in LAWS[name][0].values():
         start[1] = 1.0
-    loop = Feedback(law=replace(law, measured=("x_1",), initial=start), references=np.ones((1, 1)), every=every)
+    loop = ClosedLoop(law=replace(law, measured=("x_1",), initial=start, references=np.ones(1)), every=every)
     y = np.array(states)[::every, :1]
     run = Run(
         label="loop", role="predict", t=np.arange(n) * T * every, u=np.zeros((n, 1)), y=y, measured=("x_1",), loop=loop
@@ -103,14 +106,21 @@ def test_the_compiled_loop_runs_the_law(name: str, every: int) -> None:
 @pytest.mark.parametrize(
     ("fields", "sentence"),
     [
-        ({"A": np.eye(2)}, "needs A"),
-        ({"period": 0.0}, "sample period"),
+        ({"A": np.eye(2)}, "A of a law with 1 memories.* needs shape"),
+        ({"period": -1.0}, "sample period"),
         ({"limit": -1.0}, "limit above zero"),
-        ({"D": np.array([np.nan, 1.0])}, "finite numbers"),
-        ({"initial": np.zeros(3)}, "starts with 1 values"),
+        ({"D": np.array([[np.nan, 1.0]])}, "finite numbers"),
+        ({"initial": np.zeros(3)}, r"initial state of the law needs shape \(1,\)"),
+        ({"measured": ("y", "z")}, "and 3 signals"),
     ],
 )
 def test_a_law_that_fits_nothing_is_refused(fields: dict, sentence: str) -> None:
-    good = {"A": [[1.0]], "B": [[-1.0, 1.0]], "C": [2.0], "D": [-1.0, 1.0], "period": T}
+    good = {"A": [[1.0]], "B": [[-1.0, 1.0]], "C": [[2.0]], "D": [[-1.0, 1.0]], "period": T, "measured": ("y",)}
     with pytest.raises(BadInput, match=sentence):
-        SampledLaw(**{**good, **fields}, measured=("y",), references=("r",))
+        Law(**{**good, **fields}, reference_names=("r",))
+
+
+@pytest.mark.parametrize("period", [0.0, np.inf])
+def test_a_program_without_a_period_is_no_law(period: float) -> None:
+    with pytest.raises(BadInput, match="sample period"):
+        pid(1.0, period=period)

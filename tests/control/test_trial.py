@@ -15,7 +15,6 @@ from upright.design.loop import closed
 from upright.errors import BadInput
 from upright.lab.makes import make_rig
 from upright.records import Record
-from upright.simulation import Law
 
 RIG = make_rig("furuta")
 MODEL = RIG.linear("inverted")
@@ -79,7 +78,7 @@ def test_a_command_is_rounded_to_the_converter_and_limited():
 
 def replace_law(law):
     """A law of the same size that commands nothing."""
-    return Law(A=0 * law.A, B=0 * law.B, C=0 * law.C, D=0 * law.D, references=np.zeros((1, law.D.shape[1] - 2)))
+    return replace(law, A=0 * law.A, B=0 * law.B, C=0 * law.C, D=0 * law.D)
 
 
 def path(theta):

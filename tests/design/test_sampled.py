@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -120,11 +121,9 @@ def test_fast_sampling_comes_to_the_continuous_gains():
 
 def simulated(model, law, start, samples):
     """Commands of the compiled kernel on the nonlinear rig close to upright."""
-    from upright.simulation import Law, simulate
+    from upright.simulation import simulate
 
-    rest = np.tile([0.0, math.pi, 0.0], (2, 1))
-    matrices = {name: getattr(law, name) for name in "ABCD"}
-    given = Law(**matrices, references=rest, delay=model.delay)
+    given = replace(law, target=[0.0, math.pi], begin=None, delay=model.delay)
     x = simulate(RIG, {}, RIG.state("inverted") + start, None, model.period, samples=samples, substeps=4, loop=given)
     return x[:, :4, 0] - RIG.state("inverted")
 
@@ -215,7 +214,7 @@ def test_noise_of_the_command_is_what_a_long_run_shows():
     model = hold(UPRIGHT, 0.01)
     law = feedback(filtered(model, 0.5), place(UPRIGHT.A, UPRIGHT.B, SET_1).K)
     rng = np.random.default_rng(3)
-    B, D = law.around()
+    B, D = law.B[:, :2], law.D[:, :2]
     x, z, u = np.zeros(4), np.zeros(law.A.shape[0]), []
     for error in rng.normal(size=(200_000, 2)) * COUNT / math.sqrt(12):
         y = model.C @ x + error
@@ -231,7 +230,7 @@ def test_margins_agree_with_python_control():
     model = hold(UPRIGHT, 0.005, 1.0)
     law = feedback(filtered(model, 0.5), place(UPRIGHT.A, UPRIGHT.B, SET_1).K)
     found = margins(UPRIGHT, model, law)
-    B, D = law.around()
+    B, D = law.B[:, :2], law.D[:, :2]
     plant = control.ss(model.A, model.B, model.C, 0, model.period)
     L = -control.ss(law.A, B, law.C, D, model.period) * plant
     omega = np.geomspace(0.1, 600, 20)

@@ -10,9 +10,10 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from tests.simulation.conftest import BLOCK, FURUTA
-from upright.simulation import ACTUATOR_DEFAULTS, Loop, Simulator, choose, ensemble, simulate
+from upright.law import state_feedback
+from upright.simulation import ACTUATOR, Simulator, choose, ensemble, simulate
 
-IDLE = {f"actuator.{name}": value for name, value in ACTUATOR_DEFAULTS.items()}
+IDLE = {name: what.default for name, what in ACTUATOR.items()}
 
 
 def piecewise(t, v0, pieces):
@@ -220,11 +221,12 @@ def test_a_loop_that_trips_leaves_the_plant_to_itself(block):
     A = np.array([[0.0, 1.0], [-15.0, -0.5]])
     powered = A - np.diag([0.0, 0.6 / 0.8])
     step = expm(np.vstack([np.column_stack([powered, [0.0, 1.25]]), np.zeros((1, 3))]) * dt)
-    x, path = np.array([0.3, 0.1]), []
+    x, before, path = np.array([0.3, 0.1]), 0.3, []
     for k in range(n):
-        path.append([*x, -K @ x])
-        x = step[:2, :2] @ x + step[:2, 2] * (-K @ x) if k < trip else expm(A * dt) @ x
-    loop = Loop(K=K, velocity="true")
+        u, before = -K @ [x[0], (x[0] - before) / dt], x[0]
+        path.append([*x, u])
+        x = step[:2, :2] @ x + step[:2, 2] * u if k < trip else expm(A * dt) @ x
+    loop = state_feedback(K, dt)
     y = simulate(block, p, [[0.3, 0.1]] * 2, None, dt, samples=n, substeps=10, loop=loop)
     # the command is recorded although nobody obeys it
     assert np.allclose(y.transpose(2, 0, 1), path, rtol=0, atol=1e-8)

@@ -10,7 +10,8 @@ from scipy.linalg import expm
 
 from tests.simulation.conftest import BLOCK, FURUTA
 from upright.errors import BadInput
-from upright.simulation import Law, Loop, Simulator, choose, ensemble, simulate
+from upright.law import Law, state_feedback
+from upright.simulation import Simulator, choose, ensemble, simulate
 
 SPRING = {**BLOCK, "m": 0.8, "k": 12.0, "c": 0.4}
 A = np.array([[0.0, 1.0], [-12.0 / 0.8, -0.4 / 0.8]])
@@ -99,12 +100,12 @@ def test_an_observer_with_its_gain_is_what_python_control_makes_of_it(block):
     assert np.allclose(y[:, [0, 2], 0].T, truth, rtol=0, atol=1e-8)
 
 
-def test_a_law_can_be_the_filtered_difference_of_a_loop(rotary):
+def test_state_feedback_about_a_target_is_a_law_whose_references_hold_it(rotary):
     p = {**FURUTA, "b_1": 5e-3, "b_2": 2e-4, "actuator.limit": 0.12}
     dt, n, alpha, quantum = 1e-3, 150, 0.7, 2 * math.pi / 4096
     K, target = np.array([0.22, 0.2, -2.5, -0.3]), np.array([0.1, math.pi])
     reference, uff = 0.1 * np.sin(np.arange(n) * 0.1), 0.01 * np.cos(np.arange(n) * 0.2)
-    loop = Loop(K=K, target=target, k_pf=0.22, reference=reference, quantum=quantum, alpha=alpha)
+    loop = state_feedback(K, dt, memory=alpha, k_pf=0.22, target=target, references=reference, quantum=quantum)
     rate, O, I = (1.0 - alpha) / dt, np.zeros((2, 2)), np.eye(2)
     x0 = np.array([0.0123, 0.0, math.pi + 0.1234, 0.0])
     law = Law(
@@ -195,7 +196,7 @@ def test_a_restarted_lane_follows_its_part_of_the_references(block):
 
 def test_a_law_without_state_or_reference_is_a_gain(block):
     law = Law(A=np.zeros((0, 0)), B=np.zeros((0, 1)), C=np.zeros((1, 0)), D=[[-4.0]])
-    loop = Loop(K=[4.0, 0.0])
+    loop = state_feedback([4.0, 0.0], DT)
     a, b = (simulate(block, SPRING, [0.3, 0.0], None, DT, samples=60, loop=c) for c in (law, loop))
     assert np.allclose(a, b, rtol=0, atol=1e-14)
 
@@ -217,4 +218,4 @@ def test_a_wrong_law_is_answered_in_a_sentence(block):
     with pytest.raises(BadInput, match="lanes"):
         simulate(block, SPRING, np.zeros((3, 2)), None, DT, samples=2, loop=law)
     with pytest.raises(BadInput, match="without a flavour for it"):
-        Simulator(derived=block, flavour=choose(block, SPRING, loop=True), dt=DT, loop=Law(**good))
+        Simulator(derived=block, flavour=choose(block, SPRING), dt=DT, loop=Law(**good))

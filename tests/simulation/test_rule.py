@@ -11,7 +11,8 @@ import pytest
 
 from tests.simulation.conftest import BLOCK, FURUTA
 from upright.errors import BadInput
-from upright.simulation import Law, Rule, Simulator, choose, ensemble, simulate
+from upright.law import Law, Rule
+from upright.simulation import Simulator, choose, ensemble, simulate
 
 SPRING = {**BLOCK, "m": 0.8, "k": 12.0, "c": 0.4}
 DT = 0.02
@@ -65,7 +66,7 @@ def test_what_the_kernel_computes_is_what_the_function_says_called_by_hand(block
     rule = Rule(function=dead_zone, initial=[0.0], parameters=[0.03, 1.0], quantum=0.01)
     for lanes in (1, 3):
         out = simulate(block, SPRING, [[0.2, 0.0]] * lanes, None, DT, samples=200, loop=rule)[:, :, 0]
-        commands, memory = rule.replay(np.floor(out[:, 0] / 0.01 + 0.5) * 0.01, DT)
+        commands, memory = rule.follow(np.floor(out[:, 0] / 0.01 + 0.5) * 0.01, DT)
         assert {-1.0, 1.0} < set(commands[:, 0].tolist())  # both sides of the relay, and the wait between
         assert np.allclose(out[:, 2], commands[:, 0], rtol=0, atol=1e-14)
         assert memory[-1, 0] == np.floor(np.abs(commands[:-1, 0]) + 0.5).sum()
@@ -115,6 +116,6 @@ def test_a_wrong_rule_is_answered_in_a_sentence(block):
     rule = Rule(function=pid, initial=np.zeros((3, 2)), parameters=np.ones(5), references=R)
     with pytest.raises(BadInput, match="lanes"):
         simulate(block, SPRING, np.zeros((3, 2)), None, DT, samples=2, loop=rule)
-    flavour = choose(block, SPRING, loop=True)
+    flavour = choose(block, SPRING)
     with pytest.raises(BadInput, match="without a flavour for it"):
         Simulator(derived=block, flavour=flavour, dt=DT, loop=rule)

@@ -146,7 +146,7 @@ def test_a_loop_carries_gains_in_the_order_of_the_states(study):
     drive = '[drive]\ncolumn = "v"\nunit = "V"\n'
     run = one(study(RIG + SENSORS + drive + RUN + loop))
     r = np.where(T < 1, 0, 0.2)
-    np.testing.assert_array_equal(run.loop.references[:, 0], r)
+    np.testing.assert_array_equal(run.loop.law.signal()[:, 0], r)
     u, _ = run.loop.follow(np.column_stack([X, THETA]), ("x", "theta"))
     theta_dot = np.diff(THETA, prepend=THETA[0]) / run.period  # the loop starts where the data do: no jump
     np.testing.assert_allclose(u, 2.5 * (r - X) - 0.1 * theta_dot, atol=1e-12)

@@ -1,5 +1,6 @@
-"""Which law put out the commands of this log? Structures are tried on the recorded signals, the simplest that predicts
-rows it has not seen is kept.
+"""Recovery of the law that put out the commands of a log: which structure was it, with which numbers?
+
+Structures are tried on the recorded signals, and the simplest that predicts rows it has not seen is kept.
 """
 
 from __future__ import annotations
@@ -10,12 +11,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.closed_loop.assembled import channels_of, gains_of, law_of, sensible, structure
-from upright.closed_loop.numbers import averaged, numbers, sharpen
-from upright.closed_loop.preparation import extremes, finer, held_for, stepped
+from upright.closed_loop.intervals import averaged, numbers, sharpen
+from upright.closed_loop.loop import finer
 from upright.closed_loop.recovery import Candidate, Recovery
-from upright.closed_loop.regression import Regression, fit
-from upright.closed_loop.regressors import Family, Signals
+from upright.closed_loop.regression import TERMS, Family, Regression, Signals, Term, channels_of, fit, law_of, structure
 from upright.errors import BadInput, NotIdentifiable
 from upright.readers.quantum import find
 from upright.records import Record
@@ -33,12 +32,12 @@ ROUNDED = 0.35
 """Steps of the column that rows may miss by, root mean square, when the law is right: rounding alone makes 0.289,
 and a clock that jitters a little more."""
 
-TERMS = ("kp", "ki", "kd")
-
 ROWS = 20_000
 """Most rows a comparison of structures looks at; the last fit takes all."""
 
 _JUNK = 3  # first rows, which some front ends fill with whatever their memory held
+_LONGEST_HOLD = 50
+_LEAST_CHANGES = 20
 
 
 def recover(
@@ -89,19 +88,47 @@ def recover(
     r = [record[name][rows] for name in references]
     extra = tuple((name, record[name][rows]) for name in feedforward)
     period = float(record.t[-1] - record.t[0]) / (record.t.size - 1) * hold
-    tried: list[tuple[Found, Regression]] = []
+    tried: list[tuple[Search, Regression]] = []
     for n in (1, 2, 5, 10) if every is None else (every,):
-        found = Found(tuple(measured), tuple(references), y, r, extra, u, period / n, n)
-        best = found.best()
-        tried.append((found, best))
-        if n == 1 and (best.missed <= found.bar(0.0) or hold > 1):
+        search = Search(tuple(measured), tuple(references), y, r, extra, u, period / n, n)
+        best = search.best()
+        tried.append((search, best))
+        if n == 1 and (best.missed <= search.bar(0.0) or hold > 1):
             break
     # a faster servo has to be plainly better: a spline can only guess what lies between rows
-    found, best = min(tried, key=lambda pair: pair[1].missed * (1.0 if pair[0].every == 1 else 1.1))
-    return found.recovery(best, record, command, rows)
+    search, best = min(tried, key=lambda pair: pair[1].missed * (1.0 if pair[0].every == 1 else 1.1))
+    return search.recovery(best, record, command, rows)
 
 
-class Found:
+def held_for(u: Array) -> tuple[int, int]:
+    """Rows for which each command is held, and the first row at which one is new; (1, 0) when each row has its own."""
+    changes = np.flatnonzero(np.diff(u)) + 1
+    changes = changes[changes > 3]  # the first rows of a log may be junk
+    if changes.size < _LEAST_CHANGES:
+        return 1, 0
+    rows = int(np.gcd.reduce(changes - changes[0]))
+    return (rows, int(changes[0] % rows)) if 1 < rows <= _LONGEST_HOLD else (1, 0)
+
+
+def extremes(u: Array) -> tuple[Rows, Rows]:
+    """Rows at the highest and at the lowest command, where the command stays there for three rows or more."""
+    found: list[Rows] = []
+    for level in (u.max(), u.min()):
+        at = np.abs(u - level) <= 1e-9 * max(1.0, abs(float(level)))
+        stays = at[2:] & at[1:-1] & at[:-2]
+        found.append(at if stays.any() and level != 0 else np.zeros_like(at))
+    return found[0], found[1]
+
+
+def stepped(values: Array, every: int) -> Array:
+    """Samples of a reference (N,) at `every` times its rate: it steps, and does so right after the row before."""
+    if every == 1:
+        return values
+    k = np.arange((values.size - 1) * every + 1)
+    return values[-(-k // every)]
+
+
+class Search:
     """Signals of one log, and the structures tried on them."""
 
     def __init__(
@@ -126,14 +153,14 @@ class Found:
         """Every family worth trying on this log."""
         steps = any(r is not None and np.ptp(r) > 0 for _, r in self.signals.pairs)
         limited = bool(self.extreme.any())
-        found = [
+        families = [
             Family(on=on, smoothing=smoothing, delay=delay, hold=hold)
             for smoothing in (("difference", "two taps", "filter") if self.every == 1 else ("difference", "filter"))
             for on in (("error", "measurement") if steps else ("error",))
             for delay in (0, 1)
             for hold in ((False, True) if limited else (False,))
         ]
-        return sorted(found, key=lambda f: f.extras)
+        return sorted(families, key=lambda f: f.extras)
 
     def best(self) -> Regression:
         """The simplest structure that predicts as well as any."""
@@ -143,7 +170,7 @@ class Found:
             self.extreme = limited
             best = self.search()
         self.used = (np.arange(self.u.size) >= _JUNK) & ~self.extreme
-        return fit(self.signals, best.family, self.u, self.used, TERMS, self.dropped(best))
+        return fit(self.signals, best.family, self.u, self.used, self.dropped(best))
 
     def search(self) -> Regression:
         """Family first, then the terms it needs, on at most `ROWS` rows."""
@@ -155,8 +182,8 @@ class Found:
             )
         fits: list[Regression] = []
         for family in self.families():
-            made = fit(self.signals, family, self.u, self.used, TERMS, frozenset())
-            if not fits or sensible(made):
+            made = fit(self.signals, family, self.u, self.used)
+            if not fits or made.averages:
                 fits.append(made)
             if fits[-1].missed <= self.bar(0.0):
                 break  # what comes later is less simple
@@ -173,28 +200,28 @@ class Found:
             self.tried.append((structure(f, self.measured), f))
         return min((f for f in fits if f.missed <= bar), key=lambda f: (f.parameters, f.missed))
 
-    def dropped(self, kept: Regression) -> frozenset[tuple[str, int]]:
+    def dropped(self, kept: Regression) -> frozenset[Term]:
         """Terms that a regression goes without."""
         full = {(kind, i) for kind in TERMS for i in range(len(self.measured))}
-        return frozenset(full - set(kept.found.terms))
+        return frozenset(full - set(kept.columns.terms))
 
     def prune(self, best: Regression) -> Regression:
         """Leave out one term after the other while rows held out are predicted as well."""
         while True:
             drop = self.dropped(best)
-            terms = [t for t in best.found.terms if t[0] in TERMS]
+            terms = [t for t in best.columns.terms if t[0] in TERMS]
             if len(terms) == 1:
                 return best
-            fewer = [fit(self.signals, best.family, self.u, self.used, TERMS, drop | {term}) for term in terms]
+            fewer = [fit(self.signals, best.family, self.u, self.used, drop | {term}) for term in terms]
             for f in fewer:
                 self.tried.append((structure(f, self.measured), f))
             good = min(fewer, key=lambda f: f.missed)
             if good.missed > self.bar(best.missed):
                 return best
             best = good
-            if not any(t[0] == "kd" for t in best.found.terms) and best.family.smoothing != "difference":
+            if not any(t[0] == "kd" for t in best.columns.terms) and best.family.smoothing != "difference":
                 plain = replace(best.family, on="error", smoothing="difference")
-                best = fit(self.signals, plain, self.u, self.used, TERMS, self.dropped(best))
+                best = fit(self.signals, plain, self.u, self.used, self.dropped(best))
 
     def limited(self, best: Regression) -> Rows:
         """Rows where the law asked for more than the command's largest or less than its smallest value."""
@@ -224,17 +251,17 @@ class Found:
         limited = self.limited(best)
         limit = float(np.abs(self.u[limited]).max()) if limited.any() else np.inf
         law = law_of(best, channels, self.signals, limit)
-        extra = {name: gains_of(best)[("ff", j)] for j, (name, _) in enumerate(self.signals.feedforward)}
+        extra = {name: best.by_term[("ff", j)] for j, (name, _) in enumerate(self.signals.feedforward)}
         if self.every == 1:
             known = dict(zip((*self.measured, *self.references), (*self.y, *self.r), strict=True))
             y = np.column_stack([known[name] for name in law.measured])
-            r = np.column_stack([known[name] for name in law.references]) if law.references else None
+            r = np.column_stack([known[name] for name in law.reference_names]) if law.reference_names else None
             fed = sum((extra[name] * values for name, values in self.signals.feedforward), np.zeros(self.u.size))
-            reproduced = law.commands(y, r, fed)
+            reproduced = replace(law, references=r).follow(y, fed)[0][:, 0]
         else:
             reproduced = np.clip(best.predicted, -limit, limit)
         return Recovery(
-            law=replace(law, quantum=self.quantum) if rounded else law, command=command, feedforward=extra,
+            law=replace(law, command_quantum=self.quantum) if rounded else law, command=command, feedforward=extra,
             channels=channels, gains=named, structure=structure(best, self.measured),
             rows=rows, recorded=self.u, reproduced=reproduced, used=self.used, quantum=self.quantum,
             saturated=float(limited.mean()), every=self.every,

@@ -1,17 +1,17 @@
-"""How is a law written in a program? PID with its kinds of derivative, sums of such laws, state feedback."""
+"""Laws as programs write them: PID with its kinds of derivative, and sums of such laws."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.closed_loop.law import SampledLaw, Windup
 from upright.errors import BadInput
+from upright.law import Law
 
 Array = NDArray[np.float64]
 On = Literal["error", "measurement"]
@@ -73,32 +73,22 @@ def pid(
     on: On = "error",
     measured: str = "y",
     reference: str = "r",
-    limit: float = math.inf,
-    delay: float = 0.0,
-    windup: Windup = "free",
-    quantum: float = 0.0,
-) -> SampledLaw:
+    **fields: Any,
+) -> Law:
     """A PID law; `derivative` is "difference", the time constant [s] of its low pass, or a `Filter`.
 
     The sum of the I part includes the present sample; the difference takes the signals before the first sample as
-    zero, the reference too.
+    zero, the reference too. `fields` are further ones of the `Law`, such as its limit.
     """
     smooth = derivative if isinstance(derivative, Filter) else Filter.of(derivative, period)
     channel = Channel(measured=measured, reference=reference, kp=kp, ki=ki, kd=kd, on=on, filter=smooth)
-    return joined([channel], period=period, limit=limit, delay=delay, windup=windup, quantum=quantum)
+    return joined([channel], period=period, **fields)
 
 
-def joined(
-    channels: Sequence[Channel],
-    *,
-    period: float,
-    bias: float = 0.0,
-    limit: float = math.inf,
-    delay: float = 0.0,
-    windup: Windup = "free",
-    quantum: float = 0.0,
-) -> SampledLaw:
-    """Sum of several PID laws, one per channel, and a constant."""
+def joined(channels: Sequence[Channel], *, period: float, bias: float = 0.0, **fields: Any) -> Law:
+    """Sum of several PID laws, one per channel, and a constant; `fields` as those of `pid`."""
+    if not 0 < period < math.inf:
+        raise BadInput(f"a law needs its sample period in s, above zero, got {period}.")
     measured = tuple(dict.fromkeys(c.measured for c in channels))
     references = tuple(dict.fromkeys(c.reference for c in channels if c.reference))
     inputs = (*measured, *references)
@@ -131,10 +121,10 @@ def joined(
     for i, (row, _, _, _) in enumerate(rows):
         for j, value in row.items():
             A[i, j] = value
-    return SampledLaw(
-        A=A, B=np.array([r[1] for r in rows]).reshape(n, len(inputs)), C=np.array([r[2] for r in rows]), D=D,
-        measured=measured, references=references, period=period, limit=limit, delay=delay, windup=windup,
-        quantum=quantum, initial=np.array([r[3] for r in rows]),
+    B, C = np.array([r[1] for r in rows]).reshape(n, len(inputs)), np.array([r[2] for r in rows]).reshape(1, n)
+    return Law(
+        A, B, C, D[None], initial=np.array([r[3] for r in rows]), measured=measured, reference_names=references,
+        period=period, **fields,
     )  # fmt: skip
 
 
@@ -165,20 +155,3 @@ def memory(
             out.append(-first[c.measured] + (first[c.reference] if c.reference and c.on == "error" else 0.0))
             out.append((smoothed or {}).get(c.measured, 0.0) / c.kd)
     return np.array([*out, constant] if constant and not sums else out)
-
-
-def state_feedback(
-    gains: Mapping[str, tuple[float, float]], *, period: float, k_pf: float = 0.0, pole: float = 0.0
-) -> SampledLaw:
-    """``u = k_pf r - K x``: gains of position and velocity per coordinate, velocities from filtered differences.
-
-    Differences take the positions before the first sample as zero.
-    """
-    channels = [
-        Channel(measured=name, kp=position, kd=velocity, filter=Filter(pole=pole))
-        for name, (position, velocity) in gains.items()
-    ]
-    law = joined(channels, period=period)
-    return replace(
-        law, B=np.column_stack([law.B, np.zeros(law.C.size)]), D=np.append(law.D, k_pf), references=("reference",)
-    )

@@ -119,7 +119,7 @@ def swing_up(
     )  # fmt: skip
     names = [c.name for c in rig.plant.coordinates]
     seen = np.column_stack([run.record[n] for n in names])
-    memory = rule.replay(seen / rig.shown, rig.period)[1]
+    memory = rule.follow(seen / rig.shown, rig.period)[1]
     memory = np.vstack([memory[1:], memory[-1:]])  # what it knew once it had read this sample
     theta = seen[:, 1]
     return Ascent(

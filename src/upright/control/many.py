@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from upright.control.rig import Rig
 from upright.control.score import Scores, scores
 from upright.control.trial import SUBSTEPS, at_work
-from upright.design import Feedback
+from upright.law import Law
 from upright.simulation import simulate
 
 Array = NDArray[np.float64]
@@ -23,7 +23,7 @@ BLOCK = 256
 
 def outcomes(
     rig: Rig,
-    law: Feedback,
+    law: Law,
     *,
     at: str,
     starts: ArrayLike,
@@ -35,7 +35,7 @@ def outcomes(
     Parameters
     ----------
     rig : Rig
-    law : Feedback
+    law : Law
     at : str
         Equilibrium to hold.
     starts : array, shape (lanes, states)
@@ -55,7 +55,7 @@ def outcomes(
     for begin in range(0, lanes, BLOCK):
         part = slice(begin, begin + BLOCK)
         x0 = rig.plant.state(at) + first[part]
-        loop = at_work(rig, law, x0, point)
+        loop = at_work(rig, law, point)
         motion = simulate(
             rig.plant, {**rig.drive, **{n: v[part] for n, v in given.items()}}, x0, None, rig.period, samples=rows,
             substeps=SUBSTEPS, loop=loop, every=EVERY,

@@ -17,10 +17,11 @@ from upright.control.many import outcomes
 from upright.control.rig import Rig
 from upright.control.score import Score, Scores, score
 from upright.control.trial import Trial, trial
-from upright.design import Feedback, Margins, Sampled, hold, margins
+from upright.design import Margins, Sampled, hold, margins
 from upright.design.loop import closed, command_noise
 from upright.design.requests import poles_of
 from upright.errors import BadInput
+from upright.law import Law
 from upright.physics import Linear
 
 Array = NDArray[np.float64]
@@ -101,7 +102,7 @@ def preflight(
     rig: Rig,
     model: Linear,
     sampled: Sampled,
-    law: Feedback,
+    law: Law,
     task: Task,
     *,
     parameters: Mapping[str, ArrayLike],
@@ -117,7 +118,7 @@ def preflight(
     model, sampled : Linear, Sampled
         Its linear model about the equilibrium, and the same as the law was designed on; margins and noise count the
         rig's lag as well.
-    law : Feedback
+    law : Law
     task : Task
     parameters : mapping of str to array, shape (lanes,)
         Parameters of other rigs that the identification allows; empty when it tells of none.
@@ -171,7 +172,7 @@ def word(found: Score) -> str:
     return words(Scores(**{n: np.asarray(v)[..., None] for n, v in vars(found).items()}))[0]
 
 
-def largest(rig: Rig, law: Feedback, at: str, direction: ArrayLike, *, most: float, seconds: float = 3.0) -> float:
+def largest(rig: Rig, law: Law, at: str, direction: ArrayLike, *, most: float, seconds: float = 3.0) -> float:
     """How far along a direction of the states the rig may start and still be held; `most` when nothing less fails.
 
     Sixty-four starts side by side find the first that fails, three times, each between the neighbours of the last.
@@ -179,7 +180,7 @@ def largest(rig: Rig, law: Feedback, at: str, direction: ArrayLike, *, most: flo
     Parameters
     ----------
     rig : Rig
-    law : Feedback
+    law : Law
     at : str
     direction : array, shape (states,)
     most : float

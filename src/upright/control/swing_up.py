@@ -21,7 +21,8 @@ from upright.control.swing_up_law import HOLDING, PARAMETERS, SWINGING, swing_an
 from upright.control.trial import SUBSTEPS, readings
 from upright.design.requests import poles_of
 from upright.errors import BadInput
-from upright.simulation import Rule, simulate
+from upright.law import Rule
+from upright.simulation import simulate
 
 Array = NDArray[np.float64]
 

@@ -7,16 +7,16 @@ one. The rig is nonlinear and has dry friction.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.control.rig import Rig
-from upright.design import Feedback
 from upright.errors import BadInput
+from upright.law import Law, Rule
 from upright.records import Provenance, Record
-from upright.simulation import Law, Rule, simulate
+from upright.simulation import simulate
 
 Array = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ class Trial:
 
 def trial(
     rig: Rig,
-    law: Feedback | Law | Rule,
+    law: Law | Rule,
     *,
     at: str,
     start: ArrayLike,
@@ -78,10 +78,9 @@ def trial(
     ----------
     rig : Rig
         As it truly is.
-    law : Feedback or Law
-        State feedback, switched on knowing where the rig is and taking it to be at rest; or any law on
-        ``[readings, references]``, whose own encoder and converter steps and delay are replaced by the rig's; or
-        a rule, which brings the rig's encoders and converter itself.
+    law : Law or Rule
+        A law on deviations from rest, whose own encoder and converter steps and delay are replaced by the rig's; or a
+        rule on readings, which brings the rig's encoders and converter itself.
     at : str
         Equilibrium to hold.
     start : array, shape (states,)
@@ -108,7 +107,7 @@ def trial(
     point = np.array(list(rig.plant.equilibrium(at).values()))
     held = point if rest is None else np.asarray(rest, dtype=np.float64)
     x0 = rig.plant.state(at) + np.asarray(start, dtype=np.float64)
-    given = law if isinstance(law, Rule) else at_work(rig, law, x0, held, reference)
+    given = law if isinstance(law, Rule) else at_work(rig, law, held, reference)
     late = None
     if pushes is not None:
         late = np.zeros(count)
@@ -130,37 +129,21 @@ def readings(rig: Rig, q: ArrayLike) -> Array:
     return np.floor(np.asarray(q, dtype=np.float64) / step + 0.5) * rig.quantum
 
 
-def at_work(rig: Rig, law: Feedback | Law, x0: ArrayLike, rest: ArrayLike, reference: ArrayLike | None = None) -> Law:
-    """The law with the rig's encoders and converter about it, for one start or for many lanes.
+def at_work(rig: Rig, law: Law, rest: ArrayLike, reference: ArrayLike | None = None) -> Law:
+    """The law with the rig's encoders and converter about it.
 
     Parameters
     ----------
     rig : Rig
-    law : Feedback or Law
-    x0 : array, shape (states,) or (lanes, states)
-        Where the rig is when the law is switched on.
+    law : Law
     rest : array, shape (coordinates,)
-        What a `Feedback` takes for the readings at the equilibrium.
+        What it takes for the readings at the equilibrium.
     reference : array, shape (T,), optional
     """
-    n = len(rig.plant.coordinates)
-    shown = np.concatenate([rig.shown, np.ones(np.shape(law.D)[1] - n)])
-    at_rest = np.asarray(rest, dtype=np.float64)
-    if isinstance(law, Feedback):
-        asked = np.zeros(1) if reference is None else np.asarray(reference, dtype=np.float64)
-        references = np.column_stack([np.tile(at_rest, (asked.size, 1)), asked])
-        seen = readings(rig, np.asarray(x0, dtype=np.float64)[..., 0::2])
-        initial = law.begin @ (seen - at_rest).T
-        windup = "free"
-    else:
-        references = law.signal() if reference is None else reference
-        initial, windup = law.initial, law.windup
-    B, D = (
-        np.asarray(m, dtype=np.float64) * (shown[:, None] if np.ndim(m) == 3 else shown) for m in (law.B, law.D)
-    )  # fmt: skip
-    return Law(
-        A=law.A, B=B, C=law.C, D=D, references=references, quantum=np.abs(rig.quantum / rig.shown),
-        command_quantum=rig.converter, initial=initial, windup=windup,
+    made = law.in_units(rig.shown, -np.asarray(rest, dtype=np.float64), 1.0)
+    return replace(
+        made, references=law.references if reference is None else reference, delay=0.0,
+        quantum=np.abs(rig.quantum / rig.shown), command_quantum=rig.converter,
     )  # fmt: skip
 
 

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from upright import design
 from upright.control.rig import Rig
 from upright.control.trial import Trial, trial
-from upright.design import Feedback
+from upright.law import Law
 
 Array = NDArray[np.float64]
 
@@ -77,7 +77,7 @@ class Alarm:
 
 
 def watched(
-    watch: Watch, rig: Rig, law: Feedback, *, start: ArrayLike, seconds: float, rest: ArrayLike | None = None
+    watch: Watch, rig: Rig, law: Law, *, start: ArrayLike, seconds: float, rest: ArrayLike | None = None
 ) -> tuple[Trial, Alarm]:
     """Run a law on a rig beside a watch that switches the drive off, one sample after it has spoken.
 
@@ -88,7 +88,7 @@ def watched(
     watch : Watch
     rig : Rig
         As it truly is.
-    law : Feedback
+    law : Law
     start, seconds, rest
         As of `trial`.
     """

@@ -1,6 +1,6 @@
 """Which gain does the rig need, and what is it worth? A linear model goes in, wherever its numbers came from."""
 
-from upright.design.loop import Feedback, Margins, feedback, margins, place_sampled
+from upright.design.loop import Margins, feedback, margins, place_sampled, spelled_out
 from upright.design.lqr import dlqr, locus, lqr, weight_for_effort
 from upright.design.placement import Placement, place
 from upright.design.sampled import Sampled, hold
@@ -9,7 +9,6 @@ from upright.design.velocity import Estimator, difference, filtered, kalman, sha
 
 __all__ = [
     "Estimator",
-    "Feedback",
     "Margins",
     "Placement",
     "Sampled",
@@ -26,5 +25,6 @@ __all__ = [
     "place_sampled",
     "prefilter",
     "shaken",
+    "spelled_out",
     "weight_for_effort",
 ]

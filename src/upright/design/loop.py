@@ -13,6 +13,7 @@ from upright.design.requests import conjugate_poles, poles_of
 from upright.design.sampled import Sampled, hold, to_z
 from upright.design.velocity import Estimator, stationary
 from upright.errors import BadInput
+from upright.law import Law
 
 if TYPE_CHECKING:
     from upright.physics.linear import Linear
@@ -21,29 +22,12 @@ Array = NDArray[np.float64]
 Roots = NDArray[np.complex128]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Feedback:
-    """State feedback on estimated states as one sampled law, ``z[k+1] = A z + B w``, ``u = C z + D w``.
+def feedback(estimator: Estimator, K: ArrayLike, k_pf: float = 0.0) -> Law:
+    """The law ``u = k_pf r - K x`` with x from an estimator; K of shape (m, n) may leave out its last states.
 
-    ``w = [y_0, ..., y_0 at rest, ..., r]``: readings, their values at the equilibrium, then one reference. These are
-    the matrices that `simulation.Law` takes, with the last as its references. It is switched on with
-    ``z[0] = begin (y - y at rest)``.
+    It takes readings, less their values at the equilibrium as its `target`, and one reference, and is switched on as
+    the estimator begins.
     """
-
-    A: Array
-    B: Array
-    C: Array
-    D: Array
-    begin: Array
-    outputs: int
-
-    def around(self) -> tuple[Array, Array]:
-        """B and D for deviations from the equilibrium alone."""
-        return self.B[:, : self.outputs], self.D[:, : self.outputs]
-
-
-def feedback(estimator: Estimator, K: ArrayLike, k_pf: float = 0.0) -> Feedback:
-    """The law ``u = k_pf r - K x`` with x from an estimator; K of shape (m, n) may leave out its last states."""
     K = np.atleast_2d(np.asarray(K, dtype=np.float64))
     m, n = K.shape
     if n > estimator.C.shape[0] or m != estimator.E.shape[1]:
@@ -52,19 +36,22 @@ def feedback(estimator: Estimator, K: ArrayLike, k_pf: float = 0.0) -> Feedback:
     C, Dy = -K @ estimator.C[:n], -K @ estimator.D[:n]
     A, By = estimator.A + estimator.E @ C, estimator.B + estimator.E @ Dy
     Dr = np.full((m, 1), k_pf)
-    return Feedback(
-        A=A,
-        B=np.hstack([By, -By, estimator.E @ Dr]),
-        C=C,
-        D=np.hstack([Dy, -Dy, Dr]),
-        begin=estimator.begin,
-        outputs=Dy.shape[1],
-    )
+    return Law(
+        A, np.hstack([By, estimator.E @ Dr]), C, np.hstack([Dy, Dr]), begin=estimator.begin, period=estimator.period,
+        reference_names=("reference",),
+    )  # fmt: skip
 
 
-def closed(model: Sampled, law: Feedback, gain: float = 1.0) -> Array:
+def spelled_out(law: Law) -> dict[str, Array]:
+    """Matrices of a law with what is its target as signals of its own: readings, readings at rest, references."""
+    p = law.readings
+    B, D = (np.hstack([M[:, :p], -M[:, :p], M[:, p:]]) for M in (law.B, law.D))
+    return {"A": law.A, "B": B, "C": law.C, "D": D}
+
+
+def closed(model: Sampled, law: Law, gain: float = 1.0) -> Array:
     """Matrix of the loop, the model's states first; `gain` multiplies the command on its way to the plant."""
-    B, D = law.around()
+    B, D = law.B[:, : law.readings], law.D[:, : law.readings]
     top = np.hstack([model.A + gain * model.B @ D @ model.C, gain * model.B @ law.C])
     return np.vstack([top, np.hstack([B @ model.C, law.A])])
 
@@ -147,7 +134,7 @@ class Margins:
     modulus: float
 
 
-def margins(plant: Linear, model: Sampled, law: Feedback) -> Margins:
+def margins(plant: Linear, model: Sampled, law: Law) -> Margins:
     """Margins of a stable sampled loop; gain and delay from its eigenvalues, phase from its frequency response.
 
     Raises
@@ -183,23 +170,23 @@ def margins(plant: Linear, model: Sampled, law: Feedback) -> Margins:
     )
 
 
-def swing(model: Sampled, law: Feedback, start: ArrayLike, samples: int) -> tuple[Array, Array]:
+def swing(model: Sampled, law: Law, start: ArrayLike, samples: int) -> tuple[Array, Array]:
     """States (samples, n) and commands (samples, m) of the sampled loop, let go at rest in the law's eyes.
 
     Parameters
     ----------
     model : Sampled
-    law : Feedback
+    law : Law
     start : array, shape (n,)
         Deviation of the model's states; drive and commands on their way are at zero.
     samples : int
     """
-    A, (_, D) = closed(model, law), law.around()
-    out = np.hstack([D @ model.C, law.C])
-    n = model.A.shape[0]
+    A, n = closed(model, law), model.A.shape[0]
+    out = np.hstack([law.D[:, : law.readings] @ model.C, law.C])
     state = np.zeros(A.shape[0])
     state[: n - model.remembered] = start
-    state[n:] = law.begin @ (model.C @ state[:n])
+    if law.begin is not None:
+        state[n:] = law.begin @ (model.C @ state[:n])
     rows = np.empty((samples, A.shape[0]))
     for k in range(samples):
         rows[k] = state
@@ -207,9 +194,9 @@ def swing(model: Sampled, law: Feedback, start: ArrayLike, samples: int) -> tupl
     return rows[:, :n], rows @ out.T
 
 
-def loop_gain(model: Sampled, law: Feedback, omega: ArrayLike) -> Roots:
+def loop_gain(model: Sampled, law: Law, omega: ArrayLike) -> Roots:
     """Frequency response of the loop cut at the plant's input, negative feedback, at `omega` [rad/s]; one input."""
-    B, D = law.around()
+    B, D = law.B[:, : law.readings], law.D[:, : law.readings]
     z = np.exp(1j * np.asarray(omega, dtype=np.float64) * model.period)[:, None, None]
 
     def through(A: Array, first: Array, last: Array) -> Roots:
@@ -221,10 +208,10 @@ def loop_gain(model: Sampled, law: Feedback, omega: ArrayLike) -> Roots:
     return found[:, 0, 0]
 
 
-def command_noise(model: Sampled, law: Feedback, quantum: ArrayLike) -> float:
+def command_noise(model: Sampled, law: Law, quantum: ArrayLike) -> float:
     """Standard deviation of the command in the closed loop from the rounding of the encoders [the input's unit]."""
-    B, D = law.around()
-    sigma = np.broadcast_to(np.asarray(quantum, dtype=np.float64) / np.sqrt(12), (law.outputs,))
+    B, D = law.B[:, : law.readings], law.D[:, : law.readings]
+    sigma = np.broadcast_to(np.asarray(quantum, dtype=np.float64) / np.sqrt(12), (law.readings,))
     inlet = np.vstack([model.B @ D, B]) * sigma
     outlet = np.hstack([D @ model.C, law.C])
     spread = stationary(closed(model, law), inlet)

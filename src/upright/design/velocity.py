@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from upright.design.sampled import Sampled
 from upright.errors import BadInput
+from upright.law.linear import differences
 
 Array = NDArray[np.float64]
 
@@ -66,23 +67,13 @@ def filtered(model: Sampled, memory: float) -> Estimator:
     memory : float
         a, from 0 (plain difference) to below 1.
     """
-    if not 0 <= memory < 1:
-        raise BadInput(f"the filter's memory must be at least 0 and below 1, got {memory:g}; 0 is no filter.")
     p = model.C.shape[0]
-    n, T, a = 2 * p, model.period, memory
-    if not np.array_equal(model.C[:, :n], np.kron(np.eye(p), [1.0, 0.0])):
+    if not np.array_equal(model.C[:, : 2 * p], np.kron(np.eye(p), [1.0, 0.0])):
         raise BadInput("differences need every position measured and followed by its velocity; use an observer.")
-    # states of the estimator: the last readings, then the last speeds
-    A = np.zeros((n, n))
-    A[p:, :p], A[p:, p:] = -(1 - a) / T * np.eye(p), a * np.eye(p)
-    B = np.vstack([np.eye(p), (1 - a) / T * np.eye(p)])
-    C, D = np.zeros((n, n)), np.zeros((n, p))
-    C[1::2], D[0::2], D[1::2] = A[p:], np.eye(p), (1 - a) / T * np.eye(p)
-    name = "plain difference" if a == 0 else f"filtered difference, a = {a:g}"
-    if a == 0:  # it remembers readings only
-        A, B, C = A[:p, :p], B[:p], C[:, :p]
+    A, B, C, D = differences(p, model.period, memory)
+    name = f"filtered difference, a = {memory:g}" if memory else "plain difference"
     E = np.zeros((A.shape[0], model.B.shape[1]))
-    return Estimator(A=A, B=B, E=E, C=C, D=D, begin=np.eye(A.shape[0], p), period=T, name=name)
+    return Estimator(A=A, B=B, E=E, C=C, D=D, begin=np.eye(A.shape[0], p), period=model.period, name=name)
 
 
 def observer(model: Sampled, gain: ArrayLike, name: str = "observer") -> Estimator:

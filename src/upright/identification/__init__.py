@@ -17,14 +17,13 @@ if TYPE_CHECKING:
     from upright.identification.estimate import METHODS, fit_percent, identify, predict
     from upright.identification.model.fit import Estimate, Fit, RunScore, to_lmfit
     from upright.identification.model.rig import Parameter, Rig
-    from upright.identification.model.runs import Feedback, Run
+    from upright.identification.model.runs import Run
     from upright.identification.search.curve import CurveFit, fit_curve
 
 __all__ = [
     "METHODS",
     "CurveFit",
     "Estimate",
-    "Feedback",
     "Fit",
     "Parameter",
     "Rig",
@@ -41,7 +40,7 @@ _HOMES = {
     "estimate": ("METHODS", "fit_percent", "identify", "predict"),
     "model.fit": ("Estimate", "Fit", "RunScore", "to_lmfit"),
     "model.rig": ("Parameter", "Rig"),
-    "model.runs": ("Feedback", "Run"),
+    "model.runs": ("Run",),
     "search.curve": ("CurveFit", "fit_curve"),
 }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from upright.law.linear import Law
+from upright.law.linear import Law, state_feedback
 from upright.law.rule import Rule
 
-__all__ = ["Law", "Rule"]
+__all__ = ["Law", "Rule", "state_feedback"]

@@ -1,9 +1,12 @@
-"""Which sampled linear law closes the loop: a PID with its filter, an observer with its gain, whatever a log shows?"""
+"""Sampled linear law: a PID with its filter, an observer with its gain, state feedback, whatever a log shows."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+import math
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass, replace
+from functools import cached_property
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,89 +14,66 @@ from numpy.typing import ArrayLike, NDArray
 from upright.errors import BadInput
 
 Array = NDArray[np.float64]
+Windup = Literal["free", "hold"]
+Pattern = tuple[tuple[float | None, ...], ...]
+"""Entries of a matrix that are 0 or 1 in every lane; None for numbers that are known at run time only."""
 
 
-@dataclass(frozen=True, eq=False)
-class Law:
-    """Sampled linear controller with a state of its own, evaluated at every sample, its output held until the next.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Controller:
+    """What a `Law` and a `Rule` share: encoders before it, a converter behind it, references, limit and delay.
 
-    ``z[k+1] = A z[k] + B w[k]`` and ``u[k] = u_ff[k] + C z[k] + D w[k]`` with ``w = [y_0, ..., r_0, ...]``: the
-    coordinates as the encoders round them, then the references. The command is rounded to the converter's steps, then
-    limited to the actuator's limit. Each matrix may have an axis of lanes as its last.
+    The command is rounded to the converter's steps, then limited. Arrays may have an axis of lanes as their last.
 
     Attributes
     ----------
-    A : array, shape (z, z) or (z, z, lanes)
-        What the controller's state becomes of itself; ``np.zeros((0, 0))`` for a law without state.
-    B : array, shape (z, coordinates + references[, lanes])
-        What it takes from coordinates and references.
-    C, D : array, shape (inputs, z[, lanes]) and (inputs, coordinates + references[, lanes])
-        Command from the state and from what is measured at the same sample.
     references : array, shape (T,) or (T, references), optional
         Reference signals at the samples; the last values are held.
     quantum : float or array, shape (coordinates,)
         Resolution of each encoder [rad or m], ``y = floor(q/quantum + 1/2) quantum``; 0 for none.
-    delay : float
-        Computational delay in samples, whole or not; the output is zero before the first one arrives.
     command_quantum : float or array, shape (inputs,)
         Step of the converter that puts the command out, in the command's unit; 0 for none.
-    initial : array, shape (z,) or (z, lanes), optional
-        State at a lane's first sample, zero when omitted.
-    windup : {"free", "hold"}
-        Whether sums, states that A hands on as they are, run on while the command is beyond its limit, or stay as they
-        are for that sample. What differences and filters remember goes on.
+    limit : float
+        Largest command that leaves the controller, either way; the actuator's own limit acts besides.
+    delay : float
+        Computational delay in samples, whole or not; the output is zero before the first one arrives.
     """
 
-    A: ArrayLike
-    B: ArrayLike
-    C: ArrayLike
-    D: ArrayLike
     references: ArrayLike | None = None
     quantum: ArrayLike = 0.0
-    delay: float = 0.0
     command_quantum: ArrayLike = 0.0
-    initial: ArrayLike | None = None
-    windup: Literal["free", "hold"] = "free"
+    limit: float = math.inf
+    delay: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in "ABCD":
-            if np.ndim(getattr(self, name)) not in (2, 3):
-                raise BadInput(
-                    f"{name} of a law needs two axes, or a third for the lanes, got shape "
-                    f"{np.shape(getattr(self, name))}; a law without state has A = np.zeros((0, 0))."
-                )
-        shape = {name: np.shape(getattr(self, name))[:2] for name in "ABCD"}
-        z, nu = shape["A"][0], shape["D"][0]
-        wanted = {"A": (z, z), "B": (z, shape["D"][1]), "C": (nu, z)}
-        for name, size in wanted.items():
-            if shape[name] != size:
-                raise BadInput(
-                    f"{name} of a law with {z} states, {nu} inputs and {shape['D'][1]} signals in needs shape {size}, "
-                    f"got {shape[name]}."
-                )
-        first = (z,) if self.initial is None else np.shape(self.initial)
-        if len(first) not in (1, 2) or first[0] != z:
-            raise BadInput(f"the initial state of the law needs shape ({z},), got {first}.")
         if not 0.0 <= self.delay < 1e4:
-            raise BadInput(f"the law's delay must be at least 0 samples, got {self.delay:g}; give it in samples.")
+            raise BadInput(f"the delay must be at least 0 samples, got {self.delay:g}; give it in samples.")
+        if not self.limit > 0.0:
+            raise BadInput(f"a law needs a limit above zero, got {self.limit:g}.")
         if np.any(np.asarray(self.quantum) < 0.0) or np.any(np.asarray(self.command_quantum) < 0.0):
             raise BadInput("a quantum must be at least 0, which means no rounding.")
-        if self.windup not in ("free", "hold"):
-            raise BadInput(f'windup is "free" or "hold", got {self.windup!r}.')
         r = self.signal()
         if r.ndim != 2 or (r.shape[1] > 0 and r.shape[0] == 0) or not np.isfinite(r).all():
             raise BadInput(f"references need finite values in shape (T, references), got {r.shape}.")
 
-    @property
-    def sizes(self) -> tuple[int, int]:
-        """Number of states and of references, which are compiled in."""
-        return np.shape(self.A)[0], self.signal().shape[1]
+    def arrays(self) -> dict[str, tuple[Array, int]]:
+        """Arrays that may differ between lanes, by name, with their number of axes in one lane."""
+        raise NotImplementedError
 
     def widths(self) -> dict[str, int]:
         """Lanes that each array is given for."""
-        out = {name: np.shape(getattr(self, name))[2] if np.ndim(getattr(self, name)) == 3 else 1 for name in "ABCD"}
-        initial = () if self.initial is None else np.shape(self.initial)
-        return out | {"initial": initial[1] if len(initial) == 2 else 1}
+        return {name: a.shape[axes] if a.ndim > axes else 1 for name, (a, axes) in self.arrays().items()}
+
+    def by_lane(self, lanes: int) -> dict[str, Array]:
+        """The same arrays, row by row, each of shape (numbers, lanes)."""
+        out: dict[str, Array] = {}
+        for name, (a, axes) in self.arrays().items():
+            wide = a if a.ndim > axes else a[..., None]
+            if wide.shape[-1] not in (1, lanes):
+                raise BadInput(f"{name} of the law is given for {wide.shape[-1]} lanes, where there are {lanes}.")
+            rows = math.prod(wide.shape[:-1])
+            out[name] = np.broadcast_to(wide.reshape(rows, wide.shape[-1]), (rows, lanes))
+        return out
 
     def signal(self) -> Array:
         """References, shape (T, references)."""
@@ -103,36 +83,270 @@ class Law:
         return np.ascontiguousarray(r[:, None] if r.ndim == 1 else r)
 
     def scalars(self, n: int, nu: int) -> Array:
-        """What all lanes share, as the kernel reads it: see `Loop.scalars`."""
-        return shared(self.quantum, self.command_quantum, n, nu, (0.0, float(self.windup == "hold"), self.delay))
+        """What all lanes share, as the kernel reads it: encoder quanta, delay, room for one more, command quanta."""
+        out = np.zeros(n + 2 + nu)
+        out[n] = self.delay
+        for name, place, size in (("quantum", 0, n), ("command_quantum", n + 2, nu)):
+            try:
+                out[place : place + size] = getattr(self, name)
+            except ValueError:
+                raise BadInput(f"{name} needs one value or {size}, got {np.shape(getattr(self, name))}.") from None
+        return out
 
-    def rows(self, n: int, nu: int, lanes: int) -> Array:
-        """Matrices, row by row, and the initial state as the kernel reads them, shape (numbers, lanes)."""
-        z, m = self.sizes
-        if np.shape(self.D)[:2] != (nu, n + m):
+
+@dataclass(frozen=True)
+class Structure:
+    """What of a `Law` is compiled in: known entries of A and B, references, whether sums stand still at the limit."""
+
+    A: Pattern
+    B: Pattern
+    references: int
+    hold: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Law(Controller):
+    """Sampled linear controller with a state of its own, evaluated at every sample, its output held until the next.
+
+    ``z[k+1] = A z[k] + B w[k]`` and ``u[k] = u_ff[k] + C z[k] + D w[k]`` with ``w = [y - target, r]``: readings of the
+    encoders less their targets, then the references. Gains, filters and memories of any law that a laboratory's
+    program is likely to hold are entries of A, B, C and D, each of which may have an axis of lanes as its last.
+
+    Attributes
+    ----------
+    A : array, shape (z, z)
+        What the controller's state becomes of itself; ``np.zeros((0, 0))`` for a law without state.
+    B : array, shape (z, readings + references)
+        What it takes from readings and references.
+    C, D : array, shape (inputs, z) and (inputs, readings + references)
+        Command from the state and from what is measured at the same sample.
+    target : float or array, shape (readings,)
+        Set point of each reading [rad or m].
+    initial : array, shape (z,), optional
+        State at a lane's first sample, zero when omitted.
+    begin : array, shape (z, readings), optional
+        What the first reading less its target adds to that, so that no jump is taken for a speed.
+    windup : {"free", "hold"}
+        Whether sums, states that A hands on as they are, run on while the command is beyond its limit, or stay as they
+        are for that sample. What differences and filters remember goes on.
+    measured, reference_names : tuple of str
+        Names of readings and references, where a log or a study gives them.
+    period : float
+        Time between two samples that the matrices are made for [s], where it is known; 0 else.
+    """
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    _: KW_ONLY
+    target: ArrayLike = 0.0
+    initial: ArrayLike | None = None
+    begin: Array | None = None
+    windup: Windup = "free"
+    measured: tuple[str, ...] = ()
+    reference_names: tuple[str, ...] = ()
+    period: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in "ABCD":
+            object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=np.float64))
+            if getattr(self, name).ndim not in (2, 3):
+                raise BadInput(
+                    f"{name} of a law needs two axes, or a third for the lanes, got shape "
+                    f"{getattr(self, name).shape}; a law without state has A = np.zeros((0, 0))."
+                )
+        (nu, z), references = self.C.shape[:2], self.signal().shape[-1]
+        signals = len(self.measured) + references if self.measured else self.D.shape[1]
+        for name, size in {"A": (z, z), "B": (z, signals), "D": (nu, signals)}.items():
+            if getattr(self, name).shape[:2] != size:
+                raise BadInput(
+                    f"{name} of a law with {z} memories, {nu} inputs and {signals} signals in needs shape {size}, "
+                    f"got {getattr(self, name).shape[:2]}."
+                )
+        first = (z,) if self.initial is None else np.shape(self.initial)
+        if len(first) not in (1, 2) or first[0] != z:
+            raise BadInput(f"the initial state of the law needs shape ({z},), got {first}.")
+        for name in ("A", "B", "C", "D", "initial"):
+            if getattr(self, name) is not None and not np.isfinite(getattr(self, name)).all():
+                raise BadInput(f"{name} of a law needs finite numbers, got {np.ravel(getattr(self, name)).tolist()}.")
+        if self.windup not in ("free", "hold"):
+            raise BadInput(f'windup is "free" or "hold", got {self.windup!r}.')
+        if not 0.0 <= self.period < math.inf:
+            raise BadInput(f"a law needs its sample period in s, above zero, got {self.period}.")
+        super().__post_init__()
+
+    @property
+    def readings(self) -> int:
+        """How many readings it takes."""
+        return self.D.shape[1] - self.signal().shape[1]
+
+    @cached_property
+    def compiled_in(self) -> Structure:
+        """What the kernel is written for; everything else is data."""
+        A, B = (_pattern(m) for m in (self.A, self.B))
+        return Structure(A=A, B=B, references=self.signal().shape[1], hold=self.windup == "hold")
+
+    def signal(self) -> Array:
+        """References, shape (T, references), zero when none are given."""
+        return np.zeros((1, len(self.reference_names))) if self.references is None else super().signal()
+
+    def arrays(self) -> dict[str, tuple[Array, int]]:
+        """Matrices, first state and targets."""
+        initial = np.zeros(self.A.shape[0]) if self.initial is None else np.asarray(self.initial, dtype=np.float64)
+        target = np.asarray(self.target, dtype=np.float64)
+        target = target if target.ndim else np.broadcast_to(target, (self.readings,))
+        return {name: (getattr(self, name), 2) for name in "ABCD"} | {"initial": (initial, 1), "target": (target, 1)}
+
+    def rows(self, nu: int, lanes: int, q: Array) -> Array:
+        """Numbers as the kernel reads them, shape (numbers, lanes), for lanes that begin at coordinates `q`."""
+        n, m = len(q), self.signal().shape[1]
+        if self.D.shape[:2] != (nu, n + m):
             raise BadInput(
                 f"D of a law for {n} coordinates, {m} references and {nu} inputs needs shape ({nu}, {n + m}), "
-                f"got {np.shape(self.D)[:2]}."
+                f"got {self.D.shape[:2]}."
             )
-        initial = np.zeros(z) if self.initial is None else self.initial
-        parts: list[Array] = []
-        for name, value in (*((c, getattr(self, c)) for c in "ABCD"), ("initial", initial)):
-            a: Array = np.asarray(value, dtype=np.float64)
-            own = a.ndim == (2 if name == "initial" else 3)
-            if own and a.shape[-1] not in (1, lanes):
-                raise BadInput(f"{name} of the law is given for {a.shape[-1]} lanes, where there are {lanes}.")
-            size = int(np.prod(a.shape[:-1] if own else a.shape))
-            parts.append(np.broadcast_to(a.reshape(size, -1) if size else np.zeros((0, lanes)), (size, lanes)))
-        return np.concatenate(parts)
+        parts = self.by_lane(lanes)
+        if self.begin is not None:
+            quantum = np.broadcast_to(np.asarray(self.quantum, dtype=np.float64), (n,))
+            parts["initial"] = parts["initial"] + self.begin @ (rounded(q, quantum[:, None]) - parts["target"])
+        for name, pattern in (("A", self.compiled_in.A), ("B", self.compiled_in.B)):
+            parts[name] = parts[name][[value is None for row in pattern for value in row]]
+        return np.concatenate(list(parts.values()))
+
+    def follow(self, readings: ArrayLike, feedforward: ArrayLike = 0.0) -> tuple[Array, Array]:
+        """Commands and memory that the law has for given readings, called sample by sample as on a rig.
+
+        Parameters
+        ----------
+        readings : array, shape (N, readings), or (N,) of one
+            As the encoders show them.
+        feedforward : array, shape (N,), or float
+            Added to the commands before they are rounded and limited.
+
+        Returns
+        -------
+        commands, shape (N, inputs), as they arrive: `delay` samples late, where that is not whole the mean over each
+        sample; memory at each sample, shape (N, z)
+        """
+        y = np.asarray(readings, dtype=np.float64)
+        y, r = y.reshape(-1, 1) if y.ndim == 1 else y, self.signal()
+        if y.shape[1:] != (self.readings,) or self.D.ndim != 2:
+            raise BadInput(f"a law of one lane that reads {self.readings} signals was given an array of {y.shape}.")
+        w = np.hstack([y - np.asarray(self.target), r[np.minimum(np.arange(len(y)), len(r) - 1)]])
+        fed: Array = w @ self.D.T + np.reshape(np.asarray(feedforward, dtype=np.float64), (-1, 1))
+        driven, z = w @ self.B.T, np.zeros((len(y) + 1, len(self.A)))
+        if self.initial is not None:
+            z[0] = self.initial
+        if self.begin is not None:
+            z[0] += self.begin @ w[0, : self.readings]
+        sums = (np.eye(len(self.A)) == self.A).all(axis=1) & (self.windup == "hold")
+        for k in range(len(y)):
+            z[k + 1] = self.A @ z[k] + driven[k]
+            if sums.any() and (np.abs(rounded(fed[k] + self.C @ z[k], self.command_quantum)) > self.limit).any():
+                z[k + 1, sums] = z[k, sums]
+        u = np.clip(rounded(fed + z[:-1] @ self.C.T, self.command_quantum), -self.limit, self.limit)
+        if self.delay:
+            k = np.arange(len(u), dtype=np.float64)
+            u = np.column_stack([np.interp(k - self.delay, k, column, left=0.0) for column in u.T])
+        return u, z[:-1]
+
+    def over(self, names: Sequence[str], inputs: int) -> Law:
+        """The same law on readings by all these names, in their order, feeding the first of some inputs."""
+        n, m = len(names), self.signal().shape[1]
+        at = [names.index(name) for name in self.measured]
+        B, C, D = np.zeros((len(self.A), n + m)), np.zeros((inputs, len(self.A))), np.zeros((inputs, n + m))
+        B[:, [*at, *range(n, n + m)]], C[0], D[0, [*at, *range(n, n + m)]] = self.B, self.C[0], self.D[0]
+        target, begin = np.zeros(n), None if self.begin is None else np.zeros((len(self.A), n))
+        target[at] = self.target
+        if begin is not None:
+            begin[:, at] = self.begin
+        return replace(self, B=B, C=C, D=D, target=target, begin=begin, measured=tuple(names))
+
+    def in_units(self, scale: ArrayLike, offset: ArrayLike, command: float) -> Law:
+        """The same law between other units.
+
+        Parameters
+        ----------
+        scale, offset : array, shape (readings,)
+            What the law reads, by what is given: ``y_law = scale y + offset``.
+        command : float
+            Commands given out per command of the law.
+        """
+        s = np.asarray(scale, dtype=np.float64)
+        by = np.append(s, np.ones(self.D.shape[1] - s.size))
+        B, D = (M * (by[:, None] if M.ndim == 3 else by) for M in (self.B, self.D))
+        # with C scaled and the memory as it was, nothing about windup or the initial memory changes
+        return replace(
+            self, B=B, C=command * self.C, D=command * D, target=(np.asarray(self.target) - offset) / s,
+            begin=None if self.begin is None else self.begin * s, limit=abs(command) * self.limit,
+            command_quantum=abs(command) * np.asarray(self.command_quantum),
+        )  # fmt: skip
 
 
-def shared(quantum: ArrayLike, steps: ArrayLike, n: int, nu: int, rest: tuple[float, float, float]) -> Array:
-    """Encoder quanta, three numbers of the controller, room for one of the ensemble, steps of the commands."""
-    out = np.zeros(n + 4 + nu)
-    out[n : n + 3] = rest
-    for name, value, place, size in (("quantum", quantum, 0, n), ("command_quantum", steps, n + 4, nu)):
-        try:
-            out[place : place + size] = value
-        except ValueError:
-            raise BadInput(f"{name} needs one value or {size}, got {np.shape(value)}.") from None
-    return out
+def differences(coordinates: int, period: float, memory: float = 0.0) -> tuple[Array, Array, Array, Array]:
+    """A, B, C, D from readings to states, each coordinate followed by its speed, which is a difference low-passed.
+
+    ``v[k] = a v[k-1] + (1 - a) (y[k] - y[k-1])/T`` with `memory` a, from 0 (plain difference) to below 1. It remembers
+    the last readings, then, unless a is 0, the last speeds.
+    """
+    if not 0 <= memory < 1:
+        raise BadInput(f"the filter's memory must be at least 0 and below 1, got {memory:g}; 0 is no filter.")
+    if not 0 < period < math.inf:
+        raise BadInput(f"differences need a sample period in s, above zero, got {period:g}.")
+    p, one, rate = coordinates, np.eye(coordinates), (1 - memory) / period
+    A, B = np.zeros((2 * p, 2 * p)), np.vstack([one, rate * one])
+    A[p:, :p], A[p:, p:] = -rate * one, memory * one
+    C, D = np.zeros((2 * p, 2 * p)), np.zeros((2 * p, p))
+    C[1::2], D[0::2], D[1::2] = A[p:], one, rate * one
+    return (A, B, C, D) if memory else (A[:p, :p], B[:p], C[:, :p], D)
+
+
+def state_feedback(
+    K: ArrayLike, period: float, *, memory: float = 0.0, k_pf: ArrayLike | None = None, **fields: Any
+) -> Law:
+    """The law ``u = k_pf r - K [y - target, v, ...]`` with speeds from `differences`, the first of which is zero.
+
+    Parameters
+    ----------
+    K : array, shape (states,) or (inputs, states[, lanes])
+        Gains on each coordinate and its speed in turn.
+    period : float
+        Time between samples [s].
+    memory : float
+        Of the filter on differences.
+    k_pf : float or array, shape (lanes,), optional
+        Gain of a reference; without it there is none.
+    **fields
+        Further fields of the `Law`.
+    """
+    gains = np.asarray(K, dtype=np.float64)
+    gains = gains[None] if gains.ndim == 1 else gains
+    A, B, C, D = differences(gains.shape[1] // 2, period, memory)
+    remembered: Array
+    direct: Array
+    remembered, direct = (-np.einsum("us...,sy->uy...", gains, M) for M in (C, D))
+    given: dict[str, Any] = {"begin": np.eye(len(A), len(D.T)), "period": period}
+    if k_pf is not None:
+        pull = np.zeros((len(gains), 1, *np.broadcast_shapes(gains.shape[2:], np.shape(k_pf)))) + np.asarray(k_pf)
+        direct = direct[..., None] if direct.ndim < pull.ndim else direct
+        direct = np.concatenate([direct + 0.0 * pull, pull], axis=1)
+        B = np.hstack([B, np.zeros((len(B), 1))])
+        given["reference_names"] = ("reference",)
+    return Law(A, B, remembered, direct, **given | fields)
+
+
+def rounded(values: Array, step: ArrayLike) -> Array:
+    """Values as an encoder or a converter rounds them; a step of 0 is none."""
+    step = np.asarray(step, dtype=np.float64)
+    return np.where(step > 0.0, np.floor(values / np.where(step > 0.0, step, 1.0) + 0.5) * step, values)
+
+
+def _pattern(matrix: Array) -> Pattern:
+    """Which entries are 0 or 1 in every lane."""
+    lanes = matrix if matrix.ndim == 3 else matrix[..., None]
+    zero, one = ((lanes == value).all(axis=2) for value in (0.0, 1.0))
+    return tuple(
+        tuple(0.0 if z else 1.0 if o else None for z, o in zip(*both, strict=True))
+        for both in zip(zero.tolist(), one.tolist(), strict=True)
+    )

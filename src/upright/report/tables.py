@@ -79,9 +79,10 @@ def parameter_rows(fit: Fit) -> list[ParameterRow]:
 
 
 def _default(name: str) -> float:
-    from upright.identification.model.rig import ACTUATOR
 
-    return ACTUATOR[name][1] if name in ACTUATOR else 0.0
+    from upright.physics.actuator import ACTUATOR
+
+    return ACTUATOR[name].default if name in ACTUATOR else 0.0
 
 
 def without_rows(fit: Fit) -> list[ParameterRow]:

@@ -82,25 +82,6 @@ def middle(width: int, *, order: int = 4) -> Array:
     return _polynomials(width, min(order, width - 1))[0][0]
 
 
-def first_order(u: Array, keep: float) -> Array:
-    """Answer of a first-order lag to inputs (N,) held between samples, of which it keeps a share `keep` per sample.
-
-    It begins settled; ``y[i] = keep y[i - 1] + (1 - keep) u[i - 1]``, summed block by block.
-    """
-    size = 128
-    power = keep ** np.arange(size + 1.0)
-    i = np.arange(size)
-    answer = np.tril(power[np.abs(i[:, None] - i)]) * (1 - keep)
-    blocks = np.zeros((-(-(u.size - 1) // size), size))
-    blocks.ravel()[: u.size - 1] = u[:-1]
-    out = blocks @ answer.T
-    before = float(u[0])
-    for row in out:
-        row += before * power[1:]
-        before = float(row[-1])
-    return np.concatenate([u[:1], out.ravel()[: u.size - 1]])
-
-
 @cache
 def _polynomials(width: int, order: int) -> tuple[Array, Array]:
     """Coefficients (order + 1, width) of the fitted polynomial per sample, and derivatives 0 to 2 at the samples."""

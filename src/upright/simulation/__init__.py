@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-from upright.law.linear import Law
-from upright.law.rule import Rule
-from upright.simulation.kernel.actuator import ACTUATOR, ACTUATOR_DEFAULTS
+from upright.physics.actuator import ACTUATOR
+from upright.simulation.held import Held
 from upright.simulation.kernel.flavour import Flavour, choose
-from upright.simulation.parts import Held, Loop
 from upright.simulation.simulate import Ensemble, ensemble, simulate
 from upright.simulation.simulator import Simulator
 
 __all__ = [
     "ACTUATOR",
-    "ACTUATOR_DEFAULTS",
     "Ensemble",
     "Flavour",
     "Held",
-    "Law",
-    "Loop",
-    "Rule",
     "Simulator",
     "choose",
     "ensemble",

@@ -15,8 +15,8 @@ from upright.law.linear import Law
 from upright.law.rule import Rule
 from upright.physics.equations import Derived
 from upright.physics.plant import Plant
+from upright.simulation.held import Held
 from upright.simulation.kernel.flavour import choose
-from upright.simulation.parts import Held, Loop
 from upright.simulation.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -32,7 +32,7 @@ def simulate(
     samples: int,
     substeps: int = 1,
     start: ArrayLike = 0,
-    loop: Loop | Law | Rule | None = None,
+    loop: Law | Rule | None = None,
     held: Mapping[str, Held] | None = None,
     every: int = 1,
     threads: int = 1,
@@ -65,7 +65,7 @@ def simulate(
         Runge-Kutta steps per sample.
     start : int or int array, shape (lanes,)
         Sample of `u`, reference and held motion at which a lane begins: windows of one record are lanes.
-    loop : Loop, Law or Rule, optional
+    loop : Law or Rule, optional
         Sampled controller.
     held : mapping of str to Held, optional
         Coordinates whose motion is prescribed, or locked with ``Held()``.
@@ -97,7 +97,7 @@ class Ensemble:
     largest : array, shape (coordinates, lanes)
         Largest absolute value of each coordinate at the samples.
     error : array, shape (coordinates, lanes)
-        Largest distance from the target of a `Loop`, else from zero, from the time `settle` on.
+        Largest distance from the target of a `Law`, else from zero, from the time `settle` on.
     saturated : array, shape (inputs, lanes)
         Share of the samples at which the command met its limit.
     final : array, shape (states, lanes)
@@ -121,7 +121,7 @@ def ensemble(
     settle: float = 0.0,
     substeps: int = 1,
     start: ArrayLike = 0,
-    loop: Loop | Law | Rule | None = None,
+    loop: Law | Rule | None = None,
     held: Mapping[str, Held] | None = None,
     threads: int | None = None,
 ) -> Ensemble:
@@ -157,7 +157,7 @@ def _prepare(
     dt: float,
     substeps: int,
     start: ArrayLike,
-    loop: Loop | Law | Rule | None,
+    loop: Law | Rule | None,
     held: Mapping[str, Held],
     *,
     record: bool,

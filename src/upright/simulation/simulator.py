@@ -20,15 +20,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput
 from upright.law.linear import Law
-from upright.law.rule import Rule, compiling
+from upright.law.rule import Rule, Written, compiling
+from upright.physics.actuator import ACTUATOR
 from upright.physics.equations import Derived
-from upright.simulation.kernel.actuator import ACTUATOR, ACTUATOR_DEFAULTS
+from upright.simulation.held import Held
 from upright.simulation.kernel.blocks import aligned, padded, recorded, share
 from upright.simulation.kernel.compiled import kernel
 from upright.simulation.kernel.flavour import Flavour, Layout, lay_out
 from upright.simulation.kernel.lanes import room
 from upright.simulation.kernel.source import WIDTH, direct
-from upright.simulation.parts import Held, Loop
 
 Array = NDArray[np.float64]
 _NONE = np.zeros((1, 0, 0))
@@ -59,7 +59,7 @@ class Simulator:
         Sample time [s].
     substeps : int
         Runge-Kutta steps per sample.
-    loop : Loop, Law or Rule, optional
+    loop : Law or Rule, optional
         Controller, the one that the flavour was chosen for.
     held : mapping of str to Held
         Coordinates whose motion is prescribed, exactly those of the flavour.
@@ -71,7 +71,7 @@ class Simulator:
     flavour: Flavour
     dt: float
     substeps: int = 1
-    loop: Loop | Law | Rule | None = None
+    loop: Law | Rule | None = None
     held: Mapping[str, Held] = field(default_factory=dict)
     plain: bool = False
 
@@ -80,9 +80,9 @@ class Simulator:
             raise BadInput(f"the sample time must be positive, got {self.dt:g} s.")
         if self.substeps < 1:
             raise BadInput(f"substeps must be at least 1, got {self.substeps}.")
-        law = self.loop.sizes if isinstance(self.loop, Law | Rule) else None
+        law = None if self.loop is None else self.loop.compiled_in
         late = self.loop is not None and self.loop.delay > 0.0 and not self.flavour.dynamic
-        if (self.loop is not None, law) != (self.flavour.loop, self.flavour.law or self.flavour.rule) or late:
+        if law != self.flavour.loop or late:
             raise BadInput("a loop was given without a flavour for it, or the other way round; use choose(loop=...).")
         wanted = {self.derived.coordinates[i] for i in self.flavour.held}
         if set(self.held) != wanted:
@@ -91,8 +91,7 @@ class Simulator:
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the rows of `params`: the plant's parameters, then each actuator quantity for every input."""
-        actuator = [f"actuator.{a}" for a in ACTUATOR for _ in self.derived.inputs]
-        return (*self.derived.parameters, *actuator)
+        return (*self.derived.parameters, *(name for name in ACTUATOR for _ in self.derived.inputs))
 
     @cached_property
     def _layout(self) -> Layout:
@@ -116,7 +115,7 @@ class Simulator:
     @cached_property
     def _scalars(self) -> Array:
         n, nu = self._layout.n, self._layout.nu
-        return np.zeros(n + 4 + nu) if self.loop is None else self.loop.scalars(n, nu)
+        return np.zeros(n + 2 + nu) if self.loop is None else self.loop.scalars(n, nu)
 
     @cached_property
     def _reference(self) -> Array:
@@ -126,7 +125,7 @@ class Simulator:
         """Rows of `names` from values by name, shape (rows, lanes); what is missing takes its default or zero."""
         out = np.zeros((len(self.names), lanes))
         for r, name in enumerate(self.names):
-            out[r] = params.get(name, ACTUATOR_DEFAULTS.get(name.removeprefix("actuator."), 0.0))  # type: ignore[arg-type]
+            out[r] = params.get(name, ACTUATOR[name].default if name in ACTUATOR else 0.0)  # type: ignore[arg-type]
         return out
 
     def run(
@@ -190,11 +189,13 @@ class Simulator:
             raise BadInput(f"u needs shape (T, {nu}): time first, one column for each input; got {u.shape}.")
         width = 1 if lanes == 1 else WIDTH
         blocks = -(-lanes // width)
-        law = _NONE[0] if self.loop is None else self.loop.rows(n, nu, lanes)
+        law = _NONE[0] if self.loop is None else self.loop.rows(nu, lanes, x0[::2])
         P = padded(params, blocks * width, extra=len(law))
-        if f.loop:
+        if self.loop is not None:
             P[len(params) :, :lanes] = law
             P[len(params) :, lanes:] = law[:, -1:]
+            limit = self.names.index("actuator.limit")
+            P[limit : limit + nu] = np.minimum(P[limit : limit + nu], self.loop.limit)
         X0 = padded(x0, blocks * width)
         begin = np.zeros(blocks * width, np.int64)
         if start is not None:
@@ -208,13 +209,13 @@ class Simulator:
         buffer = 1
         if f.loop and f.dynamic:
             row = self.names.index("actuator.delay")
-            delays = params[row : row + nu] / self.dt + self._scalars[n + 2]
+            delays = params[row : row + nu] / self.dt + self._scalars[n]
             longest = float(np.max(delays[np.isfinite(delays)], initial=0.0))
             if longest > 1e4:
                 raise BadInput(f"a delay of {longest:g} samples is too long for a loop; is it in seconds?")
             buffer = int(max(longest, 0.0)) + 3
         scalars = self._scalars.copy()
-        scalars[n + 3] = math.ceil(settle / self.dt - 1e-9)
+        scalars[n + 1] = math.ceil(settle / self.dt - 1e-9)
         out, reduced = _NONE, _NONE[0]
         if f.record:
             out = recorded((samples, 2 * n + (nu if f.loop else 0), blocks * width), memory)
@@ -228,7 +229,7 @@ class Simulator:
 
         def step(first: int, last: int) -> None:
             W, address = aligned(size)
-            with compiling(f.rule):
+            with compiling(isinstance(f.loop, Written)):
                 compiled(first, last, *call, W, address, events)
 
         if threads <= 1 or blocks < 2 * threads:

@@ -20,8 +20,8 @@ from upright.errors import BadInput
 from upright.identification import Estimate, Fit
 from upright.identification.frequency.answer import Answer
 from upright.identification.ladder.cross_validation import CrossValidation
-from upright.identification.model.rig import ACTUATOR
 from upright.json_file import write_json
+from upright.physics.actuator import ACTUATOR
 from upright.study.load import Study
 
 FORMAT = 1
@@ -158,8 +158,8 @@ def read_fit(path: Path) -> FittedModel:
     parameters: Any = content["parameters"]
     for name, entry in parameters.items() if isinstance(parameters, dict) else ():
         value: Any = entry.get("value") if isinstance(entry, dict) else entry
-        if value is None and name in ACTUATOR and math.isinf(ACTUATOR[name][1]):
-            value = ACTUATOR[name][1]
+        if value is None and name in ACTUATOR and math.isinf(ACTUATOR[name].default):
+            value = ACTUATOR[name].default
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise BadInput(f"{path}: parameters.{name}.value must be a number, got {value!r}; identify again")
         values[name] = float(value)

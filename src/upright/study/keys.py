@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from upright.identification.model.rig import ACTUATOR
 from upright.identification.model.runs import FOR_GROUPS, PER_RUN
+from upright.physics.actuator import ACTUATOR
 
 
 class Key(NamedTuple):
@@ -124,9 +124,9 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
             Key(
                 name.partition(".")[2],
                 '"2 N/V" or a table as above' if name.endswith("gain") else "value",
-                f"{meaning}; {'none' if math.isinf(default) else f'{default:g}'} if left out",
+                f"{what.meaning}; {'none' if math.isinf(what.default) else f'{what.default:g}'} if left out",
             )
-            for name, (meaning, default) in ACTUATOR.items()
+            for name, what in ACTUATOR.items()
         ),
     ),
     "sensors": ("[sensors.COORDINATE]", _SENSOR),

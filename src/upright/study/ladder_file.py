@@ -8,8 +8,8 @@ from typing import Any
 
 from upright.identification.ladder.growth import Ladder, RungResult
 from upright.identification.ladder.rungs import neutral
-from upright.identification.model.rig import ACTUATOR
 from upright.json_file import write_json
+from upright.physics.actuator import ACTUATOR
 from upright.study.fit_file import provenance
 from upright.study.load import Study
 from upright.study.text import StudyText

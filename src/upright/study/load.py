@@ -15,10 +15,11 @@ from typing import Any
 from upright.errors import BadInput, nearest
 from upright.identification import Rig, Run
 from upright.identification.ladder.rungs import Rung
-from upright.identification.model.rig import ACTUATOR, NOISE
+from upright.identification.model.rig import NOISE
 from upright.identification.model.runs import PER_RUN
 from upright.identification.problem.predictor import with_noise
 from upright.physics import Plant
+from upright.physics.actuator import ACTUATOR
 from upright.records import Record
 from upright.study.keys import names
 from upright.study.rig import read_plant, read_rig

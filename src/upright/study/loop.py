@@ -1,38 +1,47 @@
-"""Which law closed the loop during a run? `loop` of a run, so that plant and controller are simulated together."""
+"""Law of a run from its table `loop`, so that plant and controller are simulated together."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.closed_loop import Channel, Feedback, SampledLaw, joined, recover, state_feedback
+from upright.closed_loop import Channel, ClosedLoop, Filter, joined, recover
 from upright.closed_loop.structures import memory
 from upright.errors import nearest
+from upright.law import Law, state_feedback
 from upright.physics import Plant
+from upright.records import Record
+from upright.study import expressions
 from upright.study.keys import names
-from upright.study.loop_parts import (
-    Scene,
-    columns_of,
-    every_of,
-    filter_of,
-    first_of,
-    gain,
-    gain_unit,
-    is_raw,
-    limited,
-    matching,
-    reference_of,
-    several,
-)
-from upright.study.sensors import read_sign
-from upright.study.text import Section, show
+from upright.study.rig import per
+from upright.study.sensors import Drive, Grid, Sensor, read_sign
+from upright.study.text import Section, show, si
+from upright.units import in_unit
 
 Array = NDArray[np.float64]
 KINDS = ("state", "pid", "general", "recover")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """What a loop is read against: the run's data, sensors by coordinate, drive, the command's unit and its column."""
+
+    plant: type[Plant]
+    record: Record
+    grid: Grid
+    sensors: Mapping[str, Sensor]
+    drive: Drive
+    unit: str
+    command: str
+
+    @property
+    def period(self) -> float:
+        """Time between two rows [s]."""
+        return float(self.grid.t[1] - self.grid.t[0])
 
 
 def state_units(plant: type[Plant]) -> dict[str, str]:
@@ -42,7 +51,7 @@ def state_units(plant: type[Plant]) -> dict[str, str]:
     }
 
 
-def read_loop(run: Section, scene: Scene) -> Feedback | None:
+def read_loop(run: Section, scene: Scene) -> ClosedLoop | None:
     """Law of one run with its references; None without one."""
     if "loop" not in run:
         return None
@@ -50,18 +59,15 @@ def read_loop(run: Section, scene: Scene) -> Feedback | None:
     section.check(names("loop"))
     kind = section.values.get("kind", "state")
     if kind not in KINDS:
-        raise section.error("kind", f"kind must be one of {', '.join(KINDS)}, got {show(kind)}; {_near(kind)}")
+        near = nearest(str(kind), KINDS)
+        raise section.error("kind", f"kind must be one of {', '.join(KINDS)}, got {show(kind)}; {near}")
     if kind == "recover":
         with section.text.at(section.place("kind")):
             return _recovered(section, scene)
     return {"state": _state, "pid": _pid, "general": _general}[kind](section, scene)
 
 
-def _near(kind: Any) -> str:
-    return nearest(str(kind), KINDS)
-
-
-def _state(section: Section, scene: Scene) -> Feedback:
+def _state(section: Section, scene: Scene) -> ClosedLoop:
     """``u = drive + k_pf r - K (y - offset)``."""
     gains = section.section("gains")
     states = state_units(scene.plant)
@@ -75,21 +81,19 @@ def _state(section: Section, scene: Scene) -> Feedback:
     if not 0 <= alpha < 1:
         raise section.error("alpha", f"alpha must be at least 0 and below 1, got {alpha:g}")
     every = every_of(section, scene)
-    pairs = {
-        c.name: (values.get(c.name, 0.0), values.get(f"{c.name}_dot", 0.0))
-        for c in scene.plant.coordinates
-        if c.name in values or f"{c.name}_dot" in values
-    }
-    law = state_feedback(pairs, period=scene.period / every, k_pf=k_pf, pole=alpha)
-    start = {name: first_of(scene, name) for name in law.measured}
-    channels = [Channel(measured=name, kd=pair[1]) for name, pair in pairs.items()]
-    law = limited(section, replace(law, initial=memory(channels, start)))
-    return _feedback(
-        section, law, [reference_of(section.values.get("reference", 0.0), states[first], section, scene)], scene, every
-    )
+    measured = [c.name for c in scene.plant.coordinates if c.name in values or f"{c.name}_dot" in values]
+    law = state_feedback(
+        [values.get(name, 0.0) for c in measured for name in (c, f"{c}_dot")], scene.period / every, memory=alpha,
+        k_pf=k_pf, measured=tuple(measured), begin=None,
+    )  # fmt: skip
+    # the readings before the first are taken to be those of the log's first row, the speeds zero
+    initial = np.zeros(len(law.A))
+    initial[: len(measured)] = [first_of(scene, name) for name in measured]
+    reference = reference_of(section.values.get("reference", 0.0), states[first], section, scene)
+    return _closed_loop(section, limited(section, replace(law, initial=initial)), [reference], scene, every)
 
 
-def _pid(section: Section, scene: Scene) -> Feedback:
+def _pid(section: Section, scene: Scene) -> ClosedLoop:
     """Sum of PID laws, in SI or on the log's own columns."""
     coordinates = {c.name: c.unit for c in scene.plant.coordinates}
     measured = section.names("measured", coordinates, (next(iter(coordinates)),))
@@ -128,10 +132,10 @@ def _pid(section: Section, scene: Scene) -> Feedback:
     start = {n: first_of(scene, n, raw=raw) for n in measured}
     start |= {f"reference {i + 1}": float(r[0]) for i, r in enumerate(references)}
     law = replace(joined(channels, period=period), initial=memory(channels, start))
-    return _feedback(section, limited(section, law), references, scene, every, raw=raw)
+    return _closed_loop(section, limited(section, law), references, scene, every, raw=raw)
 
 
-def _general(section: Section, scene: Scene) -> Feedback:
+def _general(section: Section, scene: Scene) -> ClosedLoop:
     """``z+ = A z + B w, u = C z + D w`` with the measured coordinates, then the references, in w."""
     coordinates = {c.name: c.unit for c in scene.plant.coordinates}
     measured = section.names("measured", coordinates, (next(iter(coordinates)),))
@@ -146,15 +150,18 @@ def _general(section: Section, scene: Scene) -> Feedback:
             matrices[key] = np.array(section.values.get(key, []), dtype=np.float64)
         except (ValueError, TypeError):
             raise section.error(key, f"{key} must be rows of numbers, such as {key} = [[1.0, 0.0]]") from None
+    A, B, C, D = (matrices[key] for key in "ABCD")
+    C, D = C.reshape(1, -1), D.reshape(1, -1)
     with section.text.at(section.place("D")):
-        law = SampledLaw(
-            A=matrices["A"], B=matrices["B"], C=matrices["C"].ravel(), D=matrices["D"].ravel(), measured=measured,
-            references=tuple(f"reference {i + 1}" for i in range(len(given))), period=scene.period / every,
+        law = Law(
+            A.reshape(C.size, C.size) if A.size == C.size**2 else np.atleast_2d(A),
+            B.reshape(C.size, D.size) if B.size == C.size * D.size else np.atleast_2d(B), C, D, measured=measured,
+            reference_names=tuple(f"reference {i + 1}" for i in range(len(given))), period=scene.period / every,
         )  # fmt: skip
-    return _feedback(section, limited(section, law), references, scene, every, raw=raw)
+    return _closed_loop(section, limited(section, law), references, scene, every, raw=raw)
 
 
-def _recovered(section: Section, scene: Scene) -> Feedback:
+def _recovered(section: Section, scene: Scene) -> ClosedLoop:
     """The law that the log itself shows."""
     coordinates = {c.name: c.unit for c in scene.plant.coordinates}
     measured = section.names("measured", coordinates, tuple(scene.sensors))
@@ -173,36 +180,131 @@ def _recovered(section: Section, scene: Scene) -> Feedback:
         )  # fmt: skip
     law = found.law
     every = matching(section, scene.period / law.period)
-    factors = tuple(found.feedforward)
+    factors = found.feedforward
     law = replace(
-        law, B=np.column_stack([law.B, np.zeros((law.C.size, len(factors)))]),
-        D=np.concatenate([law.D, [found.feedforward[f] for f in factors]]), references=(*law.references, *factors),
+        law, B=np.column_stack([law.B, np.zeros((len(law.A), len(factors)))]),
+        D=np.hstack([law.D, [list(factors.values())]]), reference_names=(*law.reference_names, *factors),
     )  # fmt: skip
-    references = [scene.grid.commands(scene.record[name]) for name in law.references]
+    references = [scene.grid.commands(scene.record[name]) for name in law.reference_names]
     names_of = {scene.sensors[n].column: n for n in measured}
     law = replace(law, measured=tuple(names_of[c] for c in law.measured))
-    feedback = _feedback(section, law, references, scene, every, raw=True)
-    return replace(feedback, told=f"loop recovered from the log: {found.structure}. {found.sentence}")
+    loop = _closed_loop(section, law, references, scene, every, raw=True)
+    return replace(loop, note=f"loop recovered from the log: {found.structure}. {found.sentence}")
 
 
-def _feedback(
-    section: Section, law: SampledLaw, references: Sequence[Array], scene: Scene, every: int, *, raw: bool = False
-) -> Feedback:
+def _closed_loop(
+    section: Section, law: Law, references: Sequence[Array], scene: Scene, every: int, *, raw: bool = False
+) -> ClosedLoop:
     """A law and its references; `raw` ones are between columns of the log."""
     factor = read_sign(section) if "sign" in section or not raw else scene.drive.sign
     if raw:
         lines = [scene.sensors[n].line(scene.record) for n in law.measured]
         zero = [float(offset) for _, offset in lines]
-        law = law.on([1 / slope for slope, _ in lines], zero, factor * scene.drive.scale, law.measured)
+        law = law.in_units([1 / slope for slope, _ in lines], zero, factor * scene.drive.scale)
     elif factor < 0:
-        law = law.on(np.ones(len(law.measured)), np.zeros(len(law.measured)), factor, law.measured)
+        law = law.in_units(np.ones(law.readings), np.zeros(law.readings), factor)
     rows = max((r.size for r in references), default=1)
-    table = [np.broadcast_to(r, rows) for r in references]
-    table += [np.ones(rows)] * (len(law.references) - len(table))
-    stacked = np.column_stack(table) if table else np.zeros((1, 0))
-    if every > 1 and rows > 1:
+    stacked = np.column_stack([np.broadcast_to(r, rows) for r in references]) if references else None
+    if stacked is not None and every > 1 and rows > 1:
         stacked = np.repeat(stacked, every, axis=0)[: (rows - 1) * every + 1]
     quantized = section.values.get("quantized", False)
     if not isinstance(quantized, bool):
         raise section.error("quantized", f"quantized must be true or false, got {show(quantized)}")
-    return Feedback(law=law, references=stacked, every=every, quantized=quantized)
+    return ClosedLoop(law=replace(law, references=stacked), every=every, quantized=quantized)
+
+
+def limited(section: Section, law: Law) -> Law:
+    """The law with what the study says about its limit, what its sums do there, and its delay."""
+    windup: Any = section.values.get("windup", "free")
+    if windup not in ("free", "hold"):
+        raise section.error("windup", f'windup must be "free" or "hold", got {show(windup)}')
+    limit = section.positive("limit", "", 1.0) if "limit" in section else np.inf
+    return replace(law, limit=limit, windup=windup, delay=section.number("delay", "1", 0.0))
+
+
+def is_raw(section: Section) -> bool:
+    """Whether gains are between the log's own columns."""
+    units = section.values.get("units", "SI")
+    if units not in ("SI", "log"):
+        raise section.error("units", f'units must be "SI" or "log", got {show(units)}')
+    return units == "log"
+
+
+def filter_of(section: Section, period: float) -> Filter:
+    """How differences are smoothed."""
+    taps: Any = section.values.get("taps", [1, 0])
+    if not isinstance(taps, list) or len(taps) != 2 or abs(sum(taps) - 1) > 1e-6:
+        raise section.error("taps", f"taps must be two numbers that sum to 1, such as [0.2, 0.8], got {show(taps)}")
+    tau = section.number("tau", "s", 0.0)
+    return Filter(pole=Filter.of(tau, period).pole, second=float(taps[1]))
+
+
+def every_of(section: Section, scene: Scene) -> int:
+    """Samples of the law per row."""
+    return matching(section, scene.period / section.positive("period", "s", 1.0)) if "period" in section else 1
+
+
+def matching(section: Section, ratio: float) -> int:
+    """Whole samples of the law per row."""
+    every = round(ratio)
+    if every < 1 or abs(ratio - every) > 0.02 * every:
+        raise section.error(
+            "period", f"the law is evaluated {ratio:.4g} times per row; it must be a whole number of times, so set the"
+            " run's own period to that of the law, or to a multiple",
+        )  # fmt: skip
+    return every
+
+
+def columns_of(section: Section, key: str) -> tuple[str, ...]:
+    """Names of columns under `key`."""
+    value: Any = section.values.get(key, [])
+    items = value if isinstance(value, list) else [value]
+    if not all(isinstance(item, str) for item in items):
+        raise section.error(key, f"{key} of a law to recover must name columns, got {show(value)}")
+    return tuple(items)
+
+
+def several(section: Section, key: str, count: int, units: Sequence[str]) -> list[float]:
+    """A gain per measured coordinate; a single number stands for the first."""
+    value: Any = section.values.get(key, 0.0)
+    items = value if isinstance(value, list) else [value]
+    if len(items) > count:
+        raise section.error(key, f"{key} has {len(items)} values for {count} measured coordinates")
+    with section.text.at(section.place(key)):
+        found = [
+            in_unit(item, unit) if unit and isinstance(item, str) else si(item, "1", key)
+            for item, unit in zip(items, units, strict=False)
+        ]
+    return found + [0.0] * (count - len(found))
+
+
+def gain_unit(unit: str, coordinate: str, time: str) -> str:
+    """Unit of a gain: of the command over that of the coordinate, of its sum or of its rate."""
+    if not unit:
+        return ""
+    return {"": per(unit, coordinate), "s": per(unit, f"{coordinate} s"), "/s": per(unit, f"{coordinate}/s")}[time]
+
+
+def first_of(scene: Scene, name: str, *, raw: bool = False) -> float:
+    """First reading of a coordinate, as the law sees it."""
+    sensor = scene.sensors.get(name)
+    if sensor is None:
+        return 0.0
+    return float(scene.record[sensor.column][0]) if raw else float(sensor.read(scene.record)[0][0])
+
+
+def gain(section: Section, key: str, above: str, below: str) -> float:
+    """A gain in the command's unit per SI of what it multiplies."""
+    value: Any = section.values[key]
+    with section.text.at(section.place(key)):
+        if isinstance(value, bool) or not isinstance(value, str | int | float):
+            raise section.error(key, f"{key} must be a number or text with a unit, got {show(value)}")
+        return in_unit(value, per(above, below)) if above else section.number(key, "")
+
+
+def reference_of(value: Any, unit: str, section: Section, scene: Scene) -> Array:
+    """One number (1,), or (N,) from a column or an expression."""
+    with section.text.at(section.place("reference")):
+        if isinstance(value, str) and not value[:1].isdigit() and value[:1] not in "+-.":
+            return scene.grid.commands(expressions.evaluate(value, scene.record.signals, scene.record.t))
+        return np.array([si(value, unit, "reference")])

@@ -8,8 +8,9 @@ from dataclasses import MISSING, fields
 from typing import Any
 
 from upright.errors import BadInput
-from upright.identification.model.rig import ACTUATOR, NEVER_NEGATIVE, Parameter, Rig
+from upright.identification.model.rig import Parameter, Rig
 from upright.physics import Plant, find
+from upright.physics.actuator import ACTUATOR
 from upright.quantities import Quantity
 from upright.study.keys import names
 from upright.study.text import Section, show, si
@@ -56,15 +57,15 @@ def read_rig(study: Section, plant: type[Plant], drive_unit: str, fixed: Mapping
         name: read(section, name, name, plant.quantity(name), lambda name=name: _default(study, plant, name))
         for name in plant.names()
     }
-    for name, (meaning, default) in ACTUATOR.items():
+    for name, number in ACTUATOR.items():
         key = name.partition(".")[2]
         what = Quantity(
-            unit=actuator_unit(plant, key, drive_unit),
-            meaning=meaning,
-            lower=0.0 if name in NEVER_NEGATIVE else -math.inf,
+            unit=actuator_unit(plant, name, drive_unit),
+            meaning=number.meaning,
+            lower=0.0 if number.never_negative else -math.inf,
             open_lower=key == "knee",
         )
-        parameters[name] = read(actuator, key, name, what, lambda default=default: default)
+        parameters[name] = read(actuator, key, name, what, lambda number=number: number.default)
     return Rig(plant=plant, parameters=parameters, substeps=study.section("rig").whole("substeps", 1))
 
 
@@ -81,18 +82,18 @@ def _default(study: Section, plant: type[Plant], name: str) -> float:
     return float(value)  # type: ignore[arg-type]
 
 
-def actuator_unit(plant: type[Plant], key: str, drive_unit: str) -> str:
+def actuator_unit(plant: type[Plant], name: str, drive_unit: str) -> str:
     """Unit of one actuator number; the gain's is the input's force per unit of the command."""
     force = plant.inputs[0].unit if plant.inputs else "1"
     place = next((c.unit for c in plant.coordinates if plant.inputs and c.name == plant.inputs[0].on), "1")
     drive = drive_unit or "1"
-    if key == "gain":
-        return force if drive == "1" else per(force, drive)
-    if key in ("offset", "limit"):
-        return drive
-    if key in ("lag", "delay", "start", "end", "relaxation"):
-        return "s"
-    return f"{place}/s" if key == "knee" else per(force, f"{place}/s")
+    return {
+        "force per command": force if drive == "1" else per(force, drive),
+        "command": drive,
+        "time": "s",
+        "speed": f"{place}/s",
+        "force per speed": per(force, f"{place}/s"),
+    }[ACTUATOR[name].unit]
 
 
 def per(above: str, below: str) -> str:
@@ -161,7 +162,7 @@ def _number(section: Section, keys: tuple[str, ...], value: Any, what: Quantity)
 
 def _checked(section: Section, keys: tuple[str, ...], name: str, value: Any, what: Quantity) -> float:
     number = _number(section, keys, value, what)
-    if not (math.isinf(number) and name in ACTUATOR and number == ACTUATOR[name][1]):
+    if not (math.isinf(number) and name in ACTUATOR and number == ACTUATOR[name].default):
         with section.text.at((*section.place(keys[0]), *keys[1:])):
             what.check(name, number)
     return number

@@ -14,8 +14,7 @@ from upright.identification.model.runs import FOR_GROUPS, PER_RUN, SPREADS
 from upright.physics import Plant
 from upright.records import Record
 from upright.study.keys import names
-from upright.study.loop import read_loop, state_units
-from upright.study.loop_parts import Scene
+from upright.study.loop import Scene, read_loop, state_units
 from upright.study.rig import known_values
 from upright.study.sensors import Array, Grid, drive_unit, read_drives, read_sensors
 from upright.study.text import Section, show, si
@@ -99,7 +98,7 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
             command=str(study.section("drive").values.get("column", "")),
         )  # fmt: skip
         loop = read_loop(run, scene)
-    notes += [*grid.told(), *record.provenance.notes, *([loop.told] if loop and loop.told else [])]
+    notes += [*grid.told(), *record.provenance.notes, *([loop.note] if loop and loop.note else [])]
     role: Any = run.choice("role", ("fit", "predict"), "fit")
     return Run(
         label=label,

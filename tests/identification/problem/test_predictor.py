@@ -17,8 +17,9 @@ from upright.identification.inference.scoring import predict
 from upright.identification.model.rig import NOISE
 from upright.identification.problem.predictor import discrete_model, gains, restart_states, with_noise
 from upright.identification.problem.residuals import Problem, formulate
+from upright.law import state_feedback
 from upright.physics import Furuta
-from upright.simulation import Loop, simulate
+from upright.simulation import simulate
 
 VALUES = {
     "m_p": 0.024, "l_cg": 0.0645, "r": 0.085, "J_d": 1.1e-4, "J_p": 3.3e-5, "b_1": 2.5e-4, "b_1c": 3e-4, "g": 9.81,
@@ -39,7 +40,7 @@ def balanced(seed: int, *, seconds: float = 8.0, push: float = 0.01, friction: f
         a * np.sin(2 * np.pi * f * t + generator.uniform(0, 6.3)) for a, f in ((0.8, 0.4), (0.8, 1.1), (0.6, 2.7))
     )
     hidden = push / np.sqrt(dt) * generator.normal(size=n)
-    law = Loop(K=[-6.0, -1.8, -30.0, -2.5], target=[0.0, np.pi], quantum=QUANTUM, alpha=1 / 1.1)
+    law = state_feedback([-6.0, -1.8, -30.0, -2.5], dt, memory=1 / 1.1, target=[0.0, np.pi], quantum=QUANTUM)
     x0 = Furuta(**PLANT).state("inverted")
     plant, drive = Furuta(**{**PLANT, "b_1c": friction}), {"actuator.gain": VALUES["actuator.gain"]}
     command = (known + hidden)[:, None]

@@ -10,7 +10,7 @@ from upright.identification.model.rig import base_values
 from upright.identification.search.friction_start import friction_from_energy, turning_points
 from upright.identification.search.inverse_start import observe, regress
 from upright.physics import Furuta, Pendulum
-from upright.signals.smoothing import dominant_period, first_order, savitzky_golay
+from upright.signals.smoothing import dominant_period, savitzky_golay
 
 
 def test_energy_lost_between_turns_gives_all_three_frictions() -> None:
@@ -57,15 +57,6 @@ def test_smoothing_polynomials_are_exact_for_polynomials() -> None:
     assert motion.q == pytest.approx(t**4 - 2 * t**2, abs=1e-10)
     assert motion.v == pytest.approx(4 * t**3 - 4 * t, abs=1e-8)
     assert motion.a == pytest.approx(12 * t**2 - 4, abs=1e-5)
-
-
-def test_first_order_lag_is_the_filter_of_scipy() -> None:
-    from scipy.signal import lfilter
-
-    for n in (1, 2, 129, 1000):
-        u = np.random.default_rng(n).normal(size=n)
-        expected = lfilter([0.0, 0.07], [1.0, -0.93], u, zi=[u[0]])[0]
-        assert first_order(u, 0.93) == pytest.approx(expected, abs=1e-12)
 
 
 def test_nothing_heavy_is_imported_to_fit() -> None:

@@ -137,7 +137,7 @@ def test_a_loop_is_found_and_simulated_with_its_gains(drafted):
     assert loop is not None
     assert 'kind = "pid"' in text
     assert "kp = 0.5," in text
-    np.testing.assert_allclose(loop.references[-1], 0.0, atol=1e-12)
+    np.testing.assert_allclose(loop.law.signal()[-1], 0.0, atol=1e-12)
 
 
 def test_a_window_ends_where_the_drive_no_longer_answers(drafted):

@@ -40,7 +40,7 @@ def law(
     upright law run.csv --command u --measured theta --reference target
     """
     from upright.closed_loop import recover
-    from upright.closed_loop.telling import as_json
+    from upright.closed_loop.recovery import as_json
     from upright.readers import read
     from upright.report.laws import save_law
 
@@ -69,7 +69,7 @@ def _print(log: Path, record: Record, found: Recovery, files: tuple[Path, ...]) 
     from rich.table import Table
 
     from upright.cli.terminal import console
-    from upright.closed_loop.telling import recovering, written
+    from upright.closed_loop.recovery import loop_recovered, loop_written
 
     screen = console()
     law = found.law
@@ -109,6 +109,6 @@ def _print(log: Path, record: Record, found: Recovery, files: tuple[Path, ...]) 
         screen.print("    upright show " + escape(log.name), soft_wrap=True)
         return
     screen.print("- simulate the loop with the plant: put one of these into the run of a study")
-    for line in (recovering(found), written(found)):
+    for line in (loop_recovered(found), loop_written(found)):
         if line:
             screen.print(f"    {escape(line)}", soft_wrap=True)

@@ -8,28 +8,7 @@ from dataclasses import MISSING, dataclass, fields, replace
 
 from upright.errors import BadInput
 from upright.physics import Plant
-
-ACTUATOR = {
-    "actuator.gain": ("force per unit of command", 1.0),
-    "actuator.offset": ("added to the command", 0.0),
-    "actuator.limit": ("largest command that passes", math.inf),
-    "actuator.lag": ("first-order lag", 0.0),
-    "actuator.delay": ("dead time", 0.0),
-    "actuator.slope": ("force lost per speed (back-EMF)", 0.0),
-    "actuator.start": ("when the drive comes alive, from the run's first sample", -math.inf),
-    "actuator.end": ("when the drive trips, from the run's first sample; no force after it", math.inf),
-    "actuator.damping": ("damping while the drive is alive and its command is not zero", 0.0),
-    "actuator.standby": ("damping until the drive trips, whatever its command", 0.0),
-    "actuator.knee": ("speed in the force's direction beyond which fade acts and braking grows no more", math.inf),
-    "actuator.fade": ("force lost per speed beyond the knee, down to no force", 0.0),
-    "actuator.relaxation": ("time in which damping and standby build up and fade", 0.0),
-}
-"""Numbers every actuator has, besides the plant's own parameters: meaning and default."""
-
-NEVER_NEGATIVE = tuple(
-    f"actuator.{a}" for a in ("limit", "lag", "delay", "damping", "standby", "knee", "fade", "relaxation")
-)
-"""Those that make no sense below zero."""
+from upright.physics.actuator import ACTUATOR
 
 NOISE = "noise."
 """Before the name of a coordinate: root of the density of a random force on it, which a Kalman filter allows for."""
@@ -111,5 +90,5 @@ def base_values(rig: Rig) -> dict[str, float]:
 
 
 def _defaults(plant: type[Plant]) -> dict[str, float]:
-    values = {n: default for n, (_, default) in ACTUATOR.items()}
+    values = {n: what.default for n, what in ACTUATOR.items()}
     return values | {f.name: float(f.default) for f in fields(plant) if f.default is not MISSING}  # type: ignore[arg-type]

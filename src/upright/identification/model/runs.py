@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.closed_loop.feedback import Feedback
+from upright.closed_loop.loop import ClosedLoop
 
 Array = NDArray[np.float64]
 
@@ -78,7 +78,7 @@ class Run:
         the state of a Kalman filter that knows the past alone; see `upright.identification.problem.predictor`.
     score_from : float
         Seconds after the first sample before which the run is simulated but not scored (a held-out tail).
-    loop : Feedback or None
+    loop : ClosedLoop or None
         The law that closed the loop, when it is simulated too.
     repeats, source : str
         Label of the runs that repeat this one, when their commands do not show it; file, window and hash.
@@ -101,7 +101,7 @@ class Run:
     horizon: float | tuple[float, ...] | None = None
     restart: Literal["smooth", "kalman"] = "smooth"
     score_from: float = 0.0
-    loop: Feedback | None = None
+    loop: ClosedLoop | None = None
     repeats: str = ""
     source: str = ""
 
@@ -137,7 +137,7 @@ class Run:
         n = int(self.t.size * share)
         if n < LEAST_RUN * share:
             return self
-        return replace(self.samples(slice(n)), loop=self.loop and self.loop.first(n))
+        return self.samples(slice(n))
 
     def samples(self, part: slice) -> Run:
         """Some of the samples; a law that closed the loop stays as it was."""

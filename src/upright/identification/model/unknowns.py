@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model.rig import NEVER_NEGATIVE, NOISE, Parameter, Rig, base_values
+from upright.identification.model.rig import NOISE, Parameter, Rig, base_values
+from upright.physics.actuator import ACTUATOR
 
 Array = NDArray[np.float64]
 
@@ -74,7 +75,7 @@ def _shared(rig: Rig, p: Parameter) -> Unknown:
     if p.name in rig.plant.names():
         q = rig.plant.quantity(p.name)
         positive = q.open_lower and q.lower == 0
-    elif p.name in (*NEVER_NEGATIVE, "actuator.slope"):
+    elif p.name == "actuator.slope" or (p.name in ACTUATOR and ACTUATOR[p.name].never_negative):
         lower = max(lower, 0.0)
         positive = p.name == "actuator.knee"
     elif p.name.startswith(NOISE):

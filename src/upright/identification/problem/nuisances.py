@@ -91,7 +91,7 @@ def _commanded(run: Run) -> NDArray[np.bool_]:
     """Samples (N,) at which something is asked of the drive; by a loop, from the first change of its reference on."""
     asked = np.asarray(run.u.any(axis=1), dtype=bool)
     if run.loop is not None:
-        r = run.loop.read(run.t.size)
+        r = run.loop.law.signal()[: run.t.size]
         changed = np.flatnonzero((r != r[:1]).any(axis=1))
         asked[int(changed[0]) if changed.size else 0 :] = True
     return asked

@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.closed_loop.feedback import Feedback
-from upright.closed_loop.preparation import finer
+from upright.closed_loop.loop import ClosedLoop, finer
 from upright.errors import BadInput
 from upright.identification.model.rig import NOISE, Rig
 from upright.identification.model.runs import Run
 from upright.identification.problem.predictor import predicted
 from upright.identification.problem.tracks import Track
+from upright.law import Law
 from upright.physics import Plant
-from upright.simulation import Held, Law, Simulator, choose
+from upright.simulation import Held, Simulator, choose
 
 Array = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ def simulator(rig: Rig, track: Track, values: Mapping[str, float | Array], free:
     held = {n: finely(h, every) for n, h in track.held.items()}
     law = None if loop is None else controller(loop, track.run, rig.plant)
     stepped = {n: v for n, v in values.items() if not n.startswith(NOISE)}
-    flavour = choose(derived, limited(stepped, loop), free=free, held=tuple(held), loop=law)
+    flavour = choose(derived, stepped, free=free, held=tuple(held), loop=law)
     return Simulator(derived=derived, flavour=flavour, dt=track.dt / every, substeps=rig.substeps, loop=law, held=held)
 
 
@@ -44,7 +44,7 @@ def motions(
         values = {n: np.tile(v, windows) if isinstance(v, np.ndarray) else v for n, v in values.items()}
     loop, start, every, u = track.run.loop, None, 1, track.u
     if loop is not None:
-        values, every, u = limited(values, loop), loop.every, np.repeat(track.u, loop.every, axis=0)
+        every, u = loop.every, np.repeat(track.u, loop.every, axis=0)
         if windows > 1:
             solver = remembering(solver, track.run, track.restarts, lanes)
     if windows > 1:
@@ -87,7 +87,7 @@ def outputs(
     return y + offsets if scales is None else y * scales + offsets
 
 
-def controller(loop: Feedback, run: Run, plant: type[Plant]) -> Law:
+def controller(loop: ClosedLoop, run: Run, plant: type[Plant]) -> Law:
     """The law on all coordinates of a plant, in their order, feeding its first input.
 
     Raises
@@ -95,42 +95,23 @@ def controller(loop: Feedback, run: Run, plant: type[Plant]) -> Law:
     BadInput
         When the law reads a coordinate that the plant does not have.
     """
-    law, names = loop.law, [c.name for c in plant.coordinates]
-    n, m, nu = law.C.size, len(law.references), len(plant.inputs)
-    for name in law.measured:
+    names = [c.name for c in plant.coordinates]
+    for name in loop.law.measured:
         if name not in names:
             raise BadInput(f"the law of run '{run.label}' reads '{name}'; {plant.__name__} has {', '.join(names)}.")
-    B, D = np.zeros((n, len(names) + m)), np.zeros((nu, len(names) + m))
-    C = np.zeros((nu, n))
-    C[0] = law.C
-    for j, name in enumerate(law.measured):
-        B[:, names.index(name)], D[0, names.index(name)] = law.B[:, j], law.D[j]
-    B[:, len(names) :], D[0, len(names) :] = law.B[:, len(law.measured) :], law.D[len(law.measured) :]
-    quantum, step = np.zeros(len(names)), 0.0
-    if loop.quantized:
-        for name, resolution in zip(run.measured, run.quantum, strict=False):
-            quantum[names.index(name)] = resolution
-        step = law.quantum
-    references = np.vstack([loop.references, loop.references])[: max(2, len(loop.references))]
-    return Law(
-        A=law.A, B=B, C=C, D=D, references=references if m else None, quantum=quantum, delay=law.delay,
-        command_quantum=step, initial=law.initial, windup=law.windup,
-    )  # fmt: skip
-
-
-def limited(values: Mapping[str, float | Array], loop: Feedback | None) -> Mapping[str, float | Array]:
-    """Parameters with the law's limit where the actuator's own is wider."""
-    if loop is None or not np.isfinite(loop.law.limit):
-        return values
-    return {**values, "actuator.limit": np.minimum(values.get("actuator.limit", np.inf), loop.law.limit)}
+    law = loop.law.over(names, len(plant.inputs))
+    if not loop.quantized:
+        return replace(law, command_quantum=0.0)
+    steps = dict(zip(run.measured, run.quantum, strict=False))
+    return replace(law, quantum=[steps.get(name, 0.0) for name in names])
 
 
 def remembering(solver: Simulator, run: Run, restarts: NDArray[np.int64], lanes: int) -> Simulator:
     """A solver whose law starts each window with the memory that the recorded motion had given it by then."""
-    if run.loop is None or not isinstance(solver.loop, Law) or not run.loop.law.C.size:
+    if run.loop is None or not isinstance(solver.loop, Law) or not len(run.loop.law.A):
         return solver
     _, z = run.loop.follow(run.y, run.measured)
-    return replace(solver, loop=replace(solver.loop, initial=np.repeat(z[restarts].T, lanes, axis=1)))
+    return replace(solver, loop=replace(solver.loop, initial=np.repeat(z[restarts].T, lanes, axis=1), begin=None))
 
 
 def finely(held: Held, every: int) -> Held:

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.model.rig import Rig
-from upright.identification.search.drive_force import drive_force
 from upright.identification.search.inverse_start import Sample
 from upright.physics.equations import evaluate
 from upright.signals.turning import turning_points
+from upright.simulation.drive import drive_force
 
 Array = NDArray[np.float64]
 

@@ -18,7 +18,6 @@ from upright.identification.model.runs import Run
 from upright.identification.model.unknowns import Unknown, shared_unknowns
 from upright.identification.problem.normal_equations import Normal, finite
 from upright.identification.search.descent import descend
-from upright.identification.search.drive_force import drive_force
 from upright.physics.equations import mass_and_force
 from upright.physics.plant import Plant
 from upright.signals.smoothing import (
@@ -28,6 +27,7 @@ from upright.signals.smoothing import (
     smoothing_width,
     spread,
 )
+from upright.simulation.drive import drive_force
 
 Array = NDArray[np.float64]
 
@@ -100,7 +100,8 @@ def samples_of(
         k = -(-run.t.size // most)
         thin = run
         if k > 1:
-            thin = replace(run.samples(slice(None, None, k)), loop=run.loop and run.loop.thinned(k))
+            loop = run.loop and replace(run.loop, every=k * run.loop.every)
+            thin = replace(run.samples(slice(None, None, k)), loop=loop)
         sample = observe(rig, thin, flips=flips, turns=turns)
         if sample is not None:
             found.append(sample)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from upright.design import spelled_out
 from upright.design.lqr import locus
 from upright.design.requests import written
 from upright.lab.designing.run import Designed, VelocityLoop
@@ -131,7 +132,7 @@ def as_json(done: Designed) -> dict[str, Any]:
         "peak_command_sampled": _finite(done.peak_sampled),
         "chance_over_the_fit": done.chance,
         "law": {
-            **{name: getattr(done.law, name).tolist() for name in "ABCD"},
+            **{name: matrix.tolist() for name, matrix in spelled_out(done.law).items()},
             "inputs": "readings, readings at rest, reference",
         },
         "verdict": done.verdict,
@@ -171,7 +172,7 @@ def next_steps(done: Designed, source: str, folder: str) -> list[Step]:
                  command="upright identify STUDY.toml -o OUT && upright design OUT/fit.json")
         )  # fmt: skip
     steps.append(
-        Step(sentence=f"Simulate it: simulation.Law takes A, B, C and D of law in {folder}/design.json, its "
+        Step(sentence=f"Simulate it: upright.law.Law takes A, B, C and D of law in {folder}/design.json, its "
              "references being the positions at rest and then the reference.")
     )  # fmt: skip
     return steps

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright import design
-from upright.design import Estimator, Feedback, Margins, Placement, Sampled
+from upright.design import Estimator, Margins, Placement, Sampled
 from upright.design.loop import closed, command_noise, swing
 from upright.design.lqr import motion
 from upright.design.requests import poles_of
 from upright.design.sampled import to_s
 from upright.errors import BadInput
 from upright.lab.identified import IdentifiedRig
+from upright.law import Law
 from upright.physics import Linear
 
 Array = NDArray[np.float64]
@@ -80,7 +81,7 @@ class Designed:
     placement: Placement | None
     sampled_gains: Array | None
     R: float | None
-    law: Feedback
+    law: Law
     poles: Roots
     ways: tuple[VelocityLoop, ...]
     k_pf: float | None
@@ -182,7 +183,7 @@ def design_for(rig: IdentifiedRig, wish: DesignRequest) -> Designed:
     )  # fmt: skip
 
 
-def _peak(sampled: Sampled, law: Feedback, start: Array, seconds: float) -> float:
+def _peak(sampled: Sampled, law: Law, start: Array, seconds: float) -> float:
     """Largest command of the loop as it runs; infinite when it falls."""
     if np.abs(poles_of(closed(sampled, law))).max() >= 1:
         return math.inf
@@ -236,7 +237,7 @@ def _velocity_loop(
     )
 
 
-def _cloud(rig: IdentifiedRig, wish: DesignRequest, nominal: Sampled, law: Feedback) -> tuple[Roots, float | None]:
+def _cloud(rig: IdentifiedRig, wish: DesignRequest, nominal: Sampled, law: Law) -> tuple[Roots, float | None]:
     """Poles [1/s] of the loop with these gains on every rig that the fit allows, and the share that stands."""
     rows = [
         poles_of(closed(design.hold(m, wish.period, nominal.delay, nominal.lag), law)) for m in rig.spread(wish.at)

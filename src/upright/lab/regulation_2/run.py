@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from upright import design
 from upright.control import Rig, Score, Trial, score, trial
 from upright.control.preflight import Preflight, Task, preflight, word
-from upright.design import Feedback, Margins, Placement, Sampled
+from upright.design import Margins, Placement, Sampled
 from upright.design.loop import closed, command_noise
 from upright.design.requests import poles_of, read_poles
 from upright.errors import BadInput
@@ -25,6 +25,7 @@ from upright.lab.designing.run import SPEEDS, velocities
 from upright.lab.frequency_1b.run import run_frequency
 from upright.lab.identified import IdentifiedRig, read_identified
 from upright.lab.makes import PENDULUMS
+from upright.law import Law
 from upright.paper.tables import TABLE_1
 from upright.physics import Linear
 from upright.progress import Progress, silent
@@ -63,7 +64,7 @@ class Attempt:
 
     name: str
     placement: Placement
-    law: Feedback
+    law: Law
     before: Preflight
     after: Trial | None
     score: Score | None

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from upright import design
 from upright.control import Rig
-from upright.design import Feedback
+from upright.design.loop import closed
 from upright.design.requests import conjugate_poles, poles_of
 from upright.design.sampled import to_s
 from upright.errors import BadInput
+from upright.law import Law
 from upright.paper.tables import TABLE_2, poles
 from upright.physics import Linear
-from upright.simulation import Law
 
 Array = NDArray[np.float64]
 Roots = NDArray[np.complex128]
@@ -45,7 +45,7 @@ class Tracker:
         Gains [command per m or rad, and per m/s or rad/s].
     k_pf : float
         Gain of the reference [command per m or rad].
-    law : Feedback or Law
+    law : Law
     poles : array
         Poles [1/s] of the sampled loop on the rig of the design, those that die within three samples left out.
     asked : array
@@ -59,7 +59,7 @@ class Tracker:
     name: str
     K: Array
     k_pf: float
-    law: Feedback | Law
+    law: Law
     poles: Roots
     asked: Roots
     stiffness: float
@@ -86,7 +86,7 @@ def tracker(rig: Rig, name: str, K: Array, k_pf: float, *, asked: Roots | None =
     )  # fmt: skip
 
 
-def state_law(rig: Rig, K: Array, k_pf: float) -> Feedback:
+def state_law(rig: Rig, K: Array, k_pf: float) -> Law:
     """The matrices of gains on differenced encoders."""
     sampled = design.hold(rig.linear(AT), rig.period, 0.0)
     return design.feedback(design.filtered(sampled, MEMORY), K, k_pf)
@@ -145,25 +145,23 @@ def with_sum(rig: Rig, base: Tracker, name: str) -> Tracker:
     k_pf = K[n] / EXTRA  # the sum's gain is -K[n]
     plain = tracker(rig, name, K[:n], k_pf, asked=np.append(base.asked, EXTRA))
     law = state_law(rig, K[:n], k_pf)
-    z, seen = law.A.shape[0], [*range(c), 2 * c]  # readings at rest are zero and left out
+    z = law.A.shape[0]
     inner = np.zeros((z + 1, z + 1))
     inner[:z, :z], inner[z, z] = law.A, 1.0
     into = np.zeros((z + 1, c + 1))
-    into[:z], into[z, c - 1], into[z, c] = law.B[:, seen], -rig.period, rig.period
-    summed = Law(inner, into, np.hstack([law.C, [[-K[n]]]]), law.D[:, seen], references=np.zeros((1, 1)), windup="hold")
+    into[:z], into[z, c - 1], into[z, c] = law.B, -rig.period, rig.period
+    summed = Law(
+        inner, into, np.hstack([law.C, [[-K[n]]]]), law.D, reference_names=law.reference_names, windup="hold"
+    )  # fmt: skip
     return replace(plain, law=summed, poles=loop_poles(rig, summed), play=0.0)
 
 
-def closed_by(rig: Rig, law: Feedback | Law) -> Array:
+def closed_by(rig: Rig, law: Law) -> Array:
     """Matrix of the sampled loop of a law on a rig, about rest; dry friction and rounding left out."""
-    sampled = design.hold(rig.linear(AT), rig.period, rig.delay / rig.period, rig.lag)
-    c = len(rig.plant.coordinates)
-    A, B, C, D = (np.asarray(getattr(law, n), dtype=np.float64) for n in "ABCD")
-    top = np.hstack([sampled.A + sampled.B @ D[:, :c] @ sampled.C, sampled.B @ C])
-    return np.vstack([top, np.hstack([B[:, :c] @ sampled.C, A])])
+    return closed(design.hold(rig.linear(AT), rig.period, rig.delay / rig.period, rig.lag), law)
 
 
-def loop_poles(rig: Rig, law: Feedback | Law) -> Roots:
+def loop_poles(rig: Rig, law: Law) -> Roots:
     """Poles [1/s] of that loop, those that die within three samples left out."""
     s = to_s(poles_of(closed_by(rig, law)), rig.period)
     return s[s.real > -SLOW / rig.period]

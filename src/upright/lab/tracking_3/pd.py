@@ -17,8 +17,9 @@ from upright.control.steps import step_figures
 from upright.control.trial import SUBSTEPS, at_work
 from upright.errors import BadInput
 from upright.lab.tracking_3.laws import AT, MEMORY, Tracker, closed_by, state_law, tracker
+from upright.law import Law
 from upright.physics import Linear
-from upright.simulation import Law, simulate
+from upright.simulation import simulate
 
 Array = NDArray[np.float64]
 
@@ -77,10 +78,10 @@ def tried(rig: Rig, pairs: Array, step: float) -> Array:
     estimator = design.filtered(design.hold(rig.linear(AT), rig.period, 0.0), MEMORY)
     laws = [design.feedback(estimator, _gains(rig, 0, kp, kd), kp) for kp, kd in pairs.tolist()]
     A, B, C, D = (np.stack([getattr(law, n) for law in laws], axis=-1) for n in "ABCD")
-    many = Law(A, B, C, D, references=np.append(np.zeros(c), step)[None])
+    many = Law(A, B, C, D, references=np.array([step]))
     count = round(DWELL / rig.period)
     start = rig.plant.state(AT)
-    given = at_work(rig, many, start, np.zeros(c))
+    given = at_work(rig, many, np.zeros(c))
     x = simulate(
         rig.plant, rig.drive, start, None, rig.period, samples=count, substeps=SUBSTEPS, loop=given
     )[:, 2 * c - 2]  # fmt: skip

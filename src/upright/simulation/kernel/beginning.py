@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from upright.simulation.kernel.actuator import ACTUATOR
+from upright.physics.actuator import ACTUATOR
 from upright.simulation.kernel.drive import begin
 from upright.simulation.kernel.writer import Writer
 
@@ -43,28 +43,20 @@ def start(w: Writer) -> None:
         if f.dynamic:
             _actuator(w, j, first)
     law = first + len(ACTUATOR) * p.nu
-    if f.law is not None or f.rule is not None:
-        w.add(*(f"{{{name}}} = P[{law + r}, _m]" for r, name in enumerate(p.numbers)))
-    elif f.loop:
-        row = law
-        for name in (
-            [f"K{j}_{i}" for j in range(p.nu) for i in range(2 * p.n)] + [f"tg{i}" for i in range(p.n)] + ["kr"]
-        ):
-            w.add(f"{{{name}}} = P[{row}, _m]")
-            row += 1
+    w.add(*(f"{{{name}}} = P[{law + r}, _m]" for r, name in enumerate(p.numbers)))
 
 
 def _actuator(w: Writer, j: int, first: int) -> None:
     """Lag, delay and slope of input `j`; the lag starts from what the input was before."""
     p, loop, nu = w.p, w.p.flavour.loop, w.p.nu
-    row = {name: first + k * nu + j for k, name in enumerate(ACTUATOR)}
+    row = {name.removeprefix("actuator."): first + k * nu + j for k, name in enumerate(ACTUATOR)}
     w.add(
         f"{{_sl{j}}} = P[{row['slope']}, _m]",
         f"_tau = P[{row['lag']}, _m]",
         "_x = _h / _tau if _tau > 0.0 else 1e300",
         f"{{e{j}}} = exp(-_x)",
         f"{{th{j}}} = 1.0 / _x",
-        f"_z = P[{row['delay']}, _m] / _dt" + (f" + FL[{p.n + 2}]" if loop else ""),
+        f"_z = P[{row['delay']}, _m] / _dt" + (f" + FL[{p.n}]" if loop else ""),
         "if not (abs(_z) < 1e6) or not (_tau == _tau):",
         "    {q0} = nan",
         "    _z = 0.0",

@@ -6,18 +6,17 @@ A flavour is what is fixed when a kernel is compiled; everything else (parameter
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
 from upright.errors import BadInput, nearest
-from upright.law.linear import Law
+from upright.law.linear import Law, Structure
 from upright.law.rule import Rule, Written
+from upright.physics.actuator import ACTUATOR
 from upright.physics.equations import Derived
-from upright.simulation.kernel.actuator import ACTUATOR, ACTUATOR_DEFAULTS
-from upright.simulation.parts import Loop
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,12 +45,8 @@ class Flavour:
         Its braking builds up and fades.
     curve : bool
         The drive's force falls beyond a speed.
-    loop : bool
-        A sampled controller computes the input.
-    law : tuple of int, optional
-        States and references of the controller when it is a `Law`.
-    rule : Written, optional
-        The controller when it is a `Rule`.
+    loop : Structure or Written, optional
+        What is compiled in of the `Law` or `Rule` that computes the input.
     record : bool
         The motion is returned, not only what it reduces to.
     """
@@ -66,10 +61,8 @@ class Flavour:
     damping: bool = False
     relaxation: bool = False
     curve: bool = False
-    loop: bool = False
-    law: tuple[int, int] | None = None
+    loop: Structure | Written | None = None
     record: bool = True
-    rule: Written | None = field(default=None, repr=False)  # its text stands in the kernel as it is
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,20 +112,15 @@ class Layout:
 
     @cached_property
     def numbers(self) -> tuple[str, ...]:
-        """Names of a law's numbers, matrix by matrix and row by row, then its state."""
-        if self.flavour.rule is not None:
-            return self.flavour.rule.numbers
-        states, references = self.flavour.law or (0, 0)
-        z, u, w = range(states), range(self.nu), range(self.n + references)
-        sizes = (("A", z, z), ("B", z, w), ("C", u, z), ("D", u, w))
-        return tuple(
-            [f"l{c}{i}_{j}" for c, rows, columns in sizes for i in rows for j in columns] + [f"z{i}" for i in z]
-        )
-
-    @cached_property
-    def references(self) -> int:
-        """Number of references of a law or rule."""
-        return self.flavour.rule.references if self.flavour.rule else (self.flavour.law or (0, 0))[1]
+        """Names of a controller's numbers, as its `rows` come."""
+        law = self.flavour.loop
+        if not isinstance(law, Structure):
+            return law.numbers if law else ()
+        z, u, w = range(len(law.A)), range(self.nu), range(self.n + law.references)
+        names = [f"lA{i}_{j}" for i in z for j in z if law.A[i][j] is None]
+        names += [f"lB{i}_{j}" for i in z for j in w if law.B[i][j] is None]
+        names += [f"l{c}{i}_{j}" for c, columns in (("C", z), ("D", w)) for i in u for j in columns]
+        return (*names, *(f"z{i}" for i in z), *(f"tg{i}" for i in range(self.n)))
 
     @cached_property
     def rows(self) -> dict[str, int]:
@@ -148,11 +136,7 @@ class Layout:
             more += ["csa", "csm", "csb"] * (f.damping and f.curve)
             more += ["bk", "vp", "rt", "re", "rh", "bka", "bkm", "bkb"] * f.relaxation
             names += [f"{c}{j}" for c in more for j in nu]
-        if f.law is not None or f.rule is not None:
-            names += [*self.numbers, *(f"ref{c}" for c in range(self.references))]
-        elif f.loop:
-            names += [f"{c}{i}" for c in ("yp", "vf", "tg") for i in n]
-            names += [f"K{j}_{i}" for j in nu for i in range(2 * self.n)] + ["kr", "ref"]
+        names += [*self.numbers, *(f"ref{c}" for c in range(f.loop.references if f.loop else 0))]
         if not f.record:
             names += [f"{c}{i}" for c in ("mx", "er") for i in n] + [f"{c}{j}" for c in ("sat",) for j in nu]
         names += [f"h{c}{i}{s}" for i in f.held for s in "amb" for c in "qva"] + [f"hb{i}" for i in f.held]
@@ -161,7 +145,7 @@ class Layout:
 
 @lru_cache(maxsize=64)
 def _known(derived: Derived) -> frozenset[str]:
-    return frozenset({*derived.parameters, *(f"actuator.{a}" for a in ACTUATOR)})
+    return frozenset({*derived.parameters, *ACTUATOR})
 
 
 @lru_cache(maxsize=64)
@@ -176,7 +160,7 @@ def choose(
     *,
     free: Collection[str] = (),
     held: Collection[str] = (),
-    loop: bool | Loop | Law | Rule | None = False,
+    loop: Law | Rule | None = None,
     record: bool = True,
 ) -> Flavour:
     """Smallest flavour that computes what `params` ask for.
@@ -191,8 +175,8 @@ def choose(
         Parameters that will be varied later, so that their terms stay in although they are zero now.
     held : collection of str
         Coordinates whose motion is prescribed.
-    loop : bool, Loop, Law or Rule, optional
-        Controller that computes the input; True stands for a `Loop` without delay.
+    loop : Law or Rule, optional
+        Controller that computes the input.
     record : bool
         The motion is returned.
 
@@ -212,7 +196,7 @@ def choose(
     def on(name: str) -> bool:
         if not name or name in free:
             return bool(name)
-        idle = ACTUATOR_DEFAULTS.get(name.removeprefix("actuator."), 0.0)
+        idle = ACTUATOR[name].default if name in ACTUATOR else 0.0
         value = params.get(name, idle)
         return value != idle if isinstance(value, float) else bool(np.any(np.asarray(value) != idle))
 
@@ -230,13 +214,11 @@ def choose(
         stribeck=tuple(j.coordinate for j in rough if on(j.stribeck_speed)),
         drag=tuple(j.coordinate for j in moving if on(j.quadratic)),
         held=tuple(i for i, c in enumerate(derived.coordinates) if c in held),
-        dynamic=dynamic or gate or damping or curve or (not isinstance(loop, bool | None) and loop.delay > 0.0),
+        dynamic=dynamic or gate or damping or curve or (loop is not None and loop.delay > 0.0),
         gate=gate,
         damping=damping,
         relaxation=relaxation,
         curve=curve,
-        loop=loop is not None and loop is not False,
-        law=loop.sizes if isinstance(loop, Law) else None,
-        rule=loop.sizes if isinstance(loop, Rule) else None,
+        loop=None if loop is None else loop.compiled_in,
         record=record,
     )

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from upright.law.linear import Structure
+from upright.law.rule import Written
 from upright.simulation.kernel.drive import commanded
 from upright.simulation.kernel.writer import Writer
 
@@ -62,7 +66,7 @@ def controller(w: Writer) -> None:
     w.depth -= 1
     w.add(*(f"_quantum{i} = FL[{i}]" for i in range(n)))
     w.add(*(f"_per{i} = 1.0 / _quantum{i} if _quantum{i} > 0.0 else 0.0" for i in range(n)))
-    (_rule if f.rule is not None else _gains if f.law is None else _law)(w)
+    (_law if isinstance(f.loop, Structure) else _rule)(w)
     if f.dynamic:
         w.depth -= 1
         w.lanes()
@@ -92,41 +96,16 @@ def _put(w: Writer, j: int) -> None:
     w.add(f"{{ua{j}}} = _c")
 
 
-def _gains(w: Writer) -> None:
-    """Differentiators and gains, `Loop`."""
-    p, n = w.p, w.p.n
-    w.add("if R.shape[0] > 0:")
-    w.depth += 1
-    w.lanes()
-    w.add("{ref} = R[min(max(START[_base + _i] + _k, 0), R.shape[0] - 1)]")
-    w.depth -= 2
-    w.add(f"_alpha, _true = FL[{n}], FL[{n + 1}]", "_rate = (1.0 - _alpha) / _dt if _k > 0 else 0.0")
-    w.lanes()
-    for i in range(n):
-        _encoder(w, i)
-        w.add(
-            f"_d{i} = _alpha * {{vf{i}}} + _rate * (_y{i} - {{yp{i}}})",
-            f"{{vf{i}}} = _d{i}",
-            f"{{yp{i}}} = _y{i}",
-            f"_d{i} = {{v{i}}} if _true > 0.0 else _d{i}",
-            f"_y{i} = _y{i} - {{tg{i}}}",
-        )
-    for j in range(p.nu):
-        feedback = " + ".join(f"{{K{j}_{2 * i}}} * _y{i} + {{K{j}_{2 * i + 1}}} * _d{i}" for i in range(n))
-        w.add(f"_c = {{ff{j}}} + {{kr}} * {{ref}} - ({feedback})")
-        _put(w, j)
-
-
 def _read(w: Writer) -> None:
     """References of this sample; steps of the converters; then, lane by lane, what the encoders show."""
-    p = w.p
-    if p.references:
+    p, law = w.p, w.p.flavour.loop
+    if law and law.references:
         w.lanes()
         w.add("_m = min(max(START[_base + _i] + _k, 0), R.shape[0] - 1)")
-        w.add(*(f"{{ref{c}}} = R[_m, {c}]" for c in range(p.references)))
+        w.add(*(f"{{ref{c}}} = R[_m, {c}]" for c in range(law.references)))
         w.depth -= 1
     for j in range(p.nu):
-        w.add(f"_step{j} = FL[{p.n + 4 + j}]", f"_steps{j} = 1.0 / _step{j} if _step{j} > 0.0 else 0.0")
+        w.add(f"_step{j} = FL[{p.n + 2 + j}]", f"_steps{j} = 1.0 / _step{j} if _step{j} > 0.0 else 0.0")
     w.lanes()
     for i in range(p.n):
         _encoder(w, i)
@@ -139,8 +118,8 @@ def _converted(j: int) -> tuple[str, str]:
 
 def _rule(w: Writer) -> None:
     """A controller given as a function, `Rule`."""
-    p, rule = w.p, w.p.flavour.rule
-    assert rule is not None  # asked before
+    p, rule = w.p, w.p.flavour.loop
+    assert isinstance(rule, Written)  # asked before
     _read(w)
     names = (
         [f"_y{i}" for i in range(p.n)],
@@ -158,26 +137,28 @@ def _rule(w: Writer) -> None:
 
 
 def _law(w: Writer) -> None:
-    """A controller with a state of its own, `Law`."""
-    p, n = w.p, w.p.n
-    states, references = p.flavour.law or (0, 0)
-    w.add(f"_freeze = FL[{n + 1}]")
+    """A linear controller with a state of its own, `Law`; what is 0 or 1 of its A and B is not computed."""
+    p, law = w.p, w.p.flavour.loop
+    assert isinstance(law, Structure)  # asked before
     _read(w)
-    signals = [f"_y{i}" for i in range(n)] + [f"{{ref{c}}}" for c in range(references)]
+    w.add(*(f"_y{i} = _y{i} - {{tg{i}}}" for i in range(p.n)))
+    memory = [f"{{z{i}}}" for i in range(len(law.A))]
+    signals = [f"_y{i}" for i in range(p.n)] + [f"{{ref{c}}}" for c in range(law.references)]
 
-    def combined(of: str, row: int, by: str) -> str:
-        terms = [f"{{l{of}{row}_{i}}} * {{z{i}}}" for i in range(states)]
-        return " + ".join(terms + [f"{{l{by}{row}_{i}}} * {name}" for i, name in enumerate(signals)])
+    def terms(of: str, row: int, values: list[str], known: Sequence[float | None]) -> list[str]:
+        factors = ["" if k == 1 else f"{{l{of}{row}_{i}}} * " for i, k in enumerate(known)]
+        return [f + x for f, x, k in zip(factors, values, known, strict=True) if k != 0]
 
-    w.add("_over = 0.0")
+    w.add(*["_over = 0.0"] * law.hold)
     for j in range(p.nu):
-        w.add(
-            f"_c = {{ff{j}}} + {combined('C', j, 'D')}",
-            *_converted(j),
-            f"_over = _freeze if abs(_c) > {{lim{j}}} else _over",
-        )
+        both = terms("C", j, memory, [None] * len(memory)) + terms("D", j, signals, [None] * len(signals))
+        w.add(f"_c = {' + '.join([f'{{ff{j}}}', *both])}", *_converted(j))
+        w.add(*[f"_over = 1.0 if abs(_c) > {{lim{j}}} else _over"] * law.hold)
         _put(w, j)
-    w.add(*(f"_z{i} = {combined('A', i, 'B')}" for i in range(states)))
-    for i in range(states):  # at the limit sums stand still; what differences and filters remember goes on
-        adds_up = " & ".join(f"({{lA{i}_{j}}} == {float(i == j)})" for j in range(states))
-        w.add(f"_z = {{z{i}}}", f"{{z{i}}} = _z if (_over != 0.0) & {adds_up} else _z{i}")
+    for i, (a, b) in enumerate(zip(law.A, law.B, strict=True)):
+        w.add(f"_z{i} = {' + '.join(terms('A', i, memory, a) + terms('B', i, signals, b)) or '0.0'}")
+    for i, row in enumerate(law.A):  # at the limit sums stand still; what differences and filters remember goes on
+        if law.hold and all(k in (None, float(i == j)) for j, k in enumerate(row)):
+            sums = "".join(f" & ({{lA{i}_{j}}} == {float(i == j)})" for j, k in enumerate(row) if k is None)
+            w.add(f"_z = {{z{i}}}", f"_z{i} = _z if (_over != 0.0){sums} else _z{i}")
+        w.add(f"{{z{i}}} = _z{i}")

@@ -79,10 +79,10 @@ def _record(w: Writer) -> None:
 
 def _reduce(w: Writer) -> None:
     p, n = w.p, w.p.n
-    w.add(f"_on = 1.0 if _k >= FL[{n + 3}] else 0.0")
+    w.add(f"_on = 1.0 if _k >= FL[{n + 1}] else 0.0")
     w.lanes()
     for i in range(n):
-        goal = f" - {{tg{i}}}" if p.flavour.loop and p.flavour.law is None and p.flavour.rule is None else ""
+        goal = f" - {{tg{i}}}" if f"tg{i}" in p.rows else ""
         w.add(f"_c = abs({{q{i}}})", f"_z = {{mx{i}}}", f"{{mx{i}}} = _c if _c > _z else _z")
         w.add(f"_c = abs({{q{i}}}{goal}) * _on", f"_z = {{er{i}}}", f"{{er{i}}} = _c if _c > _z else _z")
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from functools import cache
 
+from upright.law.rule import Written
 from upright.simulation.kernel.equations import ELEMENTARY, acceleration, step, terms
 from upright.simulation.kernel.events import events
 from upright.simulation.kernel.flavour import Layout
@@ -72,7 +73,7 @@ def source(p: Layout) -> str:
     """Text of the module that steps one plant in one flavour."""
     parts = [HEAD.format(name=p.derived.name, flavour=p.flavour), "" if p.plain else DIRECT]
     parts += [ELEMENTARY, acceleration(p), step(p)]
-    parts += [f"@inline_strict\n{p.flavour.rule.text}\n"] if p.flavour.rule else []
+    parts += [f"@inline_strict\n{p.flavour.loop.text}\n"] if isinstance(p.flavour.loop, Written) else []
     if p.flavour.dry:
         parts += [terms(p, places(p)), events(p)]
     return "\n\n".join([*parts, run(p, 1), run(p, WIDTH)])
