@@ -10,8 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from upright.lab.tracking_3 import run as tracking
-from upright.lab.tracking_3.figures import steps_figure
-from upright.lab.tracking_3.parts import frame, trace
+from upright.lab.tracking_3.figures import frame, steps_figure, trace
 from upright.report.drawing import save
 
 seed = int(sys.argv[1]) if sys.argv[1:] else 0

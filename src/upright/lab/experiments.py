@@ -11,7 +11,7 @@ from upright.errors import BadInput
 from upright.lab.rigs.makes import Make
 from upright.lab.weighing_1a.run import Known
 from upright.progress import Progress
-from upright.report.chapter import Chapter
+from upright.report.page import Chapter
 from upright.report.symbols import typed
 
 

@@ -12,8 +12,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from upright.report.chapter import Chapter
-from upright.report.storing import as_plain, from_plain
+from upright.report.page import Chapter
+from upright.report.store import as_plain, from_plain, replace_file
 
 FILE = "chapter.json"
 
@@ -37,9 +37,7 @@ def made_of(*parts: object, needs: Iterable[str] = ()) -> str:
 def keep(folder: Path, digest: str, chapter: Chapter) -> None:
     """Write a finished chapter into its experiment's folder; whole or not at all."""
     content = {"made_of": digest, "chapter": as_plain(chapter)}
-    half = folder / f".{FILE}.part"
-    half.write_text(json.dumps(content, ensure_ascii=False, allow_nan=False), encoding="utf-8")
-    half.replace(folder / FILE)
+    replace_file(folder / FILE, json.dumps(content, ensure_ascii=False, allow_nan=False).encode())
 
 
 def kept(folder: Path, digest: str) -> Chapter | None:

@@ -14,7 +14,7 @@ from upright.lab.experiments import EXPERIMENTS, Experiment, Task
 from upright.lab.kept import keep, kept, made_of
 from upright.lab.rigs.makes import Make, make_rig
 from upright.progress import Progress
-from upright.report.chapter import Chapter
+from upright.report.page import Chapter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -216,7 +216,4 @@ def _one(
 
 
 def _failed(e: Experiment, why: str) -> Chapter:
-    return Chapter(
-        key=e.key, title=e.title, question="", verdict="This experiment could not be finished.", detail=why,
-        sound=False, parts=(),
-    )  # fmt: skip
+    return Chapter(key=e.key, title=e.title, verdict="This experiment could not be finished.", detail=why, sound=False)

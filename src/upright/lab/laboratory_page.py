@@ -1,8 +1,9 @@
-"""How is a session in the laboratory reported, for a reader and for another program?"""
+"""A session in the laboratory as one report, and as plain values for another program."""
 
 from __future__ import annotations
 
 import platform
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -10,9 +11,8 @@ from typing import Any
 from upright import __version__
 from upright.lab.experiments import EXPERIMENTS
 from upright.lab.laboratory import Session
-from upright.report.advice import Step
-from upright.report.book import Book, Told
-from upright.report.storing import finite
+from upright.report.book import Book
+from upright.report.page import Step
 from upright.report.symbols import typed
 
 TITLE = "The laboratory: identify it hanging, hold it upright"
@@ -38,7 +38,7 @@ def book(session: Session, day: date) -> Book:
             ("Again", command(session)),
         ),
         chapters=tuple(
-            Told(chapter=t.chapter, rig=t.rig, finished=t.state in ("done", "kept")) for t in session.told
+            replace(t.chapter, about=t.rig, finished=t.state in ("done", "kept")) for t in session.told
         ),
         notes=tuple(notes),
         missing=tuple((e.key, e.title) for e in session.missing),
@@ -77,7 +77,7 @@ def next_steps(session: Session) -> tuple[Step, ...]:
 
 
 def summary(session: Session, report: Path, pdf: Path | None) -> dict[str, Any]:
-    """The session as plain values for another program: SI, finite."""
+    """The session as plain values for another program: SI."""
     return {
         "seed": session.seed,
         "rig": session.make or None,
@@ -97,7 +97,7 @@ def summary(session: Session, report: Path, pdf: Path | None) -> dict[str, Any]:
                 "sound": t.chapter.sound,
                 "verdict": t.chapter.verdict,
                 "detail": t.chapter.detail,
-                "numbers": finite(t.chapter.numbers),
+                "numbers": t.chapter.numbers,
                 "steps": [s.command for s in t.chapter.steps if s.command],
             }
             for t in session.told

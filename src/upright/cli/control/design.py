@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from upright.cli.terminal import Pdf, tell, write_json, write_page
 from upright.errors import BadInput, nearest
 
 if TYPE_CHECKING:
-    from upright.lab.designing.run import Designed
     from upright.lab.rigs.rig_file import RigFile
 
 
@@ -40,6 +39,7 @@ def design(
     sampled: Annotated[bool, typer.Option("--sampled", help="Gains whose sampled loop has the poles asked.")] = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the rigs drawn from the fit's covariance.")] = 0,
     out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="For design.json and .html.")] = Path(),
+    pdf: Pdf = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print design.json instead of tables.")] = False,
 ) -> None:
     """Find the gains that hold a rig, and say what they are worth in the loop that a computer runs.
@@ -51,9 +51,10 @@ def design(
     upright design out/fit.json --at inverted --poles "-4.15+-1.63j, -16.9, -3.2"
     """
     from upright.design.requests import read_poles
-    from upright.lab.designing import page as design_page
+    from upright.lab.designing.chapter import chapter
     from upright.lab.designing.run import Wish, design_for
     from upright.lab.rigs.rig_file import read_rig_file
+    from upright.report.symbols import typed
     from upright.units import parse
 
     if out.exists() and not out.is_dir():
@@ -83,15 +84,9 @@ def design(
         sampled=sampled,
     )
     done = design_for(rig, wish)
-    out.mkdir(parents=True, exist_ok=True)
-    content = design_page.as_json(done)
-    text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
-    (out / "design.json").write_text(text + "\n", encoding="utf-8")
-    page = design_page.write(done, out / "design.html", str(source))
-    if as_json:
-        typer.echo(text)
-        return
-    _say(done, (out / "design.json", page), source)
+    told = chapter(done, source=typed(source), folder=typed(out))
+    files = [write_json(out / "design.json", told.numbers), *write_page(told, out / "design.html", pdf)]
+    tell(told, files, told.numbers if as_json else None)
 
 
 def _numbers(text: str) -> tuple[float, ...]:
@@ -144,30 +139,3 @@ def _start(rig: RigFile, text: str) -> tuple[float, ...]:
     if not any(values.values()):
         raise BadInput("--start must leave the equilibrium; give one state a value that is not 0.")
     return tuple(values.values())
-
-
-def _say(done: Designed, files: tuple[Path, Path], source: Path) -> None:
-    from rich.markup import escape
-
-    from upright.cli.terminal import console, on_terminal, typed
-    from upright.lab.designing import page as design_page
-
-    screen = console()
-    for table in (design_page.gain_table(done), design_page.pole_table(done), design_page.way_table(done)):
-        screen.print(on_terminal(table))
-    if done.placement is not None:
-        screen.print(
-            f"\nFarthest pole from where it was asked: {done.placement.miss:.1g} 1/s. {done.placement.sentence}",
-            soft_wrap=True, markup=False,
-        )  # fmt: skip
-    if done.R is not None:
-        screen.print(f"\nWeight of the effort: {done.R:.4g}", soft_wrap=True)
-    if done.chance is not None:
-        screen.print(f"Of the rigs that the fit allows, {100 * done.chance:.1f} % stand with these gains.")
-    screen.print(f"\n[bold]Verdict[/bold]: {escape(done.verdict)}", soft_wrap=True)
-    screen.print(f"\nWritten: {escape(', '.join(str(f) for f in files))}", soft_wrap=True)
-    screen.print("What next:", style="bold")
-    for step in design_page.next_steps(done, typed(source), typed(files[0].parent)):
-        screen.print(f"- {step.sentence}", soft_wrap=True, markup=False)
-        if step.command:
-            screen.print(f"    {step.command}", soft_wrap=True, markup=False)

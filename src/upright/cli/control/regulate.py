@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
+from upright.cli.terminal import Pdf, progress_bar, tell, write_page
 from upright.errors import BadInput
 
 if TYPE_CHECKING:
-    from upright.lab.regulation_2.run import Regulation, Wish
+    from upright.lab.regulation_2.run import Wish
     from upright.lab.rigs.makes import Make
     from upright.lab.rigs.rig_file import RigFile
 
@@ -34,6 +34,7 @@ def regulate(
     out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="For logs and report.")] = Path(
         "upright-regulate"
     ),
+    pdf: Pdf = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON instead of tables.")] = False,
 ) -> None:
     r"""Hold an identified rig upright; say beforehand what each pole set will come to, then run it.
@@ -46,23 +47,21 @@ def regulate(
     upright regulate --rig furuta --seed 3
     upright regulate out/fit.json --seed 3 --set 2 --tilt "20 deg"
     """
-    from upright.cli.terminal import step_bar
-    from upright.lab.regulation_2 import chapter as regulation_page
     from upright.lab.regulation_2 import run as regulation
+    from upright.lab.regulation_2.chapter import chapter
     from upright.lab.rigs.makes import make_rig
     from upright.lab.rigs.rig_file import read_rig_file
-    from upright.report.chapter import write_chapter
     from upright.report.symbols import typed
 
     if out.exists() and not out.is_dir():
         raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
     wish = _wish(which, poles, speed, memory, tilt, push, seconds)
-    with step_bar(quiet=as_json) as tell:
+    with progress_bar(quiet=as_json) as bar:
         file: RigFile
         if source is None:
             make, seed = cast("Make", rig or "furuta"), seed or 0
-            tell("identifying the hanging twin", 0.0)
-            file = regulation.identified(make, seed, out / "identified", lambda step, share: tell(step, 0.6 * share))
+            bar("identifying the hanging twin", 0.0)
+            file = regulation.identified(make, seed, out / "identified", lambda step, share: bar(step, 0.6 * share))
             name = f"--rig {make}"
         else:
             file, name = read_rig_file(source, seed=seed or 0), typed(source)
@@ -72,16 +71,13 @@ def regulate(
         truth = None if seed is None else make_rig(make, seed)
         base = 0.6 if source is None else 0.0
         done = regulation.run(
-            file, truth, seed or 0, out, lambda step, share: tell(step, base + (1 - base) * share), wish=wish,
+            file, truth, seed or 0, out, lambda step, share: bar(step, base + (1 - base) * share), wish=wish,
             source=name,
         )  # fmt: skip
-        chapter = regulation_page.chapter(done)
-        report = write_chapter(out / "report.html", chapter)
-    if as_json:
-        content: dict[str, Any] = {**chapter.numbers, "verdict": chapter.verdict, "report": str(report)}
-        typer.echo(json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False))
-        return
-    _say(done, chapter, report)
+    told = chapter(done)
+    files = write_page(told, out / "report.html", pdf)
+    numbers = {**told.numbers, "verdict": told.verdict, "report": str(files[0])}
+    tell(told, files, numbers if as_json else None)
 
 
 def _wish(which: str, poles: str, speed: str, memory: float, tilt: str, push: str, seconds: float) -> Wish:
@@ -98,25 +94,3 @@ def _wish(which: str, poles: str, speed: str, memory: float, tilt: str, push: st
         poles={n: read_poles(t) for n, t in texts.items()}, speed=speed, memory=memory, seconds=seconds,
         tilt=parse(tilt, "rad") if tilt else None, push=parse(push, "rad/s") if push else None,
     )  # fmt: skip
-
-
-def _say(done: Regulation, chapter: Any, report: Path) -> None:
-    from rich.markup import escape
-
-    from upright.cli.terminal import console, on_terminal
-    from upright.lab.regulation_2 import chapter as regulation_page
-    from upright.lab.regulation_2 import sentences as regulation_told
-
-    screen = console()
-    tables = [regulation_page.gain_table(done), regulation_page.told_table(done)]
-    for table in tables + ([regulation_page.way_table(done)] if done.ways else []):
-        screen.print(on_terminal(table))
-    screen.print()
-    for a in done.attempts:
-        screen.print(f"- {escape(regulation_told.sentence(done, a))}", soft_wrap=True)
-    screen.print(f"\n[bold]Verdict[/bold]: {escape(chapter.verdict)} {escape(chapter.detail)}", soft_wrap=True)
-    screen.print(f"\nReport: {escape(str(report))} (open it in a browser)\nWhat next:", soft_wrap=True)
-    for step in chapter.steps:
-        screen.print(f"- {step.sentence}", soft_wrap=True, markup=False)
-        if step.command:
-            screen.print(f"    {step.command}", soft_wrap=True, markup=False)

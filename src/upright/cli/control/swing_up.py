@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from upright.cli.terminal import Pdf, tell, write_json, write_page
 from upright.errors import BadInput, nearest
 
 if TYPE_CHECKING:
@@ -35,6 +35,7 @@ def swing_up(
         typer.Option(metavar="LOG", help="Only say what this log of a hanging, driven rig tells of its encoders."),
     ] = None,
     out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Logs, page, JSON.")] = Path("swing-up"),
+    pdf: Pdf = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the numbers instead of sentences.")] = False,
 ) -> None:
     """Swing a hanging pendulum up within the drive's limit and travel, and catch it; its encoders are asked first.
@@ -49,13 +50,12 @@ def swing_up(
 
     upright swing-up out/fit.json --check swings.csv
     """
-    from upright.cli.terminal import typed
     from upright.lab.rigs.believed import believed, make_of
     from upright.lab.rigs.makes import make_rig
     from upright.lab.rigs.rig_file import read_rig_file
-    from upright.lab.swing_up_2b import chapter as swing_up_page
     from upright.lab.swing_up_2b import run as experiment
-    from upright.report.chapter import write_chapter
+    from upright.lab.swing_up_2b.chapter import chapter
+    from upright.report.symbols import typed
 
     if out.exists() and not out.is_dir():
         raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
@@ -72,7 +72,7 @@ def swing_up(
             raise BadInput(f"the fit is of the make {make}, and --rig says {rig}; leave --rig out.")
         model = believed(file)
     if check is not None:
-        _check(model, check, known, out, as_json, typed(source) if source else "FIT.json")
+        _check(model, check, known, out, pdf, as_json, typed(source) if source else "FIT.json")
         return
     done = experiment.run(
         model,
@@ -84,30 +84,22 @@ def swing_up(
         travel=travel,
         source=typed(source) if source else "",
     )
-    told = swing_up_page.chapter(done)
-    page = write_chapter(out / "swing_up.html", told)
-    text = json.dumps(told.numbers, indent=2, ensure_ascii=False, allow_nan=False)
-    (out / "swing_up.json").write_text(text + "\n", encoding="utf-8")
-    if as_json:
-        typer.echo(text)
-    else:
-        _say(done.check.verdict, told.verdict, page, [(s.sentence, s.command) for s in told.steps])
+    told = chapter(done)
+    files = [*write_page(told, out / "swing_up.html", pdf), write_json(out / "swing_up.json", told.numbers)]
+    tell(told, files, told.numbers if as_json else None)
     if not done.caught:
         raise typer.Exit(3)
 
 
-def _check(model: Rig, log: Path, known: Mapping[str, float] | None, out: Path, as_json: bool, source: str) -> None:
+def _check(
+    model: Rig, log: Path, known: Mapping[str, float] | None, out: Path, pdf: bool, as_json: bool, source: str
+) -> None:
     from upright.lab.rigs.encoders import asked
-    from upright.lab.swing_up_2b import chapter as swing_up_page
+    from upright.lab.swing_up_2b.chapter import check_chapter
     from upright.readers import read
-    from upright.report.chapter import write_chapter
 
-    told = swing_up_page.check_chapter(model, asked(model, read(log), known), log.name, source)
-    page = write_chapter(out / "encoders.html", told)
-    if as_json:
-        typer.echo(json.dumps(told.numbers, indent=2, ensure_ascii=False, allow_nan=False))
-    else:
-        _say(told.verdict, "", page, [(s.sentence, s.command) for s in told.steps])
+    told = check_chapter(model, asked(model, read(log), known), log.name, source)
+    tell(told, write_page(told, out / "encoders.html", pdf), told.numbers if as_json else None)
     if not told.sound:
         raise typer.Exit(3)
 
@@ -129,15 +121,3 @@ def _lying(rig: Rig, text: str) -> Rig:
     if not 0.01 <= abs(factor) <= 100:
         raise BadInput(f"--lie needs a factor between 0.01 and 100, or negative for swapped channels, got '{value}'.")
     return replace(rig, scales=tuple(factor if n == name else 1.0 for n in names))
-
-
-def _say(sensors: str, verdict: str, page: Path, steps: list[tuple[str, str]]) -> None:
-    from upright.cli.terminal import console
-
-    screen = console()
-    screen.print(f"Encoders: {sensors}", soft_wrap=True, markup=False)
-    if verdict:
-        screen.print(f"\nVerdict: {verdict}", soft_wrap=True, markup=False)
-    screen.print(f"\nReport: {page}\nWhat next:", soft_wrap=True, markup=False)
-    for sentence, command in steps:
-        screen.print(f"- {sentence}\n    {command}", soft_wrap=True, markup=False)

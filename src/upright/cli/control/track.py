@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from upright.cli.terminal import Pdf, progress_bar, tell, write_json, write_page
 from upright.errors import BadInput
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from upright.control import Rig
-    from upright.lab.tracking_3.run import Tracking
     from upright.lab.tracking_3.shaft import Kind
-    from upright.report.advice import Step
 
 INTERRUPTED = 130
 
@@ -37,6 +33,7 @@ def track(
         float | None, typer.Option(metavar="U", help="Largest command; the make's own if left out.")
     ] = None,
     out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for all files.")] = Path("track"),
+    pdf: Pdf = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print track.json instead of tables.")] = False,
 ) -> None:
     r"""Make the far inertia of a flexible shaft follow a step (experiment 3).
@@ -49,12 +46,9 @@ def track(
     upright track --rig torsional --seed 3 -o out
     upright track out/fit.json --set 4 --step "6 mm"
     """
-    from upright.cli.terminal import progress_line
     from upright.design.requests import read_poles
     from upright.lab.tracking_3 import run as tracking
     from upright.lab.tracking_3.chapter import chapter
-    from upright.lab.tracking_3.tables import as_json as content_of
-    from upright.report.chapter import write_chapter
     from upright.units import parse
 
     if out.exists() and not out.is_dir():
@@ -65,30 +59,20 @@ def track(
     size = parse(step, "rad" if kind == "torsional" else "m") if step else None
     if size is not None and not size > 0:
         raise BadInput(f"--step needs a size above 0, got '{step}'.")
-    with progress_line(quiet=as_json) as line:
-
-        def tell(stage: str, share: float) -> None:
-            if line is not None:
-                line(stage, share, float("nan"), 0)
-
+    with progress_bar(quiet=as_json) as bar:
         if model is None:
             from upright.lab.rigs.makes import make_rig
 
             twin = make_rig(kind, seed)
             twin = twin if limit is None else replace(twin, limit=limit)
-            done = tracking.run(twin, seed, out, tell, which=which, poles=own, step=size)
+            done = tracking.run(twin, seed, out, bar, which=which, poles=own, step=size)
         else:
-            done = tracking.follow(model, model, source or out, None, None, tell, which=which, poles=own, step=size)
+            done = tracking.follow(model, model, source or out, None, None, bar, which=which, poles=own, step=size)
     told = chapter(done)
-    out.mkdir(parents=True, exist_ok=True)
-    text = json.dumps(content_of(done) | {"verdict": told.verdict}, indent=2, ensure_ascii=False, allow_nan=False)
-    (out / "track.json").write_text(text + "\n", encoding="utf-8")
-    titled = replace(told, title=f"Experiment 3: {told.title.lower()}, {done.rig.name}")
-    page = write_chapter(out / "track.html", titled)
-    if as_json:
-        typer.echo(text)
-    else:
-        _say(done, told.verdict, (out / "track.json", page), told.steps)
+    told = replace(told, title=f"Experiment 3: {told.title.lower()}, {done.rig.name}")
+    numbers = {**told.numbers, "verdict": told.verdict}
+    files = [write_json(out / "track.json", numbers), *write_page(told, out / "track.html", pdf)]
+    tell(told, files, numbers if as_json else None)
     if done.interrupted:
         raise typer.Exit(INTERRUPTED)
 
@@ -112,24 +96,3 @@ def _kind(source: Path | None, make: str, limit: float | None) -> tuple[Kind, Ri
         if kind == make:
             return kind, None
     raise BadInput(f"--rig is {' or '.join(KINDS)}, got '{make}'.")
-
-
-def _say(done: Tracking, verdict: str, files: tuple[Path, Path], steps: Sequence[Step]) -> None:
-    from rich.markup import escape
-
-    from upright.cli.terminal import console, on_terminal
-    from upright.lab.tracking_3 import tables
-
-    screen = console()
-    if done.fit is not None:
-        screen.print(on_terminal(tables.fit_table(done)))
-    for table in (tables.gain_table(done), tables.step_table(done)):
-        screen.print(on_terminal(table))
-    if done.pd is not None:
-        screen.print(on_terminal(tables.friction_table(done)))
-    screen.print(f"\n[bold]Verdict[/bold]: {escape(verdict)}", soft_wrap=True)
-    screen.print(f"\nWritten: {escape(', '.join(str(f) for f in files))}", soft_wrap=True)
-    screen.print("What next:", style="bold")
-    for s in steps:
-        screen.print(f"- {s.sentence}", soft_wrap=True, markup=False)
-        screen.print(f"    {s.command}", soft_wrap=True, markup=False)

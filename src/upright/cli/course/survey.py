@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import math
 import re
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
+from upright.cli.terminal import Pdf, tell, write_page
 from upright.errors import BadInput
 
 
@@ -20,6 +19,7 @@ def survey(
     ] = None,
     scale: Annotated[str, typer.Option(metavar="LOW-HIGH", help="Scale of the ratings.")] = "1-4",
     out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for the report.")] = Path("survey"),
+    pdf: Pdf = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON instead of tables.")] = False,
 ) -> None:
     r"""Evaluate ratings before and after a course and agreement with statements; check printed summaries.
@@ -31,8 +31,10 @@ def survey(
     upright survey ratings.csv -o out
     upright survey means.csv --n 53
     """
+    from upright.report.page import Step
+    from upright.report.symbols import typed
     from upright.survey import Ratings, read
-    from upright.survey.page import told, write_survey
+    from upright.survey.chapter import chapter
 
     if out.exists() and not out.is_dir():
         raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
@@ -46,45 +48,10 @@ def survey(
             raise BadInput(f"--n is for printed summaries; '{file.name}' holds single answers, which are counted.")
     elif n is None:
         raise BadInput(f"'{file.name}' holds printed numbers; say with --n how many answers they are said to rest on.")
-    content = told(sheet, answers=n, scale=limits)
-    title = f"Survey: {file.stem.replace('_', ' ')}"
-    data = content.pop("data")
-    page = write_survey(content, out, title=title, source=file.name)
-    if as_json:
-        whole = {"sentences": content["sentences"], "notes": content["notes"], "report": str(page), "found": data}
-        typer.echo(json.dumps(_finite(whole), indent=2, ensure_ascii=False, allow_nan=False))
-        return
-    _print(content, page, file, n)
-
-
-def _finite(value: Any) -> Any:
-    """The same with null for what is not a finite number."""
-    if isinstance(value, dict):
-        return {str(k): _finite(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(v) for v in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _print(content: dict[str, Any], page: Path, file: Path, n: int | None) -> None:
-    from rich.markup import escape
-    from rich.table import Table
-
-    from upright.cli.terminal import console, typed
-
-    screen = console()
-    for told in content["tables"]:
-        table = Table(title=told["caption"], title_justify="left", box=None, pad_edge=False, header_style="bold")
-        for i, heading in enumerate(told["head"]):
-            table.add_column(heading, justify="left" if i == 0 else "right")
-        for row in told["rows"]:
-            table.add_row(*(escape(cell) for cell in row))
-        screen.print(table)
-        screen.print()
-    for sentence in (*content["sentences"], *(f"Note: {note}" for note in content["notes"])):
-        screen.print(f"- {sentence}", soft_wrap=True, markup=False)
-    screen.print(f"\nReport: {page}\nWhat next:", soft_wrap=True, markup=False)
-    screen.print("- hand the numbers on", soft_wrap=True)
-    screen.print(
-        f"    upright survey {typed(file)}{'' if n is None else f' --n {n}'} --json", soft_wrap=True, markup=False
-    )
+    again = f"upright survey {typed(file)}{'' if n is None else f' --n {n}'} --json"
+    told = chapter(
+        sheet, title=f"Survey: {file.stem.replace('_', ' ')}", source=file.name, answers=n, scale=limits,
+        steps=(Step(sentence="Hand the numbers on.", command=again),),
+    )  # fmt: skip
+    written = write_page(told, out / "report.html", pdf)
+    tell(told, written, {**told.numbers, "report": str(written[0])} if as_json else None)

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from upright.cli.terminal import Pdf, progress_bar, search_told, tell, write_page
 from upright.errors import BadInput
+
+if TYPE_CHECKING:
+    from upright.study.load import Study
 
 INTERRUPTED, NOT_TRUSTED = 130, 3
 METHODS = ("auto", "simplex", "least-squares")
@@ -39,6 +43,7 @@ def identify(
     method: Annotated[str, typer.Option(metavar="METHOD", help=f"How to search: {', '.join(METHODS)}.")] = "auto",
     as_json: Annotated[bool, typer.Option("--json", help="Print fit.json instead of tables.")] = False,
     report: Annotated[bool, typer.Option(help="Write report.html as well.")] = True,
+    pdf: Pdf = False,
     keys: Annotated[
         bool, typer.Option("--keys", help="Print every key a study may have.", callback=_keys, is_eager=True)
     ] = False,
@@ -77,14 +82,14 @@ def identify(
         gain = { guess = "2 N/V" }
 
     All keys: `upright identify --keys`, or docs/study.md.
-    Writes OUT/fit.json and OUT/report.html.
+    Writes OUT/fit.json and OUT/report.html (and OUT/report.pdf with --pdf).
     Ctrl-C keeps the best so far and writes it.
     --hold-out each predicts every run from a fit of the others as well.
     Exit code: 0 a fit was written (3 with --strict when its verdict is not to
     trust it), 2 the study or a log is wrong, 130 stopped by Ctrl-C.
     """
-    from upright.cli.terminal import print_fit, progress_line, typed
     from upright.errors import nearest
+    from upright.report.symbols import typed
 
     if method not in METHODS:
         raise BadInput(f"--method must be one of {', '.join(METHODS)}, got '{method}'; {nearest(method, METHODS)}")
@@ -114,37 +119,38 @@ def identify(
     from upright.identification.ladder.crossval import cross_validate
     from upright.study.fit_file import write_fit
 
-    with progress_line(quiet=as_json) as progress:
-        fit = estimate(asked.rig, asked.runs, method=method, progress=progress)
+    with progress_bar(quiet=as_json) as bar:
+        fit = estimate(asked.rig, asked.runs, method=method, progress=search_told(bar))
     written = [folder / "fit.json"]
     content = write_fit(fit, asked, written[0])
     crossed = None
     if each and not fit.interrupted:
-        with progress_line(quiet=as_json) as progress:
-            crossed = cross_validate(fit, asked.runs, progress=progress)
+        with progress_bar(quiet=as_json) as bar:
+            crossed = cross_validate(fit, asked.runs, progress=search_told(bar))
         content = write_fit(fit, asked, written[0], crossed)
-    if report:
-        written += _report(fit, folder, asked, crossed)
+    from upright.report.fit.chapter import chapter
+
+    told = chapter(
+        fit, title=asked.title or asked.path.stem.replace("_", " "), provenance=provenance(asked), crossed=crossed,
+        study=typed(study) + (f" --data {typed(data)}" if data is not None else ""), folder=typed(folder),
+    )  # fmt: skip
+    if report or pdf:
+        written += write_page(told, folder / "report.html", pdf)
     if as_json:
         typer.echo(json.dumps(content, indent=2, ensure_ascii=False))
     else:
-        again = typed(study) + (f" --data {typed(data)}" if data is not None else "")
-        print_fit(fit, written, again, crossed)
+        tell(told, written)
     if fit.interrupted or (crossed is not None and crossed.interrupted):
         raise typer.Exit(INTERRUPTED)
     if strict and not fit.trusted:
         raise typer.Exit(NOT_TRUSTED)
 
 
-def _report(fit: Any, folder: Path, asked: Any, crossed: Any) -> list[Path]:
-    """Write report.html."""
-    from upright.report.document import write_fit_report
-
-    provenance: dict[str, object] = {
+def provenance(asked: Study) -> dict[str, object]:
+    """Where the numbers of a study come from."""
+    return {
         "study": asked.path.name,
         "sha256 of the study": asked.sha256,
         "data": asked.source or "not stated",
         "runs": {run.label: run.source for run in asked.runs},
     }
-    title = asked.title or asked.path.stem.replace("_", " ")
-    return [write_fit_report(fit, folder, title=title, provenance=provenance, crossed=crossed)]

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from upright.cli.terminal import tell
 from upright.errors import BadInput
 
 
@@ -32,7 +33,8 @@ def predict(
 
     upright predict swing-fit/fit.json other_day.toml
     """
-    from upright.cli.terminal import console, print_scores
+    from upright.report.fit.tables import score_table
+    from upright.report.page import Chapter, Part
     from upright.study.fit_file import read_fit
     from upright.study.load import load_study
 
@@ -67,12 +69,13 @@ def predict(
         },
     }
     text = json.dumps(content, indent=2, ensure_ascii=False)
-    if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        (out / "prediction.json").write_text(text + "\n", encoding="utf-8")
+    written = [] if out is None else [out / "prediction.json"]
+    for path in written:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text + "\n", encoding="utf-8")
     if as_json:
         typer.echo(text)
         return
-    print_scores(scores)
-    if not fitted.trusted:
-        console().print(f"\nThe model's own verdict was: {fitted.verdict}", soft_wrap=True, markup=False)
+    explained = Part(title="How much of each signal is explained", content=(score_table(scores),))
+    doubt = () if fitted.trusted else (f"The model's own verdict was: {fitted.verdict}",)
+    tell(Chapter(title=f"{model.name} on {study.name}", verdict="", parts=(explained,), warnings=doubt), written)

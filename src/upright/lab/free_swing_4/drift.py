@@ -9,11 +9,11 @@ of level gives gravity a lever; a soft spring to ground, which the paper suggest
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.lab.free_swing_4.figures import Wander
 from upright.lab.rigs.twin import Release, Twin, motion
 from upright.physics import Furuta
 
@@ -25,6 +25,33 @@ PUSH = {"psi": 0.15, "x": 0.05}
 """Speed that a careless hand gives disk [rad/s] or cart [m/s]."""
 SPRING = {"psi": 0.04, "x": 20.0}
 """Soft anchoring spring [N m/rad or N/m]; the disk alone would swing on it at a third of the pendulum's frequency."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Wander:
+    """Path of one disk, or cart, after a release.
+
+    Attributes
+    ----------
+    name : str
+        What was done to the rig.
+    remedy : bool
+        Whether the spring was on.
+    t, psi, centre : (N,) arrays
+        Time [s], angle [rad] or place [m], and the line about which it swings.
+    slope : float
+        Drift [rad/s or m/s]: slope of the straight line closest to the path.
+    end : float
+        Where it is in the last seconds, from where it was at the release.
+    """
+
+    name: str
+    remedy: bool
+    t: Array
+    psi: Array
+    centre: Array
+    slope: float
+    end: float
 
 
 def wander(name: str, rig: Twin, release: Release | None = None, *, seconds: float, remedy: bool = False) -> Wander:

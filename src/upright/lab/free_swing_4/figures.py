@@ -1,12 +1,13 @@
-"""What did an experiment show beyond a fit: paths of the disk, the way of the energy, estimates beside a truth?"""
+"""Pictures of experiment 4: paths of the disk, the way of the energy, estimates beside the truth."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from upright.lab.free_swing_4.drift import Wander
+from upright.lab.free_swing_4.studies import Recovered
 from upright.report.drawing import (
     BLUE,
     CYCLE,
@@ -25,45 +26,6 @@ from upright.report.symbols import mathtext, plain
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Wander:
-    """Path of one disk, or cart, after a release.
-
-    Attributes
-    ----------
-    name : str
-        What was done to the rig.
-    remedy : bool
-        Whether the spring was on.
-    t, psi, centre : (N,) arrays
-        Time [s], angle [rad] or place [m], and the line about which it swings.
-    slope : float
-        Drift [rad/s or m/s]: slope of the straight line closest to the path.
-    end : float
-        Where it is in the last seconds, from where it was at the release.
-    """
-
-    name: str
-    remedy: bool
-    t: Array
-    psi: Array
-    centre: Array
-    slope: float
-    end: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class Recovered:
-    """One number: truth of the twin, what the fit says, and whether the truth lies in its interval."""
-
-    name: str
-    unit: str
-    truth: float
-    value: float
-    interval: tuple[float, float]
-    inside: bool
 
 
 @styled

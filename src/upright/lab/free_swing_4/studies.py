@@ -14,7 +14,6 @@ import numpy as np
 
 from upright.identification.model.model import Fit
 from upright.lab.free_swing_4.drift import SPRING, TILT, anchored
-from upright.lab.free_swing_4.figures import Recovered
 from upright.lab.rigs.twin import MOTOR_AND_BELT, Release, Twin, acquire
 from upright.lab.weighing_1a.run import Known
 from upright.progress import Progress
@@ -46,6 +45,18 @@ class Answer:
     question: Question
     study: Study
     fit: Fit
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recovered:
+    """One number: truth of the twin, what the fit says, and whether the truth lies in its interval."""
+
+    name: str
+    unit: str
+    truth: float
+    value: float
+    interval: tuple[float, float]
+    inside: bool
 
 
 def logs(rig: Twin) -> dict[str, Record]:

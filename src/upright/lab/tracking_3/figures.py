@@ -1,4 +1,4 @@
-"""How do steps, efforts and poles of experiment 3 look?"""
+"""Pictures of experiment 3: steps, efforts, poles, and what PD control can have."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.lab.tracking_3.run import Tracking
+from upright.lab.tracking_3.trials import BEFORE, DWELL, Outcome
 from upright.report.drawing import (
     BLACK,
     BLUE,
@@ -60,6 +62,26 @@ class Frame:
     limit: float
     command: str
     push: float = math.inf
+
+
+def frame(done: Tracking) -> Frame:
+    """What the pictures of all runs share."""
+    names = done.rig.plant.coordinates
+    return Frame(
+        near=names[0].name, far=names[-1].name, of=names[-1].unit, step=done.step.size, limit=done.rig.limit,
+        command=done.rig.unit, push=DWELL,
+    )  # fmt: skip
+
+
+def trace(o: Outcome) -> Trace:
+    """What encoders and command showed, up to a trip."""
+    run = o.found
+    record = run.trial.record
+    kept = record.t <= run.tripped
+    near, far = record.outputs[0], record.outputs[-1]
+    return Trace(
+        name=o.law.name, t=record.t[kept] - BEFORE, near=record[near][kept], far=record[far][kept], u=record["u"][kept]
+    )
 
 
 @styled

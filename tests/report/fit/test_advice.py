@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from upright.identification.model.model import Estimate
-from upright.report.advice import next_steps
+from upright.report.fit.advice import next_steps
 
 
 def said(fit, **more):

@@ -1,27 +1,19 @@
-"""What should be done next, and with which command?"""
+"""What to do after a fit, and with which command: what would make it wrong first, what would better it last."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from upright.identification.model.model import Fit
 from upright.identification.model.nuisance_names import SPREADS
-from upright.report.figures import autocorrelation
+from upright.report.fit.figures import autocorrelation
+from upright.report.page import Step
 from upright.report.symbols import percent, plain
 
 FOLLOWED = 80.0
 """Fit percent below which a free run counts as lost."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Step:
-    """A sentence and, where there is one, the command or the lines of a study that do it."""
-
-    sentence: str
-    command: str = ""
 
 
 def next_steps(fit: Fit, *, study: str = "STUDY.toml", folder: str = "OUT", crossed: bool = False) -> list[Step]:

@@ -3,55 +3,20 @@
 import math
 import re
 from dataclasses import replace
-from html.parser import HTMLParser
 
 import numpy as np
 import pytest
 
+from tests.report.reader import Page
 from upright.identification.model.model import Estimate
-from upright.report import write_fit_report
-
-VOID = {"meta", "link", "br", "hr", "img", "input"}
-
-
-class Page(HTMLParser):
-    """Collects text, attributes and ids, and insists that what opens also closes, in order."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.open, self.text, self.attributes, self.ids, self.tags = [], [], [], [], []
-        self.feed(text)
-        self.close()
-        assert self.open == []
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append(tag)
-        self.attributes += [(tag, k, v or "") for k, v in attrs]
-        self.ids += [v for k, v in attrs if k == "id"]
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag, attrs):
-        self.handle_starttag(tag, attrs)
-        if tag not in VOID:
-            self.open.pop()
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        if self.open and self.open[-1] not in ("style", "script"):
-            self.text.append(data)
-
-    @property
-    def prose(self):
-        return " ".join(" ".join(self.text).split())
+from upright.report.fit.chapter import chapter
+from upright.report.html import write_html
 
 
 @pytest.fixture
 def written(tmp_path):
     def write(fit, **more):
-        path = write_fit_report(fit, tmp_path / "out", **more)
+        path = write_html(tmp_path / "out" / "report.html", chapter(fit, folder="out", **more))
         text = path.read_text(encoding="utf-8")
         return text, Page(text)
 

@@ -1,8 +1,7 @@
-"""The reproduction as tables, JSON and a page with pictures."""
+"""The paper's tables and misprints as a chapter: what is printed beside what one plant and one Q give."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,16 +10,14 @@ from upright.design.factorization import Locus
 from upright.design.requests import matched, written
 from upright.paper.reproduce import Regenerated, Reproduced
 from upright.paper.tables import STUDENTS
-from upright.report.advice import Step
-from upright.report.document import picture
 from upright.report.drawing import BLACK, BLUE, VERMILLION
+from upright.report.page import Chapter, Part, Picture, Points, Step, Table
 from upright.report.poles import Poles, locus_figure, pole_map
-from upright.report.sections import Part, Table, write_sections
 from upright.report.symbols import number
-from upright.survey.answers_figure import answers_figure
+from upright.survey.figures import answers_figure
 
 
-def set_table(table: Regenerated) -> Table:
+def _set_table(table: Regenerated) -> Table:
     """Printed poles, regenerated ones, and their difference in roundings."""
     rows = tuple(
         (
@@ -40,7 +37,7 @@ def set_table(table: Regenerated) -> Table:
     )
 
 
-def errata_table(done: Reproduced) -> Table:
+def _errata_table(done: Reproduced) -> Table:
     """Every erratum with what shows it."""
     rows = [
         (str(e.number), e.where, e.printed, e.right, e.against, _range(e.printed_misses), _range(e.right_misses))
@@ -64,7 +61,7 @@ def _range(span: tuple[float, float]) -> str:
     return f"{number(100 * span[0], 2)} to {number(100 * span[1], 2)} %"
 
 
-def facts(done: Reproduced) -> tuple[list[str], list[str], list[str]]:
+def _facts(done: Reproduced) -> tuple[list[str], list[str], list[str]]:
     """Sentences on Table 1, on Table 2 and on the errata."""
     first, second = done.tables
     omega = float(np.sqrt(-first.locus.a[2]))
@@ -105,93 +102,85 @@ def _polynomial(locus: Locus) -> str:
     return text.replace("+ −", "− ")
 
 
-def _locus_picture(table: Regenerated, name: str) -> Any:
-    cheaper = np.geomspace(1e-4, 64.0, 1500)
-    rows = [table.locus.poles(float(c)) for c in cheaper]
-    for i in range(1, len(rows)):
-        rows[i] = matched(rows[i - 1], rows[i])
-    sets = {f"printed, set {i + 1}": poles for i, poles in enumerate(table.printed)}
-    open_loop = np.roots(table.locus.a).astype(np.complex128)
-    drawing = locus_figure(np.array(rows), sets, open_loop, origin="open loop, recovered")
-    return picture(
-        drawing, name,
+def _locus_picture(table: Regenerated, name: str) -> Picture:
+    def draw() -> Any:
+        rows = [table.locus.poles(float(c)) for c in np.geomspace(1e-4, 64.0, 1500)]  # effort ever cheaper
+        for i in range(1, len(rows)):
+            rows[i] = matched(rows[i - 1], rows[i])
+        sets = {f"printed, set {i + 1}": poles for i, poles in enumerate(table.printed)}
+        open_loop = np.roots(table.locus.a).astype(np.complex128)
+        return locus_figure(np.array(rows), sets, open_loop, origin="open loop, recovered")
+
+    return Picture(
+        name=name, draw=draw,
         caption=f"{table.name}. All four printed sets lie on the locus of one plant and one Q, with R halved from set "
         "to set.",
         description=f"Printed poles within {table.worst:.2f} roundings of the locus.",
     )  # fmt: skip
 
 
-def write(done: Reproduced, path: Path) -> Path:
-    """Write `reproduce.html`."""
-    one, two, three = facts(done)
+def chapter(done: Reproduced) -> Chapter:
+    """The tables again, and the errata."""
+    one, two, three = _facts(done)
     kinds = [
         Poles(name="asked, Table 1, set 1", values=done.asked, mark="o", colour=BLUE),
         Poles(name="attained, eq. (2) as printed", values=done.missed, mark="x", colour=VERMILLION),
         Poles(name="open loop", values=np.array([done.unstable[1]], dtype=np.complex128), mark="+", colour=BLACK),
     ]
-    miss = picture(
-        pole_map(kinds, frame=3), "missed",
+    missed = Picture(
+        name="missed", draw=lambda: pole_map(kinds, frame=3),
         caption="Poles of the right model under gains that Ackermann's formula gives for eq. (2) as printed.",
         description=f"Attained: {written(done.missed, 4)}.",
     )  # fmt: skip
-    grim = picture(
-        answers_figure(done.impossible, STUDENTS), "grim",
+    impossible = Picture(
+        name="grim", draw=lambda: answers_figure(done.impossible, STUDENTS),
         caption="How many of the 24 means of Table 4 and the two percentages of Table 3's first question cannot be "
         "averages of so many whole answers.",
         description=f"{done.impossible[STUDENTS]} for {STUDENTS} students, 1 for 48 and for 52.",
     )  # fmt: skip
-    parts = [
-        *(
-            Part(
-                title=f"Table {i}",
-                sentences=tuple(told),
-                tables=(set_table(t),),
-                pictures=(_locus_picture(t, f"t{i}"),),
-            )
-            for i, told, t in zip((1, 2), (one, two), done.tables, strict=True)
-        ),
-        Part(title="Errata", sentences=tuple(three), tables=(errata_table(done),), pictures=(miss, grim)),
-    ]  # fmt: skip
-    return write_sections(
-        path, title="The paper's tables and misprints, again", verdict=done.verdict, detail="",
+    return Chapter(
+        title="The paper's tables and misprints, again",
+        verdict=done.verdict,
         sound=max(t.worst for t in done.tables) <= 1 and all(e.shown for e in done.errata),
         question="Do the printed poles follow from one plant and one set of weights each, and which printed formulas "
         "contradict the energies? p(s) p(−s) = a(s) a(−s) + N(s)/R holds for poles of least cost.",
-        parts=parts, steps=next_steps(),
+        parts=(
+            *(
+                Part(title=f"Table {i}", content=(Points(tuple(told)), _set_table(t), _locus_picture(t, f"t{i}")))
+                for i, told, t in zip((1, 2), (one, two), done.tables, strict=True)
+            ),
+            Part(title="Errata", content=(Points(tuple(three)), _errata_table(done), missed, impossible)),
+        ),
+        steps=(
+            Step(
+                sentence="Use a set of Table 1 on a rig of your own.",
+                command='upright design OUT/fit.json --at inverted --poles "-4.1484+-1.6341j, -16.8545, -3.222"',
+            ),
+            Step(
+                sentence="Find weights instead of poles: least cost up to the drive's limit.",
+                command="upright design OUT/fit.json --at inverted --lqr 1,0,1,0 --limit LIMIT",
+            ),
+        ),
+        numbers={
+            "verdict": done.verdict,
+            "tables": [
+                {
+                    "name": t.name,
+                    "a": t.locus.a,
+                    "N_over_R": t.locus.N,
+                    "effort_ratios": t.ratios,
+                    "worst_in_roundings": t.worst,
+                    "sets": [np.asarray(poles, dtype=np.complex128) for poles in t.again],
+                }
+                for t in done.tables
+            ],
+            "errata": [
+                {
+                    "number": e.number, "where": e.where, "printed_misses": e.printed_misses,
+                    "right_misses": e.right_misses, "shown": e.shown,
+                }
+                for e in done.errata
+            ],
+            "impossible_means": done.impossible,
+        },
     )  # fmt: skip
-
-
-def next_steps() -> list[Step]:
-    """Where to go from the tables."""
-    return [
-        Step(sentence="Use a set of Table 1 on a rig of your own.",
-             command='upright design OUT/fit.json --at inverted --poles "-4.1484+-1.6341j, -16.8545, -3.222"'),
-        Step(sentence="Find weights instead of poles: least cost up to the drive's limit.",
-             command="upright design OUT/fit.json --at inverted --lqr 1,0,1,0 --limit LIMIT"),
-    ]  # fmt: skip
-
-
-def as_json(done: Reproduced) -> dict[str, Any]:
-    """Numbers of the reproduction."""
-    return {
-        "verdict": done.verdict,
-        "tables": [
-            {
-                "name": t.name,
-                "a": t.locus.a.tolist(),
-                "N_over_R": t.locus.N.tolist(),
-                "effort_ratios": t.ratios.tolist(),
-                "worst_in_roundings": t.worst,
-                "sets": [[[p.real, p.imag] for p in again.tolist()] for again in t.again],
-            }
-            for t in done.tables
-        ],
-        "errata": [
-            {
-                "number": e.number, "where": e.where, "printed_misses": list(e.printed_misses),
-                "right_misses": list(e.right_misses), "shown": e.shown,
-            }
-            for e in done.errata
-        ],
-        "impossible_means": {str(n): count for n, count in done.impossible.items()},
-    }  # fmt: skip

@@ -12,8 +12,8 @@ from tests.report.conftest import make_swing
 from upright.identification.estimate import predict
 from upright.identification.inference.scoring import fit_percent
 from upright.physics import Pendulum
-from upright.report.figures import fit_figure
-from upright.report.tables import score_rows
+from upright.report.fit.figures import fit_figure
+from upright.report.fit.tables import score_table
 
 
 def test_score_says_from_where_it_counts() -> None:
@@ -34,7 +34,7 @@ def test_part_not_scored_is_shaded_in_every_panel() -> None:
     assert not any(panel.patches for panel in fit_figure(make_swing()).axes)
 
 
-def test_table_says_from_where_scores_count(fit) -> None:
+def test_table_says_from_where_scores_count() -> None:
     runs = {"whole": make_swing(), "tail": replace(make_swing("predict", horizon=2.0), score_from=30.0)}
-    said = {row.run: row.horizon for row in score_rows(replace(fit, runs=runs))}
+    said = {row[0]: row[-1] for row in score_table(runs).rows}
     assert said == {"whole": "from the first sample", "tail": "restarted every 2 s; scored from 30 s on"}
