@@ -45,11 +45,11 @@ def chapter(key, about, *, sound=True):
         key=key, about=about, title=f"Chapter {key}", question=f"Why {key}?", verdict=f"Verdict of {key} stands.",
         detail=HOSTILE, sound=sound, warnings=(HOSTILE,),
         parts=(
-            Part(title="Data", content=(HOSTILE, table, drawn("same"))),
-            Part(title="Fit", content=(motion, Points((HOSTILE,)), Facts(((HOSTILE, HOSTILE),)), Code(HOSTILE))),
-            Part(title="Rest", content=(drawn("other"),), aside=True),
+            Part("Data", (HOSTILE, table, drawn("same"))),
+            Part("Fit", (motion, Points((HOSTILE,)), Facts(((HOSTILE, HOSTILE),)), Code(HOSTILE))),
+            Part("Rest", (drawn("other"),), aside=True),
         ),
-        steps=(Step(sentence="Do it again.", command='upright lab -o "a b"'),),
+        steps=(Step("Do it again.", 'upright lab -o "a b"'),),
         findings=(Finding(what="pole [rad/s]", value="7.98", interval="7.9 to 8.1", truth="7.97"),),
         numbers={"pole": 7.98, "kind": "a word", "list": [1, 2]},
     )  # fmt: skip
@@ -66,7 +66,7 @@ def book():
         ),
         notes=("Stopped by Ctrl-C.",),
         missing=(("3", "Tracking"),),
-        steps=(Step(sentence="Next.", command="upright lab --seed 1"),),
+        steps=(Step("Next.", "upright lab --seed 1"),),
     )
 
 

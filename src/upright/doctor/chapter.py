@@ -81,12 +81,12 @@ def _next_steps(diagnosis: Diagnosis, log: Path, rig: str, page: bool) -> list[S
     again = f"upright doctor {typed(log)}"
     if diagnosis.findings and not page:
         command = f"{again}{f' --rig {typed(rig)}' if rig else ''} -o {typed(f'{log.stem}-doctor.html')}"
-        steps.append(Step(sentence="See the pictures.", command=command))
+        steps.append(Step("See the pictures.", command))
     if not rig:
         told = "Name the rig, so that signs and scales can be told."
-        steps.append(Step(sentence=told, command=f"{again} --rig furuta"))
+        steps.append(Step(told, f"{again} --rig furuta"))
     init = f"upright init {typed(log)} -o study.toml"
-    return [*steps, Step(sentence="Write a study, with the keys named above.", command=init)]
+    return [*steps, Step("Write a study, with the keys named above.", init)]
 
 
 @styled
@@ -111,8 +111,7 @@ def finding_figure(finding: Finding) -> Figure:
             else:
                 step = "steps-post" if curve.style == "steps" else "default"
                 ax.plot(t, y, color=colour, linestyle=line, drawstyle=step, label=curve.name)
-        label = ax.set_ylabel(panel.label, rotation=0, ha="right", va="center", fontsize=8.5)
-        label.set_parse_math(False)
+        ax.set_ylabel(panel.label, rotation=0, ha="right", va="center", fontsize=8.5, parse_math=False)
         if len(panel.curves) > 1:
             legend = ax.legend(loc="best", fontsize=7.5)
             for text in legend.get_texts():

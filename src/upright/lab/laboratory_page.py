@@ -66,13 +66,13 @@ def next_steps(session: Session) -> tuple[Step, ...]:
     steps: list[Step] = []
     if session.interrupted or any(t.state == "failed" for t in session.told):
         steps.append(
-            Step(sentence="Go on where this stopped; what is finished is kept.",
-                 command=f"{command(session)} -o {typed(session.folder)}")
+            Step("Go on where this stopped; what is finished is kept.",
+                 f"{command(session)} -o {typed(session.folder)}")
         )  # fmt: skip
-    steps.append(Step(sentence="Take another rig of the same make.", command=command(session, session.seed + 1)))
+    steps.append(Step("Take another rig of the same make.", command(session, session.seed + 1)))
     other = "linear" if session.make != "linear" else "furuta"
-    steps.append(Step(sentence="Run the laboratory on another kind of rig.", command=f"upright lab --rig {other}"))
-    steps.append(Step(sentence="Start on a log of your own.", command="upright init LOG"))
+    steps.append(Step("Run the laboratory on another kind of rig.", f"upright lab --rig {other}"))
+    steps.append(Step("Start on a log of your own.", "upright init LOG"))
     return tuple(steps)
 
 

@@ -146,19 +146,19 @@ def chapter(done: Reproduced) -> Chapter:
         "contradict the energies? p(s) p(−s) = a(s) a(−s) + N(s)/R holds for poles of least cost.",
         parts=(
             *(
-                Part(title=f"Table {i}", content=(Points(tuple(told)), _set_table(t), _locus_picture(t, f"t{i}")))
+                Part(f"Table {i}", (Points(tuple(told)), _set_table(t), _locus_picture(t, f"t{i}")))
                 for i, told, t in zip((1, 2), (one, two), done.tables, strict=True)
             ),
-            Part(title="Errata", content=(Points(tuple(three)), _errata_table(done), missed, impossible)),
+            Part("Errata", (Points(tuple(three)), _errata_table(done), missed, impossible)),
         ),
         steps=(
             Step(
-                sentence="Use a set of Table 1 on a rig of your own.",
-                command='upright design OUT/fit.json --at inverted --poles "-4.1484+-1.6341j, -16.8545, -3.222"',
+                "Use a set of Table 1 on a rig of your own.",
+                'upright design OUT/fit.json --at inverted --poles "-4.1484+-1.6341j, -16.8545, -3.222"',
             ),
             Step(
-                sentence="Find weights instead of poles: least cost up to the drive's limit.",
-                command="upright design OUT/fit.json --at inverted --lqr 1,0,1,0 --limit LIMIT",
+                "Find weights instead of poles: least cost up to the drive's limit.",
+                "upright design OUT/fit.json --at inverted --lqr 1,0,1,0 --limit LIMIT",
             ),
         ),
         numbers={

@@ -58,7 +58,7 @@ class Book:
             anchors=tuple(c.anchor for c, _ in found),
         )  # fmt: skip
         return (
-            Part(title="", content=(Facts(self.facts),)),
+            Part("", (Facts(self.facts),)),
             Part(title="Verdicts at a glance", key="verdicts", content=(verdicts, READING)),
             *((Part(title="What was found", key="numbers", content=(numbers,)),) if found else ()),
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def chapter(ladder: Ladder, *, title: str, provenance: Mapping[str, object], steps: Sequence[Step] = ()) -> Chapter:
+def chapter(ladder: Ladder, *, title: str, provenance: Mapping[str, object], steps: Iterable[Step] = ()) -> Chapter:
     """What a ladder says; `steps` are those of `next_steps`."""
     seen = "; ".join(
         f"{s.rung.name}: fitted {percent(s.fit_percent)}, predicted {percent(s.predicted_percent)}"
@@ -168,40 +168,31 @@ def _label(step: Climbed) -> str:
     return "\n".join([*lines, f"{step.parameters} + {step.own}", "" if step.kept else "(refused)"]).rstrip()
 
 
-def next_steps(ladder: Ladder, *, study: str, folder: str, data: str, trimmed: bool) -> list[Step]:
+def next_steps(ladder: Ladder, *, study: str, folder: str, data: str, trimmed: bool) -> Iterator[Step]:
     """What to do with the ladder."""
-    steps: list[Step] = []
     if ladder.interrupted:
-        steps.append(Step(sentence="The climb was stopped; run it to its end."))
+        yield Step("The climb was stopped; run it to its end.")
     file = f"{folder}/study.toml" if trimmed else study
     if ladder.left_out and not trimmed:
-        steps.append(Step(sentence=f"Take {', '.join(ladder.left_out)} out of the study: they were refused."))
+        yield Step(f"Take {', '.join(ladder.left_out)} out of the study: they were refused.")
     own = [n for s in ladder.kept for n in s.rung.unknown]
     if own:
         lines = f"[[runs]]\nunknown = {list(ladder.runs[0].unknown)}".replace("'", '"')
-        steps.append(Step(sentence=f"Add {', '.join(own)} to what each run has unknown.", command=lines))
-    steps.append(
-        Step(
-            sentence="Fit the chosen model, with its intervals and what the data cannot see.",
-            command=f"upright identify {file}{f' --data {data}' if data else ''} -o {folder}/fit",
-        )
+        yield Step(f"Add {', '.join(own)} to what each run has unknown.", lines)
+    yield Step(
+        "Fit the chosen model, with its intervals and what the data cannot see.",
+        f"upright identify {file}{f' --data {data}' if data else ''} -o {folder}/fit",
     )
     if not ladder.repeats:
-        steps.append(
-            Step(
-                sentence="Repeat one run with the same command: how well one repeat predicts the other is the ceiling "
-                "of what any model can explain."
-            )
+        yield Step(
+            "Repeat one run with the same command: how well one repeat predicts the other is the ceiling of what any "
+            "model can explain."
         )
-    refused = _refused(ladder)
-    if refused:
-        steps.append(
-            Step(
-                sentence=f"If you believe in {', '.join(refused)} all the same, record a run in which "
-                "it matters more: these runs do not ask for it."
-            )
+    if refused := _refused(ladder):
+        yield Step(
+            f"If you believe in {', '.join(refused)} all the same, record a run in which it matters more: these runs "
+            "do not ask for it."
         )
-    return steps
 
 
 def _refused(ladder: Ladder) -> list[str]:

@@ -36,9 +36,9 @@ def chapter(record: Record, found: Recovery, log: str) -> Chapter:
         sound=found.quality != "poor",
         question="Which law closed the loop: its structure, its gains, its limit, and what does it leave unexplained?",
         parts=(
-            Part(title="Gains", content=(_gain_table(found), Points(tuple(_circumstances(record, found))))),
-            Part(title="Recorded and reproduced", content=(left,)),
-            Part(title="Structures tried", content=(_tried_table(found),)),
+            Part("Gains", (_gain_table(found), Points(tuple(_circumstances(record, found))))),
+            Part("Recorded and reproduced", (left,)),
+            Part("Structures tried", (_tried_table(found),)),
         ),
         steps=tuple(_next_steps(found, log)),
     )
@@ -82,12 +82,12 @@ def _next_steps(found: Recovery, log: str) -> list[Step]:
     if found.quality == "poor":
         return [
             Step(
-                sentence="Name the columns that the law reads, with --measured and --reference, or try --every N.",
-                command=f"upright show {log}",
+                "Name the columns that the law reads, with --measured and --reference, or try --every N.",
+                f"upright show {log}",
             )
         ]
     lines = "\n".join(line for line in (recovering(found), written(found)) if line)
-    return [Step(sentence="Simulate the loop with the plant: put one of these into the run of a study.", command=lines)]
+    return [Step("Simulate the loop with the plant: put one of these into the run of a study.", lines)]
 
 
 @styled
@@ -105,14 +105,12 @@ def draw_law(record: Record, found: Recovery) -> Figure:
         left.axhspan(-found.quantum / 2, found.quantum / 2, color="#eeeeee", label="half a step of the column")
     left.plot(*decimated(t, found.residual[3:], buckets=800), color=GREY, linewidth=0.8, label="recorded − law")
     for axes in (whole, close):
-        label = axes.set_ylabel(f"{found.command[:24]}{unit}")
-        label.set_parse_math(False)
-    left.set_ylabel(f"residual{unit}").set_parse_math(False)
+        axes.set_ylabel(f"{found.command[:24]}{unit}", parse_math=False)
+    left.set_ylabel(f"residual{unit}", parse_math=False)
     left.set_xlabel("time [s]")
     for axes in (whole, left):
         axes.legend(loc="lower right", ncols=2, bbox_to_anchor=(1.0, 0.98), borderaxespad=0.0)
-    title = whole.set_title("\n".join(wrap(f"{found.structure}; explains {found.explained:.4g} %", 62)))
-    title.set_parse_math(False)
+    whole.set_title("\n".join(wrap(f"{found.structure}; explains {found.explained:.4g} %", 62)), parse_math=False)
     return drawing
 
 

@@ -27,7 +27,7 @@ def chapter(record: Record, seen: Inspection) -> Chapter:
     notes = (Points(tuple(f"Note: {note}" for note in seen.notes)),) if seen.notes else ()
     name = f"{seen.file} ({seen.reader})"
     content = (Points(tuple(_time_lines(seen))), _table(seen), *notes, drawn)
-    return Chapter(title=name, verdict="", parts=(Part(title=name, content=content),))
+    return Chapter(title=name, verdict="", parts=(Part(name, content),))
 
 
 def _table(seen: Inspection) -> Table:
@@ -110,13 +110,13 @@ def draw_columns(record: Record, seen: Inspection) -> Figure:
         axes.plot(t, y, color=colour, linewidth=1.0, drawstyle="steps-post" if column.stepwise else "default")
         unit = column.unit or (f"{column.guess}?" if column.guess else "")
         name = column.name if len(column.name) <= 30 else "…" + column.name[-29:]
-        label = axes.set_ylabel(f"{name}\n[{unit}]" if unit else name, rotation=0, ha="right", va="center")
-        label.set_parse_math(False)  # names of columns are shown as the log spells them
+        name = f"{name}\n[{unit}]" if unit else name  # shown as the log spells it
+        axes.set_ylabel(name, rotation=0, ha="right", va="center", parse_math=False)
         if column.lies:
-            told = axes.set_title(column.lies[0], fontsize=8, color=GREY)
-            told.set_parse_math(False)
+            axes.set_title(column.lies[0], fontsize=8, color=GREY, parse_math=False)
     hide_inner_times(panels)
     drawing.align_ylabels(panels)
-    title = drawing.suptitle(f"{Path(seen.file).name}, {seen.time.samples} samples, grey: at rest", fontsize=10)
-    title.set_parse_math(False)
+    drawing.suptitle(
+        f"{Path(seen.file).name}, {seen.time.samples} samples, grey: at rest", fontsize=10, parse_math=False
+    )
     return drawing

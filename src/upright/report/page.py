@@ -120,7 +120,7 @@ Block = str | Points | Facts | Code | Formula | Table | Picture
 """What stands in a part, in its order; a plain text is a paragraph, which a terminal leaves to the page."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Part:
     """One heading and what stands below it.
 
@@ -150,7 +150,7 @@ class Finding:
     truth: str = ""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Step:
     """A sentence and, where there is one, the command or the lines of a study that do it."""
 

@@ -16,7 +16,7 @@ def said(fit, **more):
 def test_a_reversed_sign_is_the_first_suspicion(changed, swing):
     run = swing(n=200)
     off = replace(run, simulated=-run.simulated, fit_percent={"psi": -100.0, "theta": -99.0})
-    first = next_steps(changed(runs={"release": off}))[0]
+    first, *_ = next_steps(changed(runs={"release": off}))
     assert "sign" in first.sentence
     assert first.command == "[sensors.psi]\nsign = -1"
 
@@ -53,7 +53,8 @@ def test_a_stopped_search_is_to_be_ended(changed):
 
 
 def test_every_fit_is_to_be_tried_on_a_run_it_has_not_met(fit):
-    assert next_steps(fit, folder="out")[-1].command == "upright predict out/fit.json OTHER.toml"
+    *_, last = next_steps(fit, folder="out")
+    assert last.command == "upright predict out/fit.json OTHER.toml"
 
 
 def test_a_run_that_is_lost_is_restarted(changed, swing):

@@ -40,10 +40,10 @@ def chapter(done: Designed, *, source: str = "OUT/fit.json", folder: str = ".") 
         question=f"Which gains hold the rig at '{done.wish.at}' {wish}, and do they survive sampling, delay and "
         "differenced encoders?",
         parts=(
-            Part(title="Gains", content=(Points(tuple(gains)), _gain_table(done), _pole_table(done))),
-            Part(title="Poles", content=(*sure, *_pole_pictures(done))),
-            Part(title="The loop as it runs", content=(loop, _way_table(done))),
-            Part(title="Coming back", content=(_swing_picture(done),)),
+            Part("Gains", (Points(tuple(gains)), _gain_table(done), _pole_table(done))),
+            Part("Poles", (*sure, *_pole_pictures(done))),
+            Part("The loop as it runs", (loop, _way_table(done))),
+            Part("Coming back", (_swing_picture(done),)),
         ),
         steps=tuple(_next_steps(done, source, folder)),
         numbers=_numbers(done),
@@ -184,21 +184,21 @@ def _next_steps(done: Designed, source: str, folder: str) -> list[Step]:
     base = f"upright design {source} --at {done.wish.at}"
     if done.chosen.margins is None or done.chosen.margins.modulus < 0.4:
         steps.append(
-            Step(sentence="Make up for delay and differences: gains that meet the poles in the sampled loop.",
-                 command=f'{base} --poles "{written(_wanted(done))}" --sampled'.replace("±", "+-"))
+            Step("Make up for delay and differences: gains that meet the poles in the sampled loop.",
+                 f'{base} --poles "{written(_wanted(done))}" --sampled'.replace("±", "+-"))
         )  # fmt: skip
     if done.wish.poles is not None:
         steps.append(
-            Step(sentence="Let the drive's limit choose: the cheapest effort that comes back from this start.",
-                 command=f"{base} --lqr {','.join('1' for _ in done.model.states)} --limit LIMIT")
+            Step("Let the drive's limit choose: the cheapest effort that comes back from this start.",
+                 f"{base} --lqr {','.join('1' for _ in done.model.states)} --limit LIMIT")
         )  # fmt: skip
     if not done.rig.others:
         steps.append(
-            Step(sentence="See what the uncertainty of the numbers does to the poles: design from a fit.json.",
-                 command="upright identify STUDY.toml -o OUT && upright design OUT/fit.json")
+            Step("See what the uncertainty of the numbers does to the poles: design from a fit.json.",
+                 "upright identify STUDY.toml -o OUT && upright design OUT/fit.json")
         )  # fmt: skip
     steps.append(
-        Step(sentence=f"Simulate it: simulation.Law takes A, B, C and D of law in {folder}/design.json, its "
+        Step(f"Simulate it: simulation.Law takes A, B, C and D of law in {folder}/design.json, its "
              "references being the positions at rest and then the reference.")
     )  # fmt: skip
     return steps

@@ -7,13 +7,13 @@ from typing import Any
 
 from upright.identification.model.model import Fit
 from upright.lab.free_swing_4.drift import PUSH, SPRING, TILT
-from upright.lab.free_swing_4.figures import drift_figure, energy_figure, truth_figure
+from upright.lab.free_swing_4.figures import drift_figure, energy_figure
 from upright.lab.free_swing_4.run import Balance, FreeSwing
-from upright.lab.free_swing_4.studies import Recovered, recovered
+from upright.lab.free_swing_4.studies import recovered
 from upright.report.fit.chapter import motion_part, rest_picture, run_pictures
-from upright.report.fit.figures import directions_figure, fit_figure
-from upright.report.fit.tables import parameter_table, score_table
-from upright.report.page import Block, Chapter, Finding, Part, Picture, Step, Symbol, Table
+from upright.report.fit.figures import directions_figure, fit_figure, interval_figure
+from upright.report.fit.tables import finding, parameter_table, score_table
+from upright.report.page import Block, Chapter, Part, Picture, Step, Symbol, Table
 from upright.report.symbols import number, percent, typed, unit
 
 QUESTION = (
@@ -30,10 +30,10 @@ def chapter(done: FreeSwing) -> Chapter:
     """The experiment, however far it came."""
     fit = done.answers["free_swing"].fit if "free_swing" in done.answers else None
     found = recovered(done.rig, fit) if fit else ()
-    parts = [Part(title="Data: the releases", content=_data(done))]
+    parts = [Part("Data: the releases", _data(done))]
     if fit:
         followed = (score_table(fit.runs), *run_pictures(fit, "swing"))
-        parts += [motion_part(fit), Part(title="Fit: large free swing", content=followed), _parameters(fit, found)]
+        parts += [motion_part(fit), Part("Fit: large free swing", followed), _parameters(done, fit)]
     if "no_scale" in done.answers:
         parts.append(_blind_part(done.answers["no_scale"].fit))
     if done.balance:
@@ -52,12 +52,8 @@ def chapter(done: FreeSwing) -> Chapter:
         parts=tuple(parts),
         steps=_steps(done),
         findings=tuple(
-            Finding(
-                what=Symbol(f"{f.name} [{unit(f.unit)}]"), value=number(f.value), truth=number(f.truth),
-                interval=f"{number(f.interval[0])} to {number(f.interval[1])}",
-            )
-            for f in found
-        ),
+            finding(Symbol(f"{f.name} [{unit(f.unit)}]"), fit.estimates[f.name], f.truth) for f in found
+        ) if fit else (),
         numbers=_numbers(done),
     )  # fmt: skip
 
@@ -132,29 +128,19 @@ def _data(done: FreeSwing) -> tuple[str, ...]:
     )
 
 
-def _parameters(fit: Fit, found: tuple[Recovered, ...]) -> Part:
+def _parameters(done: FreeSwing, fit: Fit) -> Part:
     """Numbers of the rig beside the truth of the twin."""
-    truth = {f.name: (number(f.truth), "inside" if f.inside else "outside") for f in found}
-    rows: list[tuple[str, ...]] = []
-    for symbol, *told, _ in parameter_table(fit).rows:
-        true, inside = truth.get(symbol, ("", ""))
-        rows.append((symbol, true, *told, inside))
-    return Part(
-        title="Parameters",
-        content=(
-            Table(
-                caption="Estimated and given numbers of the rig, beside the truth of the twin",
-                headings=("symbol", "truth", "value", "std. error", "95 % interval", "unit", "status", "truth is"),
-                rows=tuple(rows), numbers=(1, 2, 3, 4), badge=6,
-            ),
-            Picture(
-                name="truth", draw=lambda: truth_figure(found),
-                caption="Every estimate with its interval, measured from the truth, which only a twin can tell.",
-                description="As in the table above.",
-            ),
-            *rest_picture(fit, "swing"),
-        ),
+    truth = done.rig.truth.parameters()
+    table = parameter_table(
+        fit, truth=truth,
+        caption="Estimated and given numbers of the rig, beside the truth of the twin",
     )  # fmt: skip
+    shown = Picture(
+        name="truth", draw=lambda: interval_figure(fit.estimates, truth=truth),
+        caption="Every estimate with its interval, measured from the truth, which only a twin can tell.",
+        description="As in the table above.",
+    )  # fmt: skip
+    return Part("Parameters", (table, shown, *rest_picture(fit, "swing")))
 
 
 def _blind_part(blind: Fit) -> Part:
@@ -173,7 +159,7 @@ def _blind_part(blind: Fit) -> Part:
                 description="; ".join(blind.unseen),
             )
         )  # fmt: skip
-    return Part(title="What the data cannot see", content=tuple(told))
+    return Part("What the data cannot see", tuple(told))
 
 
 def _energy_part(b: Balance) -> Part:
@@ -183,7 +169,7 @@ def _energy_part(b: Balance) -> Part:
         name="energy", draw=lambda: energy_figure(b.t, b.stored, b.taken), description=f"At the end: {ends}.",
         caption="Where the energy of the release went, as the fitted model tells it.",
     )  # fmt: skip
-    return Part(title="Where the energy went", content=(shown,))
+    return Part("Where the energy went", (shown,))
 
 
 def _drift_part(done: FreeSwing) -> Part:
@@ -212,7 +198,7 @@ def _drift_part(done: FreeSwing) -> Part:
         rows=tuple((w.name, number(factor * w.slope, 2), number(factor * w.end, 2)) for w in done.wanders),
         numbers=(1, 2),
     )
-    return Part(title=f"Why the {body} wanders", content=(told, table, shown))
+    return Part(f"Why the {body} wanders", (told, table, shown))
 
 
 def _level_part(done: FreeSwing) -> Part:
@@ -243,7 +229,7 @@ def _level_part(done: FreeSwing) -> Part:
         "and with the spring on."
     )
     said = (f"{a.question.title}: {a.fit.verdict}" for a in answers)
-    return Part(title="Is the rig level?", content=(told, *said, table, *pictures))
+    return Part("Is the rig level?", (told, *said, table, *pictures))
 
 
 def _worst(fit: Fit, role: str, name: str) -> float:
@@ -256,12 +242,12 @@ def _steps(done: FreeSwing) -> tuple[Step, ...]:
     again, other = ("tilt_model", "level_model") if done.rig.base == "psi" else ("no_scale", "no_scale")
     predicted = "the rig out of level" if done.rig.base == "psi" else "the study without an inertia"
     return (
-        Step(sentence="Repeat a fit from its files, change a guess or a bound, and see what moves:",
-             command=f"upright identify {typed(folder / f'{again}.toml')} -o {typed(folder / 'again')}"),
-        Step(sentence=f"Let the model of the level rig predict {predicted}:",
-             command=f"upright predict {typed(folder / 'fit.json')} {typed(folder / f'{other}.toml')}"),
-        Step(sentence="Look at a log as the encoders wrote it:",
-             command=f"upright show {typed(folder / 'release_90.csv')}"),
+        Step("Repeat a fit from its files, change a guess or a bound, and see what moves:",
+             f"upright identify {typed(folder / f'{again}.toml')} -o {typed(folder / 'again')}"),
+        Step(f"Let the model of the level rig predict {predicted}:",
+             f"upright predict {typed(folder / 'fit.json')} {typed(folder / f'{other}.toml')}"),
+        Step("Look at a log as the encoders wrote it:",
+             f"upright show {typed(folder / 'release_90.csv')}"),
     )  # fmt: skip
 
 

@@ -15,8 +15,9 @@ from upright.identification.model.estimates import Estimate
 from upright.lab.frequency_1b.figures import bode_figure, quality_figure
 from upright.lab.frequency_1b.own_log import Found
 from upright.lab.frequency_1b.run import BENCH, Result
+from upright.report.fit.tables import finding, parameter_table, plain_estimate, pole_table
 from upright.report.page import Chapter, Finding, Part, Picture, Points, Step, Symbol, Table
-from upright.report.symbols import measured, number, typed, unit
+from upright.report.symbols import number, typed, unit
 
 QUESTION = (
     "What does the rig answer to a sine, and which numbers of its equations does that fix, the pole by which it falls "
@@ -46,7 +47,7 @@ def chapter(done: Result) -> Chapter:
         f"interval. {_simplex_sentence(answer)}",
         sound=answer.fit.trusted,
         parts=(
-            Part(title="What was asked", content=(*_campaign(done), _quality_picture(answer.data))),
+            Part("What was asked", (*_campaign(done), _quality_picture(answer.data))),
             *_answer_parts(answer, truth=done.truth, known=_bench(done)),
         ),
         steps=_steps(done),
@@ -61,17 +62,17 @@ def log_chapter(found: Found) -> Chapter:
     data, answer = found.response, found.answer
     span = f"{data.omega[0]:.3g} to {data.omega[-1]:.3g} rad/s"
     sources = f"{len(data)} frequencies from {span} in {', '.join(found.sources)}."
-    asked = Part(title="What was asked", content=(sources, *data.notes, _quality_picture(data)))
+    asked = Part("What was asked", (sources, *data.notes, _quality_picture(data)))
     fit = typed(found.folder / "fit.json")
     if answer is not None:
         return Chapter(
             key="1b", title="Frequency response of a rig", question=QUESTION, verdict=answer.fit.verdict,
             detail=_simplex_sentence(answer), sound=answer.fit.trusted, parts=(asked, *_answer_parts(answer)),
             steps=(
-                Step(sentence="Find gains for these numbers, and what their errors do to the loop.",
-                     command=f"upright design {fit} --lqr 1,0,1,0 --limit 5"),
-                Step(sentence="Fit a log of a free swing too, and see whether both agree.",
-                     command="upright init LOG"),
+                Step("Find gains for these numbers, and what their errors do to the loop.",
+                     f"upright design {fit} --lqr 1,0,1,0 --limit 5"),
+                Step("Fit a log of a free swing too, and see whether both agree.",
+                     "upright init LOG"),
             ),
             numbers=_numbers(answer) | {"response": _response_numbers(data)},
         )  # fmt: skip
@@ -86,12 +87,12 @@ def log_chapter(found: Found) -> Chapter:
     return Chapter(
         key="1b", title="Frequency response", question="What does the rig answer, frequency by frequency?",
         verdict=verdict, sound=not poor.all(),
-        parts=(asked, Part(title="Response", content=(_bode_picture(data), _response_table(response)))),
+        parts=(asked, Part("Response", (_bode_picture(data), _response_table(response)))),
         steps=(
-            Step(sentence="Fit it: name the make, and what of it is known.",
-                 command=f"upright frequency {typed(found.folder / 'frequency.csv')} --rig linear"),
-            Step(sentence="Take it to python-control.",
-                 command="FrequencyResponse.from_csv('frequency.csv').to_control()"),
+            Step("Fit it: name the make, and what of it is known.",
+                 f"upright frequency {typed(found.folder / 'frequency.csv')} --rig linear"),
+            Step("Take it to python-control.",
+                 "FrequencyResponse.from_csv('frequency.csv').to_control()"),
         ),
         numbers=response,
     )  # fmt: skip
@@ -110,19 +111,13 @@ def _findings(done: Result, found: Estimate, true: float) -> tuple[Finding, ...]
     """The key number, inertia of the pendulum and gain of the drive, which nobody weighs."""
     at, what, _ = done.answer.key
     of = "1/s" if what == "unstable pole" else "rad/s"
-    out = [_finding(f"{what}, {at} [{of}]", found, true)]
+    out = [finding(f"{what}, {at} [{of}]", found, true)]
     estimates = done.answer.fit.estimates
     if (e := estimates.get("J_p")) is not None:
-        out.append(_finding(Symbol(f"J_p [{unit(e.unit)}]"), e, done.truth["J_p"]))
+        out.append(finding(Symbol(f"J_p [{unit(e.unit)}]"), e, done.truth["J_p"]))
     if (e := estimates.get("actuator.gain")) is not None:
-        out.append(_finding(f"gain of the drive [{unit(e.unit)}]", e, done.truth["actuator.gain"]))
+        out.append(finding(f"gain of the drive [{unit(e.unit)}]", e, done.truth["actuator.gain"]))
     return tuple(out)
-
-
-def _finding(what: str, e: Estimate, true: float) -> Finding:
-    d = digits(e)
-    low, high = (number(x, d) for x in e.interval)
-    return Finding(what=what, value=number(e.value, d), interval=f"{low} to {high}", truth=number(true, d))
 
 
 def _campaign(done: Result) -> tuple[str, ...]:
@@ -170,14 +165,14 @@ def _steps(done: Result) -> tuple[Step, ...]:
         gains = f"upright design {fit} --lqr 1,0,1,0 --limit 5"
     log, hold = typed(folder / "sweep.csv"), answer.data.hold
     return (
-        Step(sentence="Find gains for these numbers, and what their errors do to the loop.", command=gains),
+        Step("Find gains for these numbers, and what their errors do to the loop.", gains),
         Step(
-            sentence="Estimate the response again from the log, as you would from your own.",
-            command=f'upright frequency {log} --rig {make} --hold "{1e3 * hold:.4g} ms" -o again',
+            "Estimate the response again from the log, as you would from your own.",
+            f'upright frequency {log} --rig {make} --hold "{1e3 * hold:.4g} ms" -o again',
         ),
         Step(
-            sentence="Ask all frequencies at once, and see what that saves and costs.",
-            command=f"upright frequency --rig {make} --ask multisine",
+            "Ask all frequencies at once, and see what that saves and costs.",
+            f"upright frequency --rig {make} --ask multisine",
         ),
     )
 
@@ -201,10 +196,10 @@ def _answer_parts(answer: Answer, *, truth: Mapping[str, float] | None = None, k
     """Data with both fits, their cost, and the numbers."""
     left = (Points(answer.left_out),) if answer.left_out else ()
     return (
-        Part(title="Response and fits", content=(*left, _bode_picture(answer.data, answer))),
+        Part("Response and fits", (*left, _bode_picture(answer.data, answer))),
         Part(
-            title="Two ways to fit it",
-            content=(
+            "Two ways to fit it",
+            (
                 "The simplex walks on squared dB of the linear model, the far output first and then all. Least squares "
                 "uses the phase too, weighs points by their errors, and knows what dry friction amounted to in the "
                 "motion that was measured (its describing function, from the turning points of the encoders).",
@@ -213,12 +208,12 @@ def _answer_parts(answer: Answer, *, truth: Mapping[str, float] | None = None, k
             ),
         ),
         Part(
-            title="Numbers",
-            content=(
+            "Numbers",
+            (
                 *((known,) if known else ()),
                 _start_sentence(answer),
                 _parameter_table(answer, truth),
-                _pole_table(answer),
+                pole_table(answer.fit),
             ),
         ),
     )
@@ -250,48 +245,13 @@ def _way_table(answer: Answer) -> Table:
 
 
 def _parameter_table(answer: Answer, truth: Mapping[str, float] | None = None) -> Table:
-    """Every number sought, by both ways."""
-    rows: list[tuple[str, ...]] = []
-    for name, e in answer.fit.estimates.items():
-        value, error = measured(e.value, e.stderr)
-        other = answer.simplex.values[name]
-        true = (number(truth[name]),) if truth and name in truth else ("",) if truth else ()
-        walked = number(other) if name not in _unseen(answer) else "–"
-        rows.append((Symbol(name), *true, value, error, _interval(e), walked, unit(e.unit), _meaning(answer, name)))
-    extra = ("truth",) if truth else ()
-    return Table(
+    """Every number, by both ways; a magnitude of the linear model is not asked for all of them."""
+    unasked = {j.coulomb for j in answer.rig.plant.joints} | {"actuator.lag", "actuator.delay"}
+    unasked |= {n for n, p in answer.rig.parameters.items() if not p.estimate}
+    walked = {n: "–" if n in unasked else number(answer.simplex.values[n]) for n in answer.fit.estimates}
+    return parameter_table(
+        answer.fit, truth=truth, beside=("simplex", walked),
         caption="Least squares with 95 % intervals, and the simplex' values beside them",
-        headings=("", *extra, "value", "std. error", "interval", "simplex", "unit", "meaning"), rows=tuple(rows),
-        numbers=tuple(range(1, 3 + len(extra))),
-    )  # fmt: skip
-
-
-def _unseen(answer: Answer) -> set[str]:
-    """What a magnitude of the linear model is not asked."""
-    dry = {j.coulomb for j in answer.rig.plant.joints} | {"actuator.lag", "actuator.delay"}
-    return dry | {n for n, p in answer.rig.parameters.items() if not p.estimate}
-
-
-def _meaning(answer: Answer, name: str) -> str:
-    p = answer.rig.parameters[name]
-    return p.meaning + ("" if p.estimate else ", known beforehand")
-
-
-def _interval(e: Estimate) -> str:
-    d = min(digits(e), 6)
-    return f"{number(e.interval[0], d)} to {number(e.interval[1], d)}"
-
-
-def _pole_table(answer: Answer) -> Table:
-    """Poles at every equilibrium."""
-    rows = tuple(
-        (at, number(p.real.value, 5), _interval(p.real), number(p.imag.value, 5) if p.imag.value else "",
-         _interval(p.imag) if p.imag.value else "")
-        for at, poles in answer.fit.poles.items() for p in poles if abs(complex(p.real.value, p.imag.value)) > 1e-6
-    )  # fmt: skip
-    return Table(
-        caption="Poles of the fitted rig, dry friction left out; of a pair the upper one",
-        headings=("at", "real part [1/s]", "interval", "imaginary part [rad/s]", "interval"), rows=rows, numbers=(1, 3),
     )  # fmt: skip
 
 
@@ -323,17 +283,14 @@ def _quality_picture(data: FrequencyResponse) -> Picture:
 
 def _numbers(answer: Answer, *, truth: Mapping[str, float] | None = None, key: float | None = None) -> dict[str, Any]:
     """The same as plain values."""
-    found = key_value(answer.key)
-    out: dict[str, Any] = {
+    true = truth or {}
+    return {
         "at": answer.key[0], "what": answer.key[1],
-        "pole": {"value": found.value, "stderr": found.stderr, "interval": found.interval},
+        "pole": plain_estimate(key_value(answer.key), key),
         "simplex_pole": complex(answer.simplex_pole),
         "misfit": answer.squares.misfit,
         "parameters": {
-            n: {"value": e.value, "stderr": e.stderr, "interval": e.interval, "unit": e.unit}
-            | ({"truth": truth[n], "inside": e.interval[0] <= truth[n] <= e.interval[1]}
-               if truth and n in truth else {})
-            for n, e in answer.fit.estimates.items()
+            n: plain_estimate(e, true.get(n)) | {"unit": e.unit} for n, e in answer.fit.estimates.items()
         },
         "ways": {
             w.name: {
@@ -344,22 +301,19 @@ def _numbers(answer: Answer, *, truth: Mapping[str, float] | None = None, key: f
         "left_out": answer.left_out,
         "trusted": answer.fit.trusted,
     }  # fmt: skip
-    if key is not None:
-        out["pole"] |= {"truth": key, "inside": found.interval[0] <= key <= found.interval[1]}
-    return out
 
 
 def _response_numbers(data: FrequencyResponse) -> dict[str, Any]:
     """A response as plain values."""
     return {
-        "omega": data.omega.tolist(),
+        "omega": data.omega,
         "outputs": {
             name: {
-                "magnitude_dB": data.magnitude_dB[:, j].tolist(),
-                "phase_deg": [math.degrees(math.atan2(z.imag, z.real)) for z in data.response[:, j].tolist()],
-                "error_percent": (100 * data.error[:, j]).tolist(),
-                "coherence": data.coherence[:, j].tolist(),
-                "distortion": data.distortion[:, j].tolist(),
+                "magnitude_dB": data.magnitude_dB[:, j],
+                "phase_deg": np.degrees(np.angle(data.response[:, j])),
+                "error_percent": 100 * data.error[:, j],
+                "coherence": data.coherence[:, j],
+                "distortion": data.distortion[:, j],
             }
             for j, name in enumerate(data.outputs)
         },

@@ -204,10 +204,10 @@ def _parts(done: Regulation) -> list[Part]:
         f"{math.degrees(done.task.hand[2]):.1f}° and {done.task.hand[3]:.1g} rad/s.",
     )
     parts = [
-        Part(title="Gains", content=(*given, _gain_table(done))),
+        Part("Gains", (*given, _gain_table(done))),
         Part(
-            title="Told before, come after",
-            content=(
+            "Told before, come after",
+            (
                 Points(tuple(_sentence(done, a) for a in done.attempts)),
                 _told_table(done),
                 _chance_picture(done),
@@ -222,7 +222,7 @@ def _parts(done: Regulation) -> list[Part]:
             description="Changes of the command from sample to sample: "
             + ", ".join(f"{w.name} {number(w.restless, 2)} {rig.unit}" for w in done.ways) + ".",
         )  # fmt: skip
-        parts.append(Part(title="Velocities", content=(_way_table(done), ways)))
+        parts.append(Part("Velocities", (_way_table(done), ways)))
     return parts
 
 
@@ -257,16 +257,16 @@ def _steps(done: Regulation) -> list[Step]:
     seed = f" --seed {done.truth.seed}" if done.truth is not None else ""
     base = f"upright regulate {done.source}{seed}"
     first = [] if done.truth is not None else [
-        Step(sentence="Run the laws on a twin of this make.", command=f"upright regulate {done.source} --seed 0")
+        Step("Run the laws on a twin of this make.", f"upright regulate {done.source} --seed 0")
     ]  # fmt: skip
     own = f'--poles "{written(done.best.placement.asked).replace("±", "+-")}"'
     best = f"--set {done.best.name[4:]}" if done.best.name in SETS else own
     return [
         *first,
-        Step(sentence="See how hard a start the recommended set bears.",
-             command=f'{base} {best} --tilt "25 deg" --push "3 rad/s"'),
-        Step(sentence="Let an observer make the velocities.", command=f"{base} --speed kalman"),
-        Step(sentence="Try poles of your own.", command=f'{base} --poles "-5+-3j, -25, -4"'),
+        Step("See how hard a start the recommended set bears.",
+             f'{base} {best} --tilt "25 deg" --push "3 rad/s"'),
+        Step("Let an observer make the velocities.", f"{base} --speed kalman"),
+        Step("Try poles of your own.", f'{base} --poles "-5+-3j, -25, -4"'),
     ]  # fmt: skip
 
 

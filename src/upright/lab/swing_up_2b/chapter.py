@@ -37,9 +37,9 @@ def chapter(done: Swung) -> Chapter:
 
 def check_chapter(model: Rig, check: Scales, log: str, source: str = "FIT.json") -> Chapter:
     """What a log of a hanging rig says of its encoders, by itself."""
-    again = Step(sentence="Mend what is said above, log the hanging rig again, and check again.")
-    onward = Step(sentence="The encoders may be trusted: find the gains that hold the rig.",
-                  command=f"upright regulate {source}")  # fmt: skip
+    again = Step("Mend what is said above, log the hanging rig again, and check again.")
+    onward = Step("The encoders may be trusted: find the gains that hold the rig.",
+                  f"upright regulate {source}")  # fmt: skip
     return Chapter(
         key="2b", title=f"Encoders of {model.name} in {log}", question="Do the encoders show what is true?",
         verdict=check.verdict, sound=check.sound, parts=(_sensor_part(model, check),),
@@ -73,7 +73,7 @@ def _sensor_part(model: Rig, check: Scales) -> Part:
         "The period of a large swing tells its true amplitude, momentum what the driven body does meanwhile, and "
         "the drive the signs; the model's own numbers may move as far as they are uncertain."
     )
-    return Part(title="Encoders, before a loop is closed", content=(Points((check.verdict,)), how, table, swings))
+    return Part("Encoders, before a loop is closed", (Points((check.verdict,)), how, table, swings))
 
 
 def _swing_part(done: Swung, run: Ascent) -> Part:
@@ -90,8 +90,8 @@ def _swing_part(done: Swung, run: Ascent) -> Part:
         ("ellipsoid of the catch, of what the linear model allows", percent(100 * law.size / law.sure), ""),
     )
     return Part(
-        title="Swing-up and catch",
-        content=(
+        "Swing-up and catch",
+        (
             done.verdict,
             "The pivot is accelerated along with the swing, by less as the energy comes near that of upright; a spring "
             "and a damper keep it in the middle. The feedback takes over inside an ellipsoid x'Px from which a "
@@ -128,7 +128,7 @@ def _lie_part(done: Swung) -> Part:
         f"A loop started {math.degrees(TILT):.0f} degrees from upright falls with {len(falling)} of them; a watch "
         f"beside it switches off before the fall in {in_time} cases."
     )
-    return Part(title="If an encoder lied", content=(Points((told,)), table))
+    return Part("If an encoder lied", (Points((told,)), table))
 
 
 def _row(lie: Lie) -> tuple[str, ...]:
@@ -156,13 +156,13 @@ def _steps(done: Swung) -> tuple[Step, ...]:
     make = "furuta" if done.law.body.spin > 0 else "linear"
     base = f"upright swing-up {done.source or f'--rig {make}'} --seed {done.truth.seed}"
     if not done.check.sound:
-        return (Step(sentence="Mend the encoder, then try again.", command=base),)
-    out = [Step(sentence="See what happens when an encoder lies.", command=f'{base} --lie "theta=2"')]
+        return (Step("Mend the encoder, then try again.", base),)
+    out = [Step("See what happens when an encoder lies.", f'{base} --lie "theta=2"')]
     if not done.caught:
-        out.append(Step(sentence="Allow more travel.", command=f"{base} --travel {2 * done.law.travel:g}"))
+        out.append(Step("Allow more travel.", f"{base} --travel {2 * done.law.travel:g}"))
     if not done.source:
-        out.append(Step(sentence="Design from an identification instead of the data sheet.",
-                        command=f"upright swing-up FIT.json --seed {done.truth.seed}"))  # fmt: skip
+        out.append(Step("Design from an identification instead of the data sheet.",
+                        f"upright swing-up FIT.json --seed {done.truth.seed}"))  # fmt: skip
     return tuple(out)
 
 

@@ -7,17 +7,16 @@ from typing import Any
 
 import numpy as np
 
+from upright.identification.model.model import Fit
 from upright.lab.tracking_3 import tables
 from upright.lab.tracking_3.figures import (
     Bargain,
     Locus,
     Panel,
     bargain_figure,
-    frame,
     loci_figure,
     poles_figure,
     steps_figure,
-    trace,
 )
 from upright.lab.tracking_3.laws import AT, loop_poles
 from upright.lab.tracking_3.pd import best_decay, root_locus, sampled
@@ -27,9 +26,9 @@ from upright.lab.tracking_3.tables import length, milli, share
 from upright.lab.tracking_3.trials import BEFORE, DWELL, Outcome, Run
 from upright.paper.tables import TABLE_2
 from upright.report.fit.chapter import motion_part, run_pictures
-from upright.report.fit.tables import interval
-from upright.report.page import Chapter, Finding, Part, Picture, Step
-from upright.report.symbols import figures, number, plain, typed
+from upright.report.fit.tables import finding, parameter_table
+from upright.report.page import Chapter, Finding, Part, Picture, Step, Table
+from upright.report.symbols import number, plain, typed
 
 
 def chapter(done: Tracking) -> Chapter:
@@ -100,15 +99,10 @@ def _strongest(done: Tracking) -> Outcome:
 
 def _findings(done: Tracking) -> tuple[Finding, ...]:
     best, out = _strongest(done), []
-    if done.fit is not None:
-        swing = max((p for at in done.fit.poles.values() for p in at), key=lambda p: p.imag.value, default=None)
-        if swing is not None and swing.imag.value > 0:
-            digits = figures(swing.imag.value, swing.imag.stderr)
-            true = float(max(done.true.linear(AT).poles().imag))
-            out.append(
-                Finding(what="flexible mode [rad/s]", value=number(swing.imag.value, digits),
-                        interval=interval(swing.imag), truth=number(true, digits))
-            )  # fmt: skip
+    poles = [] if done.fit is None else [p.imag for at in done.fit.poles.values() for p in at]
+    swing = max(poles, key=lambda e: e.value, default=None)
+    if swing is not None and swing.value > 0:
+        out.append(finding("flexible mode [rad/s]", swing, float(max(done.true.linear(AT).poles().imag))))
     f = best.found.figures
     if f is not None:
         out.append(Finding(what=f"{best.law.name}: arrival within 5 % [s]", value=milli(f.arrival)))
@@ -119,20 +113,20 @@ def _findings(done: Tracking) -> tuple[Finding, ...]:
 
 def _steps(done: Tracking) -> tuple[Step, ...]:
     fit = typed(done.folder if done.fit is None else done.folder / FIT)
-    own = Step(sentence="Ask for poles of your own.", command=f'upright track {fit} --poles "-10+-20j, -25+-10j"')
+    own = Step("Ask for poles of your own.", f'upright track {fit} --poles "-10+-20j, -25+-10j"')
     if done.fit is None:
         return (own,)
     model = done.rig.plant.coordinates
     counts = "" if model[0].unit == "rad" else f" --counts {done.rig.counts[0]:.6g}"
     return (
         Step(
-            sentence="Repeat the fit from its files.",
-            command=f"upright identify {typed(done.folder / STUDY)} -o {typed(done.folder / 'again')}",
+            "Repeat the fit from its files.",
+            f"upright identify {typed(done.folder / STUDY)} -o {typed(done.folder / 'again')}",
         ),
         own,
         Step(
-            sentence="See margins and noise of one set.",
-            command=f"upright design {fit} --at {AT} --track {model[-1].name} --period "
+            "See margins and noise of one set.",
+            f"upright design {fit} --at {AT} --track {model[-1].name} --period "
             f'"{1e3 * done.rig.period:g} ms"{counts} --poles "{TABLE_2[-1]}"',
         ),
     )
@@ -153,10 +147,18 @@ def _data(done: Tracking) -> list[Part]:
     found = f"{fit.verdict} Other pulses are predicted: {scores}."
     scale = _scale(fit.rig.parameters["actuator.gain"].estimate)
     return [
-        Part(title="Data", content=(pulses, *run_pictures(fit, "track"))),
+        Part("Data", (pulses, *run_pictures(fit, "track"))),
         motion_part(fit),
-        Part(title="Fit", content=(found, scale, tables.fit_table(done, fit))),
+        Part("Fit", (found, scale, _fit_table(done, fit))),
     ]
+
+
+def _fit_table(done: Tracking, fit: Fit) -> Table:
+    """Numbers of the shaft, with the truth that only a twin can tell."""
+    return parameter_table(
+        fit, truth=done.true.plant.parameters() | {"actuator.gain": done.true.gain},
+        caption="What the pulses say, beside the truth of the twin; the interval holds the truth in 95 of 100 rigs",
+    )  # fmt: skip
 
 
 def _scale(weighed: bool) -> str:
@@ -180,8 +182,8 @@ def _gains(done: Tracking, far: str) -> Part:
         return poles_figure(panels, done.model.linear(AT).poles())
 
     return Part(
-        title="Gains",
-        content=(
+        "Gains",
+        (
             "Ackermann's formula on the fitted model puts the poles where Table 2 of the paper has them; "
             f"k_pf = 1/(C (B K − A)⁻¹ B) gives unit static gain from the reference to {far}.",
             f"The step is {length(done, done.step.size)}, {_sized(done)}. The largest command is the first: speeds are "
@@ -222,12 +224,12 @@ def _loop(done: Tracking, near: str, far: str) -> Part:
             + ("the same." if off < 5e-4 else f"{best.found.effort.peak:.3g} {done.rig.unit}.")
         )
     steps = Picture(
-        name="track-steps", draw=lambda: steps_figure([trace(o) for o in done.sets], frame(done)),
+        name="track-steps", draw=lambda: steps_figure(done, done.sets),
         caption=f"Reference (dotted), {near} of the driven body, {far} of the far one, and the first 0.1 s of "
         "the command with the drive's limit, set by set.",
         description=_described(done),
     )  # fmt: skip
-    return Part(title="Closed loop", content=(told, tables.step_table(done), steps))
+    return Part("Closed loop", (told, tables.step_table(done), steps))
 
 
 def _described(done: Tracking) -> str:
@@ -251,8 +253,8 @@ def _friction(done: Tracking, far: str) -> Part:
             "is followed as before."
         )
     return Part(
-        title="What friction leaves",
-        content=(
+        "What friction leaves",
+        (
             f"At rest the spring may hold the far body off by f_2/k, and the drive need not move the near one before "
             f"its pull exceeds f_1: {far} stays wrong by up to (f_1 + f_2)/(gain k_pf) + (K_1/k_pf) f_2/k. The first "
             f"part shrinks as the loop gets stiffer, the second does not.{cure}",
@@ -274,8 +276,8 @@ def _why(done: Tracking, pd: Outcome, stiff: Outcome, other_end: Outcome, near: 
     end = f"trips the rig {trips - BEFORE:.2g} s after the step" if math.isfinite(trips) else "does not trip the rig"
     tried = 0 if done.search is None else done.search.kp.size
     return Part(
-        title="Why state feedback",
-        content=(
+        "Why state feedback",
+        (
             f"PD control of the driven body, kp and kd the best of {tried} pairs tried on the fitted rig under the "
             f"same limit, brings {far} to the reference about as soon, at {share(pd.found.effort.share, 0)} of the "
             "limit. For a step alone it would do.",
@@ -291,9 +293,7 @@ def _why(done: Tracking, pd: Outcome, stiff: Outcome, other_end: Outcome, near: 
             "damping for any kp and kd: the polynomial lacks s³).",
             Picture(
                 name="track-compared",
-                draw=lambda: steps_figure(
-                    [trace(o) for o in compared], frame(done), until=DWELL + 1.4, kick=None
-                ),
+                draw=lambda: steps_figure(done, compared, until=DWELL + 1.4, kick=None),
                 caption="The same step, then a steady push of the drive, which the command shown contains. A cross: "
                 "the rig has tripped.",
                 description=f"State feedback beside PD control: {_described(done)}",

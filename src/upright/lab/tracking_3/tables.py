@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 
 from upright.design.requests import written
-from upright.identification.model.model import Fit
 from upright.lab.tracking_3.figures import shown
 from upright.lab.tracking_3.laws import AT
 from upright.lab.tracking_3.run import Tracking
 from upright.lab.tracking_3.trials import Outcome, Run
-from upright.report.fit.tables import interval
-from upright.report.page import Symbol, Table
-from upright.report.symbols import figures, number, plain
+from upright.report.page import Table
+from upright.report.symbols import number, plain
 from upright.report.symbols import unit as raised
 
 
@@ -38,26 +36,6 @@ def length(done: Tracking, value: float, digits: int = 3) -> str:
     """A length or an angle as it is read best."""
     factor, unit = shown(done.rig.plant.coordinates[-1].unit)
     return f"{number(factor * value, digits)} {unit}"
-
-
-def fit_table(done: Tracking, fit: Fit) -> Table:
-    """Numbers of the shaft, with the truth that only a twin can tell."""
-    truth = done.true.plant.parameters() | {"actuator.gain": done.true.gain}
-    rows: list[tuple[str, ...]] = []
-    for name, e in fit.estimates.items():
-        if name not in truth:
-            continue
-        digits = figures(e.value, e.stderr)
-        inside = "inside" if e.interval[0] <= truth[name] <= e.interval[1] else "outside"
-        rows.append(
-            (Symbol(name), number(truth[name], digits), number(e.value, digits), number(e.stderr, 2), interval(e),
-             inside, raised(e.unit))
-        )  # fmt: skip
-    return Table(
-        caption="What the pulses say, beside the truth of the twin; the interval holds the truth in 95 of 100 rigs",
-        headings=("", "truth", "fitted", "std. error", "95 % interval", "truth", "unit"), rows=tuple(rows),
-        numbers=(1, 2, 3),
-    )  # fmt: skip
 
 
 def gain_table(done: Tracking) -> Table:

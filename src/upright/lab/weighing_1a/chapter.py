@@ -70,9 +70,9 @@ def chapter(done: Weighing) -> Chapter:
         key="1a",
         detail=" ".join(_sentence(done, k) for k in done.known),
         parts=(
-            Part(title="The body", content=(_BODY[done.make], steps)),
+            Part("The body", (_BODY[done.make], steps)),
             *weighed.parts,
-            Part(title="What is handed on", content=(_LATER[done.make], handed)),
+            Part("What is handed on", (_LATER[done.make], handed)),
         ),
         steps=_steps(done),
         findings=tuple(
@@ -120,10 +120,10 @@ def _steps(done: Weighing) -> tuple[Step, ...]:
     files = " ".join(typed(done.folder / file) for file in first.values())
     return (
         Step(
-            sentence="Weigh the body again from one log of each loading, as you would your own.",
-            command=f"upright loadings {files} {added} -o {typed(done.folder / 'again')}",
+            "Weigh the body again from one log of each loading, as you would your own.",
+            f"upright loadings {files} {added} -o {typed(done.folder / 'again')}",
         ),
-        Step(sentence="See which masses would have told most.", command=f"upright plan-inertias --rig {kind}"),
+        Step("See which masses would have told most.", f"upright plan-inertias --rig {kind}"),
     )
 
 
@@ -136,7 +136,7 @@ def loading_chapter(
         "Dry friction takes the same length δ = f/k off the centre in every half swing and leaves the period alone; "
         "viscous friction takes the same share. Both follow from the heights of successive extremes."
     )
-    lost = (Part(title="Left out", content=(Points(tuple(left_out)),)),) if left_out else ()
+    lost = (Part("Left out", (Points(tuple(left_out)),)),) if left_out else ()
     line = Picture(
         name="line", draw=lambda: line_figure(found, _UNITS[kind]["inertia"]),
         caption="1/ω² over the added inertia. The slope is 1/k, the line meets zero at minus the bare inertia. "
@@ -151,12 +151,12 @@ def loading_chapter(
         question=QUESTION,
         parts=(
             Part(
-                title="Data: the swings",
-                content=(recursion, _swing_table(found, kind), *_swing_pictures(found, logs, signals)),
+                "Data: the swings",
+                (recursion, _swing_table(found, kind), *_swing_pictures(found, logs, signals)),
                 aside=True,
             ),
             *lost,
-            Part(title="Fit: the line", content=(_found_table(found, kind, truth or {}), line)),
+            Part("Fit: the line", (_found_table(found, kind, truth or {}), line)),
         ),
         steps=tuple(steps),
         numbers={

@@ -54,9 +54,9 @@ def swing_figure(swings: Sequence[tuple[Loaded, Record, str]]) -> Figure:
         axes.plot(*decimated(record.t[near], record[signal][near]), color=BLUE, linewidth=1.0, label="log")
         axes.plot(d.t, d.x, "o", color=VERMILLION, markersize=4.5, fillstyle="none", label="extremes")
         axes.plot(d.t, d.model, "+", color="black", markersize=6, label="recursion")
-        axes.set_title(f"{loaded.label}: {d.omega_n:.4g} rad/s, damping ratio {d.zeta:.3f}").set_parse_math(False)
+        axes.set_title(f"{loaded.label}: {d.omega_n:.4g} rad/s, damping ratio {d.zeta:.3f}", parse_math=False)
         unit_of = record.units.get(signal, "")
-        axes.set_ylabel(f"{signal[:14]}\n[{unit_of}]" if unit_of else signal[:14]).set_parse_math(False)
+        axes.set_ylabel(f"{signal[:14]}\n[{unit_of}]" if unit_of else signal[:14], parse_math=False)
     panels[0].legend(loc="upper right", ncols=3)
     panels[-1].set_xlabel("time [s]")
     return drawing

@@ -163,35 +163,37 @@ def _short(label: str, most: int = 26) -> str:
 
 
 @styled
-def interval_figure(estimates: Mapping[str, Estimate]) -> Figure:
-    """Every estimate's interval relative to its value; what leaves the picture is an arrow."""
+def interval_figure(estimates: Mapping[str, Estimate], *, truth: Mapping[str, float] | None = None) -> Figure:
+    """Every estimate's interval relative to its value, or to a twin's `truth`; what leaves the picture is an arrow.
+
+    Solid are estimates that are firm, or whose interval holds the truth.
+    """
     shown = {n: e for n, e in estimates.items() if e.status != "known" and e.value != 0}
-    drawing = figure(0.55 + 0.27 * max(len(shown), 1))
+    centres = {n: e.value for n, e in shown.items()} if truth is None else {n: truth[n] for n in shown if truth.get(n)}
+    drawing = figure(0.55 + 0.27 * max(len(centres), 1))
     ax = drawing.add_subplot()
-    ends = [_relative(e) for e in shown.values()]
-    finite = [abs(x) for pair in ends for x in pair if math.isfinite(x) and abs(x) < _MOST]
+    ends = {n: sorted((end - c) / abs(c) for end in shown[n].interval) for n, c in centres.items()}
+    finite = [abs(x) for pair in ends.values() for x in pair if math.isfinite(x) and abs(x) < _MOST]
     reach = min(_MOST, 1.25 * max(finite, default=0.1))
-    for row, ((low, high), e) in enumerate(zip(ends, shown.values(), strict=True)):
-        firm = e.status == "firm"
+    for row, (name, (low, high)) in enumerate(ends.items()):
+        e, centre = shown[name], centres[name]
+        firm = e.status == "firm" if truth is None else low <= 0 <= high
         colour = BLUE if firm else VERMILLION
         lo, hi = max(low, -reach), min(high, reach)
         ax.plot([100 * lo, 100 * hi], [row, row], color=colour, linewidth=2, linestyle="-" if firm else (0, (3, 1)))
-        ax.plot(0, row, marker="o" if firm else "s", color=colour, markersize=4.5)
+        ax.plot(100 * (e.value / centre - 1), row, marker="o" if firm else "s", color=colour, markersize=4.5)
         for end, limit, mark in ((low, -reach, "<"), (high, reach, ">")):
             if not abs(end) <= reach:
                 ax.plot(100 * limit, row, marker=mark, color=colour, markersize=6, clip_on=False)
     ax.axvline(0, color=GREY, linewidth=0.6)
-    ax.set_yticks(range(len(shown)), [f"{mathtext(n)}  ({e.status})" for n, e in shown.items()])
-    ax.set_ylim(len(shown) - 0.5, -0.5)
+    status = {n: f"  ({shown[n].status})" if truth is None else "" for n in ends}
+    ax.set_yticks(range(len(ends)), [f"{mathtext(n)}{said}" for n, said in status.items()])
+    ax.set_ylim(len(ends) - 0.5, -0.5)
     ax.set_xlim(-100 * reach, 100 * reach)
-    ax.set_xlabel("95 % interval relative to the estimate [%]")
+    what = "95 % interval relative to the estimate" if truth is None else "estimate and 95 % interval, from the truth"
+    ax.set_xlabel(f"{what} [%]")
     ax.grid(visible=False, axis="y")
     return drawing
-
-
-def _relative(e: Estimate) -> tuple[float, float]:
-    low, high = sorted((end - e.value) / abs(e.value) for end in e.interval)
-    return low, high
 
 
 @styled

@@ -8,27 +8,61 @@ from dataclasses import replace
 
 from upright.identification.ladder.crossval import CrossValidation
 from upright.identification.model.model import ACTUATOR, Estimate, Fit, Parameter, Pole, RunScore
-from upright.report.page import Symbol, Table
+from upright.report.page import Finding, Symbol, Table
 from upright.report.symbols import figures, measured, number, percent, plain, unit
 
 _ESTIMATE = ("value", "std. error", "95 % interval", "unit", "status", "name and meaning")
+_OF_THE_RIG = "Parameters of the rig; standard errors hold for residuals that remember themselves"
 
 
-def parameter_table(fit: Fit) -> Table:
-    """Estimated parameters, then those that were given and are not zero."""
+def parameter_table(
+    fit: Fit, *, truth: Mapping[str, float] | None = None, beside: tuple[str, Mapping[str, str]] | None = None,
+    caption: str = _OF_THE_RIG,
+) -> Table:  # fmt: skip
+    """Estimated parameters, then those that were given and are not zero.
+
+    Parameters
+    ----------
+    fit : Fit
+    truth : mapping of str to float, optional
+        What only a twin can tell, for two columns more.
+    beside : (str, mapping of str to str), optional
+        Heading and cells of one column more.
+    caption : str
+    """
     about = fit.rig.parameters
-    rows = [_estimate(n, e, about.get(n)) for n, e in fit.estimates.items() if e.status != "known"]
-    told = {row[0] for row in rows}
-    rows += [
-        (Symbol(n), number(p.value), number(p.uncertainty, 2) if p.uncertainty else "exact", "", unit(p.unit), "given",
-         _called(n, p))
+    told = {n: _estimate(n, e, about.get(n)) for n, e in fit.estimates.items() if e.status != "known"}
+    told |= {
+        n: (number(p.value), number(p.uncertainty, 2) if p.uncertainty else "exact", "", unit(p.unit), "given",
+            _called(n, p))
         for n, p in about.items()
         if not p.estimate and n not in told and p.value != (ACTUATOR[n][1] if n in ACTUATOR else 0.0)
-    ]  # fmt: skip
+    }  # fmt: skip
+    rows: list[tuple[str, ...]] = []
+    for name, (value, error, around, *rest) in told.items():
+        true, place = ((), ()) if truth is None else _true(fit.estimates.get(name), truth.get(name))
+        other = () if beside is None else (beside[1].get(name, ""),)
+        rows.append((Symbol(name), *true, value, error, around, *place, *other, *rest))
+    extra = ((), ()) if truth is None else (("truth",), ("truth is",))
+    headings = ("symbol", *extra[0], *_ESTIMATE[:3], *extra[1], *(beside[:1] if beside else ()), *_ESTIMATE[3:])
+    numbers = tuple(i for i, h in enumerate(headings) if h in ("truth", *_ESTIMATE[:3], *(beside or ())[:1]))
     return Table(
-        caption="Parameters of the rig; standard errors hold for residuals that remember themselves",
-        headings=("symbol", *_ESTIMATE), rows=tuple(rows), numbers=(1, 2, 3), badge=5,
+        caption=caption, headings=headings, rows=tuple(rows), numbers=numbers, badge=headings.index("status")
     )  # fmt: skip
+
+
+def _true(e: Estimate | None, true: float | None) -> tuple[tuple[str], tuple[str]]:
+    """The true value and where it lies; nothing where nobody knows it, or nothing was estimated."""
+    if true is None:
+        return ("",), ("",)
+    if e is None or e.status == "known":
+        return (number(true),), ("",)
+    return (number(true, figures(e.value, e.stderr)),), ("inside" if within(e, true) else "outside",)
+
+
+def within(e: Estimate, true: float) -> bool:
+    """Whether the 95 % interval holds the truth."""
+    return e.interval[0] <= true <= e.interval[1]
 
 
 def without_table(fit: Fit) -> Table:
@@ -37,14 +71,16 @@ def without_table(fit: Fit) -> Table:
     return Table(
         caption="What the data give without the assumed gain: per unit of the command, in seconds and counts",
         headings=("symbol", *_ESTIMATE), numbers=(1, 2, 3), badge=5,
-        rows=tuple(_estimate(n, e, about.get(n)) for a in fit.assumptions for n, e in a.without.items()),
+        rows=tuple(
+            (Symbol(n), *_estimate(n, e, about.get(n))) for a in fit.assumptions for n, e in a.without.items()
+        ),
     )  # fmt: skip
 
 
 def run_table(fit: Fit) -> Table:
     """What was estimated for groups of runs, then run by run."""
     homes = {f"group {group}": own for group, own in fit.groups.items()} | dict(fit.per_run)
-    rows = tuple((run, *_estimate(n, e, None)[:-1]) for run, own in homes.items() for n, e in own.items())
+    rows = tuple((run, Symbol(n), *_estimate(n, e, None)[:-1]) for run, own in homes.items() for n, e in own.items())
     return Table(
         caption="Initial states, offsets and factors of groups of runs and of single runs",
         headings=("run", "symbol", *_ESTIMATE[:-1]), rows=rows, numbers=(2, 3, 4), badge=6,
@@ -53,11 +89,26 @@ def run_table(fit: Fit) -> Table:
 
 
 def _estimate(name: str, e: Estimate, about: Parameter | None) -> tuple[str, ...]:
-    return (Symbol(name), *measured(e.value, e.stderr), interval(e), unit(e.unit), e.status, _called(name, about))
+    beforehand = ", known beforehand" if about and about.uncertainty else ""
+    return (*measured(e.value, e.stderr), interval(e), unit(e.unit), e.status, _called(name, about) + beforehand)
 
 
 def _called(name: str, about: Parameter | None) -> str:
     return f"{name}, {about.meaning}" if about and about.meaning else name
+
+
+def finding(what: str, e: Estimate, true: float | None = None) -> Finding:
+    """An estimate for the cover."""
+    d = figures(e.value, e.stderr)
+    return Finding(
+        what=what, value=number(e.value, d), interval=interval(e), truth="" if true is None else number(true, d)
+    )
+
+
+def plain_estimate(e: Estimate, true: float | None = None) -> dict[str, object]:
+    """An estimate as plain values, beside the truth of a twin."""
+    told: dict[str, object] = {"value": e.value, "stderr": e.stderr, "interval": e.interval}
+    return told if true is None else told | {"truth": true, "inside": within(e, true)}
 
 
 def interval(e: Estimate) -> str:
