@@ -17,6 +17,12 @@ if TYPE_CHECKING:
     from upright.report.page import Chapter
 
 
+def _folder(path: Path) -> Path:
+    if path.exists() and not path.is_dir():
+        raise BadInput(f"--out needs a folder, and '{path}' is a file; name another folder.")
+    return path
+
+
 def _wants_pdf(asked: bool) -> bool:
     """Say before the work begins that a PDF cannot be made."""
     if asked:
@@ -27,8 +33,13 @@ def _wants_pdf(asked: bool) -> bool:
     return asked
 
 
+Out = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for all files.", callback=_folder)]
+Data = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Folder the runs' files are in; the study's own if left out.")
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the numbers as JSON instead of tables.")]
 Pdf = Annotated[bool, typer.Option("--pdf", help="Write the page as PDF too (pdf extra).", callback=_wants_pdf)]
-"""Option of every command that writes a page."""
+"""Options that several commands have."""
 
 
 def console(*, error: bool = False) -> Any:

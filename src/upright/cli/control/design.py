@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from upright.cli.terminal import Pdf, tell, write_json, write_page
+from upright.cli.terminal import AsJson, Out, Pdf, tell, write_json, write_page
 from upright.errors import BadInput, nearest
 
 if TYPE_CHECKING:
@@ -38,9 +38,9 @@ def design(
     track: Annotated[str, typer.Option(metavar="COORDINATE", help="Coordinate that follows a reference.")] = "",
     sampled: Annotated[bool, typer.Option("--sampled", help="Gains whose sampled loop has the poles asked.")] = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the rigs drawn from the fit's covariance.")] = 0,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="For design.json and .html.")] = Path(),
+    out: Out = Path(),
     pdf: Pdf = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print design.json instead of tables.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Find the gains that hold a rig, and say what they are worth in the loop that a computer runs.
 
@@ -57,8 +57,6 @@ def design(
     from upright.report.symbols import typed
     from upright.units import parse
 
-    if out.exists() and not out.is_dir():
-        raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
     if bool(poles) == bool(lqr):
         raise BadInput('give either --poles "-4+-2j, -10, -3" or --lqr "1,0,1,0" (weights of the states).')
     if speed not in ("plain", "filtered", "kalman"):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from upright.cli.terminal import Pdf, progress_bar, tell, write_page
+from upright.cli.terminal import AsJson, Out, Pdf, progress_bar, tell, write_page
 from upright.errors import BadInput
 
 if TYPE_CHECKING:
@@ -31,11 +31,9 @@ def regulate(
     tilt: Annotated[str, typer.Option(metavar="ANGLE", help='From upright when let go, as in "12 deg".')] = "",
     push: Annotated[str, typer.Option(metavar="SPEED", help='Of the pendulum then, outwards: "1.5 rad/s".')] = "",
     seconds: Annotated[float, typer.Option(help="Length of a run.")] = 6.0,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="For logs and report.")] = Path(
-        "upright-regulate"
-    ),
+    out: Out = Path("upright-regulate"),
     pdf: Pdf = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON instead of tables.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     r"""Hold an identified rig upright; say beforehand what each pole set will come to, then run it.
 
@@ -53,8 +51,6 @@ def regulate(
     from upright.lab.rigs.rig_file import read_rig_file
     from upright.report.symbols import typed
 
-    if out.exists() and not out.is_dir():
-        raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
     wish = _wish(which, poles, speed, memory, tilt, push, seconds)
     with progress_bar(quiet=as_json) as bar:
         file: RigFile

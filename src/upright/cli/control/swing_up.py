@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from upright.cli.terminal import Pdf, tell, write_json, write_page
+from upright.cli.terminal import AsJson, Out, Pdf, tell, write_json, write_page
 from upright.errors import BadInput, nearest
 
 if TYPE_CHECKING:
@@ -34,9 +34,9 @@ def swing_up(
         Path | None,
         typer.Option(metavar="LOG", help="Only say what this log of a hanging, driven rig tells of its encoders."),
     ] = None,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Logs, page, JSON.")] = Path("swing-up"),
+    out: Out = Path("swing-up"),
     pdf: Pdf = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the numbers instead of sentences.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Swing a hanging pendulum up within the drive's limit and travel, and catch it; its encoders are asked first.
 
@@ -57,8 +57,6 @@ def swing_up(
     from upright.lab.swing_up_2b.chapter import chapter
     from upright.report.symbols import typed
 
-    if out.exists() and not out.is_dir():
-        raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
     if travel is not None and not travel > 0:
         raise BadInput(f"--travel must be above 0, got {travel:g}; give it in m or rad.")
     known = None

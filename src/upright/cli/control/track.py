@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from upright.cli.terminal import Pdf, progress_bar, tell, write_json, write_page
+from upright.cli.terminal import AsJson, Out, Pdf, progress_bar, tell, write_json, write_page
 from upright.errors import BadInput
 
 if TYPE_CHECKING:
@@ -32,9 +32,9 @@ def track(
     limit: Annotated[
         float | None, typer.Option(metavar="U", help="Largest command; the make's own if left out.")
     ] = None,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for all files.")] = Path("track"),
+    out: Out = Path("track"),
     pdf: Pdf = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print track.json instead of tables.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     r"""Make the far inertia of a flexible shaft follow a step (experiment 3).
 
@@ -51,8 +51,6 @@ def track(
     from upright.lab.tracking_3.chapter import chapter
     from upright.units import parse
 
-    if out.exists() and not out.is_dir():
-        raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
     own = read_poles(poles) if poles else None
     which = _which(sets) if sets else (() if poles else (1, 2, 3, 4))
     kind, model = _kind(source, rig, limit)

@@ -7,15 +7,14 @@ from typing import Annotated
 
 import typer
 
-from upright.cli.terminal import Pdf, tell, write_page
-from upright.errors import BadInput
+from upright.cli.terminal import AsJson, Out, Pdf, tell, write_page
 
 
 def reproduce(
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for reproduce.html.")] = Path(),
+    out: Out = Path(),
     seed: Annotated[int, typer.Option(min=0, help="Seed of the rigs on which formulas are tried.")] = 0,
     pdf: Pdf = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON instead of tables.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Regenerate Tables 1 and 2 of the paper from a handful of numbers, and show each of its misprints.
 
@@ -28,7 +27,5 @@ def reproduce(
     from upright.paper.chapter import chapter
     from upright.paper.reproduce import reproduce as again
 
-    if out.exists() and not out.is_dir():
-        raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
     told = chapter(again(NOMINAL, seed))
     tell(told, write_page(told, out / "reproduce.html", pdf), told.numbers if as_json else None)

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from upright.cli.terminal import Pdf, tell, write_page
+from upright.cli.terminal import AsJson, Out, Pdf, tell, write_page
 from upright.errors import BadInput
 
 
@@ -18,9 +18,9 @@ def survey(
         int | None, typer.Option("--n", min=2, metavar="N", help="Answers behind printed means or shares.")
     ] = None,
     scale: Annotated[str, typer.Option(metavar="LOW-HIGH", help="Scale of the ratings.")] = "1-4",
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for the report.")] = Path("survey"),
+    out: Out = Path("survey"),
     pdf: Pdf = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON instead of tables.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     r"""Evaluate ratings before and after a course and agreement with statements; check printed summaries.
 
@@ -36,8 +36,6 @@ def survey(
     from upright.survey import Ratings, read
     from upright.survey.chapter import chapter
 
-    if out.exists() and not out.is_dir():
-        raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
     ends = re.fullmatch(r"\s*(\d{1,2})\s*(?:-|to)\s*(\d{1,2})\s*", scale)
     if ends is None or int(ends[1]) >= int(ends[2]):
         raise BadInput(f"--scale needs its two ends, such as 1-4, got '{scale}'.")
@@ -51,7 +49,7 @@ def survey(
     again = f"upright survey {typed(file)}{'' if n is None else f' --n {n}'} --json"
     told = chapter(
         sheet, title=f"Survey: {file.stem.replace('_', ' ')}", source=file.name, answers=n, scale=limits,
-        steps=(Step(sentence="Hand the numbers on.", command=again),),
+        steps=(Step("Hand the numbers on.", again),),
     )  # fmt: skip
     written = write_page(told, out / "report.html", pdf)
     tell(told, written, {**told.numbers, "report": str(written[0])} if as_json else None)

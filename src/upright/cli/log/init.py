@@ -66,8 +66,8 @@ def init(
     if measure:
         guessed.append(f"Placeholders to replace by what you measured: {', '.join(measure)}")
     onward = Step(
-        sentence="Read it, then fit it.",
-        command=f"upright identify {typed(study)} -o {typed(study.with_name(f'{study.stem}-fit'))}",
+        "Read it, then fit it.",
+        f"upright identify {typed(study)} -o {typed(study.with_name(f'{study.stem}-fit'))}",
     )
-    parts = (Part(title="Recognised", content=(Points(tuple(guessed)),)),) if guessed else ()
+    parts = (Part("Recognised", (Points(tuple(guessed)),)),) if guessed else ()
     tell(Chapter(title=f"Draft of {study.name}", verdict="", parts=parts, steps=(onward,)), [study])

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from upright.cli.terminal import Pdf, tell, write_page
+from upright.cli.terminal import Out, Pdf, tell, write_page
 from upright.errors import BadInput
 
 
@@ -27,9 +27,7 @@ def law(
     every: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Samples of the servo per row, when it is known.")
     ] = None,
-    out: Annotated[
-        Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for law.json, .svg and .html.")
-    ] = Path(),
+    out: Out = Path(),
     pdf: Pdf = False,
 ) -> None:
     """Recover the control law from a closed-loop log: structure, gains, limit, and what it leaves unexplained.
@@ -46,8 +44,6 @@ def law(
     from upright.report.law import chapter, draw_law
     from upright.report.symbols import typed
 
-    if out.exists() and not out.is_dir():
-        raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
     record = read(log)
     if not command or not measured:
         raise BadInput(

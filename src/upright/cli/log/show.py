@@ -10,15 +10,14 @@ from typing import Annotated, Any
 
 import typer
 
-from upright.cli.terminal import tell
-from upright.errors import BadInput
+from upright.cli.terminal import AsJson, Out, tell
 
 
 def show(
     logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Logs as their programs wrote them.")],
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for the figures.")] = Path(),
+    out: Out = Path(),
     plot: Annotated[bool, typer.Option(help="Draw the columns to show-LOG.svg.")] = True,
-    as_json: Annotated[bool, typer.Option("--json", help="Print what was found as JSON instead of tables.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Print and draw what a log holds: columns, sample rate, quanta, gaps, lying columns.
 
@@ -35,8 +34,8 @@ def show(
     from upright.report.symbols import typed
 
     onward = Step(
-        sentence="Write a study file, filled in with what was recognised.",
-        command=f"upright init {typed(logs[0])} -o study.toml",
+        "Write a study file, filled in with what was recognised.",
+        f"upright init {typed(logs[0])} -o study.toml",
     )
     figures: list[Path] = []
     found: list[dict[str, Any]] = []
@@ -60,8 +59,6 @@ def show(
 
 
 def _figure_path(log: Path, out: Path, taken: list[Path]) -> Path:
-    if out.exists() and not out.is_dir():
-        raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
     out.mkdir(parents=True, exist_ok=True)
     stem = "show-" + re.sub(r"[^\w.-]+", "_", log.stem)
     path, n = out / f"{stem}.svg", 2

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from upright.cli.terminal import Pdf, progress_bar, tell, write_page
+from upright.cli.terminal import AsJson, Data, Out, Pdf, progress_bar, tell, write_page
 from upright.errors import BadInput
 from upright.progress import Progress
 
@@ -43,10 +43,10 @@ def frequency(
     hold: Annotated[str, typer.Option(metavar="TIME", help="How long a command is held; one sample.")] = "",
     low: Annotated[float | None, typer.Option("--from", metavar="W", help="Least frequency, in rad/s.")] = None,
     high: Annotated[float | None, typer.Option("--to", metavar="W", help="Greatest frequency, in rad/s.")] = None,
-    data: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder of a study's logs.")] = None,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for results.")] = Path("frequency"),
+    data: Data = None,
+    out: Out = Path("frequency"),
     pdf: Pdf = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON instead of tables.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     r"""Measure or read a frequency response and fit the rig to it (experiment 1b).
 
@@ -58,8 +58,6 @@ def frequency(
     upright frequency sweep.csv --rig linear --known "m_p=135 g +- 0.2 %" -o out
     upright frequency one.txt two.txt --command v --signal theta=theta
     """
-    if out.exists() and not out.is_dir():
-        raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
     for value, option in ((ask, "--ask"), (kind or "sines", "--kind")):
         if value not in KINDS:
             raise BadInput(f"{option} is one of {', '.join(KINDS)}, got '{value}'.")

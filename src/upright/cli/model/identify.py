@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from upright.cli.terminal import Pdf, progress_bar, search_told, tell, write_page
+from upright.cli.terminal import Data, Pdf, progress_bar, search_told, tell, write_page
 from upright.errors import BadInput
 
 if TYPE_CHECKING:
@@ -31,9 +31,7 @@ def identify(
     out: Annotated[
         Path | None, typer.Option("-o", "--out", metavar="OUT", help="Folder for results; STUDY-fit if left out.")
     ] = None,
-    data: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder the runs' files are in; the study's own if left out.")
-    ] = None,
+    data: Data = None,
     hold_out: Annotated[
         list[str] | None,
         typer.Option(
@@ -93,16 +91,8 @@ def identify(
 
     if method not in METHODS:
         raise BadInput(f"--method must be one of {', '.join(METHODS)}, got '{method}'; {nearest(method, METHODS)}")
-    if not study.exists():
-        raise BadInput(
-            f"the study {study} does not exist; `upright init LOG -o {typed(study.name)}` writes one from a log"
-        )
-    from upright.study.load import load_study
-
     folder = out if out is not None else study.with_name(f"{study.stem}-fit")
-    if folder.exists() and not folder.is_dir():
-        raise BadInput(f"results need a folder, but {folder} is a file; name another with -o")
-    asked = load_study(study, data=data)
+    asked = read_study(study, folder, data)
     each = "each" in (hold_out or ()) and all(run.label != "each" for run in asked.runs)
     asked = asked.hold_out(*(label for label in hold_out or () if not (each and label == "each")))
     fitted = sum(run.role == "fit" for run in asked.runs)
@@ -144,6 +134,20 @@ def identify(
         raise typer.Exit(INTERRUPTED)
     if strict and not fit.trusted:
         raise typer.Exit(NOT_TRUSTED)
+
+
+def read_study(study: Path, folder: Path, data: Path | None) -> Study:
+    """A study, once study and folder of the results are what they should be."""
+    from upright.report.symbols import typed
+    from upright.study.load import load_study
+
+    if not study.exists():
+        raise BadInput(
+            f"the study {study} does not exist; `upright init LOG -o {typed(study.name)}` writes one from a log"
+        )
+    if folder.exists() and not folder.is_dir():
+        raise BadInput(f"results need a folder, but {folder} is a file; name another with -o")
+    return load_study(study, data=data)
 
 
 def provenance(asked: Study) -> dict[str, object]:

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from upright.cli.model.identify import provenance
-from upright.cli.terminal import Pdf, progress_bar, search_told, tell, write_page
+from upright.cli.model.identify import provenance, read_study
+from upright.cli.terminal import Data, Pdf, progress_bar, search_told, tell, write_page
 from upright.errors import BadInput
 
 INTERRUPTED = 130
@@ -20,9 +20,7 @@ def ladder(
     out: Annotated[
         Path | None, typer.Option("-o", "--out", metavar="OUT", help="Folder for results; STUDY-ladder if left out.")
     ] = None,
-    data: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder the runs' files are in; the study's own if left out.")
-    ] = None,
+    data: Data = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print ladder.json instead of tables.")] = False,
     report: Annotated[bool, typer.Option(help="Write ladder.html as well.")] = True,
     pdf: Pdf = False,
@@ -57,16 +55,9 @@ def ladder(
     from upright.identification.ladder.grow import climb
     from upright.report.symbols import typed
     from upright.study.ladder_file import can_be_trimmed, chosen_study, write_ladder
-    from upright.study.load import load_study
 
-    if not study.exists():
-        raise BadInput(
-            f"the study {study} does not exist; `upright init LOG -o {typed(study.name)}` writes one from a log"
-        )
     folder = out if out is not None else study.with_name(f"{study.stem}-ladder")
-    if folder.exists() and not folder.is_dir():
-        raise BadInput(f"results need a folder, but {folder} is a file; name another with -o")
-    asked = load_study(study, data=data)
+    asked = read_study(study, folder, data)
     if not asked.rig.estimated:
         raise BadInput(f'{study}: nothing is asked; give a parameter a guess, such as b_2c = {{ guess = "1e-4 N m" }}')
     with progress_bar(quiet=as_json) as bar:

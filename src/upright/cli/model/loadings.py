@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from upright.cli.terminal import Pdf, tell, write_page
+from upright.cli.terminal import AsJson, Out, Pdf, tell, write_page
 from upright.errors import BadInput, NotIdentifiable
 
 if TYPE_CHECKING:
@@ -38,9 +38,9 @@ def loadings(
     ] = False,
     twin: Annotated[str, typer.Option(metavar="KIND", help="No logs: step a twin, rectilinear or torsional.")] = "",
     seed: Annotated[int, typer.Option(min=0, help="Which twin of the make; 0 is the one as designed.")] = 0,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for the report.")] = Path("loadings"),
+    out: Out = Path("loadings"),
     pdf: Pdf = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON instead of a table.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     r"""Find stiffness and bare inertia from step responses with known added masses (experiment 1a).
 
@@ -51,8 +51,6 @@ def loadings(
     upright loadings --twin rectilinear -o out
     upright loadings bare.csv one.csv two.csv --added "0 kg" --added "0.5 kg" --added "1 kg" --signal x --command u
     """
-    if out.exists() and not out.is_dir():
-        raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
     if twin:
         if logs or added:
             raise BadInput("--twin steps a simulated rig and takes no logs; leave out either.")
@@ -101,12 +99,12 @@ def _of_logs(logs: list[Path], added: list[str], signal: str, command: str, tole
     weighed = weigh(found, tolerance=parse(tolerance, "1"))
     steps = [
         Step(
-            sentence="Fit the same logs with the equations of motion; give m_1 and k_1 these values as guesses.",
-            command=f"upright init {logs[0].name} -o study.toml",
+            "Fit the same logs with the equations of motion; give m_1 and k_1 these values as guesses.",
+            f"upright init {logs[0].name} -o study.toml",
         ),
         Step(
-            sentence="Plan the next loadings with the error of a frequency that these swings show.",
-            command=f'upright plan-inertias --rig {kind} --bare "{weighed.bare.value:.4g}'
+            "Plan the next loadings with the error of a frequency that these swings show.",
+            f'upright plan-inertias --rig {kind} --bare "{weighed.bare.value:.4g}'
             f' {"kg" if kind == "rectilinear" else "kg m^2"}"',
         ),
     ]
@@ -128,10 +126,10 @@ def _of_twin(kind: str, seed: int, out: Path) -> Chapter:
     added = " ".join(f'--added "{done.added[label]:.6g} {unit}"' for label in files)
     steps = [
         Step(
-            sentence="Weigh the rig again from its logs in that folder, as you would your own.",
-            command=f"upright loadings {' '.join(files.values())} {added}",
+            "Weigh the rig again from its logs in that folder, as you would your own.",
+            f"upright loadings {' '.join(files.values())} {added}",
         ),
-        Step(sentence="See which masses would have told most.", command=f"upright plan-inertias --rig {kind}"),
+        Step("See which masses would have told most.", f"upright plan-inertias --rig {kind}"),
     ]
     return loading_chapter(
         done.found, kind=kind, title=f"Experiment 1a on a twin, {kind}, seed {seed}", logs=done.logs,

@@ -152,10 +152,10 @@ def chapter(plans: dict[int, tuple[Plan, Plan]], chosen: int, wanted: float | No
         if chosen == max(plans):
             reason = "Every run planned is still worth its while:"
     onward = Step(
-        sentence="Run them, log each step, and weigh the rig with the logs.",
-        command=f'upright loadings bare.csv heavy.csv --added "0 {UNITS[rig]}" --added "{c.loadings[-1].label}"',
+        "Run them, log each step, and weigh the rig with the logs.",
+        f'upright loadings bare.csv heavy.csv --added "0 {UNITS[rig]}" --added "{c.loadings[-1].label}"',
     )
     return Chapter(
         title="Which loadings to run", verdict=f"{reason} {_spelt(c)}; k to {100 * c.k:.2f} % (*).", steps=(onward,),
-        parts=(Part(title="Best plan for every number of runs", content=(table,)),),
+        parts=(Part("Best plan for every number of runs", (table,)),),
     )  # fmt: skip

@@ -9,16 +9,14 @@ from typing import Annotated, Any
 
 import typer
 
-from upright.cli.terminal import tell
+from upright.cli.terminal import Data, tell
 from upright.errors import BadInput
 
 
 def predict(
     model: Annotated[Path, typer.Argument(metavar="OUT/fit.json", help="Model that `upright identify` wrote.")],
     study: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="Runs to score; its guesses are not used.")],
-    data: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder the runs' files are in; the study's own if left out.")
-    ] = None,
+    data: Data = None,
     out: Annotated[
         Path | None, typer.Option("-o", "--out", metavar="OUT", help="Folder for prediction.json; none if left out.")
     ] = None,
@@ -76,6 +74,6 @@ def predict(
     if as_json:
         typer.echo(text)
         return
-    explained = Part(title="How much of each signal is explained", content=(score_table(scores),))
+    explained = Part("How much of each signal is explained", (score_table(scores),))
     doubt = () if fitted.trusted else (f"The model's own verdict was: {fitted.verdict}",)
     tell(Chapter(title=f"{model.name} on {study.name}", verdict="", parts=(explained,), warnings=doubt), written)
