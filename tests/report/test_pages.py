@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-import unicodedata
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
@@ -11,170 +11,50 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from tests.closed_loop.programs import Pid, closed_loop
-from tests.report.conftest import make_fit
+from tests.report.pages import (
+    blocks,
+    design_page,
+    doctor_page,
+    fit_page,
+    free_swing_page,
+    frequency_page,
+    ladder_page,
+    law_page,
+    loadings_page,
+    log_page,
+    measured_response_page,
+    own_frequency_page,
+    paper_page,
+    regulation_page,
+    short_ladder_page,
+    squeezed,
+    survey_page,
+    swing_up_page,
+    tracking_page,
+)
 from tests.report.reader import Page
-from upright.records import Record
 from upright.report.html import html
-from upright.report.page import Chapter, Picture, Symbol, Table
+from upright.report.page import Chapter, Finding, Picture, Symbol, Table
 from upright.report.pdf import write_pdf
-from upright.report.terminal import print_chapter
-
-EXAMPLES = Path(__file__).parents[2] / "examples"
-T = np.arange(1500) * 4e-3
-SWING = np.round(0.8 * np.exp(-0.3 * T) * np.cos(7 * T), 4)
-
-
-def fit_page(folder: Path) -> Chapter:
-    from upright.report.fit.chapter import chapter
-
-    return chapter(make_fit(), title="Free swing", provenance={"study": "swing.toml", "runs": {"release": "a.csv"}})
-
-
-def log_page(folder: Path) -> Chapter:
-    from upright.readers import inspect
-    from upright.report.log import chapter
-
-    record = Record(t=T, signals={"theta": SWING}, units={"theta": "rad"}, outputs=("theta",))
-    return chapter(record, inspect(record))
-
-
-def doctor_page(folder: Path) -> Chapter:
-    from upright.doctor import examine
-    from upright.doctor.chapter import chapter
-
-    lost = Record(
-        t=T, signals={"theta": SWING + np.where(T > 2.2, 0.15, 0.0)}, units={"theta": "rad"}, outputs=("theta",)
-    )
-    return chapter(examine(lost), log=Path("swing.csv"))
-
-
-def law_page(folder: Path) -> Chapter:
-    from upright.closed_loop import recover
-    from upright.report.law import chapter
-
-    record = closed_loop(Pid(kp=4.0, ki=3.0, kd=0.2, second=0.8, on="measurement"), rows=2000, step=0.01)
-    return chapter(record, recover(record, measured=["y"], references=["r"], command="u"), "run.csv")
-
-
-def survey_page(name: str, answers: int | None = None):
-    def page(folder: Path) -> Chapter:
-        from upright.survey import read
-        from upright.survey.chapter import chapter
-
-        return chapter(read(EXAMPLES / "survey" / name), title="Survey", source=name, answers=answers)
-
-    return page
-
-
-def design_page(**wish):
-    def page(folder: Path) -> Chapter:
-        from upright.lab.designing.chapter import chapter
-        from upright.lab.designing.run import Wish, design_for
-        from upright.lab.rigs.rig_file import RigFile
-        from upright.physics import Furuta
-
-        plant = Furuta(m_p=0.135, l_cg=0.19, r=0.16, J_d=0.011, J_p=6e-4, b_1=6e-4)
-        others = tuple((plant.replace(m_p=m), 0.5) for m in (0.134, 0.136))
-        rig = RigFile(plant=plant, name="furuta", gain=0.5, unit="V", late=0.0, lag=0.0, others=others)
-        return chapter(design_for(rig, Wish(at="inverted", limit=1.0, **wish)))
-
-    return page
-
-
-def paper_page(folder: Path) -> Chapter:
-    from upright.lab.rigs.twin import NOMINAL
-    from upright.paper.chapter import chapter
-    from upright.paper.reproduce import reproduce
-
-    return chapter(reproduce(NOMINAL, seed=1))
-
-
-def ladder_page(folder: Path) -> Chapter:
-    from tests.identification.twins import PENDULUM, noisy, rig, swing
-    from upright.identification.ladder.grow import climb
-    from upright.physics import Pendulum
-    from upright.report.ladder import chapter, next_steps
-
-    guesses = {"J_p": 1.5e-3, "b_2": 1e-3, "b_2c": 1e-3}
-    truth = {"b_2q": 0.0, "b_2c": 4e-3}
-    runs = [noisy(swing(PENDULUM | truth, angle=a, label=f"from {a:g}"), 3e-3, seed=k) for k, a in enumerate((1.5, 1))]
-    known = {n: v for n, v in (PENDULUM | truth).items() if n not in guesses}
-    ladder = climb(rig(Pendulum, known, guesses), runs)
-    steps = next_steps(ladder, study="swing.toml", folder="out", data="", trimmed=True)
-    return chapter(ladder, title="Ladder", provenance={"study": "swing.toml"}, steps=steps)
-
-
-def loadings_page(folder: Path) -> Chapter:
-    from upright.lab.rigs.makes import make_rig
-    from upright.lab.weighing_1a.chapter import chapter
-    from upright.lab.weighing_1a.run import run
-
-    return chapter(run(make_rig("rectilinear", 2), 2, folder))
-
-
-def frequency_page(folder: Path) -> Chapter:
-    from upright.lab.frequency_1b.chapter import chapter
-    from upright.lab.frequency_1b.run import run
-
-    return chapter(run("linear", 4, folder))
-
-
-def own_frequency_page(folder: Path) -> Chapter:
-    from upright.lab.frequency_1b.chapter import log_chapter
-    from upright.lab.frequency_1b.own_log import Wish, look
-    from upright.lab.frequency_1b.run import run
-
-    run("linear", 4, folder)
-    return log_chapter(look([folder / "frequency.csv"], Wish(signals={}, counts={}, known={}), folder / "own"))
-
-
-def regulation_page(folder: Path) -> Chapter:
-    from upright.lab.regulation_2.chapter import chapter
-    from upright.lab.regulation_2.run import Wish, identified, run
-    from upright.lab.rigs.makes import make_rig
-
-    wish = Wish(draws=16, seconds=2.0)
-    return chapter(run(identified("linear", 1, folder), make_rig("linear", 1), 1, folder, wish=wish))
-
-
-def swing_up_page(folder: Path) -> Chapter:
-    from upright.lab.rigs.makes import make_rig
-    from upright.lab.swing_up_2b.chapter import chapter
-    from upright.lab.swing_up_2b.run import run
-
-    return chapter(run(make_rig("furuta"), make_rig("furuta", 3), 3, folder))
-
-
-def tracking_page(folder: Path) -> Chapter:
-    from upright.lab.tracking_3.chapter import chapter
-    from upright.lab.tracking_3.run import run
-
-    return chapter(run("rectilinear", 1, folder))
-
-
-def free_swing_page(folder: Path) -> Chapter:
-    from upright.lab.free_swing_4.chapter import chapter
-    from upright.lab.free_swing_4.run import run
-    from upright.lab.rigs.makes import make_rig
-
-    return chapter(run(make_rig("furuta", 1), 1, folder))
-
+from upright.report.store import as_plain, from_plain
+from upright.report.terminal import print_book, print_chapter
 
 QUICK = {
     "fit": fit_page,
     "log": log_page,
     "doctor": doctor_page,
     "law": law_page,
+    "ladder": short_ladder_page,
+    "measured response": measured_response_page,
     "survey of people": survey_page("synthetic_wide.csv"),
     "survey of means": survey_page("table_4.csv", 53),
     "survey of shares": survey_page("table_3.csv", 53),
-    "design by poles": design_page(poles=np.array([-4.15 + 1.63j, -4.15 - 1.63j, -16.9, -3.2])),
     "design of least cost": design_page(weights=(1.0, 0.0, 1.0, 0.0)),
     "paper": paper_page,
 }
 SLOW = {
-    "ladder": ladder_page,
+    "design by poles": design_page(poles=np.array([-4.15 + 1.63j, -4.15 - 1.63j, -16.9, -3.2])),
+    "ladder climbed": ladder_page,
     "1a": loadings_page,
     "1b": frequency_page,
     "own response": own_frequency_page,
@@ -196,18 +76,9 @@ def chapter(request, tmp_path_factory) -> Chapter:
     return request.param(tmp_path_factory.mktemp("page"))
 
 
-def blocks(chapter: Chapter, kind: type, *, aside: bool = True) -> list:
-    return [b for part in chapter.parts if aside or not part.aside for b in part.content if isinstance(b, kind)]
-
-
 def cells(tables: list[Table]) -> list[str]:
     """What the columns of numbers hold."""
     return [row[i] for t in tables for row in t.rows for i in t.numbers if row[i]]
-
-
-def squeezed(text: str) -> str:
-    """Text without blanks, ligatures and raised figures, which every medium sets in its own way."""
-    return re.sub(r"\s", "", unicodedata.normalize("NFKC", text))
 
 
 def no_computer_s_word_for_nothing(text: str) -> None:
@@ -280,3 +151,58 @@ def test_a_narrow_terminal_loses_words_before_numbers(width):
     lines = StringIO()
     print_chapter(Console(file=lines, width=width, highlight=False), told)
     assert all(number in lines.getvalue() for number in cells(blocks(told, Table, aside=False)))
+
+
+HOSTILE = "<script>alert(1)</script> & [/b] [red] *bold* #let x = 1 $y$ // no"
+
+
+def hostile(content):
+    """A page whose every text ends with what means something to a browser, a terminal or Typst."""
+    if isinstance(content, list):
+        return [hostile(c) for c in content]
+    if isinstance(content, dict):
+        kept = ("kind", "key", "name", "draw", "markup", "anchors", "numbers")
+        return {k: c if k in kept else hostile(c) for k, c in content.items()}
+    return f"{content} {HOSTILE}" if isinstance(content, str) and content else content
+
+
+@pytest.mark.parametrize("page", [short_ladder_page, measured_response_page])
+def test_what_a_person_wrote_is_never_taken_for_markup(page, tmp_path):
+    pypdf = pytest.importorskip("pypdf")
+    told = from_plain(hostile(as_plain(page(tmp_path))))
+    text = html(told)
+    assert "<script" not in text
+    assert Page(text).prose.count(HOSTILE) > 10
+    lines = StringIO()
+    print_chapter(Console(file=lines, width=2000, highlight=False), told, [Path("[red]/report.html")])
+    assert lines.getvalue().count(HOSTILE) > 5
+    assert "[red]/report.html" in lines.getvalue()
+    paper = "".join(p.extract_text() for p in pypdf.PdfReader(write_pdf(tmp_path / "page.pdf", told)).pages)
+    assert squeezed(told.title) in squeezed(paper)
+
+
+def test_the_laboratory_tells_every_chapter_on_all_three(tmp_path):
+    from upright.lab.experiments import EXPERIMENTS
+    from upright.lab.laboratory import Session, Told
+    from upright.lab.laboratory_page import book, date
+
+    pypdf = pytest.importorskip("pypdf")
+    found = (Finding(what="stiffness [N/m]", value="412.5", interval="409.1 to 415.9", truth="411.2"),)
+    made = [replace(page(tmp_path), key=e.key, findings=found)
+            for page, e in zip((short_ladder_page, measured_response_page), EXPERIMENTS, strict=False)]  # fmt: skip
+    session = Session(make="", seed=7, folder=tmp_path, asked=EXPERIMENTS[:3], interrupted=True)
+    session.told.extend(
+        Told(experiment=e, make="furuta", rig="Furuta pendulum", chapter=c, state="done", seconds=1.0)
+        for e, c in zip(EXPERIMENTS, made, strict=False)
+    )
+    told = book(session, date(2006, 6, 18))
+    page = Page(html(told))
+    lines = StringIO()
+    print_book(Console(file=lines, width=300, highlight=False), told, [tmp_path / "report.html"])
+    paper = "".join(p.extract_text() for p in pypdf.PdfReader(write_pdf(tmp_path / "book.pdf", told)).pages)
+    for said in (squeezed(page.prose), squeezed(lines.getvalue()), squeezed(paper)):
+        for needed in ("412.5", "409.1 to 415.9", "411.2", EXPERIMENTS[2].title, "Stopped by Ctrl-C"):
+            assert squeezed(needed) in said
+        assert all(squeezed(c.verdict) in said for c in made)
+    assert len(set(page.ids)) == len(page.ids)
+    assert all(page.named("div", "aria-label"))
