@@ -17,12 +17,13 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.measure import Line, of_each, page
+from upright.report.drawing import BLACK, BLUE, GREY, SKY, figure, save, styled
 
 if TYPE_CHECKING:
     from upright.control import Rig
@@ -241,14 +242,46 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
         )  # fmt: skip
         rows += table(what, found, chances, came, count - len(kept))
         if markdown is not None and what == "identified by steps":
-            from upright.lab.regulation_2.figures import reliability_figure
-            from upright.report.drawing import save
-
             save(reliability_figure(chances, came, bins=BINS), IMAGE)
     if markdown is not None:
         picture = ["", f"![What came, against the chance told](../{IMAGE.as_posix()})"]
         markdown.write_text(page("regulation", "Calibration", __doc__, [*picture, *rows]), encoding="utf-8")
     return lines
+
+
+@styled
+def reliability_figure(chances: Array, came: NDArray[np.bool_], *, bins: int = 10) -> Any:
+    """How often what was told with a chance came true, with 95 % Wilson intervals, and how often each was told."""
+    from scipy.stats import binomtest
+
+    drawing = figure(4.6, width=5.0)
+    grid: Any = drawing.add_gridspec(2, 1, height_ratios=(4, 1))
+    ax: Any = drawing.add_subplot(grid[0])
+    below: Any = drawing.add_subplot(grid[1], sharex=ax)
+    ax.plot([0, 100], [0, 100], color=GREY, linewidth=0.8, label="as told")
+    edges = np.linspace(0, 1, bins + 1)
+    place = np.clip((chances * bins + 1e-9).astype(int), 0, bins - 1)
+    for b in range(bins):
+        inside = place == b
+        if not inside.any():
+            continue
+        low, high = binomtest(int(came[inside].sum()), int(inside.sum())).proportion_ci(method="wilson")
+        mean, share = 100 * float(chances[inside].mean()), 100 * float(came[inside].mean())
+        ax.errorbar(
+            mean, share, yerr=[[share - 100 * low], [100 * high - share]], fmt="o", color=BLUE, capsize=2.5,
+            markersize=5, label="came, with 95 % interval" if b == place.min() else None,
+        )  # fmt: skip
+    below.bar(
+        100 * edges[:-1], np.bincount(place, minlength=bins), 100 / bins, align="edge", color=SKY, edgecolor=BLACK
+    )
+    ax.set_ylabel("came true [%]")
+    ax.set_xlim(0, 100)
+    ax.set_ylim(-3, 103)
+    ax.tick_params(labelbottom=False)
+    below.set_ylabel("twins")
+    below.set_xlabel("chance told before the run [%]")
+    ax.legend(loc="upper left")
+    return drawing
 
 
 def table(what: str, found: Calibration, chances: Array, came: NDArray[np.bool_], strayed: int) -> list[str]:

@@ -10,9 +10,9 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from upright.identification.frequency.answer import curves
 from upright.lab.frequency_1b.figures import bode_figure
 from upright.lab.frequency_1b.run import run_frequency
-from upright.lab.frequency_1b.tables import curves
 from upright.lab.makes import make_rig
 from upright.lab.weighing_1a.figures import line_figure
 from upright.lab.weighing_1a.run import run_weighing

@@ -10,7 +10,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from upright.lab.tracking_3.figures import steps_figure
-from upright.lab.tracking_3.parts import frame, trace
 from upright.lab.tracking_3.run import run_tracking
 from upright.report.drawing import save
 
@@ -34,5 +33,5 @@ for outcome in (*done.sets, done.summed, done.pd, done.stiff, done.far):
     print(f"at the reference after {1e3 * run.figures.arrival:.0f} ms, {run.effort.peak:.2f} V at most", end=" ")
     print(f"(foreseen {outcome.foreseen.effort.peak:.2f} V), a push moves it {1e3 * run.give:.1f} mm")
 
-shown = [trace(outcome) for outcome in (done.sets[0], done.sets[-1], done.pd, done.stiff)]
-print("Picture:", save(steps_figure(shown, frame(done)), Path("experiment_3.png")))
+shown = [done.sets[0], done.sets[-1], done.pd, done.stiff]
+print("Picture:", save(steps_figure(done, shown), Path("experiment_3.png")))

@@ -16,7 +16,7 @@ from upright.lab.free_swing_4.studies import fit_question, recovered, write_ques
 from upright.lab.makes import make_rig
 from upright.physics import Furuta
 from upright.report.drawing import save
-from upright.report.figures import fit_figure
+from upright.report.fit.figures import fit_figure
 
 # A rig of the make with its drive belt off, so that the disk turns freely.
 rig = freed(make_rig("furuta", seed=int(sys.argv[1]) if sys.argv[1:] else 0))

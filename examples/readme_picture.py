@@ -10,7 +10,7 @@ from pathlib import Path
 
 from upright.identification.estimate import identify
 from upright.report.drawing import save
-from upright.report.figures import fit_figure
+from upright.report.fit.figures import fit_figure
 from upright.study.load import load_study
 
 ask = argparse.ArgumentParser(description=__doc__.splitlines()[0])

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from upright.cli import app
 from upright.lab import laboratory
 from upright.lab.laboratory import EXPERIMENTS, Experiment
-from upright.report.chapter import Chapter
+from upright.report.page import Chapter
 
 
 def upright(*arguments):

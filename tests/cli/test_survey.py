@@ -6,11 +6,9 @@ import json
 from pathlib import Path
 
 import pytest
-from scipy.stats import binomtest
 from typer.testing import CliRunner
 
 from upright.cli import app
-from upright.survey.page import wilson
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "survey"
 
@@ -59,9 +57,3 @@ def test_what_cannot_be_judged_is_said(tmp_path, arguments, sentence):
     outcome = survey(EXAMPLES / arguments[0], *arguments[1:], "-o", tmp_path)
     assert outcome.exit_code == 2
     assert sentence in " ".join(outcome.stderr.split())
-
-
-@pytest.mark.parametrize(("k", "n"), [(0, 5), (3, 7), (50, 53)])
-def test_wilsons_interval_is_scipys(k, n):
-    theirs = binomtest(k, n).proportion_ci(method="wilson")
-    assert wilson(k, n) == pytest.approx((theirs.low, theirs.high), abs=1e-12)

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from upright.cli.terminal import typed
+from upright.report.symbols import typed
 
 
 @pytest.mark.parametrize(

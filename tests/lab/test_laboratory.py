@@ -6,8 +6,7 @@ import pytest
 from upright.errors import NotIdentifiable
 from upright.lab import laboratory, laboratory_page
 from upright.lab.laboratory import Experiment
-from upright.report.chapter import Chapter, Finding
-from upright.report.sections import Part
+from upright.report.page import Chapter, Finding, Part
 
 
 @pytest.fixture

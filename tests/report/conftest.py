@@ -29,8 +29,7 @@ def make_swing(role="fit", *, n=2000, horizon=None, seconds=10.0, seed=0):
     )
 
 
-@pytest.fixture
-def fit():
+def make_fit():
     names = ("J_d", "J_p", "b_1", "b_2", "b_1c", "b_2c")
     values = (6.3e-3, 1.1e-3, 3.2e-4, 1.4e-5, 2.5e-3, 3.1e-4)
     parameters = {
@@ -79,6 +78,11 @@ def fit():
         warnings=("The base may be out of level.",),
         history=(("start", 12.0, 1), ("simplex", 0.9, 200), ("least squares", 0.456, 120)),
     )
+
+
+@pytest.fixture
+def fit():
+    return make_fit()
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from upright.report.drawing import CYCLE, broken, decimated, save, svg
-from upright.report.figures import autocorrelation, fit_figure
+from upright.report.fit.figures import autocorrelation, fit_figure
 from upright.report.symbols import axis, measured, number, percent, plain, unit
 
 

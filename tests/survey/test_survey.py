@@ -12,7 +12,22 @@ from scipy import stats
 
 from tests.paper import printed
 from upright.errors import BadInput
-from upright.survey import Means, Ratings, Shares, bound, compare, counts, fitting, holm, possible, read, whole_row
+from upright.report.page import Table
+from upright.survey import (
+    Likert,
+    Means,
+    Ratings,
+    Shares,
+    bound,
+    compare,
+    counts,
+    fitting,
+    holm,
+    possible,
+    read,
+    whole_row,
+)
+from upright.survey.chapter import chapter
 from upright.survey.paired import signed_ranks
 from upright.survey.summary import squares_of_gains
 
@@ -218,3 +233,15 @@ def test_what_cannot_be_read_is_said_with_its_line(tmp_path, text, sentence):
     path.write_text(text)
     with pytest.raises(BadInput, match=sentence):
         read(path)
+
+
+@pytest.mark.parametrize(
+    ("agree", "of", "interval"), [(81, 263, (25.53, 36.62)), (15, 148, (6.24, 16.05)), (0, 20, (0.0, 16.11))]
+)
+def test_agreement_has_the_interval_that_newcombe_prints(agree, of, interval):
+    """R. G. Newcombe, Statistics in Medicine 17 (1998) 857, table I, method 3: Wilson's score without correction."""
+    answers = Likert(name="it helped", options=("agree", "disagree"), counts=(agree, of - agree))
+    told = chapter(Ratings(items=(), likert=(answers,), people=of, notes=()), title="Survey", source="answers.csv")
+    table = next(b for part in told.parts for b in part.content if isinstance(b, Table))
+    low, _, high = table.rows[0][-1].removesuffix(" %").partition(" to ")
+    assert (float(low), float(high)) == pytest.approx(interval, abs=0.051)  # printed to three figures

@@ -15,12 +15,12 @@ import numpy as np
 
 from upright.control.rig import Rig
 from upright.errors import BadInput, UprightError
-from upright.json_file import write_json
+from upright.files import write_json
 from upright.lab.makes import MAKES, PENDULUMS, SHAFTS, make_rig
 from upright.lab.weighing_1a.run import Known
 from upright.progress import Progress, silent
-from upright.report.chapter import Chapter
-from upright.report.storing import as_plain, from_plain
+from upright.report.page import Chapter
+from upright.report.store import as_plain, from_plain
 from upright.report.symbols import typed
 
 KEPT = "chapter.json"
@@ -388,7 +388,4 @@ def _one(
 
 
 def _failed(e: Experiment, why: str) -> Chapter:
-    return Chapter(
-        key=e.key, title=e.title, question="", verdict="This experiment could not be finished.", detail=why,
-        sound=False, parts=(),
-    )  # fmt: skip
+    return Chapter(key=e.key, title=e.title, verdict="This experiment could not be finished.", detail=why, sound=False)

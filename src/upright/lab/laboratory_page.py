@@ -1,17 +1,17 @@
-"""How is a session in the laboratory reported, for a reader and for another program?"""
+"""A session in the laboratory as one report, and as plain values for another program."""
 
 from __future__ import annotations
 
 import platform
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 from typing import Any
 
 from upright import __version__
-from upright.json_file import plain_values
 from upright.lab.laboratory import EXPERIMENTS, Session
-from upright.report.advice import Step
-from upright.report.book import Book, Told
+from upright.report.book import Book
+from upright.report.page import Step
 from upright.report.symbols import typed
 
 TITLE = "The laboratory: identify it hanging, hold it upright"
@@ -37,7 +37,7 @@ def book(session: Session, day: date) -> Book:
             ("Again", command(session)),
         ),
         chapters=tuple(
-            Told(chapter=t.chapter, rig=t.rig, finished=t.state in ("done", "kept")) for t in session.told
+            replace(t.chapter, about=t.rig, finished=t.state in ("done", "kept")) for t in session.told
         ),
         notes=tuple(notes),
         missing=tuple((e.key, e.title) for e in session.missing),
@@ -65,18 +65,18 @@ def next_steps(session: Session) -> tuple[Step, ...]:
     steps: list[Step] = []
     if session.interrupted or any(t.state == "failed" for t in session.told):
         steps.append(
-            Step(sentence="Go on where this stopped; what is finished is kept.",
-                 command=f"{command(session)} -o {typed(session.folder)}")
+            Step("Go on where this stopped; what is finished is kept.",
+                 f"{command(session)} -o {typed(session.folder)}")
         )  # fmt: skip
-    steps.append(Step(sentence="Take another rig of the same make.", command=command(session, session.seed + 1)))
+    steps.append(Step("Take another rig of the same make.", command(session, session.seed + 1)))
     other = "linear" if session.make != "linear" else "furuta"
-    steps.append(Step(sentence="Run the laboratory on another kind of rig.", command=f"upright lab --rig {other}"))
-    steps.append(Step(sentence="Start on a log of your own.", command="upright init LOG"))
+    steps.append(Step("Run the laboratory on another kind of rig.", f"upright lab --rig {other}"))
+    steps.append(Step("Start on a log of your own.", "upright init LOG"))
     return tuple(steps)
 
 
 def summary(session: Session, report: Path, pdf: Path | None) -> dict[str, Any]:
-    """The session as plain values for another program: SI, finite."""
+    """The session as plain values for another program: SI."""
     return {
         "seed": session.seed,
         "rig": session.make or None,
@@ -96,7 +96,7 @@ def summary(session: Session, report: Path, pdf: Path | None) -> dict[str, Any]:
                 "sound": t.chapter.sound,
                 "verdict": t.chapter.verdict,
                 "detail": t.chapter.detail,
-                "numbers": plain_values(t.chapter.numbers),
+                "numbers": t.chapter.numbers,
                 "steps": [s.command for s in t.chapter.steps if s.command],
             }
             for t in session.told

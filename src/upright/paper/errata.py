@@ -7,14 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from fractions import Fraction
-from math import ceil, floor
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upright.paper.tables import TABLE_3_FIRST, TABLE_4
 from upright.physics import Furuta
+from upright.survey.grim import possible
 
 Array = NDArray[np.float64]
 
@@ -140,17 +139,11 @@ def _rig(rng: np.random.Generator, *, axial: bool) -> Furuta:
     return Furuta(**values, J_a=0.05 * values["J_p"] if axial else 0.0)
 
 
-def possible(mean: str, answers: int, step: int = 1) -> bool:
-    """GRIM (Brown and Heathers 2017): can a mean, as printed, come from so many whole answers?"""
-    half = Fraction(1, 2) / 10 ** len(mean.partition(".")[2])
-    return floor((Fraction(mean) + half) * answers / step) >= ceil((Fraction(mean) - half) * answers / step)
-
-
 def impossible_means(answers: int) -> int:
-    """How many of Table 4's means (24) and Table 3's first percentages (2) cannot come from so many answers."""
+    """How many of Table 4's means (24) and Table 3's first percentages (2) cannot come from so many answers (GRIM)."""
     means = [mean for row in TABLE_4 for mean in row]
     wrong = sum(not possible(mean, answers) for mean in means)
-    return wrong + sum(not possible(share, answers, step=100) for share in TABLE_3_FIRST)
+    return wrong + sum(not possible(share, answers, of=100) for share in TABLE_3_FIRST)
 
 
 def printed_inverted(p: Furuta) -> tuple[Array, Array]:

@@ -157,8 +157,35 @@ def broken(t: Array, y: Array, every: float | None) -> tuple[Array, Array]:
     return np.insert(t, cuts, t[cuts]), np.insert(y, cuts, np.nan)
 
 
+def limits(ax: Axes, most: float, name: str, at: float) -> None:
+    """Lines at plus and minus `most`, named where the curves end, `at`."""
+    for side in (-1, 1):
+        ax.axhline(side * most, color=GREY, linestyle="--", linewidth=0.9)
+    ax.text(at, most, f"{name} ", ha="right", va="bottom", fontsize=7.5, color=GREY)
+
+
 def hide_inner_times(axes: list[Axes]) -> None:
     """Label only the lowest of panels that share their time axis."""
     for a in axes[:-1]:
         a.tick_params(labelbottom=False)
     axes[-1].set_xlabel("time [s]")
+
+
+def s_plane(ax: Axes, *, unstable: float = 0.0) -> None:
+    """Axes of the plane of poles [1/s]; its right half is shaded as far as `unstable`."""
+    if unstable > 0:
+        ax.axvspan(0.0, unstable, color=ORANGE, alpha=0.15, linewidth=0)
+    ax.axhline(0.0, color=GREY, linewidth=0.8)
+    ax.axvline(0.0, color=GREY, linewidth=0.8)
+    ax.set_xlabel("real part [1/s]")
+
+
+def roots(
+    ax: Axes, values: NDArray[np.complex128], mark: str, colour: str, name: str | None, *, size: float = 7
+) -> None:
+    """Poles or zeros, each with a mark; rings, squares and the like are hollow."""
+    hollow: dict[str, Any] = {"markerfacecolor": "none"} if mark in "osD^" else {}
+    ax.plot(
+        values.real, values.imag, mark, color=colour, markersize=size, markeredgewidth=1.4, linestyle="none",
+        label=name, **hollow,
+    )  # fmt: skip

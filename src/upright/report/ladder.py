@@ -1,73 +1,77 @@
-"""How far did the model grow, and why no further? The ladder as a table, a picture and a page."""
+"""A ladder of models as a chapter: how far the model grew, why no further, and what is left over."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Iterable, Iterator, Mapping
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from upright.identification.ladder.growth import Ladder, RungResult
 from upright.identification.ladder.repeats import Repeats
-from upright.report.advice import Step as Advice
-from upright.report.document import Picture, picture, render
 from upright.report.drawing import BLACK, BLUE, VERMILLION, figure, styled
-from upright.report.figures import fit_figure
+from upright.report.fit.chapter import data_part
+from upright.report.fit.figures import fit_figure
+from upright.report.page import Block, Chapter, Facts, Part, Picture, Step, Table
 from upright.report.symbols import number, percent, plain
-from upright.report.tables import provenance_rows
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True, kw_only=True)
-class LadderRow:
-    """One rung as text."""
+def chapter(ladder: Ladder, *, title: str, provenance: Mapping[str, object], steps: Iterable[Step] = ()) -> Chapter:
+    """What a ladder says; `steps` are those of `next_steps`."""
+    seen = "; ".join(
+        f"{s.rung.name}: fitted {percent(s.fit_percent)}, predicted {percent(s.predicted_percent)}"
+        for s in ladder.steps
+    )
+    climb = Picture(
+        name="ladder-climb",
+        draw=lambda: ladder_figure(ladder),
+        caption="Mean fit percent of all signals and runs against the rung: fitted, and predicted "
+        f"({ladder.held_out}). Open marks: refused. Dash-dotted: how well one repeat of a run predicts another.",
+        description=seen,
+    )
+    refused = f"Refused: {', '.join(_refused(ladder))}. " if ladder.kept and _refused(ladder) else ""
+    return Chapter(
+        title=title,
+        verdict=_verdict(ladder),
+        detail=refused + ladder.stopped,
+        sound=not ladder.interrupted,
+        question="How rich a model do these data deserve? Each rung adds terms to the model and is kept only if what "
+        f"it has not seen is predicted better by more than chance: {ladder.held_out}.",
+        parts=(
+            Part(title="The ladder", key="ladder", content=(climb, rung_table(ladder))),
+            Part(title="Why", key="why", content=(Facts(tuple((s.rung.name, s.reason) for s in ladder.steps)),)),
+            Part(title="How well the rig repeats itself", key="ceiling", content=_ceilings(ladder)),
+            Part(title="What the chosen rung leaves over", key="rest", content=tuple(_residuals(ladder))),
+            data_part(provenance),
+        ),
+        warnings=ladder.warnings,
+        steps=tuple(steps),
+    )
 
-    name: str
-    terms: str
-    fit: str
-    predicted: str
-    cost: str
-    parameters: str
-    seconds: str
-    kept: bool
-    reason: str
 
-
-@dataclass(frozen=True, kw_only=True)
-class CeilingRow:
-    """How well runs of one group predict one another, one signal, as text."""
-
-    runs: str
-    signal: str
-    median: str
-    range: str
-    reached: str
-
-
-def ladder_rows(ladder: Ladder) -> list[LadderRow]:
+def rung_table(ladder: Ladder) -> Table:
     """Every rung in the order tried."""
-    return [
-        LadderRow(
-            name=s.rung.name,
-            terms=terms(s),
-            fit=percent(s.fit_percent),
-            predicted=percent(s.predicted_percent),
-            cost=number(s.cost, 3),
-            parameters=f"{s.parameters} + {s.own}",
-            seconds=f"{s.seconds:.1f}",
-            kept=s.kept,
-            reason=s.reason,
+    rows = tuple(
+        (
+            s.rung.name, _terms(s), percent(s.fit_percent), percent(s.predicted_percent), number(s.cost, 3),
+            f"{s.parameters} + {s.own}", f"{s.seconds:.1f}", "kept" if s.kept else "refused",
         )
         for s in ladder.steps
-    ]
+    )  # fmt: skip
+    return Table(
+        caption="Mean fit percent over signals and runs; parameters of the rig + those of single runs; predicted: "
+        f"{ladder.held_out}",
+        headings=("rung", "terms", "fitted", "predicted", "cost", "parameters", "seconds", "decision"),
+        rows=rows, numbers=(2, 3, 4, 5, 6), badge=7,
+    )  # fmt: skip
 
 
-def terms(step: RungResult) -> str:
+def _terms(step: RungResult) -> str:
     """What a rung changes: names it adds, drops, and lets differ from run to run."""
     rung = step.rung
     said = [", ".join(rung.adds)] if rung.adds else []
@@ -76,25 +80,49 @@ def terms(step: RungResult) -> str:
     return "; ".join(said)
 
 
-def ceiling_rows(ladder: Ladder) -> list[CeilingRow]:
+def _ceilings(ladder: Ladder) -> tuple[Block, ...]:
     """Every group of repeats and signal, beside what the chosen model predicts of the same runs."""
-    return [
-        CeilingRow(
-            runs=", ".join(group.labels),
-            signal=plain(signal),
-            median=percent(group.ceiling[signal]),
-            range=f"{percent(min(values))} to {percent(max(values))}",
-            reached=percent(reached(ladder, group, signal)),
+    if not ladder.repeats:
+        return ("No run repeats another, so nobody can say how much is left to explain.",)
+    rows = tuple(
+        (
+            ", ".join(group.labels), plain(signal), percent(group.ceiling[signal]),
+            f"{percent(min(values))} to {percent(max(values))}", percent(_reached(ladder, group, signal)),
         )
-        for group in ladder.repeats
-        for signal, values in group.percents.items()
-    ]
+        for group in ladder.repeats for signal, values in group.percents.items()
+    )  # fmt: skip
+    return (
+        "What one run says about another with the same command, after the offset is taken off: the one at the start, "
+        "or the one that suits best where the model, too, may choose it. No model has to do better; one that does "
+        "better is spared the scatter of the repeat it is compared with.",
+        Table(
+            caption="Fit percent of one repeat by another, and of the same runs by the chosen model's predictions",
+            headings=("runs", "signal", "median", "range", "model"), rows=rows, numbers=(2, 3, 4),
+        ),
+    )  # fmt: skip
 
 
-def reached(ladder: Ladder, group: Repeats, signal: str) -> float:
+def _reached(ladder: Ladder, group: Repeats, signal: str) -> float:
     """Mean percent of one signal that the chosen model predicts of a group's runs."""
     values = [ladder.scores[run].fit_percent[signal] for run in group.labels if run in ladder.scores]
     return float(np.mean(values)) if values else math.nan
+
+
+def _residuals(ladder: Ladder) -> list[Picture]:
+    """What the chosen model leaves over where it predicts."""
+    buckets = max(100, 3000 // max(len(ladder.scores), 1))
+    return [
+        Picture(
+            name=f"ladder-run{i}",
+            draw=lambda score=score, label=label: fit_figure(
+                score, ladder.rig.plant, title=f"{label} (predicted)", buckets=buckets
+            ),
+            caption=f"Run '{label}', {ladder.held_out}. Wide light line: measured; thin dashed line: model; below, "
+            "what the chosen rung leaves over.",
+            description=", ".join(f"{plain(n)} {percent(v)}" for n, v in score.fit_percent.items()),
+        )
+        for i, (label, score) in enumerate(ladder.scores.items())
+    ]
 
 
 @styled
@@ -135,116 +163,48 @@ def _ceiling(ladder: Ladder) -> float:
 
 
 def _label(step: RungResult) -> str:
-    lines = [""]
-    for word in step.rung.name.split():
-        if lines[-1] and len(lines[-1]) + len(word) > 12:
-            lines.append("")
-        lines[-1] = f"{lines[-1]} {word}".strip()
+    lines = wrap(step.rung.name, 13, break_long_words=False)
     return "\n".join([*lines, f"{step.parameters} + {step.own}", "" if step.kept else "(refused)"]).rstrip()
 
 
-def next_rungs(ladder: Ladder, *, study: str, folder: str, data: str, trimmed: bool) -> list[Advice]:
+def next_steps(ladder: Ladder, *, study: str, folder: str, data: str, trimmed: bool) -> Iterator[Step]:
     """What to do with the ladder."""
-    steps: list[Advice] = []
     if ladder.interrupted:
-        steps.append(Advice(sentence="The climb was stopped; run it to its end."))
+        yield Step("The climb was stopped; run it to its end.")
     file = f"{folder}/study.toml" if trimmed else study
     if ladder.left_out and not trimmed:
-        steps.append(Advice(sentence=f"Take {', '.join(ladder.left_out)} out of the study: they were refused."))
+        yield Step(f"Take {', '.join(ladder.left_out)} out of the study: they were refused.")
     own = [n for s in ladder.kept for n in s.rung.unknown]
     if own:
         lines = f"[[runs]]\nunknown = {list(ladder.runs[0].unknown)}".replace("'", '"')
-        steps.append(Advice(sentence=f"Add {', '.join(own)} to what each run has unknown.", command=lines))
-    steps.append(
-        Advice(
-            sentence="Fit the chosen model, with its intervals and what the data cannot see.",
-            command=f"upright identify {file}{f' --data {data}' if data else ''} -o {folder}/fit",
-        )
+        yield Step(f"Add {', '.join(own)} to what each run has unknown.", lines)
+    yield Step(
+        "Fit the chosen model, with its intervals and what the data cannot see.",
+        f"upright identify {file}{f' --data {data}' if data else ''} -o {folder}/fit",
     )
     if not ladder.repeats:
-        steps.append(
-            Advice(
-                sentence="Repeat one run with the same command: how well one repeat predicts the other is the ceiling "
-                "of what any model can explain."
-            )
+        yield Step(
+            "Repeat one run with the same command: how well one repeat predicts the other is the ceiling of what any "
+            "model can explain."
         )
-    refused = still_refused(ladder)
-    if refused:
-        steps.append(
-            Advice(
-                sentence=f"If you believe in {', '.join(refused)} all the same, record a run in which "
-                "it matters more: these runs do not ask for it."
-            )
+    if refused := _refused(ladder):
+        yield Step(
+            f"If you believe in {', '.join(refused)} all the same, record a run in which it matters more: these runs "
+            "do not ask for it."
         )
-    return steps
 
 
-def ladder_content(
-    ladder: Ladder, *, title: str, provenance: Mapping[str, object], steps: Sequence[Advice]
-) -> dict[str, object]:
-    """What the template needs to know."""
-    return {
-        "title": title,
-        "ladder": ladder,
-        "verdict": verdict(ladder),
-        "rows": ladder_rows(ladder),
-        "ceilings": ceiling_rows(ladder),
-        "climb": picture(
-            ladder_figure(ladder),
-            "ladder-climb",
-            caption="Mean fit percent of all signals and runs against the rung: fitted, and predicted "
-            f"({ladder.held_out}). Open marks: refused. Dash-dotted: how well one repeat of a run predicts another.",
-            description="; ".join(f"{r.name}: fitted {r.fit}, predicted {r.predicted}" for r in ladder_rows(ladder)),
-        ),
-        "left": residuals(ladder),
-        "provenance": provenance_rows(provenance),
-        "steps": list(steps),
-    }
-
-
-def still_refused(ladder: Ladder) -> list[str]:
+def _refused(ladder: Ladder) -> list[str]:
     """Names of the rungs that were refused and not kept later."""
     kept = [s.rung for s in ladder.kept]
     return list(dict.fromkeys(s.rung.name for s in ladder.steps if s.rung not in kept))
 
 
-def verdict(ladder: Ladder) -> str:
-    """What the ladder chose, in two sentences."""
-    last = ladder.kept[-1] if ladder.kept else None
-    if last is None:
-        return f"No rung was finished. {ladder.stopped}"
-    refused = still_refused(ladder)
+def _verdict(ladder: Ladder) -> str:
+    """What the ladder chose."""
+    if not ladder.kept:
+        return "No rung was finished."
+    last = ladder.kept[-1]
     names = " + ".join(s.rung.name for s in ladder.kept)
     scores = f"{percent(last.predicted_percent)} predicted on average, {percent(last.fit_percent)} fitted"
-    said = f"The data ask for {names}: {scores}."
-    if refused:
-        said += f" Refused: {', '.join(refused)}."
-    return f"{said} {ladder.stopped}"
-
-
-def residuals(ladder: Ladder) -> list[Picture]:
-    """What the chosen model leaves over where it predicts."""
-    return [
-        picture(
-            fit_figure(
-                score, ladder.rig.plant, title=f"{label} (predicted)", buckets=max(100, 3000 // len(ladder.scores))
-            ),
-            f"ladder-run{i}",
-            caption=f"Run '{label}', {ladder.held_out}. Wide light line: measured; thin dashed line: model; below, "
-            "what the chosen rung leaves over.",
-            description=", ".join(f"{plain(n)} {percent(v)}" for n, v in score.fit_percent.items()),
-        )
-        for i, (label, score) in enumerate(ladder.scores.items())
-    ]
-
-
-def write_ladder_report(
-    ladder: Ladder, folder: Path, *, title: str, provenance: Mapping[str, object], steps: Sequence[Advice]
-) -> Path:
-    """Write the ladder as one self-contained page, ``folder / "ladder.html"``."""
-    text = render("ladder.html", **ladder_content(ladder, title=title, provenance=provenance, steps=steps))
-    folder.mkdir(parents=True, exist_ok=True)
-    path, half = folder / "ladder.html", folder / ".ladder.html.part"
-    half.write_text(text, encoding="utf-8", errors="replace")
-    half.replace(path)
-    return path
+    return f"The data ask for {names}: {scores}."

@@ -9,7 +9,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.report.drawing import BLUE, GREY, ORANGE, VERMILLION, figure, hide_inner_times, styled
+from upright.report.drawing import (
+    BLUE,
+    GREY,
+    ORANGE,
+    VERMILLION,
+    figure,
+    hide_inner_times,
+    limits,
+    roots,
+    s_plane,
+    styled,
+)
 from upright.report.symbols import axis, mathtext
 
 if TYPE_CHECKING:
@@ -42,18 +53,13 @@ def pole_map(kinds: Sequence[Poles], cloud: Roots | None = None, *, frame: int =
     left, right = within * float(min(seen.real.min(), -1.0)), within * float(max(seen.real.max(), 1.0))
     high = within * float(max(np.abs(seen.imag).max(), 0.25 * (right - left)))
     ax.axvspan(left, 0.0, color=BLUE, alpha=0.06, linewidth=0)
-    ax.axvline(0.0, color=GREY, linewidth=0.8)
-    ax.axhline(0.0, color=GREY, linewidth=0.8)
+    s_plane(ax)
     if cloud is not None and cloud.size:
         ax.plot(cloud.real, cloud.imag, ".", color=ORANGE, markersize=2, alpha=0.5, label="rigs that the fit allows")
     outside = 0
     for kind in kinds:
-        hollow = {"markerfacecolor": "none"} if kind.mark in "os" else {}
-        ax.plot(
-            kind.values.real, kind.values.imag, kind.mark, color=kind.colour, markersize=8 if kind.mark == "o" else 6,
-            markeredgewidth=1.4, linestyle="none", label=kind.name, **hollow,
-        )  # fmt: skip
         v = kind.values
+        roots(ax, v, kind.mark, kind.colour, kind.name, size=8 if kind.mark == "o" else 6)
         outside += int(np.sum((v.real < left) | (v.real > right) | (np.abs(v.imag) > high)))
     ax.set_xlim(left, right)
     ax.set_ylim(-high, high)
@@ -77,9 +83,7 @@ def swing_figure(
     axes[-1].plot(t, command, color=VERMILLION)
     axes[-1].set_ylabel(axis("command", unit))
     if limit is not None:
-        for side in (-1, 1):
-            axes[-1].axhline(side * limit, color=GREY, linestyle="--", linewidth=0.9)
-        axes[-1].text(t[-1], limit, "limit ", ha="right", va="bottom", fontsize=7.5, color=GREY)
+        limits(axes[-1], limit, "limit", float(t[-1]))
         reach = 1.25 * max(limit, float(np.abs(command).max()))
         axes[-1].set_ylim(-reach, reach)
     hide_inner_times(axes)
@@ -95,26 +99,19 @@ def locus_figure(tracks: Roots, sets: dict[str, Roots], open_loop: Roots, *, ori
     """
     drawing = figure(3.4)
     ax: Any = drawing.subplots()
-    ax.axhline(0.0, color=GREY, linewidth=0.8)
-    ax.axvline(0.0, color=GREY, linewidth=0.8)
+    s_plane(ax)
     for i, track in enumerate(tracks.T):
         upper = track[track.imag >= -1e-9]
         label = "poles of least cost as effort gets cheaper" if i == 0 else None
         ax.plot(upper.real, upper.imag, ".", color=BLUE, markersize=1.5, label=label)
-    upper = open_loop[open_loop.imag >= -1e-9]
-    ax.plot(upper.real, upper.imag, "x", color=GREY, markersize=7, markeredgewidth=1.5, label=origin)
+    roots(ax, open_loop[open_loop.imag >= -1e-9], "x", GREY, origin)
     for (name, poles), mark in zip(sets.items(), "osD^", strict=False):
-        upper = poles[poles.imag >= 0]
-        ax.plot(
-            upper.real, upper.imag, mark, color=VERMILLION, markerfacecolor="none", markersize=8, markeredgewidth=1.4,
-            linestyle="none", label=name,
-        )  # fmt: skip
+        roots(ax, poles[poles.imag >= 0], mark, VERMILLION, name, size=8)
     every = np.concatenate([*sets.values(), open_loop])
     wide = float(np.ptp(every.real))
     ax.set_xlim(every.real.min() - 0.08 * wide, every.real.max() + 0.08 * wide)
     high = max(float(every.imag.max()), 0.1 * wide)
     ax.set_ylim(-0.06 * high, 1.15 * high)
-    ax.set_xlabel("real part [1/s]")
     ax.set_ylabel("imaginary part [rad/s]")
     ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
     return drawing

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import BadInput
+from upright.files import plain_values, write_json
 from upright.identification import Estimate, Fit
 from upright.identification.frequency.answer import Answer
 from upright.identification.ladder.cross_validation import CrossValidation
-from upright.json_file import write_json
 from upright.physics.actuator import ACTUATOR
 from upright.study.load import Study
 
@@ -121,7 +121,8 @@ def write_fit(fit: Fit, study: Study, path: Path, crossed: CrossValidation | Non
             label: {"fit_percent": s.fit_percent, "blind": crossed.blind[label]}
             for label, s in crossed.predicted.items()
         }
-    return write_json(path, content)
+    write_json(path, content)
+    return plain_values(content)
 
 
 def provenance(study: Study) -> dict[str, Any]:

@@ -6,9 +6,9 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
+from upright.files import plain_values, write_json
 from upright.identification.ladder.growth import Ladder, RungResult
 from upright.identification.ladder.rungs import neutral
-from upright.json_file import write_json
 from upright.physics.actuator import ACTUATOR
 from upright.study.fit_file import provenance
 from upright.study.load import Study
@@ -41,7 +41,8 @@ def write_ladder(ladder: Ladder, study: Study, path: Path) -> dict[str, Any]:
         "warnings": ladder.warnings,
         "provenance": provenance(study),
     }
-    return write_json(path, content)
+    write_json(path, content)
+    return plain_values(content)
 
 
 def _step(s: RungResult) -> dict[str, Any]:

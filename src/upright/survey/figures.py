@@ -104,5 +104,20 @@ def fitting_figure(fits: Sequence[Fits], claimed: int) -> Figure:
     return drawing
 
 
+@styled
+def answers_figure(impossible: dict[int, int], claimed: int) -> Figure:
+    """How many printed means cannot come from n answers, by n; `claimed` is the number that was printed."""
+    drawing = figure(2.6)
+    ax = drawing.subplots()
+    colours = [VERMILLION if n == claimed else BLUE if count <= 1 else GREY for n, count in impossible.items()]
+    bars = ax.bar(list(impossible), list(impossible.values()), color=colours)
+    ax.bar_label(bars, fontsize=7.5)
+    ax.set_xticks(list(impossible))
+    ax.set_xlabel("number of students who answered")
+    ax.set_ylabel("impossible means")
+    ax.text(claimed, impossible[claimed] + 2.0, "as printed", ha="center", fontsize=8, color=VERMILLION)
+    return drawing
+
+
 def _short(name: str, most: int = 30) -> str:
     return name.replace("$", r"\$") if len(name) <= most else name[: most - 1].replace("$", r"\$") + "…"

@@ -10,7 +10,7 @@ from upright.lab.free_swing_4.release import freed
 from upright.lab.free_swing_4.run import run_free_swing
 from upright.lab.free_swing_4.studies import FRICTION, fit_question, questions, recovered, write_questions
 from upright.lab.makes import make_rig
-from upright.report.chapter import write_chapter
+from upright.report.html import write_html
 
 pytestmark = pytest.mark.slow
 
@@ -83,7 +83,7 @@ def test_energy_is_shared_out_without_remainder(done):
 
 
 def page(done):
-    return write_chapter(done.folder / "report.html", release_page.chapter(done)).read_text(encoding="utf-8")
+    return write_html(done.folder / "report.html", release_page.chapter(done)).read_text(encoding="utf-8")
 
 
 def test_the_page_tells_it_all_without_leaving_the_page(done):
@@ -92,7 +92,7 @@ def test_the_page_tells_it_all_without_leaving_the_page(done):
         assert needed in text
     assert "http" not in text
     assert len(text) < 2_000_000
-    assert release_page.verdict(done) in text
+    assert release_page.chapter(done).verdict in text
 
 
 def test_a_cart_s_pendulum_is_found_too(tmp_path):

@@ -20,6 +20,7 @@ from upright.lab.identified import read_identified
 from upright.lab.makes import make_rig
 from upright.readers import read
 from upright.records import Record
+from upright.report.page import Picture
 
 TICK = 2e-3
 SYSTEM = control.tf([40.0], [1, 1.6, 64])  # damping ratio 0.1, 8 rad/s
@@ -177,7 +178,7 @@ def test_the_page_says_what_was_found(furuta):
     assert told.sound
     assert told.numbers["pole"]["inside"]
     assert "unstable pole" in told.verdict
-    assert len([p for part in told.parts for p in part.pictures]) == 2
+    assert len([b for part in told.parts for b in part.content if isinstance(b, Picture)]) == 2
 
 
 @pytest.mark.slow

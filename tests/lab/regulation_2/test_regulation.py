@@ -11,7 +11,6 @@ from upright.errors import BadInput
 from upright.lab.identified import IdentifiedRig
 from upright.lab.makes import make_rig
 from upright.lab.regulation_2 import chapter as regulation_page
-from upright.lab.regulation_2.figures import wilson
 from upright.lab.regulation_2.run import RegulationRequest, identify_make, run_regulation
 
 
@@ -83,12 +82,6 @@ def test_what_the_fit_leaves_out_is_taken_as_said():
     assert set(drawn) == {"b_1c", "b_2c"}
     # 13 % from run to run; of 4000 draws the spread is known to one part in 90, three of which are allowed
     assert np.std(np.log(drawn["b_1c"])) == pytest.approx(0.13, rel=3 / 90)
-
-
-def test_wilson_s_interval_as_newcombe_prints_it():
-    """R. G. Newcombe, Statistics in Medicine 17 (1998) 857, table I, method 3."""
-    for hits, of, interval in ((81, 263, (0.2553, 0.3662)), (15, 148, (0.0624, 0.1605)), (0, 20, (0.0, 0.1611))):
-        assert wilson(hits, of, 1.959964) == pytest.approx(interval, abs=5e-5)
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from upright.cli.terminal import AsJson, Out, Pdf, tell, write_page
 from upright.errors import BadInput, nearest
+from upright.files import write_json
 
 if TYPE_CHECKING:
-    from upright.lab.designing.run import Designed
     from upright.lab.identified import IdentifiedRig
 
 
@@ -38,8 +39,9 @@ def design(
     track: Annotated[str, typer.Option(metavar="COORDINATE", help="Coordinate that follows a reference.")] = "",
     sampled: Annotated[bool, typer.Option("--sampled", help="Gains whose sampled loop has the poles asked.")] = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the rigs drawn from the fit's covariance.")] = 0,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="For design.json and .html.")] = Path(),
-    as_json: Annotated[bool, typer.Option("--json", help="Print design.json instead of tables.")] = False,
+    out: Out = Path(),
+    pdf: Pdf = False,
+    as_json: AsJson = False,
 ) -> None:
     """Find the gains that hold a rig, and say what they are worth in the loop that a computer runs.
 
@@ -50,14 +52,12 @@ def design(
     upright design out/fit.json --at inverted --poles "-4.15+-1.63j, -16.9, -3.2"
     """
     from upright.design.requests import read_poles
-    from upright.json_file import json_text, write_json
-    from upright.lab.designing import page as design_page
+    from upright.lab.designing.chapter import chapter
     from upright.lab.designing.run import SPEEDS, DesignRequest, design_for
     from upright.lab.identified import read_identified
+    from upright.report.symbols import typed
     from upright.units import parse, parse_if_given
 
-    if out.exists() and not out.is_dir():
-        raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
     if bool(poles) == bool(lqr):
         raise BadInput('give either --poles "-4+-2j, -10, -3" or --lqr "1,0,1,0" (weights of the states).')
     if speed not in SPEEDS:
@@ -83,12 +83,9 @@ def design(
         sampled=sampled,
     )
     done = design_for(rig, wish)
-    content = write_json(out / "design.json", design_page.as_json(done))
-    page = design_page.write(done, out / "design.html", str(source))
-    if as_json:
-        typer.echo(json_text(content))
-        return
-    _say(done, (out / "design.json", page), source)
+    told = chapter(done, source=typed(source), folder=typed(out))
+    files = [write_json(out / "design.json", told.numbers), *write_page(told, out / "design.html", pdf)]
+    tell(told, files, told.numbers if as_json else None)
 
 
 def _numbers(text: str) -> tuple[float, ...]:
@@ -141,30 +138,3 @@ def _start(rig: IdentifiedRig, text: str) -> tuple[float, ...]:
     if not any(values.values()):
         raise BadInput("--start must leave the equilibrium; give one state a value that is not 0.")
     return tuple(values.values())
-
-
-def _say(done: Designed, files: tuple[Path, Path], source: Path) -> None:
-    from rich.markup import escape
-
-    from upright.cli.terminal import console, on_terminal, typed
-    from upright.lab.designing import page as design_page
-
-    screen = console()
-    for table in (design_page.gain_table(done), design_page.pole_table(done), design_page.way_table(done)):
-        screen.print(on_terminal(table))
-    if done.placement is not None:
-        screen.print(
-            f"\nFarthest pole from where it was asked: {done.placement.miss:.1g} 1/s. {done.placement.sentence}",
-            soft_wrap=True, markup=False,
-        )  # fmt: skip
-    if done.R is not None:
-        screen.print(f"\nWeight of the effort: {done.R:.4g}", soft_wrap=True)
-    if done.chance is not None:
-        screen.print(f"Of the rigs that the fit allows, {100 * done.chance:.1f} % stand with these gains.")
-    screen.print(f"\n[bold]Verdict[/bold]: {escape(done.verdict)}", soft_wrap=True)
-    screen.print(f"\nWritten: {escape(', '.join(str(f) for f in files))}", soft_wrap=True)
-    screen.print("What next:", style="bold")
-    for step in design_page.next_steps(done, typed(source), typed(files[0].parent)):
-        screen.print(f"- {step.sentence}", soft_wrap=True, markup=False)
-        if step.command:
-            screen.print(f"    {step.command}", soft_wrap=True, markup=False)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from upright.cli.terminal import AsJson, Out, Pdf, progress_bar, tell, write_page
 from upright.errors import BadInput
 
 if TYPE_CHECKING:
-    from upright.lab.regulation_2.run import Regulation, RegulationRequest
+    from upright.lab.regulation_2.run import RegulationRequest
 
 
 def regulate(
@@ -28,10 +29,9 @@ def regulate(
     tilt: Annotated[str, typer.Option(metavar="ANGLE", help='From upright when let go, as in "12 deg".')] = "",
     push: Annotated[str, typer.Option(metavar="SPEED", help='Of the pendulum then, outwards: "1.5 rad/s".')] = "",
     seconds: Annotated[float, typer.Option(help="Length of a run.")] = 6.0,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="For logs and report.")] = Path(
-        "upright-regulate"
-    ),
-    as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON instead of tables.")] = False,
+    out: Out = Path("upright-regulate"),
+    pdf: Pdf = False,
+    as_json: AsJson = False,
 ) -> None:
     r"""Hold an identified rig upright; say beforehand what each pole set will come to, then run it.
 
@@ -43,23 +43,18 @@ def regulate(
     upright regulate --rig furuta --seed 3
     upright regulate out/fit.json --seed 3 --set 2 --tilt "20 deg"
     """
-    from upright.cli.terminal import step_bar
-    from upright.json_file import json_text
     from upright.lab.identified import read_identified
     from upright.lab.makes import make_rig
-    from upright.lab.regulation_2 import chapter as regulation_page
+    from upright.lab.regulation_2.chapter import chapter
     from upright.lab.regulation_2.run import identify_make, run_regulation
-    from upright.report.chapter import write_chapter
     from upright.report.symbols import typed
 
-    if out.exists() and not out.is_dir():
-        raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
     wish = _wish(which, poles, speed, memory, tilt, push, seconds)
-    with step_bar(quiet=as_json) as tell:
+    with progress_bar(quiet=as_json) as bar:
         if source is None:
             make, seed = rig or "furuta", seed or 0
-            tell("identifying the hanging twin", 0.0)
-            known = identify_make(make, seed, out / "identified", lambda step, share: tell(step, 0.6 * share))
+            bar("identifying the hanging twin", 0.0)
+            known = identify_make(make, seed, out / "identified", lambda step, share: bar(step, 0.6 * share))
             name = f"--rig {make}"
         else:
             known, name = read_identified(source, seed=seed or 0), typed(source)
@@ -69,16 +64,13 @@ def regulate(
         truth = None if seed is None else make_rig(make, seed)
         base = 0.6 if source is None else 0.0
         done = run_regulation(
-            known, truth, seed or 0, out, lambda step, share: tell(step, base + (1 - base) * share), wish=wish,
+            known, truth, seed or 0, out, lambda step, share: bar(step, base + (1 - base) * share), wish=wish,
             source=name,
         )  # fmt: skip
-        chapter = regulation_page.chapter(done)
-        report = write_chapter(out / "report.html", chapter)
-    if as_json:
-        content: dict[str, Any] = {**chapter.numbers, "verdict": chapter.verdict, "report": str(report)}
-        typer.echo(json_text(content))
-        return
-    _say(done, chapter, report)
+    told = chapter(done)
+    files = write_page(told, out / "report.html", pdf)
+    numbers = {**told.numbers, "verdict": told.verdict, "report": str(files[0])}
+    tell(told, files, numbers if as_json else None)
 
 
 def _wish(which: str, poles: str, speed: str, memory: float, tilt: str, push: str, seconds: float) -> RegulationRequest:
@@ -95,25 +87,3 @@ def _wish(which: str, poles: str, speed: str, memory: float, tilt: str, push: st
         poles={n: read_poles(t) for n, t in texts.items()}, speed=speed, memory=memory, seconds=seconds,
         tilt=parse_if_given(tilt, "rad"), push=parse_if_given(push, "rad/s"),
     )  # fmt: skip
-
-
-def _say(done: Regulation, chapter: Any, report: Path) -> None:
-    from rich.markup import escape
-
-    from upright.cli.terminal import console, on_terminal
-    from upright.lab.regulation_2 import chapter as regulation_page
-    from upright.lab.regulation_2 import sentences as regulation_told
-
-    screen = console()
-    tables = [regulation_page.gain_table(done), regulation_page.told_table(done)]
-    for table in tables + ([regulation_page.way_table(done)] if done.ways else []):
-        screen.print(on_terminal(table))
-    screen.print()
-    for a in done.attempts:
-        screen.print(f"- {escape(regulation_told.sentence(done, a))}", soft_wrap=True)
-    screen.print(f"\n[bold]Verdict[/bold]: {escape(chapter.verdict)} {escape(chapter.detail)}", soft_wrap=True)
-    screen.print(f"\nReport: {escape(str(report))} (open it in a browser)\nWhat next:", soft_wrap=True)
-    for step in chapter.steps:
-        screen.print(f"- {step.sentence}", soft_wrap=True, markup=False)
-        if step.command:
-            screen.print(f"    {step.command}", soft_wrap=True, markup=False)

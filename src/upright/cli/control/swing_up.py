@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from upright.cli.terminal import AsJson, Out, Pdf, tell, write_page
 from upright.errors import BadInput, nearest
+from upright.files import write_json
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -33,8 +35,9 @@ def swing_up(
         Path | None,
         typer.Option(metavar="LOG", help="Only say what this log of a hanging, driven rig tells of its encoders."),
     ] = None,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Logs, page, JSON.")] = Path("swing-up"),
-    as_json: Annotated[bool, typer.Option("--json", help="Print the numbers instead of sentences.")] = False,
+    out: Out = Path("swing-up"),
+    pdf: Pdf = False,
+    as_json: AsJson = False,
 ) -> None:
     """Swing a hanging pendulum up within the drive's limit and travel, and catch it; its encoders are asked first.
 
@@ -48,16 +51,12 @@ def swing_up(
 
     upright swing-up out/fit.json --check swings.csv
     """
-    from upright.cli.terminal import typed
-    from upright.json_file import json_text, write_json
     from upright.lab.identified import read_identified
     from upright.lab.makes import make_rig
-    from upright.lab.swing_up_2b import chapter as swing_up_page
+    from upright.lab.swing_up_2b.chapter import chapter
     from upright.lab.swing_up_2b.run import known_of, run_swing_up
-    from upright.report.chapter import write_chapter
+    from upright.report.symbols import typed
 
-    if out.exists() and not out.is_dir():
-        raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
     if travel is not None and not travel > 0:
         raise BadInput(f"--travel must be above 0, got {travel:g}; give it in m or rad.")
     known = None
@@ -71,7 +70,7 @@ def swing_up(
             raise BadInput(f"the fit is of the make {make}, and --rig says {rig}; leave --rig out.")
         model = identified.rig()
     if check is not None:
-        _check(model, check, known, out, as_json, typed(source) if source else "FIT.json")
+        _check(model, check, known, out, pdf, as_json, typed(source) if source else "FIT.json")
         return
     done = run_swing_up(
         model,
@@ -82,30 +81,22 @@ def swing_up(
         travel=travel,
         source=typed(source) if source else "",
     )
-    told = swing_up_page.chapter(done)
-    page = write_chapter(out / "swing_up.html", told)
-    write_json(out / "swing_up.json", told.numbers)
-    if as_json:
-        typer.echo(json_text(told.numbers))
-    else:
-        _say(done.check.verdict, told.verdict, page, [(s.sentence, s.command) for s in told.steps])
+    told = chapter(done)
+    files = [*write_page(told, out / "swing_up.html", pdf), write_json(out / "swing_up.json", told.numbers)]
+    tell(told, files, told.numbers if as_json else None)
     if not done.caught:
         raise typer.Exit(3)
 
 
-def _check(model: Rig, log: Path, known: Mapping[str, float] | None, out: Path, as_json: bool, source: str) -> None:
-    from upright.json_file import json_text
-    from upright.lab.swing_up_2b import chapter as swing_up_page
+def _check(
+    model: Rig, log: Path, known: Mapping[str, float] | None, out: Path, pdf: bool, as_json: bool, source: str
+) -> None:
+    from upright.lab.swing_up_2b.chapter import check_chapter
     from upright.lab.swing_up_2b.run import scales_of_log
     from upright.readers import read
-    from upright.report.chapter import write_chapter
 
-    told = swing_up_page.check_chapter(model, scales_of_log(model, read(log), known), log.name, source)
-    page = write_chapter(out / "encoders.html", told)
-    if as_json:
-        typer.echo(json_text(told.numbers))
-    else:
-        _say(told.verdict, "", page, [(s.sentence, s.command) for s in told.steps])
+    told = check_chapter(model, scales_of_log(model, read(log), known), log.name, source)
+    tell(told, write_page(told, out / "encoders.html", pdf), told.numbers if as_json else None)
     if not told.sound:
         raise typer.Exit(3)
 
@@ -127,15 +118,3 @@ def _lying(rig: Rig, text: str) -> Rig:
     if not 0.01 <= abs(factor) <= 100:
         raise BadInput(f"--lie needs a factor between 0.01 and 100, or negative for swapped channels, got '{value}'.")
     return replace(rig, scales=tuple(factor if n == name else 1.0 for n in names))
-
-
-def _say(sensors: str, verdict: str, page: Path, steps: list[tuple[str, str]]) -> None:
-    from upright.cli.terminal import console
-
-    screen = console()
-    screen.print(f"Encoders: {sensors}", soft_wrap=True, markup=False)
-    if verdict:
-        screen.print(f"\nVerdict: {verdict}", soft_wrap=True, markup=False)
-    screen.print(f"\nReport: {page}\nWhat next:", soft_wrap=True, markup=False)
-    for sentence, command in steps:
-        screen.print(f"- {sentence}\n    {command}", soft_wrap=True, markup=False)

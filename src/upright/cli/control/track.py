@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from upright.cli.terminal import AsJson, Out, Pdf, progress_bar, tell, write_page
 from upright.errors import BadInput
+from upright.files import write_json
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from upright.lab.tracking_3.run import Tracking
-    from upright.report.advice import Step
+    pass
 
 INTERRUPTED = 130
 
@@ -33,8 +32,9 @@ def track(
     limit: Annotated[
         float | None, typer.Option(metavar="U", help="Largest command; the make's own if left out.")
     ] = None,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for all files.")] = Path("track"),
-    as_json: Annotated[bool, typer.Option("--json", help="Print track.json instead of tables.")] = False,
+    out: Out = Path("track"),
+    pdf: Pdf = False,
+    as_json: AsJson = False,
 ) -> None:
     r"""Make the far inertia of a flexible shaft follow a step (experiment 3).
 
@@ -46,19 +46,13 @@ def track(
     upright track --rig torsional --seed 3 -o out
     upright track out/fit.json --set 4 --step "6 mm"
     """
-    from upright.cli.terminal import progress_line
     from upright.design.requests import read_poles
-    from upright.json_file import json_text, write_json
     from upright.lab.makes import SHAFTS, make_rig
     from upright.lab.tracking_3.chapter import chapter
     from upright.lab.tracking_3.pulses import rig_of_file
     from upright.lab.tracking_3.run import follow, run_tracking
-    from upright.lab.tracking_3.tables import as_json as content_of
-    from upright.report.chapter import write_chapter
     from upright.units import parse_if_given
 
-    if out.exists() and not out.is_dir():
-        raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
     own = read_poles(poles) if poles else None
     which = _which(sets) if sets else (() if poles else (1, 2, 3, 4))
     if limit is not None and not limit > 0:
@@ -69,20 +63,17 @@ def track(
     size = parse_if_given(step, on.plant.coordinates[-1].unit)
     if size is not None and not size > 0:
         raise BadInput(f"--step needs a size above 0, got '{step}'.")
-    with progress_line(quiet=as_json) as tell:
+    with progress_bar(quiet=as_json) as bar:
         if source is None:
             on = replace(on, limit=limit or on.limit)
-            done = run_tracking(on, seed, out, tell, which=which, poles=own, step=size)
+            done = run_tracking(on, seed, out, bar, which=which, poles=own, step=size)
         else:
-            done = follow(on, on, source, None, None, tell, which=which, poles=own, step=size)
+            done = follow(on, on, source, None, None, bar, which=which, poles=own, step=size)
     told = chapter(done)
-    content = write_json(out / "track.json", content_of(done) | {"verdict": told.verdict})
-    titled = replace(told, title=f"Experiment 3: {told.title.lower()}, {done.rig.name}")
-    page = write_chapter(out / "track.html", titled)
-    if as_json:
-        typer.echo(json_text(content))
-    else:
-        _say(done, told.verdict, (out / "track.json", page), told.steps)
+    told = replace(told, title=f"Experiment 3: {told.title.lower()}, {done.rig.name}")
+    numbers = {**told.numbers, "verdict": told.verdict}
+    files = [write_json(out / "track.json", numbers), *write_page(told, out / "track.html", pdf)]
+    tell(told, files, numbers if as_json else None)
     if done.interrupted:
         raise typer.Exit(INTERRUPTED)
 
@@ -92,24 +83,3 @@ def _which(text: str) -> tuple[int, ...]:
         return tuple(int(part) for part in text.split(","))
     except ValueError:
         raise BadInput(f'--set takes numbers of Table 2 separated by commas, as in "1,4", got {text[:40]!r}.') from None
-
-
-def _say(done: Tracking, verdict: str, files: tuple[Path, Path], steps: Sequence[Step]) -> None:
-    from rich.markup import escape
-
-    from upright.cli.terminal import console, on_terminal
-    from upright.lab.tracking_3 import tables
-
-    screen = console()
-    if done.fit is not None:
-        screen.print(on_terminal(tables.fit_table(done)))
-    for table in (tables.gain_table(done), tables.step_table(done)):
-        screen.print(on_terminal(table))
-    if done.pd is not None:
-        screen.print(on_terminal(tables.friction_table(done)))
-    screen.print(f"\n[bold]Verdict[/bold]: {escape(verdict)}", soft_wrap=True)
-    screen.print(f"\nWritten: {escape(', '.join(str(f) for f in files))}", soft_wrap=True)
-    screen.print("What next:", style="bold")
-    for s in steps:
-        screen.print(f"- {s.sentence}", soft_wrap=True, markup=False)
-        screen.print(f"    {s.command}", soft_wrap=True, markup=False)

@@ -6,16 +6,18 @@ import signal
 import threading
 from collections.abc import Generator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from upright.cli.terminal import console, print_json, progress_bar
 from upright.errors import BadInput
 
 if TYPE_CHECKING:
     from upright.lab.laboratory import Session
+    from upright.report.book import Book
 
 INTERRUPTED = 130
 
@@ -60,29 +62,25 @@ def lab(
         raise BadInput(f"results need a folder, but {folder} is a file; name another with -o.")
     from datetime import date
 
-    from upright.json_file import json_text
     from upright.lab import laboratory, laboratory_page
-    from upright.report.book import write_book
-    from upright.report.pdf import write_pdf
+    from upright.report.html import write_html
+    from upright.report.pdf import available, write_pdf
 
     laboratory.choose(experiment or (), rig)  # says what is wrong with the call before anything is written
     _say_first_time()
-    from upright.cli.terminal import step_bar
-
-    with _ctrl_c() as pressed, step_bar(quiet=as_json) as tell:
+    with _ctrl_c() as pressed, progress_bar(quiet=as_json) as bar:
         session = laboratory.run_laboratory(
-            experiment or (), rig, seed, folder, tell, stopped=lambda: pressed.times > 0, fresh=fresh
+            experiment or (), rig, seed, folder, bar, stopped=lambda: pressed.times > 0, fresh=fresh
         )
         pressed.patient = True
-        tell("writing the report", 1.0)
+        bar("writing the report", 1.0)
         told = laboratory_page.book(session, date.today())
-        report = write_book(folder / "report.html", told)
-        pdf = write_pdf(folder / "report.pdf", told)
+        report = write_html(folder / "report.html", told)
+        pdf = write_pdf(folder / "report.pdf", told) if available() else None
     if as_json:
-        summary = laboratory_page.summary(session, report, pdf)
-        typer.echo(json_text(summary))
+        print_json(laboratory_page.summary(session, report, pdf))
     else:
-        _say(session, report, pdf)
+        _tell(session, told, [report] if pdf is None else [report, pdf])
     if session.interrupted or pressed.times:
         raise typer.Exit(INTERRUPTED)
 
@@ -127,30 +125,16 @@ def _ctrl_c() -> Generator[_Pressed]:
         signal.signal(signal.SIGINT, before)
 
 
-def _say(session: Session, report: Path, pdf: Path | None) -> None:
+def _tell(session: Session, told: Book, files: list[Path]) -> None:
     """Verdicts, key numbers, where the report is and what to try next."""
-    from upright.cli.terminal import console
-    from upright.lab import laboratory_page
+    from upright.report.terminal import print_book
 
-    screen = console()
-
-    def say(text: str) -> None:
-        screen.print(text, soft_wrap=True, markup=False)
-
-    for t in session.told:
-        kept = ", as kept from an earlier run" if t.state == "kept" else ""
-        say(f"Experiment {t.experiment.key}, {t.chapter.title} ({t.rig}{kept}; {t.seconds:.1f} s)")
-        say(f"    {t.chapter.verdict} {t.chapter.detail}".rstrip())
-        for f in t.chapter.findings:
-            interval = f", 95 % interval {f.interval}" if f.interval else ""
-            say(f"    {f.what}: {f.value}{interval}" + (f"; truth {f.truth}" if f.truth else ""))
-    for e in session.missing:
-        say(f"Experiment {e.key}, {e.title}: not run")
-    if session.interrupted:
-        say("\nStopped by Ctrl-C; the report holds what was there by then, and the same command goes on from there.")
-    say(f"\nReport: {report} (open it in a browser; {session.seconds:.1f} s)")
-    say(f"PDF: {pdf}" if pdf else "PDF: pip install 'upright[pdf]' and run the same again; nothing is computed twice.")
-    say("What next:")
-    for step in laboratory_page.next_steps(session):
-        say(f"- {step.sentence}\n    {step.command}")
-    say("Each chapter of the report ends with the commands that repeat its steps.")
+    took = {
+        t.experiment.key: f"{t.rig}{', as kept from an earlier run' if t.state == 'kept' else ''}; {t.seconds:.1f} s"
+        for t in session.told
+    }
+    timed = replace(told, chapters=tuple(replace(c, about=took[c.key]) for c in told.chapters))
+    print_book(console(), timed, files)
+    typer.echo("Each chapter of the report ends with the commands that repeat its steps.")
+    if len(files) == 1:
+        typer.echo("PDF: pip install 'upright[pdf]' and run the same again; nothing is computed twice.")

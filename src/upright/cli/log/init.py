@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from upright.cli.terminal import tell
 from upright.errors import BadInput
 
 
@@ -36,7 +37,8 @@ def init(
 
     Lines marked MEASURE hold placeholders: weigh, measure, or look them up.
     """
-    from upright.cli.terminal import console, typed
+    from upright.report.page import Chapter, Part, Points, Step
+    from upright.report.symbols import typed
 
     study = out if out is not None else Path(f"{log.stem}.toml")
     if not log.is_file():
@@ -58,18 +60,14 @@ def init(
         text = text.replace("[defaults]\n", f'[defaults]\nreader = "{reader}"\n')
     study.parent.mkdir(parents=True, exist_ok=True)
     study.write_text(text, encoding="utf-8")
-    screen = console()
-    screen.print(f"Written: {study}", soft_wrap=True, markup=False)
-    for line in text.splitlines():
-        if line.startswith("# GUESSED"):
-            screen.print(line.removeprefix("# "), soft_wrap=True, markup=False)
+    guessed = [line.removeprefix("# ") for line in text.splitlines() if line.startswith("# GUESSED")]
     marked = (line.split(" =")[0] for line in text.splitlines() if "MEASURE" in line and " = " in line)
     measure = list(dict.fromkeys(marked))
     if measure:
-        screen.print(
-            f"Placeholders to replace by what you measured: {', '.join(measure)}", soft_wrap=True, markup=False
-        )
-    fit = study.with_name(f"{study.stem}-fit")
-    screen.print(
-        f"What next: read it, then\n    upright identify {typed(study)} -o {typed(fit)}", soft_wrap=True, markup=False
+        guessed.append(f"Placeholders to replace by what you measured: {', '.join(measure)}")
+    onward = Step(
+        "Read it, then fit it.",
+        f"upright identify {typed(study)} -o {typed(study.with_name(f'{study.stem}-fit'))}",
     )
+    parts = (Part("Recognised", (Points(tuple(guessed)),)),) if guessed else ()
+    tell(Chapter(title=f"Draft of {study.name}", verdict="", parts=parts, steps=(onward,)), [study])

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from upright.cli.terminal import AsJson, Data, Out, Pdf, progress_bar, tell, write_page
 from upright.errors import BadInput
+from upright.progress import Progress
 
 if TYPE_CHECKING:
-    from upright.identification.frequency.answer import Answer
-    from upright.report.chapter import Chapter
+    from upright.report.page import Chapter
 
 KINDS = ("sines", "multisine", "sweep")
 
@@ -41,9 +42,10 @@ def frequency(
     hold: Annotated[str, typer.Option(metavar="TIME", help="How long a command is held; one sample.")] = "",
     low: Annotated[float | None, typer.Option("--from", metavar="W", help="Least frequency, in rad/s.")] = None,
     high: Annotated[float | None, typer.Option("--to", metavar="W", help="Greatest frequency, in rad/s.")] = None,
-    data: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder of a study's logs.")] = None,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for results.")] = Path("frequency"),
-    as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON instead of tables.")] = False,
+    data: Data = None,
+    out: Out = Path("frequency"),
+    pdf: Pdf = False,
+    as_json: AsJson = False,
 ) -> None:
     r"""Measure or read a frequency response and fit the rig to it (experiment 1b).
 
@@ -55,44 +57,42 @@ def frequency(
     upright frequency sweep.csv --rig linear --known "m_p=135 g +- 0.2 %" -o out
     upright frequency one.txt two.txt --command v --signal theta=theta
     """
-    if out.exists() and not out.is_dir():
-        raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
     for value, option in ((ask, "--ask"), (kind or "sines", "--kind")):
         if value not in KINDS:
             raise BadInput(f"{option} is one of {', '.join(KINDS)}, got '{value}'.")
     if sources:
-        _read(sources, out, data, as_json, rig=rig, command=command, kind=kind, seed=seed, hold=hold,
-              signals=_pairs(signal, "--signal"), counts=_pairs(counts, "--counts"), known=_pairs(known, "--known"),
-              band=(low or 0.0, high or float("inf")))  # fmt: skip
-        return
-    for value, option in ((signal, "--signal"), (counts, "--counts"), (known, "--known"), (command, "--command")):
-        if value:
-            raise BadInput(f"{option} belongs to a log, and none was named; name one, or leave the option out.")
-    _twin(rig or "furuta", seed, ask, out, as_json)
+        files, told = _of_logs(
+            sources, out, data, rig=rig, command=command, kind=kind, seed=seed, hold=hold,
+            signals=_pairs(signal, "--signal"), counts=_pairs(counts, "--counts"), known=_pairs(known, "--known"),
+            band=(low or 0.0, high or float("inf")),
+        )  # fmt: skip
+    else:
+        for value, option in ((signal, "--signal"), (counts, "--counts"), (known, "--known"), (command, "--command")):
+            if value:
+                raise BadInput(f"{option} belongs to a log, and none was named; name one, or leave the option out.")
+        with progress_bar(quiet=as_json) as bar:
+            files, told = _of_twin(rig or "furuta", seed, ask, out, bar)
+    files += write_page(told, out / "report.html", pdf)
+    numbers = {"verdict": told.verdict, "sound": told.sound, **told.numbers, "files": [str(f) for f in files]}
+    tell(told, files, numbers if as_json else None)
 
 
-def _twin(make: str, seed: int, ask: str, out: Path, as_json: bool) -> None:
-    from upright.cli.terminal import progress_line
+def _of_twin(make: str, seed: int, ask: str, out: Path, progress: Progress) -> tuple[list[Path], Chapter]:
     from upright.lab.frequency_1b.chapter import chapter
     from upright.lab.frequency_1b.run import run_frequency
     from upright.lab.makes import make_named
-    from upright.report.chapter import write_chapter
 
     make_named(make)
-    with progress_line(quiet=as_json) as tell:
-        done = run_frequency(make, seed, out, tell, kind=ask)
-    told = chapter(done)
-    page = write_chapter(out / "report.html", told)
-    _say(told, done.answer, (out / "frequency.csv", out / "sweep.csv", out / "fit.json", page), as_json, done.truth)
+    done = run_frequency(make, seed, out, progress, kind=ask)
+    return [out / "frequency.csv", out / "sweep.csv", out / "fit.json"], chapter(done)
 
 
-def _read(
-    sources: list[Path], out: Path, data: Path | None, as_json: bool, *, rig: str, command: str, kind: str, seed: int,
+def _of_logs(
+    sources: list[Path], out: Path, data: Path | None, *, rig: str, command: str, kind: str, seed: int,
     hold: str, signals: dict[str, str], counts: dict[str, str], known: dict[str, str], band: tuple[float, float],
-) -> None:  # fmt: skip
-    from upright.lab.frequency_1b.chapter import of_log
+) -> tuple[list[Path], Chapter]:  # fmt: skip
+    from upright.lab.frequency_1b.chapter import log_chapter
     from upright.lab.frequency_1b.from_logs import LogRequest, response_of_logs
-    from upright.report.chapter import write_chapter
     from upright.units import parse_if_given
 
     wish = LogRequest(
@@ -101,10 +101,7 @@ def _read(
         known={n: _known(n, v, rig) for n, v in known.items()},
     )  # fmt: skip
     found = response_of_logs(sources, wish, out, data=data)
-    told = of_log(found)
-    page = write_chapter(out / "report.html", told)
-    files = (out / "frequency.csv", *([out / "fit.json"] if found.answer else []), page)
-    _say(told, found.answer, files, as_json, None)
+    return [out / "frequency.csv", *([out / "fit.json"] if found.answer else [])], log_chapter(found)
 
 
 def _pairs(texts: list[str] | None, option: str) -> dict[str, str]:
@@ -130,36 +127,12 @@ def _count(name: str, text: str) -> float:
 def _known(name: str, text: str, make: str) -> tuple[float, float]:
     """Value and standard uncertainty [SI]."""
     from upright.lab.makes import MAKES
-    from upright.units import measured
 
     if make not in MAKES:
         raise BadInput("--known belongs to a fit; name the rig with --rig too.")
+    from upright.units import measured
+
     plant = MAKES[make].plant
     if name in plant.names():
         return measured(text, plant.quantity(name).unit)
     return measured(text, "s" if name in ("actuator.delay", "actuator.lag") else "")
-
-
-def _say(told: Chapter, answer: Answer | None, files: tuple[Path, ...], as_json: bool, truth: Any) -> None:
-    from upright.cli.terminal import console, on_terminal
-    from upright.json_file import json_text
-    from upright.lab.frequency_1b.tables import parameter_table, pole_table, response_table, way_table
-
-    if as_json:
-        content = {"verdict": told.verdict, "sound": told.sound, **told.numbers, "files": [str(f) for f in files]}
-        typer.echo(json_text(content))
-        return
-    screen = console()
-    if answer is None:
-        screen.print(on_terminal(response_table(told.numbers)))
-    else:
-        for table in (parameter_table(answer, truth), way_table(answer), pole_table(answer)):
-            screen.print(on_terminal(table))
-        for sentence in answer.left_out:
-            screen.print(f"\n{sentence}", soft_wrap=True, markup=False)
-    screen.print(f"\nVerdict: {told.verdict} {told.detail}", soft_wrap=True, markup=False)
-    screen.print(f"\nWritten: {', '.join(str(f) for f in files)}\nWhat next:", soft_wrap=True, markup=False)
-    for step in told.steps:
-        screen.print(f"- {step.sentence}", soft_wrap=True, markup=False)
-        if step.command:
-            screen.print(f"    {step.command}", soft_wrap=True, markup=False)

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from upright.cli.terminal import Data, Pdf, progress_bar, tell, write_page
 from upright.errors import BadInput
+
+if TYPE_CHECKING:
+    from upright.study.load import Study
 
 INTERRUPTED, NOT_TRUSTED = 130, 3
 METHODS = ("auto", "simplex", "least-squares")
@@ -26,9 +30,7 @@ def identify(
     out: Annotated[
         Path | None, typer.Option("-o", "--out", metavar="OUT", help="Folder for results; STUDY-fit if left out.")
     ] = None,
-    data: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder the runs' files are in; the study's own if left out.")
-    ] = None,
+    data: Data = None,
     hold_out: Annotated[
         list[str] | None,
         typer.Option(
@@ -38,6 +40,7 @@ def identify(
     method: Annotated[str, typer.Option(metavar="METHOD", help=f"How to search: {', '.join(METHODS)}.")] = "auto",
     as_json: Annotated[bool, typer.Option("--json", help="Print fit.json instead of tables.")] = False,
     report: Annotated[bool, typer.Option(help="Write report.html as well.")] = True,
+    pdf: Pdf = False,
     keys: Annotated[
         bool, typer.Option("--keys", help="Print every key a study may have.", callback=_keys, is_eager=True)
     ] = False,
@@ -76,27 +79,19 @@ def identify(
         gain = { guess = "2 N/V" }
 
     All keys: `upright identify --keys`, or docs/study.md.
-    Writes OUT/fit.json and OUT/report.html.
+    Writes OUT/fit.json and OUT/report.html (and OUT/report.pdf with --pdf).
     Ctrl-C keeps the best so far and writes it.
     --hold-out each predicts every run from a fit of the others as well.
     Exit code: 0 a fit was written (3 with --strict when its verdict is not to
     trust it), 2 the study or a log is wrong, 130 stopped by Ctrl-C.
     """
-    from upright.cli.terminal import print_fit, progress_line, typed
     from upright.errors import nearest
+    from upright.report.symbols import typed
 
     if method not in METHODS:
         raise BadInput(f"--method must be one of {', '.join(METHODS)}, got '{method}'; {nearest(method, METHODS)}")
-    if not study.exists():
-        raise BadInput(
-            f"the study {study} does not exist; `upright init LOG -o {typed(study.name)}` writes one from a log"
-        )
-    from upright.study.load import load_study
-
     folder = out if out is not None else study.with_name(f"{study.stem}-fit")
-    if folder.exists() and not folder.is_dir():
-        raise BadInput(f"results need a folder, but {folder} is a file; name another with -o")
-    asked = load_study(study, data=data)
+    asked = read_study(study, folder, data)
     each = "each" in (hold_out or ()) and all(run.label != "each" for run in asked.runs)
     asked = asked.hold_out(*(label for label in hold_out or () if not (each and label == "each")))
     fitted = sum(run.role == "fit" for run in asked.runs)
@@ -109,42 +104,57 @@ def identify(
         )
     if not any(run.role == "fit" for run in asked.runs):
         raise BadInput(f'{study}: every run has role = "predict"; at least one needs role = "fit"')
+    from upright.files import json_text
     from upright.identification.estimate import identify as estimate
     from upright.identification.ladder.cross_validation import cross_validate
-    from upright.json_file import json_text
     from upright.study.fit_file import write_fit
 
-    with progress_line(quiet=as_json) as progress:
-        fit = estimate(asked.rig, asked.runs, method=method, progress=progress)
+    with progress_bar(quiet=as_json) as bar:
+        fit = estimate(asked.rig, asked.runs, method=method, progress=bar)
     written = [folder / "fit.json"]
     content = write_fit(fit, asked, written[0])
     crossed = None
     if each and not fit.interrupted:
-        with progress_line(quiet=as_json) as progress:
-            crossed = cross_validate(fit, asked.runs, progress=progress)
+        with progress_bar(quiet=as_json) as bar:
+            crossed = cross_validate(fit, asked.runs, progress=bar)
         content = write_fit(fit, asked, written[0], crossed)
-    if report:
-        written += _report(fit, folder, asked, crossed)
+    from upright.report.fit.chapter import chapter
+
+    told = chapter(
+        fit, title=asked.title or asked.path.stem.replace("_", " "), provenance=provenance(asked), crossed=crossed,
+        study=typed(study) + (f" --data {typed(data)}" if data is not None else ""), folder=typed(folder),
+    )  # fmt: skip
+    if report or pdf:
+        written += write_page(told, folder / "report.html", pdf)
     if as_json:
         typer.echo(json_text(content))
     else:
-        again = typed(study) + (f" --data {typed(data)}" if data is not None else "")
-        print_fit(fit, written, again, crossed)
+        tell(told, written)
     if fit.interrupted or (crossed is not None and crossed.interrupted):
         raise typer.Exit(INTERRUPTED)
     if strict and not fit.trusted:
         raise typer.Exit(NOT_TRUSTED)
 
 
-def _report(fit: Any, folder: Path, asked: Any, crossed: Any) -> list[Path]:
-    """Write report.html."""
-    from upright.report.document import write_fit_report
+def read_study(study: Path, folder: Path, data: Path | None) -> Study:
+    """A study, once study and folder of the results are what they should be."""
+    from upright.report.symbols import typed
+    from upright.study.load import load_study
 
-    provenance: dict[str, object] = {
+    if not study.exists():
+        raise BadInput(
+            f"the study {study} does not exist; `upright init LOG -o {typed(study.name)}` writes one from a log"
+        )
+    if folder.exists() and not folder.is_dir():
+        raise BadInput(f"results need a folder, but {folder} is a file; name another with -o")
+    return load_study(study, data=data)
+
+
+def provenance(asked: Study) -> dict[str, object]:
+    """Where the numbers of a study come from."""
+    return {
         "study": asked.path.name,
         "sha256 of the study": asked.sha256,
         "data": asked.source or "not stated",
         "runs": {run.label: run.source for run in asked.runs},
     }
-    title = asked.title or asked.path.stem.replace("_", " ")
-    return [write_fit_report(fit, folder, title=title, provenance=provenance, crossed=crossed)]

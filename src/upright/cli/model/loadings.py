@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from upright.cli.terminal import AsJson, Out, Pdf, tell, write_page
 from upright.errors import BadInput, NotIdentifiable
 
 if TYPE_CHECKING:
-    from upright.identification.loadings import Loaded, Loadings
+    from upright.identification.loadings import Loaded
     from upright.records import Record
+    from upright.report.page import Chapter
 
 _MASSES = re.compile(r"\s*(\d+)\s+at\s+(.+)")
 
@@ -36,8 +38,9 @@ def loadings(
     ] = False,
     twin: Annotated[str, typer.Option(metavar="KIND", help="No logs: step a twin, rectilinear or torsional.")] = "",
     seed: Annotated[int, typer.Option(min=0, help="Which twin of the make; 0 is the one as designed.")] = 0,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for the report.")] = Path("loadings"),
-    as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON instead of a table.")] = False,
+    out: Out = Path("loadings"),
+    pdf: Pdf = False,
+    as_json: AsJson = False,
 ) -> None:
     r"""Find stiffness and bare inertia from step responses with known added masses (experiment 1a).
 
@@ -48,26 +51,30 @@ def loadings(
     upright loadings --twin rectilinear -o out
     upright loadings bare.csv one.csv two.csv --added "0 kg" --added "0.5 kg" --added "1 kg" --signal x --command u
     """
-    if out.exists() and not out.is_dir():
-        raise BadInput(f"--out needs a folder, and '{out}' is a file; name another folder.")
     if twin:
         if logs or added:
             raise BadInput("--twin steps a simulated rig and takes no logs; leave out either.")
-        _twin(twin, seed, out, as_json)
-        return
-    if not logs or len(added or ()) != len(logs):
+        told = _of_twin(twin, seed, out)
+    else:
+        told = _of_logs(logs or [], added or [], signal, command, tolerance, free)
+    written = write_page(told, out / "report.html", pdf)
+    tell(told, written, {**told.numbers, "report": str(written[0])} if as_json else None)
+
+
+def _of_logs(logs: list[Path], added: list[str], signal: str, command: str, tolerance: str, free: bool) -> Chapter:
+    if not logs or len(added) != len(logs):
         raise BadInput(
-            f"Every log needs its --added, in the same order: {len(logs or ())} logs came with {len(added or ())};"
+            f"Every log needs its --added, in the same order: {len(logs)} logs came with {len(added)};"
             ' write --added "0 kg" for the bare one, or try --twin rectilinear.'
         )
     from upright.identification.loadings import fit_loadings, swings
     from upright.lab.makes import OSCILLATORS
-    from upright.lab.weighing_1a.page import write_loadings
+    from upright.lab.weighing_1a.chapter import loading_chapter
     from upright.readers import read
-    from upright.report.advice import Step
+    from upright.report.page import Step
     from upright.units import parse
 
-    values = [inertia(text) for text in added or ()]
+    values = [inertia(text) for text in added]
     kinds = {kind for _, kind in values if kind}
     if len(kinds) > 1:
         raise BadInput("Masses in kg and inertias in kg m^2 cannot be mixed; carts take masses, disks inertias.")
@@ -83,35 +90,34 @@ def loadings(
         drive = _column(record, command, record.inputs, "--command") if command or record.inputs else ""
         records[label], signals[label] = record, column
         try:
-            told = swings(record, added=value, label=label, signal=column, command=drive)
+            seen = swings(record, added=value, label=label, signal=column, command=drive)
         except NotIdentifiable as error:
             left_out.append(str(error))
             continue
-        found += [s for s in told if not free or s.command == 0]
+        found += [s for s in seen if not free or s.command == 0]
     if left_out and len({s.added for s in found}) < 2:
         raise NotIdentifiable(left_out[0])
     weighed = fit_loadings(found, tolerance=parse(tolerance, "1"))
     steps = [
         Step(
-            sentence="Fit the same logs with the equations of motion; give m_1 and k_1 these values as guesses.",
-            command=f"upright init {logs[0].name} -o study.toml",
+            "Fit the same logs with the equations of motion; give m_1 and k_1 these values as guesses.",
+            f"upright init {logs[0].name} -o study.toml",
         ),
         Step(
-            sentence="Plan the next loadings with the error of a frequency that these swings show.",
-            command=f'upright plan-inertias --rig {kind} --bare "{weighed.bare.value:.4g} {OSCILLATORS[kind].unit}"',
+            "Plan the next loadings with the error of a frequency that these swings show.",
+            f'upright plan-inertias --rig {kind} --bare "{weighed.bare.value:.4g} {OSCILLATORS[kind].unit}"',
         ),
     ]
-    page = write_loadings(weighed, out, kind=kind, title="Stiffness and bare inertia from added loads", logs=records,
-                          signals=signals, left_out=left_out, steps=steps)  # fmt: skip
-    _tell(weighed, kind, page, as_json, left_out, steps, None)
+    return loading_chapter(weighed, kind=kind, title="Stiffness and bare inertia from added loads", logs=records,
+                           signals=signals, left_out=left_out, steps=steps)  # fmt: skip
 
 
-def _twin(kind: str, seed: int, out: Path, as_json: bool) -> None:
+def _of_twin(kind: str, seed: int, out: Path) -> Chapter:
     from upright.lab.makes import OSCILLATORS
-    from upright.lab.weighing_1a.page import write_loadings
+    from upright.lab.weighing_1a.chapter import loading_chapter
     from upright.lab.weighing_1a.run import weigh_body
     from upright.lab.weighing_1a.twin import drawn_twin, truth
-    from upright.report.advice import Step
+    from upright.report.page import Step
 
     if kind not in OSCILLATORS:
         raise BadInput(f"--twin is {' or '.join(OSCILLATORS)}, got '{kind}'.")
@@ -121,16 +127,15 @@ def _twin(kind: str, seed: int, out: Path, as_json: bool) -> None:
     added = " ".join(f'--added "{done.added[label]:.6g} {OSCILLATORS[kind].unit}"' for label in files)
     steps = [
         Step(
-            sentence="Weigh the rig again from its logs in that folder, as you would your own.",
-            command=f"upright loadings {' '.join(files.values())} {added}",
+            "Weigh the rig again from its logs in that folder, as you would your own.",
+            f"upright loadings {' '.join(files.values())} {added}",
         ),
-        Step(sentence="See which masses would have told most.", command=f"upright plan-inertias --rig {kind}"),
+        Step("See which masses would have told most.", f"upright plan-inertias --rig {kind}"),
     ]
-    page = write_loadings(
-        done.found, out, kind=kind, title=f"Experiment 1a on a twin, {kind}, seed {seed}", logs=done.logs,
+    return loading_chapter(
+        done.found, kind=kind, title=f"Experiment 1a on a twin, {kind}, seed {seed}", logs=done.logs,
         signals=dict.fromkeys(done.logs, column), left_out=done.left_out, truth=truth(done.on), steps=steps,
     )  # fmt: skip
-    _tell(done.found, kind, page, as_json, list(done.left_out), steps, truth(done.on))
 
 
 def inertia(text: str) -> tuple[float, str]:
@@ -158,44 +163,3 @@ def _column(record: Record, asked: str, known: tuple[str, ...], option: str) -> 
     if len(known) == 1:
         return known[0]
     raise BadInput(f"The log holds the columns {', '.join(record.names)}; say which one is meant with {option}.")
-
-
-def _tell(
-    found: Loadings, kind: str, page: Path, as_json: bool, left_out: list[str], steps: list[Any],
-    truth: dict[str, float] | None,
-) -> None:  # fmt: skip
-    from rich.table import Table
-
-    from upright.cli.terminal import console
-    from upright.json_file import json_text
-    from upright.lab.weighing_1a.page import rows
-
-    if as_json:
-        named = {"k": found.k, "bare": found.bare, "damping": found.damping}
-        content: dict[str, Any] = {
-            n: {"value": w.value, "stderr": w.stderr, "interval": w.interval} for n, w in named.items()
-        }
-        content |= {"kind": kind, "verdict": found.verdict, "report": str(page), "truth": truth, "left_out": left_out}
-        content["swings"] = [
-            {"label": s.label, "added": s.added, "omega_n": s.decay.omega_n, "stderr": s.decay.omega_error,
-             "sigma": s.decay.sigma, "delta": s.decay.delta} for s in found.swings
-        ]  # fmt: skip
-        typer.echo(json_text(content))
-        return
-    screen = console()
-    title = f"From {len(found.swings)} swings"
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
-    headings = ["", *(["truth"] if truth else []), "value", "std. error", "95 % interval", "unit", "meaning"]
-    for heading in headings:
-        right = heading in ("truth", "value", "std. error")
-        table.add_column(heading, justify="right" if right else "left", no_wrap=True)
-    for r in rows(found, kind):
-        true = [f"{truth[r['name']]:.4g}" if r["name"] in truth else ""] if truth else []
-        table.add_row(r["name"], *true, r["value"], r["stderr"], r["interval"], r["unit"], r["meaning"])
-    screen.print(table)
-    screen.print(f"\n{found.verdict}", soft_wrap=True, markup=False)
-    for sentence in left_out:
-        screen.print(f"Left out: {sentence}", soft_wrap=True, markup=False)
-    screen.print(f"\nReport: {page}\nWhat next:", soft_wrap=True, markup=False)
-    for step in steps:
-        screen.print(f"- {step.sentence}\n    {step.command}", soft_wrap=True, markup=False)

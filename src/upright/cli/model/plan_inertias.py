@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from upright.cli.terminal import tell
 from upright.errors import BadInput, nearest
+from upright.report.page import Chapter, Part, Step, Table
 
 if TYPE_CHECKING:
     from upright.identification.loadings import Loading, Plan
@@ -41,7 +43,6 @@ def plan_inertias(
     upright plan-inertias --rig torsional --error "0.3 %" --radius "4 cm" --radius "9 cm"
     """
     from upright.identification.loadings import plan_loadings
-    from upright.json_file import json_text
     from upright.lab.makes import OSCILLATORS
     from upright.units import parse
 
@@ -61,13 +62,12 @@ def plan_inertias(
     wanted = _share(target, "--target") if target else None
     chosen = choose({n: p[0].k for n, p in plans.items()}, wanted)
     if out is not None:
-        from upright.lab.weighing_1a.figures import save_plans
+        from upright.lab.weighing_1a.figures import plan_figure
+        from upright.report.drawing import save
 
-        save_plans(plans, chosen, out)
-    if as_json:
-        typer.echo(json_text(_as_json(plans, chosen, body.unit)))
-    else:
-        _print(plans, chosen, wanted, out, body.unit)
+        save(plan_figure(plans, chosen), out)
+    numbers = _as_json(plans, chosen, body.unit) if as_json else None
+    tell(chapter(plans, chosen, wanted, body.unit), [] if out is None else [out], numbers)
 
 
 def loadings(rig: str, radius: list[str] | None) -> list[Loading]:
@@ -111,7 +111,7 @@ def _share(text: str, option: str) -> float:
     return value
 
 
-def told(plan: Plan) -> str:
+def _spelt(plan: Plan) -> str:
     """A plan in words: ``2x none, 3x 2 kg``."""
     return ", ".join(f"{n}× {w.label}" for w, n in zip(plan.loadings, plan.runs, strict=True))
 
@@ -130,23 +130,21 @@ def _as_json(plans: dict[int, tuple[Plan, Plan]], chosen: int, unit: str) -> dic
     }
 
 
-def _print(plans: dict[int, tuple[Plan, Plan]], chosen: int, wanted: float | None, out: Path | None, unit: str) -> None:
-    from rich.table import Table
-
-    from upright.cli.terminal import console
-
-    screen = console()
-    table = Table(title="Best plan for every number of runs", title_justify="left", box=None, pad_edge=False,
-                  header_style="bold")  # fmt: skip
-    for heading in ("runs", "for the stiffness", "k", "m_0", "for both together", "k", "m_0"):
-        right = heading in ("runs", "k", "m_0")
-        table.add_column(heading, justify="right" if right else "left", no_wrap=right)
-    for n, (c, d) in plans.items():
-        cells = (f"{n}{' *' if n == chosen else ''}", told(c), f"{100 * c.k:.2f} %", f"{100 * c.bare:.2f} %",
-                 told(d), f"{100 * d.k:.2f} %", f"{100 * d.bare:.2f} %")  # fmt: skip
-        table.add_row(*cells)
-    screen.print(table)
-    screen.print("Standard errors of stiffness k and bare inertia m_0, relative.")
+def chapter(plans: dict[int, tuple[Plan, Plan]], chosen: int, wanted: float | None, unit: str) -> Chapter:
+    """The best plan for every number of runs, and the one to take."""
+    rows = tuple(
+        (
+            f"{n}{' *' if n == chosen else ''}", *(
+                cell for p in both for cell in (_spelt(p), f"{100 * p.k:.2f} %", f"{100 * p.bare:.2f} %")
+            ),
+        )
+        for n, both in plans.items()
+    )  # fmt: skip
+    table = Table(
+        caption="Standard errors of stiffness k and bare inertia m_0, relative",
+        headings=("runs", "for the stiffness", "k", "m_0", "for both together", "k", "m_0"), rows=rows,
+        numbers=(0, 2, 3, 5, 6),
+    )  # fmt: skip
     c = plans[chosen][0]
     if wanted is not None and c.k > wanted:
         reason = f"No plan up to {chosen} runs reaches {100 * wanted:.2g} %; the best is"
@@ -156,13 +154,11 @@ def _print(plans: dict[int, tuple[Plan, Plan]], chosen: int, wanted: float | Non
         reason = f"One more run would tighten the stiffness by less than {100 * FLAT:.0f} %:"
         if chosen == max(plans):
             reason = "Every run planned is still worth its while:"
-    screen.print(f"* {reason} {told(c)}; k to {100 * c.k:.2f} %.", soft_wrap=True)
-    if out is not None:
-        screen.print(f"Drawn: {out}", soft_wrap=True, markup=False)
-    screen.print("\nWhat next:", style="bold")
-    screen.print("- run them, log each step, and weigh the rig with the logs", soft_wrap=True)
-    heavy = c.loadings[-1].label
-    screen.print(
-        f'    upright loadings bare.csv heavy.csv --added "0 {unit}" --added "{heavy}"',
-        soft_wrap=True, markup=False,
+    onward = Step(
+        "Run them, log each step, and weigh the rig with the logs.",
+        f'upright loadings bare.csv heavy.csv --added "0 {unit}" --added "{c.loadings[-1].label}"',
+    )
+    return Chapter(
+        title="Which loadings to run", verdict=f"{reason} {_spelt(c)}; k to {100 * c.k:.2f} % (*).", steps=(onward,),
+        parts=(Part("Best plan for every number of runs", (table,)),),
     )  # fmt: skip

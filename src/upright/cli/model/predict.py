@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from upright.cli.terminal import Data, tell
 from upright.errors import BadInput
 
 
 def predict(
     model: Annotated[Path, typer.Argument(metavar="OUT/fit.json", help="Model that `upright identify` wrote.")],
     study: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="Runs to score; its guesses are not used.")],
-    data: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder the runs' files are in; the study's own if left out.")
-    ] = None,
+    data: Data = None,
     out: Annotated[
         Path | None, typer.Option("-o", "--out", metavar="OUT", help="Folder for prediction.json; none if left out.")
     ] = None,
@@ -31,8 +31,9 @@ def predict(
 
     upright predict swing-fit/fit.json other_day.toml
     """
-    from upright.cli.terminal import console, print_scores
-    from upright.json_file import json_text, write_json
+    from upright.files import json_text
+    from upright.report.fit.tables import score_table
+    from upright.report.page import Chapter, Part
     from upright.study.fit_file import read_fit
     from upright.study.load import load_study
 
@@ -66,11 +67,14 @@ def predict(
             for label, s in scores.items()
         },
     }
-    if out is not None:
-        write_json(out / "prediction.json", content)
+    text = json.dumps(content, indent=2, ensure_ascii=False)
+    written = [] if out is None else [out / "prediction.json"]
+    for path in written:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text + "\n", encoding="utf-8")
     if as_json:
         typer.echo(json_text(content))
         return
-    print_scores(scores)
-    if not fitted.trusted:
-        console().print(f"\nThe model's own verdict was: {fitted.verdict}", soft_wrap=True, markup=False)
+    explained = Part("How much of each signal is explained", (score_table(scores),))
+    doubt = () if fitted.trusted else (f"The model's own verdict was: {fitted.verdict}",)
+    tell(Chapter(title=f"{model.name} on {study.name}", verdict="", parts=(explained,), warnings=doubt), written)

@@ -1,4 +1,4 @@
-"""What did an experiment show beyond a fit: paths of the disk, the way of the energy, estimates beside a truth?"""
+"""Pictures of experiment 4: paths of the disk and the way of the energy."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from upright.lab.free_swing_4.drift import DriftPath
-from upright.lab.free_swing_4.studies import Recovered
 from upright.report.drawing import (
     BLUE,
     CYCLE,
@@ -22,7 +21,7 @@ from upright.report.drawing import (
     figure,
     styled,
 )
-from upright.report.symbols import mathtext, plain
+from upright.report.symbols import plain
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -75,25 +74,4 @@ def energy_figure(t: Array, stored: Array, taken: Mapping[str, Array]) -> Figure
     ax.set_ylabel("energy [mJ]")
     ax.margins(x=0, y=0)
     ax.legend(loc="center right", frameon=True, framealpha=0.9, edgecolor="none")
-    return drawing
-
-
-@styled
-def truth_figure(found: Sequence[Recovered]) -> Figure:
-    """Every estimate with its interval relative to the true value."""
-    shown = [f for f in found if f.truth != 0 and all(math.isfinite(x) for x in f.interval)]
-    drawing = figure(0.6 + 0.26 * max(len(shown), 1))
-    ax = drawing.add_subplot()
-    for row, f in enumerate(shown):
-        low, high = (100 * (x / f.truth - 1) for x in f.interval)
-        colour = BLUE if f.inside else VERMILLION
-        ax.plot([low, high], [row, row], color=colour, linewidth=2, linestyle="-" if f.inside else (0, (3, 1)))
-        ax.plot(100 * (f.value / f.truth - 1), row, "o" if f.inside else "s", color=colour, markersize=4.5)
-    ax.axvline(0, color=GREY, linewidth=0.8)
-    ax.set_yticks(range(len(shown)), [mathtext(f.name) for f in shown])
-    ax.set_ylim(len(shown) - 0.5, -0.5)
-    reach = 1.1 * max((abs(x) for x in ax.get_xlim()), default=1.0)
-    ax.set_xlim(-reach, reach)
-    ax.set_xlabel("estimate and 95 % interval, from the truth of the twin [%]")
-    ax.grid(visible=False, axis="y")
     return drawing

@@ -1,4 +1,4 @@
-"""What does holding a rig upright look like: the runs, what was told of them, and is such telling calibrated?"""
+"""Pictures of experiment 2: the runs, what was told of them beforehand, and the ways to the velocities."""
 
 from __future__ import annotations
 
@@ -127,44 +127,3 @@ def ways_figure(ways: Mapping[str, Trial], seconds: float = 0.8) -> Figure:
         ax.set_xlabel("time [s]")
     axes[0].set_ylabel(axis("command", next(iter(ways.values())).rig.unit))
     return drawing
-
-
-@styled
-def reliability_figure(chances: Array, came: NDArray[np.bool_], *, bins: int = 10) -> Figure:
-    """How often what was told with a chance came true, with 95 % Wilson intervals, and how often each was told."""
-    drawing = figure(4.6, width=5.0)
-    grid: Any = drawing.add_gridspec(2, 1, height_ratios=(4, 1))
-    ax: Any = drawing.add_subplot(grid[0])
-    below: Any = drawing.add_subplot(grid[1], sharex=ax)
-    ax.plot([0, 100], [0, 100], color=GREY, linewidth=0.8, label="as told")
-    edges = np.linspace(0, 1, bins + 1)
-    place = np.clip((chances * bins + 1e-9).astype(int), 0, bins - 1)
-    for b in range(bins):
-        inside = place == b
-        if not inside.any():
-            continue
-        low, high = wilson(int(came[inside].sum()), int(inside.sum()))
-        mean, share = 100 * float(chances[inside].mean()), 100 * float(came[inside].mean())
-        ax.errorbar(
-            mean, share, yerr=[[share - 100 * low], [100 * high - share]], fmt="o", color=BLUE, capsize=2.5,
-            markersize=5, label="came, with 95 % interval" if b == place.min() else None,
-        )  # fmt: skip
-    below.bar(
-        100 * edges[:-1], np.bincount(place, minlength=bins), 100 / bins, align="edge", color=SKY, edgecolor=BLACK
-    )
-    ax.set_ylabel("came true [%]")
-    ax.set_xlim(0, 100)
-    ax.set_ylim(-3, 103)
-    ax.tick_params(labelbottom=False)
-    below.set_ylabel("twins")
-    below.set_xlabel("chance told before the run [%]")
-    ax.legend(loc="upper left")
-    return drawing
-
-
-def wilson(hits: int, of: int, z: float = 1.96) -> tuple[float, float]:
-    """Interval of a share (E. B. Wilson, 1927)."""
-    share, spread = hits / of, z**2 / of
-    middle = (share + spread / 2) / (1 + spread)
-    half = z / (1 + spread) * math.sqrt(share * (1 - share) / of + spread / (4 * of))
-    return max(middle - half, 0.0), min(middle + half, 1.0)

@@ -20,6 +20,7 @@ from upright.report.drawing import (
     decimated,
     figure,
     hide_inner_times,
+    limits,
     styled,
 )
 from upright.report.symbols import axis, mathtext
@@ -70,9 +71,7 @@ def ascent_figure(run: Ascent, *, after: float = 2.5) -> Figure:
 def _limits(ax: Any, limit: float, most: float, name: str, where: float) -> None:
     """Draw a bound where it is near enough to be seen beside the curve, else say how far it is."""
     if limit <= 4 * most:
-        for side in (-1, 1):
-            ax.axhline(side * limit, color=GREY, linestyle="--", linewidth=0.9)
-        ax.text(where, limit, f"{name} ", ha="right", va="bottom", fontsize=7.5, color=GREY)
+        limits(ax, limit, name, where)
         ax.set_ylim(-1.3 * limit, 1.3 * limit)
     else:
         ax.text(0.995, 0.97, f"{name} ±{limit:.3g}", ha="right", va="top", fontsize=7.5, color=GREY,

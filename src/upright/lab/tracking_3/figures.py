@@ -1,4 +1,4 @@
-"""How do steps, efforts and poles of experiment 3 look?"""
+"""Pictures of experiment 3: steps, efforts, poles, and what PD control can have."""
 
 from __future__ import annotations
 
@@ -10,16 +10,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.lab.tracking_3.run import BEFORE, DWELL, Outcome, Tracking
 from upright.report.drawing import (
     BLACK,
     BLUE,
     CYCLE,
     GREEN,
     GREY,
-    ORANGE,
     VERMILLION,
     decimated,
     figure,
+    limits,
+    roots,
+    s_plane,
     styled,
 )
 from upright.report.symbols import axis, mathtext, plain, unit
@@ -38,60 +41,39 @@ def shown(of: str) -> tuple[float, str]:
     return _SHOWN.get(of, (1.0, of))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Trace:
-    """One run for a picture: time from the step [s], coordinates [m or rad] and command, cut where it tripped."""
-
-    name: str
-    t: Array
-    near: Array
-    far: Array
-    u: Array
-
-
-@dataclass(frozen=True, kw_only=True)
-class Frame:
-    """What all traces share: names and unit of the coordinates, step, limit and unit of the command, the push [s]."""
-
-    near: str
-    far: str
-    of: str
-    step: float
-    limit: float
-    command: str
-    push: float = math.inf
-
-
 @styled
-def steps_figure(traces: Sequence[Trace], frame: Frame, *, until: float = 0.5, kick: float | None = 0.1) -> Figure:
-    """Reference, positions and effort with its limit, all laws in one picture.
+def steps_figure(
+    done: Tracking, outcomes: Sequence[Outcome], *, until: float = 0.5, kick: float | None = 0.1
+) -> Figure:
+    """Reference, positions and effort with its limit, all laws in one picture; a run ends where it tripped.
 
     With `kick` both positions are shown, and the command only so long [s], for that is where it acts.
     """
-    factor, of = shown(frame.of)
-    pick = [("near", frame.near)] * (kick is not None) + [("far", frame.far)]
-    rows = len(pick) + 1
+    bodies = done.rig.plant.coordinates
+    factor, of = shown(bodies[-1].unit)
+    step = factor * done.step.size
+    picked = [bodies[-1]] if kick is None else [bodies[0], bodies[-1]]
+    rows = len(picked) + 1
     drawing = figure(0.85 + 1.75 * rows + 0.3 * (rows - 2), margins=(0.75, 0.15, 0.38, 0.48))
     axes: list[Any] = drawing.subplots(rows, 1, gridspec_kw={"hspace": 0.3}).tolist()
-    low, high = -0.15 * factor * frame.step, (1.75 if kick is None else 1.3) * factor * frame.step
-    for ax, (field, name) in zip(axes, pick, strict=False):
-        ax.plot([-0.05, 0, 0, until], [0, 0, factor * frame.step, factor * frame.step], color=BLACK, linewidth=0.8,
-                linestyle=":", label="reference")  # fmt: skip
-        for (colour, style), trace in zip(CYCLE, traces, strict=False):
-            seen = (trace.t >= -0.05) & (trace.t <= until)
-            line = decimated(trace.t[seen], factor * getattr(trace, field)[seen])
-            ax.plot(*line, color=colour, linestyle=style, label=trace.name)
-            if trace.t[-1] < until:  # tripped
+    low, high = -0.15 * step, (1.75 if kick is None else 1.3) * step
+    for ax, body in zip(axes, picked, strict=False):
+        ax.plot([-0.05, 0, 0, until], [0, 0, step, step], color=BLACK, linewidth=0.8, linestyle=":", label="reference")
+        for (colour, style), o in zip(CYCLE, outcomes, strict=False):
+            t, y = _seen(o, body.name, -0.05, until)
+            line = decimated(t, factor * y)
+            ax.plot(*line, color=colour, linestyle=style, label=o.law.name)
+            if o.found.tripped - BEFORE < until:
                 last = float(np.clip(line[1][-1], low, high))
                 ax.plot(line[0][-1:], [last], "X", color=colour, markersize=7, clip_on=False, zorder=5)
-        ax.set_ylabel(axis(mathtext(name), of))
+        ax.set_ylabel(axis(mathtext(body.name), of))
         ax.set_ylim(low, high)
         ax.set_xlim(-0.06, 1.02 * until)
-    _efforts(axes[-1], traces, frame, until if kick is None else kick)
-    if frame.push < until:
+    _efforts(axes[-1], done, outcomes, until if kick is None else kick)
+    if until > DWELL:
         for ax in axes:
-            ax.axvline(frame.push, color=GREY, linewidth=0.8, linestyle="-.")
-        axes[0].text(frame.push, 0.97 * high, " push begins", va="top", fontsize=7.5, color=GREY)
+            ax.axvline(DWELL, color=GREY, linewidth=0.8, linestyle="-.")
+        axes[0].text(DWELL, 0.97 * high, " push begins", va="top", fontsize=7.5, color=GREY)
     drawing.legend(*axes[0].get_legend_handles_labels(), loc="upper center", ncols=6, columnspacing=1.2)
     axes[-1].set_xlabel("time from the step [s]")
     hide_times = axes[:-1] if kick is None else axes[:-2]
@@ -102,17 +84,22 @@ def steps_figure(traces: Sequence[Trace], frame: Frame, *, until: float = 0.5, k
     return drawing
 
 
-def _efforts(ax: Any, traces: Sequence[Trace], frame: Frame, until: float) -> None:
-    for (colour, style), trace in zip(CYCLE, traces, strict=False):
-        seen = (trace.t >= -0.05 * until) & (trace.t <= until)
-        drawn = decimated(trace.t[seen], trace.u[seen])
+def _seen(o: Outcome, name: str, start: float, stop: float) -> tuple[Array, Array]:
+    """Time from the step [s] and what was logged between two instants, up to a trip."""
+    record = o.found.trial.record
+    t = record.t - BEFORE
+    kept = (record.t <= o.found.tripped) & (t >= start) & (t <= stop)
+    return t[kept], record[name][kept]
+
+
+def _efforts(ax: Any, done: Tracking, outcomes: Sequence[Outcome], until: float) -> None:
+    for (colour, style), o in zip(CYCLE, outcomes, strict=False):
+        drawn = decimated(*_seen(o, "u", -0.05 * until, until))
         ax.step(*drawn, color=colour, linestyle=style, linewidth=1.0, where="post")
-    for side in (-1, 1):
-        ax.axhline(side * frame.limit, color=GREY, linestyle="--", linewidth=0.9)
-    ax.text(until, frame.limit, "limit ", ha="right", va="bottom", fontsize=7.5, color=GREY)
-    ax.set_ylim(-1.3 * frame.limit, 1.3 * frame.limit)
+    limits(ax, done.rig.limit, "limit", until)
+    ax.set_ylim(-1.3 * done.rig.limit, 1.3 * done.rig.limit)
     ax.set_xlim(-0.06 if until > 1 else -0.05 * until, 1.02 * until)
-    ax.set_ylabel(axis("command", frame.command))
+    ax.set_ylabel(axis("command", done.rig.unit))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -139,8 +126,7 @@ def poles_figure(panels: Sequence[Panel], open_loop: Roots) -> Figure:
     high = 1.2 * max(float(np.abs(p.asked.imag).max()) for p in (*panels, Panel(
         name="", asked=open_loop, model=open_loop, rig=open_loop)))  # fmt: skip
     for ax, panel in zip(axes, panels, strict=False):
-        ax.axvline(0, color=GREY, linewidth=0.8)
-        ax.axhline(0, color=GREY, linewidth=0.8)
+        s_plane(ax)
         kinds = (
             ("open loop", open_loop, "x", GREY, 6), ("asked", panel.asked, "o", BLACK, 9),
             ("on the fitted model, sampled and late", panel.model, "+", BLUE, 9),
@@ -148,15 +134,12 @@ def poles_figure(panels: Sequence[Panel], open_loop: Roots) -> Figure:
         )  # fmt: skip
         beyond = int(np.sum((panel.rig.real < left) & (panel.rig.imag > -1e-9)))
         for name, values, mark, colour, size in kinds:
-            upper = values[values.imag > -1e-9]
-            hollow = {"markerfacecolor": "none"} if mark == "o" else {}
-            ax.plot(upper.real, upper.imag, mark, color=colour, markersize=size, markeredgewidth=1.3, label=name,
-                    linestyle="none", **hollow)  # fmt: skip
+            roots(ax, values[values.imag > -1e-9], mark, colour, name, size=size)
         ax.set_xlim(left, -0.06 * left)
         ax.set_ylim(-0.08 * high, high)
         ax.set_title(panel.name + (f" ({beyond} faster left out)" if beyond else ""), fontsize=9)
-    for ax in axes[-columns:]:
-        ax.set_xlabel("real part [1/s]")
+    for ax in axes[:-columns]:
+        ax.set_xlabel("")
     for ax in axes[::columns]:
         ax.set_ylabel("imaginary part [rad/s]")
     for ax in axes[len(panels) :]:
@@ -218,21 +201,17 @@ def loci_figure(loci: Sequence[Locus], open_loop: Roots) -> Figure:
     ].tolist()
     size = 1.5 * float(np.abs(open_loop).max())
     for ax, locus in zip(axes, loci, strict=True):
-        ax.axvspan(0, size, color=ORANGE, alpha=0.15, linewidth=0)
-        ax.axvline(0, color=GREY, linewidth=0.8)
+        s_plane(ax, unstable=size)
         upper = locus.tracks[locus.tracks.imag > -1e-9]
         ax.plot(upper.real, upper.imag, ".", color=BLUE, markersize=1.6, label="as kp rises")
         for values, mark, colour, name in (
             (open_loop, "x", BLACK, "open loop"), (locus.zeros, "o", BLACK, "zero"),
             (locus.marked, "s", VERMILLION, "kp of the tuned PD"),
         ):  # fmt: skip
-            v = values[values.imag > -1e-9]
-            ax.plot(v.real, v.imag, mark, color=colour, markersize=7, markerfacecolor="none", markeredgewidth=1.3,
-                    linestyle="none", label=name)  # fmt: skip
+            roots(ax, values[values.imag > -1e-9], mark, colour, name)
         ax.set_xlim(-size, 0.6 * size)
         ax.set_ylim(-0.05 * size, size)
         ax.set_title(locus.title)
-        ax.set_xlabel("real part [1/s]")
     axes[0].set_ylabel("imaginary part [rad/s]")
     drawing.legend(*axes[0].get_legend_handles_labels(), loc="lower center", ncols=4)
     return drawing

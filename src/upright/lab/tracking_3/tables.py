@@ -1,22 +1,19 @@
-"""Experiment 3 in numbers: fit, gains, step figures, what friction leaves, and what PD can have."""
+"""Tables of experiment 3: fit, gains, poles, step figures, and what friction leaves."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
-
-import numpy as np
 
 from upright.design.requests import written
 from upright.lab.tracking_3.figures import shown
 from upright.lab.tracking_3.laws import AT
 from upright.lab.tracking_3.run import Outcome, StepTrial, Tracking
-from upright.report.sections import Table
-from upright.report.symbols import figures, number, plain
+from upright.report.page import Table
+from upright.report.symbols import number, plain
 from upright.report.symbols import unit as raised
 
 
-def everything(done: Tracking) -> tuple[Outcome, ...]:
+def outcomes(done: Tracking) -> tuple[Outcome, ...]:
     """All laws that were tried, state feedback first."""
     return (*done.sets, *(o for o in (done.summed, done.pd, done.stiff, done.far) if o is not None))
 
@@ -40,28 +37,6 @@ def length(done: Tracking, value: float, digits: int = 3) -> str:
     return f"{number(factor * value, digits)} {unit}"
 
 
-def fit_table(done: Tracking) -> Table:
-    """Numbers of the shaft, with the truth that only a twin can tell."""
-    assert done.fit is not None
-    truth = done.true.plant.parameters() | {"actuator.gain": done.true.gain}
-    rows: list[tuple[str, ...]] = []
-    for name, e in done.fit.estimates.items():
-        if name not in truth:
-            continue
-        low, high = e.interval
-        digits = figures(e.value, e.stderr)
-        inside = "inside" if low <= truth[name] <= high else "outside"
-        rows.append(
-            (plain(name), number(truth[name], digits), number(e.value, digits), number(e.stderr, 2),
-             f"{number(low, digits)} to {number(high, digits)}", inside, raised(e.unit))
-        )  # fmt: skip
-    return Table(
-        caption="What the pulses say, beside the truth of the twin; the interval holds the truth in 95 of 100 rigs",
-        headings=("", "truth", "fitted", "std. error", "95 % interval", "truth", "unit"), rows=tuple(rows),
-        numbers=(1, 2, 3),
-    )  # fmt: skip
-
-
 def gain_table(done: Tracking) -> Table:
     """Gains, prefilter, and what the loop is by them."""
     of, command = done.rig.plant.coordinates[-1].unit, done.rig.unit
@@ -69,7 +44,7 @@ def gain_table(done: Tracking) -> Table:
     rows = tuple(
         (o.law.name, *(number(k, 4) for k in o.law.K), number(o.law.k_pf, 4), number(o.law.stiffness, 4),
          number(o.law.decay, 3), number(o.law.damping, 2))
-        for o in everything(done)
+        for o in outcomes(done)
     )  # fmt: skip
     force = f"{'N m' if of == 'rad' else 'N'}/{of}"
     return Table(
@@ -85,7 +60,7 @@ def pole_table(done: Tracking) -> Table:
     rows = [("open loop", "", written(done.model.linear(AT).poles(), 4))]
     rows += [
         (o.law.name, written(o.law.asked, 5) if o.law.asked.size else "–", written(o.law.poles, 4))
-        for o in everything(done)
+        for o in outcomes(done)
     ]
     return Table(
         caption="Poles [1/s]: asked for, and of the loop with held, late commands and filtered differences, "
@@ -97,7 +72,7 @@ def pole_table(done: Tracking) -> Table:
 def step_table(done: Tracking) -> Table:
     """Step figures, foreseen on the fitted model and found on the rig."""
     rows: list[tuple[str, ...]] = []
-    for o in everything(done):
+    for o in outcomes(done):
         both = (("foreseen", o.foreseen), ("found", o.found)) if done.simulated else (("foreseen", o.foreseen),)
         rows += [(o.law.name if what == both[0][0] else "", what, *_figures(run)) for what, run in both]
     return Table(
@@ -126,7 +101,7 @@ def friction_table(done: Tracking) -> Table:
     size = done.step.size
     seen = ("foreseen", "found") if done.simulated else ("foreseen",)
     rows: list[tuple[str, ...]] = []
-    for o in everything(done):
+    for o in outcomes(done):
         runs = (o.foreseen, o.found)[: len(seen)]
         if any(r.figures is None for r in runs):
             continue
@@ -149,40 +124,3 @@ def _left(run: StepTrial, size: float) -> str:
     if run.figures is None or not math.isfinite(run.figures.settling_2):
         return "still swings"
     return share(run.figures.error / size)
-
-
-def as_json(done: Tracking) -> dict[str, Any]:
-    """The same as plain values: SI, the command in its unit, null for what never happens."""
-
-    def finite(value: float) -> float | None:
-        return float(value) if math.isfinite(value) else None
-
-    def run(r: StepTrial) -> dict[str, Any]:
-        f = r.figures
-        told = ("change", "rise", "peak_time", "overshoot", "settling_2", "settling_5", "arrival", "error")
-        return {
-            **{n: None if f is None else finite(getattr(f, n)) for n in told},
-            "effort_peak": r.effort.peak, "effort_share": r.effort.share, "saturated": r.effort.saturated,
-            "twist": r.twist, "travel": r.travel, "give": finite(r.give), "tripped": finite(r.tripped),
-        }  # fmt: skip
-
-    def pairs(poles: Any) -> list[list[float]]:
-        return [[p.real, p.imag] for p in np.asarray(poles).tolist()]
-
-    return {
-        "rig": done.rig.name,
-        "seed": done.rig.seed,
-        "step": done.step.size,
-        "step_reason": done.step.reason,
-        "limit": done.rig.limit,
-        "laws": {
-            o.law.name: {
-                "K": o.law.K.tolist(), "k_pf": o.law.k_pf, "poles_asked": pairs(o.law.asked),
-                "poles": pairs(o.law.poles), "decay": o.law.decay, "damping": o.law.damping,
-                "static_force_per_error": o.law.stiffness, "error_at_most": o.law.play, "foreseen": run(o.foreseen),
-                "found": run(o.found) if done.simulated else None, "within_limits": o.within,
-            } for o in everything(done)
-        },
-        "seconds": done.seconds,
-        "interrupted": done.interrupted,
-    }  # fmt: skip

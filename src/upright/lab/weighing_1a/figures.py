@@ -1,24 +1,20 @@
-"""How do swings, line and plans of experiment 1a look?"""
+"""Pictures of experiment 1a: swings, decrements, the line, and what plans promise."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from upright.identification.loadings import Loaded, Loadings, Plan
 from upright.records import Record
-from upright.report.document import Picture, picture
-from upright.report.drawing import BLUE, CYCLE, GREY, VERMILLION, decimated, figure, save, styled
+from upright.report.drawing import BLUE, CYCLE, GREY, VERMILLION, decimated, figure, styled
 from upright.report.symbols import unit
 from upright.signals.free_swing import Decay
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-MOST_PANELS = 6
 
 
 @styled
@@ -57,9 +53,9 @@ def swing_figure(swings: Sequence[tuple[Loaded, Record, str]]) -> Figure:
         axes.plot(*decimated(record.t[near], record[signal][near]), color=BLUE, linewidth=1.0, label="log")
         axes.plot(d.t, d.x, "o", color=VERMILLION, markersize=4.5, fillstyle="none", label="extremes")
         axes.plot(d.t, d.model, "+", color="black", markersize=6, label="recursion")
-        axes.set_title(f"{loaded.label}: {d.omega_n:.4g} rad/s, damping ratio {d.zeta:.3f}").set_parse_math(False)
+        axes.set_title(f"{loaded.label}: {d.omega_n:.4g} rad/s, damping ratio {d.zeta:.3f}", parse_math=False)
         unit_of = record.units.get(signal, "")
-        axes.set_ylabel(f"{signal[:14]}\n[{unit_of}]" if unit_of else signal[:14]).set_parse_math(False)
+        axes.set_ylabel(f"{signal[:14]}\n[{unit_of}]" if unit_of else signal[:14], parse_math=False)
     panels[0].legend(loc="upper right", ncols=3)
     panels[-1].set_xlabel("time [s]")
     return drawing
@@ -106,59 +102,3 @@ def plan_figure(plans: Mapping[int, tuple[Plan, Plan]], chosen: int) -> Figure:
     axes.set_xticks(runs)
     axes.legend(loc="upper right")
     return drawing
-
-
-def save_plans(plans: Mapping[int, tuple[Plan, Plan]], chosen: int, path: Path) -> Path:
-    """Write `plan_figure` to a file."""
-    return save(plan_figure(plans, chosen), path)
-
-
-def units_of(kind: str) -> dict[str, str]:
-    """Units of what is found, for added masses in kg or inertias in kg m^2."""
-    torsional = kind == "torsional"
-    return {
-        "inertia": "kg m^2" if torsional else "kg",
-        "stiffness": "N m/rad" if torsional else "N/m",
-        "damping": "N m s/rad" if torsional else "N s/m",
-    }
-
-
-def loading_pictures(
-    found: Loadings, logs: Mapping[str, Record], signals: Mapping[str, str], kind: str
-) -> list[Picture]:
-    """Line, one swing of each loading, and their decrements; `logs` and `signals` by the label of the log."""
-    first: dict[float, Loaded] = {}
-    for s in found.swings:
-        first.setdefault(s.added, s)
-    shown = [first[a] for a in sorted(first)][:MOST_PANELS]
-    with_logs = [(s, logs[_log(s)], signals[_log(s)]) for s in shown if _log(s) in logs]
-    out = [
-        picture(
-            line_figure(found, units_of(kind)["inertia"]), "line",
-            caption="1/ω² over the added inertia. The slope is 1/k, the line meets zero at minus the bare inertia. "
-            "Bars: 95 % intervals of single swings.",
-            description=f"{len(found.swings)} points about a line; {found.verdict}",
-        )
-    ]  # fmt: skip
-    if with_logs:
-        out.append(
-            picture(
-                swing_figure(with_logs), "swings",
-                caption="One swing of each loading. Rings: extremes, from the exact shape about each; crosses: the "
-                "recursion of a spring with viscous and dry friction. Grey: where dry friction can hold the body.",
-                description=f"{len(with_logs)} decaying swings with their extremes marked.",
-            )
-        )  # fmt: skip
-    out.append(
-        picture(
-            decrement_figure(shown), "decrements",
-            caption="Height of the extremes above the centre. A straight thin line is what the viscous part alone "
-            "would leave; dry friction bends the decrement downwards.",
-            description="Logarithmic decay of the heights, one curve per loading.",
-        )
-    )  # fmt: skip
-    return out
-
-
-def _log(s: Loaded) -> str:
-    return s.label.rsplit(", step ", 1)[0]

@@ -1,0 +1,186 @@
+"""The paper's tables and misprints as a chapter: what is printed beside what one plant and one Q give."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from upright.design.factorization import Locus
+from upright.design.requests import matched, written
+from upright.paper.reproduce import Regenerated, Reproduced
+from upright.paper.tables import STUDENTS
+from upright.report.drawing import BLACK, BLUE, VERMILLION
+from upright.report.page import Chapter, Part, Picture, Points, Step, Table
+from upright.report.poles import Poles, locus_figure, pole_map
+from upright.report.symbols import number
+from upright.survey.figures import answers_figure
+
+
+def _set_table(table: Regenerated) -> Table:
+    """Printed poles, regenerated ones, and their difference in roundings."""
+    rows = tuple(
+        (
+            f"{i + 1}",
+            written(printed, 6),
+            written(again, 7),
+            f"{np.abs(again - printed).max():.1e}",
+            f"{max(np.abs(error.real).max(), np.abs(error.imag).max()):.2f}",
+        )
+        for i, (printed, again, error) in enumerate(zip(table.printed, table.again, table.errors, strict=True))
+    )
+    return Table(
+        caption=f"{table.name} [1/s]",
+        headings=("set", "printed", "regenerated", "largest difference", "in roundings"),
+        rows=rows,
+        numbers=(3, 4),
+    )
+
+
+def _errata_table(done: Reproduced) -> Table:
+    """Every erratum with what shows it."""
+    rows = [
+        (str(e.number), e.where, e.printed, e.right, e.against, _range(e.printed_misses), _range(e.right_misses))
+        for e in done.errata
+    ]
+    means = f"{done.impossible[STUDENTS]} of 26 impossible"
+    rows.append(
+        ("6", "Tables 3, 4", f"n = {STUDENTS}", "n = 48 or 52", "whole answers (GRIM)", means,
+         f"{done.impossible[48]} and {done.impossible[52]} impossible")
+    )  # fmt: skip
+    return Table(
+        caption="Relative error of the form as printed and of the right one, on 20 rigs drawn at random",
+        headings=("", "where", "printed", "right", "compared with", "printed misses by", "right misses by"),
+        rows=tuple(rows),
+    )
+
+
+def _range(span: tuple[float, float]) -> str:
+    if span[1] < 1e-9:
+        return f"at most {span[1]:.0e}"
+    return f"{number(100 * span[0], 2)} to {number(100 * span[1], 2)} %"
+
+
+def _facts(done: Reproduced) -> tuple[list[str], list[str], list[str]]:
+    """Sentences on Table 1, on Table 2 and on the errata."""
+    first, second = done.tables
+    omega = float(np.sqrt(-first.locus.a[2]))
+    a3, a2, a1 = second.locus.a[1:4]
+    roots = np.roots([1.0, a3, a2, a1])
+    flexible = roots[np.argmax(roots.imag)]
+    one = [
+        f"Recovered plant: a(s) = s² (s² − {number(-first.locus.a[2], 6)}), undamped, unstable pole "
+        f"{number(omega, 5)} rad/s. N(w)/R of set 1, w = s²: {_polynomial(first.locus)}.",
+        "From set to set R falls by the factor " + " and ".join(number(r, 5) for r in first.ratios)
+        + " (sets 1 to 3, 2 to 4; told by the sets' differences alone): it was halved.",
+    ]  # fmt: skip
+    if done.weights:
+        least, most = min(done.weights), max(done.weights)
+        middle = sorted(done.weights)[len(done.weights) // 2]
+        q = ", ".join(number(v, 3) for v in done.weights[middle])
+        one.append(
+            f"A diagonal Q without negative weights makes this N when the hanging rod swings at {least:.2f} to "
+            f"{most:.2f} rad/s; at {middle:.2f} its entries over R, times the squared gains of the torque, are {q}."
+        )
+    two = [
+        f"Recovered plant: a(s) = s (s³ + {number(a3, 4)} s² + {number(a2, 5)} s + {number(a1, 5)}); flexible mode "
+        f"{number(float(abs(flexible)), 4)} rad/s, damping ratio {number(float(-flexible.real / abs(flexible)), 2)}. "
+        f"N(w)/R of set 1: {_polynomial(second.locus)}.",
+        "R falls by the factor " + " and ".join(number(r, 4) for r in second.ratios) + ".",
+    ]
+    wrong, right = done.unstable
+    three = [
+        f"With eq. (2) as printed the twin's unstable pole would be {number(wrong, 4)} instead of {number(right, 4)} "
+        f"1/s, and gains placed with it give {written(done.missed, 4)} where {written(done.asked, 4)} was asked.",
+    ]
+    return one, two, three
+
+
+def _polynomial(locus: Locus) -> str:
+    powers = ("w³", "w²", "w", "")
+    text = " + ".join(f"{number(v, 6)} {p}".strip() for v, p in zip(locus.N, powers, strict=True))
+    return text.replace("+ −", "− ")
+
+
+def _locus_picture(table: Regenerated, name: str) -> Picture:
+    def draw() -> Any:
+        rows = [table.locus.poles(float(c)) for c in np.geomspace(1e-4, 64.0, 1500)]  # effort ever cheaper
+        for i in range(1, len(rows)):
+            rows[i] = matched(rows[i - 1], rows[i])
+        sets = {f"printed, set {i + 1}": poles for i, poles in enumerate(table.printed)}
+        open_loop = np.roots(table.locus.a).astype(np.complex128)
+        return locus_figure(np.array(rows), sets, open_loop, origin="open loop, recovered")
+
+    return Picture(
+        name=name, draw=draw,
+        caption=f"{table.name}. All four printed sets lie on the locus of one plant and one Q, with R halved from set "
+        "to set.",
+        description=f"Printed poles within {table.worst:.2f} roundings of the locus.",
+    )  # fmt: skip
+
+
+def chapter(done: Reproduced) -> Chapter:
+    """The tables again, and the errata."""
+    one, two, three = _facts(done)
+    kinds = [
+        Poles(name="asked, Table 1, set 1", values=done.asked, mark="o", colour=BLUE),
+        Poles(name="attained, eq. (2) as printed", values=done.missed, mark="x", colour=VERMILLION),
+        Poles(name="open loop", values=np.array([done.unstable[1]], dtype=np.complex128), mark="+", colour=BLACK),
+    ]
+    missed = Picture(
+        name="missed", draw=lambda: pole_map(kinds, frame=3),
+        caption="Poles of the right model under gains that Ackermann's formula gives for eq. (2) as printed.",
+        description=f"Attained: {written(done.missed, 4)}.",
+    )  # fmt: skip
+    impossible = Picture(
+        name="grim", draw=lambda: answers_figure(done.impossible, STUDENTS),
+        caption="How many of the 24 means of Table 4 and the two percentages of Table 3's first question cannot be "
+        "averages of so many whole answers.",
+        description=f"{done.impossible[STUDENTS]} for {STUDENTS} students, 1 for 48 and for 52.",
+    )  # fmt: skip
+    return Chapter(
+        title="The paper's tables and misprints, again",
+        verdict=done.verdict,
+        sound=max(t.worst for t in done.tables) <= 1 and all(e.shown for e in done.errata),
+        question="Do the printed poles follow from one plant and one set of weights each, and which printed formulas "
+        "contradict the energies? p(s) p(−s) = a(s) a(−s) + N(s)/R holds for poles of least cost.",
+        parts=(
+            *(
+                Part(f"Table {i}", (Points(tuple(told)), _set_table(t), _locus_picture(t, f"t{i}")))
+                for i, told, t in zip((1, 2), (one, two), done.tables, strict=True)
+            ),
+            Part("Errata", (Points(tuple(three)), _errata_table(done), missed, impossible)),
+        ),
+        steps=(
+            Step(
+                "Use a set of Table 1 on a rig of your own.",
+                'upright design OUT/fit.json --at inverted --poles "-4.1484+-1.6341j, -16.8545, -3.222"',
+            ),
+            Step(
+                "Find weights instead of poles: least cost up to the drive's limit.",
+                "upright design OUT/fit.json --at inverted --lqr 1,0,1,0 --limit LIMIT",
+            ),
+        ),
+        numbers={
+            "verdict": done.verdict,
+            "tables": [
+                {
+                    "name": t.name,
+                    "a": t.locus.a,
+                    "N_over_R": t.locus.N,
+                    "effort_ratios": t.ratios,
+                    "worst_in_roundings": t.worst,
+                    "sets": [np.asarray(poles, dtype=np.complex128) for poles in t.again],
+                }
+                for t in done.tables
+            ],
+            "errata": [
+                {
+                    "number": e.number, "where": e.where, "printed_misses": e.printed_misses,
+                    "right_misses": e.right_misses, "shown": e.shown,
+                }
+                for e in done.errata
+            ],
+            "impossible_means": done.impossible,
+        },
+    )  # fmt: skip

@@ -1,0 +1,250 @@
+"""A fit as a chapter: what was asked, how the runs are followed, which numbers came out and what they are worth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from upright.identification.inference.assumptions import sentences
+from upright.identification.ladder.cross_validation import CrossValidation
+from upright.identification.model.fit import Fit
+from upright.report.fit.advice import next_steps
+from upright.report.fit.equations import equations
+from upright.report.fit.figures import (
+    autocorrelation_figure,
+    correlation_figure,
+    directions_figure,
+    fit_figure,
+    interval_figure,
+)
+from upright.report.fit.tables import cross_table, parameter_table, pole_table, run_table, score_table, without_table
+from upright.report.page import Block, Chapter, Facts, Formula, Part, Picture, Points, Table
+from upright.report.symbols import percent, plain
+
+_HELD = (
+    "Held speed: what holding the measured speed from the same restarts predicts, without any model. Where it is as "
+    "good as the fit, the horizon tells nothing about the model."
+)
+
+
+def chapter(
+    fit: Fit,
+    *,
+    title: str = "Identification",
+    provenance: Mapping[str, object] | None = None,
+    study: str = "STUDY.toml",
+    folder: str = "OUT",
+    crossed: CrossValidation | None = None,
+) -> Chapter:
+    """What a fit says.
+
+    Parameters
+    ----------
+    fit : Fit
+    title : str
+    provenance : mapping, optional
+        Where the data came from: file, window, hash by run; texts, lists or further mappings.
+    study, folder : str
+        Study and folder of the results, as the commands that are proposed name them.
+    crossed : CrossValidation, optional
+        Every run predicted by the others.
+    """
+    verdict = "Trusted." if fit.trusted else "Not to be trusted yet."
+    stopped = " The search was interrupted; this is its best so far." if fit.interrupted else ""
+    return Chapter(
+        title=title,
+        verdict=verdict,
+        detail=fit.verdict + stopped,
+        sound=fit.trusted,
+        question=question(fit),
+        parts=(
+            data_part(provenance or {}),
+            motion_part(fit),
+            Part(title="Fit of the runs", key="fit", content=(*_scores(fit, crossed), *run_pictures(fit, "fit"))),
+            *_parameters(fit),
+            _residuals(fit),
+            _unseen(fit),
+            *_search(fit),
+        ),
+        warnings=fit.warnings,
+        steps=tuple(next_steps(fit, study=study, folder=folder, crossed=crossed is not None)),
+    )
+
+
+def question(fit: Fit) -> str:
+    """The question that was asked, in a sentence."""
+    fitted = sum(s.role == "fit" for s in fit.runs.values())
+    predicted = len(fit.runs) - fitted
+    runs = f"{fitted} run{'s' if fitted != 1 else ''}"
+    asked = ", ".join(fit.rig.estimated) or "no parameter"
+    held = f", and does the model then predict {predicted} more that it has not seen?" if predicted else "?"
+    return f"Which values of {asked} let the equations of motion of '{fit.rig.plant.__name__}' follow {runs}{held}"
+
+
+def data_part(provenance: Mapping[str, object]) -> Part:
+    """Where the data came from."""
+    origin: Block = Facts(tuple(_origin(provenance))) if provenance else "No origin was stated for these data."
+    return Part(title="Data", key="data", content=(origin,), aside=True)
+
+
+def _origin(provenance: Mapping[str, object], above: str = "") -> list[tuple[str, str]]:
+    """What is known about the origin, nested mappings written out: ``runs / decay / file``."""
+    rows: list[tuple[str, str]] = []
+    for key, value in provenance.items():
+        name = f"{above} / {key}" if above else str(key)
+        if isinstance(value, Mapping):
+            rows += _origin({str(k): v for k, v in value.items()}, name)
+        elif isinstance(value, list | tuple | set | frozenset):
+            rows.append((name, "; ".join(str(v) for v in value)))
+        elif value is not None and value != "":
+            rows.append((name, str(value)))
+    return rows
+
+
+def motion_part(fit: Fit) -> Part:
+    """Equations of motion with the terms that this fit used."""
+    plant, parameters = fit.rig.plant, fit.rig.parameters
+    zero = {n for n, p in parameters.items() if not p.estimate and p.value == 0}
+    for name in set(plant.names()) - parameters.keys():
+        q = plant.quantity(name)
+        if q.lower <= 0 <= q.upper and not q.open_lower:
+            zero.add(name)
+    derived = (
+        f"Derived from the kinetic and potential energy of {plant.__name__}; terms whose parameter is zero in this fit "
+        "are left out."
+    )
+    return Part(
+        title="Equations of motion", key="motion", content=(derived, Formula(markup=equations(plant, zero=zero)))
+    )
+
+
+def _scores(fit: Fit, crossed: CrossValidation | None) -> list[Block]:
+    told: list[Block] = [score_table(fit.runs)] if fit.runs else ["No run was scored."]
+    if any(score.naive for score in fit.runs.values()):
+        told.append(_HELD)
+    if crossed is not None:
+        told.append(cross_table(crossed))
+        if crossed.interrupted:
+            told.append(Points(("Interrupted: runs without a prediction were not reached.",)))
+    return told
+
+
+def run_pictures(fit: Fit, prefix: str) -> list[Picture]:
+    """Data against model, run by run, fitted runs first."""
+    pictures: list[Picture] = []
+    runs = sorted(fit.runs.items(), key=lambda item: item[1].role != "fit")
+    signals = sum(len(score.measured) for _, score in runs)
+    buckets = max(100, min(450, 6000 // max(signals, 1)))  # keeps the page below 2 MB whatever the number of runs
+    for i, (label, score) in enumerate(runs):
+        what = "fitted" if score.role == "fit" else "predicted, not fitted"
+        how = "" if score.horizon is None else f", restarted from the measured state every {score.horizon:g} s"
+        how = f", every sample predicted {score.horizon:g} s ahead" if score.ahead else how
+        how += f", scored from {score.score_from:g} s on" if score.score_from > 0 else ""
+        fits = ", ".join(f"{plain(n)} {percent(v)}" for n, v in score.fit_percent.items())
+        title = f"{label} ({what})"
+        pictures.append(
+            Picture(
+                name=f"{prefix}-run{i}",
+                draw=lambda score=score, title=title: fit_figure(score, fit.rig.plant, title=title, buckets=buckets),
+                caption=f"Run '{label}', {what}{how}. Wide light line: measured; thin dashed line: model; "
+                "below each, their difference.",
+                description=f"Measured and modelled signals over {score.t[-1] - score.t[0]:.3g} s; fit {fits}.",
+            )
+        )
+    return pictures
+
+
+def _parameters(fit: Fit) -> list[Part]:
+    table = parameter_table(fit)
+    parts = [
+        Part(title="Parameters", key="parameters", content=(table if table.rows else "No parameter was estimated.",))
+    ]
+    without, own, poles = without_table(fit), run_table(fit), pole_table(fit)
+    if fit.assumptions:
+        told = (Points(tuple(sentences(fit.assumptions))), *((without,) if without.rows else ()))
+        parts.append(Part(title="What rests on assumed numbers", key="assumed", content=told))
+    if own.rows:
+        parts.append(Part(title="Runs and groups", key="runs", content=(own,)))
+    if poles.rows:
+        about = "Of the linear model at each equilibrium, viscous friction and back-EMF included, dry friction not."
+        parts.append(Part(title="Poles of the fitted rig", key="poles", content=(about, poles)))
+    return parts
+
+
+def _residuals(fit: Fit) -> Part:
+    shown: tuple[Block, ...] = tuple(rest_picture(fit, "fit")) or ("There is no run to look at.",)
+    return Part(title="Residuals", key="residuals", content=shown)
+
+
+def rest_picture(fit: Fit, prefix: str) -> list[Picture]:
+    """Autocorrelation of the residuals of all runs, or nothing when there is no run."""
+    if not fit.runs:
+        return []
+    return [
+        Picture(
+            name=f"{prefix}-rest",
+            draw=lambda: autocorrelation_figure(fit.runs),
+            caption="Autocorrelation of the residuals. White noise would stay inside the grey band 95 % of the "
+            "time; slow waves outside it are motion that the model does not explain.",
+            description="One panel per run and signal; correlation from −1 to 1 against lag in seconds.",
+        )
+    ]
+
+
+def _unseen(fit: Fit) -> Part:
+    """What the data cannot see, with intervals, correlations and directions as far as the fit states them."""
+    told: list[Block] = [
+        Points(fit.unseen) if fit.unseen else "No combination of the estimated parameters is invisible in these runs."
+    ]
+    if any(e.status != "known" and e.value != 0 for e in fit.estimates.values()):
+        told.append(
+            Picture(
+                name="fit-intervals",
+                draw=lambda: interval_figure(fit.estimates),
+                caption="Interval of every estimate relative to its value. Solid with a disk: firm. Dashed with a "
+                "square: weak, unseen or at a bound; an arrow leaves the picture.",
+                description="The same intervals as in the table above.",
+            )
+        )
+    n = len(fit.names)
+    if 1 < n <= 24 and fit.correlation.shape == (n, n):
+        told.append(
+            Picture(
+                name="fit-correlation",
+                draw=lambda: correlation_figure(fit),
+                caption="Correlation of the estimates. Close to ±1 (bold): the data fix a combination of the two "
+                "better than either.",
+                description=_strongest(fit),
+            )
+        )
+    if n and n <= 24 and fit.singular_values.size and fit.directions.shape == (fit.singular_values.size, n):
+        told.append(
+            Picture(
+                name="fit-directions",
+                draw=lambda: directions_figure(fit),
+                caption="Singular values of the scaled Jacobian, each with its combination of relative changes in the "
+                "parameters. What stands near or left of the dotted line, the data cannot see.",
+                description="; ".join(fit.unseen) or "No combination of the parameters is unseen.",
+            )
+        )
+    return Part(title="What the data cannot see", key="unseen", content=tuple(told))
+
+
+def _strongest(fit: Fit) -> str:
+    off = np.nan_to_num(np.abs(fit.correlation - np.diag(np.diag(fit.correlation))))
+    i, j = np.unravel_index(int(np.argmax(off)), off.shape)
+    return f"The strongest correlation is {fit.correlation[i, j]:.3f}, between {fit.names[i]} and {fit.names[j]}."
+
+
+def _search(fit: Fit) -> list[Part]:
+    """How the numbers were found."""
+    how = f"{fit.method}; {fit.evaluations} evaluations in {fit.seconds:.3g} s; final cost {fit.cost:.6g}."
+    parts = [Part(title="How the numbers were found", key="how", content=(Points((how,)),))]
+    if fit.history:
+        stages = tuple((stage, f"{cost:.6g}", str(evaluations)) for stage, cost, evaluations in fit.history)
+        table = Table(
+            caption="What each stage came to", headings=("stage", "cost", "evaluations"), rows=stages, numbers=(1, 2)
+        )
+        parts.append(Part(title="Stages of the search", key="stages", content=(table,), aside=True))
+    return parts

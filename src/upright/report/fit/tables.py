@@ -1,0 +1,187 @@
+"""Tables of a fit: numbers with unit and interval, scores of the runs, poles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+from upright.identification.ladder.cross_validation import CrossValidation
+from upright.identification.model.fit import Estimate, Fit, Pole, RunScore
+from upright.identification.model.rig import Parameter
+from upright.physics.actuator import ACTUATOR
+from upright.report.page import Finding, Symbol, Table
+from upright.report.symbols import figures, measured, number, percent, plain, unit
+
+_ESTIMATE = ("value", "std. error", "95 % interval", "unit", "status", "name and meaning")
+_OF_THE_RIG = "Parameters of the rig; standard errors hold for residuals that remember themselves"
+
+
+def parameter_table(
+    fit: Fit, *, truth: Mapping[str, float] | None = None, beside: tuple[str, Mapping[str, str]] | None = None,
+    caption: str = _OF_THE_RIG,
+) -> Table:  # fmt: skip
+    """Estimated parameters, then those that were given and are not zero.
+
+    Parameters
+    ----------
+    fit : Fit
+    truth : mapping of str to float, optional
+        What only a twin can tell, for two columns more.
+    beside : (str, mapping of str to str), optional
+        Heading and cells of one column more.
+    caption : str
+    """
+    about = fit.rig.parameters
+    told = {n: _estimate(n, e, about.get(n)) for n, e in fit.estimates.items() if e.status != "known"}
+    told |= {
+        n: (number(p.value), number(p.uncertainty, 2) if p.uncertainty else "exact", "", unit(p.unit), "given",
+            _called(n, p))
+        for n, p in about.items()
+        if not p.estimate and n not in told and p.value != (ACTUATOR[n][1] if n in ACTUATOR else 0.0)
+    }  # fmt: skip
+    rows: list[tuple[str, ...]] = []
+    for name, (value, error, around, *rest) in told.items():
+        true, place = ((), ()) if truth is None else _true(fit.estimates.get(name), truth.get(name))
+        other = () if beside is None else (beside[1].get(name, ""),)
+        rows.append((Symbol(name), *true, value, error, around, *place, *other, *rest))
+    extra = ((), ()) if truth is None else (("truth",), ("truth is",))
+    headings = ("symbol", *extra[0], *_ESTIMATE[:3], *extra[1], *(beside[:1] if beside else ()), *_ESTIMATE[3:])
+    numbers = tuple(i for i, h in enumerate(headings) if h in ("truth", *_ESTIMATE[:3], *(beside or ())[:1]))
+    return Table(
+        caption=caption, headings=headings, rows=tuple(rows), numbers=numbers, badge=headings.index("status")
+    )  # fmt: skip
+
+
+def _true(e: Estimate | None, true: float | None) -> tuple[tuple[str], tuple[str]]:
+    """The true value and where it lies; nothing where nobody knows it, or nothing was estimated."""
+    if true is None:
+        return ("",), ("",)
+    if e is None or e.status == "known":
+        return (number(true),), ("",)
+    return (number(true, figures(e.value, e.stderr)),), ("inside" if within(e, true) else "outside",)
+
+
+def within(e: Estimate, true: float) -> bool:
+    """Whether the 95 % interval holds the truth."""
+    return e.interval[0] <= true <= e.interval[1]
+
+
+def without_table(fit: Fit) -> Table:
+    """What rests on assumed numbers, stated without them."""
+    about = fit.rig.parameters
+    return Table(
+        caption="What the data give without the assumed gain: per unit of the command, in seconds and counts",
+        headings=("symbol", *_ESTIMATE), numbers=(1, 2, 3), badge=5,
+        rows=tuple(
+            (Symbol(n), *_estimate(n, e, about.get(n))) for a in fit.assumptions for n, e in a.without.items()
+        ),
+    )  # fmt: skip
+
+
+def run_table(fit: Fit) -> Table:
+    """What was estimated for groups of runs, then run by run."""
+    homes = {f"group {group}": own for group, own in fit.groups.items()} | dict(fit.per_run)
+    rows = tuple((run, Symbol(n), *_estimate(n, e, None)[:-1]) for run, own in homes.items() for n, e in own.items())
+    return Table(
+        caption="Initial states, offsets and factors of groups of runs and of single runs",
+        headings=("run", "symbol", *_ESTIMATE[:-1]), rows=rows, numbers=(2, 3, 4), badge=6,
+        folded=f"What differs from run to run ({len(rows)})",
+    )  # fmt: skip
+
+
+def _estimate(name: str, e: Estimate, about: Parameter | None) -> tuple[str, ...]:
+    beforehand = ", known beforehand" if about and about.uncertainty else ""
+    return (*measured(e.value, e.stderr), interval(e), unit(e.unit), e.status, _called(name, about) + beforehand)
+
+
+def _called(name: str, about: Parameter | None) -> str:
+    return f"{name}, {about.meaning}" if about and about.meaning else name
+
+
+def finding(what: str, e: Estimate, true: float | None = None) -> Finding:
+    """An estimate for the cover."""
+    d = figures(e.value, e.stderr)
+    return Finding(
+        what=what, value=number(e.value, d), interval=interval(e), truth="" if true is None else number(true, d)
+    )
+
+
+def plain_estimate(e: Estimate, true: float | None = None) -> dict[str, object]:
+    """An estimate as plain values, beside the truth of a twin."""
+    told: dict[str, object] = {"value": e.value, "stderr": e.stderr, "interval": e.interval}
+    return told if true is None else told | {"truth": true, "inside": within(e, true)}
+
+
+def interval(e: Estimate) -> str:
+    """95 % interval of an estimate, in as many figures as the estimate has."""
+    digits = figures(e.value, e.stderr)
+    return f"{number(e.interval[0], digits)} to {number(e.interval[1], digits)}"
+
+
+def score_table(runs: Mapping[str, RunScore]) -> Table:
+    """Fit percent of every signal of every run, fitted runs first."""
+    windowed = any(score.naive for score in runs.values())
+    rows: list[tuple[str, ...]] = []
+    for label, score in sorted(runs.items(), key=lambda item: item[1].role != "fit"):
+        role = "fitted" if score.role == "fit" else "predicted"
+        further = [(f"{horizon:g} s ahead", percents) for horizon, percents in list(score.ahead.items())[1:]]
+        for how, percents in ((_compared(score), score.fit_percent), *further):
+            for name, value in percents.items():
+                held = percent(score.naive[name]) if percents is score.fit_percent and name in score.naive else ""
+                rows.append((label, role, plain(name), percent(value), *((held,) if windowed else ()), how))
+    return Table(
+        caption="Fit percent, 100 (1 − |y − ŷ| / |y − mean y|), of every signal",
+        headings=("run", "role", "signal", "fit", *(("held speed",) if windowed else ()), "simulated"),
+        rows=tuple(rows), numbers=(3, 4) if windowed else (3,),
+    )  # fmt: skip
+
+
+def _compared(score: RunScore) -> str:
+    """What of the run was compared, how it was simulated, and what a prediction took from the run itself."""
+    text = "from the first sample" if score.horizon is None else f"restarted every {score.horizon:g} s"
+    text = f"{score.horizon:g} s ahead" if score.ahead else text
+    text += f"; scored from {score.score_from:g} s on" if score.score_from > 0 else ""
+    return f"{text}; its own {', '.join(score.adapted)}" if score.adapted else text
+
+
+def cross_table(crossed: CrossValidation) -> Table:
+    """Every run and signal, fitted among all and predicted by a fit of the others."""
+    rows = tuple(
+        (
+            label, plain(signal), percent(value),
+            percent(crossed.predicted[label].fit_percent[signal]) if label in crossed.predicted else "",
+            ", ".join(crossed.blind.get(label, ())),
+        )
+        for label, score in crossed.fitted.items() for signal, value in score.fit_percent.items()
+    )  # fmt: skip
+    return Table(
+        caption="Every run fitted among all, and predicted by a fit of the others: fit percent",
+        headings=("run", "signal", "fitted", "predicted", "what the others cannot see"), rows=rows, numbers=(2, 3),
+    )  # fmt: skip
+
+
+def pole_table(fit: Fit) -> Table:
+    """Poles at every equilibrium with their 95 % intervals, and the frequency of each swing."""
+    rows: list[tuple[str, ...]] = []
+    for at, found in fit.poles.items():
+        for pole in found:
+            value, around = measured(pole.real.value, pole.real.stderr)[0], interval(pole.real)
+            if pole.imag.value > 0:
+                value += f" ± {measured(pole.imag.value, pole.imag.stderr)[0]} i"
+                around += f"; ± ({interval(pole.imag)}) i"
+            rows.append((at, value, around, _swing(pole)))
+    return Table(
+        caption="Poles [1/s]; of a conjugate pair real and imaginary part",
+        headings=("equilibrium", "pole", "95 % interval", "swings at (95 % interval)"), rows=tuple(rows), numbers=(1,),
+    )  # fmt: skip
+
+
+def _swing(pole: Pole) -> str:
+    """Damped frequency of a pair of poles with its interval; nothing for a real one."""
+    if not pole.imag.value > 0:
+        return ""
+    turn, e = 2 * math.pi, pole.imag
+    low, high = e.interval
+    hertz = replace(e, value=e.value / turn, stderr=e.stderr / turn, interval=(low / turn, high / turn))
+    return f"{measured(hertz.value, hertz.stderr)[0]} Hz ({interval(hertz)})"

@@ -1,0 +1,122 @@
+"""A log as a chapter before anybody fits anything: its time, its columns and what they look like."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from upright.readers.inspection import Column, Inspection
+from upright.records import Record
+from upright.report.drawing import CYCLE, GREY, decimated, figure, hide_inner_times, styled
+from upright.report.page import Chapter, Part, Picture, Points, Table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MOST_PANELS = 8
+
+
+def chapter(record: Record, seen: Inspection) -> Chapter:
+    """What a log holds."""
+    drawn = Picture(
+        name="columns",
+        draw=lambda: draw_columns(record, seen),
+        caption="The columns over time; grey: at rest, dotted: gaps.",
+        description="; ".join(f"{c.name} from {c.low:.5g} to {c.high:.5g}" for c in seen.columns),
+    )
+    notes = (Points(tuple(f"Note: {note}" for note in seen.notes)),) if seen.notes else ()
+    name = f"{seen.file} ({seen.reader})"
+    content = (Points(tuple(_time_lines(seen))), _table(seen), *notes, drawn)
+    return Chapter(title=name, verdict="", parts=(Part(name, content),))
+
+
+def _table(seen: Inspection) -> Table:
+    rows = tuple(
+        (
+            c.name, c.unit or (f"{c.guess}?" if c.guess else ""), f"{c.low:.5g}", f"{c.high:.5g}", str(c.quantum),
+            "; ".join(_remarks(c)),
+        )
+        for c in seen.columns
+    )  # fmt: skip
+    return Table(
+        caption="Columns", headings=("column", "unit", "lowest", "highest", "quantum", "remarks"), rows=rows,
+        numbers=(2, 3),
+    )  # fmt: skip
+
+
+def _time_lines(seen: Inspection) -> list[str]:
+    """Sentences about the time base."""
+    time = seen.time
+    lines = [
+        f"{time.samples} samples over {time.duration:.6g} s, period {time.period * 1e3:.6g} ms"
+        + f" ({1 / time.period:.5g} Hz)"
+        + (f", rebuilt from stamps rounded to {time.rounding * 1e3:g} ms" if time.rebuilt else "")
+        + (f", jitter {time.jitter * 1e3:.3g} ms (99 %)" if time.jitter > 0.01 * time.period else "")
+        + "."
+    ]
+    if abs(time.late) > 1.5 * time.period:
+        lines.append(f"The first sample is at {time.late:.6g} s, not at 0.")
+    if time.gaps:
+        largest = max(time.gaps, key=lambda gap: gap.length)
+        lines.append(
+            f"{len(time.gaps)} gap{'s' if len(time.gaps) > 1 else ''}, the largest {largest.length * 1e3:.4g} ms"
+            f" at {largest.start:.5g} s ({largest.missing} sample{'s' if largest.missing > 1 else ''} missing)."
+        )
+    if seen.rests:
+        spans = ", ".join(f"{start:.4g} to {stop:.4g} s" for start, stop in seen.rests[:6])
+        lines.append(f"Nothing moves: {spans}.")
+    return lines
+
+
+def _remarks(column: Column) -> list[str]:
+    """Short remarks on one column."""
+    if column.constant:
+        return ["idle, always 0" if column.idle else f"constant {column.low:g}"]
+    told = list(column.lies)
+    if column.drive and not told:
+        told.append("drives?")
+    if column.switches and not column.stepwise:
+        told.append(
+            ", ".join(f"{'back at' if value == 0 else 'leaves'} 0 at {t:.4g} s" for t, value in column.switches)
+        )
+    elif column.switches and len(column.switches) <= 6:
+        told.append("switches " + ", ".join(f"to {value:.4g} at {t:.4g} s" for t, value in column.switches))
+    if column.drive:
+        for share, level in ((column.low_share, column.low), (column.high_share, column.high)):
+            if share and not column.stepwise:
+                told.append(f"at {level:.4g} for {100 * share:.2g} % of the samples (saturated?)")
+    if column.turns:
+        told.append(f"offset of {column.turns} turns (2 pi each)")
+    return told
+
+
+@styled
+def draw_columns(record: Record, seen: Inspection) -> Figure:
+    """One panel per column over time [s]; spans at rest are grey, gaps are marked.
+
+    Left out are columns that do not move, time and sample index; drives come last.
+    """
+    moving = [c for c in seen.columns if not c.constant and not any("the time" in s or "index" in s for s in c.lies)]
+    columns = sorted(moving, key=lambda c: c.drive)[:MOST_PANELS]
+    drawing = figure(1.1 + 1.15 * max(len(columns), 1))
+    panels: list[Any] = drawing.subplots(max(len(columns), 1), 1, sharex=True, squeeze=False)[:, 0].tolist()
+    for i, (axes, column) in enumerate(zip(panels, columns, strict=False)):
+        colour, _ = CYCLE[i % len(CYCLE)]
+        for start, stop in seen.rests:
+            axes.axvspan(start, stop, color="#f0f0f0", linewidth=0)
+        for gap in seen.time.gaps[:20]:
+            axes.axvline(gap.start, color=GREY, linewidth=0.6, linestyle=":")
+        t, y = decimated(record.t, record[column.name], buckets=800)
+        axes.plot(t, y, color=colour, linewidth=1.0, drawstyle="steps-post" if column.stepwise else "default")
+        unit = column.unit or (f"{column.guess}?" if column.guess else "")
+        name = column.name if len(column.name) <= 30 else "…" + column.name[-29:]
+        name = f"{name}\n[{unit}]" if unit else name  # shown as the log spells it
+        axes.set_ylabel(name, rotation=0, ha="right", va="center", parse_math=False)
+        if column.lies:
+            axes.set_title(column.lies[0], fontsize=8, color=GREY, parse_math=False)
+    hide_inner_times(panels)
+    drawing.align_ylabels(panels)
+    drawing.suptitle(
+        f"{Path(seen.file).name}, {seen.time.samples} samples, grey: at rest", fontsize=10, parse_math=False
+    )
+    return drawing

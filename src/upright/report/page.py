@@ -1,0 +1,209 @@
+"""What a page says: chapters of parts, with sentences, tables and pictures; how it looks is said elsewhere.
+
+The same chapter becomes HTML (`report.html`), a PDF (`report.pdf`), lines on a terminal (`report.terminal`) and a file
+to be read again (`report.store`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from upright.report.mathml import symbol
+
+
+class Symbol(str):
+    """Text that begins with the name of a parameter or signal, set as on paper: ``J_d``, ``J_d [kg m²]``."""
+
+    __slots__ = ()
+
+    def divided(self) -> tuple[str, str]:
+        """The name, and what follows it."""
+        name, blank, rest = self.partition(" ")
+        return name, blank + rest
+
+    def __html__(self) -> str:
+        """Mark-up of it, for templates."""
+        from html import escape
+
+        name, rest = self.divided()
+        return symbol(name) + escape(rest)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Formula:
+    """Equations as MathML; left to screen and paper."""
+
+    markup: str
+
+
+@dataclass(frozen=True)
+class Points:
+    """Sentences one below the other, each with its mark."""
+
+    sentences: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Names and what belongs to each."""
+
+    pairs: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class Code:
+    """Lines to be typed: a command, or lines of a study."""
+
+    lines: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """Cells as text, row by row.
+
+    Attributes
+    ----------
+    caption : str
+    headings : tuple of str
+    rows : tuple of tuple of str
+    numbers : tuple of int
+        Columns set flush right.
+    badge : int, optional
+        Column of single words that say how something turned out, such as ``firm``, ``weak`` or ``kept``.
+    folded : str
+        Line under which a screen hides the table until it is asked for; not hidden when empty.
+    anchors : tuple of str
+        Where on the page the first cell of each row leads; nowhere when empty.
+    """
+
+    caption: str
+    headings: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    numbers: tuple[int, ...] = ()
+    badge: int | None = None
+    folded: str = ""
+    anchors: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Picture:
+    """A drawing, the caption under it, and what a reader who cannot see it is told.
+
+    Attributes
+    ----------
+    name : str
+        Unique in its chapter; ids inside the drawing begin with it.
+    draw : callable or str
+        Gives the matplotlib figure, when somebody looks; or its markup.
+    caption, description : str
+    """
+
+    name: str
+    draw: Callable[[], Any] | str
+    caption: str
+    description: str
+
+    @cached_property
+    def svg(self) -> str:
+        """Markup of the drawing."""
+        if isinstance(self.draw, str):
+            return self.draw
+        from upright.report.drawing import svg
+
+        return svg(self.draw(), self.name)
+
+
+Block = str | Points | Facts | Code | Formula | Table | Picture
+"""What stands in a part, in its order; a plain text is a paragraph, which a terminal leaves to the page."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One heading and what stands below it.
+
+    Attributes
+    ----------
+    title : str
+    content : tuple of Block
+    key : str
+        Anchor on the page; its number when empty.
+    aside : bool
+        Whether a terminal leaves all of it to the page.
+    """
+
+    title: str
+    content: tuple[Block, ...] = ()
+    key: str = ""
+    aside: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """A number for the cover, as text: what it is, its value and, where there are such, interval and truth."""
+
+    what: str
+    value: str
+    interval: str = ""
+    truth: str = ""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A sentence and, where there is one, the command or the lines of a study that do it."""
+
+    sentence: str
+    command: str = ""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Chapter:
+    """One log, fit, design or experiment, told.
+
+    Attributes
+    ----------
+    title : str
+    verdict, detail : str
+        What was learned, in a sentence; and how far it can be trusted.
+    sound : bool
+        Whether the verdict is one to build on.
+    question : str
+    parts : tuple of Part
+    warnings : tuple of str
+    steps : tuple of Step
+        What to do next.
+    findings : tuple of Finding
+        The few numbers that the cover of a whole report shows.
+    numbers : mapping
+        The same as plain values for another program: SI.
+    key, about : str
+        In a report of several: as the chapter is asked for, and what it is about.
+    finished : bool
+        False where the work was stopped or failed.
+    """
+
+    title: str
+    verdict: str
+    detail: str = ""
+    sound: bool = True
+    question: str = ""
+    parts: tuple[Part, ...] = ()
+    warnings: tuple[str, ...] = ()
+    steps: tuple[Step, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    numbers: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    key: str = ""
+    about: str = ""
+    finished: bool = True
+
+    @property
+    def anchor(self) -> str:
+        """Its place on the page of a whole report."""
+        return f"experiment-{self.key}"
+
+    @property
+    def state(self) -> str:
+        """How far the verdict carries, in a word or two."""
+        return "not finished" if not self.finished else "sound" if self.sound else "with reservations"
