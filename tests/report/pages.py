@@ -162,8 +162,6 @@ def own_frequency_page(folder: Path) -> Chapter:
     run_frequency("linear", 4, folder)
     request = LogRequest(signals={}, counts={}, known={})
     return log_chapter(response_of_logs([folder / "frequency.csv"], request, folder / "own"))
-        response_of_logs([folder / "frequency.csv"], LogRequest(signals={}, counts={}, known={}), folder / "own")
-    )
 
 
 def regulation_page(folder: Path) -> Chapter:
