@@ -26,7 +26,7 @@ from benchmarks.measure import Line, of_each, page
 from upright.report.drawing import BLACK, BLUE, GREY, SKY, figure, save, styled
 
 if TYPE_CHECKING:
-    from upright.control import Rig
+    from upright.control import ServoRig
 
 IMAGE = Path("docs/images/regulation_reliability.png")
 Array = NDArray[np.float64]
@@ -47,7 +47,7 @@ class Told:
     held: bool
 
 
-def identify(truth: Rig, seed: int) -> tuple[Rig, tuple[str, ...], Array] | None:
+def identify(truth: ServoRig, seed: int) -> tuple[ServoRig, tuple[str, ...], Array] | None:
     """Best numbers and their covariance, in logarithms, from a log of the hanging rig; None when the search strays."""
     from upright.lab.makes import make_of, make_rig
     from upright.simulation import simulate
@@ -60,7 +60,7 @@ def identify(truth: Rig, seed: int) -> tuple[Rig, tuple[str, ...], Array] | None
     u = size * np.sign(np.sin(2 * np.pi * np.arange(rows * EVERY) * truth.period / 0.35))
     x0 = np.zeros(4)
 
-    def shown(rig: Rig, parameters: Mapping[str, Array], count: int) -> Array:
+    def shown(rig: ServoRig, parameters: Mapping[str, Array], count: int) -> Array:
         x = simulate(rig.plant, {**rig.drive, **parameters}, x0, u, rig.period, samples=count, every=EVERY)
         return x[:, 0::2]
 
@@ -104,7 +104,7 @@ def identify(truth: Rig, seed: int) -> tuple[Rig, tuple[str, ...], Array] | None
 
 
 def drawn(
-    rig: Rig, names: tuple[str, ...], covariance: Array, rng: np.random.Generator, lanes: int
+    rig: ServoRig, names: tuple[str, ...], covariance: Array, rng: np.random.Generator, lanes: int
 ) -> dict[str, Array]:  # fmt: skip
     """Parameters of rigs that an identification allows, in logarithms Gaussian."""
     moves = rng.multivariate_normal(np.zeros(len(names)), covariance, size=lanes)
@@ -112,7 +112,7 @@ def drawn(
     return {n: value[n] * np.exp(moves[:, i]) for i, n in enumerate(names)}
 
 
-def setting(make: str, seed: int) -> tuple[Rig, np.random.Generator]:
+def setting(make: str, seed: int) -> tuple[ServoRig, np.random.Generator]:
     """The true rig, with its drive of this seed, and what is drawn besides."""
     from upright.lab.makes import MAKES, make_rig
 
@@ -124,7 +124,7 @@ def setting(make: str, seed: int) -> tuple[Rig, np.random.Generator]:
     return replace(truth, limit=float(limit), delay=float(delay)), rng
 
 
-def of_the_day(rig: Rig, others: Mapping[str, Array], rng: np.random.Generator, lanes: int) -> dict[str, Array]:
+def of_the_day(rig: ServoRig, others: Mapping[str, Array], rng: np.random.Generator, lanes: int) -> dict[str, Array]:
     """The same rigs, each with the dry friction of its day."""
     from upright.lab.identified import DAILY
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upright.control.rig import Rig
+from upright.control.rig import ServoRig
 from upright.control.swing_up import SwingUp
 from upright.control.swing_up_law import HOLDING, MODE, SWINGING, TRIPPED
 from upright.control.trial import Trial, trial
@@ -97,13 +97,18 @@ class Ascent:
 
 
 def swing_up(
-    rig: Rig, law: SwingUp, *, seconds: float = 10.0, start: ArrayLike | None = None, pushes: ArrayLike | None = None
+    rig: ServoRig,
+    law: SwingUp,
+    *,
+    seconds: float = 10.0,
+    start: ArrayLike | None = None,
+    pushes: ArrayLike | None = None,
 ) -> Ascent:
     """Let a law swing a rig's pendulum up from where it hangs.
 
     Parameters
     ----------
-    rig : Rig
+    rig : ServoRig
         As it truly is.
     law : SwingUp
     seconds : float

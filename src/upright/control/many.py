@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upright.control.rig import Rig
+from upright.control.rig import ServoRig
 from upright.control.score import Scores, scores
 from upright.control.trial import SUBSTEPS, at_work
 from upright.law import Law
@@ -22,7 +22,7 @@ BLOCK = 256
 
 
 def outcomes(
-    rig: Rig,
+    rig: ServoRig,
     law: Law,
     *,
     at: str,
@@ -34,7 +34,7 @@ def outcomes(
 
     Parameters
     ----------
-    rig : Rig
+    rig : ServoRig
     law : Law
     at : str
         Equilibrium to hold.

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.control.many import outcomes
-from upright.control.rig import Rig
+from upright.control.rig import ServoRig
 from upright.control.score import Score, Scores, score
 from upright.control.trial import Trial, trial
 from upright.design import Margins, Sampled, hold, margins
@@ -99,7 +99,7 @@ class Preflight:
 
 
 def preflight(
-    rig: Rig,
+    rig: ServoRig,
     model: Linear,
     sampled: Sampled,
     law: Law,
@@ -113,7 +113,7 @@ def preflight(
 
     Parameters
     ----------
-    rig : Rig
+    rig : ServoRig
         As identified.
     model, sampled : Linear, Sampled
         Its linear model about the equilibrium, and the same as the law was designed on; margins and noise count the
@@ -172,14 +172,14 @@ def word(found: Score) -> str:
     return words(Scores(**{n: np.asarray(v)[..., None] for n, v in vars(found).items()}))[0]
 
 
-def largest(rig: Rig, law: Law, at: str, direction: ArrayLike, *, most: float, seconds: float = 3.0) -> float:
+def largest(rig: ServoRig, law: Law, at: str, direction: ArrayLike, *, most: float, seconds: float = 3.0) -> float:
     """How far along a direction of the states the rig may start and still be held; `most` when nothing less fails.
 
     Sixty-four starts side by side find the first that fails, three times, each between the neighbours of the last.
 
     Parameters
     ----------
-    rig : Rig
+    rig : ServoRig
     law : Law
     at : str
     direction : array, shape (states,)

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rig:
+class ServoRig:
     """A plant with one input as a servo sees it.
 
     Attributes
@@ -103,6 +103,6 @@ class Rig:
         model = self.plant.linear(at)
         return replace(model, B=model.B * self.gain)
 
-    def changed(self, **parameters: float) -> Rig:
+    def changed(self, **parameters: float) -> ServoRig:
         """The same rig with other parameters of its plant."""
         return replace(self, plant=self.plant.replace(**parameters))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.control.rig import Rig
+from upright.control.rig import ServoRig
 from upright.control.trial import Trial
 from upright.errors import BadInput
 
@@ -101,13 +101,13 @@ def score(run: Trial, *, watched: str = "", fallen: float = FALLEN, band: float 
 
 
 def scores(
-    rig: Rig, t: Array, away: Array, u: Array, *, watched: str = "", fallen: float = FALLEN, band: float = BAND
+    rig: ServoRig, t: Array, away: Array, u: Array, *, watched: str = "", fallen: float = FALLEN, band: float = BAND
 ) -> Scores:
     """Figures of runs side by side.
 
     Parameters
     ----------
-    rig : Rig
+    rig : ServoRig
         For its limit, its travel and the names of its coordinates.
     t : array, shape (N,)
         Evenly spaced [s].

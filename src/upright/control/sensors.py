@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.control.rig import Rig
+from upright.control.rig import ServoRig
 from upright.control.swing_up import SwingUp
 from upright.control.trial import SUBSTEPS, logged, trial
 from upright.records import Record
@@ -103,7 +103,7 @@ def sentence(name: str, value: float, error: float, explained: float) -> str:
     return f"The encoder of {name} {what}: {remedy} before the loop is closed."
 
 
-def probe(model: Rig, law: SwingUp) -> Array:
+def probe(model: ServoRig, law: SwingUp) -> Array:
     """Commands, shape (N,), that swing the model to `SWING`, as far as that takes no longer than `PUMP`; then none."""
     x0 = model.plant.state("hanging")
     rule = law.rule(model, x0)
@@ -119,7 +119,7 @@ def probe(model: Rig, law: SwingUp) -> Array:
         pumped = round(0.85 * pumped)
 
 
-def put_out(rig: Rig, command: Array) -> Record:
+def put_out(rig: ServoRig, command: Array) -> Record:
     """What the encoders of a hanging rig show under commands put out blindly."""
     x = simulate(
         rig.plant, rig.drive, rig.plant.state("hanging"), command, rig.period, samples=command.size + 1,
@@ -129,7 +129,7 @@ def put_out(rig: Rig, command: Array) -> Record:
     return logged(rig, np.arange(u.size, dtype=np.float64) * rig.period, x, u)
 
 
-def scales(model: Rig, log: Record, known: Mapping[str, float] | None = None) -> Scales:
+def scales(model: ServoRig, log: Record, known: Mapping[str, float] | None = None) -> Scales:
     """Scales of the encoders from a log of a hanging rig under known commands.
 
     The model's numbers move within what is known of them (least squares with that as a prior), since an error of theirs
@@ -137,7 +137,7 @@ def scales(model: Rig, log: Record, known: Mapping[str, float] | None = None) ->
 
     Parameters
     ----------
-    model : Rig
+    model : ServoRig
     log : Record
         Readings by coordinate [m or rad] and ``u``, from rest, evenly sampled.
     known : mapping of str to float, optional
@@ -189,7 +189,7 @@ def scales(model: Rig, log: Record, known: Mapping[str, float] | None = None) ->
     )  # fmt: skip
 
 
-def _known(model: Rig, known: Mapping[str, float]) -> dict[str, float]:
+def _known(model: ServoRig, known: Mapping[str, float]) -> dict[str, float]:
     """Relative standard errors of the numbers that may move."""
     out = {"gain": known.get("gain", GAIN_KNOWN)} | ({"lag": LAG_KNOWN} if model.lag else {})
     for name, value in model.plant.parameters().items():
@@ -205,7 +205,7 @@ def _projected(shown: Array, motion: Array, drift: Array) -> tuple[Array, Array]
     return np.array([first[0], *rest], dtype=np.float64), np.asarray(first[1:], dtype=np.float64)
 
 
-def _motion(model: Rig, command: Array, every: int, names: Sequence[str], logs: Array) -> Array:
+def _motion(model: ServoRig, command: Array, every: int, names: Sequence[str], logs: Array) -> Array:
     """Coordinates of the model, shape (N, coordinates, lanes), for logarithms of factors, shape (lanes, names)."""
     values = model.plant.parameters() | {"gain": model.gain, "lag": model.lag}
     lanes = max(2, len(logs))  # two, so that one kernel serves all
@@ -220,7 +220,7 @@ def _motion(model: Rig, command: Array, every: int, names: Sequence[str], logs: 
     return x[:, 0::2, : len(logs)]
 
 
-def lifted(rig: Rig, shown: float) -> str:
+def lifted(rig: ServoRig, shown: float) -> str:
     """What a hand that lifted the pendulum upright learns from its reading [rad]; "" when it is half a turn.
 
     The encoder was zeroed where the pendulum hangs. A sign cannot be told, since half a turn either way is upright.

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright import design
-from upright.control.rig import Rig
+from upright.control.rig import ServoRig
 from upright.control.swing_up_law import HOLDING, PARAMETERS, SWINGING, swing_and_hold
 from upright.control.trial import SUBSTEPS, readings
 from upright.design.requests import poles_of
@@ -71,7 +71,7 @@ class Body:
         return np.asarray(-self.kappa * np.cos(angle) * speed * np.asarray(a, dtype=np.float64))
 
 
-def body(rig: Rig) -> Body:
+def body(rig: ServoRig) -> Body:
     """Numbers of a rig's pendulum: mass, stiffness and damping matrix hanging, and the mass at a right angle.
 
     Raises
@@ -137,12 +137,12 @@ class SwingUp:
     gain: float
     limit: float
 
-    def rule(self, rig: Rig, start: ArrayLike, *, holding: bool = False) -> Rule:
+    def rule(self, rig: ServoRig, start: ArrayLike, *, holding: bool = False) -> Rule:
         """The law with the encoders and the converter of a rig.
 
         Parameters
         ----------
-        rig : Rig
+        rig : ServoRig
             As it truly is.
         start : array, shape (states,) or (lanes, states)
             Where it is when the law is switched on, as a person sees it who writes zeros where it hangs.
@@ -169,12 +169,12 @@ class SwingUp:
         )  # fmt: skip
 
 
-def design_swing_up(model: Rig, *, travel: float | None = None, memory: float = 0.8) -> SwingUp:
+def design_swing_up(model: ServoRig, *, travel: float | None = None, memory: float = 0.8) -> SwingUp:
     """Swing-up and catch for a rig's model.
 
     Parameters
     ----------
-    model : Rig
+    model : ServoRig
         As it is known; its numbers need not be those of the rig that the law will meet.
     travel : float, optional
         How far the driven body may go from the middle [m or rad]; what the rig says when omitted.
@@ -210,7 +210,7 @@ def design_swing_up(model: Rig, *, travel: float | None = None, memory: float = 
     return replace(law, size=0.8 * sure * _share(law, model))
 
 
-def _share(law: SwingUp, model: Rig, *, rays: int = 40, seconds: float = 2.5) -> float:
+def _share(law: SwingUp, model: ServoRig, *, rays: int = 40, seconds: float = 2.5) -> float:
     """Share of the sure ellipsoid, in steps of a sixteenth of its radius, from all of whose surface the model rests.
 
     As many points of each surface are tried as there are `rays`, all of them where the law would catch.

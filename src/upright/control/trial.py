@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upright.control.rig import Rig
+from upright.control.rig import ServoRig
 from upright.errors import BadInput
 from upright.law import Law, Rule
 from upright.records import Provenance, Record
@@ -30,7 +30,7 @@ class Trial:
 
     Attributes
     ----------
-    rig : Rig
+    rig : ServoRig
     at : str
         Equilibrium that was to be held.
     t : array, shape (N,)
@@ -45,7 +45,7 @@ class Trial:
         What a program at the rig could log: readings by coordinate [m or rad], ``u``, and ``reference`` if any.
     """
 
-    rig: Rig
+    rig: ServoRig
     at: str
     t: Array
     x: Array
@@ -61,7 +61,7 @@ class Trial:
 
 
 def trial(
-    rig: Rig,
+    rig: ServoRig,
     law: Law | Rule,
     *,
     at: str,
@@ -76,7 +76,7 @@ def trial(
 
     Parameters
     ----------
-    rig : Rig
+    rig : ServoRig
         As it truly is.
     law : Law or Rule
         A law on deviations from rest, whose own encoder and converter steps and delay are replaced by the rig's; or a
@@ -123,18 +123,18 @@ def trial(
     return Trial(rig=rig, at=at, t=t, x=x, u=u, rest=held, record=logged(rig, t, x, u, reference))
 
 
-def readings(rig: Rig, q: ArrayLike) -> Array:
+def readings(rig: ServoRig, q: ArrayLike) -> Array:
     """What the encoders show [m or rad] at coordinates, shape (..., coordinates)."""
     step = rig.quantum / rig.shown  # a count is what its true length is; the program multiplies by the said one
     return np.floor(np.asarray(q, dtype=np.float64) / step + 0.5) * rig.quantum
 
 
-def at_work(rig: Rig, law: Law, rest: ArrayLike, reference: ArrayLike | None = None) -> Law:
+def at_work(rig: ServoRig, law: Law, rest: ArrayLike, reference: ArrayLike | None = None) -> Law:
     """The law with the rig's encoders and converter about it.
 
     Parameters
     ----------
-    rig : Rig
+    rig : ServoRig
     law : Law
     rest : array, shape (coordinates,)
         What it takes for the readings at the equilibrium.
@@ -147,7 +147,7 @@ def at_work(rig: Rig, law: Law, rest: ArrayLike, reference: ArrayLike | None = N
     )  # fmt: skip
 
 
-def logged(rig: Rig, t: Array, x: Array, u: Array, reference: ArrayLike | None = None) -> Record:
+def logged(rig: ServoRig, t: Array, x: Array, u: Array, reference: ArrayLike | None = None) -> Record:
     """What a program at the rig could log of states x, shape (N, states), and commands u, shape (N,)."""
     seen = readings(rig, x[:, 0::2])
     names = [c.name for c in rig.plant.coordinates]

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright import design
-from upright.control.rig import Rig
+from upright.control.rig import ServoRig
 from upright.control.trial import Trial, trial
 from upright.law import Law
 
@@ -77,7 +77,7 @@ class Alarm:
 
 
 def watched(
-    watch: Watch, rig: Rig, law: Law, *, start: ArrayLike, seconds: float, rest: ArrayLike | None = None
+    watch: Watch, rig: ServoRig, law: Law, *, start: ArrayLike, seconds: float, rest: ArrayLike | None = None
 ) -> tuple[Trial, Alarm]:
     """Run a law on a rig beside a watch that switches the drive off, one sample after it has spoken.
 
@@ -86,7 +86,7 @@ def watched(
     Parameters
     ----------
     watch : Watch
-    rig : Rig
+    rig : ServoRig
         As it truly is.
     law : Law
     start, seconds, rest
@@ -108,7 +108,7 @@ class Watch:
 
     def __init__(
         self,
-        model: Rig,
+        model: ServoRig,
         at: str = "inverted",
         *,
         odds: float = ODDS,

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.control.rig import Rig
+from upright.control.rig import ServoRig
 from upright.errors import BadInput, ImpossiblePhysics
 from upright.lab.makes import MAKES, Make, make_of, make_rig
 from upright.physics import Linear, Plant, find
@@ -66,7 +66,7 @@ class IdentifiedRig:
         return make_of(
             self.plant,
             f"none of the makes {', '.join(MAKES)} is a '{self.name}'; its drive and encoders are not known, so design "
-            "for it (upright design) and simulate with control.Rig.",
+            "for it (upright design) and simulate with control.ServoRig.",
         )
 
     def linear(self, at: str) -> Linear:
@@ -77,14 +77,14 @@ class IdentifiedRig:
         """The same for the draws."""
         return [_driven(plant, gain, at) for plant, gain in self.draws]
 
-    def rig(self, said: Rig | None = None) -> Rig:
+    def rig(self, said: ServoRig | None = None) -> ServoRig:
         """The rig as identified, with drive and encoders as said in its data sheet.
 
         Dry friction, delay and lag that the fit leaves at zero are taken as said, too: nobody's rig is without.
 
         Parameters
         ----------
-        said : Rig, optional
+        said : ServoRig, optional
             The make's own as designed when omitted.
         """
         said = said or make_rig(self.make.key)
@@ -97,12 +97,12 @@ class IdentifiedRig:
             lag=self.lag or said.lag, scales=(),
         )  # fmt: skip
 
-    def allowed(self, rig: Rig, lanes: int, seed: int) -> Mapping[str, Array]:
+    def allowed(self, rig: ServoRig, lanes: int, seed: int) -> Mapping[str, Array]:
         """Parameters of `lanes` rigs that the fit's covariance allows, dry friction as it may be on the day.
 
         Parameters
         ----------
-        rig : Rig
+        rig : ServoRig
             As `rig` gives it; without draws its friction alone varies.
         lanes : int
         seed : int
@@ -127,7 +127,7 @@ def _driven(plant: Plant, gain: float, at: str) -> Linear:
 
 
 def read_identified(path: Path, *, seed: int = 0, draws: int = 200) -> IdentifiedRig:
-    """Rig of a `fit.json` (or the folder that holds it), or of a study, whose guesses then count as its numbers.
+    """ServoRig of a `fit.json` (or the folder that holds it), or of a study, whose guesses then count as its numbers.
 
     Raises
     ------

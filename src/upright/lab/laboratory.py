@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from upright.control.rig import Rig
+from upright.control.rig import ServoRig
 from upright.errors import BadInput, UprightError
 from upright.files import write_json
 from upright.lab.makes import MAKES, PENDULUMS, SHAFTS, make_rig
@@ -32,7 +32,7 @@ class Setting:
     """What an experiment is given: rig and folder, what finished ones it builds on said and where they wrote."""
 
     make: str
-    rig: Rig
+    rig: ServoRig
     seed: int
     folder: Path
     earlier: Mapping[str, Chapter]

@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from upright.control.rig import Rig
+from upright.control.rig import ServoRig
 from upright.errors import BadInput, nearest
 from upright.physics import BUILT_IN, CartPendulum, Furuta, Plant, added_inertia, added_mass, chain
 
@@ -381,7 +381,7 @@ def make_of(plant: Plant, refusal: str = "") -> Make:
     raise BadInput(refusal or f"none of the makes {', '.join(MAKES)} is a {type(plant).__name__}.")
 
 
-def make_rig(key: str, seed: int = 0) -> Rig:
+def make_rig(key: str, seed: int = 0) -> ServoRig:
     """A rig of a make.
 
     Inertias differ by two percent, springs by four, friction by a seventh, the drive's gain by two; seed 0 is the rig
@@ -412,7 +412,7 @@ def make_rig(key: str, seed: int = 0) -> Rig:
                 changed[name] = value * math.exp(rng.normal(0, spread))
         plant = plant.replace(**changed)
         gain *= math.exp(rng.normal(0, 0.02))
-    return Rig(
+    return ServoRig(
         name=make.name,
         plant=plant,
         gain=gain,

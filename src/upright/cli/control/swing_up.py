@@ -14,7 +14,7 @@ from upright.files import write_json
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from upright.control import Rig
+    from upright.control import ServoRig
 
 
 def swing_up(
@@ -89,7 +89,7 @@ def swing_up(
 
 
 def _check(
-    model: Rig, log: Path, known: Mapping[str, float] | None, out: Path, pdf: bool, as_json: bool, source: str
+    model: ServoRig, log: Path, known: Mapping[str, float] | None, out: Path, pdf: bool, as_json: bool, source: str
 ) -> None:
     from upright.lab.swing_up_2b.chapter import check_chapter
     from upright.lab.swing_up_2b.run import scales_of_log
@@ -101,7 +101,7 @@ def _check(
         raise typer.Exit(3)
 
 
-def _lying(rig: Rig, text: str) -> Rig:
+def _lying(rig: ServoRig, text: str) -> ServoRig:
     """The rig with one encoder that shows a multiple of what is true."""
     from dataclasses import replace
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.control.rig import Rig
+from upright.control.rig import ServoRig
 from upright.lab.free_swing_4.release import Release, carrier, motion
 from upright.lab.makes import make_of
 from upright.physics import Furuta
@@ -54,7 +54,7 @@ class DriftPath:
     end: float
 
 
-def drift_path(name: str, rig: Rig, release: Release | None, *, seconds: float, remedy: bool = False) -> DriftPath:
+def drift_path(name: str, rig: ServoRig, release: Release | None, *, seconds: float, remedy: bool = False) -> DriftPath:
     """Path of the carrier of one rig after a release."""
     t, x = motion(rig, release, seconds=seconds)
     psi = x[:, 0]
@@ -83,12 +83,12 @@ def momentum(plant: Furuta, x: Array) -> Array:
     return M_11 * psi_dot - plant.m_p * plant.r * plant.l_cg * c * theta_dot
 
 
-def anchored(rig: Rig) -> Rig:
+def anchored(rig: ServoRig) -> ServoRig:
     """The rig with its soft spring to ground."""
     return rig.changed(**{f"k_{carrier(rig)}": make_of(rig.plant).anchor})
 
 
-def drift_paths(rig: Rig, *, seconds: float = 24.0) -> tuple[DriftPath, ...]:
+def drift_paths(rig: ServoRig, *, seconds: float = 24.0) -> tuple[DriftPath, ...]:
     """The same release on the rig as it stands, after a push, out of level, and with the spring in each case.
 
     A rail out of level by so little does not move a cart that sticks.

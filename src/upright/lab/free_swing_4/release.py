@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.control.rig import Rig
+from upright.control.rig import ServoRig
 from upright.errors import BadInput
 from upright.lab.makes import MOTOR_AND_BELT, SERVO
 from upright.physics import CartPendulum, Furuta
@@ -28,7 +28,7 @@ class Release:
     push: float = 0.0
 
 
-def freed(rig: Rig) -> Rig:
+def freed(rig: ServoRig) -> ServoRig:
     """A pendulum rig with its drive out of the way: a disk's belt is taken off, a cart pulls its silent motor along."""
     plant = rig.plant
     if isinstance(plant, Furuta):
@@ -39,12 +39,12 @@ def freed(rig: Rig) -> Rig:
     return replace(rig, plant=plant, name=rig.name.split(",")[0])
 
 
-def carrier(rig: Rig) -> str:
+def carrier(rig: ServoRig) -> str:
     """Coordinate of what carries the pendulum: ``"psi"`` or ``"x"``."""
     return rig.plant.coordinates[0].name
 
 
-def motion(rig: Rig, release: Release | None = None, *, seconds: float, every: int = 8) -> tuple[Array, Array]:
+def motion(rig: ServoRig, release: Release | None = None, *, seconds: float, every: int = 8) -> tuple[Array, Array]:
     """What really happens after a release: time (N,) [s] and states (N, 4) [SI]."""
     from upright.simulation import simulate
 
@@ -56,13 +56,13 @@ def motion(rig: Rig, release: Release | None = None, *, seconds: float, every: i
 
 
 def acquire(
-    rig: Rig, release: Release | None = None, *, seconds: float = 12.0, every: int = 8, shot: int = 0
+    rig: ServoRig, release: Release | None = None, *, seconds: float = 12.0, every: int = 8, shot: int = 0
 ) -> Record:
     """Log of both encoders after a release.
 
     Parameters
     ----------
-    rig : Rig
+    rig : ServoRig
         As `freed`.
     release : Release, optional
         From horizontal, its carrier at rest, when omitted; no hand holds an angle better than a degree.

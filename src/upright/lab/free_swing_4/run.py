@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.control.rig import Rig
+from upright.control.rig import ServoRig
 from upright.lab.free_swing_4.drift import DriftPath, drift_paths
 from upright.lab.free_swing_4.release import carrier, freed, motion
 from upright.lab.free_swing_4.studies import Answer, fit_question, write_questions
@@ -36,7 +36,7 @@ class Balance:
 class FreeSwing:
     """What has been found so far; it is filled step by step, so that an interrupted one can be reported."""
 
-    rig: Rig
+    rig: ServoRig
     folder: Path
     weighed: Known | None = None
     answers: dict[str, Answer] = field(default_factory=dict[str, Answer])
@@ -57,7 +57,7 @@ class FreeSwing:
 
 
 def run_free_swing(
-    rig: Rig,
+    rig: ServoRig,
     seed: int,
     folder: Path,
     progress: Progress = silent,
@@ -69,7 +69,7 @@ def run_free_swing(
 
     Parameters
     ----------
-    rig : Rig
+    rig : ServoRig
         Its drive is put out of the way first.
     seed : int
         Of guesses, and of what a hand and a ruler do.

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from upright.control.rig import Rig
+from upright.control.rig import ServoRig
 from upright.identification.model.fit import Fit
 from upright.lab.free_swing_4.drift import TILT, anchored
 from upright.lab.free_swing_4.release import Release, acquire, carrier
@@ -62,7 +62,7 @@ class Recovered:
     inside: bool
 
 
-def logs(rig: Rig) -> dict[str, Record]:
+def logs(rig: ServoRig) -> dict[str, Record]:
     """The releases of the experiment by the name of their file: level, out of level, and anchored by a spring.
 
     A cart does without the last two: a lean too small to see does not move what sticks.
@@ -78,7 +78,7 @@ def logs(rig: Rig) -> dict[str, Record]:
     return out
 
 
-def bench(rig: Rig, weighed: Known | None = None) -> dict[str, tuple[float, float]]:
+def bench(rig: ServoRig, weighed: Known | None = None) -> dict[str, tuple[float, float]]:
     """What was measured beforehand: value and standard uncertainty [SI].
 
     The inertia of disk or cart comes from experiment 1a (`weighed`; 1 % without it), the lengths from a ruler and from
@@ -95,7 +95,7 @@ def bench(rig: Rig, weighed: Known | None = None) -> dict[str, tuple[float, floa
     return measured | ({"J_a": (truth["J_a"], 0.0)} if "J_a" in truth else {})
 
 
-def questions(rig: Rig, weighed: Known | None = None) -> tuple[Question, ...]:
+def questions(rig: ServoRig, weighed: Known | None = None) -> tuple[Question, ...]:
     """The fits of the experiment, all from guesses that are 30 % off."""
     rng = np.random.default_rng([rig.seed, 42])
     guess = {n: getattr(rig.plant, n) * rng.choice([0.7, 1.3]) for n in ("m_p", "J_p", *FRICTION)}
@@ -140,7 +140,7 @@ def questions(rig: Rig, weighed: Known | None = None) -> tuple[Question, ...]:
     )
 
 
-def question_text(q: Question, rig: Rig) -> str:
+def question_text(q: Question, rig: ServoRig) -> str:
     """The question as a study file."""
     kind, source = type(rig.plant), f"digital twin of {rig.name}, seed {rig.seed}: simulated, no rig was touched"
 
@@ -174,7 +174,7 @@ def question_text(q: Question, rig: Rig) -> str:
     )
 
 
-def write_questions(rig: Rig, folder: Path, weighed: Known | None = None) -> tuple[tuple[Question, Path], ...]:
+def write_questions(rig: ServoRig, folder: Path, weighed: Known | None = None) -> tuple[tuple[Question, Path], ...]:
     """Write logs and studies; gives back each question with its study file."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, record in logs(rig).items():
@@ -197,7 +197,7 @@ def fit_question(q: Question, study: Path, progress: Progress = silent) -> Answe
     return Answer(question=q, study=loaded, fit=identify(loaded.rig, loaded.runs, method=q.method, progress=tell))
 
 
-def recovered(rig: Rig, fit: Fit) -> tuple[Recovered, ...]:
+def recovered(rig: ServoRig, fit: Fit) -> tuple[Recovered, ...]:
     """The estimates of a fit beside the truth that only a twin can tell."""
     truth = rig.plant.parameters()
     return tuple(

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from upright.control import Rig
+from upright.control import ServoRig
 from upright.identification import Parameter
 from upright.identification import Rig as Asked
 from upright.identification.frequency.answer import Answer, explain
@@ -33,7 +33,7 @@ class FrequencyRun:
 
     Attributes
     ----------
-    rig : Rig
+    rig : ServoRig
         The twin, which knows the truth.
     make : Make
     sweep : Sweep
@@ -46,7 +46,7 @@ class FrequencyRun:
         Time at the computer [s].
     """
 
-    rig: Rig
+    rig: ServoRig
     make: Make
     sweep: Sweep
     answer: Answer
@@ -60,7 +60,7 @@ class FrequencyRun:
         return {**self.rig.plant.parameters(), **self.rig.drive}
 
 
-def bench(rig: Rig, make: Make) -> dict[str, float]:
+def bench(rig: ServoRig, make: Make) -> dict[str, float]:
     """What the bench says of the numbers that it tells, each off by its tolerance; exact for the rig as designed."""
     rng = np.random.default_rng([rig.seed, 43])
     true = rig.plant.parameters()
@@ -89,7 +89,7 @@ def asked(make: Make, known: Mapping[str, float], tolerance: Mapping[str, float]
 
 
 def run_frequency(
-    rig: Rig | str,
+    rig: ServoRig | str,
     seed: int,
     folder: Path,
     progress: Progress = silent,
@@ -102,7 +102,7 @@ def run_frequency(
 
     Parameters
     ----------
-    rig : Rig or str
+    rig : ServoRig or str
         A rig of a make, or the make of which `seed` is taken.
     seed : int
     folder : Path

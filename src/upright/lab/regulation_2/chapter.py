@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from upright.control import Rig, Score
+from upright.control import Score, ServoRig
 from upright.control.preflight import FELT, WORDS, word
 from upright.design.requests import written
 from upright.lab.regulation_2.figures import Panel, chances_figure, runs_figure, ways_figure
@@ -109,7 +109,7 @@ def _came(done: Regulation, s: Score) -> str:
     )
 
 
-def _shown(rig: Rig, i: int, value: float) -> str:
+def _shown(rig: ServoRig, i: int, value: float) -> str:
     """A coordinate's deviation in degrees or centimetres."""
     if rig.plant.coordinates[i].unit == "rad":
         return f"{math.degrees(value):.2g}°" if math.degrees(value) < 99.5 else f"{math.degrees(value):.0f}°"

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright import design
-from upright.control import Rig, Score, Trial, score, trial
+from upright.control import Score, ServoRig, Trial, score, trial
 from upright.control.preflight import Preflight, Task, preflight, word
 from upright.design import Margins, Placement, Sampled
 from upright.design.loop import closed, command_noise
@@ -94,9 +94,9 @@ class Regulation:
 
     Attributes
     ----------
-    rig : Rig
+    rig : ServoRig
         As identified.
-    truth : Rig or None
+    truth : ServoRig or None
         The rig on which the laws ran.
     task : Task
     wish : Wish
@@ -113,8 +113,8 @@ class Regulation:
         Computing time.
     """
 
-    rig: Rig
-    truth: Rig | None
+    rig: ServoRig
+    truth: ServoRig | None
     task: Task
     wish: RegulationRequest
     attempts: tuple[Attempt, ...]
@@ -144,7 +144,7 @@ def _check_upright(key: str) -> None:
 
 
 def run_regulation(
-    known: IdentifiedRig, truth: Rig | None, seed: int, folder: Path, progress: Progress = silent,
+    known: IdentifiedRig, truth: ServoRig | None, seed: int, folder: Path, progress: Progress = silent,
     stopped: Callable[[], bool] = lambda: False, wish: RegulationRequest | None = None, source: str = "FIT",
 ) -> Regulation:  # fmt: skip
     """Design for the rig as identified, say what will come, and run on the rig itself.
@@ -153,7 +153,7 @@ def run_regulation(
     ----------
     known : IdentifiedRig
         What was identified, hanging.
-    truth : Rig, optional
+    truth : ServoRig, optional
         The rig; without it nothing is run and only what is expected is told.
     seed : int
         Of the hand's errors and of the rigs drawn.
@@ -203,7 +203,7 @@ def actual_start(task: Task, seed: int) -> Array:
 
 
 def _attempt(
-    name: str, poles: Roots, rig: Rig, truth: Rig | None, model: Linear, sampled: Sampled, task: Task,
+    name: str, poles: Roots, rig: ServoRig, truth: ServoRig | None, model: Linear, sampled: Sampled, task: Task,
     others: Mapping[str, Array], wish: RegulationRequest, seed: int,
 ) -> Attempt:  # fmt: skip
     placed = design.place(model.A, model.B, poles)

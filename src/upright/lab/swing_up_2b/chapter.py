@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from upright.control import Rig
+from upright.control import ServoRig
 from upright.control.ascent import Ascent
 from upright.control.sensors import Scales
 from upright.lab.makes import make_of
@@ -36,7 +36,7 @@ def chapter(done: SwingUpRun) -> Chapter:
     )  # fmt: skip
 
 
-def check_chapter(model: Rig, check: Scales, log: str, source: str = "FIT.json") -> Chapter:
+def check_chapter(model: ServoRig, check: Scales, log: str, source: str = "FIT.json") -> Chapter:
     """What a log of a hanging rig says of its encoders, by itself."""
     again = Step("Mend what is said above, log the hanging rig again, and check again.")
     onward = Step("The encoders may be trusted: find the gains that hold the rig.",
@@ -54,7 +54,7 @@ def _scales(check: Scales) -> dict[str, Any]:
     return {n: {"scale": v, "stderr": e, "explained": x, "sound": n not in check.wrong} for n, v, e, x in each}
 
 
-def _sensor_part(model: Rig, check: Scales) -> Part:
+def _sensor_part(model: ServoRig, check: Scales) -> Part:
     """What the hanging rig says of its encoders."""
     rows = tuple(
         (name, number(v, 5), number(2 * e, 2), percent(100 * x), "to be mended" if name in check.wrong else "sound")

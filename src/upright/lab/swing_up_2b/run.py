@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright import design
-from upright.control import Rig, SwingUp, design_swing_up, trial
+from upright.control import ServoRig, SwingUp, design_swing_up, trial
 from upright.control.ascent import Ascent, swing_up
 from upright.control.score import FALLEN
 from upright.control.sensors import KNOWN, Scales, probe, put_out, scales
@@ -82,9 +82,9 @@ class SwingUpRun:
 
     Attributes
     ----------
-    model : Rig
+    model : ServoRig
         As known.
-    truth : Rig
+    truth : ServoRig
     log : Record
         Of the encoders under commands put out blindly.
     check : Scales
@@ -100,8 +100,8 @@ class SwingUpRun:
         Computing time.
     """
 
-    model: Rig
-    truth: Rig
+    model: ServoRig
+    truth: ServoRig
     log: Record
     check: Scales
     law: SwingUp
@@ -152,12 +152,12 @@ def known_of(identified: IdentifiedRig) -> Mapping[str, float]:
     return out
 
 
-def scales_of_log(model: Rig, log: Record, known: Mapping[str, float] | None = None) -> Scales:
+def scales_of_log(model: ServoRig, log: Record, known: Mapping[str, float] | None = None) -> Scales:
     """Scales of the encoders from a log; see `upright.control.sensors.scales`.
 
     Parameters
     ----------
-    model : Rig
+    model : ServoRig
     log : Record
         Columns named as the coordinates, in any unit or in counts, and the command ``u``, from rest.
     known : mapping of str to float, optional
@@ -196,8 +196,8 @@ def scales_of_log(model: Rig, log: Record, known: Mapping[str, float] | None = N
 
 
 def run_swing_up(
-    model: Rig,
-    truth: Rig,
+    model: ServoRig,
+    truth: ServoRig,
     folder: Path,
     progress: Progress = silent,
     stopped: Callable[[], bool] = lambda: False,
@@ -212,9 +212,9 @@ def run_swing_up(
 
     Parameters
     ----------
-    model : Rig
+    model : ServoRig
         As known: as designed, or as identified.
-    truth : Rig
+    truth : ServoRig
         The rig itself.
     folder : Path
         Takes ``sensors.csv`` and ``swing_up.csv``.
@@ -254,7 +254,12 @@ def run_swing_up(
 
 
 def _lies(
-    model: Rig, truth: Rig, law: SwingUp, command: Array, known: Mapping[str, float] | None, seconds: float = 2.0
+    model: ServoRig,
+    truth: ServoRig,
+    law: SwingUp,
+    command: Array,
+    known: Mapping[str, float] | None,
+    seconds: float = 2.0,
 ) -> tuple[Lie, ...]:
     names = [c.name for c in model.plant.coordinates]
     sampled = design.hold(model.linear("inverted"), model.period, (model.delay + model.lag) / model.period)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright import design
-from upright.control import Rig
+from upright.control import ServoRig
 from upright.design.loop import closed
 from upright.design.requests import conjugate_poles, poles_of
 from upright.design.sampled import to_s
@@ -76,7 +76,7 @@ class Tracker:
         return float(np.min(-self.poles.real / np.abs(self.poles)))
 
 
-def tracker(rig: Rig, name: str, K: Array, k_pf: float, *, asked: Roots | None = None) -> Tracker:
+def tracker(rig: ServoRig, name: str, K: Array, k_pf: float, *, asked: Roots | None = None) -> Tracker:
     """Gains as a law on a rig's encoders, and what it is worth there."""
     law = state_law(rig, K, k_pf)
     return Tracker(
@@ -86,13 +86,13 @@ def tracker(rig: Rig, name: str, K: Array, k_pf: float, *, asked: Roots | None =
     )  # fmt: skip
 
 
-def state_law(rig: Rig, K: Array, k_pf: float) -> Law:
+def state_law(rig: ServoRig, K: Array, k_pf: float) -> Law:
     """The matrices of gains on differenced encoders."""
     sampled = design.hold(rig.linear(AT), rig.period, 0.0)
     return design.feedback(design.filtered(sampled, MEMORY), K, k_pf)
 
 
-def by_poles(rig: Rig, name: str, wanted: Roots) -> Tracker:
+def by_poles(rig: ServoRig, name: str, wanted: Roots) -> Tracker:
     """State feedback by Ackermann's formula, with the prefilter for unit static gain to the far body."""
     model = rig.linear(AT)
     K = design.place(model.A, model.B, wanted).K
@@ -109,7 +109,7 @@ def check(which: Sequence[int], own: Roots | None) -> None:
         raise BadInput("nothing to follow with: name a set of Table 2 or poles.")
 
 
-def paper_sets(rig: Rig, which: Sequence[int] = (1, 2, 3, 4)) -> tuple[Tracker, ...]:
+def paper_sets(rig: ServoRig, which: Sequence[int] = (1, 2, 3, 4)) -> tuple[Tracker, ...]:
     """State feedback by the sets of Table 2."""
     return tuple(by_poles(rig, f"set {i}", poles(TABLE_2[i - 1])[0]) for i in which)
 
@@ -119,7 +119,7 @@ def far(model: Linear) -> Array:
     return model.C[-1]
 
 
-def play(rig: Rig, K: Array, k_pf: float) -> float:
+def play(rig: ServoRig, K: Array, k_pf: float) -> float:
     """Largest error of the far body at rest that dry friction can hold, two bodies without springs to ground.
 
     The far body stays while ``|k (x_1 - x_2)| <= f_2``, the near one while ``|gain u - k (x_1 - x_2)| <= f_1``; with
@@ -131,7 +131,7 @@ def play(rig: Rig, K: Array, k_pf: float) -> float:
     return (f_1 + f_2) / (rig.gain * k_pf) + abs(K[0]) / k_pf * f_2 / p["k_12"]
 
 
-def with_sum(rig: Rig, base: Tracker, name: str) -> Tracker:
+def with_sum(rig: ServoRig, base: Tracker, name: str) -> Tracker:
     """The same poles and one more, EXTRA, for the sum of the error: what friction holds and what pushes is made up for.
 
     With ``k_pf = k_i/|EXTRA|`` the zero of the reference's way in lies on the added pole, so that the step is followed
@@ -156,12 +156,12 @@ def with_sum(rig: Rig, base: Tracker, name: str) -> Tracker:
     return replace(plain, law=summed, poles=loop_poles(rig, summed), play=0.0)
 
 
-def closed_by(rig: Rig, law: Law) -> Array:
+def closed_by(rig: ServoRig, law: Law) -> Array:
     """Matrix of the sampled loop of a law on a rig, about rest; dry friction and rounding left out."""
     return closed(design.hold(rig.linear(AT), rig.period, rig.delay / rig.period, rig.lag), law)
 
 
-def loop_poles(rig: Rig, law: Law) -> Roots:
+def loop_poles(rig: ServoRig, law: Law) -> Roots:
     """Poles [1/s] of that loop, those that die within three samples left out."""
     s = to_s(poles_of(closed_by(rig, law)), rig.period)
     return s[s.real > -SLOW / rig.period]

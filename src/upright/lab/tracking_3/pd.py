@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright import design
-from upright.control import Rig
+from upright.control import ServoRig
 from upright.control.steps import step_figures
 from upright.control.trial import SUBSTEPS, at_work
 from upright.errors import BadInput
@@ -27,17 +27,17 @@ DWELL = 2.0
 """How long each is watched [s]."""
 
 
-def near_pd(rig: Rig, name: str, kp: float, kd: float) -> Tracker:
+def near_pd(rig: ServoRig, name: str, kp: float, kd: float) -> Tracker:
     """PD on the driven body's encoder, with the reference of the far one."""
     return tracker(rig, name, _gains(rig, 0, kp, kd), kp)
 
 
-def far_pd(rig: Rig, name: str, kp: float, kd: float) -> Tracker:
+def far_pd(rig: ServoRig, name: str, kp: float, kd: float) -> Tracker:
     """PD on the far body's encoder."""
     return tracker(rig, name, _gains(rig, len(rig.plant.coordinates) - 1, kp, kd), kp)
 
 
-def _gains(rig: Rig, body: int, kp: float, kd: float) -> Array:
+def _gains(rig: ServoRig, body: int, kp: float, kd: float) -> Array:
     K = np.zeros(2 * len(rig.plant.coordinates))
     K[2 * body : 2 * body + 2] = kp, kd
     return K
@@ -53,7 +53,7 @@ class Search:
     settling: Array
 
 
-def tune(rig: Rig, step: float, most: float) -> tuple[Tracker, Search]:
+def tune(rig: ServoRig, step: float, most: float) -> tuple[Tracker, Search]:
     """The PD on the near encoder that brings the far body soonest within 5 % of the reference, and keeps it there.
 
     Every pair of gains of a grid runs on the rig in the kernel, with friction, encoders, converter and limit; then a
@@ -72,7 +72,7 @@ def tune(rig: Rig, step: float, most: float) -> tuple[Tracker, Search]:
     return near_pd(rig, "PD, tuned", float(best[0]), float(best[1])), found
 
 
-def tried(rig: Rig, pairs: Array, step: float) -> Array:
+def tried(rig: ServoRig, pairs: Array, step: float) -> Array:
     """Arrival and settling to 5 % of many PD laws at once, shape (pairs, 2)."""
     c = len(rig.plant.coordinates)
     estimator = design.filtered(design.hold(rig.linear(AT), rig.period, 0.0), MEMORY)
@@ -101,7 +101,7 @@ def continuous(model: Linear) -> tuple[Array, Array, Array]:
     return model.A, P, D
 
 
-def sampled(rig: Rig) -> tuple[Array, Array, Array]:
+def sampled(rig: ServoRig) -> tuple[Array, Array, Array]:
     """The same as it runs: held, late, lagging, with filtered differences."""
     A, P, D = (closed_by(rig, state_law(rig, _gains(rig, 0, *g), 0.0)) for g in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
     return A, P - A, D - A

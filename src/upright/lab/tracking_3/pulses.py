@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from upright.control import Rig
+from upright.control import ServoRig
 from upright.errors import BadInput
 from upright.identification.model.fit import Fit
 from upright.lab.identified import read_identified
@@ -48,7 +48,7 @@ def shaft_make(plant: Plant, name: str) -> Make:
     return make
 
 
-def rig_of_file(path: Path, limit: float | None = None) -> Rig:
+def rig_of_file(path: Path, limit: float | None = None) -> ServoRig:
     """The rig that a fit or a study describes; what neither says, limit, counts and period, is the make's."""
     known = read_identified(path)
     made = make_rig(shaft_make(known.plant, f"'{known.name}'").key)
@@ -58,7 +58,7 @@ def rig_of_file(path: Path, limit: float | None = None) -> Rig:
     return replace(known.rig(made), lag=known.lag, limit=limit or made.limit, name=f"the rig of {path.name}")
 
 
-def pulses(rig: Rig, file: str) -> Record:
+def pulses(rig: ServoRig, file: str) -> Record:
     """Log of what the encoders show, in counts, while the drive pulses [V]."""
     from upright.simulation import simulate
 
@@ -85,7 +85,7 @@ def pulses(rig: Rig, file: str) -> Record:
     )
 
 
-def shaft_study(rig: Rig, seed: int, weighed: Sequence[Known] = ()) -> str:
+def shaft_study(rig: ServoRig, seed: int, weighed: Sequence[Known] = ()) -> str:
     """Study of the logs, its guesses 30 % off what the make is designed to be.
 
     The inertia that experiment 1a weighed is known as well as it says, and the drive's gain follows; else the gain is
@@ -132,7 +132,7 @@ def shaft_study(rig: Rig, seed: int, weighed: Sequence[Known] = ()) -> str:
 
 
 def identify_shaft(
-    rig: Rig, seed: int, folder: Path, progress: Progress = silent, weighed: Sequence[Known] = ()
+    rig: ServoRig, seed: int, folder: Path, progress: Progress = silent, weighed: Sequence[Known] = ()
 ) -> tuple[Study, Fit]:
     """Pulse a rig, write logs and study, and fit it as `upright identify` would; writes `fit.json` too."""
     from upright.identification.estimate import identify
@@ -150,7 +150,7 @@ def identify_shaft(
     return study, fit
 
 
-def fitted(rig: Rig, fit: Fit) -> Rig:
+def fitted(rig: ServoRig, fit: Fit) -> ServoRig:
     """The rig as the fit sees it: same drive, encoders and period, numbers of the plant and gain as estimated."""
     values = {n: p.value for n, p in fit.rig.parameters.items()} | {n: e.value for n, e in fit.estimates.items()}
     plant = rig.plant.replace(**{n: v for n, v in values.items() if n in rig.plant.names()})

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.control import Rig, Trial, trial
+from upright.control import ServoRig, Trial, trial
 from upright.control.steps import Effort, StepFigures, effort, step_figures
 from upright.errors import BadInput
 from upright.identification.model.fit import Fit
@@ -98,7 +98,7 @@ class Tracking:
 
     Attributes
     ----------
-    rig, model, true : Rig
+    rig, model, true : ServoRig
         On the day of the trials, as the fit sees it, and when it was measured; all the same where only a fit was given.
     folder : Path
         Holds logs, study and fit; the fit itself where only that was given.
@@ -114,9 +114,9 @@ class Tracking:
         What the tuning tried.
     """
 
-    rig: Rig
-    model: Rig
-    true: Rig
+    rig: ServoRig
+    model: ServoRig
+    true: ServoRig
     folder: Path
     study: Study | None
     fit: Fit | None
@@ -142,7 +142,7 @@ class Tracking:
 
 
 def run_tracking(
-    rig: str | Rig, seed: int, folder: Path, progress: Progress = silent,
+    rig: str | ServoRig, seed: int, folder: Path, progress: Progress = silent,
     stopped: Callable[[], bool] = lambda: False, *, which: Sequence[int] = (1, 2, 3, 4),
     poles: NDArray[np.complex128] | None = None, step: float | None = None, weighed: Sequence[Known] = (),
 ) -> Tracking:  # fmt: skip
@@ -150,7 +150,7 @@ def run_tracking(
 
     Parameters
     ----------
-    rig : str or Rig
+    rig : str or ServoRig
         A make, or a rig with two inertias; the make of a pendulum's rig stands for the rig without it.
     seed : int
         Which rig of the make, and the guesses of the fit.
@@ -191,7 +191,7 @@ def run_tracking(
     )
 
 
-def another_day(rig: Rig, seed: int) -> Rig:
+def another_day(rig: ServoRig, seed: int) -> ServoRig:
     """The same rig when its dry friction has changed as between runs of real rigs."""
     rng = np.random.default_rng([seed, 31])
     dry = {n: rig.plant.parameters()[n] for n in ("f_1c", "f_2c")}
@@ -199,7 +199,7 @@ def another_day(rig: Rig, seed: int) -> Rig:
 
 
 def follow(
-    rig: Rig, model: Rig, folder: Path, study: Study | None, fit: Fit | None, progress: Progress,
+    rig: ServoRig, model: ServoRig, folder: Path, study: Study | None, fit: Fit | None, progress: Progress,
     stopped: Callable[[], bool] = lambda: False, *, which: Sequence[int] = (1, 2, 3, 4),
     poles: NDArray[np.complex128] | None = None, step: float | None = None,
 ) -> Tracking:  # fmt: skip
@@ -231,13 +231,13 @@ def follow(
     )  # fmt: skip
 
 
-def stiffest_damped(model: Rig, kp: float) -> Tracker:
+def stiffest_damped(model: ServoRig, kp: float) -> Tracker:
     """PD of the near encoder with this kp, and the kd for which its slowest pole decays fastest."""
     tried = [near_pd(model, "PD, as stiff", kp, kp * rate) for rate in np.geomspace(5e-3, 0.2, 25).tolist()]
     return max(tried, key=lambda law: law.decay)
 
 
-def choose(model: Rig, laws: Sequence[Tracker], step: float | None = None) -> Chosen:
+def choose(model: ServoRig, laws: Sequence[Tracker], step: float | None = None) -> Chosen:
     """The largest step of two digits that keeps every law within effort, twist and travel, by the linear model."""
     most = RESERVE * model.limit / max(abs(law.k_pf) for law in laws)
     unit = [outcome(model, model, law, 0.5 * most).found for law in laws]
@@ -253,13 +253,13 @@ def choose(model: Rig, laws: Sequence[Tracker], step: float | None = None) -> Ch
     return Chosen(size=size, reason=reason, by_effort=most, by_twist=twist, by_travel=travel)
 
 
-def outcome(rig: Rig, model: Rig, law: Tracker, step: float) -> Outcome:
+def outcome(rig: ServoRig, model: ServoRig, law: Tracker, step: float) -> Outcome:
     """A law on the model and on the rig."""
     foreseen = attempt(model, law, step)
     return Outcome(law=law, foreseen=foreseen, found=foreseen if rig is model else attempt(rig, law, step))
 
 
-def attempt(rig: Rig, law: Tracker, step: float) -> StepTrial:
+def attempt(rig: ServoRig, law: Tracker, step: float) -> StepTrial:
     """Zero, the step, then a steady push while the reference stays."""
     before, at, end = (round(s / rig.period) for s in (BEFORE, BEFORE + DWELL, BEFORE + DWELL + PUSHED))
     pushes = np.zeros(end + 1)

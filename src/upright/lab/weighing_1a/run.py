@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from upright.control.rig import Rig
+from upright.control.rig import ServoRig
 from upright.errors import NotIdentifiable
 from upright.identification.loadings import Loaded, Loadings, fit_loadings, swings
 from upright.lab.makes import Make, make_of
@@ -55,7 +55,7 @@ class Known:
 class Weighing:
     """Experiment 1a on a rig: the swings with their line, and what they say about the rig as it is used later."""
 
-    rig: Rig
+    rig: ServoRig
     make: Make
     folder: Path
     files: dict[str, str]
@@ -85,7 +85,7 @@ def weigh_body(
     return Campaign(on=on, logs=logs, added=added, found=found, left_out=tuple(left_out))
 
 
-def first_body(rig: Rig) -> LoadedTwin:
+def first_body(rig: ServoRig) -> LoadedTwin:
     """The first body of a rig on a spring, its masses unbolted.
 
     A pendulum's cart sits between two springs, its disk below a clamped shaft; of two bodies the second is clamped, so
@@ -102,13 +102,13 @@ def first_body(rig: Rig) -> LoadedTwin:
     return replace(drawn, truth=drawn.truth.replace(**{design.inertia: true[make.body] - on}, **spring))
 
 
-def _make(rig: Rig) -> Make:
+def _make(rig: ServoRig) -> Make:
     return make_of(
         rig.plant, f"experiment 1a knows carts, disks and pendulums on them, and no {type(rig.plant).__name__}."
     )
 
 
-def run_weighing(rig: Rig, seed: int, folder: Path, progress: Progress = silent) -> Weighing:
+def run_weighing(rig: ServoRig, seed: int, folder: Path, progress: Progress = silent) -> Weighing:
     """Weigh the first body of a rig; its logs are written to `folder`."""
     make = _make(rig)
     done = weigh_body(first_body(replace(rig, seed=seed)), progress)
