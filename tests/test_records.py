@@ -147,3 +147,46 @@ def test_a_file_of_something_else_is_refused_with_a_sentence(tmp_path: Path, for
     path.write_bytes(b"\x00\x01 not a record \xff" * 20)
     with pytest.raises(BadInput):
         getattr(Record, f"from_{form}")(path)
+
+
+def test_a_time_column_is_the_time_and_rows_are_not_counted_as_seconds() -> None:
+    import pandas as pd
+
+    frame = pd.DataFrame({"time [ms]": [0, 10, 20, 30], "theta [rad]": [0.1, 0.2, 0.3, 0.4]})
+    record = Record.from_pandas(frame)
+    np.testing.assert_allclose(record.t, [0.0, 0.01, 0.02, 0.03], rtol=1e-15)
+    assert record.names == ("theta [rad]",)
+    assert record.units == {"theta [rad]": "rad"}
+    np.testing.assert_array_equal(Record.from_pandas(frame[frame.index > 0]).t, record.t[1:])
+
+
+@pytest.mark.parametrize("name", ["t", "clock"])
+def test_the_column_named_as_the_time_is_taken(name: str) -> None:
+    import pandas as pd
+
+    frame = pd.DataFrame({name: [1.0, 1.5, 2.5], "time": [7.0, 8.0, 9.0], "u": [0.0, 1.0, 0.0]})
+    record = Record.from_pandas(frame, time=name)
+    assert record.t.tolist() == [1.0, 1.5, 2.5]
+    assert record.names == ("time", "u")
+
+
+def test_stamps_count_from_the_first() -> None:
+    import pandas as pd
+
+    at = pd.to_datetime(["2025-02-14 09:22:43.000", "2025-02-14 09:22:43.250", "2025-02-14 09:22:44.000"])
+    assert Record.from_pandas(pd.DataFrame({"u": [0.0, 1.0, 2.0]}, index=at)).t.tolist() == [0.0, 0.25, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("columns", "time", "sentence"),
+    [
+        ({"u": [0.0, 1.0], "y": [0.0, 1.0]}, None, "needs one column of time, and its columns are u, y; name it"),
+        ({"t": [0.0, 1.0], "time": [0.0, 1.0]}, None, "t and time are called so; name it, as in time='t'"),
+        ({"clock": [0.0, 1.0], "u": [0.0, 1.0]}, "clok", "did you mean 'clock'"),
+    ],
+)
+def test_a_frame_without_a_clear_time_is_refused(columns: dict[str, list[float]], time: str, sentence: str) -> None:
+    import pandas as pd
+
+    with pytest.raises(BadInput, match=sentence):
+        Record.from_pandas(pd.DataFrame(columns), time=time)

@@ -14,8 +14,8 @@ from upright.errors import BadInput
 from upright.readers import read_source, recognise
 from upright.readers.delimited import layout
 from upright.readers.source import Source, load
-from upright.readers.timebase import time_scale
 from upright.records import Array, PathLike, Record
+from upright.records.columns import time_scale
 from upright.signals.stretches import pieces
 
 LOOSE = 0.05

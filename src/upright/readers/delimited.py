@@ -13,8 +13,9 @@ import numpy as np
 
 from upright.readers.source import Source
 from upright.readers.table import Table
-from upright.readers.timebase import exact_seconds, is_epoch, is_index, rebuild, time_scale
+from upright.readers.timebase import exact_seconds, is_epoch, is_index, rebuild
 from upright.records import Array, Record
+from upright.records.columns import stated_unit, time_scale
 from upright.records.exchange import CSV_MARK
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?|[+-]?(?:nan|inf|infinity)"
@@ -120,16 +121,6 @@ def read_own(source: Source) -> Record:
     rows = Table(source=source, body="\n".join(lines[3:]), names=tuple(names), delimiter=",", first_line=4)
     t, *signals = rows.numbers().T
     return Record.rebuild(t, dict(zip(names[1:], signals, strict=True)), lines[1][2:])
-
-
-def stated_unit(name: str) -> str:
-    """Unit in brackets behind a name, as in ``theta [rad]``; empty when there is none that can be read."""
-    match = re.fullmatch(r".*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*", name)
-    if match is None:
-        return ""
-    from upright.units import known
-
-    return match[1] if known(match[1]) else ""
 
 
 def begins_with_number(line: str) -> bool:

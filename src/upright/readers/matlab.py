@@ -26,8 +26,9 @@ import numpy as np
 
 from upright.errors import BadInput
 from upright.readers.source import Source
-from upright.readers.timebase import rebuild, time_scale
+from upright.readers.timebase import rebuild
 from upright.records import Array, Record
+from upright.records.columns import time_scale
 from upright.records.exchange import KEY
 
 Variables = dict[str, Any]

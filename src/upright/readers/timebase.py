@@ -7,7 +7,6 @@ Such a time base is rebuilt from the sample index; a true jitter is left as it i
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from decimal import Decimal, InvalidOperation
 
@@ -16,26 +15,11 @@ import numpy as np
 from upright.readers.source import Source
 from upright.records import Array
 
-TIME_NAMES = ("t", "time", "t_received", "timestamp", "__time", "tout", "time_s", "t_s", "seconds", "sec")
 INDEX_NAMES = ("sample", "n", "index", "i", "k", "no", "step", "row")
-_UNIT_SUFFIX = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
 
 # A rounding below one part in 50 of the period disturbs a fit less than the sensors do.
 _MATTERS = 0.02
 _EPOCH = 1e6  # s; a clock that reads more than 11 days counts from an epoch
-
-
-def time_scale(name: str) -> float:
-    """Seconds per unit of a column that is called like a time; 0 when it is not.
-
-    ``"t"``, ``"Time"``, ``"time [ms]"``, ``"Time (s)"`` and ``"t_us"`` are.
-    """
-    match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(]\s*(\w+)\s*[\])])?\s*", name.casefold())
-    stem, unit = (match[1], match[2] or "") if match else ("", "")
-    if stem in TIME_NAMES:
-        return _UNIT_SUFFIX.get(unit, 0.0) if unit else 1.0
-    head, _, suffix = stem.rpartition("_")
-    return _UNIT_SUFFIX.get(suffix, 0.0) if head in TIME_NAMES else 0.0
 
 
 def is_index(name: str, values: Array) -> bool:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import BadInput
+from upright.records.columns import stated_unit, take_time
 from upright.records.provenance import Provenance
 
 Array = NDArray[np.float64]
@@ -82,12 +83,28 @@ class Exchange:
         return frame
 
     @classmethod
-    def from_pandas(cls, frame: Any) -> Self:
-        """Record of a frame indexed by time [s]."""
-        signals = {str(name): frame.iloc[:, j].to_numpy() for j, name in enumerate(frame.columns)}
-        if len(signals) < len(frame.columns):
+    def from_pandas(cls, frame: Any, *, time: str | None = None) -> Self:
+        """Record of a data frame.
+
+        Parameters
+        ----------
+        frame : pandas.DataFrame
+        time : str, optional
+            Column that holds the time, in s unless its name states a unit, as ``"time [ms]"`` does. When omitted: the
+            index that was made the time; where the index only numbers the rows, the one column called like a time.
+
+        Raises
+        ------
+        BadInput
+            When no column, or more than one, can be the time, or the frame does not make a record.
+        """
+        about = str(frame.attrs.get(KEY, ""))
+        t, rest = take_time(frame, time)
+        signals = {str(name): rest.iloc[:, j].to_numpy() for j, name in enumerate(rest.columns)}
+        if len(signals) < len(rest.columns):
             raise BadInput("Every column of the data frame needs a name of its own, got duplicates; rename them.")
-        return cls.rebuild(frame.index.to_numpy(), signals, str(frame.attrs.get(KEY, "")))
+        stated = {} if about else {name: stated_unit(name) for name in signals}
+        return cls.rebuild(t, signals, about, stated)
 
     def to_xarray(self) -> Any:
         """Dataset with coordinate t [s]."""

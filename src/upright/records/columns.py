@@ -1,0 +1,81 @@
+"""What do the names of columns state: which one is the time, and in which unit is each?"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.errors import BadInput, nearest
+
+TIME_NAMES = ("t", "time", "t_received", "timestamp", "__time", "tout", "time_s", "t_s", "seconds", "sec")
+_UNIT_SUFFIX = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+
+
+def time_scale(name: str) -> float:
+    """Seconds per unit of a column that is called like a time; 0 when it is not.
+
+    ``"t"``, ``"Time"``, ``"time [ms]"``, ``"Time (s)"`` and ``"t_us"`` are.
+    """
+    match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(]\s*(\w+)\s*[\])])?\s*", name.casefold())
+    stem, unit = (match[1], match[2] or "") if match else ("", "")
+    if stem in TIME_NAMES:
+        return _UNIT_SUFFIX.get(unit, 0.0) if unit else 1.0
+    head, _, suffix = stem.rpartition("_")
+    return _UNIT_SUFFIX.get(suffix, 0.0) if head in TIME_NAMES else 0.0
+
+
+def stated_unit(name: str) -> str:
+    """Unit in brackets behind a name, as in ``theta [rad]``; empty when there is none that can be read."""
+    match = re.fullmatch(r".*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*", name)
+    if match is None:
+        return ""
+    from upright.units import known
+
+    return match[1] if known(match[1]) else ""
+
+
+def take_time(frame: Any, name: str | None = None) -> tuple[NDArray[np.float64], Any]:
+    """Time [s] of a data frame, and the frame without it.
+
+    A column `name` is the time when it is given. Otherwise an index that was set to it is, one of stamps counted from
+    the first; an index that only numbers the rows is none, and the one column called like a time stands in for it.
+
+    Raises
+    ------
+    BadInput
+        When `name` is no column, or nothing or several things could be the time.
+    """
+    columns = [str(c) for c in frame.columns]
+    if name is None and not _numbers_rows(frame.index):
+        return _seconds(frame.index, 1.0), frame
+    if name is None:
+        like = [c for c in columns if time_scale(c)]
+        if len(like) != 1:
+            what = f"{' and '.join(like)} are called so" if like else f"its columns are {', '.join(columns)}"
+            raise BadInput(
+                f"A record needs one column of time, and {what}; name it, as in time='{(like or columns or ['t'])[0]}',"
+                " or make it the index of the frame."
+            )
+        name = like[0]
+    if name not in columns:
+        raise BadInput(f"The data frame has no column '{name}' to be the time; {nearest(name, columns)}")
+    at = columns.index(name)
+    rest = frame.iloc[:, [i for i in range(len(columns)) if i != at]]
+    return _seconds(frame.iloc[:, at], time_scale(name) or 1.0), rest
+
+
+def _numbers_rows(index: Any) -> bool:
+    """Whether an index counts rows and says nothing of time: whole numbers, never called a time."""
+    return np.asarray(index).dtype.kind in "iu" and not time_scale(str(index.name or ""))
+
+
+def _seconds(values: Any, unit: float) -> NDArray[np.float64]:
+    array = np.asarray(values)
+    if array.dtype.kind == "M":
+        array = array - array[:1]
+    if array.dtype.kind == "m":
+        return array / np.timedelta64(1, "s")
+    return array * unit if array.dtype.kind in "iuf" else array
