@@ -37,7 +37,7 @@ class Count:
 
 def count(fault: str, each: int, seed: int) -> Count:
     """Records of every plant with one fault ("" for none), examined with their rig known."""
-    from upright.doctor import examine
+    from upright.diagnosis import examine
 
     hits = others = records = 0
     kinds: Counter[str] = Counter()

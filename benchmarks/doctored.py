@@ -110,7 +110,7 @@ def excitation(how: str, t: np.ndarray, w: float, rng: np.random.Generator) -> n
 
 def batch(plant: str, fault: str, n: int, seed: int) -> list[Doctored]:
     """Records of one plant with one fault ("" for none), `n` of them."""
-    from upright.law import state_feedback
+    from upright.laws import state_feedback
     from upright.physics import find
     from upright.simulation import simulate
 
@@ -198,7 +198,7 @@ def _record(
     reference: np.ndarray | None, own: dict[str, float], gain: float, rng: np.random.Generator,
 ) -> Doctored:  # fmt: skip
     """Sensors, log and fault of one motion."""
-    from upright.doctor import KnownRig
+    from upright.diagnosis import KnownRig
     from upright.identification import Parameter
     from upright.physics.actuator import ACTUATOR
     from upright.records import Provenance, Record

@@ -39,7 +39,7 @@ def trajectory(*, stick_slip: bool) -> Callable[[], np.ndarray]:
 
 def ensemble(p: np.ndarray, x0: np.ndarray, *, samples: int, stick_slip: bool) -> Callable[[], np.ndarray]:
     """n closed loops; last states (4, n)."""
-    from upright.law import state_feedback
+    from upright.laws import state_feedback
     from upright.physics import Furuta
     from upright.simulation import ensemble as loops
 

@@ -49,7 +49,7 @@ class Told:
 
 def identify(truth: ServoRig, seed: int) -> tuple[ServoRig, tuple[str, ...], Array] | None:
     """Best numbers and their covariance, in logarithms, from a log of the hanging rig; None when the search strays."""
-    from upright.lab.makes import make_of, make_rig
+    from upright.experiments.makes import make_of, make_rig
     from upright.simulation import simulate
 
     rng = np.random.default_rng([seed, 61])
@@ -114,7 +114,7 @@ def drawn(
 
 def setting(make: str, seed: int) -> tuple[ServoRig, np.random.Generator]:
     """The true rig, with its drive of this seed, and what is drawn besides."""
-    from upright.lab.makes import MAKES, make_rig
+    from upright.experiments.makes import MAKES, make_rig
 
     rng = np.random.default_rng([seed, 60])
     truth = make_rig(make, seed)
@@ -126,7 +126,7 @@ def setting(make: str, seed: int) -> tuple[ServoRig, np.random.Generator]:
 
 def of_the_day(rig: ServoRig, others: Mapping[str, Array], rng: np.random.Generator, lanes: int) -> dict[str, Array]:
     """The same rigs, each with the dry friction of its day."""
-    from upright.lab.identified import DAILY
+    from upright.experiments.identified import DAILY
 
     today = {n: np.exp(rng.normal(0, DAILY, lanes)) * others.get(n, getattr(rig.plant, n)) for n in ("b_1c", "b_2c")}
     return {**others, **today}
@@ -134,19 +134,19 @@ def of_the_day(rig: ServoRig, others: Mapping[str, Array], rng: np.random.Genera
 
 def hands(start: Array, rng: np.random.Generator, lanes: int) -> Array:
     """Starts as a hand gives them."""
-    from upright.lab.regulation_2.run import HAND
+    from upright.experiments.regulation_2.run import HAND
 
     return start + rng.normal(size=(lanes, 4)) * np.array([0, 0, *HAND])
 
 
 def one(make: str, seed: int, *, swept: Path | None = None) -> Told | None:
     """One twin from identification to outcome; `swept` is a folder for one identified as in experiment 1b."""
-    from upright import design
+    from upright import gains as design
     from upright.control.many import outcomes
-    from upright.design.requests import read_poles
-    from upright.lab.designing.run import SPEEDS, velocities
-    from upright.lab.makes import make_rig
-    from upright.lab.regulation_2.run import SETS, identify_make
+    from upright.experiments.designing.run import SPEEDS, velocities
+    from upright.experiments.makes import make_rig
+    from upright.experiments.regulation_2.run import SETS, identify_make
+    from upright.gains.requests import read_poles
 
     truth, rng = setting(make, seed)
     if swept is None:

@@ -14,10 +14,10 @@ import numpy as np
 
 from upright.control import design_swing_up
 from upright.control.ascent import swing_up
-from upright.lab.frequency_1b.run import run_frequency
-from upright.lab.identified import read_identified
-from upright.lab.makes import make_rig
-from upright.lab.regulation_2.run import run_regulation
+from upright.experiments.frequency_1b.run import run_frequency
+from upright.experiments.identified import read_identified
+from upright.experiments.makes import make_rig
+from upright.experiments.regulation_2.run import run_regulation
 from upright.report.drawing import CYCLE, figure, save, styled
 
 seed = int(sys.argv[1]) if sys.argv[1:] else 0

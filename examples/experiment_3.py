@@ -9,8 +9,8 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from upright.lab.tracking_3.figures import steps_figure
-from upright.lab.tracking_3.run import run_tracking
+from upright.experiments.tracking_3.figures import steps_figure
+from upright.experiments.tracking_3.run import run_tracking
 from upright.report.drawing import save
 
 seed = int(sys.argv[1]) if sys.argv[1:] else 0

@@ -10,10 +10,10 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from upright.lab.free_swing_4.drift import drift_paths
-from upright.lab.free_swing_4.release import freed
-from upright.lab.free_swing_4.studies import fit_question, recovered, write_questions
-from upright.lab.makes import make_rig
+from upright.experiments.free_swing_4.drift import drift_paths
+from upright.experiments.free_swing_4.release import freed
+from upright.experiments.free_swing_4.studies import fit_question, recovered, write_questions
+from upright.experiments.makes import make_rig
 from upright.physics import Furuta
 from upright.report.drawing import save
 from upright.report.fit.figures import fit_figure

@@ -13,17 +13,17 @@ BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 
 # Rooms from the ground up: each imports from those above its own line only. Rooms on one line do not see each other.
 FLOORS = """
-errors progress files
+errors progress files shown
 quantities
 units
 signals
 records
 readers
 physics
-law
+laws
 simulation.kernel
 simulation
-design
+gains
 closed_loop
 identification.model
 identification.problem
@@ -38,15 +38,15 @@ control
 report
 report.fit
 report.ladder report.law report.log
-doctor survey
+diagnosis questionnaire
 paper
-lab.makes
-lab.identified
-lab.designing lab.weighing_1a
-lab.frequency_1b
-lab.regulation_2
-lab.swing_up_2b lab.tracking_3 lab.free_swing_4
-lab
+experiments.makes
+experiments.identified
+experiments.designing experiments.weighing_1a
+experiments.frequency_1b
+experiments.regulation_2
+experiments.swing_up_2b experiments.tracking_3 experiments.free_swing_4
+experiments
 cli
 __main__
 """
@@ -54,12 +54,12 @@ FLOOR = {room: floor for floor, line in enumerate(FLOORS.split("\n")) for room i
 # What a room has no business to know although it stands above it.
 BLIND = {
     "physics": {"units", "signals", "records", "readers"},
-    "law": {"units", "signals", "records", "readers", "physics"},
+    "laws": {"units", "signals", "records", "readers", "physics"},
     "simulation.kernel": {"units", "signals", "records", "readers"},
     "simulation": {"units", "signals", "records", "readers"},
-    "design": {"signals", "records", "readers", "simulation", "simulation.kernel"},
+    "gains": {"signals", "records", "readers", "simulation", "simulation.kernel"},
     "control": {"readers", "identification", "study"},
-    "survey": {"records", "readers", "physics", "simulation", "identification", "study", "control"},
+    "questionnaire": {"records", "readers", "physics", "simulation", "identification", "study", "control"},
 }
 # How a page is written is one thing, what it says another.
 BLIND["report"] = FLOOR.keys() - {"errors", "files", "progress", "quantities", "units"}
@@ -69,7 +69,7 @@ DOORS = {
     "numba": "simulation",
     "scipy.optimize": "identification closed_loop",
     "lmfit": "identification",
-    "mpmath": "design",
+    "mpmath": "gains",
     "matplotlib": "report figures frames",
     "jinja2": "report",
     "typst": "report",
@@ -198,20 +198,20 @@ def test_no_file_is_called_after_a_drawer():
         ("from upright.report import figures", "upright.identification.estimate"),
         ("from upright import records", "upright.physics.plant"),
         ("from upright import identify", "upright.cli.model.identify"),
-        ("def later():\n    from upright.cli import app", "upright.lab.laboratory"),
+        ("def later():\n    from upright.cli import app", "upright.experiments.laboratory"),
         ("from ..simulation import simulate", "upright.physics.plant"),
         ("from upright.identification.estimate import identify", "upright.identification.problem.residuals"),
-        ("from upright.lab.tracking_3 import run", "upright.lab.free_swing_4.run"),
+        ("from upright.experiments.tracking_3 import run", "upright.experiments.free_swing_4.run"),
         ("import sympy as sp", "upright.simulation.kernel.source"),
-        ("def later():\n    from sympy import sin", "upright.lab.laboratory"),
+        ("def later():\n    from sympy import sin", "upright.experiments.laboratory"),
         ("from scipy import optimize", "upright.simulation.kernel.source"),
         ("import scipy.optimize", "upright.report.fit.figures"),
         ("from scipy.optimize import brentq", "upright.physics.plant"),
         ("import lmfit", "upright.report.fit.tables"),
         ("import upright.records", "upright.report.page"),
-        ("import jinja2", "upright.lab.weighing_1a.chapter"),
-        ("import matplotlib", "upright.lab.weighing_1a.chapter"),
-        ("from matplotlib.figure import Figure", "upright.doctor.chapter"),
+        ("import jinja2", "upright.experiments.weighing_1a.chapter"),
+        ("import matplotlib", "upright.experiments.weighing_1a.chapter"),
+        ("from matplotlib.figure import Figure", "upright.diagnosis.chapter"),
         ("import numba", "upright.physics.derived"),
         ("import pint", "upright.study.load"),
         ("x = 1", "upright.drawer.thing"),
@@ -229,9 +229,9 @@ def test_an_arrow_that_points_up_is_refused(source, module):
         ("from ..physics import find", "upright.simulation.simulate"),
         ("import scipy.linalg", "upright.physics.linear"),
         ("from upright import __version__", "upright.report.html"),
-        ("from matplotlib.figure import Figure", "upright.lab.weighing_1a.figures"),
+        ("from matplotlib.figure import Figure", "upright.experiments.weighing_1a.figures"),
         ("import matplotlib", "upright.report.drawing"),
-        ("def later():\n    from upright.lab import laboratory", "upright.cli.course.lab"),
+        ("def later():\n    from upright.experiments import laboratory", "upright.cli.course.lab"),
         ("import sympy", "upright.physics.lagrange"),
         ("from upright.identification.problem.residuals import Problem", "upright.identification.search.descent"),
     ],

@@ -12,7 +12,7 @@ from scipy.stats import norm
 from typer.testing import CliRunner
 
 from upright.cli import app
-from upright.law import Law
+from upright.laws import Law
 from upright.physics import Furuta
 from upright.report.symbols import number
 from upright.simulation import simulate

@@ -9,8 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 from upright.cli import app
-from upright.lab import laboratory
-from upright.lab.laboratory import EXPERIMENTS, Experiment
+from upright.experiments import laboratory
+from upright.experiments.laboratory import EXPERIMENTS, Experiment
 from upright.report.page import Chapter
 
 

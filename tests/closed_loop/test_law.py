@@ -13,7 +13,7 @@ from upright.errors import BadInput
 from upright.identification import Parameter, Rig, Run
 from upright.identification.problem.simulated import motions, simulator
 from upright.identification.problem.tracks import prepare
-from upright.law import Law, state_feedback
+from upright.laws import Law, state_feedback
 from upright.physics import find
 
 LAWS = {

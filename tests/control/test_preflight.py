@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from upright import design
+from upright import gains as design
 from upright.control import Scores
 from upright.control.many import outcomes
 from upright.control.preflight import Task, largest, preflight, words
-from upright.design.requests import read_poles
 from upright.errors import BadInput
-from upright.lab.makes import make_rig
+from upright.experiments.makes import make_rig
+from upright.gains.requests import read_poles
 from upright.paper.tables import TABLE_1
 
 RIG = make_rig("furuta")

@@ -15,7 +15,7 @@ from upright.control.ascent import swing_up
 from upright.control.swing_up import AWAY, FADE, body
 from upright.control.swing_up_law import HOLDING, PARAMETERS, TRIPPED, swing_and_hold
 from upright.errors import BadInput
-from upright.lab.makes import make_rig
+from upright.experiments.makes import make_rig
 
 MAKES = ("furuta", "linear")
 

@@ -8,20 +8,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from upright import design
 from upright.control import Trial, score, trial
 from upright.control.trial import readings
-from upright.design.loop import closed
 from upright.errors import BadInput
-from upright.lab.makes import make_rig
+from upright.experiments.makes import make_rig
+from upright.gains import feedback, filtered, hold, place
+from upright.gains.loop import closed
 from upright.records import Record
 
 RIG = make_rig("furuta")
 MODEL = RIG.linear("inverted")
-SAMPLED = design.hold(MODEL, RIG.period, RIG.delay / RIG.period)
+SAMPLED = hold(MODEL, RIG.period, RIG.delay / RIG.period)
 SET_1 = [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220]
-GAINS = design.place(MODEL.A, MODEL.B, SET_1).K
-LAW = design.feedback(design.filtered(SAMPLED, 0.5), GAINS)
+GAINS = place(MODEL.A, MODEL.B, SET_1).K
+LAW = feedback(filtered(SAMPLED, 0.5), GAINS)
 # the same compiled terms as on the true rig, with next to nothing in them
 IDEAL = replace(
     RIG.changed(b_1c=1e-15, b_2c=1e-15), lag=0.0, converter=0.0, counts=(1e14, 1e14)

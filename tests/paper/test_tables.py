@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 from tests.paper import printed
 from tests.paper.test_errata import possible
 from upright.cli import app
-from upright.design import lqr
-from upright.design.factorization import effort_ratios, recover_locus
-from upright.lab.makes import NOMINAL
+from upright.experiments.makes import NOMINAL
+from upright.gains import lqr
+from upright.gains.factorization import effort_ratios, recover_locus
 from upright.paper import tables
 from upright.paper.errata import printed_inverted
 from upright.paper.reproduce import reproduce

@@ -33,8 +33,8 @@ def log_page(folder: Path) -> Chapter:
 
 
 def doctor_page(folder: Path) -> Chapter:
-    from upright.doctor import examine
-    from upright.doctor.chapter import chapter
+    from upright.diagnosis import examine
+    from upright.diagnosis.chapter import chapter
 
     lost = Record(
         t=T, signals={"theta": SWING + np.where(T > 2.2, 0.15, 0.0)}, units={"theta": "rad"}, outputs=("theta",)
@@ -52,8 +52,8 @@ def law_page(folder: Path) -> Chapter:
 
 def survey_page(name: str, answers: int | None = None):
     def page(folder: Path) -> Chapter:
-        from upright.survey import read
-        from upright.survey.chapter import chapter
+        from upright.questionnaire import read
+        from upright.questionnaire.chapter import chapter
 
         return chapter(read(EXAMPLES / "survey" / name), title="Survey", source=name, answers=answers)
 
@@ -62,21 +62,21 @@ def survey_page(name: str, answers: int | None = None):
 
 def design_page(**wish):
     def page(folder: Path) -> Chapter:
-        from upright.lab.designing.chapter import chapter
-        from upright.lab.designing.run import DesignRequest, design_for
-        from upright.lab.identified import IdentifiedRig
+        from upright.experiments.designing.chapter import chapter
+        from upright.experiments.designing.run import DesignRequest, design_for
+        from upright.experiments.identified import IdentifiedRig
         from upright.physics import Furuta
 
         plant = Furuta(m_p=0.135, l_cg=0.19, r=0.16, J_d=0.011, J_p=6e-4, b_1=6e-4)
         others = tuple((plant.replace(m_p=m), 0.5) for m in (0.134, 0.136))
-        rig = IdentifiedRig(plant=plant, name="furuta", gain=0.5, unit="V", late=0.0, lag=0.0, draws=others)
+        rig = IdentifiedRig(plant=plant, name="furuta", gain=0.5, unit="V", delay=0.0, lag=0.0, draws=others)
         return chapter(design_for(rig, DesignRequest(at="inverted", limit=1.0, **wish)))
 
     return page
 
 
 def paper_page(folder: Path) -> Chapter:
-    from upright.lab.makes import NOMINAL
+    from upright.experiments.makes import NOMINAL
     from upright.paper.chapter import chapter
     from upright.paper.reproduce import reproduce
 
@@ -100,19 +100,18 @@ def ladder_page(folder: Path) -> Chapter:
 
 def short_ladder_page(folder: Path) -> Chapter:
     """Two rungs made by hand: the second was refused."""
-    from upright.identification.ladder.growth import Ladder
+    from upright.identification.ladder.growth import Ladder, RungResult
     from upright.identification.ladder.repeats import Repeats
     from upright.identification.ladder.rungs import Rung
     from upright.report.ladder import chapter
-    from upright.report.page import Step
 
     fit = make_fit()
     scores = {"release": fit.runs["tail"]}
     common = {"cost": 0.0312, "parameters": 4, "own": 2, "values": {}, "seconds": 1.26}
-    viscous = Step(rung=Rung(name="viscous", adds=("b_1",)), kept=True, reason="It is the first.",
+    viscous = RungResult(rung=Rung(name="viscous", adds=("b_1",)), kept=True, reason="It is the first.",
                    fitted={"release": {"psi": 96.0, "theta": 97.0}},
                    predicted={"release": {"psi": 95.0, "theta": 94.5}}, **common)  # fmt: skip
-    dry = Step(rung=Rung(name="dry", adds=("b_1c",), drops=("b_1",)), kept=False, reason="It predicts no better.",
+    dry = RungResult(rung=Rung(name="dry", adds=("b_1c",), drops=("b_1",)), kept=False, reason="It predicts no better.",
                fitted={"release": {"psi": 97.0, "theta": 97.5}}, predicted={"release": {"psi": -3.0, "theta": 1.0}},
                **common)  # fmt: skip
     twice = Repeats(labels=("release", "tail"), percents={"theta": (97.0, 98.0)}, errors={"release": 0.0, "tail": 0.0})
@@ -127,37 +126,37 @@ ANSWER = np.array([0.4 - 0.1j, -1.3 - 0.6j, -0.05 + 0.002j])
 
 def measured_response_page(folder: Path) -> Chapter:
     """A response that was measured, of a rig that nobody named."""
+    from upright.experiments.frequency_1b.chapter import log_chapter
     from upright.identification.frequency.response import FrequencyResponse
-    from upright.lab.frequency_1b.chapter import log_chapter
 
     response = FrequencyResponse(
         omega=OMEGA, response=ANSWER[:, None], outputs=("theta",), units=("rad", "V"),
         variance=np.full((3, 1), 1e-8), coherence=np.array([[0.999], [0.98], [0.97]]),
     )  # fmt: skip
-    from upright.lab.frequency_1b.from_logs import LoggedResponse
+    from upright.experiments.frequency_1b.from_logs import LoggedResponse
 
     return log_chapter(LoggedResponse(sources=("sines.csv",), response=response, answer=None, folder=folder))
 
 
 def loadings_page(folder: Path) -> Chapter:
-    from upright.lab.makes import make_rig
-    from upright.lab.weighing_1a.chapter import chapter
-    from upright.lab.weighing_1a.run import run_weighing
+    from upright.experiments.makes import make_rig
+    from upright.experiments.weighing_1a.chapter import chapter
+    from upright.experiments.weighing_1a.run import run_weighing
 
     return chapter(run_weighing(make_rig("rectilinear", 2), 2, folder))
 
 
 def frequency_page(folder: Path) -> Chapter:
-    from upright.lab.frequency_1b.chapter import chapter
-    from upright.lab.frequency_1b.run import run_frequency
+    from upright.experiments.frequency_1b.chapter import chapter
+    from upright.experiments.frequency_1b.run import run_frequency
 
     return chapter(run_frequency("linear", 4, folder))
 
 
 def own_frequency_page(folder: Path) -> Chapter:
-    from upright.lab.frequency_1b.chapter import log_chapter
-    from upright.lab.frequency_1b.from_logs import LogRequest, response_of_logs
-    from upright.lab.frequency_1b.run import run_frequency
+    from upright.experiments.frequency_1b.chapter import log_chapter
+    from upright.experiments.frequency_1b.from_logs import LogRequest, response_of_logs
+    from upright.experiments.frequency_1b.run import run_frequency
 
     run_frequency("linear", 4, folder)
     request = LogRequest(signals={}, counts={}, known={})
@@ -165,33 +164,33 @@ def own_frequency_page(folder: Path) -> Chapter:
 
 
 def regulation_page(folder: Path) -> Chapter:
-    from upright.lab.makes import make_rig
-    from upright.lab.regulation_2.chapter import chapter
-    from upright.lab.regulation_2.run import RegulationRequest, identify_make, run_regulation
+    from upright.experiments.makes import make_rig
+    from upright.experiments.regulation_2.chapter import chapter
+    from upright.experiments.regulation_2.run import RegulationRequest, identify_make, run_regulation
 
     wish = RegulationRequest(draws=16, seconds=2.0)
     return chapter(run_regulation(identify_make("linear", 1, folder), make_rig("linear", 1), 1, folder, wish=wish))
 
 
 def swing_up_page(folder: Path) -> Chapter:
-    from upright.lab.makes import make_rig
-    from upright.lab.swing_up_2b.chapter import chapter
-    from upright.lab.swing_up_2b.run import run_swing_up
+    from upright.experiments.makes import make_rig
+    from upright.experiments.swing_up_2b.chapter import chapter
+    from upright.experiments.swing_up_2b.run import run_swing_up
 
     return chapter(run_swing_up(make_rig("furuta"), make_rig("furuta", 3), 3, folder))
 
 
 def tracking_page(folder: Path) -> Chapter:
-    from upright.lab.tracking_3.chapter import chapter
-    from upright.lab.tracking_3.run import run_tracking
+    from upright.experiments.tracking_3.chapter import chapter
+    from upright.experiments.tracking_3.run import run_tracking
 
     return chapter(run_tracking("rectilinear", 1, folder))
 
 
 def free_swing_page(folder: Path) -> Chapter:
-    from upright.lab.free_swing_4.chapter import chapter
-    from upright.lab.free_swing_4.run import run_free_swing
-    from upright.lab.makes import make_rig
+    from upright.experiments.free_swing_4.chapter import chapter
+    from upright.experiments.free_swing_4.run import run_free_swing
+    from upright.experiments.makes import make_rig
 
     return chapter(run_free_swing(make_rig("furuta", 1), 1, folder))
 

@@ -182,8 +182,8 @@ def test_what_a_person_wrote_is_never_taken_for_markup(page, tmp_path):
 
 
 def test_the_laboratory_tells_every_chapter_on_all_three(tmp_path):
-    from upright.lab.laboratory import EXPERIMENTS, ExperimentResult, Session
-    from upright.lab.laboratory_page import book, date
+    from upright.experiments.laboratory import EXPERIMENTS, ExperimentResult, Session
+    from upright.experiments.laboratory_page import book, date
 
     pypdf = pytest.importorskip("pypdf")
     found = (Finding(what="stiffness [N/m]", value="412.5", interval="409.1 to 415.9", truth="411.2"),)

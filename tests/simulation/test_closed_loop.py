@@ -11,7 +11,7 @@ from scipy.signal import cont2discrete
 from tests.simulation.conftest import BLOCK, FURUTA
 from tests.simulation.test_smooth_motion import lagrange
 from upright.errors import BadInput
-from upright.law import state_feedback
+from upright.laws import state_feedback
 from upright.simulation import ensemble, simulate
 
 SPRING = {**BLOCK, "m": 0.8, "k": 12.0, "c": 0.4}

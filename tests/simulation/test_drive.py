@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from tests.simulation.conftest import BLOCK, FURUTA
-from upright.law import state_feedback
+from upright.laws import state_feedback
 from upright.simulation import ACTUATOR, Simulator, choose, ensemble, simulate
 
 IDLE = {name: what.default for name, what in ACTUATOR.items()}

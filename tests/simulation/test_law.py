@@ -10,7 +10,7 @@ from scipy.linalg import expm
 
 from tests.simulation.conftest import BLOCK, FURUTA
 from upright.errors import BadInput
-from upright.law import Law, state_feedback
+from upright.laws import Law, state_feedback
 from upright.simulation import Simulator, choose, ensemble, simulate
 
 SPRING = {**BLOCK, "m": 0.8, "k": 12.0, "c": 0.4}

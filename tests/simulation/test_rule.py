@@ -11,7 +11,7 @@ import pytest
 
 from tests.simulation.conftest import BLOCK, FURUTA
 from upright.errors import BadInput
-from upright.law import Law, Rule
+from upright.laws import Law, Rule
 from upright.simulation import Simulator, choose, ensemble, simulate
 
 SPRING = {**BLOCK, "m": 0.8, "k": 12.0, "c": 0.4}

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.law import Law
+from upright.laws import Law
 
 Array = NDArray[np.float64]
 

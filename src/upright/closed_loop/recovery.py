@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.closed_loop.structures import Channel
-from upright.law import Law
+from upright.laws import Law
 
 Array = NDArray[np.float64]
 Quality = Literal["exact", "rounding", "partial", "poor"]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.closed_loop.structures import Channel, Filter, On, joined, memory
-from upright.law import Law
+from upright.laws import Law
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import BadInput
-from upright.law import Law
+from upright.laws import Law
 
 Array = NDArray[np.float64]
 On = Literal["error", "measurement"]

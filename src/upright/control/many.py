@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from upright.control.rig import ServoRig
 from upright.control.score import Scores, scores
 from upright.control.trial import SUBSTEPS, at_work
-from upright.law import Law
+from upright.laws import Law
 from upright.simulation import simulate
 
 Array = NDArray[np.float64]

@@ -17,11 +17,11 @@ from upright.control.many import outcomes
 from upright.control.rig import ServoRig
 from upright.control.score import Score, Scores, score
 from upright.control.trial import Trial, trial
-from upright.design import Margins, Sampled, hold, margins
-from upright.design.loop import closed, command_noise
-from upright.design.requests import poles_of
 from upright.errors import BadInput
-from upright.law import Law
+from upright.gains import Margins, Sampled, hold, margins
+from upright.gains.loop import closed, command_noise
+from upright.gains.requests import poles_of
+from upright.laws import Law
 from upright.physics import Linear
 
 Array = NDArray[np.float64]

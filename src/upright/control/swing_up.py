@@ -15,13 +15,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upright import design
+from upright import gains as design
 from upright.control.rig import ServoRig
 from upright.control.swing_up_law import HOLDING, PARAMETERS, SWINGING, swing_and_hold
 from upright.control.trial import SUBSTEPS, readings
-from upright.design.requests import poles_of
 from upright.errors import BadInput
-from upright.law import Rule
+from upright.gains.requests import poles_of
+from upright.laws import Rule
 from upright.simulation import simulate
 
 Array = NDArray[np.float64]

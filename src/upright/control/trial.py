@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from upright.control.rig import ServoRig
 from upright.errors import BadInput
-from upright.law import Law, Rule
+from upright.laws import Law, Rule
 from upright.records import Provenance, Record
 from upright.simulation import simulate
 

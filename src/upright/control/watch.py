@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upright import design
 from upright.control.rig import ServoRig
 from upright.control.trial import Trial, trial
-from upright.law import Law
+from upright.gains import hold, shaken
+from upright.laws import Law
 
 Array = NDArray[np.float64]
 
@@ -119,7 +119,7 @@ class Watch:
         self.model, self.at = model, at
         self.suspicions = (Suspicion(), *(Suspicion(name=n, factor=f) for f in FACTORS for n in names))
         linear = model.linear(at)
-        sampled = design.hold(linear, model.period, (model.delay + model.lag) / model.period)
+        sampled = hold(linear, model.period, (model.delay + model.lag) / model.period)
         self._A, self._B, n = sampled.A, sampled.B[:, 0], sampled.A.shape[0]
         scales = np.ones((len(self.suspicions), len(names)))
         for i, s in enumerate(self.suspicions[1:], start=1):
@@ -129,7 +129,7 @@ class Watch:
         noise = model.quantum**2 / 12
         # in what is shown, all suspicions expect the same disturbance: they are told apart by motions, not by noise
         shaking = unknown * model.limit * np.abs(linear.B[1::2, 0]) / np.abs(scales)
-        W = np.array([design.shaken(sampled, a) for a in shaking])
+        W = np.array([shaken(sampled, a) for a in shaking])
         # the start is known to a rad or m, and at rest to a rad/s or m/s; commands on their way are known
         P = np.zeros((len(scales), n, n))
         P[:, range(4), range(4)] = np.repeat(scales, 2, axis=1) ** -2.0

@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from upright.design.factorization import Locus
-from upright.design.requests import matched, written
+from upright.gains.factorization import Locus
+from upright.gains.requests import matched, written
 from upright.paper.reproduce import Regenerated, Reproduced
 from upright.paper.tables import STUDENTS
+from upright.questionnaire.figures import answers_figure
 from upright.report.drawing import BLACK, BLUE, VERMILLION
 from upright.report.page import Chapter, Part, Picture, Points, Step, Table
 from upright.report.poles import Poles, locus_figure, pole_map
 from upright.report.symbols import number
-from upright.survey.figures import answers_figure
 
 
 def _set_table(table: Regenerated) -> Table:

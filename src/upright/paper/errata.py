@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from upright.paper.tables import TABLE_3_FIRST, TABLE_4
 from upright.physics import Furuta
-from upright.survey.grim import possible
+from upright.questionnaire.grim import possible
 
 Array = NDArray[np.float64]
 

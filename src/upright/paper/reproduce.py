@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.design import place
-from upright.design.factorization import Locus, effort_ratios, recover_locus
-from upright.design.requests import matched, poles_of
+from upright.gains import place
+from upright.gains.factorization import Locus, effort_ratios, recover_locus
+from upright.gains.requests import matched, poles_of
 from upright.paper import tables
 from upright.paper.errata import Erratum, errata, impossible_means, printed_inverted
 from upright.physics import Furuta

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput
-from upright.law.linear import Law
-from upright.law.rule import Rule
+from upright.laws.linear import Law
+from upright.laws.rule import Rule
 from upright.physics.equations import Derived
 from upright.physics.plant import Plant
 from upright.simulation.held import Held

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput
-from upright.law.linear import Law
-from upright.law.rule import Rule, Written, compiling
+from upright.laws.linear import Law
+from upright.laws.rule import Rule, Written, compiling
 from upright.physics.actuator import ACTUATOR
 from upright.physics.equations import Derived
 from upright.simulation.held import Held

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from upright.closed_loop import Channel, ClosedLoop, Filter, joined, recover
 from upright.closed_loop.structures import memory
 from upright.errors import nearest
-from upright.law import Law, state_feedback
+from upright.laws import Law, state_feedback
 from upright.physics import Plant
 from upright.records import Record
 from upright.study import expressions

@@ -17,7 +17,7 @@ from upright.identification.inference.scoring import predict
 from upright.identification.model.rig import NOISE
 from upright.identification.problem.predictor import discrete_model, gains, restart_states, with_noise
 from upright.identification.problem.residuals import Problem, formulate
-from upright.law import state_feedback
+from upright.laws import state_feedback
 from upright.physics import Furuta
 from upright.simulation import simulate
 

@@ -12,7 +12,7 @@ from upright.errors import BadInput, nearest
 from upright.files import write_json
 
 if TYPE_CHECKING:
-    from upright.lab.identified import IdentifiedRig
+    from upright.experiments.identified import IdentifiedRig
 
 
 def design(
@@ -51,10 +51,10 @@ def design(
 
     upright design out/fit.json --at inverted --poles "-4.15+-1.63j, -16.9, -3.2"
     """
-    from upright.design.requests import read_poles
-    from upright.lab.designing.chapter import chapter
-    from upright.lab.designing.run import SPEEDS, DesignRequest, design_for
-    from upright.lab.identified import read_identified
+    from upright.experiments.designing.chapter import chapter
+    from upright.experiments.designing.run import SPEEDS, DesignRequest, design_for
+    from upright.experiments.identified import read_identified
+    from upright.gains.requests import read_poles
     from upright.report.symbols import typed
     from upright.units import parse, parse_if_given
 

@@ -11,7 +11,7 @@ from upright.cli.terminal import AsJson, Out, Pdf, progress_bar, tell, write_pag
 from upright.errors import BadInput
 
 if TYPE_CHECKING:
-    from upright.lab.regulation_2.run import RegulationRequest
+    from upright.experiments.regulation_2.run import RegulationRequest
 
 
 def regulate(
@@ -43,10 +43,10 @@ def regulate(
     upright regulate --rig furuta --seed 3
     upright regulate out/fit.json --seed 3 --set 2 --tilt "20 deg"
     """
-    from upright.lab.identified import read_identified
-    from upright.lab.makes import make_rig
-    from upright.lab.regulation_2.chapter import chapter
-    from upright.lab.regulation_2.run import identify_make, run_regulation
+    from upright.experiments.identified import read_identified
+    from upright.experiments.makes import make_rig
+    from upright.experiments.regulation_2.chapter import chapter
+    from upright.experiments.regulation_2.run import identify_make, run_regulation
     from upright.report.symbols import typed
 
     wish = _wish(which, poles, speed, memory, tilt, push, seconds)
@@ -74,8 +74,8 @@ def regulate(
 
 
 def _wish(which: str, poles: str, speed: str, memory: float, tilt: str, push: str, seconds: float) -> RegulationRequest:
-    from upright.design.requests import read_poles
-    from upright.lab.regulation_2.run import SETS, RegulationRequest
+    from upright.experiments.regulation_2.run import SETS, RegulationRequest
+    from upright.gains.requests import read_poles
     from upright.units import parse_if_given
 
     if which and poles:

@@ -51,10 +51,10 @@ def swing_up(
 
     upright swing-up out/fit.json --check swings.csv
     """
-    from upright.lab.identified import read_identified
-    from upright.lab.makes import make_rig
-    from upright.lab.swing_up_2b.chapter import chapter
-    from upright.lab.swing_up_2b.run import known_of, run_swing_up
+    from upright.experiments.identified import read_identified
+    from upright.experiments.makes import make_rig
+    from upright.experiments.swing_up_2b.chapter import chapter
+    from upright.experiments.swing_up_2b.run import known_of, run_swing_up
     from upright.report.symbols import typed
 
     if travel is not None and not travel > 0:
@@ -91,8 +91,8 @@ def swing_up(
 def _check(
     model: ServoRig, log: Path, known: Mapping[str, float] | None, out: Path, pdf: bool, as_json: bool, source: str
 ) -> None:
-    from upright.lab.swing_up_2b.chapter import check_chapter
-    from upright.lab.swing_up_2b.run import scales_of_log
+    from upright.experiments.swing_up_2b.chapter import check_chapter
+    from upright.experiments.swing_up_2b.run import scales_of_log
     from upright.readers import read
 
     told = check_chapter(model, scales_of_log(model, read(log), known), log.name, source)

@@ -46,11 +46,11 @@ def track(
     upright track --rig torsional --seed 3 -o out
     upright track out/fit.json --set 4 --step "6 mm"
     """
-    from upright.design.requests import read_poles
-    from upright.lab.makes import SHAFTS, make_rig
-    from upright.lab.tracking_3.chapter import chapter
-    from upright.lab.tracking_3.pulses import rig_of_file
-    from upright.lab.tracking_3.run import follow, run_tracking
+    from upright.experiments.makes import SHAFTS, make_rig
+    from upright.experiments.tracking_3.chapter import chapter
+    from upright.experiments.tracking_3.pulses import rig_of_file
+    from upright.experiments.tracking_3.run import follow, run_tracking
+    from upright.gains.requests import read_poles
     from upright.units import parse_if_given
 
     own = read_poles(poles) if poles else None

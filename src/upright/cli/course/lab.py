@@ -16,7 +16,7 @@ from upright.cli.terminal import console, print_json, progress_bar
 from upright.errors import BadInput
 
 if TYPE_CHECKING:
-    from upright.lab.laboratory import Session
+    from upright.experiments.laboratory import Session
     from upright.report.book import Book
 
 INTERRUPTED = 130
@@ -51,7 +51,7 @@ def lab(
     upright lab --rig linear --seed 3
     upright lab --experiment 1b --experiment 2 -o out
     """
-    from upright.lab.makes import make_named
+    from upright.experiments.makes import make_named
 
     if seed < 0:
         raise BadInput(f"--seed needs a whole number of at least 0, got {seed}.")
@@ -62,7 +62,7 @@ def lab(
         raise BadInput(f"results need a folder, but {folder} is a file; name another with -o.")
     from datetime import date
 
-    from upright.lab import laboratory, laboratory_page
+    from upright.experiments import laboratory, laboratory_page
     from upright.report.html import write_html
     from upright.report.pdf import available, write_pdf
 

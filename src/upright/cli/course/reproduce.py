@@ -23,7 +23,7 @@ def reproduce(
 
     upright reproduce -o out
     """
-    from upright.lab.makes import NOMINAL
+    from upright.experiments.makes import NOMINAL
     from upright.paper.chapter import chapter
     from upright.paper.reproduce import reproduce as again
 

@@ -31,10 +31,10 @@ def survey(
     upright survey ratings.csv -o out
     upright survey means.csv --n 53
     """
+    from upright.questionnaire import Ratings, read
+    from upright.questionnaire.chapter import chapter
     from upright.report.page import Step
     from upright.report.symbols import typed
-    from upright.survey import Ratings, read
-    from upright.survey.chapter import chapter
 
     ends = re.fullmatch(r"\s*(\d{1,2})\s*(?:-|to)\s*(\d{1,2})\s*", scale)
     if ends is None or int(ends[1]) >= int(ends[2]):

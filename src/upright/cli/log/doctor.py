@@ -11,7 +11,7 @@ from upright.cli.terminal import Pdf, tell, write_page
 from upright.errors import BadInput
 
 if TYPE_CHECKING:
-    from upright.doctor import Diagnosis
+    from upright.diagnosis import Diagnosis
 
 WRONG = 3
 
@@ -46,9 +46,9 @@ def doctor(
     Exit code: 0 nothing looks wrong, 3 something does, 2 the log or the rig
     cannot be read.
     """
-    from upright.doctor import examine, read_known
-    from upright.doctor.chapter import chapter
-    from upright.doctor.clock import read_mended
+    from upright.diagnosis import examine, read_known
+    from upright.diagnosis.chapter import chapter
+    from upright.diagnosis.clock import read_mended
     from upright.files import json_text
 
     if pdf and html is None:

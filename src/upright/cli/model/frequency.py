@@ -78,9 +78,9 @@ def frequency(
 
 
 def _of_twin(make: str, seed: int, ask: str, out: Path, progress: Progress) -> tuple[list[Path], Chapter]:
-    from upright.lab.frequency_1b.chapter import chapter
-    from upright.lab.frequency_1b.run import run_frequency
-    from upright.lab.makes import make_named
+    from upright.experiments.frequency_1b.chapter import chapter
+    from upright.experiments.frequency_1b.run import run_frequency
+    from upright.experiments.makes import make_named
 
     make_named(make)
     done = run_frequency(make, seed, out, progress, kind=ask)
@@ -91,8 +91,8 @@ def _of_logs(
     sources: list[Path], out: Path, data: Path | None, *, rig: str, command: str, kind: str, seed: int,
     hold: str, signals: dict[str, str], counts: dict[str, str], known: dict[str, str], band: tuple[float, float],
 ) -> tuple[list[Path], Chapter]:  # fmt: skip
-    from upright.lab.frequency_1b.chapter import log_chapter
-    from upright.lab.frequency_1b.from_logs import LogRequest, response_of_logs
+    from upright.experiments.frequency_1b.chapter import log_chapter
+    from upright.experiments.frequency_1b.from_logs import LogRequest, response_of_logs
     from upright.units import parse_if_given
 
     wish = LogRequest(
@@ -126,7 +126,7 @@ def _count(name: str, text: str) -> float:
 
 def _known(name: str, text: str, make: str) -> tuple[float, float]:
     """Value and standard uncertainty [SI]."""
-    from upright.lab.makes import MAKES
+    from upright.experiments.makes import MAKES
 
     if make not in MAKES:
         raise BadInput("--known belongs to a fit; name the rig with --rig too.")

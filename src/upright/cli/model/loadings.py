@@ -67,9 +67,9 @@ def _of_logs(logs: list[Path], added: list[str], signal: str, command: str, tole
             f"Every log needs its --added, in the same order: {len(logs)} logs came with {len(added)};"
             ' write --added "0 kg" for the bare one, or try --twin rectilinear.'
         )
+    from upright.experiments.makes import OSCILLATORS
+    from upright.experiments.weighing_1a.chapter import loading_chapter
     from upright.identification.loadings import fit_loadings, swings
-    from upright.lab.makes import OSCILLATORS
-    from upright.lab.weighing_1a.chapter import loading_chapter
     from upright.readers import read
     from upright.report.page import Step
     from upright.units import parse
@@ -113,10 +113,10 @@ def _of_logs(logs: list[Path], added: list[str], signal: str, command: str, tole
 
 
 def _of_twin(kind: str, seed: int, out: Path) -> Chapter:
-    from upright.lab.makes import OSCILLATORS
-    from upright.lab.weighing_1a.chapter import loading_chapter
-    from upright.lab.weighing_1a.run import weigh_body
-    from upright.lab.weighing_1a.twin import drawn_twin, truth
+    from upright.experiments.makes import OSCILLATORS
+    from upright.experiments.weighing_1a.chapter import loading_chapter
+    from upright.experiments.weighing_1a.run import weigh_body
+    from upright.experiments.weighing_1a.twin import drawn_twin, truth
     from upright.report.page import Step
 
     if kind not in OSCILLATORS:
@@ -140,7 +140,7 @@ def _of_twin(kind: str, seed: int, out: Path) -> Chapter:
 
 def inertia(text: str) -> tuple[float, str]:
     """Added inertia [SI] and the kind of rig it belongs to; none for a plain zero."""
-    from upright.lab.makes import MASS_RADIUS
+    from upright.experiments.makes import MASS_RADIUS
     from upright.physics.oscillators import added_inertia
     from upright.units import parse, same_dimension
 

@@ -42,8 +42,8 @@ def plan_inertias(
 
     upright plan-inertias --rig torsional --error "0.3 %" --radius "4 cm" --radius "9 cm"
     """
+    from upright.experiments.makes import OSCILLATORS
     from upright.identification.loadings import plan_loadings
-    from upright.lab.makes import OSCILLATORS
     from upright.units import parse
 
     if rig not in OSCILLATORS:
@@ -62,7 +62,7 @@ def plan_inertias(
     wanted = _share(target, "--target") if target else None
     chosen = choose({n: p[0].k for n, p in plans.items()}, wanted)
     if out is not None:
-        from upright.lab.weighing_1a.figures import plan_figure
+        from upright.experiments.weighing_1a.figures import plan_figure
         from upright.report.drawing import save
 
         save(plan_figure(plans, chosen), out)
@@ -72,8 +72,8 @@ def plan_inertias(
 
 def loadings(rig: str, radius: list[str] | None) -> list[Loading]:
     """What can be added to a cart, or to a disk on the bolt circles given."""
+    from upright.experiments.makes import MASS_RADIUS
     from upright.identification.loadings import Loading
-    from upright.lab.makes import MASS_RADIUS
     from upright.physics.oscillators import added_inertia, added_mass
     from upright.units import parse
 

@@ -14,7 +14,7 @@ from upright.identification.model.rig import NOISE, Rig
 from upright.identification.model.runs import Run
 from upright.identification.problem.predictor import predicted
 from upright.identification.problem.tracks import Track
-from upright.law import Law
+from upright.laws import Law
 from upright.physics import Plant
 from upright.simulation import Held, Simulator, choose
 

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from upright.errors import BadInput, nearest
-from upright.law.linear import Law, Structure
-from upright.law.rule import Rule, Written
+from upright.laws.linear import Law, Structure
+from upright.laws.rule import Rule, Written
 from upright.physics.actuator import ACTUATOR
 from upright.physics.equations import Derived
 

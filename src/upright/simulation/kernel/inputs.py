@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from upright.law.linear import Structure
-from upright.law.rule import Written
+from upright.laws.linear import Structure
+from upright.laws.rule import Written
 from upright.simulation.kernel.drive import commanded
 from upright.simulation.kernel.writer import Writer
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from upright.law.rule import Written
+from upright.laws.rule import Written
 from upright.simulation.kernel.equations import ELEMENTARY, acceleration, step, terms
 from upright.simulation.kernel.events import events
 from upright.simulation.kernel.flavour import Layout

@@ -1,0 +1,260 @@
+"""A record together with what is known about its rig: a plant's name, a study, or a fit made before."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from upright.diagnosis.findings import Curve, Panel
+from upright.errors import BadInput
+from upright.identification import Parameter
+from upright.physics import BUILT_IN, Plant, find
+from upright.readers.inspection import Column, Inspection
+from upright.records import Array, Record
+from upright.study.draft.recognise import drive_column, recognise
+from upright.study.sensors import Drive, Sensor
+
+COUNTERS = (2 * math.pi, 360.0, 65536.0, 4294967296.0)
+"""Turns that counters are known to make, in rad, deg and counts."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class KnownRig:
+    """A rig as it was said to be: plant, parameters, and which column is what; all but the plant may be empty."""
+
+    name: str
+    plant: type[Plant]
+    parameters: Mapping[str, Parameter] = field(default_factory=dict[str, Parameter])
+    sensors: Mapping[str, Sensor] = field(default_factory=dict[str, Sensor])
+    drive: Drive | None = None
+    locked: tuple[str, ...] = ()
+
+    @property
+    def friction(self) -> frozenset[str]:
+        """Names of the parameters that only dissipate."""
+        viscous = re.findall(r"\w+", self.plant.derived().power_lost)
+        dry = [n for j in self.plant.joints for n in vars(j).values() if isinstance(n, str)]
+        return frozenset(self.plant.names()) & frozenset([*viscous, *dry])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Place:
+    """A coordinate as it was measured: `y` (N,) [SI], its `quantum` [SI], and the column it came from."""
+
+    column: str
+    y: Array
+    quantum: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Case:
+    """A record with what is known about its rig.
+
+    Attributes
+    ----------
+    record, inspection
+        The log, and what can be told about it before any model.
+    plant : type of Plant or None
+    parameters : mapping of str to Parameter
+        Of the plant and its actuator; empty when only the plant's name is known.
+    places : mapping of str to Place
+        Measured coordinates.
+    zeroed : bool
+        Whether somebody said where each coordinate is zero, rather than the record.
+    drive : str
+        Column of the effort; empty when there is none.
+    u : (N,) array
+        Effort in the actuator's unit.
+    moduli : mapping of str to tuple of float
+        Turns the counter behind a column may make, in the column's unit.
+    locked : tuple of str
+        Coordinates known not to move.
+    """
+
+    record: Record
+    inspection: Inspection
+    plant: type[Plant] | None = None
+    parameters: Mapping[str, Parameter] = field(default_factory=dict[str, Parameter])
+    places: Mapping[str, Place] = field(default_factory=dict[str, Place])
+    zeroed: bool = False
+    drive: str = ""
+    u: Array = field(default_factory=lambda: np.zeros(0))
+    moduli: Mapping[str, tuple[float, ...]] = field(default_factory=dict[str, "tuple[float, ...]"])
+    locked: tuple[str, ...] = ()
+
+    @property
+    def measured(self) -> tuple[Column, ...]:
+        """Columns that measure a place: those of the coordinates, else whatever looks like one."""
+        named = [p.column for p in self.places.values()]
+        if named:
+            return tuple(self.inspection.column(name) for name in named)
+        return tuple(c for c in self.inspection.columns if not (c.drive or c.constant or tells_time(c)))
+
+    @property
+    def driven(self) -> bool:
+        """Whether an effort column ever leaves zero."""
+        return bool(self.drive) and bool(np.any(self.u))
+
+    @property
+    def chained(self) -> bool:
+        """Whether the bodies are alike, so that one that hardly moves beside another was held."""
+        if self.plant is not None:
+            return self.plant.__name__.startswith(("Rectilinear", "Torsional"))
+        return all(unit_of(c) in ("counts", "m", "mm") for c in self.measured)
+
+    def moves(self, name: str, share: float = 0.03) -> bool:
+        """Whether a coordinate moves beside the largest motion in the same unit."""
+        unit = {c.name: c.unit for c in self.plant.coordinates} if self.plant else {}
+        spans = {n: float(np.ptp(p.y)) for n, p in self.places.items() if unit.get(n) == unit.get(name)}
+        return spans.get(name, 0.0) > share * max(spans.values(), default=0.0)
+
+    def span(self, c: Column) -> float:
+        """Range of a column in the record, which may be mended when the inspection was not."""
+        return float(np.ptp(self.record[c.name]))
+
+    def widest(self, unit: str) -> Column:
+        """Measured column in a unit that covers the largest range."""
+        return max((c for c in self.measured if unit_of(c) == unit), key=self.span)
+
+    def beside(self, c: Column) -> float:
+        """Range of a measured column as a share of the largest in the same unit; 0 where nothing moves."""
+        return self.span(c) / (self.span(self.widest(unit_of(c))) or 1.0)
+
+    def coordinate(self, column: str) -> str:
+        """Coordinate that a column measures, or a placeholder that a reader replaces."""
+        return next((n for n, p in self.places.items() if p.column == column), "COORDINATE")
+
+    def over_time(self, *columns: str) -> tuple[Panel, ...]:
+        """Columns over the whole record, those that the log has."""
+        found = [self.inspection.column(name) for name in columns if name in self.record.signals]
+        return tuple(self._panel(c, slice(None), "steps" if c.stepwise else "line") for c in found)
+
+    def near(self, column: str, i: int, reach: int = 40) -> Panel:
+        """Readings of a column near sample `i`."""
+        return self._panel(self.inspection.column(column), slice(max(i - reach, 0), i + reach), "points")
+
+    def _panel(self, c: Column, rows: slice, style: Literal["line", "steps", "points"]) -> Panel:
+        unit = unit_of(c)
+        curve = Curve(name=c.name, t=self.record.t[rows], y=self.record[c.name][rows], style=style)
+        return Panel(label=f"{c.name} [{unit}]" if unit else c.name, curves=(curve,))
+
+
+def tells_time(c: Column) -> bool:
+    """Whether a column only counts rows or repeats the time."""
+    return any("the time" in s or "index" in s for s in c.lies)
+
+
+def unit_of(c: Column) -> str:
+    """Unit of a column as the log or its look says; empty when neither does."""
+    return c.unit or c.guess
+
+
+def read_known(text: str, log: str = "") -> KnownRig:
+    """Rig of a plant's name, a study (TOML) or a ``fit.json``; `log` is the file whose run a study may describe.
+
+    Raises
+    ------
+    BadInput
+        When it is none of these.
+    """
+    path = Path(text)
+    if path.suffix == ".json" or (path.is_dir() and (path / "fit.json").is_file()):
+        from upright.study.fit_file import read_fit
+
+        fit = read_fit(path / "fit.json" if path.is_dir() else path)
+        parameters = {n: Parameter(name=n, value=v) for n, v in fit.values.items()}
+        return KnownRig(name=text, plant=find(fit.plant, path.parent), parameters=parameters)
+    if path.suffix == ".toml":
+        return _study(path, log)
+    try:
+        return KnownRig(name=text, plant=find(text))
+    except BadInput as error:
+        raise BadInput(
+            f"--rig {text}: {error}; it may be a plant's name, a study (TOML) or the fit.json of `upright identify`"
+        ) from None
+
+
+def _study(path: Path, log: str) -> KnownRig:
+    from upright.study.rig import read_plant, read_rig
+    from upright.study.sensors import drive_unit, read_drives, read_sensors
+    from upright.study.text import Section, StudyText
+
+    text = StudyText(path)
+    study = text.root()
+    plant = read_plant(study)
+    rig = read_rig(study, plant, drive_unit(study))
+    entries = study.values.get("runs", [])
+    run = Section(text, ("runs",), {})
+    for i, values in enumerate(entries if isinstance(entries, list) else []):
+        if isinstance(values, dict) and Path(str(values.get("file", ""))).name == Path(log).name:
+            run = Section(text, ("runs", i), values)
+            break
+    run = run.over(study.section("defaults"))
+    sensors = {n: s for n, (s, _) in read_sensors(study, run, plant).items()}
+    drives = read_drives(study, run, plant)
+    drive = drives[0] if drives and drives[0].what and "loop" not in run else None
+    locked: object = run.values.get("locked", ())
+    names = tuple(str(n) for n in locked) if isinstance(locked, list | dict) else ()
+    return KnownRig(name=str(path), plant=plant, parameters=rig.parameters, sensors=sensors, drive=drive, locked=names)
+
+
+def case_of(record: Record, inspection: Inspection, known: KnownRig | None) -> Case:
+    """Record and rig brought together."""
+    if known is None or not any(s.column in record.signals for s in known.sensors.values()):
+        return _recognised(record, inspection, known)
+    places: dict[str, Place] = {}
+    moduli: dict[str, tuple[float, ...]] = {}
+    for name, sensor in known.sensors.items():
+        if sensor.column not in record.signals or name in known.locked:
+            continue
+        y, quantum, _ = sensor.read(record)
+        factor = sensor.factor(sensor.column_unit(record, record[sensor.column]))
+        step = inspection.column(sensor.column).quantum.step
+        places[name] = Place(column=sensor.column, y=y, quantum=quantum or step * factor)
+        turn = 2 * math.pi / factor if sensor.coordinate.unit == "rad" and factor else 0.0
+        moduli[sensor.column] = tuple({m for m in (turn, *COUNTERS) if m})
+    u, drive = np.zeros(record.t.size), ""
+    if known.drive is not None:
+        u = known.drive.read(record)
+        plain = known.drive.what.strip("`")
+        drive = plain if plain in record.signals else known.drive.what
+    return Case(
+        record=record, inspection=inspection, plant=known.plant, parameters=known.parameters, places=places,
+        zeroed=True, drive=drive, u=u, moduli=moduli, locked=known.locked,
+    )  # fmt: skip
+
+
+def _recognised(record: Record, inspection: Inspection, known: KnownRig | None) -> Case:
+    """Columns found by name and kind; a plant that needs angles gets none from counts of an unknown encoder."""
+    named = next((n for n, p in BUILT_IN.items() if known is not None and p is known.plant), "")
+    try:
+        found = recognise(record, inspection, named)
+    except BadInput:
+        found = None
+    column = found.drive if found else drive_column(record, inspection)
+    u: Array = record[column.name].copy() if column is not None else np.zeros(record.t.size)
+    if column is not None and any(lie.startswith("the first samples are outliers") for lie in column.lies):
+        u[:3] = u[3]
+    plant = known.plant if known is not None else None
+    places: dict[str, Place] = {}
+    chain = plant is not None and not any(c.name in ("theta", "psi", "x") for c in plant.coordinates)
+    for coordinate in plant.coordinates if plant is not None else ():
+        c = found.columns.get(coordinate.name) if found is not None else None
+        if c is None or found is None:
+            continue
+        factor = {"rad": 1.0, "": 1.0, "deg": math.pi / 180, "m": 1.0, "mm": 1e-3}.get(c.guess, 0.0)
+        if factor or chain or coordinate.unit == "m":
+            factor = factor or 1.0
+            y = factor * (record[c.name] - found.rest[coordinate.name])
+            places[coordinate.name] = Place(column=c.name, y=y, quantum=factor * c.quantum.step)
+    return Case(
+        record=record, inspection=inspection, plant=plant, places=places,
+        drive=column.name if column is not None else "", u=u,
+        moduli={p.column: COUNTERS for p in places.values()},
+    )  # fmt: skip

@@ -1,0 +1,136 @@
+"""One record in, everything that looks wrong out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from upright.diagnosis.balance import Balance
+from upright.diagnosis.case import Case, KnownRig, case_of
+from upright.diagnosis.clock import examine_clock
+from upright.diagnosis.drive import examine_push, examine_uselessness, push_of
+from upright.diagnosis.effort import examine_effort, examine_settings
+from upright.diagnosis.findings import KINDS, SEVERITIES, Diagnosis, Finding
+from upright.diagnosis.forces import against_form, against_gain, against_numbers, values_of
+from upright.diagnosis.motion import Motion, motion_of
+from upright.diagnosis.rest import examine_rest
+from upright.diagnosis.sensors import examine_sensors
+from upright.diagnosis.structure import terms
+from upright.readers.inspection import inspect_record
+from upright.records import Record
+
+HOPELESS = frozenset({"dead", "stuck", "gap", "doubled", "jitter"})
+"""Findings after which equations of motion are not asked, because they would only say the same again."""
+
+
+def examine(record: Record, known: KnownRig | None = None, *, before: tuple[Finding, ...] = ()) -> Diagnosis:
+    """Everything that looks wrong with a record.
+
+    Parameters
+    ----------
+    record : Record
+    known : KnownRig, optional
+        Its rig, from `read_known`; what needs one is left out without.
+    before : tuple of Finding
+        What was found, and mended, while the log was read.
+
+    Returns
+    -------
+    Diagnosis
+    """
+    inspection = inspect_record(record)
+    case = case_of(record, inspection, known)
+    found = [*before, *examine_clock(case)]
+    sensors, mended = examine_sensors(case)
+    if mended is not None:
+        case = replace(case_of(mended, inspection, known), drive=case.drive, u=case.u)
+    found += [*sensors, *examine_effort(case), *examine_rest(case), *examine_settings(case)]
+    unchecked = _unchecked(case, known)
+    forces, reasons = _forces(case, known, found)
+    if any(f.kind == "scale" for f in forces):  # what looks held is only read on another scale
+        found = [f for f in found if f.kind != "creep"]
+    found += forces
+    unchecked |= reasons
+    order = {s: i for i, s in enumerate(SEVERITIES)}
+    return Diagnosis(
+        file=inspection.file,
+        rig=known.name if known else "",
+        samples=len(record),
+        duration=inspection.time.duration,
+        findings=tuple(sorted(found, key=lambda f: order[f.severity])),
+        checked=tuple(k for k in KINDS if k not in unchecked and (k != "settings" or _settings(case))),
+        unchecked=unchecked,
+    )
+
+
+def _unchecked(case: Case, known: KnownRig | None) -> dict[str, str]:
+    """What this record cannot tell, whatever the rig."""
+    out: dict[str, str] = {}
+    if not case.drive:
+        idle = [c.name for c in case.inspection.columns if c.idle]
+        no = f"'{idle[0]}' is zero throughout" if idle else "the log has no effort column that could be recognised"
+        out |= dict.fromkeys(("effort", "trip", "early"), no)
+    elif not case.driven:
+        out |= dict.fromkeys(("trip", "early"), f"the effort '{case.drive}' is zero throughout")
+    elif case.u[0] != 0:
+        out["early"] = f"'{case.drive}' acts from the first sample on"
+    if known is None:
+        out |= dict.fromkeys(("sign", "scale", "trip"), "nobody said what the rig is; name it with --rig")
+    return out
+
+
+def _settings(case: Case) -> bool:
+    return any(n.startswith("runParameters") for n in case.inspection.notes)
+
+
+def _forces(case: Case, known: KnownRig | None, found: list[Finding]) -> tuple[list[Finding], dict[str, str]]:
+    """What effort and motion say about each other, and why they do not where they do not."""
+    if known is None:
+        return [], {}
+    spoilt = next((f for f in found if f.kind in HOPELESS and f.severity != "note" and f.spoils), None)
+    motion: Motion | str = (
+        f"after the {spoilt.kind} found above, mend that first" if spoilt is not None else motion_of(case)
+    )
+    if isinstance(motion, str):
+        return [], dict.fromkeys(("sign", "scale", "trip"), motion)
+    told = {f.columns for f in found if f.kind == "effort" and f.severity != "note"}
+    lying = (case.drive,) in told and not _in_dac(case)
+    numbers = values_of(case, known.friction)
+    out: list[Finding] = []
+    reasons: dict[str, str] = {}
+    balance: Balance | None = None
+    if isinstance(numbers, str):
+        reasons["scale"] = numbers
+    else:
+        balance = Balance(motion, *numbers)
+        balance.used = balance.used and not lying
+    push = None if lying else push_of(motion, balance)
+    conventions = against_numbers(case, balance) if balance is not None else []
+    trip = examine_push(case, push, most=0.35 if balance is None else 0.15) if push is not None else []
+    if conventions and trip and push is not None and 100 * push.cut > min(f.left for f in conventions):
+        trip = []  # the other convention explains the whole record better than an end of the effort does
+    if push is not None and trip:  # what the drive did before it tripped still tells signs and scales
+        motion = replace(motion, u=np.where(motion.t < push.end, motion.u, 0.0))
+        conventions = against_numbers(case, Balance(motion, *numbers)) if not isinstance(numbers, str) else []
+    if balance is None:
+        signed = [x for x in terms(motion) if not (lying and x.who[0] == "effort")]
+        conventions = against_form(case, motion, signed)
+        if not signed:
+            reasons["sign"] = "the record holds no motion whose sign is known"
+    out += [*trip, *conventions]
+    rough = any(f.kind in HOPELESS for f in found)  # accelerations are then too uneven to blame the effort
+    if not out and not rough and balance is not None and push is not None:
+        out += against_gain(case, balance)
+    if not out and not rough and push is not None:
+        out += examine_uselessness(case, push)
+    if push is None and case.driven:
+        reasons["trip"] = "the effort column is none" if lying else "the driven body was not measured or did not move"
+    return out, reasons
+
+
+def _in_dac(case: Case) -> bool:
+    """Whether the effort is one in converter counts, which acts all the same."""
+    return any(
+        lie.startswith("the command in DAC") for c in case.inspection.columns if c.name == case.drive for lie in c.lies
+    )

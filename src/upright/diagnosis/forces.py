@@ -1,0 +1,236 @@
+"""Do effort and motion obey the rig's equations? Signs, scales, silent trips, an effort that is none."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from upright.diagnosis.balance import Balance, Explanation
+from upright.diagnosis.case import Case
+from upright.diagnosis.findings import Curve, Finding, Panel
+from upright.diagnosis.motion import Motion
+from upright.diagnosis.structure import MATTERS, Term
+
+DOUBT, CLEAR, BETTER = 0.02, 0.15, 3.5
+"""A convention is doubted from this unexplained share on; another one must leave less than `CLEAR`, or next to nothing
+of what the declared one leaves, and together over all rows `BETTER` times less."""
+LOST = 0.25
+"""Unexplained share of the driven body's force from which its effort is believed no more."""
+CAUSES = {
+    180 / math.pi: "degrees taken for radians",
+    math.pi / 180: "radians taken for degrees",
+    2 * math.pi: "turns taken for radians",
+    4.0: "encoder lines taken for counts",
+    0.25: "counts taken for encoder lines",
+    1000.0: "thousandths taken for units",
+    0.001: "units taken for thousandths",
+}
+
+
+def values_of(case: Case, friction: frozenset[str]) -> tuple[dict[str, float], float] | str:
+    """Parameters for the balance and the gain, or the reason why there is none."""
+    if case.plant is None or not case.parameters:
+        return "only the plant's name is known; a study or fit.json with its numbers tells"
+    guessed = [n for n in case.plant.names() if case.parameters[n].estimate and n not in friction]
+    if guessed:
+        return f"{', '.join(guessed)} {'is a guess' if len(guessed) == 1 else 'are guesses'}; give the fit.json"
+    values = {n: 0.0 if p.estimate else p.value for n, p in case.parameters.items()}
+    gain = case.parameters.get("actuator.gain")
+    return values, gain.value if gain is not None and not gain.estimate else math.nan
+
+
+def against_numbers(case: Case, balance: Balance) -> list[Finding]:
+    """Signs and scales, held to known inertias, stiffnesses and gain."""
+    now = balance.declared()
+    if float(now.unexplained.max()) < DOUBT:
+        return []
+    others = balance.others()
+    best = others[0] if others else now
+    left = float(best.unexplained.max())
+    rows = now.unexplained.size
+    near = (0.8, 1.25) if float(now.unexplained.max()) > 4 * DOUBT else (0.65, 1.55)
+    better = rows * (now.cost - best.cost) > math.log(BETTER)
+    clear = CLEAR if best.who == "effort" else max(CLEAR, 0.01 * float(now.unexplained.max()))
+    if not better or left > clear or near[0] < best.factor < near[1]:
+        return []
+    alike = [e for e in others if e.cost < best.cost + 0.25 and not 0.8 < e.factor < 1.25]
+    return [_mistaken(case, balance, now, alike)]
+
+
+def against_gain(case: Case, balance: Balance) -> list[Finding]:
+    """An effort whose known gain leaves the driven body unexplained, whatever factor is put on it or on a sensor."""
+    now = balance.declared()
+    k = balance.motion.rows.index(balance.driven) if balance.used else -1
+    others = np.delete(now.unexplained, k)
+    if k < 0 or not math.isfinite(balance.gain) or now.unexplained[k] < LOST or (others > 2 * CLEAR).any():
+        return []
+    left = 100 * float(now.unexplained[k])
+    driven = case.places[balance.names[balance.driven]]
+    u = case.u - case.u.mean()
+    y = driven.y - driven.y.mean()
+    alike = float(u @ y) / (float(np.linalg.norm(u)) * float(np.linalg.norm(y)) + 1e-300)
+    follows = (
+        f" '{driven.column}' follows it ({100 * alike:.0f} % correlation), as it would a reference."
+        if alike > 0.6
+        else ""
+    )
+    return [
+        Finding(
+            kind="effort",
+            columns=(case.drive,),
+            severity="fault",
+            sentence=f"'{case.drive}' acts like no effort: with the rig's known numbers it leaves {left:.0f} % of the"
+            f" force on '{driven.column}' unexplained, and no factor mends that.{follows}",
+            evidence={"unexplained [%]": left, "correlation with the motion [%]": 100 * alike},
+            advice="Look for the column the controller put out; a reference or a set value is no effort.",
+            key='[drive]\ncolumn = "..."',
+            panels=(*case.over_time(driven.column, case.drive), _force_panel(balance, now, "as declared")),
+        )
+    ]
+
+
+def _mistaken(case: Case, balance: Balance, now: Explanation, alike: list[Explanation]) -> Finding:
+    best = min(alike, key=lambda e: abs(math.log(abs(e.factor))) + (0.0 if e.factor > 0 else 0.1))
+    reversed_, size = best.factor < 0, abs(best.factor)
+    kind = "sign" if reversed_ and 0.75 < size < 1.33 else "scale"
+    shown = f"{size:.3g}"
+    cause = next((text for f, text in CAUSES.items() if abs(size / f - 1) < 0.06), "")
+
+    def name(e: Explanation) -> str:
+        return f"the effort '{case.drive}'" if e.who == "effort" else f"'{case.places[e.who].column}'"
+
+    whom = " or ".join(dict.fromkeys(name(e) for e in [best, *(e for e in alike if e is not best)]))
+    left, then = 100 * float(now.unexplained.max()), 100 * float(best.unexplained.max())
+    rest = f"the rig's known numbers leave {left:.0f} % of the inertial force unexplained, and {then:.1f} % with it"
+    if kind == "sign":
+        sentence = f"The sign of {whom} looks reversed: {rest}."
+    else:
+        sentence = (
+            f"{whom[0].upper() + whom[1:]} is off by a factor: times {'-' if reversed_ else ''}{shown}"
+            f"{f' ({cause})' if cause else ''} it fits; {rest}."
+        )
+    line = "sign = -1" if kind == "sign" else f"scale = {best.factor:.4g}"
+    key = f"[drive]\n{line}" if best.who == "effort" else f"[sensors.{best.who}]\n{line}"
+    columns = tuple(case.drive if e.who == "effort" else case.places[e.who].column for e in alike)
+    return Finding(
+        kind=kind,
+        columns=tuple(dict.fromkeys(columns)),
+        severity="fault",
+        sentence=sentence,
+        left=then,
+        evidence={"factor [1]": best.factor, "unexplained now [%]": left, "unexplained then [%]": then},
+        advice="Set it in the study, or mend the log; then look again.",
+        key=key,
+        panels=(_force_panel(balance, now, "as declared"), _force_panel(balance, best, "with the factor", like=now)),
+    )
+
+
+def _force_panel(balance: Balance, e: Explanation, title: str, *, like: Explanation | None = None) -> Panel:
+    """Force that the worst row needs (of `like`, when given), and what is left of it."""
+    factors = np.ones((1, len(balance.names)))
+    if e.who in balance.names:
+        factors[0, balance.names.index(e.who)] = e.factor
+    tau, inertial = balance.needed(factors)
+    k = int(np.argmax((like or e).unexplained))
+    need = tau[0, k]
+    if balance.motion.rows[k] == balance.driven and balance.used:
+        need = need - e.gain * balance.motion.u
+    Q = balance.friction[k]
+    t = balance.motion.t
+    unit = "N" if balance.motion.plant.coordinates[balance.motion.rows[k]].unit == "m" else "N m"
+    name = balance.names[balance.motion.rows[k]]
+    return Panel(
+        label=f"force on {name} [{unit}],\n{title}",
+        curves=(
+            Curve(name="inertial", t=t, y=inertial[0, k]),
+            Curve(name="unexplained", t=t, y=need - Q @ (Q.T @ need)),
+        ),
+    )
+
+
+def against_form(case: Case, motion: Motion, found: list[Term]) -> list[Finding]:
+    """Signs that the form of the equations fixes."""
+    clear = [x for x in found if x.share > MATTERS and x.total < 0.6]
+    wrong = [x for x in clear if x.slope * x.expected < 0]
+    if not wrong:
+        return []
+    pushed = [x for x in wrong if x.who[0] == "effort"]
+    joined = [x for x in wrong if x.who[0] not in ("effort", x.who[1])]
+    hangs = [x for x in wrong if x.who[0] == x.who[1]]
+    thrown = any(x.text == "throw" for x in wrong)
+    if thrown and not case.zeroed:  # a zero that is upright turns both signs, and a loop hides gravity's
+        hangs += [x for x in found if x.text == "gravity" and x.slope > 0 and x.share > 0.003]
+    if hangs:
+        return [_upside_down(case, motion, hangs[0])]
+    right_joined = [x for x in clear if x.who[0] not in ("effort", x.who[1]) and x not in wrong]
+    if joined and not right_joined:
+        x = max(joined, key=lambda x: x.share)
+        first = motion.plant.coordinates[0].name
+        who = first if pushed else next(c for c in x.who[::-1] if c != first)
+        a, b = (case.places[c].column for c in x.who)
+        return [
+            _finding(
+                case, motion, x, who,
+                f"'{a}' and '{b}' count against each other: {_why(x)}, but the accelerations say the opposite.",
+            )
+        ]  # fmt: skip
+    if pushed:
+        x = pushed[0]
+        column = case.places[x.who[1]].column
+        return [
+            _finding(
+                case, motion, x, "effort" if case.drive else x.who[1],
+                f"Positive effort, negative motion: '{case.drive}' pushes '{column}' backwards. Every sensor counts"
+                " against the effort, or the effort is logged with the other sign.",
+            )
+        ]  # fmt: skip
+    return []
+
+
+def _why(x: Term) -> str:
+    return {
+        "spring": "a spring pulls one body towards the other",
+        "throw": "a hinge that is accelerated throws its pendulum in a known sense",
+    }.get(x.text, "a positive force accelerates forwards")
+
+
+def _finding(case: Case, motion: Motion, x: Term, who: str, sentence: str) -> Finding:
+    table = "drive" if who == "effort" else f"sensors.{who}"
+    name = case.drive if who == "effort" else case.places[who].column
+    body = next(c for c in motion.plant.coordinates if c.name == x.who[1])
+    curves = (
+        Curve(name="acceleration, all else taken out", t=x.t, y=x.target),
+        Curve(name=f"{x.text}, all else taken out (times its slope)", t=x.t, y=x.slope * x.alone),
+    )
+    slope = float(np.polyfit(x.alone, x.target, 1)[0])
+    return Finding(
+        kind="sign",
+        columns=(name,),
+        severity="fault",
+        sentence=sentence,
+        evidence={"slope found [SI]": slope, "slope expected (sign) [1]": x.expected, "explains [%]": 100 * x.share},
+        advice=f"Set the sign of '{name}'.",
+        key=f"[{table}]\nsign = -1",
+        panels=(
+            *case.over_time(*dict.fromkeys([case.places[x.who[1]].column, case.drive])),
+            Panel(label=f"acceleration\nof {body.name} [{body.unit}/s^2]", curves=curves),
+        ),
+    )
+
+
+def _upside_down(case: Case, motion: Motion, x: Term) -> Finding:
+    who = x.who[1]
+    column = case.places[who].column
+    finding = _finding(
+        case, motion, x, who,
+        f"'{column}' is pulled away from its zero by gravity: its zero is upright, or the pendulum is held by a loop.",
+    )  # fmt: skip
+    return replace(
+        finding,
+        severity="warning",
+        advice="If zero is upright, say so.",
+        key=f'[sensors.{who}]\noffset = "180 deg"',
+        evidence={**finding.evidence, "largest angle [rad]": float(np.abs(case.places[who].y).max())},
+    )

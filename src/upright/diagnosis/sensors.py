@@ -1,0 +1,221 @@
+"""Sensors that are dead, frozen, wrapping, losing counts, spiking or at their limit.
+
+A body with inertia cannot jump, and it cannot stop within a sample.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.diagnosis.case import Case, tells_time, unit_of
+from upright.diagnosis.findings import Finding
+from upright.readers.inspection import Column
+from upright.records import Array, Record
+from upright.signals.spikes import REACH, Jumps, jumps
+
+
+def examine_sensors(case: Case) -> tuple[list[Finding], Record | None]:
+    """Findings about each sensor, and the record with wraps, jumps and spikes taken out when there are any."""
+    found: list[Finding] = [*_dead(case)]
+    mended: dict[str, Array] = {}
+    for column in case.measured:
+        if column.constant:
+            continue
+        x = case.record[column.name]
+        jumped = jumps(case.record.t, x, column.quantum.step, case.moduli.get(column.name, ()))
+        found += _jumped(case, column, x, jumped)
+        if jumped:
+            mended[column.name] = jumped.mended(x)
+        found += _frozen(case, column, mended.get(column.name, x))
+        found += _limited(case, column, x)
+    record = case.record.replace(signals={**case.record.signals, **mended}) if mended else None
+    return found, record
+
+
+def _dead(case: Case) -> list[Finding]:
+    """Sensors that never move, although the rig was driven or something else moved."""
+    others = [c for c in case.measured if not c.constant]
+    found: list[Finding] = []
+    named = {p.column: n for n, p in case.places.items()}
+    for c in case.inspection.columns:
+        if not c.constant or c.drive or tells_time(c) or named.get(c.name, "") in case.locked != ():
+            continue
+        sure = c.name in named and (case.driven or bool(others))
+        if not sure and (not others or c.name not in named):
+            continue
+        why = "the effort acts" if case.driven else f"'{others[0].name}' moves" if others else ""
+        found.append(
+            Finding(
+                kind="dead",
+                columns=(c.name,),
+                severity="fault" if sure else "note",
+                sentence=f"'{c.name}' reads {c.low:g} from the first to the last sample"
+                + (f" although {why}: the sensor is dead, or the body was clamped." if sure else "."),
+                evidence={"samples [1]": float(case.inspection.time.samples), "value [1]": c.low},
+                advice="Check plug and cable; if the body was clamped, say so." if sure else "Leave it out.",
+                key=f"locked = [\"{named[c.name]}\"]" if c.name in named else "",
+                panels=case.over_time(*(o.name for o in others[:1]), c.name),
+            )
+        )  # fmt: skip
+    return found
+
+
+def _jumped(case: Case, c: Column, x: Array, jumped: Jumps) -> list[Finding]:
+    t, unit = case.record.t, unit_of(c) or "1"
+    found: list[Finding] = []
+    if jumped.wraps.size:
+        found.append(
+            Finding(
+                kind="wrap",
+                columns=(c.name,),
+                severity="warning",
+                sentence=f"'{c.name}' wraps {jumped.wraps.size} time{'s' if jumped.wraps.size > 1 else ''}: its counter"
+                f" jumps by {jumped.modulus:.6g} {unit} (first at {t[jumped.wraps[0]]:.5g} s) while the body goes on.",
+                evidence={f"turn [{unit}]": jumped.modulus, "wraps [1]": float(jumped.wraps.size)},
+                advice="Angles in rad are unwrapped when a study is read; unwrap counts before that.",
+                key=f'[sensors.{case.coordinate(c.name)}]\nunit = "rad"' if unit == "rad" else "",
+                panels=(*case.over_time(c.name), case.near(c.name, int(jumped.wraps[0]))),
+                marks=tuple(float(t[i]) for i in jumped.wraps[:20]),
+            )
+        )
+    if jumped.steps.size:
+        largest = int(np.argmax(np.abs(jumped.step_sizes)))
+        many = jumped.steps.size
+        found.append(
+            Finding(
+                kind="jump",
+                columns=(c.name,),
+                severity="fault",
+                sentence=f"'{c.name}' jumps by {jumped.step_sizes[largest]:.5g} {unit} between two samples at"
+                f" {t[jumped.steps[largest]]:.5g} s and stays there"
+                + (f" ({many} such jumps)" if many > 1 else "")
+                + ": counts were lost, or the sensor slipped.",
+                evidence={f"jump [{unit}]": float(jumped.step_sizes[largest]), "jumps [1]": float(many)},
+                advice="Use a window that ends before the jump or starts after it.",
+                key=f'window = [{t[jumped.steps[largest]]:.6g}, "end"]',
+                panels=(*case.over_time(c.name), case.near(c.name, int(jumped.steps[largest]))),
+                marks=tuple(float(t[i]) for i in jumped.steps[:20]),
+            )
+        )
+    if jumped.spikes.size:
+        largest = int(np.argmax(np.abs(jumped.spike_sizes)))
+        many = jumped.spikes.size
+        found.append(
+            Finding(
+                kind="spike",
+                columns=(c.name,),
+                severity="warning",
+                sentence=f"'{c.name}' has {many} isolated outlier{'s' if many > 1 else ''}, the largest of"
+                f" {jumped.spike_sizes[largest]:.4g} {unit} at {t[jumped.spikes[largest]]:.5g} s.",
+                evidence={f"largest [{unit}]": float(jumped.spike_sizes[largest]), "spikes [1]": float(many)},
+                advice="Replace these samples by their neighbours' mean before fitting.",
+                panels=(*case.over_time(c.name), case.near(c.name, int(jumped.spikes[largest]))),
+                marks=tuple(float(t[i]) for i in jumped.spikes[:20]),
+            )
+        )
+    return found
+
+
+def _frozen(case: Case, c: Column, x: Array) -> list[Finding]:
+    at, sudden = frozen_from(x, c.quantum.step)
+    if at < 0:
+        return []
+    t = case.record.t
+    others = [o.name for o in case.measured if o.name != c.name and np.ptp(case.record[o.name][at:]) > 0]
+    return [
+        Finding(
+            kind="stuck",
+            columns=(c.name,),
+            severity="fault",
+            sentence=f"'{c.name}' freezes at {x[at]:.6g} from {t[at]:.5g} s to the end: it stops within a sample,"
+            f" {sudden:.2g} times as abruptly as at any time before.",
+            evidence={"from [s]": float(t[at]), "abruptness [1]": sudden},
+            advice="Use a window that ends before; check the cable, or whether the body hit a stop.",
+            key=f'window = ["start", {t[at]:.6g}]',
+            panels=(*case.over_time(c.name, *others[:1]), case.near(c.name, at)),
+            marks=(float(t[at]),),
+        )
+    ]
+
+
+def _limited(case: Case, c: Column, x: Array) -> list[Finding]:
+    low, high, share = clipped(x, c.quantum.step, inertia=True)
+    if share < 0.005:
+        return []
+    ends = " and ".join(f"{v:.5g}" for v in (low, high) if v == v)
+    return [
+        Finding(
+            kind="saturation",
+            columns=(c.name,),
+            severity="warning",
+            sentence=f"'{c.name}' is cut off at {ends} for {100 * share:.2g} % of the samples: the sensor reaches its"
+            " limit, or the body a stop.",
+            evidence={"share [%]": 100 * share},
+            advice="Use a window without these spans.",
+            panels=case.over_time(c.name),
+        )
+    ]
+
+
+def frozen_from(x: Array, quantum: float) -> tuple[int, float]:
+    """Sample from which a column never changes again after it stopped dead in full motion, and how sudden that was.
+
+    The second number is the speed lost at once, beside the largest change of speed within as short a time before;
+    the sample is -1 when the column does not end so.
+    """
+    changes = np.flatnonzero(np.diff(x))
+    if changes.size < 4 * REACH:
+        return -1, 0.0
+    last = int(changes[-1]) + 1
+    if x.size - last < max(8, 0.02 * x.size):
+        return -1, 0.0
+    w = 5
+    slope = (x[w : last + 1] - x[: last + 1 - w]) / w
+    before = float(np.abs(np.diff(x[last - w : last + 1])).mean())
+    changed = np.abs(slope[w:] - slope[:-w])
+    usual = max(float(np.percentile(changed, 99.5)), 0.5 * quantum) if changed.size else 0.0
+    noise = float(np.median(np.abs(np.diff(x[: last + 1], n=2)))) / w
+    sudden = abs(float(slope[-1])) / max(usual, noise, 1e-300)
+    moving = before > 1.2 * quantum
+    return (last, sudden) if moving and sudden > 0.9 else (-1, sudden)
+
+
+def clipped(x: Array, quantum: float, *, inertia: bool) -> tuple[float, float, float]:
+    """Lowest and highest value of a column if it is cut off there, else nan, and the share of samples cut off.
+
+    A signal that turns by itself slows down before its extreme and leaves it slowly; one that is cut off comes or
+    leaves at the pace it has before or after, and what has `inertia` does both.
+    """
+    share, ends = 0.0, [math.nan, math.nan]
+    if np.unique(x[:: max(x.size // 5000, 1)]).size < 12:
+        return ends[0], ends[1], share
+    for k, level in enumerate((float(x.min()), float(x.max()))):
+        if not inertia and abs(level) < 0.8 * float(np.abs(x).max()):
+            continue  # a drive's limits are alike; this one only paused there
+        at = x == level
+        edges = np.flatnonzero(np.diff(np.concatenate(([0], at.astype(np.int8), [0]))))
+        first, after = edges[::2], edges[1::2]
+        inside = (first > 6) & (after < x.size - 7)
+        if not inertia:  # an effort may begin or end at its limit
+            inside |= (first == 0) | (after == x.size)
+        long = (after - first >= 3) & inside
+        if not long.any():
+            continue
+        first, after = first[long], after[long]
+        came, left = _abrupt(x, first, -1, quantum), _abrupt(x, after - 1, 1, quantum)
+        hard = came & left if inertia else came | left
+        if hard.any():
+            ends[k] = level
+            share += float((after - first)[hard].sum()) / x.size
+    return ends[0], ends[1], share
+
+
+def _abrupt(x: Array, at: NDArray[np.int64], way: int, quantum: float) -> NDArray[np.bool_]:
+    """Whether a column leaves its value at samples `at`, going `way`, at the pace it has a few samples on."""
+    place = np.clip(at, 6, None) if way < 0 else np.clip(at, None, x.size - 7)
+    near = np.abs(x[place + 2 * way] - x[place]) / 2
+    far = np.abs(x[place + 6 * way] - x[place + 4 * way]) / 2
+    return (at == place) & (near > 1.25 * quantum) & (near > 0.5 * far) & (near < 3 * far)

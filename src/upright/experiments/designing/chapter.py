@@ -1,0 +1,249 @@
+"""A design as a chapter: gains, poles, the loop as it runs, and what they are worth."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from upright.experiments.designing.run import Designed, VelocityLoop
+from upright.gains import spelled_out
+from upright.gains.lqr import locus
+from upright.gains.requests import written
+from upright.report.drawing import BLACK, BLUE, VERMILLION
+from upright.report.page import Block, Chapter, Part, Picture, Points, Step, Table
+from upright.report.poles import Poles, locus_figure, pole_map, swing_figure
+from upright.report.symbols import number, percent, plain
+from upright.report.symbols import unit as raised
+
+
+def chapter(done: Designed, *, source: str = "OUT/fit.json", folder: str = ".") -> Chapter:
+    """What a design says; fit or study and the folder of its files are named as they were typed."""
+    wish = "with poles " + written(done.wish.poles) if done.wish.poles is not None else "of least cost"
+    gains: list[str] = []
+    if done.placement is not None:
+        gains.append(f"Farthest pole from where it was asked: {done.placement.miss:.1g} 1/s. {done.placement.sentence}")
+    if done.R is not None:
+        gains.append(f"Weight of the effort: {number(done.R)}.")
+    sure: list[Block] = []
+    if done.chance is not None:
+        stand = f"{percent(100 * done.chance)} stand with these gains"
+        sure.append(Points((f"Of the rigs that the fit's covariance allows, {stand}.",)))
+    loop = (
+        f"Period {1e3 * done.wish.period:.4g} ms, command {done.sampled.delay:.3g} samples late, drive's lag "
+        f"{1e3 * done.sampled.lag:.3g} ms, velocities made from rounded encoders.{_effort(done)}"
+    )
+    return Chapter(
+        title=f"Gains for {done.rig.name}, {done.wish.at}",
+        verdict=done.verdict,
+        sound=done.chosen.margins is not None and "reservations" not in done.verdict,
+        question=f"Which gains hold the rig at '{done.wish.at}' {wish}, and do they survive sampling, delay and "
+        "differenced encoders?",
+        parts=(
+            Part("Gains", (Points(tuple(gains)), _gain_table(done), _pole_table(done))),
+            Part("Poles", (*sure, *_pole_pictures(done))),
+            Part("The loop as it runs", (loop, _way_table(done))),
+            Part("Coming back", (_swing_picture(done),)),
+        ),
+        steps=tuple(_next_steps(done, source, folder)),
+        numbers=_numbers(done),
+    )
+
+
+def _state_units(done: Designed) -> list[str]:
+    """Unit of every state of the model."""
+    out: list[str] = []
+    for c in done.rig.plant.coordinates:
+        out += [c.unit, f"{c.unit}/s"]
+    return out
+
+
+def _gain_table(done: Designed) -> Table:
+    """The gains in force, and those that meet the poles in the sampled loop."""
+    command = done.rig.unit or "1"
+    sampled = done.sampled_gains
+    rows = tuple(
+        (plain(name), number(k, 5), *((number(sampled[0, i], 5),) if sampled is not None else ()), _per(command, unit))
+        for i, (name, k, unit) in enumerate(
+            zip(done.model.states, done.continuous[0], _state_units(done), strict=True)
+        )
+    )  # fmt: skip
+    marks = ("", " (used)") if done.wish.sampled else (" (used)", "")
+    second = ("K, sampled" + marks[1],) if sampled is not None else ()
+    headings = ("state", "K, continuous" + marks[0], *second, "unit")
+    caption = "Gains of u = −K x" + (f", prefilter k_pf = {number(done.k_pf)}" if done.k_pf is not None else "")
+    return Table(caption=caption, headings=headings, rows=rows, numbers=tuple(range(1, len(headings) - 1)))
+
+
+def _pole_table(done: Designed) -> Table:
+    """Poles asked, attained by the gains on the continuous model, and of the loop as it runs."""
+    rows = [("model, open loop", written(done.model.poles()))]
+    if done.placement is not None:
+        rows.append(("asked", written(done.placement.asked)))
+        rows.append(("attained, continuous", written(done.placement.attained)))
+    else:
+        rows.append(
+            ("least cost, continuous", written(np.linalg.eigvals(done.model.A - done.model.B @ done.continuous)))
+        )
+    seen, beyond = _seen_poles(done)
+    rows.append(("loop as it runs", written(seen, 4) + (f", and {beyond} faster" if beyond else "")))
+    return Table(caption="Poles [1/s]", headings=("", "poles"), rows=tuple(rows))
+
+
+def _seen_poles(done: Designed) -> tuple[Any, int]:
+    """Poles of the loop whose motion outlasts a few samples, and how many die out at once (z close to 0)."""
+    slow = done.poles[done.poles.real > -3.0 / done.wish.period]
+    return slow, done.poles.size - slow.size
+
+
+def _way_table(done: Designed) -> Table:
+    """Velocities by difference, filtered difference and Kalman filter, side by side."""
+    rows = tuple((way.name + (" (chosen)" if way is done.chosen else ""), *_worth(way)) for way in done.ways)
+    speeds = ", ".join(f"{c.unit}/s" for c in done.rig.plant.coordinates)
+    headings = (
+        "velocities from", f"speed noise [{speeds}]", f"command noise [{done.rig.unit}]", "gain between", "phase [deg]",
+        "delay [ms]", "distance",
+    )  # fmt: skip
+    return Table(
+        caption="Noise from rounding encoders, and margins: factors on the command, phase, more delay, distance of the "
+        "loop gain to −1; all with the same gains", headings=headings, rows=rows,
+        numbers=(2, 4, 5, 6),
+    )  # fmt: skip
+
+
+def _worth(way: VelocityLoop) -> tuple[str, ...]:
+    noise = ", ".join(number(v, 2) for v in way.speed_noise)
+    if way.margins is None or way.command_noise is None:
+        return noise, "falls", "–", "–", "–", "–"
+    m = way.margins
+    return (
+        noise, number(way.command_noise, 2), f"{number(m.least_gain, 2)} and {number(m.most_gain, 3)}",
+        number(math.degrees(m.phase), 3), number(1e3 * m.delay, 3), number(m.modulus, 2),
+    )  # fmt: skip
+
+
+def _per(command: str, unit: str) -> str:
+    below = f"({unit})" if "/" in unit else unit
+    return raised(f"{command} s/{unit.removesuffix('/s')}" if unit.endswith("/s") else f"{command}/{below}")
+
+
+def _numbers(done: Designed) -> dict[str, Any]:
+    """Content of `design.json`: numbers in SI and the command's unit."""
+    wish, way = done.wish, done.chosen
+    return {
+        "plant": done.rig.name,
+        "at": wish.at,
+        "states": list(done.model.states),
+        "command_unit": done.rig.unit,
+        "period": wish.period,
+        "delay_samples": done.sampled.delay,
+        "K": done.K[0],
+        "K_sampled": None if done.sampled_gains is None else done.sampled_gains[0],
+        "k_pf": done.k_pf,
+        "effort_weight": done.R,
+        "poles": {
+            "open_loop": _complex(done.model.poles()),
+            "asked": None if done.placement is None else _complex(done.placement.asked),
+            "attained": None if done.placement is None else _complex(done.placement.attained),
+            "sampled_loop": _complex(done.poles),
+        },
+        "worst_miss": None if done.placement is None else done.placement.miss,
+        "condition": None if done.placement is None else done.placement.condition,
+        "margins": None
+        if way.margins is None
+        else {k: getattr(way.margins, k) for k in ("least_gain", "most_gain", "phase", "delay", "modulus")},
+        "lag": done.sampled.lag,
+        "peak_command": done.peak,
+        "peak_command_sampled": done.peak_sampled,
+        "chance_over_the_fit": done.chance,
+        "law": {
+            **spelled_out(done.law),
+            "inputs": "readings, readings at rest, reference",
+        },
+        "verdict": done.verdict,
+    }
+
+
+def _complex(poles: Any) -> Any:
+    """Poles as complex numbers, where all are real, too."""
+    return np.asarray(poles, dtype=np.complex128)
+
+
+def _effort(done: Designed) -> str:
+    if not math.isfinite(done.peak_sampled):
+        return ""
+    return (
+        f" The start asked for takes {number(done.peak_sampled, 3)} {done.rig.unit} at most, "
+        f"{number(done.peak, 3)} {done.rig.unit} by the continuous model."
+    )
+
+
+def _next_steps(done: Designed, source: str, folder: str) -> list[Step]:
+    """What to try after this design."""
+    steps: list[Step] = []
+    base = f"upright design {source} --at {done.wish.at}"
+    if done.chosen.margins is None or done.chosen.margins.modulus < 0.4:
+        steps.append(
+            Step("Make up for delay and differences: gains that meet the poles in the sampled loop.",
+                 f'{base} --poles "{written(_wanted(done))}" --sampled'.replace("±", "+-"))
+        )  # fmt: skip
+    if done.wish.poles is not None:
+        steps.append(
+            Step("Let the drive's limit choose: the cheapest effort that comes back from this start.",
+                 f"{base} --lqr {','.join('1' for _ in done.model.states)} --limit LIMIT")
+        )  # fmt: skip
+    if not done.rig.draws:
+        steps.append(
+            Step("See what the uncertainty of the numbers does to the poles: design from a fit.json.",
+                 "upright identify STUDY.toml -o OUT && upright design OUT/fit.json")
+        )  # fmt: skip
+    steps.append(
+        Step(f"Simulate it: upright.laws.Law takes A, B, C and D of law in {folder}/design.json, its "
+             "references being the positions at rest and then the reference.")
+    )  # fmt: skip
+    return steps
+
+
+def _wanted(done: Designed) -> Any:
+    if done.placement is not None:
+        return done.placement.asked
+    return np.linalg.eigvals(done.model.A - done.model.B @ done.continuous)
+
+
+def _pole_pictures(done: Designed) -> list[Picture]:
+    """Poles in the s-plane, and those of least cost as the effort's weight varies, a hundredfold either way."""
+    kinds = [
+        Poles(name="model, open loop", values=done.model.poles(), mark="x", colour=BLACK),
+        Poles(name="asked" if done.placement else "least cost", values=_wanted(done), mark="o", colour=BLUE),
+        Poles(name="loop as it runs", values=done.poles, mark="+", colour=VERMILLION),
+    ]
+    pictures = [
+        Picture(
+            name="poles", draw=lambda: pole_map(kinds, done.cloud),
+            caption="Poles in the s-plane; those of the loop as it runs are s = ln(z)/T of its sampled poles.",
+            description="; ".join(f"{k.name}: {written(k.values, 4)}" for k in kinds),
+        )
+    ]  # fmt: skip
+    if done.R is None:
+        return pictures
+    weights = done.wish.weights or (1.0,) * done.model.A.shape[0]
+    tracks = locus(done.model.A, done.model.B, weights, done.R * np.geomspace(100, 0.01, 300))
+    cheaper = Picture(
+        name="locus",
+        draw=lambda: locus_figure(tracks, {"chosen": np.asarray(_wanted(done))}, done.model.poles()),
+        caption="Poles of least cost as the effort gets cheaper, from a hundred times the weight chosen to a "
+        "hundredth.",
+        description=f"Chosen: R = {number(done.R)}, poles {written(_wanted(done), 4)}.",
+    )  # fmt: skip
+    return [*pictures, cheaper]
+
+
+def _swing_picture(done: Designed) -> Picture:
+    t, x, u = done.swing
+    shown = {c.name: (x[:, 2 * i], c.unit) for i, c in enumerate(done.rig.plant.coordinates)}
+    return Picture(
+        name="swing", draw=lambda: swing_figure(t, shown, u[:, 0], done.rig.unit, done.wish.limit),
+        caption="Linear model, continuous gains: the way back from the start asked for, and the command it takes.",
+        description=f"The command peaks at {done.peak:.3g} {done.rig.unit}.",
+    )  # fmt: skip

@@ -1,0 +1,391 @@
+"""The laboratory: the experiments of the paper, run under one roof and taken up again where they were left."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from upright.control.rig import ServoRig
+from upright.errors import BadInput, UprightError
+from upright.experiments.makes import MAKES, PENDULUMS, SHAFTS, make_rig
+from upright.experiments.weighing_1a.run import Known
+from upright.files import write_json
+from upright.progress import Progress, silent
+from upright.report.page import Chapter
+from upright.report.store import as_plain, from_plain
+from upright.report.symbols import typed
+
+KEPT = "chapter.json"
+"""File of a finished experiment, taken up again as long as nothing it stands on has changed."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setting:
+    """What an experiment is given: rig and folder, what finished ones it builds on said and where they wrote."""
+
+    make: str
+    rig: ServoRig
+    seed: int
+    folder: Path
+    earlier: Mapping[str, Chapter]
+    folders: Mapping[str, Path]
+    progress: Progress
+    stopped: Callable[[], bool]
+
+    @property
+    def weighed(self) -> tuple[Known, ...]:
+        """What experiment 1a hands on, as its chapter tells it."""
+        chapter = self.earlier.get("1a")
+        handed = chapter.numbers.get("handed_on", {}) if chapter else {}
+        return tuple(Known(name=name, value=w["value"], stderr=w["stderr"]) for name, w in handed.items())
+
+    @property
+    def fit(self) -> Path:
+        """The fit of experiment 1b."""
+        if "1b" not in self.earlier:
+            raise BadInput("It stands on the fit of experiment 1b, which could not be finished; its chapter says why.")
+        return self.folders["1b"] / "fit.json"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """One experiment of the paper.
+
+    Attributes
+    ----------
+    key : str
+        As it is asked for and as its folder is named.
+    part_of : str
+        Asking for this brings it as well: ``1`` means 1a and 1b.
+    title : str
+    makes : tuple of str
+        Rigs it can be run on; the first is the paper's.
+    needs : tuple of str
+        Experiments whose numbers it takes, where the rig has them.
+    seconds : float
+        How long it takes about, for the progress bar.
+    tell : callable
+        Runs it; the chapter, and whether it is whole.
+    """
+
+    key: str
+    part_of: str
+    title: str
+    makes: tuple[str, ...]
+    needs: tuple[str, ...]
+    seconds: float
+    tell: Callable[[Setting], tuple[Chapter, bool]]
+
+    def make(self, asked: str) -> str:
+        """Make that it is run on where one is asked for, or none."""
+        return asked if asked in self.makes else self.makes[0]
+
+
+def _weighing(at: Setting) -> tuple[Chapter, bool]:
+    from upright.experiments.weighing_1a.chapter import chapter
+    from upright.experiments.weighing_1a.run import run_weighing
+
+    return chapter(run_weighing(at.rig, at.seed, at.folder, at.progress)), True
+
+
+def _frequency(at: Setting) -> tuple[Chapter, bool]:
+    from upright.experiments.frequency_1b.chapter import chapter
+    from upright.experiments.frequency_1b.run import run_frequency
+
+    done = run_frequency(at.rig, at.seed, at.folder, at.progress, at.stopped, weighed=at.weighed)
+    return chapter(done), True
+
+
+def _regulation(at: Setting) -> tuple[Chapter, bool]:
+    from upright.experiments.identified import read_identified
+    from upright.experiments.regulation_2.chapter import chapter
+    from upright.experiments.regulation_2.run import run_regulation
+
+    known = read_identified(at.fit, seed=at.seed)
+    done = run_regulation(known, at.rig, at.seed, at.folder, at.progress, at.stopped, source=typed(at.fit))
+    return chapter(done), not done.interrupted
+
+
+def _swing_up(at: Setting) -> tuple[Chapter, bool]:
+    from upright.experiments.identified import read_identified
+    from upright.experiments.swing_up_2b.chapter import chapter
+    from upright.experiments.swing_up_2b.run import known_of, run_swing_up
+
+    known = read_identified(at.fit, seed=at.seed)
+    done = run_swing_up(
+        known.rig(), at.rig, at.folder, at.progress, at.stopped, known=known_of(known), source=typed(at.fit)
+    )
+    return chapter(done), not at.stopped()
+
+
+def _tracking(at: Setting) -> tuple[Chapter, bool]:
+    from upright.experiments.tracking_3.chapter import chapter
+    from upright.experiments.tracking_3.run import run_tracking
+
+    done = run_tracking(at.rig, at.seed, at.folder, at.progress, at.stopped, weighed=at.weighed)
+    return chapter(done), not done.interrupted
+
+
+def _free_swing(at: Setting) -> tuple[Chapter, bool]:
+    from upright.experiments.free_swing_4.chapter import chapter
+    from upright.experiments.free_swing_4.run import run_free_swing
+    from upright.study.fit_file import write_fit
+
+    weighed = next((k for k in at.weighed if k.name == MAKES[at.make].body), None)
+    done = run_free_swing(at.rig, at.seed, at.folder, at.progress, at.stopped, weighed=weighed)
+    if "free_swing" in done.answers:
+        first = done.answers["free_swing"]
+        write_fit(first.fit, first.study, at.folder / "fit.json")
+    return chapter(done), not done.interrupted
+
+
+EXPERIMENTS: tuple[Experiment, ...] = (
+    Experiment(
+        key="1a", part_of="1", title="Stiffness and inertia from added loads", makes=(*PENDULUMS, *SHAFTS), needs=(),
+        seconds=1.5, tell=_weighing,
+    ),
+    Experiment(
+        key="1b", part_of="1", title="Frequency response", makes=(*PENDULUMS, *SHAFTS), needs=("1a",),
+        seconds=5.0, tell=_frequency,
+    ),
+    Experiment(
+        key="2", part_of="2", title="Holding it upright", makes=PENDULUMS, needs=("1b",), seconds=4.0, tell=_regulation,
+    ),
+    Experiment(
+        key="2b", part_of="2", title="Swinging up and catching", makes=PENDULUMS, needs=("1b",), seconds=3.0,
+        tell=_swing_up,
+    ),
+    Experiment(
+        key="3", part_of="3", title="Tracking through a flexible shaft", makes=SHAFTS, needs=("1a",), seconds=5.0,
+        tell=_tracking,
+    ),
+    Experiment(
+        key="4", part_of="4", title="Large free swing", makes=PENDULUMS, needs=("1a",), seconds=9.0, tell=_free_swing,
+    ),
+)  # fmt: skip
+"""In the order in which they are run and told."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExperimentResult:
+    """An experiment with its chapter.
+
+    Attributes
+    ----------
+    experiment : Experiment
+    make, rig : str
+        Kind of rig, and its name.
+    chapter : Chapter
+    state : str
+        ``"done"``, ``"kept"`` from an earlier run, ``"stopped"`` half-way, or ``"failed"``.
+    seconds : float
+    """
+
+    experiment: Experiment
+    make: str
+    rig: str
+    chapter: Chapter
+    state: str
+    seconds: float
+
+
+@dataclass(kw_only=True, eq=False)
+class Session:
+    """What has been told so far; it is filled experiment by experiment, so that an interrupted one can be reported."""
+
+    make: str
+    seed: int
+    folder: Path
+    asked: tuple[Experiment, ...]
+    told: list[ExperimentResult] = field(default_factory=list[ExperimentResult])
+    interrupted: bool = False
+    seconds: float = 0.0
+
+    @property
+    def missing(self) -> tuple[Experiment, ...]:
+        """What was asked for and not begun."""
+        return tuple(e for e in self.asked if e.key not in {t.experiment.key for t in self.told})
+
+
+def choose(asked: Sequence[str], make: str) -> tuple[Experiment, ...]:
+    """The experiments asked for, with those whose numbers they take; all that the rig has when none is named.
+
+    Raises
+    ------
+    BadInput
+        When there is no such experiment, or not on this rig.
+    """
+    there = _there(make)
+    wanted: set[str] = set()
+    for name in asked:
+        found = [e for e in EXPERIMENTS if name in (e.key, e.part_of)]
+        if not found:
+            valid = dict.fromkeys(n for e in EXPERIMENTS for n in (e.part_of, e.key))
+            raise BadInput(f"there is no experiment '{name}'; take one of {', '.join(sorted(valid))}.")
+        if not any(e in there for e in found):
+            raise BadInput(
+                f"experiment {name} is for --rig {' or '.join(found[0].makes)}; "
+                f"{make} has experiments {', '.join(e.key for e in there)}."
+            )
+        wanted |= {e.key for e in found if e in there}
+    if not asked:
+        wanted = {e.key for e in there}
+    for e in reversed(there):  # who builds on another comes after it
+        if e.key in wanted:
+            wanted |= set(_needs(e, make))
+    return tuple(e for e in there if e.key in wanted)
+
+
+def _there(make: str) -> list[Experiment]:
+    """Experiments that a rig can have; all for the paper's."""
+    return [e for e in EXPERIMENTS if not make or make in e.makes]
+
+
+def _needs(e: Experiment, make: str) -> list[str]:
+    """What it takes numbers from: earlier experiments on the same rig."""
+    return [n.key for n in _there(make) if n.key in e.needs and n.make(make) == e.make(make)]
+
+
+def run_laboratory(
+    asked: Sequence[str],
+    make: str,
+    seed: int,
+    folder: Path,
+    progress: Progress = silent,
+    stopped: Callable[[], bool] = lambda: False,
+    *,
+    fresh: bool = False,
+) -> Session:
+    """Run experiments on a seeded rig; Ctrl-C stops and keeps what is there.
+
+    Parameters
+    ----------
+    asked : sequence of str
+        Experiments by name, all when empty.
+    make : str
+        Kind of rig; empty for the one on which the paper did each.
+    seed : int
+        Which rig of the make.
+    folder : Path
+        Takes a folder for each experiment. What is there and still holds is not made again.
+    progress : callable, optional
+        Told the step at work and the share of the whole.
+    stopped : callable, optional
+        Whether Ctrl-C was pressed, for what has swallowed it.
+    fresh : bool
+        Make everything again.
+
+    Raises
+    ------
+    BadInput
+        When there is no such experiment, or not on this rig.
+    """
+    began = time.perf_counter()
+    session = Session(make=make, seed=seed, folder=folder, asked=choose(asked, make))
+    digests = _digests(make, seed)
+    whole = sum(e.seconds for e in session.asked)
+    behind = 0.0
+    for e in session.asked:
+
+        def tell(step: str, share: float, e: Experiment = e, behind: float = behind) -> None:
+            progress(f"experiment {e.key}: {step}", (behind + e.seconds * min(share, 1.0)) / whole)
+
+        try:
+            session.told.append(_one(session, e, digests[e.key], tell, stopped, fresh))
+            session.interrupted = session.told[-1].state == "stopped"
+        except KeyboardInterrupt:
+            session.interrupted = True
+        if session.interrupted:
+            break
+        behind += e.seconds
+    session.told = _with_kept(session, digests)
+    session.seconds = time.perf_counter() - began
+    return session
+
+
+def _digests(make: str, seed: int) -> dict[str, str]:
+    """Digest of what each experiment is made of: the program, its rig and seed, the experiments it builds on."""
+    digests: dict[str, str] = {}
+    for e in _there(make):
+        parts = (_program(), e.key, e.make(make), str(seed), *(digests[n] for n in _needs(e, make)))
+        digests[e.key] = sha256("\n".join(parts).encode()).hexdigest()
+    return digests
+
+
+@cache
+def _program() -> str:
+    """Digest of the program as it stands: another version, or a changed line, is another experiment."""
+    source = Path(__file__).parent.parent
+    digest = sha256()
+    for path in sorted(source.rglob("*.py")):
+        digest.update(path.relative_to(source).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def _kept(folder: Path, digest: str) -> Chapter | None:
+    """The chapter of an earlier run, or nothing when there is none or it was made of something else."""
+    try:
+        content: Any = json.loads((folder / KEPT).read_text(encoding="utf-8"))
+        return from_plain(content["chapter"]) if content["made_of"] == digest else None
+    except (OSError, ValueError, KeyError, TypeError):  # none, torn, or another program's: it is made again
+        return None
+
+
+def _with_kept(session: Session, digests: Mapping[str, str]) -> list[ExperimentResult]:
+    """What was told, and what else is there from an earlier run on the same rig."""
+    told = {t.experiment.key: t for t in session.told}
+    for e in _there(session.make):
+        found = None if e.key in told else _kept(session.folder / e.key, digests[e.key])
+        if found:
+            make = e.make(session.make)
+            name = make_rig(make, session.seed).name
+            told[e.key] = ExperimentResult(experiment=e, make=make, rig=name, chapter=found, state="kept", seconds=0.0)
+    return [told[e.key] for e in _there(session.make) if e.key in told]
+
+
+def _one(
+    session: Session, e: Experiment, digest: str, progress: Progress, stopped: Callable[[], bool], fresh: bool
+) -> ExperimentResult:
+    """One experiment, from an earlier run where that still holds."""
+    began = time.perf_counter()
+    make, needs = e.make(session.make), _needs(e, session.make)
+    rig, folder = make_rig(make, session.seed), session.folder / e.key
+    folder.mkdir(parents=True, exist_ok=True)
+    progress("starting", 0.0)
+    state, chapter = "kept", None if fresh else _kept(folder, digest)
+    if chapter is None:
+        at = Setting(
+            make=make, rig=rig, seed=session.seed, folder=folder, progress=progress, stopped=stopped,
+            earlier={
+                t.experiment.key: t.chapter
+                for t in session.told
+                if t.experiment.key in needs and t.state in ("done", "kept")
+            },
+            folders={n: session.folder / n for n in needs},
+        )  # fmt: skip
+        try:
+            chapter, whole = e.tell(at)
+            chapter = replace(chapter, key=e.key, title=e.title)
+            state = "done" if whole and not stopped() else "stopped"
+        except UprightError as error:
+            state, chapter = "failed", _failed(e, str(error))
+        except (ArithmeticError, np.linalg.LinAlgError) as error:
+            state, chapter = "failed", _failed(e, f"Its numbers broke down ({error}), which is a fault of the program.")
+        if state == "done":
+            write_json(folder / KEPT, {"made_of": digest, "chapter": as_plain(chapter)})
+    return ExperimentResult(
+        experiment=e, make=make, rig=rig.name, chapter=chapter, state=state, seconds=time.perf_counter() - began
+    )
+
+
+def _failed(e: Experiment, why: str) -> Chapter:
+    return Chapter(key=e.key, title=e.title, verdict="This experiment could not be finished.", detail=why, sound=False)

@@ -1,0 +1,308 @@
+"""Experiment 2 as a chapter: gains, what was expected of them, what came, and was it expected?"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from upright.control import Score, ServoRig
+from upright.control.preflight import FELT, WORDS, word
+from upright.experiments.regulation_2.figures import Panel, chances_figure, runs_figure, ways_figure
+from upright.experiments.regulation_2.run import SETS, Attempt, Regulation, VelocityRun
+from upright.gains.requests import written
+from upright.report.page import Chapter, Finding, Part, Picture, Points, Step, Table
+from upright.report.symbols import number, plain
+
+SHOWN = 2.5
+"""Seconds of the runs that are drawn."""
+
+
+def chapter(done: Regulation) -> Chapter:
+    """What holding the rig upright came to."""
+    return Chapter(
+        key="2",
+        title="Holding it upright",
+        question="Which of the pole sets hold the rig upright within its drive's limit, and can that be told before "
+        "anything moves, from the numbers identified while it hung?",
+        verdict=_verdict(done),
+        detail=_detail(done),
+        sound=not done.interrupted and done.best.before.words["regulates"] > 0.9,
+        parts=tuple(_parts(done)),
+        steps=tuple(_steps(done)),
+        findings=tuple(
+            Finding(
+                what=f"chance that {a.name} holds", value=f"{100 * a.before.chance:.0f} %",
+                truth="" if a.score is None else a.word,
+            )
+            for a in done.attempts
+        ),
+        numbers=_numbers(done),
+    )  # fmt: skip
+
+
+def _verdict(done: Regulation) -> str:
+    """Which set to take, and whether things came as told."""
+    best = done.best
+    share = best.before.words["regulates"]
+    sure = f"{round(share * done.wish.draws)} of {done.wish.draws} rigs that the identification allows regulate with it"
+    head = f"{'Take' if share >= 0.5 else 'None is to be trusted with this start; best is'} {best.name}: {sure}."
+    if done.truth is None:
+        return head + " Nothing was run: this is what the model says."
+    as_told = [a for a in done.attempts if a.word == a.before.word]
+    if len(as_told) == len(done.attempts):
+        return (
+            f"{head} All {len(done.attempts)} runs came as told." if len(done.attempts) > 1 else f"{head} So it came."
+        )
+    others = ", ".join(f"{a.name} ({a.word}, told {100 * a.before.words[a.word]:.0f} %)" for a in done.attempts
+                       if a not in as_told)  # fmt: skip
+    return f"{head} {len(as_told)} of {len(done.attempts)} runs came as most of those rigs did; not so {others}."
+
+
+def _detail(done: Regulation) -> str:
+    """How far that can be trusted."""
+    spread = (
+        f"The {done.wish.draws} rigs were drawn from the fit's covariance, dry friction as it may be on the day, and "
+        "started as a hand does it."
+        if done.uncertain
+        else "The fit tells of no uncertainty, so only dry friction and the hand vary: the chances are too sure."
+    )
+    return spread + (" Stopped by Ctrl-C before every set was run." if done.interrupted else "")
+
+
+def _sentence(done: Regulation, a: Attempt) -> str:
+    """One pole set: what was told, and what came."""
+    b, rig = a.before, done.rig
+    reach = (
+        f"it recovers tilts up to {math.degrees(b.tilt):.0f}° and taps up to {b.push:.1f} rad/s"
+        if b.margins is not None
+        else "the sampled loop is not stable"
+    )
+    told = (
+        f"{a.name[:1].upper()}{a.name[1:]}: told to be held with a chance of {100 * b.chance:.0f} %"
+        f" ({_shares(a)}); {reach}; the command was to peak at {b.score.effort_peak:.2g} of {rig.limit:g} {rig.unit}."
+    )
+    if a.score is None:
+        return told
+    return f"{told} {_came(done, a.score)}"
+
+
+def _shares(a: Attempt) -> str:
+    return ", ".join(f"{w} {100 * a.before.words[w]:.0f} %" for w in WORDS if a.before.words[w] > 0)
+
+
+def _came(done: Regulation, s: Score) -> str:
+    rig = done.rig
+    driven = plain(rig.plant.inputs[0].on)
+    if not s.held and s.fell < s.ran_out:
+        return f"It fell after {s.fell:.2g} s."
+    if not s.held:
+        return f"It was too weak: {driven} came to the end of its travel after {s.ran_out:.2g} s."
+    if math.isinf(s.settled):
+        return f"It was too weak: dry friction kept the pendulum swinging by {math.degrees(s.final[-1]):.2g}°."
+    full = f", {1e3 * s.at_limit:.0f} ms of it at the limit" if s.at_limit > FELT else ""
+    still = f"swings on by {_shown(rig, 0, s.final[0])}" if s.final[0] > 2 * rig.quantum[0] else "comes to rest"
+    return (
+        f"It settled in {s.settled:.2g} s with a peak of {s.effort_peak:.2g} {rig.unit}{full}; {driven} went "
+        f"{_shown(rig, 0, s.peaks[0])} and {still}."
+    )
+
+
+def _shown(rig: ServoRig, i: int, value: float) -> str:
+    """A coordinate's deviation in degrees or centimetres."""
+    if rig.plant.coordinates[i].unit == "rad":
+        return f"{math.degrees(value):.2g}°" if math.degrees(value) < 99.5 else f"{math.degrees(value):.0f}°"
+    return f"{100 * value:.2g} cm"
+
+
+def _gain_table(done: Regulation) -> Table:
+    """Poles asked, the gains they take, and the margins of the loop as it runs."""
+    rows: list[tuple[str, ...]] = []
+    for a in done.attempts:
+        m = a.before.margins
+        worth = ("falls", "–", "–") if m is None else (
+            f"{number(m.least_gain, 2)} to {number(m.most_gain, 3)}", number(1e3 * m.delay, 3), number(m.modulus, 2)
+        )  # fmt: skip
+        gains = ", ".join(number(k, 3) for k in a.placement.K[0])
+        rows.append((a.name, written(a.placement.asked), gains, *worth))
+    states = ", ".join(plain(n) for n in done.rig.plant.state_names())
+    return Table(
+        caption=f"Gains of u = −K x for {states} [{done.rig.unit} per SI unit], and the sampled loop's margins: "
+        "factors on the command, more delay, distance to −1",
+        headings=("", "poles [1/s]", "K", "gain", "delay [ms]", "distance"),
+        rows=tuple(rows),
+        numbers=(4, 5),
+    )
+
+
+def _told_table(done: Regulation) -> Table:
+    """What was told and what came, set by set."""
+    rows: list[tuple[str, ...]] = []
+    for a in done.attempts:
+        b = a.before
+        noise = "–" if b.noise is None else number(b.noise, 2)
+        rows.append(
+            (a.name, b.word, f"{100 * b.chance:.0f} %", f"{math.degrees(b.tilt):.0f}", f"{b.push:.1f}", noise,
+             *_figures(done, b.score))
+        )  # fmt: skip
+        if a.score is not None:
+            rows.append(
+                ("", f"came: {a.word}", "held" if a.score.held else "lost", "", "", "", *_figures(done, a.score))
+            )
+    driven = done.rig.plant.coordinates[0]
+    return Table(
+        caption="Told before (first lines) and come after; tilt and tap are the largest recovered, each alone; noise "
+        "is that of the command from the encoders' counts",
+        headings=(
+            "", "verdict", "chance", "tilt [deg]", "tap [rad/s]", f"noise [{done.rig.unit}]", "settled [s]",
+            f"peak [{done.rig.unit}]", "at limit", f"{plain(driven.name)} peak", f"{plain(driven.name)} rest",
+        ),
+        rows=tuple(rows), numbers=tuple(range(2, 11)),
+    )  # fmt: skip
+
+
+def _figures(done: Regulation, s: Score) -> tuple[str, ...]:
+    settled = number(s.settled, 3) if math.isfinite(s.settled) else "never"
+    still = "still" if s.final[0] <= 2 * done.rig.quantum[0] else f"±{_shown(done.rig, 0, s.final[0])}"
+    rest = still if s.held else "–"
+    return (
+        settled, number(s.effort_peak, 3), f"{100 * s.saturated:.1f} %", _shown(done.rig, 0, s.peaks[0]), rest,
+    )  # fmt: skip
+
+
+def _way_table(done: Regulation) -> Table:
+    """Plain and filtered differences and the Kalman filter, with the same gains from the same start."""
+
+    def row(w: VelocityRun) -> tuple[str, ...]:
+        return (
+            w.name, "falls" if w.noise is None else number(w.noise, 2), number(w.restless, 2),
+            "–" if w.margins is None else number(1e3 * w.margins.delay, 3),
+            "–" if w.margins is None else number(w.margins.modulus, 2), word(w.score),
+            number(w.score.settled, 3) if math.isfinite(w.score.settled) else "never",
+            number(w.score.effort_peak, 3),
+        )  # fmt: skip
+
+    unit = done.rig.unit
+    return Table(
+        caption=f"Ways to the velocities, all with the gains of {done.best.name}: noise of the command told from "
+        "the counts, its change from sample to sample as it came in the first second, delay borne and distance to −1",
+        headings=("from", f"noise [{unit}]", f"change [{unit}]", "delay [ms]", "distance", "came", "settled [s]",
+                  f"peak [{unit}]"),
+        rows=tuple(row(w) for w in done.ways), numbers=(1, 2, 3, 4, 6, 7),
+    )  # fmt: skip
+
+
+def _parts(done: Regulation) -> list[Part]:
+    tilt, push = math.degrees(done.task.start[2]), done.task.start[3]
+    rig = done.rig
+    given = (
+        f"{rig.name}, sampled every {1e3 * rig.period:.3g} ms; the command has a limit of {rig.limit:g} {rig.unit}, "
+        f"steps of {1e3 * rig.converter:.2g} m{rig.unit}, and acts {1e3 * rig.delay:.2g} ms late with a lag of "
+        f"{1e3 * rig.lag:.2g} ms. Positions come in counts; velocities are made of them.",
+        f"The pendulum is let go {tilt:.0f}° from upright, moving away at {push:.2g} rad/s, by a hand that errs by "
+        f"{math.degrees(done.task.hand[2]):.1f}° and {done.task.hand[3]:.1g} rad/s.",
+    )
+    parts = [
+        Part("Gains", (*given, _gain_table(done))),
+        Part(
+            "Told before, come after",
+            (
+                Points(tuple(_sentence(done, a) for a in done.attempts)),
+                _told_table(done),
+                _chance_picture(done),
+                *_run_pictures(done),
+            ),
+        ),
+    ]
+    if done.ways:
+        ways = Picture(
+            name="regulation-ways", draw=lambda: ways_figure({w.name: w.run for w in done.ways}),
+            caption="The command on its way back: the same gains on velocities made in three ways.",
+            description="Changes of the command from sample to sample: "
+            + ", ".join(f"{w.name} {number(w.restless, 2)} {rig.unit}" for w in done.ways) + ".",
+        )  # fmt: skip
+        parts.append(Part("Velocities", (_way_table(done), ways)))
+    return parts
+
+
+def _chance_picture(done: Regulation) -> Picture:
+    told = {a.name: a.before.words for a in done.attempts}
+    return Picture(
+        name="regulation-chances", draw=lambda: chances_figure(told, {a.name: a.word for a in done.attempts}),
+        caption="What the rigs that the identification allows come to with each pole set, and what the rig did.",
+        description="; ".join(
+            f"{n}: " + ", ".join(f"{w} {100 * s:.0f} %" for w, s in words.items() if s > 0) for n, words in told.items()
+        ),
+    )  # fmt: skip
+
+
+def _run_pictures(done: Regulation) -> list[Picture]:
+    """Four sets at a time."""
+    panels = [
+        Panel(name=f"{a.name}: {a.word or a.before.word}", told=a.before.run, came=a.after) for a in done.attempts
+    ]
+    return [
+        Picture(
+            name=f"regulation-runs{i // 4}", draw=lambda four=panels[i : i + 4]: runs_figure(four, SHOWN),
+            caption="Deviation from upright and command. Dashed: as told by the identified model; solid: as it came; a "
+            "cross ends a run that was lost.",
+            description="; ".join(p.name for p in panels[i : i + 4]),
+        )
+        for i in range(0, len(panels), 4)
+    ]  # fmt: skip
+
+
+def _steps(done: Regulation) -> list[Step]:
+    seed = f" --seed {done.truth.seed}" if done.truth is not None else ""
+    base = f"upright regulate {done.source}{seed}"
+    first = [] if done.truth is not None else [
+        Step("Run the laws on a twin of this make.", f"upright regulate {done.source} --seed 0")
+    ]  # fmt: skip
+    own = f'--poles "{written(done.best.placement.asked).replace("±", "+-")}"'
+    best = f"--set {done.best.name[4:]}" if done.best.name in SETS else own
+    return [
+        *first,
+        Step("See how hard a start the recommended set bears.",
+             f'{base} {best} --tilt "25 deg" --push "3 rad/s"'),
+        Step("Let an observer make the velocities.", f"{base} --speed kalman"),
+        Step("Try poles of your own.", f'{base} --poles "-5+-3j, -25, -4"'),
+    ]  # fmt: skip
+
+
+def _numbers(done: Regulation) -> dict[str, Any]:
+    """The same for another program: SI, finite."""
+    return {
+        "rig": done.rig.name,
+        "seed": None if done.truth is None else done.truth.seed,
+        "start": dict(zip(done.rig.plant.state_names(), done.task.start, strict=True)),
+        "limit": done.rig.limit,
+        "command_unit": done.rig.unit,
+        "recommended": done.best.name,
+        "as_told": sum(a.word == a.before.word for a in done.attempts) if done.truth is not None else None,
+        "sets": {a.name: _set(a) for a in done.attempts},
+        "velocities": {
+            w.name: {"noise": w.noise, "change_per_sample": w.restless, **_scored(w.score)} for w in done.ways
+        },
+    }
+
+
+def _set(a: Attempt) -> dict[str, Any]:
+    b, m = a.before, a.before.margins
+    return {
+        "poles": np.asarray(a.placement.asked, dtype=np.complex128),
+        "K": a.placement.K[0],
+        "before": {
+            "word": b.word, "words": dict(b.words), "chance": b.chance, "tilt": b.tilt, "push": b.push,
+            "command_noise": b.noise,
+            "margins": None if m is None else {
+                k: getattr(m, k) for k in ("least_gain", "most_gain", "phase", "delay", "modulus")
+            },
+            **_scored(b.score),
+        },
+        "after": None if a.score is None else {"word": a.word, **_scored(a.score)},
+    }  # fmt: skip
+
+
+def _scored(s: Score) -> dict[str, Any]:
+    return {**vars(s), "held": s.held}

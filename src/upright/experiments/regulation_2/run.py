@@ -1,0 +1,239 @@
+"""Experiment 2: the rig held upright with the numbers it was identified by, and beforehand what will come of it.
+
+Gains come from the identified model, the verdict per pole set from the rigs that its covariance allows; then the law
+runs on the rig itself, here the twin's truth, and what came is put beside what was told.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright import gains as design
+from upright.control import Score, ServoRig, Trial, score, trial
+from upright.control.preflight import Preflight, Task, preflight, word
+from upright.errors import BadInput
+from upright.experiments.designing.run import SPEEDS, velocities
+from upright.experiments.frequency_1b.run import run_frequency
+from upright.experiments.identified import IdentifiedRig, read_identified
+from upright.experiments.makes import PENDULUMS
+from upright.gains import Margins, Placement, Sampled
+from upright.gains.loop import closed, command_noise
+from upright.gains.requests import poles_of, read_poles
+from upright.laws import Law
+from upright.paper.tables import TABLE_1
+from upright.physics import Linear
+from upright.progress import Progress, silent
+
+Array = NDArray[np.float64]
+Roots = NDArray[np.complex128]
+
+HAND = (0.01, 0.1)
+"""What a hand gets wrong: half a degree, and 0.1 rad/s."""
+DRAWS = 200
+SETS = {f"set {i}": text for i, text in enumerate(TABLE_1, start=1)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class RegulationRequest:
+    """What is asked: poles by name [1/s], the way to the velocities, and the start (the make's own when None)."""
+
+    poles: Mapping[str, Roots] = field(default_factory=lambda: {n: read_poles(text) for n, text in SETS.items()})
+    speed: str = "filtered"
+    memory: float = 0.5
+    tilt: float | None = None
+    push: float | None = None
+    seconds: float = 6.0
+    draws: int = DRAWS
+
+    def __post_init__(self) -> None:
+        if self.speed not in SPEEDS:
+            raise BadInput(f"velocities come from {', '.join(SPEEDS)}, got '{self.speed}'.")
+        if not 0 < self.seconds <= 120:
+            raise BadInput(f"a run takes more than 0 and at most 120 s, got {self.seconds:g} s.")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Attempt:
+    """One pole set: gains, what was told beforehand, and what came of it; None where nothing was run."""
+
+    name: str
+    placement: Placement
+    law: Law
+    before: Preflight
+    after: Trial | None
+    score: Score | None
+
+    @property
+    def word(self) -> str:
+        """What it came to, in one of `preflight.WORDS`; empty when nothing was run."""
+        return "" if self.score is None else word(self.score)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class VelocityRun:
+    """One way to the velocities, with the recommended set's gains."""
+
+    name: str
+    noise: float | None
+    margins: Margins | None
+    run: Trial
+    score: Score
+    restless: float
+    """Root mean square of the command's changes from sample to sample over the first second [the command's unit]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Regulation:
+    """What the experiment found.
+
+    Attributes
+    ----------
+    rig : ServoRig
+        As identified.
+    truth : ServoRig or None
+        The rig on which the laws ran.
+    task : Task
+    wish : Wish
+    attempts : tuple of Attempt
+    ways : tuple of Way
+        For the recommended set, on the truth, or on the model where there is no truth.
+    uncertain : bool
+        Whether the identification told of its uncertainty.
+    source : str
+        What `upright regulate` is given to do this again.
+    seed : int
+    interrupted : bool
+    seconds : float
+        Computing time.
+    """
+
+    rig: ServoRig
+    truth: ServoRig | None
+    task: Task
+    wish: RegulationRequest
+    attempts: tuple[Attempt, ...]
+    ways: tuple[VelocityRun, ...]
+    uncertain: bool
+    source: str
+    seed: int
+    interrupted: bool = False
+    seconds: float = 0.0
+
+    @property
+    def best(self) -> Attempt:
+        """The set to recommend beforehand: the surest to regulate, of equals the one that bears the hardest tap."""
+        return max(self.attempts, key=lambda a: (round(a.before.words["regulates"], 2), a.before.push))
+
+
+def identify_make(key: str, seed: int, folder: Path, progress: Progress = silent) -> IdentifiedRig:
+    """What experiment 1b makes of a rig of the make; its logs and `fit.json` go into the folder."""
+    _check_upright(key)
+    run_frequency(key, seed, folder, progress)
+    return read_identified(folder / "fit.json", seed=seed)
+
+
+def _check_upright(key: str) -> None:
+    if key not in PENDULUMS:
+        raise BadInput(f"there is nothing to hold upright on the make '{key}'; take one of {', '.join(PENDULUMS)}.")
+
+
+def run_regulation(
+    known: IdentifiedRig, truth: ServoRig | None, seed: int, folder: Path, progress: Progress = silent,
+    stopped: Callable[[], bool] = lambda: False, wish: RegulationRequest | None = None, source: str = "FIT",
+) -> Regulation:  # fmt: skip
+    """Design for the rig as identified, say what will come, and run on the rig itself.
+
+    Parameters
+    ----------
+    known : IdentifiedRig
+        What was identified, hanging.
+    truth : ServoRig, optional
+        The rig; without it nothing is run and only what is expected is told.
+    seed : int
+        Of the hand's errors and of the rigs drawn.
+    folder : Path
+        Takes the logs of the runs.
+    progress : callable, optional
+        Told the step at work and the share done.
+    stopped : callable, optional
+        Asked after every set whether to stop there.
+    wish : Wish, optional
+    source : str
+        How a command line would name the fit.
+    """
+    began = time.perf_counter()
+    wish, make = wish or RegulationRequest(), known.make
+    _check_upright(make.key)
+    rig = known.rig()
+    model = rig.linear("inverted")
+    sampled = design.hold(model, rig.period, rig.delay / rig.period)
+    tilt, push = (w if w is not None else s for w, s in zip((wish.tilt, wish.push), make.start, strict=True))
+    task = Task(start=(0.0, 0.0, tilt, push), hand=(0.0, 0.0, *HAND), seconds=wish.seconds)
+    others = known.allowed(rig, wish.draws, seed)
+    attempts: list[Attempt] = []
+    interrupted = False
+    for i, (name, poles) in enumerate(wish.poles.items()):
+        progress(f"regulating with {name}", i / (len(wish.poles) + 1))
+        attempts.append(_attempt(name, poles, rig, truth, model, sampled, task, others, wish, seed))
+        if stopped():
+            interrupted = True
+            break
+    done = Regulation(
+        rig=rig, truth=truth, task=task, wish=wish, attempts=tuple(attempts), ways=(), uncertain=bool(known.draws),
+        source=source, seed=seed, interrupted=interrupted,
+    )  # fmt: skip
+    progress("comparing the ways to the velocities", len(wish.poles) / (len(wish.poles) + 1))
+    ways = () if interrupted else tuple(_ways(done, model, sampled))
+    for a in done.attempts:
+        if a.after is not None:
+            folder.mkdir(parents=True, exist_ok=True)
+            a.after.record.to_csv(folder / f"regulation_{a.name.replace(' ', '_')}.csv")
+    return replace(done, ways=ways, seconds=time.perf_counter() - began)
+
+
+def actual_start(task: Task, seed: int) -> Array:
+    """Where the hand really let go."""
+    return task.starts(1, np.random.default_rng([seed, 54]))[0]
+
+
+def _attempt(
+    name: str, poles: Roots, rig: ServoRig, truth: ServoRig | None, model: Linear, sampled: Sampled, task: Task,
+    others: Mapping[str, Array], wish: RegulationRequest, seed: int,
+) -> Attempt:  # fmt: skip
+    placed = design.place(model.A, model.B, poles)
+    law = design.feedback(velocities(model, sampled, wish.speed, wish.memory, rig.limit, rig.quantum), placed.K)
+    told = preflight(rig, model, sampled, law, task, parameters=others, lanes=wish.draws, seed=seed)
+    after = None
+    if truth is not None:
+        after = trial(truth, law, at=task.at, start=actual_start(task, seed), seconds=task.seconds)
+    return Attempt(
+        name=name, placement=placed, law=law, before=told, after=after, score=None if after is None else score(after)
+    )  # fmt: skip
+
+
+def _ways(done: Regulation, model: Linear, sampled: Sampled) -> list[VelocityRun]:
+    on, K = done.truth or done.rig, done.best.placement.K
+    driven = design.hold(model, sampled.period, sampled.delay, done.rig.lag)
+    out: list[VelocityRun] = []
+    for speed in SPEEDS:
+        way = velocities(model, sampled, speed, done.wish.memory, done.rig.limit, done.rig.quantum)
+        law = design.feedback(way, K)
+        stands = bool(np.abs(poles_of(closed(driven, law))).max() < 1)
+        went = trial(on, law, at=done.task.at, start=actual_start(done.task, done.seed), seconds=done.task.seconds)
+        out.append(
+            VelocityRun(
+                name=way.name,
+                noise=command_noise(driven, law, done.rig.quantum) if stands else None,
+                margins=design.margins(model, driven, law) if stands else None,
+                run=went,
+                score=score(went),
+                restless=float(np.sqrt(np.mean(np.diff(went.u[went.t <= 1.0]) ** 2))),
+            )
+        )
+    return out

@@ -1,0 +1,186 @@
+"""Experiment 2b as a chapter: the encoders, the way up, and what lying encoders would have done."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from upright.control import ServoRig
+from upright.control.ascent import Ascent
+from upright.control.sensors import Scales
+from upright.experiments.makes import make_of
+from upright.experiments.swing_up_2b.figures import ascent_figure, check_figure, portrait_figure
+from upright.experiments.swing_up_2b.run import HELD, LIES, TILT, Lie, SwingUpRun
+from upright.report.page import Chapter, Finding, Part, Picture, Points, Step, Table
+from upright.report.symbols import number, percent
+from upright.report.symbols import unit as raised
+
+QUESTION = (
+    "Do the encoders show what is true, and does the drive, within its limit and travel, bring the hanging pendulum "
+    "upright and hold it there?"
+)
+
+
+def chapter(done: SwingUpRun) -> Chapter:
+    """Sensors, swing-up, lies; as far as the experiment has them."""
+    source = "numbers identified hanging" if done.source else "the numbers of the make as designed"
+    parts = [_sensor_part(done.model, done.check)]
+    if done.ascent is not None:
+        parts.append(_swing_part(done, done.ascent))
+    if done.lies:
+        parts.append(_lie_part(done))
+    return Chapter(
+        key="2b", title=f"Swing-up and catch: {done.truth.name}, seed {done.truth.seed}", question=QUESTION,
+        verdict=done.verdict, detail=f"Law and check were made from {source}; they met a rig with numbers of its own.",
+        sound=done.caught, parts=tuple(parts), steps=_steps(done), findings=_findings(done), numbers=_numbers(done),
+    )  # fmt: skip
+
+
+def check_chapter(model: ServoRig, check: Scales, log: str, source: str = "FIT.json") -> Chapter:
+    """What a log of a hanging rig says of its encoders, by itself."""
+    again = Step("Mend what is said above, log the hanging rig again, and check again.")
+    onward = Step("The encoders may be trusted: find the gains that hold the rig.",
+                  f"upright regulate {source}")  # fmt: skip
+    return Chapter(
+        key="2b", title=f"Encoders of {model.name} in {log}", question="Do the encoders show what is true?",
+        verdict=check.verdict, sound=check.sound, parts=(_sensor_part(model, check),),
+        steps=(onward if check.sound else again,), numbers={"sensors": _scales(check), "verdict": check.verdict},
+    )  # fmt: skip
+
+
+def _scales(check: Scales) -> dict[str, Any]:
+    """Scales as plain values."""
+    each = zip(check.names, check.value, check.error, check.explained, strict=True)
+    return {n: {"scale": v, "stderr": e, "explained": x, "sound": n not in check.wrong} for n, v, e, x in each}
+
+
+def _sensor_part(model: ServoRig, check: Scales) -> Part:
+    """What the hanging rig says of its encoders."""
+    rows = tuple(
+        (name, number(v, 5), number(2 * e, 2), percent(100 * x), "to be mended" if name in check.wrong else "sound")
+        for name, v, e, x in zip(check.names, check.value, check.error, check.explained, strict=True)
+    )
+    table = Table(
+        caption="What each encoder shows over what is true", rows=rows, numbers=(1, 2, 3),
+        headings=("coordinate", "scale", "± (95 %)", "explained", ""),
+    )  # fmt: skip
+    swings = Picture(
+        name="scales", draw=lambda: check_figure(check, tuple(c.unit for c in model.plant.coordinates)),
+        caption="Swings of the hanging rig under known commands, then coasting. Wide: shown; dashed: "
+        "the model's motion times the scale found.",
+        description=check.verdict,
+    )  # fmt: skip
+    how = (
+        "The period of a large swing tells its true amplitude, momentum what the driven body does meanwhile, and "
+        "the drive the signs; the model's own numbers may move as far as they are uncertain."
+    )
+    return Part("Encoders, before a loop is closed", (Points((check.verdict,)), how, table, swings))
+
+
+def _swing_part(done: SwingUpRun, run: Ascent) -> Part:
+    """The way up."""
+    law = done.law
+    unit = raised(done.model.plant.coordinates[0].unit)
+    rows = (
+        ("upright for good after", number(run.up, 3) if math.isfinite(run.up) else "never", "s"),
+        ("half swings before the first handover", str(run.swings), ""),
+        ("handovers, falls", f"{len(run.handovers)}, {len(run.falls)}", ""),
+        ("largest command, of its limit", f"{run.peak:.3g} of {law.limit:.3g}", done.model.unit),
+        ("share of the time at the limit", percent(100 * run.saturated), ""),
+        ("farthest from the middle, of the travel", f"{run.travel:.3g} of {law.travel:.3g}", unit),
+        ("ellipsoid of the catch, of what the linear model allows", percent(100 * law.size / law.sure), ""),
+    )
+    return Part(
+        "Swing-up and catch",
+        (
+            done.verdict,
+            "The pivot is accelerated along with the swing, by less as the energy comes near that of upright; a spring "
+            "and a damper keep it in the middle. The feedback takes over inside an ellipsoid x'Px from which a "
+            "least-cost loop returns although the command saturates.",
+            Table(caption="The way up", headings=("", "value", "unit"), rows=rows, numbers=(1,)),
+            Picture(
+                name="ascent", draw=lambda: ascent_figure(run),
+                caption="Angle, energy about the hinge, command and driven body as logged. Shaded: the feedback "
+                "holds.",
+                description=done.verdict,
+            ),
+            Picture(
+                name="portrait", draw=lambda: portrait_figure(run),
+                caption="Speed over angle. The pump spirals outwards to the energy of upright at rest, the feedback "
+                "takes over at the ring.",
+                description=f"{run.swings} half swings, {len(run.handovers)} handovers.",
+            ),
+        ),
+    )  # fmt: skip
+
+
+def _lie_part(done: SwingUpRun) -> Part:
+    """Lying encoders, tried one by one."""
+    rows = tuple(_row(lie) for lie in done.lies)
+    caught = sum(lie.refused for lie in done.lies)
+    falling = [lie for lie in done.lies if math.isfinite(lie.fell)]
+    in_time = sum(lie.spoke < lie.fell for lie in falling)
+    table = Table(
+        caption="Encoders that show a multiple of what is true", rows=rows, numbers=(1, 2, 3, 4, 6),
+        headings=("coordinate", "lie", "found hanging", "watch speaks [ms]", "at [°]", "and says", "fall [ms]"),
+    )  # fmt: skip
+    told = (
+        f"Hanging, {caught} of {len(done.lies)} lies are found before a loop is closed. "
+        f"A loop started {math.degrees(TILT):.0f} degrees from upright falls with {len(falling)} of them; a watch "
+        f"beside it switches off before the fall in {in_time} cases."
+    )
+    return Part("If an encoder lied", (Points((told,)), table))
+
+
+def _row(lie: Lie) -> tuple[str, ...]:
+    spoke = math.isfinite(lie.spoke)
+    return (
+        lie.name, f"{lie.factor:g}".replace("-", "−"), number(lie.found, 4), f"{1e3 * lie.spoke:.0f}" if spoke else "–",
+        number(math.degrees(lie.tilt), 2) if spoke else "–", lie.said or "–",
+        f"{1e3 * lie.fell:.0f}" if math.isfinite(lie.fell) else "stands",
+    )  # fmt: skip
+
+
+def _findings(done: SwingUpRun) -> tuple[Finding, ...]:
+    """Numbers for the cover."""
+    run = done.ascent
+    if run is None or not done.caught:
+        return (Finding(what="swing-up", value="no"),)
+    return (
+        Finding(what="from hanging to upright", value=f"{number(run.up, 3)} s"),
+        Finding(what="largest command of the swing-up", value=f"{number(run.peak, 3)} {done.model.unit}"),
+    )
+
+
+def _steps(done: SwingUpRun) -> tuple[Step, ...]:
+    """What to do next."""
+    base = f"upright swing-up {done.source or f'--rig {make_of(done.truth.plant).key}'} --seed {done.truth.seed}"
+    if not done.check.sound:
+        return (Step("Mend the encoder, then try again.", base),)
+    out = [Step("See what happens when an encoder lies.", f'{base} --lie "theta=2"')]
+    if not done.caught:
+        out.append(Step("Allow more travel.", f"{base} --travel {2 * done.law.travel:g}"))
+    if not done.source:
+        out.append(Step("Design from an identification instead of the data sheet.",
+                        f"upright swing-up FIT.json --seed {done.truth.seed}"))  # fmt: skip
+    return tuple(out)
+
+
+def _numbers(done: SwingUpRun) -> dict[str, Any]:
+    """The same as plain values."""
+    run, law = done.ascent, done.law
+    up = None if run is None else {
+        "upright_after": run.up, "held": done.caught, "half_swings": run.swings,
+        "handovers": run.handovers, "falls": run.falls, "tripped": run.tripped,
+        "peak_command": run.peak, "share_saturated": run.saturated, "travel": run.travel,
+    }  # fmt: skip
+    return {
+        "rig": done.truth.name, "seed": done.truth.seed, "verdict": done.verdict,
+        "sensors": _scales(done.check), "swing_up": up,
+        "law": {
+            "K": law.K, "P": law.P, "size": law.size, "sure": law.sure, "reach": law.reach,
+            "limit": law.limit, "travel": law.travel, "held_for": HELD, "body": vars(law.body),
+        },
+        "lies": [vars(lie) for lie in done.lies],
+        "lies_tried": len(LIES) if done.lies else 0,
+    }  # fmt: skip

@@ -1,0 +1,291 @@
+"""Experiment 2b, from hanging to upright: encoders first, then pump, catch and hold; and what lying encoders do.
+
+The law is designed from what is known of the rig, a fit or the make's data sheet; it runs on the rig itself, here the
+twin's truth.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright import gains as design
+from upright.control import ServoRig, SwingUp, design_swing_up, trial
+from upright.control.ascent import Ascent, swing_up
+from upright.control.score import FALLEN
+from upright.control.sensors import KNOWN, Scales, probe, put_out, scales
+from upright.control.trial import readings
+from upright.control.watch import Suspicion, Watch
+from upright.errors import BadInput, NotIdentifiable, nearest
+from upright.experiments.identified import IdentifiedRig
+from upright.progress import Progress, silent
+from upright.records import Record
+from upright.units import same_dimension, scale
+
+Array = NDArray[np.float64]
+
+HELD = 5.0
+"""How long the pendulum must stand before it counts as caught [s]."""
+SECONDS = 12.0
+TILT = math.radians(3)
+"""From which a loop with a lying encoder is switched on [rad]."""
+LEAST = math.radians(40)
+"""Swing below which the period tells too little of the amplitude [rad]: at 40 degrees it is 3 % longer."""
+LIES = (("theta", -1.0), ("theta", 0.25), ("theta", 0.5), ("theta", 2.0), ("theta", 1.1), ("", -1.0), ("", 4.0))
+"""Encoders tried: a coordinate, the driven one where it is empty, and what it shows over what is true."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lie:
+    """What becomes of one lying encoder.
+
+    Attributes
+    ----------
+    name : str
+        Coordinate.
+    factor : float
+        What it shows over what is true.
+    found, error : float
+        The same as measured hanging, with its standard error.
+    refused : bool
+        Whether the hanging rig gave it away.
+    spoke : float
+        When the watch of a running loop would have switched off [s]; inf when it would not.
+    tilt : float
+        True deviation from upright then [rad]; 0 when it would not.
+    said : str
+        What the watch took it for.
+    fell : float
+        When the loop fell without a watch [s]; inf when it stood.
+    """
+
+    name: str
+    factor: float
+    found: float
+    error: float
+    refused: bool
+    spoke: float
+    tilt: float
+    said: str
+    fell: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SwingUpRun:
+    """What the experiment found.
+
+    Attributes
+    ----------
+    model : ServoRig
+        As known.
+    truth : ServoRig
+    log : Record
+        Of the encoders under commands put out blindly.
+    check : Scales
+        What that says of the encoders.
+    law : SwingUp
+    ascent : Ascent or None
+        None when the encoders lie: then no loop is closed.
+    lies : tuple of Lie
+    source : str
+        File that the model comes from, as typed; empty for the data sheet.
+    folder : Path
+    seconds : float
+        Computing time.
+    """
+
+    model: ServoRig
+    truth: ServoRig
+    log: Record
+    check: Scales
+    law: SwingUp
+    ascent: Ascent | None
+    lies: tuple[Lie, ...]
+    source: str
+    folder: Path
+    seconds: float = 0.0
+
+    @property
+    def caught(self) -> bool:
+        """Whether it stood for `HELD` at the end."""
+        a = self.ascent
+        return a is not None and a.up <= float(a.trial.t[-1]) - HELD
+
+    @property
+    def verdict(self) -> str:
+        """What came of it, in a sentence or two."""
+        a, unit = self.ascent, self.model.unit
+        if a is None:
+            return f"No loop was closed. {self.check.verdict}"
+        far = f"{a.travel:.3g} of {self.law.travel:.3g} {self.model.plant.coordinates[0].unit}"
+        took = f"with at most {a.peak:.2g} of {self.law.limit:.3g} {unit} and {far} of travel"
+        if math.isfinite(a.tripped):
+            return f"The end of the travel switched the drive off after {a.tripped:.2f} s; allow more or pump less."
+        if not a.handovers:
+            return f"The pendulum was not caught in {float(a.trial.t[-1]):.3g} s, {took}; allow more time or travel."
+        if not self.caught:
+            return f"The pendulum did not stand for {HELD:g} s: it fell {len(a.falls)} times, {took}."
+        again = f" at the {len(a.handovers)}. catch" if len(a.handovers) > 1 else ""
+        return (
+            f"From hanging to upright in {a.up:.2f} s and {a.swings} half swings{again}, {took}; "
+            f"it stood to the end, {float(a.trial.t[-1]) - a.up:.3g} s."
+        )
+
+
+def known_of(identified: IdentifiedRig) -> Mapping[str, float]:
+    """Relative standard errors of a fit's numbers, from the rigs that it allows; friction as it may be on the day."""
+    out: dict[str, float] = {}
+    for name, value in identified.plant.parameters().items():
+        drawn = np.array([plant.parameters()[name] for plant, _ in identified.draws])
+        if value and drawn.size and np.ptp(drawn) > 0:
+            spread = max(float(np.std(drawn)) / abs(value), KNOWN["b"] if name.startswith("b") else 2e-3)
+            out[name] = min(spread, 1.0)  # a friction that the fit puts at its bound is not known at all
+    gains = np.array([gain for _, gain in identified.draws])
+    if gains.size and np.ptp(gains) > 0:
+        out["gain"] = max(float(np.std(gains)) / abs(identified.gain), 2e-3)
+    return out
+
+
+def scales_of_log(model: ServoRig, log: Record, known: Mapping[str, float] | None = None) -> Scales:
+    """Scales of the encoders from a log; see `upright.control.sensors.scales`.
+
+    Parameters
+    ----------
+    model : ServoRig
+    log : Record
+        Columns named as the coordinates, in any unit or in counts, and the command ``u``, from rest.
+    known : mapping of str to float, optional
+        How well the model's numbers are known.
+
+    Raises
+    ------
+    BadInput
+        When a column is missing or has another dimension.
+    NotIdentifiable
+        When the model says that the commands swing the pendulum too little.
+    """
+    signals = {"u": log["u"]} if "u" in log.names else {}
+    if not signals:
+        raise BadInput(f"the check needs the command in a column 'u'; {nearest('u', log.names)}")
+    for i, c in enumerate(model.plant.coordinates):
+        if c.name not in log.names:
+            raise BadInput(f"the check needs a column '{c.name}'; {nearest(c.name, log.names)}")
+        unit = log.units.get(c.name, "") or c.unit
+        if unit == "counts":
+            size = float(model.quantum[i])
+        elif same_dimension(unit, c.unit):
+            size = scale(unit)
+        else:
+            raise BadInput(f"'{c.name}' is in {unit}, and {c.unit} or counts were needed; say so in the log's header.")
+        signals[c.name] = (log[c.name] - log[c.name][0]) * size
+    units = {c.name: c.unit for c in model.plant.coordinates} | {"u": model.unit}
+    found = scales(model, log.replace(signals=signals, units=units, inputs=("u",), outputs=tuple(signals)[1:]), known)
+    true = np.abs(found.motion[:, 1] / found.value[1]).max()
+    if true < LEAST:
+        raise NotIdentifiable(
+            f"by the model the pendulum swings to {math.degrees(true):.0f} degrees only, where its period hardly tells "
+            f"its amplitude; drive it to {math.degrees(LEAST):.0f} or more, 100 is best, then let it coast."
+        )
+    return found
+
+
+def run_swing_up(
+    model: ServoRig,
+    truth: ServoRig,
+    folder: Path,
+    progress: Progress = silent,
+    stopped: Callable[[], bool] = lambda: False,
+    *,
+    known: Mapping[str, float] | None = None,
+    seconds: float = SECONDS,
+    travel: float | None = None,
+    lies: bool = True,
+    source: str = "",
+) -> SwingUpRun:
+    """Check the encoders of a hanging rig, swing it up and hold it; then try what lying encoders would have done.
+
+    Parameters
+    ----------
+    model : ServoRig
+        As known: as designed, or as identified.
+    truth : ServoRig
+        The rig itself.
+    folder : Path
+        Takes ``sensors.csv`` and ``swing_up.csv``.
+    progress : callable, optional
+        Told the step at work and the share done.
+    stopped : callable, optional
+        Asked before the lies whether to leave them out.
+    known : mapping of str to float, optional
+        How well the model's numbers are known, see `known_of`; `sensors.KNOWN` when omitted.
+    seconds : float
+        How long the swing-up may take, holding included.
+    travel : float, optional
+        How far the driven body may go [m or rad]; what the rig says when omitted.
+    lies : bool
+    source : str
+        File that the model comes from, as typed.
+    """
+    began = time.perf_counter()
+    progress("designing swing-up and catch", 0.0)
+    law = design_swing_up(model, travel=travel)
+    progress("asking the encoders", 0.3)
+    command = probe(model, law)
+    log = put_out(truth, command)
+    check = scales(model, log, known)
+    progress("swinging up", 0.4)
+    ascent = swing_up(truth, law, seconds=seconds) if check.sound else None
+    progress("trying encoders that lie", 0.6)
+    tried = _lies(model, truth, law, command, known) if lies and check.sound and not stopped() else ()
+    folder.mkdir(parents=True, exist_ok=True)
+    log.to_csv(folder / "sensors.csv")
+    if ascent is not None:
+        ascent.trial.record.to_csv(folder / "swing_up.csv")
+    return SwingUpRun(
+        model=model, truth=truth, log=log, check=check, law=law, ascent=ascent, lies=tried,
+        source=source, folder=folder, seconds=time.perf_counter() - began,
+    )  # fmt: skip
+
+
+def _lies(
+    model: ServoRig,
+    truth: ServoRig,
+    law: SwingUp,
+    command: Array,
+    known: Mapping[str, float] | None,
+    seconds: float = 2.0,
+) -> tuple[Lie, ...]:
+    names = [c.name for c in model.plant.coordinates]
+    sampled = design.hold(model.linear("inverted"), model.period, (model.delay + model.lag) / model.period)
+    feedback = design.feedback(design.filtered(sampled, law.memory), law.K[None])
+    told = [(name or names[0], factor) for name, factor in LIES]
+    checks: list[Scales] = []
+    runs: list[tuple[Array, Array, Array]] = []
+    for name, factor in told:
+        rig = replace(truth, scales=tuple(factor if n == name else 1.0 for n in names))
+        checks.append(scales(model, put_out(rig, command), known))
+        rest = readings(rig, list(rig.plant.equilibrium("inverted").values()))  # zeroed by a hand that holds it upright
+        went = trial(rig, feedback, at="inverted", start=[0.0, 0.0, TILT, 0.0], seconds=seconds, rest=rest)
+        seen = np.column_stack([went.record[n] for n in names]) - rest
+        runs.append((seen, went.u, np.abs(went.deviation[:, 1])))
+    alarm = Watch(model).over(np.stack([r[0] for r in runs], axis=-1), np.column_stack([r[1] for r in runs]))
+    out: list[Lie] = []
+    for i, (name, factor) in enumerate(told):
+        at, column, away = int(alarm.sample[i]), names.index(name), runs[i][2]
+        beyond = np.flatnonzero(away > FALLEN)
+        out.append(
+            Lie(
+                name=name, factor=factor, found=float(checks[i].value[column]), error=float(checks[i].error[column]),
+                refused=name in checks[i].wrong, spoke=at * model.period if at >= 0 else math.inf,
+                tilt=float(away[at]) if at >= 0 else 0.0,
+                said=str(alarm.what[i]) if alarm.what[i] != Suspicion() else "",
+                fell=float(beyond[0]) * model.period if beyond.size else math.inf,
+            )
+        )  # fmt: skip
+    return tuple(out)

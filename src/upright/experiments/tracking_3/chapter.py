@@ -1,0 +1,370 @@
+"""Experiment 3 as a chapter: data, fit, gains, closed loop, what friction leaves, and why state feedback."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from upright.experiments.tracking_3 import tables
+from upright.experiments.tracking_3.figures import (
+    Bargain,
+    Locus,
+    Panel,
+    bargain_figure,
+    loci_figure,
+    poles_figure,
+    steps_figure,
+)
+from upright.experiments.tracking_3.laws import AT, loop_poles
+from upright.experiments.tracking_3.pd import best_decay, root_locus, sampled
+from upright.experiments.tracking_3.pulses import FIT, STUDY
+from upright.experiments.tracking_3.run import BEFORE, DWELL, RESERVE, Outcome, StepTrial, Tracking
+from upright.experiments.tracking_3.tables import length, milli, share
+from upright.identification.model.fit import Fit
+from upright.paper.tables import TABLE_2
+from upright.report.fit.chapter import motion_part, run_pictures
+from upright.report.fit.tables import finding, parameter_table
+from upright.report.page import Chapter, Finding, Part, Picture, Step, Table
+from upright.report.symbols import number, plain, typed
+
+
+def chapter(done: Tracking) -> Chapter:
+    """How the far end follows, and what it takes."""
+    near, far = (plain(done.model.plant.coordinates[i].name) for i in (0, -1))
+    parts = [*_data(done), _gains(done, far), _loop(done, near, far)]
+    if done.pd is not None:
+        parts.append(_friction(done, far))
+    if done.pd is not None and done.stiff is not None and done.far is not None:
+        parts.append(_why(done, done.pd, done.stiff, done.far, near, far))
+    told = " It was interrupted; what was finished is told." if done.interrupted else ""
+    detail = "Seen on the twin: no rig was touched." if done.simulated else (
+        "Foreseen on the fitted numbers; no rig was touched.")  # fmt: skip
+    return Chapter(
+        key="3", title="Tracking through a flexible shaft",
+        question=f"Can the drive at one end of a flexible shaft make the other end, {far}, follow a step, within its "
+        "effort and the shaft's travel, and what does it take beyond PD control of its own end?",
+        verdict=_verdict(done), detail=detail + told, sound=_sound(done), parts=tuple(parts), steps=_steps(done),
+        findings=_findings(done), numbers=_numbers(done),
+    )  # fmt: skip
+
+
+def _verdict(done: Tracking) -> str:
+    """What was learned, in a few sentences."""
+    best, bad, size = _strongest(done), [o for o in done.sets if not o.within], done.step.size
+    who = best.law.name if len(done.sets) == 1 else f"all {len(done.sets)} sets of poles"
+    head = f"A step of {length(done, size)} is followed by {who} within effort, travel and twist"
+    if bad:
+        head = f"A step of {length(done, size)} is too much for {', '.join(map(_beyond, bad))}"
+    got, effort = best.found.figures, share(best.found.effort.share, 0)
+    if got is None:
+        return f"{head}."
+    head += f"; {best.law.name} takes {effort} of the drive's limit and {_arrives(got.arrival)}."
+    if done.pd is None or done.stiff is None or done.pd.found.figures is None:
+        return head
+    pd, stiff = done.pd.found, done.stiff.found.figures
+    swings = stiff is None or not math.isfinite(stiff.settling_5)
+    slow = "does not settle" if stiff is None or swings else f"swings for {stiff.settling_5:.2g} s"
+    return (
+        f"{head} A tuned PD of the near encoder {_arrives(done.pd.found.figures.arrival)}, with "
+        f"{share(pd.effort.share, 0)} of the limit, but a push of the drive moves it by {share(pd.give / size, 0)} of "
+        f"the step, {best.law.name} by {share(best.found.give / size, 0)}; made as stiff, the PD {slow}."
+    )
+
+
+def _beyond(o: Outcome) -> str:
+    run = o.found
+    if math.isfinite(run.tripped):
+        return f"{o.law.name} (leaves travel or twist after {run.tripped:.2g} s)"
+    return f"{o.law.name} (at the drive's limit in {share(run.effort.saturated, 1)} of the samples)"
+
+
+def _arrives(arrival: float) -> str:
+    return f"arrives in {milli(arrival)} s" if math.isfinite(arrival) else "never comes to stay within 5 %"
+
+
+def _sound(done: Tracking) -> bool:
+    """Whether the fit is trusted and every set stays within the limits and settles."""
+    trusted = done.fit is None or done.fit.trusted
+    settled = all(o.found.figures is not None and math.isfinite(o.found.figures.settling_5) for o in done.sets)
+    return trusted and settled and all(o.within for o in done.sets)
+
+
+def _strongest(done: Tracking) -> Outcome:
+    """The set with the largest prefilter."""
+    return max(done.sets, key=lambda o: o.law.k_pf)
+
+
+def _findings(done: Tracking) -> tuple[Finding, ...]:
+    best, out = _strongest(done), []
+    poles = [] if done.fit is None else [p.imag for at in done.fit.poles.values() for p in at]
+    swing = max(poles, key=lambda e: e.value, default=None)
+    if swing is not None and swing.value > 0:
+        out.append(finding("flexible mode [rad/s]", swing, float(max(done.true.linear(AT).poles().imag))))
+    f = best.found.figures
+    if f is not None:
+        out.append(Finding(what=f"{best.law.name}: arrival within 5 % [s]", value=milli(f.arrival)))
+        out.append(Finding(what=f"{best.law.name}: overshoot", value=share(f.overshoot)))
+    out.append(Finding(what=f"{best.law.name}: effort, of the limit", value=share(best.found.effort.share)))
+    return tuple(out)
+
+
+def _steps(done: Tracking) -> tuple[Step, ...]:
+    fit = typed(done.folder if done.fit is None else done.folder / FIT)
+    own = Step("Ask for poles of your own.", f'upright track {fit} --poles "-10+-20j, -25+-10j"')
+    if done.fit is None:
+        return (own,)
+    model = done.rig.plant.coordinates
+    counts = "" if model[0].unit == "rad" else f" --counts {done.rig.counts[0]:.6g}"
+    return (
+        Step(
+            "Repeat the fit from its files.",
+            f"upright identify {typed(done.folder / STUDY)} -o {typed(done.folder / 'again')}",
+        ),
+        own,
+        Step(
+            "See margins and noise of one set.",
+            f"upright design {fit} --at {AT} --track {model[-1].name} --period "
+            f'"{1e3 * done.rig.period:g} ms"{counts} --poles "{TABLE_2[-1]}"',
+        ),
+    )
+
+
+def _data(done: Tracking) -> list[Part]:
+    """The log, and the model found in it; nothing where only a fit was given."""
+    fit = done.fit
+    if fit is None:
+        return []
+    scores = ", ".join(f"{plain(n)} {v:.2f} %" for s in fit.runs.values() if s.role != "fit"
+                       for n, v in s.fit_percent.items())  # fmt: skip
+    pulses = (
+        "The drive pulses forth, twice back and forth again, so that two inertias without a spring to ground "
+        "end about where they began; pauses let dry friction show. Encoders count, the log is every fifth "
+        "servo sample. Other pulses, never fitted, test the model."
+    )
+    found = f"{fit.verdict} Other pulses are predicted: {scores}."
+    scale = _scale(fit.rig.parameters["actuator.gain"].estimate)
+    return [
+        Part("Data", (pulses, *run_pictures(fit, "track"))),
+        motion_part(fit),
+        Part("Fit", (found, scale, _fit_table(done, fit))),
+    ]
+
+
+def _fit_table(done: Tracking, fit: Fit) -> Table:
+    """Numbers of the shaft, with the truth that only a twin can tell."""
+    return parameter_table(
+        fit, truth=done.true.plant.parameters() | {"actuator.gain": done.true.gain},
+        caption="What the pulses say, beside the truth of the twin; the interval holds the truth in 95 of 100 rigs",
+    )  # fmt: skip
+
+
+def _scale(weighed: bool) -> str:
+    whence = "The drive's gain is taken from its maker, to 2 %"
+    if weighed:
+        whence = "What experiment 1a weighed fixes the scale, and the drive's gain follows from it"
+    return (
+        f"{whence}: masses, springs, friction and gain go up and down together, poles, gains in volts and everything "
+        "below stay."
+    )
+
+
+def _gains(done: Tracking, far: str) -> Part:
+    """Gains, poles, and the size of the step."""
+
+    def draw() -> Any:
+        panels = [
+            Panel(name=o.law.name, asked=o.law.asked, model=o.law.poles, rig=loop_poles(done.rig, o.law.law))
+            for o in done.sets
+        ]
+        return poles_figure(panels, done.model.linear(AT).poles())
+
+    return Part(
+        "Gains",
+        (
+            "Ackermann's formula on the fitted model puts the poles where Table 2 of the paper has them; "
+            f"k_pf = 1/(C (B K − A)⁻¹ B) gives unit static gain from the reference to {far}.",
+            f"The step is {length(done, done.step.size)}, {_sized(done)}. The largest command is the first: speeds are "
+            "zero and errors the whole step, so that it is k_pf times the step, whatever the rig.",
+            tables.gain_table(done),
+            tables.pole_table(done),
+            Picture(
+                name="track-poles", draw=draw,
+                caption="Poles asked (rings), of the sampled, late loop on the fitted model (+) and on the rig (x). "
+                "Delay and differences move the fast poles; the flexible mode stays where it was asked.",
+                description="Upper half of the s-plane for every set.",
+            ),
+        ),
+    )  # fmt: skip
+
+
+def _sized(done: Tracking) -> str:
+    step = done.step
+    others = {
+        "effort": (f"{100 * RESERVE:.0f} % of the drive's limit", step.by_effort),
+        "twist": ("60 % of the twist that trips the shaft", step.by_twist),
+        "travel": ("60 % of the travel", step.by_travel),
+    }
+    allowed = ", ".join(f"{what} {length(done, v)}" for what, v in others.values() if math.isfinite(v))
+    return f"{step.reason}; what each bound allows: {allowed}"
+
+
+def _loop(done: Tracking, near: str, far: str) -> Part:
+    """Step figures and pictures of the sets."""
+    shares = ", ".join(f"{o.law.name} {share(o.found.effort.share, 0)}" for o in done.sets)
+    best = _strongest(done)
+    off = abs(best.found.effort.peak / best.foreseen.effort.peak - 1)
+    told = f"Largest command, of the drive's limit: {shares}."
+    if done.simulated:
+        told += (
+            f" Foreseen for {best.law.name}: "
+            f"{best.foreseen.effort.peak:.3g} {done.rig.unit} ({share(best.foreseen.effort.share)}); found "
+            + ("the same." if off < 5e-4 else f"{best.found.effort.peak:.3g} {done.rig.unit}.")
+        )
+    steps = Picture(
+        name="track-steps", draw=lambda: steps_figure(done, done.sets),
+        caption=f"Reference (dotted), {near} of the driven body, {far} of the far one, and the first 0.1 s of "
+        "the command with the drive's limit, set by set.",
+        description=_described(done),
+    )  # fmt: skip
+    return Part("Closed loop", (told, tables.step_table(done), steps))
+
+
+def _described(done: Tracking) -> str:
+    """The picture of the steps, for who cannot see it."""
+    return "; ".join(
+        f"{o.law.name}: overshoot {share(o.found.figures.overshoot)}, settled to 5 % after "
+        f"{milli(o.found.figures.settling_5)} s"
+        for o in done.sets
+        if o.found.figures is not None
+    )
+
+
+def _friction(done: Tracking, far: str) -> Part:
+    """What dry friction leaves, why, and the cure."""
+    cure = ""
+    if done.summed is not None and done.summed.found.figures is not None:
+        left = abs(done.summed.found.figures.error) / done.step.size
+        cure = (
+            f" The sum of the error, with a fifth pole at −5 1/s, is the cure: it leaves {share(left)} of the step, "
+            "and the push is made up for. Its zero cancels that pole on the reference's way, so that the step itself "
+            "is followed as before."
+        )
+    return Part(
+        "What friction leaves",
+        (
+            f"At rest the spring may hold the far body off by f_2/k, and the drive need not move the near one before "
+            f"its pull exceeds f_1: {far} stays wrong by up to (f_1 + f_2)/(gain k_pf) + (K_1/k_pf) f_2/k. The first "
+            f"part shrinks as the loop gets stiffer, the second does not.{cure}",
+            tables.friction_table(done),
+        ),
+    )
+
+
+def _why(done: Tracking, pd: Outcome, stiff: Outcome, other_end: Outcome, near: str, far: str) -> Part:
+    """PD control beside state feedback, and what its one damper cannot do."""
+    best = _strongest(done)
+    p = done.model.plant.parameters()
+    inertia = p.get("m_1", p.get("J_1", 1.0))
+    other = p.get("m_2", p.get("J_2", 1.0))
+    force = "N m/rad" if done.rig.plant.coordinates[-1].unit == "rad" else "N/m"
+    bound = 0.5 * math.sqrt(p["k_12"] / inertia)
+    compared = [best, *((done.summed,) if done.summed else ()), pd, stiff, other_end]
+    trips = other_end.found.tripped
+    end = f"trips the rig {trips - BEFORE:.2g} s after the step" if math.isfinite(trips) else "does not trip the rig"
+    tried = 0 if done.search is None else done.search.kp.size
+    return Part(
+        "Why state feedback",
+        (
+            f"PD control of the driven body, kp and kd the best of {tried} pairs tried on the fitted rig under the "
+            f"same limit, brings {far} to the reference about as soon, at {share(pd.found.effort.share, 0)} of the "
+            "limit. For a step alone it would do.",
+            "But it has one damper for two modes. Without natural damping no kp and kd let every pole decay faster "
+            f"than half the root of k/inertia 1, {number(bound, 3)} 1/s here, and it gets there only at kp·gain = k "
+            f"(inertia 1)/(inertia 2), {number(p['k_12'] * inertia / other, 3)} {force}, where {best.law.name} has "
+            f"{number(best.law.stiffness, 3)}. Stiffer, {near} is held fast and {far} swings on its spring: as stiff "
+            f"as {best.law.name}, the slowest pole decays with {number(stiff.law.decay, 2)} 1/s at a damping ratio of "
+            f"{number(stiff.law.damping, 2)}, against {number(best.law.decay, 3)} 1/s and "
+            f"{number(best.law.damping, 2)}. State feedback is fast and stiff at once: it alone uses the far encoder.",
+            f"PD control of the far encoder with the same gains {end}: between drive and far body lies no zero, the "
+            "phase of the flexible mode is turned by half a turn, and kd drives what it should damp (without natural "
+            "damping for any kp and kd: the polynomial lacks s³).",
+            Picture(
+                name="track-compared",
+                draw=lambda: steps_figure(done, compared, until=DWELL + 1.4, kick=None),
+                caption="The same step, then a steady push of the drive, which the command shown contains. A cross: "
+                "the rig has tripped.",
+                description=f"State feedback beside PD control: {_described(done)}",
+            ),
+            *_reasons(done, pd, stiff, bound),
+        ),
+    )  # fmt: skip
+
+
+def _reasons(done: Tracking, tuned: Outcome, stiff: Outcome, bound: float) -> list[Picture]:
+    """Stiffness against decay, and the root loci of both PDs."""
+    model, pd = done.model.linear(AT), tuned.law
+    p = done.model.plant.parameters()
+    of = done.rig.plant.coordinates[-1].unit
+    kp = np.geomspace(0.2 * pd.k_pf, 2.5 * _strongest(done).law.k_pf, 40)
+    points = {o.law.name: (o.law.stiffness, o.law.decay) for o in (*done.sets, tuned, stiff)}
+    bargain = Bargain(
+        stiffness=kp * done.model.gain, bound=bound, shaft=p["k_12"], points=points,
+        decay=best_decay(sampled(done.model), kp, period=done.model.period),
+        unit=f"{'N m' if of == 'rad' else 'N'}/{of}",
+    )  # fmt: skip
+    rate = float(pd.K[1]) / pd.k_pf
+    rising = pd.k_pf * np.geomspace(1e-3, 30, 300)
+    swing = 1j * math.sqrt(p["k_12"] / p.get("m_2", p.get("J_2", 1.0)))
+    loci: list[Locus] = []
+    for title, body, zeros in (("near encoder", 0, [-1 / rate, swing]), ("far encoder", 1, [-1 / rate])):
+        loci.append(
+            Locus(title=title, tracks=root_locus(model, body, rate, rising),
+                  marked=root_locus(model, body, rate, np.array([pd.k_pf]))[0], zeros=np.array(zeros, dtype=complex))
+        )  # fmt: skip
+    return [
+        Picture(
+            name="track-bargain", draw=lambda: bargain_figure(bargain),
+            caption="Fast against stiff. PD of the near encoder has what lies under the curve; state feedback stands "
+            "outside of it. All as the loops run; dashed: the most that PD can have without natural damping and delay.",
+            description="Decay of the slowest pole over static force per error.",
+        ),
+        Picture(
+            name="track-loci", draw=lambda: loci_figure(loci, model.poles()),
+            caption="Poles as kp rises, kd/kp as tuned. Poles and zeros alternate at the near encoder, and every "
+            "branch stays left; at the far encoder the flexible mode goes right at once.",
+            description="Two root loci, upper half plane.",
+        ),
+    ]  # fmt: skip
+
+
+def _numbers(done: Tracking) -> dict[str, Any]:
+    """The same as plain values: SI, the command in its unit, null for what never happens."""
+
+    def run(r: StepTrial) -> dict[str, Any]:
+        f = r.figures
+        told = ("change", "rise", "peak_time", "overshoot", "settling_2", "settling_5", "arrival", "error")
+        return {
+            **{n: None if f is None else getattr(f, n) for n in told},
+            "effort_peak": r.effort.peak, "effort_share": r.effort.share, "saturated": r.effort.saturated,
+            "twist": r.twist, "travel": r.travel, "give": r.give, "tripped": r.tripped,
+        }  # fmt: skip
+
+    return {
+        "rig": done.rig.name,
+        "seed": done.rig.seed,
+        "step": done.step.size,
+        "step_reason": done.step.reason,
+        "limit": done.rig.limit,
+        "laws": {
+            o.law.name: {
+                "K": o.law.K, "k_pf": o.law.k_pf, "poles_asked": np.asarray(o.law.asked, dtype=np.complex128),
+                "poles": np.asarray(o.law.poles, dtype=np.complex128), "decay": o.law.decay, "damping": o.law.damping,
+                "static_force_per_error": o.law.stiffness, "error_at_most": o.law.play, "foreseen": run(o.foreseen),
+                "found": run(o.found) if done.simulated else None, "within_limits": o.within,
+            } for o in tables.outcomes(done)
+        },
+        "seconds": done.seconds,
+        "interrupted": done.interrupted,
+    }  # fmt: skip

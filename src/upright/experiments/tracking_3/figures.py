@@ -1,0 +1,217 @@
+"""Pictures of experiment 3: steps, efforts, poles, and what PD control can have."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.experiments.tracking_3.run import BEFORE, DWELL, Outcome, Tracking
+from upright.report.drawing import (
+    BLACK,
+    BLUE,
+    CYCLE,
+    GREEN,
+    GREY,
+    VERMILLION,
+    decimated,
+    figure,
+    limits,
+    roots,
+    s_plane,
+    styled,
+)
+from upright.report.symbols import axis, mathtext, plain, unit
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+Roots = NDArray[np.complex128]
+
+_SHOWN = {"m": (1e3, "mm"), "rad": (180 / math.pi, "deg")}
+
+
+def shown(of: str) -> tuple[float, str]:
+    """Factor and unit in which lengths or angles of this size are read best."""
+    return _SHOWN.get(of, (1.0, of))
+
+
+@styled
+def steps_figure(
+    done: Tracking, outcomes: Sequence[Outcome], *, until: float = 0.5, kick: float | None = 0.1
+) -> Figure:
+    """Reference, positions and effort with its limit, all laws in one picture; a run ends where it tripped.
+
+    With `kick` both positions are shown, and the command only so long [s], for that is where it acts.
+    """
+    bodies = done.rig.plant.coordinates
+    factor, of = shown(bodies[-1].unit)
+    step = factor * done.step.size
+    picked = [bodies[-1]] if kick is None else [bodies[0], bodies[-1]]
+    rows = len(picked) + 1
+    drawing = figure(0.85 + 1.75 * rows + 0.3 * (rows - 2), margins=(0.75, 0.15, 0.38, 0.48))
+    axes: list[Any] = drawing.subplots(rows, 1, gridspec_kw={"hspace": 0.3}).tolist()
+    low, high = -0.15 * step, (1.75 if kick is None else 1.3) * step
+    for ax, body in zip(axes, picked, strict=False):
+        ax.plot([-0.05, 0, 0, until], [0, 0, step, step], color=BLACK, linewidth=0.8, linestyle=":", label="reference")
+        for (colour, style), o in zip(CYCLE, outcomes, strict=False):
+            t, y = _seen(o, body.name, -0.05, until)
+            line = decimated(t, factor * y)
+            ax.plot(*line, color=colour, linestyle=style, label=o.law.name)
+            if o.found.tripped - BEFORE < until:
+                last = float(np.clip(line[1][-1], low, high))
+                ax.plot(line[0][-1:], [last], "X", color=colour, markersize=7, clip_on=False, zorder=5)
+        ax.set_ylabel(axis(mathtext(body.name), of))
+        ax.set_ylim(low, high)
+        ax.set_xlim(-0.06, 1.02 * until)
+    _efforts(axes[-1], done, outcomes, until if kick is None else kick)
+    if until > DWELL:
+        for ax in axes:
+            ax.axvline(DWELL, color=GREY, linewidth=0.8, linestyle="-.")
+        axes[0].text(DWELL, 0.97 * high, " push begins", va="top", fontsize=7.5, color=GREY)
+    drawing.legend(*axes[0].get_legend_handles_labels(), loc="upper center", ncols=6, columnspacing=1.2)
+    axes[-1].set_xlabel("time from the step [s]")
+    hide_times = axes[:-1] if kick is None else axes[:-2]
+    for ax in hide_times:
+        ax.tick_params(labelbottom=False)
+    for ax in axes:
+        ax.yaxis.set_label_coords(-0.085, 0.5)
+    return drawing
+
+
+def _seen(o: Outcome, name: str, start: float, stop: float) -> tuple[Array, Array]:
+    """Time from the step [s] and what was logged between two instants, up to a trip."""
+    record = o.found.trial.record
+    t = record.t - BEFORE
+    kept = (record.t <= o.found.tripped) & (t >= start) & (t <= stop)
+    return t[kept], record[name][kept]
+
+
+def _efforts(ax: Any, done: Tracking, outcomes: Sequence[Outcome], until: float) -> None:
+    for (colour, style), o in zip(CYCLE, outcomes, strict=False):
+        drawn = decimated(*_seen(o, "u", -0.05 * until, until))
+        ax.step(*drawn, color=colour, linestyle=style, linewidth=1.0, where="post")
+    limits(ax, done.rig.limit, "limit", until)
+    ax.set_ylim(-1.3 * done.rig.limit, 1.3 * done.rig.limit)
+    ax.set_xlim(-0.06 if until > 1 else -0.05 * until, 1.02 * until)
+    ax.set_ylabel(axis("command", done.rig.unit))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Panel:
+    """Poles [1/s] of one set: asked, of the loop on the fitted model and on the rig."""
+
+    name: str
+    asked: Roots
+    model: Roots
+    rig: Roots
+
+
+@styled
+def poles_figure(panels: Sequence[Panel], open_loop: Roots) -> Figure:
+    """Poles asked and attained, set by set; the upper half plane, which the lower mirrors."""
+    columns = min(2, len(panels))
+    rows = -(-len(panels) // columns)
+    drawing = figure(0.85 + 2.0 * rows, margins=(0.65, 0.15, 0.55, 0.48))
+    grid: Any = drawing.subplots(
+        rows, columns, squeeze=False, sharey=True, gridspec_kw={"hspace": 0.32, "wspace": 0.08}
+    )
+    axes: list[Any] = grid.ravel().tolist()
+    left = 1.12 * min(float(p.asked.real.min()) for p in panels)
+    high = 1.2 * max(float(np.abs(p.asked.imag).max()) for p in (*panels, Panel(
+        name="", asked=open_loop, model=open_loop, rig=open_loop)))  # fmt: skip
+    for ax, panel in zip(axes, panels, strict=False):
+        s_plane(ax)
+        kinds = (
+            ("open loop", open_loop, "x", GREY, 6), ("asked", panel.asked, "o", BLACK, 9),
+            ("on the fitted model, sampled and late", panel.model, "+", BLUE, 9),
+            ("on the rig", panel.rig, "x", VERMILLION, 6),
+        )  # fmt: skip
+        beyond = int(np.sum((panel.rig.real < left) & (panel.rig.imag > -1e-9)))
+        for name, values, mark, colour, size in kinds:
+            roots(ax, values[values.imag > -1e-9], mark, colour, name, size=size)
+        ax.set_xlim(left, -0.06 * left)
+        ax.set_ylim(-0.08 * high, high)
+        ax.set_title(panel.name + (f" ({beyond} faster left out)" if beyond else ""), fontsize=9)
+    for ax in axes[:-columns]:
+        ax.set_xlabel("")
+    for ax in axes[::columns]:
+        ax.set_ylabel("imaginary part [rad/s]")
+    for ax in axes[len(panels) :]:
+        ax.set_visible(False)
+    drawing.legend(*axes[0].get_legend_handles_labels(), loc="upper center", ncols=4)
+    return drawing
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Bargain:
+    """What PD of the near encoder can have, and points beside it: stiffness [N/m or N m/rad] against decay [1/s]."""
+
+    stiffness: Array
+    decay: Array
+    bound: float
+    shaft: float
+    points: Mapping[str, tuple[float, float]]
+    unit: str
+
+
+@styled
+def bargain_figure(bargain: Bargain) -> Figure:
+    """How fast the slowest pole decays over how hard the loop pulls at rest."""
+    drawing = figure(3.3, margins=(0.65, 3.0, 0.15, 0.5))
+    ax: Any = drawing.subplots()
+    ax.plot(bargain.stiffness, bargain.decay, color=BLUE, label="PD, near encoder, best kd")
+    ax.fill_between(bargain.stiffness, bargain.decay, 0, color=BLUE, alpha=0.08, linewidth=0)
+    ax.axhline(bargain.bound, color=GREY, linestyle="--", linewidth=0.9, label="half the root of k/inertia 1")
+    ax.axvline(bargain.shaft, color=GREY, linestyle=":", linewidth=1.1, label="stiffness of the shaft")
+    marks = ["o", "s", "D", "^", "P", "v", "X"]
+    for (name, (x, y)), mark in zip(bargain.points.items(), marks, strict=False):
+        colour = GREEN if name.startswith("PD") else VERMILLION
+        ax.plot(x, max(y, 0.0), mark, color=colour, markersize=7, markerfacecolor="none", markeredgewidth=1.4,
+                linestyle="none", label=plain(name), clip_on=False)  # fmt: skip
+    ax.set_xscale("log")
+    ax.set_ylim(bottom=0)
+    ax.set_xlabel(f"static force per error [{unit(bargain.unit)}]")
+    ax.set_ylabel("decay of the slowest pole [1/s]")
+    ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
+    return drawing
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Locus:
+    """Poles [1/s] as kp rises, shape (kp, states), with the poles at one marked kp, and the zeros."""
+
+    title: str
+    tracks: Roots
+    marked: Roots
+    zeros: Roots
+
+
+@styled
+def loci_figure(loci: Sequence[Locus], open_loop: Roots) -> Figure:
+    """Root loci of PD control of either body, in one scale; the right half plane is shaded."""
+    drawing = figure(3.5, margins=(0.65, 0.15, 0.3, 0.78))
+    axes: list[Any] = drawing.subplots(1, len(loci), sharey=True, squeeze=False, gridspec_kw={"wspace": 0.08})[
+        0
+    ].tolist()
+    size = 1.5 * float(np.abs(open_loop).max())
+    for ax, locus in zip(axes, loci, strict=True):
+        s_plane(ax, unstable=size)
+        upper = locus.tracks[locus.tracks.imag > -1e-9]
+        ax.plot(upper.real, upper.imag, ".", color=BLUE, markersize=1.6, label="as kp rises")
+        for values, mark, colour, name in (
+            (open_loop, "x", BLACK, "open loop"), (locus.zeros, "o", BLACK, "zero"),
+            (locus.marked, "s", VERMILLION, "kp of the tuned PD"),
+        ):  # fmt: skip
+            roots(ax, values[values.imag > -1e-9], mark, colour, name)
+        ax.set_xlim(-size, 0.6 * size)
+        ax.set_ylim(-0.05 * size, size)
+        ax.set_title(locus.title)
+    axes[0].set_ylabel("imaginary part [rad/s]")
+    drawing.legend(*axes[0].get_legend_handles_labels(), loc="lower center", ncols=4)
+    return drawing

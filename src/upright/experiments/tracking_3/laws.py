@@ -1,0 +1,167 @@
+"""Which gains make the far body follow? State feedback by Table 2, PD on the near encoder, PD on the far one.
+
+All are ``u = k_pf r - K x`` on differenced encoders, so that they differ in nothing but K. Body 1 is driven, body n
+follows; `n` is 2 on the rigs of the laboratory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright import gains as design
+from upright.control import ServoRig
+from upright.errors import BadInput
+from upright.gains.loop import closed
+from upright.gains.requests import conjugate_poles, poles_of
+from upright.gains.sampled import to_s
+from upright.laws import Law
+from upright.paper.tables import TABLE_2, poles
+from upright.physics import Linear
+
+Array = NDArray[np.float64]
+Roots = NDArray[np.complex128]
+
+AT = "rest"
+MEMORY = 0.5
+"""Of the filter on differences: half a servo period late."""
+SLOW = 0.3
+"""Decay over a servo period up to which a pole is shown; what the filter forgets faster says nothing of the rig."""
+EXTRA = -5.0
+"""Pole of the sum, where there is one [1/s]: slower than the poles of Table 2, faster than a person waits."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tracker:
+    """A law that follows, designed on one rig.
+
+    Attributes
+    ----------
+    name : str
+    K : array, shape (states,)
+        Gains [command per m or rad, and per m/s or rad/s].
+    k_pf : float
+        Gain of the reference [command per m or rad].
+    law : Law
+    poles : array
+        Poles [1/s] of the sampled loop on the rig of the design, those that die within three samples left out.
+    asked : array
+        Poles asked for; empty for a PD.
+    stiffness : float
+        Static force per error, k_pf times the drive's gain [N/m or N m/rad]: how hard it pulls at rest.
+    play : float
+        Largest error at rest that dry friction can hold [m or rad]; 0 where a sum works against it.
+    """
+
+    name: str
+    K: Array
+    k_pf: float
+    law: Law
+    poles: Roots
+    asked: Roots
+    stiffness: float
+    play: float
+
+    @property
+    def decay(self) -> float:
+        """Rate of its slowest pole [1/s]."""
+        return -float(self.poles.real.max())
+
+    @property
+    def damping(self) -> float:
+        """Least damping ratio of its poles."""
+        return float(np.min(-self.poles.real / np.abs(self.poles)))
+
+
+def tracker(rig: ServoRig, name: str, K: Array, k_pf: float, *, asked: Roots | None = None) -> Tracker:
+    """Gains as a law on a rig's encoders, and what it is worth there."""
+    law = state_law(rig, K, k_pf)
+    return Tracker(
+        name=name, K=np.ravel(K), k_pf=k_pf, law=law, poles=loop_poles(rig, law),
+        asked=np.zeros(0, dtype=np.complex128) if asked is None else asked, stiffness=rig.gain * k_pf,
+        play=play(rig, np.ravel(K), k_pf),
+    )  # fmt: skip
+
+
+def state_law(rig: ServoRig, K: Array, k_pf: float) -> Law:
+    """The matrices of gains on differenced encoders."""
+    sampled = design.hold(rig.linear(AT), rig.period, 0.0)
+    return design.feedback(design.filtered(sampled, MEMORY), K, k_pf)
+
+
+def by_poles(rig: ServoRig, name: str, wanted: Roots) -> Tracker:
+    """State feedback by Ackermann's formula, with the prefilter for unit static gain to the far body."""
+    model = rig.linear(AT)
+    K = design.place(model.A, model.B, wanted).K
+    return tracker(rig, name, K, design.prefilter(model.A, model.B, far(model), K), asked=wanted)
+
+
+def check(which: Sequence[int], own: Roots | None) -> None:
+    """Refuse sets that Table 2 does not have, and poles that a shaft with two bodies cannot have."""
+    if any(not 1 <= i <= len(TABLE_2) for i in which):
+        raise BadInput(f"Table 2 has sets 1 to {len(TABLE_2)}, got {', '.join(map(str, which))}.")
+    if own is not None:
+        conjugate_poles(own, 4)
+    elif not which:
+        raise BadInput("nothing to follow with: name a set of Table 2 or poles.")
+
+
+def paper_sets(rig: ServoRig, which: Sequence[int] = (1, 2, 3, 4)) -> tuple[Tracker, ...]:
+    """State feedback by the sets of Table 2."""
+    return tuple(by_poles(rig, f"set {i}", poles(TABLE_2[i - 1])[0]) for i in which)
+
+
+def far(model: Linear) -> Array:
+    """Row of the output that follows, the last."""
+    return model.C[-1]
+
+
+def play(rig: ServoRig, K: Array, k_pf: float) -> float:
+    """Largest error of the far body at rest that dry friction can hold, two bodies without springs to ground.
+
+    The far body stays while ``|k (x_1 - x_2)| <= f_2``, the near one while ``|gain u - k (x_1 - x_2)| <= f_1``; with
+    ``u = k_pf r - K_1 x_1 - K_3 x_2`` the error ``r - x_2`` is at most
+    ``(f_1 + f_2)/(gain k_pf) + (K_1/k_pf) f_2/k``.
+    """
+    p = rig.plant.parameters()
+    f_1, f_2 = (max(p[f"f_{i}c"], p[f"f_{i}s"]) for i in (1, 2))
+    return (f_1 + f_2) / (rig.gain * k_pf) + abs(K[0]) / k_pf * f_2 / p["k_12"]
+
+
+def with_sum(rig: ServoRig, base: Tracker, name: str) -> Tracker:
+    """The same poles and one more, EXTRA, for the sum of the error: what friction holds and what pushes is made up for.
+
+    With ``k_pf = k_i/|EXTRA|`` the zero of the reference's way in lies on the added pole, so that the step is followed
+    as without it; only disturbances see the sum, which stands still while the command is at its limit.
+    """
+    model = rig.linear(AT)
+    n, c = model.A.shape[0], len(rig.plant.coordinates)
+    A = np.zeros((n + 1, n + 1))
+    A[:n, :n], A[n, :n] = model.A, -far(model)
+    K = design.place(A, np.vstack([model.B, np.zeros((1, 1))]), np.append(base.asked, EXTRA)).K[0]
+    k_pf = K[n] / EXTRA  # the sum's gain is -K[n]
+    plain = tracker(rig, name, K[:n], k_pf, asked=np.append(base.asked, EXTRA))
+    law = state_law(rig, K[:n], k_pf)
+    z = law.A.shape[0]
+    inner = np.zeros((z + 1, z + 1))
+    inner[:z, :z], inner[z, z] = law.A, 1.0
+    into = np.zeros((z + 1, c + 1))
+    into[:z], into[z, c - 1], into[z, c] = law.B, -rig.period, rig.period
+    summed = Law(
+        inner, into, np.hstack([law.C, [[-K[n]]]]), law.D, reference_names=law.reference_names, windup="hold"
+    )  # fmt: skip
+    return replace(plain, law=summed, poles=loop_poles(rig, summed), play=0.0)
+
+
+def closed_by(rig: ServoRig, law: Law) -> Array:
+    """Matrix of the sampled loop of a law on a rig, about rest; dry friction and rounding left out."""
+    return closed(design.hold(rig.linear(AT), rig.period, rig.delay / rig.period, rig.lag), law)
+
+
+def loop_poles(rig: ServoRig, law: Law) -> Roots:
+    """Poles [1/s] of that loop, those that die within three samples left out."""
+    s = to_s(poles_of(closed_by(rig, law)), rig.period)
+    return s[s.real > -SLOW / rig.period]

@@ -1,0 +1,157 @@
+"""A flexible shaft identified by pulses of its drive: log, study and fit, the model that experiment 3 designs with.
+
+Pulses come in pairs of pairs, forth, twice back and forth, which bring two inertias without a spring to ground back to
+about where they began; pauses between them let dry friction show.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from upright.control import ServoRig
+from upright.errors import BadInput
+from upright.experiments.identified import read_identified
+from upright.experiments.makes import SHAFTS, Make, make_of, make_rig
+from upright.experiments.weighing_1a.run import Known
+from upright.identification.model.fit import Fit
+from upright.physics import Plant
+from upright.progress import Progress, part, silent
+from upright.records import Record
+from upright.records.provenance import of_twin
+from upright.study.load import Study
+from upright.study.write import Table, counted_sensor, number, study_text, table
+
+EVERY = 5
+"""Servo periods per logged sample."""
+STUDY = "shaft.toml"
+FIT = "fit.json"
+GAIN_ERROR = "2 %"
+"""Standard uncertainty of the drive's gain as the makers state it; poles and gains of the loop do not depend on it."""
+
+_PULSES = {"pulses.csv": ((0.06, 0.10, 0.05, 0.08, 0.06, 0.04), 1.0), "others.csv": ((0.09, 0.05, 0.10, 0.07), 0.7)}
+"""Widths [s] of a log's pulses, and their size beside that of the make: the first is fitted, the second predicted."""
+_PAUSE = 0.35
+
+
+def shaft_make(plant: Plant, name: str) -> Make:
+    """Make of a rig with two inertias, which its owner calls so."""
+    refusal = (
+        f"tracking needs two inertias on a shaft (rectilinear-2 or torsional-2), not {name}; fit such a plant first."
+    )
+    make = make_of(plant, refusal)
+    if make.key not in SHAFTS:
+        raise BadInput(refusal)
+    return make
+
+
+def rig_of_file(path: Path, limit: float | None = None) -> ServoRig:
+    """The rig that a fit or a study describes; what neither says, limit, counts and period, is the make's."""
+    known = read_identified(path)
+    made = make_rig(shaft_make(known.plant, f"'{known.name}'").key)
+    p = known.plant.parameters()
+    if p["k_1"] or p["k_2"]:
+        raise BadInput("tracking is for bodies without springs to ground, and k_1 or k_2 of this fit is not zero.")
+    return replace(known.rig(made), lag=known.lag, limit=limit or made.limit, name=f"the rig of {path.name}")
+
+
+def pulses(rig: ServoRig, file: str) -> Record:
+    """Log of what the encoders show, in counts, while the drive pulses [V]."""
+    from upright.simulation import simulate
+
+    widths, share = _PULSES[file]
+    volts = round(share * shaft_make(rig.plant, rig.name).pulse / rig.converter) * rig.converter
+    dt = EVERY * rig.period
+    parts = [np.zeros(round(_PAUSE / dt))]
+    for i, width in enumerate(widths):
+        one = np.full(round(width / dt), volts if i % 2 == 0 else -volts)
+        parts += [one, -one, -one, one, np.zeros(round(_PAUSE / dt))]
+    u = np.concatenate(parts)
+    x = simulate(
+        rig.plant, rig.drive, rig.plant.state(), np.repeat(u, EVERY), rig.period, samples=u.size, every=EVERY
+    )[:, ::2, 0]  # fmt: skip
+    names = tuple(c.name for c in rig.plant.coordinates)
+    counts = np.floor(x * np.array(rig.counts) + 0.5)
+    return Record(
+        t=np.arange(u.size, dtype=np.float64) * dt,
+        signals={"u": u} | {n: counts[:, i] for i, n in enumerate(names)},
+        units={"u": rig.unit} | dict.fromkeys(names, "counts"),
+        inputs=("u",),
+        outputs=names,
+        provenance=of_twin(rig.name, rig.seed),
+    )
+
+
+def shaft_study(rig: ServoRig, seed: int, weighed: Sequence[Known] = ()) -> str:
+    """Study of the logs, its guesses 30 % off what the make is designed to be.
+
+    The inertia that experiment 1a weighed is known as well as it says, and the drive's gain follows; else the gain is
+    the maker's. The stiffness of 1a is left out: it comes from the same swings and errs with the inertia.
+    """
+    make = shaft_make(rig.plant, rig.name)
+    rng = np.random.default_rng([seed, 30])
+    known = {k.name: k for k in weighed if k.name == make.body}
+    parameters = Table("[parameters]")
+    for name, value in make.plant.parameters().items():
+        unit = make.plant.quantity(name).unit
+        if name in known:
+            told, error = number(known[name].value, unit, 6), number(known[name].stderr, unit, 2)
+            parameters.key(name, {"value": told, "uncertainty": error}, "experiment 1a")
+        elif value:
+            parameters.key(name, {"guess": number(value * rng.choice([0.7, 1.3]), unit, 4), "min": 0})
+    actuator = Table("[actuator]", "the loop's poles do not depend on the gain, masses and springs do")
+    gain = number(make.gain, make.gain_unit, 6)
+    actuator.key("gain", {"guess": gain, "min": 0} if known else {"value": gain, "uncertainty": GAIN_ERROR})
+    actuator.key("delay", number(1e3 * rig.delay, "ms", 6))
+    actuator.key("lag", number(1e3 * rig.lag, "ms", 6))
+    defaults = Table("[defaults]")
+    defaults.key("initial", dict.fromkeys(rig.plant.state_names()[1::2], 0.0), "at rest")
+    defaults.key("unknown", ["initial"])
+    return study_text(
+        (
+            table(
+                "",
+                title=f"Two inertias on a shaft: {rig.name}",
+                source=f"digital twin, seed {rig.seed}: simulated, no rig was touched",
+            ),
+            table("[rig]", plant=make.plant_name),
+            parameters,
+            actuator,
+            table("[drive]", column="u", unit=rig.unit),
+            *(counted_sensor(c.name, c.unit, n) for c, n in zip(rig.plant.coordinates, rig.counts, strict=True)),
+            *(
+                table("[[runs]]", label=file.removesuffix(".csv"), file=file, role=role)
+                for role, file in zip(("fit", "predict"), _PULSES, strict=True)
+            ),
+            defaults,
+        )
+    )
+
+
+def identify_shaft(
+    rig: ServoRig, seed: int, folder: Path, progress: Progress = silent, weighed: Sequence[Known] = ()
+) -> tuple[Study, Fit]:
+    """Pulse a rig, write logs and study, and fit it as `upright identify` would; writes `fit.json` too."""
+    from upright.identification.estimate import identify
+    from upright.study.fit_file import write_fit
+    from upright.study.load import load_study
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for file in _PULSES:
+        pulses(rig, file).to_csv(folder / file)
+    path = folder / STUDY
+    path.write_text(shaft_study(rig, seed, weighed), encoding="utf-8")
+    study = load_study(path)
+    fit = identify(study.rig, study.runs, progress=part(progress, 0.0, 1.0, "fitting the shaft"))
+    write_fit(fit, study, folder / FIT)
+    return study, fit
+
+
+def fitted(rig: ServoRig, fit: Fit) -> ServoRig:
+    """The rig as the fit sees it: same drive, encoders and period, numbers of the plant and gain as estimated."""
+    values = {n: p.value for n, p in fit.rig.parameters.items()} | {n: e.value for n, e in fit.estimates.items()}
+    plant = rig.plant.replace(**{n: v for n, v in values.items() if n in rig.plant.names()})
+    return replace(rig, plant=plant, gain=values["actuator.gain"])

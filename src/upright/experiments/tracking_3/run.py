@@ -1,0 +1,289 @@
+"""Experiment 3: the far inertia follows a step through a flexible shaft, within effort and travel.
+
+Identify, place the poles of Table 2, size the step, say beforehand what will happen, run it on the rig, and compare
+with what PD control of the driven body can do.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.control import ServoRig, Trial, trial
+from upright.control.steps import Effort, StepFigures, effort, step_figures
+from upright.errors import BadInput
+from upright.experiments.identified import DAILY
+from upright.experiments.makes import MAKES, make_rig
+from upright.experiments.tracking_3.laws import AT, Tracker, by_poles, check, paper_sets, with_sum
+from upright.experiments.tracking_3.pd import Search, far_pd, near_pd, tune
+from upright.experiments.tracking_3.pulses import fitted, identify_shaft, shaft_make
+from upright.experiments.weighing_1a.run import Known
+from upright.identification.model.fit import Fit
+from upright.progress import Progress, silent
+from upright.study.load import Study
+
+Array = NDArray[np.float64]
+
+RESERVE = 0.95
+"""Share of the limit that the step may take from the strongest law."""
+BEFORE, DWELL, PUSHED = 0.1, 2.0, 1.5
+"""Time before the step, at the reference, and under the push that follows [s]."""
+PUSH = -0.1
+"""Steady push on the drive that comes after the step, as a share of the limit."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StepTrial:
+    """One law on one rig: the trial and its figures.
+
+    Attributes
+    ----------
+    trial : Trial
+        As if nothing tripped.
+    figures : StepFigures or None
+        Of the far body; None where the rig trips or nothing moves.
+    effort : Effort
+        Of the step, up to the push.
+    twist, travel : float
+        Largest distance between the bodies, and from where they began, up to the push [m or rad].
+    give : float
+        How far the push moves the far body [m or rad].
+    tripped : float
+        When twist or travel is left and a person, a stop or a trip ends the run [s]; inf if never.
+    """
+
+    trial: Trial
+    figures: StepFigures | None
+    effort: Effort
+    twist: float
+    travel: float
+    give: float
+    tripped: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Outcome:
+    """A law, what the fitted model says it will do, and what the rig did."""
+
+    law: Tracker
+    foreseen: StepTrial
+    found: StepTrial
+
+    @property
+    def within(self) -> bool:
+        """Whether the rig stayed within limit, travel and twist."""
+        return math.isinf(self.found.tripped) and self.found.effort.saturated == 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chosen:
+    """The step: its size [m or rad], why, and the largest that each bound allows."""
+
+    size: float
+    reason: str
+    by_effort: float
+    by_twist: float
+    by_travel: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tracking:
+    """Experiment 3 as far as it came.
+
+    Attributes
+    ----------
+    rig, model, true : ServoRig
+        On the day of the trials, as the fit sees it, and when it was measured; all the same where only a fit was given.
+    folder : Path
+        Holds logs, study and fit; the fit itself where only that was given.
+    study, fit : Study and Fit, or None where a fit was given.
+    step : Chosen
+    sets : tuple of Outcome
+        State feedback, strongest last.
+    summed : Outcome or None
+        The strongest with a sum.
+    pd, stiff, far : Outcome or None
+        PD of the near encoder tuned, the same as stiff as the strongest set, and PD of the far encoder.
+    search : Search or None
+        What the tuning tried.
+    """
+
+    rig: ServoRig
+    model: ServoRig
+    true: ServoRig
+    folder: Path
+    study: Study | None
+    fit: Fit | None
+    step: Chosen
+    sets: tuple[Outcome, ...]
+    summed: Outcome | None = None
+    pd: Outcome | None = None
+    stiff: Outcome | None = None
+    far: Outcome | None = None
+    search: Search | None = None
+    seconds: float = 0.0
+    interrupted: bool = False
+
+    @property
+    def push(self) -> float:
+        """Steady push after the step, in the command's unit."""
+        return PUSH * self.rig.limit
+
+    @property
+    def simulated(self) -> bool:
+        """Whether a twin stood in for the rig, so that its truth is known."""
+        return self.fit is not None
+
+
+def run_tracking(
+    rig: str | ServoRig, seed: int, folder: Path, progress: Progress = silent,
+    stopped: Callable[[], bool] = lambda: False, *, which: Sequence[int] = (1, 2, 3, 4),
+    poles: NDArray[np.complex128] | None = None, step: float | None = None, weighed: Sequence[Known] = (),
+) -> Tracking:  # fmt: skip
+    """Run the experiment on a twin.
+
+    Parameters
+    ----------
+    rig : str or ServoRig
+        A make, or a rig with two inertias; the make of a pendulum's rig stands for the rig without it.
+    seed : int
+        Which rig of the make, and the guesses of the fit.
+    folder : Path
+        Takes logs, study and fit.
+    progress : callable, optional
+        Told the step at work and the share done.
+    stopped : callable, optional
+        Asked between trials whether to stop there.
+    which : sequence of int
+        Sets of Table 2.
+    poles : array, optional
+        Poles [1/s] of one further set.
+    step : float, optional
+        Size of the step [m or rad], chosen when omitted.
+    weighed : sequence of Known
+        What experiment 1a leaves known of the shaft.
+    """
+    check(which, poles)
+    began = time.perf_counter()
+    true = make_rig(MAKES[rig].shaft if rig in MAKES else rig, seed) if isinstance(rig, str) else rig
+    progress("pulsing the shaft", 0.0)
+    study, fit = identify_shaft(true, seed, folder, lambda what, share: progress(what, 0.05 + 0.25 * share), weighed)
+    done = follow(
+        another_day(true, seed),
+        fitted(true, fit),
+        folder,
+        study,
+        fit,
+        progress,
+        stopped,
+        which=which,
+        poles=poles,
+        step=step,
+    )
+    return replace(
+        done, true=true, seconds=time.perf_counter() - began, interrupted=done.interrupted or fit.interrupted
+    )
+
+
+def another_day(rig: ServoRig, seed: int) -> ServoRig:
+    """The same rig when its dry friction has changed as between runs of real rigs."""
+    rng = np.random.default_rng([seed, 31])
+    dry = {n: rig.plant.parameters()[n] for n in ("f_1c", "f_2c")}
+    return rig.changed(**{n: v * math.exp(rng.normal(0, DAILY)) for n, v in dry.items()})
+
+
+def follow(
+    rig: ServoRig, model: ServoRig, folder: Path, study: Study | None, fit: Fit | None, progress: Progress,
+    stopped: Callable[[], bool] = lambda: False, *, which: Sequence[int] = (1, 2, 3, 4),
+    poles: NDArray[np.complex128] | None = None, step: float | None = None,
+) -> Tracking:  # fmt: skip
+    """Design on the model, try on the rig; see `run_tracking`."""
+    check(which, poles)
+    laws = list(paper_sets(model, which))
+    if poles is not None:
+        laws.append(by_poles(model, "own set", poles))
+    chosen = choose(model, laws, step)
+    progress("stepping", 0.35)
+    done = Tracking(
+        rig=rig, model=model, true=rig, folder=folder, study=study, fit=fit, step=chosen,
+        sets=tuple(outcome(rig, model, law, chosen.size) for law in laws),
+    )  # fmt: skip
+    if stopped():
+        return replace(done, interrupted=True)
+    strongest = laws[int(np.argmax([law.k_pf for law in laws]))]
+    done = replace(done, summed=outcome(rig, model, with_sum(model, strongest, "with a sum"), chosen.size))
+    progress("tuning a PD", 0.55)
+    pd, search = tune(model, chosen.size, RESERVE * model.limit)
+    done = replace(done, pd=outcome(rig, model, pd, chosen.size), search=search)
+    if stopped():
+        return replace(done, interrupted=True)
+    progress("comparing", 0.9)
+    stiff = stiffest_damped(model, strongest.k_pf)
+    far = far_pd(model, "PD, far encoder", pd.k_pf, float(pd.K[1]))
+    return replace(
+        done, stiff=outcome(rig, model, stiff, chosen.size), far=outcome(rig, model, far, chosen.size)
+    )  # fmt: skip
+
+
+def stiffest_damped(model: ServoRig, kp: float) -> Tracker:
+    """PD of the near encoder with this kp, and the kd for which its slowest pole decays fastest."""
+    tried = [near_pd(model, "PD, as stiff", kp, kp * rate) for rate in np.geomspace(5e-3, 0.2, 25).tolist()]
+    return max(tried, key=lambda law: law.decay)
+
+
+def choose(model: ServoRig, laws: Sequence[Tracker], step: float | None = None) -> Chosen:
+    """The largest step of two digits that keeps every law within effort, twist and travel, by the linear model."""
+    most = RESERVE * model.limit / max(abs(law.k_pf) for law in laws)
+    unit = [outcome(model, model, law, 0.5 * most).found for law in laws]
+    twist = 0.6 * shaft_make(model.plant, model.name).twist * 0.5 * most / max(r.twist for r in unit)
+    travel = 0.6 * model.travel * 0.5 * most / max(r.travel for r in unit)
+    bounds = {"effort": most, "twist": twist, "travel": travel}
+    what = min(bounds, key=lambda name: bounds[name])
+    size, reason = bounds[what], f"bounded by {what}"
+    digits = 10.0 ** (math.floor(math.log10(size)) - 1)
+    size = float(f"{math.floor(size / digits + 1e-9) * digits:.2g}")
+    if step is not None:
+        size, reason = step, "as asked"
+    return Chosen(size=size, reason=reason, by_effort=most, by_twist=twist, by_travel=travel)
+
+
+def outcome(rig: ServoRig, model: ServoRig, law: Tracker, step: float) -> Outcome:
+    """A law on the model and on the rig."""
+    foreseen = attempt(model, law, step)
+    return Outcome(law=law, foreseen=foreseen, found=foreseen if rig is model else attempt(rig, law, step))
+
+
+def attempt(rig: ServoRig, law: Tracker, step: float) -> StepTrial:
+    """Zero, the step, then a steady push while the reference stays."""
+    before, at, end = (round(s / rig.period) for s in (BEFORE, BEFORE + DWELL, BEFORE + DWELL + PUSHED))
+    pushes = np.zeros(end + 1)
+    pushes[at:] = PUSH * rig.limit
+    done = trial(
+        rig, law.law, at=AT, start=np.zeros(2 * len(rig.plant.coordinates)), seconds=end * rig.period,
+        reference=np.append(np.zeros(before), step), pushes=pushes,
+    )  # fmt: skip
+    q, twist = done.x[:, ::2], shaft_make(rig.plant, rig.name).twist
+    apart, away = np.abs(q[:, -1] - q[:, 0]), np.abs(q).max(axis=1)
+    beyond = np.flatnonzero((apart > twist) | (away > rig.travel))
+    tripped = float(done.t[beyond[0]]) if beyond.size else math.inf
+    last = min(at, int(beyond[0]) if beyond.size else at)
+    y = done.record[done.record.outputs[-1]]
+    figures = None
+    if not beyond.size:
+        try:
+            figures = step_figures(
+                done.t[before:at], y[before:at], before=0.0, reference=step, quantum=float(rig.quantum[-1])
+            )
+        except BadInput:  # friction held it where it was
+            figures = None
+    return StepTrial(
+        trial=done, figures=figures, effort=effort(done.u[before : last + 1], rig.limit, rig.converter),
+        twist=float(apart[: last + 1].max()), travel=float(away[: last + 1].max()),
+        give=math.inf if beyond.size else float(abs(np.mean(y[-50:]) - np.mean(y[at - 50 : at]))), tripped=tripped,
+    )  # fmt: skip

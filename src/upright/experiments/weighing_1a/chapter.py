@@ -1,0 +1,231 @@
+"""Experiment 1a as a chapter: swings, the line through their frequencies, stiffness and bare inertia."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from upright.experiments.makes import OSCILLATORS
+from upright.experiments.weighing_1a.figures import decrement_figure, line_figure, swing_figure
+from upright.experiments.weighing_1a.run import Known, Weighing
+from upright.experiments.weighing_1a.twin import truth
+from upright.identification import Estimate
+from upright.identification.loadings import Loaded, Loadings
+from upright.records import Record
+from upright.report.page import Chapter, Finding, Part, Picture, Points, Step, Symbol, Table
+from upright.report.symbols import measured, number, typed, unit
+
+QUESTION = (
+    "How stiff is the spring, and how heavy is the bare body? A step makes the body swing; known inertias are added "
+    "and each time the frequency falls. 1/ω² is a line over the added inertia: its slope is 1/k, and it starts at the "
+    "bare inertia over k."
+)
+MOST_PANELS = 6
+
+
+def chapter(done: Weighing) -> Chapter:
+    """Experiment 1a on the rig of the later experiments."""
+    on, found = done.campaign.on, done.campaign.found
+    true = truth(on)
+    column = next(iter(done.campaign.logs.values())).outputs[0]
+    weighed = loading_chapter(
+        found, kind=on.design.kind, title="Stiffness and inertia from added loads", logs=done.campaign.logs,
+        signals=dict.fromkeys(done.campaign.logs, column), left_out=done.campaign.left_out, truth=true,
+    )  # fmt: skip
+    units = {k.name: unit(type(done.rig.plant).quantity(k.name).unit) for k in done.known}
+    handed = Table(
+        caption="What the later experiments take from here",
+        headings=("symbol", "truth of the twin", "value", "std. error", "unit"),
+        rows=tuple(
+            (Symbol(k.name), number(_truth(done, k)), *measured(k.value, k.stderr), units[k.name])
+            for k in done.known
+        ),
+        numbers=(1, 2, 3),
+    )  # fmt: skip
+    steps = (
+        f"{len(done.campaign.logs)} steps of the command, masses of 500 g added one by one, each loading twice; dry "
+        "friction, encoder counts and converter steps are as on the rig."
+    )
+    named = (("k", found.k), (on.design.inertia.replace("1", "0"), found.bare), ("c", found.damping))
+    handed_on = {k.name: {"value": k.value, "stderr": k.stderr, "truth": _truth(done, k)} for k in done.known}
+    return replace(
+        weighed,
+        key="1a",
+        detail=" ".join(_sentence(done, k) for k in done.known),
+        parts=(
+            Part("The body", (done.make.mounted.bare, steps)),
+            *weighed.parts,
+            Part("What is handed on", (done.make.mounted.later, handed)),
+        ),
+        steps=_steps(done),
+        findings=tuple(
+            Finding(
+                what=Symbol(f"{k.name} [{units[k.name]}]"),
+                value=number(k.value),
+                interval=f"{number(k.value - 1.96 * k.stderr)} to {number(k.value + 1.96 * k.stderr)}",
+                truth=number(_truth(done, k)),
+            )
+            for k in done.known
+        ),
+        numbers={
+            **{name: _numbers(w, true.get(name)) for name, w in named},
+            "handed_on": handed_on,
+            "swings": len(found.swings),
+        },
+    )
+
+
+def _truth(done: Weighing, k: Known) -> float:
+    return done.rig.plant.parameters()[k.name]
+
+
+def _sentence(done: Weighing, k: Known) -> str:
+    off = abs(k.value / _truth(done, k) - 1)
+    inside = abs(k.value - _truth(done, k)) <= 1.96 * k.stderr
+    return f"{k.name} lies {100 * off:.2g} % from the twin's, {'inside' if inside else 'outside'} its 95 % interval."
+
+
+def _numbers(w: Estimate, true: float | None) -> dict[str, Any]:
+    out: dict[str, Any] = {"value": w.value, "stderr": w.stderr, "interval": w.interval}
+    if true is not None:
+        out |= {"truth": true, "inside": w.interval[0] <= true <= w.interval[1]}
+    return out
+
+
+def _steps(done: Weighing) -> tuple[Step, ...]:
+    kind = done.campaign.on.design.kind
+    first = {label: file for label, file in done.files.items() if label.endswith("run 1")}
+    added = " ".join(f'--added "{done.campaign.added[label]:.6g} {_unit(kind, "inertia")}"' for label in first)
+    files = " ".join(typed(done.folder / file) for file in first.values())
+    return (
+        Step(
+            "Weigh the body again from one log of each loading, as you would your own.",
+            f"upright loadings {files} {added} -o {typed(done.folder / 'again')}",
+        ),
+        Step("See which masses would have told most.", f"upright plan-inertias --rig {kind}"),
+    )
+
+
+def loading_chapter(
+    found: Loadings, *, kind: str, title: str, logs: Mapping[str, Record], signals: Mapping[str, str],
+    left_out: Sequence[str] = (), truth: Mapping[str, float] | None = None, steps: Sequence[Step] = (),
+) -> Chapter:  # fmt: skip
+    """What the loadings say; `truth` is what a twin knows, `logs` and `signals` go by the label of the log."""
+    recursion = (
+        "Dry friction takes the same length δ = f/k off the centre in every half swing and leaves the period alone; "
+        "viscous friction takes the same share. Both follow from the heights of successive extremes."
+    )
+    lost = (Part("Left out", (Points(tuple(left_out)),)),) if left_out else ()
+    line = Picture(
+        name="line", draw=lambda: line_figure(found, _unit(kind, "inertia")),
+        caption="1/ω² over the added inertia. The slope is 1/k, the line meets zero at minus the bare inertia. "
+        "Bars: 95 % intervals of single swings.",
+        description=f"{len(found.swings)} points about a line; {found.verdict}",
+    )  # fmt: skip
+    named = (("k", found.k), ("bare", found.bare), ("damping", found.damping))
+    return Chapter(
+        title=title,
+        verdict=found.verdict,
+        sound=found.verdict.startswith("A line"),
+        question=QUESTION,
+        parts=(
+            Part(
+                "Data: the swings",
+                (recursion, _swing_table(found, kind), *_swing_pictures(found, logs, signals)),
+                aside=True,
+            ),
+            *lost,
+            Part("Fit: the line", (_found_table(found, kind, truth or {}), line)),
+        ),
+        steps=tuple(steps),
+        numbers={
+            **{name: _numbers(w, None) for name, w in named},
+            "kind": kind,
+            "verdict": found.verdict,
+            "truth": truth,
+            "left_out": left_out,
+            "swings": [
+                {"label": s.label, "added": s.added, "omega_n": s.decay.omega_n, "stderr": s.decay.omega_error,
+                 "sigma": s.decay.sigma, "delta": s.decay.delta} for s in found.swings
+            ],
+        },
+    )  # fmt: skip
+
+
+def _found_table(found: Loadings, kind: str, truth: Mapping[str, float]) -> Table:
+    """What was found, beside the truth where a twin tells it."""
+    named = (
+        ("k", "stiffness", found.k, "stiffness"),
+        (OSCILLATORS[kind].inertia.replace("1", "0"), "inertia of the bare body", found.bare, "inertia"),
+        ("c", "viscous friction", found.damping, "damping"),
+    )
+    rows = tuple(
+        (
+            Symbol(name), *((number(truth[name]),) if truth else ()), number(w.value), number(w.stderr, 2),
+            f"{number(w.interval[0])} to {number(w.interval[1])}", unit(_unit(kind, what)), meaning,
+        )
+        for name, meaning, w, what in named
+    )  # fmt: skip
+    repeat = "" if np.isnan(found.repeat) else f"; repeats of one loading agree to {50 * found.repeat:.2g} %"
+    return Table(
+        caption=f"From {len(found.swings)} swings" + (f"{repeat} of the frequency" if repeat else ""),
+        headings=(
+            "symbol", *(("truth of the twin",) if truth else ()), "value", "std. error", "95 % interval", "unit",
+            "meaning",
+        ),
+        rows=rows, numbers=(1, 2, 3, 4) if truth else (1, 2, 3),
+    )  # fmt: skip
+
+
+def _swing_table(found: Loadings, kind: str) -> Table:
+    rows = tuple(
+        (
+            s.label, number(s.added), str(s.decay.t.size), number(s.decay.omega_n, 5),
+            number(s.decay.omega_error, 2), number(s.decay.decrement, 3), number(s.decay.zeta, 3),
+            f"{number(s.decay.delta, 3)} ± {number(s.decay.delta_error, 2)}",
+        )
+        for s in found.swings
+    )  # fmt: skip
+    return Table(
+        caption="Every swing; δ in the unit of the log",
+        headings=(
+            "swing", f"added [{unit(_unit(kind, 'inertia'))}]", "extremes", "ω [rad/s]", "std. error",
+            "log. decrement", "damping ratio", "δ",
+        ),
+        rows=rows, numbers=tuple(range(1, 8)),
+    )  # fmt: skip
+
+
+def _swing_pictures(found: Loadings, logs: Mapping[str, Record], signals: Mapping[str, str]) -> list[Picture]:
+    """One swing of each loading, and their decrements."""
+    first: dict[float, Loaded] = {}
+    for s in found.swings:
+        first.setdefault(s.added, s)
+    shown = [first[a] for a in sorted(first)][:MOST_PANELS]
+    labels = [s.label.rsplit(", step ", 1)[0] for s in shown]
+    with_logs = [(s, logs[n], signals[n]) for s, n in zip(shown, labels, strict=True) if n in logs]
+    pictures = [
+        Picture(
+            name="decrements", draw=lambda: decrement_figure(shown),
+            caption="Height of the extremes above the centre. A straight thin line is what the viscous part alone "
+            "would leave; dry friction bends the decrement downwards.",
+            description="Logarithmic decay of the heights, one curve per loading.",
+        )
+    ]  # fmt: skip
+    if not with_logs:
+        return pictures
+    swings = Picture(
+        name="swings", draw=lambda: swing_figure(with_logs),
+        caption="One swing of each loading. Rings: extremes, from the exact shape about each; crosses: the "
+        "recursion of a spring with viscous and dry friction. Grey: where dry friction can hold the body.",
+        description=f"{len(with_logs)} decaying swings with their extremes marked.",
+    )  # fmt: skip
+    return [swings, *pictures]
+
+
+def _unit(kind: str, what: str) -> str:
+    body = OSCILLATORS[kind]
+    return body.plant.quantity({"inertia": body.inertia, "stiffness": "k_1", "damping": "c_1"}[what]).unit

@@ -1,0 +1,30 @@
+"""Which gain does the rig need, and what is it worth? A linear model goes in, wherever its numbers came from."""
+
+from upright.gains.loop import Margins, feedback, margins, place_sampled, spelled_out
+from upright.gains.lqr import dlqr, locus, lqr, weight_for_effort
+from upright.gains.placement import Placement, place
+from upright.gains.sampled import Sampled, hold
+from upright.gains.tracking import prefilter
+from upright.gains.velocity import Estimator, difference, filtered, kalman, shaken
+
+__all__ = [
+    "Estimator",
+    "Margins",
+    "Placement",
+    "Sampled",
+    "difference",
+    "dlqr",
+    "feedback",
+    "filtered",
+    "hold",
+    "kalman",
+    "locus",
+    "lqr",
+    "margins",
+    "place",
+    "place_sampled",
+    "prefilter",
+    "shaken",
+    "spelled_out",
+    "weight_for_effort",
+]

@@ -1,0 +1,234 @@
+"""Gains at work: the sampled law as a computer runs it, the loop's real poles, its margins and its noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from upright.errors import BadInput
+from upright.gains.requests import conjugate_poles, poles_of
+from upright.gains.sampled import Sampled, hold, to_z
+from upright.gains.velocity import Estimator, stationary
+from upright.laws import Law
+
+if TYPE_CHECKING:
+    from upright.physics.linear import Linear
+
+Array = NDArray[np.float64]
+Roots = NDArray[np.complex128]
+
+
+def feedback(estimator: Estimator, K: ArrayLike, k_pf: float = 0.0) -> Law:
+    """The law ``u = k_pf r - K x`` with x from an estimator; K of shape (m, n) may leave out its last states.
+
+    It takes readings, less their values at the equilibrium as its `target`, and one reference, and is switched on as
+    the estimator begins.
+    """
+    K = np.atleast_2d(np.asarray(K, dtype=np.float64))
+    m, n = K.shape
+    if n > estimator.C.shape[0] or m != estimator.E.shape[1]:
+        wanted = (estimator.E.shape[1], estimator.C.shape[0])
+        raise BadInput(f"gains for this estimator need shape {wanted}, got {K.shape}.")
+    C, Dy = -K @ estimator.C[:n], -K @ estimator.D[:n]
+    A, By = estimator.A + estimator.E @ C, estimator.B + estimator.E @ Dy
+    Dr = np.full((m, 1), k_pf)
+    return Law(
+        A, np.hstack([By, estimator.E @ Dr]), C, np.hstack([Dy, Dr]), begin=estimator.begin, period=estimator.period,
+        reference_names=("reference",),
+    )  # fmt: skip
+
+
+def spelled_out(law: Law) -> dict[str, Array]:
+    """Matrices of a law with what is its target as signals of its own: readings, readings at rest, references."""
+    p = law.readings
+    B, D = (np.hstack([M[:, :p], -M[:, :p], M[:, p:]]) for M in (law.B, law.D))
+    return {"A": law.A, "B": B, "C": law.C, "D": D}
+
+
+def closed(model: Sampled, law: Law, gain: float = 1.0) -> Array:
+    """Matrix of the loop, the model's states first; `gain` multiplies the command on its way to the plant."""
+    B, D = law.B[:, : law.readings], law.D[:, : law.readings]
+    top = np.hstack([model.A + gain * model.B @ D @ model.C, gain * model.B @ law.C])
+    return np.vstack([top, np.hstack([B @ model.C, law.A])])
+
+
+def place_sampled(model: Sampled, estimator: Estimator, poles: ArrayLike) -> Array:
+    """Gains on *estimated* states that put as many poles of the sampled loop as there are gains exactly where asked.
+
+    With G(z) from the command to the estimated states, held, late and differenced as they are, z is a pole of the loop
+    where ``K G(z) = -1``: one linear equation for K per pole, its derivatives for a pole that repeats. The remaining
+    poles (the memories of delay and differences) go where they go; look at `closed`.
+
+    Parameters
+    ----------
+    model : Sampled
+        With one input.
+    estimator : Estimator
+    poles : array, shape (n,)
+        [1/s], mapped to z; n without the commands on their way.
+
+    Returns
+    -------
+    array, shape (1, n)
+    """
+    n = model.A.shape[0] - model.remembered
+    asked = conjugate_poles(poles, n)
+    if model.B.shape[1] != 1:
+        raise BadInput(f"sampled placement is for one input, and this model has {model.B.shape[1]}; use place.")
+    size = model.A.shape[0]
+    total = size + estimator.A.shape[0]
+    A = np.zeros((total, total))
+    A[:size, :size], A[size:, :size], A[size:, size:] = model.A, estimator.B @ model.C, estimator.A
+    B = np.vstack([model.B, estimator.E])[:, 0]
+    C = np.hstack([estimator.D @ model.C, estimator.C])[:n]
+    rows: list[Array] = []
+    wanted: list[float] = []
+    seen: list[complex] = []
+    for z in to_z(asked, model.period).tolist():
+        if z.imag < 0:
+            continue
+        order = sum(abs(z - other) < 1e-9 for other in seen)
+        seen.append(z)
+        column = B.astype(np.complex128)
+        for _ in range(order + 1):
+            column = np.linalg.solve(z * np.eye(A.shape[0]) - A, column)
+        value = C @ column
+        target = -1.0 if order == 0 else 0.0
+        for part, goal in ((value.real, target), (value.imag, 0.0))[: 2 if z.imag else 1]:
+            rows.append(part)
+            wanted.append(goal)
+    matrix, goals = np.array(rows), np.array(wanted)
+    size_of = np.abs(matrix).max(axis=1, keepdims=True)
+    try:
+        K = np.linalg.solve(matrix / size_of, goals / size_of[:, 0])
+    except np.linalg.LinAlgError:
+        raise BadInput("no gains put the sampled loop's poles there: a mode is out of reach, or a pole is asked where "
+                       "the model has one already; ask for others.") from None  # fmt: skip
+    return K[None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Margins:
+    """How much the sampled loop stands, at the plant's input.
+
+    Attributes
+    ----------
+    least_gain, most_gain : float
+        Factors on the command between which the loop stays stable; 0 and inf where there is no bound.
+    phase : float
+        Smallest phase margin [rad]; inf when the loop gain never is 1.
+    delay : float
+        Further delay that it bears [s].
+    modulus : float
+        Least distance of the loop's frequency response to -1, the inverse of the peak of the sensitivity.
+    """
+
+    least_gain: float
+    most_gain: float
+    phase: float
+    delay: float
+    modulus: float
+
+
+def margins(plant: Linear, model: Sampled, law: Law) -> Margins:
+    """Margins of a stable sampled loop; gain and delay from its eigenvalues, phase from its frequency response.
+
+    Raises
+    ------
+    BadInput
+        When the loop is not stable.
+    """
+    if not _stable(closed(model, law)):
+        raise BadInput("the sampled loop is not stable, so it has no margins; ask for slower poles or sample faster.")
+
+    def by_gain(g: float) -> bool:
+        return _stable(closed(model, law, g))
+
+    def by_delay(more: float) -> bool:
+        return _stable(closed(hold(plant, model.period, model.delay + more, model.lag), law))
+
+    most = _edge(by_gain, np.geomspace(1, 1e4, 161))
+    least = _edge(by_gain, np.geomspace(1, 1e-4, 161))
+    delay = _edge(by_delay, np.concatenate([[0.0], np.geomspace(0.02, 400, 120)]))
+    L = loop_gain(model, law, np.geomspace(1e-3, 1, 4000) * np.pi / model.period)
+    size = np.abs(L)
+    crossings = np.flatnonzero(np.diff(np.sign(size - 1)))
+    # at a crossing, interpolate the phase in log |L|
+    share = np.log(size[crossings]) / (np.log(size[crossings]) - np.log(size[crossings + 1]))
+    turned = L[crossings + 1] / L[crossings]
+    phase = np.angle(-L[crossings] * np.exp(1j * np.angle(turned) * share))
+    return Margins(
+        least_gain=least if least > 1e-4 else 0.0,
+        most_gain=most if most < 1e4 else np.inf,
+        phase=float(np.abs(phase).min(initial=np.inf)),
+        delay=delay * model.period if delay < 400 else np.inf,
+        modulus=float(np.abs(1 + L).min()),
+    )
+
+
+def swing(model: Sampled, law: Law, start: ArrayLike, samples: int) -> tuple[Array, Array]:
+    """States (samples, n) and commands (samples, m) of the sampled loop, let go at rest in the law's eyes.
+
+    Parameters
+    ----------
+    model : Sampled
+    law : Law
+    start : array, shape (n,)
+        Deviation of the model's states; drive and commands on their way are at zero.
+    samples : int
+    """
+    A, n = closed(model, law), model.A.shape[0]
+    out = np.hstack([law.D[:, : law.readings] @ model.C, law.C])
+    state = np.zeros(A.shape[0])
+    state[: n - model.remembered] = start
+    if law.begin is not None:
+        state[n:] = law.begin @ (model.C @ state[:n])
+    rows = np.empty((samples, A.shape[0]))
+    for k in range(samples):
+        rows[k] = state
+        state = A @ state
+    return rows[:, :n], rows @ out.T
+
+
+def loop_gain(model: Sampled, law: Law, omega: ArrayLike) -> Roots:
+    """Frequency response of the loop cut at the plant's input, negative feedback, at `omega` [rad/s]; one input."""
+    B, D = law.B[:, : law.readings], law.D[:, : law.readings]
+    z = np.exp(1j * np.asarray(omega, dtype=np.float64) * model.period)[:, None, None]
+
+    def through(A: Array, first: Array, last: Array) -> Roots:
+        if A.shape[0] == 0:
+            return np.zeros((z.shape[0], last.shape[0], first.shape[1]), dtype=np.complex128)
+        return last @ np.linalg.solve(z * np.eye(A.shape[0]) - A, first[None].astype(np.complex128))
+
+    found: Roots = -(through(law.A, B, law.C) + D) @ through(model.A, model.B, model.C)
+    return found[:, 0, 0]
+
+
+def command_noise(model: Sampled, law: Law, quantum: ArrayLike) -> float:
+    """Standard deviation of the command in the closed loop from the rounding of the encoders [the input's unit]."""
+    B, D = law.B[:, : law.readings], law.D[:, : law.readings]
+    sigma = np.broadcast_to(np.asarray(quantum, dtype=np.float64) / np.sqrt(12), (law.readings,))
+    inlet = np.vstack([model.B @ D, B]) * sigma
+    outlet = np.hstack([D @ model.C, law.C])
+    spread = stationary(closed(model, law), inlet)
+    direct = D * sigma
+    return float(np.sqrt((outlet @ spread @ outlet.T + direct @ direct.T)[0, 0]))
+
+
+def _stable(A: Array) -> bool:
+    return bool(np.abs(poles_of(A)).max(initial=0.0) < 1)
+
+
+def _edge(holds: Callable[[float], bool], steps: Array) -> float:
+    """First of the steps, refined by halving, at which a statement that holds at the first no longer does."""
+    for good, bad in zip(steps[:-1].tolist(), steps[1:].tolist(), strict=True):
+        if not holds(bad):
+            for _ in range(40):
+                middle = (good + bad) / 2
+                good, bad = (middle, bad) if holds(middle) else (good, middle)
+            return good
+    return float(steps[-1])

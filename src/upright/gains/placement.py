@@ -1,0 +1,247 @@
+"""Which gains put the poles where they are wanted, and did they get there?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from upright.errors import BadInput
+from upright.gains import exact
+from upright.gains.requests import conjugate_poles, lost_modes, matched, poles_of, weak_modes, written
+
+Array = NDArray[np.float64]
+Roots = NDArray[np.complex128]
+
+MISSED = 1e-6
+"""Poles farther from those asked than this part of the fastest are refused; the m-th root of it where m coincide,
+since a change of e in a coefficient moves an m-fold root by e^(1/m)."""
+ILL = 1e8
+"""Condition from which half of the sixteen digits are gone."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Placement:
+    """State feedback ``u = -K x`` and the poles that it really gives.
+
+    Attributes
+    ----------
+    K : array, shape (inputs, states)
+        Gains, in the input's unit per unit of the state.
+    asked, attained : arrays, shape (states,)
+        Poles wanted and eigenvalues of ``A - B K`` beside them [1/s]; K is rounded to double, the eigenvalues are not.
+    miss : float
+        Largest distance between the two [1/s].
+    condition : float
+        Of the controllability matrix of the balanced model, time and states scaled; inf beyond 1e16.
+    sensitivity : float
+        Farthest that a pole moves when one number of A or B is 0.1 % off [1/s].
+    sentence : str
+        How well conditioned all this is.
+    """
+
+    K: Array
+    asked: Roots
+    attained: Roots
+    miss: float
+    condition: float
+    sensitivity: float
+    sentence: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Balanced:
+    """The model with time and states scaled by powers of two, so that nothing is rounded: ``x = T x_b, t = t_b/rate``.
+
+    ``A_b = T^-1 A T / rate`` and ``B_b = T^-1 B / (rate size)``, `size` one number per input.
+    """
+
+    A: Array
+    B: Array
+    T: Array
+    rate: float
+    size: Array
+
+    def gains(self, K: Array) -> Array:
+        """Gains of the model itself; ``A - B K`` scales as A does."""
+        return K / self.T / self.size[:, None]
+
+
+def place(A: ArrayLike, B: ArrayLike, poles: ArrayLike) -> Placement:
+    """State feedback that puts the poles of ``x' = (A - B K) x`` where they are asked.
+
+    One input: Ackermann's formula on the balanced model, in 60 digits. Several: scipy's `place_poles`, or Ackermann's
+    formula through one mixture of the inputs when more poles coincide than there are inputs. Either way the poles are
+    computed again from the gains. A sampled model is placed the same way, its poles given in z.
+
+    Parameters
+    ----------
+    A : array, shape (n, n)
+    B : array, shape (n, m)
+    poles : array, shape (n,)
+        In conjugate pairs [1/s, or z].
+
+    Raises
+    ------
+    BadInput
+        When the poles are too few, too many or not conjugate, when the inputs do not reach every mode, or when the
+        problem is so ill conditioned that gains rounded to double precision miss the poles.
+    """
+    A, B = _checked(A, B)
+    n, m = B.shape
+    asked = conjugate_poles(poles, n)
+    even = _balanced(A, B)
+    lost = lost_modes(even.A, even.B)
+    if lost:
+        what = "poles" if len(lost) > 1 else "pole"
+        raise BadInput(
+            f"the input cannot move the {what} at {written(np.array(lost) * even.rate)} (Popov, Belevitch and Hautus' "
+            f"test: [A - s I, B] has rank {n - lost.count(lost[0])} of {n} there), so no gain places all poles; add an "
+            "input or a coupling, or leave that mode out of the model."
+        )
+    found = _single(even, asked) if m == 1 else _several(even, asked)
+    weakest = written([weak_modes(even.A, even.B)[0][1] * even.rate])
+    if found is None or not np.isfinite(found).all():
+        raise BadInput(
+            f"no gains were found for the poles {written(asked)}: the mode at {weakest} is almost out of the inputs' "
+            "reach; leave it where it is, or add an input or a coupling."
+        )
+    K = even.gains(found)
+    attained = matched(asked, exact.eigenvalues(A, B, K))
+    condition, sensitivity = _condition(even), _sensitivity(A, B, K)
+    miss = float(np.abs(attained - asked).max())
+    _refuse_a_miss(asked, attained, condition, weakest)
+    return Placement(
+        K=K,
+        asked=asked,
+        attained=attained,
+        miss=miss,
+        condition=condition,
+        sensitivity=sensitivity,
+        sentence=_sentence(asked, condition, sensitivity),
+    )
+
+
+def _checked(A: ArrayLike, B: ArrayLike) -> tuple[Array, Array]:
+    a = np.atleast_2d(np.array(A, dtype=np.float64))
+    b = np.array(B, dtype=np.float64)
+    b = b[:, None] if b.ndim == 1 else np.atleast_2d(b)
+    if a.ndim != 2 or a.shape[0] != a.shape[1] or b.shape[0] != a.shape[0] or b.shape[1] == 0:
+        raise BadInput(f"a model needs A of shape (n, n) and B of shape (n, m), got {a.shape} and {b.shape}.")
+    if not (np.isfinite(a).all() and np.isfinite(b).all()):
+        raise BadInput("A and B must hold finite numbers; check the parameters of the model.")
+    return a, b
+
+
+def _balanced(A: Array, B: Array) -> _Balanced:
+    from scipy.linalg import matrix_balance
+
+    made: Any = matrix_balance(A, permute=False, separate=True)
+    scaled, T = np.asarray(made[0], dtype=np.float64), np.asarray(made[1][0], dtype=np.float64)
+    rate = _power(float(np.abs(np.linalg.eigvals(A)).max(initial=0.0)) or float(np.abs(A).max(initial=0.0)))
+    even = B / T[:, None] / rate
+    size = np.array([_power(float(np.linalg.norm(column))) for column in even.T])
+    return _Balanced(A=scaled / rate, B=even / size, T=T, rate=rate, size=size)
+
+
+def _power(value: float) -> float:
+    """Nearest power of two; 1 for nothing."""
+    return float(2.0 ** np.round(np.log2(value))) if value > 0 else 1.0
+
+
+def _single(even: _Balanced, asked: Roots) -> Array | None:
+    gains = exact.ackermann(even.A, even.B[:, 0], asked / even.rate)
+    return None if gains is None else gains[None]
+
+
+def _several(even: _Balanced, asked: Roots) -> Array | None:
+    """Gains of several inputs; None when neither way leads to any."""
+    import scipy.signal
+
+    place_poles: Any = scipy.signal.place_poles
+
+    crowd = max(int(np.sum(np.abs(asked - p) <= 1e-9 * abs(p))) for p in asked)
+    if crowd <= np.linalg.matrix_rank(even.B):
+        try:
+            found: Array = np.asarray(place_poles(even.A, even.B, asked / even.rate).gain_matrix, dtype=np.float64)
+        except ValueError:
+            found = np.full((even.B.shape[1], even.A.shape[0]), np.nan)
+        if np.isfinite(found).all():
+            attained = matched(asked, even.rate * exact.eigenvalues(even.A, even.B, found))
+            if np.all(np.abs(attained - asked) <= _allowed(asked)):
+                return found
+    # Heymann's lemma: after a feedback that gives distinct poles, a single mixture of the inputs reaches every mode
+    first = np.zeros((even.B.shape[1], even.A.shape[0]))
+    for _ in range(2):
+        A = even.A - even.B @ first
+        v = _mixture(A, even.B)
+        if not lost_modes(A, even.B @ v[:, None]):
+            gains = exact.ackermann(A, even.B @ v, asked / even.rate)
+            return None if gains is None else first + np.outer(v, gains)
+        spread = -float(np.abs(asked).max()) * np.linspace(0.5, 1.5, asked.size) / even.rate
+        first = np.asarray(place_poles(even.A, even.B, spread).gain_matrix, dtype=np.float64)
+    return None
+
+
+def _mixture(A: Array, B: Array) -> Array:
+    """Of a few mixtures of the inputs, the one that reaches its weakest mode best."""
+    m = B.shape[1]
+    mixtures = (np.ones(m), *np.eye(m), np.arange(1.0, m + 1), (-1.0) ** np.arange(m))
+    return max(mixtures, key=lambda v: weak_modes(A, B @ v[:, None])[0][0])
+
+
+def _allowed(asked: Roots) -> Array:
+    """How far from each pole asked is still right."""
+    scale = float(np.abs(asked).max(initial=0.0)) or 1.0
+    together = np.sum(np.abs(asked[:, None] - asked[None, :]) <= 1e-3 * scale, axis=1)
+    return scale * MISSED ** (1.0 / together)
+
+
+def _refuse_a_miss(asked: Roots, attained: Roots, condition: float, weakest: str) -> None:
+    over = np.abs(attained - asked) / _allowed(asked)
+    i = int(np.argmax(over))
+    if over[i] > 1.0:
+        raise BadInput(
+            f"gains rounded to double precision leave a pole {abs(attained[i] - asked[i]):.2g} 1/s away from where "
+            f"it was asked, {written(asked[i : i + 1])} (controllability matrix: condition {condition:.1e}). "
+            f"Ask for poles closer to those of the model, of which {weakest} is the hardest to reach, or for fewer."
+        )
+
+
+def _condition(even: _Balanced) -> float:
+    columns = [even.B]
+    for _ in range(even.A.shape[0] - 1):
+        columns.append(even.A @ columns[-1])
+    values = np.linalg.svd(np.hstack(columns), compute_uv=False)
+    return float(values[0] / values[-1]) if values[-1] > 1e-16 * values[0] else float("inf")
+
+
+def _sensitivity(A: Array, B: Array, K: Array, part: float = 1e-3) -> float:
+    """Farthest that a pole of ``A - B K`` moves when one entry of A or B is multiplied by ``1 + part``."""
+    closed = A - B @ K
+    before = poles_of(closed)
+    worst = 0.0
+    for i, j in np.argwhere(A):
+        changed = closed.copy()
+        changed[i, j] += part * A[i, j]
+        worst = max(worst, float(np.abs(matched(before, poles_of(changed)) - before).max()))
+    for i, j in np.argwhere(B):
+        changed = closed.copy()
+        changed[i] -= part * B[i, j] * K[j]
+        worst = max(worst, float(np.abs(matched(before, poles_of(changed)) - before).max()))
+    return worst
+
+
+def _sentence(asked: Roots, condition: float, sensitivity: float) -> str:
+    fastest = float(np.abs(asked).max(initial=0.0))
+    size = f"condition {condition:.2g}" if np.isfinite(condition) else "condition beyond 1e16"
+    moved = f"one number of the model 0.1 % off moves a pole by up to {sensitivity:.2g} 1/s"
+    if condition > ILL or sensitivity > fastest:
+        return (
+            f"Ill conditioned ({size}): these gains are right for these very numbers, but {moved}; do not build this."
+        )
+    if sensitivity > 0.1 * fastest:
+        return f"Reachable ({size}), but touchy: {moved}."
+    return f"Well conditioned ({size}): {moved}."

@@ -1,0 +1,170 @@
+"""How fast is it, when only positions are measured? Differences, filtered differences, an observer: one form for all.
+
+An estimator is a sampled linear law from encoder readings (and, for an observer, its own command) to states.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from upright.errors import BadInput
+from upright.gains.sampled import Sampled
+from upright.laws.linear import differences
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimator:
+    """``z[k+1] = A z[k] + B y[k] + E u[k]``, ``x[k] = C z[k] + D y[k]``.
+
+    y are the positions as deviations from the equilibrium, x the states in the model's order, u the command.
+    ``begin @ y`` is the state z to switch on with, the rig at rest at y: no jump is then taken for a speed.
+    """
+
+    A: Array
+    B: Array
+    E: Array
+    C: Array
+    D: Array
+    begin: Array
+    period: float
+    name: str
+
+    def noise(self, quantum: ArrayLike) -> Array:
+        """Standard deviation of each estimated state [its unit] from the rounding of the encoders alone, shape (n,).
+
+        Parameters
+        ----------
+        quantum : float or array, shape (p,)
+            Step of each encoder [rad or m]; its rounding is white with variance ``quantum^2/12`` (Widrow), true for a
+            body that crosses several steps between samples.
+        """
+        variance = np.broadcast_to(np.asarray(quantum, dtype=np.float64) ** 2 / 12, (self.B.shape[1],))
+        spread = stationary(self.A, self.B * np.sqrt(variance))
+        return np.sqrt(np.diag(self.C @ spread @ self.C.T + (self.D * variance) @ self.D.T))
+
+
+def difference(model: Sampled) -> Estimator:
+    """Plain difference of two readings, ``v[k] = (y[k] - y[k-1])/T``; its noise is ``quantum/(T sqrt 6)``."""
+    return filtered(model, 0.0)
+
+
+def filtered(model: Sampled, memory: float) -> Estimator:
+    """Difference through a low pass, ``v[k] = a v[k-1] + (1 - a) (y[k] - y[k-1])/T``.
+
+    Its noise has the variance ``quantum^2/12 * 2 (1 - a)^2/((1 + a) T^2)``; it is late by about ``a/(1 - a)`` samples
+    more than the half of one that every difference is.
+
+    Parameters
+    ----------
+    model : Sampled
+        Whose outputs are every second state: positions, each followed by its velocity.
+    memory : float
+        a, from 0 (plain difference) to below 1.
+    """
+    p = model.C.shape[0]
+    if not np.array_equal(model.C[:, : 2 * p], np.kron(np.eye(p), [1.0, 0.0])):
+        raise BadInput("differences need every position measured and followed by its velocity; use an observer.")
+    A, B, C, D = differences(p, model.period, memory)
+    name = f"filtered difference, a = {memory:g}" if memory else "plain difference"
+    E = np.zeros((A.shape[0], model.B.shape[1]))
+    return Estimator(A=A, B=B, E=E, C=C, D=D, begin=np.eye(A.shape[0], p), period=model.period, name=name)
+
+
+def observer(model: Sampled, gain: ArrayLike, name: str = "observer") -> Estimator:
+    """Observer that corrects with the newest reading: ``x = x_p + L (y - C x_p)``, ``x_p[k+1] = A x[k] + B u[k]``.
+
+    Parameters
+    ----------
+    model : Sampled
+    gain : array, shape (n, p)
+        L, for instance from `kalman`.
+    """
+    L = np.asarray(gain, dtype=np.float64)
+    if L.shape != model.C.T.shape:
+        raise BadInput(f"an observer of this model needs a gain of shape {model.C.T.shape}, got {L.shape}.")
+    kept = np.eye(model.A.shape[0]) - L @ model.C
+    begin: Array = np.linalg.pinv(model.C).astype(np.float64)
+    return Estimator(
+        A=model.A @ kept, B=model.A @ L, E=model.B, C=kept, D=L, begin=begin, period=model.period,
+        name=name,
+    )  # fmt: skip
+
+
+def kalman(model: Sampled, process: ArrayLike, noise: ArrayLike) -> Estimator:
+    """Steady Kalman filter, the observer with the least variance.
+
+    Parameters
+    ----------
+    model : Sampled
+    process : float or array, shape (n, n)
+        What shakes the states from sample to sample: a covariance, or one number, the standard deviation of a white
+        force held over a period [the input's unit].
+    noise : float or array, shape (p,)
+        Standard deviation of each reading; ``quantum/sqrt(12)`` for an encoder.
+
+    Raises
+    ------
+    BadInput
+        When a reading is taken as exact, or the filter does not exist (a mode that the outputs do not show).
+    """
+    from scipy.linalg import solve_discrete_are
+
+    W = np.asarray(process, dtype=np.float64)
+    W = model.B @ model.B.T * float(W) ** 2 if W.ndim == 0 else W
+    p = model.C.shape[0]
+    V = np.diag(np.broadcast_to(np.asarray(noise, dtype=np.float64) ** 2, (p,)))
+    if not np.all(np.diag(V) > 0):
+        raise BadInput("a Kalman filter needs readings with noise above 0; give quantum/sqrt(12) for an encoder.")
+    try:
+        solve: Any = solve_discrete_are
+        P = np.asarray(solve(model.A.T, model.C.T, W, V), dtype=np.float64)
+    except (np.linalg.LinAlgError, ValueError):
+        raise BadInput(
+            "there is no steady Kalman filter: a mode that grows or stays is not shown by the outputs, or nothing "
+            "shakes it; measure another coordinate or give a process noise on every state."
+        ) from None
+    gain = np.linalg.solve(model.C @ P @ model.C.T + V, model.C @ P).T
+    return observer(model, gain, "Kalman filter")
+
+
+def shaken(model: Sampled, accelerations: ArrayLike) -> Array:
+    """Covariance of what shakes every coordinate by itself, for `kalman`: a white acceleration held over a period.
+
+    A force that enters like the command alone is a poor guess where bodies are also pushed by hands and dry friction:
+    the filter then corrects a push on the pendulum no faster than the plant's own zeros let it.
+
+    Parameters
+    ----------
+    model : Sampled
+        Whose first states are coordinates, each followed by its velocity.
+    accelerations : float or array, shape (p,)
+        Standard deviation of the acceleration of each coordinate [m/s^2 or rad/s^2].
+    """
+    p = model.C.shape[0]
+    found = np.zeros_like(model.A)
+    for i, a in enumerate(np.broadcast_to(np.asarray(accelerations, dtype=np.float64), (p,)).tolist()):
+        moved = np.zeros(found.shape[0])
+        moved[2 * i : 2 * i + 2] = model.period**2 / 2, model.period
+        found += a**2 * np.outer(moved, moved)
+    return found
+
+
+def stationary(A: Array, B: Array) -> Array:
+    """Covariance that unit white noise keeps up, ``P = A P A' + B B'``, by doubling; A must be stable.
+
+    Doubling sums ``A^k B B' A'^k``: it subtracts nothing, so states of very different size do not disturb each other.
+    """
+    if np.abs(np.linalg.eigvals(A)).max(initial=0.0) >= 1:
+        raise BadInput("noise has no stationary level in a loop that is not stable; stabilize it first.")
+    P, power = B @ B.T, A
+    for _ in range(60):
+        P, power = P + power @ P @ power.T, power @ power
+        if np.abs(power).max(initial=0.0) < 1e-20:
+            break
+    return P

@@ -1,8 +1,0 @@
-"""The sampled law between readings and commands: linear (`Law`) or a function (`Rule`), in a simulation as on a rig."""
-
-from __future__ import annotations
-
-from upright.law.linear import Law, state_feedback
-from upright.law.rule import Rule
-
-__all__ = ["Law", "Rule", "state_feedback"]

@@ -1,0 +1,282 @@
+"""A survey as a chapter: gains with their intervals, agreement, and which printed numbers cannot be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from upright.questionnaire.figures import agreement_figure, bounds_figure, fitting_figure, gain_figure
+from upright.questionnaire.grim import Fits, counts, fitting, possible, whole_row
+from upright.questionnaire.paired import compare, holm
+from upright.questionnaire.sheet import Likert, Means, Ratings, Shares
+from upright.questionnaire.summary import bound
+from upright.report.page import Block, Chapter, Part, Picture, Points, Step, Table
+from upright.report.symbols import number
+
+_HOW = (
+    "Paired t with Student's intervals; Wilcoxon's signed ranks with zeros dropped, middle ranks for ties and the "
+    "exact distribution; d is the mean gain over the spread of single gains, its interval from the noncentral t; the "
+    "rank effect is the share of rank sums upwards minus downwards; the normalized gain is the gain over what the "
+    "scale left to gain; Holm's adjustment for asking several questions. Printed means and percentages are checked "
+    "against whole numbers of answers (GRIM); bounds on t hold for every set of whole ratings that has these means."
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Evaluated:
+    """What one kind of sheet comes to: sentences, the most telling first, pictures with tables, and plain values."""
+
+    sentences: tuple[str, ...]
+    shown: tuple[Block, ...]
+    numbers: dict[str, Any]
+    notes: tuple[str, ...] = ()
+
+
+def chapter(
+    sheet: Ratings | Means | Shares, *, title: str, source: str, answers: int | None = None,
+    scale: tuple[int, int] = (1, 4), steps: Sequence[Step] = (),
+) -> Chapter:  # fmt: skip
+    """What a survey can say.
+
+    Parameters
+    ----------
+    sheet : Ratings, Means or Shares
+    title, source : str
+        Heading of the page, and name of the file.
+    answers : int, optional
+        On how many answers printed numbers are said to rest.
+    scale : (int, int)
+        Ends of the scale of ratings.
+    steps : sequence of Step
+    """
+    n = answers or 0
+    if isinstance(sheet, Ratings):
+        done = _ratings(sheet, scale)
+    else:
+        done = _means(sheet, n, scale) if isinstance(sheet, Means) else _shares(sheet, n)
+    verdict, *more = done.sentences or ("Nothing was compared.",)
+    also = (Points(tuple(more)),) if more else ()
+    return Chapter(
+        title=title,
+        verdict=verdict,
+        question="Did the course help, as far as its survey can tell?",
+        parts=(
+            Part(title="What the survey can say", key="said", content=(f"From {source}.", *also, *done.shown)),
+            *((Part(title="Notes", key="notes", content=(Points(done.notes),)),) if done.notes else ()),
+            Part(title="How it was found", key="how", content=(_HOW,)),
+        ),
+        steps=tuple(steps),
+        numbers={"sentences": done.sentences, "notes": done.notes, "found": done.numbers},
+    )
+
+
+def _ratings(sheet: Ratings, scale: tuple[int, int]) -> _Evaluated:
+    found = [(i.name, compare(i.pre, i.post, top=scale[1])) for i in sheet.items]
+    adjusted = holm([p.p for _, p in found])
+    rows = tuple(
+        (
+            name, str(p.n), number(p.pre, 3), number(p.post, 3), number(p.gain, 3), _span(p.interval),
+            number(p.t, 3), _chance(p.p), _chance(q), number(p.signed_rank, 3), _chance(p.p_ranks),
+            number(p.effect, 2), _span(p.effect_interval), number(p.ranks_effect, 2), number(p.normalized, 2),
+        )
+        for (name, p), q in zip(found, adjusted, strict=True)
+    )  # fmt: skip
+    sentences = [
+        f"{name}: {'raised' if p.gain > 0 else 'lowered'} by {number(abs(p.gain), 2)} ({_span(p.interval)}), "
+        + (
+            "more than chance explains."
+            if q < 0.05
+            else "not to be told from chance once all questions asked are counted."
+            if not math.isnan(q)
+            else "the same for everybody, so there is no spread to test against."
+        )
+        for (name, p), q in zip(found, adjusted, strict=True)
+    ]
+    lost = sum(p.missing for _, p in found)
+    if lost:
+        sentences.append(
+            f"{lost} comparisons miss one of their two answers and are left out, each for its question only."
+        )
+    shown: list[Block] = []
+    if found:
+        gains = Picture(
+            name="gains", draw=lambda: gain_figure(found, scale),
+            caption="Mean ratings before and after, and mean gains.", description="; ".join(sentences),
+        )  # fmt: skip
+        headings = (
+            "question", "n", "before", "after", "gain", "95 %", "t", "p", "p, Holm", "Wilcoxon", "p", "d", "95 %",
+            "rank effect", "normalized gain",
+        )  # fmt: skip
+        shown += [gains, _table(f"Ratings of {sheet.people} people before and after", headings, rows)]
+    if sheet.likert:
+        bars = [(k.name, k.options, [100 * c / max(sum(k.counts), 1) for c in k.counts]) for k in sheet.likert]
+        shown += [_agreement_picture(bars), _agreement_table(sheet.likert)]
+    return _Evaluated(
+        sentences=tuple(sentences), shown=tuple(shown), notes=sheet.notes,
+        numbers={name: asdict(p) | {"p_holm": q} for (name, p), q in zip(found, adjusted, strict=True)},
+    )  # fmt: skip
+
+
+def _table(caption: str, headings: Sequence[str], rows: Sequence[tuple[str, ...]]) -> Table:
+    """Numbers beside the name of what was asked."""
+    return Table(
+        caption=caption, headings=tuple(headings), rows=tuple(rows), numbers=tuple(range(1, len(headings)))
+    )  # fmt: skip
+
+
+def _agreement_table(likert: Sequence[Likert]) -> Table:
+    from scipy.stats import binomtest
+
+    rows: list[tuple[str, ...]] = []
+    for k in likert:
+        n = sum(k.counts)
+        agree = sum(c for o, c in zip(k.options, k.counts, strict=True) if o in ("strongly agree", "agree"))
+        counted = ", ".join(f"{c} {o}" for o, c in zip(k.options, k.counts, strict=True) if c)
+        low, high = binomtest(agree, n).proportion_ci(method="wilson")
+        rows.append((k.name, str(n), counted, f"{100 * agree / n:.0f} %", _span((low, high), 100, " %")))
+    return Table(
+        caption="Agreement; interval by Wilson's score", headings=("statement", "n", "answers", "agree", "95 %"),
+        rows=tuple(rows), numbers=(1, 3, 4),
+    )  # fmt: skip
+
+
+def _means(sheet: Means, n: int, scale: tuple[int, int]) -> _Evaluated:
+    found = [(f"{name}, {what.lower()}" if what else name, pre, post, bound(pre, post, n, scale=scale))
+             for name, what, pre, post in sheet.rows]  # fmt: skip
+    printed = [m for _, pre, post, _ in found for m in (pre, post)]
+    wrong = [m for m in printed if not possible(m, n)]
+    rows = [
+        (name, _marked(pre, n), _marked(post, n), number(float(post) - float(pre), 3), _span(b.t), b.verdict)
+        for name, pre, post, b in found
+    ]
+    sure = sum(b.verdict == "significant" for *_, b in found)
+    fits = fitting(printed, [], max(2 * n, 20))
+    sentences = [
+        f"{sure} of {len(found)} changes are significant at 5 % however the single answers were paired and spread"
+        + (", nearest totals taken where a mean is impossible" if wrong else "")
+        + f"; {len(found) - sure} cannot be told from the means alone.",
+        "The means say nothing about sizes of effect beyond these bounds, about single people, or about what caused"
+        " the change: there is no group that did not take the course.",
+        _impossible(wrong, printed, n, "means"),
+        _better(fits, n),
+    ]
+    others = [k for k in _best(fits, n)[:4] if 2 <= k != n]
+    if wrong and others:
+        again = [sum(bound(a, b, k, scale=scale).verdict == "significant" for _, a, b, _ in found) for k in others]
+        sentences.append(
+            "Significant whatever the pairing if fewer answered: "
+            + ", ".join(f"{sure} of {len(found)} with {k} answers" for k, sure in zip(others, again, strict=True))
+            + "."
+        )
+    bounds = Picture(
+        name="bounds", draw=lambda: bounds_figure([(name, b) for name, _, _, b in found]),
+        caption="Paired t that the printed means allow: its least value has to pass the dashed line.",
+        description=sentences[0],
+    )  # fmt: skip
+    table = _table(
+        f"Printed means of {n} answers; * cannot come from {n} whole ratings",
+        ("question", "before", "after", "gain", "t between", "at 5 %"), rows,
+    )  # fmt: skip
+    return _Evaluated(
+        sentences=tuple(sentences), shown=(bounds, _fitting_picture(fits, n), table),
+        numbers={
+            "impossible": wrong, "fits": {f.answers: f.possible for f in fits}, "printed": len(printed),
+            "bounds": {name: {"t": b.t, "verdict": b.verdict} for name, _, _, b in found},
+        },
+    )  # fmt: skip
+
+
+def _shares(sheet: Shares, n: int) -> _Evaluated:
+    printed = [s for _, shares in sheet.rows for s in shares]
+    wrong = [s for s in printed if not possible(s, n, of=100)]
+    rows = [
+        (
+            name,
+            *(f"{s}{'' if possible(s, n, of=100) else ' *'}" for s in shares),
+            "yes" if whole_row(shares, n) else "no",
+        )
+        for name, shares in sheet.rows
+    ]
+    most = max(2 * n, 20)
+    fits = fitting([], printed, most)
+    whole = [k for k in range(1, most + 1) if all(whole_row(s, k) for _, s in sheet.rows)]
+    together = (
+        f"All statements together come out as printed, each adding up to all answers, for {_listed(whole)} answers."
+        if whole
+        else f"No number of answers up to {most} gives all statements as printed with every answer counted."
+    )
+    bars = [(name, sheet.options, [float(s) for s in shares]) for name, shares in sheet.rows]
+    table = _table(
+        f"Printed percentages of {n} answers; * cannot come from {n} whole answers",
+        ("statement", *sheet.options, f"adds up to {n}"), rows,
+    )  # fmt: skip
+    return _Evaluated(
+        sentences=(_impossible([f"{w} %" for w in wrong], printed, n, "percentages"), _better(fits, n), together),
+        shown=(_agreement_picture(bars), _fitting_picture(fits, n), table),
+        numbers={
+            "impossible": wrong, "fits": {f.answers: f.possible for f in fits}, "printed": len(printed),
+            "whole": whole,
+        },
+    )  # fmt: skip
+
+
+def _agreement_picture(bars: Sequence[tuple[str, Sequence[str], Sequence[float]]]) -> Picture:
+    said = "; ".join(f"{name}: " + ", ".join(f"{s:.0f} % {o}" for o, s in zip(options, shares, strict=True))
+                     for name, options, shares in bars)  # fmt: skip
+    return Picture(
+        name="agreement", draw=lambda: agreement_figure(bars), caption="Agreement with each statement.",
+        description=said,
+    )  # fmt: skip
+
+
+def _fitting_picture(fits: Sequence[Fits], n: int) -> Picture:
+    return Picture(
+        name="fitting", draw=lambda: fitting_figure(fits, n),
+        caption="How many of the printed numbers each number of answers makes possible.",
+        description=_better(fits, n),
+    )  # fmt: skip
+
+
+def _impossible(wrong: Sequence[str], printed: Sequence[str], n: int, what: str) -> str:
+    if not wrong:
+        return f"All {len(printed)} {what} can come from {n} answers."
+    return (
+        f"{len(wrong)} of {len(printed)} {what} cannot come from {n} answers: {', '.join(dict.fromkeys(wrong))}."
+        " Either they were misprinted, or fewer people answered."
+    )
+
+
+def _best(fits: Sequence[Fits], n: int) -> list[int]:
+    """Numbers of answers up to n that make most of the printed numbers possible."""
+    fewer = [f for f in fits if f.answers <= n]
+    most = max(f.possible for f in fewer)
+    return [f.answers for f in fewer if f.possible == most]
+
+
+def _better(fits: Sequence[Fits], n: int) -> str:
+    best = _best(fits, n)
+    most = fits[best[0] - 1].possible
+    return (
+        f"Of up to {n} answers, {_listed(best)} fit{'s' if len(best) == 1 else ''} most: {most} of {fits[0].printed}."
+    )
+
+
+def _listed(values: Sequence[int]) -> str:
+    shown = [str(v) for v in values[:8]]
+    return (", ".join(shown[:-1]) + " or " + shown[-1] if len(shown) > 1 else shown[0]) + (
+        " …" if len(values) > 8 else ""
+    )
+
+
+def _marked(mean: str, n: int) -> str:
+    return mean if counts(mean, n) else f"{mean} *"
+
+
+def _span(pair: tuple[float, float], factor: float = 1.0, unit: str = "") -> str:
+    return f"{number(factor * pair[0], 3)} to {number(factor * pair[1], 3)}{unit}"
+
+
+def _chance(p: float) -> str:
+    return "–" if math.isnan(p) else "< 0.0001" if p < 1e-4 else f"{p:.2g}"

@@ -1,0 +1,111 @@
+"""What can be concluded when only the means before and after were printed? Bounds on the paired t that was not.
+
+``t = gain sqrt(n) / s`` needs the spread s of the single gains, which the means leave open. Whole ratings leave it open
+between two ends only. Least: all gains alike, up to the one step by which a whole total must be shared out. Most:
+people sit at the ends of the scale and as many as can move against one another; of a pair of inner ratings one can be
+moved up and the other down without changing a total, and since the square of a gain is convex that never lowers the
+sum of squares, so that at most one rating before and one after lie inside the scale.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import combinations_with_replacement, product
+
+from upright.errors import BadInput
+from upright.questionnaire.grim import counts
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bound:
+    """What two printed means and a number of answers allow.
+
+    Attributes
+    ----------
+    answers : int
+    gain : tuple of float
+        Smallest and largest mean gain that rounds as printed.
+    t : tuple of float
+        Smallest and largest paired t; infinite when all gains may be alike.
+    critical : float
+        Two-sided 5 % value of t.
+    exact : bool
+        Whether both means can come from that many answers; if not, the nearest totals were taken.
+    verdict : {"significant", "open", "not significant"}
+        Whatever the answers were, or not to be told from the means.
+    """
+
+    answers: int
+    gain: tuple[float, float]
+    t: tuple[float, float]
+    critical: float
+    exact: bool
+    verdict: str
+
+
+def bound(pre: str, post: str, answers: int, *, scale: tuple[int, int] = (1, 4)) -> Bound:
+    """Bounds on the paired t statistic of whole ratings from their printed means.
+
+    Raises
+    ------
+    BadInput
+        When fewer than two people answered or a mean lies off the scale.
+    """
+    from scipy.stats import t as student
+
+    if answers < 2:
+        raise BadInput(f"A paired test needs at least 2 answers, got {answers}.")
+    low, high = scale
+    for text in (pre, post):
+        if not low <= float(text) <= high:
+            raise BadInput(f"A mean of ratings from {low} to {high} lies between them, got {text}; check the scale.")
+    exact = True
+    totals: list[list[int]] = []
+    for text in (pre, post):
+        whole = list(counts(text, answers))
+        if not whole:
+            exact = False
+            whole = [math.floor(float(text) * answers), math.ceil(float(text) * answers)]
+        totals.append([s for s in whole if low * answers <= s <= high * answers])
+    found: list[float] = []
+    gains: list[float] = []
+    for before, after in product(*totals):
+        gains.append((after - before) / answers)
+        found += [_t(after - before, squares, answers) for squares in squares_of_gains(before, after, answers, scale)]
+    critical = float(student.ppf(0.975, answers - 1))
+    span = (min(found), max(found))
+    if span[0] > critical or span[1] < -critical:
+        verdict = "significant"
+    else:
+        verdict = "not significant" if -critical < span[0] and span[1] < critical else "open"
+    return Bound(answers=answers, gain=(min(gains), max(gains)), t=span, critical=critical, exact=exact,
+                 verdict=verdict)  # fmt: skip
+
+
+def _t(total: int, squares: int, n: int) -> float:
+    spread = (squares - total * total / n) / (n - 1)
+    if spread <= 1e-12:
+        return 0.0 if total == 0 else math.copysign(math.inf, total)
+    return total / n * math.sqrt(n / spread)
+
+
+def squares_of_gains(before: int, after: int, n: int, scale: tuple[int, int]) -> tuple[int, int]:
+    """Smallest and largest sum of squared gains of n people with these totals of ratings."""
+    low, high = scale
+    share, rest = divmod(after - before, n)
+    least = (n - rest) * share**2 + rest * (share + 1) ** 2  # always on the scale: a rating leaves room for its gain
+    width = high - low
+    a, b = before - low * n, after - low * n  # ratings above the lowest
+    best = -1
+    cells = [(i, j) for i in range(width + 1) for j in range(width + 1)]
+    for inside in (cell for k in (0, 1, 2) for cell in combinations_with_replacement(cells, min(k, n))):
+        people = n - len(inside)
+        up_before, left_before = divmod(a - sum(i for i, _ in inside), width)
+        up_after, left_after = divmod(b - sum(j for _, j in inside), width)
+        if left_before or left_after or not (0 <= up_before <= people and 0 <= up_after <= people):
+            continue
+        down = min(up_before, people - up_after)
+        moved = down + up_after - (up_before - down)
+        best = max(best, moved * width**2 + sum((j - i) ** 2 for i, j in inside))
+    return least, best

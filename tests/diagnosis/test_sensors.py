@@ -1,0 +1,85 @@
+"""Are a wrap, lost counts, a spike and a late reading told apart, and from motion that is none of them?"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from upright.diagnosis.clock import doubled_rows
+from upright.diagnosis.sensors import clipped, frozen_from
+from upright.signals.spikes import jumps
+
+T = np.arange(2000) * 2e-3
+STEP = 2 * math.pi / 4096
+SWING = np.round(1.2 * np.exp(-0.3 * T) * np.cos(6 * T) / STEP) * STEP
+PACE = float(np.abs(np.diff(SWING)).max())
+
+
+def test_a_swing_does_none_of_it():
+    found = jumps(T, SWING, STEP, (2 * math.pi,))
+    assert found.wraps.size == found.steps.size == found.spikes.size == 0
+    assert frozen_from(SWING, STEP)[0] == -1
+    assert doubled_rows([(SWING, STEP)]).size == 0
+    assert clipped(SWING, STEP, inertia=True)[2] == 0
+
+
+@pytest.mark.parametrize("turn", [2 * math.pi, 4096 * STEP])
+def test_a_counter_that_wraps_is_unwrapped_where_it_does(turn):
+    spin = np.round((0.4 + 9 * T / (1 + T)) / STEP) * STEP
+    wrapped = np.mod(spin, turn)
+    found = jumps(T, wrapped, STEP, (turn,))
+    assert found.wraps.tolist() == (np.flatnonzero(np.diff(np.floor(spin / turn + 1e-9))) + 1).tolist()
+    assert found.modulus == pytest.approx(turn)
+    assert found.steps.size == 0
+
+
+@pytest.mark.parametrize("lost", [-40, 25, 300])
+def test_lost_counts_are_found_with_their_number(lost):
+    i = 731
+    found = jumps(T, SWING + np.where(np.arange(T.size) >= i, lost * STEP, 0.0), STEP)
+    assert found.steps.tolist() == [i]
+    assert found.step_sizes[0] == pytest.approx(lost * STEP, abs=PACE)
+
+
+def test_a_spike_is_no_lost_count():
+    x = SWING.copy()
+    x[[500, 1300]] += (60 * STEP, -200 * STEP)
+    found = jumps(T, x, STEP)
+    assert found.spikes.tolist() == [500, 1300]
+    assert found.steps.size == 0
+
+
+def test_a_reading_taken_one_sample_late_is_neither():
+    x = SWING.copy()
+    x[400] = x[401]  # as the servo of a public crane log does
+    found = jumps(T, x, STEP)
+    assert found.spikes.size == found.steps.size == 0
+
+
+def test_a_sensor_that_freezes_in_motion_is_told_from_a_body_that_comes_to_rest():
+    i = int(np.argmax(np.abs(np.diff(SWING)))) + 300
+    assert frozen_from(np.where(np.arange(T.size) < i, SWING, SWING[i]), STEP)[0] == i
+    sliding = np.maximum(3.0 - 2.0 * T, 0.0)  # speed of a body that dry friction stops
+    rest = np.round(np.cumsum(sliding) * 2e-3 / STEP) * STEP
+    assert frozen_from(rest, STEP)[0] == -1
+
+
+def test_a_row_written_twice_is_found_where_the_body_moves():
+    fast = np.flatnonzero(np.abs(np.diff(SWING)) > 0.7 * PACE)
+    rows = fast[50:-50:90] + 1
+    x = SWING.copy()
+    x[rows] = x[rows - 1]
+    assert doubled_rows([(x, STEP)]).tolist() == rows.tolist()
+
+
+@pytest.mark.parametrize("limit", [0.5, 0.9])
+def test_a_sine_that_is_cut_off_is_told_from_one_that_turns(limit):
+    sine = np.sin(3 * T)
+    low, high, share = clipped(np.clip(sine, -limit, limit), 0.0, inertia=False)
+    assert (low, high) == (-limit, limit)
+    inside = np.abs(sine) >= limit
+    assert share == pytest.approx(float(inside.mean()), abs=0.05)  # the ends of the record are left out
+    coarse = np.round(50 * sine)  # turns on a plateau of its converter
+    assert clipped(coarse, 1.0, inertia=False)[2] == 0

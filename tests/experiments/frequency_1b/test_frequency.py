@@ -1,0 +1,199 @@
+"""Does experiment 1b, on twins that stick, know the pole by which they fall?"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import control
+import numpy as np
+import pytest
+
+from upright.errors import NotIdentifiable
+from upright.experiments.frequency_1b.chapter import chapter, true_key
+from upright.experiments.frequency_1b.run import run_frequency
+from upright.experiments.frequency_1b.sweeps import SHARE
+from upright.experiments.identified import read_identified
+from upright.experiments.makes import make_rig
+from upright.identification.frequency.answer import key_value
+from upright.identification.frequency.spectra import chirp, multisine, odd_lines, repetition, response_of, sines_in
+from upright.readers import read
+from upright.records import Record
+from upright.report.page import Picture
+
+TICK = 2e-3
+SYSTEM = control.tf([40.0], [1, 1.6, 64])  # damping ratio 0.1, 8 rad/s
+
+
+def log(u: np.ndarray, *, noise: float = 0.0, seed: int = 0) -> Record:
+    """What a linear system answers to a held command, by python-control."""
+    sampled = control.c2d(control.ss(SYSTEM), TICK)
+    t = np.arange(u.size) * TICK
+    y = np.asarray(control.forced_response(sampled, t, u).outputs)
+    y = y + noise * np.random.default_rng(seed).normal(size=y.size)
+    return Record(t=t, signals={"u": u, "y": y}, units={"u": "V", "y": "rad"}, inputs=("u",), outputs=("y",))
+
+
+def exact(omega: np.ndarray) -> np.ndarray:
+    sampled = control.c2d(control.ss(SYSTEM), TICK)
+    return np.asarray(sampled(np.exp(1j * omega * TICK)))
+
+
+def test_stepped_sines_in_a_log_are_told_apart_and_detected():
+    parts, at = [], []
+    for omega in (4.0, 7.5, 20.0):
+        count = round(max(24.0, 12 * 2 * np.pi / omega) / TICK)
+        parts.append(np.sin(omega * TICK * np.arange(count)))
+        at.append(omega)
+    u = np.concatenate(parts)
+    assert [w for *_, w in sines_in(np.arange(u.size) * TICK, u)] == pytest.approx(at, rel=1e-3)
+    found = response_of([log(u)], command="u", outputs=["y"])
+    assert found.omega == pytest.approx(at, rel=1e-3)
+    # settled to 2e-3, two of which may add up over a window
+    assert found.response[:, 0] == pytest.approx(exact(found.omega), rel=4e-3)
+
+
+def test_a_multisine_is_averaged_over_its_periods():
+    length, tick = 4000, TICK
+    base = 2 * np.pi / (length * tick)
+    lines = odd_lines(3.0, 40.0, 25, base)
+    assert np.all(lines % 2 == 1)
+    wave = multisine(lines, np.ones(lines.size), length)
+    spectrum = np.abs(np.fft.rfft(wave)) * 2 / length
+    assert spectrum[lines] == pytest.approx(np.ones(lines.size))
+    assert np.delete(spectrum, lines) == pytest.approx(0, abs=1e-12)
+    assert np.abs(wave).max() / np.sqrt(np.mean(wave**2)) < 2.6  # random phases seldom reach this; the best of 200 do
+    u = np.tile(wave, 9)
+    assert repetition(u) == length
+    found = response_of([log(u, noise=0.02)], command="u", outputs=["y"])
+    assert found.together
+    assert found.omega == pytest.approx(lines * base)
+    off = np.abs(found.response[:, 0] - exact(found.omega)) ** 2
+    assert np.mean(off / found.variance[:, 0]) == pytest.approx(1.0, abs=0.6)  # 25 lines, few periods
+
+
+def test_a_noisy_sweep_states_its_errors():
+    """A sweep repeated: coherence falls with noise, and errors are about as large as stated."""
+    u = chirp(2.0, 60.0, 10.0, TICK)
+    logs = [log(np.concatenate([u, np.zeros(2500)]), noise=0.05, seed=k) for k in range(6)]
+    found = response_of(logs, command="u", outputs=["y"], band=(4.0, 40.0))
+    off = np.abs(found.response[:, 0] - exact(found.omega)) / np.abs(exact(found.omega))
+    assert np.median(off) < 0.02
+    quiet = np.abs(found.response[:, 0]) > 0.3
+    assert found.coherence[quiet].min() > 0.9
+    loud = response_of([log(np.concatenate([u, np.zeros(2500)]), noise=0.5, seed=k) for k in range(6)], command="u",
+                       outputs=["y"], band=(4.0, 40.0))  # fmt: skip
+    assert np.all(loud.coherence.min(axis=0) < found.coherence.min(axis=0))
+    ratio = np.abs(loud.response[:, 0] - found.response[:, 0]) ** 2 / (loud.variance + found.variance)[:, 0]
+    assert 0.3 < np.median(ratio) < 3  # median of |z|^2 is 0.69 for the right variance
+
+
+def test_what_asks_nothing_is_refused():
+    still = Record(t=np.arange(100) * TICK, signals={"u": np.zeros(100), "y": np.zeros(100)})
+    with pytest.raises(NotIdentifiable, match="nothing was asked"):
+        response_of([still], command="u", outputs=["y"])
+    with pytest.raises(NotIdentifiable, match="three periods"):
+        response_of([log(np.sin(np.arange(1000) * 1e-3))], command="u", outputs=["y"], kind="sines")
+
+
+@pytest.fixture(scope="module")
+def furuta(tmp_path_factory):
+    return run_frequency("furuta", 0, tmp_path_factory.mktemp("1b"))
+
+
+def test_the_pole_of_the_rig_upside_down_is_known_before_it_stands(furuta):
+    """Issue: within 1 %, and covered. Ten times better here; the simplex, blind to dry friction, misses by percents."""
+    pole = key_value(furuta.answer.key)
+    truth = furuta.rig.plant.linear("inverted").poles()[0].real
+    assert furuta.answer.key[:2] == ("inverted", "unstable pole")
+    assert pole.value == pytest.approx(truth, rel=1e-3)
+    assert pole.interval[0] <= truth <= pole.interval[1]
+    assert pole.interval[1] - pole.interval[0] < 0.01 * truth
+    assert abs(furuta.answer.simplex_pole.real / truth - 1) > 0.02
+
+
+def test_amplitudes_are_scheduled(furuta):
+    """Within the drive's limit and the travel, above the encoders' steps, and no joint sticks where it is used."""
+    data, used = furuta.answer.data, furuta.answer.used
+    moved = np.abs(data.response * data.drive[:, None])
+    assert np.abs(data.drive).max() <= SHARE * furuta.rig.limit
+    assert np.abs(furuta.sweep.log["u"]).max() <= furuta.rig.limit
+    assert np.all(moved.max(axis=0) < 1.3 * np.array(furuta.make.reach))
+    assert (np.abs(used.response * used.drive[:, None]) / furuta.rig.quantum).min() > 50
+    assert len(used) >= 24
+    assert all("sticks" in s for s in furuta.answer.left_out)
+
+
+def test_design_reads_the_fit_with_its_uncertainty(furuta):
+    file = read_identified(furuta.folder)
+    pole = key_value(furuta.answer.key)
+    assert file.linear("inverted").poles()[0].real == pytest.approx(pole.value, rel=1e-9)
+    spread = np.std([m.poles()[0].real for m in file.spread("inverted")])
+    assert spread == pytest.approx(pole.stderr, rel=0.3)  # of 200 draws, 5 %; and the pole is not linear in the numbers
+    assert (file.unit, file.name) == ("V", "furuta")
+
+
+@pytest.mark.slow
+def test_other_rigs_of_the_makes_are_known_as_well(tmp_path):
+    """Six rigs here, 50 of each pendulum in `python -m benchmarks frequency`."""
+    inside = []
+    for make, seed in (
+        ("linear", 1),
+        ("linear", 2),
+        ("furuta", 1),
+        ("furuta", 2),
+        ("rectilinear", 1),
+        ("torsional", 1),
+    ):
+        done = run_frequency(make_rig(make, seed), seed, tmp_path)
+        found, truth = key_value(done.answer.key), true_key(done)
+        assert found.value == pytest.approx(truth, rel=1e-2)
+        inside.append(found.interval[0] <= truth <= found.interval[1])
+        assert done.answer.fit.trusted
+    assert sum(inside) >= 4  # six honest 95 % intervals miss three times once in 450 times
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("make", ["furuta", "linear"])
+def test_an_encoder_of_another_scale_is_told(make, tmp_path):
+    """theta/psi holds g, and the bench knows r: 10 % more counts per turn fit no pendulum of that size."""
+    done = run_frequency(replace(make_rig(make), scales=(1.0, 1.1)), 0, tmp_path)
+    assert not done.answer.fit.trusted
+    assert "scale" in done.answer.fit.verdict
+
+
+@pytest.mark.slow
+def test_all_frequencies_at_once_tell_the_same(tmp_path):
+    for make in ("torsional", "linear"):
+        done = run_frequency(make, 0, tmp_path, kind="multisine")
+        assert key_value(done.answer.key).value == pytest.approx(true_key(done), rel=1e-2)
+        assert done.sweep.seconds < 200
+
+
+@pytest.mark.slow
+def test_the_page_says_what_was_found(furuta):
+    told = chapter(furuta)
+    assert told.key == "1b"
+    assert told.sound
+    assert told.numbers["pole"]["inside"]
+    assert "unstable pole" in told.verdict
+    assert len([b for part in told.parts for b in part.content if isinstance(b, Picture)]) == 2
+
+
+@pytest.mark.slow
+@pytest.mark.real_data
+def test_a_documented_compensator_is_found_in_real_logs():
+    """Single-link robot, SIUE 2009: v = C (u - theta) with C = 3 (s + 13)/(s + 20), Tustin at 500 Hz (its README).
+
+    Ten swept sines. v is rounded to whole counts of at most 200, and below 50 rad/s the error itself is a few counts.
+    """
+    folder = Path(os.environ["UPRIGHT_REAL_DATA"]) / "flexible_robot_freqresp"
+    logs = []
+    for k in range(1, 11):
+        r = read(folder / f"swept{k}-0-10hz.txt")
+        logs.append(r.replace(signals={**r.signals, "e": r["u"] - r["$\\theta$"]}, units={}))
+    found = response_of(logs, command="e", outputs=["v"], band=(55.0, 100.0))
+    s = 2 / 2e-3 * 1j * np.tan(found.omega * 2e-3 / 2)
+    assert found.response[:, 0] == pytest.approx(3 * (s + 13) / (s + 20), rel=0.05)
+    assert found.coherence.min() > 0.99

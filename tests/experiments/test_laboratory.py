@@ -1,0 +1,126 @@
+"""Does a session keep what is finished, go on where it stopped, and survive an experiment that fails?"""
+
+import numpy as np
+import pytest
+
+from upright.errors import NotIdentifiable
+from upright.experiments import laboratory, laboratory_page
+from upright.experiments.laboratory import Experiment
+from upright.report.page import Chapter, Finding, Part
+
+
+@pytest.fixture
+def bench(monkeypatch):
+    """Three small experiments; the second builds on the first. What was run, and what may go wrong, is noted."""
+    ran, trouble = [], {}
+
+    def small(key, needs=()):
+        def tell(task):
+            ran.append(key)
+            if key in trouble:
+                raise trouble[key]
+            told = f"{key} on {task.rig.name}, seed {task.seed}, after {', '.join(task.earlier) or 'nothing'}"
+            finding = Finding(what="x", value=str(len(ran)))
+            return Chapter(key=key, title=f"Small {key}", question="?", verdict=told, detail="", sound=True,
+                           parts=(Part(title="Data"),), findings=(finding,),
+                           numbers={"run": len(ran), "bad": float("nan")}), True  # fmt: skip
+
+        makes = ("furuta", "linear") if key != "3" else ("rectilinear",)
+        return Experiment(key=key, part_of=key[0], title=f"Small {key}", makes=makes, needs=needs, seconds=1, tell=tell)
+
+    all_of_them = (small("1"), small("2", ("1",)), small("3", ("1",)))
+    for module in (laboratory, laboratory_page):
+        monkeypatch.setattr(module, "EXPERIMENTS", all_of_them)
+    return ran, trouble
+
+
+def verdicts(session):
+    return {t.experiment.key: t.chapter.verdict for t in session.told}
+
+
+def test_numbers_go_from_one_experiment_to_those_on_the_same_rig(bench, tmp_path):
+    said = verdicts(laboratory.run_laboratory((), "", 0, tmp_path))
+    assert said["2"].endswith("after 1")
+    assert said["3"] == "3 on ECP 210, two carts, seed 0, after nothing"  # another rig than experiment 1's
+
+
+def test_interrupted_it_keeps_what_is_finished_and_goes_on_from_there(bench, tmp_path):
+    ran, trouble = bench
+    trouble["2"] = KeyboardInterrupt()
+    first = laboratory.run_laboratory((), "", 0, tmp_path)
+    assert first.interrupted
+    assert [t.experiment.key for t in first.told] == ["1"]
+    assert [e.key for e in first.missing] == ["2", "3"]
+    told = laboratory_page.book(first, laboratory_page.date(2006, 6, 18))
+    assert "Stopped by Ctrl-C" in told.notes[0]
+    assert any("Go on" in s.sentence for s in told.steps)
+    trouble.clear()
+    second = laboratory.run_laboratory((), "", 0, tmp_path)
+    assert not second.interrupted
+    assert [t.state for t in second.told] == ["kept", "done", "done"]
+    assert ran == ["1", "2", "2", "3"]
+
+
+def test_a_ctrl_c_that_an_experiment_has_swallowed_is_still_obeyed(bench, tmp_path):
+    stopped = laboratory.run_laboratory((), "", 0, tmp_path, stopped=lambda: True)
+    assert [t.state for t in stopped.told] == ["stopped"]
+    assert stopped.interrupted
+    assert [t.state for t in laboratory.run_laboratory(("1",), "", 0, tmp_path).told] == ["done"]
+
+
+@pytest.mark.parametrize("kind", [NotIdentifiable, FloatingPointError, np.linalg.LinAlgError])
+def test_an_experiment_that_fails_says_why_and_the_others_go_on(bench, tmp_path, kind):
+    _, trouble = bench
+    trouble["2"] = kind("nothing moves; is the amplifier on?")
+    session = laboratory.run_laboratory((), "", 0, tmp_path)
+    assert [t.state for t in session.told] == ["done", "failed", "done"]
+    failed = session.told[1].chapter
+    assert not failed.sound
+    assert "nothing moves; is the amplifier on?" in failed.detail
+    assert laboratory_page.book(session, laboratory_page.date(2006, 6, 18)).chapters[1].state == "not finished"
+
+
+@pytest.mark.parametrize("change", [{"seed": 1}, {"make": "linear"}, {"fresh": True}])
+def test_what_was_made_of_something_else_is_made_again(bench, tmp_path, change):
+    call = {"make": "", "seed": 0} | change
+    fresh = call.pop("fresh", False)
+    laboratory.run_laboratory(("1", "2"), "", 0, tmp_path)
+    again = laboratory.run_laboratory(("1", "2"), call["make"], call["seed"], tmp_path, fresh=fresh)
+    assert [t.state for t in again.told] == ["done", "done"]
+
+
+def test_one_experiment_again_does_not_cost_the_others_their_place(bench, tmp_path):
+    ran, trouble = bench
+    laboratory.run_laboratory((), "", 0, tmp_path)
+    again = laboratory.run_laboratory(("2",), "", 0, tmp_path, fresh=True)
+    assert [(t.experiment.key, t.state) for t in again.told] == [("1", "done"), ("2", "done"), ("3", "kept")]
+    assert laboratory_page.command(again) == "upright lab"
+    trouble["2"] = KeyboardInterrupt()
+    stopped = laboratory.run_laboratory(("2",), "", 0, tmp_path, fresh=True)
+    assert stopped.interrupted
+    assert [t.experiment.key for t in stopped.told] == ["1", "2", "3"]  # 2 as it was kept: it still holds
+    alone = laboratory.run_laboratory(("1",), "", 1, tmp_path)
+    assert laboratory_page.command(alone) == "upright lab --experiment 1 --seed 1"
+    assert ran == ["1", "2", "3", "1", "2", "1", "2", "1"]
+
+
+def test_a_torn_file_is_made_again(bench, tmp_path):
+    laboratory.run_laboratory(("1",), "", 0, tmp_path)
+    path = tmp_path / "1" / "chapter.json"
+    path.write_text(path.read_text(encoding="utf-8")[:100], encoding="utf-8")
+    assert [t.state for t in laboratory.run_laboratory(("1",), "", 0, tmp_path).told] == ["done"]
+
+
+def test_what_is_kept_reads_as_it_was_written(bench, tmp_path):
+    first = laboratory.run_laboratory(("1",), "", 0, tmp_path).told[0].chapter
+    again = laboratory.run_laboratory(("1",), "", 0, tmp_path).told[0].chapter
+    assert again.numbers == {"run": 1, "bad": None}  # JSON knows no NaN
+    assert (again.parts, again.findings, again.verdict) == (first.parts, first.findings, first.verdict)
+
+
+def test_the_share_told_never_goes_back(bench, tmp_path):
+    shares = []
+    laboratory.run_laboratory((), "", 0, tmp_path, lambda step, share: shares.append(share))
+    assert shares == sorted(shares)
+    assert shares[0] >= 0
+    assert shares[-1] <= 1

@@ -1,0 +1,225 @@
+"""Does the far body follow as linear theory, friction and the analogy of carts and disks say it must?"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from upright.control import trial
+from upright.experiments.makes import MAKES, SHAFTS, make_rig
+from upright.experiments.tracking_3 import pd
+from upright.experiments.tracking_3.laws import AT, EXTRA, closed_by, paper_sets, tracker, with_sum
+from upright.experiments.tracking_3.pulses import fitted, identify_shaft, pulses
+from upright.experiments.tracking_3.run import RESERVE, run_tracking
+from upright.experiments.weighing_1a.run import Known
+from upright.gains import hold, place, prefilter
+from upright.gains.loop import swing
+from upright.identification.estimate import identify
+from upright.physics import chain
+from upright.study.load import load_study
+
+FRICTIONLESS = {"f_1c": 0.0, "f_2c": 0.0}
+
+
+@pytest.mark.slow
+def test_the_far_body_ends_at_the_reference_without_friction():
+    """Final value theorem: k_pf makes the static gain one, whatever poles, seed and encoders."""
+    for kind in SHAFTS:
+        rig = make_rig(kind, 3).changed(**FRICTIONLESS)
+        for law in paper_sets(rig):
+            step = 0.5 * rig.limit / law.k_pf
+            done = trial(rig, law.law, at=AT, start=np.zeros(4), seconds=2.0, reference=np.full(1, step))
+            # a count of each encoder by its gain, a step of the converter
+            blur = np.abs(law.K[::2]) @ rig.quantum / law.k_pf + rig.converter / law.k_pf
+            assert done.x[-1, 2] == pytest.approx(step, abs=blur)
+            assert np.abs(done.u).max() == pytest.approx(law.k_pf * step, abs=rig.converter)
+
+
+def test_the_sampled_model_with_delay_and_lag_moves_as_the_kernel():
+    """Without friction and rounding the loop is linear: two substeps of Runge-Kutta are right to 1e-6 of the start."""
+    rig = replace(make_rig("rectilinear").changed(**FRICTIONLESS), counts=(1e12, 1e12), converter=0.0)
+    law = paper_sets(rig, (4,))[0].law
+    start = np.array([1e-3, 0.0, -2e-3, 0.02])
+    sampled = hold(rig.linear(AT), rig.period, rig.delay / rig.period, rig.lag)
+    states, commands = swing(sampled, law, start, 400)
+    done = trial(rig, law, at=AT, start=start, seconds=399 * rig.period)
+    np.testing.assert_allclose(done.x, states[:, :4], atol=1e-6 * np.abs(states[:, :4]).max())
+    np.testing.assert_allclose(done.u, commands[:, 0], atol=1e-5 * np.abs(commands).max())
+
+
+def held(rig, law, offset, force):
+    """How far the far body creeps when let go at rest, the spring and the drive pulling by shares of friction."""
+    p = rig.plant.parameters()
+    fine = replace(rig, counts=(1e12, 1e12), converter=0.0)
+    d = offset * p["f_2c"] / p["k_12"]  # x_1 - x_2
+    # of gain (k_pf (r - x_1) + K_3 d) - k d = force f_1, about x_1 = 0
+    u = (force * p["f_1c"] + p["k_12"] * d) / rig.gain
+    r = (u + law.K[2] * -d) / law.k_pf
+    done = trial(fine, law.law, at=AT, start=[0, 0, -d, 0], seconds=0.4, reference=np.full(1, r))
+    return abs(done.x[-1, 2] - done.x[0, 2]), r + d
+
+
+@pytest.mark.parametrize("kind", SHAFTS)
+def test_friction_holds_the_far_body_off_up_to_the_bound_and_no_farther(kind):
+    rig = make_rig(kind)
+    for law in paper_sets(rig, (1, 4)):
+        crept, error = held(rig, law, 0.999, 0.999)
+        assert crept == 0.0
+        assert error == pytest.approx(0.999 * law.play, rel=1e-9)
+        assert held(rig, law, 1.01, 0.99)[0] > 0  # the spring pulls the far body loose
+        assert held(rig, law, 0.99, 1.05)[0] > 0  # the drive moves the near one, and the spring follows
+
+
+def test_pd_of_the_near_encoder_is_stable_for_all_gains():
+    """Drive and encoder at one body make a passive pair (no delay): every kp, kd > 0 stabilizes."""
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        m_1, m_2, k, kp, kd = np.exp(rng.normal(0, 1.5, 5))
+        model = chain(2, "rectilinear")(m_1=m_1, m_2=m_2, k_12=k).linear(AT)
+        assert np.linalg.eigvals(model.A - model.B @ np.array([[kp, kd, 0, 0]])).real.max() < 0
+
+
+def test_pd_of_the_far_encoder_is_unstable_for_all_gains():
+    """Without natural damping m_1 m_2 s^4 + k (m_1 + m_2) s^2 + k kd s + k kp lacks s^3: not Hurwitz."""
+    rng = np.random.default_rng(1)
+    for _ in range(300):
+        m_1, m_2, k, kp, kd = np.exp(rng.normal(0, 1.5, 5))
+        model = chain(2, "rectilinear")(m_1=m_1, m_2=m_2, k_12=k).linear(AT)
+        assert np.linalg.eigvals(model.A - model.B @ np.array([[0, 0, kp, kd]])).real.max() > 0
+
+
+def test_pd_of_the_near_encoder_decays_no_faster_than_half_the_root_of_k_over_m_1():
+    """The bound is met at kp = k m_1/m_2, kd = 2 sqrt(k m_1), where (s^2 + b s + k/m_2)^2 with b = kd/(2 m_1)."""
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        m_1, m_2, k = np.exp(rng.normal(0, 0.4, 3))
+        bound = 0.5 * math.sqrt(k / m_1)
+        model = chain(2, "rectilinear")(m_1=m_1, m_2=m_2, k_12=k).linear(AT)
+        kp = k * m_1 / m_2 * np.geomspace(0.05, 20, 41)
+        assert pd.best_decay(pd.continuous(model), kp, most=50.0).max() <= bound * (1 + 1e-9)
+        best = np.array([[k * m_1 / m_2, 2 * math.sqrt(k * m_1), 0, 0]])
+        poles = np.poly(model.A - model.B @ best)
+        quadratic = [1, math.sqrt(k / m_1), k / m_2]
+        np.testing.assert_allclose(poles, np.polymul(quadratic, quadratic), rtol=1e-9)
+
+
+def test_the_loop_is_linear_in_the_gains():
+    """What the search over kp and kd takes for the loop is the loop of the law."""
+    rig = make_rig("torsional", 1)
+    A, P, D = pd.sampled(rig)
+    law = pd.near_pd(rig, "", 3.0, 0.4).law
+    np.testing.assert_allclose(A + 3.0 * P + 0.4 * D, closed_by(rig, law), rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", SHAFTS)
+def test_a_sum_makes_up_for_a_push_and_follows_the_step_as_before(kind):
+    rig = make_rig(kind, 2).changed(**FRICTIONLESS)
+    model = rig.linear(AT)
+    base = paper_sets(rig, (4,))[0]
+    law = with_sum(rig, base, "")
+    assert law.k_pf == pytest.approx(prefilter(model.A, model.B, model.C[-1], place(model.A, model.B, base.asked).K))
+    step, pushes = 0.4 * rig.limit / law.k_pf, np.full(9000, 0.1 * rig.limit)
+    ends = [
+        trial(rig, one.law, at=AT, start=np.zeros(4), seconds=3.0, reference=np.full(1, step), pushes=pushes).x[-1, 2]
+        for one in (base, law)
+    ]
+    assert ends[0] - step == pytest.approx(0.1 * rig.limit / base.k_pf, rel=0.05)  # the loop's static force
+    # what is left of the sum's slow pole, and two counts
+    assert ends[1] == pytest.approx(step, abs=abs(ends[0] - step) * 3 * math.exp(3 * EXTRA) + 2 * rig.quantum[1])
+
+
+@pytest.mark.slow
+def test_disks_move_as_carts_do_in_other_units():
+    """m - J, k - k_t, c - c_t, F - T: with factors that are powers of two even the rounding is the same."""
+    carts = make_rig("rectilinear", 5)
+    inertia, angle = 2.0**-7, 2.0**4  # kg m^2 per kg, rad per m
+    p = carts.plant.parameters()
+    same = {n.replace("m_", "J_"): v * inertia for n, v in p.items() if n[0] in "mkc"}
+    dry = {n: v * inertia * angle for n, v in p.items() if n[0] == "f"}
+    disks = replace(
+        carts, plant=chain(2, "torsional")(**same, **dry), gain=carts.gain * inertia * angle,
+        counts=tuple(c / angle for c in carts.counts), travel=math.inf,
+    )  # fmt: skip
+    for one, other in zip(paper_sets(carts), paper_sets(disks), strict=True):
+        np.testing.assert_allclose(other.K * angle, one.K, rtol=1e-9)
+        step = 0.9 * carts.limit / one.k_pf
+        scaled = tracker(disks, "", one.K / angle, one.k_pf / angle)
+        line, turn = (
+            trial(rig, law.law, at=AT, start=np.zeros(4), seconds=0.6, reference=np.full(1, size))
+            for rig, law, size in ((carts, one, step), (disks, scaled, step * angle))
+        )
+        np.testing.assert_array_equal(turn.u, line.u)
+        np.testing.assert_allclose(turn.x, line.x * angle, rtol=1e-9, atol=1e-15)
+
+
+def test_pulses_stay_within_travel_and_twist():
+    for kind in SHAFTS:
+        for seed in range(12):
+            rig = make_rig(kind, seed)
+            for file in ("pulses.csv", "others.csv"):
+                q = pulses(rig, file).y * rig.quantum
+                assert np.abs(q).max() < rig.travel
+                assert np.abs(q[:, 0] - q[:, 1]).max() < MAKES[kind].twist
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", SHAFTS)
+def test_four_sets_follow_and_the_fourth_comes_close_to_the_limit(kind, tmp_path):
+    done = run_tracking(kind, 4, tmp_path)
+    truth = done.true.plant.parameters()
+    for name in ("m_1", "m_2", "J_1", "J_2", "k_12"):
+        if name in truth:
+            low, high = done.fit.estimates[name].interval
+            assert low < truth[name] < high
+    shares = [o.found.effort.share for o in done.sets]
+    assert sorted(shares) == shares
+    assert 0.85 < shares[-1] <= RESERVE  # two digits of the step may take a tenth off
+    for o in done.sets:
+        assert o.within
+        assert o.found.effort.peak == pytest.approx(o.law.k_pf * done.step.size, abs=done.rig.converter)
+        assert o.found.figures.settling_5 < 4.0 / o.law.decay
+        assert abs(o.found.figures.error) < 1.4 * o.law.play + 2 * done.rig.quantum[1]  # friction of the day: 13 %
+    assert done.far.found.tripped < 1.0
+    assert done.stiff.found.figures.settling_5 > 2 * done.sets[-1].found.figures.settling_5
+    assert done.pd.found.give > 4 * done.sets[-1].found.give
+
+
+def test_the_fit_is_repeated_from_its_files(tmp_path):
+    done = run_tracking("torsional", 6, tmp_path, which=(1,), stopped=lambda: True)
+    assert done.interrupted
+    study = load_study(tmp_path / "shaft.toml")
+    again = identify(study.rig, study.runs)
+    written = json.loads((tmp_path / "fit.json").read_text(encoding="utf-8"))["parameters"]
+    for name, e in again.estimates.items():
+        assert written[name]["value"] == pytest.approx(e.value, rel=1e-9)
+
+
+@pytest.mark.parametrize("scale", [0.5, 1.0])
+def test_the_loop_does_not_depend_on_the_scale_of_the_inertias(tmp_path, scale):
+    """Only ratios are seen: an inertia said to be half as large halves gain, springs and friction, and no gain in V."""
+    rig = make_rig("torsional", 6)
+    told = Known(name="J_1", value=scale * rig.plant.J_1, stderr=1e-3 * rig.plant.J_1)
+    _, fit = identify_shaft(rig, 6, tmp_path, weighed=(told,))
+    model = fitted(rig, fit)
+    assert model.gain == pytest.approx(scale * rig.gain, rel=5e-3)
+    assert model.plant.k_12 == pytest.approx(scale * rig.plant.k_12, rel=5e-3)
+    (found,), (true,) = paper_sets(model, (4,)), paper_sets(rig, (4,))
+    assert found.k_pf == pytest.approx(true.k_pf, rel=5e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", SHAFTS)
+def test_no_pd_of_a_hundred_others_arrives_sooner_by_more_than_the_grid(kind):
+    """The search's last grid has steps of 6 %; random pairs may beat it by little."""
+    rig = make_rig(kind)
+    step = 0.9 * rig.limit / paper_sets(rig, (4,))[0].k_pf
+    _, found = pd.tune(rig, step, RESERVE * rig.limit)
+    rng = np.random.default_rng(7)
+    kp = np.exp(rng.uniform(np.log(0.03), 0, 100)) * RESERVE * rig.limit / step
+    others = pd.tried(rig, np.column_stack([kp, kp * np.exp(rng.uniform(np.log(8e-3), np.log(0.25), 100))]), step)
+    assert found.arrival.min() < 1.05 * others[:, 0].min()

@@ -1,0 +1,99 @@
+"""Does experiment 1a, on twins that stick, find what they were built with? And does the estimator agree?"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from upright.experiments.makes import OSCILLATORS
+from upright.experiments.weighing_1a.run import weigh_body
+from upright.experiments.weighing_1a.twin import acquire, drawn_twin
+from upright.identification import Parameter, Rig, Run
+from upright.identification.estimate import identify
+from upright.physics import chain
+
+KINDS = ("rectilinear", "torsional")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_twins_are_weighed_within_one_percent(kind):
+    """Twelve rigs here, a hundred in `python -m benchmarks loadings`."""
+    held = []
+    for seed in range(1, 13):
+        done = weigh_body(drawn_twin(seed, kind))
+        for found, truth in ((done.found.k, done.on.stiffness), (done.found.bare, done.on.bare)):
+            assert found.value == pytest.approx(truth, rel=1e-2)
+            held.append(found.interval[0] <= truth <= found.interval[1])
+        assert done.found.damping.value == pytest.approx(done.on.truth.parameters()["c_1"], rel=1e-2)
+        assert abs(done.found.damping.value - done.on.truth.parameters()["c_1"]) < 4 * done.found.damping.stderr
+    # twelve pairs that err together: fewer than nine of twelve honest 95 % intervals hold once in 400 times
+    assert sum(held) >= 18
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_log_is_what_an_encoder_shows(kind):
+    on = drawn_twin(3, kind)
+    record = acquire(on, 2, shot=1)
+    again = acquire(on, 2, shot=1)
+    (name,) = record.outputs
+    x = record[name]
+    assert np.array_equal(x, np.round(x))
+    assert np.array_equal(x, again[name])
+    assert not np.array_equal(x, acquire(on, 2, shot=2)[name])
+    make = OSCILLATORS[kind]
+    assert np.abs(record["u"]).max() <= make.limit
+    # at the step's end friction holds the body within f/k of where the spring would have it
+    plant = on.truth.parameters()
+    middle = x[record["u"] > 0][-1] / make.counts
+    force = record["u"].max() * make.gain
+    assert abs(middle - force / on.stiffness) < 2 * 1.5 * plant["f_1c"] / on.stiffness
+
+
+def test_travel_stays_within_the_rigs():
+    """Carts of the 210 travel 3 cm; the shaft of the 205 trips at 25 degrees."""
+    for kind, most in (("rectilinear", 0.03), ("torsional", np.radians(25))):
+        for count in range(5):
+            record = acquire(drawn_twin(0, kind), count)
+            assert np.abs(record[record.outputs[0]]).max() / OSCILLATORS[kind].counts < most
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_least_squares_on_the_whole_motion_agrees(kind):
+    """The same records, the equations of motion: no peak is looked at."""
+    done = weigh_body(drawn_twin(5, kind))
+    make, plant = OSCILLATORS[kind], chain(1, kind)
+    mass = "m_1" if kind == "rectilinear" else "J_1"
+    guess = {mass: 1.3 * done.on.bare, "k_1": 0.8 * done.on.stiffness, "c_1": 1.5 * make.plant.parameters()["c_1"]}
+    guess |= {"f_1c": 0.7 * make.plant.parameters()["f_1c"]}
+    parameters = {n: Parameter(name=n, value=v, estimate=True, lower=0.0) for n, v in guess.items()}
+    parameters["actuator.gain"] = Parameter(name="actuator.gain", value=0.9 * make.gain, estimate=True)
+    parameters["actuator.lag"] = Parameter(name="actuator.lag", value=2e-3)
+    runs = []
+    for label, record in done.logs.items():
+        if not label.endswith("run 1"):
+            continue
+        (name,) = record.outputs
+        runs.append(
+            Run(
+                label=label,
+                role="fit",
+                t=record.t,
+                u=record.u,
+                y=record.y / make.counts,
+                measured=(name,),
+                known={"a_1": done.added[label]},
+                unknown=("initial", "offset", "friction"),
+            )
+        )
+    fit = identify(Rig(plant=plant, parameters=parameters), runs, method="least-squares")
+    for ours, name in ((done.found.k, "k_1"), (done.found.bare, mass)):
+        theirs = fit.estimates[name]
+        assert theirs.value == pytest.approx(ours.value, rel=1e-2)
+        assert theirs.interval[0] <= ours.value <= theirs.interval[1]
+
+
+def test_a_piece_weighs_what_the_laboratory_says():
+    assert OSCILLATORS["rectilinear"].piece == 0.5
+    assert OSCILLATORS["torsional"].piece == pytest.approx(0.5 * (0.065**2 + 0.025**2 / 2))  # parallel axes
