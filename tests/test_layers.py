@@ -47,6 +47,7 @@ experiments.frequency_1b
 experiments.regulation_2
 experiments.swing_up_2b experiments.tracking_3 experiments.free_swing_4
 experiments
+verbs
 cli
 __main__
 """

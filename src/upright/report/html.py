@@ -3,21 +3,37 @@
 from __future__ import annotations
 
 import re
+from itertools import count
 from pathlib import Path
+from typing import Any
 
 from upright.files import replace_file
 from upright.report.book import Book
 from upright.report.page import Chapter, Picture
 
+_FRAGMENTS = count(1)  # ids differ between the cells of a notebook
 _ID = re.compile(r'\b(id="|url\(#|href="#)')
 
 
 def html(page: Chapter | Book) -> str:
     """A chapter, or a whole report, as a page that can be mailed, printed and read in ten years; texts are escaped."""
+    from upright import __version__
+
+    return _rendered("page.html", page=page, version=__version__)
+
+
+def fragment(page: Chapter) -> str:
+    """A chapter as part of somebody else's page, a notebook's: headline, tables, and one picture; prose is left out."""
+    pictures = (b for p in page.parts if not p.aside for b in p.content if isinstance(b, Picture))
+    return _rendered(
+        "fragment.html", page=page, shown=("Table", "Points", "Facts", "Code"), picture=next(pictures, None),
+        prefix=f"u{next(_FRAGMENTS)}-",
+    )  # fmt: skip
+
+
+def _rendered(template: str, **values: Any) -> str:
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
-
-    from upright import __version__
 
     def drawing(picture: Picture, prefix: str) -> Markup:
         """Mark-up of a picture, with ids that no other chapter of the page has."""
@@ -27,8 +43,7 @@ def html(page: Chapter | Book) -> str:
         loader=PackageLoader("upright.report"), autoescape=True, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    template = templates.get_template("page.html")
-    return template.render(page=page, version=__version__, drawing=drawing, kind=lambda block: type(block).__name__)
+    return templates.get_template(template).render(**values, drawing=drawing, kind=lambda block: type(block).__name__)
 
 
 def write_html(path: Path, page: Chapter | Book) -> Path:

@@ -1,0 +1,102 @@
+"""What a verb answers: a value, told as a chapter, with the files that were written."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from io import StringIO
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from upright.errors import BadInput, nearest
+from upright.report.html import fragment, write_html
+from upright.report.page import Chapter, Picture
+
+V = TypeVar("V")
+
+
+class Answer(Generic[V]):
+    """What a verb found; it shows itself as text at a prompt and as tables in a notebook.
+
+    Attributes
+    ----------
+    value
+        What was found; its attributes can be asked for here as well.
+    chapter : Chapter
+        The same, told.
+    files : tuple of Path
+        What was written.
+    """
+
+    def __init__(self, value: V, chapter: Chapter, files: Sequence[Path] = ()) -> None:
+        self.value, self.chapter, self.files = value, chapter, tuple(files)
+
+    def __repr__(self) -> str:
+        return text(self.chapter, self.files)
+
+    def _repr_html_(self) -> str:
+        return fragment(self.chapter)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_") or name == "value":
+            raise AttributeError(name)
+        return getattr(self.value, name)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *(n for n in dir(self.value) if not n.startswith("_"))})
+
+    @property
+    def numbers(self) -> Any:
+        """Plain values for another program [SI]."""
+        return self.chapter.numbers
+
+    @property
+    def pictures(self) -> tuple[str, ...]:
+        """Names of the pictures that `plot` draws."""
+        return tuple(self._drawings())
+
+    def plot(self, name: str = "") -> Any:
+        """Matplotlib figure of the chapter's first picture, or of the one called `name`.
+
+        Raises
+        ------
+        BadInput
+            When there is no such picture.
+        """
+        drawings = self._drawings()
+        if not drawings:
+            raise BadInput(f"there is no picture of '{self.chapter.title}'; print it, or look into .numbers.")
+        name = name or next(iter(drawings))
+        if name not in drawings:
+            raise BadInput(f"plot draws {', '.join(drawings)}, got '{name}'; {nearest(name, drawings)}")
+        draw = drawings[name].draw
+        if isinstance(draw, str):
+            raise BadInput(f"the picture '{name}' was stored as SVG; take it from .report(), or make it again.")
+        return draw()
+
+    def _drawings(self) -> dict[str, Picture]:
+        return {b.name: b for p in self.chapter.parts for b in p.content if isinstance(b, Picture)}
+
+    def report(self, path: str | Path) -> Path:
+        """Write the whole chapter as a page, HTML or PDF by the ending of `path`, and give back where."""
+        path = Path(path)
+        if path.suffix == ".pdf":
+            from upright.report.pdf import available, write_pdf
+
+            if not available():
+                raise BadInput("a PDF needs the pdf extra: pip install 'upright[pdf]', or name a file ending in .html.")
+            return write_pdf(path, self.chapter)
+        if path.suffix != ".html":
+            raise BadInput(f"a report is a file ending in .html or .pdf, got '{path}'.")
+        return write_html(path, self.chapter)
+
+
+def text(chapter: Chapter, files: Sequence[Path] = ()) -> str:
+    """A chapter as a terminal shows it."""
+    from rich.console import Console
+
+    from upright.report.terminal import print_chapter
+
+    screen = Console(file=StringIO(), width=120, highlight=False)
+    screen.print(chapter.title, markup=False)
+    print_chapter(screen, chapter, files)
+    return screen.file.getvalue().strip()  # type: ignore[attr-defined]
