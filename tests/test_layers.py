@@ -48,6 +48,7 @@ experiments.regulation_2
 experiments.swing_up_2b experiments.tracking_3 experiments.free_swing_4
 experiments
 verbs
+views
 cli
 __main__
 """

@@ -1,20 +1,86 @@
-"""What does a laboratory rig weigh, and why does it move as it does?
+"""upright: identify a laboratory rig hanging, hold it upright. In a notebook::
 
-One Lagrangian per plant; simulation, linear models, identification and reports follow from it.
+    import upright as up
+
+    log = up.read("swing.csv")                      # a record: columns, units, where they came from
+    up.doctor(log)                                  # what looks wrong with it, in sentences
+    fit = up.identify(log, up.Pendulum, known={"m_p": 0.2235})
+    fit                                             # numbers with intervals, scores, verdict; fit.plot(), fit.report()
+
+    rig = up.Furuta(m_p=0.135, l_cg=0.19, r=0.16, J_d=0.011, J_p=6e-4)
+    gains = up.place(rig.linear("inverted"), [-4 + 2j, -4 - 2j, -17, -3])
+    up.simulate(rig, gains, start={"theta": 0.2}, seconds=5).plot()
+
+Every verb of the command line, `upright NAME`, stands here under the same name and takes the same options
+(`upright plan-inertias` is `up.plan_inertias`). Numbers are in SI and radians; text such as ``"12 deg"`` wears its unit.
+
+==========  ==================================================================================================
+Log         read, show, doctor, init, law; Record
+Model       identify, predict, ladder, frequency, loadings, plan_inertias; Pendulum, CartPendulum, Furuta, chain
+Control     place, lqr, simulate, chance, design, regulate, swing_up, track; Law, Rule
+Course      lab, reproduce, survey
+Own plants  Plant, Coordinate, Input, Joint, quantity
+==========  ==================================================================================================
+
+What they return is shown by name at a prompt and as tables and pictures in a notebook. A wrong argument is answered
+with one sentence: `BadInput`, `ImpossiblePhysics` or `NotIdentifiable`, all of them `UprightError`.
 """
 
 from __future__ import annotations
 
-from upright.errors import BadInput, ImpossiblePhysics, NotIdentifiable, UprightError
-from upright.quantities import quantity
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from upright.errors import BadInput, ImpossiblePhysics, NotIdentifiable, UprightError
+    from upright.laws import Law, Rule
+    from upright.physics import CartPendulum, Coordinate, Furuta, Input, Joint, Pendulum, Plant, chain
+    from upright.quantities import quantity
+    from upright.records import Record
+    from upright.verbs.chance import chance
+    from upright.verbs.control import design, regulate, swing_up, track
+    from upright.verbs.course import lab, reproduce, survey
+    from upright.verbs.feedback import lqr, place
+    from upright.verbs.fitting import identify
+    from upright.verbs.log import doctor, init, law, read, show
+    from upright.verbs.model import frequency, ladder, loadings, plan_inertias, predict
+    from upright.verbs.motion import simulate
 
 __version__ = "0.1.0"
 
+_HOMES = {
+    "errors": ("BadInput", "ImpossiblePhysics", "NotIdentifiable", "UprightError"),
+    "laws": ("Law", "Rule"),
+    "physics": ("CartPendulum", "Coordinate", "Furuta", "Input", "Joint", "Pendulum", "Plant", "chain"),
+    "quantities": ("quantity",),
+    "records": ("Record",),
+    "verbs.chance": ("chance",),
+    "verbs.control": ("design", "regulate", "swing_up", "track"),
+    "verbs.course": ("lab", "reproduce", "survey"),
+    "verbs.log": ("doctor", "init", "law", "read", "show"),
+    "verbs.feedback": ("lqr", "place"),
+    "verbs.fitting": ("identify",),
+    "verbs.model": ("frequency", "ladder", "loadings", "plan_inertias", "predict"),
+    "verbs.motion": ("simulate",),
+}
+_HOME = {name: home for home, names in _HOMES.items() for name in names}
+
 __all__ = [
-    "BadInput",
-    "ImpossiblePhysics",
-    "NotIdentifiable",
-    "UprightError",
-    "__version__",
-    "quantity",
-]
+    "BadInput", "CartPendulum", "Coordinate", "Furuta", "ImpossiblePhysics", "Input", "Joint", "Law", "NotIdentifiable",
+    "Pendulum", "Plant", "Record", "Rule", "UprightError", "__version__", "chain", "chance", "design", "doctor",
+    "frequency", "identify", "init", "lab", "ladder", "law", "loadings", "lqr", "place", "plan_inertias", "predict",
+    "quantity", "read", "regulate", "reproduce", "show", "simulate", "survey", "swing_up", "track",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    """Fetch a name from its home when it is first used, so that `import upright` waits for nothing."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'upright' has no attribute {name!r}")
+    value = getattr(import_module(f"upright.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

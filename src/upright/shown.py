@@ -21,9 +21,9 @@ class Shown:
     def _repr_html_(self) -> str:
         return _views().html(self)
 
-    def plot(self, **options: Any) -> Any:
-        """A `matplotlib.figure.Figure` of it; `options` are those of its view, such as columns or signals to draw."""
-        return _views().plot(self, **options)
+    def plot(self, *names: str) -> Any:
+        """A `matplotlib.figure.Figure` of it; `names` are the columns of a record to draw."""
+        return _views().plot(self, *names)
 
 
 def _views() -> Any:

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from upright.errors import ImpossiblePhysics, NotIdentifiable
 from upright.physics.equations import Derived, mass_and_force, small_motions
 from upright.physics.statement import Statement
+from upright.shown import Shown
 
 Matrix = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Linear:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Linear(Shown):
     """State space ``x' = A x + B u, y = C x`` about `point`, states in the paper's order.
 
     `mass` is the mass matrix at that point; `outputs` are the coordinates.

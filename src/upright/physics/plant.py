@@ -17,9 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 from upright.physics.equations import Derived, evaluate
 from upright.physics.linear import Linear, linearize
 from upright.physics.statement import Statement
+from upright.shown import Shown
 
 
-class Plant(Statement, abstract=True):
+class Plant(Shown, Statement, abstract=True):
     """Base of every plant: what is known of a rig, from its own statement."""
 
     @classmethod

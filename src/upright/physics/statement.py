@@ -170,7 +170,7 @@ def declare(cls: type[Any]) -> None:
     for name, value in vars(cls).items():
         if isinstance(value, Field) and name not in annotated:
             raise BadInput(f"{cls.__name__}: {name} = quantity(...) needs a type; write {name}: float = quantity(...).")
-    dataclass(frozen=True, kw_only=True)(cls)
+    dataclass(frozen=True, kw_only=True, repr=False)(cls)
     for f in fields(cls):
         if f.name not in quantities(cls):
             raise BadInput(f"{cls.__name__}: parameter '{f.name}' has no unit; write {f.name}: float = {QUANTITY}.")

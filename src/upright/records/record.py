@@ -15,13 +15,14 @@ import numpy as np
 from upright.errors import BadInput, nearest
 from upright.records.exchange import Array, Exchange
 from upright.records.provenance import Provenance
+from upright.shown import Shown
 
 # No laboratory instrument writes a number this large, and its square would overflow in a fit.
 LARGEST = 1e30
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Record(Exchange):
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Record(Exchange, Shown):
     """Signals sampled at the same instants.
 
     Parameters
@@ -142,6 +143,12 @@ class Record(Exchange):
             signals={name: values[lo:hi] for name, values in self.signals.items()},
             provenance=replace(self.provenance, window=(float(start), float(stop))),
         )
+
+    def animate(self, *, speed: float = 1.0, frames: int = 25) -> Any:
+        """Moving drawing of a rig whose coordinates are columns; see `upright.views.animation.animate`."""
+        from importlib import import_module
+
+        return import_module("upright.views.animation").animate(self, speed=speed, frames=frames)
 
     def replace(self, **changes: Any) -> Record:
         """Record with some fields changed, checked again."""

@@ -76,7 +76,10 @@ class Study:
         return replace(self, runs=runs)
 
 
-def load_study(path: PathLike, *, data: PathLike | None = None, fixed: Mapping[str, float] | None = None) -> Study:
+def load_study(
+    path: PathLike, *, data: PathLike | None = None, fixed: Mapping[str, float] | None = None,
+    text: str | None = None, records: Mapping[str, Record] | None = None, plant: type[Plant] | None = None,
+) -> Study:  # fmt: skip
     """Rig and runs that a study file describes.
 
     Parameters
@@ -87,6 +90,12 @@ def load_study(path: PathLike, *, data: PathLike | None = None, fixed: Mapping[s
         Folder that the runs' files are relative to; the study's own when omitted.
     fixed : mapping of str to float, optional
         Parameters [SI] of a model fitted before, ``actuator.*`` included: nothing is then estimated.
+    text : str, optional
+        The study itself, when it is in no file; `path` then only names it.
+    records : mapping of file name to Record, optional
+        Logs that are at hand already.
+    plant : type of Plant, optional
+        In the place of the one that the study names.
 
     Raises
     ------
@@ -94,13 +103,13 @@ def load_study(path: PathLike, *, data: PathLike | None = None, fixed: Mapping[s
         With file and line, when the study or a log cannot be used as it is.
     """
     path = Path(path)
-    text = StudyText(path)
-    study = text.root()
+    words = StudyText(path, text)
+    study = words.root()
     study.check(names(""))
-    plant = read_plant(study)
+    plant = plant or read_plant(study)
     rig = read_rig(study, plant, drive_unit(study), fixed)
     folder = Path(data) if data is not None else path.parent
-    logs: dict[tuple[str, str, str], Record] = {}
+    logs = {(name, "", ""): record for name, record in (records or {}).items()}
     runs = read_runs(study, plant, lambda run: _log(run, folder, logs))
     rig = with_noise(rig, runs)
     if fixed is not None:
@@ -115,7 +124,7 @@ def load_study(path: PathLike, *, data: PathLike | None = None, fixed: Mapping[s
         title=study.text_of("title", "My rig") if "title" in study else "",
         source=study.text_of("source", "https://...") if "source" in study else "",
         ladder=read_ladder(study, plant),
-        sha256=hashlib.sha256(text.text.encode()).hexdigest(),
+        sha256=hashlib.sha256(words.text.encode()).hexdigest(),
     )
 
 

@@ -27,7 +27,7 @@ _TOKEN = re.compile(
 
 
 class StudyText:
-    """Text of a study with its values and the line of each key.
+    """Text of a study, read from its file unless it is given, with its values and the line of each key.
 
     Raises
     ------
@@ -35,10 +35,10 @@ class StudyText:
         When the file is missing, no text, or no TOML.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, text: str | None = None) -> None:
         self.path = path
         try:
-            self.text = path.read_text(encoding="utf-8-sig")
+            self.text = path.read_text(encoding="utf-8-sig") if text is None else text
         except UnicodeDecodeError:
             raise BadInput(
                 f"{path} is not text, and a study is a TOML file; to make one from a log: upright init {path}"

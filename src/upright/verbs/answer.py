@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -31,10 +32,14 @@ class Answer(Generic[V]):
         self.value, self.chapter, self.files = value, chapter, tuple(files)
 
     def __repr__(self) -> str:
-        return text(self.chapter, self.files)
+        return text(self.brief(), self.files)
 
     def _repr_html_(self) -> str:
-        return fragment(self.chapter)
+        return fragment(self.brief())
+
+    def brief(self) -> Chapter:
+        """What a prompt and a notebook show of the chapter."""
+        return replace(self.chapter, steps=())
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_") or name == "value":

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from upright.cli.terminal import Data, Pdf, progress_bar, tell, write_page
+from upright.cli.terminal import Data, Pdf, progress_bar, tell
 from upright.errors import BadInput
 
 if TYPE_CHECKING:
@@ -85,54 +85,22 @@ def identify(
     Exit code: 0 a fit was written (3 with --strict when its verdict is not to
     trust it), 2 the study or a log is wrong, 130 stopped by Ctrl-C.
     """
-    from upright.errors import nearest
-    from upright.report.symbols import typed
+    from upright.verbs.fitting import identify as fit
 
-    if method not in METHODS:
-        raise BadInput(f"--method must be one of {', '.join(METHODS)}, got '{method}'; {nearest(method, METHODS)}")
     folder = out if out is not None else study.with_name(f"{study.stem}-fit")
     asked = read_study(study, folder, data)
-    each = "each" in (hold_out or ()) and all(run.label != "each" for run in asked.runs)
-    asked = asked.hold_out(*(label for label in hold_out or () if not (each and label == "each")))
-    fitted = sum(run.role == "fit" for run in asked.runs)
-    if each and fitted < 2:
-        raise BadInput(f"{study}: --hold-out each takes two runs to fit or more, got {fitted}; add a run or a window")
-    if not asked.rig.estimated:
-        raise BadInput(
-            f'{study}: nothing is asked; give a parameter a guess, such as J_p = {{ guess = "1e-3 kg m^2" }}, or score'
-            " the runs with a model fitted before: upright predict OUT/fit.json STUDY.toml"
-        )
-    if not any(run.role == "fit" for run in asked.runs):
-        raise BadInput(f'{study}: every run has role = "predict"; at least one needs role = "fit"')
-    from upright.files import json_text
-    from upright.identification.estimate import identify as estimate
-    from upright.identification.ladder.cross_validation import cross_validate
-    from upright.study.fit_file import write_fit
-
     with progress_bar(quiet=as_json) as bar:
-        fit = estimate(asked.rig, asked.runs, method=method, progress=bar)
-    written = [folder / "fit.json"]
-    content = write_fit(fit, asked, written[0])
-    crossed = None
-    if each and not fit.interrupted:
-        with progress_bar(quiet=as_json) as bar:
-            crossed = cross_validate(fit, asked.runs, progress=bar)
-        content = write_fit(fit, asked, written[0], crossed)
-    from upright.report.fit.chapter import chapter
-
-    told = chapter(
-        fit, title=asked.title or asked.path.stem.replace("_", " "), provenance=provenance(asked), crossed=crossed,
-        study=typed(study) + (f" --data {typed(data)}" if data is not None else ""), folder=typed(folder),
-    )  # fmt: skip
-    if report or pdf:
-        written += write_page(told, folder / "report.html", pdf)
+        answer = fit(
+            asked, data=data, hold_out=hold_out or (), method=method, out=folder, report=report, pdf=pdf, progress=bar
+        )
     if as_json:
-        typer.echo(json_text(content))
+        typer.echo(answer.files[0].read_text(encoding="utf-8").rstrip())
     else:
-        tell(told, written)
-    if fit.interrupted or (crossed is not None and crossed.interrupted):
+        tell(answer.chapter, answer.files)
+    crossed = answer.crossed
+    if answer.fit.interrupted or (crossed is not None and crossed.interrupted):
         raise typer.Exit(INTERRUPTED)
-    if strict and not fit.trusted:
+    if strict and not answer.fit.trusted:
         raise typer.Exit(NOT_TRUSTED)
 
 

@@ -38,7 +38,7 @@ def parameter_table(
         n: (number(p.value), number(p.uncertainty, 2) if p.uncertainty else "exact", "", unit(p.unit), "given",
             _called(n, p))
         for n, p in about.items()
-        if not p.estimate and n not in told and p.value != (ACTUATOR[n][1] if n in ACTUATOR else 0.0)
+        if not p.estimate and n not in told and p.value != (ACTUATOR[n].default if n in ACTUATOR else 0.0)
     }  # fmt: skip
     rows: list[tuple[str, ...]] = []
     for name, (value, error, around, *rest) in told.items():

@@ -1,0 +1,211 @@
+"""A study of a record at hand, with what its owner knows and asks in the place of what a draft guesses."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import MISSING, fields
+from pathlib import Path
+from typing import Any
+
+from upright.errors import BadInput, nearest
+from upright.physics import BUILT_IN, Plant
+from upright.physics.actuator import ACTUATOR
+from upright.readers import inspect
+from upright.records import Record
+from upright.study.draft.draft import draft
+from upright.study.load import Study, load_study
+from upright.study.write import toml
+
+Number = float | str
+LOG = "log.csv"
+
+
+def study_of_record(
+    record: Record, plant: type[Plant] | None = None, *, known: Mapping[str, Number] | None = None,
+    ask: Sequence[str] | Mapping[str, Number] | None = None, columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None, window: tuple[float, float] | None = None,
+) -> Study:  # fmt: skip
+    """Study of one record.
+
+    Parameters
+    ----------
+    record : Record
+    plant : type of Plant, optional
+        Recognised from the columns when omitted.
+    known : mapping of name to number or text, optional
+        Numbers that are given [SI], or as text with unit and, perhaps, uncertainty: ``{"m_p": "223.5 g"}``.
+    ask : sequence of names, or mapping of name to guess, optional
+        What to estimate, and nothing else; without it what the draft asks and `known` leaves.
+    columns : mapping of coordinate (or drive) to column, optional
+        Where the columns are called otherwise.
+    units : mapping of coordinate or column to unit, optional
+        Where the record does not say.
+    window : (start, stop), optional
+        Part to fit [s]; the rest is left out.
+
+    Raises
+    ------
+    BadInput
+        When a name fits neither the plant nor the record, or nothing can be recognised.
+    """
+    record = _renamed(record, columns or {}, units or {})
+    name = _name_of(plant) if plant is not None else ""
+    own = plant is not None and not name
+    study: dict[str, Any] = _plain(record, plant) if own else _drafted(record, name)  # type: ignore[arg-type]
+    values = study.setdefault("parameters", {})
+    if plant is None:
+        from upright.physics import find
+
+        plant = find(study["rig"]["plant"])
+    _answer(values, study.setdefault("actuator", {}), plant, known or {}, ask)
+    if not study["actuator"]:
+        del study["actuator"]
+    if window is not None:
+        first = {key: value for key, value in study["runs"][0].items() if key != "label"}
+        study["runs"] = [{**first, "window": [float(x) for x in window], "role": "fit"}]
+    file = record.provenance.file
+    study["title"] = Path(file).stem if file else "log"
+    return load_study(
+        Path(f"{study['title']}.toml"), text="\n".join(_lines(study)) + "\n", records={LOG: record}, plant=plant
+    )
+
+
+def _renamed(record: Record, columns: Mapping[str, str], units: Mapping[str, str]) -> Record:
+    back = {column: name for name, column in columns.items()}
+    for column in back:
+        record[column]  # a sentence when it is not there
+    signals = {back.get(name, name): values for name, values in record.signals.items()}
+    stated = {back.get(name, name): unit for name, unit in record.units.items()}
+    for name, unit in units.items():
+        name = back.get(name, name)
+        if name not in signals:
+            raise BadInput(f"units names columns, got '{name}'; {nearest(name, signals)}")
+        stated[name] = unit
+    roles = {role: tuple(back.get(n, n) for n in getattr(record, role)) for role in ("inputs", "outputs")}
+    return record.replace(signals=signals, units=stated, **roles)
+
+
+def _name_of(plant: type[Plant]) -> str:
+    """Name by which a draft knows a plant; empty for a plant of the user's own."""
+    from upright.physics import find
+
+    for name in (*BUILT_IN, *(f"{kind}-{n}" for kind in ("rectilinear", "torsional") for n in (1, 2, 3, 4))):
+        if find(name) is plant:
+            return name
+    return ""
+
+
+def _drafted(record: Record, name: str) -> dict[str, Any]:
+    text = draft(record, inspect(record), Path(LOG), Path("study.toml"), plant=name)
+    return tomllib.loads(text)
+
+
+def _plain(record: Record, plant: type[Plant]) -> dict[str, Any]:
+    """Study of a plant that no draft knows: columns bear the names of its coordinates and inputs."""
+    study: dict[str, Any] = {"rig": {"plant": plant.__name__}, "parameters": {}, "sensors": {}}
+    for c in plant.coordinates:
+        if c.name in record.signals:
+            study["sensors"][c.name] = {"column": c.name, "unit": record.units[c.name] or c.unit}
+    if not study["sensors"]:
+        wanted = ", ".join(c.name for c in plant.coordinates)
+        raise BadInput(
+            f"{plant.__name__} moves in {wanted}, and the log has the columns {', '.join(record.names)}; say which is "
+            f'which: columns={{"{plant.coordinates[0].name}": "{record.names[0]}"}}.'
+        )
+    driven = [i for i in plant.inputs if i.name in record.signals]
+    if driven:
+        study["drive"] = {"column": driven[0].name, "unit": record.units[driven[0].name] or driven[0].unit}
+    study["defaults"] = {"unknown": ["initial"]}
+    study["runs"] = [{"file": LOG, "role": "fit"}]
+    return study
+
+
+def _answer(
+    values: dict[str, Any], actuator: dict[str, Any], plant: type[Plant], known: Mapping[str, Number],
+    ask: Sequence[str] | Mapping[str, Number] | None,
+) -> None:  # fmt: skip
+    """Put what is known and asked in the place of what the draft guessed."""
+    names = (*plant.names(), *ACTUATOR)
+    asked = [] if ask is None else list(ask)
+    for name in (*known, *asked):
+        if name not in names:
+            raise BadInput(f"{plant.__name__} has no number '{name}'; {nearest(name, names)}")
+        if name in known and name in asked:
+            raise BadInput(f"'{name}' cannot be known and asked at once; leave it out of one.")
+
+    def table(name: str) -> tuple[dict[str, Any], str]:
+        return (actuator, name.partition(".")[2]) if name in ACTUATOR else (values, name)
+
+    guesses = {n: v["guess"] for n, v in values.items() if isinstance(v, dict) and "guess" in v}
+    guesses |= {f"actuator.{n}": v["guess"] for n, v in actuator.items() if isinstance(v, dict) and "guess" in v}
+    if ask is not None:
+        for name in guesses:
+            where, key = table(name)
+            del where[key]
+    for name, value in known.items():
+        where, key = table(name)
+        where[key] = _text(value, plant, name)
+    for name in asked:
+        where, key = table(name)
+        given = ask[name] if isinstance(ask, Mapping) else guesses.get(name) or _guess(values, plant, name)
+        where[key] = {"guess": _text(given, plant, name)}
+    defaults = {f.name for f in fields(plant) if f.default is not MISSING}  # type: ignore[arg-type]
+    missing = [n for n in plant.names() if n not in values and n not in defaults]
+    if missing:
+        raise BadInput(
+            f"{plant.__name__} needs {', '.join(missing)}, neither known nor asked; measure and pass"
+            f' known={{"{missing[0]}": ...}}, or ask for it with a guess.'
+        )
+
+
+def _text(value: Number, plant: type[Plant], name: str) -> Any:
+    """A number with its unit; text as it is; the numbers of a drive have the unit that the study gives them."""
+    if isinstance(value, str):
+        return value
+    unit = plant.quantity(name).unit if name in plant.names() else ""
+    return f"{float(value)!r} {unit}" if unit not in ("", "1") else float(value)
+
+
+def _guess(values: Mapping[str, Any], plant: type[Plant], name: str) -> Number:
+    """A first guess of an inertia that the draft left at zero: a tenth of ``m l^2``."""
+    from upright.units import parse
+
+    def number(of: str) -> float:
+        value = values.get(of, 0.0)
+        value = value.get("guess", value.get("value", 0.0)) if isinstance(value, dict) else value
+        return parse(value, plant.quantity(of).unit) if isinstance(value, str) else float(value)
+
+    if name == "J_p" and {"m_p", "l_cg"} <= set(plant.names()):
+        inertia = 0.1 * number("m_p") * number("l_cg") ** 2
+        if inertia > 0:
+            return inertia
+    raise BadInput(f'{name} is asked and no guess of it can be read from the log; pass ask={{"{name}": "..."}}.')
+
+
+def _lines(study: Mapping[str, Any]) -> Iterator[str]:
+    """A study as TOML: plain keys, then tables, then tables in lists."""
+    for key, value in study.items():
+        if not isinstance(value, dict) and not _is_tables(value):
+            yield f"{key} = {toml(value, 17)}"
+    for key, value in study.items():
+        if isinstance(value, dict):
+            nested = {k: v for k, v in value.items() if key == "sensors" and isinstance(v, dict)}
+            if len(nested) < len(value) or not value:
+                yield f"[{key}]"
+                for name, v in value.items():
+                    if name not in nested:
+                        yield f"{name} = {toml(v, 17)}"
+            for name, inner in nested.items():
+                yield f"[{key}.{name}]"
+                for k, v in inner.items():
+                    yield f"{k} = {toml(v, 17)}"
+        elif _is_tables(value):
+            for entry in value:
+                yield f"[[{key}]]"
+                for k, v in entry.items():
+                    yield f"{k} = {toml(v, 17)}"
+
+
+def _is_tables(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(v, dict) for v in value)

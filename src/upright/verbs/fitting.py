@@ -1,0 +1,330 @@
+"""Parameters of a rig from its logs, and what a fit says of other runs: `identify`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from upright.errors import BadInput, nearest
+from upright.progress import Progress, silent
+from upright.verbs.answer import Answer
+
+if TYPE_CHECKING:
+    from upright.experiments.identified import IdentifiedRig
+    from upright.identification import Fit, RunScore
+    from upright.identification.ladder.cross_validation import CrossValidation
+    from upright.physics import Plant
+    from upright.records import Record
+    from upright.report.page import Chapter
+    from upright.study.load import Study
+
+METHODS = ("auto", "simplex", "least-squares")
+
+
+class FitAnswer(Answer["Fit"]):
+    """A fit, with the study that asked for it.
+
+    Attributes
+    ----------
+    study : Study
+    crossed : CrossValidation or None
+    """
+
+    def __init__(
+        self, fit: Fit, chapter: Chapter, files: Sequence[Path], study: Study, crossed: CrossValidation | None
+    ) -> None:
+        super().__init__(fit, chapter, files)
+        self.study, self.crossed = study, crossed
+
+    def brief(self) -> Chapter:
+        """Verdict, estimates and scores; the whole chapter is what `report` writes."""
+        from upright.report.fit.tables import parameter_table, score_table
+        from upright.report.page import Part, Picture
+
+        asked = {n: p for n, p in self.value.rig.parameters.items() if p.estimate}
+        fit = replace(self.value, rig=replace(self.value.rig, parameters=asked))
+        drawn = Picture(
+            name="fit", draw=self.plot, caption="Data and model.", description="See the table of scores."
+        )  # fmt: skip
+        parts = (
+            Part("Parameters", (parameter_table(fit, caption="Estimates"),)),
+            Part("Fit of the runs", (score_table(fit.runs), drawn)),
+        )
+        return replace(self.chapter, parts=parts, steps=())
+
+    @property
+    def fit(self) -> Fit:
+        """The fit itself."""
+        return self.value
+
+    @property
+    def parameters(self) -> Any:
+        """Estimates as a `pandas.DataFrame`: value, stderr, low, high, unit, status; a parameter per row."""
+        return self.to_pandas()
+
+    def to_pandas(self) -> Any:
+        """See `parameters`."""
+        import pandas as pd
+
+        rows = {
+            name: (e.value, e.stderr, *e.interval, e.unit, e.status) for name, e in self.value.estimates.items()
+        }  # fmt: skip
+        columns = ["value", "stderr", "low", "high", "unit", "status"]
+        return pd.DataFrame.from_dict(rows, orient="index", columns=columns)
+
+    @property
+    def plant(self) -> Plant:
+        """The plant with the numbers found and given."""
+        rig, found = self.value.rig, self.value.estimates
+        values = {n: found[n].value if n in found else rig.parameters[n].value for n in rig.plant.names()}
+        return rig.plant(**values)
+
+    def plot(self, name: str = "") -> Any:
+        """Data against the model for the first run, or the picture called `name`; see `pictures`."""
+        if name:
+            return super().plot(name)
+        from upright.report.fit.figures import fit_figure
+
+        label, score = next(iter(self.value.runs.items()))
+        return fit_figure(score, self.value.rig.plant, title=label)
+
+    def save(self, path: str | Path = "fit.json") -> Path:
+        """Write the fit for `predict`, `design`, `regulate` and other programs, and give back where."""
+        from upright.study.fit_file import write_fit
+
+        path = Path(path)
+        write_fit(self.value, self.study, path, self.crossed)
+        return path
+
+    def predict(self, other: Any, *, columns: Mapping[str, str] | None = None, units: Mapping[str, str] | None = None,
+                window: tuple[float, float] | None = None) -> Prediction:  # fmt: skip
+        """How well the fit explains another log: a record, a data frame, a log's file, or a study.
+
+        Of the other log only what the study lists under `unknown` is estimated (its initial state); nothing else is.
+        """
+        from upright.identification.inference.scoring import predict as score
+        from upright.study.load import load_study
+
+        rig = self.value.rig
+        values = {n: p.value for n, p in rig.parameters.items()} | {
+            n: e.value for n, e in self.value.estimates.items() if n in rig.parameters
+        }
+        if isinstance(other, str | Path) and Path(other).suffix == ".toml":
+            study = load_study(other, fixed=values)
+        else:
+            from upright.study.draft.from_record import study_of_record
+
+            record = record_of(other)
+            given = {n: v for n, v in values.items() if n in rig.plant.names()}
+            study = study_of_record(
+                record, rig.plant, known=given, ask=[], columns=columns, units=units,
+                window=window or (float(record.t[0]), float(record.t[-1])),
+            )  # fmt: skip
+        runs = [replace(run, role="predict") for run in study.runs]
+        fixed = replace(
+            rig, parameters={n: replace(p, value=values[n], estimate=False) for n, p in rig.parameters.items()}
+        )
+        return prediction(score(values, fixed, runs), rig.plant)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scores:
+    """Scores of runs that were predicted, by their labels."""
+
+    runs: Mapping[str, RunScore]
+    plant: type[Plant]
+
+
+class Prediction(Answer[Scores]):
+    """Scores of runs that a fit has not seen."""
+
+    def plot(self, name: str = "") -> Any:
+        """Data against the prediction of the first run, or of the run called `name`."""
+        from upright.report.fit.figures import fit_figure
+
+        runs = self.value.runs
+        label = name or next(iter(runs))
+        if label not in runs:
+            raise BadInput(f"no run is called '{label}'; {nearest(label, runs)}")
+        return fit_figure(runs[label], self.value.plant, title=label)
+
+
+def prediction(runs: Mapping[str, RunScore], plant: type[Plant]) -> Prediction:
+    """Scores as an answer."""
+    from upright.report.fit.tables import score_table
+    from upright.report.page import Chapter, Part
+
+    worst = min((v for s in runs.values() for v in s.fit_percent.values()), default=float("nan"))
+    part = Part("How much of each signal is explained", (score_table(runs),))
+    chapter = Chapter(
+        title="Prediction", verdict=f"The worst signal is explained to {worst:.1f} %.", parts=(part,),
+        numbers={label: {"fit_percent": dict(s.fit_percent), "horizon": s.horizon} for label, s in runs.items()},
+    )  # fmt: skip
+    return Prediction(Scores(runs=runs, plant=plant), chapter)
+
+
+def identify(
+    study: Any, plant: Any = None, *, known: Mapping[str, float | str] | None = None,
+    ask: Sequence[str] | Mapping[str, float | str] | None = None, columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None, window: tuple[float, float] | None = None,
+    data: str | Path | None = None, hold_out: Sequence[str] | str = (), method: str = "auto",
+    out: str | Path | None = None, report: bool = True, pdf: bool = False, progress: Progress = silent,
+) -> FitAnswer:  # fmt: skip
+    """Fit a rig's parameters to its logs.
+
+    Parameters
+    ----------
+    study : Record, DataFrame, path of a log or of a study (TOML), or Study
+    plant : class of a plant or its name, optional
+        For a log: ``up.Pendulum``, ``"furuta"``; recognised from the columns when omitted.
+    known, ask, columns, units, window
+        For a log: what is given, what to estimate (as names, or names with guesses), which column is which coordinate,
+        in which unit, and the part to fit [s]; see `upright.study.draft.from_record.study_of_record`.
+    data : path, optional
+        Folder that a study's files are in.
+    hold_out : sequence of str
+        Runs to predict instead of fitting; "each": all in turn.
+    method : {"auto", "simplex", "least-squares"}
+    out : path, optional
+        Folder for fit.json and report.html.
+    report, pdf : bool
+        Whether a page, and a PDF, go there.
+    progress : callable, optional
+        Told the step at work and the share done.
+
+    Returns
+    -------
+    FitAnswer
+        ``.parameters`` (a data frame), ``.plant``, ``.plot()``, ``.predict(other)``, ``.save()``, ``.report(path)``.
+
+    Raises
+    ------
+    BadInput
+        When study, log or a name cannot be used as it is.
+    """
+    from upright.identification.estimate import identify as estimate
+    from upright.identification.ladder.cross_validation import cross_validate
+    from upright.report.fit.chapter import chapter
+    from upright.report.symbols import typed
+    from upright.study.fit_file import write_fit
+
+    if method not in METHODS:
+        raise BadInput(f"--method must be one of {', '.join(METHODS)}, got '{method}'; {nearest(method, METHODS)}")
+    asked = asked_study(study, plant, known=known, ask=ask, columns=columns, units=units, window=window, data=data)
+    label = asked.path
+    held = [hold_out] if isinstance(hold_out, str) else list(hold_out)
+    each = "each" in held and all(run.label != "each" for run in asked.runs)
+    asked = asked.hold_out(*(name for name in held if not (each and name == "each")))
+    fitted = sum(run.role == "fit" for run in asked.runs)
+    if each and fitted < 2:
+        raise BadInput(f"{label}: --hold-out each takes two runs to fit or more, got {fitted}; add a run or a window")
+    if not asked.rig.estimated:
+        raise BadInput(
+            f'{label}: nothing is asked; give a parameter a guess, such as J_p = {{ guess = "1e-3 kg m^2" }}, or score'
+            " the runs with a model fitted before: upright predict OUT/fit.json STUDY.toml"
+        )
+    if not fitted:
+        raise BadInput(f'{label}: every run has role = "predict"; at least one needs role = "fit"')
+    folder = None if out is None else Path(out)
+    fit = estimate(asked.rig, asked.runs, method=method, progress=progress)
+    written: list[Path] = []
+    crossed = None
+    if folder is not None:
+        written.append(folder / "fit.json")
+        write_fit(fit, asked, written[0])
+    if each and not fit.interrupted:
+        crossed = cross_validate(fit, asked.runs, progress=progress)
+        if folder is not None:
+            write_fit(fit, asked, written[0], crossed)
+    told = chapter(
+        fit, title=asked.title or asked.path.stem.replace("_", " "), provenance=provenance(asked), crossed=crossed,
+        study=typed(label) + (f" --data {typed(data)}" if data is not None else ""),
+        folder=typed(folder) if folder is not None else "OUT",
+    )  # fmt: skip
+    answer = FitAnswer(fit, told, written, asked, crossed)
+    if folder is not None and (report or pdf):
+        pages = [answer.report(folder / f"report.{ending}") for ending in ("html", *(["pdf"] if pdf else []))]
+        answer.files = (*written, *pages)
+    return answer
+
+
+def asked_study(given: Any, plant: Any = None, *, data: str | Path | None = None, **options: Any) -> Study:
+    """The study that was handed in, or the one that a log and what is known of it make."""
+    from upright.physics import Plant, find
+    from upright.study.load import Study, load_study
+
+    of_log = {name: value for name, value in options.items() if value is not None}
+    is_study = isinstance(given, Study) or (isinstance(given, str | Path) and _is_study(Path(given)))
+    if is_study:
+        if of_log or plant is not None:
+            name = next(iter(of_log), "plant")
+            raise BadInput(f"{name} belongs to a log; the study says it itself, so change it there.")
+        if isinstance(given, Study):
+            return given
+        path = Path(given)
+        if not path.exists():
+            raise BadInput(f"the study {path} does not exist; `upright init LOG -o {path.name}` writes one from a log")
+        return load_study(path, data=data)
+    if isinstance(plant, str):
+        plant = find(plant)
+    if isinstance(plant, Plant):
+        raise BadInput(f"identify takes the class, up.{type(plant).__name__}, and what is known in known={{...}}.")
+    if plant is not None and not (isinstance(plant, type) and issubclass(plant, Plant)):
+        raise BadInput(f"identify takes a plant such as up.Pendulum, or its name, got {type(plant).__name__}.")
+    from upright.study.draft.from_record import study_of_record
+
+    return study_of_record(record_of(given), plant, **options)
+
+
+def _is_study(path: Path) -> bool:
+    return path.suffix.lower() in (".toml", "")
+
+
+def record_of(given: Any) -> Record:
+    """The record that a verb was handed: one, a data frame, or a log's file.
+
+    Raises
+    ------
+    BadInput
+        When it is none of them.
+    """
+    from upright.readers import read
+    from upright.records import Record
+
+    if isinstance(given, Record):
+        return given
+    if isinstance(given, str | Path):
+        return read(Path(given))
+    if hasattr(given, "iloc") and hasattr(given, "columns"):
+        return Record.from_pandas(given)
+    raise BadInput(f"a log is a record, a pandas.DataFrame or the path of a file, got {type(given).__name__}.")
+
+
+def provenance(asked: Study) -> dict[str, object]:
+    """Where the numbers of a study come from."""
+    return {
+        "study": asked.path.name,
+        "sha256 of the study": asked.sha256,
+        "data": asked.source or "not stated",
+        "runs": {run.label: run.source for run in asked.runs},
+    }
+
+
+def identified(fit: Any, *, seed: int = 0, draws: int = 200) -> IdentifiedRig:
+    """The rig that a fit tells of: an answer of `identify` or `frequency`, or the path of a fit.json."""
+    from upright.experiments.identified import read_identified
+
+    if isinstance(fit, FitAnswer):
+        with TemporaryDirectory() as folder:
+            return read_identified(fit.save(Path(folder) / "fit.json"), seed=seed, draws=draws)
+    if isinstance(fit, Answer):
+        written = [f for f in fit.files if f.name == "fit.json"]
+        if written:
+            return read_identified(written[0], seed=seed, draws=draws)
+        raise BadInput("this answer holds no fit; pass what up.identify or up.frequency answered, or a fit.json.")
+    if isinstance(fit, str | Path):
+        return read_identified(Path(fit), seed=seed, draws=draws)
+    raise BadInput(f"a fit is what up.identify answered, or the path of a fit.json, got {type(fit).__name__}.")

@@ -1,0 +1,171 @@
+"""Motion of a plant, free, driven or in its loop, as a record: `simulate`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from upright.errors import BadInput, nearest
+from upright.laws import Law, Rule, state_feedback
+from upright.physics import Plant
+from upright.records import Provenance, Record
+from upright.verbs.feedback import Gains
+
+Array = NDArray[np.float64]
+
+
+def simulate(
+    plant: Any, law: Any = None, *, start: Mapping[str, Any] | None = None, seconds: float = 5.0, at: str | None = None,
+    u: float | Callable[[float], Any] | ArrayLike | None = None, dt: float = 1e-3, limit: float = math.inf,
+    counts: float | Mapping[str, float] | None = None, memory: float = 0.0,
+    actuator: Mapping[str, float] | None = None,
+) -> Record:  # fmt: skip
+    """Motion of a plant, free, driven, or with its loop closed by gains or a law.
+
+    Parameters
+    ----------
+    plant : Plant, or what has one, such as a fit
+    law : Gains, array of gains, Law or Rule, optional
+        Gains act on readings sampled every `dt`, less the equilibrium, and on their differences.
+    start : mapping of state to number or text, optional
+        Deviation from the equilibrium at the first instant: ``{"theta": 0.2}`` or ``{"theta": "12 deg"}``.
+    seconds : float
+    at : str, optional
+        Equilibrium; where the gains were designed, else the plant's first.
+    u : float, callable of time, or array, shape (N,) or (N, inputs), optional
+        Command, in the unit of the input; it is added to the law's.
+    dt : float
+        Between samples [s].
+    limit : float
+        Largest command.
+    counts : float or mapping of coordinate to float, optional
+        Encoder counts per turn or metre; without it readings are not rounded.
+    memory : float
+        Of the low pass on the differences, 0 to below 1.
+    actuator : mapping, optional
+        Numbers of the drive, such as ``{"gain": 0.5, "lag": 2e-3, "delay": 1e-3}``.
+
+    Returns
+    -------
+    Record
+        Coordinates and speeds [SI] and commands.
+
+    Raises
+    ------
+    BadInput
+        When a name, a size or a number does not fit the plant.
+    """
+    from upright.physics.actuator import ACTUATOR
+    from upright.simulation import simulate as motion
+
+    plant = _plant(plant)
+    point = _point(plant, law, at)
+    names = plant.state_names()
+    units = [unit for c in plant.coordinates for unit in (c.unit, f"{c.unit}/s")]
+    x0 = _start(names, units, point, start or {})
+    if not (seconds > 0 and dt > 0 and seconds / dt < 1e8):
+        raise BadInput(f"simulate needs seconds and dt above 0, got seconds={seconds:g} and dt={dt:g}.")
+    samples = round(seconds / dt) + 1
+    t = np.arange(samples, dtype=np.float64) * dt
+    drive = {f"actuator.{name}": float(value) for name, value in (actuator or {}).items()}
+    for name in drive:
+        if name not in ACTUATOR:
+            known = [n.partition(".")[2] for n in ACTUATOR]
+            short = name.partition(".")[2]
+            raise BadInput(f"the drive has no number '{short}'; {nearest(short, known)} (it has {', '.join(known)})")
+    if limit < math.inf:
+        drive["actuator.limit"] = limit
+    loop = _loop(plant, law, point, dt, memory, limit, _steps(plant, counts))
+    given = _command(u, t, len(plant.inputs))
+    x = motion(plant, drive, x0, given, dt, samples=samples, substeps=2, loop=loop)[:, :, 0]
+    signals = {name: x[:, i] for i, name in enumerate(names)}
+    put_out = x[:, len(names) :] if loop is not None else given
+    commands = {}
+    for j, i in enumerate(plant.inputs):
+        commands[i.name] = np.zeros(samples) if put_out is None else np.clip(put_out[:, j], -limit, limit)
+    return Record(
+        t=t, signals=signals | commands,
+        units=dict(zip(names, units, strict=True)) | {i.name: i.unit for i in plant.inputs},
+        inputs=tuple(commands), outputs=tuple(c.name for c in plant.coordinates),
+        provenance=Provenance(reader="simulation", rig=type(plant).__name__,
+                              notes=("This log was simulated; no rig was touched.",)),
+    )  # fmt: skip
+
+
+def _plant(given: Any) -> Plant:
+    plant = given if isinstance(given, Plant) else getattr(given, "plant", None)
+    if isinstance(plant, Plant):
+        return plant
+    if isinstance(given, type) and issubclass(given, Plant):
+        raise BadInput(f"simulate needs a plant with numbers: {given.__name__}({given.names()[0]}=..., ...).")
+    raise BadInput(f"simulate needs a plant, such as up.Pendulum(...), or a fit, got {type(given).__name__}.")
+
+
+def _point(plant: Plant, law: Any, at: str | None) -> dict[str, float]:
+    """Coordinates of the equilibrium that a motion is told from."""
+    if at is None and isinstance(law, Gains) and law.point is not None:
+        return {**plant.equilibrium(), **law.point}
+    return plant.equilibrium(at)
+
+
+def _start(names: Sequence[str], units: Sequence[str], point: Mapping[str, float], start: Mapping[str, Any]) -> Array:
+    from upright.units import parse
+
+    x = np.zeros(len(names))
+    for name, value in point.items():
+        x[names.index(name)] = value
+    for name, value in start.items():
+        if name not in names:
+            raise BadInput(f"start names states, got '{name}'; {nearest(name, names)} (they are {', '.join(names)})")
+        i = names.index(name)
+        x[i] += parse(value, units[i]) if isinstance(value, str) else float(value)
+    return x
+
+
+def _steps(plant: Plant, counts: float | Mapping[str, float] | None) -> Array:
+    """Step of each encoder [m or rad]; 0 where it is not rounded."""
+    names = [c.name for c in plant.coordinates]
+    if counts is None:
+        return np.zeros(len(names))
+    per = counts if isinstance(counts, Mapping) else dict.fromkeys(names, counts)
+    for name, number in per.items():
+        if name not in names:
+            raise BadInput(f"counts names coordinates, got '{name}'; {nearest(name, names)}")
+        if not number > 0:
+            raise BadInput(f"counts takes numbers above 0, got {number} for '{name}'.")
+    turn = {c.name: math.tau if c.unit == "rad" else 1.0 for c in plant.coordinates}
+    return np.array([turn[n] / per[n] if n in per else 0.0 for n in names])
+
+
+def _loop(
+    plant: Plant, law: Any, point: Mapping[str, float], dt: float, memory: float, limit: float, steps: Array
+) -> Law | Rule | None:
+    if law is None or isinstance(law, Law | Rule):
+        return law
+    try:
+        K = np.atleast_2d(np.asarray(law, dtype=np.float64))
+    except (TypeError, ValueError):
+        raise BadInput(
+            f"simulate closes the loop by gains, a Law or a Rule, got {type(law).__name__}; up.place makes gains."
+        ) from None
+    wanted = (len(plant.inputs), len(plant.state_names()))
+    if K.shape != wanted:
+        raise BadInput(f"gains for {type(plant).__name__} need shape {wanted}, got {K.shape}.")
+    target = np.array([point[c.name] for c in plant.coordinates])
+    return state_feedback(K, dt, memory=memory, target=target, limit=limit, quantum=steps)
+
+
+def _command(u: Any, t: Array, inputs: int) -> Array | None:
+    if u is None:
+        return None
+    values = np.array([u(float(s)) for s in t]) if callable(u) else np.asarray(u, dtype=np.float64)
+    if values.ndim == 0:
+        values = np.full(t.size, float(values))
+    values = values[:, None] if values.ndim == 1 else values
+    if values.shape[1:] != (inputs,) or not 0 < len(values) <= len(t):
+        raise BadInput(f"u needs at most {t.size} samples of {inputs} commands, got shape {values.shape}.")
+    return np.vstack([values, np.repeat(values[-1:], len(t) - len(values), axis=0)])
