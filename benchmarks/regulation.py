@@ -141,7 +141,7 @@ def hands(start: Array, rng: np.random.Generator, lanes: int) -> Array:
 
 def one(make: str, seed: int, *, swept: Path | None = None) -> Told | None:
     """One twin from identification to outcome; `swept` is a folder for one identified as in experiment 1b."""
-    from upright import gains as design
+    from upright import gains
     from upright.control.many import outcomes
     from upright.experiments.designing.run import SPEEDS, velocities
     from upright.experiments.makes import make_rig
@@ -161,10 +161,10 @@ def one(make: str, seed: int, *, swept: Path | None = None) -> Told | None:
         rig = replace(known.rig(), limit=truth.limit)
         others = known.allowed(rig, LANES, seed)
     model = rig.linear("inverted")
-    sampled = design.hold(model, rig.period, rig.delay / rig.period)
+    sampled = gains.hold(model, rig.period, rig.delay / rig.period)
     poles = read_poles(SETS[f"set {rng.integers(1, 5)}"])
     way = velocities(model, sampled, SPEEDS[rng.integers(3)], 0.5, rig.limit, rig.quantum)
-    law = design.feedback(way, design.place(model.A, model.B, poles).K)
+    law = gains.feedback(way, gains.place(model.A, model.B, poles).K)
     angle = rng.uniform(0, math.pi / 2)
     outwards = np.array([0, 0, 0.7 * math.cos(angle), 6.0 * math.sin(angle)])
     steps = np.linspace(0, 1.0, 129)[1:]

@@ -75,7 +75,7 @@ def _up(make: str, count: int, scatter: float) -> Line:
 
 
 def _sensors(make: str, count: int) -> list[Line]:
-    from upright import gains as design
+    from upright import gains
     from upright.control import design_swing_up, trial
     from upright.control.score import FALLEN
     from upright.control.sensors import probe, put_out, scales
@@ -87,11 +87,11 @@ def _sensors(make: str, count: int) -> list[Line]:
     names = [c.name for c in model.plant.coordinates]
     law = design_swing_up(model)
     command = probe(model, law)
-    sampled = design.hold(model.linear("inverted"), model.period, (model.delay + model.lag) / model.period)
-    estimator = design.filtered(sampled, law.memory)
+    sampled = gains.hold(model.linear("inverted"), model.period, (model.delay + model.lag) / model.period)
+    estimator = gains.filtered(sampled, law.memory)
     # the paper's set 1, which is slow enough to fall in every way
     poles = [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220]
-    feedback = design.feedback(estimator, design.place_sampled(sampled, estimator, poles))
+    feedback = gains.feedback(estimator, gains.place_sampled(sampled, estimator, poles))
     rng = np.random.default_rng(61)
     wrong = false = named = 0
     worst: list[float] = []

@@ -36,7 +36,7 @@ def frictionless(make):
 
 
 def crane(rig):
-    """PHYSICS sections 2 and 3 typed by hand: accelerations of the Furuta pendulum or of the one on a cart."""
+    """Lagrange's equations typed by hand: accelerations of the Furuta pendulum or of the one on a cart."""
     p = rig.plant
     m, l, J_A = p.m_p, p.l_cg, p.J_p + p.m_p * p.l_cg**2
 

@@ -49,7 +49,7 @@ def test_furuta_turns_into_equation_2_by_six_signs():
 
 
 def test_furuta_linear_model_with_axial_inertia_and_anchor():
-    """PHYSICS section 2: J = J_d + m_p r^2 + J_a; the anchoring spring acts where the torque acts."""
+    """Linearized by hand: J = J_d + m_p r^2 + J_a; the anchoring spring acts where the torque acts."""
     k_psi = sp.Symbol("k_psi", real=True)
     J, mlr, mgl = p.J_d + p.m_p * p.r**2 + p.J_a, p.m_p * p.l_cg * p.r, p.m_p * p.g * p.l_cg
     D_2 = J_A * J - mlr**2

@@ -59,7 +59,7 @@ def two_blocks() -> Derived:
 
 
 def furuta() -> Derived:
-    """Furuta pendulum, PHYSICS section 2, without tilt."""
+    """Furuta pendulum, eq. (3) with its errata put right, without tilt."""
     return Derived(
         name="Rotary",
         coordinates=("psi", "theta"),

@@ -13,7 +13,7 @@ from upright.simulation import Held, ensemble, simulate
 
 
 def lagrange(_, x, p):
-    """PHYSICS section 2, typed out here once more as an independent check."""
+    """Eq. (3) with its errata put right, typed out here as an independent check."""
     psi_d, th, th_d = x[1], x[2], x[3]
     s, c = np.sin(th), np.cos(th)
     J_A = p["J_p"] + p["m_p"] * p["l_cg"] ** 2

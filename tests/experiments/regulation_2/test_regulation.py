@@ -32,7 +32,7 @@ def fit_of(truth, spread=0.01, seed=0, draws=64):
 @pytest.mark.slow
 @pytest.mark.parametrize("make", ["linear", "furuta"])
 def test_two_sets_regulate_and_one_does_not_as_the_paper_saw_and_as_was_told(make, tmp_path):
-    """Section 4.2: typically at least two sets regulate, at least one saturates or has too little effort."""
+    """The paper, section 4.2: typically at least two sets regulate, at least one saturates or has too little effort."""
     truth = make_rig(make)
     done = run_regulation(fit_of(truth), truth, 0, tmp_path, wish=RegulationRequest(draws=64))
     words = [a.word for a in done.attempts]
@@ -43,7 +43,7 @@ def test_two_sets_regulate_and_one_does_not_as_the_paper_saw_and_as_was_told(mak
     chapter = regulation_page.chapter(done)
     assert chapter.numbers["as_told"] == 4
     assert "came as told" in chapter.verdict
-    # what a set needs more of from set to set, as the effort gets cheaper (PHYSICS 6): command; less of: travel
+    # each set of Table 1 weighs effort half as much as the one before: more command is spent, less travel
     peaks = [a.before.score for a in done.attempts if a.before.score.held]
     assert np.all(np.diff([s.peaks[0] for s in peaks]) < 0)
     assert np.all(np.diff([s.effort_peak for s in peaks]) > 0)

@@ -23,7 +23,7 @@ OMEGA = np.geomspace(2.0, 40.0, 25)
 
 
 def smooth(plant=FURUTA, gain=0.65, lag=2e-3, omega=OMEGA) -> FrequencyResponse:
-    """A response without dry friction and noise, from the transfer functions of PHYSICS, section 2."""
+    """A response without dry friction and noise, from eq. (3) about hanging, transformed by hand."""
     p = plant
     s = 1j * omega
     J, J_A = p.J_d + p.m_p * p.r**2 + p.J_a, p.J_p + p.m_p * p.l_cg**2

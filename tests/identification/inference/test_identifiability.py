@@ -13,7 +13,7 @@ from upright.physics import Furuta, Pendulum
 
 
 def test_a_free_swing_sees_only_ratios() -> None:
-    """m_p, J_p and frictions scale together (DESIGN 2); any one of them given fixes the rest."""
+    """Nothing known pushes it, so m_p, J_p and frictions scale together; any one of them given fixes the rest."""
     guesses = {n: 1.3 * PENDULUM[n] for n in ("m_p", "J_p", "b_2", "b_2c")}
     run = noisy(swing({**PENDULUM, "b_2q": 0.0}), 1e-4, seed=1)
     fit = identify(rig(Pendulum, PENDULUM, guesses, b_2q=0.0), [run])

@@ -67,7 +67,7 @@ def test_the_length_is_that_of_the_pendulum_and_the_arm_that_of_the_arm(drafted)
     psi, theta, u = balanced()
     _, study = drafted(t=T, voltage=u, psi=psi, theta=theta)
     given = study.rig.parameters
-    assert given["l_cg"].value == pytest.approx(LENGTH, rel=0.3)  # 30 % off, fits converge (DESIGN 2)
+    assert given["l_cg"].value == pytest.approx(LENGTH, rel=0.3)  # from 30 % off, fits converge
     assert given["r"].value == pytest.approx(ARM, rel=0.3)  # the uncertainty that the draft states
     gained = given["actuator.gain"].value / (given["J_d"].value + given["m_p"].value * given["r"].value ** 2)
     assert 0.5 < gained / 28.0 < 2

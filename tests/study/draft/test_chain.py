@@ -50,7 +50,7 @@ def test_an_assumed_gain_fixes_the_scale_and_starts_are_of_the_right_size(drafte
     given = study.rig.parameters
     assert given["actuator.gain"].value == 1.0
     assert "actuator.gain" not in study.rig.estimated
-    # a factor of two either way is where least squares has no trouble (DESIGN 9)
+    # a factor of two either way is where least squares has no trouble
     for name, truth in {"J_1": 0.009, "J_2": 0.006, "k_12": 2.4}.items():
         assert 0.5 < given[name].value / truth < 2, name
 

@@ -19,7 +19,7 @@ from upright.simulation.kernel.reach import places
 WIDTH = 16
 """Lanes of a block: two AVX-512 or four AVX2 registers of each number hide the latency of the arithmetic."""
 
-# no `nnan` or `ninf`: a lane that diverges must stay visible as NaN (DESIGN 2)
+# no `nnan` or `ninf`: a lane that diverges must stay visible as NaN
 HEAD = '''"""Generated kernel of {name}; {flavour}"""
 
 from math import cos, exp, pi, sin, sqrt, tan
