@@ -12,7 +12,7 @@
     up.simulate(rig, gains, start={"theta": 0.2}, seconds=5).plot()
 
 Every verb of the command line, `upright NAME`, stands here under the same name and takes the same options
-(`upright plan-inertias` is `up.plan_inertias`). Numbers are in SI and radians; text such as ``"12 deg"`` wears its unit.
+(`upright plan-inertias` is `up.plan_inertias`). Numbers are in SI and radians; text wears its unit: ``"12 deg"``.
 
 ==========  ==================================================================================================
 Log         read, show, doctor, init, law; Record

@@ -62,10 +62,11 @@ class Exchange:
             origin = dict(about.get("provenance", {}))
             for key in ("window", "notes"):
                 origin[key] = tuple(origin.get(key, ()))
-            units: dict[str, str] = {str(k): str(v) for k, v in dict(about.get("units", {})).items()}
+            units: dict[str, str] = {str(k): str(v) for k, v in dict(about.get("units", {})).items() if k in signals}
             units |= {k: v for k, v in (stated or {}).items() if v}
-            inputs = tuple(str(name) for name in about.get("inputs", ()))
-            outputs = tuple(str(name) for name in about.get("outputs", ()))
+            # columns may have been dropped since the description was written
+            inputs = tuple(str(name) for name in about.get("inputs", ()) if name in signals)
+            outputs = tuple(str(name) for name in about.get("outputs", ()) if name in signals)
             provenance = Provenance(**origin)
         except (ValueError, TypeError, AttributeError, RecursionError) as error:
             raise BadInput(

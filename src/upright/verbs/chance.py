@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +18,8 @@ if TYPE_CHECKING:
 
 def chance(
     fit: Any, gains: Any, *, tilt: Any = None, push: Any = None, seconds: float = 6.0, speed: str = "filtered",
-    memory: float = 0.5, draws: int = 200, seed: int = 0,
+    memory: float = 0.5, limit: float | None = None, counts: Sequence[float] | None = None, draws: int = 200,
+    seed: int = 0,
 ) -> Answer[Preflight]:  # fmt: skip
     """How likely gains are to hold the rig that a fit tells of, before anything moves.
 
@@ -34,6 +37,10 @@ def chance(
         Where the pendulum is let go [rad], and how fast [rad/s]; the make's own if left out.
     seconds, speed, memory, seed
         As in `regulate`.
+    limit : float, optional
+        Largest command, in its unit; the data sheet's of the make if left out.
+    counts : sequence of float, optional
+        Encoder counts per turn or metre, coordinate by coordinate; the data sheet's if left out.
     draws : int
         Rigs drawn.
 
@@ -44,6 +51,7 @@ def chance(
     """
     from upright.control.preflight import WORDS, Task, preflight
     from upright.experiments.designing.run import SPEEDS, velocities
+    from upright.experiments.makes import make_rig
     from upright.experiments.regulation_2.run import HAND
     from upright.gains import feedback, hold
     from upright.report.page import Chapter, Part, Table
@@ -58,7 +66,20 @@ def chance(
     if draws < 1:
         raise BadInput(f"draws needs a whole number of at least 1, got {draws}.")
     known = identified(fit, seed=seed, draws=draws)
-    make, rig = known.make, known.rig()
+    make, sheet = known.make, make_rig(known.make.key)
+    if limit is None and known.unit and known.unit != sheet.unit:
+        raise BadInput(
+            f"the command of the fit is in {known.unit} and the limit of the data sheet in {sheet.unit}; pass limit=, "
+            f"the largest command in {known.unit}."
+        )
+    rig = known.rig(sheet)
+    if limit is not None:
+        rig = replace(rig, limit=float(limit), converter=0.0 if known.unit != sheet.unit else rig.converter)
+    if counts is not None:
+        turns = (math.tau if c.unit == "rad" else 1.0 for c in rig.plant.coordinates)
+        if len(counts) != len(rig.counts):
+            raise BadInput(f"counts needs {len(rig.counts)} numbers, one for each coordinate, got {len(counts)}.")
+        rig = replace(rig, counts=tuple(float(n) / turn for n, turn in zip(counts, turns, strict=True)))
     model = rig.linear("inverted")
     K = np.atleast_2d(np.asarray(gains, dtype=np.float64))
     if K.shape != (1, len(model.states)):
@@ -79,11 +100,13 @@ def chance(
     limits = "" if told.margins is None else (
         f"It recovers from tilts up to {math.degrees(told.tilt):.2g}° and from taps up to {told.push:.2g} rad/s."
     )  # fmt: skip
-    doubt = () if known.draws else ("The fit has no covariance: only dry friction and the hand vary.",)
+    doubt = [] if known.draws else ["The fit has no covariance: only dry friction and the hand vary."]
+    said = [name for name, value in (("drive limit", limit), ("encoder counts", counts)) if value is None]
+    doubt.append(f"Taken from the data sheet of the make {make.key}: {', '.join([*said, 'servo period'])}.")
     chapter = Chapter(
         title=f"Chance that the gains hold the {rig.name}",
         verdict=f"Held for {seconds:g} s on {share} of {draws} rigs that the fit allows.", detail=limits,
-        sound=told.chance > 0.95, parts=(Part("Before the run", (table,)),), warnings=doubt,
+        sound=told.chance > 0.95, parts=(Part("Before the run", (table,)),), warnings=tuple(doubt),
         numbers={"chance": told.chance, "interval": (low, high), "words": dict(told.words), "tilt": told.tilt,
                  "push": told.push, "noise": told.noise, "draws": draws, "seed": seed},
     )  # fmt: skip

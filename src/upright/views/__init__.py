@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import MISSING, fields, replace
 from functools import singledispatch
 from typing import Any
 
@@ -73,12 +73,14 @@ def _(record: Record) -> Chapter:
 
 @summary.register
 def _(plant: Plant) -> Chapter:
+    needed = {f.name for f in fields(plant) if f.default is MISSING}  # type: ignore[arg-type]
     rows = tuple(
         (Symbol(name), number(value, 6), unit(plant.quantity(name).unit), plant.quantity(name).meaning)
         for name, value in plant.parameters().items()
+        if value != 0 or name in needed
     )
     table = Table(
-        caption="Parameters", headings=("symbol", "value", "unit", "meaning"), rows=rows, numbers=(1,)
+        caption="Parameters; those not listed are zero", headings=("symbol", "value", "unit", "meaning"), rows=rows, numbers=(1,)
     )  # fmt: skip
     moves = ", ".join(f"{c.name} [{c.unit}]" for c in plant.coordinates)
     driven = ", ".join(f"{i.name} [{i.unit}]" for i in plant.inputs) or "nothing"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, fields
@@ -58,6 +59,7 @@ def study_of_record(
         from upright.physics import find
 
         plant = find(study["rig"]["plant"])
+    _drive(study, record, plant)
     _answer(values, study.setdefault("actuator", {}), plant, known or {}, ask)
     if not study["actuator"]:
         del study["actuator"]
@@ -121,6 +123,15 @@ def _plain(record: Record, plant: type[Plant]) -> dict[str, Any]:
     return study
 
 
+def _drive(study: dict[str, Any], record: Record, plant: type[Plant]) -> None:
+    """Name what drove the rig when the record says so and the draft did not see it."""
+    said = [n for n in (*record.inputs, *(i.name for i in plant.inputs)) if n in record.signals and record[n].any()]
+    if "drive" in study or not said or not plant.inputs:
+        return
+    study["drive"] = {"column": said[0], "unit": record.units[said[0]] or plant.inputs[0].unit}
+    study.get("defaults", {}).pop("held", None)
+
+
 def _answer(
     values: dict[str, Any], actuator: dict[str, Any], plant: type[Plant], known: Mapping[str, Number],
     ask: Sequence[str] | Mapping[str, Number] | None,
@@ -139,17 +150,17 @@ def _answer(
 
     guesses = {n: v["guess"] for n, v in values.items() if isinstance(v, dict) and "guess" in v}
     guesses |= {f"actuator.{n}": v["guess"] for n, v in actuator.items() if isinstance(v, dict) and "guess" in v}
-    if ask is not None:
-        for name in guesses:
-            where, key = table(name)
-            del where[key]
     for name, value in known.items():
         where, key = table(name)
         where[key] = _text(value, plant, name)
-    for name in asked:
+    starts = {n: ask[n] if isinstance(ask, Mapping) else guesses.get(n) or _guess(values, plant, n) for n in asked}
+    for name in guesses if ask is not None else ():
         where, key = table(name)
-        given = ask[name] if isinstance(ask, Mapping) else guesses.get(name) or _guess(values, plant, name)
-        where[key] = {"guess": _text(given, plant, name)}
+        if name not in known:
+            del where[key]
+    for name, start in starts.items():
+        where, key = table(name)
+        where[key] = {"guess": _text(start, plant, name)}
     defaults = {f.name for f in fields(plant) if f.default is not MISSING}  # type: ignore[arg-type]
     missing = [n for n in plant.names() if n not in values and n not in defaults]
     if missing:
@@ -162,13 +173,14 @@ def _answer(
 def _text(value: Number, plant: type[Plant], name: str) -> Any:
     """A number with its unit; text as it is; the numbers of a drive have the unit that the study gives them."""
     if isinstance(value, str):
-        return value
+        number, mark, spread = re.sub(r"\+/-|±", "+-", value).partition("+-")
+        return {"value": number.strip(), "uncertainty": spread.strip()} if mark else value
     unit = plant.quantity(name).unit if name in plant.names() else ""
     return f"{float(value)!r} {unit}" if unit not in ("", "1") else float(value)
 
 
 def _guess(values: Mapping[str, Any], plant: type[Plant], name: str) -> Number:
-    """A first guess of an inertia that the draft left at zero: a tenth of ``m l^2``."""
+    """First guess of what the draft does not ask: its placeholder, a tenth of ``m l^2``, the other joint's friction."""
     from upright.units import parse
 
     def number(of: str) -> float:
@@ -176,10 +188,14 @@ def _guess(values: Mapping[str, Any], plant: type[Plant], name: str) -> Number:
         value = value.get("guess", value.get("value", 0.0)) if isinstance(value, dict) else value
         return parse(value, plant.quantity(of).unit) if isinstance(value, str) else float(value)
 
-    if name == "J_p" and {"m_p", "l_cg"} <= set(plant.names()):
-        inertia = 0.1 * number("m_p") * number("l_cg") ** 2
-        if inertia > 0:
-            return inertia
+    names = plant.names()
+    if name in names and number(name) != 0:
+        return number(name)
+    if name == "J_p" and {"m_p", "l_cg"} <= set(names) and number("m_p") * number("l_cg") > 0:
+        return 0.1 * number("m_p") * number("l_cg") ** 2
+    other = name.replace("_1", "_2", 1)
+    if name.startswith("b_1") and other in names and number(other) > 0:
+        return number(other)
     raise BadInput(f'{name} is asked and no guess of it can be read from the log; pass ask={{"{name}": "..."}}.')
 
 
