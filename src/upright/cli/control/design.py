@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from upright.cli.terminal import AsJson, Out, Pdf, tell, write_page
+from upright.cli.terminal import AsJson, Out, Pdf, tell
 from upright.errors import BadInput, nearest
 from upright.files import write_json
+from upright.verbs.pages import write_page
 
 if TYPE_CHECKING:
     from upright.experiments.identified import IdentifiedRig

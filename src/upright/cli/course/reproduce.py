@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from upright.cli.terminal import AsJson, Out, Pdf, tell, write_page
+from upright.cli.terminal import AsJson, Out, Pdf, tell
+from upright.verbs.pages import write_page
 
 
 def reproduce(

@@ -8,8 +8,9 @@ from typing import Annotated
 
 import typer
 
-from upright.cli.terminal import AsJson, Out, Pdf, tell, write_page
+from upright.cli.terminal import AsJson, Out, Pdf, tell
 from upright.errors import BadInput
+from upright.verbs.pages import write_page
 
 
 def survey(

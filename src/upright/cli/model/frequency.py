@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from upright.cli.terminal import AsJson, Data, Out, Pdf, progress_bar, tell, write_page
+from upright.cli.terminal import AsJson, Data, Out, Pdf, progress_bar, tell
 from upright.errors import BadInput
 from upright.progress import Progress
+from upright.verbs.pages import write_page
 
 if TYPE_CHECKING:
     from upright.report.page import Chapter

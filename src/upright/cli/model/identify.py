@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from upright.cli.terminal import Data, Pdf, progress_bar, tell, write_page
+from upright.cli.terminal import Data, Pdf, progress_bar, tell
 from upright.errors import BadInput
+from upright.verbs.pages import write_page
 
 if TYPE_CHECKING:
     from upright.study.load import Study

@@ -8,8 +8,9 @@ from typing import Annotated
 import typer
 
 from upright.cli.model.identify import provenance, read_study
-from upright.cli.terminal import Data, Pdf, progress_bar, tell, write_page
+from upright.cli.terminal import Data, Pdf, progress_bar, tell
 from upright.errors import BadInput
+from upright.verbs.pages import write_page
 
 INTERRUPTED = 130
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from upright.cli.terminal import AsJson, Out, Pdf, tell, write_page
+from upright.cli.terminal import AsJson, Out, Pdf, tell
 from upright.errors import BadInput, NotIdentifiable
+from upright.verbs.pages import write_page
 
 if TYPE_CHECKING:
     from upright.identification.loadings import Loaded
