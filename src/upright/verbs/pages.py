@@ -34,9 +34,14 @@ def folder_if_given(out: str | os.PathLike[str] | None, pdf: bool = False) -> Pa
     BadInput
         When it is a file, or a PDF is asked for and there is no folder for it or no program to make it.
     """
+    pdf_has_folder(out, pdf)
+    return None if out is None else folder(out)
+
+
+def pdf_has_folder(out: str | os.PathLike[str] | None, pdf: bool) -> None:
+    """Refuse a PDF that cannot be made, or for which no folder is named."""
     if can_be_pdf(pdf) and out is None:
         raise BadInput("pdf writes into the folder out, and none was named; name one, or call .report('page.pdf').")
-    return None if out is None else folder(out)
 
 
 def can_be_pdf(asked: bool) -> bool:
