@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from pathlib import Path
 from typing import Any
 
-from upright.files import plain_values, write_json
+from upright.files import plain_values
 from upright.identification.ladder.growth import Ladder, RungResult
 from upright.identification.ladder.rungs import neutral
 from upright.physics.actuator import ACTUATOR
@@ -17,8 +16,8 @@ from upright.study.text import StudyText
 FORMAT = 1
 
 
-def write_ladder(ladder: Ladder, study: Study, path: Path) -> dict[str, Any]:
-    """Write `ladder.json` and return what it holds."""
+def plain_ladder(ladder: Ladder, study: Study) -> dict[str, Any]:
+    """What `ladder.json` holds."""
     content = {
         "format": FORMAT,
         "title": study.title,
@@ -41,7 +40,6 @@ def write_ladder(ladder: Ladder, study: Study, path: Path) -> dict[str, Any]:
         "warnings": ladder.warnings,
         "provenance": provenance(study),
     }
-    write_json(path, content)
     return plain_values(content)
 
 

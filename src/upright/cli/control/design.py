@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from upright.cli.terminal import AsJson, Out, Pdf, tell, write_page
-from upright.errors import BadInput, nearest
-from upright.files import write_json
-
-if TYPE_CHECKING:
-    from upright.experiments.identified import IdentifiedRig
+from upright.cli.terminal import AsJson, Out, Pdf, tell
 
 
 def design(
@@ -51,90 +46,11 @@ def design(
 
     upright design out/fit.json --at inverted --poles "-4.15+-1.63j, -16.9, -3.2"
     """
-    from upright.experiments.designing.chapter import chapter
-    from upright.experiments.designing.run import SPEEDS, DesignRequest, design_for
-    from upright.experiments.identified import read_identified
-    from upright.gains.requests import read_poles
-    from upright.report.symbols import typed
-    from upright.units import parse, parse_if_given
+    from upright.verbs import control as verbs
 
-    if bool(poles) == bool(lqr):
-        raise BadInput('give either --poles "-4+-2j, -10, -3" or --lqr "1,0,1,0" (weights of the states).')
-    if speed not in SPEEDS:
-        raise BadInput(f"--speed is plain, filtered or kalman, got '{speed}'.")
-    rig = read_identified(source, seed=seed)
-    here = at or list(rig.plant.equilibria)[-1]
-    if here not in rig.plant.equilibria:
-        raise BadInput(f"'{rig.name}' has no equilibrium '{here}'; {nearest(here, rig.plant.equilibria)}")
-    wish = DesignRequest(
-        at=here,
-        poles=read_poles(poles) if poles else None,
-        weights=_numbers(lqr) if lqr else None,
-        R=effort_weight,
-        period=parse(period, "s"),
-        delay=delay,
-        lag=parse_if_given(lag, "s"),
-        speed=speed,
-        memory=memory,
-        quantum=_quanta(rig, counts),
-        limit=limit,
-        start=_start(rig, start),
-        track=track,
-        sampled=sampled,
-    )
-    done = design_for(rig, wish)
-    told = chapter(done, source=typed(source), folder=typed(out))
-    files = [write_json(out / "design.json", told.numbers), *write_page(told, out / "design.html", pdf)]
-    tell(told, files, told.numbers if as_json else None)
-
-
-def _numbers(text: str) -> tuple[float, ...]:
-    try:
-        return tuple(float(part) for part in text.split(","))
-    except ValueError:
-        raise BadInput(f'weights are numbers separated by commas, as in "1,0,1,0", got {text[:60]!r}.') from None
-
-
-def _quanta(rig: IdentifiedRig, counts: str) -> tuple[float, ...]:
-    """Step of every encoder [m or rad]; coordinates that the list does not name have 16000 counts."""
-    from math import tau
-
-    names = [c.name for c in rig.plant.coordinates]
-    per = dict.fromkeys(names, 16_000.0)
-    for part in counts.split(","):
-        name, equals, value = part.rpartition("=")
-        name = name.strip()
-        if equals and name not in per:
-            raise BadInput(
-                f"--counts names coordinates as in \"{names[0]}=16000\", got '{name}'; {nearest(name, names)}"
-            )
-        try:
-            number = float(value)
-        except ValueError:
-            number = 0.0
-        if not 0 < number < 1e15:
-            raise BadInput(
-                f"--counts takes numbers above 0, got '{part.strip()[:40]}'; write 16000 or \"{names[0]}=16000\"."
-            )
-        per |= {name: number} if equals else dict.fromkeys(names, number)
-    return tuple((tau if c.unit == "rad" else 1.0) / per[c.name] for c in rig.plant.coordinates)
-
-
-def _start(rig: IdentifiedRig, text: str) -> tuple[float, ...]:
-    """Deviation, state by state; empty when none was given."""
-    from upright.units import parse
-
-    if not text.strip():
-        return ()
-    names = rig.plant.state_names()
-    units = dict(zip(names, (u for c in rig.plant.coordinates for u in (c.unit, f"{c.unit}/s")), strict=True))
-    values = dict.fromkeys(names, 0.0)
-    for part in text.split(","):
-        name, _, value = part.partition("=")
-        name = name.strip()
-        if name not in values:
-            raise BadInput(f"--start names states as in \"theta=5 deg\", got '{name}'; {nearest(name, names)}")
-        values[name] = parse(value, units[name])
-    if not any(values.values()):
-        raise BadInput("--start must leave the equilibrium; give one state a value that is not 0.")
-    return tuple(values.values())
+    done = verbs.design(
+        source, at=at, poles=poles, lqr=lqr, effort_weight=effort_weight, limit=limit, start=start, period=period,
+        delay=delay, speed=speed, memory=memory, lag=lag, counts=counts, track=track, sampled=sampled, seed=seed,
+        out=out, pdf=pdf,
+    )  # fmt: skip
+    tell(done.chapter, done.files, done.numbers if as_json else None)

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from upright.cli.terminal import AsJson, Out, Pdf, progress_bar, tell, write_page
-from upright.errors import BadInput
-
-if TYPE_CHECKING:
-    from upright.experiments.regulation_2.run import RegulationRequest
+from upright.cli.terminal import AsJson, Out, Pdf, progress_bar, tell
 
 
 def regulate(
@@ -43,47 +39,12 @@ def regulate(
     upright regulate --rig furuta --seed 3
     upright regulate out/fit.json --seed 3 --set 2 --tilt "20 deg"
     """
-    from upright.experiments.identified import read_identified
-    from upright.experiments.makes import make_rig
-    from upright.experiments.regulation_2.chapter import chapter
-    from upright.experiments.regulation_2.run import identify_make, run_regulation
-    from upright.report.symbols import typed
+    from upright.verbs import control as verbs
 
-    wish = _wish(which, poles, speed, memory, tilt, push, seconds)
     with progress_bar(quiet=as_json) as bar:
-        if source is None:
-            make, seed = rig or "furuta", seed or 0
-            bar("identifying the hanging twin", 0.0)
-            known = identify_make(make, seed, out / "identified", lambda step, share: bar(step, 0.6 * share))
-            name = f"--rig {make}"
-        else:
-            known, name = read_identified(source, seed=seed or 0), typed(source)
-            make = known.make.key
-            if rig not in ("", make):
-                raise BadInput(f"{source} is of the make '{make}', not '{rig}'; leave --rig out.")
-        truth = None if seed is None else make_rig(make, seed)
-        base = 0.6 if source is None else 0.0
-        done = run_regulation(
-            known, truth, seed or 0, out, lambda step, share: bar(step, base + (1 - base) * share), wish=wish,
-            source=name,
+        done = verbs.regulate(
+            source, rig=rig, seed=seed, which=which, poles=poles, speed=speed, memory=memory, tilt=tilt, push=push,
+            seconds=seconds, out=out, pdf=pdf, progress=bar,
         )  # fmt: skip
-    told = chapter(done)
-    files = write_page(told, out / "report.html", pdf)
-    numbers = {**told.numbers, "verdict": told.verdict, "report": str(files[0])}
-    tell(told, files, numbers if as_json else None)
-
-
-def _wish(which: str, poles: str, speed: str, memory: float, tilt: str, push: str, seconds: float) -> RegulationRequest:
-    from upright.experiments.regulation_2.run import SETS, RegulationRequest
-    from upright.gains.requests import read_poles
-    from upright.units import parse_if_given
-
-    if which and poles:
-        raise BadInput("give either --set, a set of Table 1, or --poles of your own.")
-    if which not in ("", "all") and f"set {which}" not in SETS:
-        raise BadInput(f"--set is 1 to {len(SETS)}, or all, got '{which}'.")
-    texts = {"your poles": poles} if poles else {n: t for n, t in SETS.items() if which in ("", "all", n[4:])}
-    return RegulationRequest(
-        poles={n: read_poles(t) for n, t in texts.items()}, speed=speed, memory=memory, seconds=seconds,
-        tilt=parse_if_given(tilt, "rad"), push=parse_if_given(push, "rad/s"),
-    )  # fmt: skip
+    numbers = {**done.numbers, "verdict": done.chapter.verdict, "report": str(done.files[0])}
+    tell(done.chapter, done.files, numbers if as_json else None)

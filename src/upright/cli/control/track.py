@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from upright.cli.terminal import AsJson, Out, Pdf, progress_bar, tell, write_page
-from upright.errors import BadInput
-from upright.files import write_json
-
-if TYPE_CHECKING:
-    pass
+from upright.cli.terminal import AsJson, Out, Pdf, progress_bar, tell
 
 INTERRUPTED = 130
 
@@ -46,40 +40,12 @@ def track(
     upright track --rig torsional --seed 3 -o out
     upright track out/fit.json --set 4 --step "6 mm"
     """
-    from upright.experiments.makes import SHAFTS, make_rig
-    from upright.experiments.tracking_3.chapter import chapter
-    from upright.experiments.tracking_3.pulses import rig_of_file
-    from upright.experiments.tracking_3.run import follow, run_tracking
-    from upright.gains.requests import read_poles
-    from upright.units import parse_if_given
+    from upright.verbs import control as verbs
 
-    own = read_poles(poles) if poles else None
-    which = _which(sets) if sets else (() if poles else (1, 2, 3, 4))
-    if limit is not None and not limit > 0:
-        raise BadInput(f"--limit must be above 0, got {limit:g}.")
-    if source is None and rig not in SHAFTS:
-        raise BadInput(f"--rig is {' or '.join(SHAFTS)}, got '{rig}'.")
-    on = make_rig(rig, seed) if source is None else rig_of_file(source, limit)
-    size = parse_if_given(step, on.plant.coordinates[-1].unit)
-    if size is not None and not size > 0:
-        raise BadInput(f"--step needs a size above 0, got '{step}'.")
     with progress_bar(quiet=as_json) as bar:
-        if source is None:
-            on = replace(on, limit=limit or on.limit)
-            done = run_tracking(on, seed, out, bar, which=which, poles=own, step=size)
-        else:
-            done = follow(on, on, source, None, None, bar, which=which, poles=own, step=size)
-    told = chapter(done)
-    told = replace(told, title=f"Experiment 3: {told.title.lower()}, {done.rig.name}")
-    numbers = {**told.numbers, "verdict": told.verdict}
-    files = [write_json(out / "track.json", numbers), *write_page(told, out / "track.html", pdf)]
-    tell(told, files, numbers if as_json else None)
-    if done.interrupted:
+        done = verbs.track(
+            source, rig=rig, seed=seed, sets=sets, poles=poles, step=step, limit=limit, out=out, pdf=pdf, progress=bar
+        )
+    tell(done.chapter, done.files, done.numbers if as_json else None)
+    if done.value.interrupted:
         raise typer.Exit(INTERRUPTED)
-
-
-def _which(text: str) -> tuple[int, ...]:
-    try:
-        return tuple(int(part) for part in text.split(","))
-    except ValueError:
-        raise BadInput(f'--set takes numbers of Table 2 separated by commas, as in "1,4", got {text[:40]!r}.') from None

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import signal
-import threading
-from collections.abc import Generator
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from upright.cli.terminal import console, print_json, progress_bar
-from upright.errors import BadInput
+from upright.progress import Progress
 
 if TYPE_CHECKING:
-    from upright.experiments.laboratory import Session
-    from upright.report.book import Book
+    from upright.verbs.course import Laboratory
 
 INTERRUPTED = 130
 
@@ -51,38 +47,31 @@ def lab(
     upright lab --rig linear --seed 3
     upright lab --experiment 1b --experiment 2 -o out
     """
-    from upright.experiments.makes import make_named
+    from upright.verbs import course as verbs
 
-    if seed < 0:
-        raise BadInput(f"--seed needs a whole number of at least 0, got {seed}.")
-    if rig:
-        make_named(rig)
-    folder = out or Path("-".join(["upright-lab", *([rig] if rig else []), *([str(seed)] if seed else [])]))
-    if folder.exists() and not folder.is_dir():
-        raise BadInput(f"results need a folder, but {folder} is a file; name another with -o.")
-    from datetime import date
-
-    from upright.experiments import laboratory, laboratory_page
-    from upright.report.html import write_html
-    from upright.report.pdf import available, write_pdf
-
-    laboratory.choose(experiment or (), rig)  # says what is wrong with the call before anything is written
-    _say_first_time()
-    with _ctrl_c() as pressed, progress_bar(quiet=as_json) as bar:
-        session = laboratory.run_laboratory(
-            experiment or (), rig, seed, folder, bar, stopped=lambda: pressed.times > 0, fresh=fresh
-        )
-        pressed.patient = True
-        bar("writing the report", 1.0)
-        told = laboratory_page.book(session, date.today())
-        report = write_html(folder / "report.html", told)
-        pdf = write_pdf(folder / "report.pdf", told) if available() else None
+    with progress_bar(quiet=as_json) as bar:
+        done = verbs.lab(
+            experiment=experiment or (), rig=rig, seed=seed, out=out, fresh=fresh,
+            progress=_first(_say_first_time, bar),
+        )  # fmt: skip
     if as_json:
-        print_json(laboratory_page.summary(session, report, pdf))
+        print_json(done.numbers)
     else:
-        _tell(session, told, [report] if pdf is None else [report, pdf])
-    if session.interrupted or pressed.times:
+        _tell(done.value, done.files)
+    if done.value.interrupted:
         raise typer.Exit(INTERRUPTED)
+
+
+def _first(say: Callable[[], None], bar: Progress) -> Progress:
+    """A bar that has something said before it moves: a call that is wrong never gets so far."""
+    waiting = [say]
+
+    def follow(step: str, share: float) -> None:
+        if waiting:
+            waiting.pop()()
+        bar(step, share)
+
+    return follow
 
 
 def _say_first_time() -> None:
@@ -97,43 +86,15 @@ def _say_first_time() -> None:
         )
 
 
-@dataclass
-class _Pressed:
-    """How often Ctrl-C was pressed; once `patient`, the first press lets the report be written."""
-
-    times: int = 0
-    patient: bool = False
-
-
-@contextmanager
-def _ctrl_c() -> Generator[_Pressed]:
-    """Count Ctrl-C besides raising it, for the time of the experiments."""
-    pressed = _Pressed()
-
-    def note(_signal: int, _frame: object) -> None:
-        pressed.times += 1
-        if not pressed.patient or pressed.times > 1:
-            raise KeyboardInterrupt
-
-    if threading.current_thread() is not threading.main_thread():
-        yield pressed
-        return
-    before = signal.signal(signal.SIGINT, note)
-    try:
-        yield pressed
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-def _tell(session: Session, told: Book, files: list[Path]) -> None:
+def _tell(done: Laboratory, files: Sequence[Path]) -> None:
     """Verdicts, key numbers, where the report is and what to try next."""
     from upright.report.terminal import print_book
 
     took = {
         t.experiment.key: f"{t.rig}{', as kept from an earlier run' if t.state == 'kept' else ''}; {t.seconds:.1f} s"
-        for t in session.told
+        for t in done.session.told
     }
-    timed = replace(told, chapters=tuple(replace(c, about=took[c.key]) for c in told.chapters))
+    timed = replace(done.book, chapters=tuple(replace(c, about=took[c.key]) for c in done.book.chapters))
     print_book(console(), timed, files)
     typer.echo("Each chapter of the report ends with the commands that repeat its steps.")
     if len(files) == 1:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from upright.cli.terminal import AsJson, Out, Pdf, tell, write_page
+from upright.cli.terminal import AsJson, Out, Pdf, tell
 
 
 def reproduce(
@@ -23,9 +23,7 @@ def reproduce(
 
     upright reproduce -o out
     """
-    from upright.experiments.makes import NOMINAL
-    from upright.paper.chapter import chapter
-    from upright.paper.reproduce import reproduce as again
+    from upright.verbs import course as verbs
 
-    told = chapter(again(NOMINAL, seed))
-    tell(told, write_page(told, out / "reproduce.html", pdf), told.numbers if as_json else None)
+    told = verbs.reproduce(seed=seed, out=out, pdf=pdf)
+    tell(told.chapter, told.files, told.numbers if as_json else None)

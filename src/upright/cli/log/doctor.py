@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
-from upright.cli.terminal import Pdf, tell, write_page
-from upright.errors import BadInput
-
-if TYPE_CHECKING:
-    from upright.diagnosis import Diagnosis
+from upright.cli.terminal import Pdf, tell
 
 WRONG = 3
 
@@ -46,52 +42,9 @@ def doctor(
     Exit code: 0 nothing looks wrong, 3 something does, 2 the log or the rig
     cannot be read.
     """
-    from upright.diagnosis import examine, read_known
-    from upright.diagnosis.chapter import chapter
-    from upright.diagnosis.clock import read_mended
-    from upright.files import json_text
+    from upright.verbs import log as verbs
 
-    if pdf and html is None:
-        html = Path(f"{log.stem}-doctor.html")
-    if html is not None and html.is_dir():
-        raise BadInput(f"--html needs a file, and {html} is a folder; name one in it, such as {html / 'doctor.html'}")
-    if not log.is_file():
-        wrong = "is a folder; name one file of it" if log.is_dir() else "does not exist; check the path"
-        raise BadInput(f"the log {log} {wrong}")
-    known = read_known(rig, str(log)) if rig else None
-    record, mended = read_mended(log, reader=reader)
-    diagnosis = examine(record, known, before=mended)
-    told = chapter(diagnosis, log=log, rig=rig, page=html is not None)
-    written = [] if html is None else write_page(told, html, pdf)
-    if as_json:
-        typer.echo(json_text(as_plain(diagnosis, html)))
-    else:
-        tell(told, written)
-    if diagnosis.wrong:
+    found = verbs.doctor(log, rig=rig, html=html, pdf=pdf, reader=reader)
+    tell(found.chapter, found.files, found.numbers if as_json else None)
+    if found.value.wrong:
         raise typer.Exit(WRONG)
-
-
-def as_plain(diagnosis: Diagnosis, html: Path | None) -> dict[str, Any]:
-    """A diagnosis as plain dicts, lists, text and numbers; pictures stay in the page."""
-    return {
-        "file": diagnosis.file,
-        "rig": diagnosis.rig,
-        "samples": diagnosis.samples,
-        "duration": diagnosis.duration,
-        "wrong": bool(diagnosis.wrong),
-        "findings": [
-            {
-                "kind": f.kind,
-                "columns": list(f.columns),
-                "severity": f.severity,
-                "sentence": f.sentence,
-                "evidence": dict(f.evidence),
-                "advice": f.advice,
-                "key": f.key,
-            }
-            for f in diagnosis.findings
-        ],
-        "checked": list(diagnosis.checked),
-        "unchecked": dict(diagnosis.unchecked),
-        "page": str(html) if html is not None else "",
-    }

@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from upright.cli.terminal import tell
-from upright.errors import BadInput
 
 
 def init(
@@ -37,37 +36,8 @@ def init(
 
     Lines marked MEASURE hold placeholders: weigh, measure, or look them up.
     """
-    from upright.report.page import Chapter, Part, Points, Step
-    from upright.report.symbols import typed
+    from upright.verbs import log as verbs
 
     study = out if out is not None else Path(f"{log.stem}.toml")
-    if not log.is_file():
-        wrong = "is a folder; name one file of it" if log.is_dir() else "does not exist; check the path"
-        raise BadInput(f"the log {log} {wrong}")
-    if study.is_dir():
-        study = study / f"{log.stem}.toml"
-    if study.exists() and not force:
-        raise BadInput(f"{study} exists already; name another file with -o, or replace it with --force")
-    from upright.physics import find
-    from upright.readers import inspect, read
-    from upright.study.draft.draft import draft
-
-    if plant:
-        find(plant)
-    record = read(log, reader=reader or None)
-    text = draft(record, inspect(record), log, study, plant=plant)
-    if reader:
-        text = text.replace("[defaults]\n", f'[defaults]\nreader = "{reader}"\n')
-    study.parent.mkdir(parents=True, exist_ok=True)
-    study.write_text(text, encoding="utf-8")
-    guessed = [line.removeprefix("# ") for line in text.splitlines() if line.startswith("# GUESSED")]
-    marked = (line.split(" =")[0] for line in text.splitlines() if "MEASURE" in line and " = " in line)
-    measure = list(dict.fromkeys(marked))
-    if measure:
-        guessed.append(f"Placeholders to replace by what you measured: {', '.join(measure)}")
-    onward = Step(
-        "Read it, then fit it.",
-        f"upright identify {typed(study)} -o {typed(study.with_name(f'{study.stem}-fit'))}",
-    )
-    parts = (Part("Recognised", (Points(tuple(guessed)),)),) if guessed else ()
-    tell(Chapter(title=f"Draft of {study.name}", verdict="", parts=parts, steps=(onward,)), [study])
+    written = verbs.init(log, out=study, plant=plant, reader=reader, force=force)
+    tell(written.chapter, written.files)

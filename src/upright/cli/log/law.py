@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from upright.cli.terminal import Out, Pdf, tell, write_page
-from upright.errors import BadInput
+from upright.cli.terminal import Out, Pdf, tell
 
 
 def law(
@@ -37,27 +35,10 @@ def law(
 
     upright law run.csv --command u --measured theta --reference target
     """
-    from upright.closed_loop import recover
-    from upright.closed_loop.recovery import as_json
-    from upright.readers import read
-    from upright.report.drawing import save
-    from upright.report.law import chapter, draw_law
-    from upright.report.symbols import typed
+    from upright.verbs import log as verbs
 
-    record = read(log)
-    if not command or not measured:
-        raise BadInput(
-            f"{log.name} holds the columns {', '.join(record.names)}; say which one the law put out (--command) and"
-            " which it read (--measured, and --reference if it followed one)."
-        )
-    found = recover(
-        record, measured=measured, references=reference or (), command=command, feedforward=feedforward or (),
-        every=every,
+    found = verbs.law(
+        log, command=command, measured=measured or (), reference=reference or (), feedforward=feedforward or (),
+        every=every, out=out, pdf=pdf,
     )  # fmt: skip
-    out.mkdir(parents=True, exist_ok=True)
-    stem = re.sub(r"[^\w.-]+", "_", log.stem)
-    files = [out / f"law-{stem}.{ending}" for ending in ("json", "svg", "html")]
-    files[0].write_text(as_json(found) + "\n", encoding="utf-8")
-    save(draw_law(record, found), files[1])
-    told = chapter(record, found, typed(log.name))
-    tell(told, [*files[:2], *write_page(told, files[2], pdf)])
+    tell(found.chapter, found.files)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-import re
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -27,41 +26,17 @@ def show(
 
     upright show swing.csv
     """
-    from upright.readers import inspect, read
-    from upright.report.drawing import save
-    from upright.report.log import chapter, draw_columns
-    from upright.report.page import Step
-    from upright.report.symbols import typed
+    from upright.verbs import log as verbs
 
-    onward = Step(
-        "Write a study file, filled in with what was recognised.",
-        f"upright init {typed(logs[0])} -o study.toml",
-    )
+    steps: tuple[Any, ...] = ()
     figures: list[Path] = []
-    found: list[dict[str, Any]] = []
+    found: list[Any] = []
     for log in logs:
-        record = read(log)
-        seen = inspect(record)
-        written: Path | None = None
-        if plot:
-            written = _figure_path(log, out, figures)
-            save(draw_columns(record, seen), written)
-            figures.append(written)
-        if as_json:
-            found.append(asdict(seen) | {"figure": str(written) if written else ""})
-            continue
-        told = chapter(record, seen)
-        if log == logs[-1]:
-            told = replace(told, steps=(onward,))
-        tell(told, [written] if written else [])
+        seen = verbs.show(log, out=verbs.picture_path(log, out, figures) if plot else None)
+        figures += seen.files
+        found.append(seen.numbers)
+        steps = steps or seen.chapter.steps
+        if not as_json:
+            tell(replace(seen.chapter, steps=steps if log == logs[-1] else ()), seen.files)
     if as_json:
         typer.echo(json.dumps(found, indent=1))
-
-
-def _figure_path(log: Path, out: Path, taken: list[Path]) -> Path:
-    out.mkdir(parents=True, exist_ok=True)
-    stem = "show-" + re.sub(r"[^\w.-]+", "_", log.stem)
-    path, n = out / f"{stem}.svg", 2
-    while path in taken:  # two folders may hold logs of the same name
-        path, n = out / f"{stem}-{n}.svg", n + 1
-    return path

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from upright.cli.terminal import Data, Pdf, progress_bar, tell
 from upright.errors import BadInput
-
-if TYPE_CHECKING:
-    from upright.study.load import Study
+from upright.verbs.pages import write_page
+from upright.verbs.study import provenance, read_study
 
 INTERRUPTED, NOT_TRUSTED = 130, 3
 METHODS = ("auto", "simplex", "least-squares")
@@ -102,27 +101,3 @@ def identify(
         raise typer.Exit(INTERRUPTED)
     if strict and not answer.fit.trusted:
         raise typer.Exit(NOT_TRUSTED)
-
-
-def read_study(study: Path, folder: Path, data: Path | None) -> Study:
-    """A study, once study and folder of the results are what they should be."""
-    from upright.report.symbols import typed
-    from upright.study.load import load_study
-
-    if not study.exists():
-        raise BadInput(
-            f"the study {study} does not exist; `upright init LOG -o {typed(study.name)}` writes one from a log"
-        )
-    if folder.exists() and not folder.is_dir():
-        raise BadInput(f"results need a folder, but {folder} is a file; name another with -o")
-    return load_study(study, data=data)
-
-
-def provenance(asked: Study) -> dict[str, object]:
-    """Where the numbers of a study come from."""
-    return {
-        "study": asked.path.name,
-        "sha256 of the study": asked.sha256,
-        "data": asked.source or "not stated",
-        "runs": {run.label: run.source for run in asked.runs},
-    }

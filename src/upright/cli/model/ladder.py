@@ -7,9 +7,7 @@ from typing import Annotated
 
 import typer
 
-from upright.cli.model.identify import provenance, read_study
-from upright.cli.terminal import Data, Pdf, progress_bar, tell, write_page
-from upright.errors import BadInput
+from upright.cli.terminal import Data, Pdf, progress_bar, tell
 
 INTERRUPTED = 130
 
@@ -51,37 +49,11 @@ def ladder(
     Exit code: 0 a ladder was written, 2 the study or a log is wrong, 130
     stopped by Ctrl-C.
     """
-    from upright.files import json_text
-    from upright.identification.ladder.growth import climb
-    from upright.report.symbols import typed
-    from upright.study.ladder_file import can_be_trimmed, chosen_study, write_ladder
+    from upright.verbs import model as verbs
 
     folder = out if out is not None else study.with_name(f"{study.stem}-ladder")
-    asked = read_study(study, folder, data)
-    if not asked.rig.estimated:
-        raise BadInput(f'{study}: nothing is asked; give a parameter a guess, such as b_2c = {{ guess = "1e-4 N m" }}')
     with progress_bar(quiet=as_json) as bar:
-        climbed = climb(asked.rig, asked.runs, asked.ladder or None, progress=bar)
-    if not climbed.steps:
-        raise KeyboardInterrupt
-    written = [folder / "ladder.json"]
-    content = write_ladder(climbed, asked, written[0])
-    trimmed = can_be_trimmed(asked, climbed)
-    if trimmed:
-        written.append(folder / "study.toml")
-        written[-1].write_text(chosen_study(asked, climbed), encoding="utf-8")
-    from upright.report.ladder import chapter, next_steps
-
-    where = typed(data if data is not None else study.parent)
-    told = chapter(
-        climbed, title=f"Ladder: {asked.title or asked.path.stem.replace('_', ' ')}", provenance=provenance(asked),
-        steps=next_steps(climbed, study=typed(study), folder=typed(folder), data=where, trimmed=trimmed),
-    )  # fmt: skip
-    if report or pdf:
-        written += write_page(told, folder / "ladder.html", pdf)
-    if as_json:
-        typer.echo(json_text(content))
-    else:
-        tell(told, written)
-    if climbed.interrupted:
+        climbed = verbs.ladder(study, out=folder, data=data, report=report, pdf=pdf, progress=bar)
+    tell(climbed.chapter, climbed.files, climbed.numbers if as_json else None)
+    if climbed.value.interrupted:
         raise typer.Exit(INTERRUPTED)

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from upright.cli.terminal import Data, tell
-from upright.errors import BadInput
 
 
 def predict(
@@ -31,50 +28,7 @@ def predict(
 
     upright predict swing-fit/fit.json other_day.toml
     """
-    from upright.files import json_text
-    from upright.report.fit.tables import score_table
-    from upright.report.page import Chapter, Part
-    from upright.study.fit_file import read_fit
-    from upright.study.load import load_study
+    from upright.verbs import model as verbs
 
-    for file, what in ((model, "the model"), (study, "the study")):
-        if not file.exists():
-            raise BadInput(f"{what} {file} does not exist; the call is upright predict OUT/fit.json STUDY.toml")
-    if model.is_dir():
-        model = model / "fit.json"
-    fitted = read_fit(model)
-    asked = load_study(study, data=data, fixed=fitted.values)
-    missing = [n for n in fitted.values if n not in asked.rig.parameters]
-    if missing:
-        raise BadInput(
-            f"{study}: the plant '{asked.plant}' has no parameter {missing[0]}, and {model} is a '{fitted.plant}';"
-            " both must be the same plant"
-        )
-    from upright.identification.inference.scoring import predict as score
-
-    rig = replace(asked.rig, substeps=fitted.substeps)
-    scores = score(fitted.values, rig, [replace(run, role="predict") for run in asked.runs], groups=fitted.groups)
-    content: dict[str, Any] = {
-        "model": model.name,
-        "study": study.name,
-        "runs": {
-            label: {
-                "role": s.role,
-                "fit_percent": s.fit_percent,
-                "horizon": s.horizon,
-                "adapted": s.adapted,
-            }
-            for label, s in scores.items()
-        },
-    }
-    text = json.dumps(content, indent=2, ensure_ascii=False)
-    written = [] if out is None else [out / "prediction.json"]
-    for path in written:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text + "\n", encoding="utf-8")
-    if as_json:
-        typer.echo(json_text(content))
-        return
-    explained = Part("How much of each signal is explained", (score_table(scores),))
-    doubt = () if fitted.trusted else (f"The model's own verdict was: {fitted.verdict}",)
-    tell(Chapter(title=f"{model.name} on {study.name}", verdict="", parts=(explained,), warnings=doubt), written)
+    scored = verbs.predict(model, study, data=data, out=out)
+    tell(scored.chapter, scored.files, scored.numbers if as_json else None)

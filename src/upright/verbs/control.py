@@ -1,0 +1,462 @@
+"""Which gains hold a rig, and what becomes of them on it: standing, swinging up, tracking?"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from math import tau
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from upright.errors import BadInput, nearest
+from upright.progress import Progress, silent
+from upright.verbs.answer import Answer
+from upright.verbs.pages import can_be_pdf, folder, folder_if_given, write_page
+from upright.verbs.values import open_log, poles, si, si_if_given
+
+if TYPE_CHECKING:
+    from upright.control import ServoRig
+    from upright.control.sensors import Scales
+    from upright.experiments.designing.run import Designed
+    from upright.experiments.identified import IdentifiedRig
+    from upright.experiments.regulation_2.run import Regulation, RegulationRequest
+    from upright.experiments.swing_up_2b.run import SwingUpRun
+    from upright.experiments.tracking_3.run import Tracking
+    from upright.verbs.values import Log
+
+_poles = poles  # the verbs have options of this name
+
+
+def design(
+    source: str | os.PathLike[str], *, at: str = "", poles: str | Iterable[complex] = "",
+    lqr: str | Iterable[float] = "", effort_weight: float | None = None, limit: float | None = None,
+    start: str | Mapping[str, float | str] = "", period: float | str = "1 ms", delay: float = 1.0,
+    speed: str = "filtered", memory: float = 0.5, lag: float | str = "",
+    counts: float | str | Mapping[str, float] = "16000", track: str = "", sampled: bool = False, seed: int = 0,
+    out: str | os.PathLike[str] | None = None, pdf: bool = False,
+) -> Answer[Designed]:  # fmt: skip
+    """Gains that hold a rig, and what they are worth in the loop that a computer runs.
+
+    Poles are placed by Ackermann's formula on the model about an equilibrium, or chosen by least cost; period, delay
+    and differenced encoders are then put in.
+
+    Parameters
+    ----------
+    source : path
+        fit.json, its folder, or a study (TOML).
+    at : str, optional
+        Equilibrium; the last that the plant names when omitted.
+    poles : str or sequence of complex
+        Poles [1/s], as in ``"-4.15+-1.63j, -16.9, -3.2"``.
+    lqr : str or sequence of float
+        Weights of the states, as in ``"1,0,1,0"``, instead of poles.
+    effort_weight : float, optional
+        Weight of the effort; the limit decides when omitted.
+    limit : float, optional
+        Largest command, in the command's unit.
+    start : str or mapping, optional
+        Deviation to come back from, by state: ``{"theta": "5 deg"}``, ``{"theta": 0.087}`` [SI].
+    period : float or str
+        Between samples [s].
+    delay : float
+        Computing a command takes so many samples.
+    speed : str
+        Velocities by plain or filtered difference, or kalman.
+    memory : float
+        Of the filtered difference, 0 to 1.
+    lag : float or str, optional
+        Lag of the drive [s]; the fit's when omitted.
+    counts : float, str or mapping
+        Encoder counts per turn or metre, one number or by coordinate.
+    track : str, optional
+        Coordinate that follows a reference.
+    sampled : bool
+        Gains whose sampled loop has the poles asked.
+    seed : int
+        Of the rigs drawn from the fit's covariance.
+    out : path, optional
+        Folder for design.json and design.html.
+    pdf : bool
+        Write the page as PDF too.
+
+    Returns
+    -------
+    Answer
+        Of a `Designed`: gains `K`, `poles`, margins.
+
+    Raises
+    ------
+    BadInput
+        When the call contradicts itself or the rig, or a pole is out of the input's reach.
+    """
+    from upright.experiments.designing.chapter import chapter
+    from upright.experiments.designing.run import SPEEDS, DesignRequest, design_for
+    from upright.experiments.identified import read_identified
+    from upright.files import write_json
+    from upright.report.symbols import typed
+
+    folder_at = folder_if_given(out, pdf)
+    asked, weights = _poles(poles), _numbers(lqr)
+    if (asked is None) == (weights is None):
+        raise BadInput('give either --poles "-4+-2j, -10, -3" or --lqr "1,0,1,0" (weights of the states).')
+    if speed not in SPEEDS:
+        raise BadInput(f"--speed is plain, filtered or kalman, got '{speed}'.")
+    rig = read_identified(Path(source), seed=seed)
+    here = at or list(rig.plant.equilibria)[-1]
+    if here not in rig.plant.equilibria:
+        raise BadInput(f"'{rig.name}' has no equilibrium '{here}'; {nearest(here, rig.plant.equilibria)}")
+    wish = DesignRequest(
+        at=here, poles=asked, weights=weights, R=effort_weight, period=si(period, "s"), delay=delay,
+        lag=si_if_given(lag, "s"), speed=speed, memory=memory, quantum=_quanta(rig, counts), limit=limit,
+        start=_start(rig, start), track=track, sampled=sampled,
+    )  # fmt: skip
+    done = design_for(rig, wish)
+    told = chapter(done, source=typed(Path(source)), folder=typed(folder_at or Path()))
+    files: list[Path] = []
+    if folder_at is not None:
+        files = [
+            write_json(folder_at / "design.json", told.numbers),
+            *write_page(told, folder_at / "design.html", pdf),
+        ]
+    return Answer(done, told, files)
+
+
+def _numbers(given: str | Iterable[float]) -> tuple[float, ...] | None:
+    if not isinstance(given, str):
+        return tuple(float(x) for x in given) or None
+    if not given:
+        return None
+    try:
+        return tuple(float(part) for part in given.split(","))
+    except ValueError:
+        raise BadInput(f'weights are numbers separated by commas, as in "1,0,1,0", got {given[:60]!r}.') from None
+
+
+def _quanta(rig: IdentifiedRig, counts: float | str | Mapping[str, float]) -> tuple[float, ...]:
+    """Step of every encoder [m or rad]; coordinates that the list does not name have 16000 counts."""
+    names = [c.name for c in rig.plant.coordinates]
+    per = dict.fromkeys(names, 16_000.0)
+    said = counts if isinstance(counts, str) else ""
+    if isinstance(counts, Mapping):
+        said = ",".join(f"{name}={value}" for name, value in counts.items())
+    elif not said:
+        said = str(counts)
+    for part in said.split(","):
+        name, equals, value = part.rpartition("=")
+        name = name.strip()
+        if equals and name not in per:
+            raise BadInput(
+                f"--counts names coordinates as in \"{names[0]}=16000\", got '{name}'; {nearest(name, names)}"
+            )
+        try:
+            number = float(value)
+        except ValueError:
+            number = 0.0
+        if not 0 < number < 1e15:
+            raise BadInput(
+                f"--counts takes numbers above 0, got '{part.strip()[:40]}'; write 16000 or \"{names[0]}=16000\"."
+            )
+        per |= {name: number} if equals else dict.fromkeys(names, number)
+    return tuple((tau if c.unit == "rad" else 1.0) / per[c.name] for c in rig.plant.coordinates)
+
+
+def _start(rig: IdentifiedRig, given: str | Mapping[str, float | str]) -> tuple[float, ...]:
+    """Deviation, state by state; empty when none was given."""
+    if isinstance(given, str):
+        parts = [part.partition("=") for part in given.split(",")] if given.strip() else []
+        said: dict[str, float | str] = {name.strip(): value for name, _, value in parts}
+    else:
+        said = dict(given)
+    if not said:
+        return ()
+    names = rig.plant.state_names()
+    units = dict(zip(names, (u for c in rig.plant.coordinates for u in (c.unit, f"{c.unit}/s")), strict=True))
+    values = dict.fromkeys(names, 0.0)
+    for name, value in said.items():
+        if name not in values:
+            raise BadInput(f"--start names states as in \"theta=5 deg\", got '{name}'; {nearest(name, names)}")
+        values[name] = si(value, units[name])
+    if not any(values.values()):
+        raise BadInput("--start must leave the equilibrium; give one state a value that is not 0.")
+    return tuple(values.values())
+
+
+def regulate(
+    source: str | os.PathLike[str] | None = None, *, rig: str = "", seed: int | None = None, which: int | str = "",
+    poles: str | Iterable[complex] = "", speed: str = "filtered", memory: float = 0.5, tilt: float | str = "",
+    push: float | str = "", seconds: float = 6.0, out: str | os.PathLike[str] = "upright-regulate", pdf: bool = False,
+    progress: Progress = silent,
+) -> Answer[Regulation]:  # fmt: skip
+    """What each pole set will come to on an identified rig that stands upright, and what it came to.
+
+    Gains are placed on the numbers identified while the rig hung. What will come is simulated with limit, counts, delay
+    and dry friction, on rigs as the fit's covariance allows; the laws then run on a twin.
+
+    Parameters
+    ----------
+    source : path, optional
+        fit.json or its folder; a twin is identified when omitted.
+    rig : str, optional
+        Twin to identify: furuta or linear.
+    seed : int, optional
+        Which twin of the make runs; with a fit and no seed nothing is run.
+    which : int or str, optional
+        Pole set of Table 1, 1 to 4, or all; the command line's ``--set``.
+    poles : str or sequence of complex, optional
+        Poles of one's own [1/s].
+    speed : str
+        Velocities by plain or filtered difference, or kalman.
+    memory : float
+        Of the filtered difference, 0 to 1.
+    tilt : float or str, optional
+        From upright when let go [rad].
+    push : float or str, optional
+        Speed of the pendulum then, outwards [rad/s].
+    seconds : float
+        Length of a run.
+    out : path
+        Folder for all files.
+    pdf : bool
+        Write the page as PDF too.
+    progress : callable, optional
+        Told the step at work and the share done.
+
+    Returns
+    -------
+    Answer
+        Of a `Regulation`.
+
+    Raises
+    ------
+    BadInput
+        When the call contradicts itself or the fit, or poles cannot be placed.
+    """
+    from upright.experiments.identified import read_identified
+    from upright.experiments.makes import make_rig
+    from upright.experiments.regulation_2.chapter import chapter
+    from upright.experiments.regulation_2.run import identify_make, run_regulation
+    from upright.report.symbols import typed
+
+    at = folder(out)
+    can_be_pdf(pdf)
+    wish = _wish("" if which == "" else str(which), poles, speed, memory, tilt, push, seconds)
+    if source is None:
+        make, seed = rig or "furuta", seed or 0
+        progress("identifying the hanging twin", 0.0)
+        known = identify_make(make, seed, at / "identified", lambda step, share: progress(step, 0.6 * share))
+        name, base = f"--rig {make}", 0.6
+    else:
+        known, name, base = read_identified(Path(source), seed=seed or 0), typed(Path(source)), 0.0
+        make = known.make.key
+        if rig not in ("", make):
+            raise BadInput(f"{source} is of the make '{make}', not '{rig}'; leave --rig out.")
+    truth = None if seed is None else make_rig(make, seed)
+    done = run_regulation(
+        known, truth, seed or 0, at, lambda step, share: progress(step, base + (1 - base) * share), wish=wish,
+        source=name,
+    )  # fmt: skip
+    told = chapter(done)
+    return Answer(done, told, write_page(told, at / "report.html", pdf))
+
+
+def _wish(
+    which: str, poles: str | Iterable[complex], speed: str, memory: float, tilt: float | str, push: float | str,
+    seconds: float,
+) -> RegulationRequest:  # fmt: skip
+    from upright.experiments.regulation_2.run import SETS, RegulationRequest
+    from upright.gains.requests import read_poles
+
+    own = _poles(poles)
+    if which and own is not None:
+        raise BadInput("give either --set, a set of Table 1, or --poles of your own.")
+    if which not in ("", "all") and f"set {which}" not in SETS:
+        raise BadInput(f"--set is 1 to {len(SETS)}, or all, got '{which}'.")
+    printed = {n: read_poles(t) for n, t in SETS.items() if which in ("", "all", n[4:])}
+    return RegulationRequest(
+        poles=printed if own is None else {"your poles": own}, speed=speed, memory=memory, seconds=seconds,
+        tilt=si_if_given(tilt, "rad"), push=si_if_given(push, "rad/s"),
+    )  # fmt: skip
+
+
+def swing_up(
+    source: str | os.PathLike[str] | None = None, *, rig: str = "", seed: int = 1, seconds: float = 12.0,
+    travel: float | None = None, lie: str | Mapping[str, float] = "", check: Log | None = None,
+    out: str | os.PathLike[str] = "swing-up", pdf: bool = False,
+) -> Answer[SwingUpRun | Scales]:  # fmt: skip
+    """A hanging pendulum swung up within the drive's limit and travel, and caught; its encoders are asked first.
+
+    Parameters
+    ----------
+    source : path, optional
+        fit.json that the law is designed from; the make's data sheet when omitted.
+    rig : str, optional
+        furuta or linear; a fit says which.
+    seed : int
+        Which rig of the make; 0 is the one as designed.
+    seconds : float
+        Time for the way up and for holding, 1 to 120 s.
+    travel : float, optional
+        How far the driven body may go [m or rad]; what the rig says when omitted.
+    lie : str or mapping, optional
+        An encoder shows a multiple of what is true: ``{"theta": 2}``.
+    check : path, Record or pandas.DataFrame, optional
+        Only say what this log of a hanging, driven rig tells of its encoders.
+    out : path
+        Folder for all files.
+    pdf : bool
+        Write the page as PDF too.
+
+    Returns
+    -------
+    Answer
+        Of a `SwingUpRun`, which says whether it was `caught`; of the encoders' `Scales` when only they are asked.
+
+    Raises
+    ------
+    BadInput
+        When the call contradicts itself or the fit, or the log cannot be used.
+    """
+    from upright.experiments.identified import read_identified
+    from upright.experiments.makes import make_rig
+    from upright.experiments.swing_up_2b.chapter import chapter, check_chapter
+    from upright.experiments.swing_up_2b.run import known_of, run_swing_up, scales_of_log
+    from upright.files import write_json
+    from upright.report.symbols import typed
+
+    at = folder(out)
+    can_be_pdf(pdf)
+    if not 1 <= seconds <= 120:
+        raise BadInput(f"--seconds needs a time from 1 to 120 s, got {seconds:g}.")
+    if travel is not None and not travel > 0:
+        raise BadInput(f"--travel must be above 0, got {travel:g}; give it in m or rad.")
+    known = None
+    if source is None:
+        make = rig or "furuta"
+        model = make_rig(make)
+    else:
+        identified = read_identified(Path(source), seed=seed)
+        make, known = identified.make.key, known_of(identified)
+        if rig and rig != make:
+            raise BadInput(f"the fit is of the make {make}, and --rig says {rig}; leave --rig out.")
+        model = identified.rig()
+    name = "" if source is None else typed(Path(source))
+    if check is not None:
+        record, log = open_log(check)
+        scales = scales_of_log(model, record, known)
+        told = check_chapter(model, scales, log.name, name or "FIT.json")
+        return Answer(scales, told, write_page(told, at / "encoders.html", pdf))
+    done = run_swing_up(
+        model, _lying(make_rig(make, seed), lie), at, known=known, seconds=seconds, travel=travel, source=name
+    )
+    told = chapter(done)
+    return Answer(
+        done, told, [*write_page(told, at / "swing_up.html", pdf), write_json(at / "swing_up.json", told.numbers)]
+    )
+
+
+def _lying(rig: ServoRig, lie: str | Mapping[str, float]) -> ServoRig:
+    """The rig with one encoder that shows a multiple of what is true."""
+    if isinstance(lie, str):
+        said = [(name.strip(), value.strip()) for name, _, value in [lie.partition("=")] if lie.strip()]
+    else:
+        said = [(name, str(value)) for name, value in lie.items()]
+    names = [c.name for c in rig.plant.coordinates]
+    factors = dict.fromkeys(names, 1.0)
+    for name, value in said:
+        if name not in names:
+            raise BadInput(f"--lie names a coordinate as in \"theta=2\", got '{name}'; {nearest(name, names)}")
+        try:
+            factor = float(value)
+        except ValueError:
+            factor = 0.0
+        if not 0.01 <= abs(factor) <= 100:
+            raise BadInput(
+                f"--lie needs a factor between 0.01 and 100, or negative for swapped channels, got '{value}'."
+            )
+        factors[name] = factor
+    return replace(rig, scales=tuple(factors.values())) if said else rig
+
+
+def track(
+    source: str | os.PathLike[str] | None = None, *, rig: str = "rectilinear", seed: int = 0,
+    sets: str | int | Sequence[int] = "", poles: str | Iterable[complex] = "", step: float | str = "",
+    limit: float | None = None, out: str | os.PathLike[str] = "track", pdf: bool = False, progress: Progress = silent,
+) -> Answer[Tracking]:  # fmt: skip
+    """The far inertia of a flexible shaft made to follow a step, by state feedback and by PD (experiment 3).
+
+    Parameters
+    ----------
+    source : path, optional
+        fit.json, its folder, or a study, on whose numbers the figures are foretold; a twin when omitted.
+    rig : str
+        Twin to run on: rectilinear (ECP 210) or torsional (ECP 205).
+    seed : int
+        Which twin of the make; 0 is the one as designed.
+    sets : str, int or sequence of int, optional
+        Sets of Table 2, the command line's ``--set``; all when neither they nor poles are given.
+    poles : str or sequence of complex, optional
+        Poles of one's own [1/s].
+    step : float or str, optional
+        Size of the step [m or rad]; chosen by effort, twist and travel when omitted.
+    limit : float, optional
+        Largest command; the make's own when omitted.
+    out : path
+        Folder for all files.
+    pdf : bool
+        Write the page as PDF too.
+    progress : callable, optional
+        Told the step at work and the share done.
+
+    Returns
+    -------
+    Answer
+        Of a `Tracking`; `interrupted` when Ctrl-C stopped it.
+
+    Raises
+    ------
+    BadInput
+        When there is no such rig or set, or poles cannot be placed.
+    """
+    from upright.experiments.makes import SHAFTS, make_rig
+    from upright.experiments.tracking_3.chapter import chapter
+    from upright.experiments.tracking_3.pulses import rig_of_file
+    from upright.experiments.tracking_3.run import follow, run_tracking
+    from upright.files import write_json
+
+    at = folder(out)
+    can_be_pdf(pdf)
+    own = _poles(poles)
+    which = _sets(sets) or (() if own is not None else (1, 2, 3, 4))
+    if limit is not None and not limit > 0:
+        raise BadInput(f"--limit must be above 0, got {limit:g}.")
+    if source is None and rig not in SHAFTS:
+        raise BadInput(f"--rig is {' or '.join(SHAFTS)}, got '{rig}'.")
+    on = make_rig(rig, seed) if source is None else rig_of_file(Path(source), limit)
+    size = si_if_given(step, on.plant.coordinates[-1].unit)
+    if size is not None and not size > 0:
+        raise BadInput(f"--step needs a size above 0, got '{step}'.")
+    if source is None:
+        on = replace(on, limit=limit or on.limit)
+        done = run_tracking(on, seed, at, progress, which=which, poles=own, step=size)
+    else:
+        done = follow(on, on, Path(source), None, None, progress, which=which, poles=own, step=size)
+    told = chapter(done)
+    told = replace(
+        told, title=f"Experiment 3: {told.title.lower()}, {done.rig.name}",
+        numbers={**told.numbers, "verdict": told.verdict},
+    )  # fmt: skip
+    return Answer(done, told, [write_json(at / "track.json", told.numbers), *write_page(told, at / "track.html", pdf)])
+
+
+def _sets(given: str | int | Sequence[int]) -> tuple[int, ...]:
+    if isinstance(given, int):
+        return (given,)
+    if not isinstance(given, str):
+        return tuple(given)
+    try:
+        return tuple(int(part) for part in given.split(",")) if given else ()
+    except ValueError:
+        raise BadInput(
+            f'--set takes numbers of Table 2 separated by commas, as in "1,4", got {given[:40]!r}.'
+        ) from None

@@ -1,0 +1,224 @@
+"""What does a course do with it: the whole laboratory on twins, the paper's tables again, its survey?"""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import threading
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from upright.errors import BadInput
+from upright.progress import Progress, silent
+from upright.verbs.answer import Answer
+from upright.verbs.pages import folder_if_given, write_page
+from upright.verbs.values import texts
+
+if TYPE_CHECKING:
+    from upright.experiments.laboratory import Session
+    from upright.paper.reproduce import Reproduced
+    from upright.questionnaire import Means, Ratings, Shares
+    from upright.report.book import Book
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Laboratory:
+    """The experiments that were run, and the report on them.
+
+    `interrupted` when Ctrl-C was pressed, were it only while the report was written.
+    """
+
+    session: Session
+    book: Book
+    interrupted: bool
+
+
+def lab(
+    *, experiment: Sequence[str] | str = (), rig: str = "", seed: int = 0, out: str | os.PathLike[str] | None = None,
+    fresh: bool = False, progress: Progress = silent,
+) -> Answer[Laboratory]:  # fmt: skip
+    """The experiments of the paper on simulated rigs: identify, flip, design, hold, track, swing, and report.
+
+    Every log, study and fit is written to the folder for the other verbs, and one report.html tells it all (report.pdf
+    with the pdf extra). Ctrl-C keeps and reports what is there; the same call goes on from there.
+
+    Parameters
+    ----------
+    experiment : str or sequence of str, optional
+        Only these of 1, 1a, 1b, 2, 2b, 3, 4, and what they stand on.
+    rig : str, optional
+        linear, furuta, rectilinear or torsional; else the paper's.
+    seed : int
+        Which rig of the make; 0 is the one as designed.
+    out : path, optional
+        Folder; upright-lab[-KIND][-SEED] when omitted.
+    fresh : bool
+        Make again what the folder holds already.
+    progress : callable, optional
+        Told the step at work and the share done.
+
+    Returns
+    -------
+    Answer
+        Of a `Laboratory`.
+
+    Raises
+    ------
+    BadInput
+        When there is no such experiment or rig.
+    """
+    from upright.experiments.makes import make_named
+
+    if seed < 0:
+        raise BadInput(f"--seed needs a whole number of at least 0, got {seed}.")
+    if rig:
+        make_named(rig)
+    named = "-".join(["upright-lab", *([rig] if rig else []), *([str(seed)] if seed else [])])
+    at = Path(named if out is None else out)
+    if at.exists() and not at.is_dir():
+        raise BadInput(f"results need a folder, but {at} is a file; name another with -o.")
+    from datetime import date
+
+    from upright.experiments import laboratory, laboratory_page
+    from upright.report.html import write_html
+    from upright.report.page import Chapter
+    from upright.report.pdf import available, write_pdf
+
+    asked = texts(experiment)
+    laboratory.choose(asked, rig)  # says what is wrong with the call before anything is written
+    with _ctrl_c() as pressed:
+        session = laboratory.run_laboratory(
+            asked, rig, seed, at, progress, stopped=lambda: pressed.times > 0, fresh=fresh
+        )
+        pressed.patient = True
+        progress("writing the report", 1.0)
+        book = laboratory_page.book(session, date.today())
+        report = write_html(at / "report.html", book)
+        pdf = write_pdf(at / "report.pdf", book) if available() else None
+    sound = sum(t.chapter.sound for t in session.told)
+    told = Chapter(
+        title=book.title, verdict=f"{sound} of {len(session.told)} verdicts are sound.",
+        sound=sound == len(session.told), parts=book.cover, warnings=book.notes, steps=book.steps,
+        numbers=laboratory_page.summary(session, report, pdf), finished=not session.interrupted,
+    )  # fmt: skip
+    done = Laboratory(session=session, book=book, interrupted=session.interrupted or pressed.times > 0)
+    return Answer(done, told, [report] if pdf is None else [report, pdf])
+
+
+@dataclass
+class _Pressed:
+    """How often Ctrl-C was pressed; once `patient`, the first press lets the report be written."""
+
+    times: int = 0
+    patient: bool = False
+
+
+@contextmanager
+def _ctrl_c() -> Generator[_Pressed]:
+    """Count Ctrl-C besides raising it, for the time of the experiments."""
+    pressed = _Pressed()
+
+    def note(_signal: int, _frame: object) -> None:
+        pressed.times += 1
+        if not pressed.patient or pressed.times > 1:
+            raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield pressed
+        return
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield pressed
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def reproduce(
+    *, seed: int = 0, out: str | os.PathLike[str] | None = None, pdf: bool = False
+) -> Answer[Reproduced]:  # fmt: skip
+    """Tables 1 and 2 of the paper again, from a handful of numbers, and each of its misprints.
+
+    Parameters
+    ----------
+    seed : int
+        Of the rigs on which formulas are tried.
+    out : path, optional
+        Folder for reproduce.html.
+    pdf : bool
+        Write the page as PDF too.
+
+    Returns
+    -------
+    Answer
+        Of a `Reproduced`.
+    """
+    from upright.experiments.makes import NOMINAL
+    from upright.paper.chapter import chapter
+    from upright.paper.reproduce import reproduce as again
+
+    at = folder_if_given(out, pdf)
+    done = again(NOMINAL, seed)
+    told = chapter(done)
+    return Answer(done, told, [] if at is None else write_page(told, at / "reproduce.html", pdf))
+
+
+def survey(
+    file: str | os.PathLike[str], *, n: int | None = None, scale: str | tuple[int, int] = "1-4",
+    out: str | os.PathLike[str] | None = None, pdf: bool = False,
+) -> Answer[Ratings | Means | Shares]:  # fmt: skip
+    """What ratings before and after a course say, and agreement with statements; printed summaries are checked.
+
+    Parameters
+    ----------
+    file : path
+        CSV as a spreadsheet writes it: one row per person, one per answer, or what was printed.
+    n : int, optional
+        Answers behind printed means or shares, at least 2.
+    scale : str or (int, int)
+        Ends of the scale of the ratings.
+    out : path, optional
+        Folder for report.html.
+    pdf : bool
+        Write the page as PDF too.
+
+    Returns
+    -------
+    Answer
+        Of the sheet as it was read; what follows from it is in `numbers`.
+
+    Raises
+    ------
+    BadInput
+        When the sheet cannot be read, or it is not told on how many answers it rests.
+    """
+    from upright.questionnaire import Ratings, read
+    from upright.questionnaire.chapter import chapter
+    from upright.report.page import Step
+    from upright.report.symbols import typed
+
+    at = folder_if_given(out, pdf)
+    file = Path(file)
+    if n is not None and n < 2:
+        raise BadInput(f"--n needs a whole number of at least 2, got {n}.")
+    said = scale if isinstance(scale, str) else f"{scale[0]}-{scale[1]}"
+    ends = re.fullmatch(r"\s*(\d{1,2})\s*(?:-|to)\s*(\d{1,2})\s*", said)
+    if ends is None or int(ends[1]) >= int(ends[2]):
+        raise BadInput(f"--scale needs its two ends, such as 1-4, got '{said}'.")
+    limits = (int(ends[1]), int(ends[2]))
+    sheet = read(file, scale=limits)
+    if isinstance(sheet, Ratings):
+        if n is not None:
+            raise BadInput(f"--n is for printed summaries; '{file.name}' holds single answers, which are counted.")
+    elif n is None:
+        raise BadInput(f"'{file.name}' holds printed numbers; say with --n how many answers they are said to rest on.")
+    again = f"upright survey {typed(file)}{'' if n is None else f' --n {n}'} --json"
+    told = chapter(
+        sheet, title=f"Survey: {file.stem.replace('_', ' ')}", source=file.name, answers=n, scale=limits,
+        steps=(Step("Hand the numbers on.", again),),
+    )  # fmt: skip
+    files = [] if at is None else write_page(told, at / "report.html", pdf)
+    return Answer(sheet, replace(told, numbers={**told.numbers, "report": str(files[0]) if files else ""}), files)

@@ -1,0 +1,326 @@
+"""Which log is this: what does it hold, what is wrong with it, which study fits it, which law closed its loop?"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from upright.errors import BadInput
+from upright.verbs.answer import Answer
+from upright.verbs.pages import can_be_pdf, folder, folder_if_given, write_page
+from upright.verbs.values import open_log, texts
+
+if TYPE_CHECKING:
+    from upright.closed_loop import Recovery
+    from upright.diagnosis import Diagnosis
+    from upright.readers import Inspection
+    from upright.records import Record
+    from upright.verbs.values import Log
+
+
+def read(file: Log, *, reader: str = "") -> Record:
+    """Record of a log as its program wrote it.
+
+    Parameters
+    ----------
+    file : path, Record or pandas.DataFrame
+        CSV, tab-separated text, MATLAB, ECP export, ROS bag as CSV; recognised from the content.
+    reader : str, optional
+        Reader of the log, when it is not recognised.
+
+    Returns
+    -------
+    Record
+        Time [s] and columns in the log's own units.
+
+    Raises
+    ------
+    BadInput
+        When the log cannot be read, with the line and the column of the trouble.
+    """
+    return open_log(file, reader)[0]
+
+
+def show(log: Log, *, out: str | os.PathLike[str] | None = None, plot: bool = False) -> Answer[Inspection]:
+    """What a log holds: columns, sample rate, quanta, gaps, lying columns.
+
+    Parameters
+    ----------
+    log : path, Record or pandas.DataFrame
+    out : path, optional
+        Folder for the picture show-LOG.svg, or the picture's own name (SVG, PNG).
+    plot : bool
+        Draw the columns also where no `out` is named: into the folder at hand.
+
+    Returns
+    -------
+    Answer
+        Of an `Inspection`.
+
+    Raises
+    ------
+    BadInput
+        When the log cannot be read.
+    """
+    from upright.readers import inspect
+    from upright.report.log import chapter, draw_columns
+    from upright.report.page import Step
+    from upright.report.symbols import typed
+
+    record, path = open_log(log)
+    seen = inspect(record)
+    files: list[Path] = []
+    if plot or out is not None:
+        from upright.report.drawing import save
+
+        at = Path() if out is None else Path(out)
+        files.append(at if at.suffix in (".svg", ".png") else picture_path(path, folder(at)))
+        files[-1].parent.mkdir(parents=True, exist_ok=True)
+        save(draw_columns(record, seen), files[-1])
+    onward = Step(
+        "Write a study file, filled in with what was recognised.", f"upright init {typed(path)} -o study.toml"
+    )
+    numbers = asdict(seen) | {"figure": str(files[0]) if files else ""}
+    return Answer(seen, replace(chapter(record, seen), steps=(onward,), numbers=numbers), files)
+
+
+def picture_path(log: Path, out: Path, taken: Sequence[Path] = ()) -> Path:
+    """Where the columns of a log are drawn, beside the pictures of other logs that may be called the same."""
+    stem = f"show-{_stem(log)}"
+    path, n = out / f"{stem}.svg", 2
+    while path in taken:
+        path, n = out / f"{stem}-{n}.svg", n + 1
+    return path
+
+
+def _stem(log: Path) -> str:
+    return re.sub(r"[^\w.-]+", "_", log.stem)
+
+
+def doctor(
+    log: Log, *, rig: str | os.PathLike[str] = "", html: str | os.PathLike[str] | None = None, pdf: bool = False,
+    reader: str = "",
+) -> Answer[Diagnosis]:  # fmt: skip
+    """What looks wrong with a log, on which evidence, and what to do.
+
+    Parameters
+    ----------
+    log : path, Record or pandas.DataFrame
+    rig : str or path, optional
+        Plant, study (TOML) or fit.json of the rig; with it signs, and with known inertias scales, are examined too.
+    html : path, optional
+        Page to write, with a picture of every finding.
+    pdf : bool
+        Write the page as PDF too; LOG-doctor.html here when no page is named.
+    reader : str, optional
+        Reader of the log, when it is not recognised.
+
+    Returns
+    -------
+    Answer
+        Of a `Diagnosis`; something is wrong when its `wrong` is not empty.
+
+    Raises
+    ------
+    BadInput
+        When the log or the rig cannot be read.
+    """
+    from upright.diagnosis import Finding, examine, read_known
+    from upright.diagnosis.chapter import chapter
+
+    can_be_pdf(pdf)
+    path = _file(log)
+    page = Path(html) if html is not None else Path(f"{path.stem if path else 'log'}-doctor.html") if pdf else None
+    if page is not None and page.is_dir():
+        raise BadInput(f"--html needs a file, and {page} is a folder; name one in it, such as {page / 'doctor.html'}")
+    mended: tuple[Finding, ...] = ()
+    known = read_known(str(rig), str(path or "")) if str(rig) else None
+    if path is not None:
+        from upright.diagnosis.clock import read_mended
+
+        record, mended = read_mended(path, reader=reader)
+    else:
+        record, path = open_log(log)
+    diagnosis = examine(record, known, before=mended)
+    told = chapter(diagnosis, log=path, rig=str(rig), page=page is not None)
+    told = replace(told, numbers=_plain_diagnosis(diagnosis, page))
+    return Answer(diagnosis, told, [] if page is None else write_page(told, page, pdf))
+
+
+def _file(log: Log) -> Path | None:
+    """File of a log, None for one in memory."""
+    if not isinstance(log, str | os.PathLike):
+        return None
+    path = Path(log)
+    if not path.is_file():
+        wrong = "is a folder; name one file of it" if path.is_dir() else "does not exist; check the path"
+        raise BadInput(f"the log {path} {wrong}")
+    return path
+
+
+def _plain_diagnosis(diagnosis: Diagnosis, html: Path | None) -> dict[str, Any]:
+    """A diagnosis as plain dicts, lists, text and numbers; pictures stay in the page."""
+    said = ("kind", "columns", "severity", "sentence", "evidence", "advice", "key")
+    return {
+        "file": diagnosis.file,
+        "rig": diagnosis.rig,
+        "samples": diagnosis.samples,
+        "duration": diagnosis.duration,
+        "wrong": bool(diagnosis.wrong),
+        "findings": [{name: getattr(f, name) for name in said} for f in diagnosis.findings],
+        "checked": list(diagnosis.checked),
+        "unchecked": dict(diagnosis.unchecked),
+        "page": str(html) if html is not None else "",
+    }
+
+
+def init(
+    log: Log, *, out: str | os.PathLike[str] | None = None, plant: str = "", reader: str = "", force: bool = False
+) -> Answer[str]:
+    """Draft of a study of a log, commented and filled in with what could be recognised.
+
+    Parameters
+    ----------
+    log : path, Record or pandas.DataFrame
+    out : path, optional
+        Study to write, or a folder for LOG.toml; the draft is only answered when omitted. A log that is no file is
+        written beside the study, as CSV, for the study to name.
+    plant : str, optional
+        Plant, when the columns do not tell.
+    reader : str, optional
+        Reader of the log, when it is not recognised.
+    force : bool
+        Replace a study that exists.
+
+    Returns
+    -------
+    Answer
+        Of the study's text; lines marked MEASURE hold placeholders.
+
+    Raises
+    ------
+    BadInput
+        When the log cannot be read, the study exists, or there is no such plant.
+    """
+    from upright.report.page import Chapter, Part, Points, Step
+    from upright.report.symbols import typed
+
+    path = _file(log)
+    record = None
+    if path is None:
+        record, path = open_log(log)
+    study = Path(f"{path.stem}.toml") if out is None else Path(out)
+    if study.is_dir():
+        study = study / f"{path.stem}.toml"
+    beside = None if record is None or out is None else study.with_suffix(".csv")
+    for file in (study, beside) if out is not None else ():
+        if file is not None and file.exists() and not force:
+            raise BadInput(f"{file} exists already; name another file with -o, or replace it with --force")
+    from upright.physics import find
+    from upright.readers import inspect
+    from upright.study.draft.draft import draft
+
+    if plant:
+        find(plant)
+    if record is None:
+        record, _ = open_log(path, reader)
+    text = draft(record, inspect(record), beside or path, study, plant=plant)
+    if reader:
+        text = text.replace("[defaults]\n", f'[defaults]\nreader = "{reader}"\n')
+    files: list[Path] = []
+    if out is not None:
+        study.parent.mkdir(parents=True, exist_ok=True)
+        study.write_text(text, encoding="utf-8")
+        files.append(study)
+    if beside is not None:
+        record.to_csv(beside)
+        files.append(beside)
+    guessed = [line.removeprefix("# ") for line in text.splitlines() if line.startswith("# GUESSED")]
+    marked = (line.split(" =")[0] for line in text.splitlines() if "MEASURE" in line and " = " in line)
+    measure = list(dict.fromkeys(marked))
+    if measure:
+        guessed.append(f"Placeholders to replace by what you measured: {', '.join(measure)}")
+    onward = Step(
+        "Read it, then fit it.",
+        f"upright identify {typed(study)} -o {typed(study.with_name(f'{study.stem}-fit'))}",
+    )
+    parts = (Part("Recognised", (Points(tuple(guessed)),)),) if guessed else ()
+    numbers = {"study": text}
+    return Answer(
+        text, Chapter(title=f"Draft of {study.name}", verdict="", parts=parts, steps=(onward,), numbers=numbers), files
+    )
+
+
+def law(
+    log: Log, *, command: str = "", measured: Sequence[str] | str = (), reference: Sequence[str] | str = (),
+    feedforward: Sequence[str] | str = (), every: int | None = None, out: str | os.PathLike[str] | None = None,
+    pdf: bool = False,
+) -> Answer[Recovery]:  # fmt: skip
+    """Control law of a closed-loop log: structure, gains, limit, and what it leaves unexplained.
+
+    P, PI, PD and PID are tried on error and measurement, with plain, two-tap and low-passed differences; the simplest
+    that predicts rows held out wins.
+
+    Parameters
+    ----------
+    log : path, Record or pandas.DataFrame
+    command : str
+        Column that the law put out.
+    measured : str or sequence of str
+        Columns that it read.
+    reference : str or sequence of str, optional
+        What the measured columns followed, in the same order.
+    feedforward : str or sequence of str, optional
+        Columns that were added to the law's output.
+    every : int, optional
+        Samples of the servo per row, when it is known.
+    out : path, optional
+        Folder for law-LOG.json, its picture and its page.
+    pdf : bool
+        Write the page as PDF too.
+
+    Returns
+    -------
+    Answer
+        Of a `Recovery`.
+
+    Raises
+    ------
+    BadInput
+        When the log cannot be read, columns are missing, or the log is too short.
+    """
+    from upright.closed_loop import recover
+    from upright.closed_loop.recovery import as_json
+    from upright.report.law import chapter, draw_law
+    from upright.report.symbols import typed
+
+    at = folder_if_given(out, pdf)
+    if every is not None and every < 1:
+        raise BadInput(f"--every needs a whole number of at least 1, got {every}.")
+    record, path = open_log(log)
+    if not command or not measured:
+        raise BadInput(
+            f"{path.name} holds the columns {', '.join(record.names)}; say which one the law put out (--command) and"
+            " which it read (--measured, and --reference if it followed one)."
+        )
+    found = recover(
+        record, measured=texts(measured), references=texts(reference), command=command,
+        feedforward=texts(feedforward), every=every,
+    )  # fmt: skip
+    plain = as_json(found)
+    told = replace(chapter(record, found, typed(path.name)), numbers=json.loads(plain))
+    files: list[Path] = []
+    if at is not None:
+        from upright.report.drawing import save
+
+        at.mkdir(parents=True, exist_ok=True)
+        files = [at / f"law-{_stem(path)}.{ending}" for ending in ("json", "svg")]
+        files[0].write_text(plain + "\n", encoding="utf-8")
+        save(draw_law(record, found), files[1])
+        files += write_page(told, at / f"law-{_stem(path)}.html", pdf)
+    return Answer(found, told, files)

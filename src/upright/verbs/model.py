@@ -1,0 +1,427 @@
+"""Which model fits a rig: does it predict, how rich may it be, and what do sines and added masses say of it?"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from upright.errors import BadInput, nearest
+from upright.progress import Progress, silent
+from upright.verbs.answer import Answer
+from upright.verbs.pages import can_be_pdf, folder, folder_if_given, pdf_has_folder, write_page
+from upright.verbs.study import provenance, read_study
+from upright.verbs.values import open_log, pairs, paths, si, texts
+
+if TYPE_CHECKING:
+    from upright.experiments.frequency_1b.from_logs import LoggedResponse
+    from upright.experiments.frequency_1b.run import FrequencyRun
+    from upright.identification.inference.scoring import RunScore
+    from upright.identification.ladder.growth import Ladder
+    from upright.identification.loadings import Loadings, Plan
+    from upright.verbs.values import Log
+
+KINDS = ("sines", "multisine", "sweep")
+
+
+def predict(
+    model: str | os.PathLike[str], study: str | os.PathLike[str], *, data: str | os.PathLike[str] | None = None,
+    out: str | os.PathLike[str] | None = None,
+) -> Answer[dict[str, RunScore]]:  # fmt: skip
+    """How well a model that was fitted before explains other runs.
+
+    Every run is scored, whatever its role. What a run lists under ``unknown`` (its initial state, unless it says
+    otherwise) is estimated for that run alone; nothing else is.
+
+    Parameters
+    ----------
+    model : path
+        fit.json that `identify` wrote, or its folder.
+    study : path
+        Runs to score; its guesses are not used.
+    data : path, optional
+        Folder the runs' files are in; the study's own when omitted.
+    out : path, optional
+        Folder for prediction.json.
+
+    Returns
+    -------
+    Answer
+        Of the scores by run.
+
+    Raises
+    ------
+    BadInput
+        When model or study cannot be read, or speak of different plants.
+    """
+    from upright.files import write_json
+    from upright.identification.inference.scoring import predict as score
+    from upright.report.fit.tables import score_table
+    from upright.report.page import Chapter, Part
+    from upright.study.fit_file import read_fit
+    from upright.study.load import load_study
+
+    model, study = Path(model), Path(study)
+    for file, what in ((model, "the model"), (study, "the study")):
+        if not file.exists():
+            raise BadInput(f"{what} {file} does not exist; the call is upright predict OUT/fit.json STUDY.toml")
+    if model.is_dir():
+        model = model / "fit.json"
+    fitted = read_fit(model)
+    asked = load_study(study, data=None if data is None else Path(data), fixed=fitted.values)
+    missing = [n for n in fitted.values if n not in asked.rig.parameters]
+    if missing:
+        raise BadInput(
+            f"{study}: the plant '{asked.plant}' has no parameter {missing[0]}, and {model} is a '{fitted.plant}';"
+            " both must be the same plant"
+        )
+    rig = replace(asked.rig, substeps=fitted.substeps)
+    scores = score(fitted.values, rig, [replace(run, role="predict") for run in asked.runs], groups=fitted.groups)
+    said = ("role", "fit_percent", "horizon", "adapted")
+    numbers: dict[str, Any] = {
+        "model": model.name,
+        "study": study.name,
+        "runs": {label: {name: getattr(s, name) for name in said} for label, s in scores.items()},
+    }
+    told = Chapter(
+        title=f"{model.name} on {study.name}", verdict="", numbers=numbers,
+        parts=(Part("How much of each signal is explained", (score_table(scores),)),),
+        warnings=() if fitted.trusted else (f"The model's own verdict was: {fitted.verdict}",),
+    )  # fmt: skip
+    return Answer(scores, told, [] if out is None else [write_json(Path(out) / "prediction.json", numbers)])
+
+
+def ladder(
+    study: str | os.PathLike[str], *, out: str | os.PathLike[str] | None = None,
+    data: str | os.PathLike[str] | None = None, report: bool = True, pdf: bool = False, progress: Progress = silent,
+) -> Answer[Ladder]:  # fmt: skip
+    """How rich a model the runs deserve: it grows only while it predicts better what it has not seen.
+
+    Parameters
+    ----------
+    study : path
+        Rig, runs, guesses of everything the rig might have, and rungs of one's own where wanted.
+    out : path, optional
+        Folder for ladder.json, ladder.html and study.toml, the study of the chosen model.
+    data : path, optional
+        Folder the runs' files are in; the study's own when omitted.
+    report : bool
+        Write ladder.html too.
+    pdf : bool
+        Write the page as PDF too.
+    progress : callable, optional
+        Told the step at work and the share done.
+
+    Returns
+    -------
+    Answer
+        Of a `Ladder`; Ctrl-C keeps the rungs so far, and `interrupted` says so.
+
+    Raises
+    ------
+    BadInput
+        When the study or a log is wrong, or nothing is asked.
+    KeyboardInterrupt
+        When Ctrl-C came before the first rung stood.
+    """
+    from upright.files import write_json
+    from upright.identification.ladder.growth import climb
+    from upright.report.ladder import chapter, next_steps
+    from upright.report.symbols import typed
+    from upright.study.ladder_file import can_be_trimmed, chosen_study, plain_ladder
+
+    pdf_has_folder(out, pdf)
+    study = Path(study)
+    at = study.with_name(f"{study.stem}-ladder") if out is None else Path(out)
+    asked = read_study(study, at, None if data is None else Path(data))
+    if not asked.rig.estimated:
+        raise BadInput(f'{study}: nothing is asked; give a parameter a guess, such as b_2c = {{ guess = "1e-4 N m" }}')
+    climbed = climb(asked.rig, asked.runs, asked.ladder or None, progress=progress)
+    if not climbed.steps:
+        raise KeyboardInterrupt
+    trimmed = can_be_trimmed(asked, climbed)
+    files: list[Path] = []
+    numbers = plain_ladder(climbed, asked)
+    if out is not None:
+        files.append(write_json(at / "ladder.json", numbers))
+        if trimmed:
+            files.append(at / "study.toml")
+            files[-1].write_text(chosen_study(asked, climbed), encoding="utf-8")
+    where = typed(Path(data) if data is not None else study.parent)
+    told = chapter(
+        climbed, title=f"Ladder: {asked.title or asked.path.stem.replace('_', ' ')}", provenance=provenance(asked),
+        steps=next_steps(climbed, study=typed(study), folder=typed(at), data=where, trimmed=trimmed),
+    )  # fmt: skip
+    if out is not None and (report or pdf):
+        files += write_page(told, at / "ladder.html", pdf)
+    return Answer(climbed, replace(told, numbers=numbers), files)
+
+
+def frequency(
+    sources: Sequence[str | os.PathLike[str]] | str | os.PathLike[str] = (), *, rig: str = "", seed: int = 0,
+    ask: str = "sines", kind: str = "", command: str = "", signal: Mapping[str, str] | Sequence[str] = (),
+    counts: Mapping[str, float | str] | Sequence[str] = (),
+    known: Mapping[str, float | str | tuple[float, float]] | Sequence[str] = (), hold: float | str = "",
+    low: float | None = None, high: float | None = None, data: str | os.PathLike[str] | None = None,
+    out: str | os.PathLike[str] = "frequency", pdf: bool = False, progress: Progress = silent,
+) -> Answer[FrequencyRun | LoggedResponse]:  # fmt: skip
+    """Frequency response, measured on a twin or read from logs, and the rig fitted to it (experiment 1b).
+
+    Parameters
+    ----------
+    sources : path or sequence of paths, optional
+        Logs (repeats together), a frequency.csv, or a study; a twin is asked when omitted.
+    rig : str
+        Twin, or make of the logged rig: furuta, linear, rectilinear, torsional.
+    seed : int
+        Which twin of the make; 0 is the one as designed.
+    ask : str
+        Ask the twin by sines, multisine or sweep.
+    kind : str, optional
+        What a log holds of these, when it is not told rightly.
+    command : str, optional
+        Column that drives.
+    signal : mapping of str to str, optional
+        Column by coordinate, or texts NAME=COLUMN.
+    counts : mapping of str to float, optional
+        Counts per rad or m by coordinate, negative if reversed, or texts NAME=N.
+    known : mapping, optional
+        What is known of the rig by parameter [SI]: a number, a number with its standard uncertainty, or a text such as
+        ``"135 g +- 0.2 %"``; or texts NAME=VALUE.
+    hold : float or str, optional
+        How long a command is held [s]; one sample when omitted.
+    low, high : float, optional
+        Least and greatest frequency [rad/s].
+    data : path, optional
+        Folder the runs' files are in; the study's own when omitted.
+    out : path
+        Folder for all files.
+    pdf : bool
+        Write the page as PDF too.
+    progress : callable, optional
+        Told the step at work and the share done.
+
+    Returns
+    -------
+    Answer
+        Of a `FrequencyRun` on a twin, of a `LoggedResponse` from sources.
+
+    Raises
+    ------
+    BadInput
+        When there is no such rig or way, or a log cannot be used.
+    """
+    at = folder(out)
+    can_be_pdf(pdf)
+    for value, option in ((ask, "--ask"), (kind or "sines", "--kind")):
+        if value not in KINDS:
+            raise BadInput(f"{option} is one of {', '.join(KINDS)}, got '{value}'.")
+    files = [at / "frequency.csv"]
+    if logs := [Path(source) for source in paths(sources)]:
+        from upright.experiments.frequency_1b.chapter import log_chapter
+        from upright.experiments.frequency_1b.from_logs import LogRequest, response_of_logs
+        from upright.verbs.values import si_if_given
+
+        limits = (low or 0.0, high or float("inf"))
+        said = pairs(signal, "--signal"), pairs(counts, "--counts"), pairs(known, "--known")
+        wish = LogRequest(
+            make=rig, command=command, signals=said[0], kind=kind, seed=seed, hold=si_if_given(hold, "s"),
+            counts={n: _count(n, v) for n, v in said[1].items()},
+            band=limits if limits != (0.0, float("inf")) else None,
+            known={n: _known(n, v, rig) for n, v in said[2].items()},
+        )  # fmt: skip
+        found = response_of_logs(logs, wish, at, data=None if data is None else Path(data))
+        files += [at / "fit.json"] if found.answer else []
+        told = log_chapter(found)
+    else:
+        for value, option in ((signal, "--signal"), (counts, "--counts"), (known, "--known"), (command, "--command")):
+            if value:
+                raise BadInput(f"{option} belongs to a log, and none was named; name one, or leave the option out.")
+        from upright.experiments.frequency_1b.chapter import chapter
+        from upright.experiments.frequency_1b.run import run_frequency
+        from upright.experiments.makes import make_named
+
+        make = rig or "furuta"
+        make_named(make)
+        found = run_frequency(make, seed, at, progress, kind=ask)
+        files += [at / "sweep.csv", at / "fit.json"]
+        told = chapter(found)
+    files += write_page(told, at / "report.html", pdf)
+    return Answer(found, told, files)
+
+
+def _count(name: str, text: float | str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if value == 0:
+        raise BadInput(f"--counts {name} needs a number that is not 0, got '{text}'.")
+    return value
+
+
+def _known(name: str, value: float | str | tuple[float, float], make: str) -> tuple[float, float]:
+    """Value and standard uncertainty [SI]."""
+    from upright.experiments.makes import MAKES
+
+    if make not in MAKES:
+        raise BadInput("--known belongs to a fit; name the rig with --rig too.")
+    if isinstance(value, tuple):
+        return si(value[0], ""), si(value[1], "")
+    if not isinstance(value, str):
+        return si(value, ""), 0.0
+    from upright.units import measured
+
+    plant = MAKES[make].plant
+    if name in plant.names():
+        return measured(value, plant.quantity(name).unit)
+    return measured(value, "s" if name in ("actuator.delay", "actuator.lag") else "")
+
+
+def loadings(
+    logs: Sequence[Log] | Log = (), *, added: Sequence[str] | str = (), signal: str = "", command: str = "",
+    tolerance: float | str = "0 %", free: bool = False, twin: str = "", seed: int = 0,
+    out: str | os.PathLike[str] | None = None, pdf: bool = False,
+) -> Answer[Loadings]:  # fmt: skip
+    """Stiffness and bare inertia from step responses with known added masses (experiment 1a).
+
+    Each swing gives a damped period, and its extremes viscous and dry friction; 1/omega_n^2 over the added inertia is a
+    line whose slope is 1/k.
+
+    Parameters
+    ----------
+    logs : path, Record, pandas.DataFrame, or a list of them
+        One log of steps for each loading; repeats welcome.
+    added : sequence of str
+        What was added, log by log: ``"1.5 kg"``, ``"4e-3 kg m^2"``, or ``"2 at 6.5 cm"`` (500 g each).
+    signal : str, optional
+        Column of the position, in any unit.
+    command : str, optional
+        Column of the command that steps.
+    tolerance : float or str
+        Standard uncertainty of one added piece, as a share.
+    free : bool
+        Count swings at zero command only, with the drive silent.
+    twin : str, optional
+        No logs: step a twin, rectilinear or torsional.
+    seed : int
+        Which twin of the make; 0 is the one as designed.
+    out : path, optional
+        Folder for the page, and for the logs of a twin.
+    pdf : bool
+        Write the page as PDF too.
+
+    Returns
+    -------
+    Answer
+        Of `Loadings`.
+
+    Raises
+    ------
+    BadInput
+        When logs and loadings do not match, or a column is not told.
+    NotIdentifiable
+        When too few swings can be seen.
+    """
+    from upright.experiments.weighing_1a.from_logs import weigh_logs, weigh_twin
+
+    at = folder_if_given(out, pdf)
+    given = paths(logs)
+    if twin:
+        if given or added:
+            raise BadInput("--twin steps a simulated rig and takes no logs; leave out either.")
+        found, told = weigh_twin(twin, seed, at)
+    else:
+        if not given or len(texts(added)) != len(given):
+            raise BadInput(
+                f"Every log needs its --added, in the same order: {len(given)} logs came with {len(texts(added))};"
+                ' write --added "0 kg" for the bare one, or try --twin rectilinear.'
+            )
+        records = [(record, path.name) for record, path in map(open_log, given)]
+        found, told = weigh_logs(
+            records, texts(added), signal=signal, command=command, tolerance=si(tolerance, "1"), free=free
+        )
+    return Answer(found, told, [] if at is None else write_page(told, at / "report.html", pdf))
+
+
+def plan_inertias(
+    *, rig: str = "rectilinear", bare: float | str = "", error: float | str = "0.2 %", tolerance: float | str = "0.2 %",
+    runs: int = 10, levels: int = 3, radius: Sequence[float | str] | float | str = (), target: float | str = "",
+    out: str | os.PathLike[str] | None = None,
+) -> Answer[dict[int, tuple[Plan, Plan]]]:  # fmt: skip
+    """Which added masses give the tightest stiffness for the fewest runs of experiment 1a.
+
+    Carts take 0, 0.5, 1, 1.5 or 2 kg; disks take none, two or four masses of 500 g on any bolt circle. Every design is
+    compared on the line 1/omega_n^2 = (m_0 + a)/k.
+
+    Parameters
+    ----------
+    rig : str
+        rectilinear (carts) or torsional (disks).
+    bare : float or str, optional
+        Bare inertia, roughly [kg or kg m^2]; 0.77 kg or 3e-3 kg m^2 when omitted.
+    error : float or str
+        Standard error of a frequency from one run, as it was measured; a share.
+    tolerance : float or str
+        Standard uncertainty of one added mass or inertia; a share.
+    runs : int
+        Most runs to be planned, 2 to 16.
+    levels : int
+        Different loadings at least, 2 to 5.
+    radius : float, str or a sequence of them, optional
+        Bolt circles of a disk [m]; 2 to 9 cm when omitted.
+    target : float or str, optional
+        Standard error of the stiffness that would do; a share.
+    out : path, optional
+        Picture to draw (SVG, PNG).
+
+    Returns
+    -------
+    Answer
+        Of the best plans by number of runs: for the stiffness, and for stiffness and bare inertia together.
+
+    Raises
+    ------
+    BadInput
+        When there is no such rig, or numbers contradict each other.
+    """
+    from upright.experiments.makes import OSCILLATORS
+    from upright.experiments.weighing_1a.plan import chapter, choices, choose
+    from upright.identification.loadings import plan_loadings
+    from upright.verbs.values import si_if_given
+
+    if rig not in OSCILLATORS:
+        raise BadInput(f"--rig is {' or '.join(OSCILLATORS)}, got '{rig}'; {nearest(rig, OSCILLATORS)}")
+    for value, option, most in ((runs, "--runs", 16), (levels, "--levels", 5)):
+        if not 2 <= value <= most:
+            raise BadInput(f"{option} needs a whole number from 2 to {most}, got {value}.")
+    body = OSCILLATORS[rig]
+    choice = choices(rig, [si(r, "m") for r in paths(radius) if r != ""])
+    given = si_if_given(bare, body.unit)
+    m_0 = body.plant.parameters()[body.inertia] if given is None else given
+    piece = min(w.added for w in choice if w.added > 0)
+    piece = piece / 2 if rig == "torsional" else piece
+    e, g = _share(error, "--error"), _share(tolerance, "--tolerance")
+    if runs < levels:
+        raise BadInput(f"--runs needs at least as many as --levels, got {runs} for {levels}; plan more runs.")
+    plans = {
+        n: plan_loadings(choice, n, bare=m_0, error=e, tolerance=g, piece=piece, levels=levels)
+        for n in range(levels, runs + 1)
+    }
+    wanted = _share(target, "--target") if target != "" else None
+    chosen = choose({n: p[0].k for n, p in plans.items()}, wanted)
+    if out is not None:
+        from upright.experiments.weighing_1a.figures import plan_figure
+        from upright.report.drawing import save
+
+        save(plan_figure(plans, chosen), Path(out))
+    return Answer(plans, chapter(plans, chosen, wanted, body.unit), [] if out is None else [Path(out)])
+
+
+def _share(given: float | str, option: str) -> float:
+    value = si(given, "1")
+    if not 0 <= value < 0.5:
+        raise BadInput(f"{option} needs a share between 0 and 50 %, got '{given}'; write it as '0.2 %'.")
+    return value

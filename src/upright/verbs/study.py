@@ -1,0 +1,35 @@
+"""The study that a verb is given, and what it says of where its numbers come from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from upright.errors import BadInput
+
+if TYPE_CHECKING:
+    from upright.study.load import Study
+
+
+def read_study(study: Path, folder: Path, data: Path | None) -> Study:
+    """A study, once study and folder of the results are what they should be."""
+    from upright.report.symbols import typed
+    from upright.study.load import load_study
+
+    if not study.exists():
+        raise BadInput(
+            f"the study {study} does not exist; `upright init LOG -o {typed(study.name)}` writes one from a log"
+        )
+    if folder.exists() and not folder.is_dir():
+        raise BadInput(f"results need a folder, but {folder} is a file; name another with -o")
+    return load_study(study, data=data)
+
+
+def provenance(asked: Study) -> dict[str, object]:
+    """Where the numbers of a study come from."""
+    return {
+        "study": asked.path.name,
+        "sha256 of the study": asked.sha256,
+        "data": asked.source or "not stated",
+        "runs": {run.label: run.source for run in asked.runs},
+    }

@@ -1,0 +1,130 @@
+"""What a call hands over, as the verbs take it: logs, values with or without a unit, poles, pairs of name and value.
+
+A text is read as the command line reads it; a number is in SI units with radians.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+from upright.errors import BadInput
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from upright.records import Record
+
+T = TypeVar("T")
+
+
+class Frame(Protocol):
+    """What a pandas data frame is recognised by, so that pandas need not be there."""
+
+    @property
+    def columns(self) -> Any:
+        """Names of the columns."""
+        ...
+
+    @property
+    def iloc(self) -> Any:
+        """Rows and columns by number."""
+        ...
+
+
+if TYPE_CHECKING:
+    Log = str | os.PathLike[str] | Record | Frame
+    """A log: its file, a record, or a data frame."""
+
+
+def open_log(log: Log, reader: str = "") -> tuple[Record, Path]:
+    """Record of a log and the path that it is called by; ``log`` for one that comes from no file.
+
+    Raises
+    ------
+    BadInput
+        When it is none, or the file cannot be read.
+    """
+    if isinstance(log, str | os.PathLike):
+        from upright.readers import read
+
+        path = Path(log)
+        return read(path, reader=reader or None), path
+    from upright.records import Record
+
+    if not isinstance(log, Record):
+        if not (hasattr(log, "columns") and hasattr(log, "iloc")):
+            raise BadInput(f"a log is a file's name, a Record or a pandas DataFrame, got {log!r:.60}.")
+        log = Record.from_pandas(log)
+    name = log.provenance.file or "log"
+    return log.replace(provenance=replace(log.provenance, file=name)), Path(name)
+
+
+def si(value: float | str, unit: str) -> float:
+    """Value in SI: a text such as ``"2 mm"`` is converted, a plain number is taken to be in SI already.
+
+    Raises
+    ------
+    BadInput
+        When the text is no value of this dimension, or the number is not finite.
+    """
+    if isinstance(value, str):
+        from upright.units import parse
+
+        return parse(value, unit)
+    if not math.isfinite(value):
+        raise BadInput(f"a finite number was needed, in the SI unit of {unit or '1'}, got {value}.")
+    return float(value)
+
+
+def si_if_given(value: float | str | None, unit: str) -> float | None:
+    """The same for an option that may be left out, as None or an empty text."""
+    return None if value is None or value == "" else si(value, unit)
+
+
+def poles(value: str | Iterable[complex] | None) -> NDArray[np.complex128] | None:
+    """Poles [1/s] of a text such as ``"-4+-2j, -10"`` or of numbers, a pair as two; None where none are given."""
+    if value is None or isinstance(value, str):
+        from upright.gains.requests import read_poles
+
+        return read_poles(value) if value else None
+    import numpy as np
+
+    asked = np.atleast_1d(np.asarray(value, dtype=np.complex128)).ravel()
+    return asked if asked.size else None
+
+
+def pairs(value: Mapping[str, T] | Sequence[str] | str | None, option: str) -> dict[str, T | str]:
+    """Values by name, of a mapping or of texts NAME=VALUE.
+
+    Raises
+    ------
+    BadInput
+        When a text is no such pair.
+    """
+    if isinstance(value, Mapping):
+        return dict(value)
+    out: dict[str, T | str] = {}
+    for text in texts(value):
+        name, equals, said = text.partition("=")
+        if not equals or not name.strip() or not said.strip():
+            raise BadInput(f"{option} takes NAME=VALUE, got '{text}'.")
+        out[name.strip()] = said.strip()
+    return out
+
+
+def texts(value: Sequence[str] | str | None) -> tuple[str, ...]:
+    """Several texts of an option that may be one or none."""
+    return (value,) if isinstance(value, str) and value else tuple(value or ())
+
+
+def paths(value: Sequence[T] | T | None) -> tuple[T, ...]:
+    """Several logs or files of an argument that may be one or none."""
+    if value is None:
+        return ()
+    return tuple(value) if isinstance(value, list | tuple) else (value,)  # type: ignore[return-value]

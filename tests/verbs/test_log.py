@@ -1,0 +1,106 @@
+"""Do the verbs of a log answer in a notebook what the commands answer, and write nothing unless asked?"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.closed_loop.programs import Pid, closed_loop
+from upright.errors import BadInput
+from upright.records import Record
+from upright.verbs.log import doctor, init, law, read, show
+
+T = np.arange(1500) * 4e-3
+SWING = np.round(0.8 * np.exp(-0.3 * T) * np.cos(7 * T), 4)
+
+
+def record(theta: np.ndarray = SWING) -> Record:
+    return Record(t=T, signals={"theta": theta}, units={"theta": "rad"})
+
+
+@pytest.fixture(autouse=True)
+def nothing_is_written_unasked(tmp_path, monkeypatch):
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    yield
+    assert list((tmp_path / "here").iterdir()) == []
+
+
+def forms(tmp_path: Path):
+    """One log as file name, record and data frame."""
+    pandas = pytest.importorskip("pandas")
+    np.savetxt(tmp_path / "swing.csv", np.column_stack([T, SWING]), "%.9g", ",", header="t,theta [rad]", comments="")
+    return (str(tmp_path / "swing.csv"), tmp_path / "swing.csv", record(), pandas.DataFrame({"t": T, "theta": SWING}))
+
+
+def test_a_log_is_a_file_a_record_or_a_data_frame(tmp_path):
+    for log in forms(tmp_path):
+        seen = read(log)
+        np.testing.assert_allclose(seen.t, T, atol=1e-9)
+        np.testing.assert_allclose(seen[seen.names[0]], SWING, atol=1e-9)
+        assert show(log).value.time.period == pytest.approx(4e-3)
+
+
+@pytest.mark.parametrize("thing", [3, {"t": T}, None])
+def test_what_is_no_log_is_refused_in_a_sentence(thing):
+    with pytest.raises(BadInput, match="a Record or a pandas DataFrame"):
+        read(thing)
+
+
+def test_a_planted_jump_is_found_where_it_was_planted():
+    found = doctor(record(SWING + np.where(T > 2.2, 0.15, 0.0)))
+    (jump,) = [f for f in found.findings if f.kind == "jump"]
+    # between two samples the swing itself moves by at most 0.022 rad
+    assert jump.evidence["jump [rad]"] == pytest.approx(0.15, abs=0.03)
+    assert found.wrong
+    assert found.numbers["wrong"] is True
+    assert not doctor(record(), rig="pendulum").wrong
+    assert "jump" in repr(found)
+    assert found.files == ()
+
+
+def test_the_picture_and_the_page_are_written_where_they_are_asked_for(tmp_path):
+    assert show(record(), out=tmp_path / "out").files == (tmp_path / "out" / "show-log.svg",)
+    assert show(record(), out=tmp_path / "mine.png").files == (tmp_path / "mine.png",)
+    page = doctor(record(), html=tmp_path / "page.html")
+    assert page.files == (tmp_path / "page.html",)
+    assert "<html" in page.files[0].read_text(encoding="utf-8")
+
+
+def test_a_draft_is_answered_and_written_only_where_asked(tmp_path):
+    drafted = init(record())
+    assert tomllib.loads(drafted.value)["rig"]["plant"] == "pendulum"
+    assert drafted.files == ()
+    written = init(record(), out=tmp_path / "study.toml")
+    assert written.files == (tmp_path / "study.toml", tmp_path / "study.csv")
+    (run,) = tomllib.loads(written.files[0].read_text(encoding="utf-8"))["runs"]
+    np.testing.assert_allclose(read(tmp_path / run["file"])["theta"], SWING)
+    with pytest.raises(BadInput, match="exists already"):
+        init(record(), out=tmp_path / "study.toml")
+    init(record(), out=tmp_path / "study.toml", force=True)
+
+
+def test_the_gains_of_a_simulated_loop_come_back(tmp_path):
+    log = closed_loop(Pid(kp=4.0, ki=3.0, kd=0.2, second=0.8, on="measurement"), rows=2000, step=0.01)
+    found = law(log, command="u", measured="y", reference="r", out=tmp_path / "out")
+    for name, true in (("kp", 4.0), ("ki", 3.0), ("kd", 0.2)):
+        low, high = found.gains[name].interval
+        assert low <= true <= high
+        assert found.numbers["gains"][name]["value"] == pytest.approx(true, rel=0.01)
+    assert [f.name for f in found.files] == ["law-log.json", "law-log.svg", "law-log.html"]
+    with pytest.raises(BadInput, match="holds the columns y, r, u"):
+        law(log)
+
+
+def test_the_verbs_load_no_numerical_library_before_they_are_called():
+    code = (
+        "import sys, upright.verbs.log, upright.verbs.model, upright.verbs.control, upright.verbs.course\n"
+        "print([n for n in ('numpy', 'scipy', 'sympy', 'numba', 'matplotlib', 'pandas') if n in sys.modules])"
+    )
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, encoding="utf-8", check=True)
+    assert out.stdout.strip() == "[]"

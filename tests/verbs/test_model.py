@@ -1,0 +1,88 @@
+"""Do the verbs of a model give back numbers that are known, and say what cannot be used?"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from upright.errors import BadInput
+from upright.records import Record
+from upright.verbs.model import frequency, ladder, loadings, plan_inertias, predict
+
+
+def swinging(k: float, m: float, decay: float = 0.4) -> Record:
+    """A cart on a spring, pulled aside and let go: the closed form of m x'' + 2 decay m x' + k x = 0."""
+    t = np.arange(2500) * 2e-3
+    omega = np.sqrt(k / m - decay**2)
+    x = 0.02 * np.exp(-decay * t) * (np.cos(omega * t) + decay / omega * np.sin(omega * t))
+    return Record(t=t, signals={"x": x}, units={"x": "m"}, outputs=("x",))
+
+
+def test_stiffness_and_bare_mass_of_a_spring_come_back():
+    added = (0.0, 0.5, 1.0)
+    found = loadings([swinging(400.0, 0.8 + a) for a in added], added=[f"{a} kg" for a in added])
+    # parabolas through the samples time a swing to some 1e-4 of its period
+    assert found.k.value == pytest.approx(400.0, rel=2e-3)
+    assert found.bare.value == pytest.approx(0.8, rel=5e-3)
+    assert found.files == ()
+    assert found.numbers["k"]["value"] == found.k.value
+
+
+def test_a_loading_for_each_log_is_needed():
+    with pytest.raises(BadInput, match="1 logs came with 0"):
+        loadings(swinging(400.0, 0.8))
+    with pytest.raises(BadInput, match="takes no logs"):
+        loadings(swinging(400.0, 0.8), twin="rectilinear")
+
+
+def test_a_plan_is_as_exact_as_a_straight_line_can_be():
+    plans = plan_inertias(runs=4, error=0.002, tolerance=0.0, bare=0.8)
+    plan = plans.value[4][0]
+    # 1/omega^2 = (m + a)/k with relative errors 2*0.002: weighted least squares by hand
+    a = np.repeat([w.added for w in plan.loadings], plan.runs) + 0.8
+    design = np.column_stack([np.ones(a.size), a - 0.8]) / (0.004 * a[:, None])
+    covariance = np.linalg.inv(design.T @ design)  # of (m, 1) in units of 1/k
+    assert plan.k == pytest.approx(np.sqrt(covariance[1, 1]), rel=1e-3)
+    assert plan_inertias(runs=4, error="0.2 %", tolerance="0 %", bare="800 g").numbers == plans.numbers
+
+
+@pytest.mark.parametrize(
+    ("call", "sentence"),
+    [
+        (lambda: plan_inertias(rig="furuta"), "--rig is"),
+        (lambda: plan_inertias(radius=0.04), "--radius is for disks"),
+        (lambda: plan_inertias(runs=2, levels=3), "at least as many as --levels"),
+        (lambda: plan_inertias(runs=40), "from 2 to 16"),
+        (lambda: plan_inertias(error=0.6), "between 0 and 50 %"),
+        (lambda: frequency(ask="noise"), "sines, multisine, sweep"),
+        (lambda: frequency(known={"m_p": 0.1}), "belongs to a log"),
+        (lambda: predict("fit.json", "study.toml"), "the model fit.json does not exist"),
+        (lambda: ladder("study.toml"), "the study study.toml does not exist"),
+    ],
+)
+def test_what_cannot_be_used_is_said(tmp_path, monkeypatch, call, sentence):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(BadInput, match=sentence):
+        call()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_line_of_a_frequency_response_comes_back(tmp_path):
+    """x'' + 4 x = u, asked by a sweep: |G| = 1/|4 - w^2| far from the resonance."""
+    t = np.arange(20000) * 5e-3
+    omega = 4.0 + 8.0 * t / t[-1]
+    u = np.sin(np.cumsum(omega) * 5e-3)
+    # exact for piecewise constant u: the zero-order hold of an oscillator at 2 rad/s
+    c, s, h = np.cos(2 * 5e-3), np.sin(2 * 5e-3) / 2, (1 - np.cos(2 * 5e-3)) / 4
+    x, v, y = 0.0, 0.0, np.zeros(t.size)
+    for k in range(t.size):
+        y[k] = x
+        x, v = c * x + s * v + h * u[k], -4 * s * x + c * v + s * u[k]
+    log = Record(t=t, signals={"u": u, "y": y}, units={"y": "m"}, inputs=("u",), outputs=("y",))
+    log.to_csv(tmp_path / "sweep.csv")
+    found = frequency(tmp_path / "sweep.csv", low=5.0, high=10.0, out=tmp_path / "out")
+    response = found.response
+    near = np.abs(response.omega - 7.0).argmin()
+    w = response.omega[near]
+    assert np.abs(response.response[near, 0]) == pytest.approx(1 / abs(4 - w**2), rel=0.05)
+    assert found.files == (tmp_path / "out" / "frequency.csv", tmp_path / "out" / "report.html")
