@@ -73,7 +73,7 @@ def test_a_fit_goes_to_a_file_that_the_commands_read(fit, tmp_path):
     assert read_fit(fit.save(tmp_path / "fit.json")).values["l_cg"] == fit.parameters.value["l_cg"]
     page = fit.report(tmp_path / "fit.html").read_text(encoding="utf-8")
     assert fit.verdict.split(".")[0] in page
-    with pytest.raises(up.BadInput, match="ending in .html or .pdf"):
+    with pytest.raises(up.BadInput, match=r"ending in \.html or \.pdf"):
         fit.report(tmp_path / "fit.doc")
 
 

@@ -80,7 +80,8 @@ def _(plant: Plant) -> Chapter:
         if value != 0 or name in needed
     )
     table = Table(
-        caption="Parameters; those not listed are zero", headings=("symbol", "value", "unit", "meaning"), rows=rows, numbers=(1,)
+        caption="Parameters; those not listed are zero", headings=("symbol", "value", "unit", "meaning"), rows=rows,
+        numbers=(1,),
     )  # fmt: skip
     moves = ", ".join(f"{c.name} [{c.unit}]" for c in plant.coordinates)
     driven = ", ".join(f"{i.name} [{i.unit}]" for i in plant.inputs) or "nothing"
