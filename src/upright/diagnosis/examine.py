@@ -6,17 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from upright.diagnosis.balance import Balance
 from upright.diagnosis.case import Case, KnownRig, case_of
 from upright.diagnosis.clock import examine_clock
-from upright.diagnosis.drive import examine_push, examine_uselessness, push_of
-from upright.diagnosis.effort import examine_effort, examine_settings
+from upright.diagnosis.effort import examine_effort, examine_push, examine_settings, examine_uselessness, push_of
 from upright.diagnosis.findings import KINDS, SEVERITIES, Diagnosis, Finding
-from upright.diagnosis.forces import against_form, against_gain, against_numbers, values_of
-from upright.diagnosis.motion import Motion, motion_of
+from upright.diagnosis.forces import Balance, against_form, against_gain, against_numbers, values_of
+from upright.diagnosis.motion import Motion, motion_of, terms
 from upright.diagnosis.rest import examine_rest
 from upright.diagnosis.sensors import examine_sensors
-from upright.diagnosis.structure import terms
 from upright.readers.inspection import inspect_record
 from upright.records import Record
 

@@ -8,8 +8,7 @@ from upright.diagnosis.case import Case, unit_of
 from upright.diagnosis.effort import HELD
 from upright.diagnosis.findings import Curve, Finding, Panel
 from upright.records import Array
-from upright.signals.stretches import pieces
-from upright.signals.turning import turning_points
+from upright.signals.stretches import pieces, turning_points
 
 
 def examine_rest(case: Case) -> list[Finding]:
