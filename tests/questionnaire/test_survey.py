@@ -28,7 +28,7 @@ from upright.questionnaire import (
 )
 from upright.questionnaire.chapter import chapter
 from upright.questionnaire.paired import signed_ranks
-from upright.questionnaire.summary import squares_of_gains
+from upright.questionnaire.printed import squares_of_gains
 from upright.report.page import Table
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "survey"

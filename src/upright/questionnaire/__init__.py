@@ -1,9 +1,8 @@
 """Did the course help, as far as its survey can tell? Ratings before and after, agreement, and printed summaries."""
 
-from upright.questionnaire.grim import Fits, counts, fitting, possible, whole_row
 from upright.questionnaire.paired import Paired, compare, holm
+from upright.questionnaire.printed import Bound, Fits, bound, counts, fitting, possible, whole_row
 from upright.questionnaire.sheet import Item, Likert, Means, Ratings, Shares, read
-from upright.questionnaire.summary import Bound, bound
 
 __all__ = [
     "Bound",

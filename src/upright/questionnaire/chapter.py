@@ -8,10 +8,9 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from upright.questionnaire.figures import agreement_figure, bounds_figure, fitting_figure, gain_figure
-from upright.questionnaire.grim import Fits, counts, fitting, possible, whole_row
 from upright.questionnaire.paired import compare, holm
+from upright.questionnaire.printed import Fits, bound, counts, fitting, possible, whole_row
 from upright.questionnaire.sheet import Likert, Means, Ratings, Shares
-from upright.questionnaire.summary import bound
 from upright.report.page import Block, Chapter, Part, Picture, Points, Step, Table
 from upright.report.symbols import number
 

@@ -11,9 +11,8 @@ import re
 
 import numpy as np
 
-from upright.readers.source import Source
-from upright.readers.table import Table
-from upright.readers.timebase import exact_seconds, is_epoch, is_index, rebuild
+from upright.readers.resolution import exact_seconds, is_epoch, is_index, rebuild
+from upright.readers.source import Source, Table
 from upright.records import Array, Record
 from upright.records.columns import stated_unit, time_scale
 from upright.records.exchange import CSV_MARK

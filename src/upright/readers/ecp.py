@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import re
 
-from upright.readers.source import Source
-from upright.readers.table import Table
-from upright.readers.timebase import rebuild
+from upright.readers.resolution import rebuild
+from upright.readers.source import Source, Table
 from upright.records import Record
 
 

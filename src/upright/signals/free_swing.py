@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import NotIdentifiable
-from upright.signals.turning import turning_points
+from upright.signals.stretches import turning_points
 
 Array = NDArray[np.float64]
 

@@ -107,7 +107,7 @@ def identify(
     from upright.files import json_text
     from upright.identification.estimate import identify as estimate
     from upright.identification.ladder.cross_validation import cross_validate
-    from upright.study.fit_file import write_fit
+    from upright.study.results import write_fit
 
     with progress_bar(quiet=as_json) as bar:
         fit = estimate(asked.rig, asked.runs, method=method, progress=bar)

@@ -54,7 +54,7 @@ def ladder(
     from upright.files import json_text
     from upright.identification.ladder.growth import climb
     from upright.report.symbols import typed
-    from upright.study.ladder_file import can_be_trimmed, chosen_study, write_ladder
+    from upright.study.results import can_be_trimmed, chosen_study, write_ladder
 
     folder = out if out is not None else study.with_name(f"{study.stem}-ladder")
     asked = read_study(study, folder, data)

@@ -34,8 +34,8 @@ def predict(
     from upright.files import json_text
     from upright.report.fit.tables import score_table
     from upright.report.page import Chapter, Part
-    from upright.study.fit_file import read_fit
     from upright.study.load import load_study
+    from upright.study.results import read_fit
 
     for file, what in ((model, "the model"), (study, "the study")):
         if not file.exists():

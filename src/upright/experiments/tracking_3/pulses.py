@@ -136,8 +136,8 @@ def identify_shaft(
 ) -> tuple[Study, Fit]:
     """Pulse a rig, write logs and study, and fit it as `upright identify` would; writes `fit.json` too."""
     from upright.identification.estimate import identify
-    from upright.study.fit_file import write_fit
     from upright.study.load import load_study
+    from upright.study.results import write_fit
 
     folder.mkdir(parents=True, exist_ok=True)
     for file in _PULSES:

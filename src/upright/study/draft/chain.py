@@ -13,8 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from upright.physics import Plant, find
-from upright.readers.inspection import Column
-from upright.readers.suspect_columns import DAC_COUNTS_PER_VOLT
+from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Column
 from upright.records import Record
 from upright.signals.smoothing import acceleration_width, savitzky_golay
 from upright.signals.trips import find_trip

@@ -12,8 +12,8 @@ from upright.errors import BadInput, UprightError
 from upright.physics import find
 from upright.readers.inspection import Column, Inspection
 from upright.records import Record
+from upright.signals.stretches import turning_points
 from upright.signals.trips import goes_dead
-from upright.signals.turning import turning_points
 from upright.study.draft.recognise import REFERENCE, Recognised, in_dac_counts
 from upright.study.sensors import Array
 

@@ -14,8 +14,7 @@ from dataclasses import MISSING, dataclass, field, fields, replace
 import numpy as np
 
 from upright.physics import Plant, find
-from upright.readers.inspection import Inspection
-from upright.readers.suspect_columns import DAC_COUNTS_PER_VOLT
+from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Inspection
 from upright.records import Record
 from upright.signals.smoothing import acceleration_width, savitzky_golay
 from upright.study.draft.recognise import Recognised, in_dac_counts

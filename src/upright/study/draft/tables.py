@@ -6,8 +6,7 @@ from collections.abc import Iterable
 
 from upright.physics import Plant
 from upright.physics.statement import Coordinate
-from upright.readers.inspection import Column
-from upright.readers.suspect_columns import DAC_COUNTS_PER_VOLT
+from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Column
 from upright.records import Record
 from upright.study.draft.recognise import in_dac_counts
 from upright.study.write import Table
