@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Generator, Iterable
+from collections.abc import Generator, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -18,12 +18,6 @@ from upright.errors import BadInput, UprightError, nearest
 
 KeyPath = tuple[str | int, ...]
 """Keys from the root down; the entries of a list of tables are counted from 0."""
-
-_TOKEN = re.compile(
-    r"""(?P<string>\"\"\"(?:\\.|[^\\])*?\"\"\"|'''.*?'''|"(?:\\.|[^"\\\n])*"|'[^'\n]*')"""
-    r"""|(?P<comment>\#[^\n]*)|(?P<newline>\n)|(?P<mark>[\[\]{},=.])|(?P<bare>[^\s\[\]{},=.\#"']+)""",
-    re.DOTALL,
-)
 
 
 class StudyText:
@@ -210,88 +204,60 @@ def show(value: Any) -> str:
 def key_lines(text: str) -> dict[KeyPath, int]:
     """Line (from 1) of every key and table of valid TOML; list entries are counted from 0.
 
-    Follows tables, lists of tables, dotted keys and inline tables; strings and comments are passed over.
+    The text is read again by `tomllib`, key by key: lines are gathered until they are TOML by themselves. A list over
+    several lines is closed early after each of them, which tells what the line added.
     """
     lines: dict[KeyPath, int] = {}
     counts: dict[KeyPath, int] = {}
     base: KeyPath = ()
-    stack: list[tuple[str, KeyPath]] = []  # open inline tables and lists, with the path they stand for
-    key: list[str] = []
-    pending: KeyPath = ()
-    header = 0  # brackets of a table header that are open
-    in_value = False
-    line = 1
-    start_of_line = True
-
-    def note(path: KeyPath) -> None:
-        for cut in range(1, len(path) + 1):
-            lines.setdefault(path[:cut], line)
-
-    for token in _TOKEN.finditer(text):
-        kind, word = token.lastgroup, token.group()
-        if kind == "newline":
-            line += 1
-            if not stack:
-                in_value, start_of_line, key, header = False, True, [], 0
-            continue
-        if kind == "comment":
-            continue
-        if header or (start_of_line and word == "[" and not stack):
-            if word == "[":
-                header += 1
-            elif word == "]":
-                if key:
-                    base = _enter(tuple(key), counts, is_list=header == 2)
-                    note(base)
-                key = []
-            elif word != ".":
-                key.append(_unquote(word, kind))
-            start_of_line = False
-            continue
-        start_of_line = False
-        owner = stack[-1] if stack else ("{", base)
-        if not in_value and owner[0] == "{":
-            if word == "=":
-                pending = (*owner[1], *key)
-                note(pending)
-                key, in_value = [], True
-            elif word == "}":
-                stack.pop()
-                in_value = True
-            elif word not in (".", ","):
-                key.append(_unquote(word, kind))
-        elif word == "{":
-            stack.append(("{", pending))
-            in_value = False
-        elif word == "[":
-            stack.append(("[", pending))
-            counts[pending] = 0
-            pending = (*pending, 0)
-        elif word == "]" or word == "}":
-            if stack:
-                pending = stack.pop()[1]
-        elif word == ",":
-            if owner[0] == "{":
-                in_value = False
-            else:
-                counts[owner[1]] = counts.get(owner[1], 0) + 1
-                pending = (*owner[1], counts[owner[1]])
-        line += word.count("\n") if kind == "string" else 0
+    gathered, first = "", 1
+    for number, line in enumerate(text.split("\n"), start=1):
+        gathered += f"{line}\n"
+        values, whole = _toml_so_far(gathered)
+        if values and gathered.lstrip().startswith("["):
+            base = _enter(values, counts)
+            paths = [base]
+        else:
+            paths = [(*base, *path) for path in _paths(values)]
+        for path in paths:
+            for cut in range(1, len(path) + 1):
+                lines.setdefault(path[:cut], first if first else number)
+        if values or whole:
+            first = 0  # what comes now was added by a later line
+        if whole:
+            gathered, first = "", number + 1
     return lines
 
 
-def _enter(key: tuple[str, ...], counts: dict[KeyPath, int], *, is_list: bool) -> KeyPath:
+def _toml_so_far(text: str) -> tuple[dict[str, Any], bool]:
+    """What the beginning of a text in TOML says, its lists closed if need be, and whether that was not needed."""
+    for closed in ("", *("]" * depth for depth in range(1, 9))):
+        try:
+            return tomllib.loads(text + closed), not closed
+        except tomllib.TOMLDecodeError:
+            continue
+    return {}, False
+
+
+def _paths(value: Any) -> Iterator[KeyPath]:
+    """Path of every key in a value, with the place of each table in a list."""
+    entries = enumerate(value) if isinstance(value, list) else value.items() if isinstance(value, dict) else ()
+    for key, inner in entries:
+        if isinstance(value, dict) or isinstance(inner, dict):
+            yield (key,)
+        for path in _paths(inner):
+            yield (key, *path)
+
+
+def _enter(header: Any, counts: dict[KeyPath, int]) -> KeyPath:
     """Path of a table header, with the running number of each list of tables on the way."""
     path: KeyPath = ()
-    for i, part in enumerate(key):
-        path = (*path, part)
-        last = i == len(key) - 1
-        if last and is_list:
+    while header:
+        if isinstance(header, list):
             counts[path] = counts.get(path, -1) + 1
-        if path in counts:
+            break
+        key = next(iter(header))
+        path, header = (*path, key), header[key]
+        if path in counts and not isinstance(header, list):
             path = (*path, counts[path])
-    return path
-
-
-def _unquote(word: str, kind: str | None) -> str:
-    return word[1:-1] if kind == "string" else word
+    return (*path, counts[path]) if isinstance(header, list) else path
