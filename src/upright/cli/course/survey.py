@@ -31,8 +31,8 @@ def survey(
     upright survey ratings.csv -o out
     upright survey means.csv --n 53
     """
-    from upright.questionnaire import Ratings, read
     from upright.questionnaire.chapter import chapter
+    from upright.questionnaire.sheet import Ratings, read
     from upright.report.page import Step
     from upright.report.symbols import typed
 
