@@ -15,7 +15,7 @@ from upright.readers.resolution import exact_seconds, is_epoch, is_index, rebuil
 from upright.readers.source import Source, Table
 from upright.records import Array, Record
 from upright.records.columns import stated_unit, time_scale
-from upright.records.exchange import CSV_MARK
+from upright.records.record import CSV_MARK
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?|[+-]?(?:nan|inf|infinity)"
 

@@ -21,7 +21,7 @@ from upright.identification.model.fit import Fit
 from upright.physics import Plant
 from upright.progress import Progress, part, silent
 from upright.records import Record
-from upright.records.provenance import of_twin
+from upright.records.record import of_twin
 from upright.study.load import Study
 from upright.study.write import Table, counted_sensor, number, study_text, table
 
