@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,10 +73,10 @@ def _lies(case: Case) -> list[Finding]:
     return found
 
 
-def _copies(case: Case) -> list[Finding]:
+def _copies(case: Case) -> Iterator[Finding]:
     """An effort that repeats a measured column."""
     if not case.drive or case.drive not in case.record.signals:
-        return []
+        return
     for c in case.measured:
         x, u = case.record[c.name], case.record[case.drive]
         if c.name == case.drive or np.ptp(x) == 0 or np.ptp(u) == 0 or np.unique(u[:2000]).size < 12:
@@ -83,42 +84,37 @@ def _copies(case: Case) -> list[Finding]:
         a, b = x - x.mean(), u - u.mean()
         gain = float(a @ b) / float(a @ a)
         if float(np.abs(b - gain * a).max()) < 1e-6 * float(np.abs(b).max()) + 0.6 * abs(gain) * c.quantum.step:
-            return [
-                Finding(
-                    kind="effort",
-                    columns=(case.drive,),
-                    severity="fault",
-                    sentence=f"'{case.drive}' repeats the position '{c.name}' (times {gain:.6g}): no effort.",
-                    evidence={"factor [1]": gain},
-                    advice="Log the controller's output, or simulate the loop.",
-                    panels=case.over_time(case.drive, c.name),
-                )
-            ]
-    return []
+            yield Finding(
+                kind="effort",
+                columns=(case.drive,),
+                severity="fault",
+                sentence=f"'{case.drive}' repeats the position '{c.name}' (times {gain:.6g}): no effort.",
+                evidence={"factor [1]": gain},
+                advice="Log the controller's output, or simulate the loop.",
+                panels=case.over_time(case.drive, c.name),
+            )
+            return
 
 
-def _constant(case: Case) -> list[Finding]:
+def _constant(case: Case) -> Iterator[Finding]:
     """An effort that never changes although the rig is set in motion."""
     if not case.driven or np.ptp(case.u) > 0 or not any(not c.constant for c in case.measured):
-        return []
-    return [
-        Finding(
-            kind="effort",
-            columns=(case.drive,),
-            severity="warning",
-            sentence=f"'{case.drive}' is {case.u[0]:.6g} from the first to the last sample while the rig moves: a set"
-            " value or a dead channel rather than what was put out.",
-            evidence={"value [1]": float(case.u[0])},
-            advice="Log the effort as applied; for a free motion say so.",
-            key="drive = 0",
-            panels=case.over_time(case.drive, *[c.name for c in case.measured][:1]),
-        )
-    ]
+        return
+    yield Finding(
+        kind="effort",
+        columns=(case.drive,),
+        severity="warning",
+        sentence=f"'{case.drive}' is {case.u[0]:.6g} from the first to the last sample while the rig moves: a set"
+        " value or a dead channel rather than what was put out.",
+        evidence={"value [1]": float(case.u[0])},
+        advice="Log the effort as applied; for a free motion say so.",
+        key="drive = 0",
+        panels=case.over_time(case.drive, *[c.name for c in case.measured][:1]),
+    )
 
 
-def _limited(case: Case) -> list[Finding]:
+def _limited(case: Case) -> Iterator[Finding]:
     """Effort cut off at its limit."""
-    found: list[Finding] = []
     for c in case.inspection.columns:
         asked = any(word in c.name.casefold() for word in ("command", "target", "ref"))
         if not c.drive or c.constant or c.stepwise or asked:
@@ -129,31 +125,28 @@ def _limited(case: Case) -> list[Finding]:
         ends = " and ".join(f"{v:.5g}" for v in (low, high) if v == v)
         limit = max(abs(v) for v in (low, high) if v == v)
         unit = unit_of(c)
-        found.append(
-            Finding(
-                kind="saturation",
-                columns=(c.name,),
-                severity="warning" if share > 0.005 else "note",
-                sentence=f"'{c.name}' is cut off at {ends} {unit} for {100 * share:.2g} % of the samples: the drive is"
-                " at its limit, where a controller no longer acts.".replace("  ", " "),
-                evidence={"share [%]": 100 * share, f"limit [{unit or 1}]": limit},
-                advice="Tell the model the limit; ask for less where linear behaviour is wanted.",
-                key=f"[actuator]\nlimit = {limit:.6g}",
-                panels=case.over_time(c.name),
-            )
+        yield Finding(
+            kind="saturation",
+            columns=(c.name,),
+            severity="warning" if share > 0.005 else "note",
+            sentence=f"'{c.name}' is cut off at {ends} {unit} for {100 * share:.2g} % of the samples: the drive is"
+            " at its limit, where a controller no longer acts.".replace("  ", " "),
+            evidence={"share [%]": 100 * share, f"limit [{unit or 1}]": limit},
+            advice="Tell the model the limit; ask for less where linear behaviour is wanted.",
+            key=f"[actuator]\nlimit = {limit:.6g}",
+            panels=case.over_time(c.name),
         )
-    return found
 
 
-def _early(case: Case) -> list[Finding]:
+def _early(case: Case) -> Iterator[Finding]:
     """Motion that begins from rest before the effort does."""
     if not case.driven or case.u[0] != 0:
-        return []
+        return
     t = case.record.t
     command = int(np.argmax(case.u != 0))
     still = max(int(np.searchsorted(t, t[0] + STILL)), 5)
     if command <= still:
-        return []
+        return
     first, who = len(t), ""
     for c in case.measured:
         x = case.record[c.name]
@@ -169,52 +162,48 @@ def _early(case: Case) -> list[Finding]:
             first, who = int(np.argmax(far)), c.name
     ahead = float(t[command] - t[min(first, command)])
     if not who or ahead < max(0.02, 3 * case.record.period):
-        return []
-    return [
-        Finding(
-            kind="early",
-            columns=(who, case.drive),
-            severity="fault",
-            sentence=f"'{who}' moves at {t[first]:.4g} s, {ahead:.3g} s before the first command of '{case.drive}' at"
-            f" {t[command]:.4g} s: an earlier one was not logged, the clocks differ, or a hand moved it.",
-            evidence={"motion [s]": float(t[first]), "command [s]": float(t[command])},
-            advice="Begin the window after the first command.",
-            key=f'window = [{t[command]:.5g}, "end"]',
-            panels=case.over_time(who, case.drive),
-            marks=(float(t[first]), float(t[command])),
-        )
-    ]
+        return
+    yield Finding(
+        kind="early",
+        columns=(who, case.drive),
+        severity="fault",
+        sentence=f"'{who}' moves at {t[first]:.4g} s, {ahead:.3g} s before the first command of '{case.drive}' at"
+        f" {t[command]:.4g} s: an earlier one was not logged, the clocks differ, or a hand moved it.",
+        evidence={"motion [s]": float(t[first]), "command [s]": float(t[command])},
+        advice="Begin the window after the first command.",
+        key=f'window = [{t[command]:.5g}, "end"]',
+        panels=case.over_time(who, case.drive),
+        marks=(float(t[first]), float(t[command])),
+    )
 
 
-def examine_settings(case: Case) -> list[Finding]:
+def examine_settings(case: Case) -> Iterator[Finding]:
     """Settings in ``runParameters`` that the data contradict: ECP's MATLAB front end shifts its fields."""
     note = next((n for n in case.inspection.notes if n.startswith("runParameters:")), "")
     fields = {m[1]: float(m[2]) for m in re.finditer(r"(\w+) = (-?\d+(?:\.\d+)?(?:e-?\d+)?)", note)}
     if not {"Amplitude", "Reps"} <= fields.keys():
-        return []
+        return
     dac = [c for c in case.inspection.columns if any(lie.startswith("the command in DAC") for lie in c.lies)]
     stored, repetitions = fields["Amplitude"], fields["Reps"]
     if not dac:
-        return []
+        return
     levels = np.unique(case.record[dac[0].name])
     ran = float(levels[np.argmax(np.abs(levels))]) / DAC_COUNTS_PER_VOLT
     evidence = {"stored amplitude [V]": stored, "stored repetitions [1]": repetitions, "ran [V]": round(ran, 3)}
     if abs(stored - ran) < 0.01 or ran == 0:
-        return []
+        return
     shifted = abs(repetitions - ran) < 0.01
-    return [
-        Finding(
-            kind="settings",
-            columns=("runParameters",),
-            severity="warning",
-            sentence="The fields of runParameters are shifted: "
-            f"'Reps' holds the step of {repetitions:g} V and 'Amplitude' the repetitions ({stored:g})."
-            if shifted
-            else f"runParameters says {stored:g} V, but '{dac[0].name}' ran {ran:.3g} V.",
-            evidence=evidence,
-            advice=f"Trust '{dac[0].name}', not the settings.",
-        )
-    ]
+    yield Finding(
+        kind="settings",
+        columns=("runParameters",),
+        severity="warning",
+        sentence="The fields of runParameters are shifted: "
+        f"'Reps' holds the step of {repetitions:g} V and 'Amplitude' the repetitions ({stored:g})."
+        if shifted
+        else f"runParameters says {stored:g} V, but '{dac[0].name}' ran {ran:.3g} V.",
+        evidence=evidence,
+        advice=f"Trust '{dac[0].name}', not the settings.",
+    )
 
 
 LEAST = 0.7
@@ -318,25 +307,23 @@ def examine_push(case: Case, push: Push, *, most: float) -> list[Finding]:
     return []
 
 
-def examine_uselessness(case: Case, push: Push) -> list[Finding]:
+def examine_uselessness(case: Case, push: Push) -> Iterator[Finding]:
     """An effort column that explains little of the force that the driven body needs."""
     if push.without < 0.3 or push.full < 0.95 * push.without:
-        return []
+        return
     driven = next(iter(case.places.values())).column
     explains = 100 * (1 - push.full / push.without)
-    return [
-        Finding(
-            kind="effort",
-            columns=(case.drive,),
-            severity="warning",
-            sentence=f"'{case.drive}' acts like no effort: friction and springs leave {100 * push.without:.0f} %"
-            f" of the driven body's force, and of that '{case.drive}' explains {explains:.0f} %.",
-            evidence={"left to explain [%]": 100 * push.without, "explained by it [%]": explains},
-            advice="Look for the column the controller put out; a reference or a set value is no effort.",
-            key='[drive]\ncolumn = "..."',
-            panels=(*case.over_time(driven, case.drive), _panel(case, push)),
-        )
-    ]
+    yield Finding(
+        kind="effort",
+        columns=(case.drive,),
+        severity="warning",
+        sentence=f"'{case.drive}' acts like no effort: friction and springs leave {100 * push.without:.0f} %"
+        f" of the driven body's force, and of that '{case.drive}' explains {explains:.0f} %.",
+        evidence={"left to explain [%]": 100 * push.without, "explained by it [%]": explains},
+        advice="Look for the column the controller put out; a reference or a set value is no effort.",
+        key='[drive]\ncolumn = "..."',
+        panels=(*case.over_time(driven, case.drive), _panel(case, push)),
+    )
 
 
 def _panel(case: Case, push: Push) -> Panel:

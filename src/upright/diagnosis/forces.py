@@ -8,7 +8,7 @@ leave far less. No simulation, and no friction has to be known: it is regressed.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -205,13 +205,13 @@ def against_numbers(case: Case, balance: Balance) -> list[Finding]:
     return [_mistaken(case, balance, now, alike)]
 
 
-def against_gain(case: Case, balance: Balance) -> list[Finding]:
+def against_gain(case: Case, balance: Balance) -> Iterator[Finding]:
     """An effort whose known gain leaves the driven body unexplained, whatever factor is put on it or on a sensor."""
     now = balance.declared()
     k = balance.motion.rows.index(balance.driven) if balance.used else -1
     others = np.delete(now.unexplained, k)
     if k < 0 or not math.isfinite(balance.gain) or now.unexplained[k] < LOST or (others > 2 * CLEAR).any():
-        return []
+        return
     left = 100 * float(now.unexplained[k])
     driven = case.places[balance.names[balance.driven]]
     u = case.u - case.u.mean()
@@ -222,19 +222,17 @@ def against_gain(case: Case, balance: Balance) -> list[Finding]:
         if alike > 0.6
         else ""
     )
-    return [
-        Finding(
-            kind="effort",
-            columns=(case.drive,),
-            severity="fault",
-            sentence=f"'{case.drive}' acts like no effort: with the rig's known numbers it leaves {left:.0f} % of the"
-            f" force on '{driven.column}' unexplained, and no factor mends that.{follows}",
-            evidence={"unexplained [%]": left, "correlation with the motion [%]": 100 * alike},
-            advice="Look for the column the controller put out; a reference or a set value is no effort.",
-            key='[drive]\ncolumn = "..."',
-            panels=(*case.over_time(driven.column, case.drive), _force_panel(balance, now, "as declared")),
-        )
-    ]
+    yield Finding(
+        kind="effort",
+        columns=(case.drive,),
+        severity="fault",
+        sentence=f"'{case.drive}' acts like no effort: with the rig's known numbers it leaves {left:.0f} % of the"
+        f" force on '{driven.column}' unexplained, and no factor mends that.{follows}",
+        evidence={"unexplained [%]": left, "correlation with the motion [%]": 100 * alike},
+        advice="Look for the column the controller put out; a reference or a set value is no effort.",
+        key='[drive]\ncolumn = "..."',
+        panels=(*case.over_time(driven.column, case.drive), _force_panel(balance, now, "as declared")),
+    )
 
 
 def _mistaken(case: Case, balance: Balance, now: Explanation, alike: list[Explanation]) -> Finding:

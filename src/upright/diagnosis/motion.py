@@ -9,7 +9,6 @@ those that matter are read off.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +17,7 @@ from upright.diagnosis.case import Case
 from upright.errors import BadInput
 from upright.physics import CartPendulum, Furuta, Pendulum, Plant
 from upright.records import Array
-from upright.signals.smoothing import dominant_period, middle, savitzky_golay
+from upright.signals.smoothing import dominant_period, middle, noise_gain, savitzky_golay
 from upright.signals.stretches import pieces
 from upright.study.sensors import Grid
 
@@ -123,21 +122,10 @@ def quiet_width(y: Array, dt: float) -> int:
         width |= 1
         smooth = savitzky_golay(y, dt, width)
         inner = slice(width // 2, n - width // 2)
-        noise = float(np.std((y - smooth.q)[inner])) * curvature(width) / dt**2
+        noise = float(np.std((y - smooth.q)[inner])) * noise_gain(width) / dt**2
         if noise**2 < LOUD * float(np.var(smooth.a[inner])) or width >= most:
             return width
         width = min(int(1.35 * width) + 2, most)
-
-
-@cache
-def curvature(width: int) -> float:
-    """Standard deviation of the acceleration, in units of noise per sample period squared."""
-    s = np.arange(width) - width // 2
-    return (
-        2
-        * float(np.linalg.norm(np.linalg.pinv(np.vander(s / (width // 2), 5, increasing=True))[2]))
-        / (width // 2) ** 2
-    )
 
 
 MATTERS = 0.1

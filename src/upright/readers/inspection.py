@@ -16,6 +16,7 @@ import numpy as np
 from upright.errors import BadInput, nearest
 from upright.readers.resolution import Quantum, find_quantum, rounding
 from upright.records import Array, Record
+from upright.signals.stretches import stretches
 
 _SHOWN = 12  # switches, gaps and rests beyond these tell nothing new
 # What names have in common, in the logs of many laboratories.
@@ -206,9 +207,8 @@ def _pinned(x: Array, level: float, step: float) -> float:
     if np.unique(x[:: max(x.size // 5000, 1)]).size < 12:
         return 0.0
     at = np.abs(x - level) <= 0.25 * step
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], at.astype(np.int8), [0]))))
-    longest = int((edges[1::2] - edges[::2]).max())
-    return float(at.mean()) if longest >= 3 else 0.0
+    longest = max(last - first for first, last in stretches(at))
+    return float(at.mean()) if longest >= 2 else 0.0
 
 
 def _switches(t: Array, x: Array) -> tuple[tuple[float, float], ...]:
@@ -232,10 +232,9 @@ def _rests(t: Array, signals: list[Array]) -> tuple[tuple[float, float], ...]:
     for x in signals:
         swing = np.maximum.reduceat(x, starts) - np.minimum.reduceat(x, starts)
         still &= swing <= 0.01 * np.ptp(x)
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], still.astype(np.int8), [0]))))
     least = max(0.5, 0.01 * float(t[-1] - t[0]))
-    first, after = starts[edges[::2]], np.append(starts, t.size)[edges[1::2]]
-    spans = [(float(t[a]), float(t[b - 1])) for a, b in zip(first.tolist(), after.tolist(), strict=True)]
+    ends = np.append(starts, t.size)[1:] - 1
+    spans = [(float(t[starts[a]]), float(t[ends[b]])) for a, b in stretches(still)]
     return tuple(span for span in spans if span[1] - span[0] >= least)[:_SHOWN]
 
 
