@@ -133,9 +133,9 @@ def _log(run: Section, folder: Path, logs: dict[tuple[str, str, str], Record]) -
         file = folder / name
         if not file.is_file():
             raise run.error("file", f"the log {file} does not exist; {_instead(file, folder)}")
-        with run.text.at(run.place("reader" if reader else "file")):
+        with run.at("reader" if reader else "file"):
             record = read(file, reader=reader or None)
-        with run.text.at(run.place("time")):
+        with run.at("time"):
             logs[key] = record.replace(t=record[time]) if time else record
     return logs[key]
 
@@ -210,11 +210,11 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
     notes: list[str] = [f"{Path(record.provenance.file).name}{f' (sha256 {hash_of})' if hash_of else ''}"]
     if "window" in run:
         start, stop = _window(run, record)
-        with run.text.at(run.place("window")):
+        with run.at("window"):
             record = record.window(start, stop)
         notes.append(f"{start:g} to {stop:g} s")
     period = run.positive("period", "s", 1.0) if "period" in run else study.section("rig").number("period", "s", 0.0)
-    with run.text.at(run.place("window" if "window" in run else "file")):
+    with run.at("window" if "window" in run else "file"):
         grid = Grid.of(record.t, period)
     coordinates = {c.name: c for c in plant.coordinates}
     locked = _locked(run, plant)
@@ -290,7 +290,7 @@ def _window(run: Section, record: Record) -> tuple[float, float]:
     first, last = float(record.t[0]), float(record.t[-1])
     if not isinstance(value, list) or len(value) != 2:
         raise run.error("window", f"window must be two times in s, such as window = [1.0, 9.0], got {show(value)}")
-    with run.text.at(run.place("window")):
+    with run.at("window"):
         start = first if value[0] == "start" else si(value[0], "s", "window")
         stop = last if value[1] == "end" else si(value[1], "s", "window")
         slack = record.period
@@ -349,7 +349,7 @@ def _horizon(run: Section, grid: Grid) -> float | tuple[float, ...] | None:
     if value == "free":
         return None
     listed: list[Any] = value if isinstance(value, list) else [value]
-    with run.text.at(run.place("horizon")):
+    with run.at("horizon"):
         found = [si(v, "s", "horizon") for v in listed]
     step, length = grid.t[1] - grid.t[0], grid.t[-1] - grid.t[0]
     for horizon in found:

@@ -224,7 +224,7 @@ def read_unit(section: Section) -> str:
     if "unit" not in section:
         return ""
     unit = section.text_of("unit", "counts")
-    with section.text.at(section.place("unit")):
+    with section.at("unit"):
         units.scale(unit)
     return unit
 
@@ -242,7 +242,7 @@ def _scale(section: Section, coordinate: Coordinate) -> float:
     value: Any = section.values["scale"]
     if isinstance(value, str):
         unit = section.values.get("unit", "")
-        with section.text.at(section.place("scale")):
+        with section.at("scale"):
             needed = coordinate.unit
             if unit and not units.same_dimension(unit, needed):
                 return units.parse(value, f"{needed}/({unit})") * units.scale(unit)
@@ -256,7 +256,7 @@ def _scale(section: Section, coordinate: Coordinate) -> float:
 def _offset(section: Section) -> float | str:
     value: Any = section.values.get("offset", 0.0)
     if isinstance(value, str):
-        with section.text.at(section.place("offset")):
+        with section.at("offset"):
             units.parse(value)
         return value
     return section.number("offset", "1", 0.0)
@@ -287,15 +287,13 @@ def read_drives(study: Section, run: Section, plant: type[Plant]) -> list[Drive]
 def _as_table(section: Section, key: str) -> Section:
     """Drive of a run, where a plain text stands for its column or expression and 0 for none."""
     value: Any = section.values.get(key, {})
-    if isinstance(value, str):
-        table = Section(section.text, section.place(key), {"expression": value})
-        table.places = {"expression": section.place(key)}
-        return table
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        table = Section(section.text, section.place(key), {"expression": repr(float(value))})
-        table.places = {"expression": section.place(key)}
-        return table
-    return section.section(key)
+    if isinstance(value, bool) or not isinstance(value, str | int | float):
+        return section.section(key)
+    table = Section(
+        section.text, section.place(key), {"expression": value if isinstance(value, str) else repr(float(value))}
+    )
+    table.places = {"expression": section.place(key)}
+    return table
 
 
 def _drive(own: Section, shared: Section, *, free: bool) -> Drive:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Generator, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -105,6 +105,10 @@ class Section:
         both.places = {k: base.place(k) for k in base.values} | {k: self.place(k) for k in self.values}
         return both
 
+    def at(self, key: str) -> AbstractContextManager[None]:
+        """Put file and line of a key before whatever the block complains about."""
+        return self.text.at(self.place(key))
+
     def error(self, key: str, sentence: str) -> BadInput:
         """The complaint about one key of this table."""
         return self.text.error(self.place(key), sentence)
@@ -142,13 +146,18 @@ class Section:
                 raise self.error(key, f"{key} lists {show(item)}; {nearest(str(item), valid)}")
         return tuple(dict.fromkeys(items))
 
+    def entries(self, key: str) -> list[Any]:
+        """List under `key`, where a single entry may stand alone; empty when absent."""
+        value: Any = self.values.get(key, [])
+        return list(value) if isinstance(value, list) else [value]
+
     def number(self, key: str, unit: str, default: float | None = None) -> float:
         """Number under `key` in SI, dimension checked; a plain number is SI already."""
         if key not in self.values:
             if default is None:
                 raise self.error(key, f"[{self.name}] needs {key}, a number in {unit}")
             return default
-        with self.text.at(self.place(key)):
+        with self.at(key):
             return si(self.values[key], unit, key)
 
     def positive(self, key: str, unit: str, default: float) -> float:
