@@ -13,9 +13,18 @@ from scipy import stats
 from tests.paper import printed
 from upright.errors import BadInput
 from upright.questionnaire.chapter import chapter
-from upright.questionnaire.paired import compare, holm, signed_ranks
-from upright.questionnaire.printed import bound, counts, fitting, possible, squares_of_gains, whole_row
 from upright.questionnaire.sheet import Likert, Means, Ratings, Shares, read
+from upright.questionnaire.statistics import (
+    bound,
+    compare,
+    counts,
+    fitting,
+    holm,
+    possible,
+    signed_ranks,
+    squares_of_gains,
+    whole_row,
+)
 from upright.report.page import Table
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "survey"

@@ -8,8 +8,7 @@ import numpy as np
 
 from upright.gains.factorization import Locus
 from upright.gains.requests import matched, written
-from upright.paper.reproduce import Regenerated, Reproduced
-from upright.paper.tables import STUDENTS
+from upright.paper.reproduce import STUDENTS, Regenerated, Reproduced
 from upright.report.drawing import BLACK, BLUE, GREY, VERMILLION, figure, styled
 from upright.report.page import Chapter, Part, Picture, Points, Step, Table
 from upright.report.poles import Poles, locus_figure, pole_map

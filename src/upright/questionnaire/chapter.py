@@ -9,9 +9,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from upright.questionnaire.paired import Paired, compare, holm
-from upright.questionnaire.printed import Bound, Fits, bound, counts, fitting, possible, whole_row
 from upright.questionnaire.sheet import LIKERT, Likert, Means, Ratings, Shares
+from upright.questionnaire.statistics import (
+    Bound,
+    Fits,
+    Paired,
+    bound,
+    compare,
+    counts,
+    fitting,
+    holm,
+    possible,
+    whole_row,
+)
 from upright.report.drawing import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILLION, figure, styled
 from upright.report.page import Block, Chapter, Part, Picture, Points, Step, Table
 from upright.report.symbols import number
