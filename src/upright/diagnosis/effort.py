@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from upright.diagnosis.case import Case, unit_of
 from upright.diagnosis.findings import Curve, Finding, Panel
-from upright.diagnosis.forces import Balance
-from upright.diagnosis.motion import Motion, driven_row
+from upright.diagnosis.forces import ForceBalance
+from upright.diagnosis.motion import SmoothedMotion, driven_row
 from upright.diagnosis.sensors import clipped
 from upright.readers.inspection import DAC_COUNTS_PER_VOLT
 from upright.records import Array
-from upright.signals.trips import Regression
+from upright.signals.trips import TripRegression
 from upright.study.draft.recognise import drive_column
 
 HELD = 0.2
@@ -230,7 +230,7 @@ class Push:
     u: Array
 
 
-def push_of(motion: Motion, balance: Balance | None) -> Push | None:
+def push_of(motion: SmoothedMotion, balance: ForceBalance | None) -> Push | None:
     """What the effort explains; None without an effort on a measured body."""
     if not np.ptp(motion.u) > 0:
         return None
@@ -248,7 +248,9 @@ def push_of(motion: Motion, balance: Balance | None) -> Push | None:
     live = np.flatnonzero(np.abs(u) > 0.02 * float(np.abs(u).max()))
     if live.size < 8:
         return None
-    table = Regression(rows=rows, target=target, base=others, switched=motion.command[:, None], weights=motion.weights)
+    table = TripRegression(
+        rows=rows, target=target, base=others, switched=motion.command[:, None], weights=motion.weights
+    )
     end, costs = table.search(int(rows[live[0]]), int(rows[live[-1]]) + 1, forward=False)
     early = table.before(end)
     late = table.whole - early
@@ -271,7 +273,7 @@ def push_of(motion: Motion, balance: Balance | None) -> Push | None:
     )
 
 
-def swift(motion: Motion, i: int) -> NDArray[np.bool_]:
+def swift(motion: SmoothedMotion, i: int) -> NDArray[np.bool_]:
     """Samples (N,) at which a body is clearly on its way: then friction is known up to a number, and cannot hide."""
     return np.abs(motion.v[i]) > 0.05 * float(np.abs(motion.v[i]).max())
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from upright.diagnosis.case import Case
 from upright.diagnosis.findings import Curve, Finding, Panel
-from upright.diagnosis.motion import MATTERS, Motion, Term
+from upright.diagnosis.motion import MATTERS, SmoothedMotion, Term
 from upright.physics.equations import mass_and_force
 from upright.records import Array
 
@@ -43,19 +43,19 @@ class Explanation:
         return float(np.mean(np.log(self.unexplained + FLOOR)))
 
 
-class Balance:
+class ForceBalance:
     """Equations of motion of one record; `force` (N,) is the effort as force, None when its gain is not known.
 
     Parameters
     ----------
-    motion : Motion
+    motion : SmoothedMotion
     values : mapping of str to float
         Parameters of the plant [SI], friction zero.
     gain : float
         Force per unit of effort; nan when it is not known, any positive one is then as good.
     """
 
-    def __init__(self, motion: Motion, values: Mapping[str, float], gain: float) -> None:
+    def __init__(self, motion: SmoothedMotion, values: Mapping[str, float], gain: float) -> None:
         self.motion, self.values, self.gain = motion, values, gain
         self.names = [c.name for c in motion.plant.coordinates]
         self.driven = self.names.index(motion.plant.inputs[0].on) if motion.plant.inputs else -1
@@ -187,7 +187,7 @@ def values_of(case: Case, friction: frozenset[str]) -> tuple[dict[str, float], f
     return values, gain.value if gain is not None and not gain.estimate else math.nan
 
 
-def against_numbers(case: Case, balance: Balance) -> list[Finding]:
+def against_numbers(case: Case, balance: ForceBalance) -> list[Finding]:
     """Signs and scales, held to known inertias, stiffnesses and gain."""
     now = balance.declared()
     if float(now.unexplained.max()) < DOUBT:
@@ -205,7 +205,7 @@ def against_numbers(case: Case, balance: Balance) -> list[Finding]:
     return [_mistaken(case, balance, now, alike)]
 
 
-def against_gain(case: Case, balance: Balance) -> Iterator[Finding]:
+def against_gain(case: Case, balance: ForceBalance) -> Iterator[Finding]:
     """An effort whose known gain leaves the driven body unexplained, whatever factor is put on it or on a sensor."""
     now = balance.declared()
     k = balance.motion.rows.index(balance.driven) if balance.used else -1
@@ -235,7 +235,7 @@ def against_gain(case: Case, balance: Balance) -> Iterator[Finding]:
     )
 
 
-def _mistaken(case: Case, balance: Balance, now: Explanation, alike: list[Explanation]) -> Finding:
+def _mistaken(case: Case, balance: ForceBalance, now: Explanation, alike: list[Explanation]) -> Finding:
     best = min(alike, key=lambda e: abs(math.log(abs(e.factor))) + (0.0 if e.factor > 0 else 0.1))
     reversed_, size = best.factor < 0, abs(best.factor)
     kind = "sign" if reversed_ and 0.75 < size < 1.33 else "scale"
@@ -271,7 +271,7 @@ def _mistaken(case: Case, balance: Balance, now: Explanation, alike: list[Explan
     )
 
 
-def _force_panel(balance: Balance, e: Explanation, title: str, *, like: Explanation | None = None) -> Panel:
+def _force_panel(balance: ForceBalance, e: Explanation, title: str, *, like: Explanation | None = None) -> Panel:
     """Force that the worst row needs (of `like`, when given), and what is left of it."""
     factors = np.ones((1, len(balance.names)))
     if e.who in balance.names:
@@ -294,7 +294,7 @@ def _force_panel(balance: Balance, e: Explanation, title: str, *, like: Explanat
     )
 
 
-def against_form(case: Case, motion: Motion, found: list[Term]) -> list[Finding]:
+def against_form(case: Case, motion: SmoothedMotion, found: list[Term]) -> list[Finding]:
     """Signs that the form of the equations fixes."""
     clear = [x for x in found if x.share > MATTERS and x.total < 0.6]
     wrong = [x for x in clear if x.slope * x.expected < 0]
@@ -340,7 +340,7 @@ def _why(x: Term) -> str:
     }.get(x.text, "a positive force accelerates forwards")
 
 
-def _finding(case: Case, motion: Motion, x: Term, who: str, sentence: str) -> Finding:
+def _finding(case: Case, motion: SmoothedMotion, x: Term, who: str, sentence: str) -> Finding:
     table = "drive" if who == "effort" else f"sensors.{who}"
     name = case.drive if who == "effort" else case.places[who].column
     body = next(c for c in motion.plant.coordinates if c.name == x.who[1])
@@ -364,7 +364,7 @@ def _finding(case: Case, motion: Motion, x: Term, who: str, sentence: str) -> Fi
     )
 
 
-def _upside_down(case: Case, motion: Motion, x: Term) -> Finding:
+def _upside_down(case: Case, motion: SmoothedMotion, x: Term) -> Finding:
     who = x.who[1]
     column = case.places[who].column
     finding = _finding(

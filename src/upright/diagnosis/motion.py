@@ -28,7 +28,7 @@ MOST = 800
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Motion:
+class SmoothedMotion:
     """Smoothed motion: `q`, `v`, `a` (coordinates, N), effort `u` (N,) as commanded, `t` (N,) [s].
 
     `rows` are the coordinates whose equations can be held to it: those that move, with every other one known.
@@ -54,7 +54,7 @@ class Motion:
         return ~still if np.count_nonzero(~still) > 40 else np.ones(self.t.size, bool)
 
 
-def motion_of(case: Case) -> Motion | str:
+def motion_of(case: Case) -> SmoothedMotion | str:
     """Motion of a record, or the reason why there is none."""
     if case.plant is None:
         return "nobody said what the rig is; name it with --rig"
@@ -93,7 +93,7 @@ def motion_of(case: Case) -> Motion | str:
         if c in y:
             smooth = savitzky_golay(y[c], dt, width)
             q[i], v[i], a[i] = smooth.q[inner], smooth.v[inner], smooth.a[inner]
-    return Motion(
+    return SmoothedMotion(
         plant=case.plant,
         t=grid.t[inner],
         q=q,
@@ -152,7 +152,7 @@ class Term:
     t: Array
 
 
-def terms(motion: Motion) -> list[Term]:
+def terms(motion: SmoothedMotion) -> list[Term]:
     """Terms with a known sign, none for a plant of the user's own, whose form is not known here."""
     plant, q, v, a = motion.plant, motion.q, motion.v, motion.a
     names = [c.name for c in plant.coordinates]
@@ -235,7 +235,7 @@ def _row(
     return out
 
 
-def driven_row(motion: Motion, here: NDArray[np.bool_]) -> tuple[Array, Array] | None:
+def driven_row(motion: SmoothedMotion, here: NDArray[np.bool_]) -> tuple[Array, Array] | None:
     """Acceleration (N,) of the driven body and all terms (N, p) of its equation but the effort, at samples `here`."""
     q, v, a = motion.q, motion.v, motion.a
     if 0 not in motion.rows:
@@ -252,7 +252,7 @@ def driven_row(motion: Motion, here: NDArray[np.bool_]) -> tuple[Array, Array] |
     return a[0][here], np.column_stack([c / (float(np.linalg.norm(c)) or 1.0) for c in columns])[here]
 
 
-def _own(motion: Motion, i: int) -> list[Array]:
+def _own(motion: SmoothedMotion, i: int) -> list[Array]:
     """A body's own position, for a spring to ground; none when disks turn together, which shows that there is none."""
     q = motion.q
     alike = [j for j in (i - 1, i + 1) if j in motion.rows]

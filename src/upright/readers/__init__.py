@@ -17,7 +17,7 @@ READERS = {
     "table": delimited.read,
     "ros-bag": rosbag.read,
     "matlab": matlab.read,
-    "upright": delimited.read_own,
+    "upright": delimited.read_written,
 }
 
 __all__ = ["READERS", "inspect", "read", "recognise"]

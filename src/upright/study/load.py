@@ -22,11 +22,11 @@ from upright.identification.model.runs import FOR_GROUPS, PER_RUN, SPREADS
 from upright.identification.problem.predictor import with_noise
 from upright.physics import Plant
 from upright.physics.actuator import ACTUATOR
-from upright.records import Record
+from upright.records import Array, Record
 from upright.study.keys import names
 from upright.study.loop import Scene, read_loop, state_units
 from upright.study.rig import known_values, read_plant, read_rig
-from upright.study.sensors import Array, Grid, drive_unit, read_drives, read_sensors
+from upright.study.sensors import Grid, drive_unit, read_drives, read_sensors
 from upright.study.text import Section, StudyText, show, si
 
 PathLike = str | os.PathLike[str]
@@ -252,7 +252,7 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
             command=str(study.section("drive").values.get("column", "")),
         )  # fmt: skip
         loop = read_loop(run, scene)
-    notes += [*grid.told(), *record.provenance.notes, *([loop.note] if loop and loop.note else [])]
+    notes += [*grid.description(), *record.provenance.notes, *([loop.note] if loop and loop.note else [])]
     role: Any = run.choice("role", ("fit", "predict"), "fit")
     return Run(
         label=label,

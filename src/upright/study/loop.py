@@ -7,22 +7,19 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from upright.closed_loop import Channel, ClosedLoop, Filter, joined, recover
 from upright.closed_loop.structures import memory
 from upright.errors import nearest
 from upright.laws import Law, state_feedback
 from upright.physics import Plant
-from upright.records import Record
+from upright.records import Array, Record
 from upright.study import expressions
 from upright.study.keys import names
 from upright.study.rig import per
 from upright.study.sensors import Drive, Grid, Sensor, read_sign
 from upright.study.text import Section, show, si
 from upright.units import in_unit
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +54,7 @@ def read_loop(run: Section, scene: Scene) -> ClosedLoop | None:
     section = run.section("loop")
     section.check(names("loop"))
     kind = section.values.get("kind", "state")
-    if kind not in KINDS:
+    if kind not in tuple(KINDS):  # it may be no word at all
         near = nearest(str(kind), KINDS)
         raise section.error("kind", f"kind must be one of {', '.join(KINDS)}, got {show(kind)}; {near}")
     return KINDS[kind](section, scene)

@@ -77,13 +77,9 @@ def write_fit(fit: Fit, study: Study, path: Path, crossed: CrossValidation | Non
         "title": study.title,
         "plant": study.plant,
         "substeps": fit.rig.substeps,
-        "verdict": fit.verdict,
-        "trusted": fit.trusted,
-        "method": fit.method,
-        "evaluations": fit.evaluations,
+        **_fields(fit, "verdict trusted method evaluations"),
         "seconds": round(fit.seconds, 4),
-        "cost": fit.cost,
-        "interrupted": fit.interrupted,
+        **_fields(fit, "cost interrupted"),
         "parameters": {n: {**vars(e), "meaning": meanings.get(n, "")} for n, e in {**known, **fit.estimates}.items()},
         "assumed": [
             {
@@ -95,27 +91,17 @@ def write_fit(fit: Fit, study: Study, path: Path, crossed: CrossValidation | Non
             }
             for a in fit.assumptions
         ],
-        "per_run": fit.per_run,
-        "groups": fit.groups,
+        **_fields(fit, "per_run groups"),
         "runs": {
             label: {
-                "role": score.role,
-                "fit_percent": score.fit_percent,
-                "horizon": score.horizon,
-                "score_from": score.score_from,
-                "naive": score.naive,
-                "adapted": score.adapted,
+                **_fields(score, "role fit_percent horizon score_from naive adapted"),
                 "ahead": [{"horizon": h, "fit_percent": percents} for h, percents in score.ahead.items()],
             }
             for label, score in fit.runs.items()
         },
-        "poles": fit.poles,
-        "unseen": fit.unseen,
-        "warnings": fit.warnings,
+        **_fields(fit, "poles unseen warnings"),
         "estimated": fit.names,
-        "correlation": fit.correlation,
-        "singular_values": fit.singular_values,
-        "directions": fit.directions,
+        **_fields(fit, "correlation singular_values directions"),
         "history": [{"stage": s, "cost": c, "evaluations": n} for s, c, n in fit.history],
         "provenance": provenance(study),
     }
@@ -126,6 +112,11 @@ def write_fit(fit: Fit, study: Study, path: Path, crossed: CrossValidation | Non
         }
     write_json(path, content)
     return plain_values(content)
+
+
+def _fields(of: object, names: str) -> dict[str, Any]:
+    """Attributes that a file holds by their own names."""
+    return {name: getattr(of, name) for name in names.split()}
 
 
 def provenance(study: Study) -> dict[str, Any]:
@@ -202,11 +193,8 @@ def write_ladder(ladder: Ladder, study: Study, path: Path) -> dict[str, Any]:
         "format": FORMAT,
         "title": study.title,
         "plant": study.plant,
-        "held_out": ladder.held_out,
         "chosen": [s.rung.name for s in ladder.kept],
-        "left_out": ladder.left_out,
-        "stopped": ladder.stopped,
-        "interrupted": ladder.interrupted,
+        **_fields(ladder, "held_out left_out stopped interrupted warnings"),
         "seconds": round(ladder.seconds, 3),
         "steps": [_step(s) for s in ladder.steps],
         "repeats": [
@@ -217,7 +205,6 @@ def write_ladder(ladder: Ladder, study: Study, path: Path) -> dict[str, Any]:
             }
             for group in ladder.repeats
         ],
-        "warnings": ladder.warnings,
         "provenance": provenance(study),
     }
     write_json(path, content)
@@ -228,18 +215,10 @@ def _step(s: RungResult) -> dict[str, Any]:
     c = s.comparison
     return {
         **vars(s.rung),
-        "kept": s.kept,
-        "reason": s.reason,
-        "fit_percent": s.fit_percent,
-        "predicted_percent": s.predicted_percent,
-        "fitted": s.fitted,
-        "predicted": s.predicted,
+        **_fields(s, "kept reason fit_percent predicted_percent fitted predicted cost parameters values"),
         "gain": None if c is None else c.gain,
         "scatter": None if c is None else c.scatter,
-        "cost": s.cost,
-        "parameters": s.parameters,
         "per_run": s.own,
-        "values": s.values,
         "seconds": round(s.seconds, 3),
     }
 

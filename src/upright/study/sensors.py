@@ -7,17 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from upright import units
 from upright.errors import BadInput
 from upright.physics import Coordinate, Plant
-from upright.records import Record
+from upright.records import Array, Record
 from upright.study import expressions
 from upright.study.keys import names
 from upright.study.text import Section, show
-
-Array = NDArray[np.float64]
 
 _UNIFORM = 0.02  # samples off the grid by less than this part of a period count as on it
 _GAP, _HOPELESS = 5, 100  # periods without a sample: told, refused
@@ -172,8 +169,8 @@ class Grid:
         slack = 1e-6 * (self.t[1] - self.t[0])
         return values[np.clip(np.searchsorted(self.source, self.t + slack, side="right") - 1, 0, None)]
 
-    def told(self) -> tuple[str, ...]:
-        """What was done to the time base, in words."""
+    def description(self) -> tuple[str, ...]:
+        """What was done to the time base, in sentences."""
         if self.uniform:
             return self.notes
         period = self.t[1] - self.t[0]

@@ -1,14 +1,15 @@
-"""Text of a study with the line of every key, so that each complaint names file, line and the nearest valid name.
+"""Text of a study, read and written: the line of every key, and tables laid out as a person would write them.
 
-`tomllib` gives values without places. `StudyText` reads the same text once more for where each key stands, and
-`Section` hands out the values of one table.
+`tomllib` gives values without places. `StudyText` finds where each key stands, so that each complaint names file, line
+and the nearest valid name, and `Section` hands out the values of one table. `TomlTable` is one that is written.
 """
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
@@ -122,7 +123,7 @@ class Section:
                 raise self.error(key, f"{place} has no {what} '{key}'; {nearest(key, valid)}")
 
     def section(self, key: str) -> Section:
-        """Table under `key`, empty when absent."""
+        """TomlTable under `key`, empty when absent."""
         return Section(self.text, self.place(key), self.values.get(key, {}))
 
     def text_of(self, key: str, example: str) -> str:
@@ -270,3 +271,74 @@ def _enter(header: Any, counts: dict[KeyPath, int]) -> KeyPath:
         if path in counts and not isinstance(header, list):
             path = (*path, counts[path])
     return (*path, counts[path]) if isinstance(header, list) else path
+
+
+Value = bool | float | str | Sequence["Value"] | Mapping[str, "Value"]
+
+
+class TomlTable:
+    """One table of a study, written key by key.
+
+    Parameters
+    ----------
+    header : str
+        Its first line, ``[drive]`` or ``[[runs]]``; empty for the keys before the first table.
+    note : str, optional
+        Comment behind it.
+    """
+
+    def __init__(self, header: str = "", note: str = "") -> None:
+        self.lines: list[str] = []
+        if header:
+            self.line(header, note)
+
+    def key(self, name: str, value: Value, note: str = "", *, digits: int = 6, off: bool = False) -> None:
+        """Add a key; numbers get so many significant `digits`, and one that is `off` is commented out."""
+        self.line(f"{'# ' if off else ''}{name} = {toml(value, digits)}", note)
+
+    def line(self, text: str, note: str = "") -> None:
+        """Add a line as it is."""
+        self.lines.append(f"{text}   # {note}" if note else text)
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines) + "\n"
+
+
+def study_text(tables: Iterable[TomlTable]) -> str:
+    """Tables one below the other, a blank line between them."""
+    return "\n".join(str(table) for table in tables)
+
+
+def number(value: float, unit: str = "", digits: int = 3) -> str:
+    """A number that wears its unit, ``0.35 m``; a pure number ("" or "1") wears none."""
+    return f"{value:.{digits}g}" + (f" {unit}" if unit not in ("", "1") else "")
+
+
+def toml(value: Value, digits: int = 6) -> str:
+    """A value in TOML: text in quotes on one line, numbers to so many significant digits, lists, inline tables."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, float):
+        return f"{value:.{digits}g}"
+    if isinstance(value, str):
+        text = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", " ")
+        return f'"{text}"'
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{k} = {toml(v, digits)}" for k, v in value.items()) + " }"
+    return "[" + ", ".join(toml(v, digits) for v in value) + "]"
+
+
+def table(header: str, note: str = "", /, digits: int = 6, **keys: Value) -> TomlTable:
+    """A table with some keys."""
+    out = TomlTable(header, note)
+    for name, value in keys.items():
+        out.key(name, value, digits=digits)
+    return out
+
+
+def counted_sensor(name: str, unit: str, counts: float) -> TomlTable:
+    """Sensor of a coordinate in rad or m, whose column of the same name holds encoder counts, so many per unit."""
+    per, factor = ("counts_per_rev", 2 * math.pi) if unit == "rad" else ("counts_per_m", 1.0)
+    return table(f"[sensors.{name}]", column=name, unit="counts", digits=10, **{per: counts * factor})
