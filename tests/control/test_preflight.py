@@ -15,7 +15,7 @@ from upright.control.preflight import Task, largest, preflight, words
 from upright.errors import BadInput
 from upright.experiments.makes import make_rig
 from upright.gains.requests import read_poles
-from upright.paper.tables import TABLE_1
+from upright.paper.reproduce import TABLE_1
 
 RIG = make_rig("furuta")
 MODEL = RIG.linear("inverted")

@@ -15,9 +15,8 @@ from upright.cli import app
 from upright.experiments.makes import NOMINAL
 from upright.gains import lqr
 from upright.gains.factorization import effort_ratios, recover_locus
-from upright.paper import tables
-from upright.paper.errata import printed_inverted
-from upright.paper.reproduce import reproduce
+from upright.paper import reproduce as tables
+from upright.paper.reproduce import printed_inverted, reproduce
 from upright.physics import Furuta, chain
 
 

@@ -12,23 +12,19 @@ from scipy import stats
 
 from tests.paper import printed
 from upright.errors import BadInput
-from upright.questionnaire import (
-    Likert,
-    Means,
-    Ratings,
-    Shares,
+from upright.questionnaire.chapter import chapter
+from upright.questionnaire.sheet import Likert, Means, Ratings, Shares, read
+from upright.questionnaire.statistics import (
     bound,
     compare,
     counts,
     fitting,
     holm,
     possible,
-    read,
+    signed_ranks,
+    squares_of_gains,
     whole_row,
 )
-from upright.questionnaire.chapter import chapter
-from upright.questionnaire.paired import signed_ranks
-from upright.questionnaire.summary import squares_of_gains
 from upright.report.page import Table
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "survey"

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from tests.readers import logs
 from upright.readers import read, read_source, recognise
+from upright.readers.resolution import rebuild
 from upright.readers.source import Source
-from upright.readers.timebase import rebuild
 from upright.records import Record
 
 

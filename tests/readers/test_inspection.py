@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from upright.readers import inspect, quantum
+from upright.readers import inspect
+from upright.readers.resolution import find_quantum
 from upright.records import Record
 
 
@@ -26,7 +27,7 @@ def counted(x: np.ndarray, step: float) -> np.ndarray:
 @given(st.sampled_from([2000, 2048, 4096, 8192, 14400, 16000, 40000]), st.floats(-3, 3))
 def test_the_counts_of_an_encoder_are_found(counts: int, offset: float) -> None:
     _, theta = swing()
-    found = quantum.find(counted(theta, 2 * math.pi / counts) + offset)
+    found = find_quantum(counted(theta, 2 * math.pi / counts) + offset)
     assert found.counts_per_rev == counts
     assert found.step == pytest.approx(2 * math.pi / counts, rel=1e-9)
 
@@ -34,7 +35,7 @@ def test_the_counts_of_an_encoder_are_found(counts: int, offset: float) -> None:
 @pytest.mark.parametrize("decimals", [5, 6, 9])
 def test_the_counts_survive_text_with_few_decimals(decimals: int) -> None:
     _, theta = swing()
-    found = quantum.find(np.round(counted(theta, 2 * math.pi / 2000), decimals))
+    found = find_quantum(np.round(counted(theta, 2 * math.pi / 2000), decimals))
     assert found.counts_per_rev == 2000
 
 
@@ -42,25 +43,25 @@ def test_the_counts_survive_text_with_few_decimals(decimals: int) -> None:
 @given(st.floats(2e-5, 1e-2).filter(lambda step: abs(math.log10(step) % 1) > 1e-6))  # 1e-3 could be decimals
 def test_a_linear_encoder_has_its_step_and_no_revolution(step: float) -> None:
     _, x = swing()
-    found = quantum.find(counted(x, step))
+    found = find_quantum(counted(x, step))
     assert found.step == pytest.approx(step, rel=1e-6)
 
 
 def test_a_converter_is_told_from_the_digits_of_its_text() -> None:
     _, x = swing()
-    found = quantum.find(np.round(counted(30 * x, 80 / 4096), 6))  # 12 bits over +-40 V, always an even last digit
+    found = find_quantum(np.round(counted(30 * x, 80 / 4096), 6))  # 12 bits over +-40 V, always an even last digit
     assert found.step == pytest.approx(80 / 4096, rel=1e-5)
-    assert quantum.find(counted(x, 2e-5)).step == pytest.approx(2e-5)
+    assert find_quantum(counted(x, 2e-5)).step == pytest.approx(2e-5)
 
 
 def test_a_smooth_signal_has_no_step() -> None:
     rng = np.random.default_rng(5)
-    assert quantum.find(rng.normal(size=3000)).step == 0
-    assert quantum.find(swing()[1]).step == 0
+    assert find_quantum(rng.normal(size=3000)).step == 0
+    assert find_quantum(swing()[1]).step == 0
 
 
 def test_whole_counts_are_exact() -> None:
-    assert quantum.find(np.array([0.0, 6, -9, 3, 12])).step == 3
+    assert find_quantum(np.array([0.0, 6, -9, 3, 12])).step == 3
 
 
 def test_a_difference_quotient_is_no_sensor_but_a_tachometer_is() -> None:

@@ -52,8 +52,8 @@ def law_page(folder: Path) -> Chapter:
 
 def survey_page(name: str, answers: int | None = None):
     def page(folder: Path) -> Chapter:
-        from upright.questionnaire import read
         from upright.questionnaire.chapter import chapter
+        from upright.questionnaire.sheet import read
 
         return chapter(read(EXAMPLES / "survey" / name), title="Survey", source=name, answers=answers)
 

@@ -10,7 +10,7 @@ import pytest
 from tests.signals.swings import swing
 from upright.errors import NotIdentifiable
 from upright.signals.free_swing import decay, recursion
-from upright.signals.turning import turning_points
+from upright.signals.stretches import turning_points
 
 
 def test_the_recursion_gives_the_extremes_that_scipy_integrates():

@@ -16,7 +16,7 @@ from upright.closed_loop.loop import finer
 from upright.closed_loop.recovery import Candidate, Recovery
 from upright.closed_loop.regression import TERMS, Family, Regression, Signals, Term, channels_of, fit, law_of, structure
 from upright.errors import BadInput, NotIdentifiable
-from upright.readers.quantum import find
+from upright.readers.resolution import find_quantum
 from upright.records import Record
 
 Array = NDArray[np.float64]
@@ -138,7 +138,7 @@ class Search:
         self.measured, self.references, self.y, self.r, self.u, self.every = measured, references, y, r, u, every
         self.high, self.low = extremes(u)
         self.extreme = self.high | self.low
-        self.quantum = find(u[_JUNK:]).step
+        self.quantum = find_quantum(u[_JUNK:]).step
         pairs = tuple(
             (finer(values, every), stepped(r[i], every) if i < len(r) else None) for i, values in enumerate(y)
         )

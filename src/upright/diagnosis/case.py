@@ -108,11 +108,11 @@ class Case:
             return self.plant.__name__.startswith(("Rectilinear", "Torsional"))
         return all(unit_of(c) in ("counts", "m", "mm") for c in self.measured)
 
-    def moves(self, name: str, share: float = 0.03) -> bool:
-        """Whether a coordinate moves beside the largest motion in the same unit."""
+    def moves(self, name: str) -> bool:
+        """Whether a coordinate moves by more than 3 % of the largest motion in the same unit."""
         unit = {c.name: c.unit for c in self.plant.coordinates} if self.plant else {}
         spans = {n: float(np.ptp(p.y)) for n, p in self.places.items() if unit.get(n) == unit.get(name)}
-        return spans.get(name, 0.0) > share * max(spans.values(), default=0.0)
+        return spans.get(name, 0.0) > 0.03 * max(spans.values(), default=0.0)
 
     def span(self, c: Column) -> float:
         """Range of a column in the record, which may be mended when the inspection was not."""
@@ -135,9 +135,9 @@ class Case:
         found = [self.inspection.column(name) for name in columns if name in self.record.signals]
         return tuple(self._panel(c, slice(None), "steps" if c.stepwise else "line") for c in found)
 
-    def near(self, column: str, i: int, reach: int = 40) -> Panel:
+    def near(self, column: str, i: int) -> Panel:
         """Readings of a column near sample `i`."""
-        return self._panel(self.inspection.column(column), slice(max(i - reach, 0), i + reach), "points")
+        return self._panel(self.inspection.column(column), slice(max(i - 40, 0), i + 40), "points")
 
     def _panel(self, c: Column, rows: slice, style: Literal["line", "steps", "points"]) -> Panel:
         unit = unit_of(c)
@@ -165,7 +165,7 @@ def read_known(text: str, log: str = "") -> KnownRig:
     """
     path = Path(text)
     if path.suffix == ".json" or (path.is_dir() and (path / "fit.json").is_file()):
-        from upright.study.fit_file import read_fit
+        from upright.study.results import read_fit
 
         fit = read_fit(path / "fit.json" if path.is_dir() else path)
         parameters = {n: Parameter(name=n, value=v) for n, v in fit.values.items()}

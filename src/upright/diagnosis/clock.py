@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,90 +33,83 @@ def steps_panel(t: Array) -> Panel:
                  curves=(Curve(name="steps", t=t[1:], y=np.diff(t) * 1e3, style="points"),))  # fmt: skip
 
 
-def _rounding(case: Case) -> list[Finding]:
+def _rounding(case: Case) -> Iterator[Finding]:
     time = case.inspection.time
     if not time.rebuilt:
         coarse = time.rounding > 0.1 * time.period and time.jitter > LOOSE * time.period
         if not coarse:
-            return []
-        return [
-            Finding(
-                kind="clock",
-                columns=("time",),
-                severity="warning",
-                sentence=f"The time stamps are rounded to {time.rounding * 1e3:g} ms, which is coarse beside the"
-                f" period of {time.period * 1e3:.4g} ms, and do not follow a uniform clock.",
-                evidence={"rounding [ms]": time.rounding * 1e3, "period [ms]": time.period * 1e3},
-                advice="Log the sample index, or the time with more digits.",
-                panels=(steps_panel(case.record.t),),
-            )
-        ]
-    note = next(n for n in case.inspection.notes if "rebuilt from the sample index" in n)
-    wander = re.search(r"wander up to ([\d.e-]+) ms", note)
-    return [
-        Finding(
+            return
+        yield Finding(
             kind="clock",
             columns=("time",),
-            severity="note",
-            sentence=f"The time stamps are rounded to {time.rounding * 1e3:g} ms and wander up to"
-            f" {wander[1] if wander else '?'} ms from a uniform clock of {time.period * 1e3:.6g} ms.",
-            evidence={"rounding [ms]": time.rounding * 1e3, "wander [ms]": float(wander[1]) if wander else 0.0},
-            advice="Nothing: the reader rebuilds the time from the sample index.",
+            severity="warning",
+            sentence=f"The time stamps are rounded to {time.rounding * 1e3:g} ms, which is coarse beside the"
+            f" period of {time.period * 1e3:.4g} ms, and do not follow a uniform clock.",
+            evidence={"rounding [ms]": time.rounding * 1e3, "period [ms]": time.period * 1e3},
+            advice="Log the sample index, or the time with more digits.",
+            panels=(steps_panel(case.record.t),),
         )
-    ]
+        return
+    note = next(n for n in case.inspection.notes if "rebuilt from the sample index" in n)
+    wander = re.search(r"wander up to ([\d.e-]+) ms", note)
+    yield Finding(
+        kind="clock",
+        columns=("time",),
+        severity="note",
+        sentence=f"The time stamps are rounded to {time.rounding * 1e3:g} ms and wander up to"
+        f" {wander[1] if wander else '?'} ms from a uniform clock of {time.period * 1e3:.6g} ms.",
+        evidence={"rounding [ms]": time.rounding * 1e3, "wander [ms]": float(wander[1]) if wander else 0.0},
+        advice="Nothing: the reader rebuilds the time from the sample index.",
+    )
 
 
-def _gaps(case: Case) -> list[Finding]:
+def _gaps(case: Case) -> Iterator[Finding]:
     time = case.inspection.time
     if not time.gaps:
-        return []
+        return
     largest = max(time.gaps, key=lambda gap: gap.length)
     missing = sum(gap.missing for gap in time.gaps)
     many = len(time.gaps)
-    return [
-        Finding(
-            kind="gap",
-            columns=("time",),
-            severity="warning" if missing > 1 or many > 1 else "note",
-            sentence=f"{many} gap{'s' if many > 1 else ''} in time: about {missing} samples are missing, the longest"
-            f" silence lasts {largest.length * 1e3:.4g} ms from {largest.start:.5g} s on.",
-            spoils=missing > 0.1 * time.samples,
-            evidence={"gaps [1]": float(many), "missing samples [1]": float(missing),
-                      "longest [ms]": largest.length * 1e3},
-            advice="Choose a window without the gap, or make one run of each side of it.",
-            key=f"window = [{largest.start + largest.length:.6g}, \"end\"]",
-            panels=(steps_panel(case.record.t),),
-            marks=tuple(gap.start for gap in time.gaps[:20]),
-        )
-    ]  # fmt: skip
+    yield Finding(
+        kind="gap",
+        columns=("time",),
+        severity="warning" if missing > 1 or many > 1 else "note",
+        sentence=f"{many} gap{'s' if many > 1 else ''} in time: about {missing} samples are missing, the longest"
+        f" silence lasts {largest.length * 1e3:.4g} ms from {largest.start:.5g} s on.",
+        spoils=missing > 0.1 * time.samples,
+        evidence={"gaps [1]": float(many), "missing samples [1]": float(missing),
+                  "longest [ms]": largest.length * 1e3},
+        advice="Choose a window without the gap, or make one run of each side of it.",
+        key=f"window = [{largest.start + largest.length:.6g}, \"end\"]",
+        panels=(steps_panel(case.record.t),),
+        marks=tuple(gap.start for gap in time.gaps[:20]),
+    )  # fmt: skip
 
 
-def _jitter(case: Case) -> list[Finding]:
+def _jitter(case: Case) -> Iterator[Finding]:
     time = case.inspection.time
     share = time.jitter / time.period
     if share < LOOSE or (time.rounding > 0 and time.jitter <= time.rounding and time.rounding > LOOSE * time.period):
-        return []
-    return [
-        Finding(
-            kind="jitter",
-            columns=("time",),
-            severity="warning",
-            sentence=f"The samples jitter: 1 % of the steps differ from the period of {time.period * 1e3:.4g} ms by"
-            f" more than {time.jitter * 1e3:.3g} ms ({100 * share:.0f} %).",
-            spoils=share > 0.5,
-            evidence={"jitter [ms]": time.jitter * 1e3, "period [ms]": time.period * 1e3},
-            advice="A fit resamples by straight lines; set a period, or log from a loop with a fixed rate.",
-            key=f'period = "{time.period * 1e3:.4g} ms"',
-            panels=(steps_panel(case.record.t),),
-        )
-    ]
+        return
+    yield Finding(
+        kind="jitter",
+        columns=("time",),
+        severity="warning",
+        sentence=f"The samples jitter: 1 % of the steps differ from the period of {time.period * 1e3:.4g} ms by"
+        f" more than {time.jitter * 1e3:.3g} ms ({100 * share:.0f} %).",
+        spoils=share > 0.5,
+        evidence={"jitter [ms]": time.jitter * 1e3, "period [ms]": time.period * 1e3},
+        advice="A fit resamples by straight lines; set a period, or log from a loop with a fixed rate.",
+        key=f'period = "{time.period * 1e3:.4g} ms"',
+        panels=(steps_panel(case.record.t),),
+    )
 
 
-def _doubled(case: Case) -> list[Finding]:
+def _doubled(case: Case) -> Iterator[Finding]:
     named = {c.name: case.record[c.name] for c in case.measured if not c.constant}
     rows = doubled_rows([(x, case.inspection.column(name).quantum.step) for name, x in named.items()])
     if rows.size < 3:
-        return []
+        return
     t = case.record.t
     moved = [
         (float(np.ptp(x[j - 3 : j + 4])) / float(np.ptp(x)), name, j)
@@ -126,20 +119,18 @@ def _doubled(case: Case) -> list[Finding]:
     _, name, i = max(moved)
     near = slice(max(i - 15, 0), i + 16)
     curve = Curve(name=name, t=t[near], y=case.record[name][near], style="points")
-    return [
-        Finding(
-            kind="doubled",
-            columns=tuple(c.name for c in case.measured if not c.constant),
-            severity="warning",
-            sentence=f"{rows.size} rows repeat the row before in every measured column while the rig moves"
-            f" (the first at {t[rows[0]]:.5g} s): rows were written twice, or samples were missed.",
-            spoils=rows.size > 0.03 * t.size,
-            evidence={"doubled rows [1]": float(rows.size), "share [%]": 100 * rows.size / t.size},
-            advice="Drop the doubled rows before reading; if their time goes on, each hides a missed sample.",
-            panels=(Panel(label=name, curves=(curve,)),),
-            marks=tuple(float(t[j]) for j in rows if near.start <= j < near.stop),
-        )
-    ]  # fmt: skip
+    yield Finding(
+        kind="doubled",
+        columns=tuple(c.name for c in case.measured if not c.constant),
+        severity="warning",
+        sentence=f"{rows.size} rows repeat the row before in every measured column while the rig moves"
+        f" (the first at {t[rows[0]]:.5g} s): rows were written twice, or samples were missed.",
+        spoils=rows.size > 0.03 * t.size,
+        evidence={"doubled rows [1]": float(rows.size), "share [%]": 100 * rows.size / t.size},
+        advice="Drop the doubled rows before reading; if their time goes on, each hides a missed sample.",
+        panels=(Panel(label=name, curves=(curve,)),),
+        marks=tuple(float(t[j]) for j in rows if near.start <= j < near.stop),
+    )  # fmt: skip
 
 
 def doubled_rows(columns: Sequence[tuple[Array, float]]) -> NDArray[np.int64]:

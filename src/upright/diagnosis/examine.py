@@ -6,17 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from upright.diagnosis.balance import Balance
 from upright.diagnosis.case import Case, KnownRig, case_of
 from upright.diagnosis.clock import examine_clock
-from upright.diagnosis.drive import examine_push, examine_uselessness, push_of
-from upright.diagnosis.effort import examine_effort, examine_settings
+from upright.diagnosis.effort import examine_effort, examine_push, examine_settings, examine_uselessness, push_of
 from upright.diagnosis.findings import KINDS, SEVERITIES, Diagnosis, Finding
-from upright.diagnosis.forces import against_form, against_gain, against_numbers, values_of
-from upright.diagnosis.motion import Motion, motion_of
+from upright.diagnosis.forces import ForceBalance, against_form, against_gain, against_numbers, values_of
+from upright.diagnosis.motion import SmoothedMotion, motion_of, terms
 from upright.diagnosis.rest import examine_rest
 from upright.diagnosis.sensors import examine_sensors
-from upright.diagnosis.structure import terms
 from upright.readers.inspection import inspect_record
 from upright.records import Record
 
@@ -89,7 +86,7 @@ def _forces(case: Case, known: KnownRig | None, found: list[Finding]) -> tuple[l
     if known is None:
         return [], {}
     spoilt = next((f for f in found if f.kind in HOPELESS and f.severity != "note" and f.spoils), None)
-    motion: Motion | str = (
+    motion: SmoothedMotion | str = (
         f"after the {spoilt.kind} found above, mend that first" if spoilt is not None else motion_of(case)
     )
     if isinstance(motion, str):
@@ -99,11 +96,11 @@ def _forces(case: Case, known: KnownRig | None, found: list[Finding]) -> tuple[l
     numbers = values_of(case, known.friction)
     out: list[Finding] = []
     reasons: dict[str, str] = {}
-    balance: Balance | None = None
+    balance: ForceBalance | None = None
     if isinstance(numbers, str):
         reasons["scale"] = numbers
     else:
-        balance = Balance(motion, *numbers)
+        balance = ForceBalance(motion, *numbers)
         balance.used = balance.used and not lying
     push = None if lying else push_of(motion, balance)
     conventions = against_numbers(case, balance) if balance is not None else []
@@ -112,7 +109,7 @@ def _forces(case: Case, known: KnownRig | None, found: list[Finding]) -> tuple[l
         trip = []  # the other convention explains the whole record better than an end of the effort does
     if push is not None and trip:  # what the drive did before it tripped still tells signs and scales
         motion = replace(motion, u=np.where(motion.t < push.end, motion.u, 0.0))
-        conventions = against_numbers(case, Balance(motion, *numbers)) if not isinstance(numbers, str) else []
+        conventions = against_numbers(case, ForceBalance(motion, *numbers)) if not isinstance(numbers, str) else []
     if balance is None:
         signed = [x for x in terms(motion) if not (lying and x.who[0] == "effort")]
         conventions = against_form(case, motion, signed)

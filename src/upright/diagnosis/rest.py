@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from upright.diagnosis.case import Case, unit_of
 from upright.diagnosis.effort import HELD
 from upright.diagnosis.findings import Curve, Finding, Panel
 from upright.records import Array
-from upright.signals.stretches import pieces
-from upright.signals.turning import turning_points
+from upright.signals.stretches import pieces, turning_points
 
 
 def examine_rest(case: Case) -> list[Finding]:
@@ -17,39 +18,34 @@ def examine_rest(case: Case) -> list[Finding]:
     return [*_creep(case), *_drift(case), *_grows(case)]
 
 
-def _creep(case: Case) -> list[Finding]:
+def _creep(case: Case) -> Iterator[Finding]:
     """Bodies that hardly move beside the others, yet do not stay where they are."""
-    found: list[Finding] = []
     for c in case.measured if case.chained else ():
         unit, span = unit_of(c), case.span(c)
         largest = case.widest(unit)
         beside = case.span(largest)
         if not 5 * c.quantum.step < span < HELD * beside:
             continue
-        found.append(
-            Finding(
-                kind="creep",
-                columns=(c.name,),
-                severity="warning",
-                sentence=f"'{c.name}' moves {span:.4g} {unit}, {100 * span / beside:.2g} % of the motion"
-                f" of '{largest.name}': a body that was held, but creeps.".replace("  ", " "),
-                evidence={f"range [{unit or 1}]": span, f"beside [{unit or 1}]": beside},
-                advice="Feed its measured motion in instead of locking it.",
-                key=f'held = ["{case.coordinate(c.name)}"]',
-                panels=case.over_time(c.name, largest.name),
-            )
+        yield Finding(
+            kind="creep",
+            columns=(c.name,),
+            severity="warning",
+            sentence=f"'{c.name}' moves {span:.4g} {unit}, {100 * span / beside:.2g} % of the motion"
+            f" of '{largest.name}': a body that was held, but creeps.".replace("  ", " "),
+            evidence={f"range [{unit or 1}]": span, f"beside [{unit or 1}]": beside},
+            advice="Feed its measured motion in instead of locking it.",
+            key=f'held = ["{case.coordinate(c.name)}"]',
+            panels=case.over_time(c.name, largest.name),
         )
-    return found
 
 
-def _drift(case: Case) -> list[Finding]:
+def _drift(case: Case) -> Iterator[Finding]:
     """Rest positions that differ from one rest to the next, on a rig that a spring or gravity centres."""
     rests = [span for span in case.inspection.rests if span[1] - span[0] > 0.2]
     centred = case.plant is None or not case.plant.__name__.startswith("Torsional")
     if len(rests) < 2 or not centred:
-        return []
+        return
     t = case.record.t
-    found: list[Finding] = []
     for c in case.measured:
         x = case.record[c.name]
         quiet = [s for s in rests if not case.driven or not np.any(case.u[(t >= s[0]) & (t <= s[1])])]
@@ -61,29 +57,26 @@ def _drift(case: Case) -> list[Finding]:
         off, span = max(levels) - min(levels), float(np.ptp(x))
         if off > max(0.03 * span, 5 * c.quantum.step):
             unit = unit_of(c)
-            found.append(
-                Finding(
-                    kind="drift",
-                    columns=(c.name,),
-                    severity="note",
-                    sentence=f"'{c.name}' comes to rest {off:.4g} {unit} apart from where it lay before"
-                    f" ({100 * off / span:.2g} % of its range): dry friction holds it off centre, or the zero drifts.",
-                    evidence={f"apart [{unit or 1}]": off, "of the range [%]": 100 * off / span},
-                    advice="Ask for Coulomb friction, or an offset per run.",
-                    key=f'unknown = ["initial", "offset.{case.coordinate(c.name)}"]',
-                    panels=case.over_time(c.name),
-                    spans=tuple(quiet),
-                )
+            yield Finding(
+                kind="drift",
+                columns=(c.name,),
+                severity="note",
+                sentence=f"'{c.name}' comes to rest {off:.4g} {unit} apart from where it lay before"
+                f" ({100 * off / span:.2g} % of its range): dry friction holds it off centre, or the zero drifts.",
+                evidence={f"apart [{unit or 1}]": off, "of the range [%]": 100 * off / span},
+                advice="Ask for Coulomb friction, or an offset per run.",
+                key=f'unknown = ["initial", "offset.{case.coordinate(c.name)}"]',
+                panels=case.over_time(c.name),
+                spans=tuple(quiet),
             )
-    return found
 
 
-def _grows(case: Case) -> list[Finding]:
+def _grows(case: Case) -> Iterator[Finding]:
     """Oscillation whose amplitude grows although the effort stays as it is."""
     t = case.record.t
     columns = [c for c in case.measured if not c.constant]
     if not columns:
-        return []
+        return
     free = [c for c in columns if case.beside(c) > HELD]
     for start, stop in pieces(np.diff(case.u) != 0)[:6]:  # of constant effort
         if t[stop - 1] - t[start] < 0.5 or not np.any(case.u[start:stop]):
@@ -93,22 +86,20 @@ def _grows(case: Case) -> list[Finding]:
             name, rate, cycles, at, size = max(growth, key=lambda g: g[1])
             unit = unit_of(case.inspection.column(name))
             envelope = Curve(name="amplitude", t=at, y=size, style="points")
-            return [
-                Finding(
-                    kind="self-excited",
-                    columns=(name,),
-                    severity="fault",
-                    sentence=f"'{name}' oscillates more and more from {t[start]:.4g} to {t[stop - 1]:.4g} s while the"
-                    f" effort stays at {case.u[start]:.6g}: the amplitude grows {rate:.3g} times over {cycles} half"
-                    " swings. A constant force cannot do that; the drive, or what holds the rig, feeds the motion.",
-                    evidence={"growth [1]": rate, "half swings [1]": float(cycles)},
-                    advice="Leave this run out of a fit.",
-                    key='role = "predict"',
-                    panels=(*case.over_time(name), Panel(label=f"amplitude [{unit}]", curves=(envelope,))),
-                    spans=((float(t[start]), float(t[stop - 1])),),
-                )
-            ]
-    return []
+            yield Finding(
+                kind="self-excited",
+                columns=(name,),
+                severity="fault",
+                sentence=f"'{name}' oscillates more and more from {t[start]:.4g} to {t[stop - 1]:.4g} s while the"
+                f" effort stays at {case.u[start]:.6g}: the amplitude grows {rate:.3g} times over {cycles} half"
+                " swings. A constant force cannot do that; the drive, or what holds the rig, feeds the motion.",
+                evidence={"growth [1]": rate, "half swings [1]": float(cycles)},
+                advice="Leave this run out of a fit.",
+                key='role = "predict"',
+                panels=(*case.over_time(name), Panel(label=f"amplitude [{unit}]", curves=(envelope,))),
+                spans=((float(t[start]), float(t[stop - 1])),),
+            )
+            return
 
 
 def _growth(t: Array, x: Array) -> tuple[float, int, Array, Array]:

@@ -6,6 +6,7 @@ A body with inertia cannot jump, and it cannot stop within a sample.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from upright.diagnosis.findings import Finding
 from upright.readers.inspection import Column
 from upright.records import Array, Record
 from upright.signals.spikes import REACH, Jumps, jumps
+from upright.signals.stretches import stretches
 
 
 def examine_sensors(case: Case) -> tuple[list[Finding], Record | None]:
@@ -35,10 +37,9 @@ def examine_sensors(case: Case) -> tuple[list[Finding], Record | None]:
     return found, record
 
 
-def _dead(case: Case) -> list[Finding]:
+def _dead(case: Case) -> Iterator[Finding]:
     """Sensors that never move, although the rig was driven or something else moved."""
     others = [c for c in case.measured if not c.constant]
-    found: list[Finding] = []
     named = {p.column: n for n, p in case.places.items()}
     for c in case.inspection.columns:
         if not c.constant or c.drive or tells_time(c) or named.get(c.name, "") in case.locked != ():
@@ -47,117 +48,102 @@ def _dead(case: Case) -> list[Finding]:
         if not sure and (not others or c.name not in named):
             continue
         why = "the effort acts" if case.driven else f"'{others[0].name}' moves" if others else ""
-        found.append(
-            Finding(
-                kind="dead",
-                columns=(c.name,),
-                severity="fault" if sure else "note",
-                sentence=f"'{c.name}' reads {c.low:g} from the first to the last sample"
-                + (f" although {why}: the sensor is dead, or the body was clamped." if sure else "."),
-                evidence={"samples [1]": float(case.inspection.time.samples), "value [1]": c.low},
-                advice="Check plug and cable; if the body was clamped, say so." if sure else "Leave it out.",
-                key=f"locked = [\"{named[c.name]}\"]" if c.name in named else "",
-                panels=case.over_time(*(o.name for o in others[:1]), c.name),
-            )
+        yield Finding(
+            kind="dead",
+            columns=(c.name,),
+            severity="fault" if sure else "note",
+            sentence=f"'{c.name}' reads {c.low:g} from the first to the last sample"
+            + (f" although {why}: the sensor is dead, or the body was clamped." if sure else "."),
+            evidence={"samples [1]": float(case.inspection.time.samples), "value [1]": c.low},
+            advice="Check plug and cable; if the body was clamped, say so." if sure else "Leave it out.",
+            key=f"locked = [\"{named[c.name]}\"]" if c.name in named else "",
+            panels=case.over_time(*(o.name for o in others[:1]), c.name),
         )  # fmt: skip
-    return found
 
 
-def _jumped(case: Case, c: Column, x: Array, jumped: Jumps) -> list[Finding]:
+def _jumped(case: Case, c: Column, x: Array, jumped: Jumps) -> Iterator[Finding]:
     t, unit = case.record.t, unit_of(c) or "1"
-    found: list[Finding] = []
     if jumped.wraps.size:
-        found.append(
-            Finding(
-                kind="wrap",
-                columns=(c.name,),
-                severity="warning",
-                sentence=f"'{c.name}' wraps {jumped.wraps.size} time{'s' if jumped.wraps.size > 1 else ''}: its counter"
-                f" jumps by {jumped.modulus:.6g} {unit} (first at {t[jumped.wraps[0]]:.5g} s) while the body goes on.",
-                evidence={f"turn [{unit}]": jumped.modulus, "wraps [1]": float(jumped.wraps.size)},
-                advice="Angles in rad are unwrapped when a study is read; unwrap counts before that.",
-                key=f'[sensors.{case.coordinate(c.name)}]\nunit = "rad"' if unit == "rad" else "",
-                panels=(*case.over_time(c.name), case.near(c.name, int(jumped.wraps[0]))),
-                marks=tuple(float(t[i]) for i in jumped.wraps[:20]),
-            )
+        yield Finding(
+            kind="wrap",
+            columns=(c.name,),
+            severity="warning",
+            sentence=f"'{c.name}' wraps {jumped.wraps.size} time{'s' if jumped.wraps.size > 1 else ''}: its counter"
+            f" jumps by {jumped.modulus:.6g} {unit} (first at {t[jumped.wraps[0]]:.5g} s) while the body goes on.",
+            evidence={f"turn [{unit}]": jumped.modulus, "wraps [1]": float(jumped.wraps.size)},
+            advice="Angles in rad are unwrapped when a study is read; unwrap counts before that.",
+            key=f'[sensors.{case.coordinate(c.name)}]\nunit = "rad"' if unit == "rad" else "",
+            panels=(*case.over_time(c.name), case.near(c.name, int(jumped.wraps[0]))),
+            marks=tuple(float(t[i]) for i in jumped.wraps[:20]),
         )
     if jumped.steps.size:
         largest = int(np.argmax(np.abs(jumped.step_sizes)))
         many = jumped.steps.size
-        found.append(
-            Finding(
-                kind="jump",
-                columns=(c.name,),
-                severity="fault",
-                sentence=f"'{c.name}' jumps by {jumped.step_sizes[largest]:.5g} {unit} between two samples at"
-                f" {t[jumped.steps[largest]]:.5g} s and stays there"
-                + (f" ({many} such jumps)" if many > 1 else "")
-                + ": counts were lost, or the sensor slipped.",
-                evidence={f"jump [{unit}]": float(jumped.step_sizes[largest]), "jumps [1]": float(many)},
-                advice="Use a window that ends before the jump or starts after it.",
-                key=f'window = [{t[jumped.steps[largest]]:.6g}, "end"]',
-                panels=(*case.over_time(c.name), case.near(c.name, int(jumped.steps[largest]))),
-                marks=tuple(float(t[i]) for i in jumped.steps[:20]),
-            )
+        yield Finding(
+            kind="jump",
+            columns=(c.name,),
+            severity="fault",
+            sentence=f"'{c.name}' jumps by {jumped.step_sizes[largest]:.5g} {unit} between two samples at"
+            f" {t[jumped.steps[largest]]:.5g} s and stays there"
+            + (f" ({many} such jumps)" if many > 1 else "")
+            + ": counts were lost, or the sensor slipped.",
+            evidence={f"jump [{unit}]": float(jumped.step_sizes[largest]), "jumps [1]": float(many)},
+            advice="Use a window that ends before the jump or starts after it.",
+            key=f'window = [{t[jumped.steps[largest]]:.6g}, "end"]',
+            panels=(*case.over_time(c.name), case.near(c.name, int(jumped.steps[largest]))),
+            marks=tuple(float(t[i]) for i in jumped.steps[:20]),
         )
     if jumped.spikes.size:
         largest = int(np.argmax(np.abs(jumped.spike_sizes)))
         many = jumped.spikes.size
-        found.append(
-            Finding(
-                kind="spike",
-                columns=(c.name,),
-                severity="warning",
-                sentence=f"'{c.name}' has {many} isolated outlier{'s' if many > 1 else ''}, the largest of"
-                f" {jumped.spike_sizes[largest]:.4g} {unit} at {t[jumped.spikes[largest]]:.5g} s.",
-                evidence={f"largest [{unit}]": float(jumped.spike_sizes[largest]), "spikes [1]": float(many)},
-                advice="Replace these samples by their neighbours' mean before fitting.",
-                panels=(*case.over_time(c.name), case.near(c.name, int(jumped.spikes[largest]))),
-                marks=tuple(float(t[i]) for i in jumped.spikes[:20]),
-            )
-        )
-    return found
-
-
-def _frozen(case: Case, c: Column, x: Array) -> list[Finding]:
-    at, sudden = frozen_from(x, c.quantum.step)
-    if at < 0:
-        return []
-    t = case.record.t
-    others = [o.name for o in case.measured if o.name != c.name and np.ptp(case.record[o.name][at:]) > 0]
-    return [
-        Finding(
-            kind="stuck",
-            columns=(c.name,),
-            severity="fault",
-            sentence=f"'{c.name}' freezes at {x[at]:.6g} from {t[at]:.5g} s to the end: it stops within a sample,"
-            f" {sudden:.2g} times as abruptly as at any time before.",
-            evidence={"from [s]": float(t[at]), "abruptness [1]": sudden},
-            advice="Use a window that ends before; check the cable, or whether the body hit a stop.",
-            key=f'window = ["start", {t[at]:.6g}]',
-            panels=(*case.over_time(c.name, *others[:1]), case.near(c.name, at)),
-            marks=(float(t[at]),),
-        )
-    ]
-
-
-def _limited(case: Case, c: Column, x: Array) -> list[Finding]:
-    low, high, share = clipped(x, c.quantum.step, inertia=True)
-    if share < 0.005:
-        return []
-    ends = " and ".join(f"{v:.5g}" for v in (low, high) if v == v)
-    return [
-        Finding(
-            kind="saturation",
+        yield Finding(
+            kind="spike",
             columns=(c.name,),
             severity="warning",
-            sentence=f"'{c.name}' is cut off at {ends} for {100 * share:.2g} % of the samples: the sensor reaches its"
-            " limit, or the body a stop.",
-            evidence={"share [%]": 100 * share},
-            advice="Use a window without these spans.",
-            panels=case.over_time(c.name),
+            sentence=f"'{c.name}' has {many} isolated outlier{'s' if many > 1 else ''}, the largest of"
+            f" {jumped.spike_sizes[largest]:.4g} {unit} at {t[jumped.spikes[largest]]:.5g} s.",
+            evidence={f"largest [{unit}]": float(jumped.spike_sizes[largest]), "spikes [1]": float(many)},
+            advice="Replace these samples by their neighbours' mean before fitting.",
+            panels=(*case.over_time(c.name), case.near(c.name, int(jumped.spikes[largest]))),
+            marks=tuple(float(t[i]) for i in jumped.spikes[:20]),
         )
-    ]
+
+
+def _frozen(case: Case, c: Column, x: Array) -> Iterator[Finding]:
+    at, sudden = frozen_from(x, c.quantum.step)
+    if at < 0:
+        return
+    t = case.record.t
+    others = [o.name for o in case.measured if o.name != c.name and np.ptp(case.record[o.name][at:]) > 0]
+    yield Finding(
+        kind="stuck",
+        columns=(c.name,),
+        severity="fault",
+        sentence=f"'{c.name}' freezes at {x[at]:.6g} from {t[at]:.5g} s to the end: it stops within a sample,"
+        f" {sudden:.2g} times as abruptly as at any time before.",
+        evidence={"from [s]": float(t[at]), "abruptness [1]": sudden},
+        advice="Use a window that ends before; check the cable, or whether the body hit a stop.",
+        key=f'window = ["start", {t[at]:.6g}]',
+        panels=(*case.over_time(c.name, *others[:1]), case.near(c.name, at)),
+        marks=(float(t[at]),),
+    )
+
+
+def _limited(case: Case, c: Column, x: Array) -> Iterator[Finding]:
+    low, high, share = clipped(x, c.quantum.step, inertia=True)
+    if share < 0.005:
+        return
+    ends = " and ".join(f"{v:.5g}" for v in (low, high) if v == v)
+    yield Finding(
+        kind="saturation",
+        columns=(c.name,),
+        severity="warning",
+        sentence=f"'{c.name}' is cut off at {ends} for {100 * share:.2g} % of the samples: the sensor reaches its"
+        " limit, or the body a stop.",
+        evidence={"share [%]": 100 * share},
+        advice="Use a window without these spans.",
+        panels=case.over_time(c.name),
+    )
 
 
 def frozen_from(x: Array, quantum: float) -> tuple[int, float]:
@@ -196,8 +182,7 @@ def clipped(x: Array, quantum: float, *, inertia: bool) -> tuple[float, float, f
         if not inertia and abs(level) < 0.8 * float(np.abs(x).max()):
             continue  # a drive's limits are alike; this one only paused there
         at = x == level
-        edges = np.flatnonzero(np.diff(np.concatenate(([0], at.astype(np.int8), [0]))))
-        first, after = edges[::2], edges[1::2]
+        first, after = np.array(stretches(at)).T + np.array([[0], [1]])
         inside = (first > 6) & (after < x.size - 7)
         if not inertia:  # an effort may begin or end at its limit
             inside |= (first == 0) | (after == x.size)

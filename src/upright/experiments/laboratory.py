@@ -137,7 +137,7 @@ def _tracking(at: Setting) -> tuple[Chapter, bool]:
 def _free_swing(at: Setting) -> tuple[Chapter, bool]:
     from upright.experiments.free_swing_4.chapter import chapter
     from upright.experiments.free_swing_4.run import run_free_swing
-    from upright.study.fit_file import write_fit
+    from upright.study.results import write_fit
 
     weighed = next((k for k in at.weighed if k.name == MAKES[at.make].body), None)
     done = run_free_swing(at.rig, at.seed, at.folder, at.progress, at.stopped, weighed=weighed)

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from upright.gains.factorization import Locus
 from upright.gains.requests import matched, written
-from upright.paper.reproduce import Regenerated, Reproduced
-from upright.paper.tables import STUDENTS
-from upright.questionnaire.figures import answers_figure
-from upright.report.drawing import BLACK, BLUE, VERMILLION
+from upright.paper.reproduce import STUDENTS, Regenerated, Reproduced
+from upright.report.drawing import BLACK, BLUE, GREY, VERMILLION, figure, styled
 from upright.report.page import Chapter, Part, Picture, Points, Step, Table
 from upright.report.poles import Poles, locus_figure, pole_map
 from upright.report.symbols import number
+
+if TYPE_CHECKING:
+    from upright.report.drawing import Figure
 
 
 def _set_table(table: Regenerated) -> Table:
@@ -184,3 +185,18 @@ def chapter(done: Reproduced) -> Chapter:
             "impossible_means": done.impossible,
         },
     )  # fmt: skip
+
+
+@styled
+def answers_figure(impossible: dict[int, int], claimed: int) -> Figure:
+    """How many printed means cannot come from n answers, by n; `claimed` is the number that was printed."""
+    drawing = figure(2.6)
+    ax = drawing.subplots()
+    colours = [VERMILLION if n == claimed else BLUE if count <= 1 else GREY for n, count in impossible.items()]
+    bars = ax.bar(list(impossible), list(impossible.values()), color=colours)
+    ax.bar_label(bars, fontsize=7.5)
+    ax.set_xticks(list(impossible))
+    ax.set_xlabel("number of students who answered")
+    ax.set_ylabel("impossible means")
+    ax.text(claimed, impossible[claimed] + 2.0, "as printed", ha="center", fontsize=8, color=VERMILLION)
+    return drawing

@@ -10,14 +10,14 @@ from upright.readers import delimited, ecp, matlab, rosbag
 from upright.readers.inspection import Inspection, inspect_record
 from upright.readers.source import Source, load
 from upright.records import PathLike, Record
-from upright.records.exchange import CSV_MARK
+from upright.records.record import CSV_MARK
 
 READERS = {
     "ecp": ecp.read,
     "table": delimited.read,
     "ros-bag": rosbag.read,
     "matlab": matlab.read,
-    "upright": delimited.read_own,
+    "upright": delimited.read_written,
 }
 
 __all__ = ["READERS", "inspect", "read", "recognise"]

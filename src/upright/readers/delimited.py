@@ -11,17 +11,16 @@ import re
 
 import numpy as np
 
-from upright.readers.source import Source
-from upright.readers.table import Table
-from upright.readers.timebase import exact_seconds, is_epoch, is_index, rebuild
+from upright.readers.resolution import exact_seconds, is_epoch, is_index, rebuild
+from upright.readers.source import Source, TextTable
 from upright.records import Array, Record
 from upright.records.columns import stated_unit, time_scale
-from upright.records.exchange import CSV_MARK
+from upright.records.record import CSV_MARK
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?|[+-]?(?:nan|inf|infinity)"
 
 
-def layout(source: Source) -> Table:
+def layout(source: Source) -> TextTable:
     """Names, delimiter and rows of a table.
 
     Raises
@@ -60,7 +59,7 @@ def layout(source: Source) -> Table:
             )
     body = "\n".join(lines[first:])
     comma = delimiter in (";", "\t", None) and "," in lines[first] and "." not in lines[first]
-    return Table(
+    return TextTable(
         source=source,
         body=body,
         names=tuple(names),
@@ -107,7 +106,7 @@ def read(source: Source) -> Record:
     )
 
 
-def read_own(source: Source) -> Record:
+def read_written(source: Source) -> Record:
     """Record written by `Record.to_csv`, with the line and column of any damage."""
     lines = source.text.split("\n")
     if len(lines) < 4 or not lines[0].startswith(CSV_MARK) or not lines[1].startswith("# "):
@@ -118,7 +117,7 @@ def read_own(source: Source) -> Record:
         raise source.bad(f"expected a line of names, got a broken quotation ({error})", line=3) from None
     if not names or names[0] != "t" or len(set(names)) < len(names):
         raise source.bad("expected names that differ, the first of them 't'", line=3)
-    rows = Table(source=source, body="\n".join(lines[3:]), names=tuple(names), delimiter=",", first_line=4)
+    rows = TextTable(source=source, body="\n".join(lines[3:]), names=tuple(names), delimiter=",", first_line=4)
     t, *signals = rows.numbers().T
     return Record.rebuild(t, dict(zip(names[1:], signals, strict=True)), lines[1][2:])
 
@@ -147,7 +146,7 @@ def _split(line: str, delimiter: str | None) -> list[str]:
     return [name.strip() for name in cells]
 
 
-def _time_column(found: Table, table: Array) -> tuple[int, float]:
+def _time_column(found: TextTable, table: Array) -> tuple[int, float]:
     for j, name in enumerate(found.names if found.named else ()):
         if seconds := time_scale(name):
             return j, seconds
@@ -167,7 +166,7 @@ def _time_column(found: Table, table: Array) -> tuple[int, float]:
     return 0, 1.0
 
 
-def _torn(found: Table, rows: int) -> str:
+def _torn(found: TextTable, rows: int) -> str:
     """Judge a last row without line end: torn when its last number is shorter than the fixed format above it."""
     lines = [line for line in found.body.split("\n")[-8:] if line.strip()]
     ends = [line.split(found.delimiter)[-1].strip() for line in lines]

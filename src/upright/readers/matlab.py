@@ -25,11 +25,11 @@ from typing import Any
 import numpy as np
 
 from upright.errors import BadInput
+from upright.readers.resolution import rebuild
 from upright.readers.source import Source
-from upright.readers.timebase import rebuild
 from upright.records import Array, Record
 from upright.records.columns import time_scale
-from upright.records.exchange import KEY
+from upright.records.record import KEY
 
 Variables = dict[str, Any]
 """By name: arrays (as many axes as in MATLAB), text, dict for a structure, list for cells, `Unreadable`."""

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.readers.source import Source
-from upright.readers.table import cell
-from upright.readers.timebase import exact_seconds
+from upright.readers.resolution import exact_seconds
+from upright.readers.source import Source, cell
 from upright.records import LARGEST, Array, Record
 
 RECEIVED = "__time"

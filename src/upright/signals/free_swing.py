@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import NotIdentifiable
-from upright.signals.turning import turning_points
+from upright.signals.stretches import turning_points
 
 Array = NDArray[np.float64]
 
@@ -39,8 +39,8 @@ class Decay:
 
     Attributes
     ----------
-    t, x, t_error, x_error : (N,) arrays
-        Times [s] and heights of the extremes, and their standard errors, from the samples around each.
+    t, x : (N,) arrays
+        Times [s] and heights of the extremes, from the samples around each.
     maximum : (N,) array of bool
         Whether an extreme is a maximum.
     omega_d, omega_n : float
@@ -57,8 +57,6 @@ class Decay:
 
     t: Array
     x: Array
-    t_error: Array
-    x_error: Array
     maximum: NDArray[np.bool_]
     omega_d: float
     omega_n: float
@@ -109,7 +107,7 @@ def decay(t: Array, x: Array, *, quantum: float = 0.0) -> Decay:
     rho, omega_d = 0.9, math.pi / half
     found = [(float(t[i]), float(x[i]), 0.0, 0.0) for i in at]
     omega_d_error, covariance, numbers, maximum = 0.0, np.eye(4), np.zeros(4), _maxima(x, at)
-    times = heights = t_error = x_error = np.zeros(0)
+    times = heights = np.zeros(0)
     for _ in range(4):  # shape and extremes improve each other; the shape is known to 1e-4 after two rounds
         sigma = -math.log(rho) * omega_d / math.pi
         found = [_extreme(t, x, f[0], omega_d, sigma, quantum) for f in found]
@@ -128,7 +126,7 @@ def decay(t: Array, x: Array, *, quantum: float = 0.0) -> Decay:
     sigma_error = math.sqrt(covariance[1, 1]) / rho * omega_d / math.pi
     omega_n = math.hypot(omega_d, sigma)
     return Decay(
-        t=times, x=heights, t_error=t_error, x_error=x_error, maximum=maximum,
+        t=times, x=heights, maximum=maximum,
         omega_d=omega_d, omega_n=omega_n, sigma=sigma, rho=rho,
         centre=float(numbers[2]), delta=float(numbers[3]), model=recursion(numbers, maximum),
         omega_error=math.hypot(omega_d * omega_d_error, sigma * sigma_error) / omega_n,

@@ -1,4 +1,4 @@
-"""Stretches of samples: where a condition holds, where a signal stays as it is, between gaps in time."""
+"""Stretches of samples: where a condition holds, between cuts, from turn to turn of a motion."""
 
 from __future__ import annotations
 
@@ -26,3 +26,30 @@ def pieces(cut: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """
     edges = [0, *(np.flatnonzero(cut) + 1).tolist(), cut.size + 1]
     return sorted(pairwise(edges), key=lambda span: span[0] - span[1])
+
+
+def turning_points(x: Array, least: float, *, ends: bool = False) -> NDArray[np.int64]:
+    """Samples at which a signal (N,) turns back by at least `least`.
+
+    The extremes before the first turn and after the last are left out, since nobody sees the motion turn there; with
+    `ends` they are given too.
+    """
+    found: list[int] = []
+    low = high = 0
+    direction = 0
+    for i, value in enumerate(x.tolist()):
+        if value > x[high]:
+            high = i
+        if value < x[low]:
+            low = i
+        if direction >= 0 and value <= x[high] - least:
+            if direction > 0 or ends:
+                found.append(high)
+            direction, low = -1, i
+        elif direction <= 0 and value >= x[low] + least:
+            if direction < 0 or ends:
+                found.append(low)
+            direction, high = 1, i
+    if ends and direction:
+        found.append(high if direction > 0 else low)
+    return np.array(found, dtype=np.int64)

@@ -78,7 +78,7 @@ class Trip:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Regression:
+class TripRegression:
     """What an acceleration (or force) is explained by, when the command may have acted for a part of the time only.
 
     Attributes
@@ -235,7 +235,7 @@ def trip_or_misfit(
 
 def _linear(
     u: Array, y: Array, others: Sequence[Array], dt: float, width: int, *, late: bool, moving: bool = True
-) -> tuple[Array, Regression | None]:
+) -> tuple[Array, TripRegression | None]:
     """Speed (N,) of `y`, and the regression of its acceleration on positions and speeds; None with little motion."""
     motion = savitzky_golay(y, dt, width, order=3)
     if not np.ptp(motion.a) > 0:
@@ -257,7 +257,7 @@ def _linear(
     if rows.size < LEAST:
         return motion.v, None
     base = _smoothed(np.stack(columns, axis=1), weights)[rows]
-    return motion.v, Regression(rows=rows, target=motion.a[rows], base=base, switched=switched, weights=weights)
+    return motion.v, TripRegression(rows=rows, target=motion.a[rows], base=base, switched=switched, weights=weights)
 
 
 def _accelerations(speed: Array, dt: float, at: int, *ends: int) -> tuple[float, float]:

@@ -12,11 +12,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from upright.errors import BadInput, nearest
-
-Array = NDArray[np.float64]
+from upright.records import Array
 
 FUNCTIONS: dict[str, tuple[Callable[..., Any], int]] = {
     "where": (np.where, 3),

@@ -7,25 +7,27 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from upright.errors import BadInput, nearest
 from upright.identification import Rig, Run
 from upright.identification.ladder.rungs import Rung
 from upright.identification.model.rig import NOISE
-from upright.identification.model.runs import PER_RUN
+from upright.identification.model.runs import FOR_GROUPS, PER_RUN, SPREADS
 from upright.identification.problem.predictor import with_noise
 from upright.physics import Plant
 from upright.physics.actuator import ACTUATOR
-from upright.records import Record
+from upright.records import Array, Record
 from upright.study.keys import names
-from upright.study.rig import read_plant, read_rig
-from upright.study.runs import read_runs, sensor_nuisances
-from upright.study.sensors import drive_unit
-from upright.study.text import Section, StudyText
+from upright.study.loop import Scene, read_loop, state_units
+from upright.study.rig import known_values, read_plant, read_rig
+from upright.study.sensors import Grid, drive_unit, read_drives, read_sensors
+from upright.study.text import Section, StudyText, show, si
 
 PathLike = str | os.PathLike[str]
 
@@ -140,9 +142,9 @@ def _log(run: Section, folder: Path, logs: dict[tuple[str, str, str], Record]) -
         file = folder / name
         if not file.is_file():
             raise run.error("file", f"the log {file} does not exist; {_instead(file, folder)}")
-        with run.text.at(run.place("reader" if reader else "file")):
+        with run.at("reader" if reader else "file"):
             record = read(file, reader=reader or None)
-        with run.text.at(run.place("time")):
+        with run.at("time"):
             logs[key] = record.replace(t=record[time]) if time else record
     return logs[key]
 
@@ -178,3 +180,208 @@ def read_ladder(study: Section, plant: type[Plant]) -> tuple[Rung, ...]:
             )
         )
     return tuple(rungs)
+
+
+Log = Callable[[Section], Record]
+_EPOCH = 1e6  # a time that starts beyond this many seconds counts from some epoch, so windows count from its start
+
+
+def read_runs(study: Section, plant: type[Plant], log: Log) -> tuple[Run, ...]:
+    """All runs of a study; `log` reads the file a run names."""
+    entries: Any = study.values.get("runs")
+    if not isinstance(entries, list) or not entries:
+        raise study.error("runs", 'a study needs at least one run: [[runs]], then file = "log.csv" below it')
+    shared = study.section("defaults")
+    shared.check(names("defaults"))
+    runs: list[Run] = []
+    labels: dict[str, int] = {}
+    for i, values in enumerate(entries):
+        own = Section(study.text, ("runs", i), values)
+        own.check(names("runs"))
+        label = own.text_of("label", "swing 1") if "label" in own else Path(own.text_of("file", "log.csv")).stem
+        if label in labels:
+            key = "label" if "label" in own else "file"
+            other = study.text.line(("runs", labels[label]))
+            raise own.error(
+                key, f"the label '{label}' is taken by the run on line {other}; give each run its own label"
+            )
+        labels[label] = i
+        runs.append(read_run(study, own.over(shared), label, plant, log))
+    return tuple(runs)
+
+
+def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: Log) -> Run:
+    """One run."""
+    record = log(run)
+    if record.t[0] > _EPOCH:
+        record = record.replace(t=record.t - record.t[0])
+    hash_of = record.provenance.sha256[:12]
+    notes: list[str] = [f"{Path(record.provenance.file).name}{f' (sha256 {hash_of})' if hash_of else ''}"]
+    if "window" in run:
+        start, stop = _window(run, record)
+        with run.at("window"):
+            record = record.window(start, stop)
+        notes.append(f"{start:g} to {stop:g} s")
+    period = run.positive("period", "s", 1.0) if "period" in run else study.section("rig").number("period", "s", 0.0)
+    with run.at("window" if "window" in run else "file"):
+        grid = Grid.of(record.t, period)
+    coordinates = {c.name: c for c in plant.coordinates}
+    locked = _locked(run, plant)
+    held_names = run.names("held", coordinates)
+    readings: dict[str, Array] = {}
+    quanta: dict[str, float] = {}
+    sensors = read_sensors(study, run, plant)
+    wanted = run.names("measured", coordinates, tuple(n for n in sensors if n not in locked and n not in held_names))
+    for name in (*wanted, *held_names):
+        if name not in sensors:
+            key = "measured" if name in wanted else "held"
+            raise run.error(key, f'{name} has no sensor; add [sensors.{name}] with column = "..."')
+        if name in locked:
+            raise run.error("locked", f"{name} is locked in this run, so it is neither held nor measured")
+        sensor, place = sensors[name]
+        with run.text.at(place.place("column") if "column" in place else place.path):
+            values, quanta[name], noticed = sensor.read(record)
+        readings[name] = grid.outputs(values)
+        notes += noticed
+    measured = tuple(n for n in coordinates if n in wanted and n not in held_names)
+    if not measured:
+        raise run.error(
+            "measured" if "measured" in run else "file", _nothing_measured(plant, sensors, locked, held_names)
+        )
+    u = np.zeros((grid.t.size, len(plant.inputs)))
+    drives = read_drives(study, run, plant)
+    for k, drive in enumerate(drives):
+        with run.text.at(drive.place):
+            u[:, k] = grid.commands(drive.read(record))
+    loop = None
+    if "loop" in run:
+        known = {name: sensor for name, (sensor, _) in sensors.items()}
+        scene = Scene(
+            plant=plant, record=record, grid=grid, sensors=known, drive=drives[0], unit=drive_unit(study),
+            command=str(study.section("drive").values.get("column", "")),
+        )  # fmt: skip
+        loop = read_loop(run, scene)
+    notes += [*grid.description(), *record.provenance.notes, *([loop.note] if loop and loop.note else [])]
+    role: Any = run.choice("role", ("fit", "predict"), "fit")
+    return Run(
+        label=label,
+        role=role,
+        t=grid.t,
+        u=u,
+        y=np.column_stack([readings[n] for n in measured]),
+        measured=measured,
+        quantum=tuple(quanta[n] for n in measured),
+        held={**locked, **{n: readings[n] for n in held_names}},
+        known=known_values(run.section("known"), plant),
+        unknown=run.names("unknown", (*PER_RUN, *sensor_nuisances(plant)), ("initial",)),
+        shared={key: own.text_of(last, "28 Jan") for key, own, last in _nuisances(run, "shared", plant)},
+        spread={key: own.positive(last, "1", 1.0) for key, own, last in _nuisances(run, "spread", plant)},
+        initial=_states(run, plant),
+        horizon=_horizon(run, grid),
+        restart=_restart(run),
+        score_from=_score_from(run, grid),
+        loop=loop,
+        repeats=run.text_of("repeats", "step 0.5 V") if "repeats" in run else "",
+        source="; ".join(notes),
+    )
+
+
+def _nothing_measured(plant: type[Plant], sensors: object, locked: object, held: object) -> str:
+    if not sensors:
+        name = plant.coordinates[0].name
+        return f'nothing is measured: the study needs a table such as [sensors.{name}] with column = "..."'
+    return "nothing is left to compare: every coordinate with a sensor is locked or held in this run"
+
+
+def _window(run: Section, record: Record) -> tuple[float, float]:
+    """First and last time of a run, inside the record."""
+    value: Any = run.values["window"]
+    first, last = float(record.t[0]), float(record.t[-1])
+    if not isinstance(value, list) or len(value) != 2:
+        raise run.error("window", f"window must be two times in s, such as window = [1.0, 9.0], got {show(value)}")
+    with run.at("window"):
+        start = first if value[0] == "start" else si(value[0], "s", "window")
+        stop = last if value[1] == "end" else si(value[1], "s", "window")
+        slack = record.period
+        if not start < stop:
+            raise BadInput(
+                f"the window must start before it ends, got {start:g} to {stop:g} s; give start and end in s"
+            )
+        if start < first - slack or stop > last + slack:
+            rest = start if first <= start < last else first
+            raise BadInput(
+                f"the window {start:g} to {stop:g} s must lie inside the record, from {first:g} to {last:g} s;"
+                f' for the rest of it write window = [{rest:g}, "end"]'
+            )
+    return start, stop
+
+
+def _locked(run: Section, plant: type[Plant]) -> dict[str, float]:
+    coordinates = {c.name: c.unit for c in plant.coordinates}
+    if isinstance(run.values.get("locked"), list | str):
+        return dict.fromkeys(run.names("locked", coordinates), 0.0)
+    section = run.section("locked")
+    section.check(coordinates, f"coordinate of {plant.__name__} called")
+    return {name: section.number(name, coordinates[name]) for name in section.values}
+
+
+def sensor_nuisances(plant: type[Plant]) -> tuple[str, ...]:
+    """Names of what sensors may leave unknown."""
+    return tuple(f"{kind}.{c.name}" for kind in ("offset", "scale") for c in plant.coordinates)
+
+
+def _nuisances(run: Section, key: str, plant: type[Plant]) -> list[tuple[str, Section, str]]:
+    """Entries of a table by the name of a nuisance: name, table and key; ``scale.x`` may stand in quotes or not."""
+    valid = (*FOR_GROUPS, *sensor_nuisances(plant))
+    if key == "spread":
+        valid = tuple(n for n in valid if n.partition(".")[0] in SPREADS)
+    table = run.section(key)
+    found: list[tuple[str, Section, str]] = []
+    for name, value in table.values.items():
+        inner = table.section(name) if isinstance(value, dict) else table
+        entries = [(f"{name}.{last}", last) for last in inner.values] if inner is not table else [(name, name)]
+        for whole, last in entries:
+            if whole not in valid:
+                raise inner.error(last, f"{key} has no '{whole}'; {nearest(whole, valid)}")
+            found.append((whole, inner, last))
+    return found
+
+
+def _states(run: Section, plant: type[Plant]) -> dict[str, float]:
+    section, states = run.section("initial"), state_units(plant)
+    section.check(states, f"state of {plant.__name__} called")
+    return {name: section.number(name, states[name]) for name in section.values}
+
+
+def _horizon(run: Section, grid: Grid) -> float | tuple[float, ...] | None:
+    value: Any = run.values.get("horizon", "free")
+    if value == "free":
+        return None
+    listed: list[Any] = value if isinstance(value, list) else [value]
+    with run.at("horizon"):
+        found = [si(v, "s", "horizon") for v in listed]
+    step, length = grid.t[1] - grid.t[0], grid.t[-1] - grid.t[0]
+    for horizon in found:
+        if not horizon >= 1.5 * step and not (_restart(run) == "kalman" and horizon >= step):
+            raise run.error(
+                "horizon", f"a horizon of {horizon:g} s is less than two samples of {step:g} s; take a longer one"
+            )
+    if not found:
+        raise run.error("horizon", 'horizon must be a time such as "0.5 s" or a list of times, got []')
+    if isinstance(value, list):
+        return tuple(found)
+    return None if found[0] >= length else found[0]
+
+
+def _restart(run: Section) -> Any:
+    usual = "kalman" if isinstance(run.values.get("horizon"), list) else "smooth"
+    return run.choice("restart", ("smooth", "kalman"), usual)
+
+
+def _score_from(run: Section, grid: Grid) -> float:
+    start, length = run.number("score_from", "s", 0.0), float(grid.t[-1] - grid.t[0])
+    if not 0 <= start < length:
+        raise run.error(
+            "score_from", f"score_from must lie inside the run, 0 to {length:g} s after its start, got {start:g} s"
+        )
+    return start

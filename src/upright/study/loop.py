@@ -7,23 +7,19 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from upright.closed_loop import Channel, ClosedLoop, Filter, joined, recover
 from upright.closed_loop.structures import memory
 from upright.errors import nearest
 from upright.laws import Law, state_feedback
 from upright.physics import Plant
-from upright.records import Record
+from upright.records import Array, Record
 from upright.study import expressions
 from upright.study.keys import names
 from upright.study.rig import per
 from upright.study.sensors import Drive, Grid, Sensor, read_sign
 from upright.study.text import Section, show, si
 from upright.units import in_unit
-
-Array = NDArray[np.float64]
-KINDS = ("state", "pid", "general", "recover")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,13 +54,10 @@ def read_loop(run: Section, scene: Scene) -> ClosedLoop | None:
     section = run.section("loop")
     section.check(names("loop"))
     kind = section.values.get("kind", "state")
-    if kind not in KINDS:
+    if kind not in tuple(KINDS):  # it may be no word at all
         near = nearest(str(kind), KINDS)
         raise section.error("kind", f"kind must be one of {', '.join(KINDS)}, got {show(kind)}; {near}")
-    if kind == "recover":
-        with section.text.at(section.place("kind")):
-            return _recovered(section, scene)
-    return {"state": _state, "pid": _pid, "general": _general}[kind](section, scene)
+    return KINDS[kind](section, scene)
 
 
 def _state(section: Section, scene: Scene) -> ClosedLoop:
@@ -97,26 +90,17 @@ def _pid(section: Section, scene: Scene) -> ClosedLoop:
     """Sum of PID laws, in SI or on the log's own columns."""
     coordinates = {c.name: c.unit for c in scene.plant.coordinates}
     measured = section.names("measured", coordinates, (next(iter(coordinates)),))
-    raw = is_raw(section)
-    every = every_of(section, scene)
-    on = section.values.get("on", "error")
-    if on not in ("error", "measurement"):
-        raise section.error("on", f'on must be "error" or "measurement", got {show(on)}')
+    raw, every = is_raw(section), every_of(section, scene)
+    on: Any = section.choice("on", ("error", "measurement"), "error")
     gains = {
-        key: several(
-            section,
-            key,
-            len(measured),
-            [("" if raw else gain_unit(scene.unit, coordinates[n], time)) for n in measured],
-        )
+        key: several(section, key, ["" if raw else gain_unit(scene.unit, coordinates[n], time) for n in measured])
         for key, time in (("kp", ""), ("ki", "s"), ("kd", "/s"))
     }
     if not any(any(values) for values in gains.values()):
         raise section.error("kp", "a PID law needs kp, ki or kd, such as kp = 0.8")
     period = scene.period / every
     smooth = filter_of(section, period)
-    given: Any = section.values.get("reference", [])
-    given = given if isinstance(given, list) else [given]
+    given = section.entries("reference")
     if len(given) > len(measured):
         raise section.error(
             "reference", f"{len(measured)} measured coordinates take as many references, got {len(given)}"
@@ -140,8 +124,7 @@ def _general(section: Section, scene: Scene) -> ClosedLoop:
     coordinates = {c.name: c.unit for c in scene.plant.coordinates}
     measured = section.names("measured", coordinates, (next(iter(coordinates)),))
     raw, every = is_raw(section), every_of(section, scene)
-    given: Any = section.values.get("reference", [])
-    given = given if isinstance(given, list) else [given]
+    given = section.entries("reference")
     units = [coordinates[measured[min(i, len(measured) - 1)]] for i in range(len(given))]
     references = [reference_of(r, "1" if raw else u, section, scene) for r, u in zip(given, units, strict=True)]
     matrices: dict[str, Array] = {}
@@ -152,7 +135,7 @@ def _general(section: Section, scene: Scene) -> ClosedLoop:
             raise section.error(key, f"{key} must be rows of numbers, such as {key} = [[1.0, 0.0]]") from None
     A, B, C, D = (matrices[key] for key in "ABCD")
     C, D = C.reshape(1, -1), D.reshape(1, -1)
-    with section.text.at(section.place("D")):
+    with section.at("D"):
         law = Law(
             A.reshape(C.size, C.size) if A.size == C.size**2 else np.atleast_2d(A),
             B.reshape(C.size, D.size) if B.size == C.size * D.size else np.atleast_2d(B), C, D, measured=measured,
@@ -163,16 +146,16 @@ def _general(section: Section, scene: Scene) -> ClosedLoop:
 
 def _recovered(section: Section, scene: Scene) -> ClosedLoop:
     """The law that the log itself shows."""
-    coordinates = {c.name: c.unit for c in scene.plant.coordinates}
-    measured = section.names("measured", coordinates, tuple(scene.sensors))
+    measured = section.names("measured", [c.name for c in scene.plant.coordinates], tuple(scene.sensors))
     command = section.text_of("command", "duty") if "command" in section else scene.command
     if not command:
         raise section.error("kind", 'a law is recovered from the column it put out; add command = "duty"')
     columns = columns_of(section, "reference")
-    found = recover(
-        scene.record, measured=[scene.sensors[n].column for n in measured], references=columns, command=command,
-        feedforward=columns_of(section, "feedforward"),
-    )  # fmt: skip
+    with section.at("kind"):
+        found = recover(
+            scene.record, measured=[scene.sensors[n].column for n in measured], references=columns, command=command,
+            feedforward=columns_of(section, "feedforward"),
+        )  # fmt: skip
     if found.quality == "poor":
         raise section.error(
             "kind", f"no law could be recovered from '{command}': {found.sentence} Write the law as kind = \"pid\","
@@ -192,6 +175,9 @@ def _recovered(section: Section, scene: Scene) -> ClosedLoop:
     return replace(loop, note=f"loop recovered from the log: {found.structure}. {found.sentence}")
 
 
+KINDS = {"state": _state, "pid": _pid, "general": _general, "recover": _recovered}
+
+
 def _closed_loop(
     section: Section, law: Law, references: Sequence[Array], scene: Scene, every: int, *, raw: bool = False
 ) -> ClosedLoop:
@@ -207,27 +193,19 @@ def _closed_loop(
     stacked = np.column_stack([np.broadcast_to(r, rows) for r in references]) if references else None
     if stacked is not None and every > 1 and rows > 1:
         stacked = np.repeat(stacked, every, axis=0)[: (rows - 1) * every + 1]
-    quantized = section.values.get("quantized", False)
-    if not isinstance(quantized, bool):
-        raise section.error("quantized", f"quantized must be true or false, got {show(quantized)}")
-    return ClosedLoop(law=replace(law, references=stacked), every=every, quantized=quantized)
+    return ClosedLoop(law=replace(law, references=stacked), every=every, quantized=section.flag("quantized"))
 
 
 def limited(section: Section, law: Law) -> Law:
     """The law with what the study says about its limit, what its sums do there, and its delay."""
-    windup: Any = section.values.get("windup", "free")
-    if windup not in ("free", "hold"):
-        raise section.error("windup", f'windup must be "free" or "hold", got {show(windup)}')
+    windup: Any = section.choice("windup", ("free", "hold"), "free")
     limit = section.positive("limit", "", 1.0) if "limit" in section else np.inf
     return replace(law, limit=limit, windup=windup, delay=section.number("delay", "1", 0.0))
 
 
 def is_raw(section: Section) -> bool:
     """Whether gains are between the log's own columns."""
-    units = section.values.get("units", "SI")
-    if units not in ("SI", "log"):
-        raise section.error("units", f'units must be "SI" or "log", got {show(units)}')
-    return units == "log"
+    return section.choice("units", ("SI", "log"), "SI") == "log"
 
 
 def filter_of(section: Section, period: float) -> Filter:
@@ -257,25 +235,23 @@ def matching(section: Section, ratio: float) -> int:
 
 def columns_of(section: Section, key: str) -> tuple[str, ...]:
     """Names of columns under `key`."""
-    value: Any = section.values.get(key, [])
-    items = value if isinstance(value, list) else [value]
+    items = section.entries(key)
     if not all(isinstance(item, str) for item in items):
-        raise section.error(key, f"{key} of a law to recover must name columns, got {show(value)}")
+        raise section.error(key, f"{key} of a law to recover must name columns, got {show(section.values[key])}")
     return tuple(items)
 
 
-def several(section: Section, key: str, count: int, units: Sequence[str]) -> list[float]:
-    """A gain per measured coordinate; a single number stands for the first."""
-    value: Any = section.values.get(key, 0.0)
-    items = value if isinstance(value, list) else [value]
-    if len(items) > count:
-        raise section.error(key, f"{key} has {len(items)} values for {count} measured coordinates")
-    with section.text.at(section.place(key)):
-        found = [
+def several(section: Section, key: str, units: Sequence[str]) -> list[float]:
+    """A gain per measured coordinate, in its unit if it has one; a single number stands for the first, 0 for others."""
+    items = section.entries(key)
+    if len(items) > len(units):
+        raise section.error(key, f"{key} has {len(items)} values for {len(units)} measured coordinates")
+    items += [0.0] * (len(units) - len(items))
+    with section.at(key):
+        return [
             in_unit(item, unit) if unit and isinstance(item, str) else si(item, "1", key)
-            for item, unit in zip(items, units, strict=False)
+            for item, unit in zip(items, units, strict=True)
         ]
-    return found + [0.0] * (count - len(found))
 
 
 def gain_unit(unit: str, coordinate: str, time: str) -> str:
@@ -296,7 +272,7 @@ def first_of(scene: Scene, name: str, *, raw: bool = False) -> float:
 def gain(section: Section, key: str, above: str, below: str) -> float:
     """A gain in the command's unit per SI of what it multiplies."""
     value: Any = section.values[key]
-    with section.text.at(section.place(key)):
+    with section.at(key):
         if isinstance(value, bool) or not isinstance(value, str | int | float):
             raise section.error(key, f"{key} must be a number or text with a unit, got {show(value)}")
         return in_unit(value, per(above, below)) if above else section.number(key, "")
@@ -304,7 +280,7 @@ def gain(section: Section, key: str, above: str, below: str) -> float:
 
 def reference_of(value: Any, unit: str, section: Section, scene: Scene) -> Array:
     """One number (1,), or (N,) from a column or an expression."""
-    with section.text.at(section.place("reference")):
+    with section.at("reference"):
         if isinstance(value, str) and not value[:1].isdigit() and value[:1] not in "+-.":
             return scene.grid.commands(expressions.evaluate(value, scene.record.signals, scene.record.t))
         return np.array([si(value, unit, "reference")])

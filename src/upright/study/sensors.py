@@ -7,17 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from upright import units
 from upright.errors import BadInput
 from upright.physics import Coordinate, Plant
-from upright.records import Record
+from upright.records import Array, Record
 from upright.study import expressions
 from upright.study.keys import names
 from upright.study.text import Section, show
-
-Array = NDArray[np.float64]
 
 _UNIFORM = 0.02  # samples off the grid by less than this part of a period count as on it
 _GAP, _HOPELESS = 5, 100  # periods without a sample: told, refused
@@ -172,8 +169,8 @@ class Grid:
         slack = 1e-6 * (self.t[1] - self.t[0])
         return values[np.clip(np.searchsorted(self.source, self.t + slack, side="right") - 1, 0, None)]
 
-    def told(self) -> tuple[str, ...]:
-        """What was done to the time base, in words."""
+    def description(self) -> tuple[str, ...]:
+        """What was done to the time base, in sentences."""
         if self.uniform:
             return self.notes
         period = self.t[1] - self.t[0]
@@ -224,7 +221,7 @@ def read_unit(section: Section) -> str:
     if "unit" not in section:
         return ""
     unit = section.text_of("unit", "counts")
-    with section.text.at(section.place("unit")):
+    with section.at("unit"):
         units.scale(unit)
     return unit
 
@@ -242,7 +239,7 @@ def _scale(section: Section, coordinate: Coordinate) -> float:
     value: Any = section.values["scale"]
     if isinstance(value, str):
         unit = section.values.get("unit", "")
-        with section.text.at(section.place("scale")):
+        with section.at("scale"):
             needed = coordinate.unit
             if unit and not units.same_dimension(unit, needed):
                 return units.parse(value, f"{needed}/({unit})") * units.scale(unit)
@@ -256,7 +253,7 @@ def _scale(section: Section, coordinate: Coordinate) -> float:
 def _offset(section: Section) -> float | str:
     value: Any = section.values.get("offset", 0.0)
     if isinstance(value, str):
-        with section.text.at(section.place("offset")):
+        with section.at("offset"):
             units.parse(value)
         return value
     return section.number("offset", "1", 0.0)
@@ -287,15 +284,13 @@ def read_drives(study: Section, run: Section, plant: type[Plant]) -> list[Drive]
 def _as_table(section: Section, key: str) -> Section:
     """Drive of a run, where a plain text stands for its column or expression and 0 for none."""
     value: Any = section.values.get(key, {})
-    if isinstance(value, str):
-        table = Section(section.text, section.place(key), {"expression": value})
-        table.places = {"expression": section.place(key)}
-        return table
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        table = Section(section.text, section.place(key), {"expression": repr(float(value))})
-        table.places = {"expression": section.place(key)}
-        return table
-    return section.section(key)
+    if isinstance(value, bool) or not isinstance(value, str | int | float):
+        return section.section(key)
+    table = Section(
+        section.text, section.place(key), {"expression": value if isinstance(value, str) else repr(float(value))}
+    )
+    table.places = {"expression": section.place(key)}
+    return table
 
 
 def _drive(own: Section, shared: Section, *, free: bool) -> Drive:

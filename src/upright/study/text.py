@@ -1,15 +1,16 @@
-"""Text of a study with the line of every key, so that each complaint names file, line and the nearest valid name.
+"""Text of a study, read and written: the line of every key, and tables laid out as a person would write them.
 
-`tomllib` gives values without places. `StudyText` reads the same text once more for where each key stands, and
-`Section` hands out the values of one table.
+`tomllib` gives values without places. `StudyText` finds where each key stands, so that each complaint names file, line
+and the nearest valid name, and `Section` hands out the values of one table. `TomlTable` is one that is written.
 """
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
-from collections.abc import Generator, Iterable
-from contextlib import contextmanager
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +19,6 @@ from upright.errors import BadInput, UprightError, nearest
 
 KeyPath = tuple[str | int, ...]
 """Keys from the root down; the entries of a list of tables are counted from 0."""
-
-_TOKEN = re.compile(
-    r"""(?P<string>\"\"\"(?:\\.|[^\\])*?\"\"\"|'''.*?'''|"(?:\\.|[^"\\\n])*"|'[^'\n]*')"""
-    r"""|(?P<comment>\#[^\n]*)|(?P<newline>\n)|(?P<mark>[\[\]{},=.])|(?P<bare>[^\s\[\]{},=.\#"']+)""",
-    re.DOTALL,
-)
 
 
 class StudyText:
@@ -111,6 +106,10 @@ class Section:
         both.places = {k: base.place(k) for k in base.values} | {k: self.place(k) for k in self.values}
         return both
 
+    def at(self, key: str) -> AbstractContextManager[None]:
+        """Put file and line of a key before whatever the block complains about."""
+        return self.text.at(self.place(key))
+
     def error(self, key: str, sentence: str) -> BadInput:
         """The complaint about one key of this table."""
         return self.text.error(self.place(key), sentence)
@@ -124,7 +123,7 @@ class Section:
                 raise self.error(key, f"{place} has no {what} '{key}'; {nearest(key, valid)}")
 
     def section(self, key: str) -> Section:
-        """Table under `key`, empty when absent."""
+        """TomlTable under `key`, empty when absent."""
         return Section(self.text, self.place(key), self.values.get(key, {}))
 
     def text_of(self, key: str, example: str) -> str:
@@ -148,13 +147,18 @@ class Section:
                 raise self.error(key, f"{key} lists {show(item)}; {nearest(str(item), valid)}")
         return tuple(dict.fromkeys(items))
 
+    def entries(self, key: str) -> list[Any]:
+        """List under `key`, where a single entry may stand alone; empty when absent."""
+        value: Any = self.values.get(key, [])
+        return list(value) if isinstance(value, list) else [value]
+
     def number(self, key: str, unit: str, default: float | None = None) -> float:
         """Number under `key` in SI, dimension checked; a plain number is SI already."""
         if key not in self.values:
             if default is None:
                 raise self.error(key, f"[{self.name}] needs {key}, a number in {unit}")
             return default
-        with self.text.at(self.place(key)):
+        with self.at(key):
             return si(self.values[key], unit, key)
 
     def positive(self, key: str, unit: str, default: float) -> float:
@@ -210,88 +214,131 @@ def show(value: Any) -> str:
 def key_lines(text: str) -> dict[KeyPath, int]:
     """Line (from 1) of every key and table of valid TOML; list entries are counted from 0.
 
-    Follows tables, lists of tables, dotted keys and inline tables; strings and comments are passed over.
+    The text is read again by `tomllib`, key by key: lines are gathered until they are TOML by themselves. A list over
+    several lines is closed early after each of them, which tells what the line added.
     """
     lines: dict[KeyPath, int] = {}
     counts: dict[KeyPath, int] = {}
     base: KeyPath = ()
-    stack: list[tuple[str, KeyPath]] = []  # open inline tables and lists, with the path they stand for
-    key: list[str] = []
-    pending: KeyPath = ()
-    header = 0  # brackets of a table header that are open
-    in_value = False
-    line = 1
-    start_of_line = True
-
-    def note(path: KeyPath) -> None:
-        for cut in range(1, len(path) + 1):
-            lines.setdefault(path[:cut], line)
-
-    for token in _TOKEN.finditer(text):
-        kind, word = token.lastgroup, token.group()
-        if kind == "newline":
-            line += 1
-            if not stack:
-                in_value, start_of_line, key, header = False, True, [], 0
-            continue
-        if kind == "comment":
-            continue
-        if header or (start_of_line and word == "[" and not stack):
-            if word == "[":
-                header += 1
-            elif word == "]":
-                if key:
-                    base = _enter(tuple(key), counts, is_list=header == 2)
-                    note(base)
-                key = []
-            elif word != ".":
-                key.append(_unquote(word, kind))
-            start_of_line = False
-            continue
-        start_of_line = False
-        owner = stack[-1] if stack else ("{", base)
-        if not in_value and owner[0] == "{":
-            if word == "=":
-                pending = (*owner[1], *key)
-                note(pending)
-                key, in_value = [], True
-            elif word == "}":
-                stack.pop()
-                in_value = True
-            elif word not in (".", ","):
-                key.append(_unquote(word, kind))
-        elif word == "{":
-            stack.append(("{", pending))
-            in_value = False
-        elif word == "[":
-            stack.append(("[", pending))
-            counts[pending] = 0
-            pending = (*pending, 0)
-        elif word == "]" or word == "}":
-            if stack:
-                pending = stack.pop()[1]
-        elif word == ",":
-            if owner[0] == "{":
-                in_value = False
-            else:
-                counts[owner[1]] = counts.get(owner[1], 0) + 1
-                pending = (*owner[1], counts[owner[1]])
-        line += word.count("\n") if kind == "string" else 0
+    gathered, first = "", 1
+    for number, line in enumerate(text.split("\n"), start=1):
+        gathered += f"{line}\n"
+        values, whole = _toml_so_far(gathered)
+        if values and gathered.lstrip().startswith("["):
+            base = _enter(values, counts)
+            paths = [base]
+        else:
+            paths = [(*base, *path) for path in _paths(values)]
+        for path in paths:
+            for cut in range(1, len(path) + 1):
+                lines.setdefault(path[:cut], first if first else number)
+        if values or whole:
+            first = 0  # what comes now was added by a later line
+        if whole:
+            gathered, first = "", number + 1
     return lines
 
 
-def _enter(key: tuple[str, ...], counts: dict[KeyPath, int], *, is_list: bool) -> KeyPath:
+def _toml_so_far(text: str) -> tuple[dict[str, Any], bool]:
+    """What the beginning of a text in TOML says, its lists closed if need be, and whether that was not needed."""
+    for closed in ("", *("]" * depth for depth in range(1, 9))):
+        try:
+            return tomllib.loads(text + closed), not closed
+        except tomllib.TOMLDecodeError:
+            continue
+    return {}, False
+
+
+def _paths(value: Any) -> Iterator[KeyPath]:
+    """Path of every key in a value, with the place of each table in a list."""
+    entries = enumerate(value) if isinstance(value, list) else value.items() if isinstance(value, dict) else ()
+    for key, inner in entries:
+        if isinstance(value, dict) or isinstance(inner, dict):
+            yield (key,)
+        for path in _paths(inner):
+            yield (key, *path)
+
+
+def _enter(header: Any, counts: dict[KeyPath, int]) -> KeyPath:
     """Path of a table header, with the running number of each list of tables on the way."""
     path: KeyPath = ()
-    for i, part in enumerate(key):
-        path = (*path, part)
-        last = i == len(key) - 1
-        if last and is_list:
+    while header:
+        if isinstance(header, list):
             counts[path] = counts.get(path, -1) + 1
-        if path in counts:
+            break
+        key = next(iter(header))
+        path, header = (*path, key), header[key]
+        if path in counts and not isinstance(header, list):
             path = (*path, counts[path])
-    return path
+    return (*path, counts[path]) if isinstance(header, list) else path
 
 
-def _unquote(word: str, kind: str | None) -> str:
-    return word[1:-1] if kind == "string" else word
+Value = bool | float | str | Sequence["Value"] | Mapping[str, "Value"]
+
+
+class TomlTable:
+    """One table of a study, written key by key.
+
+    Parameters
+    ----------
+    header : str
+        Its first line, ``[drive]`` or ``[[runs]]``; empty for the keys before the first table.
+    note : str, optional
+        Comment behind it.
+    """
+
+    def __init__(self, header: str = "", note: str = "") -> None:
+        self.lines: list[str] = []
+        if header:
+            self.line(header, note)
+
+    def key(self, name: str, value: Value, note: str = "", *, digits: int = 6, off: bool = False) -> None:
+        """Add a key; numbers get so many significant `digits`, and one that is `off` is commented out."""
+        self.line(f"{'# ' if off else ''}{name} = {toml(value, digits)}", note)
+
+    def line(self, text: str, note: str = "") -> None:
+        """Add a line as it is."""
+        self.lines.append(f"{text}   # {note}" if note else text)
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines) + "\n"
+
+
+def study_text(tables: Iterable[TomlTable]) -> str:
+    """Tables one below the other, a blank line between them."""
+    return "\n".join(str(table) for table in tables)
+
+
+def number(value: float, unit: str = "", digits: int = 3) -> str:
+    """A number that wears its unit, ``0.35 m``; a pure number ("" or "1") wears none."""
+    return f"{value:.{digits}g}" + (f" {unit}" if unit not in ("", "1") else "")
+
+
+def toml(value: Value, digits: int = 6) -> str:
+    """A value in TOML: text in quotes on one line, numbers to so many significant digits, lists, inline tables."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, float):
+        return f"{value:.{digits}g}"
+    if isinstance(value, str):
+        text = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", " ")
+        return f'"{text}"'
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{k} = {toml(v, digits)}" for k, v in value.items()) + " }"
+    return "[" + ", ".join(toml(v, digits) for v in value) + "]"
+
+
+def table(header: str, note: str = "", /, digits: int = 6, **keys: Value) -> TomlTable:
+    """A table with some keys."""
+    out = TomlTable(header, note)
+    for name, value in keys.items():
+        out.key(name, value, digits=digits)
+    return out
+
+
+def counted_sensor(name: str, unit: str, counts: float) -> TomlTable:
+    """Sensor of a coordinate in rad or m, whose column of the same name holds encoder counts, so many per unit."""
+    per, factor = ("counts_per_rev", 2 * math.pi) if unit == "rad" else ("counts_per_m", 1.0)
+    return table(f"[sensors.{name}]", column=name, unit="counts", digits=10, **{per: counts * factor})

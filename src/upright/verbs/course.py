@@ -21,7 +21,7 @@ from upright.verbs.values import texts
 if TYPE_CHECKING:
     from upright.experiments.laboratory import Session
     from upright.paper.reproduce import Reproduced
-    from upright.questionnaire import Means, Ratings, Shares
+    from upright.questionnaire.sheet import Means, Ratings, Shares
     from upright.report.book import Book
 
 
@@ -195,8 +195,8 @@ def survey(
     BadInput
         When the sheet cannot be read, or it is not told on how many answers it rests.
     """
-    from upright.questionnaire import Ratings, read
     from upright.questionnaire.chapter import chapter
+    from upright.questionnaire.sheet import Ratings, read
     from upright.report.page import Step
     from upright.report.symbols import typed
 

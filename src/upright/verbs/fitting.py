@@ -93,7 +93,7 @@ class FitAnswer(Answer["Fit"]):
 
     def save(self, path: str | Path = "fit.json") -> Path:
         """Write the fit for `predict`, `design`, `regulate` and other programs, and give back where."""
-        from upright.study.fit_file import write_fit
+        from upright.study.results import write_fit
 
         path = Path(path)
         write_fit(self.value, self.study, path, self.crossed)
@@ -209,7 +209,7 @@ def identify(
     from upright.identification.ladder.cross_validation import cross_validate
     from upright.report.fit.chapter import chapter
     from upright.report.symbols import typed
-    from upright.study.fit_file import write_fit
+    from upright.study.results import write_fit
 
     if method not in METHODS:
         raise BadInput(f"--method must be one of {', '.join(METHODS)}, got '{method}'; {nearest(method, METHODS)}")

@@ -60,8 +60,8 @@ def predict(
     from upright.identification.inference.scoring import predict as score
     from upright.report.fit.tables import score_table
     from upright.report.page import Chapter, Part
-    from upright.study.fit_file import read_fit
     from upright.study.load import load_study
+    from upright.study.results import read_fit
 
     model, study = Path(model), Path(study)
     for file, what in ((model, "the model"), (study, "the study")):
@@ -130,7 +130,7 @@ def ladder(
     from upright.identification.ladder.growth import climb
     from upright.report.ladder import chapter, next_steps
     from upright.report.symbols import typed
-    from upright.study.ladder_file import can_be_trimmed, chosen_study, plain_ladder
+    from upright.study.results import can_be_trimmed, chosen_study
 
     pdf_has_folder(out, pdf)
     study = Path(study)
@@ -143,7 +143,7 @@ def ladder(
         raise KeyboardInterrupt
     trimmed = can_be_trimmed(asked, climbed)
     files: list[Path] = []
-    numbers = plain_ladder(climbed, asked)
+    numbers = ladder_content(climbed, asked)
     if out is not None:
         files.append(write_json(at / "ladder.json", numbers))
         if trimmed:

@@ -8,9 +8,7 @@ from typing import Annotated
 import typer
 
 from upright.cli.terminal import Data, Pdf, progress_bar, tell
-from upright.errors import BadInput
-from upright.verbs.pages import write_page
-from upright.verbs.study import provenance, read_study
+from upright.verbs.study import read_study
 
 INTERRUPTED, NOT_TRUSTED = 130, 3
 METHODS = ("auto", "simplex", "least-squares")

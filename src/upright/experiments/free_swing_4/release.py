@@ -13,7 +13,7 @@ from upright.errors import BadInput
 from upright.experiments.makes import MOTOR_AND_BELT, SERVO
 from upright.physics import CartPendulum, Furuta
 from upright.records import Record
-from upright.records.provenance import of_twin
+from upright.records.record import of_twin
 
 Array = NDArray[np.float64]
 

@@ -21,7 +21,7 @@ from upright.identification.model.fit import Fit
 from upright.progress import Progress, part, silent
 from upright.records import Record
 from upright.study.load import Study
-from upright.study.write import Table, counted_sensor, number, study_text, table
+from upright.study.text import TomlTable, counted_sensor, number, study_text, table
 
 FRICTION = ("b_1", "b_1c", "b_2", "b_2c")
 
@@ -148,7 +148,7 @@ def question_text(q: Question, rig: ServoRig) -> str:
         unit = kind.quantity(name).unit
         return value if unit == "1" else number(value, unit, 6)
 
-    parameters = Table("[parameters]")
+    parameters = TomlTable("[parameters]")
     for name, (value, spread) in q.known.items():
         known, uncertainty = wearing_unit(name, value), wearing_unit(name, spread)
         parameters.key(name, {"value": known, "uncertainty": uncertainty} if spread else known)
@@ -156,7 +156,7 @@ def question_text(q: Question, rig: ServoRig) -> str:
         low, high = q.bounds.get(name, (0.0, math.inf))
         bounds = {"min": low} | ({"max": high} if math.isfinite(high) else {})
         parameters.key(name, {"guess": wearing_unit(name, guess), **bounds})
-    defaults = Table("[defaults]")
+    defaults = TomlTable("[defaults]")
     defaults.key("initial", {f"{carrier(rig)}_dot": 0.0, "theta_dot": 0.0}, "released from rest")
     defaults.key("unknown", q.unknown)
     return study_text(

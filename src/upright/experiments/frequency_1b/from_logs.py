@@ -19,7 +19,7 @@ from upright.identification.frequency.response import FrequencyResponse, is_resp
 from upright.identification.frequency.spectra import response_of
 from upright.progress import Progress, silent
 from upright.records import Record
-from upright.study.fit_file import write_response_fit
+from upright.study.results import write_response_fit
 
 
 @dataclass(frozen=True, kw_only=True)

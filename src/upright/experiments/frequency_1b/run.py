@@ -21,7 +21,7 @@ from upright.identification import Parameter
 from upright.identification import Rig as Asked
 from upright.identification.frequency.answer import Answer, explain
 from upright.progress import Progress, silent
-from upright.study.fit_file import write_response_fit
+from upright.study.results import write_response_fit
 
 LAG = 1e-3
 """First guess of the drive's time constant [s]."""

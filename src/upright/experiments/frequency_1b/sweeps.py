@@ -22,7 +22,7 @@ from upright.identification.frequency.detection import Tone, by_period, detect, 
 from upright.identification.frequency.response import FrequencyResponse
 from upright.identification.frequency.spectra import chirp, from_tones, multisine, odd_lines, response_of
 from upright.records import Record
-from upright.records.provenance import of_twin
+from upright.records.record import of_twin
 
 Array = NDArray[np.float64]
 

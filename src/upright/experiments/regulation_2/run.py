@@ -26,7 +26,7 @@ from upright.gains import Margins, Placement, Sampled
 from upright.gains.loop import closed, command_noise
 from upright.gains.requests import poles_of, read_poles
 from upright.laws import Law
-from upright.paper.tables import TABLE_1
+from upright.paper.reproduce import TABLE_1
 from upright.physics import Linear
 from upright.progress import Progress, silent
 

@@ -23,7 +23,7 @@ from upright.experiments.tracking_3.pulses import FIT, STUDY
 from upright.experiments.tracking_3.run import BEFORE, DWELL, RESERVE, Outcome, StepTrial, Tracking
 from upright.experiments.tracking_3.tables import length, milli, share
 from upright.identification.model.fit import Fit
-from upright.paper.tables import TABLE_2
+from upright.paper.reproduce import TABLE_2
 from upright.report.fit.chapter import motion_part, run_pictures
 from upright.report.fit.tables import finding, parameter_table
 from upright.report.page import Chapter, Finding, Part, Picture, Step, Table

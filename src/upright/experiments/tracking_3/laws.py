@@ -19,7 +19,7 @@ from upright.gains.loop import closed
 from upright.gains.requests import conjugate_poles, poles_of
 from upright.gains.sampled import to_s
 from upright.laws import Law
-from upright.paper.tables import TABLE_2, poles
+from upright.paper.reproduce import TABLE_2, poles
 from upright.physics import Linear
 
 Array = NDArray[np.float64]

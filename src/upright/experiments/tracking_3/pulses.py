@@ -21,9 +21,9 @@ from upright.identification.model.fit import Fit
 from upright.physics import Plant
 from upright.progress import Progress, part, silent
 from upright.records import Record
-from upright.records.provenance import of_twin
+from upright.records.record import of_twin
 from upright.study.load import Study
-from upright.study.write import Table, counted_sensor, number, study_text, table
+from upright.study.text import TomlTable, counted_sensor, number, study_text, table
 
 EVERY = 5
 """Servo periods per logged sample."""
@@ -94,7 +94,7 @@ def shaft_study(rig: ServoRig, seed: int, weighed: Sequence[Known] = ()) -> str:
     make = shaft_make(rig.plant, rig.name)
     rng = np.random.default_rng([seed, 30])
     known = {k.name: k for k in weighed if k.name == make.body}
-    parameters = Table("[parameters]")
+    parameters = TomlTable("[parameters]")
     for name, value in make.plant.parameters().items():
         unit = make.plant.quantity(name).unit
         if name in known:
@@ -102,12 +102,12 @@ def shaft_study(rig: ServoRig, seed: int, weighed: Sequence[Known] = ()) -> str:
             parameters.key(name, {"value": told, "uncertainty": error}, "experiment 1a")
         elif value:
             parameters.key(name, {"guess": number(value * rng.choice([0.7, 1.3]), unit, 4), "min": 0})
-    actuator = Table("[actuator]", "the loop's poles do not depend on the gain, masses and springs do")
+    actuator = TomlTable("[actuator]", "the loop's poles do not depend on the gain, masses and springs do")
     gain = number(make.gain, make.gain_unit, 6)
     actuator.key("gain", {"guess": gain, "min": 0} if known else {"value": gain, "uncertainty": GAIN_ERROR})
     actuator.key("delay", number(1e3 * rig.delay, "ms", 6))
     actuator.key("lag", number(1e3 * rig.lag, "ms", 6))
-    defaults = Table("[defaults]")
+    defaults = TomlTable("[defaults]")
     defaults.key("initial", dict.fromkeys(rig.plant.state_names()[1::2], 0.0), "at rest")
     defaults.key("unknown", ["initial"])
     return study_text(
@@ -136,8 +136,8 @@ def identify_shaft(
 ) -> tuple[Study, Fit]:
     """Pulse a rig, write logs and study, and fit it as `upright identify` would; writes `fit.json` too."""
     from upright.identification.estimate import identify
-    from upright.study.fit_file import write_fit
     from upright.study.load import load_study
+    from upright.study.results import write_fit
 
     folder.mkdir(parents=True, exist_ok=True)
     for file in _PULSES:

@@ -13,7 +13,7 @@ import numpy as np
 from upright.experiments.makes import CONVERTER, OSCILLATORS, SERVO, Oscillator
 from upright.physics import Plant
 from upright.records import Record
-from upright.records.provenance import of_twin
+from upright.records.record import of_twin
 
 PIECES = 4  # 500 g masses that come with a rig
 EVERY = 4  # servo periods per logged sample

@@ -14,12 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.checks.spikes import merged, without_spikes
+from upright.identification.checks.spikes import without_spikes
 from upright.identification.model.fit import Fit
 from upright.identification.model.rig import Rig
 from upright.identification.model.runs import Run
 from upright.identification.problem.residuals import formulate
 from upright.signals.smoothing import dominant_period
+from upright.signals.stretches import stretches
 
 Array = NDArray[np.float64]
 
@@ -180,7 +181,7 @@ def _strange(s: Stretches, others: Sequence[Stretches], spread: Mapping[str, flo
         far |= s.missed[:, k] > max(FAR * usual, LEAST * spread[c], 5 * s.quantum[k])
         times = np.maximum(times, s.missed[:, k] / usual)
     found: list[Outlier] = []
-    for first, last in merged(far, gap=2):
+    for first, last in stretches(far, gap=2):
         here = slice(first, last + 1)
         size = np.where(np.isfinite(times[here]), times[here], 0.0).max()
         told = f"missed {size:.0f} times as much as the other stretches"

@@ -13,9 +13,8 @@ from itertools import pairwise
 import numpy as np
 
 from upright.physics import Plant, find
-from upright.readers.inspection import Column
-from upright.readers.suspect_columns import DAC_COUNTS_PER_VOLT
-from upright.records import Record
+from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Column
+from upright.records import Array, Record
 from upright.signals.smoothing import acceleration_width, savitzky_golay
 from upright.signals.trips import find_trip
 from upright.study.draft.chain_log import ChainLog
@@ -30,8 +29,7 @@ from upright.study.draft.tables import (
     sensor_table,
 )
 from upright.study.rig import per
-from upright.study.sensors import Array
-from upright.study.write import Table, number
+from upright.study.text import TomlTable, number
 
 COUNTS = {"rad": (16000, "ECP 205 has 16000"), "m": (226629, "ECP 210 has 16000 counts per 7.06 cm")}
 """Of an encoder, per turn or metre, and whose."""
@@ -49,7 +47,7 @@ PASSES = 0.1
 
 
 @dataclass(frozen=True, kw_only=True)
-class Starts:
+class ChainStarts:
     """Where the search for each number of a chain begins, in SI.
 
     `numbers` by the plant's own names; `braked` [force per speed]: damping that acts with the volts on alone, 0 when
@@ -64,9 +62,9 @@ class Starts:
     fastest: float
 
 
-def chain_tables(record: Record, log: ChainLog, file: str, label: str) -> list[Table]:
+def chain_tables(record: Record, log: ChainLog, file: str, label: str) -> list[TomlTable]:
     """Tables of a study."""
-    plant = find(log.found.plant)
+    plant = find(log.recognised.plant)
     start = _starts_of(record, log, plant)
     several = len(log.windows) > 1
     runs = [(f"{label} {i + 1}" if several else label, a, b, "fit") for i, (a, b) in enumerate(log.windows)]
@@ -74,7 +72,7 @@ def chain_tables(record: Record, log: ChainLog, file: str, label: str) -> list[T
         _rig(record, log, plant, start),
         _parameters(log, plant, start),
         *_drive(log, plant, start),
-        *(_sensor(log, plant, name) for name in log.found.columns),
+        *(_sensor(log, plant, name) for name in log.recognised.columns),
         _defaults(log, start),
         *run_tables(file, runs),
     ]
@@ -86,7 +84,7 @@ def _unit(plant: type[Plant], name: str) -> str:
 
 def _factor(log: ChainLog, plant: type[Plant], name: str) -> float:
     """SI per unit of a column."""
-    c = log.found.columns[name]
+    c = log.recognised.columns[name]
     if c.guess == "counts":
         return 2 * np.pi / COUNTS["rad"][0] if _unit(plant, name) == "rad" else 1 / COUNTS["m"][0]
     return SI.get(c.guess, 1.0)
@@ -98,20 +96,20 @@ def _volts(c: Column) -> tuple[str, float]:
     return ("V", 1 / DAC_COUNTS_PER_VOLT) if c.guess == "counts" else (unit or "V", scale)
 
 
-def _starts_of(record: Record, log: ChainLog, plant: type[Plant]) -> Starts:
+def _starts_of(record: Record, log: ChainLog, plant: type[Plant]) -> ChainStarts:
     a, b = log.windows[0]
     rows = (record.t >= a) & (record.t <= b)
-    columns, drive = log.found.columns, log.found.drive
+    columns, drive = log.recognised.columns, log.recognised.drive
     factors = {n: _factor(log, plant, n) for n in columns}
     u, reach = None, np.inf
     if drive is not None:
         scale = _volts(drive)[1]
-        u = record[drive.name][rows] * (-scale if log.found.reversed else scale)
+        u = record[drive.name][rows] * (-scale if log.recognised.reversed else scale)
         reach = REACH if scale != 1.0 else np.inf
     return starts(
         record.t[rows],
         u,
-        [(record[c.name][rows] - log.found.rest[n]) * factors[n] for n, c in columns.items()],
+        [(record[c.name][rows] - log.recognised.rest[n]) * factors[n] for n, c in columns.items()],
         [n not in log.fixed for n in columns],
         disks=log.disks,
         quanta=[(c.quantum.step or 0.0) * factors[n] for n, c in columns.items()],
@@ -120,16 +118,16 @@ def _starts_of(record: Record, log: ChainLog, plant: type[Plant]) -> Starts:
     )
 
 
-def _rig(record: Record, log: ChainLog, plant: type[Plant], start: Starts) -> Table:
+def _rig(record: Record, log: ChainLog, plant: type[Plant], start: ChainStarts) -> TomlTable:
     every = int(2 * np.pi / start.fastest / 120 / record.period)
     coarse = not log.loop and every > 1
-    return rig_table(log.found.plant, plant, record, min(every, 4) * record.period if coarse else 0.0)
+    return rig_table(log.recognised.plant, plant, record, min(every, 4) * record.period if coarse else 0.0)
 
 
-def _parameters(log: ChainLog, plant: type[Plant], start: Starts) -> Table:
-    driven, carts = log.found.drive is not None, not log.disks
+def _parameters(log: ChainLog, plant: type[Plant], start: ChainStarts) -> TomlTable:
+    driven, carts = log.recognised.drive is not None, not log.disks
     stuck = [c.name in log.fixed for c in plant.coordinates]
-    table = Table("[parameters]")
+    table = TomlTable("[parameters]")
     left: list[str] = []
     scaled = driven
     for name in plant.names():
@@ -151,7 +149,7 @@ def _parameters(log: ChainLog, plant: type[Plant], start: Starts) -> Table:
         elif name.startswith("delta_") and not driven and not stuck[body]:
             # a free swing ends in small reversals, which tell how far a body moves before its friction is whole
             coordinate = plant.coordinates[body].name
-            c = log.found.columns[coordinate]
+            c = log.recognised.columns[coordinate]
             least = max(3 * (c.quantum.step or 0.0), 1e-4 * (c.high - c.low)) * _factor(log, plant, coordinate)
             guess = {"guess": number(5 * least, what.unit, 2), "min": number(least, what.unit, 2)}
             table.key(name, guess, what.meaning)
@@ -164,13 +162,13 @@ def _parameters(log: ChainLog, plant: type[Plant], start: Starts) -> Table:
     return table
 
 
-def _drive(log: ChainLog, plant: type[Plant], start: Starts) -> list[Table]:
-    c, force = log.found.drive, plant.inputs[0]
+def _drive(log: ChainLog, plant: type[Plant], start: ChainStarts) -> list[TomlTable]:
+    c, force = log.recognised.drive, plant.inputs[0]
     if c is None:
         return [no_drive_table()]
     unit, scale = _volts(c)
     damping = per(force.unit, f"{_unit(plant, force.on)}/s")
-    actuator = Table("[actuator]")
+    actuator = TomlTable("[actuator]")
     why = f"{force.meaning} per command: nobody measured it, so masses, springs and friction are per that"
     actuator.key("gain", {"value": f"1 {per(force.unit, unit)}", "assumed": True}, why)
     braked = {"guess": number(start.braked, damping), "min": 0}
@@ -181,19 +179,21 @@ def _drive(log: ChainLog, plant: type[Plant], start: Starts) -> list[Table]:
     if start.limit:
         actuator.key("limit", {"guess": number(start.limit, unit), "min": 0}, "the bodies feel no more than that")
     actuator.key("delay", {"guess": "2 ms", "max": "50 ms"}, off=not log.disks or bool(log.loop))
-    return [drive_table(c, unit, scale, reversed_=log.found.reversed), actuator]
+    return [drive_table(c, unit, scale, reversed_=log.recognised.reversed), actuator]
 
 
-def _sensor(log: ChainLog, plant: type[Plant], name: str) -> Table:
+def _sensor(log: ChainLog, plant: type[Plant], name: str) -> TomlTable:
     coordinate = next(k for k in plant.coordinates if k.name == name)
     counts, whose = COUNTS[coordinate.unit]
     told = f"{whose}; what is said in V, s and counts does not depend on it"
-    driven = log.found.drive is not None
-    return sensor_table(coordinate, log.found.columns[name], log.found.rest[name], (counts, told), driven=driven)
+    driven = log.recognised.drive is not None
+    return sensor_table(
+        coordinate, log.recognised.columns[name], log.recognised.rest[name], (counts, told), driven=driven
+    )
 
 
-def _defaults(log: ChainLog, start: Starts) -> Table:
-    table = Table("[defaults]")
+def _defaults(log: ChainLog, start: ChainStarts) -> TomlTable:
+    table = TomlTable("[defaults]")
     if log.held:
         table.key("held", log.held, "their measured motion is prescribed")
     if log.locked:
@@ -224,8 +224,8 @@ def starts(
     quanta: list[float],
     loop: bool,
     reach: float = np.inf,
-) -> Starts:
-    """Starts for a chain.
+) -> ChainStarts:
+    """ChainStarts for a chain.
 
     Parameters
     ----------
@@ -297,7 +297,7 @@ def starts(
     if u is not None and not loop and free[0]:
         others = [y for y, f in zip(bodies[1:], free[1:], strict=True) if f]
         trips = find_trip(t, u, bodies[0], others, quantum=quanta[0]) is not None
-    return Starts(numbers=numbers, braked=braked, trips=trips, limit=limit, fastest=w)
+    return ChainStarts(numbers=numbers, braked=braked, trips=trips, limit=limit, fastest=w)
 
 
 def _frequency(t: Array, bodies: list[Array], free: list[bool]) -> float:

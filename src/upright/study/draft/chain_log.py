@@ -11,11 +11,10 @@ import numpy as np
 from upright.errors import BadInput, UprightError
 from upright.physics import find
 from upright.readers.inspection import Column, Inspection
-from upright.records import Record
+from upright.records import Array, Record
+from upright.signals.stretches import turning_points
 from upright.signals.trips import goes_dead
-from upright.signals.turning import turning_points
 from upright.study.draft.recognise import REFERENCE, Recognised, in_dac_counts
-from upright.study.sensors import Array
 
 RUNS_AWAY = 16_000
 """Counts beyond which a body is a disk: a cart of an ECP 210 has 16000 in 7 cm, and less travel than that."""
@@ -46,7 +45,7 @@ class ChainLog:
 
     Attributes
     ----------
-    found : Recognised
+    recognised : Recognised
         Plant, columns, rest levels, drive, sign and doubts, as for any plant.
     held : tuple of str
         Coordinates moved by a hand: they creep.
@@ -62,7 +61,7 @@ class ChainLog:
         Coordinates that lie still before the first command.
     """
 
-    found: Recognised
+    recognised: Recognised
     held: tuple[str, ...]
     locked: tuple[str, ...]
     reference: Column | None
@@ -78,7 +77,7 @@ class ChainLog:
     @property
     def disks(self) -> bool:
         """Whether these are disks on a shaft, not carts."""
-        return self.found.plant.startswith("tors")
+        return self.recognised.plant.startswith("tors")
 
 
 def read_chain(record: Record, seen: Inspection, found: Recognised, *, named: bool, path: str = "") -> ChainLog:
@@ -138,7 +137,7 @@ def read_chain(record: Record, seen: Inspection, found: Recognised, *, named: bo
         reversed=reversed_, mirrored=False, window=windows[0], doubts=(*told, *doubts),
     )  # fmt: skip
     return ChainLog(
-        found=found, held=held, locked=locked, reference=reference, loop=loop, windows=tuple(windows),
+        recognised=found, held=held, locked=locked, reference=reference, loop=loop, windows=tuple(windows),
         still=still_bodies(record, found.columns, at) if drive is not None else (),
     )  # fmt: skip
 

@@ -11,7 +11,7 @@ from upright.study.draft.chain import chain_tables
 from upright.study.draft.chain_log import read_chain
 from upright.study.draft.pendulum import pendulum_tables
 from upright.study.draft.recognise import recognise
-from upright.study.write import Table, study_text
+from upright.study.text import TomlTable, study_text
 
 
 def draft(record: Record, seen: Inspection, log: Path, study: Path, *, plant: str = "") -> str:
@@ -31,10 +31,10 @@ def draft(record: Record, seen: Inspection, log: Path, study: Path, *, plant: st
     if found.plant.startswith(("rectilinear", "torsional")):
         where = "/".join(log.resolve().parts[-3:])
         chain = read_chain(record, seen, found, named=bool(plant), path=where)
-        found, tables = chain.found, chain_tables(record, chain, file, log.stem)
+        found, tables = chain.recognised, chain_tables(record, chain, file, log.stem)
     else:
         found, tables = pendulum_tables(record, seen, found, file, log.stem)
-    head = Table()
+    head = TomlTable()
     head.line(f"# Study of {log.name}, drafted by `upright init`. Check it, then: upright identify THIS_FILE -o OUT")
     head.line("# A number in quotes wears its unit; { guess = ... } asks for it; a plain text or number is known.")
     head.line("# Lines marked MEASURE hold placeholders. All keys: `upright identify --keys`.")

@@ -16,7 +16,7 @@ from upright.readers import inspect
 from upright.records import Record
 from upright.study.draft.draft import draft
 from upright.study.load import Study, load_study
-from upright.study.write import toml
+from upright.study.text import toml
 
 Number = float | str
 LOG = "log.csv"

@@ -14,9 +14,8 @@ from dataclasses import MISSING, dataclass, field, fields, replace
 import numpy as np
 
 from upright.physics import Plant, find
-from upright.readers.inspection import Inspection
-from upright.readers.suspect_columns import DAC_COUNTS_PER_VOLT
-from upright.records import Record
+from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Inspection
+from upright.records import Array, Record
 from upright.signals.smoothing import acceleration_width, savitzky_golay
 from upright.study.draft.recognise import Recognised, in_dac_counts
 from upright.study.draft.tables import (
@@ -29,8 +28,7 @@ from upright.study.draft.tables import (
     sensor_table,
 )
 from upright.study.rig import per
-from upright.study.sensors import Array
-from upright.study.write import Table, number
+from upright.study.text import TomlTable, number
 
 G = 9.81
 MANY = 40_000
@@ -84,7 +82,7 @@ class Balanced:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Starts:
+class PendulumStarts:
     """Numbers of a plant in SI: `known` with the reason, `asked` from a guess on, `uncertain` with how much [%]."""
 
     known: Mapping[str, tuple[float, str]]
@@ -94,7 +92,7 @@ class Starts:
 
 def pendulum_tables(
     record: Record, seen: Inspection, found: Recognised, file: str, label: str
-) -> tuple[Recognised, list[Table]]:
+) -> tuple[Recognised, list[TomlTable]]:
     """What is recognised in the end, and the tables of a study about it."""
     plant = find(found.plant)
     balanced = balance_of(record, found)
@@ -150,25 +148,25 @@ def recognised_upright(found: Recognised, balanced: Balanced) -> Recognised:
     )  # fmt: skip
 
 
-def starts_upright(balanced: Balanced, plant: str) -> Starts:
+def starts_upright(balanced: Balanced, plant: str) -> PendulumStarts:
     """Numbers of a balanced pendulum on a cart or an arm."""
     known = {"m_p": (MASS, SCALE), "J_p": (0.0, SIMPLE)}
     inertia = balanced.inertia(plant)
     asked = {"l_cg": balanced.length, "b_1": 2 * inertia, "b_1c": 0.02 * balanced.gain(plant)}
     if plant == "cart-pendulum":
-        return Starts(known=known | {"m_c": (inertia, "MEASURE")}, asked=asked)
-    return Starts(known=known, asked=asked | {"J_d": inertia / 2, "k_psi": 2 * inertia},
+        return PendulumStarts(known=known | {"m_c": (inertia, "MEASURE")}, asked=asked)
+    return PendulumStarts(known=known, asked=asked | {"J_d": inertia / 2, "k_psi": 2 * inertia},
                   uncertain={"r": (balanced.arm(), "30 %")})  # fmt: skip
 
 
-def starts_hanging(found: Recognised, plant: type[Plant]) -> Starts:
+def starts_hanging(found: Recognised, plant: type[Plant]) -> PendulumStarts:
     """Numbers of a pendulum that swings about where it hangs; of any other plant, its first parameter as known."""
     w = found.frequency or 6.0
     length = G / w**2
     known = {"m_p": (1.0, f"{SCALE}; a swing alone sees only ratios"), "J_p": (0.0, SIMPLE)}
     if found.plant == "pendulum":
         friction = {"b_2": 0.002 * w * length**2, "b_2c": 0.002 * G * length, "b_2q": 0.002 * length**2}
-        return Starts(known=known, asked={"l_cg": length, **friction})
+        return PendulumStarts(known=known, asked={"l_cg": length, **friction})
     if found.plant in ("cart-pendulum", "furuta"):
         known["m_p"] = (MASS, known["m_p"][1])
         asked = {"l_cg": length, "b_2": 0.002 * w * MASS * length**2, "b_2c": 0.001 * G * MASS * length}
@@ -183,24 +181,24 @@ def starts_hanging(found: Recognised, plant: type[Plant]) -> Starts:
                 known["J_d"] = (1e-3, "MEASURE; not seen while the arm is held or locked")
         if driven:
             asked |= {"b_1": INERTIA[found.plant] * 1.0, "b_1c": INERTIA[found.plant] * 0.1}
-        return Starts(known=known, asked=asked)
+        return PendulumStarts(known=known, asked=asked)
     required = [f.name for f in fields(plant) if f.default is MISSING]  # type: ignore[arg-type]
-    return Starts(known=dict.fromkeys(required[:1], (1.0, "MEASURE")), asked=dict.fromkeys(required[1:], 1.0))
+    return PendulumStarts(known=dict.fromkeys(required[:1], (1.0, "MEASURE")), asked=dict.fromkeys(required[1:], 1.0))
 
 
 INERTIA = {"furuta": 2e-3, "cart-pendulum": 1.1}
 """What the drive moves, where the search begins [kg m^2, kg]."""
 
 
-def _rig(record: Record, found: Recognised, plant: type[Plant]) -> Table:
+def _rig(record: Record, found: Recognised, plant: type[Plant]) -> TomlTable:
     period = 0.0
     if (found.window[1] - found.window[0]) / record.period > MANY and found.frequency:
         period = max(1, int(2 * np.pi / found.frequency / 200 / record.period)) * record.period
     return rig_table(found.plant, plant, record, period)
 
 
-def _parameters(plant: type[Plant], starts: Starts) -> Table:
-    table = Table("[parameters]")
+def _parameters(plant: type[Plant], starts: PendulumStarts) -> TomlTable:
+    table = TomlTable("[parameters]")
     left: list[str] = []
     for name in plant.names():
         what = plant.quantity(name)
@@ -218,14 +216,14 @@ def _parameters(plant: type[Plant], starts: Starts) -> Table:
     return table
 
 
-def _drive(found: Recognised, plant: type[Plant], balanced: Balanced | None) -> list[Table]:
+def _drive(found: Recognised, plant: type[Plant], balanced: Balanced | None) -> list[TomlTable]:
     if found.drive is None or not plant.inputs:
         return [no_drive_table()] if plant.inputs else []
     unit, scale = command_unit(found.drive)
     force, driven = plant.inputs[0], next(iter(found.columns))
     guess = balanced.gain(found.plant) if balanced else _gain(found)
     speed = next(f"{k.unit}/s" for k in plant.coordinates if k.name == force.on)
-    actuator = Table("[actuator]")
+    actuator = TomlTable("[actuator]")
     gain = {"guess": number(guess, per(force.unit, unit) if unit else force.unit), "min": 0}
     actuator.key("gain", gain, f"{force.meaning} per command; moves {driven} up")
     actuator.key("slope", {"guess": number(0, per(force.unit, speed))}, "force lost per speed", off=True)
@@ -244,7 +242,7 @@ def _gain(found: Recognised) -> float:
     return max(INERTIA.get(found.plant, 1.0) * swing * (found.frequency or 6.0) ** 2 / u, 1e-9)
 
 
-def _sensor(seen: Inspection, found: Recognised, plant: type[Plant], name: str) -> Table:
+def _sensor(seen: Inspection, found: Recognised, plant: type[Plant], name: str) -> TomlTable:
     c = found.columns[name]
     coordinate = next(k for k in plant.coordinates if k.name == name)
     ecp = seen.reader == "ecp" or any(word in c.name.lower() for word in ("enc", "pos"))
@@ -255,8 +253,8 @@ def _sensor(seen: Inspection, found: Recognised, plant: type[Plant], name: str) 
     return sensor_table(coordinate, c, found.rest[name], counts, driven=found.drive is not None, mirrored=mirrored)
 
 
-def _defaults(found: Recognised, plant: type[Plant], balanced: Balanced | None) -> Table:
-    table = Table("[defaults]")
+def _defaults(found: Recognised, plant: type[Plant], balanced: Balanced | None) -> TomlTable:
+    table = TomlTable("[defaults]")
     missing = [c.name for c in plant.coordinates if c.name not in found.columns]
     if missing:
         table.key("locked", missing, "no column was found; give them a sensor if they move")
@@ -273,7 +271,7 @@ def _defaults(found: Recognised, plant: type[Plant], balanced: Balanced | None) 
     return table
 
 
-def _runs(found: Recognised, file: str, label: str) -> list[Table]:
+def _runs(found: Recognised, file: str, label: str) -> list[TomlTable]:
     """One run; a long free swing keeps its tail for prediction."""
     start, stop = found.window
     split = start + 0.6 * (stop - start)

@@ -11,9 +11,8 @@ import numpy as np
 from upright.errors import BadInput
 from upright.physics import Plant, find
 from upright.readers.inspection import Column, Inspection
-from upright.records import Record
+from upright.records import Array, Record
 from upright.signals.smoothing import savitzky_golay
-from upright.study.sensors import Array
 
 _RATE = re.compile(r"velocity|speed|rate|_dot\b|omega|\bqd|accel", re.IGNORECASE)
 _EFFORT = re.compile(r"effort|volt|current|torque|force|plant_input|cmd|duty|^(u|v|i)$", re.IGNORECASE)

@@ -6,18 +6,17 @@ from collections.abc import Iterable
 
 from upright.physics import Plant
 from upright.physics.statement import Coordinate
-from upright.readers.inspection import Column
-from upright.readers.suspect_columns import DAC_COUNTS_PER_VOLT
+from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Column
 from upright.records import Record
 from upright.study.draft.recognise import in_dac_counts
-from upright.study.write import Table
+from upright.study.text import TomlTable
 
 ROLES = {"fit": "fitted", "predict": "scored, never seen by the estimator"}
 
 
-def rig_table(name: str, plant: type[Plant], record: Record, period: float = 0.0) -> Table:
+def rig_table(name: str, plant: type[Plant], record: Record, period: float = 0.0) -> TomlTable:
     """Plant and its coordinates, and a `period` [s] coarser than the log's when there is one."""
-    table = Table("[rig]")
+    table = TomlTable("[rig]")
     coordinates = ", ".join(f"{c.name} [{c.unit}] {c.meaning}" for c in plant.coordinates)
     table.key("plant", name, f"coordinates: {coordinates}")
     if period:
@@ -25,7 +24,7 @@ def rig_table(name: str, plant: type[Plant], record: Record, period: float = 0.0
     return table
 
 
-def parameters_left_at_zero(table: Table, plant: type[Plant], names: Iterable[str]) -> None:
+def parameters_left_at_zero(table: TomlTable, plant: type[Plant], names: Iterable[str]) -> None:
     """Add parameters that nobody asks for yet, commented out."""
     names = list(names)
     if names:
@@ -41,16 +40,16 @@ def command_unit(c: Column) -> tuple[str, float]:
     return ("V", 1 / DAC_COUNTS_PER_VOLT) if in_dac_counts(c) else (c.unit or c.guess, 1.0)
 
 
-def no_drive_table() -> Table:
+def no_drive_table() -> TomlTable:
     """What to fill in when a column drives after all."""
-    table = Table("# [drive]")
+    table = TomlTable("# [drive]")
     table.key("column", "...", "no column drives: the runs are free", off=True)
     return table
 
 
-def drive_table(c: Column, unit: str, scale: float, *, reversed_: bool) -> Table:
+def drive_table(c: Column, unit: str, scale: float, *, reversed_: bool) -> TomlTable:
     """The command's column; `reversed_`: it first moves the driven body down."""
-    table = Table("[drive]")
+    table = TomlTable("[drive]")
     raw = unit if scale == 1.0 else "DAC counts"
     table.key("column", c.name, f"{c.low:.4g} to {c.high:.4g} {raw}".rstrip())
     table.key("unit", unit or "V", off=not unit)
@@ -63,13 +62,13 @@ def drive_table(c: Column, unit: str, scale: float, *, reversed_: bool) -> Table
 
 def sensor_table(
     coordinate: Coordinate, c: Column, zero: float, counts: tuple[int, str], *, driven: bool, mirrored: bool = False
-) -> Table:
+) -> TomlTable:
     """One sensor; `zero` is the reading at rest, `counts` its counts per turn or metre if it counts, and their source.
 
     `mirrored`: it counts against the coordinate.
     """
     name, turns = coordinate.name, coordinate.unit == "rad"
-    table = Table(f"[sensors.{name}]")
+    table = TomlTable(f"[sensors.{name}]")
     table.key("column", c.name, f"{c.low:.6g} to {c.high:.6g} {c.guess}".rstrip())
     if c.guess:
         table.key("unit", c.guess, "" if c.unit else "guessed; the log does not say")
@@ -88,11 +87,11 @@ def sensor_table(
     return table
 
 
-def run_tables(file: str, runs: Iterable[tuple[str, float, float, str]]) -> list[Table]:
+def run_tables(file: str, runs: Iterable[tuple[str, float, float, str]]) -> list[TomlTable]:
     """Runs of one log by label, first and last second, and role."""
-    tables: list[Table] = []
+    tables: list[TomlTable] = []
     for label, start, stop, role in runs:
-        table = Table("[[runs]]")
+        table = TomlTable("[[runs]]")
         table.key("label", label)
         table.key("file", file)
         table.key("window", [start, stop], "s", digits=5)

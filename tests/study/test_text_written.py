@@ -5,7 +5,7 @@ import tomllib
 
 import pytest
 
-from upright.study.write import Table, number, study_text, toml
+from upright.study.text import TomlTable, number, study_text, toml
 
 
 @pytest.mark.parametrize(
@@ -24,7 +24,7 @@ def test_a_number_keeps_as_many_digits_as_asked():
 
 
 def test_tables_keep_their_keys_and_comments_say_nothing_to_a_program():
-    drive, run = Table("[drive]", "what pushes"), Table("[[runs]]")
+    drive, run = TomlTable("[drive]", "what pushes"), TomlTable("[[runs]]")
     drive.key("column", "u", "-1 to 1 V")
     drive.key("sign", -1, off=True)
     run.key("window", [0.5, 12.25], "s", digits=5)

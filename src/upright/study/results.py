@@ -1,4 +1,4 @@
-"""What a fit found, written to `fit.json` and read back by `upright predict` and `upright design`.
+"""What a fit or a ladder found, for programs and for the next fit: `fit.json`, `ladder.json`, the study of the choice.
 
 JSON has no infinity: ``null`` stands for "no bound" (an interval without end, a standard error nobody can state,
 an actuator without limit).
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -21,8 +21,11 @@ from upright.files import plain_values, write_json
 from upright.identification import Estimate, Fit
 from upright.identification.frequency.answer import Answer
 from upright.identification.ladder.cross_validation import CrossValidation
+from upright.identification.ladder.growth import Ladder, RungResult
+from upright.identification.ladder.rungs import neutral
 from upright.physics.actuator import ACTUATOR
 from upright.study.load import Study
+from upright.study.text import StudyText
 
 FORMAT = 1
 
@@ -74,13 +77,9 @@ def write_fit(fit: Fit, study: Study, path: Path, crossed: CrossValidation | Non
         "title": study.title,
         "plant": study.plant,
         "substeps": fit.rig.substeps,
-        "verdict": fit.verdict,
-        "trusted": fit.trusted,
-        "method": fit.method,
-        "evaluations": fit.evaluations,
+        **_fields(fit, "verdict trusted method evaluations"),
         "seconds": round(fit.seconds, 4),
-        "cost": fit.cost,
-        "interrupted": fit.interrupted,
+        **_fields(fit, "cost interrupted"),
         "parameters": {n: {**vars(e), "meaning": meanings.get(n, "")} for n, e in {**known, **fit.estimates}.items()},
         "assumed": [
             {
@@ -92,27 +91,17 @@ def write_fit(fit: Fit, study: Study, path: Path, crossed: CrossValidation | Non
             }
             for a in fit.assumptions
         ],
-        "per_run": fit.per_run,
-        "groups": fit.groups,
+        **_fields(fit, "per_run groups"),
         "runs": {
             label: {
-                "role": score.role,
-                "fit_percent": score.fit_percent,
-                "horizon": score.horizon,
-                "score_from": score.score_from,
-                "naive": score.naive,
-                "adapted": score.adapted,
+                **_fields(score, "role fit_percent horizon score_from naive adapted"),
                 "ahead": [{"horizon": h, "fit_percent": percents} for h, percents in score.ahead.items()],
             }
             for label, score in fit.runs.items()
         },
-        "poles": fit.poles,
-        "unseen": fit.unseen,
-        "warnings": fit.warnings,
+        **_fields(fit, "poles unseen warnings"),
         "estimated": fit.names,
-        "correlation": fit.correlation,
-        "singular_values": fit.singular_values,
-        "directions": fit.directions,
+        **_fields(fit, "correlation singular_values directions"),
         "history": [{"stage": s, "cost": c, "evaluations": n} for s, c, n in fit.history],
         "provenance": provenance(study),
     }
@@ -123,6 +112,11 @@ def write_fit(fit: Fit, study: Study, path: Path, crossed: CrossValidation | Non
         }
     write_json(path, content)
     return plain_values(content)
+
+
+def _fields(of: object, names: str) -> dict[str, Any]:
+    """Attributes that a file holds by their own names."""
+    return {name: getattr(of, name) for name in names.split()}
 
 
 def provenance(study: Study) -> dict[str, Any]:
@@ -191,3 +185,110 @@ def write_response_fit(answer: Answer, folder: Path, plant: str, title: str, sou
     answer.data.to_csv(folder / "frequency.csv")
     study = Study(path=folder / "frequency.csv", plant=plant, rig=answer.rig, runs=(), title=title, source=source)
     write_fit(answer.fit, study, folder / "fit.json")
+
+
+def ladder_content(ladder: Ladder, study: Study) -> dict[str, Any]:
+    """What `ladder.json` holds, as plain values."""
+    content = {
+        "format": FORMAT,
+        "title": study.title,
+        "plant": study.plant,
+        "chosen": [s.rung.name for s in ladder.kept],
+        **_fields(ladder, "held_out left_out stopped interrupted warnings"),
+        "seconds": round(ladder.seconds, 3),
+        "steps": [_step(s) for s in ladder.steps],
+        "repeats": [
+            {
+                "runs": group.labels,
+                "ceiling": group.ceiling,
+                "range": {n: [min(v), max(v)] for n, v in group.percents.items()},
+            }
+            for group in ladder.repeats
+        ],
+        "provenance": provenance(study),
+    }
+    return plain_values(content)
+
+
+def _step(s: RungResult) -> dict[str, Any]:
+    c = s.comparison
+    return {
+        **vars(s.rung),
+        **_fields(s, "kept reason fit_percent predicted_percent fitted predicted cost parameters values"),
+        "gain": None if c is None else c.gain,
+        "scatter": None if c is None else c.scatter,
+        "per_run": s.own,
+        "seconds": round(s.seconds, 3),
+    }
+
+
+def chosen_study(study: Study, ladder: Ladder) -> str:
+    """Text of the study with the terms that the ladder refused known to do nothing, and without its rungs.
+
+    What kept rungs estimate run by run is written beside the runs, as a line to add.
+    """
+    text = StudyText(study.path)
+    lines = text.text.splitlines()
+    cut = _lines_of_ladder(lines)
+    told = {_line(text, n) for n in ladder.left_out}
+    out = [f"# {study.path.name} as far as the ladder kept it; files are where the study's own are: use --data."]
+    for number, line in enumerate(lines, start=1):
+        if number in cut:
+            continue
+        if number in told:
+            out += [f"# not kept: {line.strip()}", *_nothing(study, ladder.left_out, text, number)]
+        else:
+            out.append(line)
+    own = tuple(n for s in ladder.kept for n in s.rung.unknown)
+    if own:
+        out.append(f"# The ladder kept, run by run: add {', '.join(own)} to unknown of each of [[runs]].")
+    return "\n".join(out).rstrip() + "\n"
+
+
+def _place(name: str) -> tuple[str, str]:
+    return ("actuator", name.partition(".")[2]) if name in ACTUATOR else ("parameters", name)
+
+
+def _line(text: StudyText, name: str) -> int:
+    return text.line(_place(name))
+
+
+def _nothing(study: Study, names: Collection[str], text: StudyText, number: int) -> list[str]:
+    """A line for a parameter that must have a value, though it does nothing."""
+    found = next(n for n in names if _line(text, n) == number)
+    plant = study.rig.plant
+    if found in ACTUATOR or _has_default(study, found):
+        return []
+    return [f"{found} = {neutral(plant, found):g}"]
+
+
+def _has_default(study: Study, name: str) -> bool:
+    from dataclasses import MISSING, fields
+
+    return any(f.name == name and f.default is not MISSING for f in fields(study.rig.plant))  # type: ignore[arg-type]
+
+
+def _lines_of_ladder(lines: Sequence[str]) -> set[int]:
+    """Numbers of the lines of [[ladder]] tables, up to the next table."""
+    inside, found = False, set[int]()
+    for number, line in enumerate(lines, start=1):
+        if line.lstrip().startswith("["):
+            inside = line.replace(" ", "").startswith("[[ladder]]")
+        if inside:
+            found.add(number)
+    return found
+
+
+def can_be_trimmed(study: Study, ladder: Ladder) -> bool:
+    """Whether the text can say what the ladder chose: every refused term stands on a line of its own.
+
+    A plant that is found beside the study would not be found beside its copy.
+    """
+    text = StudyText(study.path)
+    places = [_line(text, n) for n in ladder.left_out]
+    lines = text.text.splitlines()
+    alone = all(
+        lines[number - 1].lstrip().split("=")[0].strip().strip("\"'") == _place(name)[1]
+        for number, name in zip(places, ladder.left_out, strict=True)
+    )
+    return alone and len(set(places)) == len(places) and ":" not in study.plant
