@@ -227,7 +227,7 @@ def test_an_arrow_that_points_up_is_refused(source, module):
         ("from upright.errors import BadInput", "upright.physics.plant"),
         ("from .lagrange import derive", "upright.physics.plant"),
         ("from ..physics import find", "upright.simulation.simulate"),
-        ("import scipy.linalg", "upright.physics.linear"),
+        ("import scipy.linalg", "upright.physics.plant"),
         ("from upright import __version__", "upright.report.html"),
         ("from matplotlib.figure import Figure", "upright.experiments.weighing_1a.figures"),
         ("import matplotlib", "upright.report.drawing"),

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from upright.identification.model.rig import Rig
 from upright.identification.search.inverse_start import Sample
+from upright.physics.actuator import drive_force
 from upright.physics.equations import evaluate
 from upright.signals.turning import turning_points
-from upright.simulation.drive import drive_force
 
 Array = NDArray[np.float64]
 

@@ -18,6 +18,7 @@ from upright.identification.model.runs import Run
 from upright.identification.model.unknowns import Unknown, shared_unknowns
 from upright.identification.problem.normal_equations import Normal, finite
 from upright.identification.search.descent import descend
+from upright.physics.actuator import drive_force
 from upright.physics.equations import mass_and_force
 from upright.physics.plant import Plant
 from upright.signals.smoothing import (
@@ -27,7 +28,6 @@ from upright.signals.smoothing import (
     smoothing_width,
     spread,
 )
-from upright.simulation.drive import drive_force
 
 Array = NDArray[np.float64]
 
