@@ -13,25 +13,29 @@ from numpy.typing import NDArray
 
 from upright.errors import BadInput, nearest
 from upright.identification.checks.conventions import doubts
-from upright.identification.checks.refit import watched
+from upright.identification.checks.outliers import refit_without_outliers
 from upright.identification.inference.assumptions import assumptions, sentences
-from upright.identification.inference.covariance import Optimum, assess
-from upright.identification.inference.identifiability import Identifiability, identifiability
+from upright.identification.inference.covariance import Identifiability, Optimum, assess, identifiability
 from upright.identification.inference.intervals import run_estimates, shared_estimates, widened, with_model_uncertainty
 from upright.identification.inference.poles import poles
-from upright.identification.inference.scoring import fit_percent, predict, score
-from upright.identification.inference.verdict import GOOD, judge
+from upright.identification.inference.scoring import GOOD, fit_percent, judge, predict, score
 from upright.identification.ladder.growth import choose_friction
 from upright.identification.model.fit import Estimate, Fit, Pole, RunScore
 from upright.identification.model.rig import Rig
 from upright.identification.model.runs import Run
-from upright.identification.problem.predictor import with_noise
 from upright.identification.problem.residuals import Problem, formulate, unresolved
+from upright.identification.problem.simulated import with_noise
 from upright.identification.problem.trips import located, untold
 from upright.identification.search.descent import Descent, SearchLog, descend_progressively, first_horizon
-from upright.identification.search.moments import other_moments
-from upright.identification.search.simplex import simplex
-from upright.identification.search.strategy import POOR, better, closed_form_starts, rescale_priors, search
+from upright.identification.search.strategy import (
+    POOR,
+    better,
+    closed_form_starts,
+    other_moments,
+    rescale_priors,
+    search,
+    simplex,
+)
 from upright.progress import Progress, silent
 
 __all__ = ["METHODS", "fit_percent", "identify", "predict"]
@@ -93,7 +97,9 @@ def identify(
         fit = conclude(found)
         if not watch or fit.interrupted:
             return fit
-        return watched(fit, rig, runs, lambda kept: identify(rig, kept, method=method, progress=progress, watch=False))
+        return refit_without_outliers(
+            fit, rig, runs, lambda kept: identify(rig, kept, method=method, progress=progress, watch=False)
+        )
     except KeyboardInterrupt:  # intervals and predictions may take long too; without them an answer is near
         return conclude(replace(found, interrupted=True))
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 
 from upright.identification.model.rig import Rig
 from upright.identification.model.runs import Run
-from upright.identification.search.inverse_start import regress, samples_of
+from upright.identification.search.starts import regress, samples_of
 
 CLEAR = 0.5
 """Another convention is named when it leaves less than this share of the variance that the declared one leaves."""
