@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import BadInput, nearest
-from upright.identification.checks.conventions import doubts
+from upright.identification.checks.conventions import wrong_conventions
 from upright.identification.checks.outliers import refit_without_outliers
 from upright.identification.inference.assumptions import assumptions, sentences
 from upright.identification.inference.covariance import Identifiability, Optimum, assess, identifiability
@@ -25,7 +25,7 @@ from upright.identification.model.rig import Rig
 from upright.identification.model.runs import Run
 from upright.identification.problem.residuals import Problem, formulate, unresolved
 from upright.identification.problem.simulated import with_noise
-from upright.identification.problem.trips import located, untold
+from upright.identification.problem.trips import located, unasked_trips
 from upright.identification.search.descent import Descent, SearchLog, descend_progressively, first_horizon
 from upright.identification.search.strategy import (
     POOR,
@@ -81,8 +81,8 @@ def identify(
     rig = with_noise(rig, runs)
     fitted = [located(rig, run) for run in runs if run.role == "fit"]
     _check(rig, fitted, method)
-    log = SearchLog(progress=progress, conventions=cache(lambda: doubts(rig, fitted)))
-    log.warnings += untold(rig, fitted)
+    log = SearchLog(progress=progress, conventions=cache(lambda: wrong_conventions(rig, fitted)))
+    log.warnings += unasked_trips(rig, fitted)
     try:
         problem, found = _search(rig, fitted, method, log)
     except KeyboardInterrupt:

@@ -24,7 +24,7 @@ def write_ladder(ladder: Ladder, study: Study, path: Path) -> dict[str, Any]:
         "title": study.title,
         "plant": study.plant,
         "held_out": ladder.held_out,
-        "chosen": [s.rung.name for s in ladder.kept],
+        "chosen": [s.rung.name for s in ladder.accepted],
         "left_out": ladder.left_out,
         "stopped": ladder.stopped,
         "interrupted": ladder.interrupted,
@@ -49,7 +49,7 @@ def _step(s: RungResult) -> dict[str, Any]:
     c = s.comparison
     return {
         **vars(s.rung),
-        "kept": s.kept,
+        "kept": s.accepted,
         "reason": s.reason,
         "fit_percent": s.fit_percent,
         "predicted_percent": s.predicted_percent,
@@ -59,7 +59,7 @@ def _step(s: RungResult) -> dict[str, Any]:
         "scatter": None if c is None else c.scatter,
         "cost": s.cost,
         "parameters": s.parameters,
-        "per_run": s.own,
+        "per_run": s.per_run,
         "values": s.values,
         "seconds": round(s.seconds, 3),
     }
@@ -82,7 +82,7 @@ def chosen_study(study: Study, ladder: Ladder) -> str:
             out += [f"# not kept: {line.strip()}", *_nothing(study, ladder.left_out, text, number)]
         else:
             out.append(line)
-    own = tuple(n for s in ladder.kept for n in s.rung.unknown)
+    own = tuple(n for s in ladder.accepted for n in s.rung.unknown)
     if own:
         out.append(f"# The ladder kept, run by run: add {', '.join(own)} to unknown of each of [[runs]].")
     return "\n".join(out).rstrip() + "\n"

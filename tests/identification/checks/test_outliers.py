@@ -9,9 +9,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from tests.identification.twins import PENDULUM, noisy, rig, swing
-from upright.identification.checks.outliers import BUMPED, SELF_EXCITED, SPIKES, TOUCHED, outliers, spikes
+from upright.identification.checks.outliers import BUMPED, SELF_EXCITED, SPIKES, TOUCHED, outliers, without_outliers
 from upright.identification.estimate import identify
 from upright.physics import Pendulum
+from upright.signals.spikes import spikes
 from upright.simulation import simulate
 
 GUESSES = {"J_p": 2.6e-3, "b_2": 1.4e-3, "b_2c": 2.6e-3}

@@ -17,7 +17,7 @@ CLEAR = 0.5
 """Another convention is named when it leaves less than this share of the variance that the declared one leaves."""
 
 
-def doubts(rig: Rig, runs: Sequence[Run]) -> tuple[str, ...]:
+def wrong_conventions(rig: Rig, runs: Sequence[Run]) -> tuple[str, ...]:
     """Sentences on signs and zeros that would explain the accelerations far better than the declared ones."""
     declared = _unexplained(rig, runs, {}, {})
     if not 0.1 < declared < math.inf:
