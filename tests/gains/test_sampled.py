@@ -27,7 +27,7 @@ from upright.gains.loop import closed, command_noise, loop_gain
 from upright.gains.sampled import to_s, to_z
 from upright.gains.velocity import observer
 from upright.physics import CartPendulum, Furuta, chain
-from upright.physics.linear import Linear
+from upright.physics.plant import Linear
 
 RIG = Furuta(m_p=0.2, l_cg=0.15, r=0.2, J_d=0.01, J_p=5e-4, b_1=0.007, b_2=3e-4)
 UPRIGHT = RIG.linear("inverted")

@@ -9,8 +9,9 @@ import sympy as sp
 
 from tests.paper import printed
 from tests.paper.printed import J_A, p, s
+from tests.paper.symbolic import linear, over_determinant
 from upright.physics import Furuta
-from upright.physics.lagrange import linear, motion, over_determinant
+from upright.physics.lagrange import motion
 
 # The paper's linear models know no axial inertia and no anchoring spring.
 PAPERS_RIG = {p.J_a: 0, sp.Symbol("k_psi", real=True): 0}

@@ -9,8 +9,8 @@ import sympy as sp
 
 from tests.paper import printed
 from tests.paper.printed import J_A, p, s
+from tests.paper.symbolic import linear
 from upright.physics import CartPendulum, Furuta, Plant
-from upright.physics.lagrange import linear
 
 CART = {sp.Symbol("k_x", real=True): 0}
 

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 import sympy as sp
 
+from tests.paper.symbolic import linear
 from tests.physics.specimens import EXAMPLES, SPECIMENS
 from tests.physics.text import acceleration, slope, swing
 from upright.physics import Plant, find, lagrange
-from upright.physics.derivation import derive
 from upright.physics.generate import FOLDER, source, variants
+from upright.physics.lagrange import derive
 from upright.physics.plant import module_name
 
 MOTOR = find("qube_motor.py:QubeMotor", EXAMPLES)(
@@ -50,7 +51,7 @@ def test_linear_model_is_the_slope_of_the_nonlinear_one(name, at):
 def test_linear_model_in_numbers_is_the_one_in_symbols(name, at):
     plant = PLANTS[name]
     values = {sp.Symbol(k, real=True): v for k, v in plant.parameters().items()}
-    symbolic = [np.array(m.subs(values), dtype=float) for m in lagrange.linear(type(plant), at, without=plant.optional)]
+    symbolic = [np.array(m.subs(values), dtype=float) for m in linear(type(plant), at, without=plant.optional)]
     for ours, theirs in zip((plant.linear(at).A, plant.linear(at).B), symbolic, strict=True):
         np.testing.assert_allclose(ours, theirs, rtol=1e-10, atol=1e-12 * np.abs(theirs).max())
 
@@ -101,7 +102,7 @@ def test_derivation_does_not_depend_on_the_order_of_hashes():
     """Generated text is compared, so it must be the same in every process."""
     program = (
         "import sys; from pathlib import Path; from upright.physics import Furuta, find; "
-        "from upright.physics.derivation import derive; "
+        "from upright.physics.lagrange import derive; "
         f"print(derive(Furuta), derive(find('double_pendulum.py:DoublePendulum', Path({str(EXAMPLES)!r}))))"
     )
     texts = {
@@ -141,17 +142,6 @@ def test_names_in_the_text_are_known_and_safe(name):
     assert len(set(everything)) == len(everything)
     assert all(n.isidentifier() for n in everything)
     assert not {f"{letter}{i}" for letter in "kscw" for i in range(100)} & set(everything)
-
-
-@pytest.mark.parametrize("name", PLANTS)
-def test_latex_states_every_coordinate_and_input(name):
-    plant = type(PLANTS[name])
-    text = lagrange.latex(plant)
-    assert text.startswith("\\begin{align}")
-    assert text.endswith("\\end{align}")
-    assert text.count("&=") == len(plant.coordinates)
-    for at in plant.equilibria if len(plant.coordinates) < 3 else ():
-        assert "D &=" in lagrange.latex_linear(plant, at)
 
 
 def frictionless(plant: Plant) -> Plant:

@@ -9,8 +9,8 @@ import pytest
 from scipy.signal import lfilter
 
 from upright.physics import find
+from upright.physics.actuator import drive_force
 from upright.simulation import ACTUATOR, Simulator, choose
-from upright.simulation.drive import drive_force
 
 DT, M, V = 0.01, 1e6, 0.8
 PLANT = find("rectilinear-1")

@@ -8,8 +8,8 @@ import pytest
 
 from tests.simulation.conftest import FURUTA
 from upright.simulation import Simulator, choose
+from upright.simulation.kernel.compiled import direct, source
 from upright.simulation.kernel.flavour import Layout
-from upright.simulation.kernel.source import direct, source
 
 FRICTION = {**FURUTA, "b_1c": 0.2, "b_2c": 0.02}
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from upright.closed_loop.loop import ClosedLoop
 from upright.closed_loop.recovery import Gain, Recovery
 from upright.closed_loop.search import recover
-from upright.closed_loop.structures import Channel, Filter, joined, pid
+from upright.closed_loop.structures import Channel, ClosedLoop, Filter, joined, pid
 
 __all__ = ["Channel", "ClosedLoop", "Filter", "Gain", "Recovery", "joined", "pid", "recover"]

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.closed_loop.intervals import averaged, numbers, sharpen
-from upright.closed_loop.loop import finer
 from upright.closed_loop.recovery import Candidate, Recovery
 from upright.closed_loop.regression import TERMS, Family, Regression, Signals, Term, channels_of, fit, law_of, structure
+from upright.closed_loop.structures import finer
 from upright.errors import BadInput, NotIdentifiable
 from upright.readers.resolution import find_quantum
 from upright.records import Record

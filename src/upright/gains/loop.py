@@ -16,7 +16,7 @@ from upright.gains.velocity import Estimator, stationary
 from upright.laws import Law
 
 if TYPE_CHECKING:
-    from upright.physics.linear import Linear
+    from upright.physics.plant import Linear
 
 Array = NDArray[np.float64]
 Roots = NDArray[np.complex128]

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from upright.errors import BadInput
 
 if TYPE_CHECKING:
-    from upright.physics.linear import Linear
+    from upright.physics.plant import Linear
 
 Array = NDArray[np.float64]
 Roots = NDArray[np.complex128]

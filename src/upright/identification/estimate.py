@@ -12,26 +12,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import BadInput, nearest
-from upright.identification.checks.conventions import doubts
-from upright.identification.checks.refit import watched
+from upright.identification.checks.conventions import wrong_conventions
+from upright.identification.checks.outliers import refit_without_outliers
 from upright.identification.inference.assumptions import assumptions, sentences
-from upright.identification.inference.covariance import Optimum, assess
-from upright.identification.inference.identifiability import Identifiability, identifiability
+from upright.identification.inference.covariance import Identifiability, Optimum, assess, identifiability
 from upright.identification.inference.intervals import run_estimates, shared_estimates, widened, with_model_uncertainty
 from upright.identification.inference.poles import poles
-from upright.identification.inference.scoring import fit_percent, predict, score
-from upright.identification.inference.verdict import GOOD, judge
+from upright.identification.inference.scoring import GOOD, fit_percent, judge, predict, score
 from upright.identification.ladder.growth import choose_friction
 from upright.identification.model.fit import Estimate, Fit, Pole, RunScore
 from upright.identification.model.rig import Rig
 from upright.identification.model.runs import Run
-from upright.identification.problem.predictor import with_noise
 from upright.identification.problem.residuals import Problem, formulate, unresolved
-from upright.identification.problem.trips import located, untold
+from upright.identification.problem.simulated import with_noise
+from upright.identification.problem.trips import located, unasked_trips
 from upright.identification.search.descent import Descent, SearchLog, descend_progressively, first_horizon
-from upright.identification.search.moments import other_moments
-from upright.identification.search.simplex import simplex
-from upright.identification.search.strategy import POOR, better, closed_form_starts, rescale_priors, search
+from upright.identification.search.strategy import (
+    POOR,
+    better,
+    closed_form_starts,
+    other_moments,
+    rescale_priors,
+    search,
+    simplex,
+)
 from upright.progress import Progress, silent
 
 __all__ = ["METHODS", "fit_percent", "identify", "predict"]
@@ -77,8 +81,8 @@ def identify(
     rig = with_noise(rig, runs)
     fitted = [located(rig, run) for run in runs if run.role == "fit"]
     _check(rig, fitted, method)
-    log = SearchLog(progress=progress, conventions=cache(lambda: doubts(rig, fitted)))
-    log.warnings += untold(rig, fitted)
+    log = SearchLog(progress=progress, conventions=cache(lambda: wrong_conventions(rig, fitted)))
+    log.warnings += unasked_trips(rig, fitted)
     try:
         problem, found = _search(rig, fitted, method, log)
     except KeyboardInterrupt:
@@ -93,7 +97,9 @@ def identify(
         fit = conclude(found)
         if not watch or fit.interrupted:
             return fit
-        return watched(fit, rig, runs, lambda kept: identify(rig, kept, method=method, progress=progress, watch=False))
+        return refit_without_outliers(
+            fit, rig, runs, lambda kept: identify(rig, kept, method=method, progress=progress, watch=False)
+        )
     except KeyboardInterrupt:  # intervals and predictions may take long too; without them an answer is near
         return conclude(replace(found, interrupted=True))
 

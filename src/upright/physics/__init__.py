@@ -9,10 +9,9 @@ from pathlib import Path
 
 from upright.errors import BadInput, UprightError, nearest
 from upright.physics.equations import Derived, DryJoint
-from upright.physics.linear import Linear
 from upright.physics.oscillators import added_inertia, added_mass, chain
 from upright.physics.pendulums import CartPendulum, Furuta, Pendulum
-from upright.physics.plant import Plant
+from upright.physics.plant import Linear, Plant
 from upright.physics.statement import Coordinate, Input, Joint
 
 __all__ = [

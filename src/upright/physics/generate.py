@@ -9,8 +9,8 @@ from dataclasses import fields
 from pathlib import Path
 
 from upright.physics import BUILT_IN
-from upright.physics.derivation import derive
 from upright.physics.equations import Derived
+from upright.physics.lagrange import derive
 from upright.physics.plant import Plant, module_name
 
 FOLDER = Path(__file__).parent / "generated"

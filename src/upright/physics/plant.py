@@ -1,4 +1,4 @@
-"""What follows from what a plant states: equations of motion, energies, linear models.
+"""What follows from what a plant states: equations of motion, energies, the linear model close to rest.
 
 A subclass states kinetic energy, potential energy and Rayleigh's dissipation once (see `pendulums.py`).
 """
@@ -6,6 +6,7 @@ A subclass states kinetic energy, potential energy and Rayleigh's dissipation on
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
@@ -14,10 +15,110 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upright.physics.equations import Derived, evaluate
-from upright.physics.linear import Linear, linearize
+from upright.errors import ImpossiblePhysics, NotIdentifiable
+from upright.physics.equations import Derived, evaluate, mass_and_force, small_motions
 from upright.physics.statement import Statement
 from upright.shown import Shown
+
+Matrix = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Linear(Shown):
+    """State space ``x' = A x + B u, y = C x`` about `point`, states in the paper's order.
+
+    `mass` is the mass matrix at that point; `outputs` are the coordinates.
+    """
+
+    A: Matrix
+    B: Matrix
+    C: Matrix
+    mass: Matrix
+    point: dict[str, float]
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+    @property
+    def D(self) -> Matrix:
+        """Direct feedthrough, zero for a mechanical system with measured positions."""
+        return np.zeros((self.C.shape[0], self.B.shape[1]))
+
+    def poles(self) -> NDArray[np.complex128]:
+        """Eigenvalues of A [1/s], the fastest growing first."""
+        poles = np.linalg.eigvals(self.A).astype(np.complex128)
+        return poles[np.lexsort((poles.imag, -poles.real))]
+
+    def response(self, omega: Any) -> NDArray[np.complex128]:
+        """Frequency response, shape (len(omega), outputs, inputs), at angular frequencies `omega` [rad/s]."""
+        s = 1j * np.atleast_1d(np.asarray(omega, dtype=np.float64))
+        n = self.A.shape[0]
+        return self.C @ np.linalg.solve(s[:, None, None] * np.eye(n) - self.A, self.B[None].astype(np.complex128))
+
+    def to_control(self) -> Any:
+        """The same model as a `control.StateSpace` with named signals.
+
+        ``control.ss2tf(model["psi", "T"]).minreal()`` is a transfer function of it.
+        """
+        import control
+
+        names = {"states": list(self.states), "inputs": list(self.inputs), "outputs": list(self.outputs)}
+        return control.StateSpace(self.A, self.B, self.C, self.D, **names)
+
+
+def linearize(plant: Statement, derived: Derived, at: str | None = None) -> Linear:
+    """Linear model about a named equilibrium; with the rig out of level, about the equilibrium nearest to it.
+
+    Raises
+    ------
+    NotIdentifiable
+        When the named point is no equilibrium and none is found near it.
+    ImpossiblePhysics
+        When the mass matrix there is not positive definite.
+    """
+    point = _rest(plant, derived, plant.equilibrium(at))
+    mass, damping, stiffness, gain = small_motions(derived, {**plant.parameters(), **point})
+    if np.linalg.eigvalsh(mass).min() <= 0:
+        raise ImpossiblePhysics(
+            f"{type(plant).__name__} needs a positive definite mass matrix, got {mass.tolist()}; check its inertias."
+        )
+    n, m = gain.shape
+    solve = np.linalg.solve(mass, np.hstack([-stiffness, -damping, gain]))
+    A, B, C = np.zeros((2 * n, 2 * n)), np.zeros((2 * n, m)), np.zeros((n, 2 * n))
+    A[0::2, 1::2] = C[:, 0::2] = np.eye(n)
+    A[1::2, 0::2], A[1::2, 1::2], B[1::2] = solve[:, :n], solve[:, n : 2 * n], solve[:, 2 * n :]
+    return Linear(
+        A=A, B=B, C=C, mass=mass, point=point, states=plant.state_names(), inputs=derived.inputs,
+        outputs=derived.coordinates,
+    )  # fmt: skip
+
+
+def _rest(plant: Statement, derived: Derived, point: dict[str, float]) -> dict[str, float]:
+    """Nearest true equilibrium to a nominal one; a coordinate that floats there is also tried from either side."""
+    aside = [{**point, name: value + d} for name, value in point.items() for d in (0.5, -0.5)]
+    for start in (point, *aside):
+        found = _newton(plant, derived, start)
+        if found is not None:
+            return found
+    raise NotIdentifiable(
+        f"{type(plant).__name__} has no equilibrium near {point}; level the rig or anchor the free coordinate."
+    )
+
+
+def _newton(plant: Statement, derived: Derived, point: dict[str, float]) -> dict[str, float] | None:
+    """Newton's steps, none longer than 0.3, to where no force is left."""
+    for _ in range(50):
+        scope = {**plant.parameters(), **point}
+        force = mass_and_force(derived, scope)[1]
+        stiffness = small_motions(derived, scope)[2]
+        scale = np.abs(stiffness).max(axis=1, initial=0.0)
+        if np.all(np.abs(force) <= 1e-12 * scale):
+            return point
+        even = 1 / np.sqrt(np.where(scale > 0, scale, 1.0))  # a stiff anchor must not hide a soft pendulum
+        step = even * np.linalg.lstsq(stiffness * even[:, None] * even, force * even, rcond=1e-9)[0]
+        step *= min(1.0, 0.3 / max(float(np.abs(step).max()), 1e-300))
+        point = {name: value + float(d) for (name, value), d in zip(point.items(), step, strict=True)}
+    return None
 
 
 class Plant(Shown, Statement, abstract=True):
@@ -51,7 +152,7 @@ class Plant(Shown, Statement, abstract=True):
         return {**self.parameters(), **states}
 
     def linear(self, at: str | None = None) -> Linear:
-        """State space about an equilibrium, friction viscous only; see `upright.physics.linear`."""
+        """State space about an equilibrium, friction viscous only; see `upright.physics.plant`."""
         return linearize(self, self.derived_for(self.parameters()), at)
 
 
@@ -60,7 +161,7 @@ def _derived(cls: type[Plant], without: frozenset[str]) -> Derived:
     module = f"upright.physics.generated.{module_name(cls, without)}"
     if cls.__module__.startswith("upright.physics.") and find_spec(module):
         return import_module(module).DERIVED
-    from upright.physics.derivation import derive
+    from upright.physics.lagrange import derive
 
     return derive(cls, without=without)
 

@@ -34,7 +34,7 @@ def chapter(ladder: Ladder, *, title: str, provenance: Mapping[str, object], ste
         f"({ladder.held_out}). Open marks: refused. Dash-dotted: how well one repeat of a run predicts another.",
         description=seen,
     )
-    refused = f"Refused: {', '.join(_refused(ladder))}. " if ladder.kept and _refused(ladder) else ""
+    refused = f"Refused: {', '.join(_refused(ladder))}. " if ladder.accepted and _refused(ladder) else ""
     return Chapter(
         title=title,
         verdict=_verdict(ladder),
@@ -59,7 +59,7 @@ def rung_table(ladder: Ladder) -> Table:
     rows = tuple(
         (
             s.rung.name, _terms(s), percent(s.fit_percent), percent(s.predicted_percent), number(s.cost, 3),
-            f"{s.parameters} + {s.own}", f"{s.seconds:.1f}", "kept" if s.kept else "refused",
+            f"{s.parameters} + {s.per_run}", f"{s.seconds:.1f}", "kept" if s.accepted else "refused",
         )
         for s in ladder.steps
     )  # fmt: skip
@@ -133,7 +133,7 @@ def ladder_figure(ladder: Ladder) -> Figure:
     ax = drawing.add_subplot()
     predicted = np.array([s.predicted_percent for s in steps])
     fitted = np.array([s.fit_percent for s in steps])
-    kept = np.array([s.kept for s in steps])
+    kept = np.array([s.accepted for s in steps])
     ax.plot(x[kept], fitted[kept], color=BLUE, linestyle="--", linewidth=1)
     ax.plot(x[kept], predicted[kept], color=VERMILLION, linestyle="-", linewidth=1.4)
     for values, colour, mark, label in ((fitted, BLUE, "s", "fitted"), (predicted, VERMILLION, "o", "predicted")):
@@ -164,7 +164,7 @@ def _ceiling(ladder: Ladder) -> float:
 
 def _label(step: RungResult) -> str:
     lines = wrap(step.rung.name, 13, break_long_words=False)
-    return "\n".join([*lines, f"{step.parameters} + {step.own}", "" if step.kept else "(refused)"]).rstrip()
+    return "\n".join([*lines, f"{step.parameters} + {step.per_run}", "" if step.accepted else "(refused)"]).rstrip()
 
 
 def next_steps(ladder: Ladder, *, study: str, folder: str, data: str, trimmed: bool) -> Iterator[Step]:
@@ -174,7 +174,7 @@ def next_steps(ladder: Ladder, *, study: str, folder: str, data: str, trimmed: b
     file = f"{folder}/study.toml" if trimmed else study
     if ladder.left_out and not trimmed:
         yield Step(f"Take {', '.join(ladder.left_out)} out of the study: they were refused.")
-    own = [n for s in ladder.kept for n in s.rung.unknown]
+    own = [n for s in ladder.accepted for n in s.rung.unknown]
     if own:
         lines = f"[[runs]]\nunknown = {list(ladder.runs[0].unknown)}".replace("'", '"')
         yield Step(f"Add {', '.join(own)} to what each run has unknown.", lines)
@@ -196,15 +196,15 @@ def next_steps(ladder: Ladder, *, study: str, folder: str, data: str, trimmed: b
 
 def _refused(ladder: Ladder) -> list[str]:
     """Names of the rungs that were refused and not kept later."""
-    kept = [s.rung for s in ladder.kept]
+    kept = [s.rung for s in ladder.accepted]
     return list(dict.fromkeys(s.rung.name for s in ladder.steps if s.rung not in kept))
 
 
 def _verdict(ladder: Ladder) -> str:
     """What the ladder chose."""
-    if not ladder.kept:
+    if not ladder.accepted:
         return "No rung was finished."
-    last = ladder.kept[-1]
-    names = " + ".join(s.rung.name for s in ladder.kept)
+    last = ladder.accepted[-1]
+    names = " + ".join(s.rung.name for s in ladder.accepted)
     scores = f"{percent(last.predicted_percent)} predicted on average, {percent(last.fit_percent)} fitted"
     return f"The data ask for {names}: {scores}."

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from upright.physics.actuator import ACTUATOR
-from upright.simulation.held import Held
 from upright.simulation.kernel.flavour import Flavour, choose
 from upright.simulation.simulate import Ensemble, ensemble, simulate
-from upright.simulation.simulator import Simulator
+from upright.simulation.simulator import Held, Simulator
 
 __all__ = [
     "ACTUATOR",

@@ -15,9 +15,8 @@ from upright.laws.linear import Law
 from upright.laws.rule import Rule
 from upright.physics.equations import Derived
 from upright.physics.plant import Plant
-from upright.simulation.held import Held
 from upright.simulation.kernel.flavour import choose
-from upright.simulation.simulator import Simulator
+from upright.simulation.simulator import Held, Simulator
 
 Array = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""Where is the plant at every sample, in one motion or in ten thousand?
+"""State of a plant at every sample, in one motion or in ten thousand.
 
 The one place that steps a plant. Classical Runge-Kutta with `substeps` steps per sample; dry friction sticks and slips
 at moments found inside the step. The input is held between samples. Per lane it runs through limit, offset, gain,
@@ -10,7 +10,7 @@ keep mean and first moment of the input within a substep exactly, so that the mo
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -23,14 +23,64 @@ from upright.laws.linear import Law
 from upright.laws.rule import Rule, Written, compiling
 from upright.physics.actuator import ACTUATOR
 from upright.physics.equations import Derived
-from upright.simulation.held import Held
-from upright.simulation.kernel.blocks import aligned, padded, recorded, share
-from upright.simulation.kernel.compiled import kernel
+from upright.simulation.kernel.compiled import WIDTH, direct, kernel
 from upright.simulation.kernel.flavour import Flavour, Layout, lay_out
 from upright.simulation.kernel.lanes import room
-from upright.simulation.kernel.source import WIDTH, direct
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Held:
+    """A coordinate whose motion is prescribed; the others feel its acceleration.
+
+    ``Held()`` locks the coordinate where it starts. ``Held(q=...)`` takes its positions at the samples, shape (T,),
+    and runs a cubic spline with continuous acceleration through them: smooth a rough measurement first.
+    With `v` and `a` all three are given at every half substep, shape (2 substeps (T-1) + 1,), and used as they are.
+    """
+
+    q: ArrayLike | None = None
+    v: ArrayLike | None = None
+    a: ArrayLike | None = None
+
+    @property
+    def locked(self) -> bool:
+        """Whether the coordinate stays where it starts."""
+        return self.q is None
+
+    def grid(self, dt: float, substeps: int) -> Array:
+        """Position, velocity and acceleration at every half substep, shape (., 3).
+
+        Raises
+        ------
+        BadInput
+            When the arrays are too short, of different lengths or not finite.
+        """
+        if self.q is None:
+            return np.zeros((1, 3))
+        q = np.asarray(self.q, dtype=np.float64)
+        if q.ndim != 1 or q.size < 2 or not np.all(np.isfinite(q)):
+            raise BadInput(f"a held coordinate needs at least two finite positions in one array, got shape {q.shape}.")
+        if self.v is not None and self.a is not None:
+            v, a = np.asarray(self.v, dtype=np.float64), np.asarray(self.a, dtype=np.float64)
+            if v.shape != q.shape or a.shape != q.shape:
+                raise BadInput(f"held q, v and a need one length, got {q.shape}, {v.shape} and {a.shape}.")
+            return np.stack([q, v, a], axis=1)
+        if q.size < 4:
+            return _parabola(q, dt, substeps)
+        from scipy.interpolate import CubicSpline
+
+        spline = CubicSpline(np.arange(q.size) * dt, q)
+        t = np.arange(2 * substeps * (q.size - 1) + 1) * (0.5 * dt / substeps)
+        return np.stack([spline(t), spline(t, 1), spline(t, 2)], axis=1)
+
+
+def _parabola(q: Array, dt: float, substeps: int) -> Array:
+    t = np.arange(2 * substeps * (q.size - 1) + 1) * (0.5 * dt / substeps)
+    c = np.polynomial.Polynomial.fit(np.arange(q.size) * dt, q, q.size - 1)
+    return np.stack([c(t), c.deriv(1)(t), c.deriv(2)(t)], axis=1)
+
+
 _NONE = np.zeros((1, 0, 0))
 _KIND = ("C", "A", "W")  # any other kind of array, or of number, would be compiled for anew
 
@@ -237,3 +287,41 @@ class Simulator:
         else:
             share(step, blocks, threads)
         return out[:, :, :lanes] if f.record else reduced[:, :lanes]
+
+
+def padded(a: Array, width: int, extra: int = 0) -> Array:
+    """Contiguous copy with the last lane repeated and room for `extra` rows."""
+    rows, lanes = a.shape
+    out = np.empty((rows + extra, width))
+    out[:rows, :lanes] = a
+    out[:rows, lanes:] = a[:, -1:]
+    return out
+
+
+def aligned(size: int) -> tuple[Array, int]:
+    """Zeros that start on a cache line, so that no vector straddles two; and where that is."""
+    raw = np.zeros(size + 7)
+    address = raw.ctypes.data
+    first = (-address // 8) % 8
+    return raw[first : first + size], address + 8 * first
+
+
+def recorded(shape: tuple[int, int, int], memory: Array | None) -> Array:
+    """Array to record into: fresh, or the first part of `memory`."""
+    if memory is None:
+        return np.empty(shape)
+    size = math.prod(shape)
+    if memory.ndim != 1 or memory.size < size or memory.dtype != np.float64 or not memory.flags.carray:
+        raise BadInput(f"memory needs at least {size} contiguous float64 values in one row, got {memory.shape}.")
+    return memory[:size].reshape(shape)
+
+
+def share(step: Callable[[int, int], None], blocks: int, threads: int) -> None:
+    """Let threads take turns at pieces of the work; the kernel holds no lock."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    pieces = min(blocks, 4 * threads)
+    edges = [blocks * k // pieces for k in range(pieces + 1)]
+    step(0, 0)  # compiled before the threads ask for it
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(lambda k: step(edges[k], edges[k + 1]), range(pieces)))

@@ -19,7 +19,7 @@ from upright.identification import Rig, Run
 from upright.identification.ladder.rungs import Rung
 from upright.identification.model.rig import NOISE
 from upright.identification.model.runs import FOR_GROUPS, PER_RUN, SPREADS
-from upright.identification.problem.predictor import with_noise
+from upright.identification.problem.simulated import with_noise
 from upright.physics import Plant
 from upright.physics.actuator import ACTUATOR
 from upright.records import Array, Record

@@ -193,7 +193,7 @@ def ladder_content(ladder: Ladder, study: Study) -> dict[str, Any]:
         "format": FORMAT,
         "title": study.title,
         "plant": study.plant,
-        "chosen": [s.rung.name for s in ladder.kept],
+        "chosen": [s.rung.name for s in ladder.accepted],
         **_fields(ladder, "held_out left_out stopped interrupted warnings"),
         "seconds": round(ladder.seconds, 3),
         "steps": [_step(s) for s in ladder.steps],
@@ -214,10 +214,11 @@ def _step(s: RungResult) -> dict[str, Any]:
     c = s.comparison
     return {
         **vars(s.rung),
-        **_fields(s, "kept reason fit_percent predicted_percent fitted predicted cost parameters values"),
+        "kept": s.accepted,
+        **_fields(s, "reason fit_percent predicted_percent fitted predicted cost parameters values"),
         "gain": None if c is None else c.gain,
         "scatter": None if c is None else c.scatter,
-        "per_run": s.own,
+        "per_run": s.per_run,
         "seconds": round(s.seconds, 3),
     }
 
@@ -239,7 +240,7 @@ def chosen_study(study: Study, ladder: Ladder) -> str:
             out += [f"# not kept: {line.strip()}", *_nothing(study, ladder.left_out, text, number)]
         else:
             out.append(line)
-    own = tuple(n for s in ladder.kept for n in s.rung.unknown)
+    own = tuple(n for s in ladder.accepted for n in s.rung.unknown)
     if own:
         out.append(f"# The ladder kept, run by run: add {', '.join(own)} to unknown of each of [[runs]].")
     return "\n".join(out).rstrip() + "\n"

@@ -130,7 +130,7 @@ def ladder(
     from upright.identification.ladder.growth import climb
     from upright.report.ladder import chapter, next_steps
     from upright.report.symbols import typed
-    from upright.study.results import can_be_trimmed, chosen_study
+    from upright.study.results import can_be_trimmed, chosen_study, ladder_content
 
     pdf_has_folder(out, pdf)
     study = Path(study)

@@ -9,8 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from tests.identification.twins import PENDULUM, noisy, rig, swing
-from upright.identification.checks.outliers import BUMPED, SELF_EXCITED, SPIKES, TOUCHED, outliers
-from upright.identification.checks.refit import without
+from upright.identification.checks.outliers import BUMPED, SELF_EXCITED, SPIKES, TOUCHED, outliers, without_outliers
 from upright.identification.estimate import identify
 from upright.physics import Pendulum
 from upright.signals.spikes import spikes
@@ -44,7 +43,7 @@ def test_clean_swings_raise_no_alarm(seed):
     fit = identify(rig(Pendulum, PENDULUM, GUESSES), runs)
     assert found(fit, runs) == []
     assert not any("Outlier" in w for w in fit.warnings)
-    assert without(runs, ()) == runs
+    assert without_outliers(runs, ()) == runs
 
 
 def test_three_lost_counts_are_named_and_taken_out():

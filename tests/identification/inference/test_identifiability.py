@@ -82,7 +82,7 @@ def test_a_weakly_seen_number_is_called_weak() -> None:
 def test_a_mass_that_nothing_shows_stays_a_number_one_can_print() -> None:
     # without gravity, force or friction the mass of a spinning arm is in no output
     from tests.identification.twins import rig as known
-    from upright.identification.model.unknowns import FAR, shared_unknowns
+    from upright.identification.problem.unknowns import FAR, shared_unknowns
     from upright.physics import Pendulum
 
     values = {"m_p": 0.2, "l_cg": 0.3, "J_p": 2e-3}

@@ -44,7 +44,7 @@ def swings(seed: int, *angles: float, sigma: float = 3e-3, **truth: float) -> li
 
 
 def chosen(ladder: Ladder) -> list[str]:
-    return [s.rung.name for s in ladder.kept]
+    return [s.rung.name for s in ladder.accepted]
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -79,7 +79,7 @@ def test_a_torque_that_falls_with_speed_is_found_where_it_is(fade):
     assert ("torque that falls with speed" in chosen(ladder)) is (fade > 0)
     assert "f_1c" in ladder.left_out
     if fade:
-        found = ladder.kept[-1].values
+        found = ladder.accepted[-1].values
         assert found["actuator.knee"] == pytest.approx(DISK["actuator.knee"], rel=0.05)
         assert found["actuator.fade"] == pytest.approx(fade, rel=0.05)
 
@@ -160,7 +160,7 @@ def test_a_real_pendulum_asks_for_dry_friction_and_drag():
     study = load_study(STUDIES / "aau_pendulum.toml", data=os.environ["UPRIGHT_REAL_DATA"])
     ladder = climb(study.rig, study.runs)
     assert chosen(ladder) == ["viscous friction", "Coulomb friction", "quadratic drag"]
-    viscous, coulomb, drag = ladder.kept
+    viscous, coulomb, drag = ladder.accepted
     assert 73 < viscous.fit_percent < 90
     assert coulomb.fit_percent > 85
     assert drag.fit_percent > 98.6

@@ -15,8 +15,8 @@ from upright.identification import Rig, Run
 from upright.identification.estimate import identify
 from upright.identification.inference.scoring import predict
 from upright.identification.model.rig import NOISE
-from upright.identification.problem.predictor import discrete_model, gains, restart_states, with_noise
 from upright.identification.problem.residuals import Problem, formulate
+from upright.identification.problem.simulated import discrete_model, gains, restart_states, with_noise
 from upright.laws import state_feedback
 from upright.physics import Furuta
 from upright.simulation import simulate

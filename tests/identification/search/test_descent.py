@@ -12,7 +12,7 @@ from upright.identification.inference.scoring import fit_percent
 from upright.identification.problem.normal_equations import Normal, products
 from upright.identification.problem.residuals import formulate
 from upright.identification.search.descent import descend, descend_progressively
-from upright.identification.search.simplex import simplex
+from upright.identification.search.strategy import simplex
 from upright.physics import Pendulum
 
 

@@ -33,7 +33,7 @@ def test_the_end_of_a_push_is_found_from_one_swing_too_early():
 def test_another_valley_is_reached_from_the_one_beside_it():
     from upright.identification.problem.residuals import formulate
     from upright.identification.search.descent import SearchLog, descend
-    from upright.identification.search.moments import other_moments
+    from upright.identification.search.strategy import other_moments
 
     t = np.arange(3001) * 2e-3
     u = np.where((t > 0.2) & (t < 5.0), 0.5, 0.0)[:, None]

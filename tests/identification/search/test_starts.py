@@ -7,8 +7,7 @@ import pytest
 
 from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, shaken, swing
 from upright.identification.model.rig import base_values
-from upright.identification.search.friction_start import friction_from_energy, turning_points
-from upright.identification.search.inverse_start import observe, regress
+from upright.identification.search.starts import friction_from_energy, observe, regress, turning_points
 from upright.physics import Furuta, Pendulum
 from upright.signals.smoothing import dominant_period, savitzky_golay
 

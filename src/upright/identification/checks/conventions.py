@@ -11,13 +11,13 @@ from collections.abc import Mapping, Sequence
 
 from upright.identification.model.rig import Rig
 from upright.identification.model.runs import Run
-from upright.identification.search.inverse_start import regress, samples_of
+from upright.identification.search.starts import regress, samples_of
 
 CLEAR = 0.5
 """Another convention is named when it leaves less than this share of the variance that the declared one leaves."""
 
 
-def doubts(rig: Rig, runs: Sequence[Run]) -> tuple[str, ...]:
+def wrong_conventions(rig: Rig, runs: Sequence[Run]) -> tuple[str, ...]:
     """Sentences on signs and zeros that would explain the accelerations far better than the declared ones."""
     declared = _unexplained(rig, runs, {}, {})
     if not 0.1 < declared < math.inf:

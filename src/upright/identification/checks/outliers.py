@@ -1,28 +1,44 @@
-"""Did something else than the input move the rig? A hand, a bump, a drive that feeds an oscillation, a lost count.
+"""Stretches of a run that something else than the input moved: found, named, and left out of a second fit.
 
-Each run is restarted every half swing from its measured state and the fitted model says where it should be half a
-swing later. What it misses there happened there, while the misfit of a free run lives on until the swing has died.
-A stretch that is missed far more than the other runs are is no fault of the model, since that errs alike in all.
+A hand, a bump, a drive that feeds an oscillation, a lost count. Each run is restarted every half swing from its
+measured state and the fitted model says where it should be half a swing later. What it misses there happened there,
+while the misfit of a free run lives on until the swing has died. A stretch that is missed far more than the other runs
+are is no fault of the model, since that errs alike in all.
+
+Both answers are told: what the numbers are without such a stretch, and what they would have been with it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.checks.spikes import without_spikes
+from upright.identification.inference.scoring import predict
 from upright.identification.model.fit import Fit
 from upright.identification.model.rig import Rig
 from upright.identification.model.runs import Run
 from upright.identification.problem.residuals import formulate
 from upright.signals.smoothing import dominant_period
+from upright.signals.spikes import spikes, without
 from upright.signals.stretches import stretches
 
 Array = NDArray[np.float64]
+
+
+def without_spikes(run: Run) -> tuple[Run, list[tuple[float, str]]]:
+    """The run with its spikes replaced by what stands beside them, and when they were in which coordinate."""
+    y = run.y.copy()
+    found: list[tuple[float, str]] = []
+    for k, c in enumerate(run.measured):
+        at = spikes(run.y[:, k], run.quanta[k])
+        y[:, k] = without(run.y[:, k], at)
+        found += [(float(t), c) for t in run.t[at]]
+    return (replace(run, y=y) if found else run), found
+
 
 FAR = 4.0
 """A stretch is missed far more than the others when by this factor over their upper quartile, and"""
@@ -88,12 +104,12 @@ def outliers(fit: Fit, rig: Rig, runs: Sequence[Run]) -> tuple[Outlier, ...]:
     seen: list[Stretches] = []
     known = rig.with_values({n: e.value for n, e in fit.estimates.items()})
     for run in runs:
-        clean, spikes = without_spikes(run)
-        if spikes:
-            found.append(_spiky(run, spikes))
-        stretches = None if run.loop is not None else half_swings(known, clean, _own(fit, run))
-        if stretches is not None:
-            seen.append(stretches)
+        clean, jumped = without_spikes(run)
+        if jumped:
+            found.append(_spiky(run, jumped))
+        halves = None if run.loop is not None else half_swings(known, clean, _estimated_for(fit, run))
+        if halves is not None:
+            seen.append(halves)
     spread = _spread([s.run for s in seen])
     for s in seen:
         found += _strange(s, [o for o in seen if o is not s] or [s], spread)
@@ -102,7 +118,7 @@ def outliers(fit: Fit, rig: Rig, runs: Sequence[Run]) -> tuple[Outlier, ...]:
 
 def half_swings(known: Rig, run: Run, own: Mapping[str, float]) -> Stretches | None:
     """A run restarted every half swing; `own` are its own numbers by name. None when it is too short for that."""
-    free = [k for k, c in enumerate(run.measured) if c not in run.held]
+    free = run.free
     duration = float(run.t[-1] - run.t[0])
     # of the speed, since a step that is held for long looks like one slow swing
     seconds = min(dominant_period(np.gradient(run.y[:, k], run.period), run.period) / 2 for k in free)
@@ -110,13 +126,13 @@ def half_swings(known: Rig, run: Run, own: Mapping[str, float]) -> Stretches | N
     samples = round(seconds / run.period)
     if samples < 4:
         return None
-    stretches = _restarted(known, run, own, seconds, free)
+    halves = _restarted(known, run, own, seconds, free)
     # what is left at the end is less than a half swing: another that ends there, begun inside the last one
     tail = _restarted(known, cut(run, run.t.size - 1 - 2 * samples, run.t.size), own, seconds, free)
-    if tail.stop[-1] > stretches.stop[-1] + run.period / 2:
-        joined = {n: np.concatenate([getattr(stretches, n), getattr(tail, n)[-1:]]) for n in PER_STRETCH}
-        stretches = replace(stretches, **joined)
-    return stretches
+    if tail.stop[-1] > halves.stop[-1] + run.period / 2:
+        joined = {n: np.concatenate([getattr(halves, n), getattr(tail, n)[-1:]]) for n in PER_STRETCH}
+        halves = replace(halves, **joined)
+    return halves
 
 
 def _restarted(known: Rig, run: Run, own: Mapping[str, float], seconds: float, free: Sequence[int]) -> Stretches:
@@ -145,7 +161,7 @@ PER_STRETCH = ("start", "stop", "missed", "moved", "constant")
 """What `Stretches` has one of for every half swing."""
 
 
-def _own(fit: Fit, run: Run) -> dict[str, float]:
+def _estimated_for(fit: Fit, run: Run) -> dict[str, float]:
     """What the fit found for this run alone, and for the groups it belongs to."""
     own = {n: e.value for n, e in fit.per_run.get(run.label, {}).items()}
     return own | {n: fit.groups[g][n].value for n, g in run.shared.items() if n in fit.groups.get(g, {})}
@@ -220,13 +236,13 @@ BUMPED = "bumped, something else than the input moved it"
 UNEXPLAINED = "not explained by the model that explains the rest"
 
 
-def _spiky(run: Run, spikes: Sequence[tuple[float, str]]) -> Outlier:
+def _spiky(run: Run, jumped: Sequence[tuple[float, str]]) -> Outlier:
     """Single samples that jump away and back."""
-    when = [t for t, _ in spikes]
+    when = [t for t, _ in jumped]
     some = ", ".join(f"{t:.4g} s" for t in when[:5]) + (" and others" if len(when) > 5 else "")
     return Outlier(
         run=run.label, start=min(when), stop=max(when), reason=SPIKES,
-        evidence=f"{', '.join(sorted({c for _, c in spikes}))} at {some}",
+        evidence=f"{', '.join(sorted({c for _, c in jumped}))} at {some}",
     )  # fmt: skip
 
 
@@ -234,9 +250,114 @@ def cut(run: Run, first: int, last: int) -> Run:
     """Samples `first` to `last` of a run, called so; states known at its first sample are not those of a later one."""
     if (first, last) == (0, run.t.size):
         return run
-    held = {c: v[first:last] if isinstance(v, np.ndarray) else v for c, v in run.held.items()}
     span = f"{run.t[first]:.3g} to {run.t[last - 1]:.3g} s"
     return replace(
-        run, label=f"{run.label}, {span}", t=run.t[first:last], u=run.u[first:last], y=run.y[first:last], held=held,
-        initial=run.initial if first == 0 else {}, source=f"{run.source}; cut to {span}",
+        run.samples(slice(first, last)), label=f"{run.label}, {span}", initial=run.initial if first == 0 else {},
+        source=f"{run.source}; cut to {span}",
     )  # fmt: skip
+
+
+WORTH = 1 / 3
+"""What is left of a run is fitted when it is this share of it, and"""
+
+LEAST_SAMPLES = 50
+"""so many samples, and"""
+
+MOVES = 0.1
+"""when one of its signals still spans this share of what it spans in the whole run."""
+
+
+ASTRAY = 3.0
+"""Percent by which a run may be explained worse once outliers of others are out: more than they could have bent it."""
+
+STAYS = "Without that stretch the other runs were explained worse, so the fit keeps it."
+
+
+def refit_without_outliers(fit: Fit, rig: Rig, runs: Sequence[Run], again: Callable[[Sequence[Run]], Fit]) -> Fit:
+    """The fit, or `again` without what the first one found strange; at most twice, as outliers hide each other.
+
+    Reasons are those that the last model gives: the first one was bent by what it had to explain.
+    """
+    found = outliers(fit, rig, runs)
+    first, kept = fit, list(runs)
+    for _ in range(2):
+        left = without_outliers(runs, found)
+        if not any(r.role == "fit" for r in left) or _same(left, kept):
+            break
+        kept, new = left, again(left)
+        if explains_worse(new, first):
+            told = tuple(f"Outlier: {o.sentence}" for o in found)
+            return replace(first, warnings=(*first.warnings, *told, STAYS))
+        fit = new
+        if fit.interrupted:
+            break
+        found = outliers(fit, rig, runs) or found
+    if not found:
+        return first
+    told = [f"Outlier: {o.sentence}" for o in found]
+    if fit is first:
+        return replace(fit, warnings=(*fit.warnings, *told))
+    missing = [replace(r, role="predict") for r in runs if r.label not in fit.runs]
+    scores = {**fit.runs, **predict(fit, rig, missing)}
+    known = [r.label for r in runs]
+    order = sorted(scores, key=lambda label: next((i for i, k in enumerate(known) if label.startswith(k)), len(known)))
+    names = ", ".join(dict.fromkeys(o.run for o in found))
+    return replace(
+        fit,
+        runs={label: scores[label] for label in order},
+        warnings=(*fit.warnings, *told, _compared(first, fit)),
+        verdict=f"{fit.verdict} Left out of the fit as outliers, or in part: {names}; see the warnings.",
+        seconds=first.seconds + fit.seconds,
+        evaluations=first.evaluations + fit.evaluations,
+    )
+
+
+def explains_worse(new: Fit, old: Fit) -> bool:
+    """Whether runs that both were fitted to are explained worse by the new fit: its search then went astray."""
+    both = [label for label, s in new.runs.items() if s.role == "fit" and label in old.runs]
+    return any(
+        percent < old.runs[label].fit_percent[signal] - ASTRAY
+        for label in both
+        for signal, percent in new.runs[label].fit_percent.items()
+    )
+
+
+def _same(a: Sequence[Run], b: Sequence[Run]) -> bool:
+    return len(a) == len(b) and all(r.label == s.label and r.y is s.y for r, s in zip(a, b, strict=True))
+
+
+def _compared(before: Fit, after: Fit) -> str:
+    """What the outliers would have done to the numbers."""
+    moved = [
+        f"{n} {before.estimates[n].value:.4g} instead of {e.value:.4g} {e.unit}"
+        for n, e in after.estimates.items()
+        if n in before.estimates and not e.interval[0] <= before.estimates[n].value <= e.interval[1]
+    ]
+    if not moved:
+        return "With the outliers in, every number stays within its interval."
+    return f"With the outliers in it would have been {', '.join(moved)}."
+
+
+def without_outliers(runs: Sequence[Run], found: Sequence[Outlier]) -> list[Run]:
+    """The runs with spikes taken out, and fitted ones cut into what stands before and after each stretch.
+
+    What is left of a run is dropped when it is shorter than a third of it or than 50 samples, or hardly moves. A run
+    that excites itself is dropped whole: it does so before one can see it.
+    """
+    kept: list[Run] = []
+    for run in runs:
+        spans = sorted((o.start, o.stop) for o in found if o.run == run.label and o.reason != SPIKES)
+        spiky = any(o.run == run.label and o.reason == SPIKES for o in found)
+        clean = without_spikes(run)[0] if spiky else run
+        if run.role != "fit" or not spans:
+            kept.append(clean)
+            continue
+        if any(o.run == run.label and o.reason == SELF_EXCITED for o in found):
+            continue
+        edges = [float(run.t[0]) - 1, *(e for span in spans for e in span), float(run.t[-1]) + 1]
+        for a, b in zip(edges[::2], edges[1::2], strict=True):
+            part = np.flatnonzero((run.t > a) & (run.t < b))
+            moves = part.size > 0 and np.any(np.ptp(clean.y[part], axis=0) > MOVES * np.ptp(clean.y, axis=0))
+            if moves and part.size >= max(LEAST_SAMPLES, run.t.size * WORTH):
+                kept.append(cut(clean, int(part[0]), int(part[-1]) + 1))
+    return kept

@@ -1,18 +1,23 @@
-"""Covariance of the numbers sought at an optimum, with standard errors that survive residuals with a memory.
+"""Covariance of the numbers sought at an optimum, and the combinations of them that the data cannot see.
 
 White-noise errors were found 10 to 30 times too small on real rigs, because a misfit now is a misfit a moment later.
 The sandwich estimate sums the autocovariance of the scores (Newey and West 1987) over a span chosen from the data
 (Andrews 1991); with several runs it is compared with the spread from run to run, the larger counts.
+
+Combinations of numbers that change no output are told with the one number that would fix each: a free swing without a
+known force or inertia sees only ratios, since masses, forces and frictions scale together.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.problem.normal_equations import pseudo_inverse
+from upright.identification.model.rig import NOISE
+from upright.identification.problem.normal_equations import NULL, pseudo_inverse
 from upright.identification.problem.residuals import Problem
 from upright.signals.memory import automatic_span, long_run, lost_share, memory
 
@@ -116,3 +121,111 @@ def assess(problem: Problem, x: Array) -> Optimum:
         problem=problem, x=x, covariance=covariance, white=white, matrix=A, variance=variance, memory=longest,
         samples=independent, pinned=pinned,
     )  # fmt: skip
+
+
+PART = 0.05
+"""A number takes part in a direction when its share is at least this much of the largest share."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Identifiability:
+    """Singular values (largest first) and directions (rows) of the Jacobian scaled to relative changes.
+
+    `names` are the columns, `blind` the rows of directions that the data cannot see, `effects` the columns' lengths.
+    """
+
+    names: tuple[str, ...]
+    singular_values: Array
+    directions: Array
+    blind: Array
+    effects: Array
+
+    @property
+    def hidden(self) -> set[str]:
+        """Names of the numbers that take part in a direction the data cannot see."""
+        return {n for d in self.blind for n, _ in self.parts(d)}
+
+    def parts(self, direction: Array) -> list[tuple[str, float]]:
+        """Numbers that take part in a direction, with their shares relative to the largest, largest first.
+
+        A number takes part by the size of its change or by the size of its effect.
+        """
+        share = direction / direction[np.argmax(np.abs(direction))]
+        effect = np.abs(direction * self.effects)
+        order = np.argsort(-np.abs(share))
+        strong = effect >= PART * effect.max(initial=0.0)
+        parts = [i for i in order if abs(share[i]) >= PART or (strong[i] and effect[i] > 0)]
+        return [(self.names[i], float(share[i])) for i in parts]
+
+    def sentences(self, units: Mapping[str, str]) -> tuple[str, ...]:
+        """Say which combinations cannot be seen and which one number would fix it."""
+        said: list[str] = []
+        for d in self.blind:
+            share = self.parts(d)
+            names = [n for n, _ in share]
+            if len(names) == 1:
+                said.append(
+                    f"The data cannot see {names[0]}: no measured output changes with it. "
+                    "Give its value, or add a run in which it matters."
+                )
+                continue
+            # masses first, then forces: these are what a scale or a caliper gives
+            rank = {"kg": 0, "kg m^2": 1, "m": 2}
+            fix = sorted(names, key=lambda n: rank.get(units.get(n, ""), 3))
+            if all(abs(s - 1) < 0.1 for _, s in share):
+                what = f"{_list(names)} scale together: the data see only their ratios."
+            else:
+                terms = ", ".join(f"{n} by {100 * s:+.0f} %" for n, s in share)
+                what = f"The data cannot see a common change of {terms}: the outputs stay the same."
+            one = f"Give {fix[0]}" + (f", or any other one of them ({_list(fix[1:], 'or')})," if len(fix) > 1 else "")
+            said.append(f"{what} {one} as a known value to fix it.")
+        return tuple(said)
+
+
+def identifiability(best: Optimum) -> Identifiability:
+    """Singular values of the shared numbers' Jacobian; what differs from run to run and levels of noise eliminated."""
+    unknowns, value, A = best.problem.unknowns, best.values, best.matrix
+    free = [i for i in range(best.x.size) if not best.pinned[i]]
+    shared = [i for i in free if unknowns[i].shared and not unknowns[i].name.startswith(NOISE)]
+    own = [i for i in free if i not in shared]
+    # relative to the value found, which a search along a blind direction may have carried far from its guess
+    sizes = np.array(
+        [
+            1.0 if u.log else abs(v) if (v := float(value[i])) and abs(v) > 1e-3 * u.scale else u.scale
+            for i, u in ((i, unknowns[i]) for i in shared)
+        ]
+    )
+    S = A[np.ix_(shared, shared)]
+    if own:
+        C = A[np.ix_(shared, own)]
+        S = S - C @ pseudo_inverse(A[np.ix_(own, own)]) @ C.T
+    S = S * sizes[:, None] * sizes
+    w, V = np.linalg.eigh(S) if shared else (np.zeros(0), np.zeros((0, 0)))
+    order = np.argsort(w)[::-1]
+    return Identifiability(
+        names=tuple(unknowns[i].name for i in shared),
+        singular_values=np.sqrt(np.maximum(w[order], 0.0)),
+        directions=V[:, order].T,
+        blind=np.array(_null(S)).reshape(-1, len(shared)),
+        effects=np.sqrt(np.maximum(np.diag(S), 0.0)),
+    )
+
+
+def _null(S: Array) -> list[Array]:
+    """Directions of a scaled matrix that change nothing, judged after its columns are brought to one length."""
+    d = np.sqrt(np.maximum(np.diag(S), 0.0))
+    dead = d <= NULL * d.max(initial=0.0)
+    found = [np.eye(d.size)[i] for i in np.flatnonzero(dead)]
+    live = np.flatnonzero(~dead)
+    if live.size:
+        s = 1 / d[live]
+        w, V = np.linalg.eigh(S[np.ix_(live, live)] * s[:, None] * s)
+        for k in np.flatnonzero(w <= NULL**2 * w[-1]):
+            direction = np.zeros(d.size)
+            direction[live] = V[:, k] * s
+            found.append(direction / np.linalg.norm(direction))
+    return found
+
+
+def _list(names: list[str], word: str = "and") -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} {word} {names[-1]}"

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from upright.identification.inference.covariance import Optimum, assess, student
 from upright.identification.model.fit import Estimate
 from upright.identification.model.rig import NOISE, Rig
-from upright.identification.model.unknowns import FAR, Unknown
 from upright.identification.problem.normal_equations import pseudo_inverse
 from upright.identification.problem.residuals import Problem, formulate
+from upright.identification.problem.unknowns import FAR, Unknown
 from upright.identification.search.descent import SearchLog, descend
 
 Array = NDArray[np.float64]

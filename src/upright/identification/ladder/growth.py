@@ -49,21 +49,21 @@ TYPICAL = ("friction", "gain")
 
 @dataclass(frozen=True, kw_only=True)
 class RungResult:
-    """What one rung came to: whether it was kept, and the reason in a sentence.
+    """What one rung came to: whether it was accepted, and the reason in a sentence.
 
     `fitted` and `predicted` are fit percents by run and signal, `cost` the sum of squares of the fit, `parameters` and
-    `own` how many numbers were sought for the rig and for single runs, `values` those of the rig by name. `comparison`
-    is with the best rung below, None for the first.
+    `per_run` how many numbers were sought for the rig and for single runs, `values` those of the rig by name.
+    `comparison` is with the best rung below, None for the first.
     """
 
     rung: Rung
-    kept: bool
+    accepted: bool
     reason: str
     fitted: Percents
     predicted: Percents
     cost: float
     parameters: int
-    own: int
+    per_run: int
     values: Mapping[str, float]
     seconds: float
     comparison: Comparison | None = None
@@ -101,9 +101,9 @@ class Ladder:
     seconds: float = 0.0
 
     @property
-    def kept(self) -> tuple[RungResult, ...]:
+    def accepted(self) -> tuple[RungResult, ...]:
         """The rungs that earned their place."""
-        return tuple(s for s in self.steps if s.kept)
+        return tuple(s for s in self.steps if s.accepted)
 
 
 def climb(rig: Rig, runs: Sequence[Run], rungs: Sequence[Rung] | None = None, *, progress: Progress = silent) -> Ladder:
@@ -165,7 +165,7 @@ class _Climb:
             while waiting:
                 if self.try_rung(waiting.pop(0), len(waiting)):
                     # what was refused gets another chance, last, since something else was missing then
-                    refused = [step.rung for step in self.steps if not step.kept]
+                    refused = [step.rung for step in self.steps if not step.accepted]
                     waiting += [r for r in dict.fromkeys(refused) if r not in (*waiting, *self.kept)]
                 if at_ceiling(self.repeats, self.scores):
                     stopped = "The model predicts the runs as well as they predict one another: nothing is left."
@@ -226,13 +226,13 @@ class _Climb:
         self.steps.append(
             RungResult(
                 rung=rung,
-                kept=better,
+                accepted=better,
                 reason=reason(comparison, cost, self.cost, lucky=lucky),
                 fitted={label: dict(s.fit_percent) for label, s in fitted.items()},
                 predicted={label: dict(s.fit_percent) for label, s in predicted.items()},
                 cost=found.normal.cost,
                 parameters=len(shared),
-                own=len(values) - len(shared),
+                per_run=len(values) - len(shared),
                 values=shared,
                 seconds=time.perf_counter() - began,
                 comparison=comparison,

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from upright.errors import BadInput, nearest
 from upright.identification.model.rig import Rig, neutral
 from upright.identification.model.runs import Run
-from upright.identification.model.unknowns import friction_names
+from upright.identification.problem.unknowns import friction_names
 
 DRIVE = (
     ("offset of the drive", ("actuator.offset",)),

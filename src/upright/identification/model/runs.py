@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.closed_loop.loop import ClosedLoop
+from upright.closed_loop.structures import ClosedLoop
 
 Array = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ class Run:
         horizons are explained together and need ``restart="kalman"``.
     restart : {"smooth", "kalman"}
         Where predictions start: at the smoothed measurement, which the samples of the window itself may move, or at
-        the state of a Kalman filter that knows the past alone; see `upright.identification.problem.predictor`.
+        the state of a Kalman filter that knows the past alone; see `upright.identification.problem.simulated`.
     score_from : float
         Seconds after the first sample before which the run is simulated but not scored (a held-out tail).
     loop : ClosedLoop or None

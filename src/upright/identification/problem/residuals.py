@@ -15,13 +15,19 @@ from numpy.typing import NDArray
 
 from upright.identification.model.rig import Rig, base_values
 from upright.identification.model.runs import Run
-from upright.identification.model.unknowns import Unknown, friction_names, shared_unknowns
 from upright.identification.problem.normal_equations import Normal, finite, mixed, products, squares
-from upright.identification.problem.nuisances import CHANGES, Setting, run_unknowns, setting
-from upright.identification.problem.predictor import restart_states
 from upright.identification.problem.restarts import PERTURBATION, Restart, settle
-from upright.identification.problem.simulated import motions, outputs, simulator
+from upright.identification.problem.simulated import motions, outputs, restart_states, simulator
 from upright.identification.problem.tracks import Track, prepare
+from upright.identification.problem.unknowns import (
+    CHANGES,
+    Setting,
+    Unknown,
+    friction_names,
+    run_unknowns,
+    setting,
+    shared_unknowns,
+)
 from upright.signals.memory import memory
 from upright.simulation import Simulator
 

@@ -1,21 +1,33 @@
-"""How does the solver move one run, with many sets of numbers side by side, and with the law that closed its loop?"""
+"""Runs as the solver moves them: freely, under the law that closed their loop, or predicted by a Kalman filter.
+
+Many sets of numbers are simulated side by side. A plant that would fall without its loop is predicted from the past
+alone: a constant-gain extended Kalman filter (Safonov and Athans 1978) follows the record. The compiled kernel predicts
+one sample, friction, stops and delays included, and the innovation corrects the state by the gain of the linear model
+about the equilibrium where the plant stands. From its state the kernel predicts several horizons ahead. No sample after
+the restart is looked at, and the gain follows from the parameters, so that every number sought, the levels of the
+process noise too, is felt through filter and prediction alike.
+
+To go through a record in parallel it is cut into stretches. Every filter begins `warm` samples before its stretch with
+a measured position, an unknown speed and the covariance that says so, and its gain settles while it warms up.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+import math
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.closed_loop.loop import ClosedLoop, finer
+from upright.closed_loop.structures import ClosedLoop, finer
 from upright.errors import BadInput
-from upright.identification.model.rig import NOISE, Rig
+from upright.identification.model.rig import NOISE, Parameter, Rig, base_values
 from upright.identification.model.runs import Run
-from upright.identification.problem.predictor import predicted
-from upright.identification.problem.tracks import Track
+from upright.identification.problem.tracks import DRIFT, FilterPlan, Track, nearest_equilibrium
 from upright.laws import Law
 from upright.physics import Plant
+from upright.physics.equations import small_motions
 from upright.simulation import Held, Simulator, choose
 
 Array = NDArray[np.float64]
@@ -119,3 +131,212 @@ def finely(held: Held, every: int) -> Held:
     if every == 1 or held.q is None:
         return held
     return Held(q=finer(np.asarray(held.q, dtype=np.float64), every))
+
+
+STRETCH = 2
+"""Warming-ups that a stretch lasts; warming up then costs half as much again."""
+
+SETTLED = 1e-6
+"""Relative change of the covariance per sample below which the gain counts as settled."""
+
+EASE = 0.05
+"""Share of a coordinate's own forces with which the search for the random force begins."""
+
+
+def predicted(
+    solver: Simulator, track: Track, values: Mapping[str, float | Array], offsets: Array, scales: Array | None,
+    *, samples: int,
+) -> Array:  # fmt: skip
+    """Outputs (samples, W, outputs, lanes) as the sensors show them, at the first `samples` horizons of each restart.
+
+    Parameters
+    ----------
+    values : mapping
+        Every parameter, a number or one per lane, (lanes,); ``noise.COORDINATE`` among them.
+    offsets, scales : (outputs, lanes) arrays
+        Sensor offsets and gains, the latter 1 when omitted.
+    """
+    x = restart_states(solver, track, values, offsets, scales)
+    states = len(_plan(track).equilibrium)
+    _, windows, lanes = x.shape
+    ahead = _plan(track).samples[:samples]
+    every = math.gcd(*ahead)
+    table, drift = _table(solver, values, windows, lanes)
+    table[drift] += x[states:].reshape(-1, windows * lanes)
+    motion = solver.run(
+        table, x[:states].reshape(states, -1), track.u,
+        samples=ahead[-1] // every + 1, every=every, start=np.repeat(track.restarts, lanes),
+    )  # fmt: skip
+    y = motion[[a // every for a in ahead]][:, list(track.columns)].reshape(len(ahead), -1, windows, lanes)
+    y = np.moveaxis(y, 1, 2)
+    return y + offsets if scales is None else y * scales + offsets
+
+
+def restart_states(
+    solver: Simulator, track: Track, values: Mapping[str, float | Array], offsets: Array, scales: Array | None
+) -> Array:
+    """Filtered states, then drifts of the inputs, (states + inputs, W, lanes) at the restarts.
+
+    Each knows samples up to its own and none after.
+    """
+    lanes, plan = offsets.shape[1], _plan(track)
+    stretch = STRETCH * plan.warm
+    first, last = int(track.restarts[0]) - plan.warm, int(track.restarts[-1])
+    begin = np.arange(first, last - plan.warm + 1, stretch, dtype=np.int64)
+    count, steps = begin.size, min(plan.warm + stretch, last - first + 1)
+    gain = gains(solver, track, values, steps, lanes)
+    table, drift = _table(solver, values, count, lanes)
+    still = table[drift]
+    start = np.repeat(begin, lanes)
+    columns = list(track.columns)
+    measured = track.y.T[:, : last + 1, None] - offsets[:, None]
+    if scales is not None:
+        measured /= scales[:, None]
+
+    states = len(plan.equilibrium)
+    x = np.zeros((states + len(still), count, lanes))
+    x[:states] = plan.equilibrium[:, None, None]
+    x[columns] = measured[:, begin]
+    place = np.full(last + 1, -1)
+    place[track.restarts] = np.arange(track.restarts.size)
+    out = np.full((len(x), track.restarts.size, lanes), np.nan)
+    with np.errstate(over="ignore", invalid="ignore"):  # a lane that runs away is told by its NaN
+        for j in range(1, steps):
+            table[drift] = still + x[states:].reshape(len(still), -1)
+            motion = solver.run(table, x[:states].reshape(states, -1), track.u, samples=2, start=start + (j - 1))
+            x[:states] = motion[1].reshape(states, count, lanes)
+            now = np.minimum(begin + j, last)
+            innovation = measured[:, now]
+            innovation -= x[columns]
+            for correct, missed in zip(gain[min(j, len(gain) - 1)], innovation, strict=True):
+                x += correct[:, None] * missed
+            used = (place[now] >= 0) & (begin + j <= last)
+            if j >= plan.warm and used.any():
+                out[:, place[now[used]]] = x[:, used]
+    return out
+
+
+def gains(solver: Simulator, track: Track, values: Mapping[str, float | Array], steps: int, lanes: int) -> list[Array]:
+    """Kalman gains (outputs, states, lanes) at the samples of a stretch, until they have settled; the first is zero."""
+    Phi, Q = discrete_model(solver, track, values, lanes)
+    plan = _plan(track)
+    n = Phi.shape[1]
+    C = np.zeros((len(track.columns), n))
+    C[np.arange(len(track.columns)), list(track.columns)] = 1.0
+    R = np.diag(plan.sensor)
+    P = np.zeros((lanes, n, n))
+    P[:, range(n), range(n)] = np.concatenate([plan.initial, plan.drift])
+    found: list[Array] = [np.zeros((lanes, n, len(C)))]
+    for _ in range(1, steps):
+        ahead = Phi @ P @ Phi.transpose(0, 2, 1) + Q
+        PC = ahead @ C.T
+        try:
+            L: Array = np.linalg.solve(C @ PC + R, PC.transpose(0, 2, 1)).transpose(0, 2, 1).astype(np.float64)
+        except np.linalg.LinAlgError:
+            L = np.full_like(PC, np.nan)
+        keep = np.eye(n) - L @ C
+        new = keep @ ahead @ keep.transpose(0, 2, 1) + L @ R @ L.transpose(0, 2, 1)  # Joseph: stays positive
+        found.append(L)
+        size = np.sqrt(np.maximum(np.einsum("lii->li", new), 0.0)) + 1e-300  # lanes of impossible numbers run away
+        if not np.any(np.abs(new - P) > SETTLED * size[:, :, None] * size[:, None, :]):
+            break
+        P = new
+    return [np.ascontiguousarray(L.transpose(2, 1, 0)) for L in found]
+
+
+def discrete_model(
+    solver: Simulator, track: Track, values: Mapping[str, float | Array], lanes: int
+) -> tuple[Array, Array]:
+    """Transition matrix over one sample and covariance of the process noise, (lanes, S, S) for states and drifts.
+
+    Van Loan's (1978) integral of ``x' = A x + B w``, `w` white with the roots of its densities in ``noise.COORDINATE``
+    and ``noise.INPUT``; the latter make the drift of a command.
+    """
+    from scipy.linalg import expm
+
+    d = solver.derived
+    point = {c: float(_plan(track).equilibrium[2 * i]) for i, c in enumerate(d.coordinates)}
+    M, D, K, G = small_motions(d, {**values, **point}, (lanes,))
+    n = len(d.coordinates)
+    for i in np.flatnonzero(G.any(axis=(0, 2))):
+        D[:, i, i] += values["actuator.slope"]  # back-EMF
+    free = [i for i in range(n) if i not in solver.flavour.held]
+    inputs = range(len(d.inputs))
+    S, w = 2 * n + len(inputs), n + len(inputs)
+    A, B = np.zeros((lanes, S, S)), np.zeros((lanes, S, w))
+    inner = np.ix_(range(lanes), free, free)
+    inverse = np.full((lanes, n, n), np.nan)
+    sound = np.abs(np.linalg.det(M[inner])) > 0
+    inverse[np.ix_(np.flatnonzero(sound).tolist(), free, free)] = np.linalg.inv(M[inner][sound])
+    speeds = [2 * i + 1 for i in free]
+    A[:, [2 * i for i in free], speeds] = 1.0
+    turned = inverse[inner]
+    A[np.ix_(range(lanes), speeds, [2 * i for i in free])] = -turned @ K[inner]
+    A[np.ix_(range(lanes), speeds, speeds)] = -turned @ D[inner]
+    command = turned @ G[:, free] * np.reshape(values["actuator.gain"], (-1, 1, 1))
+    A[np.ix_(range(lanes), speeds, [2 * n + j for j in inputs])] = command
+    B[np.ix_(range(lanes), speeds, free)] = turned * _levels(values, [d.coordinates[i] for i in free])
+    B[:, [2 * n + j for j in inputs], [n + j for j in inputs]] = _levels(values, d.inputs)[..., 0, :]
+    whole = np.zeros((lanes, 2 * S, 2 * S))
+    whole[:, :S, :S] = -A
+    whole[:, :S, S:] = B @ B.transpose(0, 2, 1)
+    whole[:, S:, S:] = A.transpose(0, 2, 1)
+    bad = ~np.isfinite(whole).all(axis=(1, 2))
+    whole[bad] = 0.0
+    E: Array = np.asarray(expm(whole * track.dt), dtype=np.float64)
+    Phi: Array = np.ascontiguousarray(E[:, S:, S:].transpose(0, 2, 1))
+    Phi[bad] = np.nan
+    return Phi, Phi @ E[:, :S, S:]
+
+
+def _levels(values: Mapping[str, float | Array], names: Sequence[str]) -> Array:
+    """Levels of noise (lanes or 1, 1, names)."""
+    levels = np.broadcast_arrays(*(np.asarray(values.get(f"{NOISE}{n}", 0.0), dtype=np.float64) for n in names))
+    return np.array([np.atleast_1d(v) for v in levels]).T[:, None, :]
+
+
+def _table(
+    solver: Simulator, values: Mapping[str, float | Array], times: int, lanes: int
+) -> tuple[Array, NDArray[np.int64]]:
+    """Rows of parameters for the lanes of every window or stretch, and which rows hold the inputs' offsets."""
+    tiled = {n: np.tile(v, times) if isinstance(v, np.ndarray) else v for n, v in values.items()}
+    rows = [r for r, name in enumerate(solver.names) if name == "actuator.offset"]
+    return solver.table(tiled, times * lanes), np.array(rows, dtype=np.int64)
+
+
+def _plan(track: Track) -> FilterPlan:
+    assert track.ahead is not None
+    return track.ahead
+
+
+def with_noise(rig: Rig, runs: Sequence[Run]) -> Rig:
+    """The rig with the levels of process noise that filters of these runs need, to estimate unless it has them."""
+    filtered = [run for run in runs if run.filtered]
+    moving = {c for run in filtered for c in run.measured if c not in run.held}
+    driven = {i.name for run in filtered for k, i in enumerate(rig.plant.inputs) if np.ptp(run.u[:, k]) > 0}
+    if all(f"{NOISE}{c}" in rig.parameters for c in moving | driven):
+        return rig
+    run = filtered[0]
+    values: dict[str, float] = {**base_values(rig), **run.known}
+    level = dict(zip(rig.plant.state_names(), nearest_equilibrium(rig, run), strict=True))
+    M, _, _, _ = small_motions(rig.plant.derived(), {**values, **level})
+    found = dict(rig.parameters)
+    for i, c in enumerate(rig.plant.coordinates):
+        if c.name not in moving or f"{NOISE}{c.name}" in found:
+            continue
+        y = next(r.y[:, r.measured.index(c.name)] for r in filtered if c.name in r.measured)
+        force = float(M[i, i]) * float(np.std(y)) / run.horizons[0] ** 2
+        found[f"{NOISE}{c.name}"] = Parameter(
+            name=f"{NOISE}{c.name}", value=EASE * force * math.sqrt(run.horizons[0]) or 1e-9,
+            unit=f"{'N m' if c.unit == 'rad' else 'N'} s^(1/2)", estimate=True, lower=0.0,
+            meaning=f"random force on {c.name}, root of its density",
+        )  # fmt: skip
+    for k, i in enumerate(rig.plant.inputs):
+        if i.name in driven and f"{NOISE}{i.name}" not in found:
+            size = max(float(np.std(r.u[:, k])) for r in filtered)
+            unit = rig.parameters["actuator.offset"].unit if "actuator.offset" in rig.parameters else "1"
+            found[f"{NOISE}{i.name}"] = Parameter(
+                name=f"{NOISE}{i.name}", value=0.1 * DRIFT * size, unit=f"{unit} s^(-1/2)", estimate=True, lower=0.0,
+                meaning=f"drift of the command of {i.name}, root of its variance per time",
+            )  # fmt: skip
+    return replace(rig, parameters=found)

@@ -43,7 +43,7 @@ def _moments(rig: Rig, run: Run) -> tuple[list[Trip], bool]:
     return found, plain
 
 
-def doubt(run: Run, trip: Trip) -> str:
+def trip_sentence(run: Run, trip: Trip) -> str:
     """The sentence that tells a reader of the fit."""
     t = float(run.t[0])
     what, until = ("come on only", "from") if trip.late else ("gone off", "until")
@@ -71,7 +71,7 @@ def located(rig: Rig, run: Run) -> Run:
     return replace(run, guesses={**{n: found[n] for n in asked if n in found}, **run.guesses})
 
 
-def untold(rig: Rig, runs: Sequence[Run]) -> list[str]:
+def unasked_trips(rig: Rig, runs: Sequence[Run]) -> list[str]:
     """Sentences on drives that went off or came on where nobody asked when."""
     if any(n in rig.estimated for n in ("actuator.start", "actuator.end")):
         return []
@@ -79,7 +79,7 @@ def untold(rig: Rig, runs: Sequence[Run]) -> list[str]:
     for run in runs:
         for trip in find_trips(rig, run):
             if ("input_start" if trip.late else "input_end") not in run.unknown:
-                said.append(doubt(run, trip))
+                said.append(trip_sentence(run, trip))
     return said
 
 

@@ -11,8 +11,7 @@ command, so that the motion depends continuously on when.
 
 from __future__ import annotations
 
-from upright.simulation.kernel.flavour import Flavour, Layout
-from upright.simulation.kernel.writer import Writer
+from upright.simulation.kernel.flavour import Flavour, Layout, Writer
 
 
 def nodes(f: Flavour) -> list[str]:

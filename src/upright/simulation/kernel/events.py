@@ -1,16 +1,279 @@
-"""When exactly does a joint stick, break away or turn?
+"""Text of the search for the moment at which a dry joint sticks, breaks away or turns.
 
-Text of the path for the few lanes in which a dry joint changed mode within a substep. Modes are +1, -1 (sliding, the
-sign of the velocity) and 0 (stuck). The moment is found inside the substep; there the velocity is set to exactly zero,
-statics decide on the new modes, and the rest of the substep follows.
-Names in capitals are places, from `upright.simulation.kernel.reach`.
+It is the path of the few lanes in which a dry joint changed mode within a substep. Modes are +1, -1 (sliding, the sign
+of the velocity) and 0 (stuck). The moment is found inside the substep; there the velocity is set to exactly zero,
+statics decide on the new modes, and the rest of the substep follows. Every joint at rest holds if it can; else modes
+and accelerations follow from the one solution of ``min 1/2 a'Ma - f'a + sum F_i |a_i|``, Gauss' principle with dry
+friction (Moreau 1988, Unilateral contact).
+
+The text sees two pointers: ``W``, the numbers of one lane, `L` apart, and ``S``, a few places to write on, whose names
+are in capitals (`places`).
 """
 
 from __future__ import annotations
 
+import re
+
+from upright.simulation.kernel.drive import nodes
+from upright.simulation.kernel.equations import arguments, step_arguments
 from upright.simulation.kernel.flavour import Layout
-from upright.simulation.kernel.reach import fetch, leap, located, store, terms_at
-from upright.simulation.kernel.statics import statics
+
+
+def places(p: Layout) -> dict[str, int]:
+    """Places of the search behind the lanes' numbers, and their total under ``"END"``."""
+    nf, nd = len(p.free), len(p.flavour.dry)
+    nx = 2 * nf + len(p.flavour.dahl)
+    sizes = {"STATE": nx, "NEXT": nx, "WHOLE": nx, "MASS": nf * nf, "FORCE": nf, "WORK": nf * nf}
+    sizes |= dict.fromkeys(("ACC", "RIGHT", "KEEP", "MOVES", "FIRST"), nf)
+    sizes |= dict.fromkeys(("MODES", "HOLD", "SLIDE", "MARGIN", "BEFORE", "REST", "LEVEL"), nd)
+    places, end = {}, 0
+    for name, size in sizes.items():
+        places[name] = end
+        end += size
+    return places | {"END": end}
+
+
+def _states(p: Layout) -> list[str]:
+    return [f"q{i}" for i in p.free] + [f"v{i}" for i in p.free] + [f"y{i}" for i in p.flavour.dahl]
+
+
+def fetch(p: Layout) -> str:
+    """Lines that copy the lane's state before and after the substep, its modes and levels."""
+    rows, lines = p.rows, []
+    for k, name in enumerate(_states(p)):
+        lines.append(f"S[STATE + {k}] = W[{rows['o' + name]} * L]")
+        lines.append(f"S[NEXT + {k}] = W[{rows[name]} * L]")
+    for k, i in enumerate(p.flavour.dry):
+        slide = f"_Fs{i}" if i in p.flavour.stribeck else f"_Fc{i}"
+        for name, row in (("MODES", f"s{i}"), ("HOLD", f"_Fs{i}"), ("SLIDE", slide)):
+            lines.append(f"S[{name} + {k}] = W[{rows[row]} * L]")
+    return "".join(f"    {line}\n" for line in lines)
+
+
+def store(p: Layout) -> str:
+    """Lines that give the lane its new state and modes."""
+    lines = [f"W[{p.rows[name]} * L] = S[STATE + {k}]" for k, name in enumerate(_states(p))]
+    lines += [f"W[{p.rows[f's{i}']} * L] = S[MODES + {k}]" for k, i in enumerate(p.flavour.dry)]
+    return "".join(f"    {line}\n" for line in lines)
+
+
+def located(p: Layout, text: str) -> str:
+    """Text with numbers in place of the names in capitals, and the coordinate of each dry joint."""
+    where = [p.free.index(i) for i in p.flavour.dry]
+    if where == list(range(len(where))):
+        text = re.sub(r"\bjoint\((\w+)\)", r"\1", text)
+    else:
+        chosen = "".join(f"{k} if w == {j} else " for j, k in enumerate(where))
+        text = f"@inline\ndef joint(w):\n    return {chosen}0\n\n\n{text}"
+    numbers = places(p) | {"NF": len(p.free), "ND": len(where), "NX": len(_states(p))}
+    text = re.sub(r"\b[A-Z]{2,}\b", lambda m: str(numbers.get(m[0], m[0])), text)
+    # fewer additions for Numba to type
+    return re.sub(r"(?<=\[)(\d+) \+ (\d+)(?= \+|\])", lambda m: str(int(m[1]) + int(m[2])), text)
+
+
+def _known(p: Layout, state: str) -> dict[str, str]:
+    """Where the search keeps what the equations call by name."""
+    nf, f, modes = len(p.free), p.flavour, places(p)["MODES"]
+    known = {f"_q{i}": f"S[{state} + {k}]" for k, i in enumerate(p.free)}
+    known |= {f"_v{i}": f"S[{state} + {nf + k}]" for k, i in enumerate(p.free)}
+    known |= {f"_y{i}": f"S[{state} + {2 * nf + k}]" for k, i in enumerate(f.dahl)}
+    known |= {f"_s{i}": f"S[{modes + k}]" for k, i in enumerate(f.dry)}
+    return known | {name: f"W[{p.rows[name]} * L]" for name in p.constants}
+
+
+def _input(p: Layout, j: int, z: str, c: str = "u") -> str:
+    """Input `j`, or what its drive does, at the fraction `z` of the substep, along which it runs straight."""
+    if not p.flavour.dynamic:
+        return f"W[{p.rows[f'um{j}']} * L]"
+    first, last = (f"W[{p.rows[f'{c}{w}{j}']} * L]" for w in "ab")
+    return f"{first} + ({last} - {first}) * {z}"
+
+
+def _motion(p: Layout, c: str, i: int, z: str) -> str:
+    """Held motion at the fraction `z`: a parabola through start, middle and end of the substep."""
+    first, middle, last = (f"W[{p.rows[f'h{c}{i}{w}']} * L]" for w in "amb")
+    return f"parabola({first}, {middle}, {last}, {z})"
+
+
+def leap(p: Layout) -> str:
+    """Text of ``leap``: a Runge-Kutta step over part of the substep, from the state to the next."""
+    known, f = _known(p, "STATE"), p.flavour
+    known["_h"] = "d"
+    for when, z in (("a", "za"), ("m", "zm"), ("b", "zb")):
+        known |= {f"_{c}{when}{j}": _input(p, j, z, c) for c in ("u", *nodes(f)) for j in range(p.nu)}
+        known |= {f"_h{c}{i}{when}": _motion(p, c, i, z) for i in f.held for c in "qva"}
+    call = ", ".join(known[a] for a in step_arguments(p))
+    result = ", ".join(f"S[NEXT + {k}]" for k in range(2 * len(p.free) + len(f.dahl)))
+    return (
+        "@inline\ndef parabola(first, middle, last, z):\n"
+        "    return first + z * (4.0 * middle - 3.0 * first - last + z * 2.0 * (first + last - 2.0 * middle))\n\n\n"
+        "@scalar\ndef leap(W, S, L, t, d, h):\n"
+        '    """Step `d` from the state at time `t` within the substep `h`."""\n'
+        "    za, zm, zb = t / h, (t + 0.5 * d) / h, (t + d) / h\n"
+        f"    {result}, flag = step({call})\n"
+    )
+
+
+def terms_at(p: Layout) -> str:
+    """Text of ``terms_at``: mass matrix and forces of a state within the substep."""
+    known, f = _known(p, "state"), p.flavour
+    for i, (q, v) in enumerate(zip(p.derived.coordinates, p.velocities, strict=True)):
+        known[q], known[v] = (
+            (_motion(p, "q", i, "z"), _motion(p, "v", i, "z")) if i in f.held else (known[f"_q{i}"], known[f"_v{i}"])
+        )
+    known |= {u: _input(p, j, "z") for j, u in enumerate(p.derived.inputs)}
+    known |= {f"_{c}{j}": _input(p, j, "z", c) for c in nodes(f) for j in range(p.nu)}
+    known |= {f"_ah{i}": _motion(p, "a", i, "z") for i in f.held}
+    call = ", ".join(known[a] for a in arguments(p))
+    return (
+        "@scalar\ndef terms_at(W, S, L, state, t, h):\n"
+        '    """Mass matrix and forces of a state at time `t` within the substep `h`."""\n'
+        f"    z = t / h\n    terms({call}, S)\n"
+    )
+
+
+ELIMINATION = '''
+@scalar
+def solve(S, right):
+    """Accelerations of the coordinates that move, from the forces at `right`; the others stay."""
+    for i in range(NF):
+        S[ACC + i] = S[right + i] * S[MOVES + i]
+        for j in range(NF):
+            S[WORK + NF * i + j] = S[MASS + NF * i + j] * S[MOVES + i] * S[MOVES + j]
+        S[WORK + NF * i + i] += 1.0 - S[MOVES + i]
+    for k in range(NF):
+        for i in range(k + 1, NF):
+            c = S[WORK + NF * i + k] / S[WORK + NF * k + k]
+            for j in range(k, NF):
+                S[WORK + NF * i + j] -= c * S[WORK + NF * k + j]
+            S[ACC + i] -= c * S[ACC + k]
+    for k in range(NF):
+        i = NF - 1 - k
+        for j in range(i + 1, NF):
+            S[ACC + i] -= S[WORK + NF * i + j] * S[ACC + j]
+        S[ACC + i] /= S[WORK + NF * i + i]
+'''
+
+PAIR = '''
+@scalar
+def solve(S, right):
+    """Accelerations of the coordinates that move, from the forces at `right`; the others stay."""
+    m0, m1 = S[MOVES], S[MOVES + 1]
+    a, d = S[MASS] * m0 + (1.0 - m0), S[MASS + 3] * m1 + (1.0 - m1)
+    b, f0, f1 = S[MASS + 1] * (m0 * m1), S[right] * m0, S[right + 1] * m1
+    c = 1.0 / (a * d - b * b)
+    S[ACC] = (d * f0 - b * f1) * c
+    S[ACC + 1] = (a * f1 - b * f0) * c
+'''
+
+LOAD = '''
+@inline_strict
+def taken(S, j, right):
+    """Force that coordinate `j` takes up."""
+    c = S[right + j]
+    for k in range(NF):
+        c -= S[MASS + NF * j + k] * S[ACC + k]
+    return c
+
+
+@scalar
+def load(W, S, L, state, t, h, fresh):
+    """Accelerations of a state with the modes as they are, and the margins of the stuck joints.
+
+    Returns the first joint that cannot hold, -1 when all can. Mass and forces are computed when `fresh`.
+    """
+    if fresh > 0:
+        terms_at(W, S, L, state, t, h)
+        for k in range(NF):
+            S[MOVES + k] = 1.0
+    for w in range(ND):
+        S[MOVES + joint(w)] = abs(S[MODES + w])
+    solve(S, int64(FORCE))
+    first = -1
+    for w in range(ND):
+        if S[MODES + w] == 0.0:
+            g = S[HOLD + w] - abs(taken(S, joint(w), FORCE))
+            S[MARGIN + w] = g
+            first = w if g < 0.0 and first < 0 else first
+    return first
+'''
+
+ALONE = '''
+@inline_strict
+def decide(S, forced):
+    """Mode of the only dry joint, after `load`: at rest it gives way when it must or has reached its level."""
+    if S[MODES] == 0.0 and (forced == 0 or S[MARGIN] < 0.0):
+        S[MODES] = 1.0 if taken(S, joint(0), FORCE) > 0.0 else -1.0
+'''
+
+TOGETHER = '''
+@scalar
+def decide(S, forced):
+    """Modes of the joints at rest, after `load`; joint `forced`, if not -1, has reached its break-away level."""
+    resting, again = 0, False
+    pull = taken(S, joint(forced), FORCE) if forced >= 0 else 0.0
+    for w in range(ND):
+        S[REST + w] = 0.0
+        if S[MODES + w] == 0.0:
+            resting += 1
+            S[REST + w] = 1.0
+            S[LEVEL + w] = S[HOLD + w]
+            if w == forced or S[MARGIN + w] < 0.0:
+                S[REST + w] = 2.0
+                S[LEVEL + w] = S[SLIDE + w]
+                again = True
+    if resting == 1 and again:
+        for w in range(ND):
+            if S[REST + w] > 0.0:
+                S[MODES + w] = 1.0 if taken(S, joint(w), FORCE) > 0.0 else -1.0
+        return
+    for k in range(NF):
+        S[KEEP + k] = 0.0
+    # signs of the accelerations: guessed by coordinate descent, verified by solving exactly
+    for turn in range(400):
+        if not again:
+            break
+        for sweep in range(8 * NF):
+            j = sweep % NF
+            c = S[FORCE + j] + S[MASS + NF * j + j] * S[KEEP + j]
+            for k in range(NF):
+                c -= S[MASS + NF * j + k] * S[KEEP + k]
+            for w in range(ND):
+                if joint(w) == j and S[REST + w] > 0.0:
+                    level = S[LEVEL + w]
+                    c = c - level if c > level else (c + level if c < -level else 0.0)
+            S[KEEP + j] = c / S[MASS + NF * j + j]
+        for j in range(NF):
+            S[RIGHT + j] = S[FORCE + j]
+        for w in range(ND):
+            if S[REST + w] > 0.0:
+                j = joint(w)
+                c = S[KEEP + j]
+                S[MODES + w] = 1.0 if c > 0.0 else (-1.0 if c < 0.0 else 0.0)
+                S[MOVES + j] = abs(S[MODES + w])
+                S[RIGHT + j] -= S[MODES + w] * S[LEVEL + w]
+        solve(S, int64(RIGHT))
+        again = False
+        for w in range(ND):
+            if S[REST + w] > 0.0:
+                c = abs(taken(S, joint(w), RIGHT)) - S[LEVEL + w] * (1.0 + 1e-12)
+                again = again or S[MODES + w] * S[ACC + joint(w)] < 0.0
+                again = again or (S[MODES + w] == 0.0 and c > 0.0)
+        for w in range(ND):
+            if not again and S[REST + w] == 1.0 and S[MODES + w] != 0.0:
+                # dragged along by another joint: it slides at its own lower level
+                S[REST + w] = 2.0
+                S[LEVEL + w] = S[SLIDE + w]
+                again = True
+    if forced >= 0 and S[MODES + forced] == 0.0:
+        S[MODES + forced] = 1.0 if pull > 0.0 else -1.0
+'''
+
+
+def statics(free: int, dry: int) -> str:
+    """Text of ``load`` and ``decide`` for so many free coordinates and dry joints."""
+    return "\n".join([PAIR if free == 2 else ELIMINATION, LOAD, ALONE if dry == 1 else TOGETHER])
+
 
 TURNED = '''
 @inline_strict

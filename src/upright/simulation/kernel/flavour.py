@@ -1,10 +1,11 @@
-"""Which terms does this motion need, so that the kernel computes nothing else?
+"""Which terms a motion needs, so that the kernel computes nothing else, and the names and places its parts agree on.
 
 A flavour is what is fixed when a kernel is compiled; everything else (parameters, states, inputs, modes) is data.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -222,3 +223,25 @@ def choose(
         loop=None if loop is None else loop.compiled_in,
         record=record,
     )
+
+
+class Writer:
+    """Lines of one function, with the working array's places filled in."""
+
+    def __init__(self, layout: Layout, width: int) -> None:
+        self.p, self.width, self.lines, self.depth = layout, width, [], 1
+
+    def at(self, name: str) -> str:
+        """Place of a per-lane number in the working array."""
+        return f"W[{self.p.rows[name] * self.width} + _i]"
+
+    def add(self, *lines: str) -> None:
+        """Write lines; ``{name}`` in braces becomes that number's place."""
+        for line in lines:
+            text = re.sub(r"\{(\w+)\}", lambda m: self.at(m[1]), line)
+            self.lines.append("    " * self.depth + text)
+
+    def lanes(self) -> None:
+        """Open a loop over the lanes of the block."""
+        self.add(f"for _i in range({self.width}):")
+        self.depth += 1
