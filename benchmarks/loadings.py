@@ -16,8 +16,7 @@ from benchmarks.measure import Line, of_each
 def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     """Median errors and how often the intervals hold, per kind of rig and quantity."""
     from upright.experiments.makes import OSCILLATORS
-    from upright.experiments.weighing_1a.run import weigh_body
-    from upright.experiments.weighing_1a.twin import drawn_twin
+    from upright.experiments.weighing_1a.run import drawn_twin, weigh_body
 
     lines: list[Line] = []
     seeds = range(1, 26 if quick else 101)

@@ -40,7 +40,7 @@ def _line(make: str, what: str, seconds: float, note: str) -> Line:
 def _up(make: str, count: int, scatter: float) -> Line:
     """Twins whose numbers lie `scatter` times as far from the model's as a make's do."""
     from upright.control import design_swing_up
-    from upright.control.ascent import UPRIGHT
+    from upright.control.swing_up import UPRIGHT
     from upright.experiments.makes import make_rig
     from upright.simulation import simulate
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from upright.errors import NotIdentifiable
-from upright.experiments import laboratory, laboratory_page
+from upright.experiments import laboratory
 from upright.experiments.laboratory import Experiment
 from upright.report.page import Chapter, Finding, Part
 
@@ -29,8 +29,7 @@ def bench(monkeypatch):
         return Experiment(key=key, part_of=key[0], title=f"Small {key}", makes=makes, needs=needs, seconds=1, tell=tell)
 
     all_of_them = (small("1"), small("2", ("1",)), small("3", ("1",)))
-    for module in (laboratory, laboratory_page):
-        monkeypatch.setattr(module, "EXPERIMENTS", all_of_them)
+    monkeypatch.setattr(laboratory, "EXPERIMENTS", all_of_them)
     return ran, trouble
 
 
@@ -51,7 +50,7 @@ def test_interrupted_it_keeps_what_is_finished_and_goes_on_from_there(bench, tmp
     assert first.interrupted
     assert [t.experiment.key for t in first.told] == ["1"]
     assert [e.key for e in first.missing] == ["2", "3"]
-    told = laboratory_page.book(first, laboratory_page.date(2006, 6, 18))
+    told = laboratory.book(first, laboratory.date(2006, 6, 18))
     assert "Stopped by Ctrl-C" in told.notes[0]
     assert any("Go on" in s.sentence for s in told.steps)
     trouble.clear()
@@ -77,7 +76,7 @@ def test_an_experiment_that_fails_says_why_and_the_others_go_on(bench, tmp_path,
     failed = session.told[1].chapter
     assert not failed.sound
     assert "nothing moves; is the amplifier on?" in failed.detail
-    assert laboratory_page.book(session, laboratory_page.date(2006, 6, 18)).chapters[1].state == "not finished"
+    assert laboratory.book(session, laboratory.date(2006, 6, 18)).chapters[1].state == "not finished"
 
 
 @pytest.mark.parametrize("change", [{"seed": 1}, {"make": "linear"}, {"fresh": True}])
@@ -94,13 +93,13 @@ def test_one_experiment_again_does_not_cost_the_others_their_place(bench, tmp_pa
     laboratory.run_laboratory((), "", 0, tmp_path)
     again = laboratory.run_laboratory(("2",), "", 0, tmp_path, fresh=True)
     assert [(t.experiment.key, t.state) for t in again.told] == [("1", "done"), ("2", "done"), ("3", "kept")]
-    assert laboratory_page.command(again) == "upright lab"
+    assert laboratory.command(again) == "upright lab"
     trouble["2"] = KeyboardInterrupt()
     stopped = laboratory.run_laboratory(("2",), "", 0, tmp_path, fresh=True)
     assert stopped.interrupted
     assert [t.experiment.key for t in stopped.told] == ["1", "2", "3"]  # 2 as it was kept: it still holds
     alone = laboratory.run_laboratory(("1",), "", 1, tmp_path)
-    assert laboratory_page.command(alone) == "upright lab --experiment 1 --seed 1"
+    assert laboratory.command(alone) == "upright lab --experiment 1 --seed 1"
     assert ran == ["1", "2", "3", "1", "2", "1", "2", "1"]
 
 

@@ -13,10 +13,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upright.control.many import outcomes
-from upright.control.rig import ServoRig
-from upright.control.score import Score, Scores, score
-from upright.control.trial import Trial, trial
+from upright.control.score import Score, Scores, outcomes, score
+from upright.control.trial import ServoRig, Trial, trial
 from upright.errors import BadInput
 from upright.gains import Margins, Sampled, hold, margins
 from upright.gains.loop import closed, command_noise

@@ -17,9 +17,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.control.rig import ServoRig
 from upright.control.swing_up import SwingUp
-from upright.control.trial import SUBSTEPS, logged, trial
+from upright.control.trial import SUBSTEPS, ServoRig, logged, trial
 from upright.records import Record
 from upright.simulation import simulate
 

@@ -16,8 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upright.control.rig import ServoRig
-from upright.control.trial import Trial, trial
+from upright.control.trial import ServoRig, Trial, trial
 from upright.gains import hold, shaken
 from upright.laws import Law
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.control.rig import ServoRig
+from upright.control.trial import ServoRig
 from upright.errors import BadInput, ImpossiblePhysics
 from upright.experiments.makes import MAKES, Make, make_of, make_rig
 from upright.physics import Linear, Plant, find

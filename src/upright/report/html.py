@@ -6,8 +6,7 @@ import re
 from pathlib import Path
 
 from upright.files import replace_file
-from upright.report.book import Book
-from upright.report.page import Chapter, Picture
+from upright.report.page import Book, Chapter, Picture
 
 _ID = re.compile(r'\b(id="|url\(#|href="#)')
 

@@ -11,7 +11,7 @@ import pytest
 
 from upright.control import trial
 from upright.experiments.makes import MAKES, SHAFTS, make_rig
-from upright.experiments.tracking_3 import pd
+from upright.experiments.tracking_3 import laws as pd
 from upright.experiments.tracking_3.laws import AT, EXTRA, closed_by, paper_sets, tracker, with_sum
 from upright.experiments.tracking_3.pulses import fitted, identify_shaft, pulses
 from upright.experiments.tracking_3.run import RESERVE, run_tracking

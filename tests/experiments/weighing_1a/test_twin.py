@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from upright.experiments.makes import OSCILLATORS
-from upright.experiments.weighing_1a.run import weigh_body
-from upright.experiments.weighing_1a.twin import acquire, drawn_twin
+from upright.experiments.weighing_1a.run import acquire, drawn_twin, weigh_body
 from upright.identification import Parameter, Rig, Run
 from upright.identification.estimate import identify
 from upright.physics import chain

@@ -17,7 +17,7 @@ from upright.errors import BadInput
 
 if TYPE_CHECKING:
     from upright.experiments.laboratory import Session
-    from upright.report.book import Book
+    from upright.report.page import Book
 
 INTERRUPTED = 130
 
@@ -62,7 +62,7 @@ def lab(
         raise BadInput(f"results need a folder, but {folder} is a file; name another with -o.")
     from datetime import date
 
-    from upright.experiments import laboratory, laboratory_page
+    from upright.experiments import laboratory
     from upright.report.html import write_html
     from upright.report.pdf import available, write_pdf
 
@@ -74,11 +74,11 @@ def lab(
         )
         pressed.patient = True
         bar("writing the report", 1.0)
-        told = laboratory_page.book(session, date.today())
+        told = laboratory.book(session, date.today())
         report = write_html(folder / "report.html", told)
         pdf = write_pdf(folder / "report.pdf", told) if available() else None
     if as_json:
-        print_json(laboratory_page.summary(session, report, pdf))
+        print_json(laboratory.summary(session, report, pdf))
     else:
         _tell(session, told, [report] if pdf is None else [report, pdf])
     if session.interrupted or pressed.times:

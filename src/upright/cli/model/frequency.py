@@ -92,7 +92,7 @@ def _of_logs(
     hold: str, signals: dict[str, str], counts: dict[str, str], known: dict[str, str], band: tuple[float, float],
 ) -> tuple[list[Path], Chapter]:  # fmt: skip
     from upright.experiments.frequency_1b.chapter import log_chapter
-    from upright.experiments.frequency_1b.from_logs import LogRequest, response_of_logs
+    from upright.experiments.frequency_1b.run import LogRequest, response_of_logs
     from upright.units import parse_if_given
 
     wish = LogRequest(

@@ -115,8 +115,7 @@ def _of_logs(logs: list[Path], added: list[str], signal: str, command: str, tole
 def _of_twin(kind: str, seed: int, out: Path) -> Chapter:
     from upright.experiments.makes import OSCILLATORS
     from upright.experiments.weighing_1a.chapter import loading_chapter
-    from upright.experiments.weighing_1a.run import weigh_body
-    from upright.experiments.weighing_1a.twin import drawn_twin, truth
+    from upright.experiments.weighing_1a.run import drawn_twin, truth, weigh_body
     from upright.report.page import Step
 
     if kind not in OSCILLATORS:

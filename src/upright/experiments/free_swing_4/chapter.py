@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from upright.experiments.free_swing_4.drift import TILT
 from upright.experiments.free_swing_4.figures import drift_figure, energy_figure
-from upright.experiments.free_swing_4.run import Balance, FreeSwing
-from upright.experiments.free_swing_4.studies import recovered
+from upright.experiments.free_swing_4.release import TILT
+from upright.experiments.free_swing_4.run import Balance, FreeSwing, recovered
 from upright.identification.model.fit import Fit
 from upright.report.fit.chapter import motion_part, rest_picture, run_pictures
 from upright.report.fit.figures import directions_figure, fit_figure, interval_figure

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from upright.experiments.frequency_1b.figures import bode_figure, quality_figure
-from upright.experiments.frequency_1b.from_logs import LoggedResponse
-from upright.experiments.frequency_1b.run import FrequencyRun
+from upright.experiments.frequency_1b.run import FrequencyRun, LoggedResponse
 from upright.identification.frequency.answer import Answer, curves, digits, key_value
 from upright.identification.frequency.response import FrequencyResponse
 from upright.identification.model.fit import Estimate

@@ -17,8 +17,7 @@ from upright.experiments.tracking_3.figures import (
     poles_figure,
     steps_figure,
 )
-from upright.experiments.tracking_3.laws import AT, loop_poles
-from upright.experiments.tracking_3.pd import best_decay, root_locus, sampled
+from upright.experiments.tracking_3.laws import AT, best_decay, loop_poles, root_locus, sampled
 from upright.experiments.tracking_3.pulses import FIT, STUDY
 from upright.experiments.tracking_3.run import BEFORE, DWELL, RESERVE, Outcome, StepTrial, Tracking
 from upright.experiments.tracking_3.tables import length, milli, share

@@ -20,8 +20,18 @@ from upright.control.steps import Effort, StepFigures, effort, step_figures
 from upright.errors import BadInput
 from upright.experiments.identified import DAILY
 from upright.experiments.makes import MAKES, make_rig
-from upright.experiments.tracking_3.laws import AT, Tracker, by_poles, check, paper_sets, with_sum
-from upright.experiments.tracking_3.pd import Search, far_pd, near_pd, tune
+from upright.experiments.tracking_3.laws import (
+    AT,
+    Search,
+    Tracker,
+    by_poles,
+    check,
+    far_pd,
+    near_pd,
+    paper_sets,
+    tune,
+    with_sum,
+)
 from upright.experiments.tracking_3.pulses import fitted, identify_shaft, shaft_make
 from upright.experiments.weighing_1a.run import Known
 from upright.identification.model.fit import Fit

@@ -10,8 +10,7 @@ import numpy as np
 
 from upright.experiments.makes import OSCILLATORS
 from upright.experiments.weighing_1a.figures import decrement_figure, line_figure, swing_figure
-from upright.experiments.weighing_1a.run import Known, Weighing
-from upright.experiments.weighing_1a.twin import truth
+from upright.experiments.weighing_1a.run import Known, Weighing, truth
 from upright.identification import Estimate
 from upright.identification.loadings import Loaded, Loadings
 from upright.records import Record
