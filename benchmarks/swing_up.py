@@ -78,9 +78,8 @@ def _sensors(make: str, count: int) -> list[Line]:
     from upright import gains as design
     from upright.control import design_swing_up, trial
     from upright.control.score import FALLEN
-    from upright.control.sensors import probe, put_out, scales
+    from upright.control.sensors import Suspicion, Watch, probe, put_out, scales
     from upright.control.trial import readings
-    from upright.control.watch import Suspicion, Watch
     from upright.experiments.makes import make_rig
 
     model = make_rig(make)

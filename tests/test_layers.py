@@ -70,7 +70,7 @@ DOORS = {
     "scipy.optimize": "identification closed_loop",
     "lmfit": "identification",
     "mpmath": "gains",
-    "matplotlib": "report figures frames",
+    "matplotlib": "report figures",
     "jinja2": "report",
     "typst": "report",
     "pint": "units",

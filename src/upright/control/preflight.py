@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from upright.control.score import Score, Scores, outcomes, score
 from upright.control.trial import ServoRig, Trial, trial
@@ -21,8 +21,7 @@ from upright.gains.loop import closed, command_noise
 from upright.gains.requests import poles_of
 from upright.laws import Law
 from upright.physics import Linear
-
-Array = NDArray[np.float64]
+from upright.records import Array
 
 WORDS = ("regulates", "saturates", "too weak", "falls")
 """What a run can come to; see `words`."""

@@ -20,16 +20,16 @@ from math import cos, floor, pi, sin
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from upright.control.trial import SUBSTEPS, ServoRig, Trial, readings, trial
 from upright.errors import BadInput
 from upright.gains import filtered, hold, place_sampled
 from upright.gains.requests import poles_of
 from upright.laws import Rule
+from upright.records import Array
 from upright.simulation import simulate
 
-Array = NDArray[np.float64]
 SWINGING, HOLDING, TRIPPED = 0.0, 1.0, 2.0
 """What the law is doing, and where among its numbers that stands."""
 MODE = 4

@@ -11,15 +11,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from upright.errors import BadInput
 from upright.laws import Law, Rule
 from upright.physics import Linear, Plant
-from upright.records import Provenance, Record
+from upright.records import Array, Record
+from upright.records.provenance import of_twin
 from upright.simulation import simulate
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -244,22 +243,20 @@ def at_work(rig: ServoRig, law: Law, rest: ArrayLike, reference: ArrayLike | Non
 
 def logged(rig: ServoRig, t: Array, x: Array, u: Array, reference: ArrayLike | None = None) -> Record:
     """What a program at the rig could log of states x, shape (N, states), and commands u, shape (N,)."""
-    seen = readings(rig, x[:, 0::2])
-    names = [c.name for c in rig.plant.coordinates]
-    signals = {name: seen[:, i] for i, name in enumerate(names)} | {"u": u}
-    units = {c.name: c.unit for c in rig.plant.coordinates} | {"u": rig.unit}
+    log = twin_log(rig, t, readings(rig, x[:, 0::2]), u)
+    signals = {name: log[name] for name in (*log.outputs, "u")}
     if reference is not None:
         asked = np.asarray(reference, dtype=np.float64)
         signals["reference"] = asked[np.minimum(np.arange(t.size), asked.size - 1)]
+    return log.replace(signals=signals)
+
+
+def twin_log(rig: ServoRig, t: Array, y: Array, u: Array | None = None, *, unit: str = "") -> Record:
+    """Log of a twin: commands u, (N,), if any, and readings y, (N, coordinates), in SI or a `unit` of all."""
+    of = {c.name: unit or c.unit for c in rig.plant.coordinates}
+    signals = {name: y[:, i] for i, name in enumerate(of)}
+    driven = {} if u is None else {"u": u}
     return Record(
-        t=t,
-        signals=signals,
-        units=units,
-        inputs=("u",),
-        outputs=tuple(names),
-        provenance=Provenance(
-            reader="twin",
-            rig=f"digital twin of {rig.name}, seed {rig.seed}",
-            notes=("This log was simulated; no rig was touched.",),
-        ),
-    )
+        t=t, signals=driven | signals, units=({"u": rig.unit} if driven else {}) | of, inputs=tuple(driven),
+        outputs=tuple(of), provenance=of_twin(rig.name, rig.seed),
+    )  # fmt: skip

@@ -10,13 +10,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from upright.errors import BadInput
-from upright.gains.requests import conjugate_poles, lost_modes, matched, poles_of, weak_modes, written
-
-Array = NDArray[np.float64]
-Roots = NDArray[np.complex128]
+from upright.gains.requests import Roots, conjugate_poles, lost_modes, matched, poles_of, weak_modes, written
+from upright.laws.linear import Array
 
 DIGITS = 60
 

@@ -11,9 +11,8 @@ from upright.gains.requests import matched, written
 from upright.paper.reproduce import Regenerated, Reproduced
 from upright.paper.tables import STUDENTS
 from upright.questionnaire.figures import answers_figure
-from upright.report.drawing import BLACK, BLUE, VERMILLION
+from upright.report.drawing import BLACK, BLUE, VERMILLION, Poles, locus_figure, pole_map
 from upright.report.page import Chapter, Part, Picture, Points, Step, Table
-from upright.report.poles import Poles, locus_figure, pole_map
 from upright.report.symbols import number
 
 

@@ -12,7 +12,7 @@ from functools import cached_property
 from typing import Any
 
 from upright.files import plain_values
-from upright.report.mathml import symbol
+from upright.report.symbols import symbol
 
 
 class Symbol(str):

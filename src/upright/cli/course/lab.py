@@ -131,7 +131,7 @@ def _tell(session: Session, told: Book, files: list[Path]) -> None:
 
     took = {
         t.experiment.key: f"{t.rig}{', as kept from an earlier run' if t.state == 'kept' else ''}; {t.seconds:.1f} s"
-        for t in session.told
+        for t in session.results
     }
     timed = replace(told, chapters=tuple(replace(c, about=took[c.key]) for c in told.chapters))
     print_book(console(), timed, files)

@@ -115,12 +115,12 @@ def _of_logs(logs: list[Path], added: list[str], signal: str, command: str, tole
 def _of_twin(kind: str, seed: int, out: Path) -> Chapter:
     from upright.experiments.makes import OSCILLATORS
     from upright.experiments.weighing_1a.chapter import loading_chapter
-    from upright.experiments.weighing_1a.run import drawn_twin, truth, weigh_body
+    from upright.experiments.weighing_1a.run import drawn_twin, measure_body, truth
     from upright.report.page import Step
 
     if kind not in OSCILLATORS:
         raise BadInput(f"--twin is {' or '.join(OSCILLATORS)}, got '{kind}'.")
-    done = weigh_body(drawn_twin(seed, kind))
+    done = measure_body(drawn_twin(seed, kind))
     column = next(iter(done.logs.values())).outputs[0]
     files = done.write_logs(out)
     added = " ".join(f'--added "{done.added[label]:.6g} {OSCILLATORS[kind].unit}"' for label in files)
@@ -132,7 +132,7 @@ def _of_twin(kind: str, seed: int, out: Path) -> Chapter:
         Step("See which masses would have told most.", f"upright plan-inertias --rig {kind}"),
     ]
     return loading_chapter(
-        done.found, kind=kind, title=f"Experiment 1a on a twin, {kind}, seed {seed}", logs=done.logs,
+        done.loadings, kind=kind, title=f"Experiment 1a on a twin, {kind}, seed {seed}", logs=done.logs,
         signals=dict.fromkeys(done.logs, column), left_out=done.left_out, truth=truth(done.on), steps=steps,
     )  # fmt: skip
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from upright.errors import BadInput
 from upright.experiments.identified import IdentifiedRig
@@ -29,13 +29,11 @@ from upright.gains import (
 )
 from upright.gains.loop import closed, command_noise, swing
 from upright.gains.lqr import motion
-from upright.gains.requests import poles_of
+from upright.gains.requests import Roots, poles_of
 from upright.gains.sampled import to_s
 from upright.laws import Law
 from upright.physics import Linear
-
-Array = NDArray[np.float64]
-Roots = NDArray[np.complex128]
+from upright.records import Array
 
 SPEEDS = ("plain", "filtered", "kalman")
 """Ways to the velocities: differences of encoders, plain or through a low pass, and a Kalman filter."""

@@ -12,16 +12,12 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from upright.control.trial import ServoRig
+from upright.control.trial import ServoRig, twin_log
 from upright.errors import BadInput
 from upright.experiments.makes import MOTOR_AND_BELT, SERVO, make_of
 from upright.physics import CartPendulum, Furuta
-from upright.records import Record
-from upright.records.provenance import of_twin
-
-Array = NDArray[np.float64]
+from upright.records import Array, Record
 
 _BELT_OFF = {"b_1": 0.3, "b_1c": 0.1875}  # share of the friction that the disk's own bearings have
 
@@ -87,15 +83,7 @@ def acquire(
     release = release or Release()
     meant = Release(angle=release.angle + rng.normal(0, 0.01), push=release.push)
     t, x = motion(rig, meant, seconds=seconds, every=every)
-    counts = np.round(x[:, 0::2] * np.array(rig.counts))  # zeroed where both joints rest
-    names = tuple(c.name for c in rig.plant.coordinates)
-    return Record(
-        t=t,
-        signals={n: counts[:, i] for i, n in enumerate(names)},
-        units=dict.fromkeys(names, "counts"),
-        outputs=names,
-        provenance=of_twin(rig.name, rig.seed),
-    )
+    return twin_log(rig, t, np.round(x[:, 0::2] * np.array(rig.counts)), unit="counts")  # zeroed where both joints rest
 
 
 TILT = math.radians(0.25)

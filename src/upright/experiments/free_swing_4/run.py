@@ -7,13 +7,11 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Generator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from upright.control.trial import ServoRig
 from upright.experiments.free_swing_4.release import (
@@ -32,11 +30,10 @@ from upright.experiments.weighing_1a.run import Known
 from upright.identification.model.fit import Fit
 from upright.physics import Plant
 from upright.progress import Progress, part, silent
-from upright.records import Record
+from upright.records import Array, Record
 from upright.study.load import Study
 from upright.study.write import Table, counted_sensor, number, study_text, table
 
-Array = NDArray[np.float64]
 FRICTION = ("b_1", "b_1c", "b_2", "b_2c")
 
 
@@ -56,7 +53,7 @@ class Question:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Answer:
+class QuestionFit:
     """A question with its fit and the study that repeats it."""
 
     question: Question
@@ -201,14 +198,14 @@ def write_questions(rig: ServoRig, folder: Path, weighed: Known | None = None) -
     return tuple(made)
 
 
-def fit_question(q: Question, study: Path, progress: Progress = silent) -> Answer:
+def fit_question(q: Question, study: Path, progress: Progress = silent) -> QuestionFit:
     """Fit one question from its files, as `upright identify` would."""
     from upright.identification.estimate import identify
     from upright.study.load import load_study
 
     loaded = load_study(study)
     tell = part(progress, 0.0, 1.0, q.title)
-    return Answer(question=q, study=loaded, fit=identify(loaded.rig, loaded.runs, method=q.method, progress=tell))
+    return QuestionFit(question=q, study=loaded, fit=identify(loaded.rig, loaded.runs, method=q.method, progress=tell))
 
 
 def recovered(rig: ServoRig, fit: Fit) -> tuple[Recovered, ...]:
@@ -229,7 +226,7 @@ def recovered(rig: ServoRig, fit: Fit) -> tuple[Recovered, ...]:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Balance:
+class EnergyBalance:
     """Energy of the release over time: time (N,) [s], what is still there and what each friction took [J]."""
 
     t: Array
@@ -244,9 +241,9 @@ class FreeSwing:
     rig: ServoRig
     folder: Path
     weighed: Known | None = None
-    answers: dict[str, Answer] = field(default_factory=dict[str, Answer])
+    answers: dict[str, QuestionFit] = field(default_factory=dict[str, QuestionFit])
     drifts: tuple[DriftPath, ...] = ()
-    balance: Balance | None = None
+    balance: EnergyBalance | None = None
     interrupted: bool = False
     seconds: float = 0.0
 
@@ -289,7 +286,7 @@ def run_free_swing(
     """
     began = time.perf_counter()
     done = FreeSwing(rig=freed(replace(rig, seed=seed)), folder=folder, weighed=weighed)
-    with _kept(done):
+    try:
         progress("releasing the pendulum", 0.0)
         asked = write_questions(done.rig, folder, weighed)
         for i, (question, path) in enumerate(asked):
@@ -301,19 +298,13 @@ def run_free_swing(
         progress("following the body that carries it", 0.9)
         done.drifts = drift_paths(done.rig)
         done.balance = balance(done)
+    except KeyboardInterrupt:
+        done.interrupted = True
     done.seconds = time.perf_counter() - began
     return done
 
 
-@contextmanager
-def _kept(done: FreeSwing) -> Generator[None]:
-    with suppress(KeyboardInterrupt):
-        done.interrupted = True
-        yield
-        done.interrupted = False
-
-
-def balance(done: FreeSwing) -> Balance:
+def balance(done: FreeSwing) -> EnergyBalance:
     """Where the energy of the first release went, as the fitted model tells it."""
     fit = done.answers["free_swing"].fit
     values = {n: p.value for n, p in fit.rig.parameters.items() if n in fit.rig.plant.names()}
@@ -323,7 +314,7 @@ def balance(done: FreeSwing) -> Balance:
     stored = model.energy(x) - float(model.energy(model.state()))
     taken = losses(model, t, x)
     every = max(1, round(0.02 / SERVO))
-    return Balance(t=t[::every], stored=stored[::every], taken={n: e[::every] for n, e in taken.items()})
+    return EnergyBalance(t=t[::every], stored=stored[::every], taken={n: e[::every] for n, e in taken.items()})
 
 
 def losses(plant: Plant, t: Array, x: Array) -> dict[str, Array]:
@@ -333,17 +324,15 @@ def losses(plant: Plant, t: Array, x: Array) -> dict[str, Array]:
     drag c |v|^3. Stiction takes nothing while it holds. Integrated by the trapezoid rule, so the samples must be
     close to each other.
     """
-    taken: dict[str, Array] = {}
+    from scipy.integrate import cumulative_trapezoid
+
+    powers = {"viscous friction": plant.power_lost(x)}
     values = plant.parameters()
-    taken["viscous friction"] = _running(t, plant.power_lost(x))
     for joint in plant.joints:
         i = plant.state_names().index(f"{joint.on}_dot")
         speed = np.abs(x[:, i])
         for kind, name, power in (("Coulomb friction", joint.coulomb, speed), ("drag", joint.quadratic, speed**3)):
             if name and values[name] > 0:
-                taken[f"{kind} of {joint.on}"] = _running(t, values[name] * power)
+                powers[f"{kind} of {joint.on}"] = values[name] * power
+    taken = {name: np.asarray(cumulative_trapezoid(power, t, initial=0)) for name, power in powers.items()}
     return {name: energy for name, energy in taken.items() if energy[-1] > 0}
-
-
-def _running(t: Array, power: Array) -> Array:
-    return np.concatenate([[0.0], np.cumsum(np.diff(t) * (power[1:] + power[:-1]) / 2)])

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from upright.control import Score, ServoRig, Trial, score, trial
 from upright.control.preflight import Preflight, Task, preflight, word
@@ -23,14 +22,12 @@ from upright.experiments.identified import IdentifiedRig, read_identified
 from upright.experiments.makes import PENDULUMS
 from upright.gains import Margins, Placement, Sampled, feedback, hold, margins, place
 from upright.gains.loop import closed, command_noise
-from upright.gains.requests import poles_of, read_poles
+from upright.gains.requests import Roots, poles_of, read_poles
 from upright.laws import Law
 from upright.paper.tables import TABLE_1
 from upright.physics import Linear
 from upright.progress import Progress, silent
-
-Array = NDArray[np.float64]
-Roots = NDArray[np.complex128]
+from upright.records import Array
 
 HAND = (0.01, 0.1)
 """What a hand gets wrong: half a degree, and 0.1 rad/s."""
@@ -72,6 +69,11 @@ class Attempt:
     def word(self) -> str:
         """What it came to, in one of `preflight.WORDS`; empty when nothing was run."""
         return "" if self.score is None else word(self.score)
+
+    @property
+    def title(self) -> str:
+        """Its name and what it came to, or what is expected where nothing was run."""
+        return f"{self.name}: {self.word or self.before.word}"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -13,22 +13,18 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from upright.control import ServoRig, SwingUp, design_swing_up, trial
 from upright.control.score import FALLEN
-from upright.control.sensors import KNOWN, Scales, probe, put_out, scales
+from upright.control.sensors import KNOWN, Scales, Suspicion, Watch, probe, put_out, scales
 from upright.control.swing_up import Ascent, swing_up
 from upright.control.trial import readings
-from upright.control.watch import Suspicion, Watch
 from upright.errors import BadInput, NotIdentifiable, nearest
 from upright.experiments.identified import IdentifiedRig
 from upright.gains import feedback, filtered, hold
 from upright.progress import Progress, silent
-from upright.records import Record
+from upright.records import Array, Record
 from upright.units import same_dimension, scale
-
-Array = NDArray[np.float64]
 
 HELD = 5.0
 """How long the pendulum must stand before it counts as caught [s]."""

@@ -17,20 +17,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.control import ServoRig
-from upright.control.steps import step_figures
+from upright.control.score import step_figures
 from upright.control.trial import SUBSTEPS, at_work
 from upright.errors import BadInput
 from upright.gains import feedback, filtered, hold, place, prefilter
 from upright.gains.loop import closed
-from upright.gains.requests import conjugate_poles, poles_of
+from upright.gains.requests import Roots, conjugate_poles, poles_of
 from upright.gains.sampled import to_s
 from upright.laws import Law
 from upright.paper.tables import TABLE_2, poles
 from upright.physics import Linear
+from upright.records import Array
 from upright.simulation import simulate
-
-Array = NDArray[np.float64]
-Roots = NDArray[np.complex128]
 
 AT = "rest"
 MEMORY = 0.5
@@ -195,7 +193,7 @@ def _gains(rig: ServoRig, body: int, kp: float, kd: float) -> Array:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Search:
+class GainSearch:
     """PD laws on the near encoder, tried on one rig: gains, and when the far body arrived and settled [s]."""
 
     kp: Array
@@ -204,7 +202,7 @@ class Search:
     settling: Array
 
 
-def tune(rig: ServoRig, step: float, most: float) -> tuple[Tracker, Search]:
+def tune(rig: ServoRig, step: float, most: float) -> tuple[Tracker, GainSearch]:
     """The PD on the near encoder that brings the far body soonest within 5 % of the reference, and keeps it there.
 
     Every pair of gains of a grid runs on the rig in the kernel, with friction, encoders, converter and limit; then a
@@ -219,7 +217,7 @@ def tune(rig: ServoRig, step: float, most: float) -> tuple[Tracker, Search]:
         best = rows[order[0]]
         kp = np.minimum(best[0] * np.geomspace(0.8, 1.25, 9), most / step)
         rate = best[1] / best[0] * np.geomspace(0.8, 1.25, 9)
-    found = Search(kp=rows[:, 0], kd=rows[:, 1], arrival=rows[:, 2], settling=rows[:, 3])
+    found = GainSearch(kp=rows[:, 0], kd=rows[:, 1], arrival=rows[:, 2], settling=rows[:, 3])
     return near_pd(rig, "PD, tuned", float(best[0]), float(best[1])), found
 
 

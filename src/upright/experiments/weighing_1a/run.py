@@ -105,7 +105,7 @@ class Campaign:
     on: LoadedTwin
     logs: dict[str, Record]
     added: dict[str, float]
-    found: Loadings
+    loadings: Loadings
     left_out: tuple[str, ...]
     """Why some logs did not count: friction may leave too few swings."""
 
@@ -140,7 +140,7 @@ class Weighing:
     known: tuple[Known, ...]
 
 
-def weigh_body(
+def measure_body(
     on: LoadedTwin, progress: Progress = silent, *, counts: tuple[int, ...] = (0, 1, 2, 3, 4), shots: int = 2
 ) -> Campaign:
     """Step a body with every count of masses, `shots` times each, and weigh it."""
@@ -159,7 +159,7 @@ def weigh_body(
             except NotIdentifiable as error:
                 left_out.append(str(error))
     found = fit_loadings(loaded, tolerance=on.design.tolerance, piece=on.design.piece)
-    return Campaign(on=on, logs=logs, added=added, found=found, left_out=tuple(left_out))
+    return Campaign(on=on, logs=logs, added=added, loadings=found, left_out=tuple(left_out))
 
 
 def first_body(rig: ServoRig) -> LoadedTwin:
@@ -188,8 +188,8 @@ def _make(rig: ServoRig) -> Make:
 def run_weighing(rig: ServoRig, seed: int, folder: Path, progress: Progress = silent) -> Weighing:
     """Weigh the first body of a rig; its logs are written to `folder`."""
     make = _make(rig)
-    done = weigh_body(first_body(replace(rig, seed=seed)), progress)
-    found, mounted = done.found, make.mounted
+    done = measure_body(first_body(replace(rig, seed=seed)), progress)
+    found, mounted = done.loadings, make.mounted
     spread = make.oscillator.tolerance * mounted.each * math.sqrt(mounted.pieces)
     known = [
         Known(
