@@ -166,11 +166,11 @@ def _steps(done: FrequencyRun) -> tuple[Step, ...]:
         Step("Find gains for these numbers, and what their errors do to the loop.", gains),
         Step(
             "Estimate the response again from the log, as you would from your own.",
-            f'upright frequency {log} --rig {make} --hold "{1e3 * hold:.4g} ms" -o again',
+            f'upright frequency {log} --rig {make.key} --hold "{1e3 * hold:.4g} ms" -o again',
         ),
         Step(
             "Ask all frequencies at once, and see what that saves and costs.",
-            f"upright frequency --rig {make} --ask multisine",
+            f"upright frequency --rig {make.key} --ask multisine",
         ),
     )
 
