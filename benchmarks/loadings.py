@@ -16,16 +16,15 @@ from benchmarks.measure import Line, of_each
 def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     """Median errors and how often the intervals hold, per kind of rig and quantity."""
     from upright.experiments.makes import OSCILLATORS
-    from upright.experiments.weighing_1a.run import weigh_body
-    from upright.experiments.weighing_1a.twin import drawn_twin
+    from upright.experiments.weighing_1a.run import drawn_twin, measure_body
 
     lines: list[Line] = []
     seeds = range(1, 26 if quick else 101)
-    weigh_body(drawn_twin())  # compiles
+    measure_body(drawn_twin())  # compiles
     for kind in OSCILLATORS:
         progress(kind)
-        done, each = of_each(lambda seed, kind=kind: weigh_body(drawn_twin(seed, kind)), seeds)
-        pairs = [((d.found.k, d.on.stiffness), (d.found.bare, d.on.bare)) for d in done]
+        done, each = of_each(lambda seed, kind=kind: measure_body(drawn_twin(seed, kind)), seeds)
+        pairs = [((d.loadings.k, d.on.stiffness), (d.loadings.bare, d.on.bare)) for d in done]
         errors = np.array([[abs(w.value / truth - 1) for w, truth in pair] for pair in pairs])
         held = np.array([[w.interval[0] <= truth <= w.interval[1] for w, truth in pair] for pair in pairs])
         for column, name in enumerate(("stiffness", "bare inertia")):

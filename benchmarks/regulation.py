@@ -142,7 +142,7 @@ def hands(start: Array, rng: np.random.Generator, lanes: int) -> Array:
 def one(make: str, seed: int, *, swept: Path | None = None) -> Told | None:
     """One twin from identification to outcome; `swept` is a folder for one identified as in experiment 1b."""
     from upright import gains
-    from upright.control.many import outcomes
+    from upright.control.score import outcomes
     from upright.experiments.designing.run import SPEEDS, velocities
     from upright.experiments.makes import make_rig
     from upright.experiments.regulation_2.run import SETS, identify_make

@@ -40,7 +40,7 @@ def _line(make: str, what: str, seconds: float, note: str) -> Line:
 def _up(make: str, count: int, scatter: float) -> Line:
     """Twins whose numbers lie `scatter` times as far from the model's as a make's do."""
     from upright.control import design_swing_up
-    from upright.control.ascent import UPRIGHT
+    from upright.control.swing_up import UPRIGHT
     from upright.experiments.makes import make_rig
     from upright.simulation import simulate
 
@@ -78,9 +78,8 @@ def _sensors(make: str, count: int) -> list[Line]:
     from upright import gains
     from upright.control import design_swing_up, trial
     from upright.control.score import FALLEN
-    from upright.control.sensors import probe, put_out, scales
+    from upright.control.sensors import Suspicion, Watch, probe, put_out, scales
     from upright.control.trial import readings
-    from upright.control.watch import Suspicion, Watch
     from upright.experiments.makes import make_rig
 
     model = make_rig(make)

@@ -46,8 +46,8 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
 
 
 def _line(kind: str, name: str, outcomes: Sequence[Any], done: Sequence[Any], each: Spread | None) -> Line:
-    found = [o.found for o in outcomes]
-    told = [(o.foreseen.figures, o.found.figures, d) for o, d in zip(outcomes, done, strict=True)]
+    found = [o.measured for o in outcomes]
+    told = [(o.predicted.figures, o.measured.figures, d) for o, d in zip(outcomes, done, strict=True)]
     figures = [f for _, f, _ in told if f is not None]
     inside = sum(o.within for o in outcomes)
     left = [(abs(f.error) / d.step.size, o.law.play / d.step.size) for o, (_, f, d) in zip(outcomes, told, strict=True)]

@@ -25,7 +25,7 @@ with TemporaryDirectory() as folder:
     weighed = run_weighing(rig, seed, Path(folder))
     swept = run_frequency("furuta", seed, Path(folder), weighed=weighed.known)
 
-line = weighed.campaign.found
+line = weighed.campaign.loadings
 print(f"(a) {line.verdict}")
 for known in weighed.known:
     print(f"    {known.name} = {known.value:.4g} ± {known.stderr:.2g}, truth {getattr(rig.plant, known.name):.4g}")

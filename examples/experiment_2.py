@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from upright.control import design_swing_up
-from upright.control.ascent import swing_up
+from upright.control.swing_up import swing_up
 from upright.experiments.frequency_1b.run import run_frequency
 from upright.experiments.identified import read_identified
 from upright.experiments.makes import make_rig

@@ -23,7 +23,7 @@ print(f"Poles of the fitted rig: {', '.join(f'{p:.2f}' for p in done.model.linea
 print(f"Step of {1e3 * done.step.size:g} mm, {done.step.reason}.")
 
 for outcome in (*done.sets, done.summed, done.pd, done.stiff, done.far):
-    law, run = outcome.law, outcome.found
+    law, run = outcome.law, outcome.measured
     gains = ", ".join(f"{k:.4g}" for k in law.K)
     print(f"{law.name}: K = [{gains}], k_pf = {law.k_pf:.4g} V/m")
     if run.figures is None:
@@ -31,7 +31,7 @@ for outcome in (*done.sets, done.summed, done.pd, done.stiff, done.far):
         continue
     print(f"  rise {1e3 * run.figures.rise:.0f} ms, overshoot {100 * run.figures.overshoot:.0f} %,", end=" ")
     print(f"at the reference after {1e3 * run.figures.arrival:.0f} ms, {run.effort.peak:.2f} V at most", end=" ")
-    print(f"(foreseen {outcome.foreseen.effort.peak:.2f} V), a push moves it {1e3 * run.give:.1f} mm")
+    print(f"(foreseen {outcome.predicted.effort.peak:.2f} V), a push moves it {1e3 * run.give:.1f} mm")
 
 shown = [done.sets[0], done.sets[-1], done.pd, done.stiff]
 print("Picture:", save(steps_figure(done, shown), Path("experiment_3.png")))

@@ -10,9 +10,8 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from upright.experiments.free_swing_4.drift import drift_paths
-from upright.experiments.free_swing_4.release import freed
-from upright.experiments.free_swing_4.studies import fit_question, recovered, write_questions
+from upright.experiments.free_swing_4.release import drift_paths, freed
+from upright.experiments.free_swing_4.run import fit_question, recovered, write_questions
 from upright.experiments.makes import make_rig
 from upright.physics import Furuta
 from upright.report.drawing import save

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from upright.cli import app
-from upright.experiments.weighing_1a.twin import acquire, drawn_twin
+from upright.experiments.weighing_1a.run import acquire, drawn_twin
 
 pytestmark = pytest.mark.slow
 

@@ -10,8 +10,8 @@ import pytest
 
 from upright import gains as design
 from upright.control import Scores
-from upright.control.many import outcomes
 from upright.control.preflight import Task, largest, preflight, words
+from upright.control.score import outcomes
 from upright.errors import BadInput
 from upright.experiments.makes import make_rig
 from upright.gains.requests import read_poles

@@ -16,10 +16,9 @@ from scipy.special import ellipk
 from upright import gains as design
 from upright.control import ServoRig, design_swing_up, trial
 from upright.control.score import FALLEN
-from upright.control.sensors import lifted, probe, put_out, scales
+from upright.control.sensors import ODDS, UNKNOWN, Suspicion, Watch, lifted, probe, put_out, scales
+from upright.control.sensors import watched as guarded
 from upright.control.trial import readings
-from upright.control.watch import ODDS, UNKNOWN, Suspicion, Watch
-from upright.control.watch import watched as guarded
 from upright.experiments.makes import make_rig
 from upright.experiments.swing_up_2b.run import scales_of_log
 from upright.physics import Furuta

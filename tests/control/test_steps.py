@@ -8,7 +8,7 @@ import control
 import numpy as np
 import pytest
 
-from upright.control.steps import effort, step_figures
+from upright.control.score import effort, step_figures
 from upright.errors import BadInput
 from upright.physics import chain
 from upright.simulation import simulate

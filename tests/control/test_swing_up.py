@@ -11,9 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from upright.control import design_swing_up
-from upright.control.ascent import swing_up
-from upright.control.swing_up import AWAY, FADE, body
-from upright.control.swing_up_law import HOLDING, PARAMETERS, TRIPPED, swing_and_hold
+from upright.control.swing_up import AWAY, FADE, HOLDING, PARAMETERS, TRIPPED, body, swing_and_hold, swing_up
 from upright.errors import BadInput
 from upright.experiments.makes import make_rig
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from upright.errors import NotIdentifiable
-from upright.experiments import laboratory, laboratory_page
+from upright.experiments import laboratory
 from upright.experiments.laboratory import Experiment
 from upright.report.page import Chapter, Finding, Part
 
@@ -29,13 +29,12 @@ def bench(monkeypatch):
         return Experiment(key=key, part_of=key[0], title=f"Small {key}", makes=makes, needs=needs, seconds=1, tell=tell)
 
     all_of_them = (small("1"), small("2", ("1",)), small("3", ("1",)))
-    for module in (laboratory, laboratory_page):
-        monkeypatch.setattr(module, "EXPERIMENTS", all_of_them)
+    monkeypatch.setattr(laboratory, "EXPERIMENTS", all_of_them)
     return ran, trouble
 
 
 def verdicts(session):
-    return {t.experiment.key: t.chapter.verdict for t in session.told}
+    return {t.experiment.key: t.chapter.verdict for t in session.results}
 
 
 def test_numbers_go_from_one_experiment_to_those_on_the_same_rig(bench, tmp_path):
@@ -49,23 +48,23 @@ def test_interrupted_it_keeps_what_is_finished_and_goes_on_from_there(bench, tmp
     trouble["2"] = KeyboardInterrupt()
     first = laboratory.run_laboratory((), "", 0, tmp_path)
     assert first.interrupted
-    assert [t.experiment.key for t in first.told] == ["1"]
+    assert [t.experiment.key for t in first.results] == ["1"]
     assert [e.key for e in first.missing] == ["2", "3"]
-    told = laboratory_page.book(first, laboratory_page.date(2006, 6, 18))
+    told = laboratory.book(first, laboratory.date(2006, 6, 18))
     assert "Stopped by Ctrl-C" in told.notes[0]
     assert any("Go on" in s.sentence for s in told.steps)
     trouble.clear()
     second = laboratory.run_laboratory((), "", 0, tmp_path)
     assert not second.interrupted
-    assert [t.state for t in second.told] == ["kept", "done", "done"]
+    assert [t.state for t in second.results] == ["kept", "done", "done"]
     assert ran == ["1", "2", "2", "3"]
 
 
 def test_a_ctrl_c_that_an_experiment_has_swallowed_is_still_obeyed(bench, tmp_path):
     stopped = laboratory.run_laboratory((), "", 0, tmp_path, stopped=lambda: True)
-    assert [t.state for t in stopped.told] == ["stopped"]
+    assert [t.state for t in stopped.results] == ["stopped"]
     assert stopped.interrupted
-    assert [t.state for t in laboratory.run_laboratory(("1",), "", 0, tmp_path).told] == ["done"]
+    assert [t.state for t in laboratory.run_laboratory(("1",), "", 0, tmp_path).results] == ["done"]
 
 
 @pytest.mark.parametrize("kind", [NotIdentifiable, FloatingPointError, np.linalg.LinAlgError])
@@ -73,11 +72,11 @@ def test_an_experiment_that_fails_says_why_and_the_others_go_on(bench, tmp_path,
     _, trouble = bench
     trouble["2"] = kind("nothing moves; is the amplifier on?")
     session = laboratory.run_laboratory((), "", 0, tmp_path)
-    assert [t.state for t in session.told] == ["done", "failed", "done"]
-    failed = session.told[1].chapter
+    assert [t.state for t in session.results] == ["done", "failed", "done"]
+    failed = session.results[1].chapter
     assert not failed.sound
     assert "nothing moves; is the amplifier on?" in failed.detail
-    assert laboratory_page.book(session, laboratory_page.date(2006, 6, 18)).chapters[1].state == "not finished"
+    assert laboratory.book(session, laboratory.date(2006, 6, 18)).chapters[1].state == "not finished"
 
 
 @pytest.mark.parametrize("change", [{"seed": 1}, {"make": "linear"}, {"fresh": True}])
@@ -86,21 +85,21 @@ def test_what_was_made_of_something_else_is_made_again(bench, tmp_path, change):
     fresh = call.pop("fresh", False)
     laboratory.run_laboratory(("1", "2"), "", 0, tmp_path)
     again = laboratory.run_laboratory(("1", "2"), call["make"], call["seed"], tmp_path, fresh=fresh)
-    assert [t.state for t in again.told] == ["done", "done"]
+    assert [t.state for t in again.results] == ["done", "done"]
 
 
 def test_one_experiment_again_does_not_cost_the_others_their_place(bench, tmp_path):
     ran, trouble = bench
     laboratory.run_laboratory((), "", 0, tmp_path)
     again = laboratory.run_laboratory(("2",), "", 0, tmp_path, fresh=True)
-    assert [(t.experiment.key, t.state) for t in again.told] == [("1", "done"), ("2", "done"), ("3", "kept")]
-    assert laboratory_page.command(again) == "upright lab"
+    assert [(t.experiment.key, t.state) for t in again.results] == [("1", "done"), ("2", "done"), ("3", "kept")]
+    assert laboratory.command(again) == "upright lab"
     trouble["2"] = KeyboardInterrupt()
     stopped = laboratory.run_laboratory(("2",), "", 0, tmp_path, fresh=True)
     assert stopped.interrupted
-    assert [t.experiment.key for t in stopped.told] == ["1", "2", "3"]  # 2 as it was kept: it still holds
+    assert [t.experiment.key for t in stopped.results] == ["1", "2", "3"]  # 2 as it was kept: it still holds
     alone = laboratory.run_laboratory(("1",), "", 1, tmp_path)
-    assert laboratory_page.command(alone) == "upright lab --experiment 1 --seed 1"
+    assert laboratory.command(alone) == "upright lab --experiment 1 --seed 1"
     assert ran == ["1", "2", "3", "1", "2", "1", "2", "1"]
 
 
@@ -108,12 +107,12 @@ def test_a_torn_file_is_made_again(bench, tmp_path):
     laboratory.run_laboratory(("1",), "", 0, tmp_path)
     path = tmp_path / "1" / "chapter.json"
     path.write_text(path.read_text(encoding="utf-8")[:100], encoding="utf-8")
-    assert [t.state for t in laboratory.run_laboratory(("1",), "", 0, tmp_path).told] == ["done"]
+    assert [t.state for t in laboratory.run_laboratory(("1",), "", 0, tmp_path).results] == ["done"]
 
 
 def test_what_is_kept_reads_as_it_was_written(bench, tmp_path):
-    first = laboratory.run_laboratory(("1",), "", 0, tmp_path).told[0].chapter
-    again = laboratory.run_laboratory(("1",), "", 0, tmp_path).told[0].chapter
+    first = laboratory.run_laboratory(("1",), "", 0, tmp_path).results[0].chapter
+    again = laboratory.run_laboratory(("1",), "", 0, tmp_path).results[0].chapter
     assert again.numbers == {"run": 1, "bad": None}  # JSON knows no NaN
     assert (again.parts, again.findings, again.verdict) == (first.parts, first.findings, first.verdict)
 

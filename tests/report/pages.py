@@ -133,7 +133,7 @@ def measured_response_page(folder: Path) -> Chapter:
         omega=OMEGA, response=ANSWER[:, None], outputs=("theta",), units=("rad", "V"),
         variance=np.full((3, 1), 1e-8), coherence=np.array([[0.999], [0.98], [0.97]]),
     )  # fmt: skip
-    from upright.experiments.frequency_1b.from_logs import LoggedResponse
+    from upright.experiments.frequency_1b.run import LoggedResponse
 
     return log_chapter(LoggedResponse(sources=("sines.csv",), response=response, answer=None, folder=folder))
 
@@ -155,8 +155,7 @@ def frequency_page(folder: Path) -> Chapter:
 
 def own_frequency_page(folder: Path) -> Chapter:
     from upright.experiments.frequency_1b.chapter import log_chapter
-    from upright.experiments.frequency_1b.from_logs import LogRequest, response_of_logs
-    from upright.experiments.frequency_1b.run import run_frequency
+    from upright.experiments.frequency_1b.run import LogRequest, response_of_logs, run_frequency
 
     run_frequency("linear", 4, folder)
     request = LogRequest(signals={}, counts={}, known={})

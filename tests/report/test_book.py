@@ -9,11 +9,24 @@ import pytest
 
 from upright.errors import BadInput
 from upright.report import pdf
-from upright.report.book import Book
 from upright.report.drawing import figure
 from upright.report.html import write_html
-from upright.report.page import Chapter, Code, Facts, Finding, Formula, Part, Picture, Points, Step, Symbol, Table
-from upright.report.store import as_plain, from_plain
+from upright.report.page import (
+    Book,
+    Chapter,
+    Code,
+    Facts,
+    Finding,
+    Formula,
+    Part,
+    Picture,
+    Points,
+    Step,
+    Symbol,
+    Table,
+    as_plain,
+    from_plain,
+)
 
 HOSTILE = '<script>alert(1)</script> & "quotes" *bold* #let x = 1 $y$ \\ `raw` @ref ~ [b] // no'
 

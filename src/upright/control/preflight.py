@@ -11,20 +11,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from upright.control.many import outcomes
-from upright.control.rig import ServoRig
-from upright.control.score import Score, Scores, score
-from upright.control.trial import Trial, trial
+from upright.control.score import Score, Scores, outcomes, score
+from upright.control.trial import ServoRig, Trial, trial
 from upright.errors import BadInput
 from upright.gains import Margins, Sampled, hold, margins
 from upright.gains.loop import closed, command_noise
 from upright.gains.requests import poles_of
 from upright.laws import Law
 from upright.physics import Linear
-
-Array = NDArray[np.float64]
+from upright.records import Array
 
 WORDS = ("regulates", "saturates", "too weak", "falls")
 """What a run can come to; see `words`."""

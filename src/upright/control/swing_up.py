@@ -1,30 +1,99 @@
-"""How does a hanging pendulum get upright by its own drive, within the drive's limit and the rig's travel?
+"""Swing-up of a hanging pendulum by its own drive, within its limit and travel: law, design, and how it went.
 
-`design_swing_up` finds the numbers of the law in `swing_up_law` from a rig's model. The feedback that holds is of least
+`design_swing_up` finds the numbers of the law `swing_and_hold`, one function in the kernel as on a rig, from a rig's
+model. The feedback that holds is of least
 cost (Bryson's weights); the ellipsoid ``x'Px <= c`` from which it takes over is the largest on which the command asked
 for stays below twice the limit: there saturation leaves at least half of it, and a least-cost loop bears half its
 gain, so that x'Px falls. That is exact for the linear model only; on the nonlinear one the ellipsoid is then shrunk
 until a few hundred motions from its surface all come to rest within the travel.
+
+Far from upright it pumps: the pivot is moved along with the swing and does the work ``-kappa cos(theta) theta' a``,
+by less as the energy comes near that of rest upright (Astrom and Furuta, Automatica 36, 2000), while a spring and a
+damper keep the driven body near the middle. Upright, it is a state feedback.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from math import cos, floor, pi, sin
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from upright import gains as design
-from upright.control.rig import ServoRig
-from upright.control.swing_up_law import HOLDING, PARAMETERS, SWINGING, swing_and_hold
-from upright.control.trial import SUBSTEPS, readings
+from upright.control.trial import SUBSTEPS, ServoRig, Trial, readings, trial
 from upright.errors import BadInput
+from upright.gains import filtered, hold, place_sampled
 from upright.gains.requests import poles_of
 from upright.laws import Rule
+from upright.records import Array
 from upright.simulation import simulate
 
-Array = NDArray[np.float64]
+SWINGING, HOLDING, TRIPPED = 0.0, 1.0, 2.0
+"""What the law is doing, and where among its numbers that stands."""
+MODE = 4
+
+PARAMETERS = (
+    "period", "memory", "scale_q", "scale_theta",
+    "M", "spin", "kappa", "J", "weight", "viscous", "dry", "gain", "limit",
+    "reach", "sharp", "learn", "pause", "centre", "damp",
+    "k0", "k1", "k2", "k3",
+    "p00", "p01", "p02", "p03", "p11", "p12", "p13", "p22", "p23", "p33",
+    "size", "near", "fast", "away", "fade", "allowed",
+)  # fmt: skip
+"""In order: servo period and filter; what encoders show over what is true; the rig; pumping; gains; the ellipsoid
+``x'Px <= size`` of the catch with bounds of its angle and speed; the angle of a fall; what is left of the handover's
+step from sample to sample; the travel."""
+
+
+def swing_and_hold(t: float, y: Any, r: Any, z: Any, p: Any) -> tuple[Any, Any]:
+    """One sample, as a `law.Rule`; it remembers readings, speeds, what it is doing, the handover's
+    fading step, how much more energy than the model's it asks for, and when it last changed that.
+    """
+    (period, memory, scale_q, scale_theta, M, spin, kappa, J, weight, viscous, dry, gain, limit, reach, sharp,
+     learn, pause, centre, damp, k0, k1, k2, k3, p00, p01, p02, p03, p11, p12, p13, p22, p23, p33, size, near, fast,
+     away, fade, allowed) = p  # fmt: skip
+    q, theta = y[0] * scale_q, y[1] * scale_theta
+    v = memory * z[2] + (1.0 - memory) * (q - z[0]) / period
+    w = memory * z[3] + (1.0 - memory) * (theta - z[1]) / period
+    s, c = sin(theta), cos(theta)
+    phi = theta - pi - 2.0 * pi * floor((theta - pi) / (2.0 * pi) + 0.5)
+    value = (
+        p00 * q * q + p11 * v * v + p22 * phi * phi + p33 * w * w
+        + 2.0 * (p01 * q * v + p02 * q * phi + p03 * q * w + p12 * v * phi + p13 * v * w + p23 * phi * w)
+    )  # fmt: skip
+    hold = min(max(0.0 - (k0 * q + k1 * v + k2 * phi + k3 * w), 0.0 - limit), limit)
+    # acceleration of the pivot along with the swing; at rest either side will do
+    missing = weight * (1.0 + z[6] + c) - 0.5 * J * w * w
+    # a swing that has the energy and turns short of upright needs more; one that went over needs less
+    aim, event = z[6], z[7]
+    before = z[1] - pi - 2.0 * pi * floor((z[1] - pi) / (2.0 * pi) + 0.5)
+    if t - event > pause and c < 0.0 and missing < 5.0 * learn * weight:
+        if w * z[3] < 0.0:
+            aim, event = min(aim + learn, 10.0 * learn), t
+        elif phi * before < 0.0:
+            aim, event = max(aim - learn, 0.0 - 10.0 * learn), t
+    along = -1.0 if kappa * c * w > 0.0 else 1.0
+    a = min(max(sharp * missing / weight, -1.0), 1.0) * reach * along - centre * q - damp * v
+    # the force for it, both rows of eq. (3)
+    turning = (spin * s * c * v * v - kappa * c * a - weight * s) / J
+    force = (M + spin * s * s) * a + kappa * (c * turning - s * w * w) + 2.0 * spin * s * c * w * v + viscous * v
+    force = force + (dry if a > 0.0 else 0.0 - dry)
+    swing = min(max(force / gain, 0.0 - limit), limit)
+    mode, bump = z[4], z[5] * fade
+    if mode < 0.5:
+        u = swing
+        if value <= size and abs(phi) <= near and abs(v) <= fast:
+            mode, bump, aim = 1.0, swing - hold, 0.0  # the feedback begins where the pump ends
+    else:
+        u = hold + bump
+        if abs(phi) > away:
+            mode, bump, u = 0.0, 0.0, swing
+    if abs(q) > allowed or z[4] > 1.5:
+        mode, u = 2.0, 0.0
+    return (min(max(u, 0.0 - limit), limit),), (q, theta, v, w, mode, bump, aim, event)
+
 
 TRAVEL = {"m": 0.20, "rad": 2 * math.pi}
 """How far the driven body may go from the middle where the rig does not say: a rail's half, one turn of a cable."""
@@ -196,8 +265,8 @@ def design_swing_up(model: ServoRig, *, travel: float | None = None, memory: flo
     Q, R = np.diag([(4 / room) ** 2, 0.0, 4.0, 0.0]), (2 / model.limit) ** 2
     P = np.asarray(solve_continuous_are(linear.A, linear.B, Q, np.array([[R]])), dtype=np.float64)
     K = (linear.B.T @ P / R)[0]
-    sampled = design.hold(linear, model.period, (model.delay + model.lag) / model.period)
-    gains = design.place_sampled(sampled, design.filtered(sampled, memory), poles_of(linear.A - linear.B @ K[None]))
+    sampled = hold(linear, model.period, (model.delay + model.lag) / model.period)
+    gains = place_sampled(sampled, filtered(sampled, memory), poles_of(linear.A - linear.B @ K[None]))
     sure = (2 * model.limit) ** 2 / float(K @ np.linalg.solve(P, K))
     centre = 0.45 * b.omega
     law = SwingUp(
@@ -236,3 +305,121 @@ def _share(law: SwingUp, model: ServoRig, *, rays: int = 40, seconds: float = 2.
     if within == 0:
         raise BadInput(f"no catch of {model.name} keeps within its limit and a travel of {law.travel:g}; allow more.")
     return float(radii[within - 1] ** 2)
+
+
+UPRIGHT = math.radians(10)
+"""Angle from upright within which the pendulum counts as up [rad]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Ascent:
+    """One swing-up; what is read off comes from the log, as on a rig.
+
+    Attributes
+    ----------
+    trial : Trial
+    law : SwingUp
+    mode : array, shape (N,)
+        What the law did: `SWINGING`, `HOLDING` or `TRIPPED`.
+    angle : array, shape (N,)
+        From the nearest upright, as shown [rad].
+    speeds : array, shape (N, 2)
+        As the law estimates them, of the driven body and of the pendulum.
+    energy : array, shape (N,)
+        Of the swing over that of rest upright [J].
+    """
+
+    trial: Trial
+    law: SwingUp
+    mode: Array
+    angle: Array
+    speeds: Array
+    energy: Array
+
+    @property
+    def up(self) -> float:
+        """Time from which the pendulum stands within ten degrees to the end [s]; inf when it does not."""
+        out = np.flatnonzero(np.abs(self.angle) > UPRIGHT)
+        last = int(out[-1]) + 1 if out.size else 0
+        return float(self.trial.t[last]) if last < self.trial.t.size else math.inf
+
+    @property
+    def handovers(self) -> tuple[float, ...]:
+        """When the feedback took over [s]."""
+        return self._changes(SWINGING, HOLDING)
+
+    @property
+    def falls(self) -> tuple[float, ...]:
+        """When it lost the pendulum again [s]."""
+        return self._changes(HOLDING, SWINGING)
+
+    @property
+    def tripped(self) -> float:
+        """When the travel's end switched the drive off [s]; inf when it did not."""
+        off = np.flatnonzero(self.mode == TRIPPED)
+        return float(self.trial.t[off[0]]) if off.size else math.inf
+
+    @property
+    def swings(self) -> int:
+        """Half swings until the first handover, or to the end."""
+        speed = self.speeds[:, 1]
+        first = int(np.argmax(self.mode != SWINGING)) if np.any(self.mode != SWINGING) else self.mode.size
+        sign = np.sign(np.where(np.abs(speed[:first]) > 0.2, speed[:first], 0.0))
+        sign = sign[sign != 0.0]
+        return int(np.sum(np.diff(sign) != 0)) + 1 if sign.size else 0
+
+    @property
+    def peak(self) -> float:
+        """Largest command [its unit]."""
+        return float(np.abs(self.trial.u).max())
+
+    @property
+    def saturated(self) -> float:
+        """Share of the samples at the limit, 0 to 1."""
+        return float(np.mean(np.abs(self.trial.u) >= self.trial.rig.limit * (1 - 1e-9)))
+
+    @property
+    def travel(self) -> float:
+        """Farthest that the driven body truly went from the middle [m or rad]."""
+        return float(np.abs(self.trial.x[:, 0]).max())
+
+    def _changes(self, before: float, after: float) -> tuple[float, ...]:
+        at = np.flatnonzero((self.mode[:-1] == before) & (self.mode[1:] == after)) + 1
+        return tuple(self.trial.t[at].tolist())
+
+
+def swing_up(
+    rig: ServoRig,
+    law: SwingUp,
+    *,
+    seconds: float = 10.0,
+    start: ArrayLike | None = None,
+    pushes: ArrayLike | None = None,
+) -> Ascent:
+    """Let a law swing a rig's pendulum up from where it hangs.
+
+    Parameters
+    ----------
+    rig : ServoRig
+        As it truly is.
+    law : SwingUp
+    seconds : float
+    start : array, shape (states,), optional
+        Where the rig is when the law is switched on; at rest, hanging, when omitted.
+    pushes : array, shape (T,), optional
+        What disturbs the drive, added to the command before its limit.
+    """
+    x0 = rig.plant.state("hanging") if start is None else np.asarray(start, dtype=np.float64)
+    rule = law.rule(rig, x0)
+    run = trial(
+        rig, rule, at="inverted", start=x0 - rig.plant.state("inverted"), seconds=seconds, pushes=pushes
+    )  # fmt: skip
+    names = [c.name for c in rig.plant.coordinates]
+    seen = np.column_stack([run.record[n] for n in names])
+    memory = rule.follow(seen / rig.shown, rig.period)[1]
+    memory = np.vstack([memory[1:], memory[-1:]])  # what it knew once it had read this sample
+    theta = seen[:, 1]
+    return Ascent(
+        trial=run, law=law, mode=memory[:, MODE], angle=np.mod(theta, 2 * math.pi) - math.pi,
+        speeds=memory[:, 2:4], energy=law.body.energy(theta, memory[:, 3]),
+    )  # fmt: skip

@@ -1,4 +1,4 @@
-"""What happens when a law is switched on at a rig? Its encoders, converter, limit and delay included.
+"""The run of a law on a rig as a servo sees it: drive with its limit, encoders with their counts, servo period.
 
 Fig. 6 of the paper: counts, velocities from counts, gains, saturation, servo period; the law may be any sampled linear
 one. The rig is nonlinear and has dry friction.
@@ -7,18 +7,112 @@ one. The rig is nonlinear and has dry friction.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from upright.control.rig import ServoRig
 from upright.errors import BadInput
 from upright.laws import Law, Rule
-from upright.records import Provenance, Record
+from upright.physics import Linear, Plant
+from upright.records import Array, Record
+from upright.records.record import of_twin
 from upright.simulation import simulate
 
-Array = NDArray[np.float64]
+
+@dataclass(frozen=True, kw_only=True)
+class ServoRig:
+    """A plant with one input as a servo sees it.
+
+    Attributes
+    ----------
+    name : str
+        As a reader of the report knows it.
+    plant : Plant
+    gain : float
+        Force per unit of command.
+    limit : float
+        Largest command, in its unit.
+    converter : float
+        Smallest step of the command.
+    delay : float
+        From a sample of the encoders to its command at work, computation included [s].
+    lag : float
+        Time constant of the drive [s].
+    offset : float
+        Command that the drive adds by itself.
+    unit : str
+        Of the command.
+    counts : tuple of float
+        Encoder counts per m or rad, one for each coordinate.
+    scales : tuple of float
+        What the encoders show over what is true; 1 where the counts per unit are as said.
+    period : float
+        Servo period [s].
+    travel : float
+        How far the driven coordinate may go either way before a stop or a cable ends it [m or rad].
+    seed : int
+        Which rig of the make; 0 is the one as designed.
+    """
+
+    name: str
+    plant: Plant
+    gain: float
+    limit: float
+    counts: tuple[float, ...]
+    period: float
+    converter: float = 0.0
+    delay: float = 0.0
+    lag: float = 0.0
+    offset: float = 0.0
+    unit: str = "V"
+    scales: tuple[float, ...] = ()
+    travel: float = math.inf
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        n = len(self.plant.coordinates)
+        if len(self.plant.inputs) != 1:
+            raise BadInput(f"a rig is driven by one input; {self.name} has {len(self.plant.inputs)}.")
+        if len(self.counts) != n or any(not c > 0 for c in self.counts):
+            raise BadInput(f"a rig with {n} coordinates needs {n} positive numbers of counts, got {self.counts}.")
+        if self.scales and len(self.scales) != n:
+            raise BadInput(f"a rig with {n} coordinates needs {n} scales of its encoders, got {self.scales}.")
+        for name in ("limit", "period"):
+            if not (getattr(self, name) > 0 and math.isfinite(getattr(self, name))):
+                raise BadInput(f"the {name} of a rig must be positive and finite, got {getattr(self, name):g}.")
+
+    @property
+    def drive(self) -> Mapping[str, float]:
+        """The actuator by the names of `upright.simulation.simulate`."""
+        return {
+            "actuator.gain": self.gain,
+            "actuator.limit": self.limit,
+            "actuator.delay": self.delay,
+            "actuator.lag": self.lag,
+            "actuator.offset": self.offset,
+        }
+
+    @property
+    def quantum(self) -> Array:
+        """Resolution of each encoder [m or rad], shape (coordinates,)."""
+        return 1.0 / np.array(self.counts)
+
+    @property
+    def shown(self) -> Array:
+        """What each encoder shows over what is true, shape (coordinates,)."""
+        return np.array(self.scales) if self.scales else np.ones(len(self.counts))
+
+    def linear(self, at: str) -> Linear:
+        """Model about an equilibrium, from the command to the coordinates; dry friction, drive and counts left out."""
+        model = self.plant.linear(at)
+        return replace(model, B=model.B * self.gain)
+
+    def changed(self, **parameters: float) -> ServoRig:
+        """The same rig with other parameters of its plant."""
+        return replace(self, plant=self.plant.replace(**parameters))
+
 
 SUBSTEPS = 2
 """Runge-Kutta steps per servo period: of 0.4 ms, where the fastest motion of these rigs takes some 10 ms."""
@@ -149,22 +243,20 @@ def at_work(rig: ServoRig, law: Law, rest: ArrayLike, reference: ArrayLike | Non
 
 def logged(rig: ServoRig, t: Array, x: Array, u: Array, reference: ArrayLike | None = None) -> Record:
     """What a program at the rig could log of states x, shape (N, states), and commands u, shape (N,)."""
-    seen = readings(rig, x[:, 0::2])
-    names = [c.name for c in rig.plant.coordinates]
-    signals = {name: seen[:, i] for i, name in enumerate(names)} | {"u": u}
-    units = {c.name: c.unit for c in rig.plant.coordinates} | {"u": rig.unit}
+    log = twin_log(rig, t, readings(rig, x[:, 0::2]), u)
+    signals = {name: log[name] for name in (*log.outputs, "u")}
     if reference is not None:
         asked = np.asarray(reference, dtype=np.float64)
         signals["reference"] = asked[np.minimum(np.arange(t.size), asked.size - 1)]
+    return log.replace(signals=signals)
+
+
+def twin_log(rig: ServoRig, t: Array, y: Array, u: Array | None = None, *, unit: str = "") -> Record:
+    """Log of a twin: commands u, (N,), if any, and readings y, (N, coordinates), in SI or a `unit` of all."""
+    of = {c.name: unit or c.unit for c in rig.plant.coordinates}
+    signals = {name: y[:, i] for i, name in enumerate(of)}
+    driven = {} if u is None else {"u": u}
     return Record(
-        t=t,
-        signals=signals,
-        units=units,
-        inputs=("u",),
-        outputs=tuple(names),
-        provenance=Provenance(
-            reader="twin",
-            rig=f"digital twin of {rig.name}, seed {rig.seed}",
-            notes=("This log was simulated; no rig was touched.",),
-        ),
-    )
+        t=t, signals=driven | signals, units=({"u": rig.unit} if driven else {}) | of, inputs=tuple(driven),
+        outputs=tuple(of), provenance=of_twin(rig.name, rig.seed),
+    )  # fmt: skip

@@ -7,18 +7,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from upright.control.rig import ServoRig
+from upright.control.trial import ServoRig
 from upright.errors import BadInput, ImpossiblePhysics
 from upright.experiments.makes import MAKES, Make, make_of, make_rig
 from upright.physics import Linear, Plant, find
+from upright.records import Array
 from upright.study.results import FittedModel, read_fit
 from upright.study.rig import read_plant, read_rig
 from upright.study.sensors import drive_unit
 from upright.study.text import StudyText
-
-Array = NDArray[np.float64]
 
 GAIN = "actuator.gain"
 DAILY = 0.13

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import platform
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import date
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -13,22 +15,22 @@ from typing import Any
 
 import numpy as np
 
-from upright.control.rig import ServoRig
+from upright import __version__
+from upright.control.trial import ServoRig
 from upright.errors import BadInput, UprightError
 from upright.experiments.makes import MAKES, PENDULUMS, SHAFTS, make_rig
 from upright.experiments.weighing_1a.run import Known
 from upright.files import write_json
 from upright.progress import Progress, silent
-from upright.report.page import Chapter
-from upright.report.store import as_plain, from_plain
+from upright.report.page import Book, Chapter, Step, as_plain, from_plain
 from upright.report.symbols import typed
 
-KEPT = "chapter.json"
+CHAPTER_FILE = "chapter.json"
 """File of a finished experiment, taken up again as long as nothing it stands on has changed."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Setting:
+class ExperimentInput:
     """What an experiment is given: rig and folder, what finished ones it builds on said and where they wrote."""
 
     make: str
@@ -82,21 +84,21 @@ class Experiment:
     makes: tuple[str, ...]
     needs: tuple[str, ...]
     seconds: float
-    tell: Callable[[Setting], tuple[Chapter, bool]]
+    tell: Callable[[ExperimentInput], tuple[Chapter, bool]]
 
     def make(self, asked: str) -> str:
         """Make that it is run on where one is asked for, or none."""
         return asked if asked in self.makes else self.makes[0]
 
 
-def _weighing(at: Setting) -> tuple[Chapter, bool]:
+def _weighing(at: ExperimentInput) -> tuple[Chapter, bool]:
     from upright.experiments.weighing_1a.chapter import chapter
     from upright.experiments.weighing_1a.run import run_weighing
 
     return chapter(run_weighing(at.rig, at.seed, at.folder, at.progress)), True
 
 
-def _frequency(at: Setting) -> tuple[Chapter, bool]:
+def _frequency(at: ExperimentInput) -> tuple[Chapter, bool]:
     from upright.experiments.frequency_1b.chapter import chapter
     from upright.experiments.frequency_1b.run import run_frequency
 
@@ -104,7 +106,7 @@ def _frequency(at: Setting) -> tuple[Chapter, bool]:
     return chapter(done), True
 
 
-def _regulation(at: Setting) -> tuple[Chapter, bool]:
+def _regulation(at: ExperimentInput) -> tuple[Chapter, bool]:
     from upright.experiments.identified import read_identified
     from upright.experiments.regulation_2.chapter import chapter
     from upright.experiments.regulation_2.run import run_regulation
@@ -114,7 +116,7 @@ def _regulation(at: Setting) -> tuple[Chapter, bool]:
     return chapter(done), not done.interrupted
 
 
-def _swing_up(at: Setting) -> tuple[Chapter, bool]:
+def _swing_up(at: ExperimentInput) -> tuple[Chapter, bool]:
     from upright.experiments.identified import read_identified
     from upright.experiments.swing_up_2b.chapter import chapter
     from upright.experiments.swing_up_2b.run import known_of, run_swing_up
@@ -126,7 +128,7 @@ def _swing_up(at: Setting) -> tuple[Chapter, bool]:
     return chapter(done), not at.stopped()
 
 
-def _tracking(at: Setting) -> tuple[Chapter, bool]:
+def _tracking(at: ExperimentInput) -> tuple[Chapter, bool]:
     from upright.experiments.tracking_3.chapter import chapter
     from upright.experiments.tracking_3.run import run_tracking
 
@@ -134,7 +136,7 @@ def _tracking(at: Setting) -> tuple[Chapter, bool]:
     return chapter(done), not done.interrupted
 
 
-def _free_swing(at: Setting) -> tuple[Chapter, bool]:
+def _free_swing(at: ExperimentInput) -> tuple[Chapter, bool]:
     from upright.experiments.free_swing_4.chapter import chapter
     from upright.experiments.free_swing_4.run import run_free_swing
     from upright.study.results import write_fit
@@ -205,14 +207,14 @@ class Session:
     seed: int
     folder: Path
     asked: tuple[Experiment, ...]
-    told: list[ExperimentResult] = field(default_factory=list[ExperimentResult])
+    results: list[ExperimentResult] = field(default_factory=list[ExperimentResult])
     interrupted: bool = False
     seconds: float = 0.0
 
     @property
     def missing(self) -> tuple[Experiment, ...]:
         """What was asked for and not begun."""
-        return tuple(e for e in self.asked if e.key not in {t.experiment.key for t in self.told})
+        return tuple(e for e in self.asked if e.key not in {t.experiment.key for t in self.results})
 
 
 def choose(asked: Sequence[str], make: str) -> tuple[Experiment, ...]:
@@ -299,14 +301,14 @@ def run_laboratory(
             progress(f"experiment {e.key}: {step}", (behind + e.seconds * min(share, 1.0)) / whole)
 
         try:
-            session.told.append(_one(session, e, digests[e.key], tell, stopped, fresh))
-            session.interrupted = session.told[-1].state == "stopped"
+            session.results.append(_one(session, e, digests[e.key], tell, stopped, fresh))
+            session.interrupted = session.results[-1].state == "stopped"
         except KeyboardInterrupt:
             session.interrupted = True
         if session.interrupted:
             break
         behind += e.seconds
-    session.told = _with_kept(session, digests)
+    session.results = _with_kept(session, digests)
     session.seconds = time.perf_counter() - began
     return session
 
@@ -334,7 +336,7 @@ def _program() -> str:
 def _kept(folder: Path, digest: str) -> Chapter | None:
     """The chapter of an earlier run, or nothing when there is none or it was made of something else."""
     try:
-        content: Any = json.loads((folder / KEPT).read_text(encoding="utf-8"))
+        content: Any = json.loads((folder / CHAPTER_FILE).read_text(encoding="utf-8"))
         return from_plain(content["chapter"]) if content["made_of"] == digest else None
     except (OSError, ValueError, KeyError, TypeError):  # none, torn, or another program's: it is made again
         return None
@@ -342,7 +344,7 @@ def _kept(folder: Path, digest: str) -> Chapter | None:
 
 def _with_kept(session: Session, digests: Mapping[str, str]) -> list[ExperimentResult]:
     """What was told, and what else is there from an earlier run on the same rig."""
-    told = {t.experiment.key: t for t in session.told}
+    told = {t.experiment.key: t for t in session.results}
     for e in _there(session.make):
         found = None if e.key in told else _kept(session.folder / e.key, digests[e.key])
         if found:
@@ -363,11 +365,11 @@ def _one(
     progress("starting", 0.0)
     state, chapter = "kept", None if fresh else _kept(folder, digest)
     if chapter is None:
-        at = Setting(
+        at = ExperimentInput(
             make=make, rig=rig, seed=session.seed, folder=folder, progress=progress, stopped=stopped,
             earlier={
                 t.experiment.key: t.chapter
-                for t in session.told
+                for t in session.results
                 if t.experiment.key in needs and t.state in ("done", "kept")
             },
             folders={n: session.folder / n for n in needs},
@@ -381,7 +383,7 @@ def _one(
         except (ArithmeticError, np.linalg.LinAlgError) as error:
             state, chapter = "failed", _failed(e, f"Its numbers broke down ({error}), which is a fault of the program.")
         if state == "done":
-            write_json(folder / KEPT, {"made_of": digest, "chapter": as_plain(chapter)})
+            write_json(folder / CHAPTER_FILE, {"made_of": digest, "chapter": as_plain(chapter)})
     return ExperimentResult(
         experiment=e, make=make, rig=rig.name, chapter=chapter, state=state, seconds=time.perf_counter() - began
     )
@@ -389,3 +391,93 @@ def _one(
 
 def _failed(e: Experiment, why: str) -> Chapter:
     return Chapter(key=e.key, title=e.title, verdict="This experiment could not be finished.", detail=why, sound=False)
+
+
+TITLE = "The laboratory: identify it hanging, hold it upright"
+
+
+def book(session: Session, day: date) -> Book:
+    """Everything the session has to say."""
+    rigs = dict.fromkeys(f"{t.rig} (seed {session.seed})" for t in session.results)
+    notes: list[str] = []
+    if session.interrupted:
+        left = ", ".join(e.key for e in session.missing)
+        notes.append(
+            "Stopped by Ctrl-C; this report holds what was there by then"
+            + (f", and not yet experiments {left}." if left else ".")
+        )
+    return Book(
+        title=TITLE,
+        facts=(
+            ("Rig", "; ".join(rigs) or f"seed {session.seed}"),
+            ("Data", "Digital twins: dry friction, encoder counts, delay and limits as on rigs; none was touched."),
+            ("Experiments", ", ".join(t.experiment.key for t in session.results) or "none"),
+            ("Made", f"{day.isoformat()}, upright {__version__}, Python {platform.python_version()}"),
+            ("Again", command(session)),
+        ),
+        chapters=tuple(
+            replace(t.chapter, about=t.rig, finished=t.state in ("done", "kept")) for t in session.results
+        ),
+        notes=tuple(notes),
+        missing=tuple((e.key, e.title) for e in session.missing),
+        steps=next_steps(session),
+    )  # fmt: skip
+
+
+def command(session: Session, seed: int | None = None) -> str:
+    """What to type for this session, or for the same on another rig."""
+    seed = session.seed if seed is None else seed
+    shown = ["upright lab"]
+    if session.make:
+        shown.append(f"--rig {session.make}")
+    there = [e for e in EXPERIMENTS if not session.make or session.make in e.makes]
+    told = {e.key for e in session.asked} | {t.experiment.key for t in session.results}
+    if len(told) < len(there):
+        shown += [f"--experiment {e.key}" for e in there if e.key in told]
+    if seed:
+        shown.append(f"--seed {seed}")
+    return " ".join(shown)
+
+
+def next_steps(session: Session) -> tuple[Step, ...]:
+    """What to do with the whole: go on, take another rig, or a log of one's own."""
+    steps: list[Step] = []
+    if session.interrupted or any(t.state == "failed" for t in session.results):
+        steps.append(
+            Step("Go on where this stopped; what is finished is kept.",
+                 f"{command(session)} -o {typed(session.folder)}")
+        )  # fmt: skip
+    steps.append(Step("Take another rig of the same make.", command(session, session.seed + 1)))
+    other = "linear" if session.make != "linear" else "furuta"
+    steps.append(Step("Run the laboratory on another kind of rig.", f"upright lab --rig {other}"))
+    steps.append(Step("Start on a log of your own.", "upright init LOG"))
+    return tuple(steps)
+
+
+def summary(session: Session, report: Path, pdf: Path | None) -> dict[str, Any]:
+    """The session as plain values for another program: SI."""
+    return {
+        "seed": session.seed,
+        "rig": session.make or None,
+        "folder": str(session.folder),
+        "report": str(report),
+        "pdf": str(pdf) if pdf else None,
+        "interrupted": session.interrupted,
+        "missing": [e.key for e in session.missing],
+        "seconds": session.seconds,
+        "experiments": {
+            t.experiment.key: {
+                "title": t.chapter.title,
+                "rig": t.rig,
+                "make": t.make,
+                "state": t.state,
+                "seconds": t.seconds,
+                "sound": t.chapter.sound,
+                "verdict": t.chapter.verdict,
+                "detail": t.chapter.detail,
+                "numbers": t.chapter.numbers,
+                "steps": [s.command for s in t.chapter.steps if s.command],
+            }
+            for t in session.results
+        },
+    }

@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from upright.control.rig import ServoRig
+from upright.control.trial import ServoRig
 from upright.errors import BadInput, nearest
 from upright.physics import BUILT_IN, CartPendulum, Furuta, Plant, added_inertia, added_mass, chain
 

@@ -2,9 +2,8 @@
 
 from upright.gains.loop import Margins, feedback, margins, place_sampled, spelled_out
 from upright.gains.lqr import dlqr, locus, lqr, weight_for_effort
-from upright.gains.placement import Placement, place
+from upright.gains.placement import Placement, place, prefilter
 from upright.gains.sampled import Sampled, hold
-from upright.gains.tracking import prefilter
 from upright.gains.velocity import Estimator, difference, filtered, kalman, shaken
 
 __all__ = [

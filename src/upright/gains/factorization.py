@@ -12,13 +12,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from upright.errors import BadInput
-from upright.gains.requests import matched
-
-Array = NDArray[np.float64]
-Roots = NDArray[np.complex128]
+from upright.gains.requests import Roots, matched
+from upright.laws.linear import Array
 
 
 @dataclass(frozen=True, kw_only=True)

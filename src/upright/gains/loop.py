@@ -7,19 +7,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from upright.errors import BadInput
-from upright.gains.requests import conjugate_poles, poles_of
+from upright.gains.requests import Roots, conjugate_poles, poles_of
 from upright.gains.sampled import Sampled, hold, to_z
 from upright.gains.velocity import Estimator, stationary
 from upright.laws import Law
+from upright.laws.linear import Array
 
 if TYPE_CHECKING:
     from upright.physics.plant import Linear
-
-Array = NDArray[np.float64]
-Roots = NDArray[np.complex128]
 
 
 def feedback(estimator: Estimator, K: ArrayLike, k_pf: float = 0.0) -> Law:

@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from upright.errors import BadInput
-from upright.gains.requests import matched, poles_of
-
-Array = NDArray[np.float64]
-Roots = NDArray[np.complex128]
+from upright.gains.requests import Roots, matched, poles_of
+from upright.laws.linear import Array
 
 
 def lqr(A: ArrayLike, B: ArrayLike, Q: ArrayLike, R: ArrayLike) -> Array:

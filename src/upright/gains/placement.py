@@ -1,4 +1,8 @@
-"""Which gains put the poles where they are wanted, and did they get there?"""
+"""Gains that put the poles where they are wanted, the poles that they give, and the prefilter beside them.
+
+Ackermann's formula and eigenvalues take 60 digits, which keeps rounding out of the sum: on a model of ten states with
+poles from 1 to 10, eigenvalues in double precision are off by 4.6, whatever the gains.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +10,66 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from upright.errors import BadInput
-from upright.gains import exact
-from upright.gains.requests import conjugate_poles, lost_modes, matched, poles_of, weak_modes, written
+from upright.gains.requests import Roots, conjugate_poles, lost_modes, matched, poles_of, weak_modes, written
+from upright.laws.linear import Array
 
-Array = NDArray[np.float64]
-Roots = NDArray[np.complex128]
+DIGITS = 60
+
+
+def ackermann(A: Array, b: Array, poles: Roots) -> Array | None:
+    """Gains ``K = [0 ... 0 1] [b, A b, ...]^-1 p(A)`` rounded once, at the end; None where that matrix is singular.
+
+    Parameters
+    ----------
+    A, b : arrays, shape (n, n) and (n,)
+    poles : array, shape (n,)
+        In conjugate pairs, roots of p.
+
+    Returns
+    -------
+    array, shape (n,), or None
+    """
+    import mpmath as mp
+
+    n = A.shape[0]
+    with mp.workdps(DIGITS):
+        M, column = mp.matrix(A.tolist()), mp.matrix(b.tolist())
+        transposed: Any = mp.matrix(n, n)
+        for i in range(n):
+            transposed[i, :] = column.T
+            column = M * column
+        last: Any = mp.matrix(n, 1)
+        last[n - 1] = 1
+        try:
+            row = mp.lu_solve(transposed, last).T
+        except ZeroDivisionError:
+            return None
+        coefficients: list[Any] = [mp.mpf(1)]
+        for pole in poles.tolist():
+            shifted = [*coefficients, mp.mpf(0)]
+            for i, c in enumerate(coefficients):
+                shifted[i + 1] -= mp.mpmathify(pole) * c
+            coefficients = shifted
+        gains = row * 0
+        for c in coefficients:  # Horner's scheme on the row
+            gains = gains * M + row * mp.re(c)
+        return np.array([float(g) for g in gains], dtype=np.float64)
+
+
+def eigenvalues(A: Array, B: Array, K: Array) -> Roots:
+    """Eigenvalues of ``A - B K``, the difference formed and solved with 60 digits; shapes (n, n), (n, m), (m, n)."""
+    import mpmath as mp
+
+    with mp.workdps(DIGITS):
+        closed = mp.matrix(A.tolist()) - mp.matrix(B.tolist()) * mp.matrix(K.tolist())
+        found: Any = mp.eig(closed, left=False, right=False)
+        values = np.array([complex(z) for z in found], dtype=np.complex128)
+        values.imag[np.abs(values.imag) < 1e-25 * np.abs(values)] = 0.0
+        return values
+
 
 MISSED = 1e-6
 """Poles farther from those asked than this part of the fastest are refused; the m-th root of it where m coincide,
@@ -109,7 +165,7 @@ def place(A: ArrayLike, B: ArrayLike, poles: ArrayLike) -> Placement:
             "reach; leave it where it is, or add an input or a coupling."
         )
     K = even.gains(found)
-    attained = matched(asked, exact.eigenvalues(A, B, K))
+    attained = matched(asked, eigenvalues(A, B, K))
     condition, sensitivity = _condition(even), _sensitivity(A, B, K)
     miss = float(np.abs(attained - asked).max())
     _refuse_a_miss(asked, attained, condition, weakest)
@@ -152,7 +208,7 @@ def _power(value: float) -> float:
 
 
 def _single(even: _Balanced, asked: Roots) -> Array | None:
-    gains = exact.ackermann(even.A, even.B[:, 0], asked / even.rate)
+    gains = ackermann(even.A, even.B[:, 0], asked / even.rate)
     return None if gains is None else gains[None]
 
 
@@ -169,7 +225,7 @@ def _several(even: _Balanced, asked: Roots) -> Array | None:
         except ValueError:
             found = np.full((even.B.shape[1], even.A.shape[0]), np.nan)
         if np.isfinite(found).all():
-            attained = matched(asked, even.rate * exact.eigenvalues(even.A, even.B, found))
+            attained = matched(asked, even.rate * eigenvalues(even.A, even.B, found))
             if np.all(np.abs(attained - asked) <= _allowed(asked)):
                 return found
     # Heymann's lemma: after a feedback that gives distinct poles, a single mixture of the inputs reaches every mode
@@ -178,7 +234,7 @@ def _several(even: _Balanced, asked: Roots) -> Array | None:
         A = even.A - even.B @ first
         v = _mixture(A, even.B)
         if not lost_modes(A, even.B @ v[:, None]):
-            gains = exact.ackermann(A, even.B @ v, asked / even.rate)
+            gains = ackermann(A, even.B @ v, asked / even.rate)
             return None if gains is None else first + np.outer(v, gains)
         spread = -float(np.abs(asked).max()) * np.linspace(0.5, 1.5, asked.size) / even.rate
         first = np.asarray(place_poles(even.A, even.B, spread).gain_matrix, dtype=np.float64)
@@ -245,3 +301,34 @@ def _sentence(asked: Roots, condition: float, sensitivity: float) -> str:
     if sensitivity > 0.1 * fastest:
         return f"Reachable ({size}), but touchy: {moved}."
     return f"Well conditioned ({size}): {moved}."
+
+
+def prefilter(A: ArrayLike, B: ArrayLike, C: ArrayLike, K: ArrayLike, *, sampled: bool = False) -> float:
+    """Gain k_pf of ``u = k_pf r - K x`` for unit static gain from r to ``y = C x``: ``1/(C (B K - A)^-1 B)``.
+
+    Parameters
+    ----------
+    A, B, C, K : arrays, shape (n, n), (n, 1), (n,) and (1, n)
+        C is the row of the output that follows.
+    sampled : bool
+        A and B belong to ``x[k+1]`` instead of ``x'``.
+
+    Raises
+    ------
+    BadInput
+        When the output cannot be held anywhere but at zero by a constant command.
+    """
+    a, b = np.asarray(A, dtype=np.float64), np.asarray(B, dtype=np.float64).reshape(-1, 1)
+    row, gains = np.asarray(C, dtype=np.float64).reshape(1, -1), np.asarray(K, dtype=np.float64).reshape(1, -1)
+    rest = (np.eye(a.shape[0]) if sampled else 0.0) - a + b @ gains
+    try:
+        state = np.linalg.solve(rest, b)
+    except np.linalg.LinAlgError:
+        raise BadInput("the closed loop has a pole at rest, so nothing holds the output; place it elsewhere.") from None
+    static = float((row @ state)[0, 0])
+    if abs(static) <= 1e-10 * float(np.abs(row).max() * np.abs(state).max()):
+        raise BadInput(
+            "a constant command leaves this output at zero (a zero of the plant at rest), so no prefilter makes it "
+            "follow; track another coordinate."
+        )
+    return 1.0 / static

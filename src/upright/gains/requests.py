@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput
+from upright.laws.linear import Array
 
-Array = NDArray[np.float64]
 Roots = NDArray[np.complex128]
 
 

@@ -7,15 +7,14 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from upright.errors import BadInput
+from upright.gains.requests import Roots
+from upright.laws.linear import Array
 
 if TYPE_CHECKING:
     from upright.physics.plant import Linear
-
-Array = NDArray[np.float64]
-Roots = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, kw_only=True)

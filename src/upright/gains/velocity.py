@@ -9,13 +9,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from upright.errors import BadInput
 from upright.gains.sampled import Sampled
-from upright.laws.linear import differences
-
-Array = NDArray[np.float64]
+from upright.laws.linear import Array, differences
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,9 +9,8 @@ import numpy as np
 from upright.gains.factorization import Locus
 from upright.gains.requests import matched, written
 from upright.paper.reproduce import STUDENTS, Regenerated, Reproduced
-from upright.report.drawing import BLACK, BLUE, GREY, VERMILLION, figure, styled
+from upright.report.drawing import BLACK, BLUE, GREY, VERMILLION, Poles, figure, locus_figure, pole_map, styled
 from upright.report.page import Chapter, Part, Picture, Points, Step, Table
-from upright.report.poles import Poles, locus_figure, pole_map
 from upright.report.symbols import number
 
 if TYPE_CHECKING:

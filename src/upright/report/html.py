@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from upright.files import replace_file
-from upright.report.book import Book
-from upright.report.page import Chapter, Picture
+from upright.report.page import Book, Chapter, Picture
 
 _FRAGMENTS = count(1)  # ids differ between the cells of a notebook
 _ID = re.compile(r'\b(id="|url\(#|href="#)')

@@ -1,17 +1,18 @@
 """What a page says: chapters of parts, with sentences, tables and pictures; how it looks is said elsewhere.
 
-The same chapter becomes HTML (`report.html`), a PDF (`report.pdf`), lines on a terminal (`report.terminal`) and a file
-to be read again (`report.store`).
+The same chapter becomes HTML (`report.html`), a PDF (`report.pdf`), lines on a terminal (`report.terminal`) and plain
+values, which JSON can hold, to be read again. Many chapters make a book.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
 from typing import Any
 
-from upright.report.mathml import symbol
+from upright.files import plain_values
+from upright.report.symbols import symbol
 
 
 class Symbol(str):
@@ -207,3 +208,99 @@ class Chapter:
     def state(self) -> str:
         """How far the verdict carries, in a word or two."""
         return "not finished" if not self.finished else "sound" if self.sound else "with reservations"
+
+
+READING = (
+    "A verdict is sound when what it says may be built on; with reservations, when its chapter says what stands in the "
+    "way. Intervals are meant to hold the truth in 95 of 100 rigs. Data go one way: later experiments take what "
+    "earlier ones found, with its errors. No fit sees the twin's truth, which stands beside the result to judge it."
+)
+"""How the cover is meant."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Book:
+    """The whole report.
+
+    Attributes
+    ----------
+    title : str
+    facts : tuple of (str, str)
+        For the cover: what was run, on which rig, when, by which program.
+    chapters : tuple of Chapter
+    notes : tuple of str
+        What a reader must know first, such as an interruption.
+    missing : tuple of (str, str)
+        Key and title of experiments that were not begun.
+    steps : tuple of Step
+        What to do next with the whole.
+    """
+
+    title: str
+    facts: tuple[tuple[str, str], ...]
+    chapters: tuple[Chapter, ...]
+    notes: tuple[str, ...] = ()
+    missing: tuple[tuple[str, str], ...] = ()
+    steps: tuple[Step, ...] = ()
+
+    @cached_property
+    def cover(self) -> tuple[Part, ...]:
+        """What stands before the chapters: facts, verdicts at a glance, numbers found."""
+        glance = [(c.key, c.title, c.about, c.verdict, c.state) for c in self.chapters]
+        glance += [(key, title, "", "", "not run") for key, title in self.missing]
+        found = [(c, f) for c in self.chapters for f in c.findings]
+        verdicts = Table(
+            caption="One line for each experiment; every verdict is argued in its chapter",
+            headings=("", "experiment", "rig", "verdict", "it is"), rows=tuple(glance), badge=4,
+            anchors=tuple(c.anchor for c in self.chapters),
+        )  # fmt: skip
+        numbers = Table(
+            caption="Key numbers with 95 % intervals, beside the truth that only a twin can tell",
+            headings=("from", "quantity", "value", "95 % interval", "truth"),
+            rows=tuple((c.key, f.what, f.value, f.interval, f.truth) for c, f in found), numbers=(2, 3, 4),
+            anchors=tuple(c.anchor for c, _ in found),
+        )  # fmt: skip
+        return (
+            Part("", (Facts(self.facts),)),
+            Part(title="Verdicts at a glance", key="verdicts", content=(verdicts, READING)),
+            *((Part(title="What was found", key="numbers", content=(numbers,)),) if found else ()),
+        )
+
+
+_KINDS: dict[str, Callable[..., Any]] = {
+    kind.__name__: kind for kind in (Chapter, Code, Facts, Finding, Formula, Part, Picture, Points, Step, Table)
+}
+
+
+def as_plain(value: Any, instead: Callable[[Any], Any] = lambda value: None) -> Any:
+    """A chapter, or what stands in one, as values that JSON can hold; each says its kind.
+
+    `instead` may offer something else for a value, and nothing (None) for most.
+    """
+    if (other := instead(value)) is not None:
+        return other
+    if isinstance(value, Symbol):
+        return {"kind": "Symbol", "text": str(value)}
+    if isinstance(value, Picture):
+        value = replace(value, draw=value.svg)
+    if isinstance(value, Mapping):
+        return plain_values(value)
+    if is_dataclass(value):
+        told = {f.name: as_plain(getattr(value, f.name), instead) for f in fields(value)}
+        return {"kind": type(value).__name__, **told}
+    return [as_plain(v, instead) for v in value] if isinstance(value, tuple | list) else value
+
+
+def from_plain(content: Any) -> Any:
+    """The chapter, or what stands in one, that `as_plain` wrote."""
+    if isinstance(content, list):
+        return tuple(from_plain(c) for c in content)
+    if not isinstance(content, dict):
+        return content
+    kind = content["kind"]
+    if kind == "Symbol":
+        return Symbol(content["text"])
+    told = {name: from_plain(value) for name, value in content.items() if name not in ("kind", "numbers")}
+    if "numbers" in content:  # columns of a table, or a chapter's values for another program, which stay as they are
+        told["numbers"] = tuple(content["numbers"]) if kind == "Table" else content["numbers"]
+    return _KINDS[kind](**told)

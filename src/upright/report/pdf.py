@@ -11,10 +11,8 @@ from xml.etree import ElementTree
 
 from upright.errors import BadInput
 from upright.files import replace_file
-from upright.report.book import Book
-from upright.report.mathml import symbol
-from upright.report.page import Chapter, Formula, Picture, Symbol
-from upright.report.store import as_plain
+from upright.report.page import Book, Chapter, Formula, Picture, Symbol, as_plain
+from upright.report.symbols import symbol
 
 _ROOT = '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
 _SHARE = re.compile(r'\sstyle="max-width:(\d+)%"')

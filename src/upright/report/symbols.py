@@ -1,10 +1,12 @@
-"""How is a name, a number or a unit of the program written for a person?"""
+"""How names, numbers and units of the program are written for a person: as text, for matplotlib, in MathML."""
 
 from __future__ import annotations
 
 import math
 import re
 import shlex
+from functools import cache
+from html import escape
 from pathlib import Path
 
 _LETTERS = (
@@ -24,6 +26,31 @@ def parts(name: str) -> tuple[str, str, str]:
     if digits and not below:
         stem, below = digits.groups()
     return GREEK.get(stem, stem), GREEK.get(below, below).replace("_", ","), dot
+
+
+@cache
+def identifier(name: str, power: str = "") -> str:
+    """MathML of a symbol: ``theta_ddot`` -> theta with two dots; ``b_1c`` -> b with a subscript."""
+    twice = name.endswith("_ddot")
+    stem, below, dot = parts(name.replace("_ddot", "_dot"))
+    upright = ' mathvariant="normal"' if len(stem) > 1 else ""
+    out = f"<mi{upright}>{escape(stem)}</mi>"
+    if dot:
+        # not as an accent: browsers without a mathematical font would draw the dots into the letter
+        out = f"<mover>{out}<mo>{'¨' if twice else '˙'}</mo></mover>"
+    below = f"<mtext>{escape(below)}</mtext>" if below else ""
+    if below and power:
+        return f"<msubsup>{out}{below}{power}</msubsup>"
+    if power:
+        return f"<msup>{out}{power}</msup>"
+    return f"<msub>{out}{below}</msub>" if below else out
+
+
+def symbol(name: str) -> str:
+    """MathML of a parameter's or signal's name, to stand in a sentence or a table."""
+    if not name.replace("_", "").isalnum():
+        return f"<span>{escape(name)}</span>"
+    return f"<math><mrow>{identifier(name)}</mrow></math>"
 
 
 def plain(name: str) -> str:

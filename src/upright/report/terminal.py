@@ -6,8 +6,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from upright.report.book import Book
-from upright.report.page import Block, Chapter, Code, Facts, Points, Step, Table
+from upright.report.page import Block, Book, Chapter, Code, Facts, Points, Step, Table
 
 _COLUMN = 14  # characters a column of words is squeezed to before the last one is left out
 _GAP = 2

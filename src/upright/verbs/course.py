@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from upright.experiments.laboratory import Session
     from upright.paper.reproduce import Reproduced
     from upright.questionnaire.sheet import Means, Ratings, Shares
-    from upright.report.book import Book
+    from upright.report.page import Book
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -83,7 +83,7 @@ def lab(
         raise BadInput(f"results need a folder, but {at} is a file; name another with -o.")
     from datetime import date
 
-    from upright.experiments import laboratory, laboratory_page
+    from upright.experiments import laboratory
     from upright.report.html import write_html
     from upright.report.page import Chapter
     from upright.report.pdf import available, write_pdf
@@ -96,14 +96,14 @@ def lab(
         )
         pressed.patient = True
         progress("writing the report", 1.0)
-        book = laboratory_page.book(session, date.today())
+        book = laboratory.book(session, date.today())
         report = write_html(at / "report.html", book)
         pdf = write_pdf(at / "report.pdf", book) if available() else None
-    sound = sum(t.chapter.sound for t in session.told)
+    sound = sum(t.chapter.sound for t in session.results)
     told = Chapter(
-        title=book.title, verdict=f"{sound} of {len(session.told)} verdicts are sound.",
-        sound=sound == len(session.told), parts=book.cover, warnings=book.notes, steps=book.steps,
-        numbers=laboratory_page.summary(session, report, pdf), finished=not session.interrupted,
+        title=book.title, verdict=f"{sound} of {len(session.results)} verdicts are sound.",
+        sound=sound == len(session.results), parts=book.cover, warnings=book.notes, steps=book.steps,
+        numbers=laboratory.summary(session, report, pdf), finished=not session.interrupted,
     )  # fmt: skip
     done = Laboratory(session=session, book=book, interrupted=session.interrupted or pressed.times > 0)
     return Answer(done, told, [report] if pdf is None else [report, pdf])

@@ -16,8 +16,7 @@ from upright.verbs.study import provenance, read_study
 from upright.verbs.values import open_log, pairs, paths, si, texts
 
 if TYPE_CHECKING:
-    from upright.experiments.frequency_1b.from_logs import LoggedResponse
-    from upright.experiments.frequency_1b.run import FrequencyRun
+    from upright.experiments.frequency_1b.run import FrequencyRun, LoggedResponse
     from upright.identification.inference.scoring import RunScore
     from upright.identification.ladder.growth import Ladder
     from upright.identification.loadings import Loadings, Plan
@@ -221,7 +220,7 @@ def frequency(
     files = [at / "frequency.csv"]
     if logs := [Path(source) for source in paths(sources)]:
         from upright.experiments.frequency_1b.chapter import log_chapter
-        from upright.experiments.frequency_1b.from_logs import LogRequest, response_of_logs
+        from upright.experiments.frequency_1b.run import LogRequest, response_of_logs
         from upright.verbs.values import si_if_given
 
         limits = (low or 0.0, high or float("inf"))

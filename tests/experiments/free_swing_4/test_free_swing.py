@@ -5,10 +5,15 @@ import math
 import pytest
 
 from upright.experiments.free_swing_4 import chapter as release_page
-from upright.experiments.free_swing_4.drift import TILT
-from upright.experiments.free_swing_4.release import freed
-from upright.experiments.free_swing_4.run import run_free_swing
-from upright.experiments.free_swing_4.studies import FRICTION, fit_question, questions, recovered, write_questions
+from upright.experiments.free_swing_4.release import TILT, freed
+from upright.experiments.free_swing_4.run import (
+    FRICTION,
+    fit_question,
+    questions,
+    recovered,
+    run_free_swing,
+    write_questions,
+)
 from upright.experiments.makes import make_rig
 from upright.report.html import write_html
 

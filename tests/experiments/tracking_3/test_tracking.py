@@ -11,7 +11,7 @@ import pytest
 
 from upright.control import trial
 from upright.experiments.makes import MAKES, SHAFTS, make_rig
-from upright.experiments.tracking_3 import pd
+from upright.experiments.tracking_3 import laws as pd
 from upright.experiments.tracking_3.laws import AT, EXTRA, closed_by, paper_sets, tracker, with_sum
 from upright.experiments.tracking_3.pulses import fitted, identify_shaft, pulses
 from upright.experiments.tracking_3.run import RESERVE, run_tracking
@@ -176,17 +176,17 @@ def test_four_sets_follow_and_the_fourth_comes_close_to_the_limit(kind, tmp_path
         if name in truth:
             low, high = done.fit.estimates[name].interval
             assert low < truth[name] < high
-    shares = [o.found.effort.share for o in done.sets]
+    shares = [o.measured.effort.share for o in done.sets]
     assert sorted(shares) == shares
     assert 0.85 < shares[-1] <= RESERVE  # two digits of the step may take a tenth off
     for o in done.sets:
         assert o.within
-        assert o.found.effort.peak == pytest.approx(o.law.k_pf * done.step.size, abs=done.rig.converter)
-        assert o.found.figures.settling_5 < 4.0 / o.law.decay
-        assert abs(o.found.figures.error) < 1.4 * o.law.play + 2 * done.rig.quantum[1]  # friction of the day: 13 %
-    assert done.far.found.tripped < 1.0
-    assert done.stiff.found.figures.settling_5 > 2 * done.sets[-1].found.figures.settling_5
-    assert done.pd.found.give > 4 * done.sets[-1].found.give
+        assert o.measured.effort.peak == pytest.approx(o.law.k_pf * done.step.size, abs=done.rig.converter)
+        assert o.measured.figures.settling_5 < 4.0 / o.law.decay
+        assert abs(o.measured.figures.error) < 1.4 * o.law.play + 2 * done.rig.quantum[1]  # friction of the day: 13 %
+    assert done.far.measured.tripped < 1.0
+    assert done.stiff.measured.figures.settling_5 > 2 * done.sets[-1].measured.figures.settling_5
+    assert done.pd.measured.give > 4 * done.sets[-1].measured.give
 
 
 def test_the_fit_is_repeated_from_its_files(tmp_path):

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from upright.experiments.makes import OSCILLATORS
-from upright.experiments.weighing_1a.run import weigh_body
-from upright.experiments.weighing_1a.twin import acquire, drawn_twin
+from upright.experiments.weighing_1a.run import acquire, drawn_twin, measure_body
 from upright.identification import Parameter, Rig, Run
 from upright.identification.estimate import identify
 from upright.physics import chain
@@ -21,12 +20,12 @@ def test_twins_are_weighed_within_one_percent(kind):
     """Twelve rigs here, a hundred in `python -m benchmarks loadings`."""
     held = []
     for seed in range(1, 13):
-        done = weigh_body(drawn_twin(seed, kind))
-        for found, truth in ((done.found.k, done.on.stiffness), (done.found.bare, done.on.bare)):
+        done = measure_body(drawn_twin(seed, kind))
+        for found, truth in ((done.loadings.k, done.on.stiffness), (done.loadings.bare, done.on.bare)):
             assert found.value == pytest.approx(truth, rel=1e-2)
             held.append(found.interval[0] <= truth <= found.interval[1])
-        assert done.found.damping.value == pytest.approx(done.on.truth.parameters()["c_1"], rel=1e-2)
-        assert abs(done.found.damping.value - done.on.truth.parameters()["c_1"]) < 4 * done.found.damping.stderr
+        assert done.loadings.damping.value == pytest.approx(done.on.truth.parameters()["c_1"], rel=1e-2)
+        assert abs(done.loadings.damping.value - done.on.truth.parameters()["c_1"]) < 4 * done.loadings.damping.stderr
     # twelve pairs that err together: fewer than nine of twelve honest 95 % intervals hold once in 400 times
     assert sum(held) >= 18
 
@@ -62,7 +61,7 @@ def test_travel_stays_within_the_rigs():
 @pytest.mark.parametrize("kind", KINDS)
 def test_least_squares_on_the_whole_motion_agrees(kind):
     """The same records, the equations of motion: no peak is looked at."""
-    done = weigh_body(drawn_twin(5, kind))
+    done = measure_body(drawn_twin(5, kind))
     make, plant = OSCILLATORS[kind], chain(1, kind)
     mass = "m_1" if kind == "rectilinear" else "J_1"
     guess = {mass: 1.3 * done.on.bare, "k_1": 0.8 * done.on.stiffness, "c_1": 1.5 * make.plant.parameters()["c_1"]}
@@ -88,7 +87,7 @@ def test_least_squares_on_the_whole_motion_agrees(kind):
             )
         )
     fit = identify(Rig(plant=plant, parameters=parameters), runs, method="least-squares")
-    for ours, name in ((done.found.k, "k_1"), (done.found.bare, mass)):
+    for ours, name in ((done.loadings.k, "k_1"), (done.loadings.bare, mass)):
         theirs = fit.estimates[name]
         assert theirs.value == pytest.approx(ours.value, rel=1e-2)
         assert theirs.interval[0] <= ours.value <= theirs.interval[1]

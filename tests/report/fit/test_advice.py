@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from upright.identification import Estimate
-from upright.report.fit.advice import next_steps
+from upright.report.fit.chapter import next_steps
 
 
 def said(fit, **more):

@@ -7,7 +7,7 @@ import pytest
 
 from upright.physics import BUILT_IN, CartPendulum, Furuta, Pendulum, find
 from upright.report.fit.equations import equations
-from upright.report.mathml import symbol
+from upright.report.symbols import symbol
 
 RARE = ("b_1q", "b_2q", "k_psi", "k_x", "tilt_x", "tilt_y")
 

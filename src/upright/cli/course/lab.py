@@ -92,7 +92,7 @@ def _tell(done: Laboratory, files: Sequence[Path]) -> None:
 
     took = {
         t.experiment.key: f"{t.rig}{', as kept from an earlier run' if t.state == 'kept' else ''}; {t.seconds:.1f} s"
-        for t in done.session.told
+        for t in done.session.results
     }
     timed = replace(done.book, chapters=tuple(replace(c, about=took[c.key]) for c in done.book.chapters))
     print_book(console(), timed, files)

@@ -11,9 +11,8 @@ from upright.experiments.designing.run import Designed, VelocityLoop
 from upright.gains import spelled_out
 from upright.gains.lqr import locus
 from upright.gains.requests import written
-from upright.report.drawing import BLACK, BLUE, VERMILLION
+from upright.report.drawing import BLACK, BLUE, VERMILLION, Poles, locus_figure, pole_map, swing_figure
 from upright.report.page import Block, Chapter, Part, Picture, Points, Step, Table
-from upright.report.poles import Poles, locus_figure, pole_map, swing_figure
 from upright.report.symbols import number, percent, plain
 from upright.report.symbols import unit as raised
 
@@ -83,9 +82,7 @@ def _pole_table(done: Designed) -> Table:
         rows.append(("asked", written(done.placement.asked)))
         rows.append(("attained, continuous", written(done.placement.attained)))
     else:
-        rows.append(
-            ("least cost, continuous", written(np.linalg.eigvals(done.model.A - done.model.B @ done.continuous)))
-        )
+        rows.append(("least cost, continuous", written(_wanted(done))))
     seen, beyond = _seen_poles(done)
     rows.append(("loop as it runs", written(seen, 4) + (f", and {beyond} faster" if beyond else "")))
     return Table(caption="Poles [1/s]", headings=("", "poles"), rows=tuple(rows))
@@ -143,31 +140,21 @@ def _numbers(done: Designed) -> dict[str, Any]:
         "k_pf": done.k_pf,
         "effort_weight": done.R,
         "poles": {
-            "open_loop": _complex(done.model.poles()),
-            "asked": None if done.placement is None else _complex(done.placement.asked),
-            "attained": None if done.placement is None else _complex(done.placement.attained),
-            "sampled_loop": _complex(done.poles),
+            "open_loop": done.model.poles().astype(complex),
+            "asked": None if done.placement is None else done.placement.asked,
+            "attained": None if done.placement is None else done.placement.attained,
+            "sampled_loop": done.poles,
         },
         "worst_miss": None if done.placement is None else done.placement.miss,
         "condition": None if done.placement is None else done.placement.condition,
-        "margins": None
-        if way.margins is None
-        else {k: getattr(way.margins, k) for k in ("least_gain", "most_gain", "phase", "delay", "modulus")},
+        "margins": way.margins,
         "lag": done.sampled.lag,
         "peak_command": done.peak,
         "peak_command_sampled": done.peak_sampled,
         "chance_over_the_fit": done.chance,
-        "law": {
-            **spelled_out(done.law),
-            "inputs": "readings, readings at rest, reference",
-        },
+        "law": spelled_out(done.law) | {"inputs": "readings, readings at rest, reference"},
         "verdict": done.verdict,
     }
-
-
-def _complex(poles: Any) -> Any:
-    """Poles as complex numbers, where all are real, too."""
-    return np.asarray(poles, dtype=np.complex128)
 
 
 def _effort(done: Designed) -> str:

@@ -6,21 +6,34 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from upright import gains as design
 from upright.errors import BadInput
 from upright.experiments.identified import IdentifiedRig
-from upright.gains import Estimator, Margins, Placement, Sampled
+from upright.gains import (
+    Estimator,
+    Margins,
+    Placement,
+    Sampled,
+    feedback,
+    filtered,
+    hold,
+    kalman,
+    lqr,
+    margins,
+    place,
+    place_sampled,
+    prefilter,
+    shaken,
+    weight_for_effort,
+)
 from upright.gains.loop import closed, command_noise, swing
 from upright.gains.lqr import motion
-from upright.gains.requests import poles_of
+from upright.gains.requests import Roots, poles_of
 from upright.gains.sampled import to_s
 from upright.laws import Law
 from upright.physics import Linear
-
-Array = NDArray[np.float64]
-Roots = NDArray[np.complex128]
+from upright.records import Array
 
 SPEEDS = ("plain", "filtered", "kalman")
 """Ways to the velocities: differences of encoders, plain or through a low pass, and a Kalman filter."""
@@ -142,12 +155,12 @@ def design_for(rig: IdentifiedRig, wish: DesignRequest) -> Designed:
     model = rig.linear(wish.at)
     start = np.array(wish.start) if wish.start else _tilt(rig)
     if model.B.shape[1] != 1:
-        raise BadInput(f"upright design is for one input, and this plant has {model.B.shape[1]}; use design.place.")
+        raise BadInput(f"upright design is for one input, and this plant has {model.B.shape[1]}; use place.")
     lag = rig.lag if wish.lag is None else wish.lag
-    sampled = design.hold(model, wish.period, wish.delay + rig.delay / wish.period, lag)
+    sampled = hold(model, wish.period, wish.delay + rig.delay / wish.period, lag)
     placement, R = None, wish.R
     if wish.poles is not None:
-        placement = design.place(model.A, model.B, wish.poles)
+        placement = place(model.A, model.B, wish.poles)
         K = placement.K
     else:
         weights = wish.weights or (1.0,) * model.A.shape[0]
@@ -156,13 +169,13 @@ def design_for(rig: IdentifiedRig, wish: DesignRequest) -> Designed:
                 raise BadInput(
                     "least cost needs a weight of the effort (--effort-weight) or a limit (--limit); give one."
                 )
-            R = design.weight_for_effort(model.A, model.B, weights, start, wish.limit)
-        K = design.lqr(model.A, model.B, weights, R)
+            R = weight_for_effort(model.A, model.B, weights, start, wish.limit)
+        K = lqr(model.A, model.B, weights, R)
     quantum = wish.quantum or (2 * math.pi / 16_000,) * sampled.C.shape[0]
     estimators = [velocities(model, sampled, s, wish.memory, wish.limit or 1.0, quantum) for s in SPEEDS]
     estimator = estimators[SPEEDS.index(wish.speed)]
     wanted = placement.asked if placement is not None else poles_of(model.A - model.B @ K)
-    gains = None if wish.speed == "kalman" else design.place_sampled(sampled, estimator, wanted)
+    gains = None if wish.speed == "kalman" else place_sampled(sampled, estimator, wanted)
     if wish.sampled and gains is None:
         raise BadInput("--sampled is for differenced encoders; with a Kalman filter the poles are met as they are.")
     used = gains if wish.sampled and gains is not None else K
@@ -170,8 +183,8 @@ def design_for(rig: IdentifiedRig, wish: DesignRequest) -> Designed:
     if wish.track:
         if wish.track not in model.outputs:
             raise BadInput(f"nothing called '{wish.track}' is measured; --track one of {', '.join(model.outputs)}.")
-        k_pf = design.prefilter(model.A, model.B, model.C[model.outputs.index(wish.track)], used)
-    law = design.feedback(estimator, used, k_pf or 0.0)
+        k_pf = prefilter(model.A, model.B, model.C[model.outputs.index(wish.track)], used)
+    law = feedback(estimator, used, k_pf or 0.0)
     back = motion(model.A, model.B, K, start)
     ways = tuple(_velocity_loop(model, sampled, e, used, quantum) for e in estimators)
     cloud, chance = _cloud(rig, wish, sampled, law)
@@ -217,22 +230,22 @@ def velocities(
         Step of each encoder [m or rad].
     """
     if speed == "kalman":
-        shaking = design.shaken(sampled, 0.1 * limit * np.abs(model.B[1::2, 0]))
-        return design.kalman(sampled, shaking, np.asarray(quantum) / math.sqrt(12))
-    return design.filtered(sampled, memory if speed == "filtered" else 0.0)
+        shaking = shaken(sampled, 0.1 * limit * np.abs(model.B[1::2, 0]))
+        return kalman(sampled, shaking, np.asarray(quantum) / math.sqrt(12))
+    return filtered(sampled, memory if speed == "filtered" else 0.0)
 
 
 def _velocity_loop(
     model: Linear, sampled: Sampled, estimator: Estimator, K: Array, quantum: tuple[float, ...]
 ) -> VelocityLoop:
-    law = design.feedback(estimator, K)
+    law = feedback(estimator, K)
     poles = poles_of(closed(sampled, law))
     stands = bool(np.abs(poles).max() < 1)
     return VelocityLoop(
         name=estimator.name,
         speed_noise=estimator.noise(quantum)[1 : model.A.shape[0] : 2],
         command_noise=command_noise(sampled, law, quantum) if stands else None,
-        margins=design.margins(model, sampled, law) if stands else None,
+        margins=margins(model, sampled, law) if stands else None,
         poles=to_s(poles, sampled.period),
     )
 
@@ -240,7 +253,7 @@ def _velocity_loop(
 def _cloud(rig: IdentifiedRig, wish: DesignRequest, nominal: Sampled, law: Law) -> tuple[Roots, float | None]:
     """Poles [1/s] of the loop with these gains on every rig that the fit allows, and the share that stands."""
     rows = [
-        poles_of(closed(design.hold(m, wish.period, nominal.delay, nominal.lag), law)) for m in rig.spread(wish.at)
+        poles_of(closed(hold(m, wish.period, nominal.delay, nominal.lag), law)) for m in rig.spread(wish.at)
     ]  # fmt: skip
     if not rows:
         return np.zeros(0, dtype=np.complex128), None

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from upright.experiments.free_swing_4.drift import TILT
 from upright.experiments.free_swing_4.figures import drift_figure, energy_figure
-from upright.experiments.free_swing_4.run import Balance, FreeSwing
-from upright.experiments.free_swing_4.studies import recovered
+from upright.experiments.free_swing_4.release import TILT
+from upright.experiments.free_swing_4.run import EnergyBalance, FreeSwing, recovered
 from upright.identification.model.fit import Fit
 from upright.report.fit.chapter import motion_part, rest_picture, run_pictures
 from upright.report.fit.figures import directions_figure, fit_figure, interval_figure
@@ -160,7 +159,7 @@ def _blind_part(blind: Fit) -> Part:
     return Part("What the data cannot see", tuple(told))
 
 
-def _energy_part(b: Balance) -> Part:
+def _energy_part(b: EnergyBalance) -> Part:
     """Which friction took the energy of the release."""
     ends = ", ".join(f"{name} {1e3 * e[-1]:.1f} mJ" for name, e in b.taken.items())
     shown = Picture(

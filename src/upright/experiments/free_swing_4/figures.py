@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from upright.experiments.free_swing_4.drift import DriftPath
+from upright.experiments.free_swing_4.release import DriftPath
 from upright.report.drawing import (
     BLUE,
     CYCLE,

@@ -1,30 +1,232 @@
-"""Experiment 4, from release to fits, drift and the balance of energy."""
+"""Experiment 4, from release to fits, drift and the balance of energy.
+
+Every step leaves files that anyone can work on: logs (CSV) and study files (TOML) that `upright identify` takes.
+"""
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable, Generator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from upright.control.rig import ServoRig
-from upright.experiments.free_swing_4.drift import DriftPath, drift_paths
-from upright.experiments.free_swing_4.release import carrier, freed, motion
-from upright.experiments.free_swing_4.studies import Answer, fit_question, write_questions
-from upright.experiments.makes import SERVO, Make, make_of
+from upright.control.trial import ServoRig
+from upright.experiments.free_swing_4.release import (
+    TILT,
+    DriftPath,
+    Release,
+    acquire,
+    anchored,
+    carrier,
+    drift_paths,
+    freed,
+    motion,
+)
+from upright.experiments.makes import MOTOR_AND_BELT, SERVO, Make, make_of
 from upright.experiments.weighing_1a.run import Known
+from upright.identification.model.fit import Fit
 from upright.physics import Plant
-from upright.progress import Progress, silent
+from upright.progress import Progress, part, silent
+from upright.records import Array, Record
+from upright.study.load import Study
+from upright.study.text import TomlTable, counted_sensor, number, study_text, table
 
-Array = NDArray[np.float64]
+FRICTION = ("b_1", "b_1c", "b_2", "b_2c")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Question:
+    """One fit of the experiment: what it shows, which logs it sees, what is known and asked."""
+
+    name: str
+    title: str
+    fitted: str
+    predicted: str
+    known: Mapping[str, tuple[float, float]]
+    asked: Mapping[str, float]
+    bounds: Mapping[str, tuple[float, float]]
+    unknown: tuple[str, ...] = ("initial",)
+    method: str = "auto"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Balance:
+class QuestionFit:
+    """A question with its fit and the study that repeats it."""
+
+    question: Question
+    study: Study
+    fit: Fit
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recovered:
+    """One number: truth of the twin, what the fit says, and whether the truth lies in its interval."""
+
+    name: str
+    unit: str
+    truth: float
+    value: float
+    interval: tuple[float, float]
+    inside: bool
+
+
+def logs(rig: ServoRig) -> dict[str, Record]:
+    """The releases of the experiment by the name of their file: level, out of level, and anchored by a spring.
+
+    A cart does without the last two: a lean too small to see does not move what sticks.
+    """
+    low = Release(angle=math.radians(-60))
+    out = {"release_90.csv": acquire(rig, shot=1), "release_60.csv": acquire(rig, low, shot=2)}
+    if carrier(rig) == "psi":
+        leaning = rig.changed(tilt_y=math.sin(TILT))
+        out["release_90_tilted.csv"] = acquire(leaning, shot=3)
+        out["release_60_tilted.csv"] = acquire(leaning, low, shot=4)
+        out["release_90_spring.csv"] = acquire(anchored(leaning), shot=5)
+        out["release_60_spring.csv"] = acquire(anchored(leaning), low, shot=6)
+    return out
+
+
+def bench(rig: ServoRig, weighed: Known | None = None) -> dict[str, tuple[float, float]]:
+    """What was measured beforehand: value and standard uncertainty [SI].
+
+    The inertia of disk or cart comes from experiment 1a (`weighed`; 1 % without it), the lengths from a ruler and from
+    balancing the rod on an edge; the rod's axial inertia, 0.2 % of the disk's, from a drawing.
+    """
+    rng = np.random.default_rng([rig.seed, 41])
+    truth = rig.plant.parameters()
+    body = make_of(rig.plant).body
+    spread = {body: 0.01 * truth[body], "l_cg": 0.5e-3, "r": 0.3e-3}
+    measured = {n: (truth[n] + rng.normal(0, s), s) for n, s in spread.items() if n in truth}
+    if weighed and weighed.name == body:
+        off = MOTOR_AND_BELT if body == "J_d" else 0.0
+        measured[body] = (weighed.value - off, weighed.stderr)
+    return measured | ({"J_a": (truth["J_a"], 0.0)} if "J_a" in truth else {})
+
+
+def questions(rig: ServoRig, weighed: Known | None = None) -> tuple[Question, ...]:
+    """The fits of the experiment, all from guesses that are 30 % off."""
+    rng = np.random.default_rng([rig.seed, 42])
+    guess = {n: getattr(rig.plant, n) * rng.choice([0.7, 1.3]) for n in ("m_p", "J_p", *FRICTION)}
+    known = bench(rig, weighed)
+    scale = {"J_d": 1.3, "J_a": 0.7, "m_c": 1.3}
+    blind = {n: v for n, v in known.items() if n not in scale}
+    tilt = {"tilt_x": (-0.1, 0.1), "tilt_y": (-0.1, 0.1)}
+
+    def ask(name: str, title: str, log: str, known: Mapping[str, tuple[float, float]], **more: float) -> Question:
+        return Question(
+            name=name,
+            title=title,
+            fitted=f"release_90{log}.csv",
+            predicted=f"release_60{log}.csv",
+            known=known,
+            asked={**guess, **more},
+            bounds={n: b for n, b in tilt.items() if n in more},
+        )
+
+    free = {n: share * known[n][0] for n, share in scale.items() if n in known}
+    both = (
+        ask("free_swing", "Large free swing of a level rig", "", known),
+        ask("no_scale", "The same swing, no inertia given", "", blind, **free),
+    )
+    if carrier(rig) != "psi":
+        return both
+    anchor = make_of(rig.plant).anchor
+    spring = {**known, "k_psi": (anchor, 0.01 * anchor)}
+    return (
+        *both,
+        # no friction term helps a model that cannot lean, so none is tried one by one
+        replace(
+            ask("level_model", "A rig out of level, explained as if it were level", "_tilted", known),
+            method="least-squares",
+        ),
+        ask("tilt_model", "A rig out of level, its lean estimated too", "_tilted", known, tilt_x=0.0, tilt_y=0.0),
+        replace(
+            ask("spring", "A rig out of level, anchored by a soft spring, as if it were level", "_spring", spring),
+            method="least-squares",
+            unknown=("initial", "offset"),  # the spring's own zero lies where the lean lets it
+        ),
+    )
+
+
+def question_text(q: Question, rig: ServoRig) -> str:
+    """The question as a study file."""
+    kind, source = type(rig.plant), f"digital twin of {rig.name}, seed {rig.seed}: simulated, no rig was touched"
+
+    def wearing_unit(name: str, value: float) -> float | str:
+        unit = kind.quantity(name).unit
+        return value if unit == "1" else number(value, unit, 6)
+
+    parameters = TomlTable("[parameters]")
+    for name, (value, spread) in q.known.items():
+        known, uncertainty = wearing_unit(name, value), wearing_unit(name, spread)
+        parameters.key(name, {"value": known, "uncertainty": uncertainty} if spread else known)
+    for name, guess in q.asked.items():
+        low, high = q.bounds.get(name, (0.0, math.inf))
+        bounds = {"min": low} | ({"max": high} if math.isfinite(high) else {})
+        parameters.key(name, {"guess": wearing_unit(name, guess), **bounds})
+    defaults = TomlTable("[defaults]")
+    defaults.key("initial", {f"{carrier(rig)}_dot": 0.0, "theta_dot": 0.0}, "released from rest")
+    defaults.key("unknown", q.unknown)
+    return study_text(
+        (
+            table("", title=q.title, source=source),
+            table("[rig]", plant=make_of(rig.plant).plant_name),
+            parameters,
+            *(counted_sensor(c.name, c.unit, n) for c, n in zip(rig.plant.coordinates, rig.counts, strict=True)),
+            *(
+                table("[[runs]]", label=file.removesuffix(".csv").replace("_", " "), file=file, role=role)
+                for role, file in (("fit", q.fitted), ("predict", q.predicted))
+            ),
+            defaults,
+        )
+    )
+
+
+def write_questions(rig: ServoRig, folder: Path, weighed: Known | None = None) -> tuple[tuple[Question, Path], ...]:
+    """Write logs and studies; gives back each question with its study file."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, record in logs(rig).items():
+        record.to_csv(folder / name)
+    made: list[tuple[Question, Path]] = []
+    for q in questions(rig, weighed):
+        path = folder / f"{q.name}.toml"
+        path.write_text(question_text(q, rig), encoding="utf-8")
+        made.append((q, path))
+    return tuple(made)
+
+
+def fit_question(q: Question, study: Path, progress: Progress = silent) -> QuestionFit:
+    """Fit one question from its files, as `upright identify` would."""
+    from upright.identification.estimate import identify
+    from upright.study.load import load_study
+
+    loaded = load_study(study)
+    tell = part(progress, 0.0, 1.0, q.title)
+    return QuestionFit(question=q, study=loaded, fit=identify(loaded.rig, loaded.runs, method=q.method, progress=tell))
+
+
+def recovered(rig: ServoRig, fit: Fit) -> tuple[Recovered, ...]:
+    """The estimates of a fit beside the truth that only a twin can tell."""
+    truth = rig.plant.parameters()
+    return tuple(
+        Recovered(
+            name=n,
+            unit=e.unit,
+            truth=truth[n],
+            value=e.value,
+            interval=e.interval,
+            inside=e.interval[0] <= truth[n] <= e.interval[1],
+        )
+        for n, e in fit.estimates.items()
+        if n in truth and n in fit.rig.parameters and e.status != "known"
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EnergyBalance:
     """Energy of the release over time: time (N,) [s], what is still there and what each friction took [J]."""
 
     t: Array
@@ -39,9 +241,9 @@ class FreeSwing:
     rig: ServoRig
     folder: Path
     weighed: Known | None = None
-    answers: dict[str, Answer] = field(default_factory=dict[str, Answer])
+    answers: dict[str, QuestionFit] = field(default_factory=dict[str, QuestionFit])
     drifts: tuple[DriftPath, ...] = ()
-    balance: Balance | None = None
+    balance: EnergyBalance | None = None
     interrupted: bool = False
     seconds: float = 0.0
 
@@ -84,7 +286,7 @@ def run_free_swing(
     """
     began = time.perf_counter()
     done = FreeSwing(rig=freed(replace(rig, seed=seed)), folder=folder, weighed=weighed)
-    with _kept(done):
+    try:
         progress("releasing the pendulum", 0.0)
         asked = write_questions(done.rig, folder, weighed)
         for i, (question, path) in enumerate(asked):
@@ -96,19 +298,13 @@ def run_free_swing(
         progress("following the body that carries it", 0.9)
         done.drifts = drift_paths(done.rig)
         done.balance = balance(done)
+    except KeyboardInterrupt:
+        done.interrupted = True
     done.seconds = time.perf_counter() - began
     return done
 
 
-@contextmanager
-def _kept(done: FreeSwing) -> Generator[None]:
-    with suppress(KeyboardInterrupt):
-        done.interrupted = True
-        yield
-        done.interrupted = False
-
-
-def balance(done: FreeSwing) -> Balance:
+def balance(done: FreeSwing) -> EnergyBalance:
     """Where the energy of the first release went, as the fitted model tells it."""
     fit = done.answers["free_swing"].fit
     values = {n: p.value for n, p in fit.rig.parameters.items() if n in fit.rig.plant.names()}
@@ -118,7 +314,7 @@ def balance(done: FreeSwing) -> Balance:
     stored = model.energy(x) - float(model.energy(model.state()))
     taken = losses(model, t, x)
     every = max(1, round(0.02 / SERVO))
-    return Balance(t=t[::every], stored=stored[::every], taken={n: e[::every] for n, e in taken.items()})
+    return EnergyBalance(t=t[::every], stored=stored[::every], taken={n: e[::every] for n, e in taken.items()})
 
 
 def losses(plant: Plant, t: Array, x: Array) -> dict[str, Array]:
@@ -128,17 +324,15 @@ def losses(plant: Plant, t: Array, x: Array) -> dict[str, Array]:
     drag c |v|^3. Stiction takes nothing while it holds. Integrated by the trapezoid rule, so the samples must be
     close to each other.
     """
-    taken: dict[str, Array] = {}
+    from scipy.integrate import cumulative_trapezoid
+
+    powers = {"viscous friction": plant.power_lost(x)}
     values = plant.parameters()
-    taken["viscous friction"] = _running(t, plant.power_lost(x))
     for joint in plant.joints:
         i = plant.state_names().index(f"{joint.on}_dot")
         speed = np.abs(x[:, i])
         for kind, name, power in (("Coulomb friction", joint.coulomb, speed), ("drag", joint.quadratic, speed**3)):
             if name and values[name] > 0:
-                taken[f"{kind} of {joint.on}"] = _running(t, values[name] * power)
+                powers[f"{kind} of {joint.on}"] = values[name] * power
+    taken = {name: np.asarray(cumulative_trapezoid(power, t, initial=0)) for name, power in powers.items()}
     return {name: energy for name, energy in taken.items() if energy[-1] > 0}
-
-
-def _running(t: Array, power: Array) -> Array:
-    return np.concatenate([[0.0], np.cumsum(np.diff(t) * (power[1:] + power[:-1]) / 2)])

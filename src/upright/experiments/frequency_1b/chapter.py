@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from upright.experiments.frequency_1b.figures import bode_figure, quality_figure
-from upright.experiments.frequency_1b.from_logs import LoggedResponse
-from upright.experiments.frequency_1b.run import FrequencyRun
+from upright.experiments.frequency_1b.run import FrequencyRun, LoggedResponse
 from upright.identification.frequency.answer import Answer, curves, digits, key_value
 from upright.identification.frequency.response import FrequencyResponse
 from upright.identification.model.fit import Estimate
@@ -167,11 +166,11 @@ def _steps(done: FrequencyRun) -> tuple[Step, ...]:
         Step("Find gains for these numbers, and what their errors do to the loop.", gains),
         Step(
             "Estimate the response again from the log, as you would from your own.",
-            f'upright frequency {log} --rig {make} --hold "{1e3 * hold:.4g} ms" -o again',
+            f'upright frequency {log} --rig {make.key} --hold "{1e3 * hold:.4g} ms" -o again',
         ),
         Step(
             "Ask all frequencies at once, and see what that saves and costs.",
-            f"upright frequency --rig {make} --ask multisine",
+            f"upright frequency --rig {make.key} --ask multisine",
         ),
     )
 

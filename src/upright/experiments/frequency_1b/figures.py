@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from upright.identification.frequency.answer import Answer
 from upright.identification.frequency.response import FrequencyResponse
+from upright.records import Array
 from upright.report.drawing import BLACK, BLUE, GREY, ORANGE, SKY, VERMILLION, figure, styled
 from upright.report.symbols import number, plain, unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 LEAST = ((BLUE, "-"), "least squares")
 PAPER = ((VERMILLION, "--"), "simplex on dB")

@@ -1,26 +1,33 @@
 """Experiment 1b: a frequency response of the hanging rig, fits to it, and the pole that the rig will fall by.
 
 What was weighed and measured on the bench fixes the scale: a response alone sees masses, frictions and the drive's gain
-only relative to each other. The unstable pole does not depend on that scale.
+only relative to each other. The unstable pole does not depend on that scale. The same from logs, a study or a
+file, for a rig of one's own.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from upright import units
 from upright.control import ServoRig
+from upright.errors import BadInput, nearest
 from upright.experiments.frequency_1b.sweeps import Sweep, broadband, stepped_sine
-from upright.experiments.makes import Make, make_of, make_rig
+from upright.experiments.makes import Make, make_named, make_of, make_rig
 from upright.experiments.weighing_1a.run import Known
 from upright.identification import Parameter
 from upright.identification import Rig as Asked
 from upright.identification.frequency.answer import Answer, explain
+from upright.identification.frequency.response import FrequencyResponse, is_response
+from upright.identification.frequency.spectra import response_of
 from upright.progress import Progress, silent
+from upright.records import Record
 from upright.study.results import write_response_fit
 
 LAG = 1e-3
@@ -140,3 +147,168 @@ def run_frequency(
     return FrequencyRun(
         rig=rig, make=make, sweep=sweep, answer=answer, folder=folder, kind=kind, seconds=time.perf_counter() - began,
     )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogRequest:
+    """How sources are to be read; SI units.
+
+    Attributes
+    ----------
+    make : str
+        Whose design gives plant and guesses; empty for a response without a fit, or when a study says it.
+    command : str
+        Column of the command; the log's own when empty.
+    signals : mapping of str to str
+        Column by coordinate; as the log names them when empty.
+    counts : mapping of str to float
+        Counts per rad or m by coordinate, negative when they count the other way.
+    kind : str
+        How the rig was asked; told from the command when empty.
+    hold : float, optional
+        Time for which the converter holds a command [s].
+    band : (float, float)
+        Frequencies to keep [rad/s].
+    known : mapping of str to (float, float)
+        Value and standard uncertainty [SI] of what is known.
+    seed : int
+        Of the starts.
+    """
+
+    make: str = ""
+    command: str = ""
+    signals: Mapping[str, str]
+    counts: Mapping[str, float]
+    kind: str = ""
+    hold: float | None = None
+    band: tuple[float, float] | None = None
+    known: Mapping[str, tuple[float, float]]
+    seed: int = 0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LoggedResponse:
+    """A response and, when the rig is known, what follows from it; `sources` are the files' names."""
+
+    sources: tuple[str, ...]
+    response: FrequencyResponse
+    answer: Answer | None
+    folder: Path
+
+
+def response_of_logs(
+    sources: Sequence[Path], wish: LogRequest, folder: Path, *, data: Path | None = None, tell: Progress = silent
+) -> LoggedResponse:
+    """Response of the sources, fitted when plant and numbers are named; writes `frequency.csv` and `fit.json`.
+
+    Parameters
+    ----------
+    sources : sequence of Path
+        One study, one response, or logs that repeat one another.
+    wish : LogRequest
+    folder : Path
+    data : Path, optional
+        Folder of a study's logs.
+    tell : Progress
+        Told the step at work.
+    """
+    rest: Asked | None = None
+    plant = ""
+    if len(sources) == 1 and sources[0].suffix == ".toml":
+        rest, plant, records, quantum = _study(sources[0], data)
+        response = response_of(records, command="u", outputs=records[0].outputs, kind=wish.kind, hold=wish.hold,
+                               quantum=quantum, band=wish.band)  # fmt: skip
+    elif len(sources) == 1 and is_response(sources[0]):
+        response = FrequencyResponse.from_csv(sources[0])
+        if wish.band is not None:
+            response = response.only((response.omega >= wish.band[0]) & (response.omega <= wish.band[1]))
+    else:
+        response = _logs(sources, wish)
+    if wish.make and rest is None:
+        rest, plant = _designed(wish), make_named(wish.make).plant_name
+    folder.mkdir(parents=True, exist_ok=True)
+    names = tuple(s.name for s in sources)
+    if rest is None:
+        response.to_csv(folder / "frequency.csv")
+        return LoggedResponse(sources=names, response=response, answer=None, folder=folder)
+    at = next(iter(rest.plant.equilibria))
+    answer = explain(rest, at, response, seed=wish.seed, tell=tell)
+    write_response_fit(answer, folder, plant, "Frequency response", ", ".join(names))
+    return LoggedResponse(sources=names, response=response, answer=answer, folder=folder)
+
+
+def _designed(wish: LogRequest) -> Asked:
+    """Numbers of a make: as designed where nothing is said, known within a tolerance where the bench usually tells."""
+    make = make_named(wish.make)
+    values = make.plant.parameters()
+    for name in wish.known:
+        if name not in (*values, "actuator.gain", "actuator.delay", "actuator.lag"):
+            raise BadInput(f"'{wish.make}' has no number '{name}'; {nearest(name, values)}")
+    said = {n: values[n] for n in make.bench} | {n: v for n, (v, _) in wish.known.items() if n in values}
+    tolerance = dict(make.bench) | {n: u / v if v else 0.0 for n, (v, u) in wish.known.items()}
+    rest = asked(make, said, tolerance)
+    changed = {
+        n: replace(rest.parameters[n], value=v, uncertainty=u, estimate=False)
+        for n, (v, u) in wish.known.items() if n not in values
+    }  # fmt: skip
+    return replace(rest, parameters={**rest.parameters, **changed})
+
+
+def _study(path: Path, data: Path | None) -> tuple[Asked, str, list[Record], list[float]]:
+    from upright.study.load import load_study
+
+    study = load_study(path, data=data)
+    runs = [r for r in study.runs if r.role == "fit"]
+    if not runs or any(r.measured != runs[0].measured for r in runs):
+        raise BadInput(f"{path} needs fitted runs that measure the same coordinates.")
+    records: list[Record] = []
+    for run in runs:
+        columns = {"u": run.u[:, 0], **{n: run.y[:, j] for j, n in enumerate(run.measured)}}
+        units = {c.name: c.unit for c in study.rig.plant.coordinates if c.name in run.measured}
+        records.append(Record(t=run.t, signals=columns, units=units, inputs=("u",), outputs=run.measured))
+    return study.rig, study.plant, records, list(runs[0].quantum or [0.0] * len(runs[0].measured))
+
+
+def _logs(sources: Sequence[Path], wish: LogRequest) -> FrequencyResponse:
+    from upright.readers import read
+
+    records = [read(path) for path in sources]
+    first = records[0]
+    command = wish.command or (first.inputs[0] if len(first.inputs) == 1 else "")
+    if not command:
+        raise BadInput(f"The log holds the columns {', '.join(first.names)}; say which one drives with --command.")
+    signals = dict(wish.signals) or {n: n for n in first.outputs or [n for n in first.names if n != command]}
+    for name in wish.counts:
+        if name not in signals:
+            raise BadInput(f"--counts names '{name}', which is no output; {nearest(name, signals)}")
+    scaled = [_scaled(r, command, signals, wish) for r in records]
+    quantum = [_step(scaled[0][n]) for n in signals]
+    return response_of(scaled, command=command, outputs=list(signals), kind=wish.kind, hold=wish.hold,
+                       quantum=quantum, band=wish.band)  # fmt: skip
+
+
+def _scaled(record: Record, command: str, signals: Mapping[str, str], wish: LogRequest) -> Record:
+    columns = {command: record[command]}
+    told = {command: record.units.get(command, "")}
+    for name, column in signals.items():
+        unit = record.units.get(column, "")
+        si = next((s for s in ("rad", "m") if unit and units.known(unit) and units.same_dimension(unit, s)), "")
+        if name in wish.counts:
+            columns[name], told[name] = record[column] / wish.counts[name], "m" if name.startswith("x") else "rad"
+        elif si and unit != "counts":
+            columns[name], told[name] = record[column] * units.scale(unit), si
+        elif wish.make and unit == "counts":
+            raise BadInput(
+                f"Column '{column}' is in counts, and the fit needs rad or m: say how many make one, as in --counts "
+                f"{name}=2546.5 (negative when it counts the other way)."
+            )
+        else:
+            columns[name], told[name] = record[column], unit
+    return Record(t=record.t, signals=columns, units=told, inputs=(command,), outputs=tuple(signals),
+                  provenance=record.provenance)  # fmt: skip
+
+
+def _step(x: NDArray[np.float64]) -> float:
+    """Smallest step of a column."""
+    steps = np.diff(np.unique(x))
+    return float(steps.min()) if steps.size else 0.0

@@ -16,15 +16,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.control import ServoRig
+from upright.control.trial import twin_log
 from upright.errors import BadInput
 from upright.experiments.makes import Make, make_rig
 from upright.identification.frequency.detection import Tone, by_period, detect, settled
 from upright.identification.frequency.response import FrequencyResponse
 from upright.identification.frequency.spectra import chirp, from_tones, multisine, odd_lines, response_of
-from upright.records import Record
-from upright.records.record import of_twin
-
-Array = NDArray[np.float64]
+from upright.records import Array, Record
 
 EVERY = 4  # servo periods per logged sample
 SHARE = 0.8
@@ -170,18 +168,6 @@ def _peak(y: Array, length: int, tick: float) -> Array:
     return np.median(lines[-min(4, len(lines)) :], axis=0)
 
 
-def _log(rig: ServoRig, t: Array, u: Array, y: Array) -> Record:
-    names = tuple(c.name for c in rig.plant.coordinates)
-    return Record(
-        t=t,
-        signals={"u": u, **{n: y[:, j] for j, n in enumerate(names)}},
-        units={"u": rig.unit, **{c.name: c.unit for c in rig.plant.coordinates}},
-        inputs=("u",),
-        outputs=names,
-        provenance=of_twin(rig.name, rig.seed),
-    )
-
-
 def _dwell(rig: ServoRig, omega: float, length: int, u: Array, y: Array, amplitude: float, periods: int) -> Dwell:
     tick = rig.period * EVERY
     lines = by_period(y, length, tick)
@@ -191,7 +177,7 @@ def _dwell(rig: ServoRig, omega: float, length: int, u: Array, y: Array, amplitu
     first = (len(lines) - wanted if at is None else at) * length
     part = slice(first, first + wanted * length)
     t = np.arange(y.shape[0]) * tick
-    record = _log(rig, t[part], u[part], y[part])
+    record = twin_log(rig, t[part], y[part], u[part])
     return Dwell(
         omega=omega, amplitude=amplitude, settle=math.nan if at is None else first * tick, record=record,
         tone=detect(record.t, record.y, omega, quantum=rig.quantum),
@@ -243,7 +229,7 @@ def broadband(rig: ServoRig, make: Make, kind: str, *, seed: int = 0) -> Sweep:
         scale = min(scale / float(np.clip(over, 0.4, 2.5)), most)
     u = np.round(scale * u / rig.converter) * rig.converter if rig.converter else scale * u
     y = _moved(rig, u)
-    record = _log(rig, np.arange(u.size, dtype=np.float64) * tick, u, y)
+    record = twin_log(rig, np.arange(u.size, dtype=np.float64) * tick, y, u)
     response = response_of(
         [record],
         command="u",

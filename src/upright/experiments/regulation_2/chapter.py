@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from upright.control import Score, ServoRig
 from upright.control.preflight import FELT, WORDS, word
-from upright.experiments.regulation_2.figures import Panel, chances_figure, runs_figure, ways_figure
+from upright.experiments.regulation_2.figures import chances_figure, runs_figure, ways_figure
 from upright.experiments.regulation_2.run import SETS, Attempt, Regulation, VelocityRun
 from upright.gains.requests import written
 from upright.report.page import Chapter, Finding, Part, Picture, Points, Step, Table
@@ -239,17 +237,14 @@ def _chance_picture(done: Regulation) -> Picture:
 
 def _run_pictures(done: Regulation) -> list[Picture]:
     """Four sets at a time."""
-    panels = [
-        Panel(name=f"{a.name}: {a.word or a.before.word}", told=a.before.run, came=a.after) for a in done.attempts
-    ]
     return [
         Picture(
-            name=f"regulation-runs{i // 4}", draw=lambda four=panels[i : i + 4]: runs_figure(four, SHOWN),
+            name=f"regulation-runs{i // 4}", draw=lambda four=done.attempts[i : i + 4]: runs_figure(four, SHOWN),
             caption="Deviation from upright and command. Dashed: as told by the identified model; solid: as it came; a "
             "cross ends a run that was lost.",
-            description="; ".join(p.name for p in panels[i : i + 4]),
+            description="; ".join(a.title for a in done.attempts[i : i + 4]),
         )
-        for i in range(0, len(panels), 4)
+        for i in range(0, len(done.attempts), 4)
     ]  # fmt: skip
 
 
@@ -288,16 +283,14 @@ def _numbers(done: Regulation) -> dict[str, Any]:
 
 
 def _set(a: Attempt) -> dict[str, Any]:
-    b, m = a.before, a.before.margins
+    b = a.before
     return {
-        "poles": np.asarray(a.placement.asked, dtype=np.complex128),
+        "poles": a.placement.asked,
         "K": a.placement.K[0],
         "before": {
             "word": b.word, "words": dict(b.words), "chance": b.chance, "tilt": b.tilt, "push": b.push,
             "command_noise": b.noise,
-            "margins": None if m is None else {
-                k: getattr(m, k) for k in ("least_gain", "most_gain", "phase", "delay", "modulus")
-            },
+            "margins": b.margins,
             **_scored(b.score),
         },
         "after": None if a.score is None else {"word": a.word, **_scored(a.score)},

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from upright.control import Trial, score
 from upright.control.preflight import WORDS
+from upright.experiments.regulation_2.run import Attempt
 from upright.report.drawing import BLACK, BLUE, GREY, ORANGE, SKY, VERMILLION, decimated, figure, styled
 from upright.report.symbols import axis, mathtext
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 COLOURS: Mapping[str, tuple[str, str]] = {
     "regulates": (SKY, ""),
@@ -29,26 +27,17 @@ COLOURS: Mapping[str, tuple[str, str]] = {
 """Fill and hatching of every end of a run, so that grey print tells them apart."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Panel:
-    """One column of a picture: a name, the run as expected and, where there was one, the run as it went."""
-
-    name: str
-    told: Trial
-    came: Trial | None
-
-
 @styled
-def runs_figure(panels: Sequence[Panel], seconds: float) -> Figure:
+def runs_figure(attempts: Sequence[Attempt], seconds: float) -> Figure:
     """Deviations and command over the first seconds, one column per pole set; a cross where a run was lost."""
-    first = panels[0].told
+    first = attempts[0].before.run
     coordinates = first.rig.plant.coordinates
     order = [*range(len(coordinates))][::-1]  # the pendulum on top
     drawing = figure(1.45 * (len(order) + 1) + 0.7)
-    axes: Any = drawing.subplots(len(order) + 1, len(panels), sharex=True, sharey="row", squeeze=False)
-    for column, panel in enumerate(panels):
-        runs = [(panel.told, "told", ORANGE, "--", 2.0)]
-        runs += [(panel.came, "came", BLUE, "-", 1.1)] if panel.came is not None else []
+    axes: Any = drawing.subplots(len(order) + 1, len(attempts), sharex=True, sharey="row", squeeze=False)
+    for column, a in enumerate(attempts):
+        runs = [(a.before.run, "told", ORANGE, "--", 2.0)]
+        runs += [(a.after, "came", BLUE, "-", 1.1)] if a.after is not None else []
         for run, name, colour, line, width in runs:
             found = score(run)
             lost = min(found.fell, found.ran_out)
@@ -63,7 +52,7 @@ def runs_figure(panels: Sequence[Panel], seconds: float) -> Figure:
             axes[-1, column].plot(t, u, color=colour, linestyle=line, linewidth=width)
         for side in (-1, 1):
             axes[-1, column].axhline(side * first.rig.limit, color=GREY, linestyle=":", linewidth=1.0)
-        axes[0, column].set_title(panel.name)
+        axes[0, column].set_title(a.title)
         axes[-1, column].set_xlabel("time [s]")
     for row, i in enumerate(order):
         turned = coordinates[i].unit == "rad"

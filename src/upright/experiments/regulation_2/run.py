@@ -12,9 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from upright import gains as design
 from upright.control import Score, ServoRig, Trial, score, trial
 from upright.control.preflight import Preflight, Task, preflight, word
 from upright.errors import BadInput
@@ -22,16 +20,14 @@ from upright.experiments.designing.run import SPEEDS, velocities
 from upright.experiments.frequency_1b.run import run_frequency
 from upright.experiments.identified import IdentifiedRig, read_identified
 from upright.experiments.makes import PENDULUMS
-from upright.gains import Margins, Placement, Sampled
+from upright.gains import Margins, Placement, Sampled, feedback, hold, margins, place
 from upright.gains.loop import closed, command_noise
-from upright.gains.requests import poles_of, read_poles
+from upright.gains.requests import Roots, poles_of, read_poles
 from upright.laws import Law
 from upright.paper.reproduce import TABLE_1
 from upright.physics import Linear
 from upright.progress import Progress, silent
-
-Array = NDArray[np.float64]
-Roots = NDArray[np.complex128]
+from upright.records import Array
 
 HAND = (0.01, 0.1)
 """What a hand gets wrong: half a degree, and 0.1 rad/s."""
@@ -73,6 +69,11 @@ class Attempt:
     def word(self) -> str:
         """What it came to, in one of `preflight.WORDS`; empty when nothing was run."""
         return "" if self.score is None else word(self.score)
+
+    @property
+    def title(self) -> str:
+        """Its name and what it came to, or what is expected where nothing was run."""
+        return f"{self.name}: {self.word or self.before.word}"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -172,7 +173,7 @@ def run_regulation(
     _check_upright(make.key)
     rig = known.rig()
     model = rig.linear("inverted")
-    sampled = design.hold(model, rig.period, rig.delay / rig.period)
+    sampled = hold(model, rig.period, rig.delay / rig.period)
     tilt, push = (w if w is not None else s for w, s in zip((wish.tilt, wish.push), make.start, strict=True))
     task = Task(start=(0.0, 0.0, tilt, push), hand=(0.0, 0.0, *HAND), seconds=wish.seconds)
     others = known.allowed(rig, wish.draws, seed)
@@ -206,8 +207,8 @@ def _attempt(
     name: str, poles: Roots, rig: ServoRig, truth: ServoRig | None, model: Linear, sampled: Sampled, task: Task,
     others: Mapping[str, Array], wish: RegulationRequest, seed: int,
 ) -> Attempt:  # fmt: skip
-    placed = design.place(model.A, model.B, poles)
-    law = design.feedback(velocities(model, sampled, wish.speed, wish.memory, rig.limit, rig.quantum), placed.K)
+    placed = place(model.A, model.B, poles)
+    law = feedback(velocities(model, sampled, wish.speed, wish.memory, rig.limit, rig.quantum), placed.K)
     told = preflight(rig, model, sampled, law, task, parameters=others, lanes=wish.draws, seed=seed)
     after = None
     if truth is not None:
@@ -219,18 +220,18 @@ def _attempt(
 
 def _ways(done: Regulation, model: Linear, sampled: Sampled) -> list[VelocityRun]:
     on, K = done.truth or done.rig, done.best.placement.K
-    driven = design.hold(model, sampled.period, sampled.delay, done.rig.lag)
+    driven = hold(model, sampled.period, sampled.delay, done.rig.lag)
     out: list[VelocityRun] = []
     for speed in SPEEDS:
         way = velocities(model, sampled, speed, done.wish.memory, done.rig.limit, done.rig.quantum)
-        law = design.feedback(way, K)
+        law = feedback(way, K)
         stands = bool(np.abs(poles_of(closed(driven, law))).max() < 1)
         went = trial(on, law, at=done.task.at, start=actual_start(done.task, done.seed), seconds=done.task.seconds)
         out.append(
             VelocityRun(
                 name=way.name,
                 noise=command_noise(driven, law, done.rig.quantum) if stands else None,
-                margins=design.margins(model, driven, law) if stands else None,
+                margins=margins(model, driven, law) if stands else None,
                 run=went,
                 score=score(went),
                 restless=float(np.sqrt(np.mean(np.diff(went.u[went.t <= 1.0]) ** 2))),

@@ -6,8 +6,8 @@ import math
 from typing import Any
 
 from upright.control import ServoRig
-from upright.control.ascent import Ascent
 from upright.control.sensors import Scales
+from upright.control.swing_up import Ascent
 from upright.experiments.makes import make_of
 from upright.experiments.swing_up_2b.figures import ascent_figure, check_figure, portrait_figure
 from upright.experiments.swing_up_2b.run import HELD, LIES, TILT, Lie, SwingUpRun

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.control.ascent import Ascent
 from upright.control.sensors import Scales
-from upright.control.swing_up_law import HOLDING, SWINGING
+from upright.control.swing_up import HOLDING, SWINGING, Ascent
 from upright.report.drawing import (
     BLUE,
     GREEN,

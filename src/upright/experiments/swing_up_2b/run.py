@@ -13,22 +13,18 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from upright import gains as design
 from upright.control import ServoRig, SwingUp, design_swing_up, trial
-from upright.control.ascent import Ascent, swing_up
 from upright.control.score import FALLEN
-from upright.control.sensors import KNOWN, Scales, probe, put_out, scales
+from upright.control.sensors import KNOWN, Scales, Suspicion, Watch, probe, put_out, scales
+from upright.control.swing_up import Ascent, swing_up
 from upright.control.trial import readings
-from upright.control.watch import Suspicion, Watch
 from upright.errors import BadInput, NotIdentifiable, nearest
 from upright.experiments.identified import IdentifiedRig
+from upright.gains import feedback, filtered, hold
 from upright.progress import Progress, silent
-from upright.records import Record
+from upright.records import Array, Record
 from upright.units import same_dimension, scale
-
-Array = NDArray[np.float64]
 
 HELD = 5.0
 """How long the pendulum must stand before it counts as caught [s]."""
@@ -262,8 +258,8 @@ def _lies(
     seconds: float = 2.0,
 ) -> tuple[Lie, ...]:
     names = [c.name for c in model.plant.coordinates]
-    sampled = design.hold(model.linear("inverted"), model.period, (model.delay + model.lag) / model.period)
-    feedback = design.feedback(design.filtered(sampled, law.memory), law.K[None])
+    sampled = hold(model.linear("inverted"), model.period, (model.delay + model.lag) / model.period)
+    law_upright = feedback(filtered(sampled, law.memory), law.K[None])
     told = [(name or names[0], factor) for name, factor in LIES]
     checks: list[Scales] = []
     runs: list[tuple[Array, Array, Array]] = []
@@ -271,7 +267,7 @@ def _lies(
         rig = replace(truth, scales=tuple(factor if n == name else 1.0 for n in names))
         checks.append(scales(model, put_out(rig, command), known))
         rest = readings(rig, list(rig.plant.equilibrium("inverted").values()))  # zeroed by a hand that holds it upright
-        went = trial(rig, feedback, at="inverted", start=[0.0, 0.0, TILT, 0.0], seconds=seconds, rest=rest)
+        went = trial(rig, law_upright, at="inverted", start=[0.0, 0.0, TILT, 0.0], seconds=seconds, rest=rest)
         seen = np.column_stack([went.record[n] for n in names]) - rest
         runs.append((seen, went.u, np.abs(went.deviation[:, 1])))
     alarm = Watch(model).over(np.stack([r[0] for r in runs], axis=-1), np.column_stack([r[1] for r in runs]))

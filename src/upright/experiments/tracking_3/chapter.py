@@ -9,16 +9,14 @@ import numpy as np
 
 from upright.experiments.tracking_3 import tables
 from upright.experiments.tracking_3.figures import (
-    Bargain,
-    Locus,
-    Panel,
-    bargain_figure,
+    RootLocus,
+    Tradeoff,
     loci_figure,
     poles_figure,
     steps_figure,
+    tradeoff_figure,
 )
-from upright.experiments.tracking_3.laws import AT, loop_poles
-from upright.experiments.tracking_3.pd import best_decay, root_locus, sampled
+from upright.experiments.tracking_3.laws import AT, best_decay, root_locus, sampled
 from upright.experiments.tracking_3.pulses import FIT, STUDY
 from upright.experiments.tracking_3.run import BEFORE, DWELL, RESERVE, Outcome, StepTrial, Tracking
 from upright.experiments.tracking_3.tables import length, milli, share
@@ -57,24 +55,24 @@ def _verdict(done: Tracking) -> str:
     head = f"A step of {length(done, size)} is followed by {who} within effort, travel and twist"
     if bad:
         head = f"A step of {length(done, size)} is too much for {', '.join(map(_beyond, bad))}"
-    got, effort = best.found.figures, share(best.found.effort.share, 0)
+    got, effort = best.measured.figures, share(best.measured.effort.share, 0)
     if got is None:
         return f"{head}."
     head += f"; {best.law.name} takes {effort} of the drive's limit and {_arrives(got.arrival)}."
-    if done.pd is None or done.stiff is None or done.pd.found.figures is None:
+    if done.pd is None or done.stiff is None or done.pd.measured.figures is None:
         return head
-    pd, stiff = done.pd.found, done.stiff.found.figures
+    pd, stiff = done.pd.measured, done.stiff.measured.figures
     swings = stiff is None or not math.isfinite(stiff.settling_5)
     slow = "does not settle" if stiff is None or swings else f"swings for {stiff.settling_5:.2g} s"
     return (
-        f"{head} A tuned PD of the near encoder {_arrives(done.pd.found.figures.arrival)}, with "
+        f"{head} A tuned PD of the near encoder {_arrives(done.pd.measured.figures.arrival)}, with "
         f"{share(pd.effort.share, 0)} of the limit, but a push of the drive moves it by {share(pd.give / size, 0)} of "
-        f"the step, {best.law.name} by {share(best.found.give / size, 0)}; made as stiff, the PD {slow}."
+        f"the step, {best.law.name} by {share(best.measured.give / size, 0)}; made as stiff, the PD {slow}."
     )
 
 
 def _beyond(o: Outcome) -> str:
-    run = o.found
+    run = o.measured
     if math.isfinite(run.tripped):
         return f"{o.law.name} (leaves travel or twist after {run.tripped:.2g} s)"
     return f"{o.law.name} (at the drive's limit in {share(run.effort.saturated, 1)} of the samples)"
@@ -87,7 +85,7 @@ def _arrives(arrival: float) -> str:
 def _sound(done: Tracking) -> bool:
     """Whether the fit is trusted and every set stays within the limits and settles."""
     trusted = done.fit is None or done.fit.trusted
-    settled = all(o.found.figures is not None and math.isfinite(o.found.figures.settling_5) for o in done.sets)
+    settled = all(o.measured.figures is not None and math.isfinite(o.measured.figures.settling_5) for o in done.sets)
     return trusted and settled and all(o.within for o in done.sets)
 
 
@@ -102,11 +100,11 @@ def _findings(done: Tracking) -> tuple[Finding, ...]:
     swing = max(poles, key=lambda e: e.value, default=None)
     if swing is not None and swing.value > 0:
         out.append(finding("flexible mode [rad/s]", swing, float(max(done.true.linear(AT).poles().imag))))
-    f = best.found.figures
+    f = best.measured.figures
     if f is not None:
         out.append(Finding(what=f"{best.law.name}: arrival within 5 % [s]", value=milli(f.arrival)))
         out.append(Finding(what=f"{best.law.name}: overshoot", value=share(f.overshoot)))
-    out.append(Finding(what=f"{best.law.name}: effort, of the limit", value=share(best.found.effort.share)))
+    out.append(Finding(what=f"{best.law.name}: effort, of the limit", value=share(best.measured.effort.share)))
     return tuple(out)
 
 
@@ -172,14 +170,6 @@ def _scale(weighed: bool) -> str:
 
 def _gains(done: Tracking, far: str) -> Part:
     """Gains, poles, and the size of the step."""
-
-    def draw() -> Any:
-        panels = [
-            Panel(name=o.law.name, asked=o.law.asked, model=o.law.poles, rig=loop_poles(done.rig, o.law.law))
-            for o in done.sets
-        ]
-        return poles_figure(panels, done.model.linear(AT).poles())
-
     return Part(
         "Gains",
         (
@@ -190,7 +180,7 @@ def _gains(done: Tracking, far: str) -> Part:
             tables.gain_table(done),
             tables.pole_table(done),
             Picture(
-                name="track-poles", draw=draw,
+                name="track-poles", draw=lambda: poles_figure(done),
                 caption="Poles asked (rings), of the sampled, late loop on the fitted model (+) and on the rig (x). "
                 "Delay and differences move the fast poles; the flexible mode stays where it was asked.",
                 description="Upper half of the s-plane for every set.",
@@ -212,15 +202,15 @@ def _sized(done: Tracking) -> str:
 
 def _loop(done: Tracking, near: str, far: str) -> Part:
     """Step figures and pictures of the sets."""
-    shares = ", ".join(f"{o.law.name} {share(o.found.effort.share, 0)}" for o in done.sets)
+    shares = ", ".join(f"{o.law.name} {share(o.measured.effort.share, 0)}" for o in done.sets)
     best = _strongest(done)
-    off = abs(best.found.effort.peak / best.foreseen.effort.peak - 1)
+    off = abs(best.measured.effort.peak / best.predicted.effort.peak - 1)
     told = f"Largest command, of the drive's limit: {shares}."
     if done.simulated:
         told += (
             f" Foreseen for {best.law.name}: "
-            f"{best.foreseen.effort.peak:.3g} {done.rig.unit} ({share(best.foreseen.effort.share)}); found "
-            + ("the same." if off < 5e-4 else f"{best.found.effort.peak:.3g} {done.rig.unit}.")
+            f"{best.predicted.effort.peak:.3g} {done.rig.unit} ({share(best.predicted.effort.share)}); found "
+            + ("the same." if off < 5e-4 else f"{best.measured.effort.peak:.3g} {done.rig.unit}.")
         )
     steps = Picture(
         name="track-steps", draw=lambda: steps_figure(done, done.sets),
@@ -234,18 +224,18 @@ def _loop(done: Tracking, near: str, far: str) -> Part:
 def _described(done: Tracking) -> str:
     """The picture of the steps, for who cannot see it."""
     return "; ".join(
-        f"{o.law.name}: overshoot {share(o.found.figures.overshoot)}, settled to 5 % after "
-        f"{milli(o.found.figures.settling_5)} s"
+        f"{o.law.name}: overshoot {share(o.measured.figures.overshoot)}, settled to 5 % after "
+        f"{milli(o.measured.figures.settling_5)} s"
         for o in done.sets
-        if o.found.figures is not None
+        if o.measured.figures is not None
     )
 
 
 def _friction(done: Tracking, far: str) -> Part:
     """What dry friction leaves, why, and the cure."""
     cure = ""
-    if done.summed is not None and done.summed.found.figures is not None:
-        left = abs(done.summed.found.figures.error) / done.step.size
+    if done.summed is not None and done.summed.measured.figures is not None:
+        left = abs(done.summed.measured.figures.error) / done.step.size
         cure = (
             f" The sum of the error, with a fifth pole at −5 1/s, is the cure: it leaves {share(left)} of the step, "
             "and the push is made up for. Its zero cancels that pole on the reference's way, so that the step itself "
@@ -271,14 +261,14 @@ def _why(done: Tracking, pd: Outcome, stiff: Outcome, other_end: Outcome, near: 
     force = "N m/rad" if done.rig.plant.coordinates[-1].unit == "rad" else "N/m"
     bound = 0.5 * math.sqrt(p["k_12"] / inertia)
     compared = [best, *((done.summed,) if done.summed else ()), pd, stiff, other_end]
-    trips = other_end.found.tripped
+    trips = other_end.measured.tripped
     end = f"trips the rig {trips - BEFORE:.2g} s after the step" if math.isfinite(trips) else "does not trip the rig"
     tried = 0 if done.search is None else done.search.kp.size
     return Part(
         "Why state feedback",
         (
             f"PD control of the driven body, kp and kd the best of {tried} pairs tried on the fitted rig under the "
-            f"same limit, brings {far} to the reference about as soon, at {share(pd.found.effort.share, 0)} of the "
+            f"same limit, brings {far} to the reference about as soon, at {share(pd.measured.effort.share, 0)} of the "
             "limit. For a step alone it would do.",
             "But it has one damper for two modes. Without natural damping no kp and kd let every pole decay faster "
             f"than half the root of k/inertia 1, {number(bound, 3)} 1/s here, and it gets there only at kp·gain = k "
@@ -309,7 +299,7 @@ def _reasons(done: Tracking, tuned: Outcome, stiff: Outcome, bound: float) -> li
     of = done.rig.plant.coordinates[-1].unit
     kp = np.geomspace(0.2 * pd.k_pf, 2.5 * _strongest(done).law.k_pf, 40)
     points = {o.law.name: (o.law.stiffness, o.law.decay) for o in (*done.sets, tuned, stiff)}
-    bargain = Bargain(
+    bargain = Tradeoff(
         stiffness=kp * done.model.gain, bound=bound, shaft=p["k_12"], points=points,
         decay=best_decay(sampled(done.model), kp, period=done.model.period),
         unit=f"{'N m' if of == 'rad' else 'N'}/{of}",
@@ -317,15 +307,15 @@ def _reasons(done: Tracking, tuned: Outcome, stiff: Outcome, bound: float) -> li
     rate = float(pd.K[1]) / pd.k_pf
     rising = pd.k_pf * np.geomspace(1e-3, 30, 300)
     swing = 1j * math.sqrt(p["k_12"] / p.get("m_2", p.get("J_2", 1.0)))
-    loci: list[Locus] = []
+    loci: list[RootLocus] = []
     for title, body, zeros in (("near encoder", 0, [-1 / rate, swing]), ("far encoder", 1, [-1 / rate])):
         loci.append(
-            Locus(title=title, tracks=root_locus(model, body, rate, rising),
+            RootLocus(title=title, tracks=root_locus(model, body, rate, rising),
                   marked=root_locus(model, body, rate, np.array([pd.k_pf]))[0], zeros=np.array(zeros, dtype=complex))
         )  # fmt: skip
     return [
         Picture(
-            name="track-bargain", draw=lambda: bargain_figure(bargain),
+            name="track-bargain", draw=lambda: tradeoff_figure(bargain),
             caption="Fast against stiff. PD of the near encoder has what lies under the curve; state feedback stands "
             "outside of it. All as the loops run; dashed: the most that PD can have without natural damping and delay.",
             description="Decay of the slowest pole over static force per error.",
@@ -359,10 +349,10 @@ def _numbers(done: Tracking) -> dict[str, Any]:
         "limit": done.rig.limit,
         "laws": {
             o.law.name: {
-                "K": o.law.K, "k_pf": o.law.k_pf, "poles_asked": np.asarray(o.law.asked, dtype=np.complex128),
-                "poles": np.asarray(o.law.poles, dtype=np.complex128), "decay": o.law.decay, "damping": o.law.damping,
-                "static_force_per_error": o.law.stiffness, "error_at_most": o.law.play, "foreseen": run(o.foreseen),
-                "found": run(o.found) if done.simulated else None, "within_limits": o.within,
+                "K": o.law.K, "k_pf": o.law.k_pf, "poles_asked": o.law.asked,
+                "poles": o.law.poles, "decay": o.law.decay, "damping": o.law.damping,
+                "static_force_per_error": o.law.stiffness, "error_at_most": o.law.play, "foreseen": run(o.predicted),
+                "found": run(o.measured) if done.simulated else None, "within_limits": o.within,
             } for o in tables.outcomes(done)
         },
         "seconds": done.seconds,

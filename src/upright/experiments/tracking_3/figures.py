@@ -8,9 +8,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from upright.experiments.tracking_3.laws import AT, loop_poles
 from upright.experiments.tracking_3.run import BEFORE, DWELL, Outcome, Tracking
+from upright.gains.requests import Roots
+from upright.records import Array
 from upright.report.drawing import (
     BLACK,
     BLUE,
@@ -30,8 +32,6 @@ from upright.report.symbols import axis, mathtext, plain, unit
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
-Roots = NDArray[np.complex128]
 
 _SHOWN = {"m": (1e3, "mm"), "rad": (180 / math.pi, "deg")}
 
@@ -63,7 +63,7 @@ def steps_figure(
             t, y = _seen(o, body.name, -0.05, until)
             line = decimated(t, factor * y)
             ax.plot(*line, color=colour, linestyle=style, label=o.law.name)
-            if o.found.tripped - BEFORE < until:
+            if o.measured.tripped - BEFORE < until:
                 last = float(np.clip(line[1][-1], low, high))
                 ax.plot(line[0][-1:], [last], "X", color=colour, markersize=7, clip_on=False, zorder=5)
         ax.set_ylabel(axis(mathtext(body.name), of))
@@ -86,9 +86,9 @@ def steps_figure(
 
 def _seen(o: Outcome, name: str, start: float, stop: float) -> tuple[Array, Array]:
     """Time from the step [s] and what was logged between two instants, up to a trip."""
-    record = o.found.trial.record
+    record = o.measured.trial.record
     t = record.t - BEFORE
-    kept = (record.t <= o.found.tripped) & (t >= start) & (t <= stop)
+    kept = (record.t <= o.measured.tripped) & (t >= start) & (t <= stop)
     return t[kept], record[name][kept]
 
 
@@ -102,54 +102,45 @@ def _efforts(ax: Any, done: Tracking, outcomes: Sequence[Outcome], until: float)
     ax.set_ylabel(axis("command", done.rig.unit))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Panel:
-    """Poles [1/s] of one set: asked, of the loop on the fitted model and on the rig."""
-
-    name: str
-    asked: Roots
-    model: Roots
-    rig: Roots
-
-
 @styled
-def poles_figure(panels: Sequence[Panel], open_loop: Roots) -> Figure:
+def poles_figure(done: Tracking) -> Figure:
     """Poles asked and attained, set by set; the upper half plane, which the lower mirrors."""
-    columns = min(2, len(panels))
-    rows = -(-len(panels) // columns)
+    laws, open_loop = [o.law for o in done.sets], done.model.linear(AT).poles()
+    columns = min(2, len(laws))
+    rows = -(-len(laws) // columns)
     drawing = figure(0.85 + 2.0 * rows, margins=(0.65, 0.15, 0.55, 0.48))
     grid: Any = drawing.subplots(
         rows, columns, squeeze=False, sharey=True, gridspec_kw={"hspace": 0.32, "wspace": 0.08}
     )
     axes: list[Any] = grid.ravel().tolist()
-    left = 1.12 * min(float(p.asked.real.min()) for p in panels)
-    high = 1.2 * max(float(np.abs(p.asked.imag).max()) for p in (*panels, Panel(
-        name="", asked=open_loop, model=open_loop, rig=open_loop)))  # fmt: skip
-    for ax, panel in zip(axes, panels, strict=False):
+    left = 1.12 * min(float(law.asked.real.min()) for law in laws)
+    high = 1.2 * max(float(np.abs(p.imag).max()) for p in (open_loop, *(law.asked for law in laws)))
+    for ax, law in zip(axes, laws, strict=False):
         s_plane(ax)
+        on_rig = loop_poles(done.rig, law.law)
         kinds = (
-            ("open loop", open_loop, "x", GREY, 6), ("asked", panel.asked, "o", BLACK, 9),
-            ("on the fitted model, sampled and late", panel.model, "+", BLUE, 9),
-            ("on the rig", panel.rig, "x", VERMILLION, 6),
+            ("open loop", open_loop, "x", GREY, 6), ("asked", law.asked, "o", BLACK, 9),
+            ("on the fitted model, sampled and late", law.poles, "+", BLUE, 9),
+            ("on the rig", on_rig, "x", VERMILLION, 6),
         )  # fmt: skip
-        beyond = int(np.sum((panel.rig.real < left) & (panel.rig.imag > -1e-9)))
+        beyond = int(np.sum((on_rig.real < left) & (on_rig.imag > -1e-9)))
         for name, values, mark, colour, size in kinds:
             roots(ax, values[values.imag > -1e-9], mark, colour, name, size=size)
         ax.set_xlim(left, -0.06 * left)
         ax.set_ylim(-0.08 * high, high)
-        ax.set_title(panel.name + (f" ({beyond} faster left out)" if beyond else ""), fontsize=9)
+        ax.set_title(law.name + (f" ({beyond} faster left out)" if beyond else ""), fontsize=9)
     for ax in axes[:-columns]:
         ax.set_xlabel("")
     for ax in axes[::columns]:
         ax.set_ylabel("imaginary part [rad/s]")
-    for ax in axes[len(panels) :]:
+    for ax in axes[len(laws) :]:
         ax.set_visible(False)
     drawing.legend(*axes[0].get_legend_handles_labels(), loc="upper center", ncols=4)
     return drawing
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Bargain:
+class Tradeoff:
     """What PD of the near encoder can have, and points beside it: stiffness [N/m or N m/rad] against decay [1/s]."""
 
     stiffness: Array
@@ -161,7 +152,7 @@ class Bargain:
 
 
 @styled
-def bargain_figure(bargain: Bargain) -> Figure:
+def tradeoff_figure(bargain: Tradeoff) -> Figure:
     """How fast the slowest pole decays over how hard the loop pulls at rest."""
     drawing = figure(3.3, margins=(0.65, 3.0, 0.15, 0.5))
     ax: Any = drawing.subplots()
@@ -183,7 +174,7 @@ def bargain_figure(bargain: Bargain) -> Figure:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Locus:
+class RootLocus:
     """Poles [1/s] as kp rises, shape (kp, states), with the poles at one marked kp, and the zeros."""
 
     title: str
@@ -193,7 +184,7 @@ class Locus:
 
 
 @styled
-def loci_figure(loci: Sequence[Locus], open_loop: Roots) -> Figure:
+def loci_figure(loci: Sequence[RootLocus], open_loop: Roots) -> Figure:
     """Root loci of PD control of either body, in one scale; the right half plane is shaded."""
     drawing = figure(3.5, margins=(0.65, 0.15, 0.3, 0.78))
     axes: list[Any] = drawing.subplots(1, len(loci), sharey=True, squeeze=False, gridspec_kw={"wspace": 0.08})[

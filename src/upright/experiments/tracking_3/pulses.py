@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from upright.control import ServoRig
+from upright.control.trial import twin_log
 from upright.errors import BadInput
 from upright.experiments.identified import read_identified
 from upright.experiments.makes import SHAFTS, Make, make_of, make_rig
@@ -21,7 +22,6 @@ from upright.identification.model.fit import Fit
 from upright.physics import Plant
 from upright.progress import Progress, part, silent
 from upright.records import Record
-from upright.records.record import of_twin
 from upright.study.load import Study
 from upright.study.text import TomlTable, counted_sensor, number, study_text, table
 
@@ -73,16 +73,8 @@ def pulses(rig: ServoRig, file: str) -> Record:
     x = simulate(
         rig.plant, rig.drive, rig.plant.state(), np.repeat(u, EVERY), rig.period, samples=u.size, every=EVERY
     )[:, ::2, 0]  # fmt: skip
-    names = tuple(c.name for c in rig.plant.coordinates)
-    counts = np.floor(x * np.array(rig.counts) + 0.5)
-    return Record(
-        t=np.arange(u.size, dtype=np.float64) * dt,
-        signals={"u": u} | {n: counts[:, i] for i, n in enumerate(names)},
-        units={"u": rig.unit} | dict.fromkeys(names, "counts"),
-        inputs=("u",),
-        outputs=names,
-        provenance=of_twin(rig.name, rig.seed),
-    )
+    t = np.arange(u.size, dtype=np.float64) * dt
+    return twin_log(rig, t, np.floor(x * np.array(rig.counts) + 0.5), u, unit="counts")
 
 
 def shaft_study(rig: ServoRig, seed: int, weighed: Sequence[Known] = ()) -> str:

@@ -16,19 +16,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.control import ServoRig, Trial, trial
-from upright.control.steps import Effort, StepFigures, effort, step_figures
+from upright.control.score import Effort, StepFigures, effort, step_figures
 from upright.errors import BadInput
 from upright.experiments.identified import DAILY
 from upright.experiments.makes import MAKES, make_rig
-from upright.experiments.tracking_3.laws import AT, Tracker, by_poles, check, paper_sets, with_sum
-from upright.experiments.tracking_3.pd import Search, far_pd, near_pd, tune
+from upright.experiments.tracking_3.laws import (
+    AT,
+    GainSearch,
+    Tracker,
+    by_poles,
+    check,
+    far_pd,
+    near_pd,
+    paper_sets,
+    tune,
+    with_sum,
+)
 from upright.experiments.tracking_3.pulses import fitted, identify_shaft, shaft_make
 from upright.experiments.weighing_1a.run import Known
 from upright.identification.model.fit import Fit
 from upright.progress import Progress, silent
 from upright.study.load import Study
-
-Array = NDArray[np.float64]
 
 RESERVE = 0.95
 """Share of the limit that the step may take from the strongest law."""
@@ -72,13 +80,13 @@ class Outcome:
     """A law, what the fitted model says it will do, and what the rig did."""
 
     law: Tracker
-    foreseen: StepTrial
-    found: StepTrial
+    predicted: StepTrial
+    measured: StepTrial
 
     @property
     def within(self) -> bool:
         """Whether the rig stayed within limit, travel and twist."""
-        return math.isinf(self.found.tripped) and self.found.effort.saturated == 0
+        return math.isinf(self.measured.tripped) and self.measured.effort.saturated == 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,7 +118,7 @@ class Tracking:
         The strongest with a sum.
     pd, stiff, far : Outcome or None
         PD of the near encoder tuned, the same as stiff as the strongest set, and PD of the far encoder.
-    search : Search or None
+    search : GainSearch or None
         What the tuning tried.
     """
 
@@ -126,7 +134,7 @@ class Tracking:
     pd: Outcome | None = None
     stiff: Outcome | None = None
     far: Outcome | None = None
-    search: Search | None = None
+    search: GainSearch | None = None
     seconds: float = 0.0
     interrupted: bool = False
 
@@ -240,7 +248,7 @@ def stiffest_damped(model: ServoRig, kp: float) -> Tracker:
 def choose(model: ServoRig, laws: Sequence[Tracker], step: float | None = None) -> Chosen:
     """The largest step of two digits that keeps every law within effort, twist and travel, by the linear model."""
     most = RESERVE * model.limit / max(abs(law.k_pf) for law in laws)
-    unit = [outcome(model, model, law, 0.5 * most).found for law in laws]
+    unit = [outcome(model, model, law, 0.5 * most).measured for law in laws]
     twist = 0.6 * shaft_make(model.plant, model.name).twist * 0.5 * most / max(r.twist for r in unit)
     travel = 0.6 * model.travel * 0.5 * most / max(r.travel for r in unit)
     bounds = {"effort": most, "twist": twist, "travel": travel}
@@ -255,8 +263,8 @@ def choose(model: ServoRig, laws: Sequence[Tracker], step: float | None = None) 
 
 def outcome(rig: ServoRig, model: ServoRig, law: Tracker, step: float) -> Outcome:
     """A law on the model and on the rig."""
-    foreseen = attempt(model, law, step)
-    return Outcome(law=law, foreseen=foreseen, found=foreseen if rig is model else attempt(rig, law, step))
+    predicted = attempt(model, law, step)
+    return Outcome(law=law, predicted=predicted, measured=predicted if rig is model else attempt(rig, law, step))
 
 
 def attempt(rig: ServoRig, law: Tracker, step: float) -> StepTrial:

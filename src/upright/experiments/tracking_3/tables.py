@@ -73,7 +73,7 @@ def step_table(done: Tracking) -> Table:
     """Step figures, foreseen on the fitted model and found on the rig."""
     rows: list[tuple[str, ...]] = []
     for o in outcomes(done):
-        both = (("foreseen", o.foreseen), ("found", o.found)) if done.simulated else (("foreseen", o.foreseen),)
+        both = (("foreseen", o.predicted), ("found", o.measured)) if done.simulated else (("foreseen", o.predicted),)
         rows += [(o.law.name if what == both[0][0] else "", what, *_figures(run)) for what, run in both]
     return Table(
         caption=f"A step of {length(done, done.step.size)} of the far body: rise 10 to 90 %, overshoot, time of the "
@@ -102,7 +102,7 @@ def friction_table(done: Tracking) -> Table:
     seen = ("foreseen", "found") if done.simulated else ("foreseen",)
     rows: list[tuple[str, ...]] = []
     for o in outcomes(done):
-        runs = (o.foreseen, o.found)[: len(seen)]
+        runs = (o.predicted, o.measured)[: len(seen)]
         if any(r.figures is None for r in runs):
             continue
         bound, steady = (

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from upright.experiments.makes import OSCILLATORS
 from upright.experiments.weighing_1a.figures import decrement_figure, line_figure, swing_figure
-from upright.experiments.weighing_1a.run import Known, Weighing
-from upright.experiments.weighing_1a.twin import truth
-from upright.identification import Estimate
+from upright.experiments.weighing_1a.run import Known, Weighing, truth
 from upright.identification.loadings import Loaded, Loadings
 from upright.records import Record
+from upright.report.fit.tables import plain_estimate
 from upright.report.page import Chapter, Finding, Part, Picture, Points, Step, Symbol, Table
 from upright.report.symbols import measured, number, typed, unit
 
@@ -28,7 +26,7 @@ MOST_PANELS = 6
 
 def chapter(done: Weighing) -> Chapter:
     """Experiment 1a on the rig of the later experiments."""
-    on, found = done.campaign.on, done.campaign.found
+    on, found = done.campaign.on, done.campaign.loadings
     true = truth(on)
     column = next(iter(done.campaign.logs.values())).outputs[0]
     weighed = loading_chapter(
@@ -71,7 +69,7 @@ def chapter(done: Weighing) -> Chapter:
             for k in done.known
         ),
         numbers={
-            **{name: _numbers(w, true.get(name)) for name, w in named},
+            **{name: plain_estimate(w, true.get(name)) for name, w in named},
             "handed_on": handed_on,
             "swings": len(found.swings),
         },
@@ -86,13 +84,6 @@ def _sentence(done: Weighing, k: Known) -> str:
     off = abs(k.value / _truth(done, k) - 1)
     inside = abs(k.value - _truth(done, k)) <= 1.96 * k.stderr
     return f"{k.name} lies {100 * off:.2g} % from the twin's, {'inside' if inside else 'outside'} its 95 % interval."
-
-
-def _numbers(w: Estimate, true: float | None) -> dict[str, Any]:
-    out: dict[str, Any] = {"value": w.value, "stderr": w.stderr, "interval": w.interval}
-    if true is not None:
-        out |= {"truth": true, "inside": w.interval[0] <= true <= w.interval[1]}
-    return out
 
 
 def _steps(done: Weighing) -> tuple[Step, ...]:
@@ -142,7 +133,7 @@ def loading_chapter(
         ),
         steps=tuple(steps),
         numbers={
-            **{name: _numbers(w, None) for name, w in named},
+            **{name: plain_estimate(w) for name, w in named},
             "kind": kind,
             "verdict": found.verdict,
             "truth": truth,

@@ -9,8 +9,7 @@ from pathlib import Path
 from upright.errors import BadInput, NotIdentifiable
 from upright.experiments.makes import MASS_RADIUS, OSCILLATORS
 from upright.experiments.weighing_1a.chapter import loading_chapter
-from upright.experiments.weighing_1a.run import weigh_body
-from upright.experiments.weighing_1a.twin import drawn_twin, truth
+from upright.experiments.weighing_1a.run import drawn_twin, measure_body, truth
 from upright.identification.loadings import Loaded, Loadings, fit_loadings, swings
 from upright.physics.oscillators import added_inertia
 from upright.records import Record
@@ -88,7 +87,7 @@ def weigh_twin(kind: str, seed: int, folder: Path | None) -> tuple[Loadings, Cha
     """The same of a twin that is stepped here; its logs go into the folder, where one is named."""
     if kind not in OSCILLATORS:
         raise BadInput(f"--twin is {' or '.join(OSCILLATORS)}, got '{kind}'.")
-    done = weigh_body(drawn_twin(seed, kind))
+    done = measure_body(drawn_twin(seed, kind))
     column = next(iter(done.logs.values())).outputs[0]
     files = {} if folder is None else done.write_logs(folder)
     added = " ".join(f'--added "{done.added[label]:.6g} {OSCILLATORS[kind].unit}"' for label in files)
@@ -97,10 +96,10 @@ def weigh_twin(kind: str, seed: int, folder: Path | None) -> tuple[Loadings, Cha
         again = f"upright loadings {' '.join(files.values())} {added}"
         steps.insert(0, Step("Weigh the rig again from its logs in that folder, as you would your own.", again))
     told = loading_chapter(
-        done.found, kind=kind, title=f"Experiment 1a on a twin, {kind}, seed {seed}", logs=done.logs,
+        done.loadings, kind=kind, title=f"Experiment 1a on a twin, {kind}, seed {seed}", logs=done.logs,
         signals=dict.fromkeys(done.logs, column), left_out=done.left_out, truth=truth(done.on), steps=steps,
     )  # fmt: skip
-    return done.found, told
+    return done.loadings, told
 
 
 def _inertia(text: str) -> tuple[float, str]:

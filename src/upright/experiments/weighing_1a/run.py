@@ -2,6 +2,8 @@
 
 The rig's pendulum or second body is locked or taken off, its masses are unbolted, and known ones are added one by one.
 What is then mounted for the later experiments has a known inertia, so the body's inertia follows with its uncertainty.
+
+The twins of cart and disk stick: dry friction, encoder counts, converter steps and amplifier limits are as on the rigs.
 """
 
 from __future__ import annotations
@@ -12,13 +14,88 @@ from pathlib import Path
 
 import numpy as np
 
-from upright.control.rig import ServoRig
+from upright.control.trial import ServoRig
 from upright.errors import NotIdentifiable
-from upright.experiments.makes import Make, make_of
-from upright.experiments.weighing_1a.twin import LoadedTwin, acquire, drawn_twin
+from upright.experiments.makes import CONVERTER, OSCILLATORS, SERVO, Make, Oscillator, make_of
 from upright.identification.loadings import Loaded, Loadings, fit_loadings, swings
+from upright.physics import Plant
 from upright.progress import Progress, silent
 from upright.records import Record
+from upright.records.record import of_twin
+
+PIECES = 4  # 500 g masses that come with a rig
+EVERY = 4  # servo periods per logged sample
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadedTwin:
+    """One body on a spring: its true numbers, its true added pieces [kg or kg m^2], and the seed they come from."""
+
+    design: Oscillator
+    truth: Plant
+    pieces: tuple[float, ...]
+    seed: int
+
+    @property
+    def bare(self) -> float:
+        """True inertia without additions."""
+        return self.truth.parameters()[self.design.inertia]
+
+    @property
+    def stiffness(self) -> float:
+        """True stiffness."""
+        return self.truth.parameters()["k_1"]
+
+
+def drawn_twin(seed: int = 0, kind: str = "rectilinear") -> LoadedTwin:
+    """A twin of a kind; inertias and springs differ by some percent, friction by a fifth, pieces by their tolerance.
+
+    Seed 0 is the rig as designed.
+    """
+    design = OSCILLATORS[kind]
+    if seed == 0:
+        return LoadedTwin(design=design, truth=design.plant, pieces=(design.piece,) * PIECES, seed=0)
+    rng = np.random.default_rng([seed, 10, kind == "torsional"])
+    spread = {design.inertia: 0.04, "k_1": 0.06, "c_1": 0.2, "f_1c": 0.2}
+    values = design.plant.parameters()
+    truth = design.plant.replace(**{n: values[n] * math.exp(rng.normal(0, s)) for n, s in spread.items()})
+    pieces = tuple((design.piece * (1 + design.tolerance * rng.normal(size=PIECES))).tolist())
+    return LoadedTwin(design=design, truth=truth, pieces=pieces, seed=seed)
+
+
+def acquire(on: LoadedTwin, count: int, *, shot: int = 0, seconds: float = 3.0) -> Record:
+    """Log of a step of the command and of its end, with `count` masses added; counts and volts.
+
+    Friction differs by 13 % from run to run, and the body starts from wherever friction held it.
+    """
+    from upright.simulation import simulate
+
+    design = on.design
+    rng = np.random.default_rng([on.seed, 11, design.kind == "torsional", count, shot])
+    friction = on.truth.parameters()["f_1c"] * math.exp(rng.normal(0, 0.13))
+    plant = on.truth.replace(a_1=sum(on.pieces[:count]), f_1c=friction)
+    held = friction / on.stiffness
+    half = round(seconds / SERVO / EVERY)
+    command = np.zeros(2 * half + 1)
+    command[: half + 1] = round(design.step / CONVERTER) * CONVERTER
+    start = plant.state() + np.array([rng.uniform(-0.5, 0.5) * held, 0.0])
+    drive = {"actuator.gain": design.gain, "actuator.limit": design.limit, "actuator.lag": 2e-3}
+    x = simulate(plant, drive, start, np.repeat(command, EVERY), SERVO, samples=command.size, every=EVERY)[:, 0, 0]
+    column = plant.coordinates[0].name
+    return Record(
+        t=np.arange(command.size, dtype=np.float64) * (SERVO * EVERY),
+        signals={"u": command, column: np.round((x - x[0]) * design.counts)},
+        units={"u": "V", column: "counts"},
+        inputs=("u",),
+        outputs=(column,),
+        provenance=of_twin(f"a {design.kind} rig", on.seed),
+    )
+
+
+def truth(on: LoadedTwin) -> dict[str, float]:
+    """What only a twin can tell, by the symbols of the report."""
+    name = on.design.inertia.replace("1", "0")
+    return {"k": on.stiffness, name: on.bare, "c": on.truth.parameters()["c_1"]}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -28,7 +105,7 @@ class Campaign:
     on: LoadedTwin
     logs: dict[str, Record]
     added: dict[str, float]
-    found: Loadings
+    loadings: Loadings
     left_out: tuple[str, ...]
     """Why some logs did not count: friction may leave too few swings."""
 
@@ -63,7 +140,7 @@ class Weighing:
     known: tuple[Known, ...]
 
 
-def weigh_body(
+def measure_body(
     on: LoadedTwin, progress: Progress = silent, *, counts: tuple[int, ...] = (0, 1, 2, 3, 4), shots: int = 2
 ) -> Campaign:
     """Step a body with every count of masses, `shots` times each, and weigh it."""
@@ -82,7 +159,7 @@ def weigh_body(
             except NotIdentifiable as error:
                 left_out.append(str(error))
     found = fit_loadings(loaded, tolerance=on.design.tolerance, piece=on.design.piece)
-    return Campaign(on=on, logs=logs, added=added, found=found, left_out=tuple(left_out))
+    return Campaign(on=on, logs=logs, added=added, loadings=found, left_out=tuple(left_out))
 
 
 def first_body(rig: ServoRig) -> LoadedTwin:
@@ -111,8 +188,8 @@ def _make(rig: ServoRig) -> Make:
 def run_weighing(rig: ServoRig, seed: int, folder: Path, progress: Progress = silent) -> Weighing:
     """Weigh the first body of a rig; its logs are written to `folder`."""
     make = _make(rig)
-    done = weigh_body(first_body(replace(rig, seed=seed)), progress)
-    found, mounted = done.found, make.mounted
+    done = measure_body(first_body(replace(rig, seed=seed)), progress)
+    found, mounted = done.loadings, make.mounted
     spread = make.oscillator.tolerance * mounted.each * math.sqrt(mounted.pieces)
     known = [
         Known(

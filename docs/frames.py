@@ -57,7 +57,12 @@ def _from_outside(axes: Axes) -> None:
     across = np.array([-math.cos(_ANGLE), -math.sin(_ANGLE)])
     _bar(axes, 1.5 * along)
     axes.plot(*(0.85 * along), "o", color=BLACK, markersize=6)
-    _say(axes, 0.85 * along + np.array([0.7, 0.0]), "centre of gravity,\n$l_{cg}$ from the hinge", BLACK)
+    _say(
+        axes,
+        0.85 * along + np.array([0.7, 0.0]),
+        "centre of gravity,\n$l_{cg}$ from the hinge",
+        BLACK,
+    )
     _vector(axes, np.zeros(2), np.array([0.0, -1.0]), "a", 1, BLUE)
     _vector(axes, np.zeros(2), np.array([-1.0, 0.0]), "a", 3, BLUE)
     _vector(axes, 1.5 * along, along, "b", 1, VERMILLION)
@@ -70,14 +75,37 @@ def _from_outside(axes: Axes) -> None:
 
 
 def _bar(axes: Axes, end: Array) -> None:
-    axes.plot([0.0, end[0]], [0.0, end[1]], color=GREY, alpha=0.7, linewidth=6, solid_capstyle="round", zorder=0)
+    axes.plot(
+        [0.0, end[0]],
+        [0.0, end[1]],
+        color=GREY,
+        alpha=0.7,
+        linewidth=6,
+        solid_capstyle="round",
+        zorder=0,
+    )
 
 
-def _vector(axes: Axes, start: Array, direction: Array, letter: str, number: int, colour: str) -> None:
+def _vector(
+    axes: Axes, start: Array, direction: Array, letter: str, number: int, colour: str
+) -> None:
     end = start + _UNIT * direction
-    axes.annotate("", tuple(end), tuple(start), arrowprops={"arrowstyle": "-|>", "color": colour, "linewidth": 1.5})
+    axes.annotate(
+        "",
+        tuple(end),
+        tuple(start),
+        arrowprops={"arrowstyle": "-|>", "color": colour, "linewidth": 1.5},
+    )
     _say(axes, end + 0.14 * direction, rf"$\mathbf{{{letter}}}_{number}$", colour, 11)
 
 
 def _say(axes: Axes, place: Array, words: str, colour: str, size: int = 9) -> None:
-    axes.text(float(place[0]), float(place[1]), words, color=colour, fontsize=size, ha="center", va="center")
+    axes.text(
+        float(place[0]),
+        float(place[1]),
+        words,
+        color=colour,
+        fontsize=size,
+        ha="center",
+        va="center",
+    )
