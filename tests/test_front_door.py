@@ -113,7 +113,7 @@ def test_a_wrong_argument_of_identify_gets_one_sentence(options, sentence):
 
 
 def test_a_log_that_is_none_is_named():
-    with pytest.raises(up.BadInput, match=r"a record, a pandas.DataFrame or the path"):
+    with pytest.raises(up.BadInput, match="a Record or a pandas DataFrame"):
         up.identify(3.0)
 
 

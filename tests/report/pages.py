@@ -107,11 +107,12 @@ def short_ladder_page(folder: Path) -> Chapter:
 
     fit = make_fit()
     scores = {"release": fit.runs["tail"]}
-    common = {"cost": 0.0312, "parameters": 4, "own": 2, "values": {}, "seconds": 1.26}
-    viscous = RungResult(rung=Rung(name="viscous", adds=("b_1",)), kept=True, reason="It is the first.",
+    common = {"cost": 0.0312, "parameters": 4, "per_run": 2, "values": {}, "seconds": 1.26}
+    viscous = RungResult(rung=Rung(name="viscous", adds=("b_1",)), accepted=True, reason="It is the first.",
                    fitted={"release": {"psi": 96.0, "theta": 97.0}},
                    predicted={"release": {"psi": 95.0, "theta": 94.5}}, **common)  # fmt: skip
-    dry = RungResult(rung=Rung(name="dry", adds=("b_1c",), drops=("b_1",)), kept=False, reason="It predicts no better.",
+    dry = RungResult(rung=Rung(name="dry", adds=("b_1c",), drops=("b_1",)), accepted=False,
+               reason="It predicts no better.",
                fitted={"release": {"psi": 97.0, "theta": 97.5}}, predicted={"release": {"psi": -3.0, "theta": 1.0}},
                **common)  # fmt: skip
     twice = Repeats(labels=("release", "tail"), percents={"theta": (97.0, 98.0)}, errors={"release": 0.0, "tail": 0.0})

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 from upright.errors import BadInput, nearest
 from upright.progress import Progress, silent
 from upright.verbs.answer import Answer
+from upright.verbs.values import open_log
 
 if TYPE_CHECKING:
     from upright.experiments.identified import IdentifiedRig
     from upright.identification import Fit, RunScore
     from upright.identification.ladder.cross_validation import CrossValidation
     from upright.physics import Plant
-    from upright.records import Record
     from upright.report.page import Chapter
     from upright.study.load import Study
 
@@ -117,7 +117,7 @@ class FitAnswer(Answer["Fit"]):
         else:
             from upright.study.draft.from_record import study_of_record
 
-            record = record_of(other)
+            record = open_log(other)[0]
             given = {n: v for n, v in values.items() if n in rig.plant.names()}
             study = study_of_record(
                 record, rig.plant, known=given, ask=[], columns=columns, units=units,
@@ -210,7 +210,10 @@ def identify(
     from upright.report.fit.chapter import chapter
     from upright.report.symbols import typed
     from upright.study.results import write_fit
+    from upright.verbs.pages import folder_if_given, write_page
+    from upright.verbs.study import provenance
 
+    folder = folder_if_given(out, pdf)
     if method not in METHODS:
         raise BadInput(f"--method must be one of {', '.join(METHODS)}, got '{method}'; {nearest(method, METHODS)}")
     asked = asked_study(study, plant, known=known, ask=ask, columns=columns, units=units, window=window, data=data)
@@ -228,7 +231,6 @@ def identify(
         )
     if not fitted:
         raise BadInput(f'{label}: every run has role = "predict"; at least one needs role = "fit"')
-    folder = None if out is None else Path(out)
     fit = estimate(asked.rig, asked.runs, method=method, progress=progress)
     written: list[Path] = []
     crossed = None
@@ -244,17 +246,16 @@ def identify(
         study=typed(label) + (f" --data {typed(data)}" if data is not None else ""),
         folder=typed(folder) if folder is not None else "OUT",
     )  # fmt: skip
-    answer = FitAnswer(fit, told, written, asked, crossed)
     if folder is not None and (report or pdf):
-        pages = [answer.report(folder / f"report.{ending}") for ending in ("html", *(["pdf"] if pdf else []))]
-        answer.files = (*written, *pages)
-    return answer
+        written += write_page(told, folder / "report.html", pdf)
+    return FitAnswer(fit, told, written, asked, crossed)
 
 
 def asked_study(given: Any, plant: Any = None, *, data: str | Path | None = None, **options: Any) -> Study:
     """The study that was handed in, or the one that a log and what is known of it make."""
     from upright.physics import Plant, find
-    from upright.study.load import Study, load_study
+    from upright.study.load import Study
+    from upright.verbs.study import read_study
 
     of_log = {name: value for name, value in options.items() if value is not None}
     is_study = isinstance(given, Study) or (isinstance(given, str | Path) and _is_study(Path(given)))
@@ -264,10 +265,7 @@ def asked_study(given: Any, plant: Any = None, *, data: str | Path | None = None
             raise BadInput(f"{name} belongs to a log; the study says it itself, so change it there.")
         if isinstance(given, Study):
             return given
-        path = Path(given)
-        if not path.exists():
-            raise BadInput(f"the study {path} does not exist; `upright init LOG -o {path.name}` writes one from a log")
-        return load_study(path, data=data)
+        return read_study(Path(given), Path(), None if data is None else Path(data))
     if isinstance(plant, str):
         plant = find(plant)
     if isinstance(plant, Plant):
@@ -276,41 +274,12 @@ def asked_study(given: Any, plant: Any = None, *, data: str | Path | None = None
         raise BadInput(f"identify takes a plant such as up.Pendulum, or its name, got {type(plant).__name__}.")
     from upright.study.draft.from_record import study_of_record
 
-    return study_of_record(record_of(given), plant, **options)
+    log: Any = given
+    return study_of_record(open_log(log)[0], plant, **options)
 
 
 def _is_study(path: Path) -> bool:
     return path.suffix.lower() in (".toml", "")
-
-
-def record_of(given: Any) -> Record:
-    """The record that a verb was handed: one, a data frame, or a log's file.
-
-    Raises
-    ------
-    BadInput
-        When it is none of them.
-    """
-    from upright.readers import read
-    from upright.records import Record
-
-    if isinstance(given, Record):
-        return given
-    if isinstance(given, str | Path):
-        return read(Path(given))
-    if hasattr(given, "iloc") and hasattr(given, "columns"):
-        return Record.from_pandas(given)
-    raise BadInput(f"a log is a record, a pandas.DataFrame or the path of a file, got {type(given).__name__}.")
-
-
-def provenance(asked: Study) -> dict[str, object]:
-    """Where the numbers of a study come from."""
-    return {
-        "study": asked.path.name,
-        "sha256 of the study": asked.sha256,
-        "data": asked.source or "not stated",
-        "runs": {run.label: run.source for run in asked.runs},
-    }
 
 
 def identified(fit: Any, *, seed: int = 0, draws: int = 200) -> IdentifiedRig:
