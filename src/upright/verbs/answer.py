@@ -101,7 +101,8 @@ def text(chapter: Chapter, files: Sequence[Path] = ()) -> str:
 
     from upright.report.terminal import print_chapter
 
-    screen = Console(file=StringIO(), width=120, highlight=False)
+    # in a notebook, rich would show what is printed at once instead of writing it
+    screen = Console(file=StringIO(), width=120, highlight=False, force_jupyter=False)
     screen.print(chapter.title, markup=False)
     print_chapter(screen, chapter, files)
     return screen.file.getvalue().strip()  # type: ignore[attr-defined]

@@ -47,7 +47,7 @@ class FitAnswer(Answer["Fit"]):
         asked = {n: p for n, p in self.value.rig.parameters.items() if p.estimate}
         fit = replace(self.value, rig=replace(self.value.rig, parameters=asked))
         drawn = Picture(
-            name="fit", draw=self.plot, caption="Data and model.", description="See the table of scores."
+            name="fit", draw=lambda: self._drawn(80), caption="Data and model.", description="See the table of scores."
         )  # fmt: skip
         parts = (
             Part("Parameters", (parameter_table(fit, caption="Estimates"),)),
@@ -86,10 +86,13 @@ class FitAnswer(Answer["Fit"]):
         """Data against the model for the first run, or the picture called `name`; see `pictures`."""
         if name:
             return super().plot(name)
+        return self._drawn(450)
+
+    def _drawn(self, buckets: int) -> Any:
         from upright.report.fit.figures import fit_figure
 
         label, score = next(iter(self.value.runs.items()))
-        return fit_figure(score, self.value.rig.plant, title=label)
+        return fit_figure(score, self.value.rig.plant, title=label, buckets=buckets)
 
     def save(self, path: str | Path = "fit.json") -> Path:
         """Write the fit for `predict`, `design`, `regulate` and other programs, and give back where."""

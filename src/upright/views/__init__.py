@@ -64,7 +64,7 @@ def _(record: Record) -> Chapter:
         caption="Columns" + (f" (the first {len(rows)} of {len(record.signals)})" if left else ""),
         headings=("column", "unit", "role", "least", "greatest"), rows=rows, numbers=(3, 4),
     )  # fmt: skip
-    drawn = Picture(name="columns", draw=lambda: draw_record(record), caption="The columns over time.",
+    drawn = Picture(name="columns", draw=lambda: draw_record(record, buckets=100), caption="The columns over time.",
                     description=f"{len(record.signals)} columns over {t[-1] - t[0]:.4g} s.")  # fmt: skip
     source = record.provenance.file or record.provenance.rig or "no file"
     headline = f"{len(record)} samples from {t[0]:.4g} to {t[-1]:.4g} s, one every {1e3 * record.period:.4g} ms."
@@ -130,7 +130,7 @@ def _poles(poles: Any) -> str:
 
 
 @styled
-def draw_record(record: Record, *names: str) -> Any:
+def draw_record(record: Record, *names: str, buckets: int = 800) -> Any:
     """One panel per column over time; without names the measured ones and what drives, as far as they are known."""
     for name in names:
         if name not in record.signals:
@@ -140,7 +140,7 @@ def draw_record(record: Record, *names: str) -> Any:
     drawing = figure(0.7 + 1.2 * len(chosen))
     panels: list[Any] = drawing.subplots(len(chosen), 1, sharex=True, squeeze=False)[:, 0].tolist()
     for i, (axes, name) in enumerate(zip(panels, chosen, strict=True)):
-        t, y = decimated(record.t, record[name], buckets=800)
+        t, y = decimated(record.t, record[name], buckets=buckets)
         axes.plot(t, y, color=CYCLE[i % len(CYCLE)][0], linewidth=1.0)
         axes.set_ylabel(f"{name} [{record.units[name] or '?'}]", parse_math=False)
     hide_inner_times(panels)
