@@ -46,6 +46,7 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     """Bare Python is the reference."""
     kinds: dict[str, tuple[Callable[[], None], float | None]] = {
         "python -c pass": (lambda: process("-c", "pass"), None),
+        "import upright": (lambda: process("-c", "import upright"), None),  # 0.05 s beyond bare Python is asked
         "upright --help": (lambda: process("-m", "upright", "--help"), 0.3),
         "warm process to first result": (lambda: process("-c", FIRST_RESULT), 1.0),
         "first use after install": (first_use, 10.0),

@@ -189,6 +189,15 @@ def test_no_folder_is_a_heap():
     assert {module_name(folder / "x").rpartition(".")[0]: n for folder, n in crowded.items() if n > 16} == {}
 
 
+def test_no_two_types_share_a_name():
+    homes: dict[str, list[str]] = {}
+    for path in FILES:
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                homes.setdefault(node.name, []).append(module_name(path))
+    assert {name: where for name, where in homes.items() if len(where) > 1} == {}
+
+
 def test_no_file_is_called_after_a_drawer():
     drawers = {"utils", "util", "misc", "manager", "helpers"}
     assert [module_name(p) for p in SOURCE.rglob("*") if p.stem in drawers] == []

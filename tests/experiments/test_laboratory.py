@@ -6,7 +6,7 @@ import pytest
 from upright.errors import NotIdentifiable
 from upright.experiments import laboratory
 from upright.experiments.laboratory import Experiment
-from upright.report.page import Chapter, Finding, Part
+from upright.report.page import Chapter, KeyNumber, Part
 
 
 @pytest.fixture
@@ -20,7 +20,7 @@ def bench(monkeypatch):
             if key in trouble:
                 raise trouble[key]
             told = f"{key} on {task.rig.name}, seed {task.seed}, after {', '.join(task.earlier) or 'nothing'}"
-            finding = Finding(what="x", value=str(len(ran)))
+            finding = KeyNumber(what="x", value=str(len(ran)))
             return Chapter(key=key, title=f"Small {key}", question="?", verdict=told, detail="", sound=True,
                            parts=(Part(title="Data"),), findings=(finding,),
                            numbers={"run": len(ran), "bad": float("nan")}), True  # fmt: skip

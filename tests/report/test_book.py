@@ -16,8 +16,8 @@ from upright.report.page import (
     Chapter,
     Code,
     Facts,
-    Finding,
     Formula,
+    KeyNumber,
     Part,
     Picture,
     Points,
@@ -63,7 +63,7 @@ def chapter(key, about, *, sound=True):
             Part("Rest", (drawn("other"),), aside=True),
         ),
         steps=(Step("Do it again.", 'upright lab -o "a b"'),),
-        findings=(Finding(what="pole [rad/s]", value="7.98", interval="7.9 to 8.1", truth="7.97"),),
+        findings=(KeyNumber(what="pole [rad/s]", value="7.98", interval="7.9 to 8.1", truth="7.97"),),
         numbers={"pole": 7.98, "kind": "a word", "list": [1, 2]},
     )  # fmt: skip
 

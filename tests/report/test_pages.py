@@ -34,7 +34,7 @@ from tests.report.pages import (
 )
 from tests.report.reader import Page
 from upright.report.html import html
-from upright.report.page import Chapter, Finding, Picture, Symbol, Table, as_plain, from_plain
+from upright.report.page import Chapter, KeyNumber, Picture, Symbol, Table, as_plain, from_plain
 from upright.report.pdf import write_pdf
 from upright.report.terminal import print_book, print_chapter
 
@@ -184,7 +184,7 @@ def test_the_laboratory_tells_every_chapter_on_all_three(tmp_path):
     from upright.experiments.laboratory import EXPERIMENTS, ExperimentResult, Session, book, date
 
     pypdf = pytest.importorskip("pypdf")
-    found = (Finding(what="stiffness [N/m]", value="412.5", interval="409.1 to 415.9", truth="411.2"),)
+    found = (KeyNumber(what="stiffness [N/m]", value="412.5", interval="409.1 to 415.9", truth="411.2"),)
     made = [replace(page(tmp_path), key=e.key, findings=found)
             for page, e in zip((short_ladder_page, measured_response_page), EXPERIMENTS, strict=False)]  # fmt: skip
     session = Session(make="", seed=7, folder=tmp_path, asked=EXPERIMENTS[:3], interrupted=True)

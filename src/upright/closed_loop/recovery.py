@@ -34,7 +34,7 @@ class Gain:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Candidate:
+class TriedStructure:
     """One structure that was tried: its name, how many numbers it has, and the rms that rows left out missed."""
 
     name: str
@@ -71,7 +71,7 @@ class Recovery:
         Share of the rows at the limit.
     every : int
         Samples of the law per row of the log.
-    candidates : tuple of Candidate
+    candidates : tuple of TriedStructure
         What was tried, best first.
     unit : str
         Unit of the command, "" when the log does not say.
@@ -90,7 +90,7 @@ class Recovery:
     quantum: float
     saturated: float
     every: int
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[TriedStructure, ...]
     unit: str = ""
 
     @property

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.closed_loop.intervals import averaged, numbers, sharpen
-from upright.closed_loop.recovery import Candidate, Recovery
+from upright.closed_loop.recovery import Recovery, TriedStructure
 from upright.closed_loop.regression import TERMS, Family, Regression, Signals, Term, channels_of, fit, law_of, structure
 from upright.closed_loop.structures import finer
 from upright.errors import BadInput, NotIdentifiable
@@ -266,7 +266,7 @@ class Search:
             rows=rows, recorded=self.u, reproduced=reproduced, used=self.used, quantum=self.quantum,
             saturated=float(limited.mean()), every=self.every,
             candidates=tuple(
-                Candidate(name=name, parameters=f.parameters, missed=f.missed)
+                TriedStructure(name=name, parameters=f.parameters, missed=f.missed)
                 for name, f in sorted(self.tried, key=lambda pair: pair[1].missed)
             ),
             unit=record.units.get(command, ""),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from upright.closed_loop import Recovery
-from upright.closed_loop.recovery import Candidate, loop_recovered, loop_written
+from upright.closed_loop.recovery import TriedStructure, loop_recovered, loop_written
 from upright.records import Array, Record
 from upright.report.drawing import BLUE, GREY, VERMILLION, decimated, figure, styled
 from upright.report.page import Chapter, Part, Picture, Points, Step, Table
@@ -67,7 +67,7 @@ def _circumstances(record: Record, found: Recovery) -> list[str]:
 
 def _tried_table(found: Recovery) -> Table:
     """The best of every structure."""
-    best: dict[str, Candidate] = {}
+    best: dict[str, TriedStructure] = {}
     for c in found.candidates:  # sorted by what they missed
         best.setdefault(c.name, c)
     unit = f" {found.unit}" if found.unit else ""

@@ -142,7 +142,7 @@ class Part:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Finding:
+class KeyNumber:
     """A number for the cover, as text: what it is, its value and, where there are such, interval and truth."""
 
     what: str
@@ -175,7 +175,7 @@ class Chapter:
     warnings : tuple of str
     steps : tuple of Step
         What to do next.
-    findings : tuple of Finding
+    findings : tuple of KeyNumber
         The few numbers that the cover of a whole report shows.
     numbers : mapping
         The same as plain values for another program: SI.
@@ -193,7 +193,7 @@ class Chapter:
     parts: tuple[Part, ...] = ()
     warnings: tuple[str, ...] = ()
     steps: tuple[Step, ...] = ()
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[KeyNumber, ...] = ()
     numbers: Mapping[str, Any] = field(default_factory=dict[str, Any])
     key: str = ""
     about: str = ""
@@ -268,7 +268,7 @@ class Book:
 
 
 _KINDS: dict[str, Callable[..., Any]] = {
-    kind.__name__: kind for kind in (Chapter, Code, Facts, Finding, Formula, Part, Picture, Points, Step, Table)
+    kind.__name__: kind for kind in (Chapter, Code, Facts, KeyNumber, Formula, Part, Picture, Points, Step, Table)
 }
 
 

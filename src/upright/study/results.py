@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from upright.errors import BadInput
 from upright.files import plain_values, write_json
 from upright.identification import Estimate, Fit
-from upright.identification.frequency.answer import Answer
+from upright.identification.frequency.answer import FrequencyFit
 from upright.identification.ladder.cross_validation import CrossValidation
 from upright.identification.ladder.growth import Ladder, RungResult
 from upright.identification.ladder.rungs import neutral
@@ -179,7 +179,7 @@ def _groups(path: Path, content: Any) -> dict[str, dict[str, float]]:
         raise BadInput(f"{path}: groups must hold estimates by group and name; identify again") from None
 
 
-def write_response_fit(answer: Answer, folder: Path, plant: str, title: str, source: str = "") -> None:
+def write_response_fit(answer: FrequencyFit, folder: Path, plant: str, title: str, source: str = "") -> None:
     """Write `frequency.csv` and `fit.json`, which `upright design` reads."""
     folder.mkdir(parents=True, exist_ok=True)
     answer.data.to_csv(folder / "frequency.csv")

@@ -134,14 +134,14 @@ class FitAnswer(Answer["Fit"]):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scores:
+class PredictedRuns:
     """Scores of runs that were predicted, by their labels."""
 
     runs: Mapping[str, RunScore]
     plant: type[Plant]
 
 
-class Prediction(Answer[Scores]):
+class Prediction(Answer[PredictedRuns]):
     """Scores of runs that a fit has not seen."""
 
     def plot(self, name: str = "") -> Any:
@@ -166,7 +166,7 @@ def prediction(runs: Mapping[str, RunScore], plant: type[Plant]) -> Prediction:
         title="Prediction", verdict=f"The worst signal is explained to {worst:.1f} %.", parts=(part,),
         numbers={label: {"fit_percent": dict(s.fit_percent), "horizon": s.horizon} for label, s in runs.items()},
     )  # fmt: skip
-    return Prediction(Scores(runs=runs, plant=plant), chapter)
+    return Prediction(PredictedRuns(runs=runs, plant=plant), chapter)
 
 
 def identify(

@@ -10,11 +10,11 @@ import numpy as np
 
 from upright.experiments.frequency_1b.figures import bode_figure, quality_figure
 from upright.experiments.frequency_1b.run import FrequencyRun, LoggedResponse
-from upright.identification.frequency.answer import Answer, curves, digits, key_value
+from upright.identification.frequency.answer import FrequencyFit, curves, digits, key_value
 from upright.identification.frequency.response import FrequencyResponse
 from upright.identification.model.fit import Estimate
 from upright.report.fit.tables import finding, parameter_table, plain_estimate, pole_table
-from upright.report.page import Chapter, Finding, Part, Picture, Points, Step, Symbol, Table
+from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Symbol, Table
 from upright.report.symbols import number, typed, unit
 
 QUESTION = (
@@ -105,7 +105,7 @@ def true_key(done: FrequencyRun) -> float:
     return float(poles.imag.max())
 
 
-def _findings(done: FrequencyRun, found: Estimate, true: float) -> tuple[Finding, ...]:
+def _findings(done: FrequencyRun, found: Estimate, true: float) -> tuple[KeyNumber, ...]:
     """The key number, inertia of the pendulum and gain of the drive, which nobody weighs."""
     at, what, _ = done.answer.key
     of = "1/s" if what == "unstable pole" else "rad/s"
@@ -175,7 +175,7 @@ def _steps(done: FrequencyRun) -> tuple[Step, ...]:
     )
 
 
-def _simplex_sentence(answer: Answer) -> str:
+def _simplex_sentence(answer: FrequencyFit) -> str:
     """What the paper's way says about the same number."""
     found = key_value(answer.key)
     there = answer.simplex_pole.real if answer.key[1] == "unstable pole" else answer.simplex_pole.imag
@@ -190,7 +190,9 @@ def _simplex_sentence(answer: Answer) -> str:
     return f"The paper's simplex on dB says {number(there)}, {abs(off):.2g} % {'more' if off > 0 else 'less'}.{why}"
 
 
-def _answer_parts(answer: Answer, *, truth: Mapping[str, float] | None = None, known: str = "") -> tuple[Part, ...]:
+def _answer_parts(
+    answer: FrequencyFit, *, truth: Mapping[str, float] | None = None, known: str = ""
+) -> tuple[Part, ...]:
     """Data with both fits, their cost, and the numbers."""
     left = (Points(answer.left_out),) if answer.left_out else ()
     return (
@@ -217,7 +219,7 @@ def _answer_parts(answer: Answer, *, truth: Mapping[str, float] | None = None, k
     )
 
 
-def _start_sentence(answer: Answer) -> str:
+def _start_sentence(answer: FrequencyFit) -> str:
     s = answer.squares
     return (
         f"{s.reached} of {s.starts} starts reached the same minimum; chi square per degree of freedom {s.misfit:.2g} "
@@ -225,7 +227,7 @@ def _start_sentence(answer: Answer) -> str:
     )
 
 
-def _way_table(answer: Answer) -> Table:
+def _way_table(answer: FrequencyFit) -> Table:
     """Both methods side by side."""
     found = key_value(answer.key)
     unstable = answer.key[1] == "unstable pole"
@@ -242,7 +244,7 @@ def _way_table(answer: Answer) -> Table:
     )  # fmt: skip
 
 
-def _parameter_table(answer: Answer, truth: Mapping[str, float] | None = None) -> Table:
+def _parameter_table(answer: FrequencyFit, truth: Mapping[str, float] | None = None) -> Table:
     """Every number, by both ways; a magnitude of the linear model is not asked for all of them."""
     unasked = {j.coulomb for j in answer.rig.plant.joints} | {"actuator.lag", "actuator.delay"}
     unasked |= {n for n, p in answer.rig.parameters.items() if not p.estimate}
@@ -253,7 +255,7 @@ def _parameter_table(answer: Answer, truth: Mapping[str, float] | None = None) -
     )  # fmt: skip
 
 
-def _bode_picture(data: FrequencyResponse, answer: Answer | None = None) -> Picture:
+def _bode_picture(data: FrequencyResponse, answer: FrequencyFit | None = None) -> Picture:
     """The paper's fig. 5 with residuals."""
     told = (
         "Magnitude and phase of what the encoders showed per unit of command, with 95 % bars (mostly smaller than the "
@@ -279,7 +281,9 @@ def _quality_picture(data: FrequencyResponse) -> Picture:
     )  # fmt: skip
 
 
-def _numbers(answer: Answer, *, truth: Mapping[str, float] | None = None, key: float | None = None) -> dict[str, Any]:
+def _numbers(
+    answer: FrequencyFit, *, truth: Mapping[str, float] | None = None, key: float | None = None
+) -> dict[str, Any]:
     """The same as plain values."""
     true = truth or {}
     return {

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.frequency.answer import Answer
+from upright.identification.frequency.answer import FrequencyFit
 from upright.identification.frequency.response import FrequencyResponse
 from upright.records import Array
 from upright.report.drawing import BLACK, BLUE, GREY, ORANGE, SKY, VERMILLION, figure, styled
@@ -24,7 +24,7 @@ PAPER = ((VERMILLION, "--"), "simplex on dB")
 
 @styled
 def bode_figure(
-    data: FrequencyResponse, answer: Answer | None = None, *, fine: Sequence[tuple[Array, Any]] = ()
+    data: FrequencyResponse, answer: FrequencyFit | None = None, *, fine: Sequence[tuple[Array, Any]] = ()
 ) -> Figure:
     """Magnitude [dB] and phase [deg] of every output, with 95 % bars; both fits, and what they leave over.
 
@@ -76,7 +76,7 @@ def _points(axes: Any, data: FrequencyResponse, used: NDArray[np.bool_], y: Arra
         )
 
 
-def _residuals(upper: Any, lower: Any, answer: Answer, j: int, *, first: bool) -> None:
+def _residuals(upper: Any, lower: Any, answer: FrequencyFit, j: int, *, first: bool) -> None:
     """What each fit leaves of magnitude [%] and phase [deg]; the simplex' own dB are far larger."""
     data = answer.used
     for ((colour, _), _), model, mark in (

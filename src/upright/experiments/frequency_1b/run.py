@@ -23,7 +23,7 @@ from upright.experiments.makes import Make, make_named, make_of, make_rig
 from upright.experiments.weighing_1a.run import Known
 from upright.identification import Parameter
 from upright.identification import Rig as Asked
-from upright.identification.frequency.answer import Answer, explain
+from upright.identification.frequency.answer import FrequencyFit, explain
 from upright.identification.frequency.response import FrequencyResponse, is_response
 from upright.identification.frequency.spectra import response_of
 from upright.progress import Progress, silent
@@ -44,7 +44,7 @@ class FrequencyRun:
         The twin, which knows the truth.
     make : Make
     sweep : Sweep
-    answer : Answer
+    answer : FrequencyFit
     folder : Path
         Holds `frequency.csv`, `sweep.csv` and `fit.json`.
     kind : str
@@ -56,7 +56,7 @@ class FrequencyRun:
     rig: ServoRig
     make: Make
     sweep: Sweep
-    answer: Answer
+    answer: FrequencyFit
     folder: Path
     kind: str
     seconds: float
@@ -192,7 +192,7 @@ class LoggedResponse:
 
     sources: tuple[str, ...]
     response: FrequencyResponse
-    answer: Answer | None
+    answer: FrequencyFit | None
     folder: Path
 
 

@@ -10,7 +10,7 @@ from upright.control.preflight import FELT, WORDS, word
 from upright.experiments.regulation_2.figures import chances_figure, runs_figure, ways_figure
 from upright.experiments.regulation_2.run import SETS, Attempt, Regulation, VelocityRun
 from upright.gains.requests import written
-from upright.report.page import Chapter, Finding, Part, Picture, Points, Step, Table
+from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Table
 from upright.report.symbols import number, plain
 
 SHOWN = 2.5
@@ -30,7 +30,7 @@ def chapter(done: Regulation) -> Chapter:
         parts=tuple(_parts(done)),
         steps=tuple(_steps(done)),
         findings=tuple(
-            Finding(
+            KeyNumber(
                 what=f"chance that {a.name} holds", value=f"{100 * a.before.chance:.0f} %",
                 truth="" if a.score is None else a.word,
             )

@@ -11,7 +11,7 @@ from upright.control.swing_up import Ascent
 from upright.experiments.makes import make_of
 from upright.experiments.swing_up_2b.figures import ascent_figure, check_figure, portrait_figure
 from upright.experiments.swing_up_2b.run import HELD, LIES, TILT, Lie, SwingUpRun
-from upright.report.page import Chapter, Finding, Part, Picture, Points, Step, Table
+from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Table
 from upright.report.symbols import number, percent
 from upright.report.symbols import unit as raised
 
@@ -141,14 +141,14 @@ def _row(lie: Lie) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def _findings(done: SwingUpRun) -> tuple[Finding, ...]:
+def _findings(done: SwingUpRun) -> tuple[KeyNumber, ...]:
     """Numbers for the cover."""
     run = done.ascent
     if run is None or not done.caught:
-        return (Finding(what="swing-up", value="no"),)
+        return (KeyNumber(what="swing-up", value="no"),)
     return (
-        Finding(what="from hanging to upright", value=f"{number(run.up, 3)} s"),
-        Finding(what="largest command of the swing-up", value=f"{number(run.peak, 3)} {done.model.unit}"),
+        KeyNumber(what="from hanging to upright", value=f"{number(run.up, 3)} s"),
+        KeyNumber(what="largest command of the swing-up", value=f"{number(run.peak, 3)} {done.model.unit}"),
     )
 
 

@@ -24,7 +24,7 @@ from upright.identification.model.fit import Fit
 from upright.paper.reproduce import TABLE_2
 from upright.report.fit.chapter import motion_part, run_pictures
 from upright.report.fit.tables import finding, parameter_table
-from upright.report.page import Chapter, Finding, Part, Picture, Step, Table
+from upright.report.page import Chapter, KeyNumber, Part, Picture, Step, Table
 from upright.report.symbols import number, plain, typed
 
 
@@ -94,7 +94,7 @@ def _strongest(done: Tracking) -> Outcome:
     return max(done.sets, key=lambda o: o.law.k_pf)
 
 
-def _findings(done: Tracking) -> tuple[Finding, ...]:
+def _findings(done: Tracking) -> tuple[KeyNumber, ...]:
     best, out = _strongest(done), []
     poles = [] if done.fit is None else [p.imag for at in done.fit.poles.values() for p in at]
     swing = max(poles, key=lambda e: e.value, default=None)
@@ -102,9 +102,9 @@ def _findings(done: Tracking) -> tuple[Finding, ...]:
         out.append(finding("flexible mode [rad/s]", swing, float(max(done.true.linear(AT).poles().imag))))
     f = best.measured.figures
     if f is not None:
-        out.append(Finding(what=f"{best.law.name}: arrival within 5 % [s]", value=milli(f.arrival)))
-        out.append(Finding(what=f"{best.law.name}: overshoot", value=share(f.overshoot)))
-    out.append(Finding(what=f"{best.law.name}: effort, of the limit", value=share(best.measured.effort.share)))
+        out.append(KeyNumber(what=f"{best.law.name}: arrival within 5 % [s]", value=milli(f.arrival)))
+        out.append(KeyNumber(what=f"{best.law.name}: overshoot", value=share(f.overshoot)))
+    out.append(KeyNumber(what=f"{best.law.name}: effort, of the limit", value=share(best.measured.effort.share)))
     return tuple(out)
 
 

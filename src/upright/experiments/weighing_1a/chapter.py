@@ -13,7 +13,7 @@ from upright.experiments.weighing_1a.run import Known, Weighing, truth
 from upright.identification.loadings import Loaded, Loadings
 from upright.records import Record
 from upright.report.fit.tables import plain_estimate
-from upright.report.page import Chapter, Finding, Part, Picture, Points, Step, Symbol, Table
+from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Symbol, Table
 from upright.report.symbols import measured, number, typed, unit
 
 QUESTION = (
@@ -60,7 +60,7 @@ def chapter(done: Weighing) -> Chapter:
         ),
         steps=_steps(done),
         findings=tuple(
-            Finding(
+            KeyNumber(
                 what=Symbol(f"{k.name} [{units[k.name]}]"),
                 value=number(k.value),
                 interval=f"{number(k.value - 1.96 * k.stderr)} to {number(k.value + 1.96 * k.stderr)}",

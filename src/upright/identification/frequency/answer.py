@@ -31,7 +31,7 @@ POOR = 9.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Answer:
+class FrequencyFit:
     """Everything that follows from one response, measured `at` an equilibrium of a rig as it was known and asked.
 
     `used` are the points of the `data` that were fitted, `left_out` says why the others were not. `fit` is for
@@ -54,7 +54,7 @@ class Answer:
 def explain(
     rig: Rig, at: str, data: FrequencyResponse, *, seed: int = 0, tell: Progress = silent,
     stopped: Callable[[], bool] = lambda: False,
-) -> Answer:  # fmt: skip
+) -> FrequencyFit:  # fmt: skip
     """Fit a response in both ways.
 
     Parameters
@@ -96,7 +96,7 @@ def explain(
     other = poles(rig, simplex.values, [], np.zeros((0, 0)), q)
     there = next((p for p in other.get(key[0], ()) if _what(p) == key[1]), None)
     reached = complex(there.real.value, there.imag.value) if there is not None else complex(math.nan, math.nan)
-    return Answer(
+    return FrequencyFit(
         rig=rig, at=at, data=data, used=used, left_out=left_out, simplex=simplex, squares=squares, fit=fit, key=key,
         simplex_pole=reached,
     )  # fmt: skip
@@ -194,7 +194,7 @@ def verdict(squares: Squares, key: tuple[str, str, Pole]) -> tuple[str, bool]:
     return said, True
 
 
-def curves(answer: Answer) -> tuple[tuple[Array, Complex], tuple[Array, Complex]]:
+def curves(answer: FrequencyFit) -> tuple[tuple[Array, Complex], tuple[Array, Complex]]:
     """Frequencies and responses (F, n) of least squares and of the simplex on a close grid.
 
     Least squares knows dry friction at the amplitudes measured; between frequencies these are taken from both sides.

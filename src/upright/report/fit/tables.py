@@ -10,7 +10,7 @@ from upright.identification.ladder.cross_validation import CrossValidation
 from upright.identification.model.fit import Estimate, Fit, Pole, RunScore
 from upright.identification.model.rig import Parameter
 from upright.physics.actuator import ACTUATOR
-from upright.report.page import Finding, Symbol, Table
+from upright.report.page import KeyNumber, Symbol, Table
 from upright.report.symbols import figures, measured, number, percent, plain, unit
 
 _ESTIMATE = ("value", "std. error", "95 % interval", "unit", "status", "name and meaning")
@@ -99,10 +99,10 @@ def _called(name: str, about: Parameter | None) -> str:
     return f"{name}, {about.meaning}" if about and about.meaning else name
 
 
-def finding(what: str, e: Estimate, true: float | None = None) -> Finding:
+def finding(what: str, e: Estimate, true: float | None = None) -> KeyNumber:
     """An estimate for the cover."""
     d = figures(e.value, e.stderr)
-    return Finding(
+    return KeyNumber(
         what=what, value=number(e.value, d), interval=interval(e), truth="" if true is None else number(true, d)
     )
 
