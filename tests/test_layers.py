@@ -224,7 +224,7 @@ def test_no_file_is_called_after_a_drawer():
         ("import jinja2", "upright.experiments.weighing_1a.chapter"),
         ("import matplotlib", "upright.experiments.weighing_1a.chapter"),
         ("from matplotlib.figure import Figure", "upright.diagnosis.chapter"),
-        ("import numba", "upright.physics.derived"),
+        ("import numba", "upright.physics.equations"),
         ("import pint", "upright.study.load"),
         ("x = 1", "upright.drawer.thing"),
     ],

@@ -48,7 +48,7 @@ step from sample to sample; the travel."""
 
 
 def swing_and_hold(t: float, y: Any, r: Any, z: Any, p: Any) -> tuple[Any, Any]:
-    """One sample, as a `law.Rule`; it remembers readings, speeds, what it is doing, the handover's
+    """One sample, as a `laws.Rule`; it remembers readings, speeds, what it is doing, the handover's
     fading step, how much more energy than the model's it asks for, and when it last changed that.
     """
     (period, memory, scale_q, scale_theta, M, spin, kappa, J, weight, viscous, dry, gain, limit, reach, sharp,
