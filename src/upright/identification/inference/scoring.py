@@ -202,7 +202,7 @@ def judge(
     converged, interrupted : bool
         How the search ended.
     memory, period : float
-        Seconds that residuals remember and that the motion takes for one period.
+        Seconds over which residuals are autocorrelated and that the motion takes for one period.
     """
     against: list[str] = []
     if interrupted:
@@ -258,8 +258,8 @@ def judge(
         said.append(f"At a bound: {', '.join(bound)}; the data would go further or need it less.")
     if memory > 0.05 * period and best:
         said.append(
-            f"Residuals remember {memory:.2g} s, so something small is still missing from the model; "
-            "the standard errors allow for it."
+            f"The residuals are autocorrelated over {memory:.2g} s, so something small is still missing from the "
+            "model; the standard errors allow for it."
         )
     return " ".join(said), not against
 

@@ -4,8 +4,8 @@ The measure is the logarithm of the error (what is missed over how much the sign
 that halving an error counts the same wherever it happens. A richer model is kept when the mean of the paired
 improvements exceeds one standard error of that mean, with Student's factor for so few of them: the one-standard-error
 rule of cross-validation (Breiman and others 1984), paired. The pairs are the runs left out; with fewer than three runs
-they are stretches of what was held out, each longer than the residuals remember. Stretches share one fit and so its
-luck: the fit itself, too, has to be closer than chance makes it (`by_chance`).
+they are stretches of what was held out, each longer than the residuals are autocorrelated. Stretches share one fit and
+so its luck: the fit itself, too, has to be closer than chance makes it (`by_chance`).
 """
 
 from __future__ import annotations

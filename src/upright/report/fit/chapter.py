@@ -335,7 +335,7 @@ def _nuisances(fit: Fit) -> Iterator[Step]:
 
 
 def _friction(fit: Fit, study: str, folder: str) -> Iterator[Step]:
-    """Residuals that remember themselves: is there a friction term that was left out?"""
+    """Autocorrelated residuals: is there a friction term that was left out?"""
     coloured: list[str] = []
     for label, score in fit.runs.items():
         for j, name in enumerate(score.measured):

@@ -14,7 +14,7 @@ from upright.report.page import KeyNumber, Symbol, Table
 from upright.report.symbols import figures, measured, number, percent, plain, unit
 
 _ESTIMATE = ("value", "std. error", "95 % interval", "unit", "status", "name and meaning")
-_OF_THE_RIG = "Parameters of the rig; standard errors hold for residuals that remember themselves"
+_OF_THE_RIG = "Parameters of the rig; standard errors allow for autocorrelated residuals"
 
 
 def parameter_table(
