@@ -101,7 +101,7 @@ def search() -> Callable[[], np.ndarray]:
         found = dict(
             zip([u.name for u in posed.unknowns], posed.value(descend_progressively(posed, posed.start).x), strict=True)
         )
-        return np.array([found[name] for name in (*problem.UNKNOWN, "swing: initial.theta")])
+        return np.array([found[name] for name in (*problem.UNKNOWN, "initial.theta")])
 
     return estimate
 
