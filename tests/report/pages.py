@@ -177,7 +177,7 @@ def swing_up_page(folder: Path) -> Chapter:
     from upright.experiments.swing_up_2b.chapter import chapter
     from upright.experiments.swing_up_2b.run import run_swing_up
 
-    return chapter(run_swing_up(make_rig("furuta"), make_rig("furuta", 3), 3, folder))
+    return chapter(run_swing_up(make_rig("furuta"), make_rig("furuta", 3), folder))
 
 
 def tracking_page(folder: Path) -> Chapter:
