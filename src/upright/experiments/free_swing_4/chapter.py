@@ -195,7 +195,7 @@ def _drift_part(done: FreeSwing) -> Part:
         rows=tuple((w.name, number(factor * w.slope, 2), number(factor * w.end, 2)) for w in done.drifts),
         numbers=(1, 2),
     )
-    return Part(f"Why the {body} drifts", (told, table, shown))
+    return Part(f"Why the {body} wanders", (told, table, shown))
 
 
 def _level_part(done: FreeSwing) -> Part:
