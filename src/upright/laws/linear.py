@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
@@ -20,7 +21,7 @@ Pattern = tuple[tuple[float | None, ...], ...]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Controller:
+class Controller(ABC):
     """What a `Law` and a `Rule` share: encoders before it, a converter behind it, references, limit and delay.
 
     The command is rounded to the converter's steps, then limited. Arrays may have an axis of lanes as their last.
@@ -56,9 +57,9 @@ class Controller:
         if r.ndim != 2 or (r.shape[1] > 0 and r.shape[0] == 0) or not np.isfinite(r).all():
             raise BadInput(f"references need finite values in shape (T, references), got {r.shape}.")
 
+    @abstractmethod
     def arrays(self) -> dict[str, tuple[Array, int]]:
         """Arrays that may differ between lanes, by name, with their number of axes in one lane."""
-        raise NotImplementedError
 
     def widths(self) -> dict[str, int]:
         """Lanes that each array is given for."""
