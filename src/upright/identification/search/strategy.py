@@ -151,7 +151,7 @@ def rescale_priors(problem: Problem, found: Descent) -> Descent:
         if abs(math.log(noise / problem.noise)) < 0.2:
             break
         problem.noise = noise
-        found = descend(problem.normal, found.x, problem.lower, problem.upper, tolerance=1e-6, limit=20)
+        found = descend(problem.normal, found.x, problem.lower, problem.upper, tolerance=1e-6)
     return found
 
 
