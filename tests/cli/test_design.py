@@ -11,24 +11,12 @@ import pytest
 from scipy.stats import norm
 from typer.testing import CliRunner
 
+from tests.gains.furuta import RIG, STUDY
 from upright.cli import app
 from upright.laws import Law
-from upright.physics import Furuta
 from upright.report.symbols import number
 from upright.simulation import simulate
 
-RIG = Furuta(m_p=0.135, l_cg=0.19, r=0.16, J_d=0.011, J_p=6e-4, b_1=6e-4)
-STUDY = """
-[rig]
-plant = "furuta"
-[parameters]
-m_p = "135 g"
-l_cg = { guess = "19 cm" }
-r = "16 cm"
-J_d = "0.011 kg m^2"
-J_p = "6e-4 kg m^2"
-b_1 = 6e-4
-"""
 POLES = "-4.1484+-1.6341j, -16.8545, -3.222"
 
 

@@ -7,23 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.gains.furuta import RIG, STUDY
 from upright.errors import BadInput
 from upright.files import json_text
-from upright.physics import Furuta
 from upright.verbs.control import design, regulate, swing_up, track
 
-RIG = Furuta(m_p=0.135, l_cg=0.19, r=0.16, J_d=0.011, J_p=6e-4, b_1=6e-4)
-STUDY = """
-[rig]
-plant = "furuta"
-[parameters]
-m_p = "135 g"
-l_cg = { guess = "19 cm" }
-r = "16 cm"
-J_d = "0.011 kg m^2"
-J_p = "6e-4 kg m^2"
-b_1 = 6e-4
-"""
 POLES = [-4 + 2j, -4 - 2j, -17, -3]
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from upright.errors import BadInput, nearest
 from upright.progress import Progress, silent
 from upright.verbs.answer import Answer
-from upright.verbs.pages import can_be_pdf, folder, folder_if_given, write_page
+from upright.verbs.pages import folder_if_given, page_folder, write_page
 from upright.verbs.values import open_log, poles, si, si_if_given
 
 if TYPE_CHECKING:
@@ -238,8 +238,7 @@ def regulate(
     from upright.experiments.regulation_2.run import identify_make, run_regulation
     from upright.report.symbols import typed
 
-    at = folder(out)
-    can_be_pdf(pdf)
+    at = page_folder(out, pdf)
     wish = _wish("" if which == "" else str(which), poles, speed, memory, tilt, push, seconds)
     if source is None:
         make, seed = rig or "furuta", seed or 0
@@ -324,8 +323,7 @@ def swing_up(
     from upright.files import write_json
     from upright.report.symbols import typed
 
-    at = folder(out)
-    can_be_pdf(pdf)
+    at = page_folder(out, pdf)
     if not 1 <= seconds <= 120:
         raise BadInput(f"--seconds needs a time from 1 to 120 s, got {seconds:g}.")
     if travel is not None and not travel > 0:
@@ -424,8 +422,7 @@ def track(
     from upright.experiments.tracking_3.run import follow, run_tracking
     from upright.files import write_json
 
-    at = folder(out)
-    can_be_pdf(pdf)
+    at = page_folder(out, pdf)
     own = _poles(poles)
     which = _sets(sets) or (() if own is not None else (1, 2, 3, 4))
     if limit is not None and not limit > 0:

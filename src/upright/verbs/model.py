@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from upright.errors import BadInput, nearest
 from upright.progress import Progress, silent
 from upright.verbs.answer import Answer
-from upright.verbs.pages import can_be_pdf, folder, folder_if_given, pdf_has_folder, write_page
+from upright.verbs.pages import folder_if_given, page_folder, pdf_has_folder, write_page
 from upright.verbs.study import provenance, read_study
 from upright.verbs.values import open_log, pairs, paths, si, texts
 
@@ -212,8 +212,7 @@ def frequency(
     BadInput
         When there is no such rig or way, or a log cannot be used.
     """
-    at = folder(out)
-    can_be_pdf(pdf)
+    at = page_folder(out, pdf)
     for value, option in ((ask, "--ask"), (kind or "sines", "--kind")):
         if value not in KINDS:
             raise BadInput(f"{option} is one of {', '.join(KINDS)}, got '{value}'.")

@@ -26,6 +26,18 @@ def folder(path: str | os.PathLike[str]) -> Path:
     return path
 
 
+def page_folder(out: str | os.PathLike[str], pdf: bool) -> Path:
+    """The folder for results; says before the work begins that a PDF cannot be made.
+
+    Raises
+    ------
+    BadInput
+        When it is a file, or a PDF is asked for and there is no program to make it.
+    """
+    can_be_pdf(pdf)
+    return folder(out)
+
+
 def folder_if_given(out: str | os.PathLike[str] | None, pdf: bool = False) -> Path | None:
     """The folder for results, where one is named; says before the work begins that a PDF cannot be made.
 
