@@ -21,7 +21,7 @@ NAMES = (
     "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "frequency", "swing_up", "tracking", "lab",
     "doctor", "rigs", "regulation", "real", "startup",
 )  # fmt: skip
-LIBRARIES = ("upright", "numpy", "scipy", "numba", "control", "casadi", "jax", "mujoco")
+LIBRARIES = ("upright", "numpy", "scipy", "llvmlite", "control", "casadi", "jax", "mujoco")
 
 
 def amount(seconds: float) -> str:

@@ -29,7 +29,7 @@ def process(*arguments: str, caches: Path | None = None) -> None:
     """Run Python with these arguments to its end; `caches` replaces every folder of compiled code."""
     environment = dict(os.environ)
     if caches is not None:
-        environment |= {"UPRIGHT_CACHE": str(caches / "upright"), "NUMBA_CACHE_DIR": str(caches / "numba")}
+        environment |= {"UPRIGHT_CACHE": str(caches / "upright")}
     command = [sys.executable, *arguments]
     done = subprocess.run(command, capture_output=True, encoding="utf-8", env=environment, cwd=HERE, check=False)
     if done.returncode:

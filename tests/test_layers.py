@@ -21,6 +21,7 @@ records
 readers
 physics
 laws
+simulation.lowering
 simulation.kernel
 simulation
 gains
@@ -57,6 +58,7 @@ FLOOR = {room: floor for floor, line in enumerate(FLOORS.split("\n")) for room i
 BLIND = {
     "physics": {"units", "signals", "records", "readers"},
     "laws": {"units", "signals", "records", "readers", "physics"},
+    "simulation.lowering": {"units", "signals", "records", "readers", "physics", "laws"},
     "simulation.kernel": {"units", "signals", "records", "readers"},
     "simulation": {"units", "signals", "records", "readers"},
     "gains": {"signals", "records", "readers", "simulation", "simulation.kernel"},
@@ -68,7 +70,7 @@ BLIND["report"] = FLOOR.keys() - {"errors", "files", "progress", "quantities", "
 # A heavy library has one door, opened when it is first needed: a room, or files of a name.
 DOORS = {
     "sympy": "physics",
-    "numba": "simulation",
+    "llvmlite": "machine",
     "scipy.optimize": "identification closed_loop",
     "lmfit": "identification",
     "mpmath": "gains",
@@ -224,7 +226,7 @@ def test_no_file_is_called_after_a_drawer():
         ("import jinja2", "upright.experiments.weighing_1a.chapter"),
         ("import matplotlib", "upright.experiments.weighing_1a.chapter"),
         ("from matplotlib.figure import Figure", "upright.diagnosis.chapter"),
-        ("import numba", "upright.physics.equations"),
+        ("import llvmlite", "upright.physics.equations"),
         ("import pint", "upright.study.load"),
         ("x = 1", "upright.drawer.thing"),
     ],

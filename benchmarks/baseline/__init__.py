@@ -20,7 +20,7 @@ LANES = 16
 FLAGS = ("-std=gnu11", "-shared", "-fPIC", "-O3", "-march=native")
 # gcc needs its partial redundancy elimination off, or the lane loop keeps a branch and stays scalar.
 VECTOR = (f"-DLANES={LANES}", "-ffast-math", "-fopenmp-simd", "-fno-tree-pre")
-# Left alone, gcc and LLVM (and so Numba) take 256 bits where 512 are faster: ask for each, keep the best.
+# Left alone, gcc and LLVM take 256 bits where 512 are faster: ask for each, keep the best.
 WIDTHS = ("-mprefer-vector-width=512", "-mprefer-vector-width=256", "")
 
 

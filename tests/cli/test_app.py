@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from upright import BadInput, __version__
 from upright.cli import COMMANDS, app
 
-HEAVY = ("numpy", "scipy", "sympy", "numba", "matplotlib", "pandas", "pint", "control", "lmfit", "xarray")
+HEAVY = ("numpy", "scipy", "sympy", "llvmlite", "matplotlib", "pandas", "pint", "control", "lmfit", "xarray")
 
 
 @pytest.fixture

@@ -126,15 +126,6 @@ def test_ctrl_c_keeps_and_reports_what_is_there(tmp_path, monkeypatch, swallow):
     assert again["experiments"]["1"]["state"] == "kept"
 
 
-def test_a_fresh_machine_is_told_why_the_first_run_takes_longer(tmp_path, monkeypatch):
-    monkeypatch.setattr(laboratory, "EXPERIMENTS", stopped_by(swallow=False)[:1])
-    monkeypatch.setattr("upright.simulation.kernel.compiled.folder", lambda: tmp_path)
-    assert "The first time" in upright("lab", "-o", tmp_path / "a").stderr
-    for i in range(15):
-        (tmp_path / f"upright_kernel_{i}.py").touch()
-    assert "The first time" not in upright("lab", "-o", tmp_path / "b").stderr
-
-
 def test_without_the_pdf_extra_a_sentence_says_how_to_get_it(tmp_path, monkeypatch):
     monkeypatch.setattr(laboratory, "EXPERIMENTS", stopped_by(swallow=False)[:1])
     assert "report.pdf" in upright("lab", "-o", tmp_path).stdout

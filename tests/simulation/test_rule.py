@@ -111,8 +111,10 @@ def test_a_wrong_rule_is_answered_in_a_sentence(block):
     with pytest.raises(BadInput, match="text could not be read"):
         Rule(function=eval("abs"))
     for function, words in ((short, "must return 1 commands, and this one returns 0"), (mixed, "cannot be compiled")):
-        with pytest.raises(BadInput, match=words):
+        with pytest.raises(BadInput, match=words) as caught:
             simulate(block, SPRING, [0.0, 0.0], None, DT, samples=2, loop=Rule(function=function))
+    line = mixed.__code__.co_firstlineno + 3  # the second return, of another length than the first
+    assert f"(line {line} of test_rule.py)" in str(caught.value)
     rule = Rule(function=pid, initial=np.zeros((3, 2)), parameters=np.ones(5), references=R)
     with pytest.raises(BadInput, match="lanes"):
         simulate(block, SPRING, np.zeros((3, 2)), None, DT, samples=2, loop=rule)

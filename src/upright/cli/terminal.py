@@ -46,7 +46,7 @@ def progress_bar(*, quiet: bool = False) -> Generator[Progress]:
 
     columns = (BarColumn(bar_width=24), TimeElapsedColumn(), TextColumn("{task.description}", markup=False))
     with Progress(*columns, console=screen, transient=True, refresh_per_second=8) as bar:
-        task = bar.add_task("starting (the first time, equations are compiled)", total=1.0)
+        task = bar.add_task("starting", total=1.0)
         yield lambda step, share: bar.update(task, description=step, completed=share)
 
 

@@ -9,10 +9,11 @@ from __future__ import annotations
 import ast
 import inspect
 import textwrap
-from collections.abc import Callable, Generator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -132,21 +133,6 @@ class Rule(Controller):
         return np.array(commands), np.array(memory)
 
 
-@contextmanager
-def compiling(rule: bool) -> Generator[None]:
-    """Say in a sentence what of a rule cannot be compiled."""
-    try:
-        yield
-    except Exception as error:
-        if not rule or type(error).__module__ != "numba.core.errors":
-            raise
-        why = next((line for line in str(error).splitlines() if "unif" in line or "No impl" in line), "")
-        raise BadInput(
-            f"the rule cannot be compiled{': ' + why.strip() if why else ''}; keep to floats (0.0, not 0) and return "
-            "tuples of one length at every return."
-        ) from None
-
-
 def _tuple(values: Array) -> Numbers:
     return tuple(values.tolist())
 
@@ -180,3 +166,17 @@ def text_of(function: Function) -> str:
     if ast.get_docstring(tree) is not None:
         tree.body = tree.body[1:]
     return ast.unparse(tree)
+
+
+def line_in(function: Function, line: int) -> str:
+    """Where a line of `text_of` a function, counted from its first, stands in the file that the function is from."""
+    text = ast.parse(text_of(function)).body[0]
+    written = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
+    assert isinstance(text, ast.FunctionDef) and isinstance(written, ast.FunctionDef)  # as `text_of` made sure
+    body = written.body[1:] if ast.get_docstring(written) is not None else written.body
+    pairs = zip(ast.walk(ast.Module(text.body, [])), ast.walk(ast.Module(body, [])), strict=False)
+    first = inspect.getsourcelines(function)[1]
+    for ours, theirs in pairs:
+        if isinstance(ours, ast.stmt) and isinstance(theirs, ast.stmt) and ours.lineno == line:
+            return f"line {first + theirs.lineno - 1} of {Path(inspect.getfile(function)).name}"
+    return f"the rule '{written.name}'"

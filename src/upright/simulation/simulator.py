@@ -13,17 +13,16 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput
 from upright.laws.linear import Law
-from upright.laws.rule import Rule, Written, compiling
+from upright.laws.rule import Rule
 from upright.physics.actuator import ACTUATOR
 from upright.physics.equations import Derived
-from upright.simulation.kernel.compiled import WIDTH, direct, kernel
+from upright.simulation.kernel.compiled import WIDTH, Kernel, compiling, kernel
 from upright.simulation.kernel.flavour import Flavour, Layout, lay_out
 from upright.simulation.kernel.lanes import room
 
@@ -113,8 +112,6 @@ class Simulator:
         Controller, the one that the flavour was chosen for.
     held : mapping of str to Held
         Coordinates whose motion is prescribed, exactly those of the flavour.
-    plain : bool
-        Keep to what Numba documents, slower; done anyway where the rest does not work.
     """
 
     derived: Derived
@@ -123,7 +120,6 @@ class Simulator:
     substeps: int = 1
     loop: Law | Rule | None = None
     held: Mapping[str, Held] = field(default_factory=dict)
-    plain: bool = False
 
     def __post_init__(self) -> None:
         if not (self.dt > 0.0 and math.isfinite(self.dt)):
@@ -145,10 +141,10 @@ class Simulator:
 
     @cached_property
     def _layout(self) -> Layout:
-        return lay_out(self.derived, self.flavour, self.plain or not direct())
+        return lay_out(self.derived, self.flavour)
 
     @cached_property
-    def _kernel(self) -> Any:
+    def _kernel(self) -> Kernel:
         return kernel(self._layout)
 
     @cached_property
@@ -169,7 +165,7 @@ class Simulator:
 
     @cached_property
     def _reference(self) -> Array:
-        return np.zeros(0) if self.loop is None else np.require(self.loop.signal(), np.float64, _KIND)
+        return np.zeros((0, 0)) if self.loop is None else np.require(self.loop.signal(), np.float64, _KIND)
 
     def table(self, params: Mapping[str, ArrayLike], lanes: int) -> Array:
         """Rows of `names` from values by name, shape (rows, lanes); what is missing takes its default or zero."""
@@ -271,16 +267,15 @@ class Simulator:
             out = recorded((samples, 2 * n + (nu if f.loop else 0), blocks * width), memory)
         else:
             reduced = np.empty((4 * n + nu, blocks * width))
-        compiled = self._kernel.run_1 if width == 1 else self._kernel.run_16
         size = room(self._layout, width, buffer)
-        events = self._kernel.events.address if f.dry and not self._layout.plain else 0
+        with compiling(self.loop):
+            compiled = self._kernel.run_1 if width == 1 else self._kernel.run_16
+            events = self._kernel.events if f.dry else 0
         call = (lanes, P, X0, u, self._reference, begin, self._grid, base, int((samples - 1) * every), int(every))
         call += (int(self.substeps), float(self.dt), scalars, buffer, out, reduced)
 
         def step(first: int, last: int) -> None:
-            W, address = aligned(size)
-            with compiling(isinstance(f.loop, Written)):
-                compiled(first, last, *call, W, address, events)
+            compiled(first, last, *call, aligned(size), events)
 
         if threads <= 1 or blocks < 2 * threads:
             step(0, blocks)
@@ -298,12 +293,11 @@ def padded(a: Array, width: int, extra: int = 0) -> Array:
     return out
 
 
-def aligned(size: int) -> tuple[Array, int]:
-    """Zeros that start on a cache line, so that no vector straddles two; and where that is."""
+def aligned(size: int) -> Array:
+    """Zeros that start on a cache line, so that no vector straddles two."""
     raw = np.zeros(size + 7)
-    address = raw.ctypes.data
-    first = (-address // 8) % 8
-    return raw[first : first + size], address + 8 * first
+    first = (-raw.ctypes.data // 8) % 8
+    return raw[first : first + size]
 
 
 def recorded(shape: tuple[int, int, int], memory: Array | None) -> Array:
@@ -322,6 +316,5 @@ def share(step: Callable[[int, int], None], blocks: int, threads: int) -> None:
 
     pieces = min(blocks, 4 * threads)
     edges = [blocks * k // pieces for k in range(pieces + 1)]
-    step(0, 0)  # compiled before the threads ask for it
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(lambda k: step(edges[k], edges[k + 1]), range(pieces)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from upright.cli.terminal import console, print_json, progress_bar
-from upright.progress import Progress
 
 if TYPE_CHECKING:
     from upright.verbs.course import Laboratory
@@ -52,7 +51,7 @@ def lab(
     with progress_bar(quiet=as_json) as bar:
         done = verbs.lab(
             experiment=experiment or (), rig=rig, seed=seed, out=out, fresh=fresh,
-            progress=_first(_say_first_time, bar),
+            progress=bar,
         )  # fmt: skip
     if as_json:
         print_json(done.numbers)
@@ -60,30 +59,6 @@ def lab(
         _tell(done.value, done.files)
     if done.value.interrupted:
         raise typer.Exit(INTERRUPTED)
-
-
-def _first(say: Callable[[], None], bar: Progress) -> Progress:
-    """A bar that has something said before it moves: a call that is wrong never gets so far."""
-    waiting = [say]
-
-    def follow(step: str, share: float) -> None:
-        if waiting:
-            waiting.pop()()
-        bar(step, share)
-
-    return follow
-
-
-def _say_first_time() -> None:
-    """Why the first run takes longer, where nothing is compiled yet."""
-    from upright.simulation.kernel.compiled import folder
-
-    if len(list(folder().glob("*.py"))) < 10:  # the whole laboratory needs 15
-        typer.echo(
-            "The first time, the equations of motion are compiled for this machine, about two minutes; afterwards the "
-            "laboratory takes some 20 s.",
-            err=True,
-        )
 
 
 def _tell(done: Laboratory, files: Sequence[Path]) -> None:

@@ -101,7 +101,7 @@ def substep(w: Writer, j: int) -> None:
     if f.relaxation:
         _build_up(w, j)
     if f.gate:
-        w.add("_here = float64(_k * _substeps + _j)")
+        w.add("_here = float(_k * _substeps + _j)")
         w.add(*_step_down("_ne", "_de", f"{{ge{j}}} - _here"), *_step_down("_ns", "_ds", f"{{gs{j}}} - _here"))
         w.add("_r = _ne - _ns", "_d = _de - _ds", "_oa = _r - _d", "_om = _r", "_ob = _r + _d")
         if f.curve:

@@ -67,7 +67,7 @@ def located(p: Layout, text: str) -> str:
         text = f"@inline\ndef joint(w):\n    return {chosen}0\n\n\n{text}"
     numbers = places(p) | {"NF": len(p.free), "ND": len(where), "NX": len(_states(p))}
     text = re.sub(r"\b[A-Z]{2,}\b", lambda m: str(numbers.get(m[0], m[0])), text)
-    # fewer additions for Numba to type
+    # fewer additions to write and to fold
     return re.sub(r"(?<=\[)(\d+) \+ (\d+)(?= \+|\])", lambda m: str(int(m[1]) + int(m[2])), text)
 
 
@@ -188,7 +188,7 @@ def load(W, S, L, state, t, h, fresh):
             S[MOVES + k] = 1.0
     for w in range(ND):
         S[MOVES + joint(w)] = abs(S[MODES + w])
-    solve(S, int64(FORCE))
+    solve(S, FORCE)
     first = -1
     for w in range(ND):
         if S[MODES + w] == 0.0:
@@ -252,7 +252,7 @@ def decide(S, forced):
                 S[MODES + w] = 1.0 if c > 0.0 else (-1.0 if c < 0.0 else 0.0)
                 S[MOVES + j] = abs(S[MODES + w])
                 S[RIGHT + j] -= S[MODES + w] * S[LEVEL + w]
-        solve(S, int64(RIGHT))
+        solve(S, RIGHT)
         again = False
         for w in range(ND):
             if S[REST + w] > 0.0:
@@ -283,7 +283,7 @@ def turned(S, state, w):
 '''
 
 HEAD = '''
-{decorator}
+@separate
 def events(W, S, L, h):
     """Redo one substep of the lane at `W`, event by event, with `S` to write on.
 
@@ -293,8 +293,7 @@ def events(W, S, L, h):
 
 SEARCH = """\
     FULL, MIDDLE, ROOT = 0, 1, 2
-    # not literals: Numba would compile what they are passed to once for each
-    here, there, none, fresh, known = int64(STATE), int64(NEXT), int64(-1), int64(1), int64(0)
+    here, there, none, fresh, known = STATE, NEXT, -1, 1, 0
     phase, w, count, events, turns, side = FULL, -1, 0, 0, 0, 0
     t, c, lo, hi, ga, gb, scale = 0.0, h, 0.0, 0.0, 0.0, 0.0, 0.0
     done, begin = True, True
@@ -358,7 +357,7 @@ SEARCH = """\
                     scale = 1e-6 * (ga - gb) if S[MODES + w] != 0.0 else 1e-14 * (ga - gb)
                 else:
                     # the moment is found: stop the joint, or let it break away
-                    forced = int64(w)
+                    forced = w
                     if not stuck:
                         load(W, S, L, there, t + c, h, fresh)
                     if S[MODES + w] != 0.0:
@@ -422,11 +421,7 @@ SEARCH = """\
 """
 
 
-BY_ADDRESS = '@cfunc("void(CPointer(float64), CPointer(float64), int64, float64)", error_model="numpy", cache=True)'
-
-
 def events(p: Layout) -> str:
     """Text of the search of events for one plant."""
-    head = HEAD.format(decorator="@scalar" if p.plain else BY_ADDRESS)
-    help_ = [leap(p), terms_at(p), statics(len(p.free), len(p.flavour.dry)), TURNED, head]
+    help_ = [leap(p), terms_at(p), statics(len(p.free), len(p.flavour.dry)), TURNED, HEAD]
     return located(p, "\n\n".join(help_) + fetch(p) + SEARCH + store(p))

@@ -72,7 +72,6 @@ class Layout:
 
     derived: Derived
     flavour: Flavour
-    plain: bool = False
 
     @cached_property
     def n(self) -> int:
@@ -150,9 +149,9 @@ def _known(derived: Derived) -> frozenset[str]:
 
 
 @lru_cache(maxsize=64)
-def lay_out(derived: Derived, flavour: Flavour, plain: bool = False) -> Layout:
+def lay_out(derived: Derived, flavour: Flavour) -> Layout:
     """Layout of a kernel, worked out once."""
-    return Layout(derived=derived, flavour=flavour, plain=plain)
+    return Layout(derived=derived, flavour=flavour)
 
 
 def choose(

@@ -81,14 +81,14 @@ def _actuator(w: Writer, j: int, first: int) -> None:
         return
     # settle the lag on the input before the first sample, which is held where the record does not reach
     w.add(
-        "_n = START[_m] if 40.0 * _tau > _dt * START[_m] else int64(40.0 * _tau / _dt) + 1",
+        "_n = START[_m] if 40.0 * _tau > _dt * START[_m] else int(40.0 * _tau / _dt) + 1",
         "_n = min(_n, START[_m]) if _tau > 0.0 else 0",
         "for _k in range(-_n - 1, 0):",
     )
     w.depth += 1
     for name, back in (("_cn", 0), ("_co", 1)):
         w.add(
-            f"_z = U[min(max(START[_m] + _k - int64({{di}}) - {back}, 0), _last), {j}] if _last >= 0 else 0.0",
+            f"_z = U[min(max(START[_m] + _k - int({{di}}) - {back}, 0), _last), {j}] if _last >= 0 else 0.0",
             f"_z = {{lim{j}}} if _z > {{lim{j}}} else _z",
             f"_z = 0.0 - {{lim{j}}} if _z < 0.0 - {{lim{j}}} else _z",
             f"{name} = {{gain{j}}} * (_z + {{off{j}}})",
@@ -137,7 +137,7 @@ def command(w: Writer) -> None:
     now = "START[_base + _i] + _k"
     w.add("if _last >= 0:")
     w.depth += 1
-    _feed(w, (("ff", f"{now} - int64({{di}})"), ("fo", f"{now} - int64({{di}}) - 1")) if f.dynamic else (("ff", now),))
+    _feed(w, (("ff", f"{now} - int({{di}})"), ("fo", f"{now} - int({{di}}) - 1")) if f.dynamic else (("ff", now),))
     w.depth -= 1
     w.lanes()
     for j in range(p.nu):
@@ -168,8 +168,8 @@ def controller(w: Writer) -> None:
         for j in range(p.nu):
             place = f"(_slot * {p.nu} + {j} + {len(p.rows)}) * {w.width} + _i"
             w.add("_slot = _k % _nbuf", f"W[{place}] = {{ua{j}}}")
-            for name, back in (("cn", "int64({di})"), ("co", "int64({di}) - 1")):
-                gap = back if name == "cn" else "int64({di}) + 1"
+            for name, back in (("cn", "int({di})"), ("co", "int({di}) - 1")):
+                gap = back if name == "cn" else "int({di}) + 1"
                 w.add(f"_slot = (_k - ({gap})) % _nbuf", f"_c = W[{place}]", f"_c = _c if _k >= {gap} else 0.0")
                 commanded(w, j, name[1])
                 w.add(f"{{{name}{j}}} = {{gain{j}}} * (_c + {{off{j}}})")
@@ -261,7 +261,7 @@ def _law(w: Writer) -> None:
 
 RUN_ARGUMENTS = (
     "_b0, _b1, _total, P, X0, U, R, START, HELD, HBASE, _nsteps, _every, _substeps, _dt, FL, _nbuf, OUT, STAT, "
-    "W, _data, _events"
+    "W, _events"
 )
 
 
@@ -275,7 +275,6 @@ def run(p: Layout, width: int) -> str:
     """Text of ``run_{width}``."""
     w = Writer(p, width)
     w.add(
-        "" if p.plain else "wide()",
         "_h = _dt / _substeps",
         "_last = U.shape[0] - 1",
         "_final = HELD.shape[0] - 1",
@@ -301,7 +300,7 @@ def run(p: Layout, width: int) -> str:
         w.lanes()
         names = _statistics(p)
         w.add(*(f"STAT[{r}, _base + _i] = {{{name}}}" for r, name in enumerate(names)))
-    return f"@compiled\ndef run_{width}({RUN_ARGUMENTS}):\n" + "\n".join(w.lines) + "\n"
+    return f"@entry\ndef run_{width}({RUN_ARGUMENTS}):\n" + "\n".join(w.lines) + "\n"
 
 
 def _statistics(p: Layout) -> list[str]:
@@ -354,7 +353,7 @@ def _substep(w: Writer) -> None:
                 f"_d = {{co{j}}} - {{cn{j}}}",
                 f"_r = {{cn{j}}} + _p * _d",
                 f"_w0 = {{w{j}}}",
-                # read both before one is chosen: a load under a condition keeps LLVM from using vectors
+                # read both before one is chosen: a load under a condition would need a jump
                 f"_e, _z = {{e{j}}}, {{ep{j}}}",
                 "_z = _e if _p <= 0.0 else _z",
                 "_z = 1.0 if _p >= 1.0 else _z",
@@ -383,7 +382,4 @@ def _substep(w: Writer) -> None:
         w.add("_bad = 0.0", f"for _i in range({w.width}):", "    _bad += {flag}")
         w.add("if _bad > 0.0:", "    for _i in range(_valid):", "        if {flag} > 0.0:")
         end = places(p)["END"]
-        if p.plain:
-            w.add(f"            events(W[_i:], W[W.size - {end}:], {w.width}, _h)")
-        else:
-            w.add(f"            call(_events, _data + 8 * _i, _data + 8 * (W.size - {end}), {w.width}, _h)")
+        w.add(f"            events(W[_i:], W[W.size - {end}:], {w.width}, _h)")

@@ -1,0 +1,84 @@
+"""Machine code kept between processes, in a folder that only its owner can write to and checked before it is loaded.
+
+A file's name is a hash of everything that its code depends on, so nothing goes stale. Whatever goes wrong with files
+costs the time to compile again, and nothing else.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import stat
+import tempfile
+from functools import cache
+from pathlib import Path
+
+_CHECK = 32  # bytes of a SHA-256
+
+
+@cache
+def folder() -> Path | None:
+    """Folder of the machine code: below ``UPRIGHT_CACHE``, else in the user's cache; None where neither will do."""
+    from platformdirs import user_cache_dir
+
+    for place in filter(None, [os.environ.get("UPRIGHT_CACHE"), user_cache_dir("upright")]):
+        path = Path(place) / "code"
+        try:
+            path.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if not _only_ours(path.lstat()):
+                path.chmod(0o700)  # refused for another user's folder
+            if path.is_dir() and not path.is_symlink() and _only_ours(path.lstat()):
+                return path
+        except OSError:
+            continue
+    return None
+
+
+def _only_ours(found: os.stat_result) -> bool:
+    """Whether nobody but this user can write there; on Windows the user's profile sees to that."""
+    return not hasattr(os, "getuid") or (found.st_uid == os.getuid() and not found.st_mode & 0o022)
+
+
+def key(*parts: str) -> str:
+    """Name of what depends on these texts."""
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:40]
+
+
+def read(name: str) -> bytes | None:
+    """What was kept under a name; None when there is nothing, or not what was written."""
+    place = folder()
+    if place is None:
+        return None
+    try:
+        # a link planted there is not followed, and what is opened is what is examined
+        descriptor = os.open(place / name, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0))
+        with os.fdopen(descriptor, "rb") as file:
+            found = os.fstat(descriptor)
+            if not stat.S_ISREG(found.st_mode) or not _only_ours(found):
+                return None
+            content = file.read()
+    except OSError:
+        return None
+    code = content[_CHECK:]
+    return code if content[:_CHECK] == _check(name, code) else None
+
+
+def write(name: str, code: bytes) -> None:
+    """Keep code under a name, written aside and moved so that none sees half of it; not where there is no room."""
+    place = folder()
+    if place is None:
+        return
+    aside = ""
+    try:
+        descriptor, aside = tempfile.mkstemp(dir=place, suffix=".tmp")
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(_check(name, code) + code)
+        os.replace(aside, place / name)
+    except OSError:  # a full disk; Windows, while another process has the same file open
+        if aside:
+            Path(aside).unlink(missing_ok=True)
+
+
+def _check(name: str, code: bytes) -> bytes:
+    """The name is part of it: a file moved to another name is not what was written there."""
+    return hashlib.sha256(name.encode() + code).digest()

@@ -1,0 +1,98 @@
+"""Machine code in memory from LLVM's text, for the processor it runs on."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import llvmlite.binding as llvm
+
+from upright.simulation.lowering.module import Platform
+
+_CODE = 2
+"""How hard LLVM works on the machine code; 3 takes longer and gains nothing here."""
+
+_PASSES = 1
+"""How hard on its own text: what is left after inlining are arithmetic, loads and stores."""
+
+_loaded: list[Any] = []
+"""Engines own the code they loaded, and stay."""
+
+
+@cache
+def _processor() -> tuple[str, str, int]:
+    """Name and features of this processor, and the lanes that a vector is written for."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    name, features = llvm.get_host_cpu_name(), llvm.get_host_cpu_features()
+    return name, features.flatten(), lanes_of(features)
+
+
+def lanes_of(features: dict[str, bool]) -> int:
+    """Lanes of a vector that suit a processor: one register of AVX-512, two of AVX2 or NEON."""
+    return 8 if features.get("avx2") or features.get("avx512f") else 4
+
+
+def lanes() -> int:
+    """Lanes that a vector is written for here."""
+    return _processor()[2]
+
+
+@cache
+def _target() -> Any:
+    name, features, _ = _processor()
+    return llvm.Target.from_triple(llvm.get_process_triple()).create_target_machine(
+        cpu=name, features=features, opt=_CODE, reloc="default", codemodel="jitdefault"
+    )
+
+
+@cache
+def platform() -> Platform:
+    """What modules are written for here."""
+    return Platform(triple=llvm.get_process_triple(), layout=str(_target().target_data), head=object.__basicsize__)
+
+
+@cache
+def identity() -> str:
+    """Everything of this machine that its code depends on."""
+    name, features, lanes = _processor()
+    return f"{llvm.llvm_version_info} {platform()} {name} {features} {lanes} {_CODE} {_PASSES}"
+
+
+def compiled(text: str) -> bytes:
+    """Object code of a module.
+
+    Parameters
+    ----------
+    text : str
+        LLVM's text, written for `platform`.
+    """
+    return translated(text, _target())
+
+
+def translated(text: str, target: Any) -> bytes:
+    """Object code of a module for any target machine of llvmlite."""
+    module = llvm.parse_assembly(text)
+    options = llvm.create_pipeline_tuning_options(speed_level=_PASSES)
+    # lanes are vectors already
+    options.loop_vectorization = options.slp_vectorization = options.loop_interleaving = options.loop_unrolling = False
+    passes = llvm.create_pass_builder(target, options)
+    passes.getModulePassManager().run(module, passes)
+    return target.emit_object(module)
+
+
+def load(code: bytes, name: str) -> int:
+    """Address of a function in object code, brought into memory."""
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target())
+    # an empty module is compiled, and this is handed over as what became of it
+    engine.set_object_cache(None, lambda _: code)
+    engine.finalize_object()
+    _loaded.append(engine)
+    return engine.get_function_address(name)
+
+
+def function(address: int) -> Callable[[bytes], None]:
+    """The function at an address, called with packed words; Python's lock is given up meanwhile."""
+    return ctypes.CFUNCTYPE(None, ctypes.c_char_p)(address)
