@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import sys
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -17,8 +18,14 @@ _CODE = 2
 _PASSES = 1
 """How hard on its own text: what is left after inlining are arithmetic, loads and stores."""
 
+_LINKS = sys.platform == "linux"
+"""Whether LLVM's linker lays out code and constants side by side: near enough for a constant to be an operand.
+
+Elsewhere each section may lie anywhere, and every constant needs an instruction or two of its own: a sixth slower.
+"""
+
 _loaded: list[Any] = []
-"""Engines own the code they loaded, and stay."""
+"""Whoever loaded code owns it, and stays."""
 
 
 @cache
@@ -31,8 +38,8 @@ def _processor() -> tuple[str, str, int]:
 
 
 def lanes_of(features: dict[str, bool]) -> int:
-    """Lanes of a vector that suit a processor: one register of AVX-512, two of AVX2 or NEON."""
-    return 8 if features.get("avx2") or features.get("avx512f") else 4
+    """Lanes of a vector that suit a processor: two registers of AVX-512, AVX2 or NEON."""
+    return 16 if features.get("avx512f") else 8 if features.get("avx2") else 4
 
 
 def lanes() -> int:
@@ -44,7 +51,11 @@ def lanes() -> int:
 def _target() -> Any:
     name, features, _ = _processor()
     return llvm.Target.from_triple(llvm.get_process_triple()).create_target_machine(
-        cpu=name, features=features, opt=_CODE, reloc="default", codemodel="jitdefault"
+        cpu=name,
+        features=features,
+        opt=_CODE,
+        reloc="pic" if _LINKS else "default",
+        codemodel="small" if _LINKS else "jitdefault",
     )
 
 
@@ -58,7 +69,7 @@ def platform() -> Platform:
 def identity() -> str:
     """Everything of this machine that its code depends on."""
     name, features, lanes = _processor()
-    return f"{llvm.llvm_version_info} {platform()} {name} {features} {lanes} {_CODE} {_PASSES}"
+    return f"{llvm.llvm_version_info} {platform()} {name} {features} {lanes} {_CODE} {_PASSES} {_LINKS}"
 
 
 def compiled(text: str) -> bytes:
@@ -83,8 +94,17 @@ def translated(text: str, target: Any) -> bytes:
     return target.emit_object(module)
 
 
+@cache
+def _linker() -> Any:
+    return llvm.create_lljit_compiler(_target(), use_jit_link=True)
+
+
 def load(code: bytes, name: str) -> int:
     """Address of a function in object code, brought into memory."""
+    if _LINKS:
+        library = llvm.JITLibraryBuilder().add_object_img(code).add_current_process().export_symbol(name)
+        _loaded.append(library.link(_linker(), f"kernel {len(_loaded)}"))
+        return _loaded[-1][name]
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target())
     # an empty module is compiled, and this is handed over as what became of it
     engine.set_object_cache(None, lambda _: code)
