@@ -14,6 +14,7 @@ BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 # Rooms from the ground up: each imports from those above its own line only. Rooms on one line do not see each other.
 FLOORS = """
 errors progress files shown
+workers
 quantities
 units
 signals
@@ -77,6 +78,10 @@ DOORS = {
     "typst": "report",
     "pint": "units",
     "typer": "cli",
+    "loky": "workers",
+    "cloudpickle": "workers",
+    "distributed": "workers",
+    "threadpoolctl": "workers",
 }
 
 
@@ -226,6 +231,7 @@ def test_no_file_is_called_after_a_drawer():
         ("from matplotlib.figure import Figure", "upright.diagnosis.chapter"),
         ("import numba", "upright.physics.equations"),
         ("import pint", "upright.study.load"),
+        ("from loky import get_reusable_executor", "upright.identification.estimate"),
         ("x = 1", "upright.drawer.thing"),
     ],
 )
