@@ -132,8 +132,8 @@ def ensemble(
     """Extremes and final states of many motions, without keeping the motions.
 
     Parameters are those of `simulate`; `settle` [s] is when errors begin to count, and `threads` defaults to the
-    number of processors this process may use. With `workers` blocks of `BLOCK` lanes are shared among those instead,
-    one thread each, and `progress` is told; the numbers are the same.
+    number of processors this process may use. With `workers` blocks of lanes are shared among those instead, one
+    thread each, and `progress` is told; the numbers are the same.
     """
     job = _prepare(plant, params, x0, u, dt, substeps, start, loop, held or {}, record=False)
     lanes = job.x0.shape[1]
@@ -142,7 +142,8 @@ def ensemble(
         rows = _reduced(job, samples, settle, (slice(0, lanes), job.table, job.x0, job.start), silent, threads=own)
     else:
         parts = [
-            (p, job.table[:, p], job.x0[:, p], None if job.start is None else job.start[p]) for p in cut(lanes, BLOCK)
+            (p, job.table[:, p], job.x0[:, p], None if job.start is None else job.start[p])
+            for p in cut(lanes, block(lanes))
         ]
         shared = replace(job, table=job.table[:, :0], x0=job.x0[:, :0], start=None)
         work = partial(_reduced, shared, samples, settle)
@@ -154,8 +155,19 @@ def ensemble(
     return Ensemble(largest=rows[:n], error=rows[n : 2 * n], saturated=rows[2 * n : 2 * n + nu] / samples, final=final)
 
 
-BLOCK = 256
-"""Lanes of an ensemble that are one piece of work for whoever shares it."""
+BLOCK, MANY, LARGEST = 256, 4096, 16384
+
+
+def block(lanes: int) -> int:
+    """Lanes of an ensemble that are one piece of work.
+
+    Some tens of milliseconds at first; more when there would be more than 4096 pieces, each of which costs whoever
+    hands it out a millisecond; and no more than fit into a few megabytes.
+    """
+    size = BLOCK
+    while lanes > size * MANY and size < LARGEST:
+        size *= 2
+    return size
 
 
 def _reduced(
