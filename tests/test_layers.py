@@ -41,7 +41,7 @@ report.fit
 report.ladder report.law report.log
 diagnosis questionnaire
 paper
-experiments.makes
+experiments.abreast experiments.makes
 experiments.identified
 experiments.designing experiments.weighing_1a
 experiments.frequency_1b

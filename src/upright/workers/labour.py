@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from concurrent.futures import Executor, Future
 from functools import cache, lru_cache
 from importlib import import_module
+from logging import CRITICAL, getLogger
 from threading import Lock
 from typing import Any
 
@@ -132,6 +133,7 @@ def _client(address: str) -> Any:
         distributed = import_module("distributed")
     except ImportError:
         raise BadInput("--cluster needs the cluster extra: pip install 'upright[cluster]'.") from None
+    getLogger("distributed.client").setLevel(CRITICAL)  # what it would log is said in sentences
     try:
         client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
