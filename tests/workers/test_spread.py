@@ -59,11 +59,15 @@ def test_impossible_workers_are_told_so(asked, said):
 
 def test_progress_is_one_line_from_nothing_to_all():
     heard = []
-    done = spread(
-        lambda item, tell: tell("at it", 1.0), range(4), progress=lambda *told: heard.append(told), what="rig"
-    )
-    assert heard == [(f"rig {k} of 4: at it", k / 4) for k in range(1, 5)]
+    done = spread(lambda item, _: item, range(4), progress=lambda *told: heard.append(told), what="rig")
+    assert heard == [(f"rig {k} of 4", k / 4) for k in range(5)]
     assert not done.interrupted
+
+
+def test_an_item_tells_its_share_of_the_whole():
+    heard = []
+    spread(lambda _, tell: tell("half-way", 0.5), range(2), progress=lambda *told: heard.append(told), what="rig")
+    assert ("rig 2 of 2: half-way", 0.75) in heard
 
 
 def stop_at(share, _step, here):

@@ -77,9 +77,9 @@ class Finished(Generic[R]):
         Raises
         ------
         KeyboardInterrupt
-            When Ctrl-C came before the last of them.
+            When Ctrl-C came, were it after the last of them: who pressed it waits for no next step.
         """
-        if len(self.results) < self.of:
+        if self.interrupted:
             raise KeyboardInterrupt
         return self.so_far()
 
@@ -133,8 +133,10 @@ def _here(task: Callable[[T, Progress], R], items: Sequence[T], progress: Progre
     try:
         with threadpool_limits(1, user_api="blas"):
             for i, item in enumerate(items):
+                progress(f"{what} {i} of {len(items)}", i / len(items))
                 tell = part(progress, i / len(items), (i + 1) / len(items), f"{what} {i + 1} of {len(items)}")
                 results[i] = task(item, tell)
+            progress(f"{what} {len(items)} of {len(items)}", 1.0)
     except KeyboardInterrupt:
         interrupted = True
     return Finished(results=results, of=len(items), interrupted=interrupted)
