@@ -206,33 +206,40 @@ def amount(seconds: float) -> str:
     return f"{seconds:.3g} s" if seconds >= 0.1 else f"{1e3 * seconds:.3g} ms"
 
 
+def lasting(seconds: float) -> str:
+    """A long time with a readable unit."""
+    unit, size = next((u, n) for u, n in (("h", 3600), ("min", 60), ("s", 1)) if seconds >= n or u == "s")
+    return f"{seconds / size:.3g} {unit}"
+
+
 def plan(block: float, scaling: Sequence[tuple[int, float, float, float]]) -> str:
     """The plan past this machine, from what was measured."""
     handing = float(np.median([each for *_, each in scaling]))
     hours, largest = 1e9 / LANES * block / 3600, 16384 / LANES * block
 
-    def busy(item: float, cores: int) -> str:
-        return f"{100 * min(1.0, item / handing / cores):.0f} %"
+    def bill(item: float, cores: int) -> str:
+        """Time and price: as long as the work takes, or as handing it out takes, and the last item."""
+        whole = 3600 * hours
+        seconds = max(whole / cores, whole / item * handing) + item
+        return f"{lasting(seconds)} | {PRICE * cores * seconds / 3600:,.2f} USD"
 
-    rows = "\n".join(
-        f"| {n:,} | {hours / n:,.3g} h | {PRICE * hours:,.2f} USD | {busy(block, n)} | {busy(largest, n)} |"
-        for n in (1, 16, 64, 256, 1024, 4096)
-    )
+    rows = "\n".join(f"| {n:,} | {bill(block, n)} | {bill(largest, n)} |" for n in (1, 16, 64, 256, 1024, 4096))
     return f"""\
 ## A plan past this machine, on paper
 
 A closed loop (Furuta pendulum, exact dry friction, 2 s at 1 kHz, two Runge-Kutta steps a sample) takes
 {1e6 * block / LANES:.3g} µs of one core, so 1e9 of them take {hours:,.0f} core hours.
 Assumed, not measured: {PRICE} USD per core hour, and cores as fast as this one; the bill is in proportion to both.
-Many cores cost what few cost as long as they have work; the last two columns say how much of the time they do.
+Many cores cost what few cost as long as they have work; what waits for work is paid for, too.
 
-| cores | time at full use | price | in use, items of 256 lanes | in use, items of 16,384 lanes |
+| cores | items of 256 lanes | | items of 16,384 lanes | |
 |---|---|---|---|---|
 {rows}
 
 - **First the process that hands out.** An item costs it {1e3 * handing:.2g} ms of CPU, whoever works (median of the
-  workers that wait). Items of {amount(block)} feed {block / handing:,.0f} workers, items of 16,384 lanes
-  ({amount(largest)}) feed {largest / handing:,.0f}; `ensemble` makes its blocks larger from a million lanes on.
+  workers that wait). Items of {amount(block)} feed {block / handing:,.0f} workers at best, and fewer where that process
+  has no processor to itself, as here; items of 16,384 lanes ({amount(largest)}) feed {largest / handing:,.0f}.
+  `ensemble` makes its blocks larger from a million lanes on.
 - **Then what travels.** Numbers of a lane are some 200 bytes there and back: 1e9 lanes are 200 GB, which one process
   neither holds nor sends. There an item is a seed of `SeedSequence.spawn`; its worker draws the lanes and returns what
   they reduce to, so that 60,000 items carry some megabytes in all.

@@ -61,10 +61,9 @@ HERE = Workers()
 
 @dataclass(frozen=True, kw_only=True)
 class Finished(Generic[R]):
-    """What came of the items: results by the item's place, of how many, and whether Ctrl-C ended it."""
+    """What came of the items: results by the place of each, and whether Ctrl-C ended it."""
 
     results: Mapping[int, R]
-    of: int
     interrupted: bool
 
     def so_far(self) -> list[R]:
@@ -139,7 +138,7 @@ def _here(task: Callable[[T, Progress], R], items: Sequence[T], progress: Progre
             progress(f"{what} {len(items)} of {len(items)}", 1.0)
     except KeyboardInterrupt:
         interrupted = True
-    return Finished(results=results, of=len(items), interrupted=interrupted)
+    return Finished(results=results, interrupted=interrupted)
 
 
 def _there(
@@ -181,7 +180,7 @@ def _there(
     finally:
         if running:
             pool.stop(running)
-    return Finished(results=results, of=len(items), interrupted=interrupted)
+    return Finished(results=results, interrupted=interrupted)
 
 
 def _give_up(pool: Pool, what: str, begun: Mapping[int, int], error: BaseException) -> None:
