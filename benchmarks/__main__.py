@@ -16,10 +16,12 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.measure import Line
+from upright.errors import BadInput
+from upright.workers import Workers
 
 NAMES = (
     "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "frequency", "swing_up", "tracking", "lab",
-    "doctor", "rigs", "regulation", "real", "startup",
+    "doctor", "rigs", "regulation", "real", "startup", "workers",
 )  # fmt: skip
 LIBRARIES = ("upright", "numpy", "scipy", "llvmlite", "control", "casadi", "jax", "mujoco")
 
@@ -81,11 +83,17 @@ def main(arguments: list[str] | None = None) -> int:
         "--markdown",
         type=Path,
         metavar="FILE",
-        help="write the table of `real`, `rigs` or `regulation` for publication",
+        help="write the page of `real`, `rigs`, `regulation` or `workers` for publication",
     )
+    parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes for rigs, regulation, coverage")
+    parser.add_argument("--cluster", default="", metavar="ADDRESS", help="Dask scheduler for them, tcp://host:8786")
     asked = parser.parse_args(arguments)
-    if asked.markdown and asked.names not in (["real"], ["rigs"], ["regulation"]):
-        parser.error("--markdown writes the table of one benchmark: name real, rigs or regulation")
+    try:
+        shared = {"workers": Workers(number=asked.workers, cluster=asked.cluster)}
+    except BadInput as error:
+        parser.error(str(error))
+    if asked.markdown and asked.names not in (["real"], ["rigs"], ["regulation"], ["workers"]):
+        parser.error("--markdown writes the table of one benchmark: name real, rigs, regulation or workers")
     if unknown := set(asked.names) - set(NAMES):
         parser.error(f"no benchmark is called {', '.join(sorted(unknown))}; there are {', '.join(NAMES)}")
 
@@ -95,7 +103,10 @@ def main(arguments: list[str] | None = None) -> int:
     missed = 0
     for name in asked.names or NAMES:
         markdown = {"markdown": asked.markdown}
-        extra = {"fit": {"full": asked.full}, "real": markdown, "rigs": markdown, "regulation": markdown}.get(name, {})
+        extra: dict[str, Any] = {
+            "fit": {"full": asked.full}, "real": markdown, "rigs": markdown | shared, "regulation": markdown | shared,
+            "coverage": shared, "workers": markdown,
+        }.get(name, {})  # fmt: skip
         module = importlib.import_module(f"benchmarks.{name}")
         lines: list[Line] = module.run(
             quick=asked.quick, progress=lambda text, name=name: told.print(f"[dim]{name}: {text}[/]"), **extra

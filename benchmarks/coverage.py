@@ -14,6 +14,7 @@ from collections.abc import Callable
 import numpy as np
 
 from benchmarks.measure import Line, of_each
+from upright.workers import HERE, Workers
 
 TRUTH = {"m_p": 0.2, "l_cg": 0.3, "J_p": 2e-3, "b_2": 2e-3, "b_2c": 0.0, "b_2q": 0.0}
 GUESS = {"J_p": 3e-3, "b_2": 1.5e-3}
@@ -54,7 +55,7 @@ def held(seconds: float, memory: float, seed: int) -> list[bool]:
     return [low <= TRUTH[name] <= high for name, (low, high) in intervals.items()]
 
 
-def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
+def run(*, quick: bool, progress: Callable[[str], None], workers: Workers = HERE) -> list[Line]:
     """Share of intervals that hold the truth, by length of the record and memory of its noise."""
     lines: list[Line] = []
     seeds = range(50 if quick else 200)
@@ -62,7 +63,7 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
         for memory in MEMORY:
             name = f"{seconds:g} s, autocorrelation {memory:g}"
             progress(name)
-            hits, each = of_each(functools.partial(held, seconds, memory), seeds)
+            hits, each = of_each(functools.partial(held, seconds, memory), seeds, workers)
             share = 100 * np.mean(hits, axis=0)
             said = ", ".join(f"{n} {s:.1f} %" for n, s in zip(GUESS, share, strict=True))
             note = f"95 % intervals that hold the truth, {len(seeds)} records: {said}"

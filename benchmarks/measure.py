@@ -7,6 +7,7 @@ stretch; whole processes are timed by the clock on the wall.
 
 from __future__ import annotations
 
+import functools
 import gc
 import importlib
 import math
@@ -16,6 +17,10 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
+
+from upright.progress import Progress, silent
+from upright.workers import HERE, Workers
+from upright.workers import spread as share_out
 
 T = TypeVar("T")
 Spread = tuple[float, float, float]
@@ -80,11 +85,19 @@ def spread(values: Sequence[float]) -> Spread:
     return float(middle), float(low), float(high)
 
 
-def of_each(work: Callable[[Any], T], which: Iterable[Any]) -> tuple[list[T], Spread]:
+def of_each(
+    work: Callable[[Any], T], which: Iterable[Any], workers: Workers = HERE, progress: Progress = silent
+) -> tuple[list[T], Spread]:
     """What each came to, such as the twin of each seed, and the mean CPU seconds."""
+    done = share_out(
+        functools.partial(_timed, work), list(which), workers=workers, progress=progress, what="twin"
+    ).all()
+    return [result for result, _ in done], spread([sum(seconds for _, seconds in done) / len(done)])
+
+
+def _timed(work: Callable[[Any], T], one: Any, _progress: Progress) -> tuple[T, float]:
     start = time.process_time()
-    done = [work(one) for one in which]
-    return done, spread([(time.process_time() - start) / len(done)])
+    return work(one), time.process_time() - start
 
 
 def library(name: str, what: str, part: str, *size: int, **more: Any) -> Callable[[], Contender]:

@@ -16,7 +16,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,6 +26,7 @@ from numpy.typing import NDArray
 
 from benchmarks.measure import Line, of_each, page
 from upright.report.drawing import BLACK, BLUE, GREY, SKY, figure, save, styled
+from upright.workers import HERE, Workers
 
 if TYPE_CHECKING:
     from upright.control import ServoRig
@@ -177,6 +180,11 @@ def one(make: str, seed: int, *, swept: Path | None = None) -> Told | None:
     return Told(float(np.mean(told.held)), bool(came.held[0]))
 
 
+def _twin(swept: bool, twin: tuple[str, int]) -> Told | None:
+    with TemporaryDirectory() as folder:
+        return one(*twin, swept=Path(folder) if swept else None)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Calibration:
     """Brier score and Murphy's parts of it (1973), over bins of equal width.
@@ -217,18 +225,16 @@ def calibration(chances: Array, came: NDArray[np.bool_]) -> Calibration:
     )  # fmt: skip
 
 
-def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None = None) -> list[Line]:
+def run(
+    *, quick: bool, progress: Callable[[str], None], markdown: Path | None = None, workers: Workers = HERE
+) -> list[Line]:
     """Brier score and its parts, for the twins and for those identified as in experiment 1b."""
-    from tempfile import TemporaryDirectory
-
     lines: list[Line] = []
     rows: list[str] = []
     for what, count in (("identified by steps", 60 if quick else 500), ("identified as in 1b", 6 if quick else 40)):
         progress(f"{count} twins {what}")
-        with TemporaryDirectory() as folder:
-            at = Path(folder) if what == "identified as in 1b" else None
-            twins = [(("furuta", "linear")[i % 2], 1 + i // 2) for i in range(count)]
-            told, each = of_each(lambda twin, at=at: one(*twin, swept=at), twins)
+        twins = [(("furuta", "linear")[i % 2], 1 + i // 2) for i in range(count)]
+        told, each = of_each(partial(_twin, what == "identified as in 1b"), twins, workers)
         kept = [t for t in told if t is not None]
         chances, came = np.array([t.chance for t in kept]), np.array([t.held for t in kept])
         found = calibration(chances, came)

@@ -9,6 +9,7 @@ take ``1.96 sqrt(0.95 * 0.05 / n)``.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ import numpy as np
 
 from benchmarks.coverage import noise
 from benchmarks.measure import Line, Spread, of_each, page
+from upright.workers import HERE, Workers
 
 SECONDS, DT = 8.0, 5e-3
 
@@ -105,14 +107,17 @@ def outcome(make: Make, seed: int) -> tuple[dict[str, bool], dict[str, str], boo
     return held, status, fit.trusted
 
 
-def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None = None) -> list[Line]:
+def run(
+    *, quick: bool, progress: Callable[[str], None], markdown: Path | None = None, workers: Workers = HERE
+) -> list[Line]:
     """Share of intervals that hold the truth by plant and kind of number."""
     each = 8 if quick else 40
     every: list[bool] = []
     lines: list[Line] = []
     for place, make in enumerate(MAKES):
         progress(f"{each} rigs like {make.plant}")
-        done, seconds = of_each(lambda seed, make=make: outcome(make, seed), range(1000 * place, 1000 * place + each))
+        seeds = range(1000 * place, 1000 * place + each)
+        done, seconds = of_each(functools.partial(outcome, make), seeds, workers)
         tally: dict[str, list[bool]] = {}
         for held, _, _ in done:
             for n, hit in held.items():

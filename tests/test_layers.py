@@ -14,6 +14,7 @@ BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 # Rooms from the ground up: each imports from those above its own line only. Rooms on one line do not see each other.
 FLOORS = """
 errors progress files shown
+workers
 quantities
 units
 signals
@@ -41,7 +42,7 @@ report.fit
 report.ladder report.law report.log
 diagnosis questionnaire
 paper
-experiments.makes
+experiments.abreast experiments.makes
 experiments.identified
 experiments.designing experiments.weighing_1a
 experiments.frequency_1b
@@ -79,6 +80,10 @@ DOORS = {
     "typst": "report",
     "pint": "units",
     "typer": "cli",
+    "loky": "workers",
+    "cloudpickle": "workers",
+    "distributed": "workers",
+    "threadpoolctl": "workers",
 }
 
 
@@ -228,6 +233,7 @@ def test_no_file_is_called_after_a_drawer():
         ("from matplotlib.figure import Figure", "upright.diagnosis.chapter"),
         ("import llvmlite", "upright.physics.equations"),
         ("import pint", "upright.study.load"),
+        ("from loky import get_reusable_executor", "upright.identification.estimate"),
         ("x = 1", "upright.drawer.thing"),
     ],
 )

@@ -22,6 +22,10 @@ class NotIdentifiable(UprightError, RuntimeError):
     """The data cannot answer the question asked."""
 
 
+class WorkersLost(UprightError, RuntimeError):
+    """Processes or machines that were to share the work died, again and again."""
+
+
 def nearest(name: str, valid: object) -> str:
     """Name the valid spelling closest to `name`, as a phrase, or list what exists."""
     from difflib import get_close_matches

@@ -9,6 +9,9 @@ from dataclasses import is_dataclass
 from pathlib import Path
 from typing import Any
 
+OWN_FILE = "upright_user_"
+"""How the name of a module begins that was loaded from a user's file: no other process can import it."""
+
 
 def plain_values(value: Any) -> Any:
     """Values that JSON can hold: arrays as lists, complex numbers as pairs, nothing where a number is not one.

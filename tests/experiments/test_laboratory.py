@@ -1,5 +1,7 @@
 """Does a session keep what is finished, go on where it stopped, and survive an experiment that fails?"""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from upright.errors import NotIdentifiable
 from upright.experiments import laboratory
 from upright.experiments.laboratory import Experiment
 from upright.report.page import Chapter, KeyNumber, Part
+from upright.workers import Workers
 
 
 @pytest.fixture
@@ -123,3 +126,16 @@ def test_the_share_told_never_goes_back(bench, tmp_path):
     assert shares == sorted(shares)
     assert shares[0] >= 0
     assert shares[-1] <= 1
+
+
+@pytest.mark.slow
+def test_experiments_side_by_side_say_what_they_say_one_after_another(tmp_path):
+    """Frequency response and free swing both stand on the weighing, neither on the other."""
+    one = laboratory.run_laboratory(("1", "4"), "furuta", 0, tmp_path / "one")
+    two = laboratory.run_laboratory(("1", "4"), "furuta", 0, tmp_path / "two", workers=Workers(number=2))
+    assert [t.experiment.key for t in two.results] == ["1a", "1b", "4"]
+    assert [t.state for t in two.results] == ["done"] * 3
+    assert verdicts(two) == verdicts(one)
+    for key in ("1b", "4"):
+        fits = [json.loads((tmp_path / n / key / "fit.json").read_text("utf-8")) for n in ("one", "two")]
+        assert fits[0]["parameters"] == fits[1]["parameters"]

@@ -22,6 +22,12 @@ Data = Annotated[
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the numbers as JSON instead of tables.")]
 Pdf = Annotated[bool, typer.Option("--pdf", help="Write the page as PDF too (pdf extra).", callback=can_be_pdf)]
+Processes = Annotated[
+    int, typer.Option("--workers", metavar="N", help="Processes of this machine that share the work.")
+]
+Cluster = Annotated[
+    str, typer.Option("--cluster", metavar="ADDRESS", help="Dask scheduler, tcp://host:8786 (cluster extra).")
+]
 """Options that several commands have."""
 
 

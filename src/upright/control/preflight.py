@@ -21,7 +21,9 @@ from upright.gains.loop import closed, command_noise
 from upright.gains.requests import poles_of
 from upright.laws import Law
 from upright.physics import Linear
+from upright.progress import Progress, silent
 from upright.records import Array
+from upright.workers import HERE, Workers
 
 WORDS = ("regulates", "saturates", "too weak", "falls")
 """What a run can come to; see `words`."""
@@ -105,6 +107,8 @@ def preflight(
     parameters: Mapping[str, ArrayLike],
     lanes: int,
     seed: int,
+    workers: Workers = HERE,
+    progress: Progress = silent,
 ) -> Preflight:
     """Say beforehand what a law will come to.
 
@@ -123,12 +127,18 @@ def preflight(
         How many runs the chance is taken from.
     seed : int
         Of the hand's errors.
+    workers : Workers, optional
+        Who computes the runs that the chance is taken from.
+    progress : callable, optional
     """
     driven = hold(model, sampled.period, sampled.delay, rig.lag)  # whatever the law was designed on
     stands = bool(np.abs(poles_of(closed(driven, law))).max() < 1)
     run = trial(rig, law, at=task.at, start=task.start, seconds=task.seconds)
     starts = task.starts(lanes, np.random.default_rng([seed, 52]))
-    drawn = outcomes(rig, law, at=task.at, starts=starts, seconds=task.seconds, parameters=parameters)
+    drawn = outcomes(
+        rig, law, at=task.at, starts=starts, seconds=task.seconds, parameters=parameters, workers=workers,
+        progress=progress,
+    )  # fmt: skip
     told = words(drawn)
     last = np.zeros(len(task.start))
     tilted, tapped = last.copy(), last.copy()

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,8 +18,10 @@ from numpy.typing import ArrayLike, NDArray
 from upright.control.trial import SUBSTEPS, ServoRig, Trial, at_work
 from upright.errors import BadInput
 from upright.laws import Law
+from upright.progress import Progress, silent
 from upright.records import Array
 from upright.simulation import simulate
+from upright.workers import HERE, Workers, cut, spread
 
 FALLEN = math.pi / 2
 """Deviation beyond which a pendulum has fallen [rad]: past horizontal its pivot moves it the other way."""
@@ -158,8 +161,8 @@ def _first(t: Array, when: NDArray[np.bool_]) -> Array:
 
 EVERY = 4
 """Servo periods from sample to sample of what is scored."""
-BLOCK = 256
-"""Lanes run at once, which bounds the memory."""
+BLOCK = 64
+"""Lanes run at once, which bounds the memory; one piece of work for whoever shares it."""
 
 
 def outcomes(
@@ -170,6 +173,8 @@ def outcomes(
     starts: ArrayLike,
     seconds: float,
     parameters: Mapping[str, ArrayLike] | None = None,
+    workers: Workers = HERE,
+    progress: Progress = silent,
 ) -> Scores:
     """Figures of trials side by side.
 
@@ -185,27 +190,41 @@ def outcomes(
     parameters : mapping of str to array, shape (lanes,)
         Parameters of the plant, and of the drive as ``"actuator.gain"`` and so on, in which the lanes differ from the
         rig.
+    workers : Workers, optional
+        Who computes blocks of lanes; the figures are the same.
+    progress : callable, optional
+
+    Raises
+    ------
+    KeyboardInterrupt
+        When Ctrl-C came before the last block.
     """
     first = np.atleast_2d(np.asarray(starts, dtype=np.float64))
     lanes = first.shape[0]
     given = {name: np.broadcast_to(np.asarray(v, dtype=np.float64), (lanes,)) for name, v in (parameters or {}).items()}
-    rows = round(seconds / rig.period / EVERY) + 1
-    t = np.arange(rows, dtype=np.float64) * (rig.period * EVERY)
-    point = np.array(list(rig.plant.equilibrium(at).values()))
-    found: list[Scores] = []
-    for begin in range(0, lanes, BLOCK):
-        part = slice(begin, begin + BLOCK)
-        x0 = rig.plant.state(at) + first[part]
-        loop = at_work(rig, law, point)
-        motion = simulate(
-            rig.plant, {**rig.drive, **{n: v[part] for n, v in given.items()}}, x0, None, rig.period, samples=rows,
-            substeps=SUBSTEPS, loop=loop, every=EVERY,
-        )  # fmt: skip
-        away = motion[:, 0 : x0.shape[1] : 2] - point[:, None]
-        found.append(scores(rig, t, away, motion[:, x0.shape[1]]))
+    blocks = [(first[part], {n: v[part] for n, v in given.items()}) for part in cut(lanes, BLOCK)]
+    work = partial(_outcomes, rig, law, at, seconds)
+    found = spread(work, blocks, workers=workers, progress=progress, what="block of rigs").all()
     if len(found) == 1:
         return found[0]
     return Scores(**{n: np.concatenate([getattr(s, n) for s in found], axis=-1) for n in vars(found[0])})
+
+
+def _outcomes(
+    rig: ServoRig, law: Law, at: str, seconds: float, block: tuple[Array, Mapping[str, Array]], _progress: Progress
+) -> Scores:
+    """Figures of one block: starts (lanes, states) and the parameters of its lanes."""
+    starts, given = block
+    rows = round(seconds / rig.period / EVERY) + 1
+    t = np.arange(rows, dtype=np.float64) * (rig.period * EVERY)
+    point = np.array(list(rig.plant.equilibrium(at).values()))
+    x0 = rig.plant.state(at) + starts
+    motion = simulate(
+        rig.plant, {**rig.drive, **given}, x0, None, rig.period, samples=rows, substeps=SUBSTEPS,
+        loop=at_work(rig, law, point), every=EVERY,
+    )  # fmt: skip
+    away = motion[:, 0 : x0.shape[1] : 2] - point[:, None]
+    return scores(rig, t, away, motion[:, x0.shape[1]])
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date
-from functools import cache
+from functools import cache, partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -18,12 +18,14 @@ import numpy as np
 from upright import __version__
 from upright.control.trial import ServoRig
 from upright.errors import BadInput, UprightError
+from upright.experiments.abreast import run_abreast
 from upright.experiments.makes import MAKES, PENDULUMS, SHAFTS, make_rig
 from upright.experiments.weighing_1a.run import Known
 from upright.files import write_json
 from upright.progress import Progress, silent
 from upright.report.page import Book, Chapter, Step, as_plain, from_plain
 from upright.report.symbols import typed
+from upright.workers import HERE, Workers
 
 CHAPTER_FILE = "chapter.json"
 """File of a finished experiment, taken up again as long as nothing it stands on has changed."""
@@ -265,6 +267,7 @@ def run_laboratory(
     stopped: Callable[[], bool] = lambda: False,
     *,
     fresh: bool = False,
+    workers: Workers = HERE,
 ) -> Session:
     """Run experiments on a seeded rig; Ctrl-C stops and keeps what is there.
 
@@ -284,6 +287,8 @@ def run_laboratory(
         Whether Ctrl-C was pressed, for what has swallowed it.
     fresh : bool
         Make everything again.
+    workers : Workers, optional
+        Who runs experiments that need nothing of each other; processes of this machine, since they share the folder.
 
     Raises
     ------
@@ -295,7 +300,9 @@ def run_laboratory(
     digests = _digests(make, seed)
     whole = sum(e.seconds for e in session.asked)
     behind = 0.0
-    for e in session.asked:
+    if not workers.alone:
+        _run_abreast(session, digests, workers, progress, stopped, fresh)
+    for e in session.asked if workers.alone else ():
 
         def tell(step: str, share: float, e: Experiment = e, behind: float = behind) -> None:
             progress(f"experiment {e.key}: {step}", (behind + e.seconds * min(share, 1.0)) / whole)
@@ -311,6 +318,36 @@ def run_laboratory(
     session.results = _with_kept(session, digests)
     session.seconds = time.perf_counter() - began
     return session
+
+
+def _run_abreast(
+    session: Session, digests: Mapping[str, str], workers: Workers, progress: Progress, stopped: Callable[[], bool],
+    fresh: bool,
+) -> None:  # fmt: skip
+    asked = {e.key: e for e in session.asked}
+    needs = {key: _needs(e, session.make) for key, e in asked.items()}
+    run = partial(_apart, replace(session, asked=()), digests, stopped, fresh)
+    found, interrupted = run_abreast({k: e.seconds for k, e in asked.items()}, needs, run, workers, progress)
+    session.results += [_brought(key, told) for key, told in found.items()]
+    session.interrupted = interrupted or any(t.state == "stopped" for t in session.results)
+
+
+def _apart(
+    session: Session, digests: Mapping[str, str], stopped: Callable[[], bool], fresh: bool, key: str,
+    earlier: Mapping[str, Mapping[str, Any]], progress: Progress,
+) -> dict[str, Any]:  # fmt: skip
+    """One experiment in another process: an `ExperimentResult` as plain values, its pictures drawn."""
+    results = [_brought(k, told) for k, told in earlier.items()]
+    e = next(e for e in EXPERIMENTS if e.key == key)
+    done = _one(replace(session, results=results), e, digests[key], progress, stopped, fresh)
+    return {**vars(done), "experiment": key, "chapter": as_plain(done.chapter)}
+
+
+def _brought(key: str, told: Mapping[str, Any]) -> ExperimentResult:
+    """The result that came from there."""
+    e = next(e for e in EXPERIMENTS if e.key == key)
+    values: dict[str, Any] = {**told, "experiment": e, "chapter": from_plain(told["chapter"])}
+    return ExperimentResult(**values)
 
 
 def _digests(make: str, seed: int) -> dict[str, str]:

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -64,6 +64,11 @@ class Controller(ABC):
     def widths(self) -> dict[str, int]:
         """Lanes that each array is given for."""
         return {name: a.shape[axes] if a.ndim > axes else 1 for name, (a, axes) in self.arrays().items()}
+
+    def of_lanes(self, which: slice) -> Self:
+        """The same controller for some of its lanes, compiled as for all of them."""
+        wide = {n: a[..., which] for n, (a, axes) in self.arrays().items() if a.ndim > axes and a.shape[axes] > 1}
+        return replace(self, **wide) if wide else self
 
     def by_lane(self, lanes: int) -> dict[str, Array]:
         """The same arrays, row by row, each of shape (numbers, lanes)."""
@@ -191,6 +196,12 @@ class Law(Controller):
     def signal(self) -> Array:
         """References, shape (T, references), zero when none are given."""
         return np.zeros((1, len(self.reference_names))) if self.references is None else super().signal()
+
+    def of_lanes(self, which: slice) -> Self:
+        """The same law for some of its lanes; what is 0 or 1 in them alone is not compiled in."""
+        made = super().of_lanes(which)
+        vars(made)["compiled_in"] = self.compiled_in
+        return made
 
     def arrays(self) -> dict[str, tuple[Array, int]]:
         """Matrices, first state and targets."""

@@ -8,6 +8,7 @@ import traceback
 from pathlib import Path
 
 from upright.errors import BadInput, UprightError, nearest
+from upright.files import OWN_FILE
 from upright.physics.equations import Derived, DryJoint
 from upright.physics.oscillators import added_inertia, added_mass, chain
 from upright.physics.pendulums import CartPendulum, Furuta, Pendulum
@@ -76,7 +77,7 @@ def find(name: str, folder: Path | None = None) -> type[Plant]:
 def _from_file(path: Path, class_name: str) -> type[Plant]:
     if not path.is_file():
         raise BadInput(f"the plant's file {path} does not exist; give it relative to the study file.")
-    spec = importlib.util.spec_from_file_location(f"upright_user_{path.stem}", path)
+    spec = importlib.util.spec_from_file_location(OWN_FILE + path.stem, path)
     if spec is None or spec.loader is None:
         raise BadInput(f"the plant's file {path} is no Python file.")
     module = importlib.util.module_from_spec(spec)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,10 @@ from upright.laws.linear import Law
 from upright.laws.rule import Rule
 from upright.physics.equations import Derived
 from upright.physics.plant import Plant
+from upright.progress import Progress, silent
 from upright.simulation.kernel.flavour import choose
 from upright.simulation.simulator import Held, Simulator
+from upright.workers import Workers, cut, spread
 
 Array = NDArray[np.float64]
 
@@ -123,20 +126,59 @@ def ensemble(
     loop: Law | Rule | None = None,
     held: Mapping[str, Held] | None = None,
     threads: int | None = None,
+    workers: Workers | None = None,
+    progress: Progress = silent,
 ) -> Ensemble:
     """Extremes and final states of many motions, without keeping the motions.
 
     Parameters are those of `simulate`; `settle` [s] is when errors begin to count, and `threads` defaults to the
-    number of processors this process may use.
+    number of processors this process may use. With `workers` blocks of lanes are shared among those instead, one
+    thread each, and `progress` is told; the numbers are the same.
     """
     job = _prepare(plant, params, x0, u, dt, substeps, start, loop, held or {}, record=False)
-    workers = threads or (len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1)
-    rows = job.simulator.run(job.table, job.x0, job.u, samples=samples, start=job.start, threads=workers, settle=settle)
+    lanes = job.x0.shape[1]
+    if workers is None:
+        own = threads or (len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1)
+        rows = _reduced(job, samples, settle, (slice(0, lanes), job.table, job.x0, job.start), silent, threads=own)
+    else:
+        parts = [
+            (p, job.table[:, p], job.x0[:, p], None if job.start is None else job.start[p])
+            for p in cut(lanes, block(lanes))
+        ]
+        shared = replace(job, table=job.table[:, :0], x0=job.x0[:, :0], start=None)
+        work = partial(_reduced, shared, samples, settle)
+        rows = np.hstack(spread(work, parts, workers=workers, progress=progress, what="block of lanes").all())
     n, nu = len(job.simulator.derived.coordinates), len(job.simulator.derived.inputs)
     final = rows[2 * n + nu :]
     wrong = ~np.isfinite(final).all(axis=0)
     rows[: 2 * n, wrong] = np.nan
     return Ensemble(largest=rows[:n], error=rows[n : 2 * n], saturated=rows[2 * n : 2 * n + nu] / samples, final=final)
+
+
+BLOCK, MANY, LARGEST = 256, 4096, 16384
+
+
+def block(lanes: int) -> int:
+    """Lanes of an ensemble that are one piece of work.
+
+    Some tens of milliseconds at first; more when there would be more than 4096 pieces, each of which costs whoever
+    hands it out a millisecond; and no more than fit into a few megabytes.
+    """
+    size = BLOCK
+    while lanes > size * MANY and size < LARGEST:
+        size *= 2
+    return size
+
+
+def _reduced(
+    job: _Job, samples: int, settle: float, part: tuple[slice, Array, Array, NDArray[np.int64] | None],
+    _progress: Progress, threads: int = 1,
+) -> Array:  # fmt: skip
+    """Rows of an ensemble (rows, lanes) for some of its lanes: which, their table, first states and first samples."""
+    which, table, x0, start = part
+    s = job.simulator
+    stepper = s if s.loop is None else replace(s, loop=s.loop.of_lanes(which))
+    return stepper.run(table, x0, job.u, samples=samples, start=start, threads=threads, settle=settle)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

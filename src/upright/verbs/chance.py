@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from upright.errors import BadInput
+from upright.progress import Progress, silent
 from upright.verbs.answer import Answer
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 def chance(
     fit: Any, gains: Any, *, tilt: Any = None, push: Any = None, seconds: float = 6.0, speed: str = "filtered",
     memory: float = 0.5, limit: float | None = None, counts: Sequence[float] | None = None, draws: int = 200,
-    seed: int = 0,
+    seed: int = 0, workers: int = 1, cluster: str = "", progress: Progress = silent,
 ) -> Answer[Preflight]:  # fmt: skip
     """How likely gains are to hold the rig that a fit tells of, before anything moves.
 
@@ -43,6 +44,11 @@ def chance(
         Encoder counts per turn or metre, coordinate by coordinate; the data sheet's if left out.
     draws : int
         Rigs drawn.
+    workers, cluster
+        Processes of this machine that share them, or the address of a Dask scheduler (``tcp://host:8786``, cluster
+        extra); the numbers are the same.
+    progress : callable, optional
+        Told how many are done.
 
     Raises
     ------
@@ -58,6 +64,7 @@ def chance(
     from upright.report.symbols import percent
     from upright.units import parse
     from upright.verbs.fitting import identified
+    from upright.workers import Workers
 
     if speed not in SPEEDS:
         raise BadInput(f"velocities come from {', '.join(SPEEDS)}, got '{speed}'.")
@@ -65,6 +72,7 @@ def chance(
         raise BadInput(f"a run takes more than 0 and at most 120 s, got {seconds:g} s.")
     if draws < 1:
         raise BadInput(f"draws needs a whole number of at least 1, got {draws}.")
+    shared = Workers(number=workers, cluster=cluster)
     known = identified(fit, seed=seed, draws=draws)
     make, sheet = known.make, make_rig(known.make.key)
     if limit is None and known.unit and known.unit != sheet.unit:
@@ -92,7 +100,9 @@ def chance(
     ]
     task = Task(start=(0.0, 0.0, *begin), hand=(0.0, 0.0, *HAND), seconds=seconds)
     others = known.allowed(rig, draws, seed)
-    told = preflight(rig, model, sampled, law, task, parameters=others, lanes=draws, seed=seed)
+    told = preflight(
+        rig, model, sampled, law, task, parameters=others, lanes=draws, seed=seed, workers=shared, progress=progress
+    )
     low, high = _wilson(round(told.chance * draws), draws)
     share = f"{percent(100 * told.chance)} (95 % interval {percent(100 * low)} to {percent(100 * high)})"
     rows = tuple((word, percent(100 * told.words[word])) for word in WORDS)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from upright.errors import BadInput, nearest
-from upright.progress import Progress, silent
+from upright.progress import Progress, part, silent
 from upright.verbs.answer import Answer
 from upright.verbs.pages import folder_if_given, page_folder, write_page
 from upright.verbs.values import open_log, poles, si, si_if_given
@@ -142,8 +142,8 @@ def _quanta(rig: IdentifiedRig, counts: float | str | Mapping[str, float]) -> tu
         said = ",".join(f"{name}={value}" for name, value in counts.items())
     elif not said:
         said = str(counts)
-    for part in said.split(","):
-        name, equals, value = part.rpartition("=")
+    for piece in said.split(","):
+        name, equals, value = piece.rpartition("=")
         name = name.strip()
         if equals and name not in per:
             raise BadInput(
@@ -155,7 +155,7 @@ def _quanta(rig: IdentifiedRig, counts: float | str | Mapping[str, float]) -> tu
             number = 0.0
         if not 0 < number < 1e15:
             raise BadInput(
-                f"--counts takes numbers above 0, got '{part.strip()[:40]}'; write 16000 or \"{names[0]}=16000\"."
+                f"--counts takes numbers above 0, got '{piece.strip()[:40]}'; write 16000 or \"{names[0]}=16000\"."
             )
         per |= {name: number} if equals else dict.fromkeys(names, number)
     return tuple((tau if c.unit == "rad" else 1.0) / per[c.name] for c in rig.plant.coordinates)
@@ -185,8 +185,8 @@ def _start(rig: IdentifiedRig, given: str | Mapping[str, float | str]) -> tuple[
 def regulate(
     source: str | os.PathLike[str] | None = None, *, rig: str = "", seed: int | None = None, which: int | str = "",
     poles: str | Iterable[complex] = "", speed: str = "filtered", memory: float = 0.5, tilt: float | str = "",
-    push: float | str = "", seconds: float = 6.0, out: str | os.PathLike[str] = "upright-regulate", pdf: bool = False,
-    progress: Progress = silent,
+    push: float | str = "", seconds: float = 6.0, draws: int = 200, out: str | os.PathLike[str] = "upright-regulate",
+    pdf: bool = False, workers: int = 1, cluster: str = "", progress: Progress = silent,
 ) -> Answer[Regulation]:  # fmt: skip
     """What each pole set will come to on an identified rig that stands upright, and what it came to.
 
@@ -215,10 +215,14 @@ def regulate(
         Speed of the pendulum then, outwards [rad/s].
     seconds : float
         Length of a run.
+    draws : int
+        Rigs that the fit's covariance allows, from which the chance is taken.
     out : path
         Folder for all files.
     pdf : bool
         Write the page as PDF too.
+    workers, cluster
+        Who simulates those rigs: processes of this machine, or the address of a Dask scheduler.
     progress : callable, optional
         Told the step at work and the share done.
 
@@ -237,23 +241,25 @@ def regulate(
     from upright.experiments.regulation_2.chapter import chapter
     from upright.experiments.regulation_2.run import identify_make, run_regulation
     from upright.report.symbols import typed
+    from upright.workers import Workers
 
+    shared = Workers(number=workers, cluster=cluster)
     at = page_folder(out, pdf)
-    wish = _wish("" if which == "" else str(which), poles, speed, memory, tilt, push, seconds)
+    wish = _wish("" if which == "" else str(which), poles, speed, memory, tilt, push, seconds, draws)
     if source is None:
         make, seed = rig or "furuta", seed or 0
         progress("identifying the hanging twin", 0.0)
-        known = identify_make(make, seed, at / "identified", lambda step, share: progress(step, 0.6 * share))
+        known = identify_make(make, seed, at / "identified", part(progress, 0.0, 0.6, "identifying"), draws)
         name, base = f"--rig {make}", 0.6
     else:
-        known, name, base = read_identified(Path(source), seed=seed or 0), typed(Path(source)), 0.0
+        known, name, base = read_identified(Path(source), seed=seed or 0, draws=draws), typed(Path(source)), 0.0
         make = known.make.key
         if rig not in ("", make):
             raise BadInput(f"{source} is of the make '{make}', not '{rig}'; leave --rig out.")
     truth = None if seed is None else make_rig(make, seed)
     done = run_regulation(
         known, truth, seed or 0, at, lambda step, share: progress(step, base + (1 - base) * share), wish=wish,
-        source=name,
+        source=name, workers=shared,
     )  # fmt: skip
     told = chapter(done)
     return Answer(done, told, write_page(told, at / "report.html", pdf))
@@ -261,7 +267,7 @@ def regulate(
 
 def _wish(
     which: str, poles: str | Iterable[complex], speed: str, memory: float, tilt: float | str, push: float | str,
-    seconds: float,
+    seconds: float, draws: int,
 ) -> RegulationRequest:  # fmt: skip
     from upright.experiments.regulation_2.run import SETS, RegulationRequest
     from upright.gains.requests import read_poles
@@ -274,7 +280,7 @@ def _wish(
     printed = {n: read_poles(t) for n, t in SETS.items() if which in ("", "all", n[4:])}
     return RegulationRequest(
         poles=printed if own is None else {"your poles": own}, speed=speed, memory=memory, seconds=seconds,
-        tilt=si_if_given(tilt, "rad"), push=si_if_given(push, "rad/s"),
+        draws=draws, tilt=si_if_given(tilt, "rad"), push=si_if_given(push, "rad/s"),
     )  # fmt: skip
 
 

@@ -39,7 +39,7 @@ class Laboratory:
 
 def lab(
     *, experiment: Sequence[str] | str = (), rig: str = "", seed: int = 0, out: str | os.PathLike[str] | None = None,
-    fresh: bool = False, progress: Progress = silent,
+    fresh: bool = False, workers: int = 1, progress: Progress = silent,
 ) -> Answer[Laboratory]:  # fmt: skip
     """The experiments of the paper on simulated rigs: identify, flip, design, hold, track, swing, and report.
 
@@ -58,6 +58,8 @@ def lab(
         Folder; upright-lab[-KIND][-SEED] when omitted.
     fresh : bool
         Make again what the folder holds already.
+    workers : int
+        Processes of this machine that run experiments which need nothing of each other.
     progress : callable, optional
         Told the step at work and the share done.
 
@@ -87,12 +89,14 @@ def lab(
     from upright.report.html import write_html
     from upright.report.page import Chapter
     from upright.report.pdf import available, write_pdf
+    from upright.workers import Workers
 
+    shared = Workers(number=workers)
     asked = texts(experiment)
     laboratory.choose(asked, rig)  # says what is wrong with the call before anything is written
     with _ctrl_c() as pressed:
         session = laboratory.run_laboratory(
-            asked, rig, seed, at, progress, stopped=lambda: pressed.times > 0, fresh=fresh
+            asked, rig, seed, at, progress, stopped=lambda: pressed.times > 0, fresh=fresh, workers=shared
         )
         pressed.patient = True
         progress("writing the report", 1.0)

@@ -174,7 +174,8 @@ def identify(
     ask: Sequence[str] | Mapping[str, float | str] | None = None, columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None, window: tuple[float, float] | None = None,
     data: str | Path | None = None, hold_out: Sequence[str] | str = (), method: str = "auto",
-    out: str | Path | None = None, report: bool = True, pdf: bool = False, progress: Progress = silent,
+    out: str | Path | None = None, report: bool = True, pdf: bool = False, workers: int = 1, cluster: str = "",
+    progress: Progress = silent,
 ) -> FitAnswer:  # fmt: skip
     """Fit a rig's parameters to its logs.
 
@@ -195,6 +196,8 @@ def identify(
         Folder for fit.json and report.html.
     report, pdf : bool
         Whether a page, and a PDF, go there.
+    workers, cluster
+        Who computes the refits of ``hold_out="each"``: processes of this machine, or the address of a Dask scheduler.
     progress : callable, optional
         Told the step at work and the share done.
 
@@ -215,8 +218,9 @@ def identify(
     from upright.study.results import write_fit
     from upright.verbs.pages import folder_if_given, write_page
     from upright.verbs.study import provenance
+    from upright.workers import Workers
 
-    folder = folder_if_given(out, pdf)
+    folder, shared = folder_if_given(out, pdf), Workers(number=workers, cluster=cluster)
     if method not in METHODS:
         raise BadInput(f"--method must be one of {', '.join(METHODS)}, got '{method}'; {nearest(method, METHODS)}")
     asked = asked_study(study, plant, known=known, ask=ask, columns=columns, units=units, window=window, data=data)
@@ -241,7 +245,7 @@ def identify(
         written.append(folder / "fit.json")
         write_fit(fit, asked, written[0])
     if each and not fit.interrupted:
-        crossed = cross_validate(fit, asked.runs, progress=progress)
+        crossed = cross_validate(fit, asked.runs, progress=progress, workers=shared)
         if folder is not None:
             write_fit(fit, asked, written[0], crossed)
     told = chapter(

@@ -94,7 +94,8 @@ def predict(
 
 def ladder(
     study: str | os.PathLike[str], *, out: str | os.PathLike[str] | None = None,
-    data: str | os.PathLike[str] | None = None, report: bool = True, pdf: bool = False, progress: Progress = silent,
+    data: str | os.PathLike[str] | None = None, report: bool = True, pdf: bool = False, workers: int = 1,
+    cluster: str = "", progress: Progress = silent,
 ) -> Answer[Ladder]:  # fmt: skip
     """How rich a model the runs deserve: it grows only while it predicts better what it has not seen.
 
@@ -110,6 +111,8 @@ def ladder(
         Write ladder.html too.
     pdf : bool
         Write the page as PDF too.
+    workers, cluster
+        Who predicts each run from a fit of the others: processes of this machine, or the address of a Dask scheduler.
     progress : callable, optional
         Told the step at work and the share done.
 
@@ -130,14 +133,16 @@ def ladder(
     from upright.report.ladder import chapter, next_steps
     from upright.report.symbols import typed
     from upright.study.results import can_be_trimmed, chosen_study, ladder_content
+    from upright.workers import Workers
 
+    shared = Workers(number=workers, cluster=cluster)
     pdf_has_folder(out, pdf)
     study = Path(study)
     at = study.with_name(f"{study.stem}-ladder") if out is None else Path(out)
     asked = read_study(study, at, None if data is None else Path(data))
     if not asked.rig.estimated:
         raise BadInput(f'{study}: nothing is asked; give a parameter a guess, such as b_2c = {{ guess = "1e-4 N m" }}')
-    climbed = climb(asked.rig, asked.runs, asked.ladder or None, progress=progress)
+    climbed = climb(asked.rig, asked.runs, asked.ladder or None, progress=progress, workers=shared)
     if not climbed.steps:
         raise KeyboardInterrupt
     trimmed = can_be_trimmed(asked, climbed)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from upright.cli.terminal import AsJson, Out, Pdf, progress_bar, tell
+from upright.cli.terminal import AsJson, Cluster, Out, Pdf, Processes, progress_bar, tell
 
 
 def regulate(
@@ -25,8 +25,11 @@ def regulate(
     tilt: Annotated[str, typer.Option(metavar="ANGLE", help='From upright when let go, as in "12 deg".')] = "",
     push: Annotated[str, typer.Option(metavar="SPEED", help='Of the pendulum then, outwards: "1.5 rad/s".')] = "",
     seconds: Annotated[float, typer.Option(help="Length of a run.")] = 6.0,
+    draws: Annotated[int, typer.Option(min=1, help="Rigs that the fit allows, for the chance.")] = 200,
     out: Out = Path("upright-regulate"),
     pdf: Pdf = False,
+    workers: Processes = 1,
+    cluster: Cluster = "",
     as_json: AsJson = False,
 ) -> None:
     r"""Hold an identified rig upright; say beforehand what each pole set will come to, then run it.
@@ -44,7 +47,7 @@ def regulate(
     with progress_bar(quiet=as_json) as bar:
         done = verbs.regulate(
             source, rig=rig, seed=seed, which=which, poles=poles, speed=speed, memory=memory, tilt=tilt, push=push,
-            seconds=seconds, out=out, pdf=pdf, progress=bar,
+            seconds=seconds, draws=draws, out=out, pdf=pdf, workers=workers, cluster=cluster, progress=bar,
         )  # fmt: skip
     numbers = {**done.numbers, "verdict": done.chapter.verdict, "report": str(done.files[0])}
     tell(done.chapter, done.files, numbers if as_json else None)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from upright.cli.terminal import console, print_json, progress_bar
+from upright.cli.terminal import Processes, console, print_json, progress_bar
 
 if TYPE_CHECKING:
     from upright.verbs.course import Laboratory
@@ -30,6 +30,7 @@ def lab(
         Path | None, typer.Option("-o", "--out", metavar="DIR", help="Folder; upright-lab[-KIND][-SEED] without it.")
     ] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Make again what the folder holds already.")] = False,
+    workers: Processes = 1,
     as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON instead of sentences.")] = False,
 ) -> None:
     r"""Run the experiments of the paper on simulated rigs: identify, flip, design, hold, track, swing, and report.
@@ -50,7 +51,7 @@ def lab(
 
     with progress_bar(quiet=as_json) as bar:
         done = verbs.lab(
-            experiment=experiment or (), rig=rig, seed=seed, out=out, fresh=fresh,
+            experiment=experiment or (), rig=rig, seed=seed, out=out, fresh=fresh, workers=workers,
             progress=bar,
         )  # fmt: skip
     if as_json:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from upright.cli.terminal import Data, Pdf, progress_bar, tell
+from upright.cli.terminal import Cluster, Data, Pdf, Processes, progress_bar, tell
 from upright.verbs.study import read_study
 
 INTERRUPTED, NOT_TRUSTED = 130, 3
@@ -38,6 +38,8 @@ def identify(
     as_json: Annotated[bool, typer.Option("--json", help="Print fit.json instead of tables.")] = False,
     report: Annotated[bool, typer.Option(help="Write report.html as well.")] = True,
     pdf: Pdf = False,
+    workers: Processes = 1,
+    cluster: Cluster = "",
     keys: Annotated[
         bool, typer.Option("--keys", help="Print every key a study may have.", callback=_keys, is_eager=True)
     ] = False,
@@ -78,7 +80,8 @@ def identify(
     All keys: `upright identify --keys`, or docs/study.md.
     Writes OUT/fit.json and OUT/report.html (and OUT/report.pdf with --pdf).
     Ctrl-C keeps the best so far and writes it.
-    --hold-out each predicts every run from a fit of the others as well.
+    --hold-out each predicts every run from a fit of the others as well; --workers
+    shares those fits among processes.
     Exit code: 0 a fit was written (3 with --strict when its verdict is not to
     trust it), 2 the study or a log is wrong, 130 stopped by Ctrl-C.
     """
@@ -88,8 +91,9 @@ def identify(
     asked = read_study(study, folder, data)
     with progress_bar(quiet=as_json) as bar:
         answer = fit(
-            asked, data=data, hold_out=hold_out or (), method=method, out=folder, report=report, pdf=pdf, progress=bar
-        )
+            asked, data=data, hold_out=hold_out or (), method=method, out=folder, report=report, pdf=pdf,
+            workers=workers, cluster=cluster, progress=bar,
+        )  # fmt: skip
     if as_json:
         typer.echo(answer.files[0].read_text(encoding="utf-8").rstrip())
     else:

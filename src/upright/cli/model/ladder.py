@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from upright.cli.terminal import Data, Pdf, progress_bar, tell
+from upright.cli.terminal import Cluster, Data, Pdf, Processes, progress_bar, tell
 
 INTERRUPTED = 130
 
@@ -21,6 +21,8 @@ def ladder(
     as_json: Annotated[bool, typer.Option("--json", help="Print ladder.json instead of tables.")] = False,
     report: Annotated[bool, typer.Option(help="Write ladder.html as well.")] = True,
     pdf: Pdf = False,
+    workers: Processes = 1,
+    cluster: Cluster = "",
 ) -> None:
     r"""Grow a model only while it predicts better what it has not seen.
 
@@ -53,7 +55,9 @@ def ladder(
 
     folder = out if out is not None else study.with_name(f"{study.stem}-ladder")
     with progress_bar(quiet=as_json) as bar:
-        climbed = verbs.ladder(study, out=folder, data=data, report=report, pdf=pdf, progress=bar)
+        climbed = verbs.ladder(
+            study, out=folder, data=data, report=report, pdf=pdf, workers=workers, cluster=cluster, progress=bar
+        )
     tell(climbed.chapter, climbed.files, climbed.numbers if as_json else None)
     if climbed.value.interrupted:
         raise typer.Exit(INTERRUPTED)

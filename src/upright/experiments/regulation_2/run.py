@@ -26,8 +26,9 @@ from upright.gains.requests import Roots, poles_of, read_poles
 from upright.laws import Law
 from upright.paper.reproduce import TABLE_1
 from upright.physics import Linear
-from upright.progress import Progress, silent
+from upright.progress import Progress, part, silent
 from upright.records import Array
+from upright.workers import HERE, Workers
 
 HAND = (0.01, 0.1)
 """What a hand gets wrong: half a degree, and 0.1 rad/s."""
@@ -52,6 +53,8 @@ class RegulationRequest:
             raise BadInput(f"velocities come from {', '.join(SPEEDS)}, got '{self.speed}'.")
         if not 0 < self.seconds <= 120:
             raise BadInput(f"a run takes more than 0 and at most 120 s, got {self.seconds:g} s.")
+        if self.draws < 1:
+            raise BadInput(f"draws needs a whole number of at least 1, got {self.draws}.")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -132,11 +135,11 @@ class Regulation:
         return max(self.attempts, key=lambda a: (round(a.before.words["regulates"], 2), a.before.push))
 
 
-def identify_make(key: str, seed: int, folder: Path, progress: Progress = silent) -> IdentifiedRig:
+def identify_make(key: str, seed: int, folder: Path, progress: Progress = silent, draws: int = DRAWS) -> IdentifiedRig:
     """What experiment 1b makes of a rig of the make; its logs and `fit.json` go into the folder."""
     _check_upright(key)
     run_frequency(key, seed, folder, progress)
-    return read_identified(folder / "fit.json", seed=seed)
+    return read_identified(folder / "fit.json", seed=seed, draws=draws)
 
 
 def _check_upright(key: str) -> None:
@@ -147,6 +150,7 @@ def _check_upright(key: str) -> None:
 def run_regulation(
     known: IdentifiedRig, truth: ServoRig | None, seed: int, folder: Path, progress: Progress = silent,
     stopped: Callable[[], bool] = lambda: False, wish: RegulationRequest | None = None, source: str = "FIT",
+    workers: Workers = HERE,
 ) -> Regulation:  # fmt: skip
     """Design for the rig as identified, say what will come, and run on the rig itself.
 
@@ -167,6 +171,8 @@ def run_regulation(
     wish : Wish, optional
     source : str
         How a command line would name the fit.
+    workers : Workers, optional
+        Who simulates the rigs that the fit allows.
     """
     began = time.perf_counter()
     wish, make = wish or RegulationRequest(), known.make
@@ -180,8 +186,10 @@ def run_regulation(
     attempts: list[Attempt] = []
     interrupted = False
     for i, (name, poles) in enumerate(wish.poles.items()):
-        progress(f"regulating with {name}", i / (len(wish.poles) + 1))
-        attempts.append(_attempt(name, poles, rig, truth, model, sampled, task, others, wish, seed))
+        whole = len(wish.poles) + 1
+        tell = part(progress, i / whole, (i + 1) / whole, f"regulating with {name}")
+        tell("designing", 0.0)
+        attempts.append(_attempt(name, poles, rig, truth, model, sampled, task, others, wish, seed, workers, tell))
         if stopped():
             interrupted = True
             break
@@ -205,11 +213,14 @@ def actual_start(task: Task, seed: int) -> Array:
 
 def _attempt(
     name: str, poles: Roots, rig: ServoRig, truth: ServoRig | None, model: Linear, sampled: Sampled, task: Task,
-    others: Mapping[str, Array], wish: RegulationRequest, seed: int,
+    others: Mapping[str, Array], wish: RegulationRequest, seed: int, workers: Workers, progress: Progress,
 ) -> Attempt:  # fmt: skip
     placed = place(model.A, model.B, poles)
     law = feedback(velocities(model, sampled, wish.speed, wish.memory, rig.limit, rig.quantum), placed.K)
-    told = preflight(rig, model, sampled, law, task, parameters=others, lanes=wish.draws, seed=seed)
+    told = preflight(
+        rig, model, sampled, law, task, parameters=others, lanes=wish.draws, seed=seed, workers=workers,
+        progress=progress,
+    )  # fmt: skip
     after = None
     if truth is not None:
         after = trial(truth, law, at=task.at, start=actual_start(task, seed), seconds=task.seconds)

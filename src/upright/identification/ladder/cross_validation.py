@@ -7,8 +7,9 @@ more than one fit.
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from upright.identification.model.runs import Run
 from upright.identification.problem.residuals import formulate
 from upright.identification.search.descent import SearchLog, descend_progressively
 from upright.progress import Progress, part, silent
+from upright.workers import HERE, Finished, Workers, spread
 
 SETTLED = 1e-5
 """Relative gain of the cost at which a refit has settled: its parameters are then off by less than 1 % of an error."""
@@ -60,8 +62,9 @@ def leave_one_out(
     typical: Sequence[str] = (),
     otherwise: Mapping[str, float] | None = None,
     progress: Progress = silent,
-) -> Generator[HeldOut]:
-    """Predict every run from a fit of the others, one after another.
+    workers: Workers = HERE,
+) -> Finished[HeldOut]:
+    """Predict every run from a fit of the others, as far as Ctrl-C lets it come.
 
     Parameters
     ----------
@@ -80,39 +83,45 @@ def leave_one_out(
         the run that is left out.
     progress : callable, optional
         As for `identify`.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        What was yielded before stays with the caller.
+    workers : Workers, optional
+        Who computes the refits, which are independent.
     """
-    for k, run in enumerate(runs):
-        problem = formulate(rig, [r for r in runs if r is not run])
-        if noise is not None:
-            problem.noise = noise
-        progress(f"without {run.label}", k / len(runs))
-        x = problem.place(start)
-        felt = np.diag(problem.settle_steps(x).matrix)
-        blind = [u.name for u, f in zip(problem.unknowns, felt, strict=True) if u.shared and not f > 0]
-        if otherwise:
-            x = problem.place({n: v for n, v in otherwise.items() if n in blind}, x)
-        log = SearchLog(progress=part(progress, k / len(runs), (k + 1) / len(runs), f"without {run.label}"))
-        end = descend_progressively(problem, x, log, horizon=math.inf, tolerance=SETTLED)
-        if end.interrupted:
-            raise KeyboardInterrupt
-        groups: dict[str, dict[str, float]] = {}
-        for u, v in zip(problem.unknowns, problem.value(end.x), strict=True):
-            if u.group:
-                groups.setdefault(u.group, {})[u.name] = float(v)
-        values = problem.shared_at(end.x)
-        held = replace(run, role="predict", unknown=tuple(n for n in run.unknown if n not in typical))
-        score = predict(values, rig, [held], groups=groups)[run.label]
-        yield HeldOut(
-            label=run.label, score=score, values=values, blind=tuple(n for n in rig.estimated if n in blind)
-        )  # fmt: skip
+    refit = partial(_predicted, rig, tuple(runs), dict(start), noise, tuple(typical), dict(otherwise or {}))
+    return spread(refit, range(len(runs)), workers=workers, progress=progress, what="run")
 
 
-def cross_validate(fit: Fit, runs: Sequence[Run], *, progress: Progress = silent) -> CrossValidation:
+def _predicted(
+    rig: Rig, runs: Sequence[Run], start: Mapping[str, float], noise: float | None, typical: Sequence[str],
+    otherwise: Mapping[str, float], k: int, progress: Progress,
+) -> HeldOut:  # fmt: skip
+    """Run number `k` from a fit of the others."""
+    run = runs[k]
+    problem = formulate(rig, [r for r in runs if r is not run])
+    if noise is not None:
+        problem.noise = noise
+    progress(f"without {run.label}", 0.0)
+    x = problem.place(start)
+    felt = np.diag(problem.settle_steps(x).matrix)
+    blind = [u.name for u, f in zip(problem.unknowns, felt, strict=True) if u.shared and not f > 0]
+    if otherwise:
+        x = problem.place({n: v for n, v in otherwise.items() if n in blind}, x)
+    log = SearchLog(progress=part(progress, 0.0, 1.0, f"without {run.label}"))
+    end = descend_progressively(problem, x, log, horizon=math.inf, tolerance=SETTLED)
+    if end.interrupted:
+        raise KeyboardInterrupt
+    groups: dict[str, dict[str, float]] = {}
+    for u, v in zip(problem.unknowns, problem.value(end.x), strict=True):
+        if u.group:
+            groups.setdefault(u.group, {})[u.name] = float(v)
+    values = problem.shared_at(end.x)
+    held = replace(run, role="predict", unknown=tuple(n for n in run.unknown if n not in typical))
+    score = predict(values, rig, [held], groups=groups)[run.label]
+    return HeldOut(label=run.label, score=score, values=values, blind=tuple(n for n in rig.estimated if n in blind))
+
+
+def cross_validate(
+    fit: Fit, runs: Sequence[Run], *, progress: Progress = silent, workers: Workers = HERE
+) -> CrossValidation:
     """Predict every fitted run of a fit from a fit of the others.
 
     Parameters
@@ -123,6 +132,8 @@ def cross_validate(fit: Fit, runs: Sequence[Run], *, progress: Progress = silent
         Those that were fitted, at least two with role ``"fit"``.
     progress : callable, optional
         As for `identify`.
+    workers : Workers, optional
+        Who computes the refits.
 
     Returns
     -------
@@ -147,17 +158,13 @@ def cross_validate(fit: Fit, runs: Sequence[Run], *, progress: Progress = silent
     start = {n: e.value for n, e in fit.estimates.items()}
     start |= {f"{label}: {n}": e.value for label, own in fit.per_run.items() for n, e in own.items()}
     start |= {f"group {label}: {n}": e.value for label, own in fit.groups.items() for n, e in own.items()}
-    found: list[HeldOut] = []
-    interrupted = False
-    try:
-        for one in leave_one_out(replace(fit.rig, parameters=parameters), fitted, start, progress=progress):
-            found.append(one)
-    except KeyboardInterrupt:
-        interrupted = True
+    rig = replace(fit.rig, parameters=parameters)
+    done = leave_one_out(rig, fitted, start, progress=progress, workers=workers)
+    found = done.so_far()
     return CrossValidation(
         fitted={run.label: fit.runs[run.label] for run in fitted},
         predicted={one.label: one.score for one in found},
         values={one.label: one.values for one in found},
         blind={one.label: one.blind for one in found},
-        interrupted=interrupted,
+        interrupted=done.interrupted,
     )

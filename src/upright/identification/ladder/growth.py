@@ -39,6 +39,7 @@ from upright.identification.search.descent import (
 )
 from upright.identification.search.strategy import POOR, better, closed_form_starts, rescale_priors, search
 from upright.progress import Progress, part, silent
+from upright.workers import HERE, Workers
 
 Array = NDArray[np.float64]
 Percents = Mapping[str, Mapping[str, float]]
@@ -106,7 +107,10 @@ class Ladder:
         return tuple(s for s in self.steps if s.accepted)
 
 
-def climb(rig: Rig, runs: Sequence[Run], rungs: Sequence[Rung] | None = None, *, progress: Progress = silent) -> Ladder:
+def climb(
+    rig: Rig, runs: Sequence[Run], rungs: Sequence[Rung] | None = None, *, progress: Progress = silent,
+    workers: Workers = HERE,
+) -> Ladder:  # fmt: skip
     """Grow a model rung by rung, while what was held out is predicted better by more than chance.
 
     Every rung is fitted to all runs from where the best rung below ended, then each run is predicted from a fit of the
@@ -125,6 +129,8 @@ def climb(rig: Rig, runs: Sequence[Run], rungs: Sequence[Rung] | None = None, *,
         Poorest first; `default_rungs` when omitted.
     progress : callable, optional
         As for `identify`.
+    workers : Workers, optional
+        Who predicts the runs from fits of the others.
 
     Raises
     ------
@@ -138,7 +144,7 @@ def climb(rig: Rig, runs: Sequence[Run], rungs: Sequence[Rung] | None = None, *,
         raise BadInput(
             f"a ladder has to hold something out: two runs with role 'fit', or one of {LEAST_RUN} samples or more"
         )
-    return _Climb(rig, seen, rungs, progress).walk()
+    return _Climb(rig, seen, rungs, progress, workers).walk()
 
 
 class _Climb:
@@ -147,8 +153,10 @@ class _Climb:
     Of the model kept so far: its rungs, numbers by key, predictions of the runs, cost and weight of prior knowledge.
     """
 
-    def __init__(self, rig: Rig, runs: list[Run], rungs: list[Rung], progress: Progress) -> None:
-        self.rig, self.runs, self.rungs, self.progress = rig, runs, rungs, progress
+    def __init__(
+        self, rig: Rig, runs: list[Run], rungs: list[Rung], progress: Progress, workers: Workers
+    ) -> None:  # fmt: skip
+        self.rig, self.runs, self.rungs, self.progress, self.workers = rig, runs, rungs, progress, workers
         self.log = SearchLog()
         self.steps: list[RungResult] = []
         self.kept: list[Rung] = []
@@ -252,8 +260,9 @@ class _Climb:
         found = leave_one_out(
             problem.rig, runs, problem.values_at(x), noise=problem.noise, typical=typical,
             otherwise=known | {n: neutral(problem.rig.plant, n) for n in kept[-1].adds}, progress=progress,
+            workers=self.workers,
         )  # fmt: skip
-        return {one.label: one.score for one in found}
+        return {one.label: one.score for one in found.all()}
 
     def fit(self, problem: Problem, runs: Sequence[Run], rung: Rung) -> Descent:
         """The best fit that can be found from the end of the rung below, or from nothing."""

@@ -1,0 +1,8 @@
+"""Where what is many is computed: in this process, in several, or on a cluster; the numbers are the same."""
+
+from __future__ import annotations
+
+from upright.workers.blocks import cut
+from upright.workers.spread import HERE, Finished, Workers, spread
+
+__all__ = ["HERE", "Finished", "Workers", "cut", "spread"]

@@ -1,0 +1,168 @@
+"""Who works besides this process: processes of this machine, or those of a Dask cluster."""
+
+from __future__ import annotations
+
+import sys
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from concurrent.futures import Executor, Future
+from functools import cache, lru_cache
+from importlib import import_module
+from logging import CRITICAL, getLogger
+from threading import Lock
+from typing import Any
+
+from upright.errors import BadInput
+from upright.progress import silent
+from upright.workers.carriage import carried, unpacked
+
+IDLE = 60
+"""Seconds after which processes without work end."""
+PATIENCE = 10
+"""Seconds in which a scheduler and its first worker have to answer."""
+
+
+_TURN = Lock()
+
+
+def do(order: bytes, item: bytes) -> bytes:
+    """Do a task for an item, over there; one at a time in a process."""
+    with _TURN:
+        _one_thread()
+        return carried(_task(order)(unpacked(item), silent))
+
+
+@lru_cache(maxsize=4)
+def _task(order: bytes) -> Any:
+    return unpacked(order)
+
+
+@cache
+def _one_thread() -> None:
+    import scipy.linalg  # brings a linear algebra of its own, which has to be there to be limited
+    from threadpoolctl import threadpool_limits
+
+    assert scipy.linalg
+    threadpool_limits(1, user_api="blas")
+
+
+def _leave_ctrl_c_to_the_parent() -> None:
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+class Pool(ABC):
+    """Workers that can be handed work: an executor, and how many there are."""
+
+    name: str
+    width: int
+    gone = False
+    hopeless: tuple[type[BaseException], ...] = ()
+    """What is raised when an item has killed its workers too often."""
+
+    @abstractmethod
+    def executor(self) -> Executor:
+        """Executor that takes work now; another one when the last broke."""
+
+    @abstractmethod
+    def stop(self, running: Iterable[Future[Any]]) -> None:
+        """Leave off what is under way."""
+
+
+class Processes(Pool):
+    """Processes of this machine, kept warm for the next call; a script needs no guard around its main part."""
+
+    def __init__(self, number: int) -> None:
+        self.width, self.name = number, f"{number} processes"
+
+    def executor(self) -> Executor:
+        """Its processes, started where none are left."""
+        from loky import get_reusable_executor
+
+        return get_reusable_executor(max_workers=self.width, timeout=IDLE, initializer=_leave_ctrl_c_to_the_parent)
+
+    def stop(self, running: Iterable[Future[Any]]) -> None:
+        """End the processes; what is under way would keep them."""
+        for future in running:
+            future.cancel()
+        self.executor().shutdown(kill_workers=True)  # type: ignore[call-arg]
+
+
+class Cluster(Pool):
+    """Workers of a Dask cluster, which have this program installed."""
+
+    def __init__(self, address: str) -> None:
+        client = _client(address)
+        self.name = f"the cluster {address}"
+        self.hopeless = (import_module("distributed").KilledWorker,)
+        self._client = client
+        self._executor: Any = client.get_executor(pure=False)
+        self.width = max(sum(client.nthreads().values()), 8)
+
+    @property
+    def gone(self) -> bool:  # type: ignore[override]
+        """Whether the scheduler is lost."""
+        return self._client.status != "running"
+
+    def executor(self) -> Executor:
+        """The scheduler, which hands work on and replaces workers that died by others."""
+        return self._executor
+
+    def stop(self, running: Iterable[Future[Any]]) -> None:
+        """Take back what waits there."""
+        for future in running:
+            future.cancel()
+
+
+_clients: dict[str, Any] = {}
+
+
+def _client(address: str) -> Any:
+    """Connection to a scheduler, with workers that can do our work.
+
+    Raises
+    ------
+    BadInput
+        When it cannot be had.
+    """
+    known = _clients.get(address)
+    if known is not None and known.status == "running":
+        return known
+    try:
+        distributed = import_module("distributed")
+    except ImportError:
+        raise BadInput("--cluster needs the cluster extra: pip install 'upright[cluster]'.") from None
+    getLogger("distributed.client").setLevel(CRITICAL)  # what it would log is said in sentences
+    try:
+        client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise BadInput(
+            f"no Dask scheduler answers at {address} ({str(error).splitlines()[0]:.80}); start one with `dask "
+            "scheduler` and look at the address it prints."
+        ) from None
+    try:
+        client.wait_for_workers(1, timeout=PATIENCE)
+    except TimeoutError:
+        client.close()
+        raise BadInput(
+            f"the scheduler at {address} has no workers; start some with `dask worker {address} --nthreads 1`."
+        ) from None
+    try:
+        others = set(client.run(_version).values()) - {_version()}
+    except ImportError:
+        others = {"no upright"}
+    if others:
+        client.close()
+        raise BadInput(
+            f"the workers at {address} need {_version()} as here, and have {', '.join(sorted(others))}; install the "
+            "same there: pip install 'upright[cluster]'."
+        )
+    _clients[address] = client
+    return client
+
+
+def _version() -> str:
+    from upright import __version__
+
+    return f"upright {__version__} on Python {sys.version_info[0]}.{sys.version_info[1]}"
