@@ -144,7 +144,7 @@ def doubled_rows(columns: Sequence[tuple[Array, float]]) -> NDArray[np.int64]:
         same = d == 0
         going = np.zeros(d.size, bool)
         near = np.stack([d[:-4], d[1:-3], d[3:-1], d[4:]])
-        least = max(3.5 * quantum, 2 * float(np.median(np.abs(np.diff(d)))))
+        least = max(3.5 * quantum, 3 * float(np.median(np.abs(np.diff(d)))))
         going[2:-2] = (near.min(axis=0) > least) | (near.max(axis=0) < -least)
         repeats = same if repeats is None else repeats & same
         on_the_way = going if on_the_way is None else on_the_way | going
