@@ -133,7 +133,7 @@ def read_identified(path: Path, *, seed: int = 0, draws: int = 200) -> Identifie
         When it is neither.
     """
     path = path / "fit.json" if path.is_dir() else path
-    if not path.is_file():
+    if not path.exists():
         raise BadInput(f"{path} does not exist; name the fit.json of `upright identify`, or a study with its numbers.")
     return _from_fit(path, seed, draws) if path.suffix == ".json" else _from_study(path)
 

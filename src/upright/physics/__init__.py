@@ -8,6 +8,7 @@ import traceback
 from pathlib import Path
 
 from upright.errors import BadInput, UprightError, nearest
+from upright.files import regular
 from upright.physics.equations import Derived, DryJoint
 from upright.physics.oscillators import added_inertia, added_mass, chain
 from upright.physics.pendulums import CartPendulum, Furuta, Pendulum
@@ -74,8 +75,9 @@ def find(name: str, folder: Path | None = None) -> type[Plant]:
 
 
 def _from_file(path: Path, class_name: str) -> type[Plant]:
-    if not path.is_file():
+    if not path.exists():
         raise BadInput(f"the plant's file {path} does not exist; give it relative to the study file.")
+    regular(path)
     spec = importlib.util.spec_from_file_location(f"upright_user_{path.stem}", path)
     if spec is None or spec.loader is None:
         raise BadInput(f"the plant's file {path} is no Python file.")

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from upright.errors import BadInput
+from upright.files import read_bytes
 from upright.records import LARGEST, Array, PathLike, Provenance
 
 _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0e-\x1f\x7f]")
@@ -90,9 +91,9 @@ def load(path: PathLike) -> Source:
     """
     name = str(path)
     try:
-        data = Path(path).read_bytes()
-    except IsADirectoryError:
-        raise BadInput(f"'{name}' is a folder; name the log file inside it.") from None
+        data = read_bytes(path)
+    except BadInput:
+        raise
     except FileNotFoundError:
         raise BadInput(f"There is no file '{name}';{_neighbour(Path(path))}") from None
     except (OSError, ValueError) as error:

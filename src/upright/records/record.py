@@ -9,6 +9,7 @@ It travels to pandas, xarray, python-control, MATLAB, CSV or Parquet and back; w
 from __future__ import annotations
 
 import csv
+import io
 import json
 import os
 from collections.abc import Mapping
@@ -20,6 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import BadInput, nearest
+from upright.files import LARGEST as LARGEST_FILE
+from upright.files import read_text, regular, whole_file
 from upright.records.columns import stated_unit, take_time
 from upright.shown import Shown
 
@@ -318,7 +321,7 @@ class Record(Shown):
 
     def to_csv(self, path: PathLike) -> None:
         """Text with full precision under two comment lines."""
-        with open(path, "w", encoding="utf-8", newline="") as file:
+        with whole_file(path) as half, open(half, "w", encoding="utf-8", newline="") as file:
             file.write(f"{CSV_MARK} 1\n# {self.describe()}\n")
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(("t", *self.signals))
@@ -329,10 +332,12 @@ class Record(Shown):
     def from_csv(cls, path: PathLike) -> Self:
         """Record of text written by `to_csv`."""
         try:
-            with open(path, encoding="utf-8", newline="") as file:
-                mark, about = file.readline(), file.readline()
-                names = next(csv.reader([file.readline()]), [])
-                table = np.loadtxt(file, delimiter=",", ndmin=2, comments=None)
+            file = io.StringIO(read_text(path, most=LARGEST_FILE))
+            mark, about = file.readline(), file.readline()
+            names = next(csv.reader([file.readline()]), [])
+            table = np.loadtxt(file, delimiter=",", ndmin=2, comments=None)
+        except BadInput:
+            raise
         except (OSError, ValueError) as error:
             raise BadInput(f"'{path}' must be a CSV file written by upright, but cannot be read: {error}.") from None
         if not mark.startswith(CSV_MARK) or len(names) != table.shape[1]:
@@ -363,9 +368,10 @@ class Record(Shown):
         """Record of a file written by `to_mat`."""
         from scipy.io import loadmat
 
-        if not Path(path).is_file():
+        if not Path(path).exists():
             raise BadInput(f"'{path}' must be a MATLAB file written by upright, but there is no such file.")
         try:
+            regular(path)
             content = loadmat(path)
             return cls.from_mat_variables(content)
         except KeyError as error:
@@ -401,6 +407,7 @@ class Record(Shown):
         import pyarrow.parquet as pq
 
         try:
+            regular(path)
             table: Any = pq.read_table(str(path))
         except (OSError, pa.ArrowException) as error:
             raise BadInput(f"'{path}' must be a Parquet file, but cannot be read: {error}.") from None

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.files import whole_file
 from upright.report.symbols import axis, mathtext
 
 if TYPE_CHECKING:
@@ -132,8 +133,11 @@ def svg(drawing: Figure, name: str) -> str:
 def save(drawing: Figure, path: Path) -> Path:
     """Write a figure by itself, as SVG or PNG by the ending of `path`."""
     vector = path.suffix.lower() == ".svg"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    drawing.savefig(path, dpi=160, facecolor="white", metadata={"Date": None, "Creator": None} if vector else {})
+    with whole_file(path) as half:
+        drawing.savefig(
+            half, format=path.suffix[1:].lower(), dpi=160, facecolor="white",
+            metadata={"Date": None, "Creator": None} if vector else {},
+        )  # fmt: skip
     return path
 
 

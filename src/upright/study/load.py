@@ -140,7 +140,7 @@ def _log(run: Section, folder: Path, logs: dict[tuple[str, str, str], Record]) -
     key = (name, reader, time)
     if key not in logs:
         file = folder / name
-        if not file.is_file():
+        if not file.exists():
             raise run.error("file", f"the log {file} does not exist; {_instead(file, folder)}")
         with run.at("reader" if reader else "file"):
             record = read(file, reader=reader or None)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import BadInput
-from upright.files import plain_values, write_json
+from upright.files import plain_values, read_text, write_json
 from upright.identification import Estimate, Fit
 from upright.identification.frequency.answer import FrequencyFit
 from upright.identification.ladder.cross_validation import CrossValidation
@@ -141,8 +141,10 @@ def read_fit(path: Path) -> FittedModel:
         When the file is no JSON, was not written by `upright identify`, or a value is no number.
     """
     try:
-        content: Any = json.loads(path.read_text(encoding="utf-8"))
-    except (UnicodeDecodeError, ValueError):
+        content: Any = json.loads(read_text(path))
+    except BadInput:
+        raise
+    except (UnicodeDecodeError, ValueError, RecursionError):
         raise BadInput(f"{path} is no fit.json; the first argument is the file that `upright identify` wrote") from None
     wanted = ("plant", "parameters", "verdict")
     if not isinstance(content, dict) or any(key not in content for key in wanted):

@@ -16,6 +16,7 @@ from typing import Any
 
 from upright import units
 from upright.errors import BadInput, UprightError, nearest
+from upright.files import read_text
 
 KeyPath = tuple[str | int, ...]
 """Keys from the root down; the entries of a list of tables are counted from 0."""
@@ -33,7 +34,7 @@ class StudyText:
     def __init__(self, path: Path, text: str | None = None) -> None:
         self.path = path
         try:
-            self.text = path.read_text(encoding="utf-8-sig") if text is None else text
+            self.text = read_text(path, encoding="utf-8-sig", most=4) if text is None else text
         except UnicodeDecodeError:
             raise BadInput(
                 f"{path} is not text, and a study is a TOML file; to make one from a log: upright init {path}"

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from upright.errors import BadInput, nearest
+from upright.files import check_output, keeps_its_inputs
 from upright.progress import Progress, silent
 from upright.verbs.answer import Answer
 from upright.verbs.pages import folder_if_given, page_folder, pdf_has_folder, write_page
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 KINDS = ("sines", "multisine", "sweep")
 
 
+@keeps_its_inputs
 def predict(
     model: str | os.PathLike[str], study: str | os.PathLike[str], *, data: str | os.PathLike[str] | None = None,
     out: str | os.PathLike[str] | None = None,
@@ -92,6 +94,7 @@ def predict(
     return Answer(scores, told, [] if out is None else [write_json(Path(out) / "prediction.json", numbers)])
 
 
+@keeps_its_inputs
 def ladder(
     study: str | os.PathLike[str], *, out: str | os.PathLike[str] | None = None,
     data: str | os.PathLike[str] | None = None, report: bool = True, pdf: bool = False, progress: Progress = silent,
@@ -125,7 +128,7 @@ def ladder(
     KeyboardInterrupt
         When Ctrl-C came before the first rung stood.
     """
-    from upright.files import write_json
+    from upright.files import replace_file, write_json
     from upright.identification.ladder.growth import climb
     from upright.report.ladder import chapter, next_steps
     from upright.report.symbols import typed
@@ -135,6 +138,9 @@ def ladder(
     study = Path(study)
     at = study.with_name(f"{study.stem}-ladder") if out is None else Path(out)
     asked = read_study(study, at, None if data is None else Path(data))
+    if out is not None:
+        for name in ("ladder.json", "study.toml", "ladder.html"):
+            check_output(at / name)
     if not asked.rig.estimated:
         raise BadInput(f'{study}: nothing is asked; give a parameter a guess, such as b_2c = {{ guess = "1e-4 N m" }}')
     climbed = climb(asked.rig, asked.runs, asked.ladder or None, progress=progress)
@@ -146,8 +152,7 @@ def ladder(
     if out is not None:
         files.append(write_json(at / "ladder.json", numbers))
         if trimmed:
-            files.append(at / "study.toml")
-            files[-1].write_text(chosen_study(asked, climbed), encoding="utf-8")
+            files.append(replace_file(at / "study.toml", chosen_study(asked, climbed).encode()))
     where = typed(Path(data) if data is not None else study.parent)
     told = chapter(
         climbed, title=f"Ladder: {asked.title or asked.path.stem.replace('_', ' ')}", provenance=provenance(asked),
@@ -158,6 +163,7 @@ def ladder(
     return Answer(climbed, replace(told, numbers=numbers), files)
 
 
+@keeps_its_inputs
 def frequency(
     sources: Sequence[str | os.PathLike[str]] | str | os.PathLike[str] = (), *, rig: str = "", seed: int = 0,
     ask: str = "sines", kind: str = "", command: str = "", signal: Mapping[str, str] | Sequence[str] = (),
@@ -278,6 +284,7 @@ def _known(name: str, value: float | str | tuple[float, float], make: str) -> tu
     return measured(value, "s" if name in ("actuator.delay", "actuator.lag") else "")
 
 
+@keeps_its_inputs
 def loadings(
     logs: Sequence[Log] | Log = (), *, added: Sequence[str] | str = (), signal: str = "", command: str = "",
     tolerance: float | str = "0 %", free: bool = False, twin: str = "", seed: int = 0,
@@ -344,6 +351,7 @@ def loadings(
     return Answer(found, told, [] if at is None else write_page(told, at / "report.html", pdf))
 
 
+@keeps_its_inputs
 def plan_inertias(
     *, rig: str = "rectilinear", bare: float | str = "", error: float | str = "0.2 %", tolerance: float | str = "0.2 %",
     runs: int = 10, levels: int = 3, radius: Sequence[float | str] | float | str = (), target: float | str = "",
