@@ -17,6 +17,7 @@ import typer
 from typer.core import TyperGroup
 
 from upright.errors import UprightError
+from upright.files import keeps_its_inputs
 
 GROUPS = {
     "Log": {
@@ -74,7 +75,9 @@ def _load(name: str) -> Any:
     text = function.__doc__ or COMMANDS[name]
     one = typer.Typer(add_completion=False, rich_markup_mode="rich", context_settings=SETTINGS)
     # Docstrings are raw, for rich's escapes; \b keeps the line breaks of a paragraph.
-    one.command(name, help=text.replace("\\b\n", "\b\n"))(function)
+    # The laboratory goes on in the folder that it reads; every other command leaves what it reads as it is.
+    guarded = function if name == "lab" else keeps_its_inputs(function)
+    one.command(name, help=text.replace("\\b\n", "\b\n"))(guarded)
     return typer.main.get_command(one)
 
 

@@ -90,6 +90,8 @@ def load(path: PathLike) -> Source:
         When there is no such file, it is a folder, empty, or cannot be read.
     """
     name = str(path)
+    if not name.isprintable() and any("\ud800" <= c <= "\udfff" for c in name):
+        raise BadInput(f"The name {name!r} is no text, so that no study could name it; rename the file.")
     try:
         data = read_bytes(path)
     except BadInput:

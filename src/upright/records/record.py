@@ -31,6 +31,7 @@ PathLike = str | os.PathLike[str]
 
 # No laboratory instrument writes a number this large, and its square would overflow in a fit.
 LARGEST = 1e30
+SHORTEST = 1e-12  # s; a step of time below that is none: its inverse overflows, and no clock has it
 CSV_MARK = "# upright record"
 KEY = "upright"  # name of the JSON in attrs, schema metadata and MAT files
 
@@ -104,6 +105,12 @@ class Record(Shown):
             raise BadInput(
                 f"Time must increase from sample to sample, but sample {i + 2} is at {t[i + 1]:.9g} s after"
                 f" {t[i]:.9g} s; sort the rows or read each run on its own."
+            )
+        if step.min() < SHORTEST:
+            i = int(np.argmin(step))
+            raise BadInput(
+                f"Time must advance by {SHORTEST:g} s or more from sample to sample, but sample {i + 2} comes"
+                f" {step[i]:.3g} s after the one before; is the time in another unit, or no time at all?"
             )
         signals = {str(name): _column(f"column '{name}'", values) for name, values in self.signals.items()}
         for name, values in signals.items():
@@ -215,9 +222,12 @@ class Record(Shown):
         """Record of columns and the JSON of `describe`; units `stated` elsewhere go before those of the description."""
         try:
             about = json.loads(description) if description else {}
-            origin = dict(about.get("provenance", {}))
-            for key in ("window", "notes"):
-                origin[key] = tuple(origin.get(key, ()))
+            origin = {k: str(v) for k, v in dict(about.get("provenance", {})).items()}
+            told = about.get("provenance", {})
+            origin |= {
+                "window": tuple(float(v) for v in told.get("window", ())),
+                "notes": tuple(str(v) for v in told.get("notes", ())),
+            }
             units: dict[str, str] = {str(k): str(v) for k, v in dict(about.get("units", {})).items() if k in signals}
             units |= {k: v for k, v in (stated or {}).items() if v}
             # columns may have been dropped since the description was written

@@ -17,6 +17,7 @@ from upright.study.keys import names
 from upright.study.text import Section, show
 
 _UNIFORM = 0.02  # samples off the grid by less than this part of a period count as on it
+_MOST = 10_000_000  # samples of a run, some 80 MB for each of its signals
 _GAP, _HOPELESS = 5, 100  # periods without a sample: told, refused
 
 
@@ -135,6 +136,11 @@ class Grid:
         own = float(steps[steps < 1.5 * median].mean())
         period = period or own
         count = math.floor((t[-1] - t[0]) / period * (1 + 1e-9) + 1e-6) + 1
+        if count > _MOST:
+            raise BadInput(
+                f"{t[-1] - t[0]:g} s in steps of {period:g} s are {count:.3g} samples, and a run may have {_MOST:.0e};"
+                " take a longer period or a shorter window"
+            )
         if count < 8:
             raise BadInput(f"{count} samples of {period:g} s are too few for a run; at least 8 are needed")
         notes: list[str] = []

@@ -6,6 +6,7 @@ and the nearest valid name, and `Section` hands out the values of one table. `To
 
 from __future__ import annotations
 
+import json
 import math
 import re
 import tomllib
@@ -49,6 +50,11 @@ class StudyText:
             raise BadInput(
                 f"{path}, line {line}: this is no TOML ({what[:1].lower()}{what[1:]}); text stands in quotes, as in"
                 ' plant = "furuta", and each key on its own line. Is this a log? Then: upright init LOG'
+            ) from None
+        except (ValueError, RecursionError):  # a number of 5000 digits, a list in 1000 lists
+            raise BadInput(
+                f"{path}: a study holds numbers of a few digits and lists in lists, and this one a number of thousands"
+                " of digits or brackets in hundreds of brackets; write what is meant"
             ) from None
         self.lines = key_lines(self.text)
 
@@ -184,11 +190,11 @@ class Section:
             raise self.error(key, f"{key} must be {words}, got {show(value)}; {nearest(str(value), valid)}")
         return value
 
-    def whole(self, key: str, default: int) -> int:
-        """Whole number, at least 1."""
+    def whole(self, key: str, default: int, most: int) -> int:
+        """Whole number from 1 to `most`."""
         value = self.values.get(key, default)
-        if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-            raise self.error(key, f"{key} must be a whole number, 1 or more, got {show(value)}")
+        if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
+            raise self.error(key, f"{key} must be a whole number from 1 to {most}, got {show(value)}")
         return value
 
 
@@ -245,7 +251,7 @@ def _toml_so_far(text: str) -> tuple[dict[str, Any], bool]:
     for closed in ("", *("]" * depth for depth in range(1, 9))):
         try:
             return tomllib.loads(text + closed), not closed
-        except tomllib.TOMLDecodeError:
+        except (ValueError, RecursionError):
             continue
     return {}, False
 
@@ -299,7 +305,8 @@ class TomlTable:
 
     def line(self, text: str, note: str = "") -> None:
         """Add a line as it is."""
-        self.lines.append(f"{text}   # {note}" if note else text)
+        whole = f"{text}   # {note}" if note else text
+        self.lines.append(re.sub(r"[\x00-\x08\x0a-\x1f\x7f]", " ", whole))  # as the name of a log may hold
 
     def __str__(self) -> str:
         return "\n".join(self.lines) + "\n"
@@ -324,8 +331,7 @@ def toml(value: Value, digits: int = 6) -> str:
     if isinstance(value, float):
         return f"{value:.{digits}g}"
     if isinstance(value, str):
-        text = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", " ")
-        return f'"{text}"'
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{k} = {toml(v, digits)}" for k, v in value.items()) + " }"
     return "[" + ", ".join(toml(v, digits) for v in value) + "]"

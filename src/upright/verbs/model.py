@@ -13,7 +13,7 @@ from upright.files import check_output, keeps_its_inputs
 from upright.progress import Progress, silent
 from upright.verbs.answer import Answer
 from upright.verbs.pages import folder_if_given, page_folder, pdf_has_folder, write_page
-from upright.verbs.study import provenance, read_study
+from upright.verbs.study import folder_beside, provenance, read_study
 from upright.verbs.values import open_log, pairs, paths, si, texts
 
 if TYPE_CHECKING:
@@ -136,7 +136,7 @@ def ladder(
 
     pdf_has_folder(out, pdf)
     study = Path(study)
-    at = study.with_name(f"{study.stem}-ladder") if out is None else Path(out)
+    at = folder_beside(study, "ladder") if out is None else Path(out)
     asked = read_study(study, at, None if data is None else Path(data))
     if out is not None:
         for name in ("ladder.json", "study.toml", "ladder.html"):

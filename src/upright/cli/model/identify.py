@@ -83,8 +83,9 @@ def identify(
     trust it), 2 the study or a log is wrong, 130 stopped by Ctrl-C.
     """
     from upright.verbs.fitting import identify as fit
+    from upright.verbs.study import folder_beside
 
-    folder = out if out is not None else study.with_name(f"{study.stem}-fit")
+    folder = out if out is not None else folder_beside(study, "fit")
     asked = read_study(study, folder, data)
     with progress_bar(quiet=as_json) as bar:
         answer = fit(
