@@ -8,7 +8,6 @@ import pytest
 from typer.testing import CliRunner
 
 from upright.cli import app
-from upright.readers import read
 
 STUDY = """\
 [rig]
@@ -95,3 +94,62 @@ def test_a_name_that_is_no_text_is_a_sentence(here):
     (here / name).write_bytes((here / "swing.csv").read_bytes())
     for command in ("show", "doctor", "init"):
         assert "is no text, so that no study could name it" in sentence(command, name)
+
+
+FURUTA = {"m_p": 0.135, "l_cg": 0.19, "r": 0.16, "J_d": 0.011, "J_p": 6e-4, "J_a": 0.0}
+
+
+@pytest.fixture
+def fit(here):
+    """A fit.json of a Furuta pendulum, by hand."""
+    content = {"format": 1, "plant": "furuta", "verdict": "sound", "parameters": FURUTA}
+    (here / "fit.json").write_text(json.dumps(content), encoding="utf-8")
+    return "fit.json"
+
+
+@pytest.mark.parametrize("option", ["--from", "--to"])
+@pytest.mark.parametrize("value", ["nan", "-1", "0", "inf"])
+def test_a_band_has_frequencies(here, option, value):
+    assert f"{option} needs a frequency above 0 rad/s" in sentence("frequency", "swing.csv", option, value)
+
+
+def test_a_band_is_not_upside_down(here):
+    said = sentence("frequency", "swing.csv", "--from", 10, "--to", 1)
+    assert "--from must lie below --to, got 10 and 1 rad/s" in said
+
+
+def test_frequency_says_what_it_needs(here):
+    assert "needs a log, a frequency.csv or a study to read, or a twin to sweep: --rig" in sentence("frequency")
+    assert "--from belongs to a log" in sentence("frequency", "--rig", "furuta", "--from", "1")
+    assert sorted(p.name for p in here.iterdir()) == ["nine.csv", "study.toml", "swing.csv"]
+
+
+@pytest.mark.parametrize("radius", ["4 m", "0 m", "-4 cm"])
+def test_no_disk_is_as_wide_as_a_room(here, radius):
+    limits = "above 0 and up to 50 cm, got"
+    assert limits in sentence("plan-inertias", "--rig", "torsional", "--radius", radius)
+    if not radius.startswith("-"):
+        assert limits in sentence("loadings", "swing.csv", "--added", f"2 at {radius}")
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ("--poles=0,-2,-3,-4", "a pole is asked where the model has one already"),
+        ("--poles=-1,-2,-3,-4 --period=0s", "every 1e-6 to 10 s"),
+        ("--poles=-1,-2,-3,-4 --period=1e300s", "every 1e-6 to 10 s"),
+        ("--lqr 1,1,1,1 --limit 1e300", "above 0 and below 1e9"),
+        ("--lqr 1,1,1,1 --limit nan", "above 0 and below 1e9"),
+    ],
+)
+def test_a_design_that_no_loop_can_have_is_a_sentence(fit, options, says):
+    assert says in sentence("design", fit, *options.split())
+
+
+def test_a_servo_of_a_million_samples_per_row_is_not_drawn(here):
+    t = np.arange(2000) * 0.01
+    theta = np.cumsum(np.random.default_rng(1).normal(size=t.size))
+    np.savetxt("loop.csv", np.column_stack([t, theta, -2 * theta]), "%.9g", ",", header="t,theta,u", comments="")
+    words = ("law", "loop.csv", "--command", "u", "--measured", "theta", "--every")
+    assert "2000 rows of 1000000 samples each are 2e+09 samples of the servo" in sentence(*words, 1_000_000)
+    assert run(*words, 2).exit_code == 0

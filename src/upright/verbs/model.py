@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -218,42 +219,60 @@ def frequency(
     BadInput
         When there is no such rig or way, or a log cannot be used.
     """
+    from upright.experiments.makes import MAKES
+
     at = page_folder(out, pdf)
     for value, option in ((ask, "--ask"), (kind or "sines", "--kind")):
         if value not in KINDS:
             raise BadInput(f"{option} is one of {', '.join(KINDS)}, got '{value}'.")
+    limits = _band(low, high)
     files = [at / "frequency.csv"]
+    if not rig and not paths(sources):
+        raise BadInput(
+            f"frequency needs a log, a frequency.csv or a study to read, or a twin to sweep: --rig {', '.join(MAKES)}."
+        )
     if logs := [Path(source) for source in paths(sources)]:
         from upright.experiments.frequency_1b.chapter import log_chapter
         from upright.experiments.frequency_1b.run import LogRequest, response_of_logs
         from upright.verbs.values import si_if_given
 
-        limits = (low or 0.0, high or float("inf"))
         said = pairs(signal, "--signal"), pairs(counts, "--counts"), pairs(known, "--known")
         wish = LogRequest(
             make=rig, command=command, signals=said[0], kind=kind, seed=seed, hold=si_if_given(hold, "s"),
             counts={n: _count(n, v) for n, v in said[1].items()},
-            band=limits if limits != (0.0, float("inf")) else None,
+            band=limits,
             known={n: _known(n, v, rig) for n, v in said[2].items()},
         )  # fmt: skip
         found = response_of_logs(logs, wish, at, data=None if data is None else Path(data))
         files += [at / "fit.json"] if found.answer else []
         told = log_chapter(found)
     else:
-        for value, option in ((signal, "--signal"), (counts, "--counts"), (known, "--known"), (command, "--command")):
+        said = {"--signal": signal, "--counts": counts, "--known": known, "--command": command, "--hold": hold}
+        said |= {"--kind": kind, "--from": low is not None, "--to": high is not None, "--data": data is not None}
+        for option, value in said.items():
             if value:
                 raise BadInput(f"{option} belongs to a log, and none was named; name one, or leave the option out.")
         from upright.experiments.frequency_1b.chapter import chapter
         from upright.experiments.frequency_1b.run import run_frequency
         from upright.experiments.makes import make_named
 
-        make = rig or "furuta"
-        make_named(make)
-        found = run_frequency(make, seed, at, progress, kind=ask)
+        make_named(rig)
+        found = run_frequency(rig, seed, at, progress, kind=ask)
         files += [at / "sweep.csv", at / "fit.json"]
         told = chapter(found)
     files += write_page(told, at / "report.html", pdf)
     return Answer(found, told, files)
+
+
+def _band(low: float | None, high: float | None) -> tuple[float, float] | None:
+    """Least and greatest frequency [rad/s] of those that were said."""
+    for value, option in ((low, "--from"), (high, "--to")):
+        if value is not None and not 0 < value < math.inf:
+            raise BadInput(f"{option} needs a frequency above 0 rad/s, got {value:g}; leave it out to take all.")
+    band = (low or 0.0, high or math.inf)
+    if not band[0] < band[1]:
+        raise BadInput(f"--from must lie below --to, got {band[0]:g} and {band[1]:g} rad/s; exchange them.")
+    return None if low is None and high is None else band
 
 
 def _count(name: str, text: float | str) -> float:
@@ -261,8 +280,8 @@ def _count(name: str, text: float | str) -> float:
         value = float(text)
     except ValueError:
         value = 0.0
-    if value == 0:
-        raise BadInput(f"--counts {name} needs a number that is not 0, got '{text}'.")
+    if value == 0 or not math.isfinite(value):
+        raise BadInput(f"--counts {name} needs a finite number that is not 0, got '{text}'.")
     return value
 
 
