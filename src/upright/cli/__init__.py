@@ -64,6 +64,7 @@ class LazyGroup(TyperGroup):
 
     def invoke(self, ctx: Any) -> Any:
         """Run a command; what a person got wrong becomes a sentence and an exit code."""
+        _only_sentences()
         with sentences():
             return super().invoke(ctx)
 
@@ -106,6 +107,16 @@ def sentences() -> Generator[None]:
             raise  # typer's own: usage errors and requested exits
         where = f"{type(error).__name__}: {error}".rstrip(": ")
         raise _stop(f"this is a bug in upright ({where}); UPRIGHT_DEBUG=1 shows where it happened.", BUG) from None
+
+
+def _only_sentences() -> None:
+    """Keep the remarks of libraries off the terminal, unless somebody asks for them."""
+    import logging
+    import warnings
+
+    if os.environ.get("UPRIGHT_DEBUG", "0") in ("", "0") and not sys.warnoptions:
+        warnings.simplefilter("ignore")
+        logging.getLogger("matplotlib").setLevel(logging.CRITICAL)  # says what is wrong with a user's matplotlibrc
 
 
 def _debug() -> None:
@@ -167,7 +178,33 @@ for _group, _commands in GROUPS.items():
 
 def main() -> None:
     """Run the command line; the entry point of the script `upright`."""
+    _any_terminal()
+    os.environ["MPLBACKEND"] = "agg"  # nothing is shown in a window, and an unknown backend stops matplotlib
     # The matrices of a fit are small: threads of the linear algebra only wait for each other (14.2 s against 8.1 s).
     for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
-    app()
+    try:
+        app()
+    finally:
+        _flush()
+
+
+def _any_terminal() -> None:
+    """Let streams of any encoding take any text, and have streams where they were closed before the start."""
+    for name in ("stdout", "stderr"):
+        stream: Any = getattr(sys, name)
+        if stream is None:  # `upright show LOG >&-`
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")  # a console of cp1252 has no Greek letter
+
+
+def _flush() -> None:
+    """Write what is still waiting; a reader that went away is no error, a full disk is said."""
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if not isinstance(error, BrokenPipeError):
+            typer.echo(f"upright: the output could not be written: {error.strerror or error}.", err=True)
+            raise SystemExit(USER_ERROR) from None

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from upright.cli.terminal import Data, Pdf, progress_bar, tell
+from upright.cli.terminal import Data, Pdf, print_json, progress_bar, tell
 from upright.verbs.study import read_study
 
 INTERRUPTED, NOT_TRUSTED = 130, 3
@@ -92,7 +93,7 @@ def identify(
             asked, data=data, hold_out=hold_out or (), method=method, out=folder, report=report, pdf=pdf, progress=bar
         )
     if as_json:
-        typer.echo(answer.files[0].read_text(encoding="utf-8").rstrip())
+        print_json(json.loads(answer.files[0].read_text(encoding="utf-8")))
     else:
         tell(answer.chapter, answer.files)
     crossed = answer.crossed
