@@ -165,7 +165,7 @@ def read_known(text: str, log: str = "") -> KnownRig:
     """
     path = Path(text)
     if path.suffix == ".json" or (path.is_dir() and (path / "fit.json").is_file()):
-        from upright.study.results import read_fit
+        from upright.study.fitted import read_fit
 
         fit = read_fit(path / "fit.json" if path.is_dir() else path)
         parameters = {n: Parameter(name=n, value=v) for n, v in fit.values.items()}

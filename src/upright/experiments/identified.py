@@ -13,7 +13,7 @@ from upright.errors import BadInput, ImpossiblePhysics
 from upright.experiments.makes import MAKES, Make, make_of, make_rig
 from upright.physics import Linear, Plant, find
 from upright.records import Array
-from upright.study.results import FittedModel, read_fit
+from upright.study.fitted import FittedModel, read_fit
 from upright.study.rig import read_plant, read_rig
 from upright.study.sensors import drive_unit
 from upright.study.text import StudyText

@@ -71,7 +71,7 @@ def find(name: str, folder: Path | None = None) -> type[Plant]:
     kind, _, bodies = key.replace("chain", "rectilinear").partition("-")
     if kind in ("rectilinear", "torsional") and bodies.isdigit():
         return chain(int(bodies), kind)
-    raise BadInput(f"no plant is called '{name}'; {nearest(name, [*BUILT_IN, 'chain', 'my_plant.py:ClassName'])}")
+    raise BadInput(f"no plant is called '{name[:60]}'; {nearest(name, [*BUILT_IN, 'chain', 'my_plant.py:ClassName'])}")
 
 
 def _from_file(path: Path, class_name: str) -> type[Plant]:

@@ -62,8 +62,8 @@ def predict(
     from upright.identification.inference.scoring import predict as score
     from upright.report.fit.tables import score_table
     from upright.report.page import Chapter, Part
+    from upright.study.fitted import read_fit
     from upright.study.load import load_study
-    from upright.study.results import read_fit
 
     model, study = Path(model), Path(study)
     for file, what in ((model, "the model"), (study, "the study")):
