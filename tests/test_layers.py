@@ -15,6 +15,7 @@ BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 FLOORS = """
 errors progress shown
 files
+trust
 quantities
 units
 signals

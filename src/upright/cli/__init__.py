@@ -18,6 +18,7 @@ from typer.core import TyperGroup
 
 from upright.errors import UprightError
 from upright.files import keeps_its_inputs
+from upright.trust import no_code
 
 GROUPS = {
     "Log": {
@@ -49,11 +50,17 @@ GROUPS = {
 COMMANDS = {name: line for commands in GROUPS.values() for name, line in commands.items()}
 
 SETTINGS = {"help_option_names": ["-h", "--help"]}
+NO_CODE = "--no-code"
 USER_ERROR, BUG, INTERRUPTED = 2, 1, 130
 
 
 class LazyGroup(TyperGroup):
     """The commands by name and help line; a command's module is imported when it is asked for."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Take `--no-code` wherever it stands; it is an option of all commands."""
+        moved = [NO_CODE] if NO_CODE in args else []
+        return super().parse_args(ctx, moved + [word for word in args if word != NO_CODE])
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Replace the stand-in that carried the help line by the command itself."""
@@ -65,7 +72,7 @@ class LazyGroup(TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         """Run a command; what a person got wrong becomes a sentence and an exit code."""
         _only_sentences()
-        with sentences():
+        with sentences(), no_code(bool(ctx.params.get("no_code"))):
             return super().invoke(ctx)
 
 
@@ -166,6 +173,9 @@ def _version(asked: bool) -> None:
 def _upright(
     version: Annotated[
         bool, typer.Option("--version", help="Print the version.", callback=_version, is_eager=True)
+    ] = False,
+    no_code: Annotated[
+        bool, typer.Option(NO_CODE, help="Refuse to run Python code that a study or a fit.json names as its plant.")
     ] = False,
 ) -> None:
     """From one Lagrangian to a fitted real rig: a log goes in, a trusted nonlinear model comes out."""

@@ -17,6 +17,7 @@ from upright.study.fitted import FittedModel, read_fit
 from upright.study.rig import read_plant, read_rig
 from upright.study.sensors import drive_unit
 from upright.study.text import StudyText
+from upright.trust import before_running
 
 GAIN = "actuator.gain"
 DAILY = 0.13
@@ -152,6 +153,7 @@ def _force(kind: type[Plant]) -> str:
 
 def _from_fit(path: Path, seed: int, draws: int) -> IdentifiedRig:
     fitted = read_fit(path)
+    before_running(fitted.plant, path)
     kind = find(fitted.plant, path.parent)
     try:
         plant = kind(**{n: v for n, v in fitted.values.items() if n in kind.names()})

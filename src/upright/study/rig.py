@@ -14,6 +14,7 @@ from upright.physics.actuator import ACTUATOR
 from upright.quantities import Quantity
 from upright.study.keys import names
 from upright.study.text import Section, show, si
+from upright.trust import before_running
 from upright.units import uncertainty
 
 
@@ -25,6 +26,7 @@ def read_plant(study: Section) -> type[Plant]:
     rig.check(names("rig"))
     name = rig.text_of("plant", "cart-pendulum")
     with study.text.at(("rig", "plant")):
+        before_running(name, study.text.path)
         return find(name, study.text.path.parent)
 
 
