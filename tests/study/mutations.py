@@ -6,11 +6,11 @@ import copy
 from collections.abc import Iterator
 from typing import Any
 
-Path = tuple[str | int, ...]
+Place = tuple[str | int, ...]
 REMOVED: Any = object()
 
 
-def paths(tree: Any, to: Path = ()) -> Iterator[Path]:
+def paths(tree: Any, to: Place = ()) -> Iterator[Place]:
     """Path of every key and entry, the tables themselves included."""
     entries = tree.items() if isinstance(tree, dict) else enumerate(tree) if isinstance(tree, list) else ()
     for key, value in entries:
@@ -18,13 +18,13 @@ def paths(tree: Any, to: Path = ()) -> Iterator[Path]:
         yield from paths(value, (*to, key))
 
 
-def at(tree: Any, path: Path) -> Any:
+def at(tree: Any, path: Place) -> Any:
     for key in path:
         tree = tree[key]
     return tree
 
 
-def changed(tree: Any, path: Path, value: Any) -> Any:
+def changed(tree: Any, path: Place, value: Any) -> Any:
     """A copy with another value under a path, or without it."""
     out = copy.deepcopy(tree)
     holder = at(out, path[:-1])

@@ -202,8 +202,8 @@ def si(value: Any, unit: str, what: str) -> float:
     """Value in `unit`, one of SI or of the command, of a number or of text such as ``"2 mm"``."""
     if isinstance(value, bool) or not isinstance(value, str | int | float):
         raise BadInput(f'{what} must be a number or text with a unit, such as "1.5 {unit}", got {show(value)}')
-    if not isinstance(value, str) and not abs(float(value)) < 1e300:
-        raise BadInput(f"{what} must be a finite number, got {value}")
+    if not isinstance(value, str) and not abs(value) < 1e300:
+        raise BadInput(f"{what} must be a finite number, got {show(value)}")
     return units.in_unit(value, unit)
 
 
