@@ -19,7 +19,7 @@ from benchmarks.measure import Line
 
 NAMES = (
     "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "frequency", "swing_up", "tracking", "lab",
-    "doctor", "rigs", "regulation", "real", "startup",
+    "doctor", "rigs", "regulation", "real", "startup", "long",
 )  # fmt: skip
 LIBRARIES = ("upright", "numpy", "scipy", "numba", "control", "casadi", "jax", "mujoco")
 

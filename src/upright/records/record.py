@@ -427,19 +427,28 @@ class Record(Shown):
 
 
 def _column(what: str, values: Any) -> Array:
-    """Read-only float64 copy, one-dimensional and finite."""
+    """Read-only float64 copy, one-dimensional and finite; what nobody can write to is taken as it is."""
     try:
-        out = np.array(values, dtype=np.float64)
+        out = values if _is_frozen(values) else np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise BadInput(f"{what} must be numbers, got something else ({error}); convert it first.") from None
     if out.ndim != 1:
         raise BadInput(f"{what} must be one-dimensional, got shape {out.shape}; give each column its own name.")
-    bad = ~(np.abs(out) <= LARGEST)  # catches nan and inf as well
-    if bad.any():
-        i = int(np.argmax(bad))
+    if out.size and not -LARGEST <= out.min() <= out.max() <= LARGEST:  # catches nan and inf as well
+        i = int(np.argmax(~(np.abs(out) <= LARGEST)))
         raise BadInput(
             f"{what} must be finite and below {LARGEST:g}, got {out[i]:g} at sample {i + 1};"
             " remove the sample or fill it in."
         )
     out.flags.writeable = False
     return out
+
+
+def _is_frozen(values: Any) -> bool:
+    """Whether an array of float64 can be changed by nobody, not even through the array that it is a part of."""
+    owner = values
+    while isinstance(owner, np.ndarray) and not owner.flags.writeable:
+        if owner.base is None:
+            return values.dtype == np.float64 and values.flags.contiguous
+        owner = owner.base
+    return False
