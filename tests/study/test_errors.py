@@ -143,6 +143,8 @@ RUN = 'role = "fit"\n'
 @pytest.mark.parametrize(
     ("right", "wrong", "says"),
     [
+        ("min = 0", "min = 1e-300", "J_p must be 0 or from 1e-60 to 1e[+]60 in size, got 1e-300"),
+        ("min = 0", 'min = "1e200 kg m^2"', 'must be 0 or from 1e-60 to 1e[+]60 in size, got "1e200 kg m.2"'),
         ('column = "v"\n', f'expression = "{"-" * 1900}v"\n', "nested too deeply"),
         ('column = "v"\n', f'expression = "v{"**2" * 600}"\n', "nested too deeply"),
         ('column = "v"\n', f'expression = "{"(" * 900}v{")" * 900}"\n', "neither a column nor arithmetic"),
@@ -152,7 +154,7 @@ RUN = 'role = "fit"\n'
         (RUN, f"{RUN}horizon = [{', '.join(f'{0.02 + 0.001 * i:.3f}' for i in range(2000))}]\n", "lists 2000 times"),
         ("substeps = 2", "substeps = 1000000000", "from 1 to 100, got 1000000000"),
     ],
-    ids=["signs", "powers", "brackets", "lists", "digits", "period", "horizons", "substeps"],
+    ids=["tiny", "huge", "signs", "powers", "brackets", "lists", "digits", "period", "horizons", "substeps"],
 )
 def test_more_than_anybody_means_is_a_sentence(folder, right, wrong, says):
     """Each of these ended in a recursion without end, in gigabytes, or in hours."""

@@ -19,6 +19,7 @@ from upright import units
 from upright.errors import BadInput, UprightError, nearest
 from upright.files import read_text
 
+_LEAST = 1e-60
 KeyPath = tuple[str | int, ...]
 """Keys from the root down; the entries of a list of tables are counted from 0."""
 
@@ -204,7 +205,10 @@ def si(value: Any, unit: str, what: str) -> float:
         raise BadInput(f'{what} must be a number or text with a unit, such as "1.5 {unit}", got {show(value)}')
     if not isinstance(value, str) and not abs(value) < 1e300:
         raise BadInput(f"{what} must be a finite number, got {show(value)}")
-    return units.in_unit(value, unit)
+    number = units.in_unit(value, unit)
+    if number and not _LEAST <= abs(number) <= 1 / _LEAST:  # its square, or the inverse of that, would overflow
+        raise BadInput(f"{what} must be 0 or from {_LEAST:g} to {1 / _LEAST:g} in size, got {show(value)}")
+    return number
 
 
 def show(value: Any) -> str:
