@@ -13,8 +13,9 @@ BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 
 # Rooms from the ground up: each imports from those above its own line only. Rooms on one line do not see each other.
 FLOORS = """
-errors progress files shown
-workers
+errors progress shown
+files
+trust workers
 quantities
 units
 signals

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from upright.errors import BadInput
+from upright.readers import inspect
 from upright.records import Provenance, Record
 
 NUMBERS = st.floats(min_value=-1e15, max_value=1e15, allow_nan=False, width=64)
@@ -190,3 +191,19 @@ def test_a_frame_without_a_clear_time_is_refused(columns: dict[str, list[float]]
 
     with pytest.raises(BadInput, match=sentence):
         Record.from_pandas(pd.DataFrame(columns), time=time)
+
+
+def test_a_step_of_time_that_no_clock_has_is_refused():
+    """1/5e-324 overflows, and so did whatever came of the sample rate."""
+    with pytest.raises(BadInput, match=r"advance by 1e-12 s or more .* comes 4\.94e-324 s after"):
+        Record(t=np.arange(50) * 5e-324, signals={"x": np.zeros(50)})
+
+
+def test_provenance_in_numbers_is_text_after_reading(tmp_path):
+    """Who edits the second line of such a file by hand, or with a program, may put anything there."""
+    about = '{"units": {"x": 3}, "provenance": {"file": 5, "notes": [1, 2.5], "window": ["0", 1]}}'
+    (tmp_path / "own.csv").write_text(f"# upright record 1\n# {about}\nt,x\n0,1\n1,2\n2,3\n", encoding="utf-8")
+    record = Record.from_csv(tmp_path / "own.csv")
+    assert record.provenance.notes == ("1", "2.5")
+    assert (record.provenance.file, record.provenance.window) == ("5", (0.0, 1.0))
+    assert inspect(record).time.samples == 3

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from upright import units
 from upright.errors import BadInput
+from upright.records.columns import stated_unit, time_scale
 
 
 # Expected values from the definitions of the units (SI brochure; inch and pound by their 1959 definition).
@@ -64,6 +65,39 @@ def test_a_value_becomes_si(text: str, expected: str, value: float) -> None:
 def test_a_wrong_unit_is_answered_with_the_right_one(text: str, expected: str, sentence: str) -> None:
     with pytest.raises(BadInput, match=sentence):
         units.parse(text, expected)
+
+
+@pytest.mark.parametrize(
+    "unit",
+    [
+        "9**9**9",
+        "9^9^9^9",
+        "2^9^9^9 m",
+        "m^9^9^9",
+        "m^(9^9^9)",
+        "((((((9)^9)^9)^9)^9)^9)^9",
+        "((((((m)^9)^9)^9)^9)^9)^9",
+        "9 squared squared squared squared squared squared",
+        "999999999",
+        "(" * 60,
+        "m" * 1_000_000,
+    ],
+)
+def test_a_power_that_nobody_can_work_out_is_no_unit(unit: str) -> None:
+    """9**(9**9) has 370 million digits (log10 of it), so who begins to compute it does not answer today."""
+    assert not units.known(unit)
+    assert stated_unit(f"theta [{unit}]") == ""
+
+
+def test_a_name_of_blanks_is_looked_through_at_once() -> None:
+    """A pattern with two runs of blanks around one of anything takes a step for every way to share them: 2e13."""
+    assert stated_unit("x [" + " " * 40_000) == ""
+    assert time_scale("x" + " " * 40_000 + "y") == 0.0
+
+
+@pytest.mark.parametrize("unit", ["(m/s)^2", "m^-1", "V/Hz^0.5", "m^(-2)", "kg·m**2"])
+def test_a_power_of_a_unit_is_one(unit: str) -> None:
+    assert units.known(unit)
 
 
 @pytest.mark.parametrize("unit", units.COMMON)

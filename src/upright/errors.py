@@ -26,12 +26,16 @@ class WorkersLost(UprightError, RuntimeError):
     """Processes or machines that were to share the work died, again and again."""
 
 
+_MOST = 40  # names in a sentence
+
+
 def nearest(name: str, valid: object) -> str:
     """Name the valid spelling closest to `name`, as a phrase, or list what exists."""
     from difflib import get_close_matches
 
     names = [str(v) for v in valid]  # type: ignore[attr-defined]
-    close = get_close_matches(name, names, n=1, cutoff=0.6)
+    close = get_close_matches(name[:100], names, n=1, cutoff=0.6)
     if close:
         return f"did you mean '{close[0]}'?"
-    return f"valid names: {', '.join(sorted(names))}" if names else "nothing is defined here"
+    more = f" and {len(names) - _MOST} more" if len(names) > _MOST else ""
+    return f"valid names: {', '.join(sorted(names)[:_MOST])}{more}" if names else "nothing is defined here"

@@ -59,7 +59,9 @@ COMMON = (
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
 _UNIT = re.compile(r"[A-Za-zµμΩ°%·*/^() .0-9-]{0,60}")
-_EXPONENT = re.compile(r"\^\s*\(?\s*-?\s*\d{2,}|\*\*\s*\(?\s*-?\s*\d{2,}|\d{3,}")
+_POWER = re.compile(r"(.?)\s*(?:\^|\*\*)\s*\(?\s*-?\s*(\d*)")
+_POWER_IN_WORDS = re.compile(r"squared?\b|cubed\b|cubic\b|sq\b")
+_LONGEST = 200  # characters of a value with its unit
 
 
 def parse(text: str, expected: str = "") -> float:
@@ -80,7 +82,7 @@ def parse(text: str, expected: str = "") -> float:
     """
     plain = {"": "a number with its unit", "1": "a pure number such as '0.5'"}
     wanted = plain.get(expected, f"a value in {expected} such as '0.5 {expected}'")
-    match = _NUMBER.fullmatch(text)
+    match = _NUMBER.fullmatch(text) if len(text) <= _LONGEST else None
     if match is None:
         raise BadInput(f"Expected {wanted}, got {text[:60]!r}; write the number first, then the unit.")
     number, unit = float(match[1]), match[2]
@@ -151,7 +153,7 @@ def _si(unit: str) -> tuple[float, str]:
     plain = unit.strip()
     if plain in ("", "1"):
         return 1.0, "[]"
-    if not _UNIT.fullmatch(plain) or _EXPONENT.search(plain):
+    if not _UNIT.fullmatch(plain) or _too_powerful(plain):
         raise BadInput(f"Expected a unit such as 'kg m^2', got {unit[:60]!r}: {_hint(unit, '')}")
     spelled = plain.replace("·", "*").replace("%", " percent ").replace("^", "**").replace("°", " degree ").strip()
     try:
@@ -163,6 +165,16 @@ def _si(unit: str) -> tuple[float, str]:
     if not (math.isfinite(factor) and factor > 0):
         raise BadInput(f"Expected a unit such as 'kg m^2', got {unit!r}: {_hint(unit, '')}")
     return factor, "[]" if dimension == "dimensionless" else dimension
+
+
+def _too_powerful(unit: str) -> bool:
+    """Whether a unit holds powers that no unit has; pint works out ``9**9**9`` to the last digit, and never returns."""
+    powers = [(base, exponent) for base, exponent in _POWER.findall(unit)]
+    return (
+        any(base.isdigit() or base in "*^(" or len(exponent) > 1 for base, exponent in powers)
+        or sum(base == ")" for base, _ in powers) + len(_POWER_IN_WORDS.findall(unit)) > 1
+        or re.search(r"\d{3}", unit) is not None
+    )
 
 
 @lru_cache(maxsize=1)
@@ -202,7 +214,7 @@ def _hint(unit: str, expected: str) -> str:
     if expected:
         fitting = [expected, *(u for u in fitting if u != expected)]
     folded = {re.sub(r"[\s*·^]", "", u).lower(): u for u in reversed(fitting)}
-    key = re.sub(r"[\s*·^]", "", unit).lower()
+    key = re.sub(r"[\s*·^]", "", unit[:_LONGEST]).lower()
     close = [key] if key in folded else get_close_matches(key, list(folded), n=1, cutoff=0.5)
     if close:
         return f"did you mean '{folded[close[0]]}'?"

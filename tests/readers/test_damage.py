@@ -143,5 +143,23 @@ def test_a_matlab_file_that_unpacks_to_more_than_any_log_is_refused(size: int, b
     """A few megabytes unpack to gigabytes, or to millions of objects."""
     data = matlab(packed(struct.pack("<II", 14, size) + begin, piece, repeat=600))
     assert len(data) < 4e6
-    with pytest.raises(BadInput, match="unpacks to more than 512 MB"):
+    with pytest.raises(BadInput, match=r"unpacks to more than \d+ MB"):
         read_source(source(data))
+
+
+def test_a_log_of_a_few_kilobytes_cannot_unpack_to_what_fills_a_memory() -> None:
+    """Zeros in bytes pack a thousand times, and as numbers, beside their time, take sixteen times more again."""
+    import tracemalloc
+
+    n = 54 << 20
+    zeros = element(6, struct.pack("<II", 9, 0)) + element(5, struct.pack("<2i", n, 1)) + element(1, b"theta")
+    tag = struct.pack("<II", 14, len(zeros) + 8 + n) + zeros + struct.pack("<II", 2, n)
+    step = element(14, start(6, 1, 1).replace(b"a", b"h") + element(9, struct.pack("<d", 0.01)))
+    data = matlab(step, packed(tag, bytes(1 << 20), repeat=54))
+    assert len(data) < 300_000
+    tracemalloc.start()
+    with pytest.raises(BadInput, match=r"unpacks to more than \d\d MB, more than any log of a rig in 0\.2"):
+        read_source(source(data))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 150e6

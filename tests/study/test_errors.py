@@ -1,5 +1,7 @@
 """Is a wrong study answered with the line, what was expected and the nearest valid name, in one sentence?"""
 
+import re
+
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -25,7 +27,7 @@ def test_the_good_study_is_good(folder):
 WRONG = [
     # what is written, what is written instead, line, what the answer must contain
     ("substeps = 2", "substep = 2", 3, "did you mean 'substeps'?"),
-    ("substeps = 2", "substeps = 0", 3, "a whole number, 1 or more, got 0"),
+    ("substeps = 2", "substeps = 0", 3, "a whole number from 1 to 100, got 0"),
     ("substeps = 2", "substeps = true", 3, "got true"),
     ('"cart-pendulum"', '"cart-pendulm"', 2, "did you mean 'cart-pendulum'?"),
     ('"cart-pendulum"', "7", 2, 'such as plant = "cart-pendulum", got 7'),
@@ -133,6 +135,30 @@ def test_a_wrong_study_is_answered_with_line_and_remedy(folder, right, wrong, li
     assert f"study.toml, line {line}: " in answer
     assert says in answer
     assert "\n" not in answer
+
+
+RUN = 'role = "fit"\n'
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "says"),
+    [
+        ("min = 0", "min = 1e-300", "J_p must be 0 or from 1e-60 to 1e[+]60 in size, got 1e-300"),
+        ("min = 0", 'min = "1e200 kg m^2"', 'must be 0 or from 1e-60 to 1e[+]60 in size, got "1e200 kg m.2"'),
+        ('column = "v"\n', f'expression = "{"-" * 1900}v"\n', "nested too deeply"),
+        ('column = "v"\n', f'expression = "v{"**2" * 600}"\n', "nested too deeply"),
+        ('column = "v"\n', f'expression = "{"(" * 900}v{")" * 900}"\n', "neither a column nor arithmetic"),
+        (RUN, f"{RUN}measured = {'[' * 900}{']' * 900}\n", "brackets in hundreds of brackets"),
+        (RUN, f"{RUN}score_from = {'9' * 5000}\n", "thousands of digits"),
+        (RUN, f"{RUN}period = 1e-9\n", "8 s in steps of 1e-09 s are 8e[+]09 samples, and a run may have 1e[+]07"),
+        (RUN, f"{RUN}horizon = [{', '.join(f'{0.02 + 0.001 * i:.3f}' for i in range(2000))}]\n", "lists 2000 times"),
+        ("substeps = 2", "substeps = 1000000000", "from 1 to 100, got 1000000000"),
+    ],
+    ids=["tiny", "huge", "signs", "powers", "brackets", "lists", "digits", "period", "horizons", "substeps"],
+)
+def test_more_than_anybody_means_is_a_sentence(folder, right, wrong, says):
+    """Each of these ended in a recursion without end, in gigabytes, or in hours."""
+    assert re.search(says, complaint(folder, GOOD.replace(right, wrong, 1)))
 
 
 @pytest.mark.parametrize(

@@ -56,7 +56,7 @@ def test_a_plan_is_as_exact_as_a_straight_line_can_be():
         (lambda: plan_inertias(runs=40), "from 2 to 16"),
         (lambda: plan_inertias(error=0.6), "between 0 and 50 %"),
         (lambda: frequency(ask="noise"), "sines, multisine, sweep"),
-        (lambda: frequency(known={"m_p": 0.1}), "belongs to a log"),
+        (lambda: frequency(rig="furuta", known={"m_p": 0.1}), "belongs to a log"),
         (lambda: predict("fit.json", "study.toml"), "the model fit.json does not exist"),
         (lambda: ladder("study.toml"), "the study study.toml does not exist"),
     ],

@@ -17,6 +17,8 @@ import typer
 from typer.core import TyperGroup
 
 from upright.errors import UprightError
+from upright.files import keeps_its_inputs
+from upright.trust import no_code
 
 GROUPS = {
     "Log": {
@@ -48,11 +50,17 @@ GROUPS = {
 COMMANDS = {name: line for commands in GROUPS.values() for name, line in commands.items()}
 
 SETTINGS = {"help_option_names": ["-h", "--help"]}
+NO_CODE = "--no-code"
 USER_ERROR, BUG, INTERRUPTED = 2, 1, 130
 
 
 class LazyGroup(TyperGroup):
     """The commands by name and help line; a command's module is imported when it is asked for."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Take `--no-code` wherever it stands; it is an option of all commands."""
+        moved = [NO_CODE] if NO_CODE in args else []
+        return super().parse_args(ctx, moved + [word for word in args if word != NO_CODE])
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Replace the stand-in that carried the help line by the command itself."""
@@ -63,7 +71,8 @@ class LazyGroup(TyperGroup):
 
     def invoke(self, ctx: Any) -> Any:
         """Run a command; what a person got wrong becomes a sentence and an exit code."""
-        with sentences():
+        _only_sentences()
+        with sentences(), no_code(bool(ctx.params.get("no_code"))):
             return super().invoke(ctx)
 
 
@@ -74,7 +83,9 @@ def _load(name: str) -> Any:
     text = function.__doc__ or COMMANDS[name]
     one = typer.Typer(add_completion=False, rich_markup_mode="rich", context_settings=SETTINGS)
     # Docstrings are raw, for rich's escapes; \b keeps the line breaks of a paragraph.
-    one.command(name, help=text.replace("\\b\n", "\b\n"))(function)
+    # The laboratory goes on in the folder that it reads; every other command leaves what it reads as it is.
+    guarded = function if name == "lab" else keeps_its_inputs(function)
+    one.command(name, help=text.replace("\\b\n", "\b\n"))(guarded)
     return typer.main.get_command(one)
 
 
@@ -103,6 +114,16 @@ def sentences() -> Generator[None]:
             raise  # typer's own: usage errors and requested exits
         where = f"{type(error).__name__}: {error}".rstrip(": ")
         raise _stop(f"this is a bug in upright ({where}); UPRIGHT_DEBUG=1 shows where it happened.", BUG) from None
+
+
+def _only_sentences() -> None:
+    """Keep the remarks of libraries off the terminal, unless somebody asks for them."""
+    import logging
+    import warnings
+
+    if os.environ.get("UPRIGHT_DEBUG", "0") in ("", "0") and not sys.warnoptions:
+        warnings.simplefilter("ignore")
+        logging.getLogger("matplotlib").setLevel(logging.CRITICAL)  # says what is wrong with a user's matplotlibrc
 
 
 def _debug() -> None:
@@ -153,6 +174,9 @@ def _upright(
     version: Annotated[
         bool, typer.Option("--version", help="Print the version.", callback=_version, is_eager=True)
     ] = False,
+    no_code: Annotated[
+        bool, typer.Option(NO_CODE, help="Refuse to run Python code that a study or a fit.json names as its plant.")
+    ] = False,
 ) -> None:
     """From one Lagrangian to a fitted real rig: a log goes in, a trusted nonlinear model comes out."""
 
@@ -164,7 +188,33 @@ for _group, _commands in GROUPS.items():
 
 def main() -> None:
     """Run the command line; the entry point of the script `upright`."""
+    _any_terminal()
+    os.environ["MPLBACKEND"] = "agg"  # nothing is shown in a window, and an unknown backend stops matplotlib
     # The matrices of a fit are small: threads of the linear algebra only wait for each other (14.2 s against 8.1 s).
     for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
-    app()
+    try:
+        app()
+    finally:
+        _flush()
+
+
+def _any_terminal() -> None:
+    """Let streams of any encoding take any text, and have streams where they were closed before the start."""
+    for name in ("stdout", "stderr"):
+        stream: Any = getattr(sys, name)
+        if stream is None:  # `upright show LOG >&-`
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")  # a console of cp1252 has no Greek letter
+
+
+def _flush() -> None:
+    """Write what is still waiting; a reader that went away is no error, a full disk is said."""
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if not isinstance(error, BrokenPipeError):
+            typer.echo(f"upright: the output could not be written: {error.strerror or error}.", err=True)
+            raise SystemExit(USER_ERROR) from None

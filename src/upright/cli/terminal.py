@@ -37,8 +37,12 @@ def console(*, error: bool = False) -> Any:
 
     from rich.console import Console
 
+    class Screen(Console):
+        def on_broken_pipe(self) -> None:  # rich would end the process as one that failed
+            raise BrokenPipeError
+
     watched = (sys.stderr if error else sys.stdout).isatty()
-    return Console(stderr=error, highlight=False, width=None if watched else 160)
+    return Screen(stderr=error, highlight=False, width=None if watched else 160)
 
 
 @contextmanager
@@ -68,6 +72,14 @@ def tell(chapter: Chapter, files: Sequence[Path] = (), numbers: Any = None) -> N
 
 def print_json(content: Any) -> None:
     """Print numbers for another program; nothing where one is not finite."""
+    import json
+    import sys
+
     from upright.files import json_text
 
-    typer.echo(json_text(content))
+    text = json_text(content)
+    try:
+        text.encode(sys.stdout.encoding or "utf-8")
+    except UnicodeEncodeError:  # a question mark would be another value
+        text = json.dumps(json.loads(text), indent=2)
+    typer.echo(text)

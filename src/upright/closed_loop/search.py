@@ -35,6 +35,9 @@ and a clock that jitters a little more."""
 ROWS = 20_000
 """Most rows a comparison of structures looks at; the last fit takes all."""
 
+SERVO_SAMPLES = 1_000_000
+"""Most samples of a servo that a spline is drawn through; the regression holds some 50 columns of them."""
+
 _JUNK = 3  # first rows, which some front ends fill with whatever their memory held
 _LONGEST_HOLD = 50
 _LEAST_CHANGES = 20
@@ -87,9 +90,15 @@ def recover(
     y = [record[name][rows] for name in measured]
     r = [record[name][rows] for name in references]
     extra = tuple((name, record[name][rows]) for name in feedforward)
+    if every is not None and every > 1 and rows.size * every > SERVO_SAMPLES:
+        raise BadInput(
+            f"{rows.size} rows of {every} samples each are {rows.size * every:.3g} samples of the servo, and"
+            f" {SERVO_SAMPLES:.0e} are the most; is that the number of samples within a row? Else take fewer rows."
+        )
     period = float(record.t[-1] - record.t[0]) / (record.t.size - 1) * hold
     tried: list[tuple[Search, Regression]] = []
-    for n in (1, 2, 5, 10) if every is None else (every,):
+    tries = [n for n in (1, 2, 5, 10) if n == 1 or rows.size * n <= SERVO_SAMPLES]
+    for n in tries if every is None else (every,):
         search = Search(tuple(measured), tuple(references), y, r, extra, u, period / n, n)
         best = search.best()
         tried.append((search, best))

@@ -19,6 +19,7 @@ from upright.readers.inspection import Column, Inspection
 from upright.records import Array, Record
 from upright.study.draft.recognise import drive_column, recognise
 from upright.study.sensors import Drive, Sensor
+from upright.trust import before_running
 
 COUNTERS = (2 * math.pi, 360.0, 65536.0, 4294967296.0)
 """Turns that counters are known to make, in rad, deg and counts."""
@@ -165,9 +166,11 @@ def read_known(text: str, log: str = "") -> KnownRig:
     """
     path = Path(text)
     if path.suffix == ".json" or (path.is_dir() and (path / "fit.json").is_file()):
-        from upright.study.results import read_fit
+        from upright.study.fitted import read_fit
 
-        fit = read_fit(path / "fit.json" if path.is_dir() else path)
+        path = path / "fit.json" if path.is_dir() else path
+        fit = read_fit(path)
+        before_running(fit.plant, path)
         parameters = {n: Parameter(name=n, value=v) for n, v in fit.values.items()}
         return KnownRig(name=text, plant=find(fit.plant, path.parent), parameters=parameters)
     if path.suffix == ".toml":

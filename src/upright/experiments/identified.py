@@ -13,10 +13,11 @@ from upright.errors import BadInput, ImpossiblePhysics
 from upright.experiments.makes import MAKES, Make, make_of, make_rig
 from upright.physics import Linear, Plant, find
 from upright.records import Array
-from upright.study.results import FittedModel, read_fit
+from upright.study.fitted import FittedModel, read_fit
 from upright.study.rig import read_plant, read_rig
 from upright.study.sensors import drive_unit
 from upright.study.text import StudyText
+from upright.trust import before_running
 
 GAIN = "actuator.gain"
 DAILY = 0.13
@@ -133,7 +134,7 @@ def read_identified(path: Path, *, seed: int = 0, draws: int = 200) -> Identifie
         When it is neither.
     """
     path = path / "fit.json" if path.is_dir() else path
-    if not path.is_file():
+    if not path.exists():
         raise BadInput(f"{path} does not exist; name the fit.json of `upright identify`, or a study with its numbers.")
     return _from_fit(path, seed, draws) if path.suffix == ".json" else _from_study(path)
 
@@ -152,6 +153,7 @@ def _force(kind: type[Plant]) -> str:
 
 def _from_fit(path: Path, seed: int, draws: int) -> IdentifiedRig:
     fitted = read_fit(path)
+    before_running(fitted.plant, path)
     kind = find(fitted.plant, path.parent)
     try:
         plant = kind(**{n: v for n, v in fitted.values.items() if n in kind.names()})

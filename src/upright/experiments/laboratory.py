@@ -21,7 +21,7 @@ from upright.errors import BadInput, UprightError
 from upright.experiments.abreast import run_abreast
 from upright.experiments.makes import MAKES, PENDULUMS, SHAFTS, make_rig
 from upright.experiments.weighing_1a.run import Known
-from upright.files import write_json
+from upright.files import read_text, write_json
 from upright.progress import Progress, silent
 from upright.report.page import Book, Chapter, Step, as_plain, from_plain
 from upright.report.symbols import typed
@@ -373,7 +373,7 @@ def _program() -> str:
 def _kept(folder: Path, digest: str) -> Chapter | None:
     """The chapter of an earlier run, or nothing when there is none or it was made of something else."""
     try:
-        content: Any = json.loads((folder / CHAPTER_FILE).read_text(encoding="utf-8"))
+        content: Any = json.loads(read_text(folder / CHAPTER_FILE))
         return from_plain(content["chapter"]) if content["made_of"] == digest else None
     except (OSError, ValueError, KeyError, TypeError):  # none, torn, or another program's: it is made again
         return None

@@ -31,6 +31,8 @@ CONVERTER = 10 / 32768
 """Smallest step of the command [V]."""
 MASS_RADIUS = 0.025
 """Of one brass mass of 500 g [m]."""
+WIDEST = 0.5
+"""Radius that no disk on a bench exceeds [m]; that of an ECP 205 is 0.13."""
 MOTOR_AND_BELT = 5e-4
 """Inertia that the disk loses with its drive belt [kg m^2], by the maker's guide."""
 
@@ -425,3 +427,19 @@ def make_rig(key: str, seed: int = 0) -> ServoRig:
         travel=make.travel,
         seed=seed,
     )
+
+
+def check_radius(radius: float) -> float:
+    """Radius of a bolt circle [m], as it came.
+
+    Raises
+    ------
+    BadInput
+        When no disk has it.
+    """
+    if not 0 < radius <= WIDEST:
+        raise BadInput(
+            f"a bolt circle has a radius above 0 and up to {100 * WIDEST:g} cm, got {100 * radius:g} cm; those of an"
+            " ECP 205 have 2 to 9 cm."
+        )
+    return radius

@@ -86,22 +86,22 @@ def place_sampled(model: Sampled, estimator: Estimator, poles: ArrayLike) -> Arr
     rows: list[Array] = []
     wanted: list[float] = []
     seen: list[complex] = []
-    for z in to_z(asked, model.period).tolist():
-        if z.imag < 0:
-            continue
-        order = sum(abs(z - other) < 1e-9 for other in seen)
-        seen.append(z)
-        column = B.astype(np.complex128)
-        for _ in range(order + 1):
-            column = np.linalg.solve(z * np.eye(A.shape[0]) - A, column)
-        value = C @ column
-        target = -1.0 if order == 0 else 0.0
-        for part, goal in ((value.real, target), (value.imag, 0.0))[: 2 if z.imag else 1]:
-            rows.append(part)
-            wanted.append(goal)
-    matrix, goals = np.array(rows), np.array(wanted)
-    size_of = np.abs(matrix).max(axis=1, keepdims=True)
     try:
+        for z in to_z(asked, model.period).tolist():
+            if z.imag < 0:
+                continue
+            order = sum(abs(z - other) < 1e-9 for other in seen)
+            seen.append(z)
+            column = B.astype(np.complex128)
+            for _ in range(order + 1):
+                column = np.linalg.solve(z * np.eye(A.shape[0]) - A, column)
+            value = C @ column
+            target = -1.0 if order == 0 else 0.0
+            for part, goal in ((value.real, target), (value.imag, 0.0))[: 2 if z.imag else 1]:
+                rows.append(part)
+                wanted.append(goal)
+        matrix, goals = np.array(rows), np.array(wanted)
+        size_of = np.abs(matrix).max(axis=1, keepdims=True)
         K = np.linalg.solve(matrix / size_of, goals / size_of[:, 0])
     except np.linalg.LinAlgError:
         raise BadInput("no gains put the sampled loop's poles there: a mode is out of reach, or a pole is asked where "

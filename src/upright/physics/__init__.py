@@ -8,7 +8,7 @@ import traceback
 from pathlib import Path
 
 from upright.errors import BadInput, UprightError, nearest
-from upright.files import OWN_FILE
+from upright.files import OWN_FILE, regular
 from upright.physics.equations import Derived, DryJoint
 from upright.physics.oscillators import added_inertia, added_mass, chain
 from upright.physics.pendulums import CartPendulum, Furuta, Pendulum
@@ -71,12 +71,13 @@ def find(name: str, folder: Path | None = None) -> type[Plant]:
     kind, _, bodies = key.replace("chain", "rectilinear").partition("-")
     if kind in ("rectilinear", "torsional") and bodies.isdigit():
         return chain(int(bodies), kind)
-    raise BadInput(f"no plant is called '{name}'; {nearest(name, [*BUILT_IN, 'chain', 'my_plant.py:ClassName'])}")
+    raise BadInput(f"no plant is called '{name[:60]}'; {nearest(name, [*BUILT_IN, 'chain', 'my_plant.py:ClassName'])}")
 
 
 def _from_file(path: Path, class_name: str) -> type[Plant]:
-    if not path.is_file():
+    if not path.exists():
         raise BadInput(f"the plant's file {path} does not exist; give it relative to the study file.")
+    regular(path)
     spec = importlib.util.spec_from_file_location(OWN_FILE + path.stem, path)
     if spec is None or spec.loader is None:
         raise BadInput(f"the plant's file {path} is no Python file.")

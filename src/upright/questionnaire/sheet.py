@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import BadInput
+from upright.files import read_bytes
 
 Array = NDArray[np.float64]
 
@@ -235,7 +236,7 @@ def _shares(header: list[str], rows: Sequence[tuple[int, list[str]]]) -> Shares:
 
 def cells_of(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
     """Header and rows with their line numbers, blank rows left out."""
-    data = path.read_bytes()
+    data = read_bytes(path, most=64)
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         text = data.decode("utf-16", errors="replace")
     else:

@@ -20,6 +20,8 @@ READERS = {
     "upright": delimited.read_written,
 }
 
+_HEAD = 1 << 20  # characters in which the line of names ends
+
 __all__ = ["READERS", "inspect", "read", "recognise"]
 
 
@@ -63,7 +65,7 @@ def recognise(source: Source) -> str:
         return "upright"
     if ecp.recognise(text):
         return "ecp"
-    names = tuple(name.strip() for name in text.lstrip().split("\n", 1)[0].split(","))
+    names = tuple(name.strip() for name in text[:_HEAD].lstrip().split("\n", 1)[0].split(","))
     if rosbag.recognise(names) and not delimited.begins_with_number(text):
         return "ros-bag"
     return "table"

@@ -17,6 +17,7 @@ from upright.records import Array, Record
 from upright.records.columns import stated_unit, time_scale
 from upright.records.record import CSV_MARK
 
+_FIRST = 200  # lines that names and remarks may take
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?|[+-]?(?:nan|inf|infinity)"
 
 
@@ -28,8 +29,8 @@ def layout(source: Source) -> TextTable:
     BadInput
         When no line begins with a number, or a name stands above two columns.
     """
-    lines = source.text.split("\n")
-    first = next((i for i, line in enumerate(lines[:200]) if begins_with_number(line)), -1)
+    lines = _first_lines(source.text)
+    first = next((i for i, line in enumerate(lines) if begins_with_number(line)), -1)
     if first < 0:
         raise source.bad(
             "expected rows of numbers under at most one line of names, got none;"
@@ -57,17 +58,27 @@ def layout(source: Source) -> TextTable:
                 column=j + 1,
                 name=name,
             )
-    body = "\n".join(lines[first:])
     comma = delimiter in (";", "\t", None) and "," in lines[first] and "." not in lines[first]
     return TextTable(
         source=source,
-        body=body,
+        text=source.text,
+        start=sum(len(line) + 1 for line in lines[:first]),
         names=tuple(names),
         delimiter=delimiter,
         first_line=first + 1,
         decimal_comma=comma,
         named=named,
     )
+
+
+def _first_lines(text: str) -> list[str]:
+    """The lines among which the first row of numbers must be; ten million lines would take 700 MB."""
+    lines, at = list[str](), 0
+    while at <= len(text) and len(lines) < _FIRST:
+        end = text.find("\n", at)
+        lines.append(text[at : end if end >= 0 else None])
+        at = end + 1 if end >= 0 else len(text) + 1
+    return lines
 
 
 def read(source: Source) -> Record:
@@ -95,7 +106,7 @@ def read(source: Source) -> Record:
     )
     index = next((table[:, j] for j, name in enumerate(found.names) if is_index(name, table[:, j])), None)
     t, note = rebuild(t, index)
-    if found.body.rstrip(" ") and not found.body.endswith("\n"):
+    if not source.text.endswith("\n") and found.body.rstrip(" "):
         notes.append(_torn(found, table.shape[0]))
     signals = {name: table[:, j] for j, name in enumerate(found.names) if j != at}
     return Record(
@@ -117,7 +128,7 @@ def read_written(source: Source) -> Record:
         raise source.bad(f"expected a line of names, got a broken quotation ({error})", line=3) from None
     if not names or names[0] != "t" or len(set(names)) < len(names):
         raise source.bad("expected names that differ, the first of them 't'", line=3)
-    rows = TextTable(source=source, body="\n".join(lines[3:]), names=tuple(names), delimiter=",", first_line=4)
+    rows = TextTable(source=source, text="\n".join(lines[3:]), names=tuple(names), delimiter=",", first_line=4)
     t, *signals = rows.numbers().T
     return Record.rebuild(t, dict(zip(names[1:], signals, strict=True)), lines[1][2:])
 
@@ -168,7 +179,7 @@ def _time_column(found: TextTable, table: Array) -> tuple[int, float]:
 
 def _torn(found: TextTable, rows: int) -> str:
     """Judge a last row without line end: torn when its last number is shorter than the fixed format above it."""
-    lines = [line for line in found.body.split("\n")[-8:] if line.strip()]
+    lines = [line for line in found.body.rsplit("\n", 8)[-8:] if line.strip()]
     ends = [line.split(found.delimiter)[-1].strip() for line in lines]
     decimals = {len(end.partition(".")[2]) for end in ends[:-1]}
     if len(ends) > 3 and len(decimals) == 1 and len(ends[-1].partition(".")[2]) not in decimals:

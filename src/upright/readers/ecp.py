@@ -41,7 +41,7 @@ def read(source: Source) -> Record:
     first = next((i for i in range(header + 1, len(lines)) if lines[i].strip()), len(lines))
     last = next((i for i in range(len(lines) - 1, first, -1) if lines[i].strip()), first)
     body = _unwrapped(source, lines, first, last)
-    rows = TextTable(source=source, body=body, names=tuple(names), delimiter=None, first_line=first + 1)
+    rows = TextTable(source=source, text=body, names=tuple(names), delimiter=None, first_line=first + 1)
     columns = dict(zip(names, rows.numbers().T, strict=True))
     for name, unit in (("Sample", ""), ("Time", " s")):
         source.must_increase(columns[name], lambda row: {"line": rows.line(row)}, what=name, unit=unit)

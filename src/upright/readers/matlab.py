@@ -44,6 +44,8 @@ _TEXTS = {4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32", 2: "latin-1", 1:
 _CELLS, _STRUCTURE, _OBJECT, _TEXT, _SPARSE, _LAST = 1, 2, 3, 4, 5, 15  # classes; between the last two are numbers
 _DEEPEST = 16
 _MOST = 512  # MB that a file may unpack to; a log of an hour at 1 kHz has 30 per column
+_ANYWAY, _RATIO = 32, 100  # MB that any file may; times its own size: logs pack 2 to 20 times, a bomb 1000 times
+_SLICE = 1 << 16  # bytes unpacked at a time, into some 66 MB at most
 _PART = 200  # bytes that the smallest variable or field takes in memory
 
 
@@ -124,27 +126,35 @@ class _Walk:
     def __init__(self, source: Source, order: str) -> None:
         self.source, self.order = source, order
         self.tag = Struct(order + "II")
-        self.left = _MOST << 20
+        self.most = min(_MOST, _ANYWAY + _RATIO * len(source.data) // (1 << 20))
+        self.left = self.most << 20
 
     def spend(self, size: int) -> None:
         """Count bytes of memory."""
         self.left -= size
         if self.left < 0:
             raise self.source.bad(
-                f"the MATLAB file unpacks to more than {_MOST} MB, more than any log of a rig;"
-                " in MATLAB: save only the time and the signals"
+                f"the MATLAB file unpacks to more than {self.most} MB, more than any log of a rig"
+                f" in {len(self.source.data) / (1 << 20):.3g} MB; in MATLAB: save only the time and the signals"
             )
+
+    def unpacked(self, content: memoryview) -> memoryview:
+        """What a compressed element holds, counted while it grows."""
+        machine = zlib.decompressobj()
+        out = bytearray()
+        for at in range(0, len(content), _SLICE):
+            piece = machine.decompress(content[at : at + _SLICE], self.left + 1)
+            self.spend(len(piece))
+            out += piece
+        if not machine.eof:
+            raise ValueError("a compressed variable does not end")
+        return memoryview(out)
 
     def variables(self) -> Iterator[tuple[str, Any]]:
         """Name and value of each variable in turn."""
         for kind, content in self.elements(memoryview(self.source.data)[128:]):
             if kind == _COMPRESSED:
-                machine = zlib.decompressobj()
-                unpacked = machine.decompress(content, self.left + 1)
-                self.spend(len(unpacked))
-                if not machine.eof:
-                    raise ValueError("a compressed variable does not end")
-                kind, content = _next(self.elements(memoryview(unpacked)))
+                kind, content = _next(self.elements(self.unpacked(content)))
             if kind != _MATRIX:
                 raise ValueError(f"an element of type {kind} where a variable should begin")
             yield self.matrix(content, 0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,9 +14,12 @@ from typing import Any
 import numpy as np
 
 from upright.errors import BadInput
+from upright.files import read_bytes
 from upright.records import LARGEST, Array, PathLike, Provenance
 
 _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0e-\x1f\x7f]")
+_PRINTABLE = bytes(code for code in range(256) if not _UNPRINTABLE.match(chr(code)))
+_BLOCK = 1 << 22  # characters of a table that are read at a time; NumPy needs four bytes for each
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +38,8 @@ class Source:
         except UnicodeDecodeError:
             text = self.data.decode("latin-1")  # degree signs of older Windows programs
         text = text.replace("\r\n", "\n").replace("\r", "\n")
-        strange = _UNPRINTABLE.search(text)
+        clean = encoding != "utf-16" and not self.data.translate(None, _PRINTABLE)
+        strange = None if clean else _UNPRINTABLE.search(text)
         if strange is not None:
             line = text.count("\n", 0, strange.start()) + 1
             column = strange.start() - text.rfind("\n", 0, strange.start())
@@ -89,16 +93,18 @@ def load(path: PathLike) -> Source:
         When there is no such file, it is a folder, empty, or cannot be read.
     """
     name = str(path)
+    if not name.isprintable() and any("\ud800" <= c <= "\udfff" for c in name):
+        raise BadInput(f"The name {name!r} is no text, so that no study could name it; rename the file.")
     try:
-        data = Path(path).read_bytes()
-    except IsADirectoryError:
-        raise BadInput(f"'{name}' is a folder; name the log file inside it.") from None
+        data = read_bytes(path)
+    except BadInput:
+        raise
     except FileNotFoundError:
         raise BadInput(f"There is no file '{name}';{_neighbour(Path(path))}") from None
     except (OSError, ValueError) as error:
         raise BadInput(f"'{name}' cannot be read: {error}; check its name and permissions.") from None
     source = Source(file=name, data=data)
-    if not data.strip():
+    if not data or data.isspace():
         raise source.bad("the file is empty; export the log again")
     return source
 
@@ -125,8 +131,8 @@ class TextTable:
     ----------
     source : Source
         The log, for error sentences.
-    body : str
-        Rows separated by line feeds; blank lines are skipped.
+    text : str
+        Rows separated by line feeds, blank lines skipped, from the character `start` on; that is the `body`.
     names : tuple of str
         One per column.
     delimiter : str or None
@@ -138,12 +144,18 @@ class TextTable:
     """
 
     source: Source
-    body: str
+    text: str
     names: tuple[str, ...]
     delimiter: str | None
     first_line: int
+    start: int = 0
     decimal_comma: bool = False
     named: bool = True
+
+    @property
+    def body(self) -> str:
+        """The rows; a copy of the text."""
+        return self.text[self.start :]
 
     def numbers(self) -> Array:
         """All numbers (N, columns), finite and below 1e30.
@@ -153,16 +165,29 @@ class TextTable:
         BadInput
             With line and column, when a row has too few or too many cells, or a cell is no usable number.
         """
-        body = self.body.replace(",", ".") if self.decimal_comma else self.body
-        if not body.strip():
+        blocks: list[Array] = []
+        if not self.text[self.start : self.start + _BLOCK].strip() and not self.body.strip():
             raise self.source.bad("the file holds no rows of numbers; export the log again", line=self.first_line)
         try:
-            table = np.loadtxt(io.StringIO(body), delimiter=self.delimiter, comments=None, ndmin=2)
+            for body in self._blocks():
+                table = np.loadtxt(io.StringIO(body), delimiter=self.delimiter, comments=None, ndmin=2)
+                if table.shape[1] != len(self.names) or not (np.abs(table) <= LARGEST).all():
+                    raise ValueError
+                blocks.append(table)
         except (ValueError, OverflowError, IndexError):
-            table = np.empty((0, 0))
-        if table.shape[1] != len(self.names) or not (np.abs(table) <= LARGEST).all():
-            table = self._row_by_row(body.split("\n"))
-        return table
+            body = self.body.replace(",", ".") if self.decimal_comma else self.body
+            return self._row_by_row(body.split("\n"))
+        return _joined(blocks)
+
+    def _blocks(self) -> Iterator[str]:
+        """Rows of the body, some megabytes at a time, each block whole rows."""
+        begin, text = self.start, self.text
+        while begin < len(text):
+            end = text.find("\n", begin + _BLOCK)
+            block = text[begin : end if end >= 0 else None]
+            begin = end + 1 if end >= 0 else len(text)
+            if block.strip():
+                yield block.replace(",", ".") if self.decimal_comma else block
 
     def _row_by_row(self, lines: list[str]) -> Array:
         rows: list[list[float]] = []
@@ -190,6 +215,20 @@ class TextTable:
         """Line number in the file of a row of the table, both blank lines and header counted."""
         filled = [number for number, line in enumerate(self.body.split("\n"), start=self.first_line) if line.strip()]
         return filled[row] if row < len(filled) else self.first_line
+
+
+def _joined(blocks: list[Array]) -> Array:
+    """Tables one below the other, each column in one piece and read-only; the blocks are given up on the way."""
+    rows = sum(len(block) for block in blocks)
+    out = np.empty((rows, blocks[0].shape[1]), order="F")
+    blocks.reverse()
+    at = 0
+    while blocks:
+        block = blocks.pop()
+        out[at : at + len(block)] = block
+        at += len(block)
+    out.flags.writeable = False
+    return out
 
 
 def cell(source: Source, text: str, *, line: int, column: int, name: str) -> float:

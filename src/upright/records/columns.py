@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from upright.errors import BadInput, nearest
 
 TIME_NAMES = ("t", "time", "t_received", "timestamp", "__time", "tout", "time_s", "t_s", "seconds", "sec")
+_LONGEST = 200  # characters of a name that is looked into
 _UNIT_SUFFIX = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
 
 
@@ -19,7 +20,7 @@ def time_scale(name: str) -> float:
 
     ``"t"``, ``"Time"``, ``"time [ms]"``, ``"Time (s)"`` and ``"t_us"`` are.
     """
-    match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(]\s*(\w+)\s*[\])])?\s*", name.casefold())
+    match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(]\s*(\w+)\s*[\])])?\s*", name[:_LONGEST].casefold())
     stem, unit = (match[1], match[2] or "") if match else ("", "")
     if stem in TIME_NAMES:
         return _UNIT_SUFFIX.get(unit, 0.0) if unit else 1.0
@@ -29,7 +30,7 @@ def time_scale(name: str) -> float:
 
 def stated_unit(name: str) -> str:
     """Unit in brackets behind a name, as in ``theta [rad]``; empty when there is none that can be read."""
-    match = re.fullmatch(r".*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*", name)
+    match = re.fullmatch(r".*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*", name[-_LONGEST:])
     if match is None:
         return ""
     from upright.units import known

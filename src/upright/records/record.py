@@ -9,6 +9,7 @@ It travels to pandas, xarray, python-control, MATLAB, CSV or Parquet and back; w
 from __future__ import annotations
 
 import csv
+import io
 import json
 import os
 from collections.abc import Mapping
@@ -20,6 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import BadInput, nearest
+from upright.files import LARGEST as LARGEST_FILE
+from upright.files import read_text, regular, whole_file
 from upright.records.columns import stated_unit, take_time
 from upright.shown import Shown
 
@@ -28,6 +31,7 @@ PathLike = str | os.PathLike[str]
 
 # No laboratory instrument writes a number this large, and its square would overflow in a fit.
 LARGEST = 1e30
+SHORTEST = 1e-12  # s; a step of time below that is none: its inverse overflows, and no clock has it
 CSV_MARK = "# upright record"
 KEY = "upright"  # name of the JSON in attrs, schema metadata and MAT files
 
@@ -101,6 +105,12 @@ class Record(Shown):
             raise BadInput(
                 f"Time must increase from sample to sample, but sample {i + 2} is at {t[i + 1]:.9g} s after"
                 f" {t[i]:.9g} s; sort the rows or read each run on its own."
+            )
+        if step.min() < SHORTEST:
+            i = int(np.argmin(step))
+            raise BadInput(
+                f"Time must advance by {SHORTEST:g} s or more from sample to sample, but sample {i + 2} comes"
+                f" {step[i]:.3g} s after the one before; is the time in another unit, or no time at all?"
             )
         signals = {str(name): _column(f"column '{name}'", values) for name, values in self.signals.items()}
         for name, values in signals.items():
@@ -212,15 +222,15 @@ class Record(Shown):
         """Record of columns and the JSON of `describe`; units `stated` elsewhere go before those of the description."""
         try:
             about = json.loads(description) if description else {}
-            origin = dict(about.get("provenance", {}))
-            for key in ("window", "notes"):
-                origin[key] = tuple(origin.get(key, ()))
+            told: dict[str, Any] = dict(about.get("provenance", {}))
+            window = tuple(float(v) for v in told.pop("window", ()))
+            notes = tuple(str(v) for v in told.pop("notes", ()))
             units: dict[str, str] = {str(k): str(v) for k, v in dict(about.get("units", {})).items() if k in signals}
             units |= {k: v for k, v in (stated or {}).items() if v}
             # columns may have been dropped since the description was written
             inputs = tuple(str(name) for name in about.get("inputs", ()) if name in signals)
             outputs = tuple(str(name) for name in about.get("outputs", ()) if name in signals)
-            provenance = Provenance(**origin)
+            provenance = Provenance(**{k: str(v) for k, v in told.items()}, window=window, notes=notes)
         except (ValueError, TypeError, AttributeError, RecursionError) as error:
             raise BadInput(
                 f"The description of the record must be the JSON this package wrote, got {description[:60]!r}"
@@ -318,7 +328,7 @@ class Record(Shown):
 
     def to_csv(self, path: PathLike) -> None:
         """Text with full precision under two comment lines."""
-        with open(path, "w", encoding="utf-8", newline="") as file:
+        with whole_file(path) as half, open(half, "w", encoding="utf-8", newline="") as file:
             file.write(f"{CSV_MARK} 1\n# {self.describe()}\n")
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(("t", *self.signals))
@@ -329,10 +339,12 @@ class Record(Shown):
     def from_csv(cls, path: PathLike) -> Self:
         """Record of text written by `to_csv`."""
         try:
-            with open(path, encoding="utf-8", newline="") as file:
-                mark, about = file.readline(), file.readline()
-                names = next(csv.reader([file.readline()]), [])
-                table = np.loadtxt(file, delimiter=",", ndmin=2, comments=None)
+            file = io.StringIO(read_text(path, most=LARGEST_FILE))
+            mark, about = file.readline(), file.readline()
+            names = next(csv.reader([file.readline()]), [])
+            table = np.loadtxt(file, delimiter=",", ndmin=2, comments=None)
+        except BadInput:
+            raise
         except (OSError, ValueError) as error:
             raise BadInput(f"'{path}' must be a CSV file written by upright, but cannot be read: {error}.") from None
         if not mark.startswith(CSV_MARK) or len(names) != table.shape[1]:
@@ -363,9 +375,10 @@ class Record(Shown):
         """Record of a file written by `to_mat`."""
         from scipy.io import loadmat
 
-        if not Path(path).is_file():
+        if not Path(path).exists():
             raise BadInput(f"'{path}' must be a MATLAB file written by upright, but there is no such file.")
         try:
+            regular(path)
             content = loadmat(path)
             return cls.from_mat_variables(content)
         except KeyError as error:
@@ -401,6 +414,7 @@ class Record(Shown):
         import pyarrow.parquet as pq
 
         try:
+            regular(path)
             table: Any = pq.read_table(str(path))
         except (OSError, pa.ArrowException) as error:
             raise BadInput(f"'{path}' must be a Parquet file, but cannot be read: {error}.") from None
@@ -413,19 +427,28 @@ class Record(Shown):
 
 
 def _column(what: str, values: Any) -> Array:
-    """Read-only float64 copy, one-dimensional and finite."""
+    """Read-only float64 copy, one-dimensional and finite; what nobody can write to is taken as it is."""
     try:
-        out = np.array(values, dtype=np.float64)
+        out = values if _is_frozen(values) else np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise BadInput(f"{what} must be numbers, got something else ({error}); convert it first.") from None
     if out.ndim != 1:
         raise BadInput(f"{what} must be one-dimensional, got shape {out.shape}; give each column its own name.")
-    bad = ~(np.abs(out) <= LARGEST)  # catches nan and inf as well
-    if bad.any():
-        i = int(np.argmax(bad))
+    if out.size and not -LARGEST <= out.min() <= out.max() <= LARGEST:  # catches nan and inf as well
+        i = int(np.argmax(~(np.abs(out) <= LARGEST)))
         raise BadInput(
             f"{what} must be finite and below {LARGEST:g}, got {out[i]:g} at sample {i + 1};"
             " remove the sample or fill it in."
         )
     out.flags.writeable = False
     return out
+
+
+def _is_frozen(values: Any) -> bool:
+    """Whether an array of float64 can be changed by nobody, not even through the array that it is a part of."""
+    owner = values
+    while isinstance(owner, np.ndarray) and not owner.flags.writeable:
+        if owner.base is None:
+            return values.dtype == np.float64 and values.flags.contiguous
+        owner = owner.base
+    return False

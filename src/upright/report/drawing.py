@@ -5,9 +5,11 @@ Okabe and Ito's colours, which colour-blind readers can tell apart, each with a 
 
 from __future__ import annotations
 
+import os
 import re
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, wraps
 from io import BytesIO, StringIO
@@ -18,6 +20,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.files import whole_file
 from upright.report.symbols import axis, mathtext
 
 if TYPE_CHECKING:
@@ -67,16 +70,31 @@ _STYLE: dict[Any, Any] = {
 
 
 def styled(draw: Callable[P, R]) -> Callable[P, R]:
-    """Draw in the house style; matplotlib's settings are put back afterwards."""
+    """Draw in the house style, whatever the user's own; the user's settings are put back afterwards."""
 
     @wraps(draw)
     def inside(*args: P.args, **kwargs: P.kwargs) -> R:
         import matplotlib
 
-        with matplotlib.rc_context(_STYLE):
+        with matplotlib.rc_context():
+            matplotlib.rcdefaults()  # but for the backend: a matplotlibrc may ask for LaTeX, other colours, a cut edge
+            matplotlib.rcParams.update(_STYLE)
             return draw(*args, **kwargs)
 
     return inside
+
+
+@contextmanager
+def _undisturbed() -> Generator[None]:
+    """Write a picture without a word about glyphs that our fonts lack, and without the date of somebody's build."""
+    date = os.environ.pop("SOURCE_DATE_EPOCH", None)  # matplotlib reads it even where no date is asked for
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)
+            yield
+    finally:
+        if date is not None:
+            os.environ["SOURCE_DATE_EPOCH"] = date
 
 
 def figure(height: float, width: float = WIDTH, *, margins: tuple[float, ...] = ()) -> Figure:
@@ -101,7 +119,8 @@ def _shown_in_notebooks() -> type[Figure]:
         @styled
         def _repr_png_(self) -> bytes:
             page = BytesIO()
-            self.savefig(page, format="png", dpi=120, facecolor="white")
+            with _undisturbed():
+                self.savefig(page, format="png", dpi=120, facecolor="white")
             return page.getvalue()
 
     return Drawing
@@ -111,8 +130,7 @@ def _shown_in_notebooks() -> type[Figure]:
 def svg(drawing: Figure, name: str) -> str:
     """Markup of a figure to stand inside a page; ids begin with `name`, so that several figures can share it."""
     page = StringIO()
-    with warnings.catch_warnings():  # about glyphs that only the reader's fonts have
-        warnings.simplefilter("ignore", UserWarning)
+    with _undisturbed():
         drawing.savefig(page, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
     text = page.getvalue()
     text = text[text.index("<svg") :]
@@ -132,8 +150,11 @@ def svg(drawing: Figure, name: str) -> str:
 def save(drawing: Figure, path: Path) -> Path:
     """Write a figure by itself, as SVG or PNG by the ending of `path`."""
     vector = path.suffix.lower() == ".svg"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    drawing.savefig(path, dpi=160, facecolor="white", metadata={"Date": None, "Creator": None} if vector else {})
+    with whole_file(path) as half, _undisturbed():
+        drawing.savefig(
+            half, format=path.suffix[1:].lower(), dpi=160, facecolor="white",
+            metadata={"Date": None, "Creator": None} if vector else {},
+        )  # fmt: skip
     return path
 
 

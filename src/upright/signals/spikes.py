@@ -25,6 +25,7 @@ LEAST = 0.02
 WIDTH = 2
 """Samples in a row that still count as a spike."""
 
+_BLOCK = 1 << 16  # samples whose surroundings are looked at together, so that a long log needs little memory
 REACH = 6
 """Changes to either side that tell how a body moved around a sample."""
 
@@ -63,8 +64,7 @@ def spikes(x: Array, quantum: float = 0.0) -> NDArray[np.int64]:
     They are compared with the upper percent of what a running median of five takes away, so that neither noise nor
     fast motion, which bends at every turn, counts.
     """
-    padded = np.concatenate([x[:1].repeat(2), x, x[-1:].repeat(2)])
-    calm = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
+    calm = _running_median(x)
     off = np.abs(x - calm)
     usual = float(np.quantile(off, 0.99))
     far = off > max(FAR * usual, LEAST * float(np.std(calm)), 4 * quantum, 1e-300)
@@ -88,8 +88,11 @@ def _returns(x: Array, first: int, last: int) -> bool:
 def without(x: Array, at: NDArray[np.int64]) -> Array:
     """A signal (N,) with samples replaced by straight lines between their neighbours."""
     out = x.copy()
-    beside = np.setdiff1d(np.arange(x.size), at)
-    out[at] = np.interp(at, beside, x[beside])
+    if at.size:
+        kept = np.ones(x.size, dtype=bool)
+        kept[at] = False
+        beside = np.flatnonzero(kept)
+        out[at] = np.interp(at, beside, x[beside])
     return out
 
 
@@ -102,22 +105,23 @@ def jumps(t: Array, x: Array, quantum: float, moduli: Sequence[float] = ()) -> J
     nothing = np.zeros(0, np.int64)
     if x.size < 4 * REACH:
         return Jumps(wraps=nothing, modulus=0.0, steps=nothing, step_sizes=x[:0], spikes=nothing, spike_sizes=x[:0])
-    dt = np.diff(t)
-    ratio = dt / float(np.median(dt))
+    ratio = np.diff(t)
+    ratio /= float(np.median(ratio))
     peaks = spikes(x, quantum)
     peaks = peaks[np.pad(ratio, 1, constant_values=1.0)[peaks + np.array([[0], [1]])].max(axis=0) < 1.5]
     calm = without(x, peaks)
     heights = x[peaks] - calm[peaks]
-    d = np.diff(calm)
-    around = _around(d / ratio)
-    usual = np.median(around, axis=0) * ratio
-    off = d - usual
-    spread = (around.max(axis=0) - around.min(axis=0)) * np.maximum(ratio, 1.0)
-    noise = 1.4826 * float(np.median(np.abs(off)))
+    off = np.diff(calm)
+    usual, spread = _surroundings(off / ratio)
+    usual *= ratio
+    off -= usual
+    spread *= np.maximum(ratio, 1.0)
+    noise = 1.4826 * float(np.median(np.abs(off), overwrite_input=True))
     far = np.abs(off) > 4 * spread + max(8 * noise, 6 * quantum, 2e-4 * float(np.ptp(calm)))
     # a reading that came late is caught up at once: what jumps was missing just before, or is missing just after
     caught = np.abs(np.convolve(off, np.ones(2 * REACH + 1), "same")) < 0.35 * np.abs(off)
-    steps = np.flatnonzero(far & ~caught & (np.abs(off) > 4 * np.abs(usual))) + 1
+    steps = np.flatnonzero(far & ~caught)
+    steps = steps[np.abs(off[steps]) > 4 * np.abs(usual[steps])] + 1
     sizes = off[steps - 1]
     turn = _modulus(calm, steps, sizes, spread, moduli)
     wrapped, there = (np.abs(np.abs(size) - turn) < 0.1 * turn for size in (sizes, heights))
@@ -129,9 +133,28 @@ def jumps(t: Array, x: Array, quantum: float, moduli: Sequence[float] = ()) -> J
     )  # fmt: skip
 
 
-def _around(d: Array) -> Array:
-    """Changes 2 to `REACH` samples before and after each change, (2 (REACH - 1), N - 1); ends repeat the nearest."""
-    at = np.arange(d.size)
+def _running_median(x: Array) -> Array:
+    """Median of each sample and the two before and after it (N,); ends repeat themselves."""
+    padded = np.concatenate([x[:1].repeat(2), x, x[-1:].repeat(2)])
+    out = np.empty(x.size)
+    for first in range(0, x.size, _BLOCK):
+        rows = padded[first : first + _BLOCK + 4]
+        out[first : first + _BLOCK] = np.median(np.lib.stride_tricks.sliding_window_view(rows, 5), axis=1)
+    return out
+
+
+def _surroundings(d: Array) -> tuple[Array, Array]:
+    """Median and range (N - 1,) of the changes around each change."""
+    middle, spread = np.empty(d.size), np.empty(d.size)
+    for first in range(0, d.size, _BLOCK):
+        around = _around(d, np.arange(first, min(first + _BLOCK, d.size)))
+        here = slice(first, first + _BLOCK)
+        middle[here], spread[here] = np.median(around, axis=0), np.ptp(around, axis=0)
+    return middle, spread
+
+
+def _around(d: Array, at: NDArray[np.int64]) -> Array:
+    """Changes 2 to `REACH` samples before and after the changes `at`, (2 (REACH - 1), n); ends repeat the nearest."""
     offsets = np.array([o for o in range(-REACH, REACH + 1) if abs(o) > 1])[:, None]
     place = at + offsets
     return d[np.where((place < 0) | (place >= d.size), at - offsets, place)]

@@ -85,8 +85,11 @@ def evaluate(expression: str, columns: Mapping[str, Array], t: Array) -> Array:
             f" the log has the columns {', '.join(columns)}"
         ) from None
     scope = {"t": t, **_CONSTANTS, **columns, **{k: _look_up(v, columns, expression) for k, v in quoted.items()}}
-    with np.errstate(all="ignore"):
-        value = np.asarray(_value(tree, scope, expression), dtype=np.float64) + np.zeros(t.size)
+    try:
+        with np.errstate(all="ignore"):
+            value = np.asarray(_value(tree, scope, expression), dtype=np.float64) + np.zeros(t.size)
+    except RecursionError:
+        raise BadInput(f"'{_short(expression)}' is nested too deeply; write it with fewer brackets and signs") from None
     if not np.isfinite(value).all():
         first = int(np.argmin(np.isfinite(value)))
         raise BadInput(f"'{_short(expression)}' is not finite at t = {t[first]:g} s; does it divide by zero there?")

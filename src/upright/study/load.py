@@ -140,7 +140,7 @@ def _log(run: Section, folder: Path, logs: dict[tuple[str, str, str], Record]) -
     key = (name, reader, time)
     if key not in logs:
         file = folder / name
-        if not file.is_file():
+        if not file.exists():
             raise run.error("file", f"the log {file} does not exist; {_instead(file, folder)}")
         with run.at("reader" if reader else "file"):
             record = read(file, reader=reader or None)
@@ -183,6 +183,7 @@ def read_ladder(study: Section, plant: type[Plant]) -> tuple[Rung, ...]:
 
 
 Log = Callable[[Section], Record]
+_HORIZONS = 50  # each is a residual of its own for every sample of the run
 _EPOCH = 1e6  # a time that starts beyond this many seconds counts from some epoch, so windows count from its start
 
 
@@ -360,6 +361,10 @@ def _horizon(run: Section, grid: Grid) -> float | tuple[float, ...] | None:
     listed: list[Any] = value if isinstance(value, list) else [value]
     with run.at("horizon"):
         found = [si(v, "s", "horizon") for v in listed]
+    if len(found) > _HORIZONS:
+        raise run.error(
+            "horizon", f"horizon lists {len(found)} times, and {_HORIZONS} are the most; take a few of them"
+        )
     step, length = grid.t[1] - grid.t[0], grid.t[-1] - grid.t[0]
     for horizon in found:
         if not horizon >= 1.5 * step and not (_restart(run) == "kalman" and horizon >= step):

@@ -8,12 +8,13 @@ from dataclasses import MISSING, fields
 from typing import Any
 
 from upright.errors import BadInput
-from upright.identification.model.rig import Parameter, Rig
+from upright.identification.model.rig import SUBSTEPS, Parameter, Rig
 from upright.physics import Plant, find
 from upright.physics.actuator import ACTUATOR
 from upright.quantities import Quantity
 from upright.study.keys import names
 from upright.study.text import Section, show, si
+from upright.trust import before_running
 from upright.units import uncertainty
 
 
@@ -25,6 +26,7 @@ def read_plant(study: Section) -> type[Plant]:
     rig.check(names("rig"))
     name = rig.text_of("plant", "cart-pendulum")
     with study.text.at(("rig", "plant")):
+        before_running(name, study.text.path)
         return find(name, study.text.path.parent)
 
 
@@ -66,7 +68,7 @@ def read_rig(study: Section, plant: type[Plant], drive_unit: str, fixed: Mapping
             open_lower=key == "knee",
         )
         parameters[name] = read(actuator, key, name, what, lambda number=number: number.default)
-    return Rig(plant=plant, parameters=parameters, substeps=study.section("rig").whole("substeps", 1))
+    return Rig(plant=plant, parameters=parameters, substeps=study.section("rig").whole("substeps", 1, most=SUBSTEPS))
 
 
 def _default(study: Section, plant: type[Plant], name: str) -> float:

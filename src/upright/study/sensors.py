@@ -14,9 +14,10 @@ from upright.physics import Coordinate, Plant
 from upright.records import Array, Record
 from upright.study import expressions
 from upright.study.keys import names
-from upright.study.text import Section, show
+from upright.study.text import Section, show, si
 
 _UNIFORM = 0.02  # samples off the grid by less than this part of a period count as on it
+_MOST = 10_000_000  # samples of a run, some 80 MB for each of its signals
 _GAP, _HOPELESS = 5, 100  # periods without a sample: told, refused
 
 
@@ -135,6 +136,11 @@ class Grid:
         own = float(steps[steps < 1.5 * median].mean())
         period = period or own
         count = math.floor((t[-1] - t[0]) / period * (1 + 1e-9) + 1e-6) + 1
+        if count > _MOST:
+            raise BadInput(
+                f"{t[-1] - t[0]:g} s in steps of {period:g} s are {count:.3g} samples, and a run may have {_MOST:.0e};"
+                " take a longer period or a shorter window"
+            )
         if count < 8:
             raise BadInput(f"{count} samples of {period:g} s are too few for a run; at least 8 are needed")
         notes: list[str] = []
@@ -286,9 +292,10 @@ def _as_table(section: Section, key: str) -> Section:
     value: Any = section.values.get(key, {})
     if isinstance(value, bool) or not isinstance(value, str | int | float):
         return section.section(key)
-    table = Section(
-        section.text, section.place(key), {"expression": value if isinstance(value, str) else repr(float(value))}
-    )
+    if not isinstance(value, str):
+        with section.at(key):
+            value = repr(si(value, "", key))
+    table = Section(section.text, section.place(key), {"expression": value})
     table.places = {"expression": section.place(key)}
     return table
 
@@ -316,7 +323,8 @@ def drive_unit(study: Section) -> str:
     tables = [study.section("drive"), study.section("defaults").values.get("drive")]
     inputs: Any = study.values.get("inputs", {})
     tables += list(inputs.values()) if isinstance(inputs, dict) else []
-    tables += [run.get("drive") for run in study.values.get("runs", []) if isinstance(run, dict)]
+    runs: Any = study.values.get("runs", [])
+    tables += [run.get("drive") for run in (runs if isinstance(runs, list) else []) if isinstance(run, dict)]
     for table in tables:
         values: Any = table.values if isinstance(table, Section) else table
         if isinstance(values, dict) and isinstance(values.get("unit"), str) and units.known(values["unit"]):

@@ -6,6 +6,7 @@ and the nearest valid name, and `Section` hands out the values of one table. `To
 
 from __future__ import annotations
 
+import json
 import math
 import re
 import tomllib
@@ -16,7 +17,9 @@ from typing import Any
 
 from upright import units
 from upright.errors import BadInput, UprightError, nearest
+from upright.files import read_text
 
+_LEAST = 1e-60
 KeyPath = tuple[str | int, ...]
 """Keys from the root down; the entries of a list of tables are counted from 0."""
 
@@ -33,7 +36,7 @@ class StudyText:
     def __init__(self, path: Path, text: str | None = None) -> None:
         self.path = path
         try:
-            self.text = path.read_text(encoding="utf-8-sig") if text is None else text
+            self.text = read_text(path, encoding="utf-8-sig", most=4) if text is None else text
         except UnicodeDecodeError:
             raise BadInput(
                 f"{path} is not text, and a study is a TOML file; to make one from a log: upright init {path}"
@@ -48,6 +51,11 @@ class StudyText:
             raise BadInput(
                 f"{path}, line {line}: this is no TOML ({what[:1].lower()}{what[1:]}); text stands in quotes, as in"
                 ' plant = "furuta", and each key on its own line. Is this a log? Then: upright init LOG'
+            ) from None
+        except (ValueError, RecursionError):  # a number of 5000 digits, a list in 1000 lists
+            raise BadInput(
+                f"{path}: a study holds numbers of a few digits and lists in lists, and this one a number of thousands"
+                " of digits or brackets in hundreds of brackets; write what is meant"
             ) from None
         self.lines = key_lines(self.text)
 
@@ -183,11 +191,11 @@ class Section:
             raise self.error(key, f"{key} must be {words}, got {show(value)}; {nearest(str(value), valid)}")
         return value
 
-    def whole(self, key: str, default: int) -> int:
-        """Whole number, at least 1."""
+    def whole(self, key: str, default: int, most: int) -> int:
+        """Whole number from 1 to `most`."""
         value = self.values.get(key, default)
-        if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-            raise self.error(key, f"{key} must be a whole number, 1 or more, got {show(value)}")
+        if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
+            raise self.error(key, f"{key} must be a whole number from 1 to {most}, got {show(value)}")
         return value
 
 
@@ -195,9 +203,12 @@ def si(value: Any, unit: str, what: str) -> float:
     """Value in `unit`, one of SI or of the command, of a number or of text such as ``"2 mm"``."""
     if isinstance(value, bool) or not isinstance(value, str | int | float):
         raise BadInput(f'{what} must be a number or text with a unit, such as "1.5 {unit}", got {show(value)}')
-    if not isinstance(value, str) and not abs(float(value)) < 1e300:
-        raise BadInput(f"{what} must be a finite number, got {value}")
-    return units.in_unit(value, unit)
+    if not isinstance(value, str) and not abs(value) < 1e300:
+        raise BadInput(f"{what} must be a finite number, got {show(value)}")
+    number = units.in_unit(value, unit)
+    if number and not _LEAST <= abs(number) <= 1 / _LEAST:  # its square, or the inverse of that, would overflow
+        raise BadInput(f"{what} must be 0 or from {_LEAST:g} to {1 / _LEAST:g} in size, got {show(value)}")
+    return number
 
 
 def show(value: Any) -> str:
@@ -244,7 +255,7 @@ def _toml_so_far(text: str) -> tuple[dict[str, Any], bool]:
     for closed in ("", *("]" * depth for depth in range(1, 9))):
         try:
             return tomllib.loads(text + closed), not closed
-        except tomllib.TOMLDecodeError:
+        except (ValueError, RecursionError):
             continue
     return {}, False
 
@@ -298,7 +309,8 @@ class TomlTable:
 
     def line(self, text: str, note: str = "") -> None:
         """Add a line as it is."""
-        self.lines.append(f"{text}   # {note}" if note else text)
+        whole = f"{text}   # {note}" if note else text
+        self.lines.append(re.sub(r"[\x00-\x08\x0a-\x1f\x7f]", " ", whole))  # as the name of a log may hold
 
     def __str__(self) -> str:
         return "\n".join(self.lines) + "\n"
@@ -323,8 +335,7 @@ def toml(value: Value, digits: int = 6) -> str:
     if isinstance(value, float):
         return f"{value:.{digits}g}"
     if isinstance(value, str):
-        text = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", " ")
-        return f'"{text}"'
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{k} = {toml(v, digits)}" for k, v in value.items()) + " }"
     return "[" + ", ".join(toml(v, digits) for v in value) + "]"

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from upright.errors import BadInput, nearest
+from upright.files import keeps_its_inputs
 from upright.progress import Progress, part, silent
 from upright.verbs.answer import Answer
 from upright.verbs.pages import folder_if_given, page_folder, write_page
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 _poles = poles  # the verbs have options of this name
 
 
+@keeps_its_inputs
 def design(
     source: str | os.PathLike[str], *, at: str = "", poles: str | Iterable[complex] = "",
     lqr: str | Iterable[float] = "", effort_weight: float | None = None, limit: float | None = None,
@@ -182,6 +184,7 @@ def _start(rig: IdentifiedRig, given: str | Mapping[str, float | str]) -> tuple[
     return tuple(values.values())
 
 
+@keeps_its_inputs
 def regulate(
     source: str | os.PathLike[str] | None = None, *, rig: str = "", seed: int | None = None, which: int | str = "",
     poles: str | Iterable[complex] = "", speed: str = "filtered", memory: float = 0.5, tilt: float | str = "",
@@ -284,6 +287,7 @@ def _wish(
     )  # fmt: skip
 
 
+@keeps_its_inputs
 def swing_up(
     source: str | os.PathLike[str] | None = None, *, rig: str = "", seed: int = 1, seconds: float = 12.0,
     travel: float | None = None, lie: str | Mapping[str, float] = "", check: Log | None = None,
@@ -382,6 +386,7 @@ def _lying(rig: ServoRig, lie: str | Mapping[str, float]) -> ServoRig:
     return replace(rig, scales=tuple(factors.values())) if said else rig
 
 
+@keeps_its_inputs
 def track(
     source: str | os.PathLike[str] | None = None, *, rig: str = "rectilinear", seed: int = 0,
     sets: str | int | Sequence[int] = "", poles: str | Iterable[complex] = "", step: float | str = "",

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from upright.errors import BadInput
+from upright.files import keeps_its_inputs
 from upright.progress import Progress, silent
 from upright.verbs.answer import Answer
 from upright.verbs.pages import folder_if_given, write_page
@@ -170,6 +171,7 @@ def reproduce(
     return Answer(done, told, [] if at is None else write_page(told, at / "reproduce.html", pdf))
 
 
+@keeps_its_inputs
 def survey(
     file: str | os.PathLike[str], *, n: int | None = None, scale: str | tuple[int, int] = "1-4",
     out: str | os.PathLike[str] | None = None, pdf: bool = False,

@@ -9,6 +9,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from upright.errors import BadInput, nearest
+from upright.files import keeps_its_inputs
 from upright.progress import Progress, silent
 from upright.verbs.answer import Answer
 from upright.verbs.values import open_log
@@ -169,6 +170,7 @@ def prediction(runs: Mapping[str, RunScore], plant: type[Plant]) -> Prediction:
     return Prediction(PredictedRuns(runs=runs, plant=plant), chapter)
 
 
+@keeps_its_inputs
 def identify(
     study: Any, plant: Any = None, *, known: Mapping[str, float | str] | None = None,
     ask: Sequence[str] | Mapping[str, float | str] | None = None, columns: Mapping[str, str] | None = None,

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from upright.errors import BadInput
+from upright.files import check_output, keeps_its_inputs, regular, replace_file
 from upright.verbs.answer import Answer
 from upright.verbs.pages import can_be_pdf, folder, folder_if_given, write_page
 from upright.verbs.values import open_log, texts
@@ -46,6 +47,7 @@ def read(file: Log, *, reader: str = "") -> Record:
     return open_log(file, reader)[0]
 
 
+@keeps_its_inputs
 def show(log: Log, *, out: str | os.PathLike[str] | None = None, plot: bool = False) -> Answer[Inspection]:
     """What a log holds: columns, sample rate, quanta, gaps, lying columns.
 
@@ -80,7 +82,6 @@ def show(log: Log, *, out: str | os.PathLike[str] | None = None, plot: bool = Fa
 
         at = Path() if out is None else Path(out)
         files.append(at if at.suffix in (".svg", ".png") else picture_path(path, folder(at)))
-        files[-1].parent.mkdir(parents=True, exist_ok=True)
         save(draw_columns(record, seen), files[-1])
     onward = Step(
         "Write a study file, filled in with what was recognised.", f"upright init {typed(path)} -o study.toml"
@@ -102,6 +103,7 @@ def _stem(log: Path) -> str:
     return re.sub(r"[^\w.-]+", "_", log.stem)
 
 
+@keeps_its_inputs
 def doctor(
     log: Log, *, rig: str | os.PathLike[str] = "", html: str | os.PathLike[str] | None = None, pdf: bool = False,
     reader: str = "",
@@ -157,9 +159,9 @@ def _file(log: Log) -> Path | None:
     if not isinstance(log, str | os.PathLike):
         return None
     path = Path(log)
-    if not path.is_file():
-        wrong = "is a folder; name one file of it" if path.is_dir() else "does not exist; check the path"
-        raise BadInput(f"the log {path} {wrong}")
+    if not path.exists():
+        raise BadInput(f"the log {path} does not exist; check the path")
+    regular(path)
     return path
 
 
@@ -179,6 +181,7 @@ def _plain_diagnosis(diagnosis: Diagnosis, html: Path | None) -> dict[str, Any]:
     }
 
 
+@keeps_its_inputs
 def init(
     log: Log, *, out: str | os.PathLike[str] | None = None, plant: str = "", reader: str = "", force: bool = False
 ) -> Answer[str]:
@@ -219,6 +222,8 @@ def init(
         study = study / f"{path.stem}.toml"
     beside = None if record is None or out is None else study.with_suffix(".csv")
     for file in (study, beside) if out is not None else ():
+        if file is not None and record is None:
+            check_output(file, path)
         if file is not None and file.exists() and not force:
             raise BadInput(f"{file} exists already; name another file with -o, or replace it with --force")
     from upright.physics import find
@@ -234,9 +239,7 @@ def init(
         text = text.replace("[defaults]\n", f'[defaults]\nreader = "{reader}"\n')
     files: list[Path] = []
     if out is not None:
-        study.parent.mkdir(parents=True, exist_ok=True)
-        study.write_text(text, encoding="utf-8")
-        files.append(study)
+        files.append(replace_file(study, text.encode()))
     if beside is not None:
         record.to_csv(beside)
         files.append(beside)
@@ -256,6 +259,7 @@ def init(
     )
 
 
+@keeps_its_inputs
 def law(
     log: Log, *, command: str = "", measured: Sequence[str] | str = (), reference: Sequence[str] | str = (),
     feedforward: Sequence[str] | str = (), every: int | None = None, out: str | os.PathLike[str] | None = None,
@@ -318,9 +322,8 @@ def law(
     if at is not None:
         from upright.report.drawing import save
 
-        at.mkdir(parents=True, exist_ok=True)
         files = [at / f"law-{_stem(path)}.{ending}" for ending in ("json", "svg")]
-        files[0].write_text(plain + "\n", encoding="utf-8")
+        replace_file(files[0], f"{plain}\n".encode())
         save(draw_law(record, found), files[1])
         files += write_page(told, at / f"law-{_stem(path)}.html", pdf)
     return Answer(found, told, files)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -9,10 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from upright.errors import BadInput, nearest
+from upright.files import check_output, keeps_its_inputs
 from upright.progress import Progress, silent
 from upright.verbs.answer import Answer
 from upright.verbs.pages import folder_if_given, page_folder, pdf_has_folder, write_page
-from upright.verbs.study import provenance, read_study
+from upright.verbs.study import folder_beside, provenance, read_study
 from upright.verbs.values import open_log, pairs, paths, si, texts
 
 if TYPE_CHECKING:
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
 KINDS = ("sines", "multisine", "sweep")
 
 
+@keeps_its_inputs
 def predict(
     model: str | os.PathLike[str], study: str | os.PathLike[str], *, data: str | os.PathLike[str] | None = None,
     out: str | os.PathLike[str] | None = None,
@@ -59,8 +62,8 @@ def predict(
     from upright.identification.inference.scoring import predict as score
     from upright.report.fit.tables import score_table
     from upright.report.page import Chapter, Part
+    from upright.study.fitted import read_fit
     from upright.study.load import load_study
-    from upright.study.results import read_fit
 
     model, study = Path(model), Path(study)
     for file, what in ((model, "the model"), (study, "the study")):
@@ -92,6 +95,7 @@ def predict(
     return Answer(scores, told, [] if out is None else [write_json(Path(out) / "prediction.json", numbers)])
 
 
+@keeps_its_inputs
 def ladder(
     study: str | os.PathLike[str], *, out: str | os.PathLike[str] | None = None,
     data: str | os.PathLike[str] | None = None, report: bool = True, pdf: bool = False, workers: int = 1,
@@ -128,7 +132,7 @@ def ladder(
     KeyboardInterrupt
         When Ctrl-C came before the first rung stood.
     """
-    from upright.files import write_json
+    from upright.files import replace_file, write_json
     from upright.identification.ladder.growth import climb
     from upright.report.ladder import chapter, next_steps
     from upright.report.symbols import typed
@@ -138,8 +142,11 @@ def ladder(
     shared = Workers(number=workers, cluster=cluster)
     pdf_has_folder(out, pdf)
     study = Path(study)
-    at = study.with_name(f"{study.stem}-ladder") if out is None else Path(out)
+    at = folder_beside(study, "ladder") if out is None else Path(out)
     asked = read_study(study, at, None if data is None else Path(data))
+    if out is not None:
+        for name in ("ladder.json", "study.toml", "ladder.html"):
+            check_output(at / name)
     if not asked.rig.estimated:
         raise BadInput(f'{study}: nothing is asked; give a parameter a guess, such as b_2c = {{ guess = "1e-4 N m" }}')
     climbed = climb(asked.rig, asked.runs, asked.ladder or None, progress=progress, workers=shared)
@@ -151,8 +158,7 @@ def ladder(
     if out is not None:
         files.append(write_json(at / "ladder.json", numbers))
         if trimmed:
-            files.append(at / "study.toml")
-            files[-1].write_text(chosen_study(asked, climbed), encoding="utf-8")
+            files.append(replace_file(at / "study.toml", chosen_study(asked, climbed).encode()))
     where = typed(Path(data) if data is not None else study.parent)
     told = chapter(
         climbed, title=f"Ladder: {asked.title or asked.path.stem.replace('_', ' ')}", provenance=provenance(asked),
@@ -163,6 +169,7 @@ def ladder(
     return Answer(climbed, replace(told, numbers=numbers), files)
 
 
+@keeps_its_inputs
 def frequency(
     sources: Sequence[str | os.PathLike[str]] | str | os.PathLike[str] = (), *, rig: str = "", seed: int = 0,
     ask: str = "sines", kind: str = "", command: str = "", signal: Mapping[str, str] | Sequence[str] = (),
@@ -217,42 +224,60 @@ def frequency(
     BadInput
         When there is no such rig or way, or a log cannot be used.
     """
+    from upright.experiments.makes import MAKES
+
     at = page_folder(out, pdf)
     for value, option in ((ask, "--ask"), (kind or "sines", "--kind")):
         if value not in KINDS:
             raise BadInput(f"{option} is one of {', '.join(KINDS)}, got '{value}'.")
+    limits = _band(low, high)
     files = [at / "frequency.csv"]
+    if not rig and not paths(sources):
+        raise BadInput(
+            f"frequency needs a log, a frequency.csv or a study to read, or a twin to sweep: --rig {', '.join(MAKES)}."
+        )
     if logs := [Path(source) for source in paths(sources)]:
         from upright.experiments.frequency_1b.chapter import log_chapter
         from upright.experiments.frequency_1b.run import LogRequest, response_of_logs
         from upright.verbs.values import si_if_given
 
-        limits = (low or 0.0, high or float("inf"))
         said = pairs(signal, "--signal"), pairs(counts, "--counts"), pairs(known, "--known")
         wish = LogRequest(
             make=rig, command=command, signals=said[0], kind=kind, seed=seed, hold=si_if_given(hold, "s"),
             counts={n: _count(n, v) for n, v in said[1].items()},
-            band=limits if limits != (0.0, float("inf")) else None,
+            band=limits,
             known={n: _known(n, v, rig) for n, v in said[2].items()},
         )  # fmt: skip
         found = response_of_logs(logs, wish, at, data=None if data is None else Path(data))
         files += [at / "fit.json"] if found.answer else []
         told = log_chapter(found)
     else:
-        for value, option in ((signal, "--signal"), (counts, "--counts"), (known, "--known"), (command, "--command")):
+        said = {"--signal": signal, "--counts": counts, "--known": known, "--command": command, "--hold": hold}
+        said |= {"--kind": kind, "--from": low is not None, "--to": high is not None, "--data": data is not None}
+        for option, value in said.items():
             if value:
                 raise BadInput(f"{option} belongs to a log, and none was named; name one, or leave the option out.")
         from upright.experiments.frequency_1b.chapter import chapter
         from upright.experiments.frequency_1b.run import run_frequency
         from upright.experiments.makes import make_named
 
-        make = rig or "furuta"
-        make_named(make)
-        found = run_frequency(make, seed, at, progress, kind=ask)
+        make_named(rig)
+        found = run_frequency(rig, seed, at, progress, kind=ask)
         files += [at / "sweep.csv", at / "fit.json"]
         told = chapter(found)
     files += write_page(told, at / "report.html", pdf)
     return Answer(found, told, files)
+
+
+def _band(low: float | None, high: float | None) -> tuple[float, float] | None:
+    """Least and greatest frequency [rad/s] of those that were said."""
+    for value, option in ((low, "--from"), (high, "--to")):
+        if value is not None and not 0 < value < math.inf:
+            raise BadInput(f"{option} needs a frequency above 0 rad/s, got {value:g}; leave it out to take all.")
+    band = (low or 0.0, high or math.inf)
+    if not band[0] < band[1]:
+        raise BadInput(f"--from must lie below --to, got {band[0]:g} and {band[1]:g} rad/s; exchange them.")
+    return None if low is None and high is None else band
 
 
 def _count(name: str, text: float | str) -> float:
@@ -260,8 +285,8 @@ def _count(name: str, text: float | str) -> float:
         value = float(text)
     except ValueError:
         value = 0.0
-    if value == 0:
-        raise BadInput(f"--counts {name} needs a number that is not 0, got '{text}'.")
+    if value == 0 or not math.isfinite(value):
+        raise BadInput(f"--counts {name} needs a finite number that is not 0, got '{text}'.")
     return value
 
 
@@ -283,6 +308,7 @@ def _known(name: str, value: float | str | tuple[float, float], make: str) -> tu
     return measured(value, "s" if name in ("actuator.delay", "actuator.lag") else "")
 
 
+@keeps_its_inputs
 def loadings(
     logs: Sequence[Log] | Log = (), *, added: Sequence[str] | str = (), signal: str = "", command: str = "",
     tolerance: float | str = "0 %", free: bool = False, twin: str = "", seed: int = 0,
@@ -349,6 +375,7 @@ def loadings(
     return Answer(found, told, [] if at is None else write_page(told, at / "report.html", pdf))
 
 
+@keeps_its_inputs
 def plan_inertias(
     *, rig: str = "rectilinear", bare: float | str = "", error: float | str = "0.2 %", tolerance: float | str = "0.2 %",
     runs: int = 10, levels: int = 3, radius: Sequence[float | str] | float | str = (), target: float | str = "",

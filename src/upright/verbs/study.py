@@ -25,6 +25,19 @@ def read_study(study: Path, folder: Path, data: Path | None) -> Study:
     return load_study(study, data=data)
 
 
+def folder_beside(study: Path, what: str) -> Path:
+    """Folder of results beside a study and called after it, ``crane-fit``.
+
+    Raises
+    ------
+    BadInput
+        When the study is a folder.
+    """
+    if study.is_dir():
+        raise BadInput(f"'{study}' is a folder, and a study is a TOML file; name the file inside it.")
+    return study.with_name(f"{study.stem}-{what}")
+
+
 def provenance(asked: Study) -> dict[str, object]:
     """Where the numbers of a study come from."""
     return {

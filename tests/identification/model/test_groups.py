@@ -108,7 +108,8 @@ def test_what_the_runs_say_nothing_about_is_unseen():
 def test_a_fit_file_keeps_what_groups_share(two_days, tmp_path):
     from types import SimpleNamespace
 
-    from upright.study.results import read_fit, write_fit
+    from upright.study.fitted import read_fit
+    from upright.study.results import write_fit
 
     fit, runs = two_days
     study = SimpleNamespace(title="", plant="pendulum", path=tmp_path, sha256="", source="", runs=runs)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from upright.cli.terminal import Cluster, Data, Pdf, Processes, progress_bar, tell
+from upright.cli.terminal import Cluster, Data, Pdf, Processes, print_json, progress_bar, tell
 from upright.verbs.study import read_study
 
 INTERRUPTED, NOT_TRUSTED = 130, 3
@@ -86,8 +87,9 @@ def identify(
     trust it), 2 the study or a log is wrong, 130 stopped by Ctrl-C.
     """
     from upright.verbs.fitting import identify as fit
+    from upright.verbs.study import folder_beside
 
-    folder = out if out is not None else study.with_name(f"{study.stem}-fit")
+    folder = out if out is not None else folder_beside(study, "fit")
     asked = read_study(study, folder, data)
     with progress_bar(quiet=as_json) as bar:
         answer = fit(
@@ -95,7 +97,7 @@ def identify(
             workers=workers, cluster=cluster, progress=bar,
         )  # fmt: skip
     if as_json:
-        typer.echo(answer.files[0].read_text(encoding="utf-8").rstrip())
+        print_json(json.loads(answer.files[0].read_text(encoding="utf-8")))
     else:
         tell(answer.chapter, answer.files)
     crossed = answer.crossed

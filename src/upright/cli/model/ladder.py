@@ -52,8 +52,9 @@ def ladder(
     stopped by Ctrl-C.
     """
     from upright.verbs import model as verbs
+    from upright.verbs.study import folder_beside
 
-    folder = out if out is not None else study.with_name(f"{study.stem}-ladder")
+    folder = out if out is not None else folder_beside(study, "ladder")
     with progress_bar(quiet=as_json) as bar:
         climbed = verbs.ladder(
             study, out=folder, data=data, report=report, pdf=pdf, workers=workers, cluster=cluster, progress=bar

@@ -64,6 +64,12 @@ class DesignRequest:
     track: str = ""
     sampled: bool = False
 
+    def __post_init__(self) -> None:
+        if not 1e-6 <= self.period <= 10.0:
+            raise BadInput(f"a loop is closed every 1e-6 to 10 s, got a period of {self.period:g} s.")
+        if self.limit is not None and not 0 < self.limit < 1e9:
+            raise BadInput(f"the largest command lies above 0 and below 1e9, got {self.limit:g}.")
+
 
 @dataclass(frozen=True, kw_only=True)
 class VelocityLoop:

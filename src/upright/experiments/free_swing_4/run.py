@@ -27,6 +27,7 @@ from upright.experiments.free_swing_4.release import (
 )
 from upright.experiments.makes import MOTOR_AND_BELT, SERVO, Make, make_of
 from upright.experiments.weighing_1a.run import Known
+from upright.files import replace_file
 from upright.identification.model.fit import Fit
 from upright.physics import Plant
 from upright.progress import Progress, part, silent
@@ -193,7 +194,7 @@ def write_questions(rig: ServoRig, folder: Path, weighed: Known | None = None) -
     made: list[tuple[Question, Path]] = []
     for q in questions(rig, weighed):
         path = folder / f"{q.name}.toml"
-        path.write_text(question_text(q, rig), encoding="utf-8")
+        replace_file(path, question_text(q, rig).encode())
         made.append((q, path))
     return tuple(made)
 

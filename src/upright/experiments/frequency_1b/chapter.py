@@ -88,7 +88,7 @@ def log_chapter(found: LoggedResponse) -> Chapter:
         parts=(asked, Part("Response", (_bode_picture(data), _response_table(response)))),
         steps=(
             Step("Fit it: name the make, and what of it is known.",
-                 f"upright frequency {typed(found.folder / 'frequency.csv')} --rig linear"),
+                 f"upright frequency {typed(found.folder / 'frequency.csv')} --rig linear -o again"),
             Step("Take it to python-control.",
                  "FrequencyResponse.from_csv('frequency.csv').to_control()"),
         ),

@@ -18,6 +18,7 @@ from upright.errors import BadInput
 from upright.experiments.identified import read_identified
 from upright.experiments.makes import SHAFTS, Make, make_of, make_rig
 from upright.experiments.weighing_1a.run import Known
+from upright.files import replace_file
 from upright.identification.model.fit import Fit
 from upright.physics import Plant
 from upright.progress import Progress, part, silent
@@ -135,7 +136,7 @@ def identify_shaft(
     for file in _PULSES:
         pulses(rig, file).to_csv(folder / file)
     path = folder / STUDY
-    path.write_text(shaft_study(rig, seed, weighed), encoding="utf-8")
+    replace_file(path, shaft_study(rig, seed, weighed).encode())
     study = load_study(path)
     fit = identify(study.rig, study.runs, progress=part(progress, 0.0, 1.0, "fitting the shaft"))
     write_fit(fit, study, folder / FIT)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from upright.errors import BadInput, NotIdentifiable
-from upright.experiments.makes import MASS_RADIUS, OSCILLATORS
+from upright.experiments.makes import MASS_RADIUS, OSCILLATORS, check_radius
 from upright.experiments.weighing_1a.chapter import loading_chapter
 from upright.experiments.weighing_1a.run import drawn_twin, measure_body, truth
 from upright.identification.loadings import Loaded, Loadings, fit_loadings, swings
@@ -105,7 +105,8 @@ def weigh_twin(kind: str, seed: int, folder: Path | None) -> tuple[Loadings, Cha
 def _inertia(text: str) -> tuple[float, str]:
     """Added inertia [SI] and the kind of rig it belongs to; none for a plain zero."""
     if masses := _MASSES.fullmatch(text):
-        return added_inertia(int(masses[1]), parse(masses[2], "m"), mass_radius=MASS_RADIUS), "torsional"
+        radius = check_radius(parse(masses[2], "m"))
+        return added_inertia(int(masses[1]), radius, mass_radius=MASS_RADIUS), "torsional"
     if text.strip() in ("0", "none"):
         return 0.0, ""
     unit = text.lstrip("+-0123456789.eE ").strip()

@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Any
 
 from upright.errors import BadInput
-from upright.experiments.makes import MASS_RADIUS
+from upright.experiments.makes import MASS_RADIUS, check_radius
 from upright.identification.loadings import Loading, Plan
 from upright.physics.oscillators import added_inertia, added_mass
 from upright.report.page import Chapter, Part, Step, Table
@@ -24,6 +24,8 @@ def choices(rig: str, circles: Sequence[float] = ()) -> list[Loading]:
                 "--radius is for disks; a cart takes its masses anywhere. Leave it out or say --rig torsional."
             )
         return [Loading(label=f"{added_mass(n):g} kg", added=added_mass(n)) for n in range(5)]
+    for r in circles:
+        check_radius(r)
     circles = circles or [0.01 * cm for cm in range(2, 10)]
     out = [Loading(label="none", added=0.0)]
     for n in (2, 4):

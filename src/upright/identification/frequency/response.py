@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import math
+import os
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -12,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput
+from upright.files import read_text, whole_file
 from upright.records import PathLike
 
 Array = NDArray[np.float64]
@@ -172,7 +175,7 @@ class FrequencyResponse:
             for k in range(self.overtones.shape[2]):
                 names += [f"{y}_{k + 2}_re", f"{y}_{k + 2}_im"]
                 columns += _parts(self.overtones[:, j, k])
-        with open(path, "w", encoding="utf-8", newline="") as file:
+        with whole_file(path) as half, open(half, "w", encoding="utf-8", newline="") as file:
             file.write(f"{MARK} 1\n# {json.dumps(about)}\n")
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(names)
@@ -182,12 +185,12 @@ class FrequencyResponse:
     def from_csv(path: PathLike) -> FrequencyResponse:
         """Response of text written by `to_csv`."""
         try:
-            with open(path, encoding="utf-8", newline="") as file:
-                mark, about = file.readline(), file.readline()
-                names = next(csv.reader([file.readline()]), [])
-                if not mark.startswith(MARK):
-                    raise ValueError(f"it does not begin with '{MARK}'")
-                table = np.loadtxt(file, delimiter=",", ndmin=2, comments=None)
+            file = io.StringIO(read_text(path))
+            mark, about = file.readline(), file.readline()
+            names = next(csv.reader([file.readline()]), [])
+            if not mark.startswith(MARK):
+                raise ValueError(f"it does not begin with '{MARK}'")
+            table = np.loadtxt(file, delimiter=",", ndmin=2, comments=None)
             told = json.loads(about[2:])
             column = dict(zip(names, table.T, strict=True))
             outputs = tuple(str(y) for y in told["outputs"])
@@ -221,9 +224,11 @@ def _parts(values: Complex) -> list[Array]:
 def is_response(path: PathLike) -> bool:
     """Whether a file is a frequency response written by `FrequencyResponse.to_csv`."""
     try:
-        with open(path, encoding="utf-8") as file:
-            return file.readline().startswith(MARK)
-    except (OSError, UnicodeDecodeError):
+        if not os.path.isfile(path):
+            return False
+        with open(path, "rb") as file:
+            return file.read(len(MARK)) == MARK.encode()
+    except OSError:
         return False
 
 

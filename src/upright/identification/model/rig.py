@@ -13,6 +13,9 @@ from upright.physics.actuator import ACTUATOR
 NOISE = "noise."
 """Before the name of a coordinate: root of the density of a random force on it, which a Kalman filter allows for."""
 
+SUBSTEPS = 100
+"""Most integration steps within one sample; at order 4, ten make an error 10^4 times less."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Parameter:

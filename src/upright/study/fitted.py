@@ -1,0 +1,179 @@
+"""A fit that was written before, read again: nothing impossible gets through, since anybody may have edited the file.
+
+JSON has no infinity: ``null`` stands for "no bound" (a standard error nobody can state, an actuator without limit).
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.errors import BadInput, ImpossiblePhysics
+from upright.files import read_text
+from upright.identification.model.rig import SUBSTEPS
+from upright.physics import BUILT_IN, find
+from upright.physics.actuator import ACTUATOR
+
+FORMAT = 1
+LARGEST = 1e12
+"""Beyond any number of a laboratory rig in SI units."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FittedModel:
+    """What is read of a `fit.json`: the plant's name, every parameter [SI], what groups share, and all content."""
+
+    plant: str
+    values: Mapping[str, float]
+    substeps: int
+    verdict: str
+    trusted: bool
+    groups: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
+    content: Mapping[str, Any] = field(default_factory=dict[str, Any])
+
+    def unit(self, name: str) -> str:
+        """Unit of a parameter, "" where the file does not tell."""
+        entry = self.content["parameters"].get(name)
+        return str(entry.get("unit") or "") if isinstance(entry, dict) else ""
+
+    def covariance(self, among: Collection[str]) -> tuple[list[str], NDArray[np.float64]]:
+        """Those of the estimates that are `among` the names, and their covariance; zeros where the file has none."""
+        estimated: list[str] = list(self.content.get("estimated", []))
+        kept = [i for i, n in enumerate(estimated) if n in among]
+        names = [estimated[i] for i in kept]
+        entries = [self.content["parameters"].get(n) or {} for n in names]
+        errors = np.array([float(e.get("stderr") or 0.0) if isinstance(e, dict) else 0.0 for e in entries])
+        correlation = np.array([[float(v or 0.0) for v in row] for row in self.content.get("correlation") or []])
+        if correlation.shape != (len(estimated), len(estimated)):
+            correlation = np.zeros((len(estimated), len(estimated)))
+        return names, correlation[np.ix_(kept, kept)] * np.outer(errors, errors)
+
+
+def read_fit(path: Path) -> FittedModel:
+    """Model of a `fit.json`.
+
+    Raises
+    ------
+    BadInput
+        When the file is no JSON, was not written by `upright identify`, or holds what no rig can have.
+    """
+    try:
+        content: Any = json.loads(read_text(path))
+    except BadInput:
+        raise
+    except (UnicodeDecodeError, ValueError, RecursionError):
+        raise BadInput(f"{path} is no fit.json; the first argument is the file that `upright identify` wrote") from None
+    wanted = ("plant", "parameters", "verdict")
+    if not isinstance(content, dict) or any(key not in content for key in wanted):
+        raise BadInput(f"{path} lacks the keys {', '.join(wanted)} of a fit.json; write it with `upright identify`")
+    if content.get("format") != FORMAT:
+        raise BadInput(
+            f"{path} has format {_shown(content.get('format'))}, this version reads {FORMAT}; identify again"
+        )
+    try:
+        return _model(content)
+    except (BadInput, ImpossiblePhysics) as error:
+        raise BadInput(f"{path}: {str(error).rstrip('.')}; identify again, or put it right") from None
+
+
+def _model(content: dict[str, Any]) -> FittedModel:
+    plant, verdict = (_text(content[key], key) for key in ("plant", "verdict"))
+    if not plant:
+        raise BadInput("plant must be a name, got an empty one")
+    entries = _table(content["parameters"], "parameters")
+    values = {name: _value(name, entry) for name, entry in entries.items()}
+    if not values:
+        raise BadInput("it holds no parameters")
+    _check_physics(plant, values)
+    substeps = content.get("substeps", 1)
+    if isinstance(substeps, bool) or not isinstance(substeps, int) or not 1 <= substeps <= SUBSTEPS:
+        raise BadInput(f"substeps must be a whole number from 1 to {SUBSTEPS}, got {_shown(substeps)}")
+    trusted = content.get("trusted", False)
+    if not isinstance(trusted, bool):
+        raise BadInput(f"trusted must be true or false, got {_shown(trusted)}")
+    _check_correlation(content, entries)
+    groups = {
+        label: {n: _value(f"groups.{label}.{n}", e) for n, e in _table(group, f"groups.{label}").items()}
+        for label, group in _table(content.get("groups", {}), "groups").items()
+    }
+    return FittedModel(
+        plant=plant, values=values, substeps=substeps, verdict=verdict, trusted=trusted, groups=groups, content=content
+    )
+
+
+def _value(name: str, entry: Any) -> float:
+    """Value of one number, plain or in a table beside its error and unit."""
+    place = name if name.startswith("groups.") else f"parameters.{name}"
+    table = _table(entry, place) if isinstance(entry, dict) else {"value": entry}
+    error, unit = table.get("stderr"), table.get("unit")
+    if error is not None and not _number(error, f"{place}.stderr") >= 0:
+        raise BadInput(f"{place}.stderr must be 0 or more, got {error:g}")
+    if unit is not None:
+        _text(unit, f"{place}.unit")
+    value = table.get("value")
+    if value is None and name in ACTUATOR and math.isinf(ACTUATOR[name].default):
+        return ACTUATOR[name].default
+    return _number(value, f"{place}.value")
+
+
+def _check_physics(plant: str, values: Mapping[str, float]) -> None:
+    """Refuse what the plant, where it is one of ours, and the drive cannot be; a user's plant checks itself."""
+    for name, number in ACTUATOR.items():
+        value = values.get(name, number.default)
+        if number.never_negative and value < 0:
+            raise BadInput(f"{name} ({number.meaning}) must be 0 or more, got {value:g}")
+    if values.get("actuator.gain", 1.0) == 0:
+        raise BadInput("actuator.gain must not be 0, since nothing would drive the rig then")
+    kind = find(plant) if ".py:" not in plant else None
+    if kind is None:
+        return
+    for name in kind.names():
+        if name in values:
+            kind.quantity(name).check(name, values[name])
+    if plant in BUILT_IN and all(name in values for name in kind.names()):
+        kind(**{name: values[name] for name in kind.names()})
+
+
+def _check_correlation(content: Mapping[str, Any], entries: Mapping[str, Any]) -> None:
+    """Refuse correlations that are none: of names that are not there, above 1, or in no square."""
+    estimated, rows = content.get("estimated", []), content.get("correlation") or []
+    if not isinstance(estimated, list) or not all(isinstance(n, str) and n in entries for n in estimated):
+        raise BadInput(f"estimated must list names of the parameters, got {_shown(estimated)}")
+    if not isinstance(rows, list) or not all(isinstance(row, list) for row in rows):
+        raise BadInput(f"correlation must be a list of rows, got {_shown(rows)}")
+    if rows and [len(row) for row in rows] != [len(estimated)] * len(estimated):
+        raise BadInput(f"correlation must have {len(estimated)} rows of as many numbers, one for each of `estimated`")
+    for row in rows:
+        for value in row:
+            if value is not None and not abs(_number(value, "correlation")) <= 1 + 1e-6:
+                raise BadInput(f"correlation must lie between -1 and 1, got {value:g}")
+
+
+def _table(value: Any, place: str) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise BadInput(f"{place} must be a table, got {_shown(value)}")
+    return value
+
+
+def _text(value: Any, place: str) -> str:
+    if not isinstance(value, str):
+        raise BadInput(f"{place} must be text, got {_shown(value)}")
+    return value
+
+
+def _number(value: Any, place: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST:
+        raise BadInput(f"{place} must be a finite number of a rig's size, got {_shown(value)}")
+    return float(value)
+
+
+def _shown(value: Any) -> str:
+    said = repr(value)
+    return said if len(said) < 40 else f"{said[:37]}..."
