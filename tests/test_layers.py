@@ -72,6 +72,7 @@ BLIND["report"] = FLOOR.keys() - {"errors", "files", "progress", "quantities", "
 DOORS = {
     "sympy": "physics",
     "llvmlite": "machine",
+    "cuda": "gpu",
     "scipy.optimize": "identification closed_loop",
     "lmfit": "identification",
     "mpmath": "gains",
