@@ -109,5 +109,7 @@ def _do(driver: Any, name: str, *given: Any) -> Any:
         said = getattr(status, "name", status)
         if said == "CUDA_ERROR_OUT_OF_MEMORY":
             raise BadInput(f"the GPU has no room for so many motions; give it fewer lanes at a time, or {_STAY}.")
-        raise BadInput(f"the GPU's driver answers {said} to {name}; bring the driver up to date, or {_STAY}.")
+        raise BadInput(
+            f"the GPU's driver answers {said} to {name}; an A100 or newer and a current driver are needed, or {_STAY}."
+        )
     return out[0] if out else None
