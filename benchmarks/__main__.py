@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from benchmarks.measure import Line
@@ -21,7 +22,7 @@ from upright.workers import Workers
 
 NAMES = (
     "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "frequency", "swing_up", "tracking", "lab",
-    "doctor", "rigs", "regulation", "real", "startup", "workers", "long",
+    "doctor", "rigs", "regulation", "real", "startup", "workers", "long", "gpu",
 )  # fmt: skip
 LIBRARIES = ("upright", "numpy", "scipy", "llvmlite", "control", "casadi", "jax", "mujoco")
 
@@ -45,7 +46,7 @@ def row(line: Line) -> list[str]:
         ratio = middle if low == middle == high else f"{middle} ({low} to {high})"
     reached = {None: "", True: "[green]reached[/]", False: "[red]missed[/]"}[line.reached]
     error = "" if line.error is None else f"{line.error:.1e}"
-    return [line.contender, seconds, spread, ratio, error, str(line.target or ""), reached, line.note]
+    return [line.contender, seconds, spread, ratio, error, str(line.target or ""), reached, escape(line.note)]
 
 
 def table(name: str, title: str, lines: list[Line]) -> Table:

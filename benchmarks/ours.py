@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -37,7 +37,9 @@ def trajectory(*, stick_slip: bool) -> Callable[[], np.ndarray]:
     return run
 
 
-def ensemble(p: np.ndarray, x0: np.ndarray, *, samples: int, stick_slip: bool) -> Callable[[], np.ndarray]:
+def ensemble(
+    p: np.ndarray, x0: np.ndarray, *, samples: int, stick_slip: bool, device: Literal["cpu", "gpu"] = "cpu"
+) -> Callable[[], np.ndarray]:
     """n closed loops; last states (4, n)."""
     from upright.laws import state_feedback
     from upright.physics import Furuta
@@ -53,6 +55,7 @@ def ensemble(p: np.ndarray, x0: np.ndarray, *, samples: int, stick_slip: bool) -
         done = loops(
             Furuta, values, start, None, problem.PERIOD,
             samples=samples + 1, substeps=problem.SUBSTEPS, loop=loop, threads=1,
+            device=device,
         )  # fmt: skip
         return done.final[list(ORDER)]
 

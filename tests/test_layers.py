@@ -73,6 +73,7 @@ BLIND["report"] = FLOOR.keys() - {"errors", "files", "progress", "quantities", "
 DOORS = {
     "sympy": "physics",
     "llvmlite": "machine",
+    "cuda": "gpu",
     "scipy.optimize": "identification closed_loop",
     "lmfit": "identification",
     "mpmath": "gains",

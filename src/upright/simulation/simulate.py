@@ -18,7 +18,7 @@ from upright.physics.equations import Derived
 from upright.physics.plant import Plant
 from upright.progress import Progress, silent
 from upright.simulation.kernel.flavour import choose
-from upright.simulation.simulator import Held, Simulator
+from upright.simulation.simulator import Device, Held, Simulator
 from upright.workers import Workers, cut, spread
 
 Array = NDArray[np.float64]
@@ -128,18 +128,22 @@ def ensemble(
     threads: int | None = None,
     workers: Workers | None = None,
     progress: Progress = silent,
+    device: Device = "cpu",
 ) -> Ensemble:
     """Extremes and final states of many motions, without keeping the motions.
 
     Parameters are those of `simulate`; `settle` [s] is when errors begin to count, and `threads` defaults to the
     number of processors this process may use. With `workers` blocks of lanes are shared among those instead, one
-    thread each, and `progress` is told; the numbers are the same.
+    thread each, and `progress` is told; the numbers are the same. On the `device` ``"gpu"`` each lane is a thread of
+    its own there, and they are the same to rounding.
     """
+    if device == "gpu" and workers is not None:
+        raise BadInput("an ensemble is computed by workers or on one GPU; leave workers or device='gpu' out.")
     job = _prepare(plant, params, x0, u, dt, substeps, start, loop, held or {}, record=False)
     lanes = job.x0.shape[1]
     if workers is None:
         own = threads or (len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1)
-        rows = _reduced(job, samples, settle, (slice(0, lanes), job.table, job.x0, job.start), silent, threads=own)
+        rows = _reduced(job, samples, settle, (slice(0, lanes), job.table, job.x0, job.start), silent, own, device)
     else:
         parts = [
             (p, job.table[:, p], job.x0[:, p], None if job.start is None else job.start[p])
@@ -172,13 +176,13 @@ def block(lanes: int) -> int:
 
 def _reduced(
     job: _Job, samples: int, settle: float, part: tuple[slice, Array, Array, NDArray[np.int64] | None],
-    _progress: Progress, threads: int = 1,
+    _progress: Progress, threads: int = 1, device: Device = "cpu",
 ) -> Array:  # fmt: skip
     """Rows of an ensemble (rows, lanes) for some of its lanes: which, their table, first states and first samples."""
     which, table, x0, start = part
     s = job.simulator
     stepper = s if s.loop is None else replace(s, loop=s.loop.of_lanes(which))
-    return stepper.run(table, x0, job.u, samples=samples, start=start, threads=threads, settle=settle)
+    return stepper.run(table, x0, job.u, samples=samples, start=start, threads=threads, settle=settle, device=device)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,11 +23,13 @@ from upright.laws.linear import Law
 from upright.laws.rule import Rule
 from upright.physics.actuator import ACTUATOR
 from upright.physics.equations import Derived
+from upright.simulation import gpu
 from upright.simulation.kernel.compiled import WIDTH, Kernel, compiling, kernel
 from upright.simulation.kernel.flavour import Flavour, Layout, lay_out
 from upright.simulation.kernel.lanes import room
 
 Array = NDArray[np.float64]
+Device = Literal["cpu", "gpu"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -186,6 +189,7 @@ class Simulator:
         threads: int = 1,
         settle: float = 0.0,
         memory: Array | None = None,
+        device: Device = "cpu",
     ) -> Array:
         """Motion of every lane.
 
@@ -210,6 +214,9 @@ class Simulator:
         memory : array, shape (values,), optional
             Where the motion is written, for who calls often and is done with one motion before the next: what comes
             back is a view of it. At least samples x rows x lanes values, lanes rounded up to 16 unless there is one.
+        device : "cpu" or "gpu"
+            What computes: this processor, or a GPU of NVIDIA's, each of whose threads steps one lane; the numbers
+            agree to rounding.
 
         Returns
         -------
@@ -220,8 +227,10 @@ class Simulator:
         Raises
         ------
         BadInput
-            When shapes do not fit together.
+            When shapes do not fit together, or there is no GPU where one was asked for.
         """
+        if device not in ("cpu", "gpu"):
+            raise BadInput(f"motions are computed on device 'cpu' or 'gpu', got {device!r}.")
         n, nu, f = self._layout.n, self._layout.nu, self.flavour
         lanes = params.shape[1] if params.ndim == 2 else 0
         if lanes == 0 or params.shape[0] != len(self.names):
@@ -233,7 +242,7 @@ class Simulator:
         u = np.zeros((0, nu)) if u is None else np.require(u, np.float64, _KIND)
         if u.ndim != 2 or u.shape[1] != nu:
             raise BadInput(f"u needs shape (T, {nu}): time first, one column for each input; got {u.shape}.")
-        width = 1 if lanes == 1 else WIDTH
+        width = 1 if lanes == 1 or device == "gpu" else WIDTH
         blocks = -(-lanes // width)
         law = _NONE[0] if self.loop is None else self.loop.rows(nu, lanes, x0[::2])
         P = padded(params, blocks * width, extra=len(law))
@@ -268,11 +277,15 @@ class Simulator:
         else:
             reduced = np.empty((4 * n + nu, blocks * width))
         size = room(self._layout, width, buffer)
+        call = (lanes, P, X0, u, self._reference, begin, self._grid, base, int((samples - 1) * every), int(every))
+        call += (int(self.substeps), float(self.dt), scalars, buffer, out, reduced)
+        if device == "gpu":
+            with compiling(self.loop):
+                gpu.launch(gpu.door(), lambda: self._kernel.ptx(size), lanes, call, results=(out, reduced))
+            return out if f.record else reduced
         with compiling(self.loop):
             compiled = self._kernel.run_1 if width == 1 else self._kernel.run_16
             events = self._kernel.events if f.dry else 0
-        call = (lanes, P, X0, u, self._reference, begin, self._grid, base, int((samples - 1) * every), int(every))
-        call += (int(self.substeps), float(self.dt), scalars, buffer, out, reduced)
 
         def step(first: int, last: int) -> None:
             compiled(first, last, *call, aligned(size), events)

@@ -16,9 +16,10 @@ from upright.laws.rule import Rule, Written, line_in
 from upright.simulation.kernel.equations import ELEMENTARY, acceleration, step, terms
 from upright.simulation.kernel.events import events, places
 from upright.simulation.kernel.flavour import Layout
-from upright.simulation.kernel.lanes import run
+from upright.simulation.kernel.lanes import RUN_ARGUMENTS, run
 from upright.simulation.lowering import cache as kept
-from upright.simulation.lowering.module import Module
+from upright.simulation.lowering.gpu import threads
+from upright.simulation.lowering.module import Module, Platform
 from upright.simulation.lowering.operands import FLOAT, INT, ArrayOf, Type, Unsupported
 
 WIDTH = 16
@@ -79,16 +80,25 @@ class Kernel:
         """Address of the search of events."""
         return self._address("events")
 
+    def ptx(self, room: int) -> bytes:
+        """Code that steps one motion in each thread of a GPU, with so much `lanes.room`."""
+        from upright.simulation.lowering import machine
+
+        return self._code(f"ptx {room}", lambda: machine.ptx(threaded(self.text, room, machine.gpu())))
+
     def _address(self, name: str) -> int:
         from upright.simulation.lowering import machine
 
+        return machine.load(self._code(name, lambda: machine.compiled(lowered(self.text, name))), name)
+
+    def _code(self, name: str, compiled: Callable[[], bytes]) -> bytes:
         key = kept.key(_version(), name, self.text)
         code = kept.read(key)
         if code is None:
             self.compiled.append(name)
-            code = machine.compiled(lowered(self.text, name))
+            code = compiled()
             kept.write(key, code)
-        return machine.load(code, name)
+        return code
 
 
 def _steps(address: int) -> Callable[..., None]:
@@ -120,6 +130,12 @@ def lowered(text: str, name: str) -> str:
     if name == "events":
         return module.pointed(name, EVENTS, machine.platform())
     return module.entry(name, RUN, machine.platform())
+
+
+def threaded(text: str, room: int, platform: Platform) -> str:
+    """LLVM's text of a kernel of which each thread steps one motion, with so much `lanes.room`."""
+    types: dict[str, Type] = dict(zip(RUN_ARGUMENTS.split(", "), RUN, strict=True))
+    return threads(text, "run_1", types, platform, room)
 
 
 @contextmanager

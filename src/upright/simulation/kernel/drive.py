@@ -66,8 +66,8 @@ def begin(w: Writer, j: int, row: dict[str, int]) -> None:
         w.add(
             f"_z = P[{row['relaxation']}, _m]",
             f"{{rt{j}}} = _z",
-            f"{{re{j}}} = exp(-_h / _z) if _z > 0.0 else 0.0",
-            f"{{rh{j}}} = exp(-0.5 * _h / _z) if _z > 0.0 else 0.0",
+            f"{{re{j}}} = falling(_h / _z) if _z > 0.0 else 0.0",
+            f"{{rh{j}}} = falling(0.5 * _h / _z) if _z > 0.0 else 0.0",
             f"{{vp{j}}} = {{v{w.p.drives[j]}}}",
         )
         wanted.append("relaxation")

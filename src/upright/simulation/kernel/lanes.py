@@ -63,7 +63,7 @@ def _actuator(w: Writer, j: int, first: int) -> None:
         f"{{_sl{j}}} = P[{row['slope']}, _m]",
         f"_tau = P[{row['lag']}, _m]",
         "_x = _h / _tau if _tau > 0.0 else 1e300",
-        f"{{e{j}}} = exp(-_x)",
+        f"{{e{j}}} = falling(_x)",
         f"{{th{j}}} = 1.0 / _x",
         f"_z = P[{row['delay']}, _m] / _dt" + (f" + FL[{p.n}]" if loop else ""),
         "if not (abs(_z) < 1e6) or not (_tau == _tau):",
@@ -73,7 +73,7 @@ def _actuator(w: Writer, j: int, first: int) -> None:
         "{di} = floor(_z)" if j == 0 else "",
         f"{{df{j}}} = _z - floor(_z)",
         # what is left at the end of a substep of a jump inside it
-        f"{{ep{j}}} = exp(-_x * (1.0 - ({{df{j}}} * _substeps - floor({{df{j}}} * _substeps))))",
+        f"{{ep{j}}} = falling(_x * (1.0 - ({{df{j}}} * _substeps - floor({{df{j}}} * _substeps))))",
     )
     begin(w, j, row)
     if loop:

@@ -85,13 +85,45 @@ def compiled(text: str) -> bytes:
 
 def translated(text: str, target: Any) -> bytes:
     """Object code of a module for any target machine of llvmlite."""
+    return target.emit_object(_optimized(text, target))
+
+
+def _optimized(text: str, target: Any) -> Any:
     module = llvm.parse_assembly(text)
     options = llvm.create_pipeline_tuning_options(speed_level=_PASSES)
     # lanes are vectors already
     options.loop_vectorization = options.slp_vectorization = options.loop_interleaving = options.loop_unrolling = False
     passes = llvm.create_pass_builder(target, options)
     passes.getModulePassManager().run(module, passes)
-    return target.emit_object(module)
+    return module
+
+
+GPU = "sm_80"
+"""Oldest GPU of NVIDIA's that code is written for: A100; the driver translates it for the one at hand."""
+
+
+@cache
+def _gpu() -> Any:
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    return llvm.Target.from_triple("nvptx64-nvidia-cuda").create_target_machine(cpu=GPU, opt=_CODE)
+
+
+@cache
+def gpu() -> Platform:
+    """What modules are written for that run on a GPU; no Python object lies there."""
+    return Platform(triple="nvptx64-nvidia-cuda", layout=str(_gpu().target_data), head=0)
+
+
+def ptx(text: str) -> bytes:
+    """Code of a module for NVIDIA's driver.
+
+    Parameters
+    ----------
+    text : str
+        LLVM's text, written for `gpu`.
+    """
+    return _gpu().emit_assembly(_optimized(text, _gpu())).encode()
 
 
 @cache

@@ -1,8 +1,9 @@
 """All functions of one text as a module of LLVM's text, with one of them to be called from outside.
 
 The text marks each function with a decorator: ``inline`` and ``inline_strict`` stand where they are called, ``scalar``
-is called, ``entry`` is called from outside, ``separate`` is a module of its own and called by its address. What floats
-may be rearranged to differs too: no `nnan` or `ninf` anywhere, because a lane that diverges must stay visible as NaN.
+is called, ``entry`` is called from outside, ``separate`` is a module of its own and called by its address, unless all
+stand together. What floats may be rearranged to differs too: no `nnan` or `ninf` anywhere, because a lane that diverges
+must stay visible as NaN.
 """
 
 from __future__ import annotations
@@ -60,12 +61,13 @@ class Platform:
 
 
 class Module:
-    """Functions of one text, written for so many lanes in a vector."""
+    """Functions of one text, written for so many lanes in a vector; `together` when none of them is `separate`."""
 
-    def __init__(self, text: str, lanes: int) -> None:
-        self._functions, self._lanes = functions(text), lanes
+    def __init__(self, text: str, lanes: int, *, together: bool = False) -> None:
+        self._functions, self._lanes, self._together = functions(text), lanes, together
         self._written: list[str] = []
-        self._declared: dict[str, str] = {}
+        self.declared: dict[str, str] = {}
+        """What of LLVM and of the C library is called, by name."""
         self._instances: dict[tuple[str, tuple[Type, ...]], tuple[str, Number | TupleOf | None]] = {}
 
     def defined(self, name: str) -> ast.FunctionDef | None:
@@ -74,19 +76,21 @@ class Module:
 
     def separate(self, name: str) -> bool:
         """Whether it is a module of its own."""
-        return mark(self._functions[name]) == "separate"
+        return mark(self._functions[name]) == "separate" and not self._together
 
     def instance(self, name: str, types: tuple[Type, ...]) -> tuple[str, Number | TupleOf | None]:
         """Symbol of a function for these types of arguments, written when it is first asked for, and its result."""
         key = name, types
         if key not in self._instances:
             flags, attribute = _MARKS[mark(self._functions[name])]
+            if self._together and mark(self._functions[name]) == "separate":
+                attribute = "noinline"  # few lanes need it, at a time
             symbol = f"{name}.{len(self._instances)}"
             known: dict[str, Number | TupleOf] = {}
             result: list[Number | TupleOf] = []
             while True:
                 function = Function(
-                    self._functions[name], types, self, lanes=self._lanes, flags=flags, declared=self._declared,
+                    self._functions[name], types, self, lanes=self._lanes, flags=flags, declared=self.declared,
                     aligned=ALIGNED, known=known, result=result,
                 )  # fmt: skip
                 try:
@@ -124,15 +128,16 @@ class Module:
                 given.append(f"i64 %size{k}.{axis}")
         lines += [f"call void @{symbol}({', '.join(given)})", "ret void"]
         body = "\n".join(f"  {line}" for line in lines)
-        return self._whole(platform, f"define void @{name}(ptr %words) {_WIDE} {{\n{body}\n}}\n")
+        return self.whole(platform, f"define void @{name}(ptr %words) {_WIDE} {{\n{body}\n}}\n")
 
     def pointed(self, name: str, types: Sequence[Type], platform: Platform) -> str:
         """The module with a `separate` function under its own name, to be called by other modules."""
         symbol, _ = self.instance(name, tuple(types))
         named = [f"{llvm(t, 1)} %a{k}" for k, t in enumerate(types)]
         call = f"  call void @{symbol}({', '.join(named)})\n  ret void\n"
-        return self._whole(platform, f"define void @{name}({', '.join(named)}) {_WIDE} {{\n{call}}}\n")
+        return self.whole(platform, f"define void @{name}({', '.join(named)}) {_WIDE} {{\n{call}}}\n")
 
-    def _whole(self, platform: Platform, last: str) -> str:
+    def whole(self, platform: Platform, last: str) -> str:
+        """The module with all that was asked for, and with what is called from outside at its end."""
         head = [f'target triple = "{platform.triple}"', f'target datalayout = "{platform.layout}"']
-        return "\n".join([*head, *self._declared.values(), *self._written, last]) + "\n"
+        return "\n".join([*head, *self.declared.values(), *self._written, last]) + "\n"
