@@ -183,6 +183,11 @@ def _closed_loop(
 ) -> ClosedLoop:
     """A law and its references; `raw` ones are between columns of the log."""
     factor = read_sign(section) if "sign" in section or not raw else scene.drive.sign
+    for name in law.measured if raw else ():
+        if name not in scene.sensors:
+            raise section.error(
+                "kind", f'the law reads {name}, which has no sensor; add [sensors.{name}] with column = "..."'
+            )
     if raw:
         lines = [scene.sensors[n].line(scene.record) for n in law.measured]
         zero = [float(offset) for _, offset in lines]
