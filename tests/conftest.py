@@ -2,6 +2,9 @@
 
 import os
 
+# The matrices here are small: threads of the linear algebra only wait for each other and for other tests.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import pytest
 
 

@@ -123,6 +123,7 @@ def test_impossible_means_are_counted_as_elsewhere():
         assert count == sum(not possible(mean, n) for mean in means) + shares
 
 
+@pytest.mark.slow
 def test_the_command_writes_page_and_numbers(tmp_path):
     outcome = CliRunner().invoke(app, ["reproduce", "--json", "-o", str(tmp_path)])
     assert outcome.exit_code == 0, outcome.stderr

@@ -27,7 +27,7 @@ def test_every_number_of_a_long_log_is_the_one_written(text, end):
     assert np.array_equal(record["u"], k % 7)
 
 
-@pytest.mark.parametrize("row", [3, 400_000, ROWS - 1])
+@pytest.mark.parametrize("row", [3, *(pytest.param(row, marks=pytest.mark.slow) for row in (400_000, ROWS - 1))])
 def test_a_torn_row_of_a_long_log_is_found_in_its_line(text, row):
     lines = text.split("\n")
     lines[row + 1] = lines[row + 1].rpartition(",")[0]
@@ -35,6 +35,7 @@ def test_a_torn_row_of_a_long_log_is_found_in_its_line(text, row):
         read_source(Source(file="long.csv", data="\n".join(lines).encode()))
 
 
+@pytest.mark.slow
 def test_a_row_costs_no_more_memory_than_its_text_and_its_numbers(text):
     """Beside the file: its text once, two tables of float64 while blocks are joined, and a block in wide characters.
 

@@ -102,6 +102,7 @@ def furuta(tmp_path_factory):
     return run_frequency("furuta", 0, tmp_path_factory.mktemp("1b"))
 
 
+@pytest.mark.slow
 def test_the_pole_of_the_rig_upside_down_is_known_before_it_stands(furuta):
     """Issue: within 1 %, and covered. Ten times better here; the simplex, blind to dry friction, misses by percents."""
     pole = key_value(furuta.answer.key)
@@ -113,6 +114,7 @@ def test_the_pole_of_the_rig_upside_down_is_known_before_it_stands(furuta):
     assert abs(furuta.answer.simplex_pole.real / truth - 1) > 0.02
 
 
+@pytest.mark.slow
 def test_amplitudes_are_scheduled(furuta):
     """Within the drive's limit and the travel, above the encoders' steps, and no joint sticks where it is used."""
     data, used = furuta.answer.data, furuta.answer.used
@@ -125,6 +127,7 @@ def test_amplitudes_are_scheduled(furuta):
     assert all("sticks" in s for s in furuta.answer.left_out)
 
 
+@pytest.mark.slow
 def test_design_reads_the_fit_with_its_uncertainty(furuta):
     file = read_identified(furuta.folder)
     pole = key_value(furuta.answer.key)

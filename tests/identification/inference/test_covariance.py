@@ -16,6 +16,7 @@ from upright.signals.memory import automatic_span, long_run
 SEEDS = 80
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("memory", [0.0, 0.9])
 def test_scatter_matches_the_reported_errors(memory: float) -> None:
     """95 % intervals hold the truth in 90 to 99 % of 80 repetitions; memory 0.9 hides 19 of 20 samples' worth."""
@@ -37,6 +38,7 @@ def test_scatter_matches_the_reported_errors(memory: float) -> None:
     assert np.all((ratio > 0.75) & (ratio < 1.35)), ratio
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("memory", [0.0, 0.5, 0.9])
 def test_intervals_of_short_records_hold_the_truth_too(memory: float) -> None:
     """100 samples, four numbers sought: what the fit takes from the residuals must be given back."""
