@@ -232,10 +232,6 @@ def frequency(
             raise BadInput(f"{option} is one of {', '.join(KINDS)}, got '{value}'.")
     limits = _band(low, high)
     files = [at / "frequency.csv"]
-    if not rig and not paths(sources):
-        raise BadInput(
-            f"frequency needs a log, a frequency.csv or a study to read, or a twin to sweep: --rig {', '.join(MAKES)}."
-        )
     if logs := [Path(source) for source in paths(sources)]:
         from upright.experiments.frequency_1b.chapter import log_chapter
         from upright.experiments.frequency_1b.run import LogRequest, response_of_logs
@@ -257,6 +253,11 @@ def frequency(
         for option, value in said.items():
             if value:
                 raise BadInput(f"{option} belongs to a log, and none was named; name one, or leave the option out.")
+        if not rig:
+            raise BadInput(
+                "frequency needs a log, a frequency.csv or a study to read, or a twin to sweep: --rig "
+                f"{', '.join(MAKES)}."
+            )
         from upright.experiments.frequency_1b.chapter import chapter
         from upright.experiments.frequency_1b.run import run_frequency
         from upright.experiments.makes import make_named
