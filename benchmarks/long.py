@@ -33,15 +33,32 @@ def write_log(path: Path, rows: int) -> Path:
     return path
 
 
+WATCHED = """
+import atexit, sys
+from pathlib import Path
+out, status = Path(sys.argv.pop(1)), Path("/proc/self/status")
+if status.exists():
+    atexit.register(lambda: out.write_text(status.read_text().split("VmHWM:")[1].split()[0]))
+from upright.cli import main
+sys.argv[0] = "upright"
+main()
+"""
+
+
 def measured(*words: str) -> tuple[float, float]:
-    """Seconds of CPU and the largest memory [MB] of a command in a process of its own."""
-    child = subprocess.Popen([sys.executable, "-m", "upright", *words], stdout=subprocess.DEVNULL)
-    _, status, used = os.wait4(child.pid, 0)
-    child.returncode = os.waitstatus_to_exitcode(status)
-    if child.returncode not in (0, 3):  # 3: the doctor found something
-        raise RuntimeError(f"upright {' '.join(words)} ended with {child.returncode}")
-    unit = 1 << 20 if sys.platform == "darwin" else 1 << 10
-    return used.ru_utime + used.ru_stime, used.ru_maxrss / unit
+    """Seconds of CPU and the largest memory [MB] of a command in a process of its own.
+
+    What `wait4` says of memory begins with that of whoever started the process, so Linux is asked from inside.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        peak = Path(folder) / "peak"
+        child = subprocess.Popen([sys.executable, "-c", WATCHED, str(peak), *words], stdout=subprocess.DEVNULL)
+        _, status, used = os.wait4(child.pid, 0)
+        child.returncode = os.waitstatus_to_exitcode(status)
+        if child.returncode not in (0, 3):  # 3: the doctor found something
+            raise RuntimeError(f"upright {' '.join(words)} ended with {child.returncode}")
+        memory = float(peak.read_text()) / 1024 if peak.exists() else used.ru_maxrss / (1 << 20)
+    return used.ru_utime + used.ru_stime, memory
 
 
 def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:

@@ -68,15 +68,11 @@ def test_a_column_that_nobody_can_write_to_is_not_copied():
 @pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "wait4"), reason="memory of one process is told by POSIX")
 @pytest.mark.parametrize("command", ["show", "doctor"])
-def test_a_command_takes_memory_and_time_by_the_row(tmp_path, command):
-    """Ten times the rows take ten times the time beyond the start, and 100 bytes of memory each: 1 GB at 10^7 rows."""
+def test_a_command_takes_memory_by_the_row(tmp_path, command):
+    """100 bytes for each row beyond what any log takes: 1 GB at 10^7 rows. Its time is the benchmark's."""
     from benchmarks.long import measured, write_log
 
     out = ["-o", str(tmp_path / ("page.html" if command == "doctor" else "pictures"))]
-    seconds, memory = zip(
-        *(measured(command, str(write_log(tmp_path / f"{n}.csv", n)), *out) for n in (1000, 300_000, 3_000_000)),
-        strict=True,
-    )
-    assert memory[2] < 90 + 300
-    assert seconds[2] - seconds[0] < 2 * 10 * max(seconds[1] - seconds[0], 0.2)
-    assert seconds[2] < 10
+    _, few = measured(command, str(write_log(tmp_path / "few.csv", 1000)), *out)
+    _, many = measured(command, str(write_log(tmp_path / "many.csv", 3_000_000)), *out)
+    assert many - few < 300

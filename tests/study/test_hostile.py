@@ -60,8 +60,8 @@ def test_some_changes_of_every_study_are_a_study_or_a_sentence(part):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", STUDIES)
-def test_every_change_of_a_study_is_a_study_or_a_sentence(name):
-    assert judge(name, mutations(name)) > 0
+def test_a_fifth_of_all_changes_of_a_study_are_a_study_or_a_sentence(name):
+    assert judge(name, mutations(name)[list(STUDIES).index(name) % 5 :: 5]) > 0
 
 
 CLI = [(name, change) for i, name in enumerate(STUDIES) for change in mutations(name)[i * 7 :: 1600]]

@@ -62,7 +62,7 @@ def test_a_parameter_that_one_run_alone_sees_is_named():
     free = shaken(seconds=2.0, label="free")
     locked = replace(shaken(seconds=2.0, label="locked"), held={"theta": 0.0}, measured=("psi",), y=free.y[:, :1])
     question = rig(Furuta, FURUTA, {"J_d": 7e-3, "b_2": 1e-4})
-    found = {one.label: one for one in leave_one_out(question, [free, locked], {})}
+    found = {one.label: one for one in leave_one_out(question, [free, locked], {}).all()}
     assert found["free"].blind == ("b_2",)
     assert found["locked"].blind == ()
 
