@@ -11,7 +11,6 @@ import sys
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
-from hashlib import sha256
 from pathlib import Path
 
 from upright.errors import BadInput
@@ -44,6 +43,8 @@ def before_running(plant: str, by: Path) -> None:
     BadInput
         When code is refused.
     """
+    from hashlib import sha256
+
     if ".py:" not in plant:  # as `physics.find` tells a file from a name
         return
     name, _, _ = plant.rpartition(":")
