@@ -84,7 +84,7 @@ def _parabola(q: Array, dt: float, substeps: int) -> Array:
 
 
 _NONE = np.zeros((1, 0, 0))
-_KIND = ("C", "A", "W")  # any other kind of array, or of number, would be compiled for anew
+_KIND = ("C", "A", "W")  # machine code reads an array from its first number on, whatever its strides and type
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -33,7 +33,7 @@ RUN: tuple[Type, ...] = (
 )  # fmt: skip
 """Types of `lanes.RUN_ARGUMENTS`."""
 
-_WORDS = struct.Struct("=13qd6q")
+_WORDS = struct.Struct("=" + "".join("d" if t == FLOAT else "q" for t in RUN))
 
 EVENTS: tuple[Type, ...] = (ArrayOf(0), ArrayOf(0), INT, FLOAT)
 """Types of the arguments of the search of events."""
@@ -53,7 +53,8 @@ def _version() -> str:
     """What the machine code depends on besides the text: this processor, LLVM, and how the text is lowered."""
     from upright.simulation.lowering import machine
 
-    own = [path.read_bytes() for path in sorted(Path(machine.__file__).parent.glob("*.py"))]
+    files = [Path(__file__), *sorted(Path(machine.__file__).parent.glob("*.py"))]
+    own = [path.read_bytes() for path in files]
     return f"{machine.identity()} {hashlib.sha256(b''.join(own)).hexdigest()}"
 
 
@@ -107,17 +108,8 @@ def _steps(address: int) -> Callable[..., None]:
 
     function = machine.function(address)
 
-    def run(
-        first: int, last: int, total: int, P: Any, X0: Any, U: Any, R: Any, START: Any, HELD: Any, HBASE: Any,
-        steps: int, every: int, substeps: int, dt: float, FL: Any, buffer: int, OUT: Any, STAT: Any, W: Any,
-        events: int,
-    ) -> None:  # fmt: skip
-        function(
-            _WORDS.pack(
-                first, last, total, id(P), id(X0), id(U), id(R), id(START), id(HELD), id(HBASE),
-                steps, every, substeps, dt, id(FL), buffer, id(OUT), id(STAT), id(W), events,
-            )
-        )  # fmt: skip
+    def run(*given: Any) -> None:
+        function(_WORDS.pack(*[id(a) if isinstance(t, ArrayOf) else a for t, a in zip(RUN, given, strict=True)]))
 
     return run
 

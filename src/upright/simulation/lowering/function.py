@@ -10,6 +10,7 @@ from upright.simulation.lowering.expressions import Callees, Expressions, is_str
 from upright.simulation.lowering.instructions import Crooked, Instructions
 from upright.simulation.lowering.operands import (
     INT,
+    INTS,
     Array,
     ArrayOf,
     Group,
@@ -334,7 +335,7 @@ class Function(Expressions):
                 self.in_lane = {LANE: whole(0)}
                 self.body(node.body)
             elif width == w.lanes:
-                self.in_lane = {LANE: Value(INT_LANES, "", first=whole(0))}
+                self.in_lane = {LANE: Value(INTS, "", first=whole(0))}
                 self.body(node.body)
             else:
                 self._pieces(node, width)
@@ -358,7 +359,7 @@ class Function(Expressions):
         w.jump(head)
         w.start(head)
         k = cast("Value", w.fetch(counter))
-        self.in_lane = {LANE: Value(INT_LANES, "", first=k)}
+        self.in_lane = {LANE: Value(INTS, "", first=k)}
         self.body(node.body)
         self.in_lane = None
         k = w.binary_number("+", w.fetch(counter), whole(w.lanes))
@@ -393,9 +394,6 @@ class Function(Expressions):
         if self.in_lane is not None or not self.loops:
             raise Crooked
         self.write.jump(self.loops[-1][where])
-
-
-INT_LANES = Number("int", True)
 
 
 def _as_read(target: ast.expr) -> ast.expr:
