@@ -3,42 +3,23 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 
+from benchmarks.workers import cluster as started
 from upright.errors import BadInput
 from upright.workers import Workers, spread
 
 pytestmark = pytest.mark.slow
-distributed = pytest.importorskip("distributed", reason="the cluster extra is not installed")
+pytest.importorskip("distributed", reason="the cluster extra is not installed")
 
 
 @pytest.fixture(scope="module")
-def cluster(tmp_path_factory):
+def cluster():
     """Address of a scheduler with two workers, each a process as a person starts it."""
-    folder = tmp_path_factory.mktemp("cluster")
-    address_file = folder / "scheduler.json"
-    python = [sys.executable, "-m", "distributed.cli"]
-    scheduler = [*python[:2], "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
-    worker = [*python[:2], "distributed.cli.dask_worker", "--scheduler-file", str(address_file), "--nthreads", "1"]
-    commands = [[*scheduler, "--scheduler-file", str(address_file)], *[[*worker, "--no-dashboard"]] * 2]
-    started = []
-    try:
-        for command in commands:
-            log = open(folder / f"{len(started)}.log", "w", encoding="utf-8")  # noqa: SIM115
-            started.append(subprocess.Popen(command, cwd=folder, stdout=log, stderr=subprocess.STDOUT))
-        with distributed.Client(scheduler_file=str(address_file), timeout=60, set_as_default=False) as client:
-            client.wait_for_workers(2, timeout=60)
-            address = client.scheduler.address
+    with started(2) as address:
         yield address
-    finally:
-        for process in reversed(started):
-            process.terminate()
-        for process in started:
-            process.wait(30)
 
 
 def test_a_cluster_says_what_one_process_says_to_the_last_bit(cluster):
