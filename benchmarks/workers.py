@@ -119,6 +119,16 @@ def simulated(number: int, seconds: float, count: int) -> tuple[float, float]:
     return count * seconds / best.wall, best.parent / count
 
 
+def stop(process: subprocess.Popen[bytes]) -> None:
+    """Asks a process to end; kills one that does not, as a Dask worker that waits for a lost child may not."""
+    process.terminate()
+    try:
+        process.wait(10)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
 @contextlib.contextmanager
 def cluster(count: int) -> Generator[str]:
     """Address of a Dask scheduler with `count` workers on this machine, processes of their own."""
@@ -137,10 +147,8 @@ def cluster(count: int) -> Generator[str]:
                 address = client.scheduler.address
             yield address
         finally:
-            for process in reversed(started):
-                process.terminate()
-            for process in started:
-                process.wait(30)
+            for process in reversed(started):  # workers before the scheduler
+                stop(process)
 
 
 def idle(name: str, workers: Workers, count: int) -> tuple[Line, float]:
