@@ -105,4 +105,4 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
             "scipy", "scipy, solve_ivp per sample", EARLY, share=one * EARLY / problem.SAMPLES
         ),
     }
-    return compare(builders, rounds=3 if quick else 9, progress=progress)
+    return compare(builders, rounds=1 if quick else 9, progress=progress)

@@ -231,7 +231,7 @@ def run(
     """Brier score and its parts, for the twins and for those identified as in experiment 1b."""
     lines: list[Line] = []
     rows: list[str] = []
-    for what, count in (("identified by steps", 60 if quick else 500), ("identified as in 1b", 6 if quick else 40)):
+    for what, count in (("identified by steps", 15 if quick else 500), ("identified as in 1b", 2 if quick else 40)):
         progress(f"{count} twins {what}")
         twins = [(("furuta", "linear")[i % 2], 1 + i // 2) for i in range(count)]
         told, each = of_each(partial(_twin, what == "identified as in 1b"), twins, workers)

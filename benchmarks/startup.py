@@ -115,5 +115,5 @@ def _timed(log: Path, *, quick: bool, progress: Callable[[str], None]) -> list[L
         return Contender(name=name, run=run, target=None if most is None else Target(most=most, of="seconds"))
 
     builders = {name: lambda name=name: contender(name) for name in kinds}
-    lines = compare(builders, rounds=3 if quick else 5, clock=time.perf_counter, progress=progress)
+    lines = compare(builders, rounds=1 if quick else 5, clock=time.perf_counter, progress=progress)
     return [replace(line, note=f"{np.median(cpu[line.contender]):.2g} s of CPU") for line in lines]

@@ -72,4 +72,4 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
         "scipy, solve_ivp 1e-8": library("scipy", "scipy, solve_ivp 1e-8", "trajectory", error=error),
         "python-control, 1e-8": library("control", "python-control, 1e-8", "trajectory", error=error),
     }
-    return compare(builders, rounds=7 if quick else 31, progress=progress)
+    return compare(builders, rounds=3 if quick else 31, progress=progress)

@@ -162,7 +162,7 @@ def idle(name: str, workers: Workers, count: int) -> tuple[Line, float]:
 
 def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None = None) -> list[Line]:
     """One worker, two, and more that only wait; what one item costs to hand out; what 1e9 closed loops would cost."""
-    rounds, two = (3 if quick else 7), Workers(number=2)
+    rounds, two = (1 if quick else 7), Workers(number=2)
     seeds = np.random.SeedSequence(1).spawn(40 if quick else 160)
     progress("closed loops")
     lines, one, _ = duel("closed loops", loops, seeds, two, rounds)
