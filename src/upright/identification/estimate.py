@@ -32,7 +32,8 @@ from upright.identification.search.strategy import (
     better,
     closed_form_starts,
     other_moments,
-    rescale_priors,
+    other_valleys,
+    settle_weights,
     search,
     simplex,
 )
@@ -131,7 +132,8 @@ def _search(rig: Rig, runs: Sequence[Run], method: str, log: SearchLog) -> tuple
         whole = formulate(problem.rig.without(log.unresolved), runs)
         found = descend_progressively(whole, whole.place(problem.values_at(found.x)), log, horizon=math.inf)
         problem = whole
-    found = rescale_priors(problem, found)
+    found = settle_weights(problem, found)
+    found = other_valleys(problem, found, log)
     if found.interrupted:  # perhaps over a part of the runs
         found = replace(found, normal=problem.normal(found.x))
     return problem, found

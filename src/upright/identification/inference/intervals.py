@@ -257,7 +257,7 @@ def with_left_out(best: Optimum, asked: Rig, left_out: Sequence[str], log: Searc
     chosen = best.problem
     parameters = {**chosen.rig.parameters, **{n: asked.parameters[n] for n in left_out}}
     richer = formulate(replace(chosen.rig, parameters=parameters), [t.run for t in chosen.tracks])
-    richer.noise = chosen.noise
+    richer.weigh_like(chosen)
     start = richer.place(chosen.values_at(best.x) | {n: 0.1 * asked.parameters[n].value for n in left_out})
     richer.settle_steps(start)
     found = descend(richer.normal, start, richer.lower, richer.upper, tolerance=1e-5, limit=25)

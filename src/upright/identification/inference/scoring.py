@@ -17,7 +17,7 @@ from upright.identification.problem.simulated import with_noise
 from upright.identification.problem.tracks import FilterPlan, Track
 from upright.identification.problem.trips import located
 from upright.identification.search.descent import SearchLog, descend_progressively
-from upright.identification.search.strategy import better, rescale_priors
+from upright.identification.search.strategy import better, settle_weights
 from upright.progress import Progress, silent
 
 Array = NDArray[np.float64]
@@ -161,7 +161,7 @@ def _predict(rig: Rig, run: Run, groups: Mapping[str, Mapping[str, float]], prog
         if found.interrupted:
             raise KeyboardInterrupt
         if math.isinf(upto):  # else what is scored must not weigh
-            found = rescale_priors(problem, found)
+            found = settle_weights(problem, found)
         x = found.x
     whole = formulate(rig, [run], thin=False, given=groups)
     sought = [u.name for u in problem.unknowns if u.lower < u.upper]

@@ -101,6 +101,7 @@ def _predicted(
         problem.noise = noise
     progress(f"without {run.label}", 0.0)
     x = problem.place(start)
+    problem.weigh_components(x)
     felt = np.diag(problem.settle_steps(x).matrix)
     blind = [u.name for u, f in zip(problem.unknowns, felt, strict=True) if u.shared and not f > 0]
     if otherwise:

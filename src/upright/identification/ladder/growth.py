@@ -37,7 +37,7 @@ from upright.identification.search.descent import (
     descend_progressively,
     first_horizon,
 )
-from upright.identification.search.strategy import POOR, better, closed_form_starts, rescale_priors, search
+from upright.identification.search.strategy import POOR, better, closed_form_starts, settle_weights, search
 from upright.progress import Progress, part, silent
 from upright.workers import HERE, Workers
 
@@ -150,7 +150,7 @@ def climb(
 class _Climb:
     """One climb; what it found so far survives an interruption.
 
-    Of the model kept so far: its rungs, numbers by key, predictions of the runs, cost and weight of prior knowledge.
+    Of the model kept so far: its rungs, numbers by key, predictions of the runs, cost, and the problem that weighed it.
     """
 
     def __init__(
@@ -162,7 +162,8 @@ class _Climb:
         self.kept: list[Rung] = []
         self.values: dict[str, float] = {}
         self.scores: dict[str, RunScore] = {}
-        self.cost, self.noise = math.inf, math.nan
+        self.cost = math.inf
+        self.weighed: Problem | None = None
         self.repeats = repeats(runs)
 
     def walk(self) -> Ladder:
@@ -203,8 +204,8 @@ class _Climb:
         rig, runs = rig_at(self.rig, self.rungs, kept), runs_at(self.runs, kept)
         shown = [runs[0].first_part()] if len(runs) == 1 else runs
         problem = formulate(rig, shown)
-        if self.values:  # costs of two rungs compare only where prior knowledge weighs the same
-            problem.noise = self.noise
+        if self.weighed is not None:
+            problem.weigh_like(self.weighed)
         found = self.fit(problem, shown, rung)
         if found.interrupted:
             raise KeyboardInterrupt
@@ -213,7 +214,7 @@ class _Climb:
         chance = by_chance(len(problem.unknowns) - len(self.values), noise_level(problem, found.x))
         lucky = bool(self.values) and self.cost - found.normal.cost <= chance and not rung.drops
         cost = found.normal.cost
-        found = rescale_priors(problem, found)
+        found = settle_weights(problem, found)
         if found.interrupted:
             raise KeyboardInterrupt
         whole = formulate(rig, shown, thin=False)
@@ -248,7 +249,7 @@ class _Climb:
         )
         if better:
             self.kept, self.values, self.scores = kept, values, predicted
-            self.cost, self.noise = found.normal.cost, problem.noise
+            self.cost, self.weighed = found.normal.cost, problem
         return better
 
     def leave_out(

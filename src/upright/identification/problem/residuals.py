@@ -37,6 +37,12 @@ Array = NDArray[np.float64]
 ROUNDING = 12**-0.5
 """Standard deviation of the rounding to steps of one."""
 
+NOTICED = 0.2
+"""A weight that changes by less, of its logarithm, moves no estimate by what matters."""
+
+LEAST_MISSED = 0.01
+"""What is missed of a component counts as no less than this share of what is missed of the worst."""
+
 STEP = 1e-5
 """A perturbed number moves the weighted outputs by about this much, root mean square."""
 
@@ -197,6 +203,39 @@ class Problem:
             return np.concatenate([restart.residual, restart.price], axis=1)
         y = self.simulate(index, x[:, None], track.within(horizon))[..., 0]
         return np.moveaxis(track.errors(y), 1, 0).reshape(track.restarts.size, -1)
+
+    def weigh_components(self, x: Array) -> bool:
+        """Weigh the components of outputs that move alike by what is missed of each at coordinates `x`.
+
+        Over all runs with the same components; the cost at `x` stays about what it was. Whether a weight changed by
+        enough to matter.
+        """
+        squares: dict[tuple[str, ...], list[Array]] = {}
+        for index, track in enumerate(self.tracks):
+            if track.principal is not None:
+                e = self.residuals(index, x)
+                width = len(track.columns)
+                e = e[:, : e.shape[1] // width * width].reshape(-1, width) * _relative(track.missed)
+                squares.setdefault(_components(track), []).append(np.mean(e * e, axis=0))
+        changed = False
+        for index, track in enumerate(self.tracks):
+            if track.principal is None:
+                continue
+            missed = np.sqrt(np.mean(squares[_components(track)], axis=0))
+            free = track.weights > 0
+            if not (np.isfinite(missed).all() and missed[free].all()):
+                continue
+            missed = np.where(free, np.maximum(missed, LEAST_MISSED * missed.max()), 1.0)
+            missed[free] /= np.sqrt(np.mean(missed[free] ** 2))
+            changed = changed or bool(np.abs(np.log(missed / _relative(track.missed))).max() > NOTICED)
+            self.tracks[index] = replace(track, missed=missed)
+        return changed
+
+    def weigh_like(self, other: Problem) -> None:
+        """Weigh prior knowledge and components as another problem does, so that their costs compare."""
+        self.noise = other.noise
+        missed = {_components(track): track.missed for track in other.tracks}
+        self.tracks = [replace(t, missed=missed.get(_components(t), t.missed)) for t in self.tracks]
 
     def restart(self, index: int, x: Array) -> Restart:
         """Where the windows of one run are best restarted, for coordinates `x`."""
@@ -366,6 +405,15 @@ def _shortest(rig: Rig, runs: Sequence[Run]) -> dict[str, float]:
     return {j.presliding: ROUNDING * steps[derived.coordinates[j.coordinate]] for j in derived.joints if j.presliding}
 
 
+def _components(track: Track) -> tuple[str, ...]:
+    """What tells which runs have the same components: the outputs that moved freely."""
+    return tuple(c for c, w in zip(track.run.measured, track.weights, strict=True) if w)
+
+
+def _relative(missed: Array | None) -> Array | float:
+    return 1.0 if missed is None else missed
+
+
 def noise_level(problem: Problem, x: Array) -> float:
     """Weighted residual that one independent observation carries: its deviation times the root of its memory.
 
@@ -374,7 +422,7 @@ def noise_level(problem: Problem, x: Array) -> float:
     squares, samples = 0.0, 0
     for index, track in enumerate(problem.tracks):
         y = problem.simulate(index, x[:, None], track.length)[:, :, :, 0]
-        e = np.moveaxis((y - track.targets(track.length)) * track.weights, 1, 0)
+        e = np.moveaxis((y - track.targets(track.length)) @ track.weighting.T, 1, 0)
         e = e.reshape(len(e), -1) if track.ahead else e.reshape(-1, len(track.columns))
         alike = max(1.0, 2 * memory(e, track.spacing) / track.spacing - 1)
         squares += alike * float(np.sum(e * e))

@@ -84,7 +84,8 @@ class Track:
     held one), `first` the first sample that counts of a free run. `restarts` (W,) are the first samples of the windows
     and `x0` (W, states) the measured states there, whose `variance` (W, states) counts in variances of a weighted
     residual: 0 where they are known, or sought with the rest. A run predicted by a filter has `ahead`: what then counts
-    as its samples are its horizons.
+    as its samples are its horizons. `missed` (outputs,) is how much the last fit missed of each component that outputs
+    which move alike are weighed by, beside the others; all alike when omitted.
     """
 
     run: Run
@@ -102,6 +103,7 @@ class Track:
     first: int
     variance: Array
     ahead: FilterPlan | None = None
+    missed: Array | None = None
 
     @property
     def windowed(self) -> bool:
@@ -120,10 +122,11 @@ class Track:
         """Weights (outputs, outputs) of errors whose outputs move nearly alike; None when each can stand for itself.
 
         Friction that is a little off carries two disks on one shaft astray together: their angles err by hundreds of
-        counts, their twist by few. Scored one by one, the common error drowns what the twist says of the shaft; with
-        the principal components of the motion each in units of its own spread, both speak, as in generalized least
-        squares (Aitken 1935) with errors taken proportional to the motion itself. A component's spread includes the
-        rounding of the encoders, so that a difference nobody could see weighs nothing.
+        counts, their twist by few. Scored one by one, the common error drowns what the twist says of the shaft. With
+        the principal components of the motion each in units of its own spread both speak, as in generalized least
+        squares (Aitken 1935) with errors taken proportional to the motion itself; what a first fit `missed` of each
+        then takes the place of that assumption. A component's spread includes the rounding of the encoders, so that a
+        difference nobody could see weighs nothing.
         """
         free = np.flatnonzero(self.weights)
         if free.size < 2:
@@ -142,7 +145,7 @@ class Track:
         floor = 1e-12 * power[-1]
         W = np.diag(self.weights)
         W[np.ix_(free, free)] = (V / np.sqrt(np.maximum(power, floor) + rounding)).T * w
-        return W
+        return W if self.missed is None else W / self.missed[:, None]
 
     @cached_property
     def weighting(self) -> Array:

@@ -95,12 +95,13 @@ def samples_of(
     rig: Rig,
     runs: Sequence[Run],
     *,
-    most: int = 6000,
+    most: int | None = None,
     flips: Mapping[str, float] | None = None,
     turns: Mapping[str, float] | None = None,
 ) -> list[Sample]:
-    """Smoothed motion of every run that allows it, long runs thinned to at most `most` samples."""
+    """Smoothed motion of every run that allows it, long runs thinned to at most `most` samples, 1500 or more each."""
     found: list[Sample] = []
+    most = max(1500, 6000 // max(len(runs), 1)) if most is None else most
     for run in runs:
         k = -(-run.t.size // most)
         thin = run

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from upright.identification.model.rig import Rig
 from upright.identification.model.runs import Run
 from upright.identification.problem.normal_equations import pseudo_inverse
-from upright.identification.problem.residuals import Problem, noise_level
+from upright.identification.problem.residuals import NOTICED, Problem, noise_level
 from upright.identification.search.descent import (
     Descent,
     SearchLog,
@@ -134,25 +134,40 @@ def better(a: Descent, b: Descent) -> Descent:
     return replace(best, interrupted=a.interrupted or b.interrupted)
 
 
-def rescale_priors(problem: Problem, found: Descent) -> Descent:
-    """Weigh prior knowledge by the residuals found, memory included, and settle again; unless it hardly pulls."""
-    if found.interrupted or not any(u.prior is not None for u in problem.unknowns):
-        return found
-    for _ in range(3):
+REWEIGHED = 2
+"""How often outputs that move alike are weighed by what was missed of them: what is missed most would count ever less.
+
+Of the twist of two disks 79, 79 and 74 percent were explained after one, two and three times.
+"""
+
+
+def settle_weights(problem: Problem, found: Descent) -> Descent:
+    """Weigh prior knowledge, and outputs that move alike, by the residuals found, and settle again."""
+    for k in range(3):
         if found.interrupted:
             break
-        r, J = problem.prior_rows(found.x)
-        pull = pseudo_inverse(found.normal.matrix) @ (J.T @ r)
-        variance = found.normal.cost / problem.count()
-        error = np.sqrt(np.maximum(np.diag(pseudo_inverse(found.normal.matrix)) * variance, 0.0))
-        if np.all(np.abs(pull) <= 0.02 * error) and not any(u.prior and u.shared for u in problem.unknowns):
+        changed = k < REWEIGHED and problem.weigh_components(found.x)
+        if not (_weigh_priors(problem, found) or changed):
             break
-        noise = max(noise_level(problem, found.x), 1e-9)
-        if abs(math.log(noise / problem.noise)) < 0.2:
-            break
-        problem.noise = noise
         found = descend(problem.normal, found.x, problem.lower, problem.upper, tolerance=1e-6)
     return found
+
+
+def _weigh_priors(problem: Problem, found: Descent) -> bool:
+    """Weigh prior knowledge by the residuals found, memory included, unless it hardly pulls; whether that matters."""
+    if not any(u.prior is not None for u in problem.unknowns):
+        return False
+    r, J = problem.prior_rows(found.x)
+    pull = pseudo_inverse(found.normal.matrix) @ (J.T @ r)
+    variance = found.normal.cost / problem.count()
+    error = np.sqrt(np.maximum(np.diag(pseudo_inverse(found.normal.matrix)) * variance, 0.0))
+    if np.all(np.abs(pull) <= 0.02 * error) and not any(u.prior and u.shared for u in problem.unknowns):
+        return False
+    noise = max(noise_level(problem, found.x), 1e-9)
+    if abs(math.log(noise / problem.noise)) < NOTICED:
+        return False
+    problem.noise = noise
+    return True
 
 
 def _ranked(problem: Problem, candidates: Sequence[Array], h: float) -> list[Array]:
@@ -171,6 +186,69 @@ def _ranked(problem: Problem, candidates: Sequence[Array], h: float) -> list[Arr
             raise KeyboardInterrupt
     costs.sort(key=lambda c: c[:2])
     return [x for _, _, x in costs]
+
+
+ATTEMPTS = 4
+"""Descents from around an optimum that look for a lower one; a good fit (below `GOOD`) needs none."""
+
+GOOD = 4e-4
+"""A mean squared residual below this, a fit of 98 %, leaves no other valley to look for."""
+
+AWAY = 3.0
+"""How many standard errors every number is moved by, to either side."""
+
+
+def other_valleys(problem: Problem, found: Descent, log: SearchLog, *, seed: int = 0) -> Descent:
+    """The lowest optimum met by descents from around the one found, every number moved by `AWAY` standard errors.
+
+    Stiction, trips and cycles slipped fold the cost into valleys a few standard errors apart; of descents from such
+    starts most end lower, where there is a lower one.
+    """
+    if found.interrupted or found.normal.cost <= GOOD * problem.count():
+        return found
+    rng = np.random.default_rng(seed)
+    sigma, attempts = _errors(problem, found), 0
+    while attempts < ATTEMPTS:
+        attempts += 1
+        away = AWAY * rng.choice([-1.0, 1.0], found.x.size) * sigma
+        x = np.clip(found.x + away, problem.lower, problem.upper)
+        other = _from(problem, x, found)
+        log.tell("another valley", attempts / ATTEMPTS, min(other.normal.cost, found.normal.cost), problem)
+        if other.interrupted:
+            return replace(found, interrupted=True)
+        if other.normal.cost < (1 - WORTH) * found.normal.cost:
+            log.note("another valley", other.normal.cost, problem)
+            found, log.best, attempts = other, (problem, other.x), 0
+            sigma = _errors(problem, found)
+    return found
+
+
+LEG = 8
+"""Evaluations after which a descent is looked at."""
+
+HOPELESS, ARRIVED = 3.0, 0.05
+"""A descent is given up above this multiple of the lowest cost known, and when all that it is short of it is explained
+by how far it still is from there, within this share."""
+
+
+def _from(problem: Problem, x: Array, known: Descent) -> Descent:
+    """Where a descent ends; given up early where it only returns to an optimum that is `known`, or ends far above."""
+    found = descend(problem.normal, x, problem.lower, problem.upper, tolerance=1e-6, limit=LEG)
+    for _ in range(60 // LEG):
+        cost, away = found.normal.cost, found.x - known.x
+        back = away @ known.normal.matrix @ away <= ARRIVED * known.normal.cost and cost >= known.normal.cost
+        if found.converged or found.interrupted or back or not cost < HOPELESS * known.normal.cost:
+            break
+        found = descend(
+            problem.normal, found.x, problem.lower, problem.upper, tolerance=1e-6, limit=LEG, here=found.normal
+        )
+    return found
+
+
+def _errors(problem: Problem, found: Descent) -> Array:
+    """Standard errors (n,) of the coordinates, for residuals with the memory that they have."""
+    variance = np.diag(pseudo_inverse(found.normal.matrix)) * noise_level(problem, found.x) ** 2
+    return np.sqrt(np.maximum(variance, 0.0))
 
 
 MOMENTS = ("input_start", "input_end")
