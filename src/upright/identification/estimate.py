@@ -26,15 +26,15 @@ from upright.identification.model.runs import Run
 from upright.identification.problem.residuals import Problem, formulate, unresolved
 from upright.identification.problem.simulated import with_noise
 from upright.identification.problem.trips import located, unasked_trips
-from upright.identification.search.descent import Descent, SearchLog, descend_progressively, first_horizon
+from upright.identification.search.descent import Descent, SearchLog, descend, descend_progressively, first_horizon
 from upright.identification.search.strategy import (
     POOR,
     better,
     closed_form_starts,
     other_moments,
     other_valleys,
-    settle_weights,
     search,
+    settle_weights,
     simplex,
 )
 from upright.progress import Progress, silent
@@ -48,9 +48,14 @@ METHODS = ("auto", "least-squares", "simplex")
 the guess over a growing horizon. `simplex`: the paper's, then polished by least squares."""
 
 
+LOWER = 2
+"""How often a search is taken up again where the profile of an interval met a lower cost."""
+
+
 def identify(
-    rig: Rig, runs: Sequence[Run], *, method: str = "auto", progress: Progress = silent, watch: bool = True
-) -> Fit:
+    rig: Rig, runs: Sequence[Run], *, method: str = "auto", progress: Progress = silent, watch: bool = True,
+    near: Fit | None = None,
+) -> Fit:  # fmt: skip
     """Estimate a rig's parameters from its runs.
 
     Parameters
@@ -66,6 +71,8 @@ def identify(
         Told the stage, its cost and its number of simulations, and the share done.
     watch : bool
         Whether stretches that something else than the input moved are named, and left out in a second fit.
+    near : Fit, optional
+        Of nearly the same runs: the search begins there, and asks for friction that this fit left out once more.
 
     Returns
     -------
@@ -85,7 +92,7 @@ def identify(
     log = SearchLog(progress=progress, conventions=cache(lambda: wrong_conventions(rig, fitted)))
     log.warnings += unasked_trips(rig, fitted)
     try:
-        problem, found = _search(rig, fitted, method, log)
+        problem, found = _search(rig, fitted, method, log, near)
     except KeyboardInterrupt:
         problem, x = _best_so_far(rig, fitted, log)
         found = Descent(x=x, normal=problem.normal(x), converged=False, interrupted=True)
@@ -96,19 +103,30 @@ def identify(
 
     try:
         fit = conclude(found)
+        for _ in range(LOWER):
+            if log.lower is None or fit.interrupted:
+                break
+            found = descend(problem.normal, log.lower[1], problem.lower, problem.upper, tolerance=1e-6)
+            log.note("lower, met by an interval", found.normal.cost, problem)
+            log.lower = None
+            fit = conclude(other_valleys(problem, found, log))
         if not watch or fit.interrupted:
             return fit
         return refit_without_outliers(
-            fit, rig, runs, lambda kept: identify(rig, kept, method=method, progress=progress, watch=False)
+            fit, rig, runs, lambda kept: identify(rig, kept, method=method, progress=progress, watch=False, near=fit)
         )
     except KeyboardInterrupt:  # intervals and predictions may take long too; without them an answer is near
         return conclude(replace(found, interrupted=True))
 
 
-def _search(rig: Rig, runs: Sequence[Run], method: str, log: SearchLog) -> tuple[Problem, Descent]:
+def _search(
+    rig: Rig, runs: Sequence[Run], method: str, log: SearchLog, near: Fit | None = None
+) -> tuple[Problem, Descent]:  # fmt: skip
     """The problem whose model was chosen, and where its cost is least."""
     problem = formulate(rig, runs)
-    if method == "auto":
+    if near is not None and not any(e.status == "left out" for e in near.estimates.values()):
+        found = descend_progressively(problem, problem.place(near.keyed()), log, horizon=math.inf)
+    elif method == "auto":
         chosen, candidates = choose_friction(rig, runs, log)
         if chosen is not rig:
             problem = formulate(chosen, runs)

@@ -162,7 +162,7 @@ def _ends(best: Optimum, place: int, quantile: float, log: SearchLog) -> tuple[f
         def tell(cost: float, share: float = (sign + 1) / 2) -> None:
             log.tell(f"interval of {u.name}", share, cost, problem)
 
-        ends.append(_end(problem, x, place, model.cost, rise, sign * min(max(step, 1e-9 * u.scale), most), tell))
+        ends.append(_end(problem, x, place, model.cost, rise, sign * min(max(step, 1e-9 * u.scale), most), tell, log))
     return ends[0], ends[1]
 
 
@@ -174,8 +174,9 @@ def _curvature(A: Array, place: int, best: Optimum) -> float:
 
 
 def _end(
-    problem: Problem, x: Array, place: int, best: float, rise: float, step: float, tell: Callable[[float], None]
-) -> float:
+    problem: Problem, x: Array, place: int, best: float, rise: float, step: float, tell: Callable[[float], None],
+    log: SearchLog,
+) -> float:  # fmt: skip
     """Coordinate at which the refitted cost has risen by `rise`, by secants of its square root, bracketed."""
     lower, upper = problem.lower.copy(), problem.upper.copy()
     bound = float(lower[place] if step < 0 else upper[place])
@@ -189,6 +190,7 @@ def _end(
         if found.interrupted:
             raise KeyboardInterrupt
         z = found.x
+        log.met(found, best)
         height = math.sqrt(max(found.normal.cost - best, 0.0) / rise)
         if abs(height - 1) < 0.05 or (at == bound and height < 1):
             return at

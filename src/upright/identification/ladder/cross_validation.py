@@ -156,11 +156,8 @@ def cross_validate(
     parameters = {
         n: replace(p, value=left_out[n], estimate=False) if n in left_out else p for n, p in fit.rig.parameters.items()
     }
-    start = {n: e.value for n, e in fit.estimates.items()}
-    start |= {f"{label}: {n}": e.value for label, own in fit.per_run.items() for n, e in own.items()}
-    start |= {f"group {label}: {n}": e.value for label, own in fit.groups.items() for n, e in own.items()}
     rig = replace(fit.rig, parameters=parameters)
-    done = leave_one_out(rig, fitted, start, progress=progress, workers=workers)
+    done = leave_one_out(rig, fitted, fit.keyed(), progress=progress, workers=workers)
     found = done.so_far()
     return CrossValidation(
         fitted={run.label: fit.runs[run.label] for run in fitted},

@@ -37,7 +37,7 @@ from upright.identification.search.descent import (
     descend_progressively,
     first_horizon,
 )
-from upright.identification.search.strategy import POOR, better, closed_form_starts, settle_weights, search
+from upright.identification.search.strategy import POOR, better, closed_form_starts, search, settle_weights
 from upright.progress import Progress, part, silent
 from upright.workers import HERE, Workers
 

@@ -275,8 +275,9 @@ class Problem:
             if not math.isfinite(squares[2]):
                 return Normal.lost(size)
             cost += squares[2]
-            A[np.ix_(sought, sought)] += squares[0]
-            g[sought] += squares[1]
+            with np.errstate(over="ignore", invalid="ignore"):  # a number far from where it is felt
+                A[np.ix_(sought, sought)] += squares[0]
+                g[sought] += squares[1]
         r, J = self.prior_rows(x)
         cost += float(r @ r)
         normal = Normal(cost, A + J.T @ J, g + J.T @ r)
