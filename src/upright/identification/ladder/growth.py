@@ -3,8 +3,8 @@
 A ladder stops early when one run predicts another no better than the model predicts both (`repeats`).
 
 Inside a fit its first rungs choose the friction model. `climb` refits all runs for every rung and asks whether the
-held-out error falls by more than chance; inside a fit there is no time for that: every rung is fitted once to the first
-part of every run, and of all of them the one with the least squared error over the rest is taken.
+held-out error falls by more than chance; inside a fit there is no time for that: every rung is fitted once to two
+thirds of every run, and of all of them the one with the least squared error over the rest is taken.
 """
 
 from __future__ import annotations
@@ -293,7 +293,7 @@ def _mean(percents: Percents) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class Candidate:
-    """A friction model fitted to the first part of every run.
+    """A friction model fitted to some blocks of every run.
 
     `values` are its numbers by key, those of single runs that ended at a bound left out, `noise` the level of its
     residuals, `held_out` its mean squared residual over what it has not seen.
@@ -320,12 +320,12 @@ def choose_friction(rig: Rig, runs: Sequence[Run], log: SearchLog) -> tuple[Rig,
         if filtered:
             starts = [min(starts, key=lambda x: problem.cost(x, first_horizon(problem)))]
         return rig, starts
-    seen = [run.first_part() for run in runs]
     tried: list[Candidate] = []
     for k, rung in enumerate(rungs):
         here = rig_at(rig, rungs, rungs[: k + 1])
-        part = formulate(here, seen)
-        starts = [part.place(s) for s in closed_form_starts(here, seen)]
+        part = formulate(here, runs)
+        part.tracks = [track.hidden()[1] for track in part.tracks]
+        starts = [part.place(s) for s in closed_form_starts(here, runs)]
         if tried:
             starts = [part.place(tried[-1].values | rung.seeds(rig)), *starts[:1]]
         else:
@@ -364,22 +364,19 @@ def _note_rival(tried: Sequence[Candidate], left_out: Sequence[str], log: Search
             log.rivals[n] = b
     if log.rivals:
         log.warnings.append(
-            f"The first part of the runs is explained better with {', '.join(left_out)} (cost {rival.cost:.3g} against "
+            f"What was fitted of the runs is explained better with {', '.join(left_out)} (cost {rival.cost:.3g} against "
             f"{chosen.cost:.3g}), the rest is predicted better without, so something else is missing from the model; "
             f"until it is found, the intervals of {', '.join(log.rivals)} hold what both models say."
         )
 
 
 def _held_out(rig: Rig, runs: Sequence[Run], x: Array) -> float:
-    """Mean squared residual of what the fit on the first parts has not seen."""
+    """Mean squared residual of what the fit has not seen."""
     whole = formulate(rig, runs)
     total, samples = 0.0, 0
     for index, track in enumerate(whole.tracks):
-        e = whole.residuals(index, x)
-        if track.windowed:
-            e = e[int(FITTED_SHARE * track.restarts.size) :]
-        else:
-            e = e[0].reshape(-1, len(track.columns))[int(FITTED_SHARE * track.length) :]
+        e, judges = whole.residuals(index, x), track.hidden()[0]
+        e = e[judges] if track.windowed else e[0].reshape(-1, len(track.columns))[judges[track.first :]]
         # one run that slips a cycle should not outvote all others
         total += float(np.sum(np.minimum(e * e, 4.0))) if finite(e) else 4.0 * e.size
         samples += e.size

@@ -127,7 +127,11 @@ class Problem:
 
     def count(self, horizon: float = math.inf) -> int:
         """Number of residuals within `horizon` seconds."""
-        return sum(t.within(horizon) * t.restarts.size * max(1, int(np.count_nonzero(t.weights))) for t in self.tracks)
+        return sum(
+            (t.within(horizon) if t.kept is None else int(np.count_nonzero(t.kept[: t.within(horizon)])))
+            * t.restarts.size * max(1, int(np.count_nonzero(t.weights)))
+            for t in self.tracks
+        )  # fmt: skip
 
     def simulate(self, index: int, x: Array, samples: int, shift: Array | None = None) -> Array:
         """Outputs (samples, W, outputs, lanes) of one run for coordinates `x` (sought, lanes).
@@ -293,11 +297,12 @@ class Problem:
             self._memory = np.empty(most)
         motion = motions(self.solver(index), track, d.values, d.x0, samples=n, memory=self._memory)
         skip = min(track.first, n - 1)
-        seen = [motion[skip:, c] for c in track.columns]
+        counts = slice(skip, n) if track.kept is None else np.flatnonzero(track.kept[:n])
+        seen = [motion[counts, c] for c in track.columns]
         if track.principal is None:
-            G = squares(seen, track.y[skip:n], d.offsets, track.weights, d.scales)
+            G = squares(seen, track.y[counts], d.offsets, track.weights, d.scales)
         else:
-            G = squares(*mixed(seen, track.y[skip:n], d.offsets, d.scales, track.principal))
+            G = squares(*mixed(seen, track.y[counts], d.offsets, d.scales, track.principal))
         h = self.steps[sought]
         with np.errstate(over="ignore", invalid="ignore"):  # a lane that ran away makes the cost infinite
             return G[1:, 1:] / np.outer(h, h), G[1:, 0] / h, float(G[0, 0])
@@ -423,7 +428,8 @@ def noise_level(problem: Problem, x: Array) -> float:
     squares, samples = 0.0, 0
     for index, track in enumerate(problem.tracks):
         y = problem.simulate(index, x[:, None], track.length)[:, :, :, 0]
-        e = np.moveaxis((y - track.targets(track.length)) @ track.weighting.T, 1, 0)
+        e = (y - track.targets(track.length)) @ track.weighting.T
+        e = np.moveaxis(e if track.kept is None else e[track.kept], 1, 0)
         e = e.reshape(len(e), -1) if track.ahead else e.reshape(-1, len(track.columns))
         alike = max(1.0, 2 * memory(e, track.spacing) / track.spacing - 1)
         squares += alike * float(np.sum(e * e))

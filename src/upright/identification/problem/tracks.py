@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from upright.errors import BadInput
 from upright.identification.model.rig import Rig
-from upright.identification.model.runs import Run
+from upright.identification.model.runs import LEAST_RUN, Run
 from upright.identification.problem.restarts import smoothed_variance
 from upright.signals.smoothing import (
     State,
@@ -33,6 +33,9 @@ Array = NDArray[np.float64]
 STEPS_PER_PERIOD = 120
 """Steps a free run is simulated with per period: RK4 is then off by less than 1e-6 per period."""
 
+
+BLOCKS = 9
+"""Blocks of a run of which every third judges a model fitted to the others."""
 
 ALIKE = 0.98
 """Correlation of two outputs from which on their difference, a tenth of the motion, would be drowned."""
@@ -85,7 +88,8 @@ class Track:
     and `x0` (W, states) the measured states there, whose `variance` (W, states) counts in variances of a weighted
     residual: 0 where they are known, or sought with the rest. A run predicted by a filter has `ahead`: what then counts
     as its samples are its horizons. `missed` (outputs,) is how much the last fit missed of each component that outputs
-    which move alike are weighed by, beside the others; all alike when omitted.
+    which move alike are weighed by, beside the others; all alike when omitted. `kept` (samples,) are the samples of a
+    free run that count; all when omitted.
     """
 
     run: Run
@@ -104,6 +108,7 @@ class Track:
     variance: Array
     ahead: FilterPlan | None = None
     missed: Array | None = None
+    kept: NDArray[np.bool_] | None = None
 
     @property
     def windowed(self) -> bool:
@@ -170,10 +175,26 @@ class Track:
             return self.length
         return max(2, min(self.length, int(horizon / self.dt) + 1))
 
+    def hidden(self) -> tuple[NDArray[np.bool_], Track]:
+        """Which samples, or windows, judge a model that was fitted to the others, and the run without them.
+
+        Every third of `BLOCKS` blocks, so that every regime of the run, driven or not, fast or slow, is on both sides.
+        A short run judges nothing.
+        """
+        count = self.restarts.size if self.windowed else self.length
+        judges = (np.arange(count) * BLOCKS // count) % 3 == 2
+        if self.run.t.size < LEAST_RUN or not judges.any():
+            return np.zeros(count, dtype=bool), self
+        if not self.windowed:
+            return judges, replace(self, kept=~judges)
+        stay = ~judges
+        return judges, replace(self, restarts=self.restarts[stay], x0=self.x0[stay], variance=self.variance[stay])
+
     def errors(self, y: Array) -> Array:
         """Weighted errors (samples, W, outputs) of simulated outputs, of a free run from the first that counts on."""
         skip = min(self.first, len(y) - 1)
-        return (y[skip:] - self.targets(len(y))[skip:]) @ self.weighting.T
+        e = (y[skip:] - self.targets(len(y))[skip:]) @ self.weighting.T
+        return e if self.kept is None else e * self.kept[skip : len(y), None, None]
 
     def targets(self, samples: int) -> Array:
         """Measured outputs (samples, W, outputs) that windows cut to `samples` are compared with."""

@@ -189,9 +189,12 @@ def _ranked(problem: Problem, candidates: Sequence[Array], h: float) -> list[Arr
     return [x for _, _, x in costs]
 
 
-ATTEMPTS = 6
-"""Descents in a row from around an optimum that find no lower one; then it counts as the lowest. A good fit (below
-`GOOD`) needs none."""
+ATTEMPTS = (4, 20)
+"""Descents in a row from around an optimum that find no lower one, at least and at most, before it counts as the
+lowest; more than the least only as long as they are cheap, see `CHEAP`. A good fit (below `GOOD`) needs none."""
+
+CHEAP = 1.5e8
+"""Simulated numbers, perturbed lanes counted, that cost a few seconds."""
 
 GOOD = 4e-4
 """A mean squared residual below this, a fit of 98 %, leaves no other valley to look for."""
@@ -212,12 +215,13 @@ def other_valleys(problem: Problem, found: Descent, log: SearchLog, *, seed: int
         return found
     rng = np.random.default_rng(seed)
     sigma, attempts = _errors(problem, found), 0
-    while attempts < ATTEMPTS:
+    begun, lanes = problem.evaluations, problem.count() / len(problem.tracks) * (found.x.size + 1)
+    while attempts < ATTEMPTS[0] or (attempts < ATTEMPTS[1] and (problem.evaluations - begun) * lanes < CHEAP):
         away = AWAY[attempts % len(AWAY)] * rng.choice([-1.0, 1.0], found.x.size) * sigma
         x = np.clip(found.x + away, problem.lower, problem.upper)
         other = _from(problem, x, found)
         attempts += 1
-        log.tell("another valley", attempts / ATTEMPTS, min(other.normal.cost, found.normal.cost), problem)
+        log.tell("another valley", attempts / ATTEMPTS[1], min(other.normal.cost, found.normal.cost), problem)
         if other.interrupted:
             return replace(found, interrupted=True)
         if other.normal.cost < (1 - WORTH) * found.normal.cost:
