@@ -189,7 +189,7 @@ def _ranked(problem: Problem, candidates: Sequence[Array], h: float) -> list[Arr
     return [x for _, _, x in costs]
 
 
-ATTEMPTS = (4, 20)
+ATTEMPTS = (6, 20)
 """Descents in a row from around an optimum that find no lower one, at least and at most, before it counts as the
 lowest; more than the least only as long as they are cheap, see `CHEAP`. A good fit (below `GOOD`) needs none."""
 
@@ -200,7 +200,10 @@ GOOD = 4e-4
 """A mean squared residual below this, a fit of 98 %, leaves no other valley to look for."""
 
 AWAY = (1.0, 3.0)
-"""How many standard errors every number is moved by, to either side, in turn."""
+"""How many standard errors every number is moved by, to either side, in turn with"""
+
+SHARE = 0.4
+"""this share of every number that all runs share."""
 
 
 def other_valleys(problem: Problem, found: Descent, log: SearchLog, *, seed: int = 0) -> Descent:
@@ -215,9 +218,12 @@ def other_valleys(problem: Problem, found: Descent, log: SearchLog, *, seed: int
         return found
     rng = np.random.default_rng(seed)
     sigma, attempts = _errors(problem, found), 0
+    shares = [1.0 if u.log else max(abs(v), u.scale) for u, v in zip(problem.unknowns, found.x, strict=True)]
+    far = SHARE * np.array([s if u.shared else 0.0 for u, s in zip(problem.unknowns, shares, strict=True)])
     begun, lanes = problem.evaluations, problem.count() / len(problem.tracks) * (found.x.size + 1)
     while attempts < ATTEMPTS[0] or (attempts < ATTEMPTS[1] and (problem.evaluations - begun) * lanes < CHEAP):
-        away = AWAY[attempts % len(AWAY)] * rng.choice([-1.0, 1.0], found.x.size) * sigma
+        sizes = [*(n * sigma for n in AWAY), far][attempts % 3]
+        away = sizes * rng.choice([-1.0, 1.0], found.x.size)
         x = np.clip(found.x + away, problem.lower, problem.upper)
         other = _from(problem, x, found)
         attempts += 1
