@@ -205,7 +205,9 @@ def test_a_drive_at_its_defaults_does_nothing(block):
         assert np.allclose(np.moveaxis(x, 2, 0), plain, rtol=0, atol=1e-13)
 
 
-@pytest.mark.parametrize("name", ["start", "end", "damping", "standby", "knee", "fade", "relaxation"])
+@pytest.mark.parametrize(
+    "name", ["start", "end", "damping", "standby", "knee", "fade", "relaxation", "droop", "force_limit", "damping_rise"]
+)
 def test_a_lane_whose_drive_is_not_a_number_says_so(block, name):
     p = {**BLOCK, **IDLE, "actuator.fade": 1.0, "actuator.knee": 2.0, "actuator.damping": 0.5}
     p |= {f"actuator.{name}": np.array([math.nan, 0.5])}
@@ -311,3 +313,36 @@ def test_a_commanded_drive_brakes_no_harder_beyond_the_knee(block):
     truth = np.where(t < off, rise, v_off * np.exp(-S * (t - off)))
     # the kink at the knee lies inside a substep h: slope off by r^2 (v - v_k) there, h^2/8 of it remains
     assert np.allclose(x[:, 1, 0], truth, rtol=0, atol=r * F * (dt / 2) ** 2)
+
+
+def test_a_servo_pulls_at_its_limit_until_it_has_its_speed(block):
+    # gain u - slope v beyond the limit: the limit alone, v = F t/m; then the slope's own approach to gain u/slope
+    gain, slope, most, dt, n = 8.0, 4.0, 2.0, 0.01, 300
+    p = {**BLOCK, "m": 1.0, "k": 0.0, "c": 0.0}
+    p |= {"actuator.gain": gain, "actuator.slope": slope, "actuator.force_limit": most}
+    t = np.arange(n) * dt
+    until = (gain / slope - most / slope) / most
+    then = gain / slope - (most / slope) * np.exp(-slope * (t - until))
+    v = simulate(block, p, [0.0, 0.0], np.ones(n), dt, samples=n, substeps=20)[:, 1, 0]
+    # a substep of 0.5 ms holds the corner
+    assert np.allclose(v, np.where(t < until, most * t, then), rtol=0, atol=1e-6)
+    assert until == pytest.approx(0.75)
+
+
+def test_braking_that_the_command_takes_away(block):
+    # D = 0.6 - 0.5 |u|: commands of 1 and 0.4 in turn, after which 0.2 of standby is left
+    p = {**BLOCK, "m": 1.0, "k": 0.0, "c": 0.0, "actuator.gain": 0.0, "actuator.damping": 0.6}
+    p |= {"actuator.damping_rise": -0.5, "actuator.standby": 0.2}
+    t = np.arange(151) * 0.02
+    u = np.select([t < 0.999, t < 1.999], [1.0, -0.4], 0.0)
+    truth = piecewise(t, 1.0, [(0, 1.0, 0.0, 0.3), (1.0, 2.0, 0.0, 0.6), (2.0, 9.0, 0.0, 0.2)])
+    v = simulate(block, p, [0.0, 1.0], u, 0.02, samples=151, substeps=4)[:, 1, 0]
+    assert np.allclose(v, truth, rtol=0, atol=1e-9)
+
+
+def test_a_gain_that_falls_with_the_command(block):
+    # a free unit mass: what each command of one second adds to the speed is gain u/(1 + droop |u|)
+    p = {**BLOCK, "m": 1.0, "k": 0.0, "c": 0.0, "actuator.gain": 1.432, "actuator.droop": 0.684}
+    u = np.repeat([0.2, -1.0, 0.5], 50)
+    v = simulate(block, p, [0.0, 0.0], u, 0.02, samples=151)[::50, 1, 0]
+    assert np.diff(v) == pytest.approx([1.432 * w / (1 + 0.684 * abs(w)) for w in (0.2, -1.0, 0.5)], abs=1e-12)

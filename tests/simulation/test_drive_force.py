@@ -30,9 +30,12 @@ NUMBERS = {
     "standby": {"standby": 0.2, "end": 0.777},
     "fade": {"knee": 0.5, "fade": 0.9},
     "knee of braking": {"knee": 0.5, "damping": 0.5},
+    "droop": {"droop": 0.8, "offset": 0.1},
+    "force limit": {"force_limit": 0.6, "slope": 0.4},
+    "damping that rises": {"damping_rise": -0.4, "damping": 0.5, "limit": 0.7, "delay": 0.013},
     "all that do not lag": {
         "gain": 2.5, "offset": 0.25, "limit": 0.7, "delay": 0.02, "slope": 0.4, "start": 0.12, "end": 0.78,
-        "damping": 0.5, "standby": 0.2, "knee": 0.5, "fade": 0.9,
+        "damping": 0.5, "standby": 0.2, "knee": 0.5, "fade": 0.9, "droop": 0.3, "force_limit": 1.4, "damping_rise": 0.2,
     },
 }  # fmt: skip
 LAGGING = {

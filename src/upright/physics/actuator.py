@@ -1,7 +1,8 @@
 """Numbers that every drive has besides the plant's own parameters, and the force it gives at measured speeds.
 
-``force = F_c(gain lag(delay(clip(u, limit) + offset))) on(t) - slope v - B``: the drive is alive, ``on``, from `start`
-to `end`; F_c loses `fade` for each unit of speed beyond `knee`; and the braking ``B``, `damping` while the drive is
+``force = clip(F_c(lag(delay(gain w / (1 + droop |w|)))) on(t) - slope v, force_limit) - B`` with
+``w = clip(u, limit) + offset``: the drive is alive, ``on``, from `start` to `end`; F_c loses `fade` for each unit of
+speed beyond `knee`; and the braking ``B``, `damping` and `damping_rise` for each unit of command while the drive is
 alive and commanded and `standby` until it trips, times the speed, needs `relaxation` to build up and to fade.
 """
 
@@ -20,7 +21,10 @@ from upright.physics.plant import Plant
 class DriveNumber(NamedTuple):
     """One number of a drive; `default` is the value at which it does nothing."""
 
-    unit: Literal["force per command", "command", "time", "speed", "force per speed"]
+    unit: Literal[
+        "force per command", "command", "time", "speed", "force per speed", "force", "per command",
+        "force per speed per command",
+    ]  # fmt: skip
     meaning: str
     default: float
     never_negative: bool = False
@@ -50,6 +54,13 @@ ACTUATOR = {
         "force per speed", "force lost per speed beyond the knee, down to no force", 0.0, True
     ),
     "actuator.relaxation": DriveNumber("time", "time in which damping and standby build up and fade", 0.0, True),
+    "actuator.droop": DriveNumber("per command", "gain lost with the command u: gain/(1 + droop |u|)", 0.0, True),
+    "actuator.force_limit": DriveNumber(
+        "force", "largest force that reaches the body, what the slope takes included", math.inf, True
+    ),
+    "actuator.damping_rise": DriveNumber(
+        "force per speed per command", "damping added for each unit of command; negative takes away", 0.0
+    ),
 }
 """By name, in the order of the kernel."""
 
@@ -82,12 +93,15 @@ def drive_force(plant: type[Plant], values: Mapping[str, float], u: Array, v: Ar
         speed = v[[c.name for c in plant.coordinates].index(drive.on)]
         command = np.interp(k - a["delay"] / dt, k, np.clip(u[i], -a["limit"], a["limit"]) + a["offset"])
         commanded = np.interp(k - a["delay"] / dt, k, (u[i] != 0.0).astype(np.float64)) * on
-        force = a["gain"] * _lagging(command, a["lag"] / dt, float(command[0]))
+        size = np.interp(k - a["delay"] / dt, k, np.abs(np.clip(u[i], -a["limit"], a["limit"]))) * on
+        drooping = command / (1.0 + a["droop"] * np.abs(command))
+        force = a["gain"] * _lagging(drooping, a["lag"] / dt, float(drooping[0]))
         beyond = np.maximum(np.sign(force) * speed - a["knee"], 0.0)
         braked = speed - np.sign(force) * beyond * commanded
-        braking = (a["damping"] * commanded + a["standby"] * alive) * braked
+        braking = (a["damping"] * commanded + a["damping_rise"] * size + a["standby"] * alive) * braked
         force = np.sign(force) * np.maximum(np.abs(force) - a["fade"] * beyond, 0.0)
-        out[i] = force * on - a["slope"] * speed - _lagging(braking, a["relaxation"] / dt, 0.0)
+        force = np.clip(force * on - a["slope"] * speed, -a["force_limit"], a["force_limit"])
+        out[i] = force - _lagging(braking, a["relaxation"] / dt, 0.0)
     return out
 
 

@@ -54,7 +54,8 @@ def simulate(
         ``"actuator.start"`` and ``"actuator.end"`` [s from the first sample of `u`], between which the drive is alive;
         ``"actuator.damping"`` [force per speed] while the command is not zero, ``"actuator.standby"`` whatever it is;
         ``"actuator.relaxation"`` [s], the time in which that braking builds up and fades;
-        ``"actuator.fade"``, force lost per speed beyond ``"actuator.knee"`` in the force's own direction.
+        ``"actuator.fade"``, force lost per speed beyond ``"actuator.knee"`` in the force's own direction;
+        ``"actuator.droop"``, ``"actuator.force_limit"``, ``"actuator.damping_rise"``: see `upright.physics.actuator`.
     x0 : array, shape (states,) or (lanes, states)
         Initial states: coordinate, its velocity, next coordinate, ...
     u : array, shape (T,) or (T, inputs), or None

@@ -88,13 +88,18 @@ def actuator_unit(plant: type[Plant], name: str, drive_unit: str) -> str:
     """Unit of one actuator number; the gain's is the input's force per unit of the command."""
     force = plant.inputs[0].unit if plant.inputs else "1"
     place = next((c.unit for c in plant.coordinates if plant.inputs and c.name == plant.inputs[0].on), "1")
-    drive = drive_unit or "1"
+    drive, braking = drive_unit or "1", per(force, f"{place}/s")
     return {
         "force per command": force if drive == "1" else per(force, drive),
         "command": drive,
         "time": "s",
         "speed": f"{place}/s",
-        "force per speed": per(force, f"{place}/s"),
+        "force per speed": braking,
+        "force": force,
+        "per command": f"1/{drive}" if drive != "1" else "1",
+        "force per speed per command": per(force, f"{place}/s")
+        if drive == "1"
+        else f"{per(force, f'{place}/s')}/{drive}",
     }[ACTUATOR[name].unit]
 
 

@@ -71,7 +71,8 @@ def test_a_term_that_must_not_be_zero_is_part_of_every_model():
 def test_friction_that_shows_once_the_drive_is_off_is_not_left_out():
     # the drive gives less than was asked after a second and goes off where the last third begins: judged there alone,
     # friction that the first two thirds ask for would be refused
-    truth = {"J_1": 2.4e-3, "J_2": 1.9e-3, "k_12": 1.1, "c_1": 5e-4, "c_2": 3e-4, "c_12": 4e-4, "f_1c": 8e-3, "f_2c": 2e-3}  # fmt: skip
+    truth = {"J_1": 2.4e-3, "J_2": 1.9e-3, "k_12": 1.1, "c_1": 5e-4, "c_2": 3e-4, "c_12": 4e-4}
+    truth |= {"f_1c": 8e-3, "f_2c": 2e-3}
     plant, dt, quantum = find("torsional-2"), 1e-3, 2 * np.pi / 16000
     t = np.arange(5001) * dt
     u = np.where((t > 0.3) & (t < 3.3), 0.06, 0.0)[:, None]

@@ -364,9 +364,9 @@ def _note_rival(tried: Sequence[Candidate], left_out: Sequence[str], log: Search
             log.rivals[n] = b
     if log.rivals:
         log.warnings.append(
-            f"What was fitted of the runs is explained better with {', '.join(left_out)} (cost {rival.cost:.3g} against "
-            f"{chosen.cost:.3g}), the rest is predicted better without, so something else is missing from the model; "
-            f"until it is found, the intervals of {', '.join(log.rivals)} hold what both models say."
+            f"The fitted part of the runs is explained better with {', '.join(left_out)} (cost {rival.cost:.3g} "
+            f"against {chosen.cost:.3g}), the rest is predicted better without, so something else is missing from the "
+            f"model; until it is found, the intervals of {', '.join(log.rivals)} hold what both models say."
         )
 
 

@@ -18,6 +18,9 @@ DRIVE = (
     ("offset of the drive", ("actuator.offset",)),
     ("lag of the drive", ("actuator.lag", "actuator.delay")),
     ("damping by the drive", ("actuator.slope", "actuator.damping", "actuator.standby", "actuator.relaxation")),
+    ("damping that follows the command", ("actuator.damping_rise",)),
+    ("gain that falls with the command", ("actuator.droop",)),
+    ("limit of the force", ("actuator.force_limit",)),
     ("torque that falls with speed", ("actuator.knee", "actuator.fade")),
     ("end of the drive", ("actuator.start", "actuator.end")),
 )

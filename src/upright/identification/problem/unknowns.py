@@ -84,7 +84,7 @@ def _shared(rig: Rig, p: Parameter) -> Unknown:
         positive = q.open_lower and q.lower == 0
     elif p.name == "actuator.slope" or (p.name in ACTUATOR and ACTUATOR[p.name].never_negative):
         lower = max(lower, 0.0)
-        positive = p.name == "actuator.knee"
+        positive = p.name in ("actuator.knee", "actuator.force_limit")
     elif p.name.startswith(NOISE):
         lower, positive = max(lower, 0.0), True
     log = positive and p.value > 0

@@ -2,11 +2,12 @@
 
 Text for one input of a kernel. ``u_eff = F_c(u, v) on(t) - slope v - B``, where the braking ``B = D(t) v`` may need a
 time to build up and to fade, ``relaxation B' + B = D(t) v``, as the current of a winding does. There ``on`` is 1
-between start and end, ``D = damping on(t) [command is not zero] + standby [t < end]``, and the force ``u`` loses `fade`
-for each unit of speed beyond `knee` in its own direction, down to zero at most. A commanded drive brakes no harder
-beyond the knee than at it, so that `knee` joins a steep and a flat part of a torque-speed curve. ``on`` and ``D``
-switch inside a substep: there the straight line with the same mean and first moment stands for them, as for a delayed
-command, so that the motion depends continuously on when.
+between start and end, ``D = (damping + damping_rise |command|) on(t) [command is not zero] + standby [t < end]``, and
+the force ``u`` loses `fade` for each unit of speed beyond `knee` in its own direction, down to zero at most. What then
+reaches the body, the slope's part included and the braking's not, is no larger than `force_limit`. A commanded drive
+brakes no harder beyond the knee than at it, so that `knee` joins a steep and a flat part of a torque-speed curve.
+``on`` and ``D`` switch inside a substep: there the straight line with the same mean and first moment stands for them,
+as for a delayed command, so that the motion depends continuously on when.
 """
 
 from __future__ import annotations
@@ -39,7 +40,14 @@ def force(p: Layout) -> list[str]:
             braking = f" - _dm{j} * {f'_vb{j}' if f.curve else v}"
         else:
             braking = f" - _bk{j}" if f.relaxation else ""
-        lines.append(f"{u} = {u} - {lost} * {v}{braking}")
+        if f.capped:
+            lines += [
+                f"_w = {u} - {lost} * {v}",
+                f"_w = _fl{j} if _w > _fl{j} else _w",
+                f"{u} = (0.0 - _fl{j} if _w < 0.0 - _fl{j} else _w){braking}",
+            ]
+        else:
+            lines.append(f"{u} = {u} - {lost} * {v}{braking}")
     return lines
 
 
@@ -62,6 +70,8 @@ def begin(w: Writer, j: int, row: dict[str, int]) -> None:
         wanted += ["start", "end"]
     if f.damping:
         w.add(f"{{dc{j}}} = P[{row['damping']}, _m]", f"{{ds{j}}} = P[{row['standby']}, _m]")
+    if f.rising:
+        w.add(f"{{dr{j}}} = P[{row['damping_rise']}, _m]")
     if f.relaxation:
         w.add(
             f"_z = P[{row['relaxation']}, _m]",
@@ -74,6 +84,10 @@ def begin(w: Writer, j: int, row: dict[str, int]) -> None:
     if f.curve:
         w.add(f"{{_kn{j}}} = P[{row['knee']}, _m]", f"{{_fd{j}}} = P[{row['fade']}, _m]")
         wanted += ["knee", "fade"]
+    if f.capped:
+        w.add(f"{{_fl{j}}} = P[{row['force_limit']}, _m]")
+        wanted.append("force_limit")
+    wanted += ["droop"] * f.droop
     for name in wanted:
         # comparisons would let it pass unseen
         w.add(f"_z = P[{row[name]}, _m]", "if not (_z == _z):", "    {q0} = nan")
@@ -83,6 +97,8 @@ def commanded(w: Writer, j: int, place: str) -> None:
     """Whether the command ``_c`` of this sample or of the one before is not zero."""
     if w.p.flavour.damping:
         w.add(f"{{z{place}{j}}} = 1.0 if _c != 0.0 else 0.0")
+    if w.p.flavour.rising:
+        w.add("_z = abs(_c)", f"{{y{place}{j}}} = {{lim{j}}} if _z > {{lim{j}}} else _z")
 
 
 def _step_down(name: str, slope: str, moment: str) -> list[str]:
@@ -114,6 +130,9 @@ def substep(w: Writer, j: int) -> None:
             at = f"{side}_z" if side else ""
             on, alive = (f" * _o{c}", f" * (_ne {side}_de)" if side else " * _ne") if f.gate else ("", "")
             w.add(f"_r = ({{zn{j}}} + _d * (_p {at})){on}", f"{{dm{c}{j}}} = {{dc{j}}} * _r + {{ds{j}}}{alive}")
+            if f.rising:
+                rise = f"({{yn{j}}} + ({{yo{j}}} - {{yn{j}}}) * (_p {at})){on}"
+                w.add(f"{{dm{c}{j}}} = {{dm{c}{j}}} + {{dr{j}}} * {rise}")
             if f.curve:
                 w.add(f"{{cs{c}{j}}} = _r")
     if f.relaxation:

@@ -46,6 +46,12 @@ class Flavour:
         Its braking builds up and fades.
     curve : bool
         The drive's force falls beyond a speed.
+    capped : bool
+        What reaches the body has a limit.
+    rising : bool
+        The drive brakes by how much is asked of it.
+    droop : bool
+        The gain falls with the command.
     loop : Structure or Written, optional
         What is compiled in of the `Law` or `Rule` that computes the input.
     record : bool
@@ -62,6 +68,9 @@ class Flavour:
     damping: bool = False
     relaxation: bool = False
     curve: bool = False
+    capped: bool = False
+    rising: bool = False
+    droop: bool = False
     loop: Structure | Written | None = None
     record: bool = True
 
@@ -107,7 +116,8 @@ class Layout:
         names = [f"k{i}" for i in range(len(self.derived.lumps))]
         names += [f"_Fc{i}" for i in joints] + [f"_Fs{i}" for i in joints]
         names += [f"_cq{i}" for i in f.drag] + [f"_iv{i}" for i in f.stribeck] + [f"_id{i}" for i in f.dahl]
-        names += [f"{c}{j}" for c in ["_sl"] * f.dynamic + ["_kn", "_fd"] * f.curve for j in range(self.nu)]
+        drive = ["_sl"] * f.dynamic + ["_kn", "_fd"] * f.curve + ["_fl"] * f.capped
+        names += [f"{c}{j}" for c in drive for j in range(self.nu)]
         return tuple(names)
 
     @cached_property
@@ -128,11 +138,14 @@ class Layout:
         f, n, nu = self.flavour, range(self.n), range(self.nu)
         names = [f"q{i}" for i in n] + [f"v{i}" for i in n] + [f"y{i}" for i in f.dahl] + [f"s{i}" for i in f.dry]
         names += [f"oq{i}" for i in n] + [f"ov{i}" for i in n] + [f"oy{i}" for i in f.dahl]
-        names += [f"{c}{j}" for c in ("ua", "um", "ub", "gain", "off", "lim", "ff", "cn") for j in nu]
+        names += [
+            f"{c}{j}" for c in ("ua", "um", "ub", "gain", "off", "lim", "ff", "cn", *["gd"] * f.droop) for j in nu
+        ]
         if f.dynamic:
             names += [f"{c}{j}" for c in ("co", "fo", "w", "e", "ep", "th", "df") for j in nu] + ["di"]
             more = ["gs", "ge"] * f.gate + ["ona", "onm", "onb"] * (f.gate and f.curve)
             more += ["dc", "ds", "zn", "zo", "dma", "dmm", "dmb"] * f.damping
+            more += ["dr", "yn", "yo"] * f.rising
             more += ["csa", "csm", "csb"] * (f.damping and f.curve)
             more += ["bk", "vp", "rt", "re", "rh", "bka", "bkm", "bkb"] * f.relaxation
             names += [f"{c}{j}" for c in more for j in nu]
@@ -203,10 +216,11 @@ def choose(
     moving = [j for j in derived.joints if derived.coordinates[j.coordinate] not in held]
     gate, damping, curve, dynamic = (
         any(on(f"actuator.{a}") for a in names)
-        for names in (("start", "end"), ("damping", "standby"), ("fade",), ("lag", "delay", "slope"))
+        for names in (("start", "end"), ("damping", "standby", "damping_rise"), ("fade",), ("lag", "delay", "slope"))
     )
     curve = (curve or damping) and on("actuator.knee")
     relaxation = damping and on("actuator.relaxation")
+    capped = on("actuator.force_limit")
     rough = [j for j in moving if on(j.coulomb) or on(j.stiction)]
     return Flavour(
         dry=tuple(j.coordinate for j in rough if not on(j.presliding)),
@@ -214,11 +228,14 @@ def choose(
         stribeck=tuple(j.coordinate for j in rough if on(j.stribeck_speed)),
         drag=tuple(j.coordinate for j in moving if on(j.quadratic)),
         held=tuple(i for i, c in enumerate(derived.coordinates) if c in held),
-        dynamic=dynamic or gate or damping or curve or (loop is not None and loop.delay > 0.0),
+        dynamic=dynamic or gate or damping or curve or capped or (loop is not None and loop.delay > 0.0),
         gate=gate,
         damping=damping,
         relaxation=relaxation,
         curve=curve,
+        capped=capped,
+        rising=on("actuator.damping_rise"),
+        droop=on("actuator.droop"),
         loop=None if loop is None else loop.compiled_in,
         record=record,
     )

@@ -49,6 +49,8 @@ def start(w: Writer) -> None:
     for j in range(p.nu):
         for k, name in enumerate(("gain", "off", "lim")):
             w.add(f"{{{name}{j}}} = P[{first + k * p.nu + j}, _m]")
+        if f.droop:
+            w.add(f"{{gd{j}}} = P[{first + list(ACTUATOR).index('actuator.droop') * p.nu + j}, _m]")
         if f.dynamic:
             _actuator(w, j, first)
     law = first + len(ACTUATOR) * p.nu
@@ -77,7 +79,7 @@ def _actuator(w: Writer, j: int, first: int) -> None:
     )
     begin(w, j, row)
     if loop:
-        w.add(f"{{w{j}}} = {{gain{j}}} * {{off{j}}}")
+        w.add(*_asked(w, j, f"{{w{j}}}", "0.0"))
         return
     # settle the lag on the input before the first sample, which is held where the record does not reach
     w.add(
@@ -91,7 +93,7 @@ def _actuator(w: Writer, j: int, first: int) -> None:
             f"_z = U[min(max(START[_m] + _k - int({{di}}) - {back}, 0), _last), {j}] if _last >= 0 else 0.0",
             f"_z = {{lim{j}}} if _z > {{lim{j}}} else _z",
             f"_z = 0.0 - {{lim{j}}} if _z < 0.0 - {{lim{j}}} else _z",
-            f"{name} = {{gain{j}}} * (_z + {{off{j}}})",
+            *_asked(w, j, name, "_z"),
         )
     w.add(
         "if _k == -_n - 1:",
@@ -119,7 +121,14 @@ def prescribed(w: Writer) -> None:
 
 def _clip(w: Writer, j: int, name: str) -> None:
     w.add(f"_c = {{lim{j}}} if _c > {{lim{j}}} else _c", f"_c = 0.0 - {{lim{j}}} if _c < 0.0 - {{lim{j}}} else _c")
-    w.add(f"{{{name}{j}}} = {{gain{j}}} * (_c + {{off{j}}})")
+    w.add(*_asked(w, j, f"{{{name}{j}}}", "_c"))
+
+
+def _asked(w: Writer, j: int, name: str, command: str) -> list[str]:
+    """Lines for the force asked of input `j` by a command."""
+    if not w.p.flavour.droop:
+        return [f"{name} = {{gain{j}}} * ({command} + {{off{j}}})"]
+    return [f"_z = {command} + {{off{j}}}", f"{name} = {{gain{j}}} * _z / (1.0 + {{gd{j}}} * abs(_z))"]
 
 
 def _feed(w: Writer, back: tuple[tuple[str, str], ...]) -> None:
@@ -172,7 +181,7 @@ def controller(w: Writer) -> None:
                 gap = back if name == "cn" else "int({di}) + 1"
                 w.add(f"_slot = (_k - ({gap})) % _nbuf", f"_c = W[{place}]", f"_c = _c if _k >= {gap} else 0.0")
                 commanded(w, j, name[1])
-                w.add(f"{{{name}{j}}} = {{gain{j}}} * (_c + {{off{j}}})")
+                w.add(*_asked(w, j, f"{{{name}{j}}}", "_c"))
 
 
 def _encoder(w: Writer, i: int) -> None:
