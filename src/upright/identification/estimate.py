@@ -21,9 +21,9 @@ from upright.identification.inference.poles import poles
 from upright.identification.inference.scoring import GOOD, fit_percent, judge, predict, score
 from upright.identification.ladder.growth import choose_friction
 from upright.identification.model.fit import Estimate, Fit, Pole, RunScore
-from upright.identification.model.rig import Rig
+from upright.identification.model.rig import Rig, neutral
 from upright.identification.model.runs import Run
-from upright.identification.problem.residuals import Problem, formulate, unresolved
+from upright.identification.problem.residuals import Problem, formulate, unreached, unresolved
 from upright.identification.problem.simulated import with_noise
 from upright.identification.problem.trips import located, unasked_trips
 from upright.identification.search.descent import Descent, SearchLog, descend, descend_progressively, first_horizon
@@ -33,6 +33,7 @@ from upright.identification.search.strategy import (
     closed_form_starts,
     other_moments,
     other_valleys,
+    reached_limits,
     search,
     settle_weights,
     simplex,
@@ -144,13 +145,15 @@ def _search(
             starts = [problem.place(s) for s in closed_form_starts(rig, runs)]
             other = search(problem, starts, log, patient=False) if starts else found
             found = better(found, other)
-    found = other_moments(problem, found, log)
+    found = settle_weights(problem, other_moments(problem, found, log))
+    found = reached_limits(problem, found, log)
     log.unresolved = () if found.interrupted else unresolved(problem, found.x)
-    if log.unresolved:  # kept at their bound they would bias everything else
-        whole = formulate(problem.rig.without(log.unresolved), runs)
+    log.unreached = () if found.interrupted else unreached(problem, found.x)
+    if log.unresolved or log.unreached:  # kept at their bound they would bias everything else, or what is predicted
+        whole = formulate(problem.rig.without((*log.unresolved, *log.unreached)), runs)
+        whole.weigh_like(problem)
         found = descend_progressively(whole, whole.place(problem.values_at(found.x)), log, horizon=math.inf)
-        problem = whole
-    found = settle_weights(problem, found)
+        problem, found = whole, settle_weights(whole, found)
     found = other_valleys(problem, found, log)
     if found.interrupted:  # perhaps over a part of the runs
         found = replace(found, normal=problem.normal(found.x))
@@ -192,9 +195,13 @@ def _conclude(asked: Rig, runs: Sequence[Run], problem: Problem, found: Descent,
     left_out = [n for n in asked.estimated if n not in problem.rig.estimated]
     for name in left_out:
         unit = asked.parameters[name].unit
-        estimates[name] = Estimate(value=0.0, stderr=0.0, interval=(0.0, 0.0), unit=unit, status="left out")
+        value = neutral(asked.plant, name)
+        estimates[name] = Estimate(value=value, stderr=0.0, interval=(value, value), unit=unit, status="left out")
         warnings.append(
-            f"{name} was left out: shorter than the encoder's rounding, it is plain Coulomb friction."
+            f"{name} was left out: no fitted run reaches it, so a run that goes further may be limited where this "
+            "model says it is not."
+            if name in log.unreached
+            else f"{name} was left out: shorter than the encoder's rounding, it is plain Coulomb friction."
             if name in log.unresolved
             else f"{name} was left out: with it the held-out part of the runs is not predicted better."
         )

@@ -97,9 +97,7 @@ def actuator_unit(plant: type[Plant], name: str, drive_unit: str) -> str:
         "force per speed": braking,
         "force": force,
         "per command": f"1/{drive}" if drive != "1" else "1",
-        "force per speed per command": per(force, f"{place}/s")
-        if drive == "1"
-        else f"{per(force, f'{place}/s')}/{drive}",
+        "force per speed per command": braking if drive == "1" else f"{braking}/{drive}",
     }[ACTUATOR[name].unit]
 
 

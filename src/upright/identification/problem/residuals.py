@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model.rig import Rig, base_values
+from upright.identification.model.rig import Rig, base_values, neutral
 from upright.identification.model.runs import Run
 from upright.identification.problem.normal_equations import Normal, finite, mixed, products, squares
 from upright.identification.problem.restarts import PERTURBATION, Restart, settle
@@ -21,6 +21,7 @@ from upright.identification.problem.simulated import motions, outputs, restart_s
 from upright.identification.problem.tracks import Track, prepare
 from upright.identification.problem.unknowns import (
     CHANGES,
+    FAR,
     Setting,
     Unknown,
     friction_names,
@@ -36,6 +37,9 @@ Array = NDArray[np.float64]
 
 ROUNDING = 12**-0.5
 """Standard deviation of the rounding to steps of one."""
+
+SAME = 1e-4
+"""Relative rise of the cost that tells nothing."""
 
 NOTICED = 0.2
 """A weight that changes by less, of its logarithm, moves no estimate by what matters."""
@@ -401,6 +405,19 @@ def unresolved(problem: Problem, x: Array) -> tuple[str, ...]:
         for u, value in zip(problem.unknowns, problem.value(x), strict=True)
         if u.asked and u.name in least and u.lower == least[u.name] and value <= u.lower * (1 + 1e-6)
     )
+
+
+def unreached(problem: Problem, x: Array) -> tuple[str, ...]:
+    """Limits at coordinates `x` that no run reaches: knees and largest forces without which the cost is the same."""
+    plant, cost = problem.rig.plant, problem.cost(x)
+    found: list[str] = []
+    for i, u in enumerate(problem.unknowns):
+        if u.asked and u.shared and u.log and math.isinf(neutral(plant, u.name)):
+            beyond = x.copy()
+            beyond[i] = min(x[i] + math.log(FAR), problem.upper[i])
+            if problem.cost(beyond) <= cost * (1 + SAME):
+                found.append(u.name)
+    return tuple(found)
 
 
 def _shortest(rig: Rig, runs: Sequence[Run]) -> dict[str, float]:

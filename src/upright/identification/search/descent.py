@@ -37,9 +37,9 @@ class SearchLog:
     """What happened on the way: stages with their cost and simulations, and the best so far should one interrupt.
 
     `best` holds the problem last worked on and where in it the search stood, `lower` coordinates of a lower cost met
-    since, `rivals` values of another model that the data do not refuse, `unresolved` lengths below the rounding.
-    `conventions` says which signs and zeros look wrong; asked only when a fit is poor, since no search mends a reversed
-    sign.
+    since, `rivals` values of another model that the data do not refuse, `unresolved` lengths below the rounding and
+    `unreached` limits. `conventions` says which signs and zeros look wrong; asked only when a fit is poor, since no
+    search mends a reversed sign.
     """
 
     progress: Progress = silent
@@ -49,6 +49,7 @@ class SearchLog:
     warnings: list[str] = field(default_factory=list[str])
     rivals: dict[str, float] = field(default_factory=dict[str, float])
     unresolved: tuple[str, ...] = ()
+    unreached: tuple[str, ...] = ()
     conventions: Callable[[], Sequence[str]] = tuple
 
     def tell(self, stage: str, share: float, cost: float, problem: Problem) -> None:

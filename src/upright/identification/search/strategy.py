@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from upright.identification.model.rig import Rig
 from upright.identification.model.runs import Run
 from upright.identification.problem.normal_equations import pseudo_inverse
-from upright.identification.problem.residuals import NOTICED, Problem, noise_level
+from upright.identification.problem.residuals import NOTICED, SAME, Problem, noise_level, unreached
 from upright.identification.search.descent import (
     WORTH,
     Descent,
@@ -264,6 +264,39 @@ def _errors(problem: Problem, found: Descent) -> Array:
     """Standard errors (n,) of the coordinates, for residuals with the memory that they have."""
     variance = np.diag(pseudo_inverse(found.normal.matrix)) * noise_level(problem, found.x) ** 2
     return np.sqrt(np.maximum(variance, 0.0))
+
+
+BITES = (0.95, 0.8, 0.6)
+"""Shares of the least value that still does nothing, from which a limit that no run reached is sought once more."""
+
+
+LUCK = 10.8
+"""Squared residuals, of independent ones, by which a number that does nothing lowers the cost once in 1000 times."""
+
+
+def reached_limits(problem: Problem, found: Descent, log: SearchLog) -> Descent:
+    """The optimum after every limit that does nothing was tried where it begins to.
+
+    Beyond what a run reaches the cost is flat, so that no descent comes back from there.
+    """
+    for name in () if found.interrupted else unreached(problem, found.x):
+        place = next(i for i, u in enumerate(problem.unknowns) if u.name == name)
+        lanes = np.repeat(found.x[:, None], 40, axis=1)
+        lanes[place] = np.maximum(lanes[place] + math.log(0.85) * np.arange(40), problem.lower[place])
+        costs = np.sum([_costs(problem, k, lanes) for k in range(len(problem.tracks))], axis=0)
+        idle = np.flatnonzero(costs <= costs[0] * (1 + SAME))
+        for share in BITES:
+            x = found.x.copy()
+            x[place] = max(lanes[place, idle[-1]] + math.log(share), problem.lower[place])
+            problem.settle_steps(x)
+            other = _from(problem, x, found)
+            if other.interrupted:
+                return replace(found, interrupted=True)
+            if other.normal.cost < found.normal.cost - LUCK * noise_level(problem, other.x) ** 2:
+                log.note(f"{name} reached", other.normal.cost, problem)
+                found, log.best = other, (problem, other.x)
+                break
+    return found
 
 
 MOMENTS = ("input_start", "input_end")
