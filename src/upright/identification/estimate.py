@@ -31,6 +31,7 @@ from upright.identification.search.strategy import (
     POOR,
     better,
     closed_form_starts,
+    explains_nothing,
     other_moments,
     other_valleys,
     reached_limits,
@@ -187,7 +188,13 @@ def _conclude(asked: Rig, runs: Sequence[Run], problem: Problem, found: Descent,
     best = assess(problem, found.x)
     seen = identifiability(best)
     warnings = list(log.warnings)
-    estimates = shared_estimates(best, seen.hidden, log, profiles=not found.interrupted)
+    nothing = explains_nothing(problem, found)
+    if nothing and not found.interrupted:
+        warnings.append(
+            "The search stopped after its first pass, because the model explains less than half of how the signals "
+            "vary; intervals come from standard errors. Look at units, signs and the plant first."
+        )
+    estimates = shared_estimates(best, seen.hidden, log, profiles=not (found.interrupted or nothing))
     per_run, groups = run_estimates(best)
     for name, value in log.rivals.items():
         e = widened(estimates[name], (value, value))
