@@ -28,6 +28,8 @@ from upright.identification.problem.simulated import with_noise
 from upright.identification.problem.trips import located, unasked_trips
 from upright.identification.search.descent import Descent, SearchLog, descend, descend_progressively, first_horizon
 from upright.identification.search.strategy import (
+    ATTEMPTS,
+    FEW,
     POOR,
     better,
     closed_form_starts,
@@ -155,7 +157,7 @@ def _search(
         whole.weigh_like(problem)
         found = descend_progressively(whole, whole.place(problem.values_at(found.x)), log, horizon=math.inf)
         problem, found = whole, settle_weights(whole, found)
-    found = other_valleys(problem, found, log)
+    found = other_valleys(problem, found, log, attempts=ATTEMPTS if near is None else FEW)
     if found.interrupted:  # perhaps over a part of the runs
         found = replace(found, normal=problem.normal(found.x))
     return problem, found

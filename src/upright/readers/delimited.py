@@ -21,15 +21,16 @@ _FIRST = 200  # lines that names and remarks may take
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?|[+-]?(?:nan|inf|infinity)"
 
 
-def layout(source: Source) -> TextTable:
-    """Names, delimiter and rows of a table.
+def layout(source: Source, text: str | None = None) -> TextTable:
+    """Names, delimiter and rows of a table, of its `text` without what ends its rows where that is given.
 
     Raises
     ------
     BadInput
         When no line begins with a number, or a name stands above two columns.
     """
-    lines = _first_lines(source.text)
+    text = source.text if text is None else text
+    lines = _first_lines(text)
     first = next((i for i, line in enumerate(lines) if begins_with_number(line)), -1)
     if first < 0:
         raise source.bad(
@@ -40,6 +41,8 @@ def layout(source: Source) -> TextTable:
     above = [i for i in range(first) if lines[i].strip()]
     candidates = [lines[i].strip() for i in above]
     delimiter = _delimiter(lines[first], candidates[-1] if candidates else "")
+    if delimiter and _trails(lines[first], candidates[-1] if candidates else "", delimiter):
+        return layout(source, re.sub(rf"{re.escape(delimiter)}[ \t]*$", "", text, flags=re.MULTILINE))
     width = len(lines[first].split(delimiter))
     names = _split(re.sub(r"^[#%]+\s*", "", candidates[-1]), delimiter) if candidates else []
     if names and len(names) != width and not candidates[-1].startswith(("#", "%")):
@@ -61,7 +64,7 @@ def layout(source: Source) -> TextTable:
     comma = delimiter in (";", "\t", None) and "," in lines[first] and "." not in lines[first]
     return TextTable(
         source=source,
-        text=source.text,
+        text=text,
         start=sum(len(line) + 1 for line in lines[:first]),
         names=tuple(names),
         delimiter=delimiter,
@@ -144,6 +147,14 @@ def _delimiter(row: str, header: str) -> str | None:
             return delimiter
     decimal = re.fullmatch(r"\s*[+-]?\d+,\d+(\s+[+-]?\d+,\d+)*\s*", row) and "," not in header and row.count(",") > 1
     return "," if "," in row and not decimal else None
+
+
+def _trails(row: str, header: str, delimiter: str) -> bool:
+    """Whether rows end with a delimiter that no further column follows; a last column left empty has a name."""
+    if not row.rstrip(" ").endswith(delimiter) or delimiter == "\t":
+        return False
+    names = header.rstrip(" ").split(delimiter)
+    return not names[-1].strip() or len(names) < len(row.split(delimiter))
 
 
 def _split(line: str, delimiter: str | None) -> list[str]:

@@ -73,10 +73,15 @@ def read(source: Source) -> Record:
         return _written_by_us(source, content)
     found = _pieces(source, content) or _structures(content) or _vectors(source, content)
     if found is None or not found[1]:
+        found = _vectors(source, _lifted(content)) or _table(content)
+    if found is None or not found[1]:
+        objects = any(isinstance(value, Unreadable) and value.kind == "object" for value in content.values())
+        save = "; of a timeseries x, in MATLAB: t = x.Time; y = squeeze(x.Data); save('log.mat', 't', 'y', '-v7')"
         raise source.bad(
             "expected a log with a time vector and signals of the same length, got only parameters: "
             + (", ".join(f"{name} ({_shape(value)})" for name, value in list(content.items())[:8]) or "nothing")
             + "; a log needs a vector called t or time"
+            + save * objects
         )
     t, signals, notes = found
     advice = "remove the sample or read each run on its own"
@@ -287,6 +292,32 @@ def _vectors(source: Source, content: Variables) -> Signals | None:
     return t, signals, notes
 
 
+def _lifted(content: Variables) -> Variables:
+    """The variables with the fields of structures beside them, under their own names where these are free."""
+    found = {name: value for name, value in content.items() if not isinstance(value, dict)}
+    for name, value in content.items():
+        for field, item in value.items() if isinstance(value, dict) else ():
+            found[field if field not in found else f"{name}_{field}"] = item
+    return found
+
+
+EVEN = 0.2
+"""Largest spread of the steps of a column, as a share of their mean, that is taken for a time without being named."""
+
+
+def _table(content: Variables) -> Signals | None:
+    """Columns of the one matrix whose first column, or row, increases evenly as a time does."""
+    for name, value in content.items():
+        if not isinstance(value, np.ndarray) or value.ndim != 2 or min(value.shape) < 2 or max(value.shape) < 10:
+            continue
+        table = value if value.shape[0] > value.shape[1] else value.T
+        t, steps = table[:, 0], np.diff(table[:, 0])
+        if np.isfinite(t).all() and steps.min() > 0 and steps.std() < EVEN * steps.mean():
+            columns = {f"{name}_{j}": x for j, x in enumerate(table.T[1:], start=2)}
+            return t, columns, [f"Column 1 of '{name}' increases evenly, so it is the time."]
+    return None
+
+
 def _structures(content: Variables) -> Signals | None:
     """Simulink's structures with time; those on the time base of the longest."""
     runs: list[tuple[str, Array, dict[str, Array]]] = []
@@ -367,8 +398,8 @@ def _settings(content: Variables) -> Iterator[str]:
     """Notes on scalars, text and flat structures of settings."""
     for name, value in content.items():
         if isinstance(value, dict) and "signals" not in value:
-            flat = {key: _plain(item) for key, item in value.items()}
-            yield f"{name}: {', '.join(f'{key} = {item}' for key, item in flat.items() if item)}."
+            if told := [f"{key} = {text}" for key, item in value.items() if (text := _plain(item))]:
+                yield f"{name}: {', '.join(told)}."
         elif _plain(value):
             yield f"{name} = {_plain(value)}."
         elif isinstance(value, Unreadable):

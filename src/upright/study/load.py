@@ -23,6 +23,7 @@ from upright.identification.problem.simulated import with_noise
 from upright.physics import Plant
 from upright.physics.actuator import ACTUATOR
 from upright.records import Array, Record
+from upright.study.clock import check_clock
 from upright.study.keys import names
 from upright.study.loop import Scene, read_loop, state_units
 from upright.study.rig import known_values, read_plant, read_rig
@@ -216,6 +217,8 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
     record = log(run)
     if record.t[0] > _EPOCH:
         record = record.replace(t=record.t - record.t[0])
+    with run.at("file"):
+        check_clock(record)
     hash_of = record.provenance.sha256[:12]
     notes: list[str] = [f"{Path(record.provenance.file).name}{f' (sha256 {hash_of})' if hash_of else ''}"]
     if "window" in run:

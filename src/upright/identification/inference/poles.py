@@ -17,6 +17,10 @@ STEP = 1e-4
 """Share of a standard error by which parameters are moved to see how the poles follow."""
 
 
+SPLIT = 1e-6
+"""Imaginary parts below this share of the largest pole are rounding."""
+
+
 def poles(
     rig: Rig, values: Mapping[str, float], names: list[str], covariance: Array, quantile: float
 ) -> dict[str, tuple[Pole, ...]]:
@@ -75,4 +79,6 @@ def _poles(rig: Rig, values: Mapping[str, float], at: str) -> NDArray[np.complex
         i = driven[source.on]
         A[:, 2 * i + 1] -= linear.B[:, k] * values.get("actuator.slope", 0.0)
     found = np.linalg.eigvals(A).astype(np.complex128)
+    # rounding splits a double pole, as that of a free body, by the root of what it is
+    found.imag[np.abs(found.imag) < SPLIT * np.abs(found).max(initial=0.0)] = 0.0
     return found[np.lexsort((found.imag, -found.real))]

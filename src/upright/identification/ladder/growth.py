@@ -3,8 +3,8 @@
 A ladder stops early when one run predicts another no better than the model predicts both (`repeats`).
 
 Inside a fit its first rungs choose the friction model. `climb` refits all runs for every rung and asks whether the
-held-out error falls by more than chance; inside a fit there is no time for that: every rung is fitted once to two
-thirds of every run, and of all of them the one with the least squared error over the rest is taken.
+held-out error falls by more than chance; inside a fit there is no time for that: every rung is fitted to all runs, and
+of all of them the one is taken that predicts blocks of the runs best, a third of them left out in turn.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from upright.identification.model.rig import Rig, neutral
 from upright.identification.model.runs import FITTED_SHARE, LEAST_RUN, Run
 from upright.identification.problem.normal_equations import finite
 from upright.identification.problem.residuals import Problem, formulate, noise_level
+from upright.identification.problem.tracks import FOLDS
 from upright.identification.search.descent import (
     CREEP,
     Descent,
@@ -293,10 +294,10 @@ def _mean(percents: Percents) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class Candidate:
-    """A friction model fitted to some blocks of every run.
+    """A friction model fitted to every run.
 
     `values` are its numbers by key, those of single runs that ended at a bound left out, `noise` the level of its
-    residuals, `held_out` its mean squared residual over what it has not seen.
+    residuals, `held_out` the mean squared residual over blocks of the runs that were left out in turn.
     """
 
     rig: Rig
@@ -324,7 +325,6 @@ def choose_friction(rig: Rig, runs: Sequence[Run], log: SearchLog) -> tuple[Rig,
     for k, rung in enumerate(rungs):
         here = rig_at(rig, rungs, rungs[: k + 1])
         part = formulate(here, runs)
-        part.tracks = [track.hidden()[1] for track in part.tracks]
         starts = [part.place(s) for s in closed_form_starts(here, runs)]
         if tried:
             starts = [part.place(tried[-1].values | rung.seeds(rig)), *starts[:1]]
@@ -341,7 +341,7 @@ def choose_friction(rig: Rig, runs: Sequence[Run], log: SearchLog) -> tuple[Rig,
             log.warnings.append(stalled(rung.name, cost, tried[-1].cost))
         level, v = noise_level(part, found.x), part.value(found.x)
         values = {part.key(i): float(v[i]) for i, u in enumerate(part.unknowns) if u.shared or u.lower < v[i] < u.upper}
-        held_out = _held_out(here, runs, found.x)
+        held_out = _held_out(part, found.x)
         log.note(f"{rung.name}: held-out cost", held_out, part)
         tried.append(Candidate(rig=here, cost=cost, noise=level, values=values, held_out=held_out))
     k = min(range(len(tried)), key=lambda i: tried[i].held_out)
@@ -350,10 +350,10 @@ def choose_friction(rig: Rig, runs: Sequence[Run], log: SearchLog) -> tuple[Rig,
 
 
 def _note_rival(tried: Sequence[Candidate], left_out: Sequence[str], log: SearchLog) -> None:
-    """Note what a richer model would have said otherwise, where it explains its part of the runs better.
+    """Note what a richer model would have said otherwise, where it explains the runs better.
 
-    That the rest is predicted worse then means that something else is missing, not that the richer model is wrong.
-    The chosen model comes first.
+    That what is left out is predicted worse then means that something else is missing, not that the richer model is
+    wrong. The chosen model comes first.
     """
     chosen, rival = tried[0], min(tried, key=lambda c: c.cost)
     if chosen.cost - rival.cost <= by_chance(len(left_out), rival.noise):
@@ -364,20 +364,34 @@ def _note_rival(tried: Sequence[Candidate], left_out: Sequence[str], log: Search
             log.rivals[n] = b
     if log.rivals:
         log.warnings.append(
-            f"The fitted part of the runs is explained better with {', '.join(left_out)} (cost {rival.cost:.3g} "
-            f"against {chosen.cost:.3g}), the rest is predicted better without, so something else is missing from the "
-            f"model; until it is found, the intervals of {', '.join(log.rivals)} hold what both models say."
+            f"The runs are explained better with {', '.join(left_out)} (cost {rival.cost:.3g} against "
+            f"{chosen.cost:.3g}), what is left out of them is predicted better without, so something else is missing "
+            f"from the model; until it is found, the intervals of {', '.join(log.rivals)} hold what both models say."
         )
 
 
-def _held_out(rig: Rig, runs: Sequence[Run], x: Array) -> float:
-    """Mean squared residual of what the fit has not seen."""
-    whole = formulate(rig, runs)
+def _held_out(problem: Problem, x: Array) -> float:
+    """Mean squared residual over blocks of the runs, each fitted without them, from the optimum `x` of all.
+
+    Of runs too short to leave anything out the mean squared residual itself.
+    """
     total, samples = 0.0, 0
-    for index, track in enumerate(whole.tracks):
-        e, judges = whole.residuals(index, x), track.hidden()[0]
-        e = e[judges] if track.windowed else e[0].reshape(-1, len(track.columns))[judges[track.first :]]
-        # one run that slips a cycle should not outvote all others
-        total += float(np.sum(np.minimum(e * e, 4.0))) if finite(e) else 4.0 * e.size
-        samples += e.size
+    for fold in range(FOLDS):
+        parts = [track.hidden(fold) for track in problem.tracks]
+        if not any(judges.any() for judges, _ in parts):
+            return problem.cost(x) / max(problem.count(), 1)
+        part = replace(problem, tracks=[track for _, track in parts])
+        found = descend(part.normal, x, part.lower, part.upper, tolerance=REFIT, limit=10)
+        if found.interrupted:
+            raise KeyboardInterrupt
+        for index, (track, (judges, _)) in enumerate(zip(problem.tracks, parts, strict=True)):
+            e = problem.residuals(index, found.x)
+            e = e[judges] if track.windowed else e[0].reshape(-1, len(track.columns))[judges[track.first :]]
+            # one run that slips a cycle should not outvote all others
+            total += float(np.sum(np.minimum(e * e, 4.0))) if finite(e) else 4.0 * e.size
+            samples += e.size
     return total / max(samples, 1)
+
+
+REFIT = 1e-3
+"""Relative gain of the cost at which a fit that leaves something out has settled well enough."""

@@ -34,8 +34,8 @@ STEPS_PER_PERIOD = 120
 """Steps a free run is simulated with per period: RK4 is then off by less than 1e-6 per period."""
 
 
-BLOCKS = 9
-"""Blocks of a run of which every third judges a model fitted to the others."""
+BLOCKS, FOLDS = 9, 3
+"""Blocks of a run, of which every third judges a model fitted to the others, in turn."""
 
 ALIKE = 0.98
 """Correlation of two outputs from which on their difference, a tenth of the motion, would be drowned."""
@@ -175,14 +175,14 @@ class Track:
             return self.length
         return max(2, min(self.length, int(horizon / self.dt) + 1))
 
-    def hidden(self) -> tuple[NDArray[np.bool_], Track]:
+    def hidden(self, fold: int) -> tuple[NDArray[np.bool_], Track]:
         """Which samples, or windows, judge a model that was fitted to the others, and the run without them.
 
-        Every third of `BLOCKS` blocks, so that every regime of the run, driven or not, fast or slow, is on both sides.
-        A short run judges nothing.
+        Every `FOLDS`-th of `BLOCKS` blocks from number `fold` on, so that every regime of the run, driven or not, fast
+        or slow, is on both sides. A short run judges nothing.
         """
         count = self.restarts.size if self.windowed else self.length
-        judges = (np.arange(count) * BLOCKS // count) % 3 == 2
+        judges = (np.arange(count) * BLOCKS // count) % FOLDS == fold
         if self.run.t.size < LEAST_RUN or not judges.any():
             return np.zeros(count, dtype=bool), self
         if not self.windowed:

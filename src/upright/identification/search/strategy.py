@@ -193,6 +193,9 @@ ATTEMPTS = (6, 20)
 """Descents in a row from around an optimum that find no lower one, at least and at most, before it counts as the
 lowest; more than the least only as long as they are cheap, see `CHEAP`. A good fit (below `GOOD`) needs none."""
 
+FEW = (2, 6)
+"""The same where the search began at an optimum of nearly the same runs."""
+
 CHEAP = 1.5e8
 """Simulated numbers, perturbed lanes counted, that cost a few seconds."""
 
@@ -215,7 +218,9 @@ SHARE = 0.4
 """this share of every number that all runs share."""
 
 
-def other_valleys(problem: Problem, found: Descent, log: SearchLog, *, seed: int = 0) -> Descent:
+def other_valleys(
+    problem: Problem, found: Descent, log: SearchLog, *, attempts: tuple[int, int] = ATTEMPTS, seed: int = 0
+) -> Descent:
     """The lowest optimum met by descents from around the one found, every number moved by `AWAY` standard errors.
 
     Stiction, trips and cycles slipped fold the cost into valleys a few standard errors apart; of descents from one
@@ -226,23 +231,23 @@ def other_valleys(problem: Problem, found: Descent, log: SearchLog, *, seed: int
     if found.interrupted or found.normal.cost <= GOOD * problem.count():
         return found
     rng = np.random.default_rng(seed)
-    sigma, attempts = _errors(problem, found), 0
+    sigma, failed = _errors(problem, found), 0
     shares = [1.0 if u.log else max(abs(v), u.scale) for u, v in zip(problem.unknowns, found.x, strict=True)]
     far = SHARE * np.array([s if u.shared else 0.0 for u, s in zip(problem.unknowns, shares, strict=True)])
     begun, lanes = problem.evaluations, problem.count() / len(problem.tracks) * (found.x.size + 1)
-    while attempts < ATTEMPTS[0] or (attempts < ATTEMPTS[1] and (problem.evaluations - begun) * lanes < CHEAP):
-        sizes = [*(n * sigma for n in AWAY), far][attempts % 3]
+    while failed < attempts[0] or (failed < attempts[1] and (problem.evaluations - begun) * lanes < CHEAP):
+        sizes = [*(n * sigma for n in AWAY), far][failed % 3]
         away = sizes * rng.choice([-1.0, 1.0], found.x.size)
         x = np.clip(found.x + away, problem.lower, problem.upper)
         other = _from(problem, x, found)
-        attempts += 1
-        log.tell("another valley", attempts / ATTEMPTS[1], min(other.normal.cost, found.normal.cost), problem)
+        failed += 1
+        log.tell("another valley", failed / attempts[1], min(other.normal.cost, found.normal.cost), problem)
         if other.interrupted:
             return replace(found, interrupted=True)
         if other.normal.cost < (1 - WORTH) * found.normal.cost:
             other = descend(problem.normal, other.x, problem.lower, problem.upper, tolerance=1e-6, here=other.normal)
             log.note("another valley", other.normal.cost, problem)
-            found, log.best, attempts = other, (problem, other.x), 0
+            found, log.best, failed = other, (problem, other.x), 0
             sigma = _errors(problem, found)
     return found
 

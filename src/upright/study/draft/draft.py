@@ -7,6 +7,7 @@ from pathlib import Path
 
 from upright.readers.inspection import Inspection
 from upright.records import Record
+from upright.study.clock import check_clock
 from upright.study.draft.chain import chain_tables
 from upright.study.draft.chain_log import read_chain
 from upright.study.draft.pendulum import pendulum_tables
@@ -25,7 +26,13 @@ def draft(record: Record, seen: Inspection, log: Path, study: Path, *, plant: st
         Its file, and where the study will be written: the file is named relative to that.
     plant : str, optional
         Overrides the plant that the columns suggest.
+
+    Raises
+    ------
+    BadInput
+        When nothing moves, or the clock cannot be in seconds.
     """
+    check_clock(record)
     found = recognise(record, seen, plant)
     file = os.path.relpath(log.resolve(), study.resolve().parent).replace(os.sep, "/")
     if found.plant.startswith(("rectilinear", "torsional")):

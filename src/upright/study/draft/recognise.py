@@ -78,6 +78,8 @@ def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
         plant, doubt = _plant(found, drive)
         doubts += [doubt] if doubt else []
     columns, missing = _assign(find(plant), found)
+    degrees = [c.name for c in columns.values() if c.guess == "deg" and not c.unit]
+    doubts += [f"'{name}' swings to and fro by more than half a turn in rad: taken for degrees." for name in degrees]
     doubts += [f"No column was found for {name}; lock it, leave it unmeasured or name its column." for name in missing]
     last = record[list(columns.values())[-1].name]
     pushed = plant in ("cart-pendulum", "furuta") and len(columns) > 1
@@ -108,7 +110,7 @@ def position_columns(record: Record, seen: Inspection) -> list[Column]:
     kinds = ("rad", "m", "counts", "deg", "mm", "")
     found = [c for c in seen.columns if not (c.drive or c.constant or _lies(c, seen)) and c.guess in kinds]
     found = [c for c in found if not _RATE.search(c.name) and not _is_speed(record, c.name, [o.name for o in found])]
-    found = [_as_angle(record, c, seen) for c in found]
+    found = [_in_degrees(record, _as_angle(record, c, seen)) for c in found]
     found = [c for c in found if c.guess] or found
     span = {c.name: c.high - c.low for c in found}
     largest = {unit: max(span[c.name] for c in found if c.guess == unit) for unit in {c.guess for c in found}}
@@ -142,6 +144,19 @@ def _as_angle(record: Record, c: Column, seen: Inspection) -> Column:
         return c
     rest = rest_level(record[c.name], seen, record.t)
     return replace(c, guess="rad") if abs(abs(rest) - math.pi) < 0.1 else c
+
+
+def _in_degrees(record: Record, c: Column) -> Column:
+    """A column guessed to be an angle in rad that swings to and fro by more than half a turn is one in degrees."""
+    if c.unit or c.guess != "rad":
+        return c
+    x = record[c.name] - np.median(record[c.name])
+    far = x[np.abs(x) > math.pi]
+    return replace(c, guess="deg") if np.count_nonzero(np.diff(np.signbit(far))) >= TO_AND_FRO else c
+
+
+TO_AND_FRO = 4
+"""Passages from beyond half a turn on one side to beyond it on the other that no pendulum in rad makes."""
 
 
 def in_dac_counts(c: Column) -> bool:
@@ -219,10 +234,21 @@ def zero_reading(
     if drive is not None:
         u = record[drive.name]
         first = int(np.argmax(u != u[0]))
-        if u[0] == 0 and first >= 5:
-            return float(np.median(x[max(0, first - 50) : first]))
-        return float(x[np.searchsorted(record.t, window[0])]) if c.guess != "rad" else rest_level(x, seen, record.t)
+        before = x[max(0, first - 50) : first]
+        angle = c.guess in ("rad", "deg")
+        if u[0] == 0 and first >= 5 and not (angle and _moves(x[:first], x)):
+            return float(np.median(before))
+        return rest_level(x, seen, record.t) if angle else float(x[np.searchsorted(record.t, window[0])])
     return rest_level(x, seen, record.t)
+
+
+STILL = 0.05
+"""Share of how much a signal varies that it may vary by where it rests."""
+
+
+def _moves(before: Array, x: Array) -> bool:
+    """Whether a signal already moves before the first command, so that its place there is no zero."""
+    return float(np.ptp(before)) > STILL * float(np.ptp(x))
 
 
 def rest_level(x: Array, seen: Inspection, t: Array) -> float:
@@ -270,7 +296,10 @@ def moving_window(
 
 
 def moves_against(t: Array, u: Array, x: Array) -> bool:
-    """Whether the driven column moves against the first command."""
+    """Whether the driven column is accelerated against the command; against the first one where that does not tell."""
+    told = _pushed(t, u, x)
+    if told:
+        return told < 0
     live = np.flatnonzero(u != u[0])
     if not live.size:
         return False
@@ -280,6 +309,30 @@ def moves_against(t: Array, u: Array, x: Array) -> bool:
     moved = x[i : i + min(int(changes[0]) if changes.size else most, most)] - x[i]
     far = np.flatnonzero(np.abs(moved) > 0.03 * np.ptp(x))
     return bool(far.size and moved[far[0]] * (u[i] - u[0]) < 0)
+
+
+def _pushed(t: Array, u: Array, x: Array) -> float:
+    """Acceleration of a column per command, place, speed and dry friction allowed for; 0 when the data do not tell."""
+    step = max(float(np.median(np.diff(t))), float(t[-1] - t[0]) / 20_000)
+    grid = np.arange(t[0], t[-1], step)
+    width = max(7, int(0.05 / step) | 1)
+    if grid.size < 10 * width:
+        return 0.0
+    motion = savitzky_golay(np.interp(grid, t, x), step, width)
+    push = savitzky_golay(np.interp(grid, t, u), step, width).q
+    both = np.column_stack([push, motion.q, motion.v, np.sign(motion.v), np.ones_like(push)])[width:-width]
+    a, scale = motion.a[width:-width], np.abs(both).max(axis=0)
+    both = both[:, scale > 0] / scale[scale > 0]
+    if not scale[0] > 0:
+        return 0.0
+    slopes, *_ = np.linalg.lstsq(both, a, rcond=None)
+    alone, *_ = np.linalg.lstsq(both[:, 1:], a, rcond=None)
+    left, without = np.sum((a - both @ slopes) ** 2), np.sum((a - both[:, 1:] @ alone) ** 2)
+    return float(slopes[0]) if left < TOLD * without else 0.0
+
+
+TOLD = 0.9
+"""What accelerations are missed by with the command, over what without, at most, for its sign to be believed."""
 
 
 def swing_frequency(t: Array, x: Array) -> float:
