@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.io import savemat
 
 from tests.readers import logs
+from upright.errors import BadInput
 from upright.readers import read, read_source, recognise
 from upright.readers.resolution import rebuild
 from upright.readers.source import Source
@@ -227,3 +229,52 @@ def test_two_megabytes_are_read_in_half_a_second() -> None:
         read_source(source(data))
         best = min(best, perf_counter() - start)
     assert best < 0.5
+
+
+SWING_T = np.arange(200) * 0.01
+SWING = np.sin(6 * SWING_T) * np.exp(-0.2 * SWING_T)
+PUSH = np.sign(np.sin(SWING_T))
+
+
+def mat(**content) -> Record:
+    file = io.BytesIO()
+    savemat(file, content)
+    return read_source(source(file.getvalue(), "log.mat"))
+
+
+@pytest.mark.parametrize(
+    ("content", "names"),
+    [
+        ({"data": np.column_stack([SWING_T, SWING, PUSH])}, ("data_2", "data_3")),
+        ({"data": np.stack([SWING_T, SWING, PUSH])}, ("data_2", "data_3")),
+        ({"log": {"time": SWING_T, "theta": SWING, "u": PUSH}}, ("theta", "u")),
+        ({"time": SWING_T, "log": {"theta": SWING, "u": PUSH}}, ("theta", "u")),
+    ],
+    ids=["matrix", "matrix in rows", "structure with its time", "structure beside its time"],
+)
+def test_matlab_habits_beside_simulinks_are_read(content, names):
+    record = mat(**content)
+    assert record.names == names
+    np.testing.assert_allclose(record.t, SWING_T, rtol=0, atol=1e-12)
+    for name, x in zip(names, (SWING, PUSH), strict=True):
+        np.testing.assert_array_equal(record[name], x)
+
+
+def test_a_matrix_without_a_column_that_can_be_time_is_refused():
+    with pytest.raises(BadInput, match="needs a vector called t or time"):
+        mat(data=np.column_stack([SWING, PUSH, SWING_T**3 - SWING_T]))
+
+
+@pytest.mark.parametrize("header", ["t,theta,u,", "t,theta,u"])
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_a_delimiter_behind_the_last_column_is_no_column(header, newline):
+    rows = [f"{t:.2f},{x!r},{u:.0f}," for t, x, u in zip(SWING_T, SWING.tolist(), PUSH, strict=True)]
+    record = read_source(source(newline.join([header, *rows, ""]).encode()))
+    assert record.names == ("theta", "u")
+    np.testing.assert_array_equal(record["theta"], SWING)
+
+
+def test_a_last_column_that_is_named_and_left_empty_is_named_in_the_sentence():
+    rows = "\n".join(f"{t:.2f},{x:.6f}," for t, x in zip(SWING_T, SWING, strict=True))
+    with pytest.raises(BadInput, match=r"column 3 \(u\): expected a number, got an empty cell"):
+        read_source(source(f"t,theta,u\n{rows}\n".encode()))

@@ -10,6 +10,7 @@ import pytest
 from upright.errors import BadInput
 from upright.readers import inspect, read
 from upright.study.draft.draft import draft
+from upright.study.draft.recognise import moves_against
 from upright.study.load import load_study
 
 G = 9.81
@@ -159,3 +160,43 @@ def test_a_nameless_column_that_only_switches_is_the_command(drafted):
     assert study.plant == "rectilinear-1"
     assert '[drive]\ncolumn = "c1"' in text
     assert "Column 'c2' says neither unit nor kind" in text
+
+
+def test_an_angle_that_swings_by_more_than_half_a_turn_is_in_degrees(drafted):
+    text, study = drafted(theta=np.degrees(4 * SWING))
+    assert study.rig.parameters["l_cg"].value == pytest.approx(LENGTH, rel=0.1)  # 0.8 rad lengthens it by 4 %
+    at = np.interp(study.runs[0].t, T, 4 * SWING)
+    np.testing.assert_allclose(study.runs[0].y[:, 0], at, atol=0.02)
+    assert "taken for degrees" in text
+
+
+def pushed(sign: float, *, moving: bool) -> tuple[np.ndarray, np.ndarray]:
+    """A cart that volts push along `sign`, and those volts, on for two seconds in every three; it may move before."""
+    u = np.where((T % 3.0 < 2.0) & (T > 1.0), 1.0 - 2.0 * ((T // 3) % 2), 0.0)
+    x, v, out = 0.0, (-0.3 * sign if moving else 0.0), []
+    for push in u:  # damped, with steps far below the time constant of 0.5 s
+        out.append(x)
+        for _ in range(10):
+            v += 1e-3 * (0.5 * sign * push - 2.0 * v)
+            x += 1e-3 * v
+    return u, np.array(out)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("moving", [False, True])
+def test_the_sign_of_the_drive_is_that_of_the_acceleration(sign, moving):
+    # a cart that still rolls the other way when the first command comes would tell the opposite
+    u, x = pushed(sign, moving=moving)
+    assert moves_against(T, u, x) == (sign < 0)
+
+
+def test_the_place_of_a_pendulum_that_moves_when_the_command_comes_is_not_its_zero(drafted):
+    u = np.where((T > 0.2) & (T < 1.0), 1.0, 0.0)  # it swings from the start, at 0.06 rad when the command comes
+    _, study = drafted(theta=SWING + 0.5, u=u)
+    at = np.interp(study.runs[0].t, T, SWING)
+    np.testing.assert_allclose(study.runs[0].y[:, 0], at, atol=0.02)
+
+
+def test_a_clock_in_microseconds_is_told_not_fitted(drafted):
+    with pytest.raises(BadInput, match=r"every 2 s, got one every 1e\+04 s; its clock may count microseconds"):
+        drafted(t=1e6 * T, theta=SWING)

@@ -98,7 +98,8 @@ def outliers(fit: Fit, rig: Rig, runs: Sequence[Run]) -> tuple[Outlier, ...]:
         The model; `rig` is what it was asked about.
     runs : sequence of Run
         Those that were fitted and any others of the same rig. A run under a loop is only searched for spikes, since
-        what its law remembers is not in the log.
+        what its law remembers is not in the log; so is a predicted one with numbers of its own, since those are not in
+        the fit.
     """
     found: list[Outlier] = []
     seen: list[Stretches] = []
@@ -107,7 +108,12 @@ def outliers(fit: Fit, rig: Rig, runs: Sequence[Run]) -> tuple[Outlier, ...]:
         clean, jumped = without_spikes(run)
         if jumped:
             found.append(_spiky(run, jumped))
-        halves = None if run.loop is not None else half_swings(known, clean, _estimated_for(fit, run))
+        own = _estimated_for(fit, run)
+        wanted = {name for name in (*run.unknown, *run.shared) if name != "initial"}
+        blind = run.loop is not None or not {name.partition(".")[0] for name in wanted} <= {
+            n.partition(".")[0] for n in own
+        }
+        halves = None if blind else half_swings(known, clean, own)
         if halves is not None:
             seen.append(halves)
     spread = _spread([s.run for s in seen])
@@ -201,6 +207,8 @@ def _strange(s: Stretches, others: Sequence[Stretches], spread: Mapping[str, flo
         here = slice(first, last + 1)
         size = np.where(np.isfinite(times[here]), times[here], 0.0).max()
         told = f"missed {size:.0f} times as much as the other stretches"
+        if size < FAR:  # far by the resolution or the signal's size alone
+            told = "missed, and the other stretches are not"
         lasting, grown = _lasts(s, first, last)
         if lasting:
             reason, told = SELF_EXCITED, f"{grown}; {told}"
