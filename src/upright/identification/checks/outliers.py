@@ -109,10 +109,8 @@ def outliers(fit: Fit, rig: Rig, runs: Sequence[Run]) -> tuple[Outlier, ...]:
         if jumped:
             found.append(_spiky(run, jumped))
         own = _estimated_for(fit, run)
-        wanted = {name for name in (*run.unknown, *run.shared) if name != "initial"}
-        blind = run.loop is not None or not {name.partition(".")[0] for name in wanted} <= {
-            n.partition(".")[0] for n in own
-        }
+        missing = {*run.unknown, *run.shared} - {"initial", *own}
+        blind = run.loop is not None or (run.role != "fit" and missing)
         halves = None if blind else half_swings(known, clean, own)
         if halves is not None:
             seen.append(halves)

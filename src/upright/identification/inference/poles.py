@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,12 +63,18 @@ def poles(
         found[at] = tuple(
             Pole(
                 real=Estimate.within(float(p.real), float(a), quantile * float(a), "1/s"),
-                imag=Estimate.within(float(p.imag), float(b), quantile * float(b), "rad/s"),
+                imag=_upper(float(p.imag), float(b), quantile),
             )
             for p, a, b in zip(here, *errors, strict=True)
             if p.imag >= 0
         )
     return found
+
+
+def _upper(value: float, stderr: float, quantile: float) -> Estimate:
+    """Imaginary part of the upper pole of a pair: none lies below the real axis."""
+    plain = Estimate.within(value, stderr, quantile * stderr, "rad/s")
+    return replace(plain, interval=(max(plain.interval[0], 0.0), plain.interval[1]))
 
 
 def _poles(rig: Rig, values: Mapping[str, float], at: str) -> NDArray[np.complex128]:

@@ -143,6 +143,8 @@ def _feed(w: Writer, back: tuple[tuple[str, str], ...]) -> None:
 def command(w: Writer) -> None:
     """Open loop: command, limit, offset and gain."""
     p, f = w.p, w.p.flavour
+    if not p.nu:
+        return
     now = "START[_base + _i] + _k"
     w.add("if _last >= 0:")
     w.depth += 1
