@@ -13,6 +13,7 @@ FAMILIES = {
     "Pendulums": ("pendulum", "cart-pendulum", "furuta"),
     "Carts on a rail": ("rectilinear-2",),
     "Disks on a shaft": ("torsional-2",),
+    "Two links": ("double-pendulum", "double-pendulum-absolute", "flexible-link"),
 }
 _HEAD = """# Nomenclature
 

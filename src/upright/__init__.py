@@ -16,7 +16,8 @@ Every verb of the command line, `upright NAME`, stands here under the same name 
 
 ==========  ==================================================================================================
 Log         read, show, doctor, init, law; Record
-Model       identify, predict, ladder, frequency, loadings, plan_inertias; Pendulum, CartPendulum, Furuta, chain
+Model       identify, predict, ladder, frequency, loadings, plan_inertias
+Plants      Pendulum, CartPendulum, Furuta, DoublePendulum, DoublePendulumAbsolute, FlexibleLink, chain
 Control     place, lqr, simulate, chance, design, regulate, swing_up, track; Law, Rule
 Course      lab, reproduce, survey
 Own plants  Plant, Coordinate, Input, Joint, quantity
@@ -34,7 +35,19 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from upright.errors import BadInput, ImpossiblePhysics, NotIdentifiable, UprightError
     from upright.laws import Law, Rule
-    from upright.physics import CartPendulum, Coordinate, Furuta, Input, Joint, Pendulum, Plant, chain
+    from upright.physics import (
+        CartPendulum,
+        Coordinate,
+        DoublePendulum,
+        DoublePendulumAbsolute,
+        FlexibleLink,
+        Furuta,
+        Input,
+        Joint,
+        Pendulum,
+        Plant,
+        chain,
+    )
     from upright.quantities import quantity
     from upright.records import Record
     from upright.verbs.chance import chance
@@ -51,7 +64,19 @@ __version__ = "0.1.0"
 _HOMES = {
     "errors": ("BadInput", "ImpossiblePhysics", "NotIdentifiable", "UprightError"),
     "laws": ("Law", "Rule"),
-    "physics": ("CartPendulum", "Coordinate", "Furuta", "Input", "Joint", "Pendulum", "Plant", "chain"),
+    "physics": (
+        "CartPendulum",
+        "Coordinate",
+        "DoublePendulum",
+        "DoublePendulumAbsolute",
+        "FlexibleLink",
+        "Furuta",
+        "Input",
+        "Joint",
+        "Pendulum",
+        "Plant",
+        "chain",
+    ),
     "quantities": ("quantity",),
     "records": ("Record",),
     "verbs.chance": ("chance",),
@@ -66,7 +91,8 @@ _HOMES = {
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
-    "BadInput", "CartPendulum", "Coordinate", "Furuta", "ImpossiblePhysics", "Input", "Joint", "Law", "NotIdentifiable",
+    "BadInput", "CartPendulum", "Coordinate", "DoublePendulum", "DoublePendulumAbsolute", "FlexibleLink", "Furuta",
+    "ImpossiblePhysics", "Input", "Joint", "Law", "NotIdentifiable",
     "Pendulum", "Plant", "Record", "Rule", "UprightError", "__version__", "chain", "chance", "design", "doctor",
     "frequency", "identify", "init", "lab", "ladder", "law", "loadings", "lqr", "place", "plan_inertias", "predict",
     "quantity", "read", "regulate", "reproduce", "show", "simulate", "survey", "swing_up", "track",

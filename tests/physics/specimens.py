@@ -6,7 +6,7 @@ MuJoCo knows bodies, joints and springs, none of our equations.
 from dataclasses import dataclass
 from pathlib import Path
 
-from upright.physics import CartPendulum, Furuta, Pendulum, Plant, chain, find
+from upright.physics import CartPendulum, DoublePendulum, FlexibleLink, Furuta, Pendulum, Plant, chain, find
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "plants"
 G = 9.81
@@ -100,7 +100,23 @@ def double_pendulum() -> Specimen:
     return Specimen(plant=p, bodies=f'<body>{upper}<body pos="0 0 {-v["l_1"]!r}">{lower}</body></body>', swing=1.5)
 
 
+def two_links() -> Specimen:
+    p = DoublePendulum(m_1=0.35, m_2=0.2, l_1=0.2, l_c1=0.11, l_c2=0.13, J_1=1e-3, J_2=8e-4, b_1=5e-3, b_2=2e-3)
+    lower = hinge("theta_2", "0 -1 0", p.b_2) + inertial(p.m_2, p.J_2, 1e-5, p.l_c2)
+    upper = hinge("theta_1", "0 -1 0", p.b_1) + inertial(p.m_1, p.J_1, 1e-5, p.l_c1)
+    return Specimen(plant=p, bodies=f'<body>{upper}<body pos="0 0 {-p.l_1!r}">{lower}</body></body>', swing=1.5)
+
+
+def flexible_link() -> Specimen:
+    p = FlexibleLink(J_h=2e-3, J_l=4e-3, k_s=1.4, b_1=4e-3, b_2=1e-3)
+    link = hinge("alpha", "0 0 1", p.b_2, p.k_s) + inertial(0.07, p.J_l / 2, p.J_l)
+    hub = hinge("theta", "0 0 1", p.b_1) + inertial(0.5, p.J_h / 2, p.J_h)
+    return Specimen(plant=p, bodies=f"<body>{hub}<body>{link}</body></body>", swing=0.5)
+
+
 SPECIMENS = {
+    "double-pendulum": two_links(),
+    "flexible-link": flexible_link(),
     "pendulum": pendulum(),
     "cart-pendulum": cart_pendulum(),
     "furuta": furuta(0.0, (0.0, 0.0)),

@@ -10,6 +10,7 @@ from pathlib import Path
 from upright.errors import BadInput, UprightError, nearest
 from upright.files import OWN_FILE, regular
 from upright.physics.equations import Derived, DryJoint
+from upright.physics.links import DoublePendulum, DoublePendulumAbsolute, FlexibleLink
 from upright.physics.oscillators import added_inertia, added_mass, chain
 from upright.physics.pendulums import CartPendulum, Furuta, Pendulum
 from upright.physics.plant import Linear, Plant
@@ -20,7 +21,10 @@ __all__ = [
     "CartPendulum",
     "Coordinate",
     "Derived",
+    "DoublePendulum",
+    "DoublePendulumAbsolute",
     "DryJoint",
+    "FlexibleLink",
     "Furuta",
     "Input",
     "Joint",
@@ -37,11 +41,17 @@ BUILT_IN: dict[str, type[Plant]] = {
     "pendulum": Pendulum,
     "cart-pendulum": CartPendulum,
     "furuta": Furuta,
+    "double-pendulum": DoublePendulum,
+    "double-pendulum-absolute": DoublePendulumAbsolute,
+    "flexible-link": FlexibleLink,
     **{f"{kind}-{n}": chain(n, kind) for kind in ("rectilinear", "torsional") for n in (1, 2, 3)},
 }
-_ALIASES = {"chain": "rectilinear-2", "rectilinear": "rectilinear-2", "torsional": "torsional-2"} | {
-    f"chain-{n}": f"rectilinear-{n}" for n in (1, 2, 3)
-}
+_ALIASES = {
+    "pendubot": "double-pendulum",
+    "chain": "rectilinear-2",
+    "rectilinear": "rectilinear-2",
+    "torsional": "torsional-2",
+} | {f"chain-{n}": f"rectilinear-{n}" for n in (1, 2, 3)}
 
 
 def find(name: str, folder: Path | None = None) -> type[Plant]:
