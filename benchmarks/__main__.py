@@ -22,7 +22,7 @@ from upright.workers import Workers
 
 NAMES = (
     "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "frequency", "swing_up", "tracking", "lab",
-    "doctor", "rigs", "regulation", "real", "startup", "workers", "long", "gpu",
+    "doctor", "rigs", "regulation", "real", "starts", "startup", "workers", "long", "gpu",
 )  # fmt: skip
 LIBRARIES = ("upright", "numpy", "scipy", "llvmlite", "control", "casadi", "jax", "mujoco")
 
@@ -86,7 +86,10 @@ def main(arguments: list[str] | None = None) -> int:
         metavar="FILE",
         help="write the page of `real`, `rigs`, `regulation` or `workers` for publication",
     )
-    parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes for rigs, regulation, coverage")
+    parser.add_argument("--starts", type=int, default=300, metavar="N", help="random starts of each study in `starts`")
+    parser.add_argument(
+        "--workers", type=int, default=1, metavar="N", help="processes for rigs, regulation, coverage, starts"
+    )
     parser.add_argument("--cluster", default="", metavar="ADDRESS", help="Dask scheduler for them, tcp://host:8786")
     asked = parser.parse_args(arguments)
     try:
@@ -106,7 +109,7 @@ def main(arguments: list[str] | None = None) -> int:
         markdown = {"markdown": asked.markdown}
         extra: dict[str, Any] = {
             "fit": {"full": asked.full}, "real": markdown, "rigs": markdown | shared, "regulation": markdown | shared,
-            "coverage": shared, "workers": markdown,
+            "coverage": shared, "starts": shared | {"starts": asked.starts}, "workers": markdown,
         }.get(name, {})  # fmt: skip
         module = importlib.import_module(f"benchmarks.{name}")
         lines: list[Line] = module.run(

@@ -96,7 +96,7 @@ def identify(
     log = SearchLog(progress=progress, conventions=cache(lambda: wrong_conventions(rig, fitted)))
     log.warnings += unasked_trips(rig, fitted)
     try:
-        problem, found = _search(rig, fitted, method, log, near)
+        problem, found = find_optimum(rig, fitted, method, log, near)
     except KeyboardInterrupt:
         problem, x = _best_so_far(rig, fitted, log)
         found = Descent(x=x, normal=problem.normal(x), converged=False, interrupted=True)
@@ -123,7 +123,7 @@ def identify(
         return conclude(replace(found, interrupted=True))
 
 
-def _search(
+def find_optimum(
     rig: Rig, runs: Sequence[Run], method: str, log: SearchLog, near: Fit | None = None
 ) -> tuple[Problem, Descent]:  # fmt: skip
     """The problem whose model was chosen, and where its cost is least."""
