@@ -108,9 +108,9 @@ def identify(
     try:
         fit = conclude(found)
         for _ in range(LOWER):
-            if log.lower is None or fit.interrupted:
+            if log.lower is None or log.lower[0] is not problem or fit.interrupted:
                 break
-            found = descend(problem.normal, log.lower[1], problem.lower, problem.upper, tolerance=1e-6)
+            found = descend(problem.normal, log.lower[2], problem.lower, problem.upper, tolerance=1e-6)
             log.note("lower, met by an interval", found.normal.cost, problem)
             log.lower = None
             fit = conclude(other_valleys(problem, found, log))

@@ -1,11 +1,13 @@
 """Two disks on one shaft: the twist speaks although friction is wrong by what carries both astray."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from upright.identification import Parameter, Rig, Run, identify
+from upright.identification.problem.residuals import formulate
 from upright.physics import find
 from upright.simulation import simulate
 
@@ -42,3 +44,20 @@ def test_the_shaft_is_found_although_the_friction_is_another():
 
     found = {n: e.value for n, e in fit.estimates.items()}
     assert abs(flexible(found) / flexible(TRUTH) - 1) < 0.02
+
+
+def test_components_are_weighed_by_what_is_missed_of_them_and_the_cost_stays():
+    run = spin_up()
+    parameters = {n: Parameter(name=n, value=v, estimate=n == "J_1", lower=0.0) for n, v in TRUTH.items()}
+    problem = formulate(Rig(plant=PLANT, parameters=parameters, substeps=2), [run])
+    x = problem.start
+    y = problem.tracks[0].y
+    apart = 0.05 * (y[:, :1] - y[:, 1:]) * [1, -1]  # a tenth of the twist, and a hundredth of both angles
+    problem.tracks[0] = replace(problem.tracks[0], y=1.01 * y + apart)
+    cost, e = problem.cost(x), problem.residuals(0, x).reshape(-1, 2)
+    missed = np.sqrt(np.mean(e**2, axis=0))
+    assert missed.max() > 2 * missed.min()  # otherwise there would be nothing to weigh
+    assert problem.weigh_components(x)
+    weighed = np.sqrt(np.mean(problem.residuals(0, x).reshape(-1, 2) ** 2, axis=0))
+    assert weighed[0] == pytest.approx(weighed[1], rel=1e-9)  # all alike now
+    assert problem.cost(x) == pytest.approx(cost, rel=1e-9)

@@ -11,7 +11,7 @@ from tests.identification.twins import PENDULUM, noisy, rig, swing
 from upright.identification.inference.scoring import fit_percent
 from upright.identification.problem.normal_equations import Normal, products
 from upright.identification.problem.residuals import formulate
-from upright.identification.search.descent import descend, descend_progressively
+from upright.identification.search.descent import Descent, SearchLog, descend, descend_progressively
 from upright.identification.search.strategy import simplex
 from upright.physics import Pendulum
 
@@ -117,3 +117,18 @@ def test_squares_of_lanes_are_those_of_the_residuals_laid_out() -> None:
     assert found.cost == pytest.approx(r @ r + prior @ prior, rel=1e-12)
     assert found.gradient == pytest.approx(J.T @ r + slope.T @ prior, rel=1e-9)
     assert found.matrix == pytest.approx(J.T @ J + slope.T @ slope, rel=1e-9)
+
+
+def test_a_lower_cost_is_kept_for_the_problem_in_which_it_was_met() -> None:
+    # a richer model's profile meets lower costs too, in coordinates that the poorer one does not have
+    asked = rig(Pendulum, PENDULUM, {"J_p": 2.4e-3, "b_2": 1.8e-3})
+    poorer, richer = (formulate(asked, [swing(unknown=unknown)]) for unknown in (("initial",), ("initial", "offset")))
+    log = SearchLog()
+    for problem in (poorer, richer):
+        here = Descent(x=problem.start, normal=problem.normal(problem.start), converged=True)
+        log.met(problem, here, here.normal.cost)
+        assert log.lower is None or log.lower[0] is not problem  # no lower than it was
+        log.met(problem, here, 2 * here.normal.cost)
+        assert log.lower is not None
+        assert log.lower[0] is problem
+        assert log.lower[2].size == problem.start.size

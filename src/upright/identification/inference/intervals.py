@@ -190,7 +190,7 @@ def _end(
         if found.interrupted:
             raise KeyboardInterrupt
         z = found.x
-        log.met(found, best)
+        log.met(problem, found, best)
         height = math.sqrt(max(found.normal.cost - best, 0.0) / rise)
         if abs(height - 1) < 0.05 or (at == bound and height < 1):
             return at
@@ -274,7 +274,7 @@ def with_left_out(best: Optimum, asked: Rig, left_out: Sequence[str], log: Searc
         u, e = richer.unknowns[i], estimate(there, i, quantile)
         low, high = e.interval
         if u.name in left_out and there.pinned[i] and profile_work(there) < AFFORDED:
-            low, high = profile(there, i, e, quantile, log)
+            low, high = profile(there, i, e, quantile, SearchLog(progress=log.progress))
         estimates[u.name] = replace(e, interval=(max(low, u.lower), min(high, u.upper)))
     intervals = {n: e.interval for n, e in estimates.items()}
     return intervals | beyond_bounds(there, estimates)

@@ -36,16 +36,16 @@ class Descent:
 class SearchLog:
     """What happened on the way: stages with their cost and simulations, and the best so far should one interrupt.
 
-    `best` holds the problem last worked on and where in it the search stood, `lower` coordinates of a lower cost met
-    since, `rivals` values of another model that the data do not refuse, `unresolved` lengths below the rounding and
-    `unreached` limits. `conventions` says which signs and zeros look wrong; asked only when a fit is poor, since no
-    search mends a reversed sign.
+    `best` holds the problem last worked on and where in it the search stood, `lower` a problem, a lower cost of it met
+    since and where, `rivals` values of another model that the data do not refuse, `unresolved` lengths below the
+    rounding and `unreached` limits. `conventions` says which signs and zeros look wrong; asked only when a fit is poor,
+    since no search mends a reversed sign.
     """
 
     progress: Progress = silent
     history: list[tuple[str, float, int]] = field(default_factory=list[tuple[str, float, int]])
     best: tuple[Problem, Array] | None = None
-    lower: tuple[float, Array] | None = None
+    lower: tuple[Problem, float, Array] | None = None
     warnings: list[str] = field(default_factory=list[str])
     rivals: dict[str, float] = field(default_factory=dict[str, float])
     unresolved: tuple[str, ...] = ()
@@ -56,10 +56,11 @@ class SearchLog:
         """Report progress, with the cost reached and the simulations made."""
         self.progress(f"{stage}, cost {cost:.6g}, {problem.evaluations} evaluations", share)
 
-    def met(self, here: Descent, best: float) -> None:
-        """Keep where a cost below the `best` one was met, the lowest of all."""
-        if here.normal.cost < (1 - WORTH) * (best if self.lower is None else self.lower[0]):
-            self.lower = here.normal.cost, here.x
+    def met(self, problem: Problem, here: Descent, best: float) -> None:
+        """Keep where a cost below the `best` one of a problem was met, the lowest of all."""
+        known = self.lower[1] if self.lower is not None and self.lower[0] is problem else best
+        if here.normal.cost < (1 - WORTH) * known:
+            self.lower = problem, here.normal.cost, here.x
 
     def note(self, stage: str, cost: float, problem: Problem) -> None:
         """Add a stage to the history."""

@@ -85,7 +85,7 @@ def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
     pushed = plant in ("cart-pendulum", "furuta") and len(columns) > 1
     window = moving_window(record, seen, [record[c.name] for c in columns.values()], drive, pushed=pushed)
     inside = (record.t >= window[0]) & (record.t <= window[1])
-    rest = {name: zero_reading(record, seen, c, drive, window) for name, c in columns.items()}
+    rest = {n: zero_reading(record, seen, c, drive, window, hangs=n == "theta") for n, c in columns.items()}
     centre = rest[list(columns)[-1]]
     driven = record[next(iter(columns.values())).name]
     mirrored = False
@@ -227,16 +227,19 @@ def _assign(plant: type[Plant], places: list[Column]) -> tuple[dict[str, Column]
 
 
 def zero_reading(
-    record: Record, seen: Inspection, c: Column, drive: Column | None, window: tuple[float, float]
+    record: Record, seen: Inspection, c: Column, drive: Column | None, window: tuple[float, float], *, hangs: bool
 ) -> float:
-    """Reading at which a coordinate is taken to be zero: before the first command, else where it comes to rest."""
+    """Reading at which a coordinate is taken to be zero: before the first command, else where it comes to rest.
+
+    One that `hangs` has its zero where it rests, and not where it is while it swings.
+    """
     x = record[c.name]
     if drive is not None:
         u = record[drive.name]
         first = int(np.argmax(u != u[0]))
         before = x[max(0, first - 50) : first]
         angle = c.guess in ("rad", "deg")
-        if u[0] == 0 and first >= 5 and not (angle and _moves(x[:first], x)):
+        if u[0] == 0 and first >= 5 and not (hangs and _moves(x[:first], x)):
             return float(np.median(before))
         return rest_level(x, seen, record.t) if angle else float(x[np.searchsorted(record.t, window[0])])
     return rest_level(x, seen, record.t)
