@@ -200,7 +200,8 @@ def main() -> None:
     """Run the command line; the entry point of the script `upright`."""
     _any_terminal()
     os.environ["MPLBACKEND"] = "agg"  # nothing is shown in a window, and an unknown backend stops matplotlib
-    if not os.environ.get("SOURCE_DATE_EPOCH", "0").isdecimal():  # numpy.f2py, which SciPy imports, stops at others
+    date = os.environ.get("SOURCE_DATE_EPOCH", "0")
+    if not date.isdecimal() or len(date) > 10:  # numpy.f2py, which SciPy imports, stops at what is no date
         del os.environ["SOURCE_DATE_EPOCH"]
     # The matrices of a fit are small: threads of the linear algebra only wait for each other (14.2 s against 8.1 s).
     for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):

@@ -193,8 +193,8 @@ def _conclude(asked: Rig, runs: Sequence[Run], problem: Problem, found: Descent,
     nothing = explains_nothing(problem, found)
     if nothing and not found.interrupted:
         warnings.append(
-            "The search stopped after its first pass, because the model explains less than half of how the signals "
-            "vary; intervals come from standard errors. Look at units, signs and the plant first."
+            "The search stopped after its first pass, because the model explains hardly more than half of how the "
+            "signals vary; intervals come from standard errors. Look at units, signs and the plant first."
         )
     estimates = shared_estimates(best, seen.hidden, log, profiles=not (found.interrupted or nothing))
     per_run, groups = run_estimates(best)

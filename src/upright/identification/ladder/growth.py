@@ -38,7 +38,7 @@ from upright.identification.search.descent import (
     descend_progressively,
     first_horizon,
 )
-from upright.identification.search.strategy import POOR, better, closed_form_starts, search, settle_weights
+from upright.identification.search.strategy import NOTHING, POOR, better, closed_form_starts, search, settle_weights
 from upright.progress import Progress, part, silent
 from upright.workers import HERE, Workers
 
@@ -375,6 +375,8 @@ def _held_out(problem: Problem, x: Array) -> float:
 
     Of runs too short to leave anything out the mean squared residual itself.
     """
+    if problem.cost(x) > NOTHING * problem.count():  # refits would only lose time
+        return problem.cost(x) / max(problem.count(), 1)
     total, samples = 0.0, 0
     for fold in range(FOLDS):
         parts = [track.hidden(fold) for track in problem.tracks]

@@ -202,8 +202,8 @@ CHEAP = 1.5e8
 GOOD = 4e-4
 """A mean squared residual below this, a fit of 98 %, leaves no other valley to look for."""
 
-NOTHING = 0.25
-"""A mean squared residual above this, a fit of less than 50 %, is a model that explains nothing."""
+NOTHING = 0.1
+"""A mean squared residual above this, a fit of less than 68 %, is a model that explains nothing."""
 
 
 def explains_nothing(problem: Problem, found: Descent) -> bool:
