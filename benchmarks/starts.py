@@ -12,15 +12,15 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from benchmarks.asked import studies
 from benchmarks.measure import Line, of_each
+from benchmarks.real import STUDIES
 from upright.identification.estimate import find_optimum
-from upright.identification.model.rig import Rig
+from upright.identification.model.rig import Rig, neutral
 from upright.identification.problem.residuals import Problem, formulate
 from upright.identification.problem.simulated import with_noise
 from upright.identification.problem.trips import located
@@ -28,7 +28,6 @@ from upright.identification.search.descent import SearchLog
 from upright.study.load import load_study
 from upright.workers import HERE, Workers
 
-STUDIES = Path(__file__).parents[1] / "examples" / "studies"
 SPREAD, NEAR = 0.3, 0.005
 """Of the logarithms of the guesses; share above the lowest cost known within which a search has found it."""
 STARTS, QUICK = 300, 2
@@ -58,12 +57,12 @@ def ended(name: str, seed: int) -> float:
         }  # fmt: skip
         found, there = find_optimum(replace(rig, parameters=moved), runs, "auto", SearchLog())
         values = found.values_at(there.x)
-    left_out = {n: 0.0 for n in rig.estimated if n not in values and rig.parameters[n].lower <= 0}
+    left_out = {n: neutral(rig.plant, n) for n in rig.estimated if n not in values}
     return problem.cost(problem.place(left_out | values))
 
 
 def run(*, quick: bool, progress: Callable[[str], None], workers: Workers = HERE, starts: int = STARTS) -> list[Line]:
-    """One line per study; `quick`, few starts of every fourth."""
+    """One line per study; `quick`, few starts of every sixth."""
     if not os.environ.get("UPRIGHT_REAL_DATA"):
         return [Line(contender="all studies", note="left out: UPRIGHT_REAL_DATA names no folder")]
     lines: list[Line] = []

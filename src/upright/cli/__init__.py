@@ -191,9 +191,8 @@ def _upright(
     """From one Lagrangian to a fitted real rig: a log goes in, a trusted nonlinear model comes out."""
 
 
-for _group, _commands in GROUPS.items():
-    for _name, _help in _commands.items():
-        app.command(_name, help=_help, rich_help_panel=_group)(lambda: None)
+for _name, _help in COMMANDS.items():
+    app.command(_name, help=_help)(lambda: None)
 
 
 def main() -> None:

@@ -33,7 +33,7 @@ from upright.identification.search.strategy import (
     POOR,
     better,
     closed_form_starts,
-    explains_nothing,
+    explains_little,
     other_moments,
     other_valleys,
     reached_limits,
@@ -190,13 +190,13 @@ def _conclude(asked: Rig, runs: Sequence[Run], problem: Problem, found: Descent,
     best = assess(problem, found.x)
     seen = identifiability(best)
     warnings = list(log.warnings)
-    nothing = explains_nothing(problem, found)
-    if nothing and not found.interrupted:
+    little = explains_little(problem, found)
+    if little and not found.interrupted:
         warnings.append(
-            "The search stopped after its first pass, because the model explains hardly more than half of how the "
+            "The search stopped after its first pass, because the model explains less than two thirds of how the "
             "signals vary; intervals come from standard errors. Look at units, signs and the plant first."
         )
-    estimates = shared_estimates(best, seen.hidden, log, profiles=not (found.interrupted or nothing))
+    estimates = shared_estimates(best, seen.hidden, log, profiles=not (found.interrupted or little))
     per_run, groups = run_estimates(best)
     for name, value in log.rivals.items():
         e = widened(estimates[name], (value, value))

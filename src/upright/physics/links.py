@@ -16,19 +16,8 @@ from upright.quantities import quantity
 _G = 9.81
 
 
-def _two_links(p: Any, theta: Any, theta_dot: Any, second: Any, second_dot: Any) -> tuple[Any, Any]:
-    """Kinetic and potential energy of two rigid links at absolute angles."""
-    from sympy import cos, sin
-
-    x = p.l_1 * cos(theta) * theta_dot + p.l_c2 * cos(second) * second_dot
-    y = p.l_1 * sin(theta) * theta_dot + p.l_c2 * sin(second) * second_dot
-    T = ((p.J_1 + p.m_1 * p.l_c1**2) * theta_dot**2 + p.m_2 * (x**2 + y**2) + p.J_2 * second_dot**2) / 2
-    V = -p.g * ((p.m_1 * p.l_c1 + p.m_2 * p.l_1) * cos(theta) + p.m_2 * p.l_c2 * cos(second))
-    return T, V
-
-
-class DoublePendulum(Plant):
-    """Two rigid links in a vertical plane, the second angle counted from the first link; a Pendubot when driven."""
+class TwoLinks(Plant, abstract=True):
+    """Two rigid links in a vertical plane, whichever way their angles are counted."""
 
     m_1: float = quantity("kg", "mass of the first link", above=0)
     m_2: float = quantity("kg", "mass of the second link", above=0)
@@ -40,16 +29,33 @@ class DoublePendulum(Plant):
     b_1: float = quantity("N m s/rad", "viscous friction of the first joint", default=0.0, at_least=0)
     b_2: float = quantity("N m s/rad", "viscous friction of the second joint", default=0.0, at_least=0)
     b_1c: float = quantity("N m", "Coulomb friction of the first joint", default=0.0, at_least=0)
-    b_2c: float = quantity("N m", "Coulomb friction of the second joint", default=0.0, at_least=0)
     b_1q: float = quantity("N m s^2/rad^2", "quadratic drag of the first joint", default=0.0, at_least=0)
-    b_2q: float = quantity("N m s^2/rad^2", "quadratic drag of the second joint", default=0.0, at_least=0)
     g: float = quantity("m/s^2", "gravity", default=_G, above=0)
+
+    inputs = (Input("T", "N m", "torque at the first joint", on="theta_1"),)
+
+
+def _two_links(p: Any, theta: Any, theta_dot: Any, second: Any, second_dot: Any) -> tuple[Any, Any]:
+    """Kinetic and potential energy of two rigid links at absolute angles."""
+    from sympy import cos, sin
+
+    x = p.l_1 * cos(theta) * theta_dot + p.l_c2 * cos(second) * second_dot
+    y = p.l_1 * sin(theta) * theta_dot + p.l_c2 * sin(second) * second_dot
+    T = ((p.J_1 + p.m_1 * p.l_c1**2) * theta_dot**2 + p.m_2 * (x**2 + y**2) + p.J_2 * second_dot**2) / 2
+    V = -p.g * ((p.m_1 * p.l_c1 + p.m_2 * p.l_1) * cos(theta) + p.m_2 * p.l_c2 * cos(second))
+    return T, V
+
+
+class DoublePendulum(TwoLinks):
+    """Two rigid links in a vertical plane, the second angle counted from the first link; a Pendubot when driven."""
+
+    b_2c: float = quantity("N m", "Coulomb friction of the second joint", default=0.0, at_least=0)
+    b_2q: float = quantity("N m s^2/rad^2", "quadratic drag of the second joint", default=0.0, at_least=0)
 
     coordinates = (
         Coordinate("theta_1", "rad", "angle of the first link, 0 hanging"),
         Coordinate("theta_2", "rad", "angle of the second link from the first, 0 straight"),
     )
-    inputs = (Input("T", "N m", "torque at the first joint", on="theta_1"),)
     joints = (Joint("theta_1", "b_1c", "b_1q"), Joint("theta_2", "b_2c", "b_2q"))
     equilibria = {
         "hanging": {"theta_1": 0.0, "theta_2": 0.0},
@@ -65,27 +71,13 @@ class DoublePendulum(Plant):
         return T, V, (p.b_1 * v[0] ** 2 + p.b_2 * v[1] ** 2) / 2
 
 
-class DoublePendulumAbsolute(Plant):
+class DoublePendulumAbsolute(TwoLinks):
     """Two rigid links in a vertical plane, both angles counted from hanging; no dry friction at the second joint."""
-
-    m_1: float = quantity("kg", "mass of the first link", above=0)
-    m_2: float = quantity("kg", "mass of the second link", above=0)
-    l_1: float = quantity("m", "first joint to second joint", above=0)
-    l_c1: float = quantity("m", "first joint to centre of gravity of the first link", at_least=0)
-    l_c2: float = quantity("m", "second joint to centre of gravity of the second link", above=0)
-    J_1: float = quantity("kg m^2", "inertia of the first link about its centre of gravity", default=0.0, at_least=0)
-    J_2: float = quantity("kg m^2", "inertia of the second link about its centre of gravity", default=0.0, at_least=0)
-    b_1: float = quantity("N m s/rad", "viscous friction of the first joint", default=0.0, at_least=0)
-    b_2: float = quantity("N m s/rad", "viscous friction of the second joint", default=0.0, at_least=0)
-    b_1c: float = quantity("N m", "Coulomb friction of the first joint", default=0.0, at_least=0)
-    b_1q: float = quantity("N m s^2/rad^2", "quadratic drag of the first joint", default=0.0, at_least=0)
-    g: float = quantity("m/s^2", "gravity", default=_G, above=0)
 
     coordinates = (
         Coordinate("theta_1", "rad", "angle of the first link, 0 hanging"),
         Coordinate("theta_2", "rad", "angle of the second link, 0 hanging"),
     )
-    inputs = (Input("T", "N m", "torque at the first joint", on="theta_1"),)
     joints = (Joint("theta_1", "b_1c", "b_1q"),)
     equilibria = {
         "hanging": {"theta_1": 0.0, "theta_2": 0.0},

@@ -80,10 +80,12 @@ class Statement:
 
     def __init_subclass__(cls, *, abstract: bool = False, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        if abstract:
-            cls._base = cls
-        else:
+        if not abstract:
             declare(cls)
+        elif Statement in cls.__bases__:
+            cls._base = cls
+        else:  # parameters that several plants share
+            _as_dataclass(cls)
 
     def __post_init__(self) -> None:
         for name, what in quantities(self).items():
@@ -157,6 +159,8 @@ FUNCTIONS = ("sin", "cos", "tan", "sqrt", "exp", "log", "pi")
 INTERMEDIATE = re.compile(r"[kscw]\d+")  # k0, s0, c0, w0: what `Derived` calls its own intermediate results
 QUANTITY = 'quantity("kg", "what it is")'
 
+_as_dataclass = dataclass(frozen=True, kw_only=True, repr=False)
+
 
 def declare(cls: type[Any]) -> None:
     """Turn `cls` into a frozen, keyword-only dataclass and check that it states a plant.
@@ -170,7 +174,7 @@ def declare(cls: type[Any]) -> None:
     for name, value in vars(cls).items():
         if isinstance(value, Field) and name not in annotated:
             raise BadInput(f"{cls.__name__}: {name} = quantity(...) needs a type; write {name}: float = quantity(...).")
-    dataclass(frozen=True, kw_only=True, repr=False)(cls)
+    _as_dataclass(cls)
     for f in fields(cls):
         if f.name not in quantities(cls):
             raise BadInput(f"{cls.__name__}: parameter '{f.name}' has no unit; write {f.name}: float = {QUANTITY}.")

@@ -38,7 +38,14 @@ from upright.identification.search.descent import (
     descend_progressively,
     first_horizon,
 )
-from upright.identification.search.strategy import NOTHING, POOR, better, closed_form_starts, search, settle_weights
+from upright.identification.search.strategy import (
+    POOR,
+    better,
+    closed_form_starts,
+    explains_little,
+    search,
+    settle_weights,
+)
 from upright.progress import Progress, part, silent
 from upright.workers import HERE, Workers
 
@@ -341,7 +348,7 @@ def choose_friction(rig: Rig, runs: Sequence[Run], log: SearchLog) -> tuple[Rig,
             log.warnings.append(stalled(rung.name, cost, tried[-1].cost))
         level, v = noise_level(part, found.x), part.value(found.x)
         values = {part.key(i): float(v[i]) for i, u in enumerate(part.unknowns) if u.shared or u.lower < v[i] < u.upper}
-        held_out = _held_out(part, found.x)
+        held_out = _held_out(part, found)
         log.note(f"{rung.name}: held-out cost", held_out, part)
         tried.append(Candidate(rig=here, cost=cost, noise=level, values=values, held_out=held_out))
     k = min(range(len(tried)), key=lambda i: tried[i].held_out)
@@ -370,18 +377,19 @@ def _note_rival(tried: Sequence[Candidate], left_out: Sequence[str], log: Search
         )
 
 
-def _held_out(problem: Problem, x: Array) -> float:
-    """Mean squared residual over blocks of the runs, each fitted without them, from the optimum `x` of all.
+def _held_out(problem: Problem, best: Descent) -> float:
+    """Mean squared residual over blocks of the runs, each fitted without them, from the `best` of all.
 
     Of runs too short to leave anything out the mean squared residual itself.
     """
-    if problem.cost(x) > NOTHING * problem.count():  # refits would only lose time
-        return problem.cost(x) / max(problem.count(), 1)
+    x, itself = best.x, best.normal.cost / max(problem.count(), 1)
+    if explains_little(problem, best):  # refits would only lose time
+        return itself
     total, samples = 0.0, 0
     for fold in range(FOLDS):
         parts = [track.hidden(fold) for track in problem.tracks]
         if not any(judges.any() for judges, _ in parts):
-            return problem.cost(x) / max(problem.count(), 1)
+            return itself
         part = replace(problem, tracks=[track for _, track in parts])
         found = descend(part.normal, x, part.lower, part.upper, tolerance=REFIT, limit=10)
         if found.interrupted:

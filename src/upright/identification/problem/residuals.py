@@ -223,7 +223,9 @@ class Problem:
             if track.principal is not None:
                 e = self.residuals(index, x)
                 width = len(track.columns)
-                e = e[:, : e.shape[1] // width * width].reshape(-1, width) * _relative(track.missed)
+                e = e[:, : track.length * width].reshape(-1, width) * _relative(
+                    track.missed
+                )  # without prices of restarts
                 squares.setdefault(_components(track), []).append(np.mean(e * e, axis=0))
         changed = False
         for index, track in enumerate(self.tracks):
@@ -409,15 +411,17 @@ def unresolved(problem: Problem, x: Array) -> tuple[str, ...]:
 
 def unreached(problem: Problem, x: Array) -> tuple[str, ...]:
     """Limits at coordinates `x` that no run reaches: knees and largest forces without which the cost is the same."""
-    plant, cost = problem.rig.plant, problem.cost(x)
-    found: list[str] = []
-    for i, u in enumerate(problem.unknowns):
-        if u.asked and u.shared and u.log and math.isinf(neutral(plant, u.name)):
-            beyond = x.copy()
-            beyond[i] = min(x[i] + math.log(FAR), problem.upper[i])
-            if problem.cost(beyond) <= cost * (1 + SAME):
-                found.append(u.name)
-    return tuple(found)
+    plant = problem.rig.plant
+    limits = [i for i, u in enumerate(problem.unknowns) if u.asked and u.shared and u.log]
+    limits = [i for i in limits if math.isinf(neutral(plant, problem.unknowns[i].name))]
+    most = problem.cost(x) * (1 + SAME) if limits else 0.0
+
+    def idle(i: int) -> bool:
+        beyond = x.copy()
+        beyond[i] = min(x[i] + math.log(FAR), problem.upper[i])
+        return problem.cost(beyond) <= most
+
+    return tuple(problem.unknowns[i].name for i in limits if idle(i))
 
 
 def _shortest(rig: Rig, runs: Sequence[Run]) -> dict[str, float]:

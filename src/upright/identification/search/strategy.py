@@ -202,13 +202,13 @@ CHEAP = 1.5e8
 GOOD = 4e-4
 """A mean squared residual below this, a fit of 98 %, leaves no other valley to look for."""
 
-NOTHING = 0.1
-"""A mean squared residual above this, a fit of less than 68 %, is a model that explains nothing."""
+LITTLE = 0.1
+"""A mean squared residual above this, a fit of less than 68 %, is a model that explains too little to go on with."""
 
 
-def explains_nothing(problem: Problem, found: Descent) -> bool:
+def explains_little(problem: Problem, found: Descent) -> bool:
     """Whether so little is explained that neither other valleys nor careful intervals are worth their time."""
-    return not found.normal.cost <= NOTHING * problem.count()
+    return not found.normal.cost <= LITTLE * problem.count()
 
 
 AWAY = (1.0, 3.0)
@@ -226,7 +226,7 @@ def other_valleys(
     Stiction, trips and cycles slipped fold the cost into valleys a few standard errors apart; of descents from one
     standard error away six in ten ended lower, where there was a lower one. Filters see smooth costs, dearly.
     """
-    if any(track.ahead for track in problem.tracks) or explains_nothing(problem, found):
+    if any(track.ahead for track in problem.tracks) or explains_little(problem, found):
         return found
     if found.interrupted or found.normal.cost <= GOOD * problem.count():
         return found

@@ -23,10 +23,10 @@ DERIVED = Derived(
         'b_1',
         'b_2',
         'b_1c',
-        'b_2c',
         'b_1q',
-        'b_2q',
         'g',
+        'b_2c',
+        'b_2q',
     ),
     lumps=(
         'l_1*l_c2*m_2',
