@@ -43,7 +43,10 @@ WHEN_MADE = {
         "parameter 'energy' hides what a plant itself calls energy",
     ),
     "coordinate that is no name": (RIGHT.replace('"x"', '"x 1"', 1), "coordinate 'x 1' is no Python name"),
-    "unknown coordinate in a joint": (RIGHT + "    joints = (Joint('y'),)\n", "a joint names 'y'; valid names: x"),
+    "unknown coordinate in a joint": (
+        RIGHT + "    joints = (Joint('y'),)\n",
+        "a joint is on 'y': 'y' is no coordinate; valid names: x",
+    ),
     "unknown parameter in a joint": (
         RIGHT + "    joints = (Joint('x', coulomb='mm'),)\n",
         "the joint on x names 'mm'; did you mean 'm'",

@@ -21,7 +21,12 @@ def block_on_a_spring() -> Derived:
         force=("F - k1*x - k2*x_dot - k3",),
         joints=(
             DryJoint(
-                coordinate=0, coulomb="F_c", quadratic="c_q", stiction="F_s", stribeck_speed="v_s", presliding="delta"
+                direction=(1.0,),
+                coulomb="F_c",
+                quadratic="c_q",
+                stiction="F_s",
+                stribeck_speed="v_s",
+                presliding="delta",
             ),
         ),
         stiffness=("k",),
@@ -46,8 +51,8 @@ def two_blocks() -> Derived:
         mass=("k0", "0", "k1"),
         force=("F + w0 - k3*x1", "-w0"),
         joints=(
-            DryJoint(coordinate=0, coulomb="F_1", stiction="S_1"),
-            DryJoint(coordinate=1, coulomb="F_2", stiction="S_2"),
+            DryJoint(direction=(1.0, 0.0), coulomb="F_1", stiction="S_1"),
+            DryJoint(direction=(0.0, 1.0), coulomb="F_2", stiction="S_2"),
         ),
         stiffness=("k + k_w", "-k", "-k", "k"),
         damping=("0", "0", "0", "0"),
@@ -81,7 +86,7 @@ def furuta() -> Derived:
             "T - 2*w0*psi_dot*theta_dot - k2*s0*theta_dot**2 - k5*psi_dot",
             "-k4*s0 + w0*psi_dot**2 - k6*theta_dot",
         ),
-        joints=(DryJoint(coordinate=0, coulomb="b_1c"), DryJoint(coordinate=1, coulomb="b_2c")),
+        joints=(DryJoint(direction=(1.0, 0.0), coulomb="b_1c"), DryJoint(direction=(0.0, 1.0), coulomb="b_2c")),
         stiffness=("0", "0", "0", "g*l_cg*m_p*cos(theta)"),
         damping=("b_1", "0", "0", "b_2"),
         gain=("1", "0"),

@@ -22,9 +22,12 @@ Program = Callable[[Scope], tuple[tuple[Any, ...], ...]]
 
 @dataclass(frozen=True, kw_only=True)
 class DryJoint:
-    """Dry friction of one coordinate: names of the parameters that set it, "" where a term is absent."""
+    """Dry friction of one joint: names of the parameters that set it, "" where a term is absent.
 
-    coordinate: int
+    The joint turns or slides by ``direction . q``.
+    """
+
+    direction: tuple[float, ...]
     coulomb: str = ""
     quadratic: str = ""
     stiction: str = ""

@@ -137,7 +137,7 @@ def derive(cls: type[Statement], *, without: frozenset[str] = frozenset()) -> De
         kinetic=text(sp.expand(momentum_energy) if momentum_energy.is_polynomial(*v) else momentum_energy),
         potential=text(V),
         power_lost=text(sum(vi * sp.diff(D, vi) for vi in v)),
-        joints=tuple(DryJoint(coordinate=index[j.on], **j.parameters()) for j in cls.joints),
+        joints=tuple(DryJoint(direction=j.direction(index), **j.parameters()) for j in cls.joints),
     )
 
 

@@ -30,6 +30,8 @@ class TwoLinks(Plant, abstract=True):
     b_2: float = quantity("N m s/rad", "viscous friction of the second joint", default=0.0, at_least=0)
     b_1c: float = quantity("N m", "Coulomb friction of the first joint", default=0.0, at_least=0)
     b_1q: float = quantity("N m s^2/rad^2", "quadratic drag of the first joint", default=0.0, at_least=0)
+    b_2c: float = quantity("N m", "Coulomb friction of the second joint", default=0.0, at_least=0)
+    b_2q: float = quantity("N m s^2/rad^2", "quadratic drag of the second joint", default=0.0, at_least=0)
     g: float = quantity("m/s^2", "gravity", default=_G, above=0)
 
     inputs = (Input("T", "N m", "torque at the first joint", on="theta_1"),)
@@ -48,9 +50,6 @@ def _two_links(p: Any, theta: Any, theta_dot: Any, second: Any, second_dot: Any)
 
 class DoublePendulum(TwoLinks):
     """Two rigid links in a vertical plane, the second angle counted from the first link; a Pendubot when driven."""
-
-    b_2c: float = quantity("N m", "Coulomb friction of the second joint", default=0.0, at_least=0)
-    b_2q: float = quantity("N m s^2/rad^2", "quadratic drag of the second joint", default=0.0, at_least=0)
 
     coordinates = (
         Coordinate("theta_1", "rad", "angle of the first link, 0 hanging"),
@@ -72,13 +71,13 @@ class DoublePendulum(TwoLinks):
 
 
 class DoublePendulumAbsolute(TwoLinks):
-    """Two rigid links in a vertical plane, both angles counted from hanging; no dry friction at the second joint."""
+    """Two rigid links in a vertical plane, both angles counted from hanging."""
 
     coordinates = (
         Coordinate("theta_1", "rad", "angle of the first link, 0 hanging"),
         Coordinate("theta_2", "rad", "angle of the second link, 0 hanging"),
     )
-    joints = (Joint("theta_1", "b_1c", "b_1q"),)
+    joints = (Joint("theta_1", "b_1c", "b_1q"), Joint("theta_2 - theta_1", "b_2c", "b_2q"))
     equilibria = {
         "hanging": {"theta_1": 0.0, "theta_2": 0.0},
         "inverted": {"theta_1": math.pi, "theta_2": math.pi},

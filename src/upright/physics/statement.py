@@ -6,7 +6,7 @@ What its author can have forgotten is said in a sentence when the class is made.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import Field, dataclass, fields, replace
 from inspect import get_annotations
 from keyword import iskeyword
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import BadInput, nearest
+from upright.physics.combination import combination
 from upright.quantities import Quantity, quantities, quantity
 
 
@@ -40,8 +41,10 @@ class Input:
 
 @dataclass(frozen=True)
 class Joint:
-    """Dry friction on one coordinate: which parameters set its terms; "" leaves a term out.
+    """Dry friction at a joint: which parameters set its terms; "" leaves a term out.
 
+    `on` is the coordinate by which the joint turns or slides, or a combination of coordinates such as
+    ``theta_2 - theta_1`` for the joint between two links whose angles are both absolute.
     `coulomb` is the sliding level, `quadratic` the drag per speed squared, `stiction` the break-away level,
     `stribeck_speed` the speed at which stiction fades into sliding, `presliding` Dahl's length.
     """
@@ -56,6 +59,11 @@ class Joint:
     def parameters(self) -> dict[str, str]:
         """Name of the parameter, or "", by kind of friction."""
         return {kind: name for kind, name in vars(self).items() if kind != "on"}
+
+    def direction(self, coordinates: Collection[str]) -> tuple[float, ...]:
+        """By how much the joint turns or slides for each coordinate's own unit of motion."""
+        factors = combination(self.on, coordinates)
+        return tuple(factors.get(name, 0.0) for name in coordinates)
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(quantity,))
@@ -225,9 +233,18 @@ def _check_references(cls: type[Any]) -> None:
     for i in cls.inputs:
         known(i.on, coordinates, f"input {i.name}")
     for j in cls.joints:
-        known(j.on, coordinates, "a joint")
+        try:
+            j.direction(coordinates)
+        except BadInput as error:
+            raise BadInput(f"{cls.__name__}: a joint is on '{j.on}': {error}") from None
         for name in filter(None, j.parameters().values()):
             known(name, parameters, f"the joint on {j.on}")
+    directions = [j.direction(coordinates) for j in cls.joints]
+    if directions and np.linalg.matrix_rank(np.array(directions)) < len(directions):
+        raise BadInput(
+            f"{cls.__name__}: the joints on {', '.join(j.on for j in cls.joints)} do not move independently;"
+            " state all friction of one joint in one Joint."
+        )
     if not cls.equilibria:
         raise BadInput(
             f'{cls.__name__} has no equilibria; write equilibria = {{"rest": {{}}}} for all coordinates at 0.'

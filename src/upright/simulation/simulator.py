@@ -136,6 +136,13 @@ class Simulator:
         wanted = {self.derived.coordinates[i] for i in self.flavour.held}
         if set(self.held) != wanted:
             raise BadInput(f"the flavour holds {sorted(wanted)}, but motion was given for {sorted(self.held)}.")
+        for i in (*self.flavour.dry, *self.flavour.dahl):
+            for name, held in self.held.items():
+                if not held.locked and self._layout.joints[i][self.derived.coordinates.index(name)]:
+                    raise BadInput(
+                        f"dry friction at a joint between {self.derived.coordinates[i]} and {name} is not computed"
+                        f" while {name} is moved from outside; lock it, or describe the rig in the angle of the joint."
+                    )
 
     @cached_property
     def names(self) -> tuple[str, ...]:

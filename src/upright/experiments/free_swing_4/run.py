@@ -330,8 +330,7 @@ def losses(plant: Plant, t: Array, x: Array) -> dict[str, Array]:
     powers = {"viscous friction": plant.power_lost(x)}
     values = plant.parameters()
     for joint in plant.joints:
-        i = plant.state_names().index(f"{joint.on}_dot")
-        speed = np.abs(x[:, i])
+        speed = np.abs(x[:, 1::2] @ joint.direction([c.name for c in plant.coordinates]))
         for kind, name, power in (("Coulomb friction", joint.coulomb, speed), ("drag", joint.quadratic, speed**3)):
             if name and values[name] > 0:
                 powers[f"{kind} of {joint.on}"] = values[name] * power

@@ -12,13 +12,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import BadInput, nearest
-from upright.identification.frequency.response import FrequencyResponse
+from upright.identification.frequency.response import FrequencyResponse, describing
 from upright.physics import Plant
 from upright.physics.equations import needed_force, small_motions
 
@@ -114,12 +115,22 @@ class Balance:
             force = force - self._beyond(derived, values, point, Z, lanes) / data.drive[None, :, None]
         if not (self.linear or self.plain_friction):
             for joint in derived.joints:
-                if joint.coulomb and joint.coordinate in self.columns:
+                acting = [i for i, factor in enumerate(joint.direction) if factor]
+                if joint.coulomb and set(acting) <= set(self.columns):
                     level = np.reshape(np.broadcast_to(values.get(joint.coulomb, 0.0), (lanes,)), (lanes, 1))
-                    dry = data.dry[:, self.columns.index(joint.coordinate)]
-                    Z[:, :, joint.coordinate, joint.coordinate] += 1j * w * dry * level
+                    dry = 1j * w * self._dry(np.array(joint.direction)) * level
+                    for i, j in product(acting, acting):
+                        Z[:, :, i, j] += joint.direction[i] * joint.direction[j] * dry
         answer = np.linalg.solve(Z, force[..., None])[..., 0][:, :, self.columns]
         return np.asarray(answer, dtype=np.complex128)
+
+    def _dry(self, direction: Array) -> Complex:
+        """Viscous equivalent (F,) of unit Coulomb friction at a joint, from the motion that was measured."""
+        factors = direction[self.columns]
+        if np.count_nonzero(factors) == 1 and factors.max() == 1.0:
+            return self.data.dry[:, int(np.argmax(factors))]
+        amplitude = (self.data.response * self.data.drive[:, None]) @ factors  # overtones of a combination are not kept
+        return describing(self.data.omega, np.abs(amplitude)[:, None])[:, 0]
 
     def drive(self, values: Mapping[str, Any], lanes: int = 1) -> Complex:
         """Force per unit of command (lanes, F): gain, delay, lag, and the hold between samples."""

@@ -428,8 +428,8 @@ def _shortest(rig: Rig, runs: Sequence[Run]) -> dict[str, float]:
     """Least presliding length worth telling, by its name."""
     derived = rig.plant.derived()
     seen = [pair for run in runs for pair in zip(run.measured, run.quantum, strict=False)]
-    steps = {c: min((quantum for name, quantum in seen if name == c), default=0.0) for c in derived.coordinates}
-    return {j.presliding: ROUNDING * steps[derived.coordinates[j.coordinate]] for j in derived.joints if j.presliding}
+    steps = [min((quantum for name, quantum in seen if name == c), default=0.0) for c in derived.coordinates]
+    return {j.presliding: ROUNDING * float(np.abs(j.direction) @ steps) for j in derived.joints if j.presliding}
 
 
 def _components(track: Track) -> tuple[str, ...]:

@@ -122,12 +122,12 @@ def model_accelerations(plant: type[Plant], values: Mapping[str, float], sample:
     M, f = mass_and_force(derived, {**values, **states, **dict(zip(derived.inputs, force, strict=True))})
     n = f.shape[1]
     for joint in derived.joints:
-        i = joint.coordinate
-        v = sample.v[i]
-        if joint.coulomb and sample.fades[i] > 0:
-            f[:, i] -= values[joint.coulomb] * np.tanh(v / sample.fades[i])
+        direction = np.array(joint.direction)
+        v, fade = direction @ sample.v, float(np.linalg.norm(direction * sample.fades))
+        if joint.coulomb and fade > 0:
+            f -= values[joint.coulomb] * np.outer(np.tanh(v / fade), direction)
         if joint.quadratic:
-            f[:, i] -= values[joint.quadratic] * v * np.abs(v)
+            f -= values[joint.quadratic] * np.outer(v * np.abs(v), direction)
     free = list(sample.free)
     held = [i for i in range(n) if i not in free]
     if held:
@@ -206,9 +206,9 @@ def friction_from_energy(rig: Rig, samples: list[Sample], values: Mapping[str, f
 
     plant, derived = rig.plant, rig.plant.derived_for(values)
     estimated = set(rig.estimated)
-    kinds: list[tuple[str, int, int]] = []
+    kinds: list[tuple[str, tuple[float, ...], int]] = []
     for joint in derived.joints:
-        kinds += [(joint.coulomb, joint.coordinate, 1), (joint.quadratic, joint.coordinate, 3)]
+        kinds += [(joint.coulomb, joint.direction, 1), (joint.quadratic, joint.direction, 3)]
     kinds = [k for k in kinds if k[0]]
     viscous = [n for n in derived.parameters if _mentions(derived.power_lost, n)]
     sought = [n for n in (*viscous, *(k[0] for k in kinds)) if n in estimated]
@@ -232,8 +232,8 @@ def friction_from_energy(rig: Rig, samples: list[Sample], values: Mapping[str, f
         columns: dict[str, Array] = {}
         for n in viscous:
             columns[n] = evaluate(derived.power_lost, {**scope, **dict.fromkeys(viscous, 0.0), n: 1.0}) + 0 * power
-        for name, i, order in kinds:
-            columns[name] = np.abs(s.v[i]) ** order
+        for name, direction, order in kinds:
+            columns[name] = np.abs(np.array(direction) @ s.v) ** order
         known = sum((here[n] * columns[n] for n in columns if n not in estimated), np.zeros_like(power))
         size = float(np.ptp(energy[cuts])) or 1.0
 

@@ -24,9 +24,9 @@ DERIVED = Derived(
         'b_2',
         'b_1c',
         'b_1q',
-        'g',
         'b_2c',
         'b_2q',
+        'g',
     ),
     lumps=(
         'l_1*l_c2*m_2',
@@ -80,7 +80,7 @@ DERIVED = Derived(
     potential='-g*(l_c2*m_2*cos(theta_1 + theta_2) + (l_1*m_2 + l_c1*m_1)*cos(theta_1))',
     power_lost='b_1*(theta_1_dot*theta_1_dot) + b_2*(theta_2_dot*theta_2_dot)',
     joints=(
-        DryJoint(coordinate=0, coulomb='b_1c', quadratic='b_1q', stiction='', stribeck_speed='', presliding=''),
-        DryJoint(coordinate=1, coulomb='b_2c', quadratic='b_2q', stiction='', stribeck_speed='', presliding=''),
+        DryJoint(direction=(1.0, 0.0), coulomb='b_1c', quadratic='b_1q', stiction='', stribeck_speed='', presliding=''),
+        DryJoint(direction=(0.0, 1.0), coulomb='b_2c', quadratic='b_2q', stiction='', stribeck_speed='', presliding=''),
     ),
 )

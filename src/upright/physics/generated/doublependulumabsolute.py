@@ -24,6 +24,8 @@ DERIVED = Derived(
         'b_2',
         'b_1c',
         'b_1q',
+        'b_2c',
+        'b_2q',
         'g',
     ),
     lumps=(
@@ -74,6 +76,7 @@ DERIVED = Derived(
     potential='-g*(l_c2*m_2*cos(theta_2) + (l_1*m_2 + l_c1*m_1)*cos(theta_1))',
     power_lost='(1/2)*b_2*theta_2_dot*(-2*theta_1_dot + 2*theta_2_dot) + theta_1_dot*(b_1*theta_1_dot + (1/2)*b_2*(2*theta_1_dot - 2*theta_2_dot))',
     joints=(
-        DryJoint(coordinate=0, coulomb='b_1c', quadratic='b_1q', stiction='', stribeck_speed='', presliding=''),
+        DryJoint(direction=(1.0, 0.0), coulomb='b_1c', quadratic='b_1q', stiction='', stribeck_speed='', presliding=''),
+        DryJoint(direction=(-1.0, 1.0), coulomb='b_2c', quadratic='b_2q', stiction='', stribeck_speed='', presliding=''),
     ),
 )

@@ -59,6 +59,6 @@ DERIVED = Derived(
     potential='(1/2)*(alpha*alpha)*k_s',
     power_lost='(alpha_dot*alpha_dot)*b_2 + b_1*(theta_dot*theta_dot)',
     joints=(
-        DryJoint(coordinate=0, coulomb='b_1c', quadratic='b_1q', stiction='', stribeck_speed='', presliding=''),
+        DryJoint(direction=(1.0, 0.0), coulomb='b_1c', quadratic='b_1q', stiction='', stribeck_speed='', presliding=''),
     ),
 )

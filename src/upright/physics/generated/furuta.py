@@ -84,7 +84,7 @@ DERIVED = Derived(
     potential='g*m_p*(-l_cg*sqrt(-(tilt_x*tilt_x) - (tilt_y*tilt_y) + 1)*cos(theta) - tilt_x*(l_cg*sin(psi)*sin(theta) + r*cos(psi)) - tilt_y*(-l_cg*sin(theta)*cos(psi) + r*sin(psi))) + (1/2)*k_psi*(psi*psi)',
     power_lost='b_1*(psi_dot*psi_dot) + b_2*(theta_dot*theta_dot)',
     joints=(
-        DryJoint(coordinate=0, coulomb='b_1c', quadratic='b_1q', stiction='b_1s', stribeck_speed='v_1s', presliding='delta_1'),
-        DryJoint(coordinate=1, coulomb='b_2c', quadratic='b_2q', stiction='b_2s', stribeck_speed='v_2s', presliding='delta_2'),
+        DryJoint(direction=(1.0, 0.0), coulomb='b_1c', quadratic='b_1q', stiction='b_1s', stribeck_speed='v_1s', presliding='delta_1'),
+        DryJoint(direction=(0.0, 1.0), coulomb='b_2c', quadratic='b_2q', stiction='b_2s', stribeck_speed='v_2s', presliding='delta_2'),
     ),
 )

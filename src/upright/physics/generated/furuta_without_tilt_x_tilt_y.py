@@ -79,7 +79,7 @@ DERIVED = Derived(
     potential='-g*l_cg*m_p*cos(theta) + (1/2)*k_psi*(psi*psi)',
     power_lost='b_1*(psi_dot*psi_dot) + b_2*(theta_dot*theta_dot)',
     joints=(
-        DryJoint(coordinate=0, coulomb='b_1c', quadratic='b_1q', stiction='b_1s', stribeck_speed='v_1s', presliding='delta_1'),
-        DryJoint(coordinate=1, coulomb='b_2c', quadratic='b_2q', stiction='b_2s', stribeck_speed='v_2s', presliding='delta_2'),
+        DryJoint(direction=(1.0, 0.0), coulomb='b_1c', quadratic='b_1q', stiction='b_1s', stribeck_speed='v_1s', presliding='delta_1'),
+        DryJoint(direction=(0.0, 1.0), coulomb='b_2c', quadratic='b_2q', stiction='b_2s', stribeck_speed='v_2s', presliding='delta_2'),
     ),
 )

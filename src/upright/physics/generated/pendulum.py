@@ -51,6 +51,6 @@ DERIVED = Derived(
     potential='-g*l_cg*m_p*cos(theta)',
     power_lost='b_2*(theta_dot*theta_dot)',
     joints=(
-        DryJoint(coordinate=0, coulomb='b_2c', quadratic='b_2q', stiction='b_2s', stribeck_speed='v_2s', presliding='delta_2'),
+        DryJoint(direction=(1.0,), coulomb='b_2c', quadratic='b_2q', stiction='b_2s', stribeck_speed='v_2s', presliding='delta_2'),
     ),
 )

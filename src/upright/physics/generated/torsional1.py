@@ -48,6 +48,6 @@ DERIVED = Derived(
     potential='(1/2)*k_1*(theta_1*theta_1)',
     power_lost='c_1*(theta_1_dot*theta_1_dot)',
     joints=(
-        DryJoint(coordinate=0, coulomb='f_1c', quadratic='f_1q', stiction='f_1s', stribeck_speed='v_1s', presliding='delta_1'),
+        DryJoint(direction=(1.0,), coulomb='f_1c', quadratic='f_1q', stiction='f_1s', stribeck_speed='v_1s', presliding='delta_1'),
     ),
 )

@@ -107,8 +107,8 @@ DERIVED = Derived(
     potential='(1/2)*k_1*(theta_1*theta_1) + (1/2)*k_12*((-theta_1 + theta_2)*(-theta_1 + theta_2)) + (1/2)*k_2*(theta_2*theta_2) + (1/2)*k_23*((-theta_2 + theta_3)*(-theta_2 + theta_3)) + (1/2)*k_3*(theta_3*theta_3)',
     power_lost='theta_1_dot*(c_1*theta_1_dot + (1/2)*c_12*(2*theta_1_dot - 2*theta_2_dot)) + theta_2_dot*((1/2)*c_12*(-2*theta_1_dot + 2*theta_2_dot) + c_2*theta_2_dot + (1/2)*c_23*(2*theta_2_dot - 2*theta_3_dot)) + theta_3_dot*((1/2)*c_23*(-2*theta_2_dot + 2*theta_3_dot) + c_3*theta_3_dot)',
     joints=(
-        DryJoint(coordinate=0, coulomb='f_1c', quadratic='f_1q', stiction='f_1s', stribeck_speed='v_1s', presliding='delta_1'),
-        DryJoint(coordinate=1, coulomb='f_2c', quadratic='f_2q', stiction='f_2s', stribeck_speed='v_2s', presliding='delta_2'),
-        DryJoint(coordinate=2, coulomb='f_3c', quadratic='f_3q', stiction='f_3s', stribeck_speed='v_3s', presliding='delta_3'),
+        DryJoint(direction=(1.0, 0.0, 0.0), coulomb='f_1c', quadratic='f_1q', stiction='f_1s', stribeck_speed='v_1s', presliding='delta_1'),
+        DryJoint(direction=(0.0, 1.0, 0.0), coulomb='f_2c', quadratic='f_2q', stiction='f_2s', stribeck_speed='v_2s', presliding='delta_2'),
+        DryJoint(direction=(0.0, 0.0, 1.0), coulomb='f_3c', quadratic='f_3q', stiction='f_3s', stribeck_speed='v_3s', presliding='delta_3'),
     ),
 )

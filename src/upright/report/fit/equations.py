@@ -10,6 +10,7 @@ from collections.abc import Collection, Sequence
 from html import escape
 
 from upright.physics import Derived, Plant
+from upright.physics.combination import spelled
 from upright.report.symbols import identifier
 
 _ZERO = ast.Constant(0)
@@ -40,14 +41,15 @@ def _row(derived: Derived, i: int, inner: _Inner, zero: frozenset[str]) -> tuple
         entry = inner.of(derived.mass[a * n - a * (a - 1) // 2 + b - a])
         left = _add(left, _multiply(entry, ast.Name(f"{c}_ddot")))
     right = inner.of(derived.force[i])
-    v = f"{derived.coordinates[i]}_dot"
     for joint in derived.joints:
-        if joint.coordinate != i:
+        v, factor = spelled(joint.direction, [f"{c}_dot" for c in derived.coordinates]), joint.direction[i]
+        if not factor:
             continue
+        times = "-" if factor == 1 else "" if factor == -1 else f"{-factor!r}*"
         if joint.coulomb and joint.coulomb not in zero:
-            right = _add(right, inner.of(f"-{joint.coulomb}*sgn({v})"))
+            right = _add(right, inner.of(f"{times}{joint.coulomb}*sgn({v})"))
         if joint.quadratic and joint.quadratic not in zero:
-            right = _add(right, inner.of(f"-{joint.quadratic}*{v}*abs({v})"))
+            right = _add(right, inner.of(f"{times}{joint.quadratic}*{v}*abs({v})"))
     return left, right
 
 

@@ -1,11 +1,14 @@
 """How fast does the plant accelerate, written out for one kernel?
 
-Text of the acceleration, of one Runge-Kutta step, and of mass matrix and forces for the search of events.
+Text of the acceleration, of one Runge-Kutta step, and of mass matrix and forces for the search of events. Where a joint
+acts on several coordinates (``theta_2 - theta_1``), dry friction is solved for in coordinates ``z = T q`` of which each
+joint is one, ``S' M S z'' = S' f`` with ``q = S z``; the state stays q.
 Names that start with an underscore are ours, so that they cannot meet a plant's.
 """
 
 from __future__ import annotations
 
+from upright.physics.combination import spelled
 from upright.simulation.kernel.drive import force, nodes
 from upright.simulation.kernel.flavour import Layout
 
@@ -63,7 +66,10 @@ def arguments(p: Layout) -> list[str]:
 
 
 def _forces(p: Layout) -> tuple[list[str], dict[tuple[int, int], str]]:
-    """Lines that compute mass matrix and forces; and the name of each entry that is not zero, free coordinates only."""
+    """Lines that compute mass matrix and forces of the joints; and the name of each entry that is not zero.
+
+    Free coordinates only, ``z`` where a joint acts on several of them.
+    """
     d, f = p.derived, p.flavour
     lines = force(p)
     lines += [f"{s}, {c} = sincos({x})" for s, c, x in d.trig]
@@ -74,8 +80,19 @@ def _forces(p: Layout) -> tuple[list[str], dict[tuple[int, int], str]]:
         if text.strip() not in ("0", "0.0") and not (i in f.held and j in f.held):
             lines.append(f"_m{i}_{j} = {text}")
             names[i, j] = names[j, i] = f"_m{i}_{j}"
+    pull = {i: "".join(f" - {names[i, j]} * _ah{j}" for j in f.held if (i, j) in names) for i in p.free}
+    force_of = {i: f"({d.force[i]})" for i in p.free}
+    names = {k: name for k, name in names.items() if k[0] in p.free and k[1] in p.free}
+    if p.slanted:
+        lines += [f"_o{i} = {force_of[i]}{pull[i]}" for i in p.free]
+        more, names = _turned(p, names)
+        lines += more
+        force_of = {i: spelled(p.from_joints[:, k], [f"_o{j}" for j in p.free]) for k, i in enumerate(p.free)}
+        pull = dict.fromkeys(p.free, "")
     for i in p.free:
-        v, text = p.velocities[i], f"({d.force[i]})"
+        v, text = p.velocities[i], force_of[i]
+        if i in {*f.dry, *f.dahl, *f.drag}:
+            v = spelled(p.joints[i], p.velocities)
         level = f"_Fc{i}"
         if i in f.stribeck:
             lines += [f"_r = {v} * _iv{i}", f"_lv{i} = _Fc{i} + (_Fs{i} - _Fc{i}) * falling(_r * _r)"]
@@ -86,9 +103,26 @@ def _forces(p: Layout) -> tuple[list[str], dict[tuple[int, int], str]]:
             text += f" - _cq{i} * {v} * abs({v})"
         if i in f.dahl:
             text += f" - _y{i} * {level}"
-        text += "".join(f" - {names[i, j]} * _ah{j}" for j in f.held if (i, j) in names)
-        lines.append(f"_f{i} = {text}")
-    return lines, {k: name for k, name in names.items() if k[0] in p.free and k[1] in p.free}
+        lines.append(f"_f{i} = {text}{pull[i]}")
+    return lines, names
+
+
+def _turned(p: Layout, mass: dict[tuple[int, int], str]) -> tuple[list[str], dict[tuple[int, int], str]]:
+    """Lines that compute the mass matrix of the joints, ``S' M S``, and the names of its entries."""
+    lines, names = list[str](), dict[tuple[int, int], str]()
+    S = p.from_joints
+    for a, i in enumerate(p.free):
+        for b, j in enumerate(p.free[: a + 1]):
+            pairs = {(min(k, m), max(k, m)): 0.0 for k, m in mass}
+            for c, k in enumerate(p.free):
+                for d, m in enumerate(p.free):
+                    if (k, m) in mass:
+                        pairs[min(k, m), max(k, m)] += float(S[c, a] * S[d, b])
+            text = spelled(pairs.values(), [mass[pair] for pair in pairs])
+            if text != "0.0":
+                lines.append(f"_n{j}_{i} = {text}")
+                names[i, j] = names[j, i] = f"_n{j}_{i}"
+    return lines, names
 
 
 def _solution(p: Layout, mass: dict[tuple[int, int], str]) -> list[str]:
@@ -142,7 +176,8 @@ def acceleration(p: Layout) -> str:
     for i in p.flavour.dry:
         pull = "".join(f" - {mass[i, j]} * _a{j}" for j in p.free if j != i and (i, j) in mass)
         held.append(f"(1.0 - _free{i}) * abs(_f{i}{pull})")
-    result = ", ".join([f"_a{i}" for i in p.free] + held or ["0.0"])  # with all coordinates held nothing is left
+    accelerations = [spelled(row, [f"_a{i}" for i in p.free]) for row in p.from_joints]
+    result = ", ".join(accelerations + held or ["0.0"])  # with all coordinates held nothing is left
     return _function("@inline", "acceleration", arguments(p), [*lines, f"return ({result},)"])
 
 
@@ -189,7 +224,7 @@ def step(p: Layout) -> str:
         call += [f"_h{'v'}{i}{when}" if i in f.held else f"{speed}{i}" for i in range(p.n)]
         call += [f"_u{when}{j}" for j in range(p.nu)] + [f"_s{i}" for i in f.dry]
         for i in f.dahl:
-            lines.extend(_presliding(i, f"_y{k}_", f"{shift}{i}") if shift else [])
+            lines.extend(_presliding(i, f"_y{k}_", p.along(i, lambda j: f"{shift}{j}")) if shift else [])
         call += [(f"_y{k}_{i}" if shift else f"_y{i}") for i in f.dahl]
         call += [f"_ha{i}{when}" for i in f.held]
         call += [f"_{c}{when}{j}" for c in nodes(f) for j in range(p.nu)] + list(p.constants)
@@ -210,14 +245,15 @@ def step(p: Layout) -> str:
         lines.append(f"_nq{i} = _q{i} + _g5_{i}")
         lines.append(f"_nv{i} = _v{i} + _h6 * (_a1_{i} + 2.0 * _a2_{i} + 2.0 * _a3_{i} + _a4_{i})")
     for i in f.dahl:
-        lines += _presliding(i, "_ny", f"_g5_{i}")
+        lines += _presliding(i, "_ny", p.along(i, lambda j: f"_g5_{j}"))
     result = [f"_nq{i}" for i in free] + [f"_nv{i}" for i in free] + [f"_ny{i}" for i in f.dahl]
     if f.dry:
         lines.append("_flag = 0.0")
         for i in f.dry:
-            lines.append(f"_w = _s{i} * _nv{i}")
+            lines.append(f"_w = _s{i} * {p.along(i, lambda j: f'_nv{j}')}")
             for k in (2, 3, 4):
-                lines += [f"_z = _s{i} * _p{k}_{i}", "_w = _z if _z < _w else _w"]
+                speed = p.along(i, lambda j, k=k: f"_p{k}_{j}")
+                lines += [f"_z = _s{i} * {speed}", "_w = _z if _z < _w else _w"]
             lines.append(f"_z = _e4_{i} if _e4_{i} > _e1_{i} else _e1_{i}")
             lines.append(f"_flag = 1.0 if (_w < 0.0) | (_z > _Fs{i}) else _flag")
         result.append("_flag")

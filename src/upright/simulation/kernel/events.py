@@ -13,10 +13,12 @@ are in capitals (`places`).
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
+from upright.physics.combination import spelled
 from upright.simulation.kernel.drive import nodes
 from upright.simulation.kernel.equations import arguments, step_arguments
-from upright.simulation.kernel.flavour import Layout
+from upright.simulation.kernel.flavour import Array, Layout
 
 
 def places(p: Layout) -> dict[str, int]:
@@ -34,15 +36,23 @@ def places(p: Layout) -> dict[str, int]:
 
 
 def _states(p: Layout) -> list[str]:
+    """Names of the lane's numbers that make its state."""
     return [f"q{i}" for i in p.free] + [f"v{i}" for i in p.free] + [f"y{i}" for i in p.flavour.dahl]
+
+
+def _mixed(p: Layout, matrix: Array, states: Sequence[str]) -> list[str]:
+    """A state whose coordinates and speeds are turned by a matrix, as text."""
+    nf = len(p.free)
+    turned = [spelled(row, part) for part in (states[:nf], states[nf : 2 * nf]) for row in matrix]
+    return [*turned, *states[2 * nf :]]
 
 
 def fetch(p: Layout) -> str:
     """Lines that copy the lane's state before and after the substep, its modes and levels."""
     rows, lines = p.rows, []
-    for k, name in enumerate(_states(p)):
-        lines.append(f"S[STATE + {k}] = W[{rows['o' + name]} * L]")
-        lines.append(f"S[NEXT + {k}] = W[{rows[name]} * L]")
+    for place, when in (("STATE", "o"), ("NEXT", "")):
+        state = _mixed(p, p.to_joints, [f"W[{rows[when + name]} * L]" for name in _states(p)])
+        lines += [f"S[{place} + {k}] = {text}" for k, text in enumerate(state)]
     for k, i in enumerate(p.flavour.dry):
         slide = f"_Fs{i}" if i in p.flavour.stribeck else f"_Fc{i}"
         for name, row in (("MODES", f"s{i}"), ("HOLD", f"_Fs{i}"), ("SLIDE", slide)):
@@ -52,7 +62,8 @@ def fetch(p: Layout) -> str:
 
 def store(p: Layout) -> str:
     """Lines that give the lane its new state and modes."""
-    lines = [f"W[{p.rows[name]} * L] = S[STATE + {k}]" for k, name in enumerate(_states(p))]
+    state = _mixed(p, p.from_joints, [f"S[STATE + {k}]" for k in range(len(_states(p)))])
+    lines = [f"W[{p.rows[name]} * L] = {text}" for name, text in zip(_states(p), state, strict=True)]
     lines += [f"W[{p.rows[f's{i}']} * L] = S[MODES + {k}]" for k, i in enumerate(p.flavour.dry)]
     return "".join(f"    {line}\n" for line in lines)
 
@@ -73,10 +84,10 @@ def located(p: Layout, text: str) -> str:
 
 def _known(p: Layout, state: str) -> dict[str, str]:
     """Where the search keeps what the equations call by name."""
-    nf, f, modes = len(p.free), p.flavour, places(p)["MODES"]
-    known = {f"_q{i}": f"S[{state} + {k}]" for k, i in enumerate(p.free)}
-    known |= {f"_v{i}": f"S[{state} + {nf + k}]" for k, i in enumerate(p.free)}
-    known |= {f"_y{i}": f"S[{state} + {2 * nf + k}]" for k, i in enumerate(f.dahl)}
+    f, modes = p.flavour, places(p)["MODES"]
+    names = [*(f"_{c}{i}" for c in "qv" for i in p.free), *(f"_y{i}" for i in f.dahl)]
+    states = _mixed(p, p.from_joints, [f"S[{state} + {k}]" for k in range(len(names))])
+    known = dict(zip(names, states, strict=True))
     known |= {f"_s{i}": f"S[{modes + k}]" for k, i in enumerate(f.dry)}
     return known | {name: f"W[{p.rows[name]} * L]" for name in p.constants}
 
@@ -103,14 +114,16 @@ def leap(p: Layout) -> str:
         known |= {f"_{c}{when}{j}": _input(p, j, z, c) for c in ("u", *nodes(f)) for j in range(p.nu)}
         known |= {f"_h{c}{i}{when}": _motion(p, c, i, z) for i in f.held for c in "qva"}
     call = ", ".join(known[a] for a in step_arguments(p))
-    result = ", ".join(f"S[NEXT + {k}]" for k in range(2 * len(p.free) + len(f.dahl)))
+    new = [f"n{k}" for k in range(len(_states(p)))]
+    turned = _mixed(p, p.to_joints, new) if p.slanted else []
+    written = ", ".join(new if p.slanted else (f"S[NEXT + {k}]" for k in range(len(new))))
     return (
         "@inline\ndef parabola(first, middle, last, z):\n"
         "    return first + z * (4.0 * middle - 3.0 * first - last + z * 2.0 * (first + last - 2.0 * middle))\n\n\n"
         "@scalar\ndef leap(W, S, L, t, d, h):\n"
         '    """Step `d` from the state at time `t` within the substep `h`."""\n'
         "    za, zm, zb = t / h, (t + 0.5 * d) / h, (t + d) / h\n"
-        f"    {result}, flag = step({call})\n"
+        f"    {written}, flag = step({call})\n" + "".join(f"    S[NEXT + {k}] = {t}\n" for k, t in enumerate(turned))
     )
 
 

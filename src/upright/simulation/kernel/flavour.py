@@ -6,23 +6,27 @@ A flavour is what is fixed when a kernel is compiled; everything else (parameter
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from upright.errors import BadInput, nearest
 from upright.laws.linear import Law, Structure
 from upright.laws.rule import Rule, Written
 from upright.physics.actuator import ACTUATOR
+from upright.physics.combination import spelled
 from upright.physics.equations import Derived
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Flavour:
-    """Terms compiled into a kernel; numbers are indices of coordinates.
+    """Terms compiled into a kernel; numbers are indices of coordinates, a joint's that of its pivot (`pivots`).
 
     Attributes
     ----------
@@ -98,6 +102,39 @@ class Layout:
         return tuple(i for i in range(self.n) if i not in self.flavour.held)
 
     @cached_property
+    def pivots(self) -> tuple[int | None, ...]:
+        """Coordinate whose place each joint takes, as `pivots` finds it."""
+        return pivots(self.derived, self.flavour.held)
+
+    @cached_property
+    def joints(self) -> dict[int, Array]:
+        """Direction of each joint that can move, by its pivot."""
+        found = zip(self.pivots, self.derived.joints, strict=True)
+        return {i: np.array(j.direction) for i, j in found if i is not None}
+
+    @cached_property
+    def to_joints(self) -> Array:
+        """Matrix T of ``z = T q``: free coordinates into some of which each joint is one, if any has friction."""
+        f = self.flavour
+        known = self.joints if f.dry or f.dahl or f.drag else {}
+        rows = [known.get(i, np.eye(self.n)[i]) for i in self.free]
+        return np.array(rows).reshape(len(self.free), self.n)[:, list(self.free)]
+
+    @cached_property
+    def from_joints(self) -> Array:
+        """Matrix S of ``q = S z``, so that mass matrix and forces are ``S' M S`` and ``S' f`` there."""
+        return np.asarray(np.linalg.inv(self.to_joints), dtype=np.float64) + 0.0  # no -0
+
+    @cached_property
+    def slanted(self) -> bool:
+        """Whether a joint with friction acts on several coordinates."""
+        return not np.array_equal(self.to_joints, np.eye(len(self.free)))
+
+    def along(self, i: int, name: Callable[[int], str]) -> str:
+        """Motion of the joint with pivot `i`, where the free coordinates' has these names."""
+        return spelled(self.joints[i][list(self.free)], [name(k) for k in self.free])
+
+    @cached_property
     def velocities(self) -> tuple[str, ...]:
         """Names of the velocities."""
         return tuple(f"{q}_dot" for q in self.derived.coordinates)
@@ -157,6 +194,31 @@ class Layout:
 
 
 @lru_cache(maxsize=64)
+def pivots(derived: Derived, held: tuple[int, ...]) -> tuple[int | None, ...]:
+    """Coordinate whose place each joint can take, each another, by elimination; None for a joint that is held.
+
+    Raises
+    ------
+    BadInput
+        When joints that move independently do so no longer, with these coordinates held.
+    """
+    rows = np.array([j.direction for j in derived.joints]).reshape(len(derived.joints), len(derived.coordinates))
+    rows[:, list(held)] = 0.0
+    found: list[int | None] = [None] * len(rows)
+    reduced: dict[int, Array] = {}
+    for k in sorted((k for k, row in enumerate(rows) if row.any()), key=lambda k: np.count_nonzero(rows[k])):
+        left = rows[k].copy()
+        for done, row in reduced.items():
+            left = left - left[found[done]] / row[found[done]] * row
+        if np.abs(left).max() <= 1e-9 * np.abs(rows[k]).max():
+            names = ", ".join(derived.coordinates[i] for i in held)
+            raise BadInput(f"{derived.name}: with {names} held, two joints are one; let it move or merge them.")
+        i = int(np.argmax(np.abs(left)))
+        reduced[k], found[k] = left, i
+    return tuple(found)
+
+
+@lru_cache(maxsize=64)
 def _known(derived: Derived) -> frozenset[str]:
     return frozenset({*derived.parameters, *ACTUATOR})
 
@@ -213,7 +275,8 @@ def choose(
         value = params.get(name, idle)
         return value != idle if isinstance(value, float) else bool(np.any(np.asarray(value) != idle))
 
-    moving = [j for j in derived.joints if derived.coordinates[j.coordinate] not in held]
+    still = tuple(i for i, c in enumerate(derived.coordinates) if c in held)
+    moving = [(i, j) for i, j in zip(pivots(derived, still), derived.joints, strict=True) if i is not None]
     gate, damping, curve, dynamic = (
         any(on(f"actuator.{a}") for a in names)
         for names in (("start", "end"), ("damping", "standby", "damping_rise"), ("fade",), ("lag", "delay", "slope"))
@@ -221,13 +284,13 @@ def choose(
     curve = (curve or damping) and on("actuator.knee")
     relaxation = damping and on("actuator.relaxation")
     capped = on("actuator.force_limit")
-    rough = [j for j in moving if on(j.coulomb) or on(j.stiction)]
+    rough = [(i, j) for i, j in moving if on(j.coulomb) or on(j.stiction)]
     return Flavour(
-        dry=tuple(j.coordinate for j in rough if not on(j.presliding)),
-        dahl=tuple(j.coordinate for j in rough if on(j.presliding)),
-        stribeck=tuple(j.coordinate for j in rough if on(j.stribeck_speed)),
-        drag=tuple(j.coordinate for j in moving if on(j.quadratic)),
-        held=tuple(i for i, c in enumerate(derived.coordinates) if c in held),
+        dry=tuple(i for i, j in rough if not on(j.presliding)),
+        dahl=tuple(i for i, j in rough if on(j.presliding)),
+        stribeck=tuple(i for i, j in rough if on(j.stribeck_speed)),
+        drag=tuple(i for i, j in moving if on(j.quadratic)),
+        held=still,
         dynamic=dynamic or gate or damping or curve or capped or (loop is not None and loop.delay > 0.0),
         gate=gate,
         damping=damping,

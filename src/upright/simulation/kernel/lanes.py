@@ -29,8 +29,7 @@ def start(w: Writer) -> None:
     w.add("_m = _base + _i")
     w.add(*(f"{name} = P[{r}, _m]" for r, name in enumerate(d.parameters) if name in used))
     w.add(*(f"{{k{i}}} = {text}" for i, text in enumerate(d.lumps)))
-    for j in d.joints:
-        i = j.coordinate
+    for i, j in zip(p.pivots, d.joints, strict=True):
         if i in (*f.dry, *f.dahl):
             w.add(f"_c = {j.coulomb or '0.0'}", f"_level = {j.stiction or '0.0'}")
             # not zero: what holds at rest with nothing at all would be on its border for ever
@@ -42,9 +41,10 @@ def start(w: Writer) -> None:
                 w.add(f"{{{name}{i}}} = 1.0 / {text} if {text} > 0.0 else 1e300")
     for i in range(p.n):
         w.add(f"{{q{i}}} = X0[{2 * i}, _m]", f"{{v{i}}} = X0[{2 * i + 1}, _m]")
-        for name, on in (("s", f.dry), ("y", f.dahl)):
-            if i in on:
-                w.add(f"{{{name}{i}}} = 1.0 if {{v{i}}} > 0.0 else (-1.0 if {{v{i}}} < 0.0 else 0.0)")
+    for name, on in (("s", f.dry), ("y", f.dahl)):
+        for i in on:
+            v = p.along(i, lambda k: f"{{v{k}}}")
+            w.add(f"{{{name}{i}}} = 1.0 if {v} > 0.0 else (-1.0 if {v} < 0.0 else 0.0)")
     w.add(*(f"{{hb{i}}} = HBASE[{k}, _m]" for k, i in enumerate(f.held)))
     for j in range(p.nu):
         for k, name in enumerate(("gain", "off", "lim")):
