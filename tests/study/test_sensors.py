@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from tests.study.crane_log import RIG, RUN, SENSORS, THETA, T, X, one
+from upright.physics.oscillators import Rectilinear1
+from upright.simulation import simulate
 
 
 @pytest.mark.parametrize(
@@ -97,6 +99,28 @@ def test_commands_are_held_not_interpolated(study):
     run = one(study(RIG + SENSORS + '[drive]\ncolumn = "v"\n' + RUN + 'period = "2 ms"\n', theta=THETA, x=X, v=step))
     np.testing.assert_array_equal(run.u[:, 0], np.where(run.t < 3.0 - 1e-9, 0.0, 1.0))
     assert run.period == pytest.approx(0.002)
+
+
+@pytest.mark.parametrize("period", [0.02, 0.0073])
+def test_pulses_shorter_than_the_grid_move_a_free_mass_as_they_did(study, period):
+    t = 1e-3 * np.arange(2001)
+    pulses = np.where(np.arange(t.size) % 50 // 3 == 4, 5.0, 0.0) - np.where(np.arange(t.size) % 170 == 33, 7.0, 0.0)
+    run = one(study(
+        RIG + SENSORS + '[drive]\ncolumn = "v"\n' + RUN + f"period = {period}\n",
+        t=t, theta=np.cos(t), x=np.sin(t), v=pulses,
+    ))  # fmt: skip
+    mass = 2.0
+    x = simulate(Rectilinear1(m_1=mass, k_1=0.0), {}, [0.0, 0.1], run.u, run.period, samples=run.t.size)[:, :, 0]
+    impulse = np.interp(run.t, t, np.concatenate([[0.0], 1e-3 * np.cumsum(pulses[:-1])]))
+    np.testing.assert_allclose(x[:, 1], 0.1 + impulse / mass, rtol=0, atol=1e-12)
+
+
+def test_a_law_reads_its_reference_at_its_samples(study):
+    ramp = np.round(3 * T, 1)
+    loop = '[runs.loop]\ngains = { x = "2 V/m" }\nreference = "r"\n'
+    unit = '[actuator]\ngain = "2 N/V"\n[drive]\ncolumn = "v"\nunit = "V"\n'
+    run = one(study(RIG + unit + SENSORS + RUN + 'period = "20 ms"\n' + loop, theta=THETA, x=X, v=0 * T, r=ramp))
+    np.testing.assert_array_equal(run.loop.law.references[:, 0], ramp[::4])
 
 
 def test_a_whole_multiple_of_the_period_picks_samples(study):

@@ -168,7 +168,7 @@ def _recovered(section: Section, scene: Scene) -> ClosedLoop:
         law, B=np.column_stack([law.B, np.zeros((len(law.A), len(factors)))]),
         D=np.hstack([law.D, [list(factors.values())]]), reference_names=(*law.reference_names, *factors),
     )  # fmt: skip
-    references = [scene.grid.commands(scene.record[name]) for name in law.reference_names]
+    references = [scene.grid.references(scene.record[name]) for name in law.reference_names]
     names_of = {scene.sensors[n].column: n for n in measured}
     law = replace(law, measured=tuple(names_of[c] for c in law.measured))
     loop = _closed_loop(section, law, references, scene, every, raw=True)
@@ -284,5 +284,5 @@ def reference_of(value: Any, unit: str, section: Section, scene: Scene) -> Array
     """One number (1,), or (N,) from a column or an expression."""
     with section.at("reference"):
         if isinstance(value, str) and not value[:1].isdigit() and value[:1] not in "+-.":
-            return scene.grid.commands(expressions.evaluate(value, scene.record.signals, scene.record.t))
+            return scene.grid.references(expressions.evaluate(value, scene.record.signals, scene.record.t))
         return np.array([si(value, unit, "reference")])

@@ -17,6 +17,7 @@ from upright.study.keys import names
 from upright.study.text import Section, show, si
 
 _UNIFORM = 0.02  # samples off the grid by less than this part of a period count as on it
+_ON_GRID = 1e-6  # and by less than this as at the grid's instant
 _MOST = 10_000_000  # samples of a run, some 80 MB for each of its signals
 _GAP, _HOPELESS = 5, 100  # periods without a sample: told, refused
 
@@ -168,12 +169,23 @@ class Grid:
         """Measured values on the grid, straight lines between samples."""
         return values if self.uniform else np.interp(self.t, self.source, values)
 
-    def commands(self, values: Array) -> Array:
-        """Commands on the grid, each held until the next."""
+    def references(self, values: Array) -> Array:
+        """What a program reads at the instants of the grid: the last value before each."""
         if self.uniform:
             return values
-        slack = 1e-6 * (self.t[1] - self.t[0])
+        slack = _ON_GRID * (self.t[1] - self.t[0])
         return values[np.clip(np.searchsorted(self.source, self.t + slack, side="right") - 1, 0, None)]
+
+    def commands(self, values: Array) -> Array:
+        """Commands on the grid: the mean over each interval of what was held there, so that impulses are kept."""
+        if self.uniform:
+            return values
+        since = (self.source[1:] - self.t[0]) / (self.t[1] - self.t[0])
+        interval = np.floor(since + _ON_GRID).astype(np.int64)
+        left = 1.0 - (since - interval)  # share of its interval for which a change lasts
+        inside = (left < 1.0 - _ON_GRID) & (interval < self.t.size)
+        changed = np.bincount(interval[inside], (np.diff(values) * left)[inside], minlength=self.t.size)
+        return self.references(values) + changed
 
     def description(self) -> tuple[str, ...]:
         """What was done to the time base, in sentences."""
