@@ -15,7 +15,7 @@ from upright.identification.frequency.balance import Balance
 from upright.identification.frequency.detection import by_period, detect, settled
 from upright.identification.frequency.fitting import least_squares, simplex_dB
 from upright.identification.frequency.response import FrequencyResponse, describing
-from upright.physics import CartPendulum, Furuta, chain
+from upright.physics import CartPendulum, DoublePendulum, DoublePendulumAbsolute, Furuta, chain
 from upright.simulation import simulate
 
 FURUTA = Furuta(m_p=0.135, l_cg=0.184, r=0.15, J_d=7.2e-3, J_p=6e-4, J_a=2e-5, b_1=2e-3, b_2=4e-5)
@@ -245,3 +245,20 @@ def test_what_is_no_response_is_refused(tmp_path):
         explain(asked(**GUESS), "hanging", smooth(omega=OMEGA[:3]))
     with pytest.raises(BadInput, match="at least one period"):
         detect(np.arange(10) * 0.1, np.zeros(10), 1.0)
+
+
+def test_friction_between_two_links_answers_alike_in_relative_and_absolute_angles():
+    links = {"m_1": 0.35, "m_2": 0.2, "l_1": 0.2, "l_c1": 0.11, "l_c2": 0.13, "b_1": 5e-3, "b_1c": 3e-3, "b_2c": 4e-3}
+    omega, rng = np.array([3.0, 5.0, 9.0]), np.random.default_rng(1)
+    relative = rng.normal(size=(3, 2)) + 1j * rng.normal(size=(3, 2))
+    answers: list[np.ndarray] = []
+    for plant, G in (
+        (DoublePendulum(**links), relative),
+        (DoublePendulumAbsolute(**links), np.cumsum(relative, axis=1)),
+    ):
+        data = FrequencyResponse(
+            omega=omega, response=G, outputs=("theta_1", "theta_2"), units=("rad", "rad", "N m"),
+            drive=np.full(3, 0.05), dry=describing(omega, np.abs(0.05 * G)),
+        )  # fmt: skip
+        answers.append(Balance(plant=type(plant), at="hanging", data=data).response(plant.parameters())[0])
+    np.testing.assert_allclose(answers[1], np.cumsum(answers[0], axis=1), rtol=1e-12)
