@@ -10,6 +10,8 @@ import pytest
 from typer.testing import CliRunner
 
 from upright.cli import app
+from upright.physics import find
+from upright.simulation import simulate
 
 T = np.arange(1500) * 4e-3
 SWING = np.round(0.8 * np.exp(-0.3 * T) * np.cos(7 * T), 4)
@@ -56,6 +58,35 @@ def test_json_can_be_read_by_a_program(tmp_path: Path) -> None:
     jump = next(f for f in found["findings"] if f["kind"] == "jump")
     assert jump["evidence"]["jump [rad]"] == pytest.approx(0.15, abs=0.03)  # 0.022 rad is the largest step of the swing
     assert "sign" in found["unchecked"]
+
+
+def disks(folder: Path) -> Path:
+    """Counts of two disks on a shaft that a torque has spun up, as an ECP 205 logs them."""
+    volts = np.where(T >= 0.5, 0.5, 0.0)
+    shaft = find("torsional-2")(J_1=0.01, J_2=0.01, k_12=1.4, c_1=0.007, c_2=0.001)
+    x = simulate(shaft, {}, [0.0] * 4, 0.6 * volts, 4e-3, samples=T.size, substeps=4)[:, ::2, 0]
+    counts = np.round(16000 / (2 * np.pi) * x)
+    path = folder / "run.csv"
+    rows = "\n".join(f"{a:.4f},{b:.0f},{c:.0f},{d:.0f}" for a, (b, c), d in zip(T, counts, 819 * volts, strict=True))
+    path.write_text(f"t,Encoder 1 Pos,Encoder 2 Pos,Control Effort\n{rows}\n", encoding="utf-8")
+    return path
+
+
+def test_rigs_are_proposed_that_the_columns_can_be_of(tmp_path: Path) -> None:
+    path = disks(tmp_path)
+    proposed = json.loads(doctor(path, "--json").stdout)["rigs"]
+    assert proposed[0] == "torsional-2"  # a cart travels less than 16000 counts
+    assert {"rectilinear-2", "furuta"} < set(proposed)
+    assert all(len(find(name).coordinates) == 2 for name in proposed)
+    told = doctor(path).stdout
+    assert f"upright doctor {path.name} --rig torsional-2" in told.replace(str(path), path.name)
+    assert all(name in told for name in proposed)
+
+
+def test_no_rig_of_two_bodies_is_proposed_for_one_angle(tmp_path: Path) -> None:
+    told = doctor(log(tmp_path)).stdout
+    assert "--rig pendulum" in told
+    assert "furuta" not in told
 
 
 def test_a_clock_that_starts_again_is_a_finding_not_an_error(tmp_path: Path) -> None:

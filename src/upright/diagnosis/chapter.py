@@ -82,9 +82,10 @@ def _next_steps(diagnosis: Diagnosis, log: Path, rig: str, page: bool) -> list[S
     if diagnosis.findings and not page:
         command = f"{again}{f' --rig {typed(rig)}' if rig else ''} -o {typed(f'{log.stem}-doctor.html')}"
         steps.append(Step("See the pictures.", command))
-    if not rig:
-        told = "Name the rig, so that signs and scales can be told."
-        steps.append(Step(told, f"{again} --rig furuta"))
+    if not rig and diagnosis.rigs:
+        choice = " or ".join(diagnosis.rigs)
+        told = f"Name the rig, so that signs and scales can be told; these columns would suit {choice}."
+        steps.append(Step(told, f"{again} --rig {diagnosis.rigs[0]}"))
     init = f"upright init {typed(log)} -o study.toml"
     return [*steps, Step("Write a study, with the keys named above.", init)]
 

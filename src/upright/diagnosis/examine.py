@@ -16,6 +16,7 @@ from upright.diagnosis.rest import examine_rest
 from upright.diagnosis.sensors import examine_sensors
 from upright.readers.inspection import inspect_record
 from upright.records import Record
+from upright.study.draft.suits import plants_that_suit
 
 HOPELESS = frozenset({"dead", "stuck", "gap", "doubled", "jitter"})
 """Findings after which equations of motion are not asked, because they would only say the same again."""
@@ -58,6 +59,7 @@ def examine(record: Record, known: KnownRig | None = None, *, before: tuple[Find
         findings=tuple(sorted(found, key=lambda f: order[f.severity])),
         checked=tuple(k for k in KINDS if k not in unchecked and (k != "settings" or _settings(case))),
         unchecked=unchecked,
+        rigs=plants_that_suit(case.record, inspection) if known is None else (),
     )
 
 

@@ -101,7 +101,10 @@ KINDS = {
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Diagnosis:
-    """All findings about one record, worst first; what was looked for; what could not be looked for, and why."""
+    """All findings about one record, worst first; what was looked for; what could not be looked for, and why.
+
+    `rig` is what was said of it; where nothing was, `rigs` are the plants whose coordinates its columns can measure.
+    """
 
     file: str
     rig: str
@@ -110,6 +113,7 @@ class Diagnosis:
     findings: tuple[Finding, ...]
     checked: tuple[str, ...]
     unchecked: Mapping[str, str]
+    rigs: tuple[str, ...] = ()
 
     @property
     def wrong(self) -> tuple[Finding, ...]:

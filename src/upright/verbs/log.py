@@ -171,6 +171,7 @@ def _plain_diagnosis(diagnosis: Diagnosis, html: Path | None) -> dict[str, Any]:
     return {
         "file": diagnosis.file,
         "rig": diagnosis.rig,
+        "rigs": list(diagnosis.rigs),
         "samples": diagnosis.samples,
         "duration": diagnosis.duration,
         "wrong": bool(diagnosis.wrong),

@@ -90,7 +90,6 @@ def read_chain(record: Record, seen: Inspection, found: Recognised, *, named: bo
     drive, doubts = _drive(record, found, reference)
     t = record.t
     first = record[columns[0].name]
-    most = max((record[c.name] for c in columns), key=lambda x: float(np.ptp(x)))
     plant = found.plant
     told = list(found.doubts)
     u = record[drive.name] if drive is not None else np.zeros(t.size)
@@ -98,9 +97,7 @@ def read_chain(record: Record, seen: Inspection, found: Recognised, *, named: bo
     at = int(np.argmax(asked != 0)) if asked[0] == 0 else 0
     reversed_ = drive is not None and not follows(t, u, first, at)
     if not named:
-        moved = float(most[-1] - most[0])
-        pushed = drive is not None and float(u[-1]) * moved * (-1 if reversed_ else 1) > 0
-        kind, why = _kind(columns, most, drive is not None and not pushed, path)
+        kind, why = chain_kind(record, columns, drive, reversed_, path)
         plant = f"{kind}-{len(columns)}"
         other = "torsional" if kind == "rectilinear" else "rectilinear"
         told = [told[0].partition(";")[0].replace("rectilinear", kind).replace("torsional", kind)] if told else []
@@ -113,7 +110,7 @@ def read_chain(record: Record, seen: Inspection, found: Recognised, *, named: bo
         )
     windows, loop = [_driven(record, seen, at, disks=plant.startswith("tors"))], ""
     if drive is None:
-        windows = releases(t, most) or [found.window]
+        windows = releases(t, widest(record, columns)) or [found.window]
     elif reference is not None:
         loop, about_law = _law(record, drive, reference, columns[0], names[0])
         doubts.append(about_law)
@@ -159,8 +156,22 @@ def _bodies(record: Record, seen: Inspection, found: Recognised) -> list[Column]
     return [both[c.name] for c in seen.columns if c.name in both][:9]
 
 
-def _kind(columns: list[Column], most: Array, released: bool, path: str) -> tuple[str, str]:
-    """Whether these are carts or disks, and why; `released`: they were driven, and nothing holds them at the end."""
+def widest(record: Record, columns: list[Column]) -> Array:
+    """Readings (N,) of the body that moves most."""
+    return max((record[c.name] for c in columns), key=lambda x: float(np.ptp(x)))
+
+
+def chain_kind(
+    record: Record, columns: list[Column], drive: Column | None, against: bool, path: str
+) -> tuple[str, str]:
+    """Whether these are carts or disks, and why.
+
+    `against`: the columns count against the command; `path` of the log may say what the rig is.
+    """
+    most = widest(record, columns)
+    last = float(record[drive.name][-1]) if drive is not None else 0.0
+    pushed = last * float(most[-1] - most[0]) * (-1 if against else 1) > 0
+    released = drive is not None and not pushed  # driven, and nothing holds them at the end
     units = {c.guess for c in columns}
     if units & {"rad", "deg"}:
         return "torsional", "they are angles"

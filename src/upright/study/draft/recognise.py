@@ -75,7 +75,7 @@ def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
     drive = drive_column(record, seen)
     doubts: list[str] = []
     if not plant:
-        plant, doubt = _plant(found, drive)
+        plant, doubt = plant_of(found, drive)
         doubts += [doubt] if doubt else []
     columns, missing = _assign(find(plant), found)
     degrees = [c.name for c in columns.values() if c.guess == "deg" and not c.unit]
@@ -176,7 +176,7 @@ def drive_column(record: Record, seen: Inspection) -> Column | None:
     return (effort or candidates or [None])[0]
 
 
-def _plant(places: list[Column], drive: Column | None) -> tuple[str, str]:
+def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
     """Plant whose coordinates look like these columns, and how sure that is."""
     lengths = [c for c in places if c.guess in ("m", "mm")]
     counts = [c for c in places if c.guess in ("counts", "")]

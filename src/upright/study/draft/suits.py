@@ -1,0 +1,39 @@
+"""Which plants a log's columns could be of, before anybody has said what the rig is."""
+
+from __future__ import annotations
+
+from upright.physics import BUILT_IN, Plant
+from upright.readers.inspection import Inspection
+from upright.records import Record
+from upright.study.draft.chain_log import chain_kind
+from upright.study.draft.recognise import drive_column, moves_against, plant_of, position_columns
+
+COUNTED = ("counts", "")
+"""Units of a column that may be an angle as well as a length."""
+
+MOST_BODIES = 3
+
+
+def plants_that_suit(record: Record, seen: Inspection) -> tuple[str, ...]:
+    """Built-in plants whose coordinates a log's moving columns can measure, the likeliest first; none when none can."""
+    places = position_columns(record, seen)
+    if not places:
+        return ()
+    drive = drive_column(record, seen)
+    likely, _ = plant_of(places, drive)
+    if all(c.guess in COUNTED for c in places):
+        places = places[:MOST_BODIES]
+        first = record[places[0].name]
+        against = drive is not None and moves_against(record.t, record[drive.name], first)
+        kind, _ = chain_kind(record, places, drive, against, record.provenance.file)
+        likely = f"{kind}-{len(places)}"
+    units = [c.guess for c in places]
+    lengths, angles = sum(u in ("m", "mm") for u in units), sum(u in ("rad", "deg") for u in units)
+
+    def suits(plant: type[Plant]) -> bool:
+        turning = sum(c.unit == "rad" for c in plant.coordinates)
+        sliding = len(plant.coordinates) - turning
+        return len(plant.coordinates) == len(units) and turning >= angles and sliding >= lengths
+
+    others = [name for name, plant in BUILT_IN.items() if name != likely and suits(plant)]
+    return (likely, *others)
