@@ -17,12 +17,15 @@ from upright.identification import Parameter
 from upright.physics import BUILT_IN, Plant, find
 from upright.readers.inspection import Column, Inspection
 from upright.records import Array, Record
-from upright.study.draft.recognise import drive_column, recognise
+from upright.study.draft.recognise import RATE, drive_column, recognise
 from upright.study.sensors import Drive, Sensor
 from upright.trust import before_running
 
 COUNTERS = (2 * math.pi, 360.0, 65536.0, 4294967296.0)
 """Turns that counters are known to make, in rad, deg and counts."""
+
+HELD = 0.2
+"""A body that moves less than this part of the largest motion was held."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,6 +130,10 @@ class Case:
         """Range of a measured column as a share of the largest in the same unit; 0 where nothing moves."""
         return self.span(c) / (self.span(self.widest(unit_of(c))) or 1.0)
 
+    def held(self, c: Column) -> bool:
+        """Whether a body hardly moves beside another one that is alike."""
+        return self.chained and self.beside(c) < HELD
+
     def coordinate(self, column: str) -> str:
         """Coordinate that a column measures, or a placeholder that a reader replaces."""
         return next((n for n, p in self.places.items() if p.column == column), "COORDINATE")
@@ -149,6 +156,11 @@ class Case:
 def tells_time(c: Column) -> bool:
     """Whether a column only counts rows or repeats the time."""
     return any("the time" in s or "index" in s for s in c.lies)
+
+
+def tells_speed(c: Column) -> bool:
+    """Whether a column is a rate, which a stop changes at once and no count is lost from."""
+    return unit_of(c).endswith("/s") or RATE.search(c.name) is not None
 
 
 def unit_of(c: Column) -> str:

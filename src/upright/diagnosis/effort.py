@@ -19,8 +19,6 @@ from upright.records import Array
 from upright.signals.trips import TripRegression
 from upright.study.draft.recognise import drive_column
 
-HELD = 0.2
-"""A body that moves less than this part of the largest motion was held."""
 STILL = 0.1
 """Seconds at the beginning in which a rig must lie still before its first motion can be told."""
 
@@ -151,11 +149,7 @@ def _early(case: Case) -> Iterator[Finding]:
     for c in case.measured:
         x = case.record[c.name]
         span = float(np.ptp(x))
-        if (
-            (case.chained and case.beside(c) < HELD)
-            or span == 0
-            or np.ptp(x[:still]) > max(0.005 * span, 2 * c.quantum.step)
-        ):
+        if case.held(c) or span == 0 or np.ptp(x[:still]) > max(0.005 * span, 2 * c.quantum.step):
             continue
         far = np.abs(x[:command] - x[0]) > max(0.03 * span, 6 * c.quantum.step)
         if far.any() and int(np.argmax(far)) < first:

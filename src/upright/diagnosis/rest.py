@@ -6,8 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from upright.diagnosis.case import Case, unit_of
-from upright.diagnosis.effort import HELD
+from upright.diagnosis.case import HELD, Case, tells_speed, unit_of
 from upright.diagnosis.findings import Curve, Finding, Panel
 from upright.records import Array
 from upright.signals.stretches import pieces, turning_points
@@ -47,6 +46,8 @@ def _drift(case: Case) -> Iterator[Finding]:
         return
     t = case.record.t
     for c in case.measured:
+        if tells_speed(c):
+            continue
         x = case.record[c.name]
         quiet = [s for s in rests if not case.driven or not np.any(case.u[(t >= s[0]) & (t <= s[1])])]
         levels = [float(np.median(x[(t >= a) & (t <= b)])) for a, b in quiet]

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.diagnosis.case import Case, tells_time, unit_of
+from upright.diagnosis.case import Case, tells_speed, tells_time, unit_of
 from upright.diagnosis.findings import Finding
 from upright.readers.inspection import Column
 from upright.records import Array, Record
@@ -28,6 +29,8 @@ def examine_sensors(case: Case) -> tuple[list[Finding], Record | None]:
             continue
         x = case.record[column.name]
         jumped = jumps(case.record.t, x, column.quantum.step, case.moduli.get(column.name, ()))
+        if tells_speed(column):
+            jumped = replace(jumped, steps=jumped.steps[:0], step_sizes=jumped.step_sizes[:0])
         found += _jumped(case, column, x, jumped)
         if jumped:
             mended[column.name] = jumped.mended(x)
@@ -129,7 +132,13 @@ def _frozen(case: Case, c: Column, x: Array) -> Iterator[Finding]:
     )
 
 
+FEW = 50
+"""Steps of a sensor: a body that moves by fewer is held, and has reached no limit."""
+
+
 def _limited(case: Case, c: Column, x: Array) -> Iterator[Finding]:
+    if float(np.ptp(x)) < FEW * c.quantum.step or case.held(c):
+        return
     low, high, share = clipped(x, c.quantum.step, inertia=True)
     if share < 0.005:
         return

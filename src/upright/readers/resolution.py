@@ -138,16 +138,14 @@ def find_quantum(values: Array) -> Quantum:
     if rounding >= 1:  # counts
         return Quantum(step=_common_divisor(values, rounding))
     levels = _levels(values, rounding)
-    if levels.size < 3:
-        return Quantum()
-    step = _grid(levels, rounding)
+    step = _grid(levels, rounding) if levels.size > 2 else 0.0
     if step >= 1.5 * rounding and step > 0:
         return Quantum(step=step, counts_per_rev=counts_per_rev(step))
     common = _common_divisor(values, rounding) if rounding else 0.0
     if levels.size > 8 and common > 1.5 * rounding:  # too fine beside its text for a fit, yet exact
         return Quantum(step=common)
     # Steps no coarser than the text's own digits tell about the text, not about the sensor.
-    few = rounding > 0 and levels.size < 0.5 * values.size
+    few = rounding > 0 and 2 < np.unique(values).size < 0.5 * values.size
     return Quantum(step=rounding, decimals=True) if few else Quantum()
 
 

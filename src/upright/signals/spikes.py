@@ -67,7 +67,7 @@ def spikes(x: Array, quantum: float = 0.0) -> NDArray[np.int64]:
     calm = _running_median(x)
     off = np.abs(x - calm)
     usual = float(np.quantile(off, 0.99))
-    far = off > max(FAR * usual, LEAST * float(np.std(calm)), 4 * quantum, 1e-300)
+    far = off > max(FAR * usual, LEAST * float(np.std(calm)), 4 * _step(x, quantum), 1e-300)
     keep: list[int] = []
     for first, last in stretches(far):
         here = np.arange(first, last + 1)
@@ -76,6 +76,14 @@ def spikes(x: Array, quantum: float = 0.0) -> NDArray[np.int64]:
         if high.size <= WIDTH and here.size <= WIDTH + 4 and _returns(x, int(high[0]), int(high[-1])):
             keep += [int(i) for i in high]
     return np.array(keep, dtype=np.int64)
+
+
+def _step(x: Array, quantum: float) -> float:
+    """Step of a signal (N,); two values alone do not tell theirs: 1 between counts, else all that they differ by."""
+    low, high = float(x.min()), float(x.max())
+    if quantum or not ((x == low) | (x == high)).all():
+        return quantum
+    return min(high - low, 1.0) if low.is_integer() and high.is_integer() else high - low
 
 
 def _returns(x: Array, first: int, last: int) -> bool:
@@ -105,6 +113,7 @@ def jumps(t: Array, x: Array, quantum: float, moduli: Sequence[float] = ()) -> J
     nothing = np.zeros(0, np.int64)
     if x.size < 4 * REACH:
         return Jumps(wraps=nothing, modulus=0.0, steps=nothing, step_sizes=x[:0], spikes=nothing, spike_sizes=x[:0])
+    quantum = _step(x, quantum)
     ratio = np.diff(t)
     ratio /= float(np.median(ratio))
     peaks = spikes(x, quantum)

@@ -14,7 +14,7 @@ from upright.readers.inspection import Column, Inspection
 from upright.records import Array, Record
 from upright.signals.smoothing import savitzky_golay
 
-_RATE = re.compile(r"velocity|speed|rate|_dot\b|omega|\bqd|accel", re.IGNORECASE)
+RATE = re.compile(r"velocity|speed|rate|_dot\b|omega|\bqd|accel", re.IGNORECASE)
 _EFFORT = re.compile(r"effort|volt|current|torque|force|plant_input|cmd|duty|^(u|v|i)$", re.IGNORECASE)
 REFERENCE = re.compile(r"target|reference|\bref\b|commanded|set.?point", re.IGNORECASE)
 _ARM = re.compile(r"arm|psi|joint0|base|motor", re.IGNORECASE)
@@ -109,7 +109,7 @@ def position_columns(record: Record, seen: Inspection) -> list[Column]:
     """Columns that measure a place and move, without speeds, drives, clocks and liars."""
     kinds = ("rad", "m", "counts", "deg", "mm", "")
     found = [c for c in seen.columns if not (c.drive or c.constant or _lies(c, seen)) and c.guess in kinds]
-    found = [c for c in found if not _RATE.search(c.name) and not _is_speed(record, c.name, [o.name for o in found])]
+    found = [c for c in found if not RATE.search(c.name) and not _is_speed(record, c.name, [o.name for o in found])]
     found = [_in_degrees(record, _as_angle(record, c, seen)) for c in found]
     found = [c for c in found if c.guess] or found
     span = {c.name: c.high - c.low for c in found}
