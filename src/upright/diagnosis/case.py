@@ -49,11 +49,15 @@ class KnownRig:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Place:
-    """A coordinate as it was measured: `y` (N,) [SI], its `quantum` [SI], and the column it came from."""
+    """A coordinate as it was measured: `y` (N,) and its `quantum` in `unit`, and the column it came from.
+
+    The unit is the coordinate's, or counts where nobody said how many make a turn or a metre.
+    """
 
     column: str
     y: Array
     quantum: float
+    unit: str
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -79,6 +83,8 @@ class Case:
         Turns the counter behind a column may make, in the column's unit.
     locked : tuple of str
         Coordinates known not to move.
+    stated : mapping of str to Sensor or Drive
+        What a study says of each coordinate, and of ``"effort"``; what is found wrong is so with that.
     """
 
     record: Record
@@ -91,6 +97,7 @@ class Case:
     u: Array = field(default_factory=lambda: np.zeros(0))
     moduli: Mapping[str, tuple[float, ...]] = field(default_factory=dict[str, "tuple[float, ...]"])
     locked: tuple[str, ...] = ()
+    stated: Mapping[str, Sensor | Drive] = field(default_factory=dict[str, "Sensor | Drive"])
 
     @property
     def measured(self) -> tuple[Column, ...]:
@@ -137,6 +144,15 @@ class Case:
     def coordinate(self, column: str) -> str:
         """Coordinate that a column measures, or a placeholder that a reader replaces."""
         return next((n for n, p in self.places.items() if p.column == column), "COORDINATE")
+
+    def corrected(self, who: str, factor: float) -> str:
+        """Lines of a study that multiply a coordinate, or the effort, by a factor on top of what is stated now."""
+        stated = self.stated.get(who)
+        sign = stated.sign if stated is not None else 1.0
+        scale = (stated.scale if stated is not None else None) or 1.0
+        table = "drive" if who == "effort" else f"sensors.{who}"
+        line = f"sign = {-sign:.0f}" if factor == -1 else f"scale = {scale * factor:.4g}"
+        return f"[{table}]\n{line}"
 
     def over_time(self, *columns: str) -> tuple[Panel, ...]:
         """Columns over the whole record, those that the log has."""
@@ -231,7 +247,7 @@ def case_of(record: Record, inspection: Inspection, known: KnownRig | None) -> C
         y, quantum, _ = sensor.read(record)
         factor = sensor.factor(sensor.column_unit(record, record[sensor.column]))
         step = inspection.column(sensor.column).quantum.step
-        places[name] = Place(column=sensor.column, y=y, quantum=quantum or step * factor)
+        places[name] = Place(column=sensor.column, y=y, quantum=quantum or step * factor, unit=sensor.coordinate.unit)
         turn = 2 * math.pi / factor if sensor.coordinate.unit == "rad" and factor else 0.0
         moduli[sensor.column] = tuple({m for m in (turn, *COUNTERS) if m})
     u, drive = np.zeros(record.t.size), ""
@@ -242,6 +258,7 @@ def case_of(record: Record, inspection: Inspection, known: KnownRig | None) -> C
     return Case(
         record=record, inspection=inspection, plant=known.plant, parameters=known.parameters, places=places,
         zeroed=True, drive=drive, u=u, moduli=moduli, locked=known.locked,
+        stated={**known.sensors, **({"effort": known.drive} if known.drive is not None else {})},
     )  # fmt: skip
 
 
@@ -267,7 +284,8 @@ def _recognised(record: Record, inspection: Inspection, known: KnownRig | None) 
         if factor or chain or coordinate.unit == "m":
             factor = factor or 1.0
             y = factor * (record[c.name] - found.rest[coordinate.name])
-            places[coordinate.name] = Place(column=c.name, y=y, quantum=factor * c.quantum.step)
+            unit = c.guess if c.guess == "counts" else coordinate.unit
+            places[coordinate.name] = Place(column=c.name, y=y, quantum=factor * c.quantum.step, unit=unit)
     return Case(
         record=record, inspection=inspection, plant=plant, places=places,
         drive=column.name if column is not None else "", u=u,

@@ -18,6 +18,7 @@ from upright.diagnosis.findings import Curve, Finding, Panel
 from upright.diagnosis.motion import MATTERS, SmoothedMotion, Term
 from upright.physics.equations import mass_and_force
 from upright.records import Array
+from upright.study.sensors import Sensor
 
 FLOOR = 0.004
 """Unexplained share that is as good as nothing: parameters are known to some percent."""
@@ -255,8 +256,6 @@ def _mistaken(case: Case, balance: ForceBalance, now: Explanation, alike: list[E
             f"{whom[0].upper() + whom[1:]} is off by a factor: times {'-' if reversed_ else ''}{shown}"
             f"{f' ({cause})' if cause else ''} it fits; {rest}."
         )
-    line = "sign = -1" if kind == "sign" else f"scale = {best.factor:.4g}"
-    key = f"[drive]\n{line}" if best.who == "effort" else f"[sensors.{best.who}]\n{line}"
     columns = tuple(case.drive if e.who == "effort" else case.places[e.who].column for e in alike)
     return Finding(
         kind=kind,
@@ -266,7 +265,7 @@ def _mistaken(case: Case, balance: ForceBalance, now: Explanation, alike: list[E
         left=then,
         evidence={"factor [1]": best.factor, "unexplained now [%]": left, "unexplained then [%]": then},
         advice="Set it in the study, or mend the log; then look again.",
-        key=key,
+        key=case.corrected(best.who, -1.0 if kind == "sign" else best.factor),
         panels=(_force_panel(balance, now, "as declared"), _force_panel(balance, best, "with the factor", like=now)),
     )
 
@@ -341,7 +340,6 @@ def _why(x: Term) -> str:
 
 
 def _finding(case: Case, motion: SmoothedMotion, x: Term, who: str, sentence: str) -> Finding:
-    table = "drive" if who == "effort" else f"sensors.{who}"
     name = case.drive if who == "effort" else case.places[who].column
     body = next(c for c in motion.plant.coordinates if c.name == x.who[1])
     curves = (
@@ -349,19 +347,36 @@ def _finding(case: Case, motion: SmoothedMotion, x: Term, who: str, sentence: st
         Curve(name=f"{x.text}, all else taken out (times its slope)", t=x.t, y=x.slope * x.alone),
     )
     slope = float(np.polyfit(x.alone, x.target, 1)[0])
+    unit = case.places[x.who[1]].unit
+    system = "SI" if unit == body.unit else unit
+    stated = case.stated.get(who)
+    turned = stated is not None and stated.sign < 0
     return Finding(
         kind="sign",
         columns=(name,),
         severity="fault",
         sentence=sentence,
-        evidence={"slope found [SI]": slope, "slope expected (sign) [1]": x.expected, "explains [%]": 100 * x.share},
-        advice=f"Set the sign of '{name}'.",
-        key=f"[{table}]\nsign = -1",
+        evidence={
+            f"slope found [{system}]": slope,
+            "slope expected (sign) [1]": x.expected,
+            "explains [%]": 100 * x.share,
+        },
+        advice=f"Take the sign of '{name}' out again." if turned else f"Set the sign of '{name}'.",
+        key=case.corrected(who, -1.0),
         panels=(
             *case.over_time(*dict.fromkeys([case.places[x.who[1]].column, case.drive])),
-            Panel(label=f"acceleration\nof {body.name} [{body.unit}/s^2]", curves=curves),
+            Panel(label=f"acceleration\nof {body.name} [{unit}/s^2]", curves=curves),
         ),
     )
+
+
+def _half_a_turn_on(case: Case, who: str) -> float:
+    """Reading [deg] half a turn from where a sensor has its zero, in (-180, 180]."""
+    stated = case.stated.get(who)
+    if not isinstance(stated, Sensor):
+        return 180.0
+    factor, zero = stated.line(case.record)
+    return 180.0 - (-math.degrees(abs(factor) * zero)) % 360.0
 
 
 def _upside_down(case: Case, motion: SmoothedMotion, x: Term) -> Finding:
@@ -375,6 +390,6 @@ def _upside_down(case: Case, motion: SmoothedMotion, x: Term) -> Finding:
         finding,
         severity="warning",
         advice="If zero is upright, say so.",
-        key=f'[sensors.{who}]\noffset = "180 deg"',
+        key=f'[sensors.{who}]\noffset = "{_half_a_turn_on(case, who):.5g} deg"',
         evidence={**finding.evidence, "largest angle [rad]": float(np.abs(case.places[who].y).max())},
     )

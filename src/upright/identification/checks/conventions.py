@@ -41,7 +41,11 @@ def wrong_conventions(rig: Rig, runs: Sequence[Run]) -> tuple[str, ...]:
     if best > CLEAR * min(declared, 1.0):  # what explains next to nothing is no better convention
         return ()
     flips, turns = found
-    said = [f"set sign = -1 for {c} (its sign looks reversed)" for c, s in flips.items() if s < 0]
+    said = [
+        f"set sign = -1 for {c}, or take it out where it is said (the sign looks reversed)"
+        for c, s in flips.items()
+        if s < 0
+    ]
     said += [f"add an offset of pi to {c} (its zero looks upright)" for c in turns]
     now, then = 100 * (1 - min(declared, 1.0)), 100 * (1 - best)
     what = " and ".join(said)

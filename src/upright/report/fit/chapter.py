@@ -283,7 +283,8 @@ def _broken(fit: Fit) -> Iterator[Step]:
             if value < 0:
                 yield Step(
                     f"{plain(name)} of run '{label}' is explained worse than by its mean ({percent(value)}): look at "
-                    "the sign and scale of the column first; a reversed sign scores about −100 %.",
+                    "the sign and scale of the column first; a reversed sign scores about −100 %. Where the study "
+                    "says sign = -1 already, take that out.",
                     f"[sensors.{name}]\nsign = -1",
                 )
     lost = [
