@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -72,9 +73,15 @@ def poles(
 
 
 def _upper(value: float, stderr: float, quantile: float) -> Estimate:
-    """Imaginary part of the upper pole of a pair: none lies below the real axis."""
+    """Imaginary part of the upper pole of a pair, positive as a frequency is: its logarithm is what is uncertain.
+
+    An interval from 0 on says that the pair may as well be two real poles.
+    """
     plain = Estimate.within(value, stderr, quantile * stderr, "rad/s")
-    return replace(plain, interval=(max(plain.interval[0], 0.0), plain.interval[1]))
+    if plain.interval[0] <= 0:
+        return replace(plain, interval=(0.0, plain.interval[1]))
+    factor = math.exp(quantile * stderr / value)
+    return replace(plain, interval=(value / factor, value * factor))
 
 
 def _poles(rig: Rig, values: Mapping[str, float], at: str) -> NDArray[np.complex128]:

@@ -183,5 +183,7 @@ def _swing(pole: Pole) -> str:
         return ""
     turn, e = 2 * math.pi, pole.imag
     low, high = e.interval
+    if low <= 0 < e.stderr:
+        return f"not determined; below {number(high / turn, 2)} Hz"
     hertz = replace(e, value=e.value / turn, stderr=e.stderr / turn, interval=(low / turn, high / turn))
     return f"{measured(hertz.value, hertz.stderr)[0]} Hz ({interval(hertz)})"
