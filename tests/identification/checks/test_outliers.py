@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,8 @@ from scipy.integrate import solve_ivp
 from tests.identification.twins import PENDULUM, noisy, rig, swing
 from upright.identification.checks.outliers import BUMPED, SELF_EXCITED, SPIKES, TOUCHED, outliers, without_outliers
 from upright.identification.estimate import identify
-from upright.physics import Pendulum
+from upright.identification.model.runs import Run
+from upright.physics import Pendulum, find
 from upright.signals.spikes import spikes
 from upright.simulation import simulate
 
@@ -109,6 +111,41 @@ def test_a_swing_that_feeds_itself_is_named():
     for n in GUESSES:
         low, high = fit.estimates[n].interval
         assert low < PENDULUM[n] < high, n
+
+
+@pytest.mark.parametrize("small", [0.2, 0.4])
+def test_the_only_fitted_run_is_not_judged_by_one_that_was_not_fitted(small):
+    # drag that the model lacks is missed in a large swing and not in a small one
+    truth = PENDULUM | {"b_2q": 5e-3}
+    runs = [
+        noisy(swing(truth, angle=2.5, label="fitted"), 1e-3, 1),
+        noisy(swing(truth, angle=small, label="small", role="predict"), 1e-3, 2),
+    ]
+    fit = identify(rig(Pendulum, {n: v for n, v in PENDULUM.items() if n != "b_2q"}, GUESSES), runs)
+    assert set(fit.runs) == {"fitted", "small"}
+    assert "fitted" not in {run for run, *_ in found(fit, runs)}
+
+
+def test_a_coordinate_that_only_one_run_measures_is_held_against_itself():
+    values = {"J_1": 0.01, "J_2": 0.01, "k_12": 1.4, "c_1": 0.007, "c_2": 0.001}
+    disks, dt, n = find("torsional-2"), 5e-3, 2000
+    u = 0.3 * np.sin(3 * np.arange(n) * dt)[:, None]
+    # drag on the second disk: every half swing is missed by a model that does not know it
+    y = simulate(disks(**values, f_2q=0.01), {}, [0.0] * 4, u, dt, samples=n, substeps=4)[:, ::2, 0]
+    both = Run(label="both", role="fit", t=np.arange(n) * dt, u=u, y=y, measured=("theta_1", "theta_2"))
+    one = replace(both, label="one", y=y[:, :1], measured=("theta_1",))
+    fit = identify(rig(disks, values, {"c_1": 0.005}), [both, one], watch=False)
+    assert found(fit, [both, one]) == []
+
+
+def test_what_a_stretch_is_missed_by_is_a_number_that_means_something():
+    runs = swings(3)
+    runs[2] = noisy(pushed(runs[2], 5.03, 1.5), 1e-3, 99)
+    fit = identify(rig(Pendulum, PENDULUM, GUESSES), runs)
+    (told,) = outliers(fit, fit.rig, runs)
+    times = re.search(r"missed (more than )?([\d.]+) times", told.evidence)
+    assert times is not None
+    assert 4 <= float(times[2]) < 100
 
 
 def test_a_fast_motion_is_no_spike():
