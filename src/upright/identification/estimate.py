@@ -291,4 +291,5 @@ def _poles(best: Optimum) -> dict[str, tuple[Pole, ...]]:
     values = best.problem.base | best.problem.shared_at(best.x)
     slope = np.array([values[unknowns[i].name] if unknowns[i].log else 1.0 for i in best.shared])
     C = best.covariance[np.ix_(best.shared, best.shared)] * np.outer(slope, slope)
-    return poles(best.problem.rig, values, [unknowns[i].name for i in best.shared], C, best.quantile)
+    held = {frozenset(track.run.held) for track in best.problem.tracks}
+    return poles(best.problem.rig, values, [unknowns[i].name for i in best.shared], C, best.quantile, held)

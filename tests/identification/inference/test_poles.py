@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from tests.identification.twins import rig
+from tests.identification.twins import noisy, rig
+from upright.identification.estimate import identify
 from upright.identification.inference.poles import poles
-from upright.physics import Pendulum
+from upright.identification.model.runs import Run
+from upright.physics import CartPendulum, Pendulum
+from upright.simulation import Held, simulate
 
 SIMPLE = {"m_p": 0.2, "l_cg": 0.25, "J_p": 0.0}
 TWO_SIGMA = 2.0
@@ -36,3 +40,42 @@ def test_the_interval_of_a_frequency_is_that_of_its_logarithm(spread: float) -> 
 
 def test_a_frequency_that_may_be_zero_has_an_interval_from_zero() -> None:
     assert upper(2.0).interval[0] == 0.0
+
+
+CRANE = {"m_c": 0.4, "m_p": 0.3, "l_cg": 0.3, "J_p": 5e-3, "b_2": 5e-3}
+DT, N = 5e-3, 1600
+
+
+def swung(label: str, *, held: bool) -> Run:
+    """A pendulum on a cart that a servo moves to and fro as it was told, or on one that rolls freely."""
+    t = np.arange(N) * DT
+    x = 0.02 * np.sin(4 * t)
+    motion = Held(q=x)
+    y = simulate(
+        CartPendulum(**CRANE), {}, [0.0, 0.08 * held, 0.5, 0.0], None, DT, samples=N, substeps=4,
+        held={"x": motion} if held else None,
+    )[:, ::2, 0]  # fmt: skip
+    theta = noisy(Run(label=label, role="fit", t=t, u=np.zeros((N, 1)), y=y[:, 1:], measured=("theta",)), 1e-3, 1)
+    return replace(theta, held={"x": x}) if held else replace(theta, measured=("x", "theta"), y=y)
+
+
+def damped_frequency(mass: float) -> float:
+    """Of the pendulum where its hinge is held (infinite mass of the cart), or of both, by hand [rad/s]."""
+    m, length, b = CRANE["m_p"], CRANE["l_cg"], CRANE["b_2"]
+    J = CRANE["J_p"] + m * length**2 - (m * length) ** 2 / (mass + m)  # elimination of the cart's momentum
+    return math.sqrt(m * 9.81 * length / J - (b / (2 * J)) ** 2)
+
+
+@pytest.mark.parametrize(
+    ("runs", "told"),
+    [
+        ([True], {"hanging, x held": math.inf}),
+        ([False], {"hanging": CRANE["m_c"]}),
+        ([True, False], {"hanging, x held": math.inf, "hanging": CRANE["m_c"]}),
+    ],
+)
+def test_a_rig_swings_as_it_was_run(runs: list[bool], told: dict[str, float]) -> None:
+    known = {n: v for n, v in CRANE.items() if n not in ("l_cg", "b_2")}
+    fit = identify(rig(CartPendulum, known, {"l_cg": 0.32, "b_2": 4e-3}), [swung(f"run {h}", held=h) for h in runs])
+    hanging = {at: max(p.imag.value for p in found) for at, found in fit.poles.items() if at.startswith("hanging")}
+    assert hanging == pytest.approx({at: damped_frequency(mass) for at, mass in told.items()}, rel=5e-3)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +25,9 @@ SPLIT = 1e-6
 
 
 def poles(
-    rig: Rig, values: Mapping[str, float], names: list[str], covariance: Array, quantile: float
-) -> dict[str, tuple[Pole, ...]]:
+    rig: Rig, values: Mapping[str, float], names: list[str], covariance: Array, quantile: float,
+    held: Iterable[frozenset[str]] = (frozenset(),),
+) -> dict[str, tuple[Pole, ...]]:  # fmt: skip
     """Poles [1/s] at each equilibrium, the fastest growing first, friction viscous only and back-EMF included.
 
     First-order propagation (delta method) of the covariance of the numbers sought. Of a conjugate pair the one above
@@ -41,18 +43,22 @@ def poles(
         Theirs.
     quantile : float
         Standard errors from the estimate to the end of an interval.
+    held : iterable of sets of str
+        Coordinates that did not move freely, for each way in which the rig was run: it swings otherwise then, and the
+        equilibrium is called so.
     """
     found: dict[str, tuple[Pole, ...]] = {}
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     if not np.isfinite(covariance).all():
         return found
-    for at in rig.plant.equilibria:
+    ways = sorted({still & {c.name for c in rig.plant.coordinates} for still in held}, key=sorted)
+    for at, still in product(rig.plant.equilibria, ways):
         try:
-            here = _poles(rig, values, at)
+            here = _poles(rig, values, at, still)
             slope = np.zeros((here.size, len(names)), dtype=np.complex128)
             for i, name in enumerate(names):
                 if (step := STEP * float(sigma[i])) > 0:
-                    moved = _poles(rig, {**values, name: values[name] + step}, at)
+                    moved = _poles(rig, {**values, name: values[name] + step}, at, still)
                     nearest = np.abs(moved[None, :] - here[:, None]).argmin(axis=1)
                     slope[:, i] = (moved[nearest] - here) / step
         except (ImpossiblePhysics, NotIdentifiable):
@@ -61,7 +67,7 @@ def poles(
             np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", part, covariance, part), 0.0))
             for part in (slope.real, slope.imag)
         ]
-        found[at] = tuple(
+        found[f"{at}, {' and '.join(sorted(still))} held" if still else at] = tuple(
             Pole(
                 real=Estimate.within(float(p.real), float(a), quantile * float(a), "1/s"),
                 imag=_upper(float(p.imag), float(b), quantile),
@@ -84,14 +90,20 @@ def _upper(value: float, stderr: float, quantile: float) -> Estimate:
     return replace(plain, interval=(value / factor, value * factor))
 
 
-def _poles(rig: Rig, values: Mapping[str, float], at: str) -> NDArray[np.complex128]:
-    """Poles with the actuator's loss per speed as damping of the coordinates that it drives."""
+def _poles(rig: Rig, values: Mapping[str, float], at: str, held: frozenset[str]) -> NDArray[np.complex128]:
+    """Poles with the actuator's loss per speed as damping of the coordinates that it drives, some coordinates held."""
     linear = rig.plant(**{n: values[n] for n in rig.plant.names()}).linear(at)
     A = linear.A.copy()
     driven = {c.name: i for i, c in enumerate(rig.plant.coordinates)}
     for k, source in enumerate(rig.plant.inputs):
         i = driven[source.on]
         A[:, 2 * i + 1] -= linear.B[:, k] * values.get("actuator.slope", 0.0)
+    if held:  # what holds them takes up the force in their rows
+        free = [i for name, i in driven.items() if name not in held]
+        states = [s for i in free for s in (2 * i, 2 * i + 1)]
+        force = linear.mass @ A[1::2]
+        A = A[np.ix_(states, states)]
+        A[1::2] = np.linalg.solve(linear.mass[np.ix_(free, free)], force[np.ix_(free, states)])
     found = np.linalg.eigvals(A).astype(np.complex128)
     # rounding splits a double pole, as that of a free body, by the root of what it is
     found.imag[np.abs(found.imag) < SPLIT * np.abs(found).max(initial=0.0)] = 0.0
