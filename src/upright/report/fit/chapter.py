@@ -170,8 +170,8 @@ def _parameters(fit: Fit) -> list[Part]:
         parts.append(Part(title="Runs and groups", key="runs", content=(own,)))
     if poles.rows:
         about = (
-            "Of the linear model at each equilibrium, viscous friction and back-EMF included, dry friction not; what the "
-            "runs held is held."
+            "Of the linear model at each equilibrium, viscous friction and back-EMF included, dry friction not; what "
+            "the runs held is held."
         )
         parts.append(Part(title="Poles of the fitted rig", key="poles", content=(about, poles)))
     return parts

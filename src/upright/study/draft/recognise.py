@@ -13,6 +13,7 @@ from upright.physics import Plant, find
 from upright.readers.inspection import Column, Inspection
 from upright.records import Array, Record
 from upright.signals.smoothing import savitzky_golay
+from upright.study.draft.release import release_of
 
 RATE = re.compile(r"velocity|speed|rate|_dot\b|omega|\bqd|accel", re.IGNORECASE)
 _EFFORT = re.compile(r"effort|volt|current|torque|force|plant_input|cmd|duty|^(u|v|i)$", re.IGNORECASE)
@@ -88,6 +89,14 @@ def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
     rest = {n: zero_reading(record, seen, c, drive, window, hangs=n == "theta") for n, c in columns.items()}
     centre = rest[list(columns)[-1]]
     driven = record[next(iter(columns.values())).name]
+    turned = {"rad": 1.0, "deg": math.pi / 180}.get(columns[list(columns)[-1]].guess, 0.0)
+    if drive is None and turned and list(columns)[-1] == "theta":
+        angle = turned * (last - centre)
+        small = swing_frequency(record.t[inside], angle[inside])
+        let_go = release_of(record.t, angle, small, driven if pushed else None)
+        if window[0] < let_go < window[1]:
+            window = let_go, window[1]
+            inside = (record.t >= window[0]) & (record.t <= window[1])
     mirrored = False
     if pushed and all(c.guess == "rad" or name == "x" for name, c in columns.items()):
         thrown = coupling(record.t[inside], driven[inside], last[inside] - centre)

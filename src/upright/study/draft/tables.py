@@ -79,6 +79,7 @@ def sensor_table(
     elif c.quantum.step and c.guess in ("rad", "m"):
         table.key("resolution", f"{c.quantum.step:.4g} {c.guess}", "from the column's steps")
     where = "lay before the first command" if driven else "comes to rest"
+    zero = zero if abs(zero) > 1e-9 * (c.high - c.low) else 0.0  # a motion that has died out ends in rounding
     table.key("offset", zero, f"reading at which {name} is zero, here where it {where}")
     if mirrored:
         table.key("sign", -1, "it is thrown the other way than the plant's angle")

@@ -1,0 +1,65 @@
+"""Does the window of a draft begin after the hand has let go, and not later than it must?"""
+
+import numpy as np
+import pytest
+
+from upright.physics import CartPendulum, Pendulum
+from upright.simulation import Held, simulate
+
+DT = 0.01
+PENDULUM = Pendulum(m_p=0.2, l_cg=0.3, J_p=2e-3, b_2=2e-3, b_2c=1e-3)
+PERIOD = 2 * np.pi * np.sqrt((2e-3 + 0.2 * 0.3**2) / (0.2 * 9.81 * 0.3))
+
+
+def lifted(to: float, held_at: float, seconds: float) -> np.ndarray:
+    """A hand takes a pendulum from rest to an angle and back to where it holds it for some seconds."""
+    still = np.zeros(100)
+    up = 0.5 * to * (1 - np.cos(np.linspace(0, np.pi, 100)))
+    back = held_at + 0.5 * (to - held_at) * (1 + np.cos(np.linspace(0, np.pi, 80)))
+    return np.concatenate([still, up, back, np.full(round(seconds / DT), held_at)])
+
+
+def swing(angle: float, n: int = 2000) -> np.ndarray:
+    return simulate(PENDULUM, {}, [angle, 0.0], None, DT, samples=n, substeps=2)[:, 0, 0]
+
+
+@pytest.mark.parametrize("seconds", [0.2, 1.5])
+@pytest.mark.parametrize(("to", "held_at"), [(1.2, 0.9), (0.5, 0.4), (2.6, 2.0), (1.0, 1.0)])
+def test_the_window_begins_after_the_hand_has_let_go(drafted, to, held_at, seconds):
+    hand = lifted(to, held_at, seconds)
+    theta = np.concatenate([hand, swing(held_at)])
+    theta += 5e-4 * np.random.default_rng(1).normal(size=theta.size)
+    _, study = drafted(t=np.arange(theta.size) * DT, theta=theta)
+    release = hand.size * DT
+    assert release - 0.05 * PERIOD <= study.runs[0].t[0] < release + PERIOD
+
+
+def test_a_swing_that_nobody_touches_begins_within_its_first_period(drafted):
+    theta = swing(1.5)
+    _, study = drafted(t=np.arange(theta.size) * DT, theta=theta)
+    assert study.runs[0].t[0] < PERIOD
+
+
+def test_a_pendulum_that_its_cart_throws_is_not_held(drafted):
+    t = np.arange(2500) * DT
+    x = 0.08 * np.sin(2.2 * np.clip(t - 2, 0, None)) * (t > 2)
+    theta = simulate(
+        CartPendulum(m_c=1.0, m_p=0.2, l_cg=0.3, J_p=2e-3, b_2=2e-3), {}, [0.0] * 4, None, DT, samples=t.size,
+        substeps=2, held={"x": Held(q=x)},
+    )[:, 2, 0]  # fmt: skip
+    _, study = drafted(t=t, x=x, theta=theta)
+    assert study.runs[0].t[0] < 2.0
+
+
+def test_a_pendulum_lifted_beside_its_moving_cart_is_released_first(drafted):
+    hand = lifted(1.2, 0.9, 0.5)
+    n = 2000
+    t = np.arange(hand.size + n) * DT
+    x = 0.05 * np.sin(2.2 * np.clip(t - 0.5, 0, None))
+    theta = simulate(
+        CartPendulum(m_c=1.0, m_p=0.2, l_cg=0.3, J_p=2e-3, b_2=2e-3), {}, [x[hand.size], 0.0, 0.9, 0.0], None, DT,
+        samples=n, substeps=2, held={"x": Held(q=x[hand.size :])},
+    )[:, 2, 0]  # fmt: skip
+    _, study = drafted(t=t, x=x, theta=np.concatenate([hand, theta]))
+    release = hand.size * DT
+    assert release - 0.05 * PERIOD <= study.runs[0].t[0] < release + PERIOD
