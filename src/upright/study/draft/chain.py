@@ -7,7 +7,7 @@ for a free swing, an inertia of 1) the slopes are the numbers of the plant, roug
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -16,9 +16,11 @@ from upright.physics import Plant, find
 from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Column
 from upright.records import Array, Record
 from upright.signals.smoothing import acceleration_width, savitzky_golay
+from upright.signals.stretches import pieces
 from upright.signals.trips import find_trip
 from upright.study.draft.chain_log import ChainLog
-from upright.study.draft.recognise import swing_frequency
+from upright.study.draft.plausible import implausible
+from upright.study.draft.recognise import Recognised, swing_frequency
 from upright.study.draft.tables import (
     command_unit,
     drive_table,
@@ -42,6 +44,15 @@ REACH = 10.0
 RESOLVED = 0.003
 """Sample period [s] above which the braking of a drive, built up in some 30 ms, is not seen and not asked for."""
 
+RESTS = 0.01
+"""Share of its travel by which a body at rest may creep."""
+
+FAR = 50.0
+"""Steps of a sensor from which a ratio of two displacements is known to some percent."""
+
+LAGS = 0.95
+"""Share of its neighbour's displacement above which dry friction may hold a body back as well as a spring."""
+
 PASSES = 0.1
 """Share of its range that a converter's amplifier may pass when more is asked than the range; where a search begins."""
 
@@ -52,7 +63,8 @@ class ChainStarts:
 
     `numbers` by the plant's own names; `braked` [force per speed]: damping that acts with the volts on alone, 0 when
     they never go off; `trips`: whether the drive went off although it is logged as on; `limit`: of the command, 0 where
-    it stays within reach; `fastest`: angular frequency [rad/s] of the fastest swing.
+    it stays within reach; `fastest`: angular frequency [rad/s] of the fastest swing; `grounded`: where the last body
+    rests beside its neighbour under a constant command, 0 where it does not lag behind.
     """
 
     numbers: dict[str, float]
@@ -60,15 +72,22 @@ class ChainStarts:
     trips: bool
     limit: float
     fastest: float
+    grounded: float = 0.0
 
 
-def chain_tables(record: Record, log: ChainLog, file: str, label: str) -> list[TomlTable]:
-    """Tables of a study."""
+def chain_tables(record: Record, log: ChainLog, file: str, label: str) -> tuple[Recognised, list[TomlTable]]:
+    """What is recognised in the end, and the tables of a study about it."""
     plant = find(log.recognised.plant)
     start = _starts_of(record, log, plant)
     several = len(log.windows) > 1
     runs = [(f"{label} {i + 1}" if several else label, a, b, "fit") for i, (a, b) in enumerate(log.windows)]
-    return [
+    doubts = implausible(plant, start.numbers, scaled_by="the assumed 1 N (N m) per volt")
+    if start.grounded:
+        doubts.append(
+            f"Under a constant command the last body rests at {start.grounded:.2f} of its neighbour's place: a spring"
+            " to ground was asked for it."
+        )
+    tables = [
         _rig(record, log, plant, start),
         _parameters(log, plant, start),
         *_drive(log, plant, start),
@@ -76,6 +95,7 @@ def chain_tables(record: Record, log: ChainLog, file: str, label: str) -> list[T
         _defaults(log, start),
         *run_tables(file, runs),
     ]
+    return replace(log.recognised, doubts=(*log.recognised.doubts, *doubts)), tables
 
 
 def _unit(plant: type[Plant], name: str) -> str:
@@ -293,11 +313,36 @@ def starts(
                 numbers[spring] = inertia * (slope[side] if slope[side] > 0 else w**2)
         numbers[f"c_{n}"] = inertia * max(slope["c"], 0.01 * w)
         numbers[f"f_{n}c"] = inertia * max(slope["friction"], 0.01 * w * float(np.abs(own.v).max()))
+    grounded = _lags_behind(command, bodies, quanta) if len(bodies) > 1 and free[-1] and free[-2] else 0.0
+    if grounded:  # k_12 (x_1 - x_2) = k_2 x_2
+        last = len(bodies)
+        numbers[f"k_{last}"] = numbers[f"k_{last - 1}{last}"] * (1 / grounded - 1)
     trips = False
     if u is not None and not loop and free[0]:
         others = [y for y, f in zip(bodies[1:], free[1:], strict=True) if f]
         trips = find_trip(t, u, bodies[0], others, quantum=quanta[0]) is not None
-    return ChainStarts(numbers=numbers, braked=braked, trips=trips, limit=limit, fastest=w)
+    return ChainStarts(numbers=numbers, braked=braked, trips=trips, limit=limit, fastest=w, grounded=grounded)
+
+
+def _lags_behind(u: Array, bodies: list[Array], quanta: list[float]) -> float:
+    """Share of its neighbour's displacement at which the last body rests under a constant command; 0 for all of it.
+
+    Springs between bodies alone take all of them equally far; one to ground holds the last one back.
+    """
+    for start, stop in pieces(np.diff(u) != 0):  # the longest first
+        if stop - start < 10:
+            break
+        late = slice(stop - (stop - start) // 5, stop)
+        near, far = (y[late] for y in bodies[-2:])
+        still = all(
+            np.ptp(y[late]) <= max(3 * q, RESTS * float(np.ptp(y)))
+            for y, q in zip(bodies[-2:], quanta[-2:], strict=True)
+        )
+        away = abs(float(np.median(near))) > max(FAR * quanta[-2], 0.1 * float(np.ptp(bodies[-2])))
+        if u[start] != 0 and still and away:
+            share = float(np.median(far) / np.median(near))
+            return share if 0.05 < share < LAGS else 0.0
+    return 0.0
 
 
 def _frequency(t: Array, bodies: list[Array], free: list[bool]) -> float:

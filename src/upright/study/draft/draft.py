@@ -12,7 +12,10 @@ from upright.study.draft.chain import chain_tables
 from upright.study.draft.chain_log import read_chain
 from upright.study.draft.pendulum import pendulum_tables
 from upright.study.draft.recognise import recognise
+from upright.study.draft.suits import plants_that_suit
 from upright.study.text import TomlTable, study_text
+
+CHAINS = ("rectilinear", "torsional")
 
 
 def draft(record: Record, seen: Inspection, log: Path, study: Path, *, plant: str = "") -> str:
@@ -35,17 +38,22 @@ def draft(record: Record, seen: Inspection, log: Path, study: Path, *, plant: st
     check_clock(record)
     found = recognise(record, seen, plant)
     file = os.path.relpath(log.resolve(), study.resolve().parent).replace(os.sep, "/")
-    if found.plant.startswith(("rectilinear", "torsional")):
+    if found.plant.startswith(CHAINS):
         where = "/".join(log.resolve().parts[-3:])
         chain = read_chain(record, seen, found, named=bool(plant), path=where)
-        found, tables = chain.recognised, chain_tables(record, chain, file, log.stem)
+        found, tables = chain_tables(record, chain, file, log.stem)
     else:
         found, tables = pendulum_tables(record, seen, found, file, log.stem)
+    doubts = list(found.doubts)
+    told = bool(plant) or (found.plant.startswith(CHAINS) and len(found.columns) > 1)  # carts from disks, and why
+    others = [name for name in plants_that_suit(record, seen) if name != found.plant and name not in " ".join(doubts)]
+    if others and not told:
+        doubts.append(f"Taken for {found.plant}; the columns could be of {' or '.join(others)}: --plant says which.")
     head = TomlTable()
     head.line(f"# Study of {log.name}, drafted by `upright init`. Check it, then: upright identify THIS_FILE -o OUT")
     head.line("# A number in quotes wears its unit; { guess = ... } asks for it; a plain text or number is known.")
     head.line("# Lines marked MEASURE hold placeholders. All keys: `upright identify --keys`.")
-    for doubt in found.doubts:
+    for doubt in doubts:
         head.line(f"# GUESSED: {doubt}")
     head.key("title", log.stem)
     return study_text([head, *tables])

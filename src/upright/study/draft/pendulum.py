@@ -17,6 +17,7 @@ from upright.physics import Plant, find
 from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Inspection
 from upright.records import Array, Record
 from upright.signals.smoothing import acceleration_width, savitzky_golay
+from upright.study.draft.plausible import implausible
 from upright.study.draft.recognise import Recognised, in_dac_counts
 from upright.study.draft.tables import (
     command_unit,
@@ -99,6 +100,8 @@ def pendulum_tables(
     if balanced:
         found = recognised_upright(found, balanced)
     starts = starts_upright(balanced, found.plant) if balanced else starts_hanging(found, plant)
+    told = implausible(plant, {**{n: v for n, (v, _) in starts.known.items()}, **starts.asked}, scaled_by="")
+    found = replace(found, doubts=(*found.doubts, *told))
     tables = [_rig(record, found, plant), _parameters(plant, starts), *_drive(found, plant, balanced)]
     tables += [_sensor(seen, found, plant, name) for name in found.columns]
     return found, [*tables, _defaults(found, plant, balanced), *_runs(found, file, label)]

@@ -11,7 +11,7 @@ from upright.signals.smoothing import savitzky_golay
 from upright.signals.stretches import stretches
 
 HAND = 0.25
-"""Share of the largest pull of gravity that neither it nor friction nor the hinge explains, from which a hand is told."""
+"""Share of gravity's largest pull that neither it nor friction nor the hinge explains, from which a hand is told."""
 
 LASTS = 0.1
 """Share of a period that a hand holds at least."""
