@@ -81,16 +81,17 @@ def predict(
         )
     rig = replace(asked.rig, substeps=fitted.substeps)
     scores = score(fitted.values, rig, [replace(run, role="predict") for run in asked.runs], groups=fitted.groups)
-    said = ("role", "fit_percent", "horizon", "adapted")
+    said = ("role", "fit_percent", "horizon", "adapted", "offer")
     numbers: dict[str, Any] = {
         "model": model.name,
         "study": study.name,
         "runs": {label: {name: getattr(s, name) for name in said} for label, s in scores.items()},
     }
+    offers = [s.offer.sentence(label, s.fit_percent) for label, s in scores.items() if s.offer is not None]
     told = Chapter(
         title=f"{model.name} on {study.name}", verdict="", numbers=numbers,
         parts=(Part("How much of each signal is explained", (score_table(scores),)),),
-        warnings=() if fitted.trusted else (f"The model's own verdict was: {fitted.verdict}",),
+        warnings=(*(() if fitted.trusted else (f"The model's own verdict was: {fitted.verdict}",)), *offers),
     )  # fmt: skip
     return Answer(scores, told, [] if out is None else [write_json(Path(out) / "prediction.json", numbers)])
 

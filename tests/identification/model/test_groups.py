@@ -61,6 +61,24 @@ def test_a_run_of_a_fitted_day_is_predicted_without_choosing_its_friction(two_da
     assert predict(fit, fit.rig, [stranger])[runs[-1].label].adapted == ("initial", "friction")
 
 
+def test_a_run_of_another_day_is_offered_the_friction_of_that_day(two_days):
+    fit, runs = two_days
+    alone = replace(runs[-1], shared={})  # friction of the fit: the geometric mean of both days
+    told = predict(fit, fit.rig, [alone])[alone.label]
+    assert told.offer is not None
+    assert told.offer.name == "friction"
+    that_day = fit.groups["Tuesday"]["friction"]  # known from the day's other runs
+    assert told.offer.factor.value == pytest.approx(1.25, rel=0.03)
+    assert max(told.offer.factor.interval[0], that_day.interval[0]) < min(
+        told.offer.factor.interval[1], that_day.interval[1]
+    )
+    assert told.adapted == ("initial",)
+    assert told.offer.fit_percent["theta"] > fit.runs[alone.label].fit_percent["theta"] - 1
+    assert "1.25" in told.offer.sentence(alone.label, told.fit_percent)
+    of_that_day = fit.runs[alone.label]
+    assert of_that_day.offer is None
+
+
 def test_the_wrong_day_predicts_worse(two_days):
     fit, runs = two_days
     right = fit.runs[runs[-1].label].fit_percent["theta"]

@@ -9,7 +9,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upright.identification.model.fit import Estimate, Fit, RunScore
+from upright.identification.inference.covariance import assess
+from upright.identification.inference.intervals import run_estimates
+from upright.identification.model.fit import Estimate, Fit, Offer, RunScore
 from upright.identification.model.rig import Rig
 from upright.identification.model.runs import Run
 from upright.identification.problem.residuals import Problem, formulate
@@ -146,8 +148,35 @@ def _either_side(problem: Problem) -> list[Array]:
     return starts
 
 
+SHORT, MENDED = 90.0, 2 / 3
+"""Fit percent below which a prediction falls short, and the share of what it missed that a mended one may miss."""
+
+FACTORS = ("friction", "gain")
+
+
 def _predict(rig: Rig, run: Run, groups: Mapping[str, Mapping[str, float]], progress: Progress) -> RunScore:
+    """Score of one run, with the factor of its own that would mend it where it falls short."""
     run = located(rig, run)
+    plain, *_ = _foresee(rig, run, groups, progress)
+    missed = 100 - min(plain.fit_percent.values(), default=100.0)
+    if missed <= 100 - SHORT:
+        return plain
+    offers: list[tuple[float, Offer]] = []
+    for name in FACTORS:
+        if name in (*run.unknown, *run.shared) or (name == "gain" and not run.u.any()):
+            continue
+        with_it, problem, x = _foresee(rig, replace(run, unknown=(*run.unknown, name)), groups, progress)
+        left = 100 - min(with_it.fit_percent.values())
+        if left <= MENDED * missed:
+            factor = run_estimates(assess(problem, x))[0][run.label][name]
+            offers.append((left, Offer(name=name, factor=factor, fit_percent=with_it.fit_percent)))
+    return replace(plain, offer=min(offers, key=lambda o: o[0])[1]) if offers else plain
+
+
+def _foresee(
+    rig: Rig, run: Run, groups: Mapping[str, Mapping[str, float]], progress: Progress
+) -> tuple[RunScore, Problem, Array]:
+    """Score of one run, and the problem and the coordinates of what was estimated from the run itself."""
     before = replace(run, score_from=0.0)
     upto = run.score_from if run.score_from > 0 else math.inf
     if run.score_from > 0 and run.horizon is not None:
@@ -166,7 +195,7 @@ def _predict(rig: Rig, run: Run, groups: Mapping[str, Mapping[str, float]], prog
     whole = formulate(rig, [run], thin=False, given=groups)
     sought = [u.name for u in problem.unknowns if u.lower < u.upper]
     adapted = dict.fromkeys("initial" if name.startswith("initial.") else name for name in sought)
-    return replace(score(whole, 0, x), adapted=tuple(adapted))
+    return replace(score(whole, 0, x), adapted=tuple(adapted)), problem, x
 
 
 GOOD = 80.0

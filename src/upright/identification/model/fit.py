@@ -59,6 +59,30 @@ class Assumption:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Offer:
+    """A factor of a run's own, on all friction or on the drive's gain, that mends its prediction, and its score then.
+
+    The factor is estimated from the run itself, so that score is no prediction's.
+    """
+
+    name: str
+    factor: Estimate
+    fit_percent: Mapping[str, float]
+
+    def sentence(self, label: str, before: Mapping[str, float]) -> str:
+        """What would be reached, and what it costs."""
+        what = "its friction" if self.name == "friction" else "the gain of its drive"
+        low, high = self.factor.interval
+        signal = min(before, key=lambda s: before[s])
+        return (
+            f"Run '{label}' is predicted at {before[signal]:.1f} % ({signal}); with {what} "
+            f"{self.factor.value:.3g} times as large ({low:.3g} to {high:.3g}) it would be "
+            f"{self.fit_percent[signal]:.1f} %. That factor comes from the run itself, so this is one number less "
+            "foreseen."
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
 class RunScore:
     """How well one run is explained: fit percent per signal, over which horizon, and the simulated signals.
 
@@ -66,6 +90,7 @@ class RunScore:
     `naive` is the fit percent that holding the measured speed reaches from the same restarts, empty for a free run: a
     horizon at which the model is hardly better tells nothing about the model.
     `adapted` names what was estimated from the run itself: a prediction that chose its own gain is less of one.
+    `offer` is a factor of the run's own that would mend a prediction which falls short.
     `ahead` is the fit percent by horizon [s] and signal of samples predicted exactly so far ahead, from a filter that
     knows the past alone; empty for other runs. Then `horizon`, `fit_percent` and the signals are the shortest's.
     """
@@ -80,6 +105,7 @@ class RunScore:
     score_from: float = 0.0
     naive: Mapping[str, float] = field(default_factory=dict[str, float])
     adapted: tuple[str, ...] = ()
+    offer: Offer | None = None
     ahead: Mapping[float, Mapping[str, float]] = field(default_factory=dict[float, Mapping[str, float]])
 
 

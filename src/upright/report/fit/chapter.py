@@ -335,7 +335,13 @@ def _nuisances(fit: Fit) -> Iterator[Step]:
                 "share that with runs that are fitted.",
                 f'[[runs]]\nlabel = "{label}"\nshared = {{ {chosen[0]} = "that day" }}',
             )
-            return  # one example is enough
+            break  # one example is enough
+    for label, score in fit.runs.items():
+        if score.offer is not None:
+            own = ", ".join(f'"{n}"' for n in dict.fromkeys([*score.adapted, score.offer.name]))
+            yield Step(
+                score.offer.sentence(label, score.fit_percent), f'[[runs]]\nlabel = "{label}"\nunknown = [{own}]'
+            )
 
 
 def _friction(fit: Fit, study: str, folder: str) -> Iterator[Step]:
