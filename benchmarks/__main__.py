@@ -22,7 +22,7 @@ from upright.workers import Workers
 
 NAMES = (
     "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "frequency", "swing_up", "tracking", "lab",
-    "doctor", "rigs", "regulation", "real", "starts", "startup", "workers", "long", "gpu",
+    "doctor", "rigs", "misfit", "regulation", "real", "starts", "startup", "workers", "long", "gpu",
 )  # fmt: skip
 LIBRARIES = ("upright", "numpy", "scipy", "llvmlite", "control", "casadi", "jax", "mujoco")
 
@@ -84,11 +84,11 @@ def main(arguments: list[str] | None = None) -> int:
         "--markdown",
         type=Path,
         metavar="FILE",
-        help="write the page of `real`, `rigs`, `regulation` or `workers` for publication",
+        help="write the page of `real`, `rigs`, `misfit`, `regulation` or `workers` for publication",
     )
     parser.add_argument("--starts", type=int, default=300, metavar="N", help="random starts of each study in `starts`")
     parser.add_argument(
-        "--workers", type=int, default=1, metavar="N", help="processes for rigs, regulation, coverage, starts"
+        "--workers", type=int, default=1, metavar="N", help="processes for rigs, misfit, regulation, coverage, starts"
     )
     parser.add_argument("--cluster", default="", metavar="ADDRESS", help="Dask scheduler for them, tcp://host:8786")
     asked = parser.parse_args(arguments)
@@ -96,8 +96,8 @@ def main(arguments: list[str] | None = None) -> int:
         shared = {"workers": Workers(number=asked.workers, cluster=asked.cluster)}
     except BadInput as error:
         parser.error(str(error))
-    if asked.markdown and asked.names not in (["real"], ["rigs"], ["regulation"], ["workers"]):
-        parser.error("--markdown writes the table of one benchmark: name real, rigs, regulation or workers")
+    if asked.markdown and asked.names not in (["real"], ["rigs"], ["misfit"], ["regulation"], ["workers"]):
+        parser.error("--markdown writes the table of one benchmark: name real, rigs, misfit, regulation or workers")
     if unknown := set(asked.names) - set(NAMES):
         parser.error(f"no benchmark is called {', '.join(sorted(unknown))}; there are {', '.join(NAMES)}")
 
@@ -108,7 +108,8 @@ def main(arguments: list[str] | None = None) -> int:
     for name in asked.names or NAMES:
         markdown = {"markdown": asked.markdown}
         extra: dict[str, Any] = {
-            "fit": {"full": asked.full}, "real": markdown, "rigs": markdown | shared, "regulation": markdown | shared,
+            "fit": {"full": asked.full}, "real": markdown, "rigs": markdown | shared, "misfit": markdown | shared,
+            "regulation": markdown | shared,
             "coverage": shared, "starts": shared | {"starts": asked.starts}, "workers": markdown,
         }.get(name, {})  # fmt: skip
         module = importlib.import_module(f"benchmarks.{name}")

@@ -68,43 +68,74 @@ def command(force: float, samples: int, generator: np.random.Generator) -> np.nd
     return u[:, None]
 
 
-def outcome(make: Make, seed: int) -> tuple[dict[str, bool], dict[str, str], bool]:
-    """Whether each interval held the truth, its status, and whether the fit is trusted, of one rig."""
-    from upright.identification import Parameter, Rig, Run
-    from upright.identification.estimate import identify
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """Of one fit: by parameter whether its interval held the truth, how wide it is beside the truth, and its status."""
+
+    held: dict[str, bool]
+    width: dict[str, float]
+    status: dict[str, str]
+    trusted: bool
+    explained: float
+
+
+def drawn(make: Make, generator: np.random.Generator) -> tuple[dict[str, float], np.ndarray]:
+    """Numbers of one rig of a make, and the commands (samples, inputs) that it is given."""
+    truth = {n: v * 2 ** generator.uniform(-0.7, 0.7) for n, v in make.sought.items()}
+    if make.plant in ("pendulum", "cart-pendulum", "furuta"):  # a body is no lighter than its own mass makes it
+        truth["J_p"] = max(truth["J_p"], 0.3 * make.known["m_p"] * make.known["l_cg"] ** 2)
+    return truth, command(make.force, round(SECONDS / DT) + 1, generator)
+
+
+def outcome(make: Make, seed: int) -> Outcome:
+    """What a fit says of one rig whose motion has coloured noise on it."""
     from upright.physics import find
     from upright.simulation import simulate
 
     generator = np.random.default_rng(seed)
     plant = find(make.plant)
-    truth = {n: v * 2 ** generator.uniform(-0.7, 0.7) for n, v in make.sought.items()}
-    if make.plant in ("pendulum", "cart-pendulum", "furuta"):  # a body is no lighter than its own mass makes it
-        truth["J_p"] = max(truth["J_p"], 0.3 * make.known["m_p"] * make.known["l_cg"] ** 2)
-    samples = round(SECONDS / DT) + 1
-    u = command(make.force, samples, generator) if plant.inputs else np.zeros((samples, 0))
-    states = plant.state_names()
+    truth, u = drawn(make, generator)
+    samples, states = len(u), plant.state_names()
     x0 = [make.start.get(n, 0.0) for n in states]
     x = simulate(plant(**truth, **make.known), {}, x0, u if plant.inputs else None, DT, samples=samples, substeps=2)
-    measured = tuple(c.name for c in plant.coordinates)
-    clean = x[:, ::2, 0]
     memory, loud = generator.uniform(0, 0.95), generator.uniform(0.005, 0.03)
+    return judged(make, truth, u, sensed(make, x[:, ::2, 0], memory, loud, generator), generator)
+
+
+def sensed(make: Make, clean: np.ndarray, memory: float, loud: float, generator: np.random.Generator) -> np.ndarray:
+    """Motion (samples, coordinates) with noise, a share `loud` of each principal component, and rounded by encoders."""
+    samples = len(clean)
     _, size, axes = np.linalg.svd(clean - clean.mean(axis=0), full_matrices=False)
-    white = np.stack([noise(samples, memory, generator) for _ in measured], axis=1)
+    white = np.stack([noise(samples, memory, generator) for _ in make.quantum], axis=1)
     rough = (loud * white * size / math.sqrt(samples)) @ axes
-    y = np.round((clean + rough) / make.quantum) * np.array(make.quantum)
-    run = Run(label="run", role="fit", t=np.arange(samples) * DT, u=u if u.size else np.zeros((samples, 1)), y=y,
-              measured=measured, quantum=make.quantum)  # fmt: skip
+    return np.round((clean + rough) / make.quantum) * np.array(make.quantum)
+
+
+def judged(
+    make: Make, truth: dict[str, float], u: np.ndarray, y: np.ndarray, generator: np.random.Generator
+) -> Outcome:
+    """What a fit of commands and positions says, beside the truth."""
+    from upright.identification import Parameter, Rig, Run
+    from upright.identification.estimate import identify
+    from upright.physics import find
+
+    plant = find(make.plant)
+    run = Run(label="run", role="fit", t=np.arange(float(len(u))) * DT, u=u, y=y,
+              measured=tuple(c.name for c in plant.coordinates), quantum=make.quantum)  # fmt: skip
     parameters: dict[str, Any] = {n: Parameter(name=n, value=v) for n, v in make.known.items()}
     for n, v in truth.items():
         off = 1 + generator.choice([-1, 1]) * generator.uniform(0.2, 0.4)
         lower = 0.0
         parameters[n] = Parameter(name=n, value=v * off, estimate=True, lower=lower)
     fit = identify(Rig(plant=plant, parameters=parameters, substeps=2), [run])
-    held, status = {}, {}
-    for n, v in truth.items():
-        e = fit.estimates[n]
-        held[n], status[n] = e.interval[0] <= v <= e.interval[1], e.status
-    return held, status, fit.trusted
+    said = {n: fit.estimates[n] for n in truth}
+    return Outcome(
+        held={n: e.interval[0] <= truth[n] <= e.interval[1] for n, e in said.items()},
+        width={n: (e.interval[1] - e.interval[0]) / truth[n] for n, e in said.items()},
+        status={n: e.status for n, e in said.items()},
+        trusted=fit.trusted,
+        explained=min(fit.runs["run"].fit_percent.values()),
+    )
 
 
 def run(
@@ -112,32 +143,50 @@ def run(
 ) -> list[Line]:
     """Share of intervals that hold the truth by plant and kind of number."""
     each = 8 if quick else 40
-    every: list[bool] = []
-    lines: list[Line] = []
+    done: dict[str, tuple[list[Outcome], Spread]] = {}
     for place, make in enumerate(MAKES):
         progress(f"{each} rigs like {make.plant}")
         seeds = range(1000 * place, 1000 * place + each)
-        done, seconds = of_each(functools.partial(outcome, make), seeds, workers)
-        tally: dict[str, list[bool]] = {}
-        for held, _, _ in done:
-            for n, hit in held.items():
-                tally.setdefault(kind(n), []).append(hit)
-        lines += [_line(f"{make.plant}: {what}", hits, seconds) for what, hits in tally.items()]
-        every += [hit for hits in tally.values() for hit in hits]
-        firm = [s == "firm" for _, status, _ in done for s in status.values()]
-        trusted = sum(good for *_, good in done)
-        note = f"{trusted} of {each} fits trusted, {sum(firm)} of {len(firm)} numbers firm"
-        lines.append(Line(contender=f"{make.plant}: fits", seconds=seconds, note=note))
-    lines.append(_line("all", every, None))
+        done[make.plant] = of_each(functools.partial(outcome, make), seeds, workers)
+    lines = told(done)
     if markdown is not None:
-        rows = [f"| {line.contender} | {line.note} |" for line in lines]
-        body = ["", f"| of {each * len(MAKES)} rigs | |", "|---|---|", *rows]
-        markdown.write_text(page("rigs", "Coverage", __doc__, body), encoding="utf-8")
+        publish(markdown, "rigs", "Coverage", __doc__, lines)
     return lines
 
 
-def _line(name: str, hits: list[bool], seconds: Spread | None) -> Line:
-    share, n = 100 * float(np.mean(hits)), len(hits)
+def publish(file: Path, name: str, title: str, about: str | None, lines: list[Line]) -> None:
+    """Write the lines as a page."""
+    body = ["", "| | |", "|---|---|", *(f"| {line.contender} | {line.note} |" for line in lines)]
+    file.write_text(page(name, title, about, body), encoding="utf-8")
+
+
+def told(done: dict[str, tuple[list[Outcome], Spread]]) -> list[Line]:
+    """Lines of each plant, of each kind of number and of all."""
+    lines: list[Line] = []
+    every: dict[str, list[tuple[bool, float]]] = {}
+    for plant, (outcomes, seconds) in done.items():
+        tally: dict[str, list[tuple[bool, float]]] = {}
+        for o in outcomes:
+            for n, hit in o.held.items():
+                tally.setdefault(kind(n), []).append((hit, o.width[n]))
+        lines += [_line(f"{plant}: {what}", hits, seconds) for what, hits in tally.items()]
+        for what, hits in tally.items():
+            every.setdefault(what, []).extend(hits)
+        firm = [s == "firm" for o in outcomes for s in o.status.values()]
+        trusted = [o for o in outcomes if o.trusted]
+        hits = [hit for o in trusted for hit in o.held.values()]
+        note = f"{len(trusted)} of {len(outcomes)} fits trusted, {sum(firm)} of {len(firm)} numbers firm; "
+        note += f"{100 * float(np.mean(hits)):.1f} % of the intervals of trusted fits hold the truth; " if hits else ""
+        note += f"median fit {np.median([o.explained for o in outcomes]):.1f} %"
+        lines.append(Line(contender=f"{plant}: fits", seconds=seconds, note=note))
+    lines += [_line(f"all: {what}", hits, None) for what, hits in every.items()]
+    lines.append(_line("all", [hit for hits in every.values() for hit in hits], None))
+    return lines
+
+
+def _line(name: str, hits: list[tuple[bool, float]], seconds: Spread | None) -> Line:
+    share, n = 100 * float(np.mean([hit for hit, _ in hits])), len(hits)
     give = 196 * math.sqrt(0.95 * 0.05 / n)
     note = f"{share:.1f} % of {n} intervals hold the truth (95 +- {give:.1f} if honest)"
+    note += f", median width {100 * float(np.median([width for _, width in hits])):.3g} % of it"
     return Line(contender=name, seconds=seconds, note=note)

@@ -4,6 +4,12 @@ White-noise errors were found 10 to 30 times too small on real rigs, because a m
 The sandwich estimate sums the autocovariance of the scores (Newey and West 1987) over a span chosen from the data
 (Andrews 1991); with several runs it is compared with the spread from run to run, the larger counts.
 
+A wrong model pulls its numbers one way in one part of the runs and another way in the next, over spans that no
+autocorrelation reaches. So every block of the runs is left out in turn (the jackknife of Quenouille and Tukey, each in
+one Gauss-Newton step). What the estimates then scatter beyond the sandwich is a spread from block to block, as of
+random effects (DerSimonian and Laird 1986), and the truth counts as one more block: on rigs with physics that their
+models lack 93 % of the 95 % intervals held the truth, 83 % without (`python -m benchmarks misfit`).
+
 Combinations of numbers that change no output are told with the one number that would fix each: a free swing without a
 known force or inertia sees only ratios, since masses, forces and frictions scale together.
 """
@@ -17,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.model.rig import NOISE
+from upright.identification.model.runs import LEAST_RUN
 from upright.identification.problem.normal_equations import NULL, pseudo_inverse
 from upright.identification.problem.residuals import Problem
 from upright.signals.memory import automatic_span, long_run, lost_share, memory
@@ -77,6 +84,7 @@ def assess(problem: Problem, x: Array) -> Optimum:
     size = x.size
     A = np.zeros((size, size))
     hac, from_runs = np.zeros((size, size)), np.zeros((size, size))
+    blocks: dict[int, list[tuple[Array, Array]]] = {number: [] for number in BLOCKS}
     cost, count, runs, longest, independent = 0.0, 0, 0, 0.0, 0.0
     for index, track in enumerate(problem.tracks):
         rows = problem.rows(index, x, central=True)
@@ -93,6 +101,9 @@ def assess(problem: Problem, x: Array) -> Optimum:
         hac[here] += long_run(scores, span) / (1 - lost_share(scores, span))
         g = scores.sum(axis=0)
         from_runs[here] += np.outer(g, g)
+        for number, parts in blocks.items():
+            pieces = -(-number // len(problem.tracks))
+            parts += _parts(r, J, pieces if track.run.t.size >= LEAST_RUN else 1, sought, size)
         cost += float(np.sum(r * r))
         count += int(np.count_nonzero(track.weights)) * r.size // track.weights.size
         longest = max(longest, memory(r, track.spacing))
@@ -116,11 +127,49 @@ def assess(problem: Problem, x: Array) -> Optimum:
         spread = inverse @ (from_runs * runs / (runs - 1) + prior_meat) @ inverse
         factor = np.sqrt(np.maximum(np.diag(spread) / np.where(np.diag(covariance) > 0, np.diag(covariance), 1.0), 1.0))
         covariance = covariance * np.outer(factor, factor)
+    covariance = covariance * _between_blocks(blocks, A, free, np.diag(covariance), independent - float(free.sum()))
     white = np.diag(inverse) * variance
     return Optimum(
         problem=problem, x=x, covariance=covariance, white=white, matrix=A, variance=variance, memory=longest,
         samples=independent, pinned=pinned,
     )  # fmt: skip
+
+
+BLOCKS = (4, 8)
+"""Numbers of blocks that the runs are cut into: few see what changes slowly, many what changes fast."""
+
+HONEST = 1.5
+"""Multiple of the sandwich by which estimates scatter between blocks under a right model, short blocks being what they
+are: 1.3 in the median over rigs drawn at random."""
+
+
+def _parts(r: Array, J: Array, pieces: int, sought: NDArray[np.int64], size: int) -> list[tuple[Array, Array]]:
+    """Gradient (size,) and Gauss-Newton matrix (size, size) of each of so many pieces of a run's rows."""
+    found: list[tuple[Array, Array]] = []
+    for rows in np.array_split(np.arange(len(r)), pieces):
+        flat, g, A = J[rows].reshape(-1, sought.size), np.zeros(size), np.zeros((size, size))
+        g[sought], A[np.ix_(sought, sought)] = flat.T @ r[rows].reshape(-1), flat.T @ flat
+        found.append((g, A))
+    return found
+
+
+def _between_blocks(
+    blocks: Mapping[int, list[tuple[Array, Array]]], A: Array, free: NDArray[np.bool_], known: Array, freedom: float
+) -> Array:
+    """What a covariance with the diagonal `known` (n,) is multiplied by (n, n) for the spread between blocks."""
+    here, most = np.ix_(free, free), np.zeros(len(known))
+    for parts in blocks.values():
+        count = len(parts)
+        if count < min(BLOCKS):
+            continue
+        away = np.zeros((count, len(known)))
+        for row, (g, own) in zip(away, parts, strict=True):
+            row[free] = pseudo_inverse((A - own)[here]) @ g[free]
+        jackknife = (count - 1) * np.var(away, axis=0)
+        beyond = count * np.maximum(jackknife - HONEST * known, 0.0)
+        most = np.maximum(most, beyond * (student(count - 1) / student(freedom)) ** 2)
+    factor = np.sqrt(1 + most / np.where(known > 0, known, np.inf))
+    return np.outer(factor, factor)
 
 
 PART = 0.05
