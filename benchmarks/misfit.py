@@ -84,9 +84,10 @@ def moved(make: Make, truths: list[dict[str, float]], u: np.ndarray, flaws: Flaw
         M, f = mass_and_force(derived, scope)
         f = f + out_of_level(make.plant, whole, q, flaws)
         for joint in derived.joints:
-            w = v[joint.coordinate]
+            along = np.array(joint.direction)[:, None]
+            w = (along * v).sum(axis=0)
             level = p[joint.coulomb] * (1 + flaws.excess * np.exp(-((w / (STRIBECK * speed)) ** 2)))
-            f[:, joint.coordinate] -= level * np.tanh(w / (CREEP * speed))
+            f -= (along * level * np.tanh(w / (CREEP * speed))).T
         a = np.linalg.solve(M, f[..., None])[..., 0].T
         return np.vstack([a, (torque - pull) / motor])
 

@@ -49,7 +49,7 @@ def shared_estimates(
     found: dict[str, Estimate] = {}
     budget = AFFORDED if profiles else 0.0
     for i in best.shared:
-        u, plain = best.problem.unknowns[i], estimate(best, i)
+        u, plain = best.problem.unknowns[i], beside_bound(best, i)
         if u.name in hidden:
             infinite = (-math.inf, math.inf)
             found[u.name] = replace(plain, stderr=math.inf, interval=infinite, status="unseen")
@@ -101,6 +101,16 @@ def estimate(best: Optimum, place: int, quantile: float | None = None) -> Estima
     return Estimate(value=value, stderr=sigma, interval=interval, unit=_unit(best.problem.rig, u.name))
 
 
+def beside_bound(best: Optimum, place: int, quantile: float | None = None) -> Estimate:
+    """As `estimate`; of a number that ended at a bound, which has no standard error, as far as the cost allows."""
+    plain, u = estimate(best, place, quantile), best.problem.unknowns[place]
+    if not best.pinned[place]:
+        return plain
+    _, (down, up) = _steps(best, place, best.quantile if quantile is None else quantile)
+    low, high = float(best.x[place]) - down, float(best.x[place]) + up
+    return replace(plain, interval=(math.exp(max(low, -700.0)), math.exp(min(high, 700.0))) if u.log else (low, high))
+
+
 def _within(u: Unknown, interval: tuple[float, float]) -> tuple[float, float]:
     return max(interval[0], u.lower), min(interval[1], u.upper)
 
@@ -145,18 +155,10 @@ def profile(best: Optimum, place: int, plain: Estimate, quantile: float, log: Se
 def _ends(best: Optimum, place: int, quantile: float, log: SearchLog) -> tuple[float, float]:
     """Coordinates at which the refitted cost has risen enough, infinite where it never does."""
     problem, x = best.problem, best.x
-    model = problem.normal(x)
-    u = problem.unknowns[place]
-    ratio = np.diag(best.covariance)[best.white > 0] / best.white[best.white > 0]
-    here = float(best.covariance[place, place] / best.white[place]) if best.white[place] > 0 else 0.0
-    rise = quantile**2 * best.variance * max(1.0, here or float(np.median(ratio)) if ratio.size else 1.0)
-    curvature = _curvature(model.matrix, place, best)
-    g = float(model.gradient[place]) if best.pinned[place] else 0.0
+    rise, steps = _steps(best, place, quantile)
+    u, model = problem.unknowns[place], problem.normal(x)
     ends: list[float] = []
-    for sign in (-1.0, 1.0):
-        # where the quadratic model has risen enough: 2 g s + c s^2 = rise
-        slope = g * sign
-        step = (-slope + math.sqrt(slope**2 + curvature * rise)) / curvature if curvature > 0 else u.scale
+    for sign, step in zip((-1.0, 1.0), steps, strict=True):
         most = 2.0 if u.log else 100 * max(abs(float(x[place])), u.scale)
 
         def tell(cost: float, share: float = (sign + 1) / 2) -> None:
@@ -164,6 +166,20 @@ def _ends(best: Optimum, place: int, quantile: float, log: SearchLog) -> tuple[f
 
         ends.append(_end(problem, x, place, model.cost, rise, sign * min(max(step, 1e-9 * u.scale), most), tell, log))
     return ends[0], ends[1]
+
+
+def _steps(best: Optimum, place: int, quantile: float) -> tuple[float, tuple[float, float]]:
+    """Rise of the cost at the ends of an interval, and the steps down and up to them in the quadratic model."""
+    u = best.problem.unknowns[place]
+    ratio = np.diag(best.covariance)[best.white > 0] / best.white[best.white > 0]
+    here = float(best.covariance[place, place] / best.white[place]) if best.white[place] > 0 else 0.0
+    rise = quantile**2 * best.variance * max(1.0, here or float(np.median(ratio)) if ratio.size else 1.0)
+    model = best.problem.normal(best.x)
+    curvature = _curvature(model.matrix, place, best)
+    g = float(model.gradient[place]) if best.pinned[place] else 0.0
+    # where the quadratic model has risen enough: 2 g s + c s^2 = rise
+    down, up = ((-s + math.sqrt(s**2 + curvature * rise)) / curvature if curvature > 0 else u.scale for s in (-g, g))
+    return rise, (down, up)
 
 
 def _curvature(A: Array, place: int, best: Optimum) -> float:
@@ -271,7 +287,7 @@ def with_left_out(best: Optimum, asked: Rig, left_out: Sequence[str], log: Searc
     quantile = student(best.samples - best.x.size - len(left_out))
     estimates: dict[str, Estimate] = {}
     for i in there.shared:
-        u, e = richer.unknowns[i], estimate(there, i, quantile)
+        u, e = richer.unknowns[i], beside_bound(there, i, quantile)
         low, high = e.interval
         if u.name in left_out and there.pinned[i] and profile_work(there) < AFFORDED:
             low, high = profile(there, i, e, quantile, SearchLog(progress=log.progress))
