@@ -13,7 +13,7 @@ from scipy import stats
 from tests.paper import printed
 from upright.errors import BadInput
 from upright.questionnaire.chapter import chapter
-from upright.questionnaire.sheet import Likert, Means, Ratings, Shares, read
+from upright.questionnaire.sheet import Item, Likert, Means, Ratings, Shares, read
 from upright.questionnaire.statistics import (
     bound,
     compare,
@@ -241,3 +241,39 @@ def test_agreement_has_the_interval_that_newcombe_prints(agree, of, interval):
     table = next(b for part in told.parts for b in part.content if isinstance(b, Table))
     low, _, high = table.rows[0][-1].removesuffix(" %").partition(" to ")
     assert (float(low), float(high)) == pytest.approx(interval, abs=0.051)  # printed to three figures
+
+
+def test_a_question_with_one_pair_is_told_and_the_others_are_evaluated():
+    pre, post = ratings(2, 12)
+    one = np.where(np.arange(12) == 3, post, np.nan)
+    items = (Item(name="alone", pre=pre, post=one), Item(name="all", pre=pre, post=post))
+    told = chapter(Ratings(items=items, likert=(), people=12, notes=()), title="Survey", source="answers.csv")
+    assert any(s.startswith("alone: 1 person answered before and after") for s in told.numbers["sentences"])
+    assert any(s.startswith("11 comparisons miss one") for s in told.numbers["sentences"])
+    found = told.numbers["found"]
+    assert found["alone"] == {"n": 1, "missing": 11}
+    assert found["all"]["t"] == pytest.approx(stats.ttest_rel(post, pre).statistic, rel=1e-12)
+    assert found["all"]["p_holm"] == pytest.approx(stats.ttest_rel(post, pre).pvalue, rel=1e-9)
+
+
+def test_no_gain_is_not_a_loss():
+    pre, post = np.array([1.0, 2, 3, 4]), np.array([2.0, 1, 4, 3])
+    told = chapter(Ratings(items=(Item(name="even", pre=pre, post=post),), likert=(), people=4, notes=()),
+                   title="Survey", source="answers.csv")  # fmt: skip
+    assert told.verdict.startswith("even: unchanged on average")
+
+
+def test_each_printed_change_has_one_verdict_and_its_gain(tmp_path):
+    """Five people, critical t 2.78: four up by one point each make t = 0.8 sqrt(5)/0.447 = 4, other pairings less."""
+    path = tmp_path / "means.csv"
+    path.write_text("concept,pre,post\nsame,4.0,4.0\nmore,2.0,2.8\nall,1.0,4.0\n")
+    told = chapter(read(path), title="Survey", source=path.name, answers=5)
+    found = told.numbers["found"]["bounds"]
+    assert [b["verdict"] for b in found.values()] == ["not significant", "open", "significant"]
+    assert [b["gain"] for b in found.values()] == [0.0, 0.8, 3.0]
+    assert found["more"]["gain_between"] == pytest.approx((0.8, 0.8), rel=1e-12)
+    assert found["more"]["t"][1] == pytest.approx(4.0, rel=1e-12)
+    assert told.verdict == (
+        "1 of 3 changes are significant at 5 % however the single answers were paired and spread; 1 is not significant,"
+        " however they were; 1 cannot be told from the means alone."
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -87,7 +88,9 @@ def chapter(
 
 
 def _ratings(sheet: Ratings, scale: tuple[int, int]) -> _Evaluated:
-    found = [(i.name, compare(i.pre, i.post, top=scale[1])) for i in sheet.items]
+    pairs = {i.name: np.isfinite(i.pre) & np.isfinite(i.post) for i in sheet.items}
+    few = [i for i in sheet.items if pairs[i.name].sum() < 2]
+    found = [(i.name, compare(i.pre, i.post, top=scale[1])) for i in sheet.items if i not in few]
     adjusted = holm([p.p for _, p in found])
     rows = tuple(
         (
@@ -98,7 +101,7 @@ def _ratings(sheet: Ratings, scale: tuple[int, int]) -> _Evaluated:
         for (name, p), q in zip(found, adjusted, strict=True)
     )  # fmt: skip
     sentences = [
-        f"{name}: {'raised' if p.gain > 0 else 'lowered'} by {number(abs(p.gain), 2)} ({_span(p.interval)}), "
+        f"{name}: {_moved(p.gain)} ({_span(p.interval)}), "
         + (
             "more than chance explains."
             if q < 0.05
@@ -108,7 +111,12 @@ def _ratings(sheet: Ratings, scale: tuple[int, int]) -> _Evaluated:
         )
         for (name, p), q in zip(found, adjusted, strict=True)
     ]
-    lost = sum(p.missing for _, p in found)
+    sentences += [
+        f"{i.name}: {_people(int(pairs[i.name].sum()))} answered before and after, and a comparison needs at least 2; "
+        "this question is left out."
+        for i in few
+    ]
+    lost = sum(int((~both).sum()) for both in pairs.values())
     if lost:
         sentences.append(
             f"{lost} comparisons miss one of their two answers and are left out, each for its question only."
@@ -129,8 +137,18 @@ def _ratings(sheet: Ratings, scale: tuple[int, int]) -> _Evaluated:
         shown += [_agreement_picture(bars), _agreement_table(sheet.likert)]
     return _Evaluated(
         sentences=tuple(sentences), shown=tuple(shown), notes=sheet.notes,
-        numbers={name: asdict(p) | {"p_holm": q} for (name, p), q in zip(found, adjusted, strict=True)},
+        numbers={name: asdict(p) | {"p_holm": q} for (name, p), q in zip(found, adjusted, strict=True)}
+        | {i.name: {"n": int(pairs[i.name].sum()), "missing": int((~pairs[i.name]).sum())} for i in few},
     )  # fmt: skip
+
+
+def _moved(gain: float) -> str:
+    """What became of a mean rating."""
+    return f"{'raised' if gain > 0 else 'lowered'} by {number(abs(gain), 2)}" if gain else "unchanged on average"
+
+
+def _people(n: int) -> str:
+    return {0: "nobody", 1: "1 person"}.get(n, f"{n} people")
 
 
 def _table(caption: str, headings: Sequence[str], rows: Sequence[tuple[str, ...]]) -> Table:
@@ -162,15 +180,15 @@ def _means(sheet: Means, n: int, scale: tuple[int, int]) -> _Evaluated:
     printed = [m for _, pre, post, _ in found for m in (pre, post)]
     wrong = [m for m in printed if not possible(m, n)]
     rows = [
-        (name, _marked(pre, n), _marked(post, n), number(float(post) - float(pre), 3), _span(b.t), b.verdict)
+        (name, _marked(pre, n), _marked(post, n), number(_gain(pre, post), 3), _span(b.t), b.verdict)
         for name, pre, post, b in found
     ]
-    sure = sum(b.verdict == "significant" for *_, b in found)
+    sure = _verdicts(found, "significant")
     fits = fitting(printed, [], max(2 * n, 20))
     sentences = [
         f"{sure} of {len(found)} changes are significant at 5 % however the single answers were paired and spread"
         + (", nearest totals taken where a mean is impossible" if wrong else "")
-        + f"; {len(found) - sure} cannot be told from the means alone.",
+        + f"; {_rest(found)}.",
         "The means say nothing about sizes of effect beyond these bounds, about single people, or about what caused"
         " the change: there is no group that did not take the course.",
         _impossible(wrong, printed, n, "means"),
@@ -197,9 +215,30 @@ def _means(sheet: Means, n: int, scale: tuple[int, int]) -> _Evaluated:
         sentences=tuple(sentences), shown=(bounds, _fitting_picture(fits, n), table),
         numbers={
             "impossible": wrong, "fits": {f.answers: f.possible for f in fits}, "printed": len(printed),
-            "bounds": {name: {"t": b.t, "verdict": b.verdict} for name, _, _, b in found},
+            "bounds": {
+                name: {"gain": _gain(pre, post), "gain_between": b.gain, "t": b.t, "verdict": b.verdict}
+                for name, pre, post, b in found
+            },
         },
     )  # fmt: skip
+
+
+def _gain(pre: str, post: str) -> float:
+    """Gain of the means as printed, without what binary fractions add."""
+    return float(Fraction(post) - Fraction(pre))
+
+
+def _verdicts(found: Sequence[tuple[str, str, str, Bound]], verdict: str) -> int:
+    return sum(b.verdict == verdict for *_, b in found)
+
+
+def _rest(found: Sequence[tuple[str, str, str, Bound]]) -> str:
+    """How many changes no pairing makes significant, and how many the means leave open."""
+    never, open_ones = _verdicts(found, "not significant"), _verdicts(found, "open")
+    said = [f"{never} {'is' if never == 1 else 'are'} not significant, however they were"] if never else []
+    if open_ones or not never:
+        said.append(f"{open_ones} cannot be told from the means alone")
+    return "; ".join(said)
 
 
 def _shares(sheet: Shares, n: int) -> _Evaluated:
