@@ -141,6 +141,8 @@ def test_sampled_gains_meet_the_poles_in_the_loop_as_it_runs(study, tmp_path):
         (["--lqr", "1,0,1,0"], "--limit"),
         (["--lqr", "1,0,1,0", "--limit", "0.01"], "takes at least"),
         (["--lqr", "1,0", "--effort-weight", "1"], "must be 4 weights"),
+        (["--lqr", "0,0,10,1", "--effort-weight", "1"], "do not see the mode at 0 (psi)"),
+        (["--lqr", "0,0,10,1", "--limit", "0.5"], "weigh psi too"),
         (["--poles", POLES, "--counts", "phi=4000"], "got 'phi'; did you mean 'psi'?"),
         (["--poles", POLES, "--counts", "psi=none"], "--counts takes numbers above 0"),
         (["--poles", POLES, "--period", "10"], "Expected a value in s"),

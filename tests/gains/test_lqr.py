@@ -9,13 +9,14 @@ import pytest
 
 from upright.errors import BadInput
 from upright.gains import dlqr, locus, lqr, place, prefilter, weight_for_effort
-from upright.gains.lqr import motion
+from upright.gains.lqr import least_cost, motion
 from upright.physics import CartPendulum, Furuta
 
 DOUBLE_INTEGRATOR = ([[0, 1], [0, 0]], [0, 1])
 # Control Tutorials for MATLAB and Simulink (Univ. of Michigan), inverted pendulum: M, m, b, l, I of its page
 CTMS = CartPendulum(m_c=0.5, m_p=0.2, b_1=0.1, l_cg=0.3, J_p=0.006, g=9.8).linear("inverted")
 RIG = Furuta(m_p=0.2, l_cg=0.15, r=0.2, J_d=0.01, J_p=5e-4, b_1=0.007, b_2=3e-4)
+ARM = RIG.linear("inverted")
 
 
 @pytest.mark.parametrize(
@@ -66,7 +67,7 @@ def test_two_inputs_share_the_effort():
 def test_dear_effort_mirrors_the_unstable_poles():
     """Kwakernaak and Sivan: as R grows, unstable poles go to their mirror images and stable ones stay."""
     model = RIG.linear("inverted")
-    poles = np.sort(locus(model.A, model.B, [0, 0, 1, 0], [1e12])[0].real)
+    poles = np.sort(locus(model.A, model.B, [1, 0, 1, 0], [1e12])[0].real)
     open_loop = np.linalg.eigvals(model.A).real
     np.testing.assert_allclose(poles, np.sort(-np.abs(open_loop)), atol=2e-3)
 
@@ -120,8 +121,58 @@ def test_weights_that_do_not_cost_are_refused(Q, R, words):
 
 
 def test_a_mode_out_of_reach_has_no_regulator():
-    with pytest.raises(BadInput, match="no gain is best"):
+    with pytest.raises(BadInput, match="input cannot move the mode at 2, which"):
         lqr([[1, 0], [0, 2]], [1, 0], [1, 1], 1)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        # two integrators: the position's mode, s = 0 with the eigenvector (1, 0), costs nothing where the speed does
+        (lambda: lqr(*DOUBLE_INTEGRATOR, [0, 1], 1), r"mode at 0 \(state 1\).*weigh state 1 too"),
+        (lambda: dlqr([[1, 0.1], [0, 1]], [0, 0.1], [0, 1], 1), r"mode at 1 \(state 1\)"),
+        # an undamped oscillator of 2 rad/s, any state of which shows it
+        (lambda: lqr([[0, 1], [-4, 0]], [0, 1], [0, 0], 1), r"mode at 0±2j .*weigh state 1 or state 2"),
+        # the free arm of a rotary pendulum: nothing turns it back
+        (lambda: lqr(ARM.A, ARM.B, [0, 0, 10, 1], 1, states=ARM.states), r"mode at 0 \(psi\).*weigh psi too"),
+    ],
+)
+def test_weights_that_do_not_see_a_mode_that_stays_are_refused(call, words):
+    with pytest.raises(BadInput, match=words):
+        call()
+
+
+def test_an_unstable_mode_is_mirrored_even_where_it_costs_nothing():
+    """Kwakernaak and Sivan, section 3.8: without a cost of the states the least effort mirrors +-2; K by hand."""
+    np.testing.assert_allclose(lqr([[0, 1], [4, 0]], [0, 1], 0, 1), [[8, 4]], rtol=1e-7)
+
+
+@pytest.mark.parametrize("sampled", [False, True])
+def test_the_riccati_matrix_is_the_cost_from_a_start(sampled):
+    """``x0' S x0`` against the cost of the motion, summed or integrated; python-control's S and E beside it."""
+    import control
+    from scipy.integrate import quad
+    from scipy.linalg import expm
+
+    model, Q, R, x0 = RIG.linear("inverted"), np.diag([1.0, 0.1, 3.0, 0.2]), 0.3, np.array([0.1, 0.0, -0.05, 0.3])
+    A, B = (np.eye(4) + 0.01 * model.A, 0.01 * model.B) if sampled else (model.A, model.B)
+    K, S, E = least_cost(A, B, Q, R, sampled=sampled)
+    _, S_c, E_c = (control.dlqr if sampled else control.lqr)(A, B, Q, R)
+    np.testing.assert_allclose(S, S_c, rtol=1e-6)
+    np.testing.assert_allclose(np.sort_complex(E), np.sort_complex(E_c), rtol=1e-6)
+    rate = Q + K.T @ np.atleast_2d(R) @ K
+
+    def cost(x):
+        return x @ rate @ x
+
+    if sampled:
+        powers = [x0]
+        for _ in range(5000):
+            powers.append((A - B @ K) @ powers[-1])
+        total = sum(map(cost, powers))
+    else:
+        total = quad(lambda t: cost(expm((A - B @ K) * t) @ x0), 0, 30, epsrel=1e-9, limit=400)[0]
+    assert x0 @ S @ x0 == pytest.approx(total, rel=1e-6)
 
 
 @pytest.mark.parametrize("gamma", [0.0, 0.5, 1.3])

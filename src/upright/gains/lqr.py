@@ -2,32 +2,112 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput
-from upright.gains.requests import Roots, matched, poles_of
+from upright.gains.requests import UNREACHED, Roots, checked, lost_modes, matched, poles_of, written
 from upright.laws.linear import Array
 
 
-def lqr(A: ArrayLike, B: ArrayLike, Q: ArrayLike, R: ArrayLike) -> Array:
-    """Gains K, shape (m, n), of ``u = -K x`` that minimize the integral of ``x'Q x + u'R u``.
+class LeastCost(NamedTuple):
+    """Gains of least cost, named as python-control's `lqr` returns them.
 
-    Q is a matrix or the diagonal of one, R a number or a matrix.
+    Attributes
+    ----------
+    K : array, shape (m, n)
+        Gains of ``u = -K x``.
+    S : array, shape (n, n)
+        Solution of Riccati's equation: ``x' S x`` is the cost from x.
+    E : array, shape (n,)
+        Poles of the loop [1/s, or z].
+    """
+
+    K: Array
+    S: Array
+    E: Roots
+
+
+def lqr(A: ArrayLike, B: ArrayLike, Q: ArrayLike, R: ArrayLike, *, states: Sequence[str] = ()) -> Array:
+    """Gains K, shape (m, n), of ``u = -K x`` that of all that stabilize have the least integral of ``x'Q x + u'R u``.
+
+    Q is a matrix or the diagonal of one, R a number or a matrix; `states` are names for what is said of them.
 
     Raises
     ------
     BadInput
-        When the weights are of the wrong size or sign, or no gain makes that integral finite.
+        When the weights are of the wrong size or sign, a mode that does not die out is out of the input's reach, or
+        the weights do not see a mode that stays as it is.
     """
-    return _riccati("solve_continuous_are", A, B, Q, R)
+    return least_cost(A, B, Q, R, states=states).K
 
 
-def dlqr(A: ArrayLike, B: ArrayLike, Q: ArrayLike, R: ArrayLike) -> Array:
+def dlqr(A: ArrayLike, B: ArrayLike, Q: ArrayLike, R: ArrayLike, *, states: Sequence[str] = ()) -> Array:
     """The same for a sampled model and the sum over its samples."""
-    return _riccati("solve_discrete_are", A, B, Q, R)
+    return least_cost(A, B, Q, R, sampled=True, states=states).K
+
+
+def least_cost(
+    A: ArrayLike, B: ArrayLike, Q: ArrayLike, R: ArrayLike, *, sampled: bool = False, states: Sequence[str] = ()
+) -> LeastCost:
+    """Gains of `lqr`, or of `dlqr` where the model is `sampled`, with what they cost and the poles they make."""
+    import scipy.linalg
+
+    a, b = checked(A, B)
+    q, r = _square(Q, a.shape[0], "Q"), _square(R, b.shape[1], "R")
+    if np.linalg.eigvalsh(r).min() <= 0 or np.linalg.eigvalsh(q).min() < -1e-12 * np.abs(q).max(initial=0.0):
+        raise BadInput("weights must cost: R above 0 and no eigenvalue of Q below 0; check their signs.")
+    solve: Any = scipy.linalg.solve_discrete_are if sampled else scipy.linalg.solve_continuous_are
+    try:
+        S = np.asarray(solve(a, b, q, r), dtype=np.float64)
+    except (np.linalg.LinAlgError, ValueError):
+        raise BadInput(_why_none(a, b, q, sampled, states)) from None
+    K = np.linalg.solve(r + b.T @ S @ b, b.T @ S @ a) if sampled else np.linalg.solve(r, b.T @ S)
+    E = poles_of(a - b @ K)
+    if not _dies_out(E, sampled).all():
+        raise BadInput(_why_none(a, b, q, sampled, states))
+    return LeastCost(np.asarray(K, dtype=np.float64), S, E)
+
+
+def _dies_out(poles: Roots, sampled: bool) -> NDArray[np.bool_]:
+    """Which modes die out, by more than rounding explains."""
+    rounding = UNREACHED * poles.size
+    if sampled:
+        return np.abs(poles) < 1.0 - rounding
+    return poles.real < -rounding * np.abs(poles).max(initial=0.0)
+
+
+def _why_none(A: Array, B: Array, Q: Array, sampled: bool, states: Sequence[str]) -> str:
+    """Why no gains of least cost stabilize: a mode that stays or grows is out of reach, or costs nothing."""
+    n = A.shape[0]
+
+    def stays(p: complex) -> bool:
+        return not bool(_dies_out(np.array([p]), sampled)[0])
+
+    def at(p: complex) -> str:
+        return written([p, p.conjugate()] if p.imag else p)
+
+    out_of_reach = [p for p in lost_modes(A, B) if stays(p)]
+    if out_of_reach:
+        return (
+            f"no gain is best for these weights: the input cannot move the mode at {at(out_of_reach[0])}, which "
+            "does not die out by itself; add an input or a coupling, or leave that mode out of the model."
+        )
+    # duality: a mode is unseen by Q as that of the transposed model is unreached by it
+    unseen = [p for p in lost_modes(A.T, Q) if stays(p)]
+    if not unseen:
+        return "no gain is best for these weights, which nearly miss a mode that does not die out; weigh more states."
+    values, rows = np.linalg.svd(np.vstack([A - unseen[0] * np.eye(n), Q]))[1:]
+    free = np.abs(rows[values <= UNREACHED * n * max(float(values[0]), 1.0)]).max(axis=0, initial=0.0)
+    names = [states[i] if states else f"state {i + 1}" for i in range(n) if free[i] > 1e-8 * free.max()]
+    return (
+        f"no gain is best for these weights: they do not see the mode at {at(unseen[0])} ({', '.join(names)}), "
+        "which does not die out by itself and costs nothing, so it would stay where it is; weigh "
+        f"{' or '.join(names)} too, or use place."
+    )
 
 
 def locus(A: ArrayLike, B: ArrayLike, Q: ArrayLike, weights: ArrayLike) -> Roots:
@@ -66,7 +146,9 @@ def peak_effort(A: Array, B: Array, K: Array, start: ArrayLike) -> float:
     return float(np.abs(motion(A, B, K, start)[2]).max())
 
 
-def weight_for_effort(A: ArrayLike, B: ArrayLike, Q: ArrayLike, start: ArrayLike, limit: float) -> float:
+def weight_for_effort(
+    A: ArrayLike, B: ArrayLike, Q: ArrayLike, start: ArrayLike, limit: float, *, states: Sequence[str] = ()
+) -> float:
     """Effort weight R whose gains need just `limit` [the input's unit] to come back from the deviation `start` (n,).
 
     Raises
@@ -82,7 +164,7 @@ def weight_for_effort(A: ArrayLike, B: ArrayLike, Q: ArrayLike, start: ArrayLike
     unit = float(x0 @ _square(Q, A.shape[0], "Q") @ x0) / limit**2 or 1.0
 
     def peak(exponent: float) -> float:
-        return peak_effort(A, B, lqr(A, B, Q, unit * 10**exponent), x0)
+        return peak_effort(A, B, lqr(A, B, Q, unit * 10**exponent, states=states), x0)
 
     low, high = -6.0, 6.0  # cheap control, dear control
     least = peak(high)
@@ -95,27 +177,6 @@ def weight_for_effort(A: ArrayLike, B: ArrayLike, Q: ArrayLike, start: ArrayLike
         middle = (low + high) / 2
         low, high = (low, middle) if peak(middle) < limit else (middle, high)
     return unit * 10**high
-
-
-def _riccati(solver: str, A: ArrayLike, B: ArrayLike, Q: ArrayLike, R: ArrayLike) -> Array:
-    import scipy.linalg
-
-    a, b = np.atleast_2d(np.asarray(A, dtype=np.float64)), np.asarray(B, dtype=np.float64)
-    b = b[:, None] if b.ndim == 1 else b
-    q, r = _square(Q, a.shape[0], "Q"), _square(R, b.shape[1], "R")
-    if np.linalg.eigvalsh(r).min() <= 0 or np.linalg.eigvalsh(q).min() < -1e-12 * np.abs(q).max(initial=0.0):
-        raise BadInput("weights must cost: R above 0 and no eigenvalue of Q below 0; check their signs.")
-    solve: Any = getattr(scipy.linalg, solver)
-    try:
-        P = np.asarray(solve(a, b, q, r), dtype=np.float64)
-    except (np.linalg.LinAlgError, ValueError):
-        raise BadInput(
-            "no gain is best for these weights: a mode that does not die out by itself is out of the input's reach, or "
-            "Q does not see it; weigh its state, or use place."
-        ) from None
-    if solver == "solve_continuous_are":
-        return np.asarray(np.linalg.solve(r, b.T @ P), dtype=np.float64)
-    return np.asarray(np.linalg.solve(r + b.T @ P @ b, b.T @ P @ a), dtype=np.float64)
 
 
 def _square(weight: ArrayLike, size: int, name: str) -> Array:

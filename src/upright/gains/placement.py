@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upright.errors import BadInput
-from upright.gains.requests import Roots, conjugate_poles, lost_modes, matched, poles_of, weak_modes, written
+from upright.gains.requests import Roots, checked, conjugate_poles, lost_modes, matched, poles_of, weak_modes, written
 from upright.laws.linear import Array
 
 DIGITS = 60
@@ -145,7 +145,7 @@ def place(A: ArrayLike, B: ArrayLike, poles: ArrayLike) -> Placement:
         When the poles are too few, too many or not conjugate, when the inputs do not reach every mode, or when the
         problem is so ill conditioned that gains rounded to double precision miss the poles.
     """
-    A, B = _checked(A, B)
+    A, B = checked(A, B)
     n, m = B.shape
     asked = conjugate_poles(poles, n)
     even = _balanced(A, B)
@@ -178,17 +178,6 @@ def place(A: ArrayLike, B: ArrayLike, poles: ArrayLike) -> Placement:
         sensitivity=sensitivity,
         sentence=_sentence(asked, condition, sensitivity),
     )
-
-
-def _checked(A: ArrayLike, B: ArrayLike) -> tuple[Array, Array]:
-    a = np.atleast_2d(np.array(A, dtype=np.float64))
-    b = np.array(B, dtype=np.float64)
-    b = b[:, None] if b.ndim == 1 else np.atleast_2d(b)
-    if a.ndim != 2 or a.shape[0] != a.shape[1] or b.shape[0] != a.shape[0] or b.shape[1] == 0:
-        raise BadInput(f"a model needs A of shape (n, n) and B of shape (n, m), got {a.shape} and {b.shape}.")
-    if not (np.isfinite(a).all() and np.isfinite(b).all()):
-        raise BadInput("A and B must hold finite numbers; check the parameters of the model.")
-    return a, b
 
 
 def _balanced(A: Array, B: Array) -> _Balanced:

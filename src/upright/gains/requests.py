@@ -68,6 +68,24 @@ def conjugate_poles(poles: ArrayLike, states: int) -> Roots:
     return asked
 
 
+def checked(A: ArrayLike, B: ArrayLike) -> tuple[Array, Array]:
+    """A, shape (n, n), and B, shape (n, m), of a linear model, one column for a flat B.
+
+    Raises
+    ------
+    BadInput
+        When the shapes do not go together or a number is not finite.
+    """
+    a = np.atleast_2d(np.array(A, dtype=np.float64))
+    b = np.array(B, dtype=np.float64)
+    b = b[:, None] if b.ndim == 1 else np.atleast_2d(b)
+    if a.ndim != 2 or a.shape[0] != a.shape[1] or b.shape[0] != a.shape[0] or b.shape[1] == 0:
+        raise BadInput(f"a model needs A of shape (n, n) and B of shape (n, m), got {a.shape} and {b.shape}.")
+    if not (np.isfinite(a).all() and np.isfinite(b).all()):
+        raise BadInput("A and B must hold finite numbers; check the parameters of the model.")
+    return a, b
+
+
 UNREACHED = 1e-13
 """Distance to a model with a mode out of reach, relative to its size and per state, that rounding alone explains."""
 

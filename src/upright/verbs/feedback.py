@@ -129,18 +129,13 @@ def lqr(*system: Any, Q: Any = None, R: Any = None) -> Gains:
     BadInput
         When the model or a weight cannot be read or has another size, or no such gains exist.
     """
-    from scipy.linalg import solve_continuous_are, solve_discrete_are
-
-    from upright.gains.lqr import dlqr
-    from upright.gains.lqr import lqr as least
+    from upright.gains.lqr import least_cost
 
     model, (weights, effort) = _model(system, "lqr", ("Q", "R"), (Q, R))
     n, m = model.B.shape
     q, r = _weights(weights, n, "Q", "states"), _weights(effort, m, "R", "inputs")
-    K = (dlqr if model.period else least)(model.A, model.B, q, r)
-    solve = solve_discrete_are if model.period else solve_continuous_are
-    poles = np.linalg.eigvals(model.A - model.B @ K).astype(np.complex128)
-    return model.gains(K, poles, np.asarray(solve(model.A, model.B, q, r)), "")
+    K, S, E = least_cost(model.A, model.B, q, r, sampled=model.period > 0, states=model.states)
+    return model.gains(K, E, S, "")
 
 
 @dataclass(frozen=True, kw_only=True)

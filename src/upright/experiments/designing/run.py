@@ -175,8 +175,8 @@ def design_for(rig: IdentifiedRig, wish: DesignRequest) -> Designed:
                 raise BadInput(
                     "least cost needs a weight of the effort (--effort-weight) or a limit (--limit); give one."
                 )
-            R = weight_for_effort(model.A, model.B, weights, start, wish.limit)
-        K = lqr(model.A, model.B, weights, R)
+            R = weight_for_effort(model.A, model.B, weights, start, wish.limit, states=model.states)
+        K = lqr(model.A, model.B, weights, R, states=model.states)
     quantum = wish.quantum or (2 * math.pi / 16_000,) * sampled.C.shape[0]
     estimators = [velocities(model, sampled, s, wish.memory, wish.limit or 1.0, quantum) for s in SPEEDS]
     estimator = estimators[SPEEDS.index(wish.speed)]
