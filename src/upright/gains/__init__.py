@@ -1,7 +1,8 @@
 """Which gain does the rig need, and what is it worth? A linear model goes in, wherever its numbers came from."""
 
-from upright.gains.loop import Margins, feedback, margins, place_sampled, spelled_out
+from upright.gains.loop import feedback, margins, place_sampled, spelled_out
 from upright.gains.lqr import dlqr, locus, lqr, weight_for_effort
+from upright.gains.margins import Margins
 from upright.gains.placement import Placement, place, prefilter
 from upright.gains.sampled import Sampled, hold
 from upright.gains.velocity import Estimator, difference, filtered, kalman, shaken

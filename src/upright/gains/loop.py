@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from upright.errors import BadInput
+from upright.gains.margins import Margins, Response, balanced, gain_bounds, modulus, phases, root
 from upright.gains.requests import Roots, conjugate_poles, poles_of
 from upright.gains.sampled import Sampled, hold, to_z
 from upright.gains.velocity import Estimator, stationary
@@ -109,31 +109,23 @@ def place_sampled(model: Sampled, estimator: Estimator, poles: ArrayLike) -> Arr
     return K[None]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Margins:
-    """How much the sampled loop stands, at the plant's input.
+def response(model: Sampled, law: Law) -> Response:
+    """The loop cut at the plant's one input, negative feedback: what a unit command comes back as, times -1.
 
-    Attributes
-    ----------
-    least_gain, most_gain : float
-        Factors on the command between which the loop stays stable; 0 and inf where there is no bound.
-    phase : float
-        Smallest phase margin [rad]; inf when the loop gain never is 1.
-    delay : float
-        Further delay that it bears [s].
-    modulus : float
-        Least distance of the loop's frequency response to -1, the inverse of the peak of the sensitivity.
+    Raises
+    ------
+    BadInput
+        When there are several inputs.
     """
-
-    least_gain: float
-    most_gain: float
-    phase: float
-    delay: float
-    modulus: float
+    if model.B.shape[1] != 1:
+        raise BadInput(f"margins are for one input, and this model has {model.B.shape[1]}; close all loops but one.")
+    B, D = law.B[:, : law.readings], law.D[:, : law.readings]
+    A = np.block([[model.A, np.zeros((model.A.shape[0], law.A.shape[0]))], [B @ model.C, law.A]])
+    return balanced(A, np.vstack([model.B, np.zeros((law.A.shape[0], 1))]), -np.hstack([D @ model.C, law.C]))
 
 
 def margins(plant: Linear, model: Sampled, law: Law) -> Margins:
-    """Margins of a stable sampled loop; gain and delay from its eigenvalues, phase from its frequency response.
+    """Margins of a stable sampled loop, from every crossing of the unit circle and of the real axis.
 
     Raises
     ------
@@ -142,30 +134,43 @@ def margins(plant: Linear, model: Sampled, law: Law) -> Margins:
     """
     if not _stable(closed(model, law)):
         raise BadInput("the sampled loop is not stable, so it has no margins; ask for slower poles or sample faster.")
-
-    def by_gain(g: float) -> bool:
-        return _stable(closed(model, law, g))
-
-    def by_delay(more: float) -> bool:
-        return _stable(closed(hold(plant, model.period, model.delay + more, model.lag), law))
-
-    most = _edge(by_gain, np.geomspace(1, 1e4, 161))
-    least = _edge(by_gain, np.geomspace(1, 1e-4, 161))
-    delay = _edge(by_delay, np.concatenate([[0.0], np.geomspace(0.02, 400, 120)]))
-    L = loop_gain(model, law, np.geomspace(1e-3, 1, 4000) * np.pi / model.period)
-    size = np.abs(L)
-    crossings = np.flatnonzero(np.diff(np.sign(size - 1)))
-    # at a crossing, interpolate the phase in log |L|
-    share = np.log(size[crossings]) / (np.log(size[crossings]) - np.log(size[crossings + 1]))
-    turned = L[crossings + 1] / L[crossings]
-    phase = np.angle(-L[crossings] * np.exp(1j * np.angle(turned) * share))
+    L = response(model, law)
+    least, most = gain_bounds(L)
     return Margins(
-        least_gain=least if least > 1e-4 else 0.0,
-        most_gain=most if most < 1e4 else np.inf,
-        phase=float(np.abs(phase).min(initial=np.inf)),
-        delay=delay * model.period if delay < 400 else np.inf,
-        modulus=float(np.abs(1 + L).min()),
-    )
+        least_gain=least, most_gain=most, phase=float(np.abs(phases(L)[1]).min(initial=np.inf)),
+        delay=_delay(plant, model, law) * model.period, modulus=modulus(L),
+    )  # fmt: skip
+
+
+def _delay(plant: Linear, model: Sampled, law: Law) -> float:
+    """Further delay [samples] at which the loop falls.
+
+    Below a sample, by its eigenvalues. Beyond: whole samples turn the loop gain and leave its size, so a loop that is
+    already `part` of a sample late falls where its turned phase reaches -180 degrees; that sum hardly varies with part.
+    """
+
+    def late(more: float) -> Sampled:
+        return hold(plant, model.period, model.delay + more, model.lag)
+
+    def stands(more: float) -> bool:
+        return _stable(closed(late(more), law))
+
+    def falls(part: float) -> float:
+        w, phase = phases(response(late(part), law))
+        return part + float((np.mod(phase, 2 * np.pi) / w).min(initial=np.inf))
+
+    parts = np.arange(8) / 8
+    # a sample more turns L(-1) into its negative, through -1 if it is larger than 1
+    if abs(response(model, law).at(np.array([np.pi]))[0]) >= 1 or not all(map(stands, [*parts.tolist(), 1.0])):
+        return _edge(stands, np.linspace(0, 1, 65))
+    sums = np.array([falls(part) for part in parts.tolist()])
+    if not np.isfinite(sums).all():  # the loop gain is 1 at some parts of a sample only, if at all
+        return float(sums.min())
+    steps = np.arange(np.floor(8 * sums.min()), np.ceil(8 * sums.max()) + 2) / 8
+    i = int(np.argmax(sums[np.mod(np.rint(8 * steps), 8).astype(int)] <= steps))
+    if i == 0:
+        return float(steps[0])
+    return root(lambda delay: falls(delay % 1.0) - delay, float(steps[i - 1]), float(steps[i]))
 
 
 def swing(model: Sampled, law: Law, start: ArrayLike, samples: int) -> tuple[Array, Array]:

@@ -1,0 +1,197 @@
+"""How much a loop stands: every frequency at which it crosses the unit circle or the real axis, and what is left there.
+
+A loop gain L crosses the unit circle where ``1 - L(1/z) L(z)`` is zero, the real axis where ``L(z) - L(1/z)`` is; both
+are zeros of a linear system, eigenvalues of a pencil of twice its order (Boyd, Balakrishnan and Kabamba, Math. Control
+Signals Systems 2, 1989). No frequency is too low and no resonance too narrow for that. Each is refined between its
+neighbours on the response itself, so that rounding of the pencil does not enter.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from upright.gains.requests import Roots, poles_of
+from upright.laws.linear import Array
+
+NO_BOUND = 1e9
+"""Factors on a command beyond which, or below whose inverse, it counts as unbounded."""
+
+TOUCHING = 1e-7
+"""What remains of a response's size or angle where it touches the circle or the axis without crossing, by rounding."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Margins:
+    """How much the sampled loop stands, at the plant's input.
+
+    Attributes
+    ----------
+    least_gain, most_gain : float
+        Factors on the command between which the loop stays stable; 0 and inf where there is no bound.
+    phase : float
+        Smallest phase margin [rad]; inf when the loop gain never is 1.
+    delay : float
+        Further delay that it bears [s].
+    modulus : float
+        Least distance of the loop's frequency response to -1, the inverse of the peak of the sensitivity.
+    """
+
+    least_gain: float
+    most_gain: float
+    phase: float
+    delay: float
+    modulus: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Response:
+    """One signal through ``x[k+1] = A x[k] + B u[k], y[k] = C x[k] + D u[k]``; B and C are a column and a row.
+
+    Frequencies are angles ``omega T`` on the unit circle, from 0 to pi.
+    """
+
+    A: Array
+    B: Array
+    C: Array
+    D: float = 0.0
+
+    def at(self, angles: Array) -> Roots:
+        """Frequency response; ``z - 1`` and ``A - 1`` are formed without cancellation, for slow loops live there."""
+        one = np.eye(self.A.shape[0])
+        gap = np.expm1(1j * np.atleast_1d(angles))[:, None, None] * one - (self.A - one)
+        x = np.linalg.solve(gap, np.broadcast_to(self.B.astype(np.complex128), (len(gap), *self.B.shape)))
+        return (self.C @ x)[:, 0, 0] + self.D
+
+    def on_circle(self, radius: float = 1.0) -> Array:
+        """Angles at which ``|y/u|`` is `radius`."""
+        A, B, C, D = self.A, self.B / radius, self.C, self.D / radius
+        # z x = A x + B u; y = C x + D u; p = z (A' p + C' y); u = B' p + D y
+        left = _blocks([[A, None, B], [None, np.eye(len(A)), None], [D * C, B.T, np.array([[D * D - 1.0]])]])
+        right = _blocks([[np.eye(len(A)), None, B * 0], [C.T @ C, A.T, D * C.T], [C * 0, None, np.zeros((1, 1))]])
+        return _crossings(_angles(left, right), lambda w: np.log(np.abs(self.at(w)) / radius))
+
+    def on_axis(self) -> Array:
+        """Real values that y/u takes on the circle, shape (crossings,)."""
+        A, B, C = self.A, self.B, self.C
+        # z x = A x + B u; p = z (A' p + C' u); C x = B' p
+        left = _blocks([[A, None, B], [None, np.eye(len(A)), None], [C, -B.T, np.zeros((1, 1))]])
+        right = _blocks([[np.eye(len(A)), None, B * 0], [None, A.T, C.T], [C * 0, None, np.zeros((1, 1))]])
+        found = _crossings(_angles(left, right), lambda w: np.imag(self.at(w)) / np.abs(self.at(w)))
+        ends = [self._at_end(w) for w in (0.0, math.pi)]
+        return np.concatenate([self.at(found).real if found.size else found, [v for v in ends if math.isfinite(v)]])
+
+    def _at_end(self, angle: float) -> float:
+        """Value at z = 1 or z = -1, infinite at a pole."""
+        try:
+            return float(self.at(np.array([angle]))[0].real)
+        except np.linalg.LinAlgError:
+            return math.inf
+
+    def peak(self) -> float:
+        """Largest ``|y/u|`` of a stable system, by Bruinsma and Steinbuch (Systems & Control Letters 14, 1990).
+
+        Between two neighbouring angles at which a level is met, the response is above it or below it: the middles give
+        the next level, until none is met.
+        """
+        angles = np.concatenate([[0.0, math.pi], np.abs(np.angle(poles_of(self.A)))])
+        level = float(np.abs(self.at(angles)).max())
+        for _ in range(50):
+            met = self.on_circle(level * (1 + 1e-9))
+            if met.size < 2:
+                break
+            ends = np.concatenate([[0.0], met, [math.pi]])
+            higher = float(np.abs(self.at((ends[1:] + ends[:-1]) / 2)).max())
+            if higher <= level * (1 + 1e-9):
+                break
+            level = higher
+        return level
+
+
+def balanced(A: Array, B: Array, C: Array, D: float = 0.0) -> Response:
+    """The same system with states scaled by powers of two, so that their units do not matter."""
+    from scipy.linalg import matrix_balance
+
+    n = A.shape[0]
+    whole = np.block([[A - np.eye(n), B], [C, np.zeros((1, 1))]])
+    scale = np.asarray(matrix_balance(whole, permute=False, separate=True)[1][0], dtype=np.float64)  # type: ignore[index]
+    T = scale[:n] / scale[n]
+    return Response(A=A / T[:, None] * T, B=B / T[:, None], C=C * T, D=D)
+
+
+def sampled_continuous(A: Array, B: Array, C: Array, D: float, rate: float) -> Response:
+    """A continuous system on the unit circle, ``z = (rate + s)/(rate - s)``: omega is ``rate tan(angle/2)``."""
+    n = A.shape[0]
+    inverse = np.linalg.inv(rate * np.eye(n) - A)
+    root = math.sqrt(2 * rate)
+    return balanced(inverse @ (rate * np.eye(n) + A), root * inverse @ B, root * C @ inverse,
+                    D + float((C @ inverse @ B)[0, 0]))  # fmt: skip
+
+
+def gain_bounds(L: Response) -> tuple[float, float]:
+    """Factors next below and above 1 on the loop gain at which the closed loop has a pole on the circle."""
+    real = L.on_axis()
+    factors = -1.0 / real[real < -1.0 / NO_BOUND]
+    least = float(factors[factors < 1.0].max(initial=0.0))
+    return (least if least > 1.0 / NO_BOUND else 0.0), float(factors[factors > 1.0].min(initial=math.inf))
+
+
+def phases(L: Response) -> tuple[Array, Array]:
+    """Angles at which ``|L|`` is 1, and the phase of -L there, from -pi to pi."""
+    w = L.on_circle()
+    return w, np.angle(-L.at(w)) if w.size else w
+
+
+def modulus(L: Response) -> float:
+    """Least ``|1 + L|`` on the circle, of a stable loop."""
+    d = 1.0 + L.D
+    S = Response(A=L.A - L.B @ L.C / d, B=L.B / d, C=-L.C / d, D=1.0 / d)
+    return 1.0 / S.peak()
+
+
+def _blocks(rows: list[list[Array | None]]) -> Array:
+    """Block matrix of which None is a square of zeros, as wide and high as the first block of its row and column."""
+    heights = [next(b.shape[0] for b in row if b is not None) for row in rows]
+    widths = [next(row[j].shape[1] for row in rows if row[j] is not None) for j in range(len(rows[0]))]  # type: ignore[union-attr]
+    return np.block([
+        [np.zeros((h, w)) if b is None else b for b, w in zip(row, widths, strict=True)]
+        for row, h in zip(rows, heights, strict=True)
+    ])  # fmt: skip
+
+
+def _angles(left: Array, right: Array) -> Array:
+    """Angles of the finite eigenvalues of ``left - z right``, on the circle or not, inside 0 to pi."""
+    from scipy.linalg import eigvals
+
+    z: Roots = np.asarray(eigvals(left, right), dtype=np.complex128)
+    found = np.unique(np.abs(np.angle(z[np.isfinite(z)])))
+    found = found[(found > 1e-12) & (found < math.pi - 1e-12)]
+    return found[np.diff(found, prepend=0.0) > 1e-12 * found]  # what rounding makes of one
+
+
+def _crossings(candidates: Array, f: Callable[[Array], Array]) -> Array:
+    """Angles at which f is zero, each between the middles of its candidate and the next ones."""
+    if not candidates.size:
+        return candidates
+    between = np.sqrt(candidates[1:] * candidates[:-1])
+    edges = np.concatenate([[candidates[0] / 2], between, [(candidates[-1] + math.pi) / 2]])
+    signs, heights = np.sign(f(edges)), np.abs(f(candidates))
+    out: list[float] = []
+    for i, w in enumerate(candidates.tolist()):
+        if signs[i] * signs[i + 1] < 0:
+            out.append(root(lambda a: float(f(np.array([a]))[0]), float(edges[i]), float(edges[i + 1])))
+        elif heights[i] < TOUCHING:
+            out.append(w)
+    return np.array(out)
+
+
+def root(f: Callable[[float], float], low: float, high: float) -> float:
+    """Zero of f between two numbers of which one gives more and the other less than 0."""
+    from scipy.optimize import brentq
+
+    solve: Any = brentq
+    return float(solve(f, low, high, xtol=1e-300, rtol=1e-12))
