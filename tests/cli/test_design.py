@@ -120,6 +120,28 @@ def test_a_lag_takes_effort_and_margin(study, tmp_path):
     assert told[0]["peak_command_sampled"] == pytest.approx(told[0]["peak_command"], rel=0.05)
 
 
+@pytest.mark.parametrize(
+    ("fitted", "options", "samples", "said"),
+    [
+        (3e-3, (), 1.5, "as the file says"),  # 3 ms of 2 ms samples, and no sample of computing besides
+        (3e-3, ("--delay", "2"), 2.0, "as asked"),
+        (0.0, (), 1.0, "assumed"),
+        (0.0, ("--delay", "0"), 0.0, "as asked"),
+    ],
+)
+def test_a_delay_is_counted_once_and_its_source_is_told(tmp_path, fitted, options, samples, said):
+    path = fit_file(tmp_path, 0.0)
+    content = json.loads(path.read_text(encoding="utf-8"))
+    content["parameters"]["actuator.delay"] = {"value": fitted, "stderr": 0.0, "unit": "s", "status": "known"}
+    path.write_text(json.dumps(content), encoding="utf-8")
+    outcome = design(path, "--poles", POLES, "--period", "2 ms", *options, "-o", tmp_path)
+    assert outcome.exit_code == 0, outcome.stderr
+    found = json.loads((tmp_path / "design.json").read_text(encoding="utf-8"))
+    assert found["delay_samples"] == pytest.approx(samples)
+    assert found["delay_from"] == said
+    assert f"{samples:.3g} samples late ({said})" in (tmp_path / "design.html").read_text(encoding="utf-8")
+
+
 def test_sampled_gains_meet_the_poles_in_the_loop_as_it_runs(study, tmp_path):
     slow = ("--period", "10 ms", "--poles", "-4.1484+-1.6341j, -16.8545, -3.222", "-o", tmp_path)
     design(study, *slow, "--sampled")

@@ -33,7 +33,7 @@ _poles = poles  # the verbs have options of this name
 def design(
     source: str | os.PathLike[str], *, at: str = "", poles: str | Iterable[complex] = "",
     lqr: str | Iterable[float] = "", effort_weight: float | None = None, limit: float | None = None,
-    start: str | Mapping[str, float | str] = "", period: float | str = "1 ms", delay: float = 1.0,
+    start: str | Mapping[str, float | str] = "", period: float | str = "1 ms", delay: float | None = None,
     speed: str = "filtered", memory: float = 0.5, lag: float | str = "",
     counts: float | str | Mapping[str, float] = "16000", track: str = "", sampled: bool = False, seed: int = 0,
     out: str | os.PathLike[str] | None = None, pdf: bool = False,
@@ -61,8 +61,8 @@ def design(
         Deviation to come back from, by state: ``{"theta": "5 deg"}``, ``{"theta": 0.087}`` [SI].
     period : float or str
         Between samples [s].
-    delay : float
-        Computing a command takes so many samples.
+    delay : float, optional
+        How many samples late a command acts in all; when omitted the fit's delay, or one where it has none.
     speed : str
         Velocities by plain or filtered difference, or kalman.
     memory : float

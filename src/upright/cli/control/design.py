@@ -23,7 +23,9 @@ def design(
         str, typer.Option(metavar="LIST", help='Deviation to come back from, as in "theta=5 deg, psi_dot=0.2 rad/s".')
     ] = "",
     period: Annotated[str, typer.Option(metavar="TIME", help="Between samples.")] = "1 ms",
-    delay: Annotated[float, typer.Option(metavar="SAMPLES", help="Computing a command takes so long.")] = 1.0,
+    delay: Annotated[
+        float | None, typer.Option(metavar="SAMPLES", help="Commands act so late in all; the fit's, else 1.")
+    ] = None,
     speed: Annotated[str, typer.Option(help="Velocities by plain or filtered difference, or kalman.")] = "filtered",
     memory: Annotated[float, typer.Option(help="a of the filtered difference, 0 to 1.")] = 0.5,
     lag: Annotated[str, typer.Option(metavar="TIME", help="Lag of the drive; the fit's if left out.")] = "",

@@ -30,7 +30,7 @@ def chapter(done: Designed, *, source: str = "OUT/fit.json", folder: str = ".") 
         stand = f"{percent(100 * done.chance)} stand with these gains"
         sure.append(Points((f"Of the rigs that the fit's covariance allows, {stand}.",)))
     loop = (
-        f"Period {1e3 * done.wish.period:.4g} ms, command {done.sampled.delay:.3g} samples late, drive's lag "
+        f"Period {1e3 * done.wish.period:.4g} ms, command {done.sampled.delay:.3g} samples late ({_delay_from(done)}), drive's lag "
         f"{1e3 * done.sampled.lag:.3g} ms, velocities made from rounded encoders.{_effort(done)}"
     )
     return Chapter(
@@ -48,6 +48,11 @@ def chapter(done: Designed, *, source: str = "OUT/fit.json", folder: str = ".") 
         steps=tuple(_next_steps(done, source, folder)),
         numbers=_numbers(done),
     )
+
+
+def _delay_from(done: Designed) -> str:
+    """Who says how late a command acts."""
+    return "as asked" if done.wish.delay is not None else "as the file says" if done.rig.delay else "assumed"
 
 
 def _state_units(done: Designed) -> list[str]:
@@ -135,6 +140,7 @@ def _numbers(done: Designed) -> dict[str, Any]:
         "command_unit": done.rig.unit,
         "period": wish.period,
         "delay_samples": done.sampled.delay,
+        "delay_from": _delay_from(done),
         "K": done.K[0],
         "K_sampled": None if done.sampled_gains is None else done.sampled_gains[0],
         "k_pf": done.k_pf,

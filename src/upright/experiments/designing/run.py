@@ -43,6 +43,7 @@ SPEEDS = ("plain", "filtered", "kalman")
 class DesignRequest:
     """What is asked of the loop; SI units, the limit in the command's.
 
+    `delay` is how late a command acts in all [samples]: that of the rig's file when None, or one where it has none.
     `lag` is the drive's [s], that of the rig's file when None.
     `poles` [1/s] or `weights` (diagonal of Q, with `R`, or with the limit and `start` from which R follows).
     `speed` is ``"plain"``, ``"filtered"`` or ``"kalman"``; `memory` is the filter's. With `sampled`, the gains are
@@ -54,7 +55,7 @@ class DesignRequest:
     weights: tuple[float, ...] | None = None
     R: float | None = None
     period: float = 1e-3
-    delay: float = 1.0
+    delay: float | None = None
     lag: float | None = None
     speed: str = "filtered"
     memory: float = 0.5
@@ -122,7 +123,7 @@ class Designed:
         if way.margins is None:
             return (
                 f"The sampled loop falls: with a period of {1e3 * self.wish.period:.4g} ms, "
-                f"{self.wish.delay:g} samples of delay and the {way.name} the gains do not stabilize. "
+                f"{self.sampled.delay:.3g} samples of delay and the {way.name} the gains do not stabilize. "
                 "Sample faster, ask for slower poles, or design for the sampled loop (--sampled)."
             )
         m, chance = way.margins, 1.0 if self.chance is None else self.chance
@@ -163,7 +164,7 @@ def design_for(rig: IdentifiedRig, wish: DesignRequest) -> Designed:
     if model.B.shape[1] != 1:
         raise BadInput(f"upright design is for one input, and this plant has {model.B.shape[1]}; use place.")
     lag = rig.lag if wish.lag is None else wish.lag
-    sampled = hold(model, wish.period, wish.delay + rig.delay / wish.period, lag)
+    sampled = hold(model, wish.period, _late(rig, wish), lag)
     placement, R = None, wish.R
     if wish.poles is not None:
         placement = place(model.A, model.B, wish.poles)
@@ -200,6 +201,13 @@ def design_for(rig: IdentifiedRig, wish: DesignRequest) -> Designed:
         k_pf=k_pf, peak=float(np.abs(back[2]).max()), peak_sampled=_peak(sampled, law, start, float(back[0][-1])),
         swing=back, chance=chance, cloud=cloud,
     )  # fmt: skip
+
+
+def _late(rig: IdentifiedRig, wish: DesignRequest) -> float:
+    """How late a command acts [samples]; what was identified from a log holds the computer's share already."""
+    if wish.delay is not None:
+        return wish.delay
+    return rig.delay / wish.period or 1.0
 
 
 def _peak(sampled: Sampled, law: Law, start: Array, seconds: float) -> float:
