@@ -18,7 +18,8 @@ Every verb of the command line, `upright NAME`, stands here under the same name 
 Log         read, show, doctor, init, law; Record
 Model       identify, predict, ladder, frequency, loadings, plan_inertias
 Plants      Pendulum, CartPendulum, Furuta, DoublePendulum, DoublePendulumAbsolute, FlexibleLink, chain
-Control     place, lqr, simulate, chance, design, regulate, swing_up, track; Law, Rule
+Control     place, lqr, dlqr, prefilter, hold, margins, simulate, chance, design, regulate,
+            swing_up, track; Law, Rule
 Course      lab, reproduce, survey
 Own plants  Plant, Coordinate, Input, Joint, quantity
 ==========  ==================================================================================================
@@ -53,7 +54,7 @@ if TYPE_CHECKING:
     from upright.verbs.chance import chance
     from upright.verbs.control import design, regulate, swing_up, track
     from upright.verbs.course import lab, reproduce, survey
-    from upright.verbs.feedback import lqr, place
+    from upright.verbs.feedback import dlqr, hold, lqr, margins, place, prefilter
     from upright.verbs.fitting import identify
     from upright.verbs.log import doctor, init, law, read, show
     from upright.verbs.model import frequency, ladder, loadings, plan_inertias, predict
@@ -83,7 +84,7 @@ _HOMES = {
     "verbs.control": ("design", "regulate", "swing_up", "track"),
     "verbs.course": ("lab", "reproduce", "survey"),
     "verbs.log": ("doctor", "init", "law", "read", "show"),
-    "verbs.feedback": ("lqr", "place"),
+    "verbs.feedback": ("dlqr", "hold", "lqr", "margins", "place", "prefilter"),
     "verbs.fitting": ("identify",),
     "verbs.model": ("frequency", "ladder", "loadings", "plan_inertias", "predict"),
     "verbs.motion": ("simulate",),
@@ -92,9 +93,9 @@ _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "BadInput", "CartPendulum", "Coordinate", "DoublePendulum", "DoublePendulumAbsolute", "FlexibleLink", "Furuta",
-    "ImpossiblePhysics", "Input", "Joint", "Law", "NotIdentifiable",
-    "Pendulum", "Plant", "Record", "Rule", "UprightError", "__version__", "chain", "chance", "design", "doctor",
-    "frequency", "identify", "init", "lab", "ladder", "law", "loadings", "lqr", "place", "plan_inertias", "predict",
+    "ImpossiblePhysics", "Input", "Joint", "Law", "NotIdentifiable", "Pendulum", "Plant", "Record", "Rule",
+    "UprightError", "__version__", "chain", "chance", "design", "dlqr", "doctor", "frequency", "hold", "identify",
+    "init", "lab", "ladder", "law", "loadings", "lqr", "margins", "place", "plan_inertias", "predict", "prefilter",
     "quantity", "read", "regulate", "reproduce", "show", "simulate", "survey", "swing_up", "track",
 ]  # fmt: skip
 

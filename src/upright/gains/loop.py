@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from upright.errors import BadInput
 from upright.gains.margins import Margins, Response, balanced, gain_bounds, modulus, phases, root
 from upright.gains.requests import Roots, conjugate_poles, poles_of
-from upright.gains.sampled import Sampled, hold, to_z
+from upright.gains.sampled import Sampled, hold, to_z, without_feedthrough
 from upright.gains.velocity import Estimator, stationary
 from upright.laws import Law
 from upright.laws.linear import Array
@@ -49,6 +49,7 @@ def spelled_out(law: Law) -> dict[str, Array]:
 
 def closed(model: Sampled, law: Law, gain: float = 1.0) -> Array:
     """Matrix of the loop, the model's states first; `gain` multiplies the command on its way to the plant."""
+    without_feedthrough(model, "a loop")
     B, D = law.B[:, : law.readings], law.D[:, : law.readings]
     top = np.hstack([model.A + gain * model.B @ D @ model.C, gain * model.B @ law.C])
     return np.vstack([top, np.hstack([B @ model.C, law.A])])

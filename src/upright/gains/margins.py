@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from upright.errors import BadInput
 from upright.gains.requests import Roots, poles_of
 from upright.laws.linear import Array
 
@@ -151,6 +152,34 @@ def modulus(L: Response) -> float:
     d = 1.0 + L.D
     S = Response(A=L.A - L.B @ L.C / d, B=L.B / d, C=-L.C / d, D=1.0 / d)
     return 1.0 / S.peak()
+
+
+def loop_margins(A: Array, B: Array, C: Array, D: float, period: float) -> Margins:
+    """Margins of a loop gain under negative feedback, sampled with a `period` [s] or continuous where that is 0.
+
+    Raises
+    ------
+    BadInput
+        When the closed loop is not stable.
+    """
+    poles = poles_of(A - B @ C / (1.0 + D)) if D != -1.0 else np.full(1, np.inf, dtype=np.complex128)
+    slow: Array = np.abs(poles) if period else 1.0 + np.real(poles)
+    if not (slow < 1).all():
+        raise BadInput("the closed loop is not stable, so it has no margins; check the sign of the feedback.")
+    rate = 0.0
+    L = balanced(A, B, C, D)
+    if not period:
+        rate = float(np.exp(np.log(np.abs(poles)).mean())) if poles.size else 1.0
+        while np.abs(poles_of(A) - rate).min(initial=np.inf) < 0.1 * rate:  # no pole at infinity afterwards
+            rate *= 1.3
+        L = sampled_continuous(A, B, C, D, rate)
+    least, most = gain_bounds(L)
+    angles, phase = phases(L)
+    omega = angles / period if period else rate * np.tan(angles / 2)
+    return Margins(
+        least_gain=least, most_gain=most, phase=float(np.abs(phase).min(initial=np.inf)),
+        delay=float((np.mod(phase, 2 * np.pi) / omega).min(initial=np.inf)), modulus=modulus(L),
+    )  # fmt: skip
 
 
 def _blocks(rows: list[list[Array | None]]) -> Array:

@@ -292,13 +292,19 @@ def _sentence(asked: Roots, condition: float, sensitivity: float) -> str:
     return f"Well conditioned ({size}): {moved}."
 
 
-def prefilter(A: ArrayLike, B: ArrayLike, C: ArrayLike, K: ArrayLike, *, sampled: bool = False) -> float:
-    """Gain k_pf of ``u = k_pf r - K x`` for unit static gain from r to ``y = C x``: ``1/(C (B K - A)^-1 B)``.
+def prefilter(
+    A: ArrayLike, B: ArrayLike, C: ArrayLike, K: ArrayLike, *, D: float = 0.0, sampled: bool = False
+) -> float:
+    """Gain k_pf of ``u = k_pf r - K x`` for unit static gain from r to ``y = C x + D u``.
+
+    It is ``1/((C - D K) (B K - A)^-1 B + D)``, with ``B K - A + I`` for a sampled model.
 
     Parameters
     ----------
     A, B, C, K : arrays, shape (n, n), (n, 1), (n,) and (1, n)
         C is the row of the output that follows.
+    D : float
+        What of the command that output shows at once.
     sampled : bool
         A and B belong to ``x[k+1]`` instead of ``x'``.
 
@@ -314,8 +320,8 @@ def prefilter(A: ArrayLike, B: ArrayLike, C: ArrayLike, K: ArrayLike, *, sampled
         state = np.linalg.solve(rest, b)
     except np.linalg.LinAlgError:
         raise BadInput("the closed loop has a pole at rest, so nothing holds the output; place it elsewhere.") from None
-    static = float((row @ state)[0, 0])
-    if abs(static) <= 1e-10 * float(np.abs(row).max() * np.abs(state).max()):
+    static = float(((row - D * gains) @ state)[0, 0]) + D
+    if abs(static) <= 1e-10 * max(float(np.abs(row).max() * np.abs(state).max()), abs(D)):
         raise BadInput(
             "a constant command leaves this output at zero (a zero of the plant at rest), so no prefilter makes it "
             "follow; track another coordinate."

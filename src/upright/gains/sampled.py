@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Sampled:
-    """The model at its samples, ``x[k+1] = A x[k] + B u[k], y[k] = C x[k]``, every command held for a period.
+    """The model at its samples, ``x[k+1] = A x[k] + B u[k], y[k] = C x[k] + D u[k]``.
 
     Attributes
     ----------
@@ -33,6 +33,8 @@ class Sampled:
     states : tuple of str
     lag : float
         Time constant of the drive [s]; 0 for none.
+    D : array, shape (p, m), or None
+        What of a command is read at the same sample; None for nothing.
     """
 
     A: Array
@@ -42,6 +44,7 @@ class Sampled:
     delay: float
     states: tuple[str, ...]
     lag: float = 0.0
+    D: Array | None = None
 
     @property
     def remembered(self) -> int:
@@ -49,8 +52,10 @@ class Sampled:
         return (math.ceil(self.delay - 1e-12) + (self.lag > 0)) * self.B.shape[1]
 
 
-def hold(model: Linear, period: float, delay: float = 0.0, lag: float = 0.0) -> Sampled:
-    """A linear model behind a zero-order hold, exactly: one matrix exponential (two for part of a sample's delay).
+def hold(
+    model: Linear, period: float, delay: float = 0.0, lag: float = 0.0, *, D: Array | None = None, method: str = "zoh"
+) -> Sampled:
+    """A linear model behind a hold, exactly: one matrix exponential (two for part of a sample's delay).
 
     Parameters
     ----------
@@ -61,6 +66,12 @@ def hold(model: Linear, period: float, delay: float = 0.0, lag: float = 0.0) -> 
         How late a command acts [samples]: computation, converters, drive. Not only whole ones.
     lag : float
         Time constant with which the drive follows its command [s].
+    D : array, shape (p, m), optional
+        Feedthrough of the model.
+    method : {"zoh", "foh"}
+        Each command stays until the next, or runs straight to it, as a logged force does; the states are then
+        ``x - G u`` with what a ramp of slope ``1/T`` makes of them in a sample (Franklin, Powell and Workman, Digital
+        Control of Dynamic Systems, section 6.3.2).
 
     Raises
     ------
@@ -73,12 +84,23 @@ def hold(model: Linear, period: float, delay: float = 0.0, lag: float = 0.0) -> 
         raise BadInput(f"the delay must be between 0 and 1000 samples, got {delay:g}; give it in samples.")
     if not (math.isfinite(lag) and lag >= 0):
         raise BadInput(f"the drive's lag must be at least 0 s, got {lag:g}; give it in seconds.")
-    model = _lagged(model, lag) if lag > 0 else model
+    if method not in ("zoh", "foh"):
+        raise BadInput(f'a hold is of order zero, "zoh", or one, "foh", got {method!r}.')
+    through = np.zeros((model.C.shape[0], model.B.shape[1])) if D is None else D
+    if lag > 0:  # what comes through is what the drive gives
+        model = _lagged(model, lag)
+        model = replace(model, C=np.hstack([model.C[:, : -model.B.shape[1]], through]))
+        through = through * 0
     n, m = model.B.shape
     whole = math.floor(delay + 1e-12)
     part = max(delay - whole, 0.0) if delay - whole > 1e-12 else 0.0
+    if method == "foh" and part:
+        raise BadInput(f'a first-order hold takes a delay of whole samples, got {delay:g}; round it, or use "zoh".')
     early, new = _held(model.A, model.B, (1 - part) * period)
     late, old = _held(model.A, model.B, part * period)
+    if method == "foh":
+        ramp = _ramped(model.A, model.B, period)
+        new, through = new - ramp + early @ ramp, through + model.C @ ramp
     memories = whole + (part > 0)
     A = np.zeros((n + memories * m, n + memories * m))
     B = np.zeros((n + memories * m, m))
@@ -93,7 +115,37 @@ def hold(model: Linear, period: float, delay: float = 0.0, lag: float = 0.0) -> 
         A[n + m :, n:-m] = np.eye((memories - 1) * m)
     ago_names = tuple(f"{u} {k} ago" for k in range(1, memories + 1) for u in model.inputs)
     C = np.hstack([model.C, np.zeros((model.C.shape[0], memories * m))])
-    return Sampled(A=A, B=B, C=C, period=period, delay=delay, states=(*model.states, *ago_names), lag=lag)
+    if memories:  # what acts at a sample is the oldest command on its way
+        C[:, n + (memories - 1) * m :] = through
+    return Sampled(
+        A=A, B=B, C=C, period=period, delay=delay, states=(*model.states, *ago_names), lag=lag,
+        D=through if through.any() and not memories else None,
+    )  # fmt: skip
+
+
+def without_feedthrough(model: Sampled, what: str) -> None:
+    """Refuse a model whose readings show the command of the same sample.
+
+    Raises
+    ------
+    BadInput
+        When there is a D.
+    """
+    if model.D is not None:
+        raise BadInput(
+            f"{what} needs readings that the command of the same sample does not change, and D is not zero here; let "
+            "the command come a sample late (hold(..., delay=1)), as a computer's does."
+        )
+
+
+def _ramped(A: Array, B: Array, time: float) -> Array:
+    """What a command that rises from 0 to 1 meanwhile adds."""
+    from scipy.linalg import expm
+
+    n, m = B.shape
+    block = np.zeros((n + 2 * m, n + 2 * m))
+    block[:n, :n], block[:n, n : n + m], block[n : n + m, n + m :] = A, B, np.eye(m) / time
+    return np.asarray(expm(block * time), dtype=np.float64)[:n, n + m :]
 
 
 def _lagged(model: Linear, lag: float) -> Linear:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upright.errors import BadInput
-from upright.gains.sampled import Sampled
+from upright.gains.sampled import Sampled, without_feedthrough
 from upright.laws.linear import Array, differences
 
 
@@ -65,6 +65,7 @@ def filtered(model: Sampled, memory: float) -> Estimator:
     memory : float
         a, from 0 (plain difference) to below 1.
     """
+    without_feedthrough(model, "a difference of readings")
     p = model.C.shape[0]
     if not np.array_equal(model.C[:, : 2 * p], np.kron(np.eye(p), [1.0, 0.0])):
         raise BadInput("differences need every position measured and followed by its velocity; use an observer.")
@@ -83,6 +84,7 @@ def observer(model: Sampled, gain: ArrayLike, name: str = "observer") -> Estimat
     gain : array, shape (n, p)
         L, for instance from `kalman`.
     """
+    without_feedthrough(model, "an observer")
     L = np.asarray(gain, dtype=np.float64)
     if L.shape != model.C.T.shape:
         raise BadInput(f"an observer of this model needs a gain of shape {model.C.T.shape}, got {L.shape}.")

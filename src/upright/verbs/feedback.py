@@ -1,17 +1,21 @@
-"""Gains for a linear model, by poles or by least cost: `place` and `lqr`."""
+"""A loop around a linear model: gains by poles or by least cost, its model at the samples, prefilter and margins."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.errors import BadInput
+from upright.errors import BadInput, nearest
+from upright.laws import Law
 from upright.physics import Linear, Plant
 from upright.shown import Shown
+
+if TYPE_CHECKING:
+    from upright.gains import Margins, Sampled
 
 Array = NDArray[np.float64]
 
@@ -138,14 +142,178 @@ def lqr(*system: Any, Q: Any = None, R: Any = None) -> Gains:
     return model.gains(K, E, S, "")
 
 
+def dlqr(*system: Any, Q: Any = None, R: Any = None) -> Gains:
+    """Gains of least cost of a sampled model, the sum of ``x' Q x + u' R u``; ``K, S, E = dlqr(...)``.
+
+    Parameters
+    ----------
+    *system
+        What `hold` gives, a `control.StateSpace` with its period, ``(A, B)`` or ``A, B``; then Q and R as for `lqr`.
+    Q, R
+        Weights of the states and of the inputs.
+
+    Returns
+    -------
+    Gains
+        Poles are those in z.
+
+    Raises
+    ------
+    BadInput
+        When the model is continuous, it or a weight cannot be read, or no such gains exist.
+    """
+    from upright.gains.lqr import least_cost
+
+    model, (weights, effort) = _model(system, "dlqr", ("Q", "R"), (Q, R))
+    if not model.period:
+        if not model.bare:
+            raise BadInput("dlqr takes a sampled model, and this one is continuous; sample it with hold, or use lqr.")
+        model = replace(model, period=1.0)
+    n, m = model.B.shape
+    q, r = _weights(weights, n, "Q", "states"), _weights(effort, m, "R", "inputs")
+    K, S, E = least_cost(model.A, model.B, q, r, sampled=True, states=model.states)
+    return model.gains(K, E, S, "")
+
+
+def hold(*system: Any, period: Any = None, delay: float = 0.0, lag: float = 0.0, method: str = "zoh") -> Sampled:
+    """A continuous linear model at its samples, exactly.
+
+    Parameters
+    ----------
+    *system
+        ``plant.linear("inverted")``, a `control.StateSpace`, ``(A, B[, C[, D]])`` or ``A, B``; then the period.
+    period : float or text
+        Time between samples, in s or as ``"2 ms"``.
+    delay : float
+        How late a command acts [samples].
+    lag : float
+        Time constant with which the drive follows its command [s].
+    method : {"zoh", "foh"}
+        A command stays until the next one, or runs straight to it, as a logged force does.
+
+    Returns
+    -------
+    Sampled
+        A, B, C, D and `period`; `place`, `dlqr`, `prefilter` and `margins` take it.
+
+    Raises
+    ------
+    BadInput
+        When the model cannot be read or is sampled already, or a time is impossible.
+    """
+    from upright.gains import hold as held
+    from upright.verbs.values import si
+
+    model, (step,) = _model(system, "hold", ("period",), (period,))
+    if model.period:
+        raise BadInput(f"hold samples a continuous model, and this one has a period of {model.period:g} s already.")
+    linear = Linear(
+        A=model.A, B=model.B, C=model.C, mass=np.zeros((0, 0)), point=dict(model.point or {}), states=model.states,
+        inputs=model.inputs, outputs=model.outputs,
+    )  # fmt: skip
+    return held(linear, si(step, "s"), delay, lag, D=model.D, method=method)
+
+
+def margins(*system: Any, K: Any = None, period: float = 0.0) -> Margins:
+    """How much a loop stands: gain, phase and delay margin, and its least distance to -1, from every crossing.
+
+    Parameters
+    ----------
+    *system
+        A loop gain of one input and one output (negative feedback around it) as `control.StateSpace` or
+        ``(A, B, C, D)``; or a model and the gains K of ``u = -K x``; or, as a computer runs it, a continuous model,
+        what `hold` made of it, and a `Law`.
+    K : array, shape (1, states), optional
+        Gains, where they are not the second argument.
+    period : float
+        Of matrices that belong to a sampled loop [s]; 0 for a continuous one.
+
+    Returns
+    -------
+    Margins
+        `least_gain` and `most_gain` as factors, `phase` [rad], `delay` [s], `modulus`.
+
+    Raises
+    ------
+    BadInput
+        When the loop cannot be read, has several inputs or outputs, or is not stable.
+    """
+    from upright.gains import margins as as_it_runs
+    from upright.gains.margins import loop_margins
+
+    if len(system) == 3 and isinstance(system[0], Linear) and isinstance(system[2], Law):
+        return as_it_runs(*system)
+    given, names = list(system), ("K",) if K is not None or len(system) == 2 else ()
+    model, rest = _model(tuple(given), "margins", names, (K,))
+    period = model.period or period
+    if names:
+        gains = np.atleast_2d(np.asarray(rest[0], dtype=np.float64))
+        if model.B.shape[1] != 1 or gains.shape != (1, model.A.shape[0]):
+            raise BadInput(
+                f"margins are for one input, with K of shape (1, {model.A.shape[0]}), got {model.B.shape[1]} inputs "
+                f"and K of shape {gains.shape}."
+            )
+        return loop_margins(model.A, model.B, gains, 0.0, period)
+    if model.D.shape != (1, 1):
+        raise BadInput(
+            f"margins are those of a loop gain with one input and one output, got {model.D.shape[1]} and "
+            f"{model.D.shape[0]}; give the gains K of the state feedback too, or close all loops but one."
+        )
+    return loop_margins(model.A, model.B, model.C, float(model.D[0, 0]), period)
+
+
+def prefilter(*system: Any, K: Any = None, output: int | str = 0) -> float:
+    """Gain k_pf of ``u = k_pf r - K x`` with which an output comes to rest at the reference r.
+
+    Parameters
+    ----------
+    *system
+        A model with one input, as for `place`, or what `hold` gives; then its gains.
+    K : array, shape (1, states)
+    output : int or str
+        Which output follows, by number or by name.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    BadInput
+        When the model cannot be read, has no such output, or a constant command leaves that output at zero.
+    """
+    from upright.gains import prefilter as static
+
+    model, (gains,) = _model(system, "prefilter", ("K",), (K,))
+    names = model.outputs
+    if isinstance(output, str) and output not in names:
+        raise BadInput(f"this model has no output '{output}'; {nearest(output, names)}")
+    i = names.index(output) if isinstance(output, str) else output
+    if not 0 <= i < len(names):
+        raise BadInput(f"output is a number from 0 to {len(names) - 1} or one of {', '.join(names)}, got {output}.")
+    k = np.atleast_2d(np.asarray(gains, dtype=np.float64))
+    if k.shape != (1, model.A.shape[0]) or model.B.shape[1] != 1:
+        raise BadInput(
+            f"a prefilter is for one input and K of shape (1, {model.A.shape[0]}), got {model.B.shape[1]} inputs and "
+            f"K of shape {k.shape}."
+        )
+    return static(model.A, model.B, model.C[i], k, D=float(model.D[i, 0]), sampled=model.period > 0)
+
+
 @dataclass(frozen=True, kw_only=True)
 class _Model:
+    """A linear model as it was handed over; `bare` where it came as arrays, which say no period."""
+
     A: Array
     B: Array
+    C: Array
+    D: Array
     states: tuple[str, ...]
     inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
     point: Mapping[str, float] | None = None
     period: float = 0.0
+    bare: bool = False
 
     def gains(self, K: Array, poles: NDArray[np.complex128], S: Array | None, sentence: str) -> Gains:
         return Gains(
@@ -158,6 +326,8 @@ def _model(given: tuple[Any, ...], verb: str, names: tuple[str, ...], by_name: t
     """The model that the first arguments name, and the values that follow it."""
     wanted = f'{verb} takes a model and {" and ".join(names)}: {verb}(plant.linear("inverted"), {", ".join(names)}), '
     wanted += f"{verb}(A, B, {', '.join(names)}), or a control.StateSpace in the model's place"
+    if not names:
+        wanted = f"{verb} takes a loop gain: {verb}(control.StateSpace), {verb}((A, B, C, D)), or {verb}(model, K)"
     if not given:
         raise BadInput(f"{wanted}; no model came.")
     first, rest = given[0], list(given[1:])
@@ -168,19 +338,18 @@ def _model(given: tuple[Any, ...], verb: str, names: tuple[str, ...], by_name: t
             + " or ".join(f'.linear("{at}")' for at in plant.equilibria)
             + "."
         )
-    if isinstance(first, Linear):
-        model = _Model(A=first.A, B=first.B, states=first.states, inputs=first.inputs, point=first.point)
-    elif hasattr(first, "A") and hasattr(first, "B"):
-        dt = getattr(first, "dt", None)
-        model = _named(first.A, first.B, verb)
-        model = _Model(
-            A=model.A, B=model.B, states=tuple(getattr(first, "state_labels", model.states)),
-            inputs=tuple(getattr(first, "input_labels", model.inputs)), period=float(dt) if dt else 0.0,
+    if hasattr(first, "A") and hasattr(first, "B"):
+        model = _named(verb, first.A, first.B, getattr(first, "C", None), getattr(first, "D", None))
+        step = getattr(first, "dt", None) or getattr(first, "period", None)
+        model = replace(
+            model, states=_labels(first, "state", model.states), inputs=_labels(first, "input", model.inputs),
+            outputs=_labels(first, "output", model.outputs), point=getattr(first, "point", None),
+            period=float(step) if step else 0.0, bare=False,
         )  # fmt: skip
-    elif isinstance(first, tuple) and len(first) >= 2:
-        model = _named(first[0], first[1], verb)
+    elif isinstance(first, tuple) and 2 <= len(first) <= 4:
+        model = _named(verb, *first)
     elif isinstance(first, list | np.ndarray) and rest:
-        model = _named(first, rest.pop(0), verb)
+        model = _named(verb, first, rest.pop(0))
     else:
         raise BadInput(f"{wanted}; got {type(first).__name__}.")
     values = [*rest, *(v for v in by_name if v is not None)]
@@ -189,17 +358,36 @@ def _model(given: tuple[Any, ...], verb: str, names: tuple[str, ...], by_name: t
     return model, values
 
 
-def _named(A: Any, B: Any, verb: str) -> _Model:
+def _labels(system: Any, kind: str, default: tuple[str, ...]) -> tuple[str, ...]:
+    """Names as python-control or `Linear` has them."""
+    found = getattr(system, f"{kind}_labels", None) or getattr(system, f"{kind}s", None)
+    return tuple(found) if isinstance(found, list | tuple) and len(found) == len(default) else default
+
+
+def _named(verb: str, A: Any, B: Any, C: Any = None, D: Any = None) -> _Model:
+    """Model of plain arrays; every state is measured where C is left out, and nothing comes through where D is."""
     try:
         a = np.atleast_2d(np.asarray(A, dtype=np.float64))
         b = np.asarray(B, dtype=np.float64)
+        c = np.eye(len(a)) if C is None else np.atleast_2d(np.asarray(C, dtype=np.float64))
+        d = None if D is None else np.asarray(D, dtype=np.float64)
     except (TypeError, ValueError):
-        raise BadInput(f"{verb} needs A and B as arrays of real numbers.") from None
+        raise BadInput(f"{verb} needs A and B, C and D where they are given, as arrays of real numbers.") from None
     b = b[:, None] if b.ndim == 1 else b
     if a.ndim != 2 or a.shape[0] != a.shape[1] or b.ndim != 2 or b.shape[0] != a.shape[0]:
         raise BadInput(f"{verb} needs A of shape (n, n) and B of shape (n, m), got {a.shape} and {b.shape}.")
-    states, inputs = (tuple(f"{letter}[{i}]" for i in range(size)) for letter, size in zip("xu", b.shape, strict=True))
-    return _Model(A=a, B=b, states=states, inputs=inputs)
+    if c.ndim != 2 or c.shape[1] != a.shape[0]:
+        raise BadInput(f"{verb} needs C of shape (p, {a.shape[0]}), got {c.shape}.")
+    through = (c.shape[0], b.shape[1])
+    if d is None or not d.any():
+        d = np.zeros(through)
+    d = d.reshape(1, 1) if d.size == 1 else d
+    if d.shape != through:
+        raise BadInput(f"{verb} needs D of shape {through}, got {d.shape}.")
+    states, inputs, outputs = (
+        tuple(f"{letter}[{i}]" for i in range(size)) for letter, size in zip("xuy", (*b.shape, c.shape[0]), strict=True)
+    )
+    return _Model(A=a, B=b, C=c, D=d, states=states, inputs=inputs, outputs=outputs, bare=True)
 
 
 def _complex(poles: Any) -> NDArray[np.complex128]:

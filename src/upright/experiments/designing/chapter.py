@@ -30,8 +30,9 @@ def chapter(done: Designed, *, source: str = "OUT/fit.json", folder: str = ".") 
         stand = f"{percent(100 * done.chance)} stand with these gains"
         sure.append(Points((f"Of the rigs that the fit's covariance allows, {stand}.",)))
     loop = (
-        f"Period {1e3 * done.wish.period:.4g} ms, command {done.sampled.delay:.3g} samples late ({_delay_from(done)}), drive's lag "
-        f"{1e3 * done.sampled.lag:.3g} ms, velocities made from rounded encoders.{_effort(done)}"
+        f"Period {1e3 * done.wish.period:.4g} ms, command {done.sampled.delay:.3g} samples late "
+        f"({_delay_from(done)}), drive's lag {1e3 * done.sampled.lag:.3g} ms, "
+        f"velocities made from rounded encoders.{_effort(done)}"
     )
     return Chapter(
         title=f"Gains for {done.rig.name}, {done.wish.at}",
