@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -219,8 +218,14 @@ def _crossings(candidates: Array, f: Callable[[Array], Array]) -> Array:
 
 
 def root(f: Callable[[float], float], low: float, high: float) -> float:
-    """Zero of f between two numbers of which one gives more and the other less than 0."""
-    from scipy.optimize import brentq
-
-    solve: Any = brentq
-    return float(solve(f, low, high, xtol=1e-300, rtol=1e-12))
+    """Zero of f between two numbers of which one gives more and the other less than 0: false position, Illinois'."""
+    a, b, f_a, f_b = low, high, f(low), f(high)
+    for _ in range(200):
+        c = b - f_b * (b - a) / (f_b - f_a)
+        f_c = f(c)
+        done = f_c == 0.0 or abs(c - b) <= 1e-14 * abs(c)
+        a, f_a = (b, f_b) if f_c * f_b < 0 else (a, f_a / 2)  # an end that stays twice loses half its weight
+        b, f_b = c, f_c
+        if done:
+            break
+    return b
