@@ -20,6 +20,7 @@ from upright.files import read_text
 from upright.identification.model.rig import SUBSTEPS
 from upright.physics import BUILT_IN, find
 from upright.physics.actuator import ACTUATOR
+from upright.study.description import Entry, RigDescription, check_vendor
 
 FORMAT = 1
 LARGEST = 1e12
@@ -28,7 +29,7 @@ LARGEST = 1e12
 
 @dataclass(frozen=True, kw_only=True)
 class FittedModel:
-    """What is read of a `fit.json`: the plant's name, every parameter [SI], what groups share, and all content."""
+    """What is read of a `fit.json`: the plant's name, every parameter [SI], what groups share, the rig, all content."""
 
     plant: str
     values: Mapping[str, float]
@@ -36,6 +37,7 @@ class FittedModel:
     verdict: str
     trusted: bool
     groups: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
+    description: RigDescription = field(default_factory=RigDescription)
     content: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def unit(self, name: str) -> str:
@@ -104,8 +106,44 @@ def _model(content: dict[str, Any]) -> FittedModel:
         for label, group in _table(content.get("groups", {}), "groups").items()
     }
     return FittedModel(
-        plant=plant, values=values, substeps=substeps, verdict=verdict, trusted=trusted, groups=groups, content=content
-    )
+        plant=plant, values=values, substeps=substeps, verdict=verdict, trusted=trusted, groups=groups, content=content,
+        description=_description(content, values),
+    )  # fmt: skip
+
+
+def _description(content: Mapping[str, Any], values: Mapping[str, float]) -> RigDescription:
+    """What the file says of drive, encoders and servo; an older one has its drive among the parameters alone."""
+    said = _table(content.get("rig", {}), "rig")
+    entries = _drive(content, values)
+    for name, entry in _table(said.get("entries", {}), "rig.entries").items():
+        place = f"rig.entries.{name}"
+        table = _table(entry, place)
+        unit, source = _text(table.get("unit"), f"{place}.unit"), _text(table.get("source"), f"{place}.source")
+        drive = f"actuator.{name}"
+        if table.get("value") is None and drive in ACTUATOR:
+            continue  # the drive is without it
+        value = _number(table.get("value"), f"{place}.value")
+        if drive not in ACTUATOR and not name.startswith(("sign.", "offset.")) and not value > 0:
+            raise BadInput(f"{place}.value must be above 0, got {value:g}")
+        if drive in values and not math.isclose(value, values[drive], rel_tol=1e-9):
+            raise BadInput(f"{place}.value is {value:g}, and parameters.{drive} is {values[drive]:g}")
+        entries[name] = Entry(value=value, unit=unit, source=source)
+    name, vendor = (_text(said.get(key, ""), f"rig.{key}") for key in ("name", "vendor"))
+    return RigDescription(name=name, vendor=check_vendor(vendor), entries=entries)
+
+
+def _drive(content: Mapping[str, Any], values: Mapping[str, float]) -> dict[str, Entry]:
+    """Numbers of the drive that do something, as the fit's parameters tell them."""
+    asked, out = content.get("estimated", []), dict[str, Entry]()
+    for name, number in ACTUATOR.items():
+        if name in values and values[name] != number.default:
+            entry = content["parameters"][name]
+            table: Mapping[str, Any] = entry if isinstance(entry, dict) else {}
+            known = "measured" if table.get("stderr") else "known"
+            out[name.partition(".")[2]] = Entry(
+                value=values[name], unit=str(table.get("unit") or ""), source="identified" if name in asked else known
+            )
+    return out
 
 
 def _value(name: str, entry: Any) -> float:

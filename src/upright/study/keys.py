@@ -88,7 +88,7 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
         (
             Key("title", '"Crane, three gains"', "heading of the report"),
             Key("source", '"https://..."', "where the data come from; text for the report"),
-            Key("rig", "table", "the plant"),
+            Key("rig", "table", "the plant, and what its servo keeps to"),
             Key("parameters", "table", "every number of the plant: known or asked"),
             Key("actuator", "table", "what stands between command and force"),
             Key("sensors", "table", "how a column becomes a coordinate"),
@@ -105,14 +105,25 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
             Key("plant", '"cart-pendulum"', 'built-in plant, or "my_plant.py:MyRig" beside the study'),
             Key("substeps", "2", "integration steps per sample"),
             Key("period", '"2 ms"', "sample period that all runs are resampled to; each log's own if left out"),
+            Key("name", '"bench 3"', "what its owner calls the rig; a fit that meets another rig says so"),
+            Key(
+                "vendor",
+                '"ECP 205"',
+                "whose data sheet says what is left out of drive, encoders and servo (ECP 205, ECP 210); without it"
+                " nothing is filled in: what a verb needs, it asks for",
+            ),
+            Key("servo_period", '"2 ms"', "time between two commands of the controller; a value as below"),
+            Key("travel", '"0.2 m"', "how far the driven body may go either way; a value as below"),
+            Key("speed_limit", '"1.5 m/s"', "speed of the driven body at which the drive trips; a value as below"),
         ),
     ),
     "value": (
-        "Values of [parameters] and [actuator]",
+        "Values of [parameters], [actuator], servo and encoder counts",
         (
             Key("value", '"0.23 m"', "a known number"),
             Key("uncertainty", '"2 mm" or "1 %"', "its standard uncertainty"),
             Key("assumed", "true", "a known number that is a convention: the report says what rests on it"),
+            Key("measured", "true", "a known number that somebody measured on this rig, as one with an uncertainty is"),
             Key("guess", '"1.6e-3 kg m^2"', "a number to estimate, and where to start"),
             Key("min", "0", "lower bound of the estimate; the plant's own if left out"),
             Key("max", '"5e-3 kg m^2"', "upper bound of the estimate"),
@@ -120,13 +131,16 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
     ),
     "actuator": (
         "[actuator]",
-        tuple(
-            Key(
-                name.partition(".")[2],
-                '"2 N/V" or a table as above' if name.endswith("gain") else "value",
-                f"{what.meaning}; {'none' if math.isinf(what.default) else f'{what.default:g}'} if left out",
-            )
-            for name, what in ACTUATOR.items()
+        (
+            *(
+                Key(
+                    name.partition(".")[2],
+                    '"2 N/V" or a table as above' if name.endswith("gain") else "value",
+                    f"{what.meaning}; {'none' if math.isinf(what.default) else f'{what.default:g}'} if left out",
+                )
+                for name, what in ACTUATOR.items()
+            ),
+            Key("converter", '"0.3 mV"', "smallest step of the command, for simulations; not rounded if left out"),
         ),
     ),
     "sensors": ("[sensors.COORDINATE]", _SENSOR),

@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from upright.physics import Plant
 from upright.physics.actuator import ACTUATOR
 from upright.records import Array, Record
 from upright.study.clock import check_clock
+from upright.study.description import RigDescription, read_description
 from upright.study.keys import names
 from upright.study.loop import Scene, read_loop, state_units
 from upright.study.rig import known_values, read_plant, read_rig
@@ -51,6 +52,8 @@ class Study:
         Of the study's text.
     ladder : tuple of Rung
         Rungs that the study declares.
+    description : RigDescription
+        Drive, encoders, servo and travel, as far as the study says.
     """
 
     path: Path
@@ -61,6 +64,7 @@ class Study:
     source: str = ""
     sha256: str = ""
     ladder: tuple[Rung, ...] = ()
+    description: RigDescription = field(default_factory=RigDescription)
 
     def hold_out(self, *labels: str) -> Study:
         """The same study with some of its fitted runs predicted instead.
@@ -114,6 +118,7 @@ def load_study(
     folder = Path(data) if data is not None else path.parent
     logs = {(name, "", ""): record for name, record in (records or {}).items()}
     runs = read_runs(study, plant, lambda run: _log(run, folder, logs))
+    description = read_description(study, plant, rig, [log.provenance.rig for log in logs.values()])
     rig = with_noise(rig, runs)
     if fixed is not None:
         levels = {n: p for n, p in rig.parameters.items() if n.startswith(NOISE)}
@@ -127,6 +132,7 @@ def load_study(
         title=study.text_of("title", "My rig") if "title" in study else "",
         source=study.text_of("source", "https://...") if "source" in study else "",
         ladder=read_ladder(study, plant),
+        description=description,
         sha256=hashlib.sha256(words.text.encode()).hexdigest(),
     )
 

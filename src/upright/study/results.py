@@ -6,7 +6,8 @@ an actuator without limit).
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from upright.identification.ladder.cross_validation import CrossValidation
 from upright.identification.ladder.growth import Ladder, RungResult
 from upright.identification.ladder.rungs import neutral
 from upright.physics.actuator import ACTUATOR
+from upright.study.description import RigDescription
 from upright.study.fitted import FORMAT
 from upright.study.load import Study
 from upright.study.text import StudyText
@@ -39,6 +41,7 @@ def write_fit(fit: Fit, study: Study, path: Path, crossed: CrossValidation | Non
         "format": FORMAT,
         "title": study.title,
         "plant": study.plant,
+        "rig": _estimated(study.description, fit.estimates).plain(),
         "substeps": fit.rig.substeps,
         **_fields(fit, "verdict trusted method evaluations"),
         "seconds": round(fit.seconds, 4),
@@ -77,6 +80,12 @@ def write_fit(fit: Fit, study: Study, path: Path, crossed: CrossValidation | Non
     return plain_values(content)
 
 
+def _estimated(said: RigDescription, found: Mapping[str, Estimate]) -> RigDescription:
+    """The description with the drive's numbers as they were estimated."""
+    asked = {n: e for n, e in said.entries.items() if f"actuator.{n}" in found}
+    return said.given({n: replace(e, value=found[f"actuator.{n}"].value) for n, e in asked.items()})
+
+
 def _fields(of: object, names: str) -> dict[str, Any]:
     """Attributes that a file holds by their own names."""
     return {name: getattr(of, name) for name in names.split()}
@@ -95,11 +104,16 @@ def provenance(study: Study) -> dict[str, Any]:
     }
 
 
-def write_response_fit(answer: FrequencyFit, folder: Path, plant: str, title: str, source: str = "") -> None:
-    """Write `frequency.csv` and `fit.json`, which `upright design` reads."""
+def write_response_fit(
+    answer: FrequencyFit, folder: Path, plant: str, title: str, source: str = "", said: RigDescription | None = None
+) -> None:
+    """Write `frequency.csv` and `fit.json`, which `upright design` reads; `said` is what is known of the rig."""
     folder.mkdir(parents=True, exist_ok=True)
     answer.data.to_csv(folder / "frequency.csv")
-    study = Study(path=folder / "frequency.csv", plant=plant, rig=answer.rig, runs=(), title=title, source=source)
+    study = Study(
+        path=folder / "frequency.csv", plant=plant, rig=answer.rig, runs=(), title=title, source=source,
+        description=said or RigDescription(),
+    )  # fmt: skip
     write_fit(answer.fit, study, folder / "fit.json")
 
 

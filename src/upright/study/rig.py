@@ -13,7 +13,7 @@ from upright.physics import Plant, find
 from upright.physics.actuator import ACTUATOR
 from upright.quantities import Quantity
 from upright.study.keys import names
-from upright.study.text import Section, show, si
+from upright.study.text import SOURCES, Section, show, si
 from upright.trust import before_running
 from upright.units import uncertainty
 
@@ -124,7 +124,7 @@ def read_parameter(section: Section, key: str, name: str, what: Quantity) -> Par
             f' for instance {key} = {{ guess = "1 {what.unit}", min = 0 }}',
         )
     estimate = "guess" in table
-    for wrong in ("min", "max") if not estimate else ("uncertainty", "assumed"):
+    for wrong in ("min", "max") if not estimate else ("uncertainty", *SOURCES):
         if wrong in table:
             raise table.error(
                 wrong,
@@ -135,7 +135,9 @@ def read_parameter(section: Section, key: str, name: str, what: Quantity) -> Par
     number = _checked(section, (key, main), name, table.values[main], what)
     if not estimate:
         sigma = _uncertainty(section, key, table.values.get("uncertainty", 0.0), number, what)
-        assumed = table.flag("assumed")
+        assumed, measured = table.flag("assumed"), table.flag("measured")
+        if assumed and measured:
+            raise table.error("assumed", f"{name} is assumed or measured, not both; leave one out")
         if assumed and sigma > 0:
             raise table.error("assumed", f"{name} has an uncertainty, so it is known about, not assumed; leave one out")
         return Parameter(

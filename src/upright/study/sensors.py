@@ -219,7 +219,7 @@ def read_sensor(section: Section, coordinate: Coordinate) -> Sensor:
             right = "counts_per_m" if coordinate.unit == "m" else "counts_per_rev"
             raise section.error(key, f"{name} is in {coordinate.unit}, so give {right} or scale, not {key}")
     per = {
-        key: section.positive(key, unit, 1.0) if key in section else 0.0
+        key: section.stated(key, unit)[0] if key in section else 0.0
         for key, unit in (("counts_per_rev", "1"), ("counts_per_m", "1/m"))
     }
     return Sensor(
@@ -229,7 +229,7 @@ def read_sensor(section: Section, coordinate: Coordinate) -> Sensor:
         scale=_scale(section, coordinate) if "scale" in section else None,
         sign=read_sign(section),
         offset=_offset(section),
-        resolution=section.positive("resolution", coordinate.unit, 1.0) if "resolution" in section else 0.0,
+        resolution=section.stated("resolution", coordinate.unit)[0] if "resolution" in section else 0.0,
         **per,
     )
 

@@ -20,6 +20,8 @@ from upright.errors import BadInput, UprightError, nearest
 from upright.files import read_text
 
 _LEAST = 1e-60
+SOURCES = ("assumed", "measured")
+"""What a known number may be said to be, as in ``{ value = "10 V", measured = true }``."""
 KeyPath = tuple[str | int, ...]
 """Keys from the root down; the entries of a list of tables are counted from 0."""
 
@@ -176,6 +178,17 @@ class Section:
             raise self.error(key, f"{key} must be above zero, got {show(self.values[key])}")
         return value
 
+    def stated(self, key: str, unit: str) -> tuple[float, str]:
+        """Number above zero, plain or in a table beside what it rests on, and that in a word."""
+        value = self.values[key]
+        inner = self.section(key) if isinstance(value, dict) else self
+        if inner is not self:
+            inner.check(("value", *SOURCES))
+        number = inner.number("value" if inner is not self else key, unit)
+        if not number > 0:
+            raise self.error(key, f"{key} must be above zero, got {show(value)}; leave it out where there is none")
+        return number, source_of(value)
+
     def flag(self, key: str) -> bool:
         """True or false, false when left out."""
         value = self.values.get(key, False)
@@ -197,6 +210,14 @@ class Section:
         if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
             raise self.error(key, f"{key} must be a whole number from 1 to {most}, got {show(value)}")
         return value
+
+
+def source_of(value: Any) -> str:
+    """What a number of a study rests on, in the study's own word: "known" where it says nothing of it."""
+    if not isinstance(value, dict):
+        return "known"
+    told: dict[str, Any] = value
+    return next((word for word in SOURCES if told.get(word)), "measured" if "uncertainty" in told else "known")
 
 
 def si(value: Any, unit: str, what: str) -> float:

@@ -1,0 +1,188 @@
+"""Is a rig described once, in the study, and does fit.json hand on what was said and where it came from?"""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from upright.errors import BadInput
+from upright.identification import identify
+from upright.physics import CartPendulum
+from upright.simulation import simulate
+from upright.study.fitted import read_fit
+from upright.study.load import load_study
+from upright.study.results import write_fit
+
+STUDY = """
+[rig]
+plant = "pendulum"
+name = "bench 3"
+servo_period = "2 ms"
+travel = { value = "20 deg", assumed = true }
+speed_limit = { value = "5 rad/s", measured = true }
+
+[parameters]
+m_p = "0.2 kg"
+l_cg = { guess = "0.3 m" }
+b_2 = { guess = "1e-3 N m s/rad", min = 0 }
+
+[sensors.theta]
+column = "theta"
+unit = "rad"
+counts_per_rev = { value = 4096, measured = true }
+sign = -1
+offset = "180 deg"
+
+[[runs]]
+file = "log.csv"
+"""
+
+
+@pytest.fixture
+def study(tmp_path):
+    """A pendulum of 0.3 m that swings by 0.1 rad about half a turn, counted backwards."""
+    t = np.arange(1000) * 0.01
+    theta = math.pi - 0.1 * np.exp(-0.05 * t) * np.cos(math.sqrt(9.81 / 0.3) * t)
+    np.savetxt(tmp_path / "log.csv", np.column_stack([t, theta]), "%.9f", ",", header="t,theta", comments="")
+    path = tmp_path / "study.toml"
+
+    def write(text=STUDY):
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+def test_every_entry_tells_its_value_and_its_source(study):
+    said = load_study(study()).description
+    assert (said.name, said.vendor) == ("bench 3", "")
+    told = {n: (e.value, e.unit, e.source) for n, e in said.entries.items()}
+    assert told["servo_period"] == (pytest.approx(0.002), "s", "known")
+    assert told["counts.theta"] == (pytest.approx(4096), "1/rev", "measured")
+    assert told["sign.theta"] == (-1.0, "1", "known")
+    assert told["offset.theta"] == (pytest.approx(math.pi), "rad", "known")
+
+
+CART = """
+[rig]
+plant = "cart-pendulum"
+vendor = "ECP 210"
+travel = { value = "15 cm", assumed = true }
+speed_limit = { value = "1.5 m/s", measured = true }
+[parameters]
+m_c = "0.5 kg"
+m_p = "0.1 kg"
+l_cg = "0.2 m"
+J_p = "1e-3 kg m^2"
+[actuator]
+gain = { guess = "4 N/V", min = 0 }
+limit = { value = "10 V", measured = true }
+force_limit = "30 N"
+lag = { value = "3 ms", uncertainty = "1 ms" }
+converter = "2.4 mV"
+[drive]
+column = "u"
+unit = "V"
+[sensors.x]
+unit = "m"
+counts_per_m = 20000
+[sensors.theta]
+unit = "rad"
+resolution = "0.1 deg"
+[[runs]]
+file = "log.csv"
+"""
+
+
+@pytest.fixture(scope="module")
+def log():
+    """Columns of a cart that a sine drives by 4 N/V within the limits of the study."""
+    t = np.arange(400) * 0.01
+    u = np.sin(5 * t)
+    drive = {"actuator.gain": 4.0, "actuator.lag": 3e-3}
+    plant = CartPendulum(m_c=0.5, m_p=0.1, l_cg=0.2, J_p=1e-3)
+    x = simulate(plant, drive, plant.state("hanging"), u, 0.01, samples=400)[:, ::2, 0]
+    return np.column_stack([t, u, x])
+
+
+@pytest.fixture
+def cart(tmp_path, log):
+    np.savetxt(tmp_path / "log.csv", log, "%.9f", ",", header="t,u,x,theta", comments="")
+
+    def write(text=CART):
+        (tmp_path / "cart.toml").write_text(text, encoding="utf-8")
+        return tmp_path / "cart.toml"
+
+    return write
+
+
+def test_a_fit_hands_on_the_drive_the_encoders_and_the_servo(cart, tmp_path):
+    study = load_study(cart())
+    fit = identify(study.rig, study.runs)
+    write_fit(fit, study, tmp_path / "fit.json")
+    back = read_fit(tmp_path / "fit.json").description
+    assert back.vendor == "ECP 210"
+    assert set(back.entries) == set(study.description.entries)
+    said = {n: (e.value, e.unit, e.source) for n, e in back.entries.items()}
+    assert said["limit"] == (10.0, "V", "measured")
+    assert said["force_limit"] == (30.0, "N", "known")
+    assert said["lag"] == (pytest.approx(3e-3), "s", "measured")
+    assert said["converter"] == (pytest.approx(2.4e-3), "V", "known")
+    assert said["travel"] == (pytest.approx(0.15), "m", "assumed")
+    assert said["speed_limit"] == (pytest.approx(1.5), "m/s", "measured")
+    assert said["counts.x"] == (pytest.approx(20_000), "1/m", "known")
+    assert said["counts.theta"] == (pytest.approx(3600), "1/rev", "known")
+    assert said["gain"] == (fit.estimates["actuator.gain"].value, "N/V", "identified")
+
+
+def test_a_fit_of_older_form_tells_its_drive_from_its_parameters(cart, tmp_path):
+    study = load_study(cart())
+    write_fit(identify(study.rig, study.runs), study, tmp_path / "fit.json")
+    content = json.loads((tmp_path / "fit.json").read_text(encoding="utf-8"))
+    del content["rig"]
+    (tmp_path / "fit.json").write_text(json.dumps(content), encoding="utf-8")
+    said = read_fit(tmp_path / "fit.json").description
+    assert {n: e.source for n, e in said.entries.items()} == {
+        "gain": "identified", "limit": "known", "force_limit": "known",
+        "lag": "identified",  # known about: it may have moved, and such a file says no more
+    }  # fmt: skip
+    assert said.entries["limit"].value == 10.0
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (('vendor = "ECP 210"', 'vendor = "ECP 201"'), "line 4: there is no data sheet of 'ECP 201'; did you mean"),
+        (('converter = "2.4 mV"', 'converter = "2.4 mm"'), "Expected a value in V"),
+        (('converter = "2.4 mV"', "converter = 0"), "converter must be above zero"),
+        (("counts_per_m = 20000", "counts_per_m = { value = -4 }"), "counts_per_m must be above zero"),
+        (("counts_per_m = 20000", "counts_per_m = { guess = 4 }"), "has no key 'guess'"),
+        (("measured = true }\nforce", "measured = true, assumed = true }\nforce"), "assumed or measured, not both"),
+        (("1.5 m/s", "1.5 rad/s"), "Expected a value in m/s"),
+    ],
+)
+def test_what_no_rig_has_is_said_with_its_line(cart, change, words):
+    with pytest.raises(BadInput) as error:
+        load_study(cart(CART.replace(*change)))
+    assert words in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"limit": {"value": 5.0, "unit": "V", "source": "known"}}, "parameters.actuator.limit is 10"),
+        ({"servo_period": {"value": -1.0, "unit": "s", "source": "known"}}, "must be above 0"),
+        ({"servo_period": {"value": 1.0, "unit": "s"}}, "rig.entries.servo_period.source must be text"),
+    ],
+)
+def test_a_changed_description_is_refused(cart, tmp_path, change, words):
+    study = load_study(cart())
+    write_fit(identify(study.rig, study.runs), study, tmp_path / "fit.json")
+    content = json.loads((tmp_path / "fit.json").read_text(encoding="utf-8"))
+    content["rig"]["entries"] |= change
+    (tmp_path / "fit.json").write_text(json.dumps(content), encoding="utf-8")
+    with pytest.raises(BadInput, match=words):
+        read_fit(tmp_path / "fit.json")
