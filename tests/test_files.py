@@ -150,7 +150,7 @@ SURVEY = "student,a pre,a post\n1,1,3\n2,2,4\n3,1,2\n"
         ("init IN -o IN --force", "study.toml", ""),
         ("doctor IN -o IN", "page.html", ""),
         ("survey IN -o .", "report.html", SURVEY),
-        ("design IN --poles=-4+-2j,-6,-7 -o .", "design.json", FIT),
+        ("design IN --poles=-4+-2j,-6,-7 --period=1ms --counts=4096 -o .", "design.json", FIT),
         ("ladder IN -o .", "study.toml", STUDY),
     ],
 )

@@ -198,9 +198,17 @@ def test_chance_asks_for_a_limit_in_the_unit_of_the_fit():
     known = {n: v for n, v in FURUTA.items() if n != "J_d"} | {"b_1": "0 N m s/rad"}
     fit = up.identify(log, up.Furuta, known=known, ask={"J_d": "9e-3 kg m^2"})
     gains = up.place(fit.plant.linear("inverted"), POLES)
-    with pytest.raises(up.BadInput, match="pass limit="):
+    with pytest.raises(up.BadInput, match=r"limit=10 .*period=\"2 ms\" .*counts"):
         up.chance(fit, gains)
-    told = {"tilt": "3 deg", "push": 0.0, "limit": 0.6, "draws": 16, "seconds": 2.0}
+    told = {
+        "tilt": "3 deg",
+        "push": 0.0,
+        "limit": 0.6,
+        "period": "1 ms",
+        "counts": (4096, 4096),
+        "draws": 16,
+        "seconds": 2.0,
+    }
     assert up.chance(fit, gains, **told).numbers["chance"] == 1.0
     assert up.chance(fit, 0.0 * gains.K, **told).numbers["chance"] == 0.0
 

@@ -37,7 +37,11 @@ def fit_file(folder: Path, stderr: float) -> Path:
     entries["actuator.gain"] = {"value": 0.5, "stderr": stderr, "unit": "N m/V", "status": "firm"}
     content = {
         "format": 1, "plant": "furuta", "verdict": "", "trusted": True, "parameters": entries,
-        "estimated": ["actuator.gain"], "correlation": [[1.0]],
+        "estimated": ["actuator.gain"], "correlation": [[1.0]], "rig": {"entries": {
+            "servo_period": {"value": 1e-3, "unit": "s", "source": "known"},
+            "counts.psi": {"value": 16_000, "unit": "1/rev", "source": "known"},
+            "counts.theta": {"value": 16_000, "unit": "1/rev", "source": "known"},
+        }},
     }  # fmt: skip
     path = folder / "fit.json"
     path.write_text(json.dumps(content), encoding="utf-8")

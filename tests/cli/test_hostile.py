@@ -135,15 +135,15 @@ def test_no_disk_is_as_wide_as_a_room(here, radius):
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        ("--poles=0,-2,-3,-4", "a pole is asked where the model has one already"),
+        ("--poles=0,-2,-3,-4 --period=1ms", "a pole is asked where the model has one already"),
         ("--poles=-1,-2,-3,-4 --period=0s", "every 1e-6 to 10 s"),
         ("--poles=-1,-2,-3,-4 --period=1e300s", "every 1e-6 to 10 s"),
-        ("--lqr 1,1,1,1 --limit 1e300", "above 0 and below 1e9"),
-        ("--lqr 1,1,1,1 --limit nan", "above 0 and below 1e9"),
+        ("--lqr 1,1,1,1 --period=1ms --limit 1e300", "above 0 and below 1e9"),
+        ("--lqr 1,1,1,1 --period=1ms --limit nan", "above 0 and below 1e9"),
     ],
 )
 def test_a_design_that_no_loop_can_have_is_a_sentence(fit, options, says):
-    assert says in sentence("design", fit, *options.split())
+    assert says in sentence("design", fit, "--counts=4096", *options.split())
 
 
 def test_a_servo_of_a_million_samples_per_row_is_not_drawn(here):

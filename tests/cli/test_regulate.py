@@ -24,7 +24,7 @@ def fit(tmp_path: Path) -> Path:
     entries["actuator.gain"] = {"value": rig.gain, "stderr": 0.01 * rig.gain, "unit": "N/V", "status": "firm"}
     content = {
         "format": 1, "plant": "cart-pendulum", "verdict": "", "trusted": True, "parameters": entries,
-        "estimated": ["actuator.gain"], "correlation": [[1.0]],
+        "estimated": ["actuator.gain"], "correlation": [[1.0]], "rig": {"vendor": "ECP 210"},
     }  # fmt: skip
     path = tmp_path / "fit.json"
     path.write_text(json.dumps(content), encoding="utf-8")

@@ -38,7 +38,7 @@ class Scores:
     fell : array, shape (lanes,)
         Time at which the watched coordinate was lost [s]; inf when it never was.
     ran_out : array, shape (lanes,)
-        Time at which the driven coordinate came to the end of its travel [s]; inf when it never did.
+        Time at which the driven coordinate came to the end of its travel, or of its speed [s]; inf when it never did.
     settled : array, shape (lanes,)
         Time from which the watched coordinate stayed within its band to the end [s]; inf when it did not, or was lost.
     peaks : array, shape (coordinates, lanes)
@@ -49,7 +49,7 @@ class Scores:
     effort_peak, effort_rms : array, shape (lanes,)
         Of the command [its unit].
     saturated : array, shape (lanes,)
-        Share of the samples at the limit, 0 to 1.
+        Share of the samples at the limit of command or force, 0 to 1.
     at_limit : array, shape (lanes,)
         Time spent there [s].
     """
@@ -132,7 +132,11 @@ def scores(
     size = np.abs(away)
     main = size[:, names.index(watched or names[-1])]
     fell = _first(t, ~(main <= fallen))
-    ran_out = _first(t, ~(size[:, names.index(rig.plant.inputs[0].on)] <= rig.travel))
+    moved = names.index(rig.plant.inputs[0].on)
+    ran_out = _first(t, ~(size[:, moved] <= rig.travel))
+    if math.isfinite(rig.speed_limit):
+        speed = np.abs(np.gradient(away[:, moved], t, axis=0))
+        ran_out = np.minimum(ran_out, _first(t, ~(speed <= rig.speed_limit)))
     before = t[:, None] <= np.minimum(fell, ran_out)
     inside = main <= band
     # after the last sample outside
@@ -140,7 +144,7 @@ def scores(
     settled = np.where(inside.all(axis=0), t[0], t[np.minimum(after, t.size - 1)])
     lost = np.isfinite(fell) | np.isfinite(ran_out) | ~inside[-1]
     end = away[-max(2, t.size // 3) :]
-    full = before & (np.abs(u) >= rig.limit * (1 - 1e-9))
+    full = before & (np.abs(u) >= rig.saturation * (1 - 1e-9))
     return Scores(
         fell=fell,
         ran_out=ran_out,

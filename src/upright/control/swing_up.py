@@ -152,7 +152,7 @@ def body(rig: ServoRig) -> Body:
     names = [c.name for c in plant.coordinates]
     if len(names) != 2 or names[1] != "theta" or not {"hanging", "inverted"} <= set(plant.equilibria):
         raise BadInput(f"a swing-up needs a pendulum theta on a driven body, and {rig.name} has {', '.join(names)}.")
-    hanging = plant.linear("hanging")
+    hanging = rig.linear("hanging")
     m = hanging.mass
     stiffness, damping = (-(m @ hanging.A[1::2, i::2]) for i in (0, 1))
     moving, still = plant.energy([[0.0, 1.0, math.pi / 2, 0.0], [0.0, 0.0, math.pi / 2, 0.0]])
@@ -262,19 +262,20 @@ def design_swing_up(model: ServoRig, *, travel: float | None = None, memory: flo
     room = known if travel is None else travel
     linear = model.linear("inverted")
     # Bryson: a quarter of the travel, half a radian and half the limit cost alike
-    Q, R = np.diag([(4 / room) ** 2, 0.0, 4.0, 0.0]), (2 / model.limit) ** 2
+    Q, R = np.diag([(4 / room) ** 2, 0.0, 4.0, 0.0]), (2 / model.saturation) ** 2
     P = np.asarray(solve_continuous_are(linear.A, linear.B, Q, np.array([[R]])), dtype=np.float64)
     K = (linear.B.T @ P / R)[0]
     sampled = hold(linear, model.period, (model.delay + model.lag) / model.period)
     gains = place_sampled(sampled, filtered(sampled, memory), poles_of(linear.A - linear.B @ K[None]))
-    sure = (2 * model.limit) ** 2 / float(K @ np.linalg.solve(P, K))
+    sure = (2 * model.saturation) ** 2 / float(K @ np.linalg.solve(P, K))
     centre = 0.45 * b.omega
     law = SwingUp(
         body=b, K=gains[0], P=P, size=sure, sure=sure, memory=memory,
         fast=min(math.sqrt(0.2 * b.weight / max(b.spin, 1e-12)), room * b.omega),
         # half of what would hold the pendulum level, and no wider a swing of the pivot than fits
         reach=min(0.5 * b.weight / abs(b.kappa), 0.3 * room * b.omega**2), sharp=4.0,
-        centre=centre**2, damp=1.5 * centre, travel=room, period=model.period, gain=model.gain, limit=model.limit,
+        centre=centre**2, damp=1.5 * centre, travel=room, period=model.period, gain=model.gain,
+        limit=model.saturation,
     )  # fmt: skip
     return replace(law, size=0.8 * sure * _share(law, model))
 
@@ -376,7 +377,7 @@ class Ascent:
     @property
     def saturated(self) -> float:
         """Share of the samples at the limit, 0 to 1."""
-        return float(np.mean(np.abs(self.trial.u) >= self.trial.rig.limit * (1 - 1e-9)))
+        return float(np.mean(np.abs(self.trial.u) >= self.trial.rig.saturation * (1 - 1e-9)))
 
     @property
     def travel(self) -> float:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +19,8 @@ from upright.physics import Linear, Plant
 from upright.records import Array, Record
 from upright.records.record import of_twin
 from upright.simulation import simulate
+
+GAIN = "actuator.gain"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,6 +54,12 @@ class ServoRig:
         Servo period [s].
     travel : float
         How far the driven coordinate may go either way before a stop or a cable ends it [m or rad].
+    speed_limit : float
+        Speed of the driven coordinate at which the drive trips [m/s or rad/s].
+    more : mapping of str to float
+        What else the drive does: numbers of `physics.actuator.ACTUATOR`, such as ``"actuator.force_limit"``.
+    sources : mapping of str to str
+        What limit, counts and so on rest on, in a word or two by name; empty for a twin.
     seed : int
         Which rig of the make; 0 is the one as designed.
     """
@@ -69,6 +77,9 @@ class ServoRig:
     unit: str = "V"
     scales: tuple[float, ...] = ()
     travel: float = math.inf
+    speed_limit: float = math.inf
+    more: Mapping[str, float] = field(default_factory=dict[str, float])
+    sources: Mapping[str, str] = field(default_factory=dict[str, str])
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -87,12 +98,18 @@ class ServoRig:
     def drive(self) -> Mapping[str, float]:
         """The actuator by the names of `upright.simulation.simulate`."""
         return {
+            **self.more,
             "actuator.gain": self.gain,
             "actuator.limit": self.limit,
             "actuator.delay": self.delay,
             "actuator.lag": self.lag,
             "actuator.offset": self.offset,
         }
+
+    @property
+    def saturation(self) -> float:
+        """Smallest command at which the drive gives all that it can, at rest: that of its command or of its force."""
+        return min(self.limit, full_command({**self.more, GAIN: self.gain}))
 
     @property
     def quantum(self) -> Array:
@@ -105,13 +122,35 @@ class ServoRig:
         return np.array(self.scales) if self.scales else np.ones(len(self.counts))
 
     def linear(self, at: str) -> Linear:
-        """Model about an equilibrium, from the command to the coordinates; dry friction, drive and counts left out."""
-        model = self.plant.linear(at)
-        return replace(model, B=model.B * self.gain)
+        """Model about an equilibrium, from the command to the coordinates; dry friction, lag and counts left out."""
+        return driven(self.plant, {**self.more, GAIN: self.gain}, at)
 
     def changed(self, **parameters: float) -> ServoRig:
         """The same rig with other parameters of its plant."""
         return replace(self, plant=self.plant.replace(**parameters))
+
+
+def driven(plant: Plant, drive: Mapping[str, float], at: str) -> Linear:
+    """Model about an equilibrium from the command to the coordinates, with what the drive takes for speed.
+
+    The drive gives gain u less its slope and its braking, times the speed of what it drives; that braking is at work
+    while a loop runs.
+    """
+    model = plant.linear(at)
+    A, names = model.A, plant.state_names()
+    taken = sum(drive.get(f"actuator.{n}", 0.0) for n in ("slope", "damping", "standby"))
+    if taken:
+        A = A.copy()
+        for i, force in enumerate(plant.inputs):
+            A[:, names.index(force.on) + 1] -= taken * model.B[:, i]
+    return replace(model, A=A, B=model.B * drive[GAIN])
+
+
+def full_command(drive: Mapping[str, float]) -> float:
+    """Command at which the force of a drive at rest meets its limit; infinite for a drive without one."""
+    force, gain = drive.get("actuator.force_limit", math.inf), abs(drive[GAIN])
+    left = gain - force * drive.get("actuator.droop", 0.0) if math.isfinite(force) else 0.0
+    return force / left if left > 0 else math.inf
 
 
 SUBSTEPS = 2

@@ -2,24 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from upright.control.trial import ServoRig
+from upright.control.trial import GAIN, ServoRig, driven
 from upright.errors import BadInput, ImpossiblePhysics
-from upright.experiments.makes import MAKES, Make, make_of, make_rig
+from upright.experiments.makes import MAKES, Make, make_of, make_rig, sheet
 from upright.physics import Linear, Plant, find
+from upright.physics.actuator import ACTUATOR
 from upright.records import Array
+from upright.records.record import of_twin
+from upright.report.page import Table
+from upright.report.symbols import number
+from upright.study.description import (
+    Entry,
+    RigDescription,
+    check_vendor,
+    meaning_of,
+    read_description,
+    turn_of,
+)
 from upright.study.fitted import FittedModel, read_fit
 from upright.study.rig import read_plant, read_rig
 from upright.study.sensors import drive_unit
 from upright.study.text import StudyText
 from upright.trust import before_running
 
-GAIN = "actuator.gain"
+MORE = ACTUATOR.keys() - {f"actuator.{n}" for n in ("gain", "limit", "delay", "lag", "offset", "start", "end")}
+"""Numbers of the drive that nothing else of a `ServoRig` tells."""
 DAILY = 0.13
 """Relative spread of dry friction from one run to the next, as between two runs of one day on an ECP 205."""
 
@@ -43,6 +57,8 @@ class IdentifiedRig:
         Time constant of the drive [s], which the linear model leaves out.
     draws : tuple of (Plant, float)
         Plants and gains drawn from the fit's covariance; empty without one.
+    description : RigDescription
+        Drive, encoders and servo, as far as fit or study says.
     """
 
     plant: Plant
@@ -52,6 +68,7 @@ class IdentifiedRig:
     delay: float = 0.0
     lag: float = 0.0
     draws: tuple[tuple[Plant, float], ...] = ()
+    description: RigDescription = field(default_factory=RigDescription)
 
     @property
     def make(self) -> Make:
@@ -68,33 +85,124 @@ class IdentifiedRig:
             "for it (upright design) and simulate with control.ServoRig.",
         )
 
+    @property
+    def more(self) -> Mapping[str, float]:
+        """What else the drive does, besides gain, limit, delay, lag and offset."""
+        return {f"actuator.{n}": e.value for n, e in self.description.entries.items() if f"actuator.{n}" in MORE}
+
     def linear(self, at: str) -> Linear:
         """Model about an equilibrium, from the command to the coordinates."""
-        return _driven(self.plant, self.gain, at)
+        return driven(self.plant, {**self.more, GAIN: self.gain}, at)
 
     def spread(self, at: str) -> list[Linear]:
         """The same for the draws."""
-        return [_driven(plant, gain, at) for plant, gain in self.draws]
+        return [driven(plant, {**self.more, GAIN: gain}, at) for plant, gain in self.draws]
 
-    def rig(self, said: ServoRig | None = None) -> ServoRig:
-        """The rig as identified, with drive and encoders as said in its data sheet.
-
-        Dry friction, delay and lag that the fit leaves at zero are taken as said, too: nobody's rig is without.
+    def described(
+        self, given: Mapping[str, Entry | None] | None = None, *, vendor: str = "",
+        needs: Collection[str] = ("limit", "servo_period", "counts"), who: str = "a simulation",
+    ) -> RigDescription:  # fmt: skip
+        """What is known of drive, encoders and servo: what a call gives, what the fit says, the data sheet named.
 
         Parameters
         ----------
-        said : ServoRig, optional
-            The make's own as designed when omitted.
+        given : mapping of str to Entry, optional
+            Options of the command line; None is none.
+        vendor : str, optional
+            Data sheet chosen by name; the fit's own choice when empty.
+        needs : collection of str
+            What may not be missing; ``"counts"`` is those of every encoder.
+        who : str
+            Verb that asks.
+
+        Raises
+        ------
+        BadInput
+            When something is missing, with the options and keys that say it.
         """
-        said = said or make_rig(self.make.key)
-        dry = [n for n in ("b_1c", "b_2c") if n in self.plant.names()]
-        plant = self.plant
-        if dry and not any(getattr(plant, n) for n in dry):
-            plant = plant.replace(**{n: getattr(said.plant, n) for n in dry})
-        return replace(
-            said, plant=plant, gain=self.gain, unit=self.unit or said.unit, delay=self.delay or said.delay,
-            lag=self.lag or said.lag, scales=(),
+        chosen = check_vendor(vendor or self.description.vendor)
+        said = replace(self.description, vendor=chosen).given(given or {})
+        if chosen:
+            said = said.over(sheet(chosen, self.plant, self.unit))
+        dash, equals = ("", "=") if who == "chance" else ("--", " ")  # which has no command line
+        counts = {f"counts.{c.name}": f"{dash}counts{equals}4096" for c in self.plant.coordinates}
+        options = {"limit": "10", "servo_period": '"2 ms"', "travel": "0.2"}
+        options = {n: f"{dash}{n.removeprefix('servo_')}{equals}{value}" for n, value in options.items()}
+        wanted = {n: w for n, w in options.items() if n in needs} | (counts if "counts" in needs else {})
+        said.demand(wanted, who)
+        if "delay" not in said.entries and "servo_period" in said.entries:
+            late = Entry(value=said.entries["servo_period"].value, unit="s", source="assumed: one servo period")
+            said = said.given({"delay": late})
+        return said
+
+    def rig(self, said: RigDescription | None = None) -> ServoRig:
+        """The rig as identified, with the drive and encoders that are described.
+
+        Where a vendor's data sheet was chosen, dry friction that the fit leaves at zero is that of his rig as designed.
+
+        Parameters
+        ----------
+        said : RigDescription, optional
+            As `described` gives it.
+        """
+        said = said or self.described()
+        make = self.made_by(said.vendor)
+        return ServoRig(
+            name=make.name if make else said.name or self.name, plant=self._with_friction(make), gain=self.gain,
+            limit=said.entries["limit"].value, converter=said.value("converter", 0.0),
+            delay=said.entries["delay"].value, lag=said.value("lag", 0.0), offset=said.value("offset", 0.0),
+            unit=self.unit or "V",
+            counts=tuple(said.entries[f"counts.{c.name}"].value / turn_of(c.unit) for c in self.plant.coordinates),
+            period=said.entries["servo_period"].value, travel=said.value("travel", math.inf),
+            speed_limit=said.value("speed_limit", math.inf), more=self.more,
         )  # fmt: skip
+
+    def twin(self, rig: ServoRig, said: RigDescription, seed: int) -> ServoRig:
+        """Another rig to run on: one of the vendor's make, or, of a rig of one's own, one that the covariance allows.
+
+        Raises
+        ------
+        BadInput
+            When there is neither.
+        """
+        make = self.made_by(said.vendor)
+        if make is not None:
+            return make_rig(make.key, seed)
+        if not self.draws:
+            raise BadInput(
+                "a rig to run on is drawn from the fit's covariance, and this fit has none; leave --seed out, or "
+                "identify the rig from its logs (upright identify)."
+            )
+        plant, gain = self.draws[int(np.random.default_rng([seed, 59]).integers(len(self.draws)))]
+        return replace(rig, plant=plant, gain=gain, seed=seed, name=f"a rig that the fit of {rig.name} allows")
+
+    def doubts(self, said: RigDescription, truth: ServoRig | None = None) -> tuple[str, ...]:
+        """What of the description is somebody else's or assumed, and whether what runs is another rig."""
+        out: list[str] = []
+        sheets = [n for n, e in said.entries.items() if e.source.startswith("data sheet")]
+        if sheets:
+            out.append(f"Nobody said so of this rig, taken from the data sheet of the {said.vendor}: {_list(sheets)}.")
+        make = self.made_by(said.vendor)
+        if make is not None and self._with_friction(make) != self.plant:
+            out.append(f"The fit knows no dry friction; simulations have that of the {make.name} as designed.")
+        assumed = [n for n, e in said.entries.items() if e.source.startswith("assumed")]
+        if assumed:
+            out.append(f"Assumed, not measured: {_list(assumed)}.")
+        ran = "" if truth is None else of_twin(truth.name, truth.seed).rig
+        if make is not None and truth is not None and said.name and said.name != ran:
+            out.append(f"The fit is of another rig ({said.name}) than the one that runs ({ran}).")
+        return tuple(out)
+
+    def made_by(self, vendor: str) -> Make | None:
+        """Make of the vendor that has this plant, None where he has none, or none was chosen."""
+        of_his = (m for m in MAKES.values() if m.vendor == vendor and type(m.plant) is type(self.plant))
+        return next(of_his, None)
+
+    def _with_friction(self, make: Make | None) -> Plant:
+        dry = [n for n in ("b_1c", "b_2c") if n in self.plant.names()]
+        if make is None or not dry or any(getattr(self.plant, n) for n in dry):
+            return self.plant
+        return self.plant.replace(**{n: getattr(make.plant, n) for n in dry})
 
     def allowed(self, rig: ServoRig, lanes: int, seed: int) -> Mapping[str, Array]:
         """Parameters of `lanes` rigs that the fit's covariance allows, dry friction as it may be on the day.
@@ -120,9 +228,18 @@ class IdentifiedRig:
         return out
 
 
-def _driven(plant: Plant, gain: float, at: str) -> Linear:
-    model = plant.linear(at)
-    return replace(model, B=model.B * gain)
+def _list(names: Sequence[str]) -> str:
+    return ", ".join(meaning_of(n) for n in names)
+
+
+def rig_table(said: RigDescription) -> Table:
+    """Drive, encoders and servo with what each number rests on."""
+    told = {n: e for n, e in said.entries.items() if not n.startswith(("sign.", "offset."))}
+    return Table(
+        caption="The rig as it is described", headings=("", "value", "from"),
+        rows=tuple((meaning_of(n), f"{number(e.value, 5)} {e.unit if e.unit != '1' else ''}".strip(), e.source)
+                   for n, e in told.items()), numbers=(1,),
+    )  # fmt: skip
 
 
 def read_identified(path: Path, *, seed: int = 0, draws: int = 200) -> IdentifiedRig:
@@ -142,9 +259,11 @@ def read_identified(path: Path, *, seed: int = 0, draws: int = 200) -> Identifie
 def _from_study(path: Path) -> IdentifiedRig:
     study = StudyText(path).root()
     kind, unit = read_plant(study), drive_unit(study)
-    values = {n: p.value for n, p in read_rig(study, kind, unit).parameters.items()}
+    rig = read_rig(study, kind, unit)
+    values = {n: p.value for n, p in rig.parameters.items()}
     plant = kind(**{n: values[n] for n in kind.names()})
-    return _with_drive(plant, study.section("rig").text_of("plant", "furuta"), values, unit or _force(kind))
+    known = _with_drive(plant, study.section("rig").text_of("plant", "furuta"), values, unit or _force(kind))
+    return replace(known, description=read_description(study, kind, rig))
 
 
 def _force(kind: type[Plant]) -> str:
@@ -162,6 +281,7 @@ def _from_fit(path: Path, seed: int, draws: int) -> IdentifiedRig:
     per, force = fitted.unit(GAIN), _force(kind)
     unit = per.rpartition("/")[2].strip("()") if "/" in per and per != force else force
     known = _with_drive(plant, fitted.plant, fitted.values, unit)
+    known = replace(known, description=fitted.description)
     return replace(known, draws=tuple(_drawn(fitted, plant, known.gain, seed, draws)))
 
 

@@ -18,6 +18,8 @@ import numpy as np
 from upright.control.trial import ServoRig
 from upright.errors import BadInput, nearest
 from upright.physics import BUILT_IN, CartPendulum, Furuta, Plant, added_inertia, added_mass, chain
+from upright.records.record import of_twin
+from upright.study.description import VENDORS, Entry, RigDescription, driven_unit
 
 COUNTS = 16_000
 """Encoder counts per turn of every joint (ECP 205)."""
@@ -29,6 +31,8 @@ PER_METRE = 16_000 / 0.0706
 """Counts per metre (ECP 210)."""
 CONVERTER = 10 / 32768
 """Smallest step of the command [V]."""
+LAG = 2e-3
+"""Time constant of the drive [s]."""
 MASS_RADIUS = 0.025
 """Of one brass mass of 500 g [m]."""
 WIDEST = 0.5
@@ -224,6 +228,11 @@ class Make:
     anchor: float = 0.0
 
     @property
+    def vendor(self) -> str:
+        """Whose rig it is, as studies name the data sheet."""
+        return next(v for v in VENDORS if self.name.startswith(v))
+
+    @property
     def plant_name(self) -> str:
         """As studies call the plant."""
         return next(name for name, plant in BUILT_IN.items() if plant is type(self.plant))
@@ -383,6 +392,25 @@ def make_of(plant: Plant, refusal: str = "") -> Make:
     raise BadInput(refusal or f"none of the makes {', '.join(MAKES)} is a {type(plant).__name__}.")
 
 
+def sheet(vendor: str, plant: Plant, unit: str = "V") -> dict[str, Entry]:
+    """What a vendor's data sheet says of drive, encoders and servo of a rig with this plant, commanded in `unit`."""
+    source = f"data sheet of the {vendor}"
+    make = next((m for m in MAKES.values() if m.vendor == vendor and type(m.plant) is type(plant)), None)
+    per = {"rad": (float(COUNTS), "1/rev")} | ({"m": (PER_METRE, "1/m")} if vendor == "ECP 210" else {})
+    said = {f"counts.{c.name}": per[c.unit] for c in plant.coordinates if c.unit in per}
+    said |= {"servo_period": (SERVO, "s"), "delay": (SERVO, "s"), "lag": (LAG, "s")}
+    if unit in ("", "V"):
+        said |= {"converter": (CONVERTER, "V")} | ({"limit": (make.limit, "V")} if make else {})
+    if make and math.isfinite(make.travel):
+        said |= {"travel": (make.travel, driven_unit(type(plant)))}
+    return {name: Entry(value=value, unit=unit, source=source) for name, (value, unit) in said.items()}
+
+
+def described_make(rig: ServoRig) -> RigDescription:
+    """What a fit of a make's rig says of it: name and vendor; the data sheet is that of the make."""
+    return RigDescription(name=of_twin(rig.name, rig.seed).rig, vendor=make_of(rig.plant).vendor)
+
+
 def make_rig(key: str, seed: int = 0) -> ServoRig:
     """A rig of a make.
 
@@ -421,7 +449,7 @@ def make_rig(key: str, seed: int = 0) -> ServoRig:
         limit=make.limit,
         converter=CONVERTER,
         delay=SERVO,
-        lag=2e-3,
+        lag=LAG,
         counts=make.counts,
         period=SERVO,
         travel=make.travel,

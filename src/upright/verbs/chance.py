@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,13 +18,14 @@ if TYPE_CHECKING:
 
 def chance(
     fit: Any, gains: Any, *, tilt: Any = None, push: Any = None, seconds: float = 6.0, speed: str = "filtered",
-    memory: float = 0.5, limit: float | None = None, counts: Sequence[float] | None = None, draws: int = 200,
+    memory: float = 0.5, limit: float | None = None, counts: float | Sequence[float] | None = None,
+    period: float | str = "", vendor: str = "", draws: int = 200,
     seed: int = 0, workers: int = 1, cluster: str = "", progress: Progress = silent,
 ) -> Answer[Preflight]:  # fmt: skip
     """How likely gains are to hold the rig that a fit tells of, before anything moves.
 
-    The run is simulated with drive limit, encoder counts, delay and dry friction of the rig's make on the rigs that
-    the covariance of the fit allows, each let go as a hand would.
+    The run is simulated with drive limit, encoder counts, delay and dry friction of the rig as its study describes it,
+    on the rigs that the covariance of the fit allows, each let go as a hand would.
 
     Parameters
     ----------
@@ -35,13 +35,17 @@ def chance(
         On the states about the inverted equilibrium, commands in the unit of the fit's drive; see `design`, or
         multiply ``plant.linear("inverted").B`` by the gain of the drive.
     tilt, push : number or text, optional
-        Where the pendulum is let go [rad], and how fast [rad/s]; the make's own if left out.
+        Where the pendulum is let go [rad], and how fast [rad/s]; 5 degrees at rest, or the make's own, if left out.
     seconds, speed, memory, seed
         As in `regulate`.
     limit : float, optional
-        Largest command, in its unit; the data sheet's of the make if left out.
-    counts : sequence of float, optional
-        Encoder counts per turn or metre, coordinate by coordinate; the data sheet's if left out.
+        Largest command, in its unit; the study's if left out.
+    counts : float or sequence of float, optional
+        Encoder counts per turn or metre, of all or coordinate by coordinate; the study's if left out.
+    period : float or str, optional
+        Servo period [s]; the study's if left out.
+    vendor : str, optional
+        Whose data sheet says what neither the call nor the study does: "ECP 205" or "ECP 210".
     draws : int
         Rigs drawn.
     workers, cluster
@@ -53,17 +57,18 @@ def chance(
     Raises
     ------
     BadInput
-        When the fit is of no make with a drive, or the gains do not fit it.
+        When something of the rig is not known, or the gains do not fit it.
     """
     from upright.control.preflight import WORDS, Task, preflight
     from upright.experiments.designing.run import SPEEDS, velocities
-    from upright.experiments.makes import make_rig
-    from upright.experiments.regulation_2.run import HAND
+    from upright.experiments.identified import rig_table
+    from upright.experiments.regulation_2.run import HAND, START
     from upright.gains import feedback, hold
     from upright.report.page import Chapter, Part, Table
     from upright.report.symbols import percent
     from upright.units import parse
     from upright.verbs.fitting import identified
+    from upright.verbs.rig import rig_options
     from upright.workers import Workers
 
     if speed not in SPEEDS:
@@ -74,29 +79,24 @@ def chance(
         raise BadInput(f"draws needs a whole number of at least 1, got {draws}.")
     shared = Workers(number=workers, cluster=cluster)
     known = identified(fit, seed=seed, draws=draws)
-    make, sheet = known.make, make_rig(known.make.key)
-    if limit is None and known.unit and known.unit != sheet.unit:
-        raise BadInput(
-            f"the command of the fit is in {known.unit} and the limit of the data sheet in {sheet.unit}; pass limit=, "
-            f"the largest command in {known.unit}."
-        )
-    rig = known.rig(sheet)
-    if limit is not None:
-        rig = replace(rig, limit=float(limit), converter=0.0 if known.unit != sheet.unit else rig.converter)
-    if counts is not None:
-        turns = (math.tau if c.unit == "rad" else 1.0 for c in rig.plant.coordinates)
-        if len(counts) != len(rig.counts):
-            raise BadInput(f"counts needs {len(rig.counts)} numbers, one for each coordinate, got {len(counts)}.")
-        rig = replace(rig, counts=tuple(float(n) / turn for n, turn in zip(counts, turns, strict=True)))
+    names = [c.name for c in known.plant.coordinates]
+    each = [counts] * len(names) if isinstance(counts, int | float) else list(counts or ())
+    if each and len(each) != len(names):
+        raise BadInput(f"counts needs {len(names)} numbers, one for each coordinate, got {len(each)}.")
+    listed = dict(zip(names, each, strict=False))
+    given = rig_options(known.plant, known.unit, limit=limit, period=period, counts=listed)
+    said = known.described(given, vendor=vendor, who="chance")
+    rig, make = known.rig(said), known.made_by(said.vendor)
+    usual = make.start if make else START
     model = rig.linear("inverted")
     K = np.atleast_2d(np.asarray(gains, dtype=np.float64))
     if K.shape != (1, len(model.states)):
-        raise BadInput(f"gains for {make.key} need shape {(1, len(model.states))}, got {K.shape}.")
+        raise BadInput(f"gains for {known.name} need shape {(1, len(model.states))}, got {K.shape}.")
     sampled = hold(model, rig.period, rig.delay / rig.period)
     law = feedback(velocities(model, sampled, speed, memory, rig.limit, rig.quantum), K)
     begin = [
         s if w is None else parse(w, unit) if isinstance(w, str) else float(w)
-        for w, s, unit in zip((tilt, push), make.start, ("rad", "rad/s"), strict=True)
+        for w, s, unit in zip((tilt, push), usual, ("rad", "rad/s"), strict=True)
     ]
     task = Task(start=(0.0, 0.0, *begin), hand=(0.0, 0.0, *HAND), seconds=seconds)
     others = known.allowed(rig, draws, seed)
@@ -111,12 +111,12 @@ def chance(
         f"It recovers from tilts up to {math.degrees(told.tilt):.2g}° and from taps up to {told.push:.2g} rad/s."
     )  # fmt: skip
     doubt = [] if known.draws else ["The fit has no covariance: only dry friction and the hand vary."]
-    said = [name for name, value in (("drive limit", limit), ("encoder counts", counts)) if value is None]
-    doubt.append(f"Taken from the data sheet of the make {make.key}: {', '.join([*said, 'servo period'])}.")
+    doubt += known.doubts(said)
     chapter = Chapter(
         title=f"Chance that the gains hold the {rig.name}",
         verdict=f"Held for {seconds:g} s on {share} of {draws} rigs that the fit allows.", detail=limits,
-        sound=told.chance > 0.95, parts=(Part("Before the run", (table,)),), warnings=tuple(doubt),
+        sound=told.chance > 0.95, warnings=tuple(doubt),
+        parts=(Part("Before the run", (table,)), Part("The rig", (rig_table(said),))),
         numbers={"chance": told.chance, "interval": (low, high), "words": dict(told.words), "tilt": told.tilt,
                  "push": told.push, "noise": told.noise, "draws": draws, "seed": seed},
     )  # fmt: skip

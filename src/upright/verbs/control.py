@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from math import tau
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +14,7 @@ from upright.files import keeps_its_inputs
 from upright.progress import Progress, part, silent
 from upright.verbs.answer import Answer
 from upright.verbs.pages import folder_if_given, page_folder, write_page
+from upright.verbs.rig import Counts, rig_options
 from upright.verbs.values import open_log, poles, si, si_if_given
 
 if TYPE_CHECKING:
@@ -33,10 +34,10 @@ _poles = poles  # the verbs have options of this name
 def design(
     source: str | os.PathLike[str], *, at: str = "", poles: str | Iterable[complex] = "",
     lqr: str | Iterable[float] = "", effort_weight: float | None = None, limit: float | None = None,
-    start: str | Mapping[str, float | str] = "", period: float | str = "1 ms", delay: float | None = None,
+    start: str | Mapping[str, float | str] = "", period: float | str = "", delay: float | None = None,
     speed: str = "filtered", memory: float = 0.5, lag: float | str = "",
-    counts: float | str | Mapping[str, float] = "16000", track: str = "", sampled: bool = False, seed: int = 0,
-    out: str | os.PathLike[str] | None = None, pdf: bool = False,
+    counts: float | str | Mapping[str, float] = "", vendor: str = "", track: str = "", sampled: bool = False,
+    seed: int = 0, out: str | os.PathLike[str] | None = None, pdf: bool = False,
 ) -> Answer[Designed]:  # fmt: skip
     """Gains that hold a rig, and what they are worth in the loop that a computer runs.
 
@@ -56,11 +57,11 @@ def design(
     effort_weight : float, optional
         Weight of the effort; the limit decides when omitted.
     limit : float, optional
-        Largest command, in the command's unit.
+        Largest command, in the command's unit; the study's when omitted.
     start : str or mapping, optional
         Deviation to come back from, by state: ``{"theta": "5 deg"}``, ``{"theta": 0.087}`` [SI].
-    period : float or str
-        Between samples [s].
+    period : float or str, optional
+        Between samples [s]; the study's servo period when omitted.
     delay : float, optional
         How many samples late a command acts in all; when omitted the fit's delay, or one where it has none.
     speed : str
@@ -69,8 +70,10 @@ def design(
         Of the filtered difference, 0 to 1.
     lag : float or str, optional
         Lag of the drive [s]; the fit's when omitted.
-    counts : float, str or mapping
-        Encoder counts per turn or metre, one number or by coordinate.
+    counts : float, str or mapping, optional
+        Encoder counts per turn or metre, one number or by coordinate; the study's when omitted.
+    vendor : str, optional
+        Whose data sheet says what neither the call nor the study does: "ECP 205" or "ECP 210".
     track : str, optional
         Coordinate that follows a reference.
     sampled : bool
@@ -92,8 +95,9 @@ def design(
     BadInput
         When the call contradicts itself or the rig, or a pole is out of the input's reach.
     """
+    from upright.control.trial import GAIN, full_command
     from upright.experiments.designing.chapter import chapter
-    from upright.experiments.designing.run import SPEEDS, DesignRequest, design_for
+    from upright.experiments.designing.run import SPEEDS, DesignRequest, design_for, quanta
     from upright.experiments.identified import read_identified
     from upright.files import write_json
     from upright.report.symbols import typed
@@ -108,10 +112,13 @@ def design(
     here = at or list(rig.plant.equilibria)[-1]
     if here not in rig.plant.equilibria:
         raise BadInput(f"'{rig.name}' has no equilibrium '{here}'; {nearest(here, rig.plant.equilibria)}")
+    given = rig_options(rig.plant, rig.unit, limit=limit, period=period, counts=counts)
+    said = rig.described(given, vendor=vendor, needs=("servo_period", "counts"), who="upright design")
+    most = min(said.value("limit", math.inf), full_command({**rig.more, GAIN: rig.gain}))
     wish = DesignRequest(
-        at=here, poles=asked, weights=weights, R=effort_weight, period=si(period, "s"), delay=delay,
-        lag=si_if_given(lag, "s"), speed=speed, memory=memory, quantum=_quanta(rig, counts), limit=limit,
-        start=_start(rig, start), track=track, sampled=sampled,
+        at=here, poles=asked, weights=weights, R=effort_weight, period=said.entries["servo_period"].value, delay=delay,
+        lag=si_if_given(lag, "s"), speed=speed, memory=memory, quantum=quanta(rig, said),
+        limit=most if math.isfinite(most) else None, start=_start(rig, start), track=track, sampled=sampled, said=said,
     )  # fmt: skip
     done = design_for(rig, wish)
     told = chapter(done, source=typed(Path(source)), folder=typed(folder_at or Path()))
@@ -133,34 +140,6 @@ def _numbers(given: str | Iterable[float]) -> tuple[float, ...] | None:
         return tuple(float(part) for part in given.split(","))
     except ValueError:
         raise BadInput(f'weights are numbers separated by commas, as in "1,0,1,0", got {given[:60]!r}.') from None
-
-
-def _quanta(rig: IdentifiedRig, counts: float | str | Mapping[str, float]) -> tuple[float, ...]:
-    """Step of every encoder [m or rad]; coordinates that the list does not name have 16000 counts."""
-    names = [c.name for c in rig.plant.coordinates]
-    per = dict.fromkeys(names, 16_000.0)
-    said = counts if isinstance(counts, str) else ""
-    if isinstance(counts, Mapping):
-        said = ",".join(f"{name}={value}" for name, value in counts.items())
-    elif not said:
-        said = str(counts)
-    for piece in said.split(","):
-        name, equals, value = piece.rpartition("=")
-        name = name.strip()
-        if equals and name not in per:
-            raise BadInput(
-                f"--counts names coordinates as in \"{names[0]}=16000\", got '{name}'; {nearest(name, names)}"
-            )
-        try:
-            number = float(value)
-        except ValueError:
-            number = 0.0
-        if not 0 < number < 1e15:
-            raise BadInput(
-                f"--counts takes numbers above 0, got '{piece.strip()[:40]}'; write 16000 or \"{names[0]}=16000\"."
-            )
-        per |= {name: number} if equals else dict.fromkeys(names, number)
-    return tuple((tau if c.unit == "rad" else 1.0) / per[c.name] for c in rig.plant.coordinates)
 
 
 def _start(rig: IdentifiedRig, given: str | Mapping[str, float | str]) -> tuple[float, ...]:
@@ -188,8 +167,10 @@ def _start(rig: IdentifiedRig, given: str | Mapping[str, float | str]) -> tuple[
 def regulate(
     source: str | os.PathLike[str] | None = None, *, rig: str = "", seed: int | None = None, which: int | str = "",
     poles: str | Iterable[complex] = "", speed: str = "filtered", memory: float = 0.5, tilt: float | str = "",
-    push: float | str = "", seconds: float = 6.0, draws: int = 200, out: str | os.PathLike[str] = "upright-regulate",
-    pdf: bool = False, workers: int = 1, cluster: str = "", progress: Progress = silent,
+    push: float | str = "", seconds: float = 6.0, draws: int = 200, limit: float | None = None,
+    period: float | str = "", counts: Counts = "", travel: float | None = None, vendor: str = "",
+    out: str | os.PathLike[str] = "upright-regulate", pdf: bool = False, workers: int = 1, cluster: str = "",
+    progress: Progress = silent,
 ) -> Answer[Regulation]:  # fmt: skip
     """What each pole set will come to on an identified rig that stands upright, and what it came to.
 
@@ -201,9 +182,10 @@ def regulate(
     source : path, optional
         fit.json or its folder; a twin is identified when omitted.
     rig : str, optional
-        Twin to identify: furuta or linear.
+        Twin to identify: furuta or linear; with a fit, the make whose vendor is chosen.
     seed : int, optional
-        Which twin of the make runs; with a fit and no seed nothing is run.
+        Which twin of the make runs, or which rig that the fit's covariance allows where no vendor is named; with a fit
+        and no seed nothing is run.
     which : int or str, optional
         Pole set of Table 1, 1 to 4, or all; the command line's ``--set``.
     poles : str or sequence of complex, optional
@@ -220,6 +202,16 @@ def regulate(
         Length of a run.
     draws : int
         Rigs that the fit's covariance allows, from which the chance is taken.
+    limit : float, optional
+        Largest command, in its unit; the study's when omitted, as for the next three.
+    period : float or str, optional
+        Servo period [s].
+    counts : float, str or mapping, optional
+        Encoder counts per turn or metre, one number or by coordinate.
+    travel : float, optional
+        How far the driven body may go either way [m or rad].
+    vendor : str, optional
+        Whose data sheet says what neither the call nor the study does: "ECP 205" or "ECP 210".
     out : path
         Folder for all files.
     pdf : bool
@@ -240,7 +232,6 @@ def regulate(
         When the call contradicts itself or the fit, or poles cannot be placed.
     """
     from upright.experiments.identified import read_identified
-    from upright.experiments.makes import make_rig
     from upright.experiments.regulation_2.chapter import chapter
     from upright.experiments.regulation_2.run import identify_make, run_regulation
     from upright.report.symbols import typed
@@ -256,16 +247,27 @@ def regulate(
         name, base = f"--rig {make}", 0.6
     else:
         known, name, base = read_identified(Path(source), seed=seed or 0, draws=draws), typed(Path(source)), 0.0
-        make = known.make.key
-        if rig not in ("", make):
-            raise BadInput(f"{source} is of the make '{make}', not '{rig}'; leave --rig out.")
-    truth = None if seed is None else make_rig(make, seed)
+        vendor = _vendor(known, rig, vendor, str(source))
+    given = rig_options(known.plant, known.unit, limit=limit, period=period, counts=counts, travel=travel)
+    said = known.described(given, vendor=vendor, who="upright regulate")
+    truth = None if seed is None else known.twin(known.rig(said), said, seed)
     done = run_regulation(
         known, truth, seed or 0, at, lambda step, share: progress(step, base + (1 - base) * share), wish=wish,
-        source=name, workers=shared,
+        source=name, workers=shared, said=said,
     )  # fmt: skip
     told = chapter(done)
+    if source is not None:
+        told = replace(told, warnings=(*told.warnings, *known.doubts(said, truth)))
     return Answer(done, told, write_page(told, at / "report.html", pdf))
+
+
+def _vendor(known: IdentifiedRig, rig: str, vendor: str, source: str) -> str:
+    """Data sheet chosen by the name of a make, ``--rig``, or of the vendor."""
+    if not rig:
+        return vendor
+    if rig != known.make.key:
+        raise BadInput(f"{source} is of the make '{known.make.key}', not '{rig}'; leave --rig out.")
+    return vendor or known.make.vendor
 
 
 def _wish(
@@ -290,7 +292,8 @@ def _wish(
 @keeps_its_inputs
 def swing_up(
     source: str | os.PathLike[str] | None = None, *, rig: str = "", seed: int = 1, seconds: float = 12.0,
-    travel: float | None = None, lie: str | Mapping[str, float] = "", check: Log | None = None,
+    travel: float | None = None, limit: float | None = None, period: float | str = "", counts: Counts = "",
+    vendor: str = "", lie: str | Mapping[str, float] = "", check: Log | None = None,
     out: str | os.PathLike[str] = "swing-up", pdf: bool = False,
 ) -> Answer[SwingUpRun | Scales]:  # fmt: skip
     """A hanging pendulum swung up within the drive's limit and travel, and caught; its encoders are asked first.
@@ -300,13 +303,22 @@ def swing_up(
     source : path, optional
         fit.json that the law is designed from; the make's data sheet when omitted.
     rig : str, optional
-        furuta or linear; a fit says which.
+        furuta or linear; with a fit, the make whose vendor is chosen.
     seed : int
-        Which rig of the make; 0 is the one as designed.
+        Which rig of the make, 0 is the one as designed; or which rig that the fit's covariance allows where no vendor
+        is named.
     seconds : float
         Time for the way up and for holding, 1 to 120 s.
     travel : float, optional
-        How far the driven body may go [m or rad]; what the rig says when omitted.
+        How far the driven body may go [m or rad]; the study's when omitted, as for the next three.
+    limit : float, optional
+        Largest command, in its unit.
+    period : float or str, optional
+        Servo period [s].
+    counts : float, str or mapping, optional
+        Encoder counts per turn or metre, one number or by coordinate.
+    vendor : str, optional
+        Whose data sheet says what neither the call nor the study does: "ECP 205" or "ECP 210".
     lie : str or mapping, optional
         An encoder shows a multiple of what is true: ``{"theta": 2}``.
     check : path, Record or pandas.DataFrame, optional
@@ -338,26 +350,33 @@ def swing_up(
         raise BadInput(f"--seconds needs a time from 1 to 120 s, got {seconds:g}.")
     if travel is not None and not travel > 0:
         raise BadInput(f"--travel must be above 0, got {travel:g}; give it in m or rad.")
-    known = None
+    known, doubts = None, ()
     if source is None:
-        make = rig or "furuta"
-        model = make_rig(make)
+        for option, value in (("limit", limit), ("period", period), ("counts", counts), ("vendor", vendor)):
+            if value not in (None, ""):
+                raise BadInput(f"--{option} is for a rig of your own: name its fit.json first.")
+        model, truth = make_rig(rig or "furuta"), make_rig(rig or "furuta", seed)
     else:
         identified = read_identified(Path(source), seed=seed)
-        make, known = identified.make.key, known_of(identified)
-        if rig and rig != make:
-            raise BadInput(f"the fit is of the make {make}, and --rig says {rig}; leave --rig out.")
-        model = identified.rig()
+        known, vendor = known_of(identified), _vendor(identified, rig, vendor, str(source))
+        given = rig_options(
+            identified.plant, identified.unit, limit=limit, period=period, counts=counts, travel=travel
+        )  # fmt: skip
+        needs = ("limit", "servo_period", "counts", "travel")
+        said = identified.described(given, vendor=vendor, needs=needs, who="upright swing-up")
+        model = identified.rig(said)
+        truth = model if check is not None else identified.twin(model, said, seed)
+        doubts = identified.doubts(said, None if check is not None else truth)
     name = "" if source is None else typed(Path(source))
     if check is not None:
         record, log = open_log(check)
         scales = scales_of_log(model, record, known)
         told = check_chapter(model, scales, log.name, name or "FIT.json")
+        told = replace(told, warnings=(*told.warnings, *doubts))
         return Answer(scales, told, write_page(told, at / "encoders.html", pdf))
-    done = run_swing_up(
-        model, _lying(make_rig(make, seed), lie), at, known=known, seconds=seconds, travel=travel, source=name
-    )
+    done = run_swing_up(model, _lying(truth, lie), at, known=known, seconds=seconds, travel=travel, source=name)
     told = chapter(done)
+    told = replace(told, warnings=(*told.warnings, *doubts))
     return Answer(
         done, told, [*write_page(told, at / "swing_up.html", pdf), write_json(at / "swing_up.json", told.numbers)]
     )
@@ -390,7 +409,8 @@ def _lying(rig: ServoRig, lie: str | Mapping[str, float]) -> ServoRig:
 def track(
     source: str | os.PathLike[str] | None = None, *, rig: str = "rectilinear", seed: int = 0,
     sets: str | int | Sequence[int] = "", poles: str | Iterable[complex] = "", step: float | str = "",
-    limit: float | None = None, out: str | os.PathLike[str] = "track", pdf: bool = False, progress: Progress = silent,
+    limit: float | None = None, period: float | str = "", counts: Counts = "", vendor: str = "",
+    out: str | os.PathLike[str] = "track", pdf: bool = False, progress: Progress = silent,
 ) -> Answer[Tracking]:  # fmt: skip
     """The far inertia of a flexible shaft made to follow a step, by state feedback and by PD (experiment 3).
 
@@ -409,7 +429,13 @@ def track(
     step : float or str, optional
         Size of the step [m or rad]; chosen by effort, twist and travel when omitted.
     limit : float, optional
-        Largest command; the make's own when omitted.
+        Largest command; the make's own, or the study's, when omitted.
+    period : float or str, optional
+        Servo period [s] of a rig of your own; the study's when omitted.
+    counts : float, str or mapping, optional
+        Encoder counts of a rig of your own, per turn or metre; the study's when omitted.
+    vendor : str, optional
+        Whose data sheet says what neither the call nor the study does: "ECP 205" or "ECP 210".
     out : path
         Folder for all files.
     pdf : bool
@@ -427,9 +453,10 @@ def track(
     BadInput
         When there is no such rig or set, or poles cannot be placed.
     """
+    from upright.experiments.identified import read_identified
     from upright.experiments.makes import SHAFTS, make_rig
     from upright.experiments.tracking_3.chapter import chapter
-    from upright.experiments.tracking_3.pulses import rig_of_file
+    from upright.experiments.tracking_3.pulses import rig_of_file, shaft_make
     from upright.experiments.tracking_3.run import follow, run_tracking
     from upright.files import write_json
 
@@ -440,7 +467,15 @@ def track(
         raise BadInput(f"--limit must be above 0, got {limit:g}.")
     if source is None and rig not in SHAFTS:
         raise BadInput(f"--rig is {' or '.join(SHAFTS)}, got '{rig}'.")
-    on = make_rig(rig, seed) if source is None else rig_of_file(Path(source), limit)
+    doubts: tuple[str, ...] = ()
+    if source is None:
+        on = make_rig(rig, seed)
+    else:
+        known = read_identified(Path(source))
+        shaft_make(known.plant, f"'{known.name}'")
+        given = rig_options(known.plant, known.unit, limit=limit, period=period, counts=counts)
+        said = known.described(given, vendor=vendor, who="upright track")
+        on, doubts = rig_of_file(known, said, Path(source).name), known.doubts(said)
     size = si_if_given(step, on.plant.coordinates[-1].unit)
     if size is not None and not size > 0:
         raise BadInput(f"--step needs a size above 0, got '{step}'.")
@@ -452,7 +487,7 @@ def track(
     told = chapter(done)
     told = replace(
         told, title=f"Experiment 3: {told.title.lower()}, {done.rig.name}",
-        numbers={**told.numbers, "verdict": told.verdict},
+        numbers={**told.numbers, "verdict": told.verdict}, warnings=(*told.warnings, *doubts),
     )  # fmt: skip
     return Answer(done, told, [write_json(at / "track.json", told.numbers), *write_page(told, at / "track.html", pdf)])
 

@@ -9,7 +9,7 @@ import pytest
 
 from upright.errors import BadInput
 from upright.experiments.identified import IdentifiedRig
-from upright.experiments.makes import make_rig
+from upright.experiments.makes import described_make, make_rig
 from upright.experiments.regulation_2 import chapter as regulation_page
 from upright.experiments.regulation_2.run import RegulationRequest, identify_make, run_regulation
 
@@ -26,7 +26,9 @@ def fit_of(truth, spread=0.01, seed=0, draws=64):
 
     plant, gain = draw(truth.plant, truth.gain)
     others = tuple(draw(plant, gain) for _ in range(draws))
-    return IdentifiedRig(plant=plant, name="rig", gain=gain, unit="V", draws=others if spread else ())
+    return IdentifiedRig(
+        plant=plant, name="rig", gain=gain, unit="V", draws=others if spread else (), description=described_make(truth)
+    )
 
 
 @pytest.mark.slow

@@ -18,11 +18,13 @@ def design(
     effort_weight: Annotated[
         float | None, typer.Option(metavar="R", help="Weight of the effort; without it --limit decides.")
     ] = None,
-    limit: Annotated[float | None, typer.Option(metavar="U", help="Largest command, in the command's unit.")] = None,
+    limit: Annotated[
+        float | None, typer.Option(metavar="U", help="Largest command, in its unit; the study's if left out.")
+    ] = None,
     start: Annotated[
         str, typer.Option(metavar="LIST", help='Deviation to come back from, as in "theta=5 deg, psi_dot=0.2 rad/s".')
     ] = "",
-    period: Annotated[str, typer.Option(metavar="TIME", help="Between samples.")] = "1 ms",
+    period: Annotated[str, typer.Option(metavar="TIME", help="Between samples; the study's if left out.")] = "",
     delay: Annotated[
         float | None, typer.Option(metavar="SAMPLES", help="Commands act so late in all; the fit's, else 1.")
     ] = None,
@@ -31,8 +33,11 @@ def design(
     lag: Annotated[str, typer.Option(metavar="TIME", help="Lag of the drive; the fit's if left out.")] = "",
     counts: Annotated[
         str,
-        typer.Option(metavar="LIST", help='Encoder counts per turn or metre: one number, or "x=226629, theta=16000".'),
-    ] = "16000",
+        typer.Option(metavar="LIST", help='Encoder counts per turn or metre, "4096" or "x=20000, theta=4096".'),
+    ] = "",
+    vendor: Annotated[
+        str, typer.Option(metavar="NAME", help='Whose data sheet says the rest: "ECP 205" or "ECP 210".')
+    ] = "",
     track: Annotated[str, typer.Option(metavar="COORDINATE", help="Coordinate that follows a reference.")] = "",
     sampled: Annotated[bool, typer.Option("--sampled", help="Gains whose sampled loop has the poles asked.")] = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the rigs drawn from the fit's covariance.")] = 0,
@@ -52,7 +57,7 @@ def design(
 
     done = verbs.design(
         source, at=at, poles=poles, lqr=lqr, effort_weight=effort_weight, limit=limit, start=start, period=period,
-        delay=delay, speed=speed, memory=memory, lag=lag, counts=counts, track=track, sampled=sampled, seed=seed,
-        out=out, pdf=pdf,
+        delay=delay, speed=speed, memory=memory, lag=lag, counts=counts, vendor=vendor, track=track, sampled=sampled,
+        seed=seed, out=out, pdf=pdf,
     )  # fmt: skip
     tell(done.chapter, done.files, done.numbers if as_json else None)

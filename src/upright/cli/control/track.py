@@ -24,8 +24,15 @@ def track(
     poles: Annotated[str, typer.Option(metavar="LIST", help='Poles [1/s] of your own: "-10+-20j, -25+-10j".')] = "",
     step: Annotated[str, typer.Option(metavar="SIZE", help='Size of the step, as in "5 mm" or "10 deg".')] = "",
     limit: Annotated[
-        float | None, typer.Option(metavar="U", help="Largest command; the make's own if left out.")
+        float | None, typer.Option(metavar="U", help="Largest command; the make's own, or the study's, if left out.")
     ] = None,
+    period: Annotated[str, typer.Option(metavar="TIME", help="Servo period; the study's if left out.")] = "",
+    counts: Annotated[
+        str, typer.Option(metavar="LIST", help='Encoder counts per turn or metre, "4096" or "x=20000, theta=4096".')
+    ] = "",
+    vendor: Annotated[
+        str, typer.Option(metavar="NAME", help='Whose data sheet says the rest: "ECP 205" or "ECP 210".')
+    ] = "",
     out: Out = Path("track"),
     pdf: Pdf = False,
     as_json: AsJson = False,
@@ -44,7 +51,19 @@ def track(
 
     with progress_bar(quiet=as_json) as bar:
         done = verbs.track(
-            source, rig=rig, seed=seed, sets=sets, poles=poles, step=step, limit=limit, out=out, pdf=pdf, progress=bar
+            source,
+            rig=rig,
+            seed=seed,
+            sets=sets,
+            poles=poles,
+            step=step,
+            limit=limit,
+            period=period,
+            counts=counts,
+            vendor=vendor,
+            out=out,
+            pdf=pdf,
+            progress=bar,
         )
     tell(done.chapter, done.files, done.numbers if as_json else None)
     if done.value.interrupted:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from upright.experiments.designing.run import Designed, VelocityLoop
+from upright.experiments.identified import rig_table
 from upright.gains import spelled_out
 from upright.gains.lqr import locus
 from upright.gains.requests import written
@@ -45,8 +46,10 @@ def chapter(done: Designed, *, source: str = "OUT/fit.json", folder: str = ".") 
             Part("Poles", (*sure, *_pole_pictures(done))),
             Part("The loop as it runs", (loop, _way_table(done))),
             Part("Coming back", (_swing_picture(done),)),
+            *((Part("The rig", (rig_table(done.wish.said),)),) if done.wish.said else ()),
         ),
         steps=tuple(_next_steps(done, source, folder)),
+        warnings=_doubts(done),
         numbers=_numbers(done),
     )
 
@@ -54,6 +57,18 @@ def chapter(done: Designed, *, source: str = "OUT/fit.json", folder: str = ".") 
 def _delay_from(done: Designed) -> str:
     """Who says how late a command acts."""
     return "as asked" if done.wish.delay is not None else "as the file says" if done.rig.delay else "assumed"
+
+
+def _doubts(done: Designed) -> tuple[str, ...]:
+    """What was not said of the rig, and whose number stands for it."""
+    told = done.rig.doubts(done.wish.said) if done.wish.said else ()
+    if done.wish.limit is not None:
+        return told
+    return (
+        *told,
+        "Nobody said how large a command the drive takes, so whether it saturates is not known: --limit 10, or "
+        '[actuator] limit = "10 V" in the study.',
+    )
 
 
 def _state_units(done: Designed) -> list[str]:
@@ -139,6 +154,8 @@ def _numbers(done: Designed) -> dict[str, Any]:
         "at": wish.at,
         "states": list(done.model.states),
         "command_unit": done.rig.unit,
+        "limit": wish.limit,
+        "described": None if wish.said is None else wish.said.plain(),
         "period": wish.period,
         "delay_samples": done.sampled.delay,
         "delay_from": _delay_from(done),

@@ -34,6 +34,7 @@ from upright.gains.sampled import to_s
 from upright.laws import Law
 from upright.physics import Linear
 from upright.records import Array
+from upright.study.description import RigDescription, turn_of
 
 SPEEDS = ("plain", "filtered", "kalman")
 """Ways to the velocities: differences of encoders, plain or through a low pass, and a Kalman filter."""
@@ -47,7 +48,7 @@ class DesignRequest:
     `lag` is the drive's [s], that of the rig's file when None.
     `poles` [1/s] or `weights` (diagonal of Q, with `R`, or with the limit and `start` from which R follows).
     `speed` is ``"plain"``, ``"filtered"`` or ``"kalman"``; `memory` is the filter's. With `sampled`, the gains are
-    those whose sampled loop has the poles asked.
+    those whose sampled loop has the poles asked. `said` is what period, limit and quantum rest on, to be told.
     """
 
     at: str
@@ -64,6 +65,7 @@ class DesignRequest:
     start: tuple[float, ...] = ()
     track: str = ""
     sampled: bool = False
+    said: RigDescription | None = None
 
     def __post_init__(self) -> None:
         if not 1e-6 <= self.period <= 10.0:
@@ -178,8 +180,14 @@ def design_for(rig: IdentifiedRig, wish: DesignRequest) -> Designed:
                 )
             R = weight_for_effort(model.A, model.B, weights, start, wish.limit, states=model.states)
         K = lqr(model.A, model.B, weights, R, states=model.states)
-    quantum = wish.quantum or (2 * math.pi / 16_000,) * sampled.C.shape[0]
-    estimators = [velocities(model, sampled, s, wish.memory, wish.limit or 1.0, quantum) for s in SPEEDS]
+    quantum = wish.quantum or quanta(rig, rig.described(needs=("counts",), who="upright design"))
+    if wish.limit is None and wish.speed == "kalman":
+        raise BadInput(
+            "a Kalman filter has to know how hard the rig is pushed, a tenth of what the drive can; give the largest "
+            'command (--limit 10, or [actuator] limit = "10 V" in the study).'
+        )
+    ways = SPEEDS if wish.limit is not None else SPEEDS[:-1]
+    estimators = [velocities(model, sampled, s, wish.memory, wish.limit or math.inf, quantum) for s in ways]
     estimator = estimators[SPEEDS.index(wish.speed)]
     wanted = placement.asked if placement is not None else poles_of(model.A - model.B @ K)
     gains = None if wish.speed == "kalman" else place_sampled(sampled, estimator, wanted)
@@ -193,11 +201,11 @@ def design_for(rig: IdentifiedRig, wish: DesignRequest) -> Designed:
         k_pf = prefilter(model.A, model.B, model.C[model.outputs.index(wish.track)], used)
     law = feedback(estimator, used, k_pf or 0.0)
     back = motion(model.A, model.B, K, start)
-    ways = tuple(_velocity_loop(model, sampled, e, used, quantum) for e in estimators)
+    loops = tuple(_velocity_loop(model, sampled, e, used, quantum) for e in estimators)
     cloud, chance = _cloud(rig, wish, sampled, law)
     return Designed(
         rig=rig, wish=wish, model=model, sampled=sampled, K=used, continuous=K, placement=placement,
-        sampled_gains=gains, R=R, law=law, poles=to_s(poles_of(closed(sampled, law)), wish.period), ways=ways,
+        sampled_gains=gains, R=R, law=law, poles=to_s(poles_of(closed(sampled, law)), wish.period), ways=loops,
         k_pf=k_pf, peak=float(np.abs(back[2]).max()), peak_sampled=_peak(sampled, law, start, float(back[0][-1])),
         swing=back, chance=chance, cloud=cloud,
     )  # fmt: skip
@@ -208,6 +216,11 @@ def _late(rig: IdentifiedRig, wish: DesignRequest) -> float:
     if wish.delay is not None:
         return wish.delay
     return rig.delay / wish.period or 1.0
+
+
+def quanta(rig: IdentifiedRig, said: RigDescription) -> tuple[float, ...]:
+    """Step of every encoder [m or rad], as described."""
+    return tuple(turn_of(c.unit) / said.entries[f"counts.{c.name}"].value for c in rig.plant.coordinates)
 
 
 def _peak(sampled: Sampled, law: Law, start: Array, seconds: float) -> float:

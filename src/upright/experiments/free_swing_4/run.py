@@ -174,7 +174,7 @@ def question_text(q: Question, rig: ServoRig) -> str:
     return study_text(
         (
             table("", title=q.title, source=source),
-            table("[rig]", plant=make_of(rig.plant).plant_name),
+            table("[rig]", plant=make_of(rig.plant).plant_name, vendor=make_of(rig.plant).vendor),
             parameters,
             *(counted_sensor(c.name, c.unit, n) for c, n in zip(rig.plant.coordinates, rig.counts, strict=True)),
             *(

@@ -19,7 +19,7 @@ from upright import units
 from upright.control import ServoRig
 from upright.errors import BadInput, nearest
 from upright.experiments.frequency_1b.sweeps import Sweep, broadband, stepped_sine
-from upright.experiments.makes import Make, make_named, make_of, make_rig
+from upright.experiments.makes import Make, described_make, make_named, make_of, make_rig
 from upright.experiments.weighing_1a.run import Known
 from upright.identification import Parameter
 from upright.identification import Rig as Asked
@@ -28,6 +28,7 @@ from upright.identification.frequency.response import FrequencyResponse, is_resp
 from upright.identification.frequency.spectra import response_of
 from upright.progress import Progress, silent
 from upright.records import Record
+from upright.study.description import RigDescription
 from upright.study.results import write_response_fit
 
 LAG = 1e-3
@@ -141,7 +142,8 @@ def run_frequency(
 
     answer = explain(asked(make, said, tolerance), at, sweep.response, seed=seed, tell=follow, stopped=stopped)
     progress("writing the log and the fit", 0.9)
-    write_response_fit(answer, folder, make.plant_name, f"Frequency response of {rig.name}, seed {rig.seed}")
+    title = f"Frequency response of {rig.name}, seed {rig.seed}"
+    write_response_fit(answer, folder, make.plant_name, title, said=described_make(rig))
     sweep.log.to_csv(folder / "sweep.csv")
     progress("done", 1.0)
     return FrequencyRun(
@@ -213,9 +215,9 @@ def response_of_logs(
         Told the step at work.
     """
     rest: Asked | None = None
-    plant = ""
+    plant, said = "", RigDescription()
     if len(sources) == 1 and sources[0].suffix == ".toml":
-        rest, plant, records, quantum = _study(sources[0], data)
+        rest, plant, records, quantum, said = _study(sources[0], data)
         response = response_of(records, command="u", outputs=records[0].outputs, kind=wish.kind, hold=wish.hold,
                                quantum=quantum, band=wish.band)  # fmt: skip
     elif len(sources) == 1 and is_response(sources[0]):
@@ -226,6 +228,7 @@ def response_of_logs(
         response = _logs(sources, wish)
     if wish.make and rest is None:
         rest, plant = _designed(wish), make_named(wish.make).plant_name
+        said = RigDescription(vendor=make_named(wish.make).vendor)
     folder.mkdir(parents=True, exist_ok=True)
     names = tuple(s.name for s in sources)
     if rest is None:
@@ -233,7 +236,7 @@ def response_of_logs(
         return LoggedResponse(sources=names, response=response, answer=None, folder=folder)
     at = next(iter(rest.plant.equilibria))
     answer = explain(rest, at, response, seed=wish.seed, tell=tell)
-    write_response_fit(answer, folder, plant, "Frequency response", ", ".join(names))
+    write_response_fit(answer, folder, plant, "Frequency response", ", ".join(names), said)
     return LoggedResponse(sources=names, response=response, answer=answer, folder=folder)
 
 
@@ -254,7 +257,7 @@ def _designed(wish: LogRequest) -> Asked:
     return replace(rest, parameters={**rest.parameters, **changed})
 
 
-def _study(path: Path, data: Path | None) -> tuple[Asked, str, list[Record], list[float]]:
+def _study(path: Path, data: Path | None) -> tuple[Asked, str, list[Record], list[float], RigDescription]:
     from upright.study.load import load_study
 
     study = load_study(path, data=data)
@@ -266,7 +269,7 @@ def _study(path: Path, data: Path | None) -> tuple[Asked, str, list[Record], lis
         columns = {"u": run.u[:, 0], **{n: run.y[:, j] for j, n in enumerate(run.measured)}}
         units = {c.name: c.unit for c in study.rig.plant.coordinates if c.name in run.measured}
         records.append(Record(t=run.t, signals=columns, units=units, inputs=("u",), outputs=run.measured))
-    return study.rig, study.plant, records, list(runs[0].quantum or [0.0] * len(runs[0].measured))
+    return study.rig, study.plant, records, list(runs[0].quantum or [0.0] * len(runs[0].measured)), study.description
 
 
 def _logs(sources: Sequence[Path], wish: LogRequest) -> FrequencyResponse:

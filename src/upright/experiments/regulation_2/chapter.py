@@ -7,6 +7,7 @@ from typing import Any
 
 from upright.control import Score, ServoRig
 from upright.control.preflight import FELT, WORDS, word
+from upright.experiments.identified import rig_table
 from upright.experiments.regulation_2.figures import chances_figure, runs_figure, ways_figure
 from upright.experiments.regulation_2.run import SETS, Attempt, Regulation, VelocityRun
 from upright.gains.requests import written
@@ -194,15 +195,17 @@ def _way_table(done: Regulation) -> Table:
 def _parts(done: Regulation) -> list[Part]:
     tilt, push = math.degrees(done.task.start[2]), done.task.start[3]
     rig = done.rig
+    steps = f"steps of {1e3 * rig.converter:.2g} m{rig.unit}" if rig.converter else "no steps that anybody told"
     given = (
         f"{rig.name}, sampled every {1e3 * rig.period:.3g} ms; the command has a limit of {rig.limit:g} {rig.unit}, "
-        f"steps of {1e3 * rig.converter:.2g} m{rig.unit}, and acts {1e3 * rig.delay:.2g} ms late with a lag of "
+        f"{steps}, and acts {1e3 * rig.delay:.2g} ms late with a lag of "
         f"{1e3 * rig.lag:.2g} ms. Positions come in counts; velocities are made of them.",
         f"The pendulum is let go {tilt:.0f}° from upright, moving away at {push:.2g} rad/s, by a hand that errs by "
         f"{math.degrees(done.task.hand[2]):.1f}° and {done.task.hand[3]:.1g} rad/s.",
     )
     parts = [
         Part("Gains", (*given, _gain_table(done))),
+        Part("The rig", (rig_table(done.said),)),
         Part(
             "Told before, come after",
             (
@@ -252,7 +255,8 @@ def _steps(done: Regulation) -> list[Step]:
     seed = f" --seed {done.truth.seed}" if done.truth is not None else ""
     base = f"upright regulate {done.source}{seed}"
     first = [] if done.truth is not None else [
-        Step("Run the laws on a twin of this make.", f"upright regulate {done.source} --seed 0")
+        Step("Run the laws on another rig: of this make, or one that the fit allows.",
+             f"upright regulate {done.source} --seed 0")
     ]  # fmt: skip
     own = f'--poles "{written(done.best.placement.asked).replace("±", "+-")}"'
     best = f"--set {done.best.name[4:]}" if done.best.name in SETS else own
@@ -272,6 +276,7 @@ def _numbers(done: Regulation) -> dict[str, Any]:
         "seed": None if done.truth is None else done.truth.seed,
         "start": dict(zip(done.rig.plant.state_names(), done.task.start, strict=True)),
         "limit": done.rig.limit,
+        "described": done.said.plain(),
         "command_unit": done.rig.unit,
         "recommended": done.best.name,
         "as_told": sum(a.word == a.before.word for a in done.attempts) if done.truth is not None else None,

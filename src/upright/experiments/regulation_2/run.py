@@ -6,6 +6,7 @@ runs on the rig itself, here the twin's truth, and what came is put beside what 
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -28,8 +29,11 @@ from upright.paper.reproduce import TABLE_1
 from upright.physics import Linear
 from upright.progress import Progress, part, silent
 from upright.records import Array
+from upright.study.description import RigDescription
 from upright.workers import HERE, Workers
 
+START = (math.radians(5), 0.0)
+"""Tilt [rad] and speed [rad/s] with which a pendulum is let go where nobody says and no make has its own."""
 HAND = (0.01, 0.1)
 """What a hand gets wrong: half a degree, and 0.1 rad/s."""
 DRAWS = 200
@@ -38,7 +42,7 @@ SETS = {f"set {i}": text for i, text in enumerate(TABLE_1, start=1)}
 
 @dataclass(frozen=True, kw_only=True)
 class RegulationRequest:
-    """What is asked: poles by name [1/s], the way to the velocities, and the start (the make's own when None)."""
+    """What is asked: poles by name [1/s], the way to the velocities, and the start (see `START` when None)."""
 
     poles: Mapping[str, Roots] = field(default_factory=lambda: {n: read_poles(text) for n, text in SETS.items()})
     speed: str = "filtered"
@@ -112,6 +116,8 @@ class Regulation:
     source : str
         What `upright regulate` is given to do this again.
     seed : int
+    said : RigDescription
+        Drive, encoders and servo, with what each number rests on.
     interrupted : bool
     seconds : float
         Computing time.
@@ -126,6 +132,7 @@ class Regulation:
     uncertain: bool
     source: str
     seed: int
+    said: RigDescription = field(default_factory=RigDescription)
     interrupted: bool = False
     seconds: float = 0.0
 
@@ -137,20 +144,25 @@ class Regulation:
 
 def identify_make(key: str, seed: int, folder: Path, progress: Progress = silent, draws: int = DRAWS) -> IdentifiedRig:
     """What experiment 1b makes of a rig of the make; its logs and `fit.json` go into the folder."""
-    _check_upright(key)
+    if key not in PENDULUMS:
+        raise BadInput(f"there is nothing to hold upright on the make '{key}'; take one of {', '.join(PENDULUMS)}.")
     run_frequency(key, seed, folder, progress)
     return read_identified(folder / "fit.json", seed=seed, draws=draws)
 
 
-def _check_upright(key: str) -> None:
-    if key not in PENDULUMS:
-        raise BadInput(f"there is nothing to hold upright on the make '{key}'; take one of {', '.join(PENDULUMS)}.")
+def _check_upright(known: IdentifiedRig) -> None:
+    plant = known.plant
+    if "inverted" not in plant.equilibria or len(plant.coordinates) != 2 or len(plant.inputs) != 1:
+        raise BadInput(
+            f"there is nothing to hold upright on a '{known.name}'; regulate is for one driven body with a pendulum "
+            "on it (furuta, cart-pendulum, or your own with the equilibrium 'inverted'), upright design for all."
+        )
 
 
 def run_regulation(
     known: IdentifiedRig, truth: ServoRig | None, seed: int, folder: Path, progress: Progress = silent,
     stopped: Callable[[], bool] = lambda: False, wish: RegulationRequest | None = None, source: str = "FIT",
-    workers: Workers = HERE,
+    workers: Workers = HERE, said: RigDescription | None = None,
 ) -> Regulation:  # fmt: skip
     """Design for the rig as identified, say what will come, and run on the rig itself.
 
@@ -173,14 +185,18 @@ def run_regulation(
         How a command line would name the fit.
     workers : Workers, optional
         Who simulates the rigs that the fit allows.
+    said : RigDescription, optional
+        Drive, encoders and servo; what the fit says of them when omitted.
     """
     began = time.perf_counter()
-    wish, make = wish or RegulationRequest(), known.make
-    _check_upright(make.key)
-    rig = known.rig()
+    wish = wish or RegulationRequest()
+    _check_upright(known)
+    said = said or known.described(who="regulate")
+    rig, make = known.rig(said), known.made_by(said.vendor)
+    usual = make.start if make else START
     model = rig.linear("inverted")
     sampled = hold(model, rig.period, rig.delay / rig.period)
-    tilt, push = (w if w is not None else s for w, s in zip((wish.tilt, wish.push), make.start, strict=True))
+    tilt, push = (w if w is not None else s for w, s in zip((wish.tilt, wish.push), usual, strict=True))
     task = Task(start=(0.0, 0.0, tilt, push), hand=(0.0, 0.0, *HAND), seconds=wish.seconds)
     others = known.allowed(rig, wish.draws, seed)
     attempts: list[Attempt] = []
@@ -195,7 +211,7 @@ def run_regulation(
             break
     done = Regulation(
         rig=rig, truth=truth, task=task, wish=wish, attempts=tuple(attempts), ways=(), uncertain=bool(known.draws),
-        source=source, seed=seed, interrupted=interrupted,
+        source=source, seed=seed, said=said, interrupted=interrupted,
     )  # fmt: skip
     progress("comparing the ways to the velocities", len(wish.poles) / (len(wish.poles) + 1))
     ways = () if interrupted else tuple(_ways(done, model, sampled))

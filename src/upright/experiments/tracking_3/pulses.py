@@ -15,14 +15,15 @@ import numpy as np
 from upright.control import ServoRig
 from upright.control.trial import twin_log
 from upright.errors import BadInput
-from upright.experiments.identified import read_identified
-from upright.experiments.makes import SHAFTS, Make, make_of, make_rig
+from upright.experiments.identified import IdentifiedRig
+from upright.experiments.makes import SHAFTS, Make, make_of
 from upright.experiments.weighing_1a.run import Known
 from upright.files import replace_file
 from upright.identification.model.fit import Fit
 from upright.physics import Plant
 from upright.progress import Progress, part, silent
 from upright.records import Record
+from upright.study.description import RigDescription
 from upright.study.load import Study
 from upright.study.text import TomlTable, counted_sensor, number, study_text, table
 
@@ -49,14 +50,13 @@ def shaft_make(plant: Plant, name: str) -> Make:
     return make
 
 
-def rig_of_file(path: Path, limit: float | None = None) -> ServoRig:
-    """The rig that a fit or a study describes; what neither says, limit, counts and period, is the make's."""
-    known = read_identified(path)
-    made = make_rig(shaft_make(known.plant, f"'{known.name}'").key)
+def rig_of_file(known: IdentifiedRig, said: RigDescription, name: str) -> ServoRig:
+    """The rig that a fit or a study of this `name` tells of, with drive and encoders as they are described."""
+    shaft_make(known.plant, f"'{known.name}'")
     p = known.plant.parameters()
     if p["k_1"] or p["k_2"]:
         raise BadInput("tracking is for bodies without springs to ground, and k_1 or k_2 of this fit is not zero.")
-    return replace(known.rig(made), lag=known.lag, limit=limit or made.limit, name=f"the rig of {path.name}")
+    return replace(known.rig(said), name=f"the rig of {name}")
 
 
 def pulses(rig: ServoRig, file: str) -> Record:
@@ -110,7 +110,7 @@ def shaft_study(rig: ServoRig, seed: int, weighed: Sequence[Known] = ()) -> str:
                 title=f"Two inertias on a shaft: {rig.name}",
                 source=f"digital twin, seed {rig.seed}: simulated, no rig was touched",
             ),
-            table("[rig]", plant=make.plant_name),
+            table("[rig]", plant=make.plant_name, vendor=make.vendor),
             parameters,
             actuator,
             table("[drive]", column="u", unit=rig.unit),
