@@ -17,7 +17,6 @@ from upright.physics.actuator import ACTUATOR
 from upright.records import Array
 from upright.records.record import of_twin
 from upright.report.page import Table
-from upright.report.symbols import number
 from upright.study.description import (
     Entry,
     RigDescription,
@@ -29,7 +28,7 @@ from upright.study.description import (
 from upright.study.fitted import FittedModel, read_fit
 from upright.study.rig import read_plant, read_rig
 from upright.study.sensors import drive_unit
-from upright.study.text import StudyText
+from upright.study.text import StudyText, number
 from upright.trust import before_running
 
 MORE = ACTUATOR.keys() - {f"actuator.{n}" for n in ("gain", "limit", "delay", "lag", "offset", "start", "end")}
@@ -237,7 +236,7 @@ def rig_table(said: RigDescription) -> Table:
     told = {n: e for n, e in said.entries.items() if not n.startswith(("sign.", "offset."))}
     return Table(
         caption="The rig as it is described", headings=("", "value", "from"),
-        rows=tuple((meaning_of(n), f"{number(e.value, 5)} {e.unit if e.unit != '1' else ''}".strip(), e.source)
+        rows=tuple((meaning_of(n), number(e.value, e.unit, 6), e.source)
                    for n, e in told.items()), numbers=(1,),
     )  # fmt: skip
 

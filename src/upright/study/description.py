@@ -98,6 +98,20 @@ class RigDescription:
             f" and identify again; --vendor takes a data sheet by name ({vendors}) where the rig is one of those."
         )
 
+    def unlike(self, other: RigDescription) -> tuple[str, ...]:
+        """Sentences on what the other, a rig that a fit of this one is applied to, differs in."""
+        out: list[str] = []
+        for what, mine, others in (("", self.name, other.name), ("vendor ", self.vendor, other.vendor)):
+            if mine and others and mine != others:
+                out.append(f"The fit is of another rig ({what}{mine}) than the study ({what}{others}).")
+        for name in self.entries.keys() & other.entries.keys():
+            mine, others = self.entries[name], other.entries[name]
+            fixed = name.startswith("counts.") or {mine.source, others.source} <= {"known", "measured"}
+            if fixed and not name.startswith("offset.") and not math.isclose(mine.value, others.value, rel_tol=1e-3):
+                fit, study = (number(e.value, e.unit, 5) for e in (mine, others))
+                out.append(f"Is it the same rig? Its {meaning_of(name)}: {fit} in the fit, {study} in the study.")
+        return tuple(sorted(out))
+
     def plain(self) -> dict[str, Any]:
         """As `fit.json` holds it."""
         table = {n: {"value": e.value, "unit": e.unit, "source": e.source} for n, e in self.entries.items()}

@@ -91,7 +91,10 @@ def predict(
     told = Chapter(
         title=f"{model.name} on {study.name}", verdict="", numbers=numbers,
         parts=(Part("How much of each signal is explained", (score_table(scores),)),),
-        warnings=(*(() if fitted.trusted else (f"The model's own verdict was: {fitted.verdict}",)), *offers),
+        warnings=(
+            *(() if fitted.trusted else (f"The model's own verdict was: {fitted.verdict}",)),
+            *fitted.description.unlike(asked.description), *offers,
+        ),
     )  # fmt: skip
     return Answer(scores, told, [] if out is None else [write_json(Path(out) / "prediction.json", numbers)])
 
