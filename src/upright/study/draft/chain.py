@@ -33,9 +33,6 @@ from upright.study.draft.tables import (
 from upright.study.rig import per
 from upright.study.text import TomlTable, number
 
-COUNTS = {"rad": (16000, "ECP 205 has 16000"), "m": (226629, "ECP 210 has 16000 counts per 7.06 cm")}
-"""Of an encoder, per turn or metre, and whose."""
-
 SI = {"mm": 1e-3, "deg": float(np.pi / 180)}
 
 REACH = 10.0
@@ -106,7 +103,7 @@ def _factor(log: ChainLog, plant: type[Plant], name: str) -> float:
     """SI per unit of a column."""
     c = log.recognised.columns[name]
     if c.guess == "counts":
-        return 2 * np.pi / COUNTS["rad"][0] if _unit(plant, name) == "rad" else 1 / COUNTS["m"][0]
+        return 2 * np.pi / log.counts["rad"][0] if _unit(plant, name) == "rad" else 1 / log.counts["m"][0]
     return SI.get(c.guess, 1.0)
 
 
@@ -204,7 +201,7 @@ def _drive(log: ChainLog, plant: type[Plant], start: ChainStarts) -> list[TomlTa
 
 def _sensor(log: ChainLog, plant: type[Plant], name: str) -> TomlTable:
     coordinate = next(k for k in plant.coordinates if k.name == name)
-    counts, whose = COUNTS[coordinate.unit]
+    counts, whose = log.counts[coordinate.unit]
     told = f"{whose}; what is said in V, s and counts does not depend on it"
     driven = log.recognised.drive is not None
     return sensor_table(

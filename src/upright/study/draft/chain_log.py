@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -14,6 +15,7 @@ from upright.readers.inspection import Column, Inspection
 from upright.records import Array, Record
 from upright.signals.stretches import turning_points
 from upright.signals.trips import goes_dead
+from upright.study.draft.described import COUNTS, counts_of
 from upright.study.draft.recognise import REFERENCE, Recognised, in_dac_counts
 
 RUNS_AWAY = 16_000
@@ -59,6 +61,8 @@ class ChainLog:
         Stretches that speak about the plant [s].
     still : tuple of str
         Coordinates that lie still before the first command.
+    counts : mapping of str to (int, str)
+        Encoder counts per turn and metre to begin with, by rad and m, and whose they are.
     """
 
     recognised: Recognised
@@ -68,6 +72,7 @@ class ChainLog:
     loop: str
     windows: tuple[tuple[float, float], ...]
     still: tuple[str, ...] = ()
+    counts: Mapping[str, tuple[int, str]] = field(default_factory=lambda: COUNTS)
 
     @property
     def fixed(self) -> tuple[str, ...]:
@@ -136,6 +141,7 @@ def read_chain(record: Record, seen: Inspection, found: Recognised, *, named: bo
     return ChainLog(
         recognised=found, held=held, locked=locked, reference=reference, loop=loop, windows=tuple(windows),
         still=still_bodies(record, found.columns, at) if drive is not None else (),
+        counts={unit: counts_of(seen, unit) for unit in COUNTS},
     )  # fmt: skip
 
 

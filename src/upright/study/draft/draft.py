@@ -10,6 +10,7 @@ from upright.records import Record
 from upright.study.clock import check_clock
 from upright.study.draft.chain import chain_tables
 from upright.study.draft.chain_log import read_chain
+from upright.study.draft.described import describe
 from upright.study.draft.pendulum import pendulum_tables
 from upright.study.draft.recognise import recognise
 from upright.study.draft.suits import plants_that_suit
@@ -44,6 +45,7 @@ def draft(record: Record, seen: Inspection, log: Path, study: Path, *, plant: st
         found, tables = chain_tables(record, chain, file, log.stem)
     else:
         found, tables = pendulum_tables(record, seen, found, file, log.stem)
+    describe(tables, record, seen, found)
     doubts = list(found.doubts)
     told = bool(plant) or (found.plant.startswith(CHAINS) and len(found.columns) > 1)  # carts from disks, and why
     others = [name for name in plants_that_suit(record, seen) if name != found.plant and name not in " ".join(doubts)]

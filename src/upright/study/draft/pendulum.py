@@ -17,6 +17,7 @@ from upright.physics import Plant, find
 from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Inspection
 from upright.records import Array, Record
 from upright.signals.smoothing import acceleration_width, savitzky_golay
+from upright.study.draft.described import counts_of
 from upright.study.draft.plausible import implausible
 from upright.study.draft.recognise import Recognised, in_dac_counts
 from upright.study.draft.tables import (
@@ -248,12 +249,15 @@ def _gain(found: Recognised) -> float:
 def _sensor(seen: Inspection, found: Recognised, plant: type[Plant], name: str) -> TomlTable:
     c = found.columns[name]
     coordinate = next(k for k in plant.coordinates if k.name == name)
-    ecp = seen.reader == "ecp" or any(word in c.name.lower() for word in ("enc", "pos"))
-    counts = (16000, "ECP rigs have 16000") if ecp else (4096, "see the encoder")
-    if coordinate.unit != "rad":
-        counts = (226629, "ECP 210 has 16000 counts per 7.06 cm")
     mirrored = found.mirrored and name == plant.coordinates[-1].name
-    return sensor_table(coordinate, c, found.rest[name], counts, driven=found.drive is not None, mirrored=mirrored)
+    return sensor_table(
+        coordinate,
+        c,
+        found.rest[name],
+        counts_of(seen, coordinate.unit),
+        driven=found.drive is not None,
+        mirrored=mirrored,
+    )
 
 
 def _defaults(found: Recognised, plant: type[Plant], balanced: Balanced | None) -> TomlTable:

@@ -73,9 +73,10 @@ def sensor_table(
     if c.guess:
         table.key("unit", c.guess, "" if c.unit else "guessed; the log does not say")
     if c.guess == "counts":
-        table.key("counts_per_rev" if turns else "counts_per_m", counts[0], f"MEASURE: {counts[1]}")
+        count = {"value": counts[0], "assumed": True}
+        table.key("counts_per_rev" if turns else "counts_per_m", count, f"MEASURE: {counts[1]}")
     elif c.quantum.counts_per_rev and turns:
-        table.key("counts_per_rev", c.quantum.counts_per_rev, "from the column's steps")
+        table.key("counts_per_rev", {"value": c.quantum.counts_per_rev, "measured": True}, "from the column's steps")
     elif c.quantum.step and c.guess in ("rad", "m"):
         table.key("resolution", f"{c.quantum.step:.4g} {c.guess}", "from the column's steps")
     where = "lay before the first command" if driven else "comes to rest"

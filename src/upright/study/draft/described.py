@@ -1,0 +1,72 @@
+"""What a log tells of drive, encoders and servo, for the tables of a drafted study; what it does not stands ready."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+
+from upright.physics import find
+from upright.readers.inspection import Inspection
+from upright.records import Record
+from upright.study.draft.recognise import Recognised, in_dac_counts
+from upright.study.text import TomlTable, number
+from upright.units import scale
+
+COUNTS = {"rad": (4096, "see the encoder"), "m": (10_000, "see the encoder")}
+"""Placeholders of an encoder's counts per turn or metre."""
+ECP_COUNTS = {"rad": (16000, "ECP 205 has 16000"), "m": (226629, "ECP 210 has 16000 counts per 7.06 cm")}
+"""The same of ECP's rigs, for logs that are theirs."""
+
+
+def is_ecp(seen: Inspection) -> bool:
+    """Whether the log itself shows that it is of an ECP rig: its export, or commands in counts of its converter."""
+    return seen.reader == "ecp" or any(in_dac_counts(c) for c in seen.columns)
+
+
+def counts_of(seen: Inspection, unit: str) -> tuple[int, str]:
+    """Counts per turn or metre to begin with, and whose they are."""
+    return (ECP_COUNTS if is_ecp(seen) else COUNTS)[unit]
+
+
+def describe(tables: Sequence[TomlTable], record: Record, seen: Inspection, found: Recognised) -> None:
+    """Add to [rig] and [actuator] what `upright design`, `regulate` and `swing-up` need to know.
+
+    A limit counts as measured where a command that varies stays at its extreme; what the log only hints at is
+    commented out, so that nobody's guess passes for a rig's number.
+    """
+    if found.drive is None:
+        return
+    plant = find(found.plant)
+    coordinates = {c.name: c.unit for c in plant.coordinates}
+    body = plant.inputs[0].on
+    named = {t.lines[0].partition("]")[0] + "]": t for t in tables if t.lines}
+    rig = named["[rig]"]
+    if is_ecp(seen):
+        vendor = "ECP 210" if coordinates[body] == "m" else "ECP 205"
+        rig.key("vendor", vendor, "the log is an ECP rig's; its data sheet says what is not said here")
+    else:
+        period = f"{record.period * 1e3:.4g} ms"
+        rig.key("servo_period", {"value": period, "assumed": True}, "the log's; MEASURE if the controller is faster")
+    rig.key(
+        "travel", _went(found, body, coordinates[body]), "MEASURE: how far it may go; here it went so far", off=True
+    )
+    actuator, drive = (
+        next((t for t in tables if t.lines[0].startswith(f"[{n}]")), None) for n in ("actuator", "drive")
+    )
+    if actuator is None or drive is None or any(line.startswith("limit") for line in actuator.lines):
+        return
+    said = tomllib.loads(str(drive))["drive"]
+    unit, factor = said.get("unit", ""), abs(said.get("scale", 1.0))
+    most = max(abs(found.drive.low), abs(found.drive.high)) * factor
+    if not found.drive.stepwise and max(found.drive.low_share, found.drive.high_share) > 0:
+        actuator.key("limit", {"value": number(most, unit, 12), "measured": True}, "the command stays at it")
+    else:
+        actuator.key("limit", number(most, unit), "MEASURE: largest command that passes; this is the log's", off=True)
+
+
+def _went(found: Recognised, body: str, unit: str) -> str:
+    """Half of what the driven body went through, "..." where its column is in counts."""
+    c = found.columns.get(body)
+    if c is None or c.guess not in ("rad", "deg", "m", "mm"):
+        return f"... {unit}"
+    return number((c.high - c.low) / 2 * scale(c.guess), unit)
