@@ -78,7 +78,8 @@ def sensor_table(
     elif c.quantum.counts_per_rev and turns:
         table.key("counts_per_rev", {"value": c.quantum.counts_per_rev, "measured": True}, "from the column's steps")
     elif c.quantum.step and c.guess in ("rad", "m"):
-        table.key("resolution", f"{c.quantum.step:.4g} {c.guess}", "from the column's steps")
+        step = {"value": f"{c.quantum.step:.4g} {c.guess}", "measured": True}
+        table.key("resolution", step, "from the column's steps")
     where = "lay before the first command" if driven else "comes to rest"
     zero = zero if abs(zero) > 1e-9 * (c.high - c.low) else 0.0  # a motion that has died out ends in rounding
     table.key("offset", zero, f"reading at which {name} is zero, here where it {where}")
