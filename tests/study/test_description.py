@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import json
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from upright import readers
 from upright.errors import BadInput
 from upright.identification import identify
 from upright.physics import CartPendulum
+from upright.readers import inspect
 from upright.simulation import simulate
+from upright.study.draft.draft import draft
 from upright.study.fitted import read_fit
 from upright.study.load import load_study
 from upright.study.results import write_fit
@@ -186,3 +191,52 @@ def test_a_changed_description_is_refused(cart, tmp_path, change, words):
     (tmp_path / "fit.json").write_text(json.dumps(content), encoding="utf-8")
     with pytest.raises(BadInput, match=words):
         read_fit(tmp_path / "fit.json")
+
+
+def test_the_example_of_the_page_describes_a_rig(tmp_path, log):
+    page = (Path(__file__).parents[2] / "docs" / "study.md").read_text(encoding="utf-8")
+    example = re.findall(r"```toml\n(.*?)```", page.partition("## The rig as a loop sees it")[2], re.DOTALL)[0]
+    np.savetxt(tmp_path / "log.csv", log, "%.9f", ",", header="t,u,x,theta", comments="")
+    rest = CART.partition("[parameters]")[2].partition("[actuator]")[0]
+    text = f'{example}unit = "rad"\n[drive]\ncolumn = "u"\nunit = "V"\n[parameters]{rest}[[runs]]\nfile = "log.csv"\n'
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    said = load_study(tmp_path / "study.toml").description
+    assert {n: e.source for n, e in said.entries.items()} == {
+        "gain": "identified", "limit": "measured", "force_limit": "known", "lag": "assumed", "converter": "known",
+        "servo_period": "known", "travel": "known", "speed_limit": "measured", "counts.theta": "measured",
+    }  # fmt: skip
+
+
+def test_a_drafted_study_leads_from_a_log_to_a_rig_without_anybody_else_s_numbers(tmp_path):
+    """A cart of 0.4 N/V whose command is cut off at +-10 V, read by encoders of 20000 per m and 4096 per turn."""
+    dt, n = 2e-3, 4000
+    t = np.arange(n) * dt
+    u = np.where(t > 0.3, np.clip(14 * np.sin(2 * np.pi * (1.5 + 0.03 * t) * t), -10, 10), 0.0)
+    plant = CartPendulum(m_c=0.9, m_p=0.12, l_cg=0.2, J_p=1.5e-3, b_1=0.8, b_2=1e-4, b_1c=0.05)
+    x = simulate(plant, {"actuator.gain": 0.4}, plant.state("hanging"), u, dt, samples=n)[:, ::2, 0]
+    read = np.round(x * [20_000, 4096 / math.tau]) / [20_000, 4096 / math.tau]
+    columns = np.column_stack([t, u, read])
+    np.savetxt(tmp_path / "log.csv", columns, "%.7f", ",", header="t,u,x,theta", comments="")
+    record = readers.read(tmp_path / "log.csv")
+    path = tmp_path / "study.toml"
+    text = draft(record, inspect(record), tmp_path / "log.csv", path)
+    path.write_text(text, encoding="utf-8")
+    assert "ECP" not in text
+    said = load_study(path).description
+    told = {n: (e.value, e.source) for n, e in said.entries.items()}
+    assert told["limit"] == (10.0, "measured")
+    assert told["servo_period"] == (pytest.approx(dt), "assumed")
+    assert told["counts.theta"] == (pytest.approx(4096), "measured")
+    assert told["counts.x"] == (pytest.approx(20_000, rel=1e-3), "measured")
+    assert '# travel = "0.' in text
+
+
+def test_only_a_log_that_is_an_ecp_s_is_given_its_data_sheet(tmp_path, log):
+    rows = "\n".join(f"{i} {row[0]:.4f} {0:d} {row[2] * 226629:.0f} {row[3] * 2546:.0f} {row[1]:.4f};"
+                     for i, row in enumerate(log.tolist()))  # fmt: skip
+    head = "Sample\tTime\tCommanded Pos\tEncoder 1 Pos\tEncoder 2 Pos\tControl Effort\n\n["
+    (tmp_path / "ecp.txt").write_text(head + rows.rstrip(";") + "]\n", encoding="utf-8")
+    record = readers.read(tmp_path / "ecp.txt")
+    text = draft(record, inspect(record), tmp_path / "ecp.txt", tmp_path / "s.toml", plant="rectilinear-2")
+    assert 'vendor = "ECP 210"' in text
+    assert "servo_period" not in text  # its export leaves samples out
