@@ -98,6 +98,8 @@ def test_options_come_before_the_study(study, tmp_path):
     assert told["encoder counts of x"] == ("20000 1/m", "known")
     assert told["first-order lag"] == ("0.004 s", "known")
     assert any("Assumed, not measured: dead time" in w for w in done.chapter.warnings)
+    steps = " ".join(step.command for step in done.chapter.steps)
+    assert 'rig.toml --limit 6 --period "1 ms" --counts "theta=2000" --travel 0.1 ' in steps
 
 
 def without(*lines: str) -> str:

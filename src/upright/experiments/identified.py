@@ -180,7 +180,7 @@ class IdentifiedRig:
         out: list[str] = []
         sheets = [n for n, e in said.entries.items() if e.source.startswith("data sheet")]
         if sheets:
-            out.append(f"Nobody said so of this rig, taken from the data sheet of the {said.vendor}: {_list(sheets)}.")
+            out.append(f"From the data sheet of the {said.vendor}, not said of this rig: {_list(sheets)}.")
         make = self.made_by(said.vendor)
         if make is not None and self._with_friction(make) != self.plant:
             out.append(f"The fit knows no dry friction; simulations have that of the {make.name} as designed.")

@@ -14,7 +14,7 @@ from upright.files import keeps_its_inputs
 from upright.progress import Progress, part, silent
 from upright.verbs.answer import Answer
 from upright.verbs.pages import folder_if_given, page_folder, write_page
-from upright.verbs.rig import Counts, rig_options
+from upright.verbs.rig import Counts, as_typed, rig_options
 from upright.verbs.values import open_log, poles, si, si_if_given
 
 if TYPE_CHECKING:
@@ -121,7 +121,8 @@ def design(
         limit=most if math.isfinite(most) else None, start=_start(rig, start), track=track, sampled=sampled, said=said,
     )  # fmt: skip
     done = design_for(rig, wish)
-    told = chapter(done, source=typed(Path(source)), folder=typed(folder_at or Path()))
+    again = as_typed(limit=limit, period=period, counts=counts, vendor=vendor)
+    told = chapter(done, source=typed(Path(source)) + again, folder=typed(folder_at or Path()))
     files: list[Path] = []
     if folder_at is not None:
         files = [
@@ -248,6 +249,7 @@ def regulate(
     else:
         known, name, base = read_identified(Path(source), seed=seed or 0, draws=draws), typed(Path(source)), 0.0
         vendor = _vendor(known, rig, vendor, str(source))
+        name += as_typed(limit=limit, period=period, counts=counts, travel=travel, vendor=vendor)
     given = rig_options(known.plant, known.unit, limit=limit, period=period, counts=counts, travel=travel)
     said = known.described(given, vendor=vendor, who="upright regulate")
     truth = None if seed is None else known.twin(known.rig(said), said, seed)
@@ -367,7 +369,8 @@ def swing_up(
         model = identified.rig(said)
         truth = model if check is not None else identified.twin(model, said, seed)
         doubts = identified.doubts(said, None if check is not None else truth)
-    name = "" if source is None else typed(Path(source))
+    again = as_typed(travel=travel, limit=limit, period=period, counts=counts, vendor=vendor)
+    name = "" if source is None else typed(Path(source)) + again
     if check is not None:
         record, log = open_log(check)
         scales = scales_of_log(model, record, known)

@@ -56,6 +56,17 @@ def rig_options(
     return out
 
 
+def as_typed(**options: float | str | Mapping[str, float] | None) -> str:
+    """Options as a command line says them again, a space before each; those left out are left out."""
+    out = ""
+    for name, value in options.items():
+        if isinstance(value, Mapping):
+            value = ", ".join(f"{k}={v}" for k, v in value.items())
+        if value not in (None, ""):
+            out += f" --{name} " + (f"{value:g}" if isinstance(value, int | float) else f'"{value}"')
+    return out
+
+
 def _counts(counts: Counts, names: list[str]) -> dict[str, float]:
     """Counts by coordinate; a number alone is for all of them."""
     if (isinstance(counts, Mapping) and not counts) or (isinstance(counts, str) and not counts.strip()):

@@ -200,9 +200,10 @@ def _next_steps(done: Designed, source: str, folder: str) -> list[Step]:
                  f'{base} --poles "{written(_wanted(done))}" --sampled'.replace("±", "+-"))
         )  # fmt: skip
     if done.wish.poles is not None:
+        limit = " --limit LIMIT" if done.wish.limit is None else ""
         steps.append(
             Step("Let the drive's limit choose: the cheapest effort that comes back from this start.",
-                 f"{base} --lqr {','.join('1' for _ in done.model.states)} --limit LIMIT")
+                 f"{base} --lqr {','.join('1' for _ in done.model.states)}{limit}")
         )  # fmt: skip
     if not done.rig.draws:
         steps.append(
