@@ -82,7 +82,7 @@ def test_a_report_is_written_and_the_terminal_says_what_next(fitted):
     folder, outcome, fit = fitted
     assert (folder / "out" / "report.html").stat().st_size > 10_000
     assert "A thread and a bob" in (folder / "out" / "report.html").read_text(encoding="utf-8")
-    for words in ("l_cg", "two", fit["verdict"][:30], "What next", "upright predict"):
+    for words in ("l_cg", "two", fit["answers"][0]["headline"][:30], "What next", "upright predict"):
         assert words in outcome.stdout
 
 

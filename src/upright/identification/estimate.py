@@ -17,8 +17,10 @@ from upright.identification.checks.outliers import refit_without_outliers
 from upright.identification.inference.assumptions import assumptions, sentences
 from upright.identification.inference.covariance import Identifiability, Optimum, assess, identifiability
 from upright.identification.inference.intervals import run_estimates, shared_estimates, widened, with_model_uncertainty
-from upright.identification.inference.poles import poles
-from upright.identification.inference.scoring import GOOD, fit_percent, judge, predict, score
+from upright.identification.inference.loop import standing
+from upright.identification.inference.poles import poles, shared_values
+from upright.identification.inference.scoring import fit_percent, predict, score
+from upright.identification.inference.verdict import GOOD, Evidence, judge, trusted
 from upright.identification.ladder.growth import choose_friction
 from upright.identification.model.fit import Estimate, Fit, Pole, RunScore
 from upright.identification.model.rig import Rig, neutral
@@ -224,25 +226,31 @@ def _conclude(asked: Rig, runs: Sequence[Run], problem: Problem, found: Descent,
     unseen = seen.sentences({n: p.unit for n, p in asked.parameters.items()})
     worst = min((p for s in scores.values() if s.role == "fit" for p in s.fit_percent.values()), default=100.0)
     conventions = tuple(log.conventions()) if worst < GOOD else ()
-    verdict, trusted = judge(
-        runs=scores,
-        estimates=estimates,
-        unseen=unseen,
-        conventions=conventions,
-        converged=found.converged,
-        interrupted=found.interrupted,
-        memory=best.memory,
-        period=min(t.period for t in problem.tracks),
-    )
     assumed = () if found.interrupted else assumptions(best, estimates)
+    answers = judge(
+        Evidence(
+            rig=problem.rig,
+            runs=scores,
+            estimates=estimates,
+            unseen=unseen,
+            conventions=conventions,
+            assumptions=assumed,
+            converged=found.converged,
+            interrupted=found.interrupted,
+            memory=best.memory,
+            period=min(t.period for t in problem.tracks),
+            standing=None if found.interrupted or seen.hidden else standing(best),
+        )
+    )
     return Fit(
         rig=asked,
         estimates=estimates,
         per_run=per_run,
         groups=groups,
         runs=scores,
-        verdict=" ".join([verdict, *sentences(assumed)]),
-        trusted=trusted,
+        verdict=" ".join([*(a.text() for a in answers), *sentences(assumed)]),
+        trusted=trusted(answers),
+        answers=answers,
         method="",
         evaluations=problem.evaluations,
         seconds=0.0,
@@ -287,9 +295,6 @@ def _correlation(best: Optimum, seen: Identifiability) -> Array:
 
 
 def _poles(best: Optimum) -> dict[str, tuple[Pole, ...]]:
-    unknowns = best.problem.unknowns
-    values = best.problem.base | best.problem.shared_at(best.x)
-    slope = np.array([values[unknowns[i].name] if unknowns[i].log else 1.0 for i in best.shared])
-    C = best.covariance[np.ix_(best.shared, best.shared)] * np.outer(slope, slope)
+    values, names, C = shared_values(best)
     held = {frozenset(track.run.held) for track in best.problem.tracks}
-    return poles(best.problem.rig, values, [unknowns[i].name for i in best.shared], C, best.quantile, held)
+    return poles(best.problem.rig, values, names, C, best.quantile, held)

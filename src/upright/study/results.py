@@ -43,7 +43,7 @@ def write_fit(fit: Fit, study: Study, path: Path, crossed: CrossValidation | Non
         "plant": study.plant,
         "rig": _estimated(study.description, fit.estimates).plain(),
         "substeps": fit.rig.substeps,
-        **_fields(fit, "verdict trusted method evaluations"),
+        **_fields(fit, "verdict trusted answers method evaluations"),
         "seconds": round(fit.seconds, 4),
         **_fields(fit, "cost interrupted"),
         "parameters": {n: {**vars(e), "meaning": meanings.get(n, "")} for n, e in {**known, **fit.estimates}.items()},

@@ -10,6 +10,14 @@ import pytest
 
 from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, shaken, swing
 from upright.identification.estimate import identify, predict
+from upright.identification.inference.covariance import Optimum, assess
+from upright.identification.inference.loop import standing
+from upright.identification.inference.verdict import Evidence, judge, trusted
+from upright.identification.model.fit import Answer, Estimate, RunScore
+from upright.identification.model.rig import Rig
+from upright.identification.model.runs import Run
+from upright.identification.problem.residuals import formulate
+from upright.identification.search.descent import descend_progressively
 from upright.physics import Furuta, Pendulum
 
 
@@ -72,7 +80,7 @@ def test_a_fifth_of_a_swing_tells_no_friction_and_is_not_trusted() -> None:
     fit = identify(rig(Pendulum, PENDULUM, guesses), [run])
     assert min(fit.runs["swing"].fit_percent.values()) > 95
     assert not fit.trusted
-    assert "none of the numbers asked is seen well" in fit.verdict or "cannot see" in fit.verdict
+    assert "None of the numbers asked is determined well" in fit.verdict or "cannot see" in fit.verdict
 
 
 def test_a_bound_that_excludes_the_truth_is_not_trusted() -> None:
@@ -104,6 +112,96 @@ def test_a_speed_that_is_held_scores_what_the_closed_form_says() -> None:
     assert score.naive["theta"] == pytest.approx(100 * (1 - missed), abs=0.02 * 100 * missed)
     free = predict({}, rig(Pendulum, PENDULUM, {}), [replace(run, horizon=None)])["swing"]
     assert free.naive == {}
+
+
+def test_nothing_held_out_is_not_tested() -> None:
+    question = rig(Pendulum, PENDULUM, {"J_p": 3e-3, "b_2": 1e-3})
+    runs = [noisy(swing(), 1e-3, seed=11), replace(noisy(swing(angle=1.0), 1e-3, seed=12), label="other")]
+    alone = identify(question, runs)
+    assert alone.answers[0].answer == "not tested"
+    assert "hold" in alone.answers[0].advice.lower()
+    tested = identify(question, [runs[0], replace(runs[1], role="predict")])
+    assert tested.answers[0].answer == "yes"
+    wrong = replace(runs[1], role="predict", y=runs[1].y * 0.5)
+    assert identify(question, [runs[0], wrong]).answers[0].answer == "no"
+
+
+def test_horizons_are_compared_with_their_like() -> None:
+    """At 0.05 s everything is predicted; that 2 s ahead is harder is no sign of a bad model."""
+    near, far = (_score(role, 100 - missed, h) for role, missed, h in (("fit", 1.0, 0.05), ("predict", 22.0, 2.0)))
+    assert "much worse" not in _judged({"near": near, "far": far})[0].text()
+    assert "much worse" in _judged({"near": replace(near, horizon=2.0), "far": far})[0].text()
+
+
+def test_an_inertia_over_four_decades_is_no_number_to_use() -> None:
+    firm = Estimate(value=2e-3, stderr=1e-5, interval=(1.9e-3, 2.1e-3), unit="N m s/rad")
+    vague = Estimate(value=0.1, stderr=1.0, interval=(2.7e-4, 83.0), unit="kg m^2", status="weak")
+    answers = _judged({"a": _score("fit", 99.0, None)}, {"J_p": vague, "b_2": firm})
+    assert answers[1].answer == "no"
+    assert not trusted(answers)
+    assert any("J_p lies anywhere from 0.00027 to 83 kg m^2" in r for r in answers[1].reasons)
+    assert _judged({"a": _score("fit", 99.0, None)}, {"b_2": firm})[1].answer == "yes"
+
+
+def test_friction_at_zero_is_said_to_have_no_evidence() -> None:
+    none = Estimate(value=0.0, stderr=0.0, interval=(0.0, 3e-4), unit="N m", status="at bound")
+    firm = Estimate(value=2e-3, stderr=1e-5, interval=(1.9e-3, 2.1e-3), unit="kg m^2")
+    told = _judged({"a": _score("fit", 99.0, None)}, {"b_2c": none, "J_p": firm})[1]
+    assert told.answer == "in part"
+    assert told.reasons == (
+        "b_2c reached its lower limit, 0: these data give no evidence for it (at most 0.0003 N m).",
+    )
+
+
+def test_a_length_beside_no_inertia_is_the_equivalent_length() -> None:
+    known = {**PENDULUM, "J_p": 0.0, "b_2c": 0.0, "b_2q": 0.0}
+    fit = identify(rig(Pendulum, known, {"l_cg": 0.4, "b_2": 1e-3}), [noisy(swing(known), 1e-3, seed=13)])
+    assert any("equivalent point pendulum" in r for r in fit.answers[1].reasons)
+
+
+def test_the_pole_upright_and_the_loops_that_hold() -> None:
+    question = rig(Furuta, FURUTA, {"J_d": 0.9 * FURUTA["J_d"], "J_p": 1.1 * FURUTA["J_p"], "b_1": 4e-3})
+    fit = identify(question, [noisy(shaken(seconds=4.0), 1e-4, seed=14)])
+    assert fit.answers[2].answer == "yes"
+    best = _optimum(question, noisy(shaken(seconds=4.0), 1e-4, seed=14))
+    told = standing(best)
+    assert told is not None
+    truth = max(Furuta(**FURUTA).linear("inverted").poles().real)
+    assert told.at == "inverted"
+    assert told.growth.interval[0] < truth < told.growth.interval[1]
+    assert told.share == 1.0
+    wide = replace(best, covariance=best.covariance * (3.0 / best.sigma.max()) ** 2)  # a factor of 20 to either side
+    rough = standing(wide)
+    assert rough is not None
+    assert rough.share < 1.0
+    assert rough.growth.interval[1] - rough.growth.interval[0] > told.growth.interval[1] - told.growth.interval[0]
+
+
+def test_what_cannot_fall_asks_for_no_loop() -> None:
+    assert _judged({"a": _score("fit", 99.0, None)})[2].answer == "not asked"
+
+
+def _score(role: str, percent: float, horizon: float | None) -> RunScore:
+    nothing = np.zeros((0, 1))
+    return RunScore(
+        role=role, fit_percent={"theta": percent}, horizon=horizon, t=np.zeros(0), y=nothing, simulated=nothing,
+        measured=("theta",),
+    )  # fmt: skip
+
+
+def _judged(runs: dict[str, RunScore], estimates: dict[str, Estimate] | None = None) -> tuple[Answer, ...]:
+    return judge(
+        Evidence(
+            rig=rig(Pendulum, PENDULUM, dict.fromkeys(estimates or {}, 1e-3)), runs=runs, estimates=estimates or {},
+            unseen=(), conventions=(), assumptions=(), converged=True, interrupted=False, memory=0.0, period=1.0,
+            standing=None,
+        )
+    )  # fmt: skip
+
+
+def _optimum(question: Rig, run: Run) -> Optimum:
+    problem = formulate(question, [run])
+    return assess(problem, descend_progressively(problem, problem.start).x)
 
 
 @pytest.mark.parametrize(("horizon", "blank"), [(0.03, True), (1.0, False)])

@@ -27,7 +27,8 @@ def test_the_page_says_what_a_reader_asks_first(fit, written):
     _, page = written(
         fit, title="Free swing", provenance={"study": "swing.toml", "runs": {"release": {"sha256": "c0ffee"}}}
     )
-    assert page.prose.index(fit.verdict) < page.prose.index("Question")
+    for answer in fit.answers:
+        assert page.prose.index(answer.headline) < page.prose.index("Question")
     for name in fit.estimates:
         assert name in page.prose
         assert fit.rig.parameters[name].meaning in page.prose

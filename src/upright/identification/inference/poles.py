@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import ImpossiblePhysics, NotIdentifiable
+from upright.identification.inference.covariance import Optimum
 from upright.identification.model.fit import Estimate, Pole
 from upright.identification.model.rig import Rig
 
@@ -22,6 +23,15 @@ STEP = 1e-4
 
 SPLIT = 1e-6
 """Imaginary parts below this share of the largest pole are rounding."""
+
+
+def shared_values(best: Optimum) -> tuple[dict[str, float], list[str], Array]:
+    """Every parameter by name, which of them are uncertain, and the covariance (names, names) of these values."""
+    unknowns = best.problem.unknowns
+    values = best.problem.base | best.problem.shared_at(best.x)
+    slope = np.array([values[unknowns[i].name] if unknowns[i].log else 1.0 for i in best.shared])
+    C = best.covariance[np.ix_(best.shared, best.shared)] * np.outer(slope, slope)
+    return values, [unknowns[i].name for i in best.shared], C
 
 
 def poles(

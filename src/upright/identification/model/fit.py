@@ -59,6 +59,25 @@ class Assumption:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Answer:
+    """One of the questions that a verdict answers: "yes", "in part", "no", "not tested" or "not asked".
+
+    The headline says it with its numbers, `advice` what to do, `reasons` why.
+    """
+
+    question: str
+    answer: str
+    headline: str
+    advice: str = ""
+    reasons: tuple[str, ...] = ()
+
+    def text(self) -> str:
+        """All of it, the headline first."""
+        first = f"{self.question} {self.answer.capitalize()}. {self.headline}"
+        return " ".join(filter(None, (first, self.advice, *self.reasons)))
+
+
+@dataclass(frozen=True, kw_only=True)
 class Offer:
     """A factor of a run's own, on all friction or on the drive's gain, that mends its prediction, and its score then.
 
@@ -116,7 +135,8 @@ class Fit:
     `per_run` holds what was estimated run by run, by run label and name, `groups` what several runs share, by the
     group's label and name; `unseen` says in sentences which combinations the data cannot see and which number would
     fix it; `singular_values` belong to the scaled Jacobian, `directions` (rows) to them, in the order of `names`;
-    `poles` are those at every equilibrium of the fitted plant.
+    `poles` are those at every equilibrium of the fitted plant. The `verdict` is what the `answers` say, one after
+    another, and the model is `trusted` when none of the first two is "no".
     """
 
     rig: Rig
@@ -126,6 +146,7 @@ class Fit:
     runs: Mapping[str, RunScore]
     verdict: str
     trusted: bool
+    answers: tuple[Answer, ...] = ()
     method: str
     evaluations: int
     seconds: float

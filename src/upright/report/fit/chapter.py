@@ -52,12 +52,10 @@ def chapter(
     crossed : CrossValidation, optional
         Every run predicted by the others.
     """
-    verdict = "Trusted." if fit.trusted else "Not to be trusted yet."
-    stopped = " The search was interrupted; this is its best so far." if fit.interrupted else ""
     return Chapter(
         title=title,
-        verdict=verdict,
-        detail=fit.verdict + stopped,
+        verdict=headline(fit),
+        detail=" ".join([*(a.headline for a in fit.answers), *sentences(fit.assumptions)]) or fit.verdict,
         sound=fit.trusted,
         question=question(fit),
         parts=(
@@ -67,11 +65,32 @@ def chapter(
             *_parameters(fit),
             _residuals(fit),
             _unseen(fit),
+            *_verdict(fit),
             *_search(fit),
         ),
         warnings=fit.warnings,
         steps=tuple(next_steps(fit, study=study, folder=folder, crossed=crossed is not None)),
     )
+
+
+def headline(fit: Fit) -> str:
+    """The verdict in a sentence."""
+    if fit.interrupted:
+        return "Not to be trusted yet: the search was interrupted, and this is its best so far."
+    if not fit.trusted:
+        return "Not to be trusted yet."
+    if fit.answers and fit.answers[0].answer == "not tested":
+        return "Not tested: it explains the runs that it was fitted to, and none was held out."
+    return "Trusted."
+
+
+def _verdict(fit: Fit) -> Iterator[Part]:
+    """The answers with what to do and why."""
+    if fit.answers:
+        rows = tuple((a.question, a.answer, a.advice, " ".join(a.reasons)) for a in fit.answers)
+        headings = ("question", "answer", "what to do", "why")
+        table = Table(caption="What the fit is good for", headings=headings, rows=rows, badge=1)
+        yield Part(title="Verdict", key="verdict", content=(table,))
 
 
 def question(fit: Fit) -> str:

@@ -1,0 +1,87 @@
+"""What the uncertainty of a fit does to the plant upright: the pole that grows, and whether a loop still holds it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import reduce
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.errors import UprightError
+from upright.identification.inference.covariance import Optimum
+from upright.identification.inference.poles import poles, shared_values
+from upright.identification.model.fit import Estimate
+from upright.identification.model.rig import Rig
+
+Array = NDArray[np.float64]
+
+DRAWS = 400
+"""Rigs drawn; a share of 99 % is then known to half a percent."""
+
+STEP = 1e-4
+"""Share of a standard error by which numbers are moved to see how the plant follows."""
+
+FASTER = (1.0, 1.25, 1.5, 1.75, 2.0, 2.25, 2.5, 2.75)
+"""Where the poles of the loop are placed, in units of the growth rate: as fast as what they must hold."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Standing:
+    """An unstable equilibrium: its name, the fastest `growth` [1/s], and the `share` of rigs that one loop holds."""
+
+    at: str
+    growth: Estimate
+    share: float
+
+
+def standing(best: Optimum, *, seed: int = 0) -> Standing | None:
+    """How rigs within the intervals stand at the equilibrium that grows fastest; None where none grows or is driven.
+
+    One state feedback, placed for the estimate, meets plants drawn from the covariance, to first order in it: A and B
+    move by their derivatives, the gain of the drive included.
+    """
+    rig = best.problem.rig
+    if len(rig.plant.inputs) != 1:
+        return None
+    values, names, C = shared_values(best)
+    found = poles(rig, values, names, C, best.quantile)
+    growing = {at: max((p.real for p in told), key=lambda e: e.value) for at, told in found.items()}
+    at = max(growing, key=lambda a: growing[a].value, default="")
+    if not at or growing[at].value <= 0 or growing[at].interval[0] == growing[at].interval[1] == 0:
+        return None
+    growth = growing[at].value
+    try:
+        A, B = _loop_of(rig, values, at)
+        moved = [
+            tuple((m - m0) / s for m, m0 in zip(_loop_of(rig, {**values, n: values[n] + s}, at), (A, B), strict=True))
+            for n, s in zip(names, np.maximum(STEP * np.sqrt(np.diag(C)), 1e-12), strict=True)
+        ]
+    except UprightError:
+        return None
+    K = _placed(A / growth, B[:, 0] / growth, -np.array(FASTER[: len(A)]))
+    if K is None:
+        return None
+    root = np.linalg.cholesky(C + 1e-12 * np.diag(np.diag(C)) + 1e-300 * np.eye(len(C)))
+    z = np.random.default_rng(seed).normal(size=(DRAWS, len(names))) @ root.T
+    dA, dB = (np.array([m[k] for m in moved]) for k in (0, 1))
+    loops = A + np.tensordot(z, dA, 1) - (B + np.tensordot(z, dB, 1)) @ K[None, :]
+    return Standing(at=at, growth=growing[at], share=float(np.mean(np.linalg.eigvals(loops).real.max(axis=1) < 0)))
+
+
+def _placed(A: Array, b: Array, wanted: Array) -> Array | None:
+    """Gains by Ackermann's formula, time counted so that the poles are near one; None where b does not reach all."""
+    reach = np.stack([np.linalg.matrix_power(A, k) @ b for k in range(len(A))], axis=1)
+    if np.linalg.cond(reach) > 1e10:
+        return None
+    p = reduce(lambda done, pole: done @ (A - pole * np.eye(len(A))), wanted, np.eye(len(A)))
+    return np.linalg.solve(reach.T, np.eye(len(A))[-1]) @ p
+
+
+def _loop_of(rig: Rig, values: dict[str, float], at: str) -> tuple[Array, Array]:
+    """State matrices with the drive's gain, and its loss per speed as damping."""
+    linear = rig.plant(**{n: values[n] for n in rig.plant.names()}).linear(at)
+    A, B = linear.A.copy(), linear.B * values.get("actuator.gain", 1.0)
+    place = [c.name for c in rig.plant.coordinates].index(rig.plant.inputs[0].on)
+    A[:, 2 * place + 1] -= linear.B[:, 0] * values.get("actuator.slope", 0.0)
+    return A, B

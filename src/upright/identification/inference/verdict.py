@@ -1,0 +1,254 @@
+"""The verdict in three answers: does the model predict, which of its numbers can be used, and is it enough for a loop?
+
+None is better than its reasons. What was not tested is said to be not tested.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from upright.identification.inference.assumptions import proportional
+from upright.identification.inference.loop import Standing
+from upright.identification.model.fit import Answer, Assumption, Estimate, RunScore
+from upright.identification.model.rig import Rig
+
+GOOD = 80.0
+"""Fit percent below which a run counts as not explained."""
+
+DROP = 15.0
+"""Percent by which a predicted signal may fall behind the worst fitted one of the same name."""
+
+MARGIN = 2.0
+"""Percent by which a model has to beat held speeds for its horizon to tell anything; one step ahead fits anything."""
+
+VAGUE = 10.0
+"""An interval of a positive number whose ends are this many times apart leaves it undetermined."""
+
+NARROW, SOME = 0.1, 0.3
+"""Half an interval of the growth rate upright, relative to it, within which a loop can be designed, or perhaps."""
+
+SURE, LIKELY = 0.99, 0.9
+"""Shares of the rigs within the intervals that a loop has to hold."""
+
+PREDICTS, USABLE, LOOP = "Does it predict?", "Can its numbers be used?", "Is it good enough for the loop?"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evidence:
+    """What a fit came to.
+
+    `unseen` and `conventions` are sentences on what the data cannot see and on signs or zeros that look wrong. The
+    residuals are autocorrelated over `memory` seconds, the motion takes `period` seconds for one period. `standing`
+    says how a rig within the intervals stands upright, if this plant can.
+    """
+
+    rig: Rig
+    runs: Mapping[str, RunScore]
+    estimates: Mapping[str, Estimate]
+    unseen: Sequence[str]
+    conventions: Sequence[str]
+    assumptions: Sequence[Assumption]
+    converged: bool
+    interrupted: bool
+    memory: float
+    period: float
+    standing: Standing | None
+
+
+def judge(found: Evidence) -> tuple[Answer, ...]:
+    """The three answers."""
+    return _predicts(found), _usable(found), _loop(found)
+
+
+def trusted(answers: Sequence[Answer]) -> bool:
+    """Whether nothing speaks against the model or its numbers; what was not tested does not."""
+    return not any(a.answer == "no" for a in answers if a.question != LOOP)
+
+
+def _predicts(found: Evidence) -> Answer:
+    against: list[str] = []
+    if found.interrupted:
+        against.append("The search was interrupted; this is its best so far.")
+    elif not found.converged:
+        against.append("The search had not settled when its evaluations ran out.")
+    fitted, predicted = (_percents(found.runs, role) for role in ("fit", "predict"))
+    poor = [f"{what} {p:.1f} %" for what, p in fitted.items() if p < GOOD]
+    if poor:
+        against.append(f"The fitted runs are not explained ({', '.join(poor)}; {GOOD:.0f} % is the least).")
+    worse = _worse(found.runs)
+    if worse:
+        against.append(f"Runs that were not fitted are predicted much worse than fitted ones ({', '.join(worse)}).")
+    bad = [f"{what} {p:.1f} %" for what, p in predicted.items() if p < GOOD]
+    if bad and not worse:
+        against.append(f"Runs that were not fitted are not predicted ({', '.join(bad)}; {GOOD:.0f} % is the least).")
+    against += [s[0].upper() + s[1:] for s in found.conventions]
+    blank = uninformative(found.runs)
+    explains = f"It explains {_range(fitted)} of the fitted runs. " if fitted else ""
+    if blank and len(blank) == sum(len(s.fit_percent) for s in found.runs.values()):
+        against.append("No run is predicted far enough ahead to test the model.")
+    notes: list[str] = []
+    if blank:
+        where = ", ".join(f"{label} {signal} at {found.runs[label].horizon:g} s" for label, signal in blank)
+        notes.append(
+            f"Some horizons tell nothing: holding the measured speed predicts as well to within {MARGIN:.0f} % "
+            f"({where}); predict further ahead."
+        )
+    if found.memory > 0.05 * found.period and fitted:
+        notes.append(
+            f"The residuals are autocorrelated over about {found.memory:.2g} s, so a small effect is unmodelled. The "
+            "intervals include this correlation and the spread between parts of the runs, but not a wrong structure of "
+            "the model."
+        )
+    if against:
+        return Answer(
+            question=PREDICTS, answer="no", headline=f"{explains}Not to be trusted as it stands.",
+            reasons=(*against, *notes),
+        )  # fmt: skip
+    if not predicted:
+        return Answer(
+            question=PREDICTS, answer="not tested", headline=f"{explains}Every run was fitted.",
+            advice="Hold a run or a tail out (role = \"predict\", or --hold-out).", reasons=tuple(notes),
+        )  # fmt: skip
+    part = "in part" if blank else "yes"
+    headline = f"{explains}It predicts {_range(predicted)} of runs it has not seen{_held_speed(found.runs)}."
+    return Answer(question=PREDICTS, answer=part, headline=headline, reasons=tuple(notes))
+
+
+def _usable(found: Evidence) -> Answer:
+    asked = {n: e for n, e in found.estimates.items() if e.status in ("firm", "weak", "at bound", "unseen")}
+    firm = [n for n, e in asked.items() if e.status == "firm"]
+    reasons: list[str] = list(found.unseen)
+    no = bool(found.unseen)
+    if asked and not firm and not found.unseen:
+        no = True
+        reasons.append("None of the numbers asked is determined well, so others would explain the runs as well.")
+    for n, e in asked.items():
+        low, high = e.interval
+        limit = found.rig.bounds(n) if n in found.rig.parameters else (-math.inf, math.inf)
+        if e.status == "at bound" and e.value != 0:
+            no = True
+            reasons.append(
+                f"{n} reached its {'lower' if e.value <= limit[0] else 'upper'} limit, {_shown(e.value, e)}: the data "
+                f"would push {n} past a bound that was set for it. Widen it, or give the value as known."
+            )
+        elif e.status == "at bound":
+            reasons.append(
+                f"{n} reached its lower limit, 0: these data give no evidence for it (at most {_shown(high, e)})."
+            )
+        elif e.status == "weak" and low > 0 and high > VAGUE * low:
+            essential = not n.startswith(("b_", "c_", "f_", "actuator.")) or n == "actuator.gain"
+            no = no or essential
+            reasons.append(f"{n} lies anywhere from {low:.2g} to {_shown(high, e)}: it is not determined.")
+        elif e.status == "weak":
+            reasons.append(f"{n} is known poorly, {low:.2g} to {_shown(high, e)}.")
+    for a in found.assumptions:
+        along = proportional(a)
+        if along:
+            reasons.append(f"{', '.join(along)}: only per {a.name}, which is assumed to be {a.value:g} {a.unit}.")
+    lumped = _lumped(found.rig)
+    reasons += lumped
+    resting = {n for a in found.assumptions for n in proportional(a)}
+    free = [n for n in firm if n not in resting]
+    if no:
+        answer, headline = "no", "Not all of them are determined."
+    elif reasons:
+        answer, headline = "in part", f"Usable: {', '.join(free)}." if free else "Only their ratios."
+    else:
+        answer, headline = "yes", f"All: {', '.join(firm)}." if firm else "Nothing was asked."
+    advice = ""
+    if any(e.status in ("weak", "unseen") for e in asked.values()):
+        advice = "Measure one of the others on the bench and give it as known, or add a run that moves it more."
+    return Answer(question=USABLE, answer=answer, headline=headline, advice=advice, reasons=tuple(reasons))
+
+
+def _lumped(rig: Rig) -> list[str]:
+    """Numbers that stand for something else than their name, because another was set to zero."""
+    p = rig.parameters
+    if {"l_cg", "J_p"} <= p.keys() and p["l_cg"].estimate and not p["J_p"].estimate and p["J_p"].value == 0:
+        return ["l_cg is the length of the equivalent point pendulum, J_A/(m_p l_cg), because J_p was set to 0."]
+    return []
+
+
+def _loop(found: Evidence) -> Answer:
+    s = found.standing
+    if s is None:
+        return Answer(
+            question=LOOP, answer="not asked",
+            headline="No equilibrium of this plant is unstable, or no drive acts on it.",
+        )  # fmt: skip
+    where = f"{s.at}, the fastest pole is {s.growth.value:.3g} 1/s ({s.growth.interval[0]:.3g} to "
+    where = f"{where}{s.growth.interval[1]:.3g})"
+    half = (s.growth.interval[1] - s.growth.interval[0]) / 2 / s.growth.value
+    held = f"a loop whose poles are as fast as that holds {100 * s.share:.0f} % of the rigs within the intervals"
+    answer = "no"
+    if half <= NARROW and s.share >= SURE:
+        answer = "yes"
+    elif half <= SOME and s.share >= LIKELY:
+        answer = "in part"
+    doubted = any(not a for a in (found.converged, not found.interrupted))
+    return Answer(
+        question=LOOP, answer="no" if doubted else answer,
+        headline=f"{where[0].upper()}{where[1:]}; {held}.",
+        advice="" if answer == "yes" else "Narrow the numbers above before a loop is closed.",
+        reasons=("To first order, and without friction that differs by the day: `upright regulate` runs such rigs.",),
+    )  # fmt: skip
+
+
+def _shown(value: float, e: Estimate) -> str:
+    return f"{value:.2g} {e.unit}".removesuffix(" 1").rstrip()
+
+
+def _percents(runs: Mapping[str, RunScore], role: str) -> dict[str, float]:
+    """Fit percent by run and signal, of several horizons the worst, since that is the one asked for last."""
+    found: dict[str, float] = {}
+    for label, s in runs.items():
+        if s.role == role:
+            for signal, percent in s.fit_percent.items():
+                every = [percents[signal] for percents in s.ahead.values() if signal in percents]
+                found[f"{label} {signal}"] = min([percent, *every])
+    return found
+
+
+def _held_speed(runs: Mapping[str, RunScore]) -> str:
+    """What holding the measured speed reaches where runs are predicted from restarts."""
+    naive = {
+        f"{label} {signal}": p for label, s in runs.items() if s.role == "predict" for signal, p in s.naive.items()
+    }
+    return f" (holding the measured speed: {_range(naive)})" if naive else ""
+
+
+def uninformative(runs: Mapping[str, RunScore]) -> list[tuple[str, str]]:
+    """Runs and signals whose horizon is so short that a held speed predicts them as well as the model.
+
+    A model that explains nothing is no proof of a short horizon.
+    """
+    return [
+        (label, signal)
+        for label, s in runs.items()
+        for signal, percent in s.naive.items()
+        if percent >= GOOD and percent >= s.fit_percent[signal] - MARGIN
+    ]
+
+
+def _range(percents: Mapping[str, float]) -> str:
+    low, high = min(percents.values()), max(percents.values())
+    return f"{low:.1f} %" if high - low < 0.05 else f"{low:.1f} to {high:.1f} %"
+
+
+def _worse(runs: Mapping[str, RunScore]) -> list[str]:
+    """Predicted signals far behind the worst fitted one that was simulated as far ahead."""
+    least: dict[tuple[str, float | None], float] = {}
+    for s in runs.values():
+        if s.role == "fit":
+            for signal, percent in s.fit_percent.items():
+                key = signal, s.horizon
+                least[key] = min(percent, least.get(key, 100.0))
+    return [
+        f"{label} {signal} {percent:.1f} %"
+        for label, s in runs.items()
+        if s.role == "predict"
+        for signal, percent in s.fit_percent.items()
+        if percent < least.get((signal, s.horizon), GOOD) - DROP and percent < GOOD
+    ]
