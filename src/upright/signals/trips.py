@@ -162,9 +162,11 @@ class TripRegression:
 
     @cached_property
     def levels(self) -> bool:
-        """Whether the command has more than one level besides zero."""
+        """Whether the command has more than one level besides zero; what a resampled step passes is none."""
         u = self.switched[:, 0]
-        return bool(np.ptp(u[u != 0]))
+        held = u[1:][np.diff(u) == 0]
+        held = held if np.any(held) else u
+        return bool(np.ptp(held[held != 0]))
 
     def search(self, low: int, high: int, *, late: bool = False, forward: bool = True) -> tuple[int, dict[int, float]]:
         """Sample between two at which the command most likely ended (or began), and the misfit of all that were tried.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +48,15 @@ def test_a_trip_is_seen_without_a_model_and_to_a_few_samples():
         # counts over the smoothing leave about a sample, 2 ms
         assert trip.at == pytest.approx(end, abs=5e-3)
         assert trip.after < trip.before
+
+
+def test_a_trip_is_seen_under_a_command_that_was_resampled():
+    """The mean over an interval in which a step falls is no level of the command."""
+    run = spin_up(actuator={"end": 2.531})
+    u = run.u.copy()
+    u[np.flatnonzero(np.diff(u[:, 0]) > 0)[0]] = 0.25
+    (trip,) = find_trips(asked(), replace(run, u=u))
+    assert trip.at == pytest.approx(2.531, abs=5e-3)
 
 
 def test_a_late_begin_is_seen():
