@@ -103,6 +103,11 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
         "[rig]",
         (
             Key("plant", '"cart-pendulum"', 'built-in plant, or "my_plant.py:MyRig" beside the study'),
+            Key(
+                "guessed",
+                "true",
+                "nobody named the plant: its numbers count as a guess until a run that was not fitted is predicted",
+            ),
             Key("substeps", "2", "integration steps per sample"),
             Key("period", '"2 ms"', "sample period that all runs are resampled to; each log's own if left out"),
             Key("name", '"bench 3"', "what its owner calls the rig; a fit that meets another rig says so"),

@@ -68,7 +68,9 @@ def read_rig(study: Section, plant: type[Plant], drive_unit: str, fixed: Mapping
             open_lower=key == "knee",
         )
         parameters[name] = read(actuator, key, name, what, lambda number=number: number.default)
-    return Rig(plant=plant, parameters=parameters, substeps=study.section("rig").whole("substeps", 1, most=SUBSTEPS))
+    rig = study.section("rig")
+    substeps = rig.whole("substeps", 1, most=SUBSTEPS)
+    return Rig(plant=plant, parameters=parameters, substeps=substeps, guessed=rig.flag("guessed"))
 
 
 def _default(study: Section, plant: type[Plant], name: str) -> float:

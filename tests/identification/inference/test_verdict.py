@@ -153,6 +153,16 @@ def test_friction_at_zero_is_said_to_have_no_evidence() -> None:
     )
 
 
+def test_a_guessed_plant_is_a_guess_until_a_prediction_confirms_it() -> None:
+    question = replace(rig(Pendulum, PENDULUM, {"J_p": 3e-3, "b_2": 1e-3}), guessed=True)
+    run, other = noisy(swing(), 1e-3, seed=11), replace(noisy(swing(angle=1.0), 1e-3, seed=12), label="other")
+    alone = identify(question, [run, other]).answers[1]
+    assert alone.answer == "in part"
+    assert "guessed" in alone.headline
+    assert "guessed" not in identify(question, [run, replace(other, role="predict")]).answers[1].text()
+    assert "guessed" not in identify(replace(question, guessed=False), [run, other]).answers[1].text()
+
+
 def test_a_length_beside_no_inertia_is_the_equivalent_length() -> None:
     known = {**PENDULUM, "J_p": 0.0, "b_2c": 0.0, "b_2q": 0.0}
     fit = identify(rig(Pendulum, known, {"l_cg": 0.4, "b_2": 1e-3}), [noisy(swing(known), 1e-3, seed=13)])

@@ -59,7 +59,8 @@ class Evidence:
 
 def judge(found: Evidence) -> tuple[Answer, ...]:
     """The three answers."""
-    return _predicts(found), _usable(found), _loop(found)
+    predicts = _predicts(found)
+    return predicts, _usable(found, confirmed=predicts.answer == "yes"), _loop(found)
 
 
 def trusted(answers: Sequence[Answer]) -> bool:
@@ -116,7 +117,7 @@ def _predicts(found: Evidence) -> Answer:
     return Answer(question=PREDICTS, answer=part, headline=headline, reasons=tuple(notes))
 
 
-def _usable(found: Evidence) -> Answer:
+def _usable(found: Evidence, *, confirmed: bool) -> Answer:
     asked = {n: e for n, e in found.estimates.items() if e.status in ("firm", "weak", "at bound", "unseen")}
     firm = [n for n, e in asked.items() if e.status == "firm"]
     reasons: list[str] = list(found.unseen)
@@ -147,12 +148,19 @@ def _usable(found: Evidence) -> Answer:
         along = proportional(a)
         if along:
             reasons.append(f"{', '.join(along)}: only per {a.name}, which is assumed to be {a.value:g} {a.unit}.")
-    lumped = _lumped(found.rig)
-    reasons += lumped
+    reasons += _lumped(found.rig)
+    guessed = found.rig.guessed and not confirmed
+    if guessed:
+        reasons.append(
+            "That the rig is of this kind was guessed from its columns, and no prediction of a run that was not fitted "
+            "confirms it: name the plant, or hold a run out."
+        )
     resting = {n for a in found.assumptions for n in proportional(a)}
     free = [n for n in firm if n not in resting]
     if no:
         answer, headline = "no", "Not all of them are determined."
+    elif guessed:
+        answer, headline = "in part", "As numbers of a plant that was guessed."
     elif reasons:
         answer, headline = "in part", f"Usable: {', '.join(free)}." if free else "Only their ratios."
     else:

@@ -37,11 +37,15 @@ class Parameter:
 
 @dataclass(frozen=True, kw_only=True)
 class Rig:
-    """A plant with what is known and what is asked about its parameters and its actuator."""
+    """A plant with what is known and what is asked about its parameters and its actuator.
+
+    The plant may be `guessed`: its columns suit it, and nobody said that it is this one.
+    """
 
     plant: type[Plant]
     parameters: Mapping[str, Parameter]
     substeps: int = 1
+    guessed: bool = False
 
     @property
     def estimated(self) -> tuple[str, ...]:

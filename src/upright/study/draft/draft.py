@@ -46,6 +46,9 @@ def draft(record: Record, seen: Inspection, log: Path, study: Path, *, plant: st
     else:
         found, tables = pendulum_tables(record, seen, found, file, log.stem)
     describe(tables, record, seen, found)
+    if not plant:
+        rig = next(t for t in tables if t.lines and t.lines[0].startswith("[rig]"))
+        rig.key("guessed", True, "nobody named the plant: take this out once you know it is this one")
     doubts = list(found.doubts)
     told = bool(plant) or (found.plant.startswith(CHAINS) and len(found.columns) > 1)  # carts from disks, and why
     others = [name for name in plants_that_suit(record, seen) if name != found.plant and name not in " ".join(doubts)]
