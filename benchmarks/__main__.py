@@ -22,8 +22,12 @@ from upright.workers import Workers
 
 NAMES = (
     "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "frequency", "swing_up", "tracking", "lab",
-    "doctor", "rigs", "misfit", "regulation", "real", "starts", "startup", "workers", "long", "gpu",
+    "doctor", "rigs", "misfit", "verdicts", "regulation", "real", "starts", "startup", "workers", "long", "gpu",
 )  # fmt: skip
+PUBLISHED = ("real", "rigs", "misfit", "verdicts", "regulation", "workers")
+SHARED = ("coverage", "rigs", "misfit", "verdicts", "regulation", "starts")
+"""Those whose table is a page, and those whose work processes may share."""
+
 LIBRARIES = ("upright", "numpy", "scipy", "llvmlite", "control", "casadi", "jax", "mujoco")
 
 
@@ -80,24 +84,18 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every figure to a file too")
     parser.add_argument("--quick", action="store_true", help="fewer rounds and smaller shares, under two minutes")
     parser.add_argument("--full", action="store_true", help="run what is otherwise estimated from its parts")
-    parser.add_argument(
-        "--markdown",
-        type=Path,
-        metavar="FILE",
-        help="write the page of `real`, `rigs`, `misfit`, `regulation` or `workers` for publication",
-    )
+    pages = ", ".join(PUBLISHED)
+    parser.add_argument("--markdown", type=Path, metavar="FILE", help=f"write the page of one of {pages}")
     parser.add_argument("--starts", type=int, default=300, metavar="N", help="random starts of each study in `starts`")
-    parser.add_argument(
-        "--workers", type=int, default=1, metavar="N", help="processes for rigs, misfit, regulation, coverage, starts"
-    )
+    parser.add_argument("--workers", type=int, default=1, metavar="N", help=f"processes for {', '.join(SHARED)}")
     parser.add_argument("--cluster", default="", metavar="ADDRESS", help="Dask scheduler for them, tcp://host:8786")
     asked = parser.parse_args(arguments)
     try:
         shared = {"workers": Workers(number=asked.workers, cluster=asked.cluster)}
     except BadInput as error:
         parser.error(str(error))
-    if asked.markdown and asked.names not in (["real"], ["rigs"], ["misfit"], ["regulation"], ["workers"]):
-        parser.error("--markdown writes the table of one benchmark: name real, rigs, misfit, regulation or workers")
+    if asked.markdown and (len(asked.names) != 1 or asked.names[0] not in PUBLISHED):
+        parser.error(f"--markdown writes the table of one benchmark: name one of {pages}")
     if unknown := set(asked.names) - set(NAMES):
         parser.error(f"no benchmark is called {', '.join(sorted(unknown))}; there are {', '.join(NAMES)}")
 
@@ -106,12 +104,9 @@ def main(arguments: list[str] | None = None) -> int:
     results: dict[str, Any] = {"versions": versions(), "lines": []}
     missed = 0
     for name in asked.names or NAMES:
-        markdown = {"markdown": asked.markdown}
-        extra: dict[str, Any] = {
-            "fit": {"full": asked.full}, "real": markdown, "rigs": markdown | shared, "misfit": markdown | shared,
-            "regulation": markdown | shared,
-            "coverage": shared, "starts": shared | {"starts": asked.starts}, "workers": markdown,
-        }.get(name, {})  # fmt: skip
+        extra: dict[str, Any] = {"fit": {"full": asked.full}, "starts": {"starts": asked.starts}}.get(name, {})
+        extra |= {"markdown": asked.markdown} if name in PUBLISHED else {}
+        extra |= shared if name in SHARED else {}
         module = importlib.import_module(f"benchmarks.{name}")
         lines: list[Line] = module.run(
             quick=asked.quick, progress=lambda text, name=name: told.print(f"[dim]{name}: {text}[/]"), **extra

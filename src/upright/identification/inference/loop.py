@@ -52,24 +52,23 @@ def standing(best: Optimum, *, seed: int = 0) -> Standing | None:
         return None
     growth = growing[at].value
     try:
-        A, B = _loop_of(rig, values, at)
-        moved = [
-            tuple((m - m0) / s for m, m0 in zip(_loop_of(rig, {**values, n: values[n] + s}, at), (A, B), strict=True))
-            for n, s in zip(names, np.maximum(STEP * np.sqrt(np.diag(C)), 1e-12), strict=True)
-        ]
+        A, B = driven_plant(rig, values, at)
+        steps = np.maximum(STEP * np.sqrt(np.diag(C)), 1e-12)
+        moved = [driven_plant(rig, {**values, n: values[n] + s}, at) for n, s in zip(names, steps, strict=True)]
     except UprightError:
         return None
-    K = _placed(A / growth, B[:, 0] / growth, -np.array(FASTER[: len(A)]))
+    K = placed(A / growth, B[:, 0] / growth, -np.array(FASTER[: len(A)]))
     if K is None:
         return None
     root = np.linalg.cholesky(C + 1e-12 * np.diag(np.diag(C)) + 1e-300 * np.eye(len(C)))
     z = np.random.default_rng(seed).normal(size=(DRAWS, len(names))) @ root.T
-    dA, dB = (np.array([m[k] for m in moved]) for k in (0, 1))
+    dA = np.array([(a - A) / s for (a, _), s in zip(moved, steps, strict=True)])
+    dB = np.array([(b - B) / s for (_, b), s in zip(moved, steps, strict=True)])
     loops = A + np.tensordot(z, dA, 1) - (B + np.tensordot(z, dB, 1)) @ K[None, :]
     return Standing(at=at, growth=growing[at], share=float(np.mean(np.linalg.eigvals(loops).real.max(axis=1) < 0)))
 
 
-def _placed(A: Array, b: Array, wanted: Array) -> Array | None:
+def placed(A: Array, b: Array, wanted: Array) -> Array | None:
     """Gains by Ackermann's formula, time counted so that the poles are near one; None where b does not reach all."""
     reach = np.stack([np.linalg.matrix_power(A, k) @ b for k in range(len(A))], axis=1)
     if np.linalg.cond(reach) > 1e10:
@@ -78,7 +77,7 @@ def _placed(A: Array, b: Array, wanted: Array) -> Array | None:
     return np.linalg.solve(reach.T, np.eye(len(A))[-1]) @ p
 
 
-def _loop_of(rig: Rig, values: dict[str, float], at: str) -> tuple[Array, Array]:
+def driven_plant(rig: Rig, values: dict[str, float], at: str) -> tuple[Array, Array]:
     """State matrices with the drive's gain, and its loss per speed as damping."""
     linear = rig.plant(**{n: values[n] for n in rig.plant.names()}).linear(at)
     A, B = linear.A.copy(), linear.B * values.get("actuator.gain", 1.0)

@@ -1,0 +1,170 @@
+"""What was said of a fit, and what came: the verdict's answers against runs, rigs and loops that it never saw.
+
+Of each plant 40 rigs of `misfit` are fitted to the first two thirds of a record and predict its last third. One in four
+is asked too little (viscous friction alone, the truth four times as dry), one in four has a record of a second and a
+half. What came is as long a piece of another record, under other commands (80 % of each signal are asked); each number,
+within its interval or a fifth of the truth where it was called usable, not within a twentieth where it was not; and the
+plant upright under the loop that the fit would place. Of real rigs with three fitted runs or more all but two
+are fitted, one is predicted, and the last is what came. Asked: a wrong yes in at most 5 of 100 cases, a wrong no in at
+most 15.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.measure import Line, of_each
+from benchmarks.misfit import Flaws, moved, read
+from benchmarks.real import STUDIES
+from benchmarks.rigs import DT, MAKES, Make, command, drawn, publish, sensed
+from upright.workers import HERE, Workers
+
+GOOD = 80.0
+USEFUL, CLOSE = 0.2, 0.05
+"""Shares of the truth within which a number serves, and within which one that was called too poor was not."""
+
+SHORT = 1.5  # s
+DRY = 4.0
+
+Told = list[tuple[str, str, bool]]
+"""Question, what was said of it (yes, in part, no), and whether a yes would have been right."""
+
+
+@dataclass(kw_only=True)
+class Case:
+    """One rig: its numbers, two records of commands and positions, and what is wrong with the question."""
+
+    make: Make
+    truth: dict[str, float]
+    records: list[tuple[np.ndarray, np.ndarray]] = field(default_factory=list[tuple[np.ndarray, np.ndarray]])
+    spoiled: str = ""
+
+
+def cases(make: Make, place: int, count: int) -> list[Case]:
+    """Flawed rigs with two records each."""
+    generators = [np.random.default_rng(50_000 + 1000 * place + k) for k in range(count)]
+    rigs = [drawn(make, g) for g in generators]
+    found = [Case(make=make, truth=truth, spoiled=("", "too little asked", "", "short")[k % 4])
+             for k, (truth, _) in enumerate(rigs)]  # fmt: skip
+    for case in found:
+        if case.spoiled == "too little asked":
+            case.truth |= {n: DRY * v for n, v in case.truth.items() if n in ("b_1c", "b_2c", "f_1c")}
+    flaws = Flaws(count, np.random.default_rng(100 + place))
+    other = [command(make.force, len(u), g) for (_, u), g in zip(rigs, generators, strict=True)]
+    for again, inputs in ((False, [u for _, u in rigs]), (True, other)):
+        start = {n: (0.7 if again else 1.0) * v for n, v in make.start.items()}
+        u = np.stack([c[:, 0] for c in inputs], axis=1)
+        motion = moved(replace(make, start=start), [case.truth for case in found], u, flaws)
+        for k, (case, g) in enumerate(zip(found, generators, strict=True)):
+            y = sensed(make, read(make, motion[:, :, k], flaws, k), g.uniform(0, 0.95), 0.003, g)
+            case.records.append((inputs[k], y))
+    return found
+
+
+def answered(case: Case) -> Told:
+    """What was said of one rig, and what came."""
+    from upright.identification import Parameter, Rig, Run
+    from upright.identification.estimate import identify, predict
+    from upright.identification.inference.loop import driven_plant, placed
+    from upright.identification.model.rig import base_values
+    from upright.physics import find
+
+    make, plant = case.make, find(case.make.plant)
+    (u, y), (u2, y2) = case.records
+    length = round(SHORT / DT) if case.spoiled == "short" else len(u)
+    cut = 2 * length // 3
+    measured = tuple(c.name for c in plant.coordinates)
+
+    def run(label: str, role: Any, u: np.ndarray, y: np.ndarray) -> Run:
+        t = np.arange(float(len(u))) * DT
+        return Run(label=label, role=role, t=t, u=u, y=y, measured=measured, quantum=make.quantum)
+
+    parameters: dict[str, Any] = {n: Parameter(name=n, value=v) for n, v in make.known.items()}
+    for n, v in case.truth.items():
+        dry = case.spoiled == "too little asked" and n in ("b_1c", "b_2c", "f_1c")
+        parameters[n] = Parameter(name=n, value=0.0 if dry else 1.3 * v, estimate=not dry, lower=0.0)
+    rig = Rig(plant=plant, parameters=parameters, substeps=2)
+    runs = [run("seen", "fit", u[:cut], y[:cut]), run("unseen", "predict", u[cut:length], y[cut:length])]
+    fit = identify(rig, runs)
+    predicts, _, loop = fit.answers
+    came = predict(fit, rig, [run("other", "predict", u2[: length - cut], y2[: length - cut])])["other"].fit_percent
+    told: Told = [(predicts.question, predicts.answer, min(came.values()) >= GOOD)]
+    for n, e in fit.estimates.items():
+        if e.status in ("firm", "weak", "at bound", "unseen"):
+            usable = e.status == "firm" and fit.trusted
+            near = abs(e.value / case.truth[n] - 1)
+            holds = e.interval[0] <= case.truth[n] <= e.interval[1] or near <= USEFUL
+            told.append(("Can its numbers be used?", "yes" if usable else "no", holds if usable else near <= CLOSE))
+    if loop.answer != "not asked":
+        at = loop.headline.partition(",")[0].lower()
+        values = base_values(rig) | {n: e.value for n, e in fit.estimates.items()}
+        A, B = driven_plant(rig, values, at)
+        growth = float(np.linalg.eigvals(A).real.max())
+        K = placed(A / growth, B[:, 0] / growth, -np.array([1.0, 1.25, 1.5, 1.75]))
+        true_A, true_B = driven_plant(rig, base_values(rig) | case.truth | make.known, at)
+        stands = K is not None and float(np.linalg.eigvals(true_A - true_B @ K[None, :]).real.max()) < 0
+        told.append((loop.question, loop.answer, stands))
+    return told
+
+
+def rehearsed(name: str) -> Told:
+    """What was said of a real rig, and what its last run came to."""
+    from upright.identification.estimate import identify
+    from upright.study.load import load_study
+
+    study = load_study(STUDIES / f"{name}.toml", data=os.environ["UPRIGHT_REAL_DATA"])
+    fitted = [run for run in study.runs if run.role == "fit"]
+    if len(fitted) < 3:
+        return []
+    *seen, told, last = fitted
+    runs = [*seen, replace(told, role="predict"), replace(last, role="predict", label="what came")]
+    fit = identify(study.rig, runs[:-1])
+    from upright.identification.estimate import predict
+
+    came = predict(fit, study.rig, runs[-1:])["what came"].fit_percent
+    return [("Does it predict? (real rigs)", fit.answers[0].answer, min(came.values()) >= GOOD)]
+
+
+def run(
+    *, quick: bool, progress: Callable[[str], None], markdown: Path | None = None, workers: Workers = HERE
+) -> list[Line]:
+    """Wrong yes and wrong no by question."""
+    every: Told = []
+    for place, make in enumerate(MAKES):
+        each = 4 if quick else 40
+        progress(f"{each} rigs like {make.plant}")
+        done, _ = of_each(answered, cases(make, place, each), workers)
+        every += [one for told in done for one in told]
+    if os.environ.get("UPRIGHT_REAL_DATA"):
+        from benchmarks.asked import studies
+
+        for name in studies()[:: 6 if quick else 1]:
+            progress(name)
+            every += rehearsed(name)
+    lines = [_line(question, [one[1:] for one in every if one[0] == question]) for question in
+             dict.fromkeys(question for question, *_ in every)]  # fmt: skip
+    if markdown is not None:
+        publish(markdown, "verdicts", "Verdicts", __doc__, lines)
+    return lines
+
+
+def _line(question: str, told: list[tuple[str, bool]]) -> Line:
+    counts = {
+        (said, right): sum(one == (said, right) for one in told)
+        for said in ("yes", "in part", "no", "not tested")
+        for right in (True, False)
+    }
+    yes, no = ([right for said, right in told if said == word] for word in ("yes", "no"))
+    wrong_yes = 100 * np.mean([not right for right in yes]) if yes else 0.0
+    wrong_no = 100 * np.mean(no) if no else 0.0
+    said = "; ".join(f'"{word}" {counts[word, True]} right, {counts[word, False]} wrong' for word in ("yes", "in part"))
+    note = f'{said}; "no" {counts["no", False]} right, {counts["no", True]} wrong; wrong yes {wrong_yes:.1f} % (5), '
+    note += f"wrong no {wrong_no:.1f} % (15)"
+    untested = counts["not tested", True] + counts["not tested", False]
+    return Line(contender=question, note=note + (f"; not tested {untested}" if untested else ""))
