@@ -184,26 +184,11 @@ class Track:
         count = self.restarts.size if self.windowed else self.length
         judges = (np.arange(count) * BLOCKS // count) % FOLDS == fold
         if self.run.t.size < LEAST_RUN or not judges.any():
-            return self.seen()
+            return np.zeros(count, dtype=bool), self
         if not self.windowed:
             return judges, replace(self, kept=~judges)
         stay = ~judges
         return judges, replace(self, restarts=self.restarts[stay], x0=self.x0[stay], variance=self.variance[stay])
-
-    def seen(self) -> tuple[NDArray[np.bool_], Track]:
-        """The run whole, which judges nothing."""
-        return np.zeros(self.restarts.size if self.windowed else self.length, dtype=bool), self
-
-    def unseen(self) -> tuple[NDArray[np.bool_], Track]:
-        """Which samples, or windows, judge a model that was fitted to other runs, and the run when it says nothing.
-
-        One window stays, since there is no run without any.
-        """
-        if not self.windowed:
-            return np.ones(self.length, dtype=bool), replace(self, kept=np.zeros(self.length, dtype=bool))
-        judges = np.arange(self.restarts.size) > 0
-        first = replace(self, restarts=self.restarts[:1], x0=self.x0[:1], variance=self.variance[:1])
-        return judges, first
 
     def errors(self, y: Array) -> Array:
         """Weighted errors (samples, W, outputs) of simulated outputs, of a free run from the first that counts on."""
