@@ -139,7 +139,7 @@ ASKED: list[Asked] = [
         least=86.0,
         how="left out",
         missed="where a cart that climbs in stairs stops hangs on what the drive gives at small commands, not known; "
-        "with an offset of the command of each run's own 87, 89 and 93 were reached, but that search did not settle",
+        "with an offset of the command of each run's own 87, 89 and 93 were reached",
     ),
     *_each("ecp210_export", {"x_1": 95.0, "x_2": 91.0}, ()),
     *_each("ecp210_export", {"x_1": 91.0, "x_2": 89.0}, (), "left out"),
