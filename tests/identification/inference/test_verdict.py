@@ -13,7 +13,7 @@ from upright.identification.estimate import identify, predict
 from upright.identification.inference.covariance import Optimum, assess
 from upright.identification.inference.loop import standing
 from upright.identification.inference.verdict import Evidence, judge, trusted
-from upright.identification.model.fit import Answer, Estimate, RunScore
+from upright.identification.model.fit import Estimate, Judgement, RunScore
 from upright.identification.model.rig import Rig
 from upright.identification.model.runs import Run
 from upright.identification.problem.residuals import formulate
@@ -199,7 +199,7 @@ def _score(role: str, percent: float, horizon: float | None) -> RunScore:
     )  # fmt: skip
 
 
-def _judged(runs: dict[str, RunScore], estimates: dict[str, Estimate] | None = None) -> tuple[Answer, ...]:
+def _judged(runs: dict[str, RunScore], estimates: dict[str, Estimate] | None = None) -> tuple[Judgement, ...]:
     return judge(
         Evidence(
             rig=rig(Pendulum, PENDULUM, dict.fromkeys(estimates or {}, 1e-3)), runs=runs, estimates=estimates or {},

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from upright.identification.inference.assumptions import proportional
 from upright.identification.inference.loop import Standing
-from upright.identification.model.fit import Answer, Assumption, Estimate, RunScore
+from upright.identification.model.fit import Assumption, Estimate, Judgement, RunScore
 from upright.identification.model.rig import Rig
 
 GOOD = 80.0
@@ -57,18 +57,18 @@ class Evidence:
     standing: Standing | None
 
 
-def judge(found: Evidence) -> tuple[Answer, ...]:
+def judge(found: Evidence) -> tuple[Judgement, ...]:
     """The three answers."""
     predicts = _predicts(found)
     return predicts, _usable(found, confirmed=predicts.answer == "yes"), _loop(found)
 
 
-def trusted(answers: Sequence[Answer]) -> bool:
+def trusted(answers: Sequence[Judgement]) -> bool:
     """Whether nothing speaks against the model or its numbers; what was not tested does not."""
     return not any(a.answer == "no" for a in answers if a.question != LOOP)
 
 
-def _predicts(found: Evidence) -> Answer:
+def _predicts(found: Evidence) -> Judgement:
     against: list[str] = []
     if found.interrupted:
         against.append("The search was interrupted; this is its best so far.")
@@ -103,21 +103,21 @@ def _predicts(found: Evidence) -> Answer:
             "the model."
         )
     if against:
-        return Answer(
+        return Judgement(
             question=PREDICTS, answer="no", headline=f"{explains}Not to be trusted as it stands.",
             reasons=(*against, *notes),
         )  # fmt: skip
     if not predicted:
-        return Answer(
+        return Judgement(
             question=PREDICTS, answer="not tested", headline=f"{explains}Every run was fitted.",
             advice="Hold a run or a tail out (role = \"predict\", or --hold-out).", reasons=tuple(notes),
         )  # fmt: skip
     part = "in part" if blank else "yes"
     headline = f"{explains}It predicts {_range(predicted)} of runs it has not seen{_held_speed(found.runs)}."
-    return Answer(question=PREDICTS, answer=part, headline=headline, reasons=tuple(notes))
+    return Judgement(question=PREDICTS, answer=part, headline=headline, reasons=tuple(notes))
 
 
-def _usable(found: Evidence, *, confirmed: bool) -> Answer:
+def _usable(found: Evidence, *, confirmed: bool) -> Judgement:
     asked = {n: e for n, e in found.estimates.items() if e.status in ("firm", "weak", "at bound", "unseen")}
     firm = [n for n, e in asked.items() if e.status == "firm"]
     reasons: list[str] = list(found.unseen)
@@ -168,7 +168,7 @@ def _usable(found: Evidence, *, confirmed: bool) -> Answer:
     advice = ""
     if any(e.status in ("weak", "unseen") for e in asked.values()):
         advice = "Measure one of the others on the bench and give it as known, or add a run that moves it more."
-    return Answer(question=USABLE, answer=answer, headline=headline, advice=advice, reasons=tuple(reasons))
+    return Judgement(question=USABLE, answer=answer, headline=headline, advice=advice, reasons=tuple(reasons))
 
 
 def _lumped(rig: Rig) -> list[str]:
@@ -179,10 +179,10 @@ def _lumped(rig: Rig) -> list[str]:
     return []
 
 
-def _loop(found: Evidence) -> Answer:
+def _loop(found: Evidence) -> Judgement:
     s = found.standing
     if s is None:
-        return Answer(
+        return Judgement(
             question=LOOP, answer="not asked",
             headline="No equilibrium of this plant is unstable, or no drive acts on it.",
         )  # fmt: skip
@@ -196,7 +196,7 @@ def _loop(found: Evidence) -> Answer:
     elif half <= SOME and s.share >= LIKELY:
         answer = "in part"
     doubted = any(not a for a in (found.converged, not found.interrupted))
-    return Answer(
+    return Judgement(
         question=LOOP, answer="no" if doubted else answer,
         headline=f"{where[0].upper()}{where[1:]}; {held}.",
         advice="" if answer == "yes" else "Narrow the numbers above before a loop is closed.",

@@ -59,7 +59,7 @@ class Assumption:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Answer:
+class Judgement:
     """One of the questions that a verdict answers: "yes", "in part", "no", "not tested" or "not asked".
 
     The headline says it with its numbers, `advice` what to do, `reasons` why.
@@ -146,7 +146,7 @@ class Fit:
     runs: Mapping[str, RunScore]
     verdict: str
     trusted: bool
-    answers: tuple[Answer, ...] = ()
+    answers: tuple[Judgement, ...] = ()
     method: str
     evaluations: int
     seconds: float
