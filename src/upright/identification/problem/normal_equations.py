@@ -51,6 +51,27 @@ def finite(values: Array) -> bool:
         return bool(np.isfinite(values.sum()))
 
 
+def slopes(lanes: Array, steps: Array, *, central: bool = False) -> Array:
+    """Derivatives (..., n) from lanes (..., n + 1), the first unmoved and then each number moved by its one of `steps`.
+
+    When `central`, n more lanes are moved the other way. At the edge of where a model is stable one side may run away:
+    its squares overflow, and the other side alone tells. Where both do there is no derivative.
+    """
+    n = steps.size
+    here, ahead = lanes[..., :1], lanes[..., 1 : n + 1]
+    with np.errstate(over="ignore", invalid="ignore"):
+        if not central:
+            return (ahead - here) / steps
+        found = (ahead - lanes[..., n + 1 :]) / (2 * steps)
+        if finite(found * found):
+            return found
+        sides = np.stack([(ahead - here) / steps, (here - lanes[..., n + 1 :]) / steps])
+        tells = np.isfinite(np.sum(sides * sides, axis=tuple(range(1, sides.ndim - 1))))
+        for k in np.flatnonzero(tells.any(axis=0) & ~tells.all(axis=0)):
+            found[..., k] = sides[int(np.argmax(tells[:, k])), ..., k]
+    return found
+
+
 def squares(lanes: Sequence[Array], target: Array, offset: Array, weights: Array, scale: Array | None = None) -> Array:
     """``B'B`` (p, p) of what p lanes miss and how they differ, ``B = (z_0 - y, z_1 - z_0, ...)`` times `weights`.
 

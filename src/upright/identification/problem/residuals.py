@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from upright.identification.model.rig import Rig, base_values, neutral
 from upright.identification.model.runs import Run
-from upright.identification.problem.normal_equations import Normal, finite, mixed, products, squares
+from upright.identification.problem.normal_equations import Normal, finite, mixed, products, slopes, squares
 from upright.identification.problem.restarts import PERTURBATION, Restart, settle
 from upright.identification.problem.simulated import motions, outputs, restart_states, simulator
 from upright.identification.problem.tracks import Track, prepare
@@ -184,7 +184,7 @@ class Problem:
     ) -> tuple[Array, Array] | None:
         """Residuals (T, outputs) of one run, windows one after another, and their Jacobian (T, outputs, sought in it).
 
-        None when the simulation ran away.
+        None when the simulation ran away, or does as soon as a number is moved to either side.
         """
         track, sought = self.tracks[index], self.sought_in(index)
         n, m = track.within(horizon), sought.size
@@ -195,8 +195,9 @@ class Problem:
             return None
         y = y[min(track.first, n - 1) :]
         with np.errstate(over="ignore", invalid="ignore"):  # a lane that ran away makes the cost infinite
-            behind = y[..., m + 1 :] if central else y[..., :1]
-            slope = track.weighting @ ((y[..., 1 : m + 1] - behind) / (self.steps[sought] * (1 + central)))
+            slope = track.weighting @ slopes(y, self.steps[sought], central=central)
+            if central and not finite(slope * slope):
+                return None
         k = len(track.columns) * (n if track.ahead else 1)  # all horizons of one restart stand in one row
         r, J = np.moveaxis(residual, 1, 0), np.moveaxis(slope, 1, 0)  # windows one after another
         if restart is not None:
