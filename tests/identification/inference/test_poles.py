@@ -79,3 +79,23 @@ def test_a_rig_swings_as_it_was_run(runs: list[bool], told: dict[str, float]) ->
     fit = identify(rig(CartPendulum, known, {"l_cg": 0.32, "b_2": 4e-3}), [swung(f"run {h}", held=h) for h in runs])
     hanging = {at: max(p.imag.value for p in found) for at, found in fit.poles.items() if at.startswith("hanging")}
     assert hanging == pytest.approx({at: damped_frequency(mass) for at, mass in told.items()}, rel=5e-3)
+
+
+@pytest.mark.parametrize("spread", [0.05, 0.3, 0.45])
+def test_the_interval_of_a_decay_is_that_of_its_logarithm(spread: float) -> None:
+    # a swing decays by b_2/(2 J), so that the logarithm of the decay is as uncertain as that of b_2
+    inertia, b_2 = SIMPLE["m_p"] * SIMPLE["l_cg"] ** 2, 2e-3
+    simple = rig(Pendulum, SIMPLE | {"b_2": b_2}, {})
+    values = {**simple.plant(**SIMPLE).parameters(), **SIMPLE, "b_2": b_2, "g": 9.81}
+    found = poles(simple, values, ["b_2"], np.array([[(spread * b_2) ** 2]]), TWO_SIGMA)
+    (pole,) = found["hanging"]
+    decay, off = b_2 / (2 * inertia), TWO_SIGMA * spread
+    assert pole.real.value == pytest.approx(-decay)
+    assert pole.real.interval == pytest.approx((-decay * math.exp(off), -decay * math.exp(-off)), rel=1e-3)
+
+
+def test_a_stable_pole_stays_stable_however_uncertain_its_damping() -> None:
+    simple = rig(Pendulum, SIMPLE | {"b_2": 2e-3}, {})
+    values = {**simple.plant(**SIMPLE).parameters(), **SIMPLE, "b_2": 2e-3, "g": 9.81}
+    (pole,) = poles(simple, values, ["b_2"], np.array([[4e-6]]), TWO_SIGMA)["hanging"]
+    assert pole.real.interval[0] < pole.real.value < pole.real.interval[1] == 0.0

@@ -79,8 +79,8 @@ def poles(
         ]
         found[f"{at}, {' and '.join(sorted(still))} held" if still else at] = tuple(
             Pole(
-                real=Estimate.within(float(p.real), float(a), quantile * float(a), "1/s"),
-                imag=_upper(float(p.imag), float(b), quantile),
+                real=_of_one_sign(float(p.real), float(a), quantile, "1/s"),
+                imag=_of_one_sign(float(p.imag), float(b), quantile, "rad/s"),
             )
             for p, a, b in zip(here, *errors, strict=True)
             if p.imag >= 0
@@ -88,16 +88,20 @@ def poles(
     return found
 
 
-def _upper(value: float, stderr: float, quantile: float) -> Estimate:
-    """Imaginary part of the upper pole of a pair, positive as a frequency is: its logarithm is what is uncertain.
+def _of_one_sign(value: float, stderr: float, quantile: float, unit: str) -> Estimate:
+    """A decay or growth, or the imaginary part of the upper pole of a pair: its logarithm is what is uncertain.
 
-    An interval from 0 on says that the pair may as well be two real poles.
+    So a stable pole stays stable, and a frequency positive. An interval that ends at 0 says of a pair that it may as
+    well be two real poles, of a decay that none is seen.
     """
-    plain = Estimate.within(value, stderr, quantile * stderr, "rad/s")
-    if plain.interval[0] <= 0:
-        return replace(plain, interval=(0.0, plain.interval[1]))
-    factor = math.exp(quantile * stderr / value)
-    return replace(plain, interval=(value / factor, value * factor))
+    plain = Estimate.within(value, stderr, quantile * stderr, unit)
+    low, high = plain.interval
+    if value == 0 or not math.isfinite(high - low):
+        return plain
+    if low * high <= 0:
+        return replace(plain, interval=(0.0, high) if value > 0 else (low, 0.0))
+    ends = sorted(value * math.exp(sign * quantile * stderr / abs(value)) for sign in (-1, 1))
+    return replace(plain, interval=(ends[0], ends[1]))
 
 
 def _poles(rig: Rig, values: Mapping[str, float], at: str, held: frozenset[str]) -> NDArray[np.complex128]:
