@@ -142,11 +142,22 @@ BLOCKS = (4, 8)
 def _parts(r: Array, J: Array, pieces: int, sought: NDArray[np.int64], size: int) -> list[tuple[Array, Array]]:
     """Gradient (size,) and Gauss-Newton matrix (size, size) of each of so many pieces of a run's rows."""
     found: list[tuple[Array, Array]] = []
-    for rows in np.array_split(np.arange(len(r)), pieces):
+    for rows in np.split(np.arange(len(r)), _cuts(J, pieces)):
         flat, g, A = J[rows].reshape(-1, sought.size), np.zeros(size), np.zeros((size, size))
         g[sought], A[np.ix_(sought, sought)] = flat.T @ r[rows].reshape(-1), flat.T @ flat
         found.append((g, A))
     return found
+
+
+def _cuts(J: Array, pieces: int) -> NDArray[np.int64]:
+    """Rows at which so many pieces begin that tell equally much, the first left out.
+
+    Pieces as long as one another would leave all but one without a say where a rig moves for a moment only.
+    """
+    length = np.sqrt(np.sum(J * J, axis=(0, 1)))
+    told = np.cumsum(np.sum((J / np.where(length > 0, length, np.inf)) ** 2, axis=(1, 2)))
+    shares = np.arange(1, pieces) / pieces
+    return np.searchsorted(told, shares * told[-1])
 
 
 def between_blocks(
