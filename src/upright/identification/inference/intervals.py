@@ -30,7 +30,8 @@ Array = NDArray[np.float64]
 Intervals = dict[str, tuple[float, float]]
 
 NARROW = 0.1
-"""A profile below this share of the interval from the standard error was not followed along its valley."""
+"""An end nearer than this share of what the quadratic model says was not followed along its valley: no wall is there,
+and the refits beside the estimate stall, as on the staircase that what sticks makes of the cost."""
 
 AFFORDED = 2.0e7
 """Residuals that the profiles of one fit may cost altogether."""
@@ -143,12 +144,17 @@ def profile(best: Optimum, place: int, plain: Estimate, quantile: float, log: Se
     KeyboardInterrupt
         When somebody interrupts: half a profile is no interval.
     """
-    low, high = _ends(best, place, quantile, log)
-    if best.problem.unknowns[place].log:
+    u, x = best.problem.unknowns[place], float(best.x[place])
+    low, high = (
+        x + sign * step if abs(end - x) < NARROW * step and end != wall else end
+        for sign, step, end, wall in zip(
+            (-1, 1), _steps(best, place, quantile)[1], _ends(best, place, quantile, log),
+            (best.problem.lower[place], best.problem.upper[place]), strict=True,
+        )
+    )  # fmt: skip
+    if u.log:
         low, high = (math.exp(low) if low > -700 else 0.0), math.exp(min(high, 700.0))
         return (low, high) if plain.value / FAR < low and high < plain.value * FAR else plain.interval
-    if high - low < NARROW * (plain.interval[1] - plain.interval[0]):
-        return plain.interval  # a valley too narrow to follow with one number held
     return (low if math.isfinite(low) else plain.interval[0]), (high if math.isfinite(high) else plain.interval[1])
 
 
