@@ -10,7 +10,8 @@ from scipy import stats
 
 from tests.identification.twins import PENDULUM, noisy, rig, swing
 from upright.identification.estimate import identify
-from upright.identification.inference.covariance import assess, between_blocks
+from upright.identification.inference.covariance import assess, between_blocks, cuts
+from upright.identification.model.runs import Run
 from upright.identification.problem.residuals import formulate
 from upright.identification.search.descent import descend_progressively
 from upright.physics import Pendulum
@@ -89,17 +90,36 @@ def test_blocks_that_agree_leave_the_sandwich_as_it_is() -> None:
     assert between_blocks(parts, 4 * np.eye(1), np.array([True]), np.array([0.1]), 100.0) == 1.0
 
 
-def test_an_interval_holds_what_either_half_of_a_run_says_of_its_friction() -> None:
-    """A swing whose viscous friction doubles half-way: no constant is true, and both halves are within the interval."""
-    half = swing({**PENDULUM, "b_2c": 0.0, "b_2q": 0.0}, angle=1.5, seconds=10.0)
-    late = {**PENDULUM, "b_2": 2 * PENDULUM["b_2"], "b_2c": 0.0, "b_2q": 0.0}
-    last = half.y[-1, 0], (half.y[-1, 0] - half.y[-2, 0]) / half.period
-    other = simulate(Pendulum(**late), {}, [last[0], last[1]], None, half.period, samples=half.t.size)[:, 0, 0]
-    y = np.concatenate([half.y[:, 0], other[1:]])[:, None]
-    run = noisy(replace(half, t=np.arange(len(y)) * half.period, u=np.zeros((len(y), 1)), y=y), 1e-3, 0)
-    asked = rig(Pendulum, {**PENDULUM, "b_2c": 0.0, "b_2q": 0.0}, {"J_p": 3e-3, "b_2": 1.5e-3})
-    low, high = identify(asked, [run], method="least-squares").estimates["b_2"].interval
-    assert low <= PENDULUM["b_2"] < 2 * PENDULUM["b_2"] <= high
+def doubled(first: float, rest: float, **values: float) -> Run:
+    """A swing whose viscous friction doubles after `first` seconds, and that is logged for the `rest`."""
+    early = {**PENDULUM, "b_2c": 0.0, "b_2q": 0.0, **values}
+    swung = swing(early, angle=1.5, seconds=first)
+    late = {**early, "b_2": 2 * early["b_2"]}
+    last = [swung.y[-1, 0], (swung.y[-1, 0] - swung.y[-2, 0]) / swung.period]
+    samples = round(rest / swung.period) + 1
+    other = simulate(Pendulum(**late), {}, last, None, swung.period, samples=samples)[:, 0, 0]
+    y = np.concatenate([swung.y[:, 0], other[1:]])[:, None]
+    return noisy(replace(swung, t=np.arange(len(y)) * swung.period, u=np.zeros((len(y), 1)), y=y), 1e-3, 0)
+
+
+@pytest.mark.parametrize(("first", "rest", "b_2"), [(10.0, 10.0, PENDULUM["b_2"]), (3.0, 57.0, 1e-2)])
+def test_an_interval_holds_what_either_part_of_a_run_says_of_its_friction(
+    first: float, rest: float, b_2: float
+) -> None:
+    """No constant is true, and those of both parts are within the interval, also where most of the log is rest."""
+    asked = rig(Pendulum, {**PENDULUM, "b_2c": 0.0, "b_2q": 0.0}, {"J_p": 3e-3, "b_2": 0.75 * b_2})
+    fit = identify(asked, [doubled(first, rest, b_2=b_2)], method="least-squares", watch=False)
+    low, high = fit.estimates["b_2"].interval
+    assert low <= b_2 < 2 * b_2 <= high
+
+
+def test_blocks_are_of_one_length_unless_one_would_tell_most() -> None:
+    """The first 101 rows tell all, each as much: 40 of 160 are no more than half, 75 of 301 are."""
+    J = np.zeros((200, 2, 3))
+    J[:101] = [[1.0, 0.0, 3.0], [0.0, 2.0, 4.0]]
+    assert cuts(J[:160], 4).tolist() == [40, 80, 120]
+    assert cuts(np.concatenate([J[:101], 0 * J]), 4).tolist() == [25, 50, 75]
+    assert cuts(J, 1).tolist() == []
 
 
 def test_linear_problem_has_the_textbook_covariance() -> None:

@@ -139,25 +139,32 @@ BLOCKS = (4, 8)
 """Numbers of blocks that the runs are cut into: few see what changes slowly, many what changes fast."""
 
 
+MOST = 0.5
+"""No block tells more than this share of all, or nothing would be left to tell whether others differ from it."""
+
+
+def cuts(J: Array, pieces: int) -> NDArray[np.int64]:
+    """Rows of a Jacobian (T, outputs, numbers) at which so many pieces begin, the first left out.
+
+    Pieces of one length; where one would tell most of what there is to know, as where a rig answers a step for a moment
+    and then stands, pieces that tell equally much.
+    """
+    length = np.sqrt(np.sum(J * J, axis=(0, 1)))
+    told = np.cumsum(np.sum((J / np.where(length > 0, length, np.inf)) ** 2, axis=(1, 2)))
+    inside = np.arange(1, pieces)
+    even = inside * len(J) // pieces
+    each = np.diff(told[even - 1], prepend=0.0, append=told[-1])
+    return even if each.max() <= MOST * told[-1] else np.searchsorted(told, inside / pieces * told[-1], side="right")
+
+
 def _parts(r: Array, J: Array, pieces: int, sought: NDArray[np.int64], size: int) -> list[tuple[Array, Array]]:
     """Gradient (size,) and Gauss-Newton matrix (size, size) of each of so many pieces of a run's rows."""
     found: list[tuple[Array, Array]] = []
-    for rows in np.split(np.arange(len(r)), _cuts(J, pieces)):
+    for rows in np.split(np.arange(len(r)), cuts(J, pieces)):
         flat, g, A = J[rows].reshape(-1, sought.size), np.zeros(size), np.zeros((size, size))
         g[sought], A[np.ix_(sought, sought)] = flat.T @ r[rows].reshape(-1), flat.T @ flat
         found.append((g, A))
     return found
-
-
-def _cuts(J: Array, pieces: int) -> NDArray[np.int64]:
-    """Rows at which so many pieces begin that tell equally much, the first left out.
-
-    Pieces as long as one another would leave all but one without a say where a rig moves for a moment only.
-    """
-    length = np.sqrt(np.sum(J * J, axis=(0, 1)))
-    told = np.cumsum(np.sum((J / np.where(length > 0, length, np.inf)) ** 2, axis=(1, 2)))
-    shares = np.arange(1, pieces) / pieces
-    return np.searchsorted(told, shares * told[-1])
 
 
 def between_blocks(
