@@ -22,7 +22,8 @@ from upright.workers import Workers
 
 NAMES = (
     "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "frequency", "swing_up", "tracking", "lab",
-    "doctor", "rigs", "misfit", "verdicts", "regulation", "real", "agree", "starts", "startup", "workers", "long", "gpu",
+    "doctor", "rigs", "misfit", "verdicts", "regulation", "real", "agree", "starts", "startup", "workers",
+    "long", "gpu",
 )  # fmt: skip
 PUBLISHED = ("real", "agree", "rigs", "misfit", "verdicts", "regulation", "workers")
 SHARED = ("coverage", "agree", "rigs", "misfit", "verdicts", "regulation", "starts")
