@@ -15,6 +15,7 @@ from upright.errors import BadInput, nearest
 from upright.identification.checks.conventions import wrong_conventions
 from upright.identification.checks.outliers import refit_without_outliers
 from upright.identification.inference.assumptions import assumptions, sentences
+from upright.identification.inference.bands import calibrated
 from upright.identification.inference.covariance import Identifiability, Optimum, assess, identifiability
 from upright.identification.inference.intervals import run_estimates, shared_estimates, widened, with_model_uncertainty
 from upright.identification.inference.loop import standing
@@ -22,6 +23,7 @@ from upright.identification.inference.poles import poles, shared_values
 from upright.identification.inference.scoring import fit_percent, predict, score
 from upright.identification.inference.verdict import GOOD, Evidence, judge, trusted
 from upright.identification.ladder.growth import choose_friction
+from upright.identification.model.bands import Bands
 from upright.identification.model.fit import Estimate, Fit, Pole, RunScore
 from upright.identification.model.rig import Rig, neutral
 from upright.identification.model.runs import Run
@@ -220,7 +222,8 @@ def _conclude(asked: Rig, runs: Sequence[Run], problem: Problem, found: Descent,
     if not found.interrupted:
         estimates = with_model_uncertainty(estimates, best, asked, left_out, log)
     scored = [run for run in runs if run.role == "fit" or not found.interrupted]
-    scores = _scores(best, scored, estimates, groups, log)
+    bands = None if found.interrupted else calibrated(best)
+    scores = _scores(best, scored, estimates, groups, bands, log)
     if len(scored) < len(runs):
         warnings.append("What was held out is not predicted, because the search was interrupted.")
     unseen = seen.sentences({n: p.unit for n, p in asked.parameters.items()})
@@ -265,12 +268,13 @@ def _conclude(asked: Rig, runs: Sequence[Run], problem: Problem, found: Descent,
         interrupted=found.interrupted,
         poles={} if seen.hidden else _poles(best),  # a pole may depend on what the data cannot see
         assumptions=assumed,
+        bands=bands,
     )
 
 
 def _scores(
     best: Optimum, runs: Sequence[Run], estimates: dict[str, Estimate], groups: dict[str, dict[str, Estimate]],
-    log: SearchLog,
+    bands: Bands | None, log: SearchLog,
 ) -> dict[str, RunScore]:  # fmt: skip
     problem, rig = best.problem, best.problem.rig
     fitted = [run for run in runs if run.role == "fit"]
@@ -279,7 +283,8 @@ def _scores(
     found = {run.label: score(whole, i, best.x) for i, run in enumerate(fitted)}
     values = {n: e.value for n, e in estimates.items()}
     known = {label: {n: e.value for n, e in group.items()} for label, group in groups.items()}
-    found |= predict(values, rig, [r for r in runs if r.role != "fit"], groups=known, progress=log.progress)
+    foreseen = [r for r in runs if r.role != "fit"]
+    found |= predict(values, rig, foreseen, groups=known, bands=bands, progress=log.progress)
     return {run.label: found[run.label] for run in runs}
 
 

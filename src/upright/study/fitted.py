@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from upright.errors import BadInput, ImpossiblePhysics
 from upright.files import read_text
+from upright.identification.model.bands import Bands, Spread
 from upright.identification.model.rig import SUBSTEPS
 from upright.physics import BUILT_IN, find
 from upright.physics.actuator import ACTUATOR
@@ -29,7 +30,10 @@ LARGEST = 1e12
 
 @dataclass(frozen=True, kw_only=True)
 class FittedModel:
-    """What is read of a `fit.json`: the plant's name, every parameter [SI], what groups share, the rig, all content."""
+    """What is read of a `fit.json`: the plant's name, every parameter [SI], what groups share, the rig, all content.
+
+    `bands` are None in files that versions without them wrote.
+    """
 
     plant: str
     values: Mapping[str, float]
@@ -38,6 +42,7 @@ class FittedModel:
     trusted: bool
     groups: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
     description: RigDescription = field(default_factory=RigDescription)
+    bands: Bands | None = None
     content: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def unit(self, name: str) -> str:
@@ -108,6 +113,7 @@ def _model(content: dict[str, Any]) -> FittedModel:
     return FittedModel(
         plant=plant, values=values, substeps=substeps, verdict=verdict, trusted=trusted, groups=groups, content=content,
         description=_description(content, values),
+        bands=None if content.get("bands") is None else _bands(content["bands"]),
     )  # fmt: skip
 
 
@@ -144,6 +150,56 @@ def _drive(content: Mapping[str, Any], values: Mapping[str, float]) -> dict[str,
                 value=values[name], unit=str(table.get("unit") or ""), source="identified" if name in asked else known
             )
     return out
+
+
+def _bands(entry: Any) -> Bands:
+    """What the fit promises of predictions."""
+    table = _table(entry, "bands")
+    spreads = {
+        signal: tuple(_spread(part, f"bands.spreads.{signal}") for part in _list(parts, f"bands.spreads.{signal}"))
+        for signal, parts in _table(table.get("spreads"), "bands.spreads").items()
+    }
+    names = [_text(name, "bands.names") for name in _list(table.get("names"), "bands.names")]
+    rows = [
+        [_number(v, "bands.covariance") for v in _list(row, "bands.covariance")]
+        for row in _list(table.get("covariance"), "bands.covariance")
+    ]
+    if [len(row) for row in rows] != [len(names)] * len(names):
+        raise BadInput(f"bands.covariance must have {len(names)} rows of as many numbers, one for each of bands.names")
+    covariance = np.array(rows).reshape(len(names), len(names))
+    if names and np.linalg.eigvalsh(_scaled(covariance))[0] < -1e-6:
+        raise BadInput("bands.covariance must be that of some numbers, so none of its variances may be negative")
+    return Bands(
+        quantile=_positive(table.get("quantile"), "bands.quantile"), level=_positive(table.get("level"), "bands.level"),
+        spreads=spreads, names=tuple(names), covariance=covariance,
+        reached={n: _number(v, f"bands.reached.{n}") for n, v in _table(table.get("reached"), "bands.reached").items()},
+    )  # fmt: skip
+
+
+def _scaled(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    size = np.sqrt(np.abs(np.diag(covariance)))
+    size[size == 0] = 1.0
+    return covariance / np.outer(size, size)
+
+
+def _spread(entry: Any, place: str) -> Spread:
+    table = _table(entry, place)
+    horizon, start, end = (_number(table.get(n), f"{place}.{n}") for n in ("horizon", "start", "end"))
+    if horizon < 0 or not 0 < start <= end:
+        raise BadInput(f"{place} must have a horizon of 0 or more and 0 < start <= end, got {_shown(entry)}")
+    return Spread(horizon=horizon, start=start, end=end)
+
+
+def _positive(value: Any, place: str) -> float:
+    if not (number := _number(value, place)) > 0:
+        raise BadInput(f"{place} must be above 0, got {number:g}")
+    return number
+
+
+def _list(value: Any, place: str) -> list[Any]:
+    if not isinstance(value, list):
+        raise BadInput(f"{place} must be a list, got {_shown(value)}")
+    return value  # type: ignore[reportUnknownVariableType]
 
 
 def _value(name: str, entry: Any) -> float:

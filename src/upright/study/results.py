@@ -37,6 +37,7 @@ def write_fit(fit: Fit, study: Study, path: Path, crossed: CrossValidation | Non
         for name, p in fit.rig.parameters.items()
     }
     meanings = {name: p.meaning for name, p in fit.rig.parameters.items()}
+    bands = fit.bands if crossed is None else crossed.bands
     content: dict[str, Any] = {
         "format": FORMAT,
         "title": study.title,
@@ -60,7 +61,7 @@ def write_fit(fit: Fit, study: Study, path: Path, crossed: CrossValidation | Non
         **_fields(fit, "per_run groups"),
         "runs": {
             label: {
-                **_fields(score, "role fit_percent horizon score_from naive adapted offer"),
+                **_fields(score, "role fit_percent horizon score_from naive adapted offer inside beyond"),
                 "ahead": [{"horizon": h, "fit_percent": percents} for h, percents in score.ahead.items()],
             }
             for label, score in fit.runs.items()
@@ -69,6 +70,7 @@ def write_fit(fit: Fit, study: Study, path: Path, crossed: CrossValidation | Non
         "estimated": fit.names,
         **_fields(fit, "correlation singular_values directions"),
         "history": [{"stage": s, "cost": c, "evaluations": n} for s, c, n in fit.history],
+        "bands": None if bands is None else vars(bands),
         "provenance": provenance(study),
     }
     if crossed is not None:

@@ -35,15 +35,17 @@ Array = NDArray[np.float64]
 class Optimum:
     """Coordinates `x` (n,) at which the cost of a problem is least, and how sure they are.
 
-    `covariance` (n, n) has zero rows for numbers that are `pinned` (n,), held by a bound; `white` (n,) are the
-    variances that uncorrelated residuals would give, `matrix` (n, n) is Gauss-Newton's, prior knowledge included. One
-    weighted residual has the `variance`; residuals have forgotten themselves after `memory` seconds (autocorrelation
-    below 1/e), which leaves so many independent `samples`.
+    `covariance` (n, n) has zero rows for numbers that are `pinned` (n,), held by a bound; `sandwich` (n, n) is that of
+    the residuals' memory alone, in which combinations that the data see well stay as sure as they are; `white` (n,) are
+    the variances that uncorrelated residuals would give, `matrix` (n, n) is Gauss-Newton's, prior knowledge included.
+    One weighted residual has the `variance`; residuals have forgotten themselves after `memory` seconds
+    (autocorrelation below 1/e), which leaves so many independent `samples`.
     """
 
     problem: Problem
     x: Array
     covariance: Array
+    sandwich: Array
     white: Array
     matrix: Array
     variance: float
@@ -122,7 +124,7 @@ def assess(problem: Problem, x: Array) -> Optimum:
     # a prior's row is one residual of the size that one sigma is worth
     prior_meat = prior.T @ prior * problem.noise**2
     meat = hac + prior_meat
-    covariance = inverse @ meat @ inverse
+    covariance = sandwich = inverse @ meat @ inverse
     if runs > 1:
         spread = inverse @ (from_runs * runs / (runs - 1) + prior_meat) @ inverse
         factor = np.sqrt(np.maximum(np.diag(spread) / np.where(np.diag(covariance) > 0, np.diag(covariance), 1.0), 1.0))
@@ -130,8 +132,8 @@ def assess(problem: Problem, x: Array) -> Optimum:
     covariance = covariance * between_blocks(blocks, A, free, np.diag(covariance), independent - float(free.sum()))
     white = np.diag(inverse) * variance
     return Optimum(
-        problem=problem, x=x, covariance=covariance, white=white, matrix=A, variance=variance, memory=longest,
-        samples=independent, pinned=pinned,
+        problem=problem, x=x, covariance=covariance, sandwich=sandwich, white=white, matrix=A, variance=variance,
+        memory=longest, samples=independent, pinned=pinned,
     )  # fmt: skip
 
 

@@ -9,8 +9,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from upright.identification.inference.bands import banded
 from upright.identification.inference.covariance import assess
 from upright.identification.inference.intervals import run_estimates
+from upright.identification.model.bands import Bands
 from upright.identification.model.fit import Fit, Offer, RunScore
 from upright.identification.model.rig import Rig
 from upright.identification.model.runs import Run
@@ -100,6 +102,7 @@ def predict(
     runs: Sequence[Run],
     *,
     groups: Mapping[str, Mapping[str, float]] | None = None,
+    bands: Bands | None = None,
     progress: Progress = silent,
 ) -> dict[str, RunScore]:
     """Scores of runs that a fitted model has not seen, by label.
@@ -117,6 +120,8 @@ def predict(
         was fitted.
     groups : mapping, optional
         What groups of runs share, by label and name; those of a `Fit` when omitted.
+    bands : Bands, optional
+        What the fit promises; that of a `Fit` when omitted. Without it no band is drawn.
     progress : callable, optional
         Told the stage, its cost and its number of simulations, and the share done.
 
@@ -128,8 +133,10 @@ def predict(
     values = {n: e.value for n, e in fitted.estimates.items()} if isinstance(fitted, Fit) else dict(fitted)
     if groups is None and isinstance(fitted, Fit):
         groups = {label: {n: e.value for n, e in group.items()} for label, group in fitted.groups.items()}
+    if bands is None and isinstance(fitted, Fit):
+        bands = fitted.bands
     known = with_noise(rig, runs).with_values(values)
-    return {run.label: _predict(known, run, groups or {}, progress) for run in runs}
+    return {run.label: _predict(known, run, groups or {}, bands, progress) for run in runs}
 
 
 def _either_side(problem: Problem) -> list[Array]:
@@ -154,10 +161,14 @@ SHORT, MENDED = 90.0, 2 / 3
 FACTORS = ("friction", "gain")
 
 
-def _predict(rig: Rig, run: Run, groups: Mapping[str, Mapping[str, float]], progress: Progress) -> RunScore:
-    """Score of one run, with the factor of its own that would mend it where it falls short."""
+def _predict(
+    rig: Rig, run: Run, groups: Mapping[str, Mapping[str, float]], bands: Bands | None, progress: Progress
+) -> RunScore:
+    """Score of one run, with its band, and the factor of its own that would mend it where it falls short."""
     run = located(rig, run)
-    plain, *_ = _foresee(rig, run, groups, progress)
+    plain, problem, x = _foresee(rig, run, groups, progress)
+    if bands is not None:
+        plain = banded(plain, bands, rig, run, groups, problem.values_at(x))
     missed = 100 - min(plain.fit_percent.values(), default=100.0)
     if missed <= 100 - SHORT:
         return plain

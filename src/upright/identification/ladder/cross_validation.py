@@ -14,7 +14,10 @@ from functools import partial
 import numpy as np
 
 from upright.errors import BadInput
+from upright.identification.inference.bands import calibrated, recalibrated
+from upright.identification.inference.covariance import assess
 from upright.identification.inference.scoring import predict
+from upright.identification.model.bands import Bands
 from upright.identification.model.fit import Fit, RunScore
 from upright.identification.model.rig import Rig
 from upright.identification.model.runs import Run
@@ -33,13 +36,14 @@ class CrossValidation:
 
     `values` are the parameters of the fit without the run, `blind` those that the others could not see: they keep what
     the run itself said, so that its prediction is none of theirs. Runs that an interrupted search did not come to are
-    missing but for `fitted`.
+    missing but for `fitted`. `bands` are those of the fit of all runs, as wide as these predictions ask.
     """
 
     fitted: Mapping[str, RunScore]
     predicted: Mapping[str, RunScore]
     values: Mapping[str, Mapping[str, float]]
     blind: Mapping[str, tuple[str, ...]]
+    bands: Bands | None = None
     interrupted: bool = False
 
 
@@ -61,6 +65,7 @@ def leave_one_out(
     noise: float | None = None,
     typical: Sequence[str] = (),
     otherwise: Mapping[str, float] | None = None,
+    promise: bool = False,
     progress: Progress = silent,
     workers: Workers = HERE,
 ) -> Finished[HeldOut]:
@@ -81,18 +86,20 @@ def leave_one_out(
     otherwise : mapping, optional
         Values of parameters that the other runs cannot see at all; without it they keep those of `start`, which knows
         the run that is left out.
+    promise : bool
+        Whether each prediction carries the bands that the fit of the others promises, which takes a little longer.
     progress : callable, optional
         As for `identify`.
     workers : Workers, optional
         Who computes the refits, which are independent.
     """
-    refit = partial(_predicted, rig, tuple(runs), dict(start), noise, tuple(typical), dict(otherwise or {}))
+    refit = partial(_predicted, rig, tuple(runs), dict(start), noise, tuple(typical), dict(otherwise or {}), promise)
     return spread(refit, range(len(runs)), workers=workers, progress=progress, what="run")
 
 
 def _predicted(
     rig: Rig, runs: Sequence[Run], start: Mapping[str, float], noise: float | None, typical: Sequence[str],
-    otherwise: Mapping[str, float], k: int, progress: Progress,
+    otherwise: Mapping[str, float], promise: bool, k: int, progress: Progress,
 ) -> HeldOut:  # fmt: skip
     """Run number `k` from a fit of the others."""
     run = runs[k]
@@ -116,7 +123,8 @@ def _predicted(
             groups.setdefault(u.group, {})[u.name] = float(v)
     values = problem.shared_at(end.x)
     held = replace(run, role="predict", unknown=tuple(n for n in run.unknown if n not in typical))
-    score = predict(values, rig, [held], groups=groups)[run.label]
+    bands = calibrated(assess(problem, end.x)) if promise else None
+    score = predict(values, rig, [held], groups=groups, bands=bands)[run.label]
     return HeldOut(label=run.label, score=score, values=values, blind=tuple(n for n in rig.estimated if n in blind))
 
 
@@ -157,12 +165,15 @@ def cross_validate(
         n: replace(p, value=left_out[n], estimate=False) if n in left_out else p for n, p in fit.rig.parameters.items()
     }
     rig = replace(fit.rig, parameters=parameters)
-    done = leave_one_out(rig, fitted, fit.keyed(), progress=progress, workers=workers)
+    done = leave_one_out(rig, fitted, fit.keyed(), promise=True, progress=progress, workers=workers)
     found = done.so_far()
     return CrossValidation(
         fitted={run.label: fit.runs[run.label] for run in fitted},
         predicted={one.label: one.score for one in found},
         values={one.label: one.values for one in found},
         blind={one.label: one.blind for one in found},
+        bands=recalibrated(fit.bands, [one.score for one in found])
+        if fit.bands and not done.interrupted
+        else fit.bands,
         interrupted=done.interrupted,
     )

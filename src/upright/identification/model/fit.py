@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.identification.model.bands import Bands
 from upright.identification.model.rig import Rig
 
 Array = NDArray[np.float64]
@@ -112,6 +113,8 @@ class RunScore:
     `offer` is a factor of the run's own that would mend a prediction which falls short.
     `ahead` is the fit percent by horizon [s] and signal of samples predicted exactly so far ahead, from a filter that
     knows the past alone; empty for other runs. Then `horizon`, `fit_percent` and the signals are the shortest's.
+    `band` is how far (N,) from a prediction 90 % of the samples should lie, by signal; empty for a run that was fitted,
+    and where the fit does not say. `beyond` says in sentences how far the run goes beyond what was fitted.
     """
 
     role: str
@@ -126,6 +129,15 @@ class RunScore:
     adapted: tuple[str, ...] = ()
     offer: Offer | None = None
     ahead: Mapping[float, Mapping[str, float]] = field(default_factory=dict[float, Mapping[str, float]])
+    band: Mapping[str, Array] = field(default_factory=dict[str, Array])
+    beyond: tuple[str, ...] = ()
+
+    @property
+    def inside(self) -> dict[str, float]:
+        """Percent of the scored samples inside the band, by signal; empty without one."""
+        scored = self.t >= self.t[0] + self.score_from - 1e-9
+        missed = {s: np.abs(self.y[:, k] - self.simulated[:, k]) for k, s in enumerate(self.measured)}
+        return {s: 100 * float(np.mean((missed[s] <= half)[scored])) for s, half in self.band.items()}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,7 +148,8 @@ class Fit:
     group's label and name; `unseen` says in sentences which combinations the data cannot see and which number would
     fix it; `singular_values` belong to the scaled Jacobian, `directions` (rows) to them, in the order of `names`;
     `poles` are those at every equilibrium of the fitted plant. The `verdict` is what the `answers` say, one after
-    another, and the model is `trusted` when none of the first two is "no".
+    another, and the model is `trusted` when none of the first two is "no". `bands` is what it
+    promises of predictions, None when it was interrupted.
     """
 
     rig: Rig
@@ -161,6 +174,7 @@ class Fit:
     interrupted: bool = False
     assumptions: tuple[Assumption, ...] = ()
     poles: Mapping[str, tuple[Pole, ...]] = field(default_factory=dict[str, tuple[Pole, ...]])
+    bands: Bands | None = None
 
     def keyed(self) -> dict[str, float]:
         """Every number found, by the key that problems know it by, see `Problem.key`."""

@@ -173,7 +173,7 @@ class Problem:
             self._solvers[index] = simulator(self.rig, track, {**self.base, **track.run.known}, free)
         return self._solvers[index]
 
-    def _lanes(self, x: Array, sought: NDArray[np.int64], *, central: bool = False) -> Array:
+    def lanes(self, x: Array, sought: NDArray[np.int64], *, central: bool = False) -> Array:
         """Coordinates (sought, lanes) with every number moved by its step, to both sides when `central`."""
         move = np.zeros((x.size, sought.size))
         move[sought, np.arange(sought.size)] = self.steps[sought]
@@ -189,7 +189,7 @@ class Problem:
         track, sought = self.tracks[index], self.sought_in(index)
         n, m = track.within(horizon), sought.size
         restart = self.restart(index, x) if track.uncertain.size else None
-        y = self.simulate(index, self._lanes(x, sought, central=central), n, restart.shift if restart else None)
+        y = self.simulate(index, self.lanes(x, sought, central=central), n, restart.shift if restart else None)
         residual = track.errors(y[..., 0])
         if not finite(residual):
             return None
@@ -297,7 +297,7 @@ class Problem:
     def _squares(self, index: int, x: Array, horizon: float, sought: NDArray[np.int64]) -> tuple[Array, Array, float]:
         """``J'J``, ``J'r`` and ``r'r`` of a free run, in the lanes as they come: the same numbers as from `rows`."""
         track, n = self.tracks[index], self.tracks[index].within(horizon)
-        d = self._setting(index, self._lanes(x, sought))
+        d = self._setting(index, self.lanes(x, sought))
         self.evaluations += 1
         rows = len(d.x0) + track.u.shape[1]  # a loop records its commands as well
         if self._memory.size < (most := n * rows * (sought.size + 16)):

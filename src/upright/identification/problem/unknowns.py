@@ -118,10 +118,11 @@ def friction_names(rig: Rig) -> tuple[str, ...]:
     return tuple(n for n in derived.parameters if n in words)
 
 
-def matters(rig: Rig, coordinate: str) -> bool:
+def matters(rig: Rig, coordinate: str, by: float = 1.0) -> bool:
     """Whether a coordinate's own value, not only its changes, is felt: by gravity, a spring or the mass matrix.
 
-    A constant error of the sensor cannot be told from the place where the run began otherwise.
+    A constant error of the sensor cannot be told from the place where the run began otherwise. Of an angle that comes
+    round a change `by` one turn is not felt.
     """
     from upright.physics.equations import evaluate
 
@@ -132,9 +133,9 @@ def matters(rig: Rig, coordinate: str) -> bool:
     for c in derived.coordinates:
         scope[c], scope[f"{c}_dot"] = generator.normal(size=2)
     energies = [float(evaluate(text, scope)) for text in (derived.kinetic, derived.potential)]
-    scope[coordinate] += 1.0
+    scope[coordinate] += by
     moved = [float(evaluate(text, scope)) for text in (derived.kinetic, derived.potential)]
-    return not np.allclose(energies, moved, rtol=1e-12, atol=0.0)
+    return not np.allclose(energies, moved, rtol=1e-12, atol=1e-12 * max(map(abs, energies)))
 
 
 CHANGES = {"input_offset": "actuator.offset", "input_start": "actuator.start", "input_end": "actuator.end"}

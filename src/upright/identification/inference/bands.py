@@ -1,0 +1,294 @@
+"""Bands around predictions that hold 90 % of the samples of runs a fit has not seen.
+
+What a free run misses grows with time and with the motion: a damping that is a little off is felt late, a stiffness
+while it swings. So the width follows the variance that the uncertainty of the numbers gives this very prediction, what
+the run tells of its own first state taken off, beside what the fit leaves over anyway. Uncertain they are by the
+residuals' memory and by how far they move when one block of the runs is left out (a jackknife in Gauss-Newton steps).
+Both matrices keep a combination that is seen well as sure as it is, which intervals widened one by one do not.
+
+How many such widths are needed is asked of data that a fit did not see (conformal prediction: Vovk, Gammerman and
+Shafer 2005): each block is predicted from the fit of the others, and the quantile is that of what is missed, in widths.
+Whole blocks, since neighbouring samples err together (Chernozhukov, Wuethrich and Zhu 2018). Blocks lie between others
+of the same motion, and a new run does not: on real rigs and on twins with physics that their models lack bands had to
+be `BEYOND` times as wide, and no narrower than normal errors ask (`python -m benchmarks bands`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.identification.inference.covariance import Optimum
+from upright.identification.inference.reach import beyond, reached
+from upright.identification.model.bands import LEVEL, Bands, Spread
+from upright.identification.model.fit import RunScore
+from upright.identification.model.rig import NOISE, Rig
+from upright.identification.model.runs import LEAST_RUN, Run
+from upright.identification.problem.normal_equations import pseudo_inverse
+from upright.identification.problem.residuals import ROUNDING, Problem, formulate
+from upright.identification.problem.tracks import Track
+
+Array = NDArray[np.float64]
+
+BLOCKS = 4
+"""Blocks that the runs are cut into; fewer are longer, and more like a run of its own."""
+
+BEYOND = 1.25
+"""Widths that a run needs for each that a block of the fitted runs needed."""
+
+NORMAL, MOST = 1.645, 5.0
+"""Widths that hold 90 % of normal errors, and that no prediction is worth: such a block was lost, not missed."""
+
+LEAST = 1e-3
+"""Share of how much a signal varies that nobody minds to be missed."""
+
+DAMPED = 0.01
+"""Share of all data that speaks beside the blocks that are left, lest a number seen in one block alone ran away."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Response:
+    """A run's errors (N, outputs) and slopes of its outputs (N, outputs, sought in it), windows end to end.
+
+    `age` (N,) are the seconds since the restart, or the first sample.
+    """
+
+    error: Array
+    slope: Array
+    age: Array
+
+
+def response(problem: Problem, index: int, x: Array) -> Response:
+    """How a run is met at coordinates `x`, in the units of its outputs; of several horizons the shortest."""
+    track, sought = problem.tracks[index], problem.sought_in(index)
+    m = sought.size
+    samples = 1 if track.ahead else track.length
+    y = problem.simulate(index, problem.lanes(x, sought, central=True), samples)
+    error = y[..., 0] - track.targets(samples)
+    slope = (y[..., 1 : m + 1] - y[..., m + 1 :]) / (2 * problem.steps[sought])
+    if track.ahead:
+        weight = float(track.ahead.weight[0])
+        ahead = np.full(len(error[0]), track.run.horizons[0])
+        return Response(error=error[0] / weight, slope=slope[0] / weight, age=ahead)
+    time = track.dt * np.arange(float(samples))
+    if not track.windowed:
+        return Response(error=error[:, 0], slope=slope[:, 0], age=time)
+    ends = (np.moveaxis(a[1:], 1, 0).reshape(-1, *a.shape[2:]) for a in (error, slope))
+    return Response(error=next(ends), slope=next(ends), age=np.tile(time[1:], track.restarts.size))
+
+
+def calibrated(best: Optimum) -> Bands:
+    """Bands that a fit promises, from blocks of its runs predicted by fits of the others."""
+    problem = best.problem
+    met = [response(problem, i, best.x) for i in range(len(problem.tracks))]
+    blocks = _blocks(best)
+    moved = np.array([block.step for block in blocks]).reshape(-1, best.x.size)
+    covariance = best.sandwich + _one_more(len(blocks)) * (moved.T @ moved)
+    shared = [i for i in best.shared if not problem.unknowns[i].name.startswith(NOISE)]
+    slope = np.array([best.values[i] if problem.unknowns[i].log else 1.0 for i in shared])
+    bands = Bands(
+        quantile=BEYOND * NORMAL,
+        spreads=_spreads(problem.tracks, met),
+        names=tuple(problem.unknowns[i].name for i in shared),
+        covariance=covariance[np.ix_(shared, shared)] * np.outer(slope, slope),
+        reached=reached(problem.rig, [track.run for track in problem.tracks]),
+    )
+    missed = [_missed(problem, met[block.run], block, covariance, best.x, bands) for block in blocks]
+    if len(blocks) < 2:
+        return bands
+    widths = float(np.quantile(np.concatenate(missed), LEVEL))
+    return replace(bands, quantile=BEYOND * float(np.clip(widths, NORMAL, MOST)))
+
+
+def recalibrated(bands: Bands, left_out: Sequence[RunScore]) -> Bands:
+    """Bands as wide as runs ask that were each predicted, bands included, by a fit of the others.
+
+    Of n exchangeable runs as many more, in n + 1, must lie inside as promised of the next (split conformal prediction).
+    """
+    missed = [
+        np.abs(run.y[:, k] - run.simulated[:, k]) / run.band[c]
+        for run in left_out for k, c in enumerate(run.measured) if c in run.band
+    ]  # fmt: skip
+    if not missed:
+        return bands
+    level = min(1.0, bands.level * (1 + 1 / len(left_out)))
+    widths = float(np.quantile(np.concatenate(missed), level)) * bands.quantile
+    return replace(bands, quantile=float(np.clip(widths, NORMAL, MOST)))
+
+
+def _one_more(blocks: int) -> float:
+    """What the squares of the moves without each block are multiplied by for the spread of a run as one more block.
+
+    Without one of B alike blocks the mean moves by ``1 / (B - 1)`` of how far that block lies from it, and another one
+    lies ``1 + 1/B`` spreads, in the square, from the mean of these.
+    """
+    return (blocks - 1) ** 2 / blocks * (1 + 1 / blocks) if blocks else 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Block:
+    """Piece `number` of `count` of a run, and how the numbers (n,) move in a fit without it."""
+
+    run: int
+    number: int
+    count: int
+    step: Array
+
+
+def _blocks(best: Optimum) -> list[_Block]:
+    problem, free = best.problem, ~best.pinned
+    found: list[_Block] = []
+    for index, track in enumerate(problem.tracks):
+        rows = problem.rows(index, best.x, central=True)
+        if rows is None:
+            continue
+        count = -(-BLOCKS // len(problem.tracks)) if track.run.t.size >= LEAST_RUN else 1
+        sought = problem.sought_in(index)
+        for number, cut in enumerate(np.array_split(np.arange(len(rows[0])), count)):
+            J = rows[1][cut].reshape(-1, sought.size)
+            without, g, step = best.matrix.copy(), np.zeros(best.x.size), np.zeros(best.x.size)
+            without[np.ix_(sought, sought)] -= (1 - DAMPED) * (J.T @ J)
+            g[sought] = J.T @ rows[0][cut].reshape(-1)
+            step[free] = pseudo_inverse(without[np.ix_(free, free)]) @ g[free]
+            found.append(_Block(run=index, number=number, count=count, step=step))
+    return found if len(found) > 1 else []
+
+
+def _missed(problem: Problem, met: Response, block: _Block, covariance: Array, x: Array, bands: Bands) -> Array:
+    """What a block misses (all,) when the others predict it, in widths."""
+    sought, slope = problem.sought_in(block.run), met.slope
+    if block.count == 1:  # a run that is left out still says how it began
+        slope = adapted(problem, block.run, slope, x)
+    here = np.array_split(np.arange(len(met.error)), block.count)[block.number]
+    error = met.error[here] + slope[here] @ block.step[sought]
+    variance = _variance(slope[here], covariance[np.ix_(sought, sought)])
+    track = problem.tracks[block.run]
+    width = _width(track, bands, met.age[here], variance)
+    return np.concatenate([np.abs(error[:, k]) / width[c] for k, c in _signals(track)])
+
+
+def _signals(track: Track) -> list[tuple[int, str]]:
+    return [(k, track.run.measured[k]) for k in track.run.free]
+
+
+def _own(problem: Problem, index: int) -> NDArray[np.int64]:
+    """Places, among the numbers that matter in a run, of those that it alone knows."""
+    return np.array(
+        [
+            k for k, i in enumerate(problem.sought_in(index))
+            if problem.unknowns[i].runs == (index,) and problem.unknowns[i].lower < problem.unknowns[i].upper
+        ], dtype=np.int64,
+    )  # fmt: skip
+
+
+def adapted(problem: Problem, index: int, slope: Array, x: Array) -> Array:
+    """Slopes (N, outputs, sought) of a run whose own numbers follow, by least squares, as they do when it is predicted.
+
+    Those of its own numbers become zero. Samples before `score_from` alone are followed where that is set.
+    """
+    track, own = problem.tracks[index], _own(problem, index)
+    if not own.size:
+        return slope
+    upto = len(slope) if not track.run.score_from else max(own.size, round(track.run.score_from / track.dt))
+    seen = np.einsum("ab,tbp->tap", track.weighting, slope[:upto])
+    A = seen[..., own].reshape(-1, own.size)
+    _, prior = problem.prior_rows(x)
+    P = prior[:, problem.sought_in(index)[own]]
+    follow = pseudo_inverse(A.T @ A + P.T @ P) @ (A.T @ seen.reshape(-1, slope.shape[-1]))
+    follow[:, own] = np.eye(own.size)  # so that their own slopes become zero
+    return slope - slope[..., own] @ follow
+
+
+def _variance(slope: Array, covariance: Array) -> Array:
+    """Variance (N, outputs) that uncertain numbers give the outputs."""
+    return np.maximum(np.einsum("tap,pq,taq->ta", slope, covariance, slope, optimize=True), 0.0)
+
+
+def _width(track: Track, bands: Bands, age: Array, variance: Array) -> dict[str, Array]:
+    """Root of what is left over and what the numbers' uncertainty adds, (N,) by signal."""
+    horizon = next(iter(track.run.horizons), None)
+    found: dict[str, Array] = {}
+    for k, c in _signals(track):
+        spread = bands.spread(c, horizon)
+        if spread is not None:
+            found[c] = np.sqrt(spread.at(age) ** 2 + variance[:, k])
+    return found
+
+
+def _spreads(tracks: Sequence[Track], met: Sequence[Response]) -> dict[str, tuple[Spread, ...]]:
+    """What is left over of every signal, by horizon, and never less than counts or a line's width of its picture."""
+    kinds: dict[tuple[str, float], list[tuple[Array, Array, float]]] = {}
+    for track, run in zip(tracks, met, strict=True):
+        horizon = next(iter(track.run.horizons), 0.0)
+        for k, c in _signals(track):
+            least = max(ROUNDING * track.run.quanta[k], LEAST * float(np.std(track.run.y[:, k])))
+            kinds.setdefault((c, horizon), []).append((run.error[:, k], run.age, least))
+    found: dict[str, tuple[Spread, ...]] = {}
+    for (c, horizon), parts in kinds.items():
+        error, age = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
+        least = min(part[2] for part in parts)
+        found[c] = (*found.get(c, ()), _spread(error**2, age, horizon, least**2))
+    return found
+
+
+def _spread(squares: Array, age: Array, horizon: float, least: float) -> Spread:
+    """Spread of errors whose `squares` (N,) grow with the square of their `age` (N,), no less than the root of `least`.
+
+    The mean of ``start^2 + growth age^2`` over an early and a late half gives both.
+    """
+    early, late = squares[age <= horizon / 2], squares[age > horizon / 2]
+    if not horizon or not early.size or not late.size:
+        both = math.sqrt(max(float(np.mean(squares)), least))
+        return Spread(horizon=horizon, start=both, end=both)
+    a, b = float(np.mean(age[age <= horizon / 2] ** 2)), float(np.mean(age[age > horizon / 2] ** 2))
+    growth = max(0.0, (float(late.mean()) - float(early.mean())) / (b - a))
+    start = max(float(squares.mean()) - growth * float(np.mean(age**2)), least)
+    return Spread(horizon=horizon, start=math.sqrt(start), end=math.sqrt(start + growth * horizon**2))
+
+
+def banded(
+    plain: RunScore, bands: Bands, rig: Rig, run: Run, groups: Mapping[str, Mapping[str, float]],
+    own: Mapping[str, float],
+) -> RunScore:  # fmt: skip
+    """The score of a predicted run with the band of each signal.
+
+    Parameters
+    ----------
+    plain : RunScore
+        Of the run.
+    bands : Bands
+    rig : Rig
+        With every number known.
+    run : Run
+    groups : mapping
+        What groups of runs share, by label and name.
+    own : mapping of str to float
+        What was estimated from the run itself, by its key, see `Problem.key`.
+    """
+    names = [n for n in bands.names if n in rig.parameters and math.isfinite(rig.parameters[n].value)]
+    if run.filtered:  # what disturbs a plant between two samples counts, not its numbers
+        names = []
+    uncertain = {n: replace(rig.parameters[n], estimate=True) for n in names}
+    problem = formulate(replace(rig, parameters={**rig.parameters, **uncertain}), [run], thin=False, given=groups)
+    track, x = problem.tracks[0], problem.place(own)
+    variance = np.zeros(plain.y.shape)
+    age = np.full(len(plain.y), next(iter(run.horizons), 0.0))
+    if not run.filtered:
+        problem.settle_steps(x)
+        met = response(problem, 0, x)
+        slope, age = adapted(problem, 0, met.slope, x), met.age
+        places = [bands.names.index(problem.unknowns[i].name) if problem.unknowns[i].shared else -1
+                  for i in problem.sought_in(0)]  # fmt: skip
+        shared = np.flatnonzero(np.array(places) >= 0)
+        kept = np.array(places)[shared]
+        natural = np.array([1 / problem.value(x)[i] if problem.unknowns[i].log else 1.0 for i in problem.sought_in(0)])
+        C = bands.covariance[np.ix_(kept, kept)]
+        variance = _variance((slope * natural)[..., shared], C)
+    width = _width(track, bands, age, np.nan_to_num(variance, nan=math.inf))
+    return replace(
+        plain, band={c: bands.quantile * w for c, w in width.items()}, beyond=beyond(rig, run, bands.reached)
+    )
