@@ -50,6 +50,17 @@ class FittedModel:
         entry = self.content["parameters"].get(name)
         return str(entry.get("unit") or "") if isinstance(entry, dict) else ""
 
+    @property
+    def scores(self) -> dict[str, dict[str, float]]:
+        """Fit percent by label and signal of the runs that were fitted, as far as the file tells."""
+        runs: Any = self.content.get("runs")
+        told = {} if not isinstance(runs, dict) else runs
+        return {
+            label: {s: float(p) for s, p in run["fit_percent"].items() if isinstance(p, int | float)}
+            for label, run in told.items()
+            if isinstance(run, dict) and run.get("role") == "fit" and isinstance(run.get("fit_percent"), dict)
+        }
+
     def covariance(self, among: Collection[str]) -> tuple[list[str], NDArray[np.float64]]:
         """Those of the estimates that are `among` the names, and their covariance; zeros where the file has none."""
         estimated: list[str] = list(self.content.get("estimated", []))

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from upright.experiments.identified import IdentifiedRig
     from upright.identification import Fit, RunScore
     from upright.identification.ladder.cross_validation import CrossValidation
+    from upright.identification.model.bands import Bands
     from upright.physics import Plant
     from upright.report.page import Chapter
     from upright.study.load import Study
@@ -131,7 +132,8 @@ class FitAnswer(Answer["Fit"]):
         fixed = replace(
             rig, parameters={n: replace(p, value=values[n], estimate=False) for n, p in rig.parameters.items()}
         )
-        return prediction(score(values, fixed, runs), rig.plant)
+        bands = self.value.bands if self.crossed is None else self.crossed.bands
+        return prediction(score(values, fixed, runs, bands=bands), rig.plant, bands)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,16 +158,22 @@ class Prediction(Answer[PredictedRuns]):
         return fit_figure(runs[label], self.value.plant, title=label)
 
 
-def prediction(runs: Mapping[str, RunScore], plant: type[Plant]) -> Prediction:
+def prediction(runs: Mapping[str, RunScore], plant: type[Plant], bands: Bands | None) -> Prediction:
     """Scores as an answer."""
+    from upright.identification.inference.promise import promise
     from upright.report.fit.tables import score_table
     from upright.report.page import Chapter, Part
 
     worst = min((v for s in runs.values() for v in s.fit_percent.values()), default=float("nan"))
+    found = promise(runs, bands)
     part = Part("How much of each signal is explained", (score_table(runs),))
     chapter = Chapter(
-        title="Prediction", verdict=f"The worst signal is explained to {worst:.1f} %.", parts=(part,),
-        numbers={label: {"fit_percent": dict(s.fit_percent), "horizon": s.horizon} for label, s in runs.items()},
+        title="Prediction", verdict=f"The worst signal is explained to {worst:.1f} %. {found.sentence}", parts=(part,),
+        sound=found.kept, warnings=tuple(said for s in runs.values() for said in s.beyond),
+        numbers={
+            label: {"fit_percent": dict(s.fit_percent), "horizon": s.horizon, "inside": s.inside}
+            for label, s in runs.items()
+        },
     )  # fmt: skip
     return Prediction(PredictedRuns(runs=runs, plant=plant), chapter)
 

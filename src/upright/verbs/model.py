@@ -13,7 +13,7 @@ from upright.errors import BadInput, nearest
 from upright.files import check_output, keeps_its_inputs
 from upright.progress import Progress, silent
 from upright.verbs.answer import Answer
-from upright.verbs.pages import folder_if_given, page_folder, pdf_has_folder, write_page
+from upright.verbs.pages import folder, folder_if_given, page_folder, pdf_has_folder, write_page
 from upright.verbs.study import folder_beside, provenance, read_study
 from upright.verbs.values import open_log, pairs, paths, si, texts
 
@@ -46,12 +46,12 @@ def predict(
     data : path, optional
         Folder the runs' files are in; the study's own when omitted.
     out : path, optional
-        Folder for prediction.json.
+        Folder for prediction.json and prediction.html.
 
     Returns
     -------
     Answer
-        Of the scores by run.
+        Of the scores by run. Its chapter is `sound` when they are predicted as well as the fit promises.
 
     Raises
     ------
@@ -59,7 +59,9 @@ def predict(
         When model or study cannot be read, or speak of different plants.
     """
     from upright.files import write_json
+    from upright.identification.inference.promise import promise
     from upright.identification.inference.scoring import predict as score
+    from upright.report.fit.chapter import score_pictures
     from upright.report.fit.tables import score_table
     from upright.report.page import Chapter, Part
     from upright.study.fitted import read_fit
@@ -80,23 +82,37 @@ def predict(
             " both must be the same plant"
         )
     rig = replace(asked.rig, substeps=fitted.substeps)
-    scores = score(fitted.values, rig, [replace(run, role="predict") for run in asked.runs], groups=fitted.groups)
-    said = ("role", "fit_percent", "horizon", "adapted", "offer")
+    runs = [replace(run, role="predict") for run in asked.runs]
+    scores = score(fitted.values, rig, runs, groups=fitted.groups, bands=fitted.bands)
+    found = promise(scores, fitted.bands, fitted.scores)
+    said = ("role", "fit_percent", "horizon", "adapted", "offer", "inside", "beyond")
     numbers: dict[str, Any] = {
         "model": model.name,
         "study": study.name,
+        "verdict": found.sentence,
+        "as_promised": found.kept,
         "runs": {label: {name: getattr(s, name) for name in said} for label, s in scores.items()},
     }
     offers = [s.offer.sentence(label, s.fit_percent) for label, s in scores.items() if s.offer is not None]
     told = Chapter(
-        title=f"{model.name} on {study.name}", verdict="", numbers=numbers,
-        parts=(Part("How much of each signal is explained", (score_table(scores),)),),
+        title=f"{model.name} on {study.name}", verdict=found.sentence, sound=found.kept, numbers=numbers,
+        parts=(
+            Part(
+                "How much of each signal is explained",
+                (score_table(scores), *score_pictures(scores, rig.plant, "prediction")),
+            ),
+        ),
         warnings=(
             *(() if fitted.trusted else (f"The model's own verdict was: {fitted.verdict}",)),
-            *fitted.description.unlike(asked.description), *offers,
+            *fitted.description.unlike(asked.description), *(s for run in scores.values() for s in run.beyond), *offers,
         ),
     )  # fmt: skip
-    return Answer(scores, told, [] if out is None else [write_json(Path(out) / "prediction.json", numbers)])
+    if out is None:
+        return Answer(scores, told)
+    at = folder(out)
+    return Answer(
+        scores, told, [write_json(at / "prediction.json", numbers), *write_page(told, at / "prediction.html", False)]
+    )
 
 
 @keeps_its_inputs

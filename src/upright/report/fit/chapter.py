@@ -9,8 +9,9 @@ import numpy as np
 
 from upright.identification.inference.assumptions import sentences
 from upright.identification.ladder.cross_validation import CrossValidation
-from upright.identification.model.fit import Fit
+from upright.identification.model.fit import Fit, RunScore
 from upright.identification.model.runs import SPREADS
+from upright.physics import Plant
 from upright.report.fit.equations import equations
 from upright.report.fit.figures import (
     autocorrelation,
@@ -153,8 +154,13 @@ def _scores(fit: Fit, crossed: CrossValidation | None) -> list[Block]:
 
 def run_pictures(fit: Fit, prefix: str) -> list[Picture]:
     """Data against model, run by run, fitted runs first."""
+    return score_pictures(fit.runs, fit.rig.plant, prefix)
+
+
+def score_pictures(scores: Mapping[str, RunScore], plant: type[Plant], prefix: str) -> list[Picture]:
+    """Data against model, run by run, fitted runs first, predicted ones with their bands."""
     pictures: list[Picture] = []
-    runs = sorted(fit.runs.items(), key=lambda item: item[1].role != "fit")
+    runs = sorted(scores.items(), key=lambda item: item[1].role != "fit")
     signals = sum(len(score.measured) for _, score in runs)
     buckets = max(100, min(450, 6000 // max(signals, 1)))  # keeps the page below 2 MB whatever the number of runs
     for i, (label, score) in enumerate(runs):
@@ -167,13 +173,20 @@ def run_pictures(fit: Fit, prefix: str) -> list[Picture]:
         pictures.append(
             Picture(
                 name=f"{prefix}-run{i}",
-                draw=lambda score=score, title=title: fit_figure(score, fit.rig.plant, title=title, buckets=buckets),
+                draw=lambda score=score, title=title: fit_figure(score, plant, title=title, buckets=buckets),
                 caption=f"Run '{label}', {what}{how}. Wide light line: measured; thin dashed line: model; "
-                "below each, their difference.",
+                f"below each, their difference.{_banded(score)}",
                 description=f"Measured and modelled signals over {score.t[-1] - score.t[0]:.3g} s; fit {fits}.",
             )
         )
     return pictures
+
+
+def _banded(score: RunScore) -> str:
+    if not score.band:
+        return ""
+    inside = ", ".join(f"{plain(n)} {percent(v)}" for n, v in score.inside.items())
+    return f" Grey: the band that should hold 90 % of the samples; inside are {inside}."
 
 
 def _parameters(fit: Fit) -> list[Part]:

@@ -44,7 +44,7 @@ def fit_figure(
     height: float = 2.2,
     buckets: int = 450,
 ) -> Figure:
-    """Data against model, signal by signal, each with a strip of what is left over.
+    """Data against model, signal by signal, each with a strip of what is left over; of a prediction with its band.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def fit_figure(
         *panels[0].get_legend_handles_labels(),
         loc="lower left",
         bbox_to_anchor=(0.85 / width, 0.0),
-        ncols=3,
+        ncols=4,
         columnspacing=1.0,
         borderpad=0,
         borderaxespad=0.1,
@@ -92,6 +92,10 @@ def _signal(upper: Axes, lower: Axes, score: RunScore, j: int, unit: str, bucket
 
     t, y, model = score.t, score.y[:, j], score.simulated[:, j]
     left = y - model
+    if (half := score.band.get(score.measured[j])) is not None:
+        for panel, middle, label in ((upper, model, "90 % band"), (lower, np.zeros_like(t), None)):
+            edges = _envelope(t, middle - half, middle + half, buckets)
+            panel.fill_between(*edges, color=GREY, alpha=0.3, linewidth=0, label=label)
     upper.plot(*decimated(t, y, buckets), color=SKY, linewidth=2.6, solid_capstyle="butt", label="measured")
     foreseen = broken(*decimated(t, model, buckets), None if score.ahead else score.horizon)
     upper.plot(*foreseen, color=BLACK, linewidth=0.9, linestyle=(0, (5, 1.5)), label="model")
@@ -106,6 +110,14 @@ def _signal(upper: Axes, lower: Axes, score: RunScore, j: int, unit: str, bucket
             panel.axvspan(t[0], t[0] + score.score_from, color=GREY, alpha=0.25, linewidth=0, label=label)
     for panel, values in ((upper, np.concatenate([y, model])), (lower, left)):
         _limits(panel, values)
+
+
+def _envelope(t: Array, low: Array, high: Array, buckets: int) -> tuple[Array, Array, Array]:
+    """Edges of a band, thinned to the outermost of every bucket."""
+    if t.size <= 3 * buckets:
+        return t, low, high
+    first = np.linspace(0, t.size, buckets, endpoint=False).astype(int)
+    return t[first], np.minimum.reduceat(low, first), np.maximum.reduceat(high, first)
 
 
 def _limits(panel: Axes, values: Array) -> None:

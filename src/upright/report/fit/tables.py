@@ -122,6 +122,7 @@ def interval(e: Estimate) -> str:
 def score_table(runs: Mapping[str, RunScore]) -> Table:
     """Fit percent of every signal of every run, fitted runs first."""
     windowed = any(score.naive for score in runs.values())
+    banded = any(score.band for score in runs.values())
     rows: list[tuple[str, ...]] = []
     for label, score in sorted(runs.items(), key=lambda item: item[1].role != "fit"):
         role = "fitted" if score.role == "fit" else "predicted"
@@ -129,11 +130,16 @@ def score_table(runs: Mapping[str, RunScore]) -> Table:
         for how, percents in ((_compared(score), score.fit_percent), *further):
             for name, value in percents.items():
                 held = percent(score.naive[name]) if percents is score.fit_percent and name in score.naive else ""
-                rows.append((label, role, plain(name), percent(value), *((held,) if windowed else ()), how))
+                inside = percent(score.inside[name]) if percents is score.fit_percent and name in score.band else ""
+                beside = (*((held,) if windowed else ()), *((inside,) if banded else ()))
+                rows.append((label, role, plain(name), percent(value), *beside, how))
     return Table(
         caption="Fit percent, 100 (1 − |y − ŷ| / |y − mean y|), of every signal",
-        headings=("run", "role", "signal", "fit", *(("held speed",) if windowed else ()), "simulated"),
-        rows=tuple(rows), numbers=(3, 4) if windowed else (3,),
+        headings=(
+            "run", "role", "signal", "fit", *(("held speed",) if windowed else ()),
+            *(("in 90 % band",) if banded else ()), "simulated",
+        ),
+        rows=tuple(rows), numbers=tuple(range(3, 4 + windowed + banded)),
     )  # fmt: skip
 
 
