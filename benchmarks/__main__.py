@@ -22,11 +22,11 @@ from upright.workers import Workers
 
 NAMES = (
     "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "frequency", "swing_up", "tracking", "lab",
-    "doctor", "rigs", "misfit", "verdicts", "regulation", "real", "agree", "starts", "startup", "workers",
-    "long", "gpu",
+    "doctor", "rigs", "misfit", "verdicts", "regulation", "real", "agree", "bands", "starts", "startup",
+    "workers", "long", "gpu",
 )  # fmt: skip
-PUBLISHED = ("real", "agree", "rigs", "misfit", "verdicts", "regulation", "workers")
-SHARED = ("coverage", "agree", "rigs", "misfit", "verdicts", "regulation", "starts")
+PUBLISHED = ("real", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "workers")
+SHARED = ("coverage", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "starts")
 """Those whose table is a page, and those whose work processes may share."""
 
 LIBRARIES = ("upright", "numpy", "scipy", "llvmlite", "control", "casadi", "jax", "mujoco")

@@ -9,8 +9,8 @@ Both matrices keep a combination that is seen well as sure as it is, which inter
 How many such widths are needed is asked of data that a fit did not see (conformal prediction: Vovk, Gammerman and
 Shafer 2005): each block is predicted from the fit of the others, and the quantile is that of what is missed, in widths.
 Whole blocks, since neighbouring samples err together (Chernozhukov, Wuethrich and Zhu 2018). Blocks lie between others
-of the same motion, and a new run does not: on real rigs and on twins with physics that their models lack bands had to
-be `BEYOND` times as wide, and no narrower than normal errors ask (`python -m benchmarks bands`).
+of the same motion, and a new run does not, so no quantile is less than that of normal errors. How often bands hold runs
+that were not seen stands in `benchmarks/bands.md`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.inference.covariance import Optimum
+from upright.identification.inference.covariance import Optimum, student
 from upright.identification.inference.reach import beyond, reached
 from upright.identification.model.bands import LEVEL, Bands, Spread
 from upright.identification.model.fit import RunScore
@@ -36,9 +36,6 @@ Array = NDArray[np.float64]
 
 BLOCKS = 4
 """Blocks that the runs are cut into; fewer are longer, and more like a run of its own."""
-
-BEYOND = 1.25
-"""Widths that a run needs for each that a block of the fitted runs needed."""
 
 NORMAL, MOST = 1.645, 5.0
 """Widths that hold 90 % of normal errors, and that no prediction is worth: such a block was lost, not missed."""
@@ -91,7 +88,7 @@ def calibrated(best: Optimum) -> Bands:
     shared = [i for i in best.shared if not problem.unknowns[i].name.startswith(NOISE)]
     slope = np.array([best.values[i] if problem.unknowns[i].log else 1.0 for i in shared])
     bands = Bands(
-        quantile=BEYOND * NORMAL,
+        quantile=NORMAL,
         spreads=_spreads(problem.tracks, met),
         names=tuple(problem.unknowns[i].name for i in shared),
         covariance=covariance[np.ix_(shared, shared)] * np.outer(slope, slope),
@@ -101,7 +98,7 @@ def calibrated(best: Optimum) -> Bands:
     if len(blocks) < 2:
         return bands
     widths = float(np.quantile(np.concatenate(missed), LEVEL))
-    return replace(bands, quantile=BEYOND * float(np.clip(widths, NORMAL, MOST)))
+    return replace(bands, quantile=float(np.clip(widths, NORMAL, MOST)))
 
 
 def recalibrated(bands: Bands, left_out: Sequence[RunScore]) -> Bands:
@@ -124,9 +121,13 @@ def _one_more(blocks: int) -> float:
     """What the squares of the moves without each block are multiplied by for the spread of a run as one more block.
 
     Without one of B alike blocks the mean moves by ``1 / (B - 1)`` of how far that block lies from it, and another one
-    lies ``1 + 1/B`` spreads, in the square, from the mean of these.
+    lies ``1 + 1/B`` spreads, in the square, from the mean of these. So few tell a spread as well as Student's quantile
+    of ``B - 1`` degrees of freedom says.
     """
-    return (blocks - 1) ** 2 / blocks * (1 + 1 / blocks) if blocks else 0.0
+    if not blocks:
+        return 0.0
+    few = student(blocks - 1, (1 + LEVEL) / 2) / NORMAL
+    return few**2 * (blocks - 1) ** 2 / blocks * (1 + 1 / blocks)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -74,11 +74,11 @@ class Optimum:
         return [i for i, u in enumerate(self.problem.unknowns) if u.shared]
 
 
-def student(freedom: float) -> float:
-    """Student's 97.5 % point for this many degrees of freedom, two at least."""
+def student(freedom: float, share: float = 0.975) -> float:
+    """Student's 97.5 % point, or that of another `share`, for this many degrees of freedom, two at least."""
     from scipy.special import stdtrit
 
-    return float(stdtrit(max(freedom, 2.0), 0.975))
+    return float(stdtrit(max(freedom, 2.0), share))
 
 
 def assess(problem: Problem, x: Array) -> Optimum:
