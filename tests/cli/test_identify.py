@@ -177,3 +177,43 @@ def test_a_mistake_is_answered_in_one_sentence(bench, arguments, says):
     assert outcome.exit_code == 2, outcome.output
     assert says in outcome.stderr
     assert outcome.stderr.count("\n") == 1
+
+
+def test_a_prediction_that_falls_short_exits_with_3(fitted):
+    """A thread a tenth longer swings 5 % slower: after nine swings it is half a swing late."""
+    slower = 0.02 * np.cos(W / np.sqrt(1.1) * T)
+    np.savetxt("slow.csv", np.column_stack([T, slower]), "%.12g", ",", header="t,theta", comments="")
+    study = STUDY.split("[[runs]]")[0] + '[[runs]]\nlabel = "slow"\nfile = "slow.csv"\n'
+    (fitted[0] / "slow.toml").write_text(study, encoding="utf-8")
+    outcome = run("predict", "out/fit.json", "slow.toml")
+    assert outcome.exit_code == 3, outcome.output
+    assert "worse than the fit promises" in outcome.stdout
+    told = json.loads(run("predict", "out/fit.json", "slow.toml", "--json").stdout)
+    assert told["as_promised"] is False
+    assert told["runs"]["slow"]["inside"]["theta"] < 70
+
+
+def test_a_larger_swing_is_named_as_extrapolation(fitted):
+    np.savetxt("wide.csv", np.column_stack([T, swing(T, 0.04)]), "%.12g", ",", header="t,theta", comments="")
+    study = STUDY.split("[[runs]]")[0] + '[[runs]]\nlabel = "wide"\nfile = "wide.csv"\n'
+    (fitted[0] / "wide.toml").write_text(study, encoding="utf-8")
+    said = " ".join(run("predict", "out/fit.json", "wide.toml").stdout.split())
+    assert "Run 'wide' extrapolates: theta reaches 0.04 rad, 2 times the 0.02 rad" in said
+    assert "extrapolates" not in run("predict", "out/fit.json", "study.toml").stdout
+
+
+def test_a_fit_of_an_older_version_predicts_without_bands(fitted):
+    path = fitted[0] / "out" / "fit.json"
+    old = json.loads(path.read_text(encoding="utf-8"))
+    assert old.pop("bands")["level"] == 0.9
+    path.write_text(json.dumps(old), encoding="utf-8")
+    outcome = run("predict", "out/fit.json", "study.toml", "-o", "old")
+    assert outcome.exit_code == 0, outcome.output
+    assert "holds no bands" in outcome.stdout
+    assert "90 % band" not in (fitted[0] / "old" / "prediction.html").read_text(encoding="utf-8")
+
+
+def test_the_page_of_a_prediction_shows_its_band(fitted):
+    assert run("predict", "out/fit.json", "study.toml", "-o", "new").exit_code == 0
+    for page in ("new/prediction.html", "out/report.html"):
+        assert "should hold 90 % of the samples" in (fitted[0] / page).read_text(encoding="utf-8")

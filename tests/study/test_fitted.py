@@ -31,6 +31,10 @@ FIT = {
     "groups": {"28 Jan": {"friction": number(1.2, "1", 0.1)}},
     "estimated": ["J_p", "actuator.gain"],
     "correlation": [[1.0, 0.3], [0.3, 1.0]],
+    "bands": {
+        "level": 0.9, "quantile": 1.8, "names": ["J_p"], "covariance": [[1e-9]], "reached": {"x_dot": 0.4},
+        "spreads": {"x": [{"horizon": 0.0, "start": 1e-3, "end": 1e-3}]},
+    },
 }  # fmt: skip
 MUTATIONS = [(p, what, value) for p in paths(FIT) for what, value in wrong(at(FIT, p))]
 

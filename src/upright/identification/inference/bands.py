@@ -48,7 +48,7 @@ DAMPED = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
-class Response:
+class Sensitivity:
     """A run's errors (N, outputs) and slopes of its outputs (N, outputs, sought in it), windows end to end.
 
     `age` (N,) are the seconds since the restart, or the first sample.
@@ -59,7 +59,7 @@ class Response:
     age: Array
 
 
-def response(problem: Problem, index: int, x: Array) -> Response:
+def sensitivity(problem: Problem, index: int, x: Array) -> Sensitivity:
     """How a run is met at coordinates `x`, in the units of its outputs; of several horizons the shortest."""
     track, sought = problem.tracks[index], problem.sought_in(index)
     m = sought.size
@@ -70,18 +70,18 @@ def response(problem: Problem, index: int, x: Array) -> Response:
     if track.ahead:
         weight = float(track.ahead.weight[0])
         ahead = np.full(len(error[0]), track.run.horizons[0])
-        return Response(error=error[0] / weight, slope=slope[0] / weight, age=ahead)
+        return Sensitivity(error=error[0] / weight, slope=slope[0] / weight, age=ahead)
     time = track.dt * np.arange(float(samples))
     if not track.windowed:
-        return Response(error=error[:, 0], slope=slope[:, 0], age=time)
+        return Sensitivity(error=error[:, 0], slope=slope[:, 0], age=time)
     ends = (np.moveaxis(a[1:], 1, 0).reshape(-1, *a.shape[2:]) for a in (error, slope))
-    return Response(error=next(ends), slope=next(ends), age=np.tile(time[1:], track.restarts.size))
+    return Sensitivity(error=next(ends), slope=next(ends), age=np.tile(time[1:], track.restarts.size))
 
 
 def calibrated(best: Optimum) -> Bands:
     """Bands that a fit promises, from blocks of its runs predicted by fits of the others."""
     problem = best.problem
-    met = [response(problem, i, best.x) for i in range(len(problem.tracks))]
+    met = [sensitivity(problem, i, best.x) for i in range(len(problem.tracks))]
     blocks = _blocks(best)
     moved = np.array([block.step for block in blocks]).reshape(-1, best.x.size)
     covariance = best.sandwich + _one_more(len(blocks)) * (moved.T @ moved)
@@ -159,7 +159,7 @@ def _blocks(best: Optimum) -> list[_Block]:
     return found if len(found) > 1 else []
 
 
-def _missed(problem: Problem, met: Response, block: _Block, covariance: Array, x: Array, bands: Bands) -> Array:
+def _missed(problem: Problem, met: Sensitivity, block: _Block, covariance: Array, x: Array, bands: Bands) -> Array:
     """What a block misses (all,) when the others predict it, in widths."""
     sought, slope = problem.sought_in(block.run), met.slope
     if block.count == 1:  # a run that is left out still says how it began
@@ -220,7 +220,7 @@ def _width(track: Track, bands: Bands, age: Array, variance: Array) -> dict[str,
     return found
 
 
-def _spreads(tracks: Sequence[Track], met: Sequence[Response]) -> dict[str, tuple[Spread, ...]]:
+def _spreads(tracks: Sequence[Track], met: Sequence[Sensitivity]) -> dict[str, tuple[Spread, ...]]:
     """What is left over of every signal, by horizon, and never less than counts or a line's width of its picture."""
     kinds: dict[tuple[str, float], list[tuple[Array, Array, float]]] = {}
     for track, run in zip(tracks, met, strict=True):
@@ -280,7 +280,7 @@ def banded(
     age = np.full(len(plain.y), next(iter(run.horizons), 0.0))
     if not run.filtered:
         problem.settle_steps(x)
-        met = response(problem, 0, x)
+        met = sensitivity(problem, 0, x)
         slope, age = adapted(problem, 0, met.slope, x), met.age
         places = [bands.names.index(problem.unknowns[i].name) if problem.unknowns[i].shared else -1
                   for i in problem.sought_in(0)]  # fmt: skip
