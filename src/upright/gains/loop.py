@@ -125,8 +125,17 @@ def response(model: Sampled, law: Law) -> Response:
     return balanced(A, np.vstack([model.B, np.zeros((law.A.shape[0], 1))]), -np.hstack([D @ model.C, law.C]))
 
 
-def margins(plant: Linear, model: Sampled, law: Law) -> Margins:
+def margins(plant: Linear | None, model: Sampled, law: Law, *, D: Array | None = None) -> Margins:
     """Margins of a stable sampled loop, from every crossing of the unit circle and of the real axis.
+
+    Parameters
+    ----------
+    plant : Linear or None
+        What was held; None for a model known at its samples alone, whose further delay is its phase over its frequency.
+    model : Sampled
+    law : Law
+    D : array, shape (p, m), optional
+        Feedthrough of the plant.
 
     Raises
     ------
@@ -137,13 +146,20 @@ def margins(plant: Linear, model: Sampled, law: Law) -> Margins:
         raise BadInput("the sampled loop is not stable, so it has no margins; ask for slower poles or sample faster.")
     L = response(model, law)
     least, most = gain_bounds(L)
+    late = _turned(L) if plant is None else _delay(plant, model, law, D)
     return Margins(
         least_gain=least, most_gain=most, phase=float(np.abs(phases(L)[1]).min(initial=np.inf)),
-        delay=_delay(plant, model, law) * model.period, modulus=modulus(L),
+        delay=late * model.period, modulus=modulus(L),
     )  # fmt: skip
 
 
-def _delay(plant: Linear, model: Sampled, law: Law) -> float:
+def _turned(L: Response) -> float:
+    """Delay [samples] that turns the loop gain through -180 degrees where it is 1."""
+    w, phase = phases(L)
+    return float((np.mod(phase, 2 * np.pi) / w).min(initial=np.inf))
+
+
+def _delay(plant: Linear, model: Sampled, law: Law, D: Array | None) -> float:
     """Further delay [samples] at which the loop falls.
 
     Below a sample, by its eigenvalues. Beyond: whole samples turn the loop gain and leave its size, so a loop that is
@@ -151,14 +167,13 @@ def _delay(plant: Linear, model: Sampled, law: Law) -> float:
     """
 
     def late(more: float) -> Sampled:
-        return hold(plant, model.period, model.delay + more, model.lag)
+        return hold(plant, model.period, model.delay + more, model.lag, D=D)
 
     def stands(more: float) -> bool:
         return _stable(closed(late(more), law))
 
     def falls(part: float) -> float:
-        w, phase = phases(response(late(part), law))
-        return part + float((np.mod(phase, 2 * np.pi) / w).min(initial=np.inf))
+        return part + _turned(response(late(part), law))
 
     parts = np.arange(8) / 8
     # a sample more turns L(-1) into its negative, through -1 if it is larger than 1

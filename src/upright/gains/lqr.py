@@ -110,12 +110,12 @@ def _why_none(A: Array, B: Array, Q: Array, sampled: bool, states: Sequence[str]
     )
 
 
-def locus(A: ArrayLike, B: ArrayLike, Q: ArrayLike, weights: ArrayLike) -> Roots:
-    """Poles [1/s] of the loop closed by `lqr`, shape (len(weights), n), each followed from weight to weight."""
+def locus(A: ArrayLike, B: ArrayLike, Q: ArrayLike, weights: ArrayLike, *, sampled: bool = False) -> Roots:
+    """Poles [1/s, or z] of the loop closed by `lqr` (`dlqr`), shape (len(weights), n), each followed on its way."""
     A, B = np.asarray(A, dtype=np.float64), np.asarray(B, dtype=np.float64)
     rows: list[Roots] = []
     for R in np.atleast_1d(np.asarray(weights, dtype=np.float64)).tolist():
-        found = poles_of(A - B @ lqr(A, B, Q, R))
+        found = least_cost(A, B, Q, R, sampled=sampled).E
         rows.append(matched(rows[-1], found) if rows else found[np.lexsort((found.imag, found.real))])
     return np.array(rows)
 

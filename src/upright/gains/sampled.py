@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -91,7 +92,6 @@ def hold(
         model = _lagged(model, lag)
         model = replace(model, C=np.hstack([model.C[:, : -model.B.shape[1]], through]))
         through = through * 0
-    n, m = model.B.shape
     whole = math.floor(delay + 1e-12)
     part = max(delay - whole, 0.0) if delay - whole > 1e-12 else 0.0
     if method == "foh" and part:
@@ -101,24 +101,44 @@ def hold(
     if method == "foh":
         ramp = _ramped(model.A, model.B, period)
         new, through = new - ramp + early @ ramp, through + model.C @ ramp
-    memories = whole + (part > 0)
-    A = np.zeros((n + memories * m, n + memories * m))
+    return _remembering(
+        {whole: new, whole + 1: early @ old}, through, period, delay, A=early @ late, C=model.C, states=model.states,
+        inputs=model.inputs, lag=lag,
+    )  # fmt: skip
+
+
+def sampled_model(
+    A: Array, B: Array, C: Array, D: Array, period: float, delay: int, *, states: tuple[str, ...],
+    inputs: tuple[str, ...],
+) -> Sampled:  # fmt: skip
+    """A model that is known at its samples alone, its commands so many whole samples late."""
+    return _remembering({delay: B}, D, period, float(delay), A=A, C=C, states=states, inputs=inputs)
+
+
+def _remembering(
+    columns: Mapping[int, Array], through: Array, period: float, delay: float, *, A: Array, C: Array,
+    states: tuple[str, ...], inputs: tuple[str, ...], lag: float = 0.0,
+) -> Sampled:  # fmt: skip
+    """A sampled model with what commands of so many samples ago do as `columns`, and those commands as states."""
+    n, m = A.shape[0], len(inputs)
+    memories = math.ceil(delay - 1e-12)
+    whole = np.zeros((n + memories * m, n + memories * m))
     B = np.zeros((n + memories * m, m))
-    A[:n, :n] = early @ late
-    for ago, column in ((whole, new), (whole + 1, early @ old)):
+    whole[:n, :n] = A
+    for ago, column in columns.items():
         if ago == 0:
             B[:n] = column
         elif ago <= memories:
-            A[:n, n + (ago - 1) * m : n + ago * m] = column
+            whole[:n, n + (ago - 1) * m : n + ago * m] = column
     if memories:
         B[n : n + m] = np.eye(m)
-        A[n + m :, n:-m] = np.eye((memories - 1) * m)
-    ago_names = tuple(f"{u} {k} ago" for k in range(1, memories + 1) for u in model.inputs)
-    C = np.hstack([model.C, np.zeros((model.C.shape[0], memories * m))])
+        whole[n + m :, n:-m] = np.eye((memories - 1) * m)
+    ago_names = tuple(f"{u} {k} ago" for k in range(1, memories + 1) for u in inputs)
+    C = np.hstack([C, np.zeros((C.shape[0], memories * m))])
     if memories:  # what acts at a sample is the oldest command on its way
         C[:, n + (memories - 1) * m :] = through
     return Sampled(
-        A=A, B=B, C=C, period=period, delay=delay, states=(*model.states, *ago_names), lag=lag,
+        A=whole, B=B, C=C, period=period, delay=delay, states=(*states, *ago_names), lag=lag,
         D=through if through.any() and not memories else None,
     )  # fmt: skip
 

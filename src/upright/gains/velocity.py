@@ -5,14 +5,16 @@ An estimator is a sampled linear law from encoder readings (and, for an observer
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from upright.errors import BadInput
-from upright.gains.sampled import Sampled, without_feedthrough
+from upright.gains.placement import place
+from upright.gains.requests import conjugate_poles, lost_modes, written
+from upright.gains.sampled import Sampled, to_s, without_feedthrough
 from upright.laws.linear import Array, differences
 
 
@@ -93,6 +95,60 @@ def observer(model: Sampled, gain: ArrayLike, name: str = "observer") -> Estimat
     return Estimator(
         A=model.A @ kept, B=model.A @ L, E=model.B, C=kept, D=L, begin=begin, period=model.period,
         name=name,
+    )  # fmt: skip
+
+
+def placed_observer(model: Sampled, poles: ArrayLike) -> Estimator:
+    """Observer whose error dies out with the `poles` asked [z]; drive and commands on their way need no correction.
+
+    A model in which something dies out within one sample is corrected by the reading of the sample before, since its
+    transition cannot be undone.
+
+    Parameters
+    ----------
+    model : Sampled
+    poles : array, shape (n,)
+        In conjugate pairs; n without drive and commands on their way.
+
+    Raises
+    ------
+    BadInput
+        When the outputs do not show a mode, or the poles cannot be had.
+    """
+    without_feedthrough(model, "an observer")
+    n, T = model.A.shape[0] - model.remembered, model.period
+    A, C = model.A[:n, :n], model.C[:, :n]
+    z = conjugate_poles(poles, n)
+    slope = (A - np.eye(n)) / T  # (z - 1)/T spreads poles that crowd at 1
+    unseen = np.array(lost_modes(slope.T, C.T))
+    if unseen.size:
+        raise BadInput(
+            f"the outputs do not show the mode at {written(to_s(1 + T * unseen, T))} 1/s, so no observer finds the "
+            "states; measure another output, or leave that mode out of the model."
+        )
+    newest = float(np.abs(np.linalg.eigvals(A)).min()) > 1e-9
+    gain = place(slope.T, ((C @ A) if newest else C).T / T, (z - 1) / T).K.T  # duality
+    L = np.vstack([gain, np.zeros((model.remembered, gain.shape[1]))])
+    begin: Array = np.zeros_like(L)
+    begin[:n] = np.linalg.pinv(C)
+    if newest:
+        return replace(observer(model, L), begin=begin)
+    return Estimator(
+        A=model.A - L @ model.C, B=L, E=model.B, C=np.eye(model.A.shape[0]), D=np.zeros_like(L),
+        begin=begin, period=T, name="observer, a sample late",
+    )  # fmt: skip
+
+
+def read_off(model: Sampled) -> Estimator:
+    """States read off the outputs, of which there are enough: nothing is estimated."""
+    without_feedthrough(model, "reading states off the outputs")
+    n = model.A.shape[0] - model.remembered
+    C, (p, m) = model.C[:, :n], (model.C.shape[0], model.B.shape[1])
+    if np.linalg.matrix_rank(C) < n or model.C[:, n:].any():
+        raise BadInput("the outputs do not tell every state by themselves; use an observer.")
+    return Estimator(
+        A=np.zeros((0, 0)), B=np.zeros((0, p)), E=np.zeros((0, m)), C=np.zeros((n, 0)),
+        D=np.linalg.pinv(C).astype(np.float64), begin=np.zeros((0, p)), period=model.period, name="states as measured",
     )  # fmt: skip
 
 
