@@ -89,6 +89,26 @@ class IdentifiedRig:
         """What else the drive does, besides gain, limit, delay, lag and offset."""
         return {f"actuator.{n}": e.value for n, e in self.description.entries.items() if f"actuator.{n}" in MORE}
 
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Coordinates, each followed by its velocity."""
+        return self.plant.state_names()
+
+    @property
+    def state_units(self) -> list[str]:
+        """Unit of every state."""
+        return [u for c in self.plant.coordinates for u in (c.unit, f"{c.unit}/s")]
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """What is measured: the coordinates."""
+        return tuple(c.name for c in self.plant.coordinates)
+
+    @property
+    def output_units(self) -> list[str]:
+        """Unit of every output."""
+        return [c.unit for c in self.plant.coordinates]
+
     def linear(self, at: str) -> Linear:
         """Model about an equilibrium, from the command to the coordinates."""
         return driven(self.plant, {**self.more, GAIN: self.gain}, at)

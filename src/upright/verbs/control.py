@@ -7,12 +7,13 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
 from upright.progress import Progress, part, silent
 from upright.verbs.answer import Answer
+from upright.verbs.matrices import matrices_of, read_matrices
 from upright.verbs.pages import folder_if_given, page_folder, write_page
 from upright.verbs.rig import Counts, as_typed, rig_options
 from upright.verbs.values import open_log, poles, si, si_if_given
@@ -20,6 +21,7 @@ from upright.verbs.values import open_log, poles, si, si_if_given
 if TYPE_CHECKING:
     from upright.control import ServoRig
     from upright.control.sensors import Scales
+    from upright.experiments.designing.matrices import Matrices
     from upright.experiments.designing.run import Designed
     from upright.experiments.identified import IdentifiedRig
     from upright.experiments.regulation_2.run import Regulation, RegulationRequest
@@ -32,10 +34,10 @@ _poles = poles  # the verbs have options of this name
 
 @keeps_its_inputs
 def design(
-    source: str | os.PathLike[str], *, at: str = "", poles: str | Iterable[complex] = "",
-    lqr: str | Iterable[float] = "", effort_weight: float | None = None, limit: float | None = None,
-    start: str | Mapping[str, float | str] = "", period: float | str = "", delay: float | None = None,
-    speed: str = "filtered", memory: float = 0.5, lag: float | str = "",
+    source: Any = None, *, matrices: str | os.PathLike[str] | None = None, at: str = "",
+    poles: str | Iterable[complex] = "", lqr: str | Iterable[float] = "", effort_weight: float | None = None,
+    limit: float | None = None, start: str | Mapping[str, float | str] = "", period: float | str = "",
+    delay: float | None = None, speed: str = "", memory: float = 0.5, lag: float | str = "",
     counts: float | str | Mapping[str, float] = "", vendor: str = "", track: str = "", sampled: bool = False,
     seed: int = 0, out: str | os.PathLike[str] | None = None, pdf: bool = False,
 ) -> Answer[Designed]:  # fmt: skip
@@ -46,8 +48,12 @@ def design(
 
     Parameters
     ----------
-    source : path
-        fit.json, its folder, or a study (TOML).
+    source : path or linear model, optional
+        fit.json, its folder, or a study (TOML); or a `control.StateSpace`, ``plant.linear("inverted")``, what `hold`
+        gives, or arrays ``(A, B[, C[, D]])``.
+    matrices : path, optional
+        Instead of `source`, a file in TOML with A and B, and C, D, dt [s], names and units where there are any. Of a
+        linear model there are no dry friction, no encoders and no covariance; a sampled one is designed for as it is.
     at : str, optional
         Equilibrium; the last that the plant names when omitted.
     poles : str or sequence of complex
@@ -63,9 +69,11 @@ def design(
     period : float or str, optional
         Between samples [s]; the study's servo period when omitted.
     delay : float, optional
-        How many samples late a command acts in all; when omitted the fit's delay, or one where it has none.
+        How many samples late a command acts in all; when omitted the fit's delay, or one where it has none. Sampled
+        matrices hold their own.
     speed : str
-        Velocities by plain or filtered difference, or kalman.
+        Velocities by plain or filtered difference, or kalman; filtered when omitted. Of matrices measured, filtered,
+        plain or observer; the first of these that the outputs allow when omitted.
     memory : float
         Of the filtered difference, 0 to 1.
     lag : float or str, optional
@@ -106,23 +114,36 @@ def design(
     asked, weights = _poles(poles), _numbers(lqr)
     if (asked is None) == (weights is None):
         raise BadInput('give either --poles "-4+-2j, -10, -3" or --lqr "1,0,1,0" (weights of the states).')
-    if speed not in SPEEDS:
-        raise BadInput(f"--speed is plain, filtered or kalman, got '{speed}'.")
-    rig = read_identified(Path(source), seed=seed)
-    here = at or list(rig.plant.equilibria)[-1]
-    if here not in rig.plant.equilibria:
-        raise BadInput(f"'{rig.name}' has no equilibrium '{here}'; {nearest(here, rig.plant.equilibria)}")
-    given = rig_options(rig.plant, rig.unit, limit=limit, period=period, counts=counts)
-    said = rig.described(given, vendor=vendor, needs=("servo_period", "counts"), who="upright design")
-    most = min(said.value("limit", math.inf), full_command({**rig.more, GAIN: rig.gain}))
+    if (source is None) == (matrices is None):
+        raise BadInput("design takes a fit.json, its folder, a study or a linear model, or --matrices FILE; give one.")
     wish = DesignRequest(
-        at=here, poles=asked, weights=weights, R=effort_weight, period=said.entries["servo_period"].value, delay=delay,
-        lag=si_if_given(lag, "s"), speed=speed, memory=memory, quantum=quanta(rig, said),
-        limit=most if math.isfinite(most) else None, start=_start(rig, start), track=track, sampled=sampled, said=said,
+        at="", poles=asked, weights=weights, R=effort_weight, delay=delay, lag=si_if_given(lag, "s"), memory=memory,
+        track=track, sampled=sampled,
     )  # fmt: skip
+    if matrices is not None or not isinstance(source, str | os.PathLike):
+        if at or counts or vendor:
+            raise BadInput("--at, --counts and --vendor are of a rig, and plain matrices are none; leave them out.")
+        rig = read_matrices(matrices) if matrices is not None else matrices_of(source)
+        wish = replace(wish, period=_sampling(rig, period), speed=speed, limit=limit, start=_start(rig, start))
+        name = "--matrices " + (typed(Path(matrices)) if matrices is not None else "FILE")
+    else:
+        if (speed := speed or "filtered") not in SPEEDS:
+            raise BadInput(f"--speed is plain, filtered or kalman, got '{speed}'.")
+        rig = read_identified(Path(source), seed=seed)
+        here = at or list(rig.plant.equilibria)[-1]
+        if here not in rig.plant.equilibria:
+            raise BadInput(f"'{rig.name}' has no equilibrium '{here}'; {nearest(here, rig.plant.equilibria)}")
+        given = rig_options(rig.plant, rig.unit, limit=limit, period=period, counts=counts)
+        said = rig.described(given, vendor=vendor, needs=("servo_period", "counts"), who="upright design")
+        most = min(said.value("limit", math.inf), full_command({**rig.more, GAIN: rig.gain}))
+        wish = replace(
+            wish, at=here, period=said.entries["servo_period"].value, speed=speed, quantum=quanta(rig, said),
+            limit=most if math.isfinite(most) else None, start=_start(rig, start), said=said,
+        )  # fmt: skip
+        name = typed(Path(source))
     done = design_for(rig, wish)
     again = as_typed(limit=limit, period=period, counts=counts, vendor=vendor)
-    told = chapter(done, source=typed(Path(source)) + again, folder=typed(folder_at or Path()))
+    told = chapter(done, source=name + again, folder=typed(folder_at or Path()))
     files: list[Path] = []
     if folder_at is not None:
         files = [
@@ -130,6 +151,19 @@ def design(
             *write_page(told, folder_at / "design.html", pdf),
         ]
     return Answer(done, told, files)
+
+
+def _sampling(model: Matrices, period: float | str) -> float:
+    """Period of the loop [s]; that of sampled matrices is theirs."""
+    asked = si_if_given(period, "s")
+    if asked is None and not model.period:
+        raise BadInput('these matrices are continuous, and a computer closes the loop: say how often, --period "2 ms".')
+    if asked is not None and model.period and not math.isclose(asked, model.period, rel_tol=1e-9):
+        raise BadInput(
+            f"these matrices are sampled every {1e3 * model.period:.6g} ms, and a period of {1e3 * asked:.6g} ms was "
+            "asked for; leave --period out, or give a continuous model."
+        )
+    return model.period or asked or 0.0
 
 
 def _numbers(given: str | Iterable[float]) -> tuple[float, ...] | None:
@@ -143,8 +177,10 @@ def _numbers(given: str | Iterable[float]) -> tuple[float, ...] | None:
         raise BadInput(f'weights are numbers separated by commas, as in "1,0,1,0", got {given[:60]!r}.') from None
 
 
-def _start(rig: IdentifiedRig, given: str | Mapping[str, float | str]) -> tuple[float, ...]:
-    """Deviation, state by state; empty when none was given."""
+def _start(rig: IdentifiedRig | Matrices, given: str | Mapping[str, float | str]) -> tuple[float, ...]:
+    """Deviation, state by state in its unit; empty when none was given."""
+    from upright.units import scale
+
     if isinstance(given, str):
         parts = [part.partition("=") for part in given.split(",")] if given.strip() else []
         said: dict[str, float | str] = {name.strip(): value for name, _, value in parts}
@@ -152,13 +188,13 @@ def _start(rig: IdentifiedRig, given: str | Mapping[str, float | str]) -> tuple[
         said = dict(given)
     if not said:
         return ()
-    names = rig.plant.state_names()
-    units = dict(zip(names, (u for c in rig.plant.coordinates for u in (c.unit, f"{c.unit}/s")), strict=True))
+    names = rig.states
+    units = dict(zip(names, rig.state_units, strict=True))
     values = dict.fromkeys(names, 0.0)
     for name, value in said.items():
         if name not in values:
             raise BadInput(f"--start names states as in \"theta=5 deg\", got '{name}'; {nearest(name, names)}")
-        values[name] = si(value, units[name])
+        values[name] = si(value, units[name]) / (scale(units[name]) if isinstance(value, str) else 1.0)
     if not any(values.values()):
         raise BadInput("--start must leave the equilibrium; give one state a value that is not 0.")
     return tuple(values.values())

@@ -104,7 +104,7 @@ def place(*system: Any, poles: Any = None) -> Gains:
     from upright.gains import place as placed
     from upright.gains.requests import read_poles
 
-    model, rest = _model(system, "place", ("poles",), (poles,))
+    model, rest = read_model(system, "place", ("poles",), (poles,))
     (asked,) = rest
     wanted = read_poles(asked) if isinstance(asked, str) else _complex(asked)
     found = placed(model.A, model.B, wanted)
@@ -135,7 +135,7 @@ def lqr(*system: Any, Q: Any = None, R: Any = None) -> Gains:
     """
     from upright.gains.lqr import least_cost
 
-    model, (weights, effort) = _model(system, "lqr", ("Q", "R"), (Q, R))
+    model, (weights, effort) = read_model(system, "lqr", ("Q", "R"), (Q, R))
     n, m = model.B.shape
     q, r = _weights(weights, n, "Q", "states"), _weights(effort, m, "R", "inputs")
     K, S, E = least_cost(model.A, model.B, q, r, sampled=model.period > 0, states=model.states)
@@ -164,7 +164,7 @@ def dlqr(*system: Any, Q: Any = None, R: Any = None) -> Gains:
     """
     from upright.gains.lqr import least_cost
 
-    model, (weights, effort) = _model(system, "dlqr", ("Q", "R"), (Q, R))
+    model, (weights, effort) = read_model(system, "dlqr", ("Q", "R"), (Q, R))
     if not model.period:
         if not model.bare:
             raise BadInput("dlqr takes a sampled model, and this one is continuous; sample it with hold, or use lqr.")
@@ -204,7 +204,7 @@ def hold(*system: Any, period: Any = None, delay: float = 0.0, lag: float = 0.0,
     from upright.gains import hold as held
     from upright.verbs.values import si
 
-    model, (step,) = _model(system, "hold", ("period",), (period,))
+    model, (step,) = read_model(system, "hold", ("period",), (period,))
     if model.period:
         raise BadInput(f"hold samples a continuous model, and this one has a period of {model.period:g} s already.")
     linear = Linear(
@@ -244,7 +244,7 @@ def margins(*system: Any, K: Any = None, period: float = 0.0) -> Margins:
     if len(system) == 3 and isinstance(system[0], Linear) and isinstance(system[2], Law):
         return as_it_runs(*system)
     given, names = list(system), ("K",) if K is not None or len(system) == 2 else ()
-    model, rest = _model(tuple(given), "margins", names, (K,))
+    model, rest = read_model(tuple(given), "margins", names, (K,))
     period = model.period or period
     if names:
         gains = np.atleast_2d(np.asarray(rest[0], dtype=np.float64))
@@ -284,7 +284,7 @@ def prefilter(*system: Any, K: Any = None, output: int | str = 0) -> float:
     """
     from upright.gains import prefilter as static
 
-    model, (gains,) = _model(system, "prefilter", ("K",), (K,))
+    model, (gains,) = read_model(system, "prefilter", ("K",), (K,))
     names = model.outputs
     if isinstance(output, str) and output not in names:
         raise BadInput(f"this model has no output '{output}'; {nearest(output, names)}")
@@ -301,7 +301,7 @@ def prefilter(*system: Any, K: Any = None, output: int | str = 0) -> float:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Model:
+class Model:
     """A linear model as it was handed over; `bare` where it came as arrays, which say no period."""
 
     A: Array
@@ -316,13 +316,16 @@ class _Model:
     bare: bool = False
 
     def gains(self, K: Array, poles: NDArray[np.complex128], S: Array | None, sentence: str) -> Gains:
+        """Gains found for it."""
         return Gains(
             K=K, poles=poles, S=S, states=self.states, inputs=self.inputs, point=self.point, period=self.period,
             sentence=sentence,
         )  # fmt: skip
 
 
-def _model(given: tuple[Any, ...], verb: str, names: tuple[str, ...], by_name: tuple[Any, ...]) -> tuple[_Model, Any]:
+def read_model(
+    given: tuple[Any, ...], verb: str, names: tuple[str, ...], by_name: tuple[Any, ...]
+) -> tuple[Model, Any]:
     """The model that the first arguments name, and the values that follow it."""
     wanted = f'{verb} takes a model and {" and ".join(names)}: {verb}(plant.linear("inverted"), {", ".join(names)}), '
     wanted += f"{verb}(A, B, {', '.join(names)}), or a control.StateSpace in the model's place"
@@ -339,7 +342,7 @@ def _model(given: tuple[Any, ...], verb: str, names: tuple[str, ...], by_name: t
             + "."
         )
     if hasattr(first, "A") and hasattr(first, "B"):
-        model = _named(verb, first.A, first.B, getattr(first, "C", None), getattr(first, "D", None))
+        model = named_model(verb, first.A, first.B, getattr(first, "C", None), getattr(first, "D", None))
         step = getattr(first, "dt", None) or getattr(first, "period", None)
         model = replace(
             model, states=_labels(first, "state", model.states), inputs=_labels(first, "input", model.inputs),
@@ -347,9 +350,9 @@ def _model(given: tuple[Any, ...], verb: str, names: tuple[str, ...], by_name: t
             period=float(step) if step else 0.0, bare=False,
         )  # fmt: skip
     elif isinstance(first, tuple) and 2 <= len(first) <= 4:
-        model = _named(verb, *first)
+        model = named_model(verb, *first)
     elif isinstance(first, list | np.ndarray) and rest:
-        model = _named(verb, first, rest.pop(0))
+        model = named_model(verb, first, rest.pop(0))
     else:
         raise BadInput(f"{wanted}; got {type(first).__name__}.")
     values = [*rest, *(v for v in by_name if v is not None)]
@@ -360,11 +363,12 @@ def _model(given: tuple[Any, ...], verb: str, names: tuple[str, ...], by_name: t
 
 def _labels(system: Any, kind: str, default: tuple[str, ...]) -> tuple[str, ...]:
     """Names as python-control or `Linear` has them."""
-    found = getattr(system, f"{kind}_labels", None) or getattr(system, f"{kind}s", None)
+    found = getattr(system, f"{kind}_labels", None)
+    found = getattr(system, f"{kind}s", None) if found is None else found
     return tuple(found) if isinstance(found, list | tuple) and len(found) == len(default) else default
 
 
-def _named(verb: str, A: Any, B: Any, C: Any = None, D: Any = None) -> _Model:
+def named_model(verb: str, A: Any, B: Any, C: Any = None, D: Any = None) -> Model:
     """Model of plain arrays; every state is measured where C is left out, and nothing comes through where D is."""
     try:
         a = np.atleast_2d(np.asarray(A, dtype=np.float64))
@@ -378,6 +382,8 @@ def _named(verb: str, A: Any, B: Any, C: Any = None, D: Any = None) -> _Model:
         raise BadInput(f"{verb} needs A of shape (n, n) and B of shape (n, m), got {a.shape} and {b.shape}.")
     if c.ndim != 2 or c.shape[1] != a.shape[0]:
         raise BadInput(f"{verb} needs C of shape (p, {a.shape[0]}), got {c.shape}.")
+    if not all(np.isfinite(matrix).all() for matrix in (a, b, c) + (() if d is None else (d,))):
+        raise BadInput(f"{verb} needs matrices of finite numbers; one of them is infinite or no number at all.")
     through = (c.shape[0], b.shape[1])
     if d is None or not d.any():
         d = np.zeros(through)
@@ -387,7 +393,7 @@ def _named(verb: str, A: Any, B: Any, C: Any = None, D: Any = None) -> _Model:
     states, inputs, outputs = (
         tuple(f"{letter}[{i}]" for i in range(size)) for letter, size in zip("xuy", (*b.shape, c.shape[0]), strict=True)
     )
-    return _Model(A=a, B=b, C=c, D=d, states=states, inputs=inputs, outputs=outputs, bare=True)
+    return Model(A=a, B=b, C=c, D=d, states=states, inputs=inputs, outputs=outputs, bare=True)
 
 
 def _complex(poles: Any) -> NDArray[np.complex128]:

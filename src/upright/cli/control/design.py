@@ -11,7 +11,13 @@ from upright.cli.terminal import AsJson, Out, Pdf, tell
 
 
 def design(
-    source: Annotated[Path, typer.Argument(metavar="STUDY_OR_FIT", help="fit.json, its folder, or a study (TOML).")],
+    source: Annotated[
+        Path | None, typer.Argument(metavar="STUDY_OR_FIT", help="fit.json, its folder, or a study (TOML).")
+    ] = None,
+    matrices: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Plain matrices instead: TOML with A and B; C, D, dt, names, units if any."),
+    ] = None,
     at: Annotated[str, typer.Option(metavar="NAME", help="Equilibrium; the last that the plant names.")] = "",
     poles: Annotated[str, typer.Option(metavar="LIST", help='Poles [1/s], as in "-4.15+-1.63j, -16.9, -3.2".')] = "",
     lqr: Annotated[str, typer.Option(metavar="LIST", help='Weights of the states, as in "1,0,1,0".')] = "",
@@ -28,7 +34,14 @@ def design(
     delay: Annotated[
         float | None, typer.Option(metavar="SAMPLES", help="Commands act so late in all; the fit's, else 1.")
     ] = None,
-    speed: Annotated[str, typer.Option(help="Velocities by plain or filtered difference, or kalman.")] = "filtered",
+    speed: Annotated[
+        str,
+        typer.Option(
+            metavar="WAY",
+            help="Velocities by plain or filtered difference, or kalman; filtered if left out. Of matrices measured, "
+            "filtered, plain or observer; the first that fits if left out.",
+        ),
+    ] = "",
     memory: Annotated[float, typer.Option(help="a of the filtered difference, 0 to 1.")] = 0.5,
     lag: Annotated[str, typer.Option(metavar="TIME", help="Lag of the drive; the fit's if left out.")] = "",
     counts: Annotated[
@@ -52,12 +65,13 @@ def design(
     chosen by least cost; period, delay and differenced encoders are then put in.
 
     upright design out/fit.json --at inverted --poles "-4.15+-1.63j, -16.9, -3.2"
+    upright design --matrices model.toml --poles "-4, -5" --period "2 ms"
     """
     from upright.verbs import control as verbs
 
     done = verbs.design(
-        source, at=at, poles=poles, lqr=lqr, effort_weight=effort_weight, limit=limit, start=start, period=period,
-        delay=delay, speed=speed, memory=memory, lag=lag, counts=counts, vendor=vendor, track=track, sampled=sampled,
-        seed=seed, out=out, pdf=pdf,
+        source, matrices=matrices, at=at, poles=poles, lqr=lqr, effort_weight=effort_weight, limit=limit, start=start,
+        period=period, delay=delay, speed=speed, memory=memory, lag=lag, counts=counts, vendor=vendor, track=track,
+        sampled=sampled, seed=seed, out=out, pdf=pdf,
     )  # fmt: skip
     tell(done.chapter, done.files, done.numbers if as_json else None)

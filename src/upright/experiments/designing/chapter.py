@@ -7,11 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from upright.experiments.designing.matrices import Matrices
 from upright.experiments.designing.run import Designed, VelocityLoop
-from upright.experiments.identified import rig_table
-from upright.gains import spelled_out
+from upright.experiments.identified import IdentifiedRig, rig_table
+from upright.gains import Sampled, spelled_out
 from upright.gains.lqr import locus
-from upright.gains.requests import written
+from upright.gains.requests import Roots, written
+from upright.gains.sampled import to_s
 from upright.report.drawing import BLACK, BLUE, VERMILLION, Poles, locus_figure, pole_map, swing_figure
 from upright.report.page import Block, Chapter, Part, Picture, Points, Step, Table
 from upright.report.symbols import number, percent, plain
@@ -30,17 +32,21 @@ def chapter(done: Designed, *, source: str = "OUT/fit.json", folder: str = ".") 
     if done.chance is not None:
         stand = f"{percent(100 * done.chance)} stand with these gains"
         sure.append(Points((f"Of the rigs that the fit's covariance allows, {stand}.",)))
+    plain_matrices = isinstance(done.rig, Matrices)
     loop = (
         f"Period {1e3 * done.wish.period:.4g} ms, command {done.sampled.delay:.3g} samples late "
         f"({_delay_from(done)}), drive's lag {1e3 * done.sampled.lag:.3g} ms, "
-        f"velocities made from rounded encoders.{_effort(done)}"
+        f"{f'states by {done.chosen.name}' if plain_matrices else 'velocities made from rounded encoders'}."
+        f"{_effort(done)}"
     )
+    what = f"{done.rig.name}, {done.wish.at}".removesuffix(", ")
+    held = "the model" if plain_matrices else f"the rig at '{done.wish.at}'"
+    trial = "sampling, delay and " + ("their way to the states" if plain_matrices else "differenced encoders")
     return Chapter(
-        title=f"Gains for {done.rig.name}, {done.wish.at}",
+        title=f"Gains for {what}",
         verdict=done.verdict,
         sound=done.chosen.margins is not None and "reservations" not in done.verdict,
-        question=f"Which gains hold the rig at '{done.wish.at}' {wish}, and do they survive sampling, delay and "
-        "differenced encoders?",
+        question=f"Which gains hold {held} {wish}, and do they survive {trial}?",
         parts=(
             Part("Gains", (Points(tuple(gains)), _gain_table(done), _pole_table(done))),
             Part("Poles", (*sure, *_pole_pictures(done))),
@@ -56,11 +62,18 @@ def chapter(done: Designed, *, source: str = "OUT/fit.json", folder: str = ".") 
 
 def _delay_from(done: Designed) -> str:
     """Who says how late a command acts."""
-    return "as asked" if done.wish.delay is not None else "as the file says" if done.rig.delay else "assumed"
+    if done.wish.delay is not None:
+        return "as asked"
+    if isinstance(done.rig, Matrices):
+        return "besides what the matrices hold" if done.rig.period else "assumed"
+    return "as the file says" if done.rig.delay else "assumed"
 
 
 def _doubts(done: Designed) -> tuple[str, ...]:
     """What was not said of the rig, and whose number stands for it."""
+    if isinstance(done.rig, Matrices):
+        left = "dry friction, steps of encoders" + ("" if done.wish.limit else ", the largest command of the drive")
+        return (f"Plain matrices say nothing of a rig: {left} are in none of these numbers.",)
     told = done.rig.doubts(done.wish.said) if done.wish.said else ()
     if done.wish.limit is not None:
         return told
@@ -71,14 +84,6 @@ def _doubts(done: Designed) -> tuple[str, ...]:
     )
 
 
-def _state_units(done: Designed) -> list[str]:
-    """Unit of every state of the model."""
-    out: list[str] = []
-    for c in done.rig.plant.coordinates:
-        out += [c.unit, f"{c.unit}/s"]
-    return out
-
-
 def _gain_table(done: Designed) -> Table:
     """The gains in force, and those that meet the poles in the sampled loop."""
     command = done.rig.unit or "1"
@@ -86,62 +91,79 @@ def _gain_table(done: Designed) -> Table:
     rows = tuple(
         (plain(name), number(k, 5), *((number(sampled[0, i], 5),) if sampled is not None else ()), _per(command, unit))
         for i, (name, k, unit) in enumerate(
-            zip(done.model.states, done.continuous[0], _state_units(done), strict=True)
+            zip(done.model.states, done.continuous[0], done.rig.state_units, strict=True)
         )
     )  # fmt: skip
     marks = ("", " (used)") if done.wish.sampled else (" (used)", "")
     second = ("K, sampled" + marks[1],) if sampled is not None else ()
-    headings = ("state", "K, continuous" + marks[0], *second, "unit")
+    headings = ("state", f"K, {_of_model(done)}" + marks[0], *second, "unit")
     caption = "Gains of u = −K x" + (f", prefilter k_pf = {number(done.k_pf)}" if done.k_pf is not None else "")
     return Table(caption=caption, headings=headings, rows=rows, numbers=tuple(range(1, len(headings) - 1)))
 
 
 def _pole_table(done: Designed) -> Table:
     """Poles asked, attained by the gains on the continuous model, and of the loop as it runs."""
-    rows = [("model, open loop", written(done.model.poles()))]
+    discrete = isinstance(done.model, Sampled)
+    rows = [("model, open loop", _outlasting(done, done.open_loop, 5) if discrete else written(done.open_loop))]
     if done.placement is not None:
         rows.append(("asked", written(done.placement.asked)))
-        rows.append(("attained, continuous", written(done.placement.attained)))
+        rows.append((f"attained, {_of_model(done)}", written(done.placement.attained)))
     else:
-        rows.append(("least cost, continuous", written(_wanted(done))))
-    seen, beyond = _seen_poles(done)
-    rows.append(("loop as it runs", written(seen, 4) + (f", and {beyond} faster" if beyond else "")))
+        least = _outlasting(done, done.wanted, 5) if discrete else written(done.wanted)
+        rows.append((f"least cost, {_of_model(done)}", least))
+    rows.append(("loop as it runs", _outlasting(done, done.poles, 4)))
     return Table(caption="Poles [1/s]", headings=("", "poles"), rows=tuple(rows))
 
 
-def _seen_poles(done: Designed) -> tuple[Any, int]:
-    """Poles of the loop whose motion outlasts a few samples, and how many die out at once (z close to 0)."""
-    slow = done.poles[done.poles.real > -3.0 / done.wish.period]
-    return slow, done.poles.size - slow.size
+def _of_model(done: Designed) -> str:
+    """Which model gains or poles belong to, before its loop."""
+    return "at the samples" if isinstance(done.model, Sampled) else "continuous"
+
+
+def _drawn(done: Designed, poles: Roots) -> Roots:
+    """Poles that a picture has room for: of sampled matrices those whose motion outlasts a few samples."""
+    return poles[poles.real > -3.0 / done.wish.period] if isinstance(done.model, Sampled) else poles
+
+
+def _outlasting(done: Designed, poles: Roots, digits: int) -> str:
+    """Poles whose motion outlasts a few samples, and how many die out at once (z close to 0)."""
+    slow = poles[poles.real > -3.0 / done.wish.period]
+    beyond = poles.size - slow.size
+    return written(slow, digits) + (f", and {beyond} faster" if beyond else "")
 
 
 def _way_table(done: Designed) -> Table:
     """Velocities by difference, filtered difference and Kalman filter, side by side."""
     rows = tuple((way.name + (" (chosen)" if way is done.chosen else ""), *_worth(way)) for way in done.ways)
-    speeds = ", ".join(f"{c.unit}/s" for c in done.rig.plant.coordinates)
-    headings = (
-        "velocities from", f"speed noise [{speeds}]", f"command noise [{done.rig.unit}]", "gain between", "phase [deg]",
-        "delay [ms]", "distance",
-    )  # fmt: skip
+    margins = ("gain between", "phase [deg]", "delay [ms]", "distance")
+    caption = "factors on the command, phase, more delay, distance of the loop gain to −1; all with the same gains"
+    if done.chosen.speed_noise is None:
+        return Table(caption=f"Margins: {caption}", headings=("states from", *margins), rows=rows, numbers=(2, 3, 4))
+    speeds = ", ".join(done.rig.state_units[1::2])
+    noise = (f"speed noise [{speeds}]", f"command noise [{done.rig.unit}]")
     return Table(
-        caption="Noise from rounding encoders, and margins: factors on the command, phase, more delay, distance of the "
-        "loop gain to −1; all with the same gains", headings=headings, rows=rows,
-        numbers=(2, 4, 5, 6),
+        caption=f"Noise from rounding encoders, and margins: {caption}", headings=("velocities from", *noise, *margins),
+        rows=rows, numbers=(2, 4, 5, 6),
     )  # fmt: skip
 
 
 def _worth(way: VelocityLoop) -> tuple[str, ...]:
-    noise = ", ".join(number(v, 2) for v in way.speed_noise)
-    if way.margins is None or way.command_noise is None:
-        return noise, "falls", "–", "–", "–", "–"
+    noise: tuple[str, ...] = ()
+    if way.speed_noise is not None:
+        command = "falls" if way.command_noise is None else number(way.command_noise, 2)
+        noise = (", ".join(number(v, 2) for v in way.speed_noise), command)
+    if way.margins is None:
+        return (*noise, "–" if noise else "falls", "–", "–", "–")
     m = way.margins
     return (
-        noise, number(way.command_noise, 2), f"{number(m.least_gain, 2)} and {number(m.most_gain, 3)}",
-        number(math.degrees(m.phase), 3), number(1e3 * m.delay, 3), number(m.modulus, 2),
+        *noise, f"{number(m.least_gain, 2)} and {number(m.most_gain, 3)}", number(math.degrees(m.phase), 3),
+        number(1e3 * m.delay, 3), number(m.modulus, 2),
     )  # fmt: skip
 
 
 def _per(command: str, unit: str) -> str:
+    if unit == "1":
+        return command
     below = f"({unit})" if "/" in unit else unit
     return raised(f"{command} s/{unit.removesuffix('/s')}" if unit.endswith("/s") else f"{command}/{below}")
 
@@ -164,7 +186,7 @@ def _numbers(done: Designed) -> dict[str, Any]:
         "k_pf": done.k_pf,
         "effort_weight": done.R,
         "poles": {
-            "open_loop": done.model.poles().astype(complex),
+            "open_loop": done.open_loop,
             "asked": None if done.placement is None else done.placement.asked,
             "attained": None if done.placement is None else done.placement.attained,
             "sampled_loop": done.poles,
@@ -193,42 +215,38 @@ def _effort(done: Designed) -> str:
 def _next_steps(done: Designed, source: str, folder: str) -> list[Step]:
     """What to try after this design."""
     steps: list[Step] = []
-    base = f"upright design {source} --at {done.wish.at}"
-    if done.chosen.margins is None or done.chosen.margins.modulus < 0.4:
+    plain_matrices = isinstance(done.rig, Matrices)
+    base = f"upright design {source}" + ("" if plain_matrices else f" --at {done.wish.at}")
+    if done.sampled_gains is not None and (done.chosen.margins is None or done.chosen.margins.modulus < 0.4):
         steps.append(
             Step("Make up for delay and differences: gains that meet the poles in the sampled loop.",
-                 f'{base} --poles "{written(_wanted(done))}" --sampled'.replace("±", "+-"))
+                 f'{base} --poles "{written(done.wanted)}" --sampled'.replace("±", "+-"))
         )  # fmt: skip
-    if done.wish.poles is not None:
+    if done.wish.poles is not None and not isinstance(done.model, Sampled):
         limit = " --limit LIMIT" if done.wish.limit is None else ""
         steps.append(
             Step("Let the drive's limit choose: the cheapest effort that comes back from this start.",
                  f"{base} --lqr {','.join('1' for _ in done.model.states)}{limit}")
         )  # fmt: skip
-    if not done.rig.draws:
+    if isinstance(done.rig, IdentifiedRig) and not done.rig.draws:
         steps.append(
             Step("See what the uncertainty of the numbers does to the poles: design from a fit.json.",
                  "upright identify STUDY.toml -o OUT && upright design OUT/fit.json")
         )  # fmt: skip
     steps.append(
         Step(f"Simulate it: upright.laws.Law takes A, B, C and D of law in {folder}/design.json, its "
-             "references being the positions at rest and then the reference.")
+             "references being the readings at rest and then the reference.")
     )  # fmt: skip
     return steps
 
 
-def _wanted(done: Designed) -> Any:
-    if done.placement is not None:
-        return done.placement.asked
-    return np.linalg.eigvals(done.model.A - done.model.B @ done.continuous)
-
-
 def _pole_pictures(done: Designed) -> list[Picture]:
     """Poles in the s-plane, and those of least cost as the effort's weight varies, a hundredfold either way."""
+    aim = "asked" if done.placement else "least cost"
     kinds = [
-        Poles(name="model, open loop", values=done.model.poles(), mark="x", colour=BLACK),
-        Poles(name="asked" if done.placement else "least cost", values=_wanted(done), mark="o", colour=BLUE),
-        Poles(name="loop as it runs", values=done.poles, mark="+", colour=VERMILLION),
+        Poles(name="model, open loop", values=_drawn(done, done.open_loop), mark="x", colour=BLACK),
+        Poles(name=aim, values=_drawn(done, done.wanted), mark="o", colour=BLUE),
+        Poles(name="loop as it runs", values=_drawn(done, done.poles), mark="+", colour=VERMILLION),
     ]
     pictures = [
         Picture(
@@ -240,20 +258,23 @@ def _pole_pictures(done: Designed) -> list[Picture]:
     if done.R is None:
         return pictures
     weights = done.wish.weights or (1.0,) * done.model.A.shape[0]
-    tracks = locus(done.model.A, done.model.B, weights, done.R * np.geomspace(100, 0.01, 300))
+    discrete = isinstance(done.model, Sampled)
+    tracks = locus(done.model.A, done.model.B, weights, done.R * np.geomspace(100, 0.01, 300), sampled=discrete)
+    tracks = to_s(tracks, done.wish.period) if discrete else tracks
     cheaper = Picture(
         name="locus",
-        draw=lambda: locus_figure(tracks, {"chosen": np.asarray(_wanted(done))}, done.model.poles()),
+        draw=lambda: locus_figure(tracks, {"chosen": _drawn(done, done.wanted)}, _drawn(done, done.open_loop)),
         caption="Poles of least cost as the effort gets cheaper, from a hundred times the weight chosen to a "
         "hundredth.",
-        description=f"Chosen: R = {number(done.R)}, poles {written(_wanted(done), 4)}.",
+        description=f"Chosen: R = {number(done.R)}, poles {written(done.wanted, 4)}.",
     )  # fmt: skip
     return [*pictures, cheaper]
 
 
 def _swing_picture(done: Designed) -> Picture:
-    t, x, u = done.swing
-    shown = {c.name: (x[:, 2 * i], c.unit) for i, c in enumerate(done.rig.plant.coordinates)}
+    t, y, u = done.swing
+    units = zip(done.rig.outputs, done.rig.output_units, strict=True)
+    shown = {name: (y[:, i], unit) for i, (name, unit) in enumerate(units)}
     return Picture(
         name="swing", draw=lambda: swing_figure(t, shown, u[:, 0], done.rig.unit, done.wish.limit),
         caption="Linear model, continuous gains: the way back from the start asked for, and the command it takes.",

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from upright.errors import BadInput
+from upright.experiments.designing.matrices import Matrices
 from upright.experiments.identified import IdentifiedRig
 from upright.gains import (
     Estimator,
@@ -19,18 +20,18 @@ from upright.gains import (
     filtered,
     hold,
     kalman,
-    lqr,
     margins,
     place,
     place_sampled,
     prefilter,
+    read_off,
     shaken,
     weight_for_effort,
 )
 from upright.gains.loop import closed, command_noise, swing
-from upright.gains.lqr import motion
-from upright.gains.requests import Roots, poles_of
-from upright.gains.sampled import to_s
+from upright.gains.lqr import least_cost, motion
+from upright.gains.requests import Roots, conjugate_poles, poles_of, written
+from upright.gains.sampled import to_s, to_z
 from upright.laws import Law
 from upright.physics import Linear
 from upright.records import Array
@@ -44,11 +45,13 @@ SPEEDS = ("plain", "filtered", "kalman")
 class DesignRequest:
     """What is asked of the loop; SI units, the limit in the command's.
 
+    `period` is that of the matrices where they are sampled.
     `delay` is how late a command acts in all [samples]: that of the rig's file when None, or one where it has none.
     `lag` is the drive's [s], that of the rig's file when None.
     `poles` [1/s] or `weights` (diagonal of Q, with `R`, or with the limit and `start` from which R follows).
-    `speed` is ``"plain"``, ``"filtered"`` or ``"kalman"``; `memory` is the filter's. With `sampled`, the gains are
-    those whose sampled loop has the poles asked. `said` is what period, limit and quantum rest on, to be told.
+    `speed` is one of `SPEEDS`, or a way that matrices allow, empty for the plainest; `memory` is the filter's. With
+    `sampled`, the gains are those whose sampled loop has the poles asked. `said` is what period, limit and quantum
+    rest on, to be told.
     """
 
     at: str
@@ -76,10 +79,13 @@ class DesignRequest:
 
 @dataclass(frozen=True, kw_only=True)
 class VelocityLoop:
-    """One way to the velocities, with the loop that it makes; `margins` is None where the loop falls."""
+    """One way to the velocities, with the loop that it makes; `margins` is None where the loop falls.
+
+    Noise is that of rounding encoders; None where no encoders are known.
+    """
 
     name: str
-    speed_noise: Array
+    speed_noise: Array | None
     command_noise: float | None
     margins: Margins | None
     poles: Roots
@@ -89,14 +95,16 @@ class VelocityLoop:
 class Designed:
     """Gains and what they are worth.
 
-    `peak` is the largest command that the start takes with continuous feedback, `peak_sampled` in the loop as it runs.
+    `model` is `Sampled` where plain matrices are those of samples; all poles are in s [1/s] all the same.
+    `peak` is the largest command that the start takes with continuous feedback, `peak_sampled` in the loop as it runs;
+    `swing` is that way back: t, outputs, commands.
     K are the gains in force: the `continuous` ones of placement or least cost (`placement` is None then), or the
     `sampled_gains`, whose poles are met in the loop as it runs.
     """
 
-    rig: IdentifiedRig
+    rig: IdentifiedRig | Matrices
     wish: DesignRequest
-    model: Linear
+    model: Linear | Sampled
     sampled: Sampled
     K: Array
     continuous: Array
@@ -106,6 +114,7 @@ class Designed:
     law: Law
     poles: Roots
     ways: tuple[VelocityLoop, ...]
+    chosen: VelocityLoop
     k_pf: float | None
     peak: float
     peak_sampled: float
@@ -114,9 +123,17 @@ class Designed:
     cloud: Roots = field(default_factory=lambda: np.zeros(0, dtype=np.complex128))
 
     @property
-    def chosen(self) -> VelocityLoop:
-        """The way to the velocities that was asked for."""
-        return self.ways[SPEEDS.index(self.wish.speed)]
+    def open_loop(self) -> Roots:
+        """Poles of the model, the fastest growing first."""
+        found = _in_s(self.model, poles_of(self.model.A))
+        return found[np.lexsort((found.imag, -found.real))]
+
+    @property
+    def wanted(self) -> Roots:
+        """Poles asked for, or those of least cost."""
+        if self.placement is not None:
+            return self.placement.asked
+        return _in_s(self.model, poles_of(self.model.A - self.model.B @ self.continuous))
 
     @property
     def verdict(self) -> str:
@@ -153,33 +170,125 @@ class Designed:
         return f"{head}; the start asked for takes {100 * share:.0f} % of the drive's limit."
 
 
-def design_for(rig: IdentifiedRig, wish: DesignRequest) -> Designed:
+def design_for(rig: IdentifiedRig | Matrices, wish: DesignRequest) -> Designed:
     """Gains as wished, and their loop as a computer runs it.
+
+    Parameters
+    ----------
+    rig : IdentifiedRig or Matrices
+        Plain matrices know no encoders and no covariance, and need no equilibrium.
+    wish : DesignRequest
 
     Raises
     ------
     BadInput
         When what is asked cannot be had; the sentence says why.
     """
-    model = rig.linear(wish.at)
+    through = None
+    if isinstance(rig, Matrices):
+        model, sampled, through = rig.linear(), _held(rig, wish), rig.D
+    else:
+        model = rig.linear(wish.at)
+        sampled = hold(model, wish.period, _late(rig, wish), rig.lag if wish.lag is None else wish.lag)
     start = np.array(wish.start) if wish.start else _tilt(rig)
     if model.B.shape[1] != 1:
-        raise BadInput(f"upright design is for one input, and this plant has {model.B.shape[1]}; use place.")
-    lag = rig.lag if wish.lag is None else wish.lag
-    sampled = hold(model, wish.period, _late(rig, wish), lag)
-    placement, R = None, wish.R
-    if wish.poles is not None:
-        placement = place(model.A, model.B, wish.poles)
-        K = placement.K
+        raise BadInput(f"upright design is for one input, and this model has {model.B.shape[1]}; use place.")
+    K, placement, R = _gains(model, wish, start)
+    wanted = placement.asked if placement is not None else _in_s(model, poles_of(model.A - model.B @ K))
+    quantum: tuple[float, ...] | None = None
+    if isinstance(rig, Matrices):
+        speed = rig.way(wish.speed)
+        estimators = {s: rig.estimator(s, sampled, wish.memory, wanted) for s in dict.fromkeys((speed, *rig.ways[:-1]))}
     else:
-        weights = wish.weights or (1.0,) * model.A.shape[0]
-        if R is None:
-            if wish.limit is None:
-                raise BadInput(
-                    "least cost needs a weight of the effort (--effort-weight) or a limit (--limit); give one."
-                )
-            R = weight_for_effort(model.A, model.B, weights, start, wish.limit, states=model.states)
-        K = lqr(model.A, model.B, weights, R, states=model.states)
+        speed, estimators, quantum = _from_encoders(rig, model, sampled, wish)
+    estimator = estimators[speed]
+    observed = speed in ("kalman", "observer")
+    if wish.sampled and observed:
+        raise BadInput(
+            f"--sampled is for states that no model estimates; with --speed {speed} the poles are met as they are."
+        )
+    needed = wish.sampled or not isinstance(model, Sampled)  # gains of a sampled model are at its samples already
+    gains = place_sampled(sampled, estimator, wanted) if needed and not observed else None
+    used = gains if wish.sampled and gains is not None else K
+    k_pf = None
+    if wish.track:
+        if wish.track not in rig.outputs:
+            raise BadInput(f"nothing called '{wish.track}' is measured; --track one of {', '.join(rig.outputs)}.")
+        i = rig.outputs.index(wish.track)
+        D = 0.0 if through is None else float(through[i, 0])
+        k_pf = prefilter(model.A, model.B, model.C[i], used, D=D, sampled=isinstance(model, Sampled))
+    law = feedback(estimator, used, k_pf or 0.0)
+    t, x, u = _way_back(model, K, start)
+    loops = {s: _velocity_loop(model, sampled, e, used, quantum, through) for s, e in estimators.items()}
+    cloud, chance = _cloud(rig, wish, sampled, law)
+    return Designed(
+        rig=rig, wish=wish, model=model, sampled=sampled, K=used, continuous=K, placement=placement,
+        sampled_gains=gains, R=R, law=law, poles=to_s(poles_of(closed(sampled, law)), sampled.period),
+        ways=tuple(loops.values()), chosen=loops[speed], k_pf=k_pf, peak=float(np.abs(u).max()),
+        peak_sampled=_peak(sampled, law, start, float(t[-1])),
+        swing=(t, x @ model.C.T + (0.0 if through is None else u @ through.T), u), chance=chance, cloud=cloud,
+    )  # fmt: skip
+
+
+def _held(model: Matrices, wish: DesignRequest) -> Sampled:
+    """Plain matrices as the loop meets them: a sample late unless they are those of samples, which hold their delay."""
+    late = wish.delay if wish.delay is not None else 0.0 if model.period else 1.0
+    if model.D.any() and not late:
+        raise BadInput(
+            "with a D the readings show the command of the same sample, and no computer answers a reading by what "
+            "changes it; let the command come a sample late: --delay 1."
+        )
+    return model.at_samples(wish.period, late, wish.lag or 0.0)
+
+
+def _in_s(model: Linear | Sampled, poles: Roots) -> Roots:
+    """Poles in s [1/s] of those of the model."""
+    return to_s(poles, model.period) if isinstance(model, Sampled) else poles
+
+
+def _gains(model: Linear | Sampled, wish: DesignRequest, start: Array) -> tuple[Array, Placement | None, float | None]:
+    """Gains as wished, how their poles were placed, in s, or the weight of the effort."""
+    A, B = model.A, model.B
+    if wish.poles is not None:
+        placement = _placed_samples(model, wish.poles) if isinstance(model, Sampled) else place(A, B, wish.poles)
+        return placement.K, placement, wish.R
+    weights, R, discrete = wish.weights or (1.0,) * A.shape[0], wish.R, isinstance(model, Sampled)
+    if R is None and (discrete or wish.limit is None):
+        other = "" if discrete else " or a limit (--limit)"
+        raise BadInput(f"least cost needs a weight of the effort (--effort-weight){other}; give one.")
+    if R is None:
+        R = weight_for_effort(A, B, weights, start, wish.limit or math.inf, states=model.states)
+    return least_cost(A, B, weights, R, sampled=discrete, states=model.states).K, None, R
+
+
+def _placed_samples(model: Sampled, poles: Roots) -> Placement:
+    """Gains of a model that is known at its samples, poles in s; placed as (z - 1)/T, which spreads those near 1."""
+    asked, T = conjugate_poles(poles, model.A.shape[0]), model.period
+    if np.abs(asked.imag).max() > math.pi / T:
+        raise BadInput(
+            f"samples of {1e3 * T:g} ms show nothing faster than {math.pi / T:.4g} rad/s, and a pole was asked at "
+            f"{written(asked)}; ask for slower ones."
+        )
+    found = place((model.A - np.eye(asked.size)) / T, model.B / T, (to_z(asked, T) - 1) / T)
+    attained = to_s(1 + T * found.attained, T)
+    return replace(found, asked=asked, attained=attained, miss=float(np.abs(attained - asked).max()))
+
+
+def _way_back(model: Linear | Sampled, K: Array, start: Array) -> tuple[Array, Array, Array]:
+    """Motion of the model under ``u = -K x``: t (N,) [s], x (N, n) and u (N, m)."""
+    if not isinstance(model, Sampled):
+        return motion(model.A, model.B, K, start)
+    slowest = float(np.abs(poles_of(model.A - model.B @ K)).max())
+    samples = int(np.clip(10 / -math.log(slowest) if 0 < slowest < 1 else 0, 20, 20_000))
+    shown = replace(model, C=np.eye(model.A.shape[0]), D=None)
+    x, u = swing(shown, feedback(read_off(shown), K), start, samples)
+    return np.arange(samples, dtype=np.float64) * model.period, x, u
+
+
+def _from_encoders(
+    rig: IdentifiedRig, model: Linear | Sampled, sampled: Sampled, wish: DesignRequest
+) -> tuple[str, dict[str, Estimator], tuple[float, ...]]:
+    """The way to the velocities that was asked for, all that a rig has, and the steps of its encoders."""
     quantum = wish.quantum or quanta(rig, rig.described(needs=("counts",), who="upright design"))
     if wish.limit is None and wish.speed == "kalman":
         raise BadInput(
@@ -187,28 +296,8 @@ def design_for(rig: IdentifiedRig, wish: DesignRequest) -> Designed:
             'command (--limit 10, or [actuator] limit = "10 V" in the study).'
         )
     ways = SPEEDS if wish.limit is not None else SPEEDS[:-1]
-    estimators = [velocities(model, sampled, s, wish.memory, wish.limit or math.inf, quantum) for s in ways]
-    estimator = estimators[SPEEDS.index(wish.speed)]
-    wanted = placement.asked if placement is not None else poles_of(model.A - model.B @ K)
-    gains = None if wish.speed == "kalman" else place_sampled(sampled, estimator, wanted)
-    if wish.sampled and gains is None:
-        raise BadInput("--sampled is for differenced encoders; with a Kalman filter the poles are met as they are.")
-    used = gains if wish.sampled and gains is not None else K
-    k_pf = None
-    if wish.track:
-        if wish.track not in model.outputs:
-            raise BadInput(f"nothing called '{wish.track}' is measured; --track one of {', '.join(model.outputs)}.")
-        k_pf = prefilter(model.A, model.B, model.C[model.outputs.index(wish.track)], used)
-    law = feedback(estimator, used, k_pf or 0.0)
-    back = motion(model.A, model.B, K, start)
-    loops = tuple(_velocity_loop(model, sampled, e, used, quantum) for e in estimators)
-    cloud, chance = _cloud(rig, wish, sampled, law)
-    return Designed(
-        rig=rig, wish=wish, model=model, sampled=sampled, K=used, continuous=K, placement=placement,
-        sampled_gains=gains, R=R, law=law, poles=to_s(poles_of(closed(sampled, law)), wish.period), ways=loops,
-        k_pf=k_pf, peak=float(np.abs(back[2]).max()), peak_sampled=_peak(sampled, law, start, float(back[0][-1])),
-        swing=back, chance=chance, cloud=cloud,
-    )  # fmt: skip
+    limit = wish.limit or math.inf
+    return wish.speed, {s: velocities(model, sampled, s, wish.memory, limit, quantum) for s in ways}, quantum
 
 
 def _late(rig: IdentifiedRig, wish: DesignRequest) -> float:
@@ -231,15 +320,17 @@ def _peak(sampled: Sampled, law: Law, start: Array, seconds: float) -> float:
     return float(np.abs(swing(sampled, law, start, samples)[1]).max())
 
 
-def _tilt(rig: IdentifiedRig) -> Array:
-    """Five degrees, or 5 cm, of the last coordinate."""
+def _tilt(rig: IdentifiedRig | Matrices) -> Array:
+    """Five degrees, or 5 cm, of the last coordinate; of plain matrices one unit of the first state."""
+    if isinstance(rig, Matrices):
+        return np.eye(len(rig.states))[0]
     x = np.zeros(2 * len(rig.plant.coordinates))
     x[-2] = math.radians(5) if rig.plant.coordinates[-1].unit == "rad" else 0.05
     return x
 
 
 def velocities(
-    model: Linear, sampled: Sampled, speed: str, memory: float, limit: float, quantum: ArrayLike
+    model: Linear | Sampled, sampled: Sampled, speed: str, memory: float, limit: float, quantum: ArrayLike
 ) -> Estimator:
     """States from encoders in one of the ways of `SPEEDS`.
 
@@ -263,25 +354,28 @@ def velocities(
 
 
 def _velocity_loop(
-    model: Linear, sampled: Sampled, estimator: Estimator, K: Array, quantum: tuple[float, ...]
-) -> VelocityLoop:
+    model: Linear | Sampled, sampled: Sampled, estimator: Estimator, K: Array, quantum: tuple[float, ...] | None,
+    through: Array | None,
+) -> VelocityLoop:  # fmt: skip
     law = feedback(estimator, K)
     poles = poles_of(closed(sampled, law))
     stands = bool(np.abs(poles).max() < 1)
+    held = None if isinstance(model, Sampled) else model
     return VelocityLoop(
         name=estimator.name,
-        speed_noise=estimator.noise(quantum)[1 : model.A.shape[0] : 2],
-        command_noise=command_noise(sampled, law, quantum) if stands else None,
-        margins=margins(model, sampled, law) if stands else None,
+        speed_noise=None if quantum is None else estimator.noise(quantum)[1 : model.A.shape[0] : 2],
+        command_noise=command_noise(sampled, law, quantum) if stands and quantum is not None else None,
+        margins=margins(held, sampled, law, D=through) if stands else None,
         poles=to_s(poles, sampled.period),
     )
 
 
-def _cloud(rig: IdentifiedRig, wish: DesignRequest, nominal: Sampled, law: Law) -> tuple[Roots, float | None]:
+def _cloud(
+    rig: IdentifiedRig | Matrices, wish: DesignRequest, nominal: Sampled, law: Law
+) -> tuple[Roots, float | None]:
     """Poles [1/s] of the loop with these gains on every rig that the fit allows, and the share that stands."""
-    rows = [
-        poles_of(closed(hold(m, wish.period, nominal.delay, nominal.lag), law)) for m in rig.spread(wish.at)
-    ]  # fmt: skip
+    others = [] if isinstance(rig, Matrices) else rig.spread(wish.at)
+    rows = [poles_of(closed(hold(m, wish.period, nominal.delay, nominal.lag), law)) for m in others]
     if not rows:
         return np.zeros(0, dtype=np.complex128), None
     z = np.array(rows)
