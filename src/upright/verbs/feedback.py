@@ -301,7 +301,7 @@ def prefilter(*system: Any, K: Any = None, output: int | str = 0) -> float:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Model:
+class NamedModel:
     """A linear model as it was handed over; `bare` where it came as arrays, which say no period."""
 
     A: Array
@@ -325,7 +325,7 @@ class Model:
 
 def read_model(
     given: tuple[Any, ...], verb: str, names: tuple[str, ...], by_name: tuple[Any, ...]
-) -> tuple[Model, Any]:
+) -> tuple[NamedModel, Any]:
     """The model that the first arguments name, and the values that follow it."""
     wanted = f'{verb} takes a model and {" and ".join(names)}: {verb}(plant.linear("inverted"), {", ".join(names)}), '
     wanted += f"{verb}(A, B, {', '.join(names)}), or a control.StateSpace in the model's place"
@@ -368,7 +368,7 @@ def _labels(system: Any, kind: str, default: tuple[str, ...]) -> tuple[str, ...]
     return tuple(found) if isinstance(found, list | tuple) and len(found) == len(default) else default
 
 
-def named_model(verb: str, A: Any, B: Any, C: Any = None, D: Any = None) -> Model:
+def named_model(verb: str, A: Any, B: Any, C: Any = None, D: Any = None) -> NamedModel:
     """Model of plain arrays; every state is measured where C is left out, and nothing comes through where D is."""
     try:
         a = np.atleast_2d(np.asarray(A, dtype=np.float64))
@@ -393,7 +393,7 @@ def named_model(verb: str, A: Any, B: Any, C: Any = None, D: Any = None) -> Mode
     states, inputs, outputs = (
         tuple(f"{letter}[{i}]" for i in range(size)) for letter, size in zip("xuy", (*b.shape, c.shape[0]), strict=True)
     )
-    return Model(A=a, B=b, C=c, D=d, states=states, inputs=inputs, outputs=outputs, bare=True)
+    return NamedModel(A=a, B=b, C=c, D=d, states=states, inputs=inputs, outputs=outputs, bare=True)
 
 
 def _complex(poles: Any) -> NDArray[np.complex128]:

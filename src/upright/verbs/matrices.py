@@ -11,7 +11,7 @@ from upright.errors import BadInput, nearest
 if TYPE_CHECKING:
     from upright.experiments.designing.matrices import Matrices
     from upright.study.text import Section
-    from upright.verbs.feedback import Model
+    from upright.verbs.feedback import NamedModel
 
 KEYS = ("A", "B", "C", "D", "dt", "states", "inputs", "outputs", "units")
 
@@ -82,7 +82,7 @@ def read_matrices(path: str | os.PathLike[str]) -> Matrices:
     return _to_design(replace(model, period=period, **names), dict(given.values), path.stem)
 
 
-def _to_design(model: Model, units: dict[str, str], name: str) -> Matrices:
+def _to_design(model: NamedModel, units: dict[str, str], name: str) -> Matrices:
     from upright.experiments.designing.matrices import Matrices
 
     return Matrices(
