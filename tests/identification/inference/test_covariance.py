@@ -79,15 +79,26 @@ def test_numbers_that_differ_from_block_to_block_scatter_as_random_effects() -> 
     y -= y.mean()  # the estimate
     known = np.array([0.01 / (blocks * each)])
     parts = {blocks: [(np.array([row.sum()]), np.array([[float(each)]])) for row in y]}
-    factor = between_blocks(parts, np.array([[float(blocks * each)]]), np.array([True]), known, 1e6)
+    added = between_blocks(parts, np.array([[float(blocks * each)]]), np.array([True]), known, 1e6)
     between = np.var(y.mean(axis=1), ddof=1) - 0.01 / each  # analysis of variance, Fisher 1925
     quantiles = (stats.t.ppf(0.975, blocks - 1) / stats.t.ppf(0.975, 1e6)) ** 2
-    assert factor[0, 0] == pytest.approx(1 + (1 + 1 / blocks) * between * quantiles / known[0], rel=1e-6)
+    assert added[0, 0] == pytest.approx((1 + 1 / blocks) * between * quantiles, rel=1e-6)
+
+
+def test_a_ratio_that_every_block_agrees_on_stays_known() -> None:
+    """Of (1 + d, 2 + 2 d) with a d for every block the sum is not known; twice the one less the other is."""
+    each = np.array([0.3, -0.1, 0.4, -0.6])
+    own = np.array([[2.0, 0.5], [0.5, 1.0]])
+    parts = {4: [(own @ np.array([d, 2 * d]), own) for d in each]}
+    added = between_blocks(parts, 4 * own, np.array([True, True]), np.full(2, 1e-9), 100.0)
+    assert np.linalg.eigvalsh(added).min() > -1e-12
+    assert np.array([1.0, 2.0]) @ added @ np.array([1.0, 2.0]) > 0.1
+    assert np.array([2.0, -1.0]) @ added @ np.array([2.0, -1.0]) == pytest.approx(0.0, abs=1e-7)
 
 
 def test_blocks_that_agree_leave_the_sandwich_as_it_is() -> None:
     parts = {4: [(np.zeros(1), np.eye(1))] * 4}
-    assert between_blocks(parts, 4 * np.eye(1), np.array([True]), np.array([0.1]), 100.0) == 1.0
+    assert between_blocks(parts, 4 * np.eye(1), np.array([True]), np.array([0.1]), 100.0) == 0.0
 
 
 def doubled(first: float, rest: float, **values: float) -> Run:

@@ -127,9 +127,8 @@ def assess(problem: Problem, x: Array) -> Optimum:
     covariance = sandwich = inverse @ meat @ inverse
     if runs > 1:
         spread = inverse @ (from_runs * runs / (runs - 1) + prior_meat) @ inverse
-        factor = np.sqrt(np.maximum(np.diag(spread) / np.where(np.diag(covariance) > 0, np.diag(covariance), 1.0), 1.0))
-        covariance = covariance * np.outer(factor, factor)
-    covariance = covariance * between_blocks(blocks, A, free, np.diag(covariance), independent - float(free.sum()))
+        covariance = covariance + _along(spread, np.maximum(np.diag(spread) - np.diag(covariance), 0.0))
+    covariance = covariance + between_blocks(blocks, A, free, np.diag(covariance), independent - float(free.sum()))
     white = np.diag(inverse) * variance
     return Optimum(
         problem=problem, x=x, covariance=covariance, sandwich=sandwich, white=white, matrix=A, variance=variance,
@@ -172,14 +171,17 @@ def _parts(r: Array, J: Array, pieces: int, sought: NDArray[np.int64], size: int
 def between_blocks(
     blocks: Mapping[int, list[tuple[Array, Array]]], A: Array, free: NDArray[np.bool_], known: Array, freedom: float
 ) -> Array:
-    """What a covariance with the diagonal `known` (n,) is multiplied by (n, n) for the spread between blocks.
+    """What a covariance with the diagonal `known` (n,) has to be added (n, n) for the spread between blocks.
 
     Of a number to which block b contributes the share w of what is known, the variance without it is ``known / (1 -
     w)`` under a right model, and the number moves by the difference, in the square (Hausman 1978). Where every block
     has a value of its own, with the variance `spread` and a mean weighted by w, it moves by as much more as follows
     from one-way analysis of variance. The truth is as one more block, away from that mean by ``spread (1 + sum w^2)``.
+
+    Numbers are correlated as they move together when a block is left out: widened one by one, two whose ratio every
+    block agrees on would lose it.
     """
-    here, most = np.ix_(free, free), np.zeros(len(known))
+    here, most, together = np.ix_(free, free), np.zeros(len(known)), np.zeros((len(known), len(known)))
     whole = np.diag(pseudo_inverse(A[here]))
     for parts in blocks.values():
         if len(parts) < min(BLOCKS):
@@ -195,8 +197,16 @@ def between_blocks(
         excess = np.maximum(np.sum(moved**2, axis=0) - known * odds.sum(axis=0), 0.0)
         spread = excess / np.where(weight > 0, weight, np.inf)
         most = np.maximum(most, spread * (1 + squares) * (student(len(parts) - 1) / student(freedom)) ** 2)
-    factor = np.sqrt(1 + most / np.where(known > 0, known, np.inf))
-    return np.outer(factor, factor)
+        steps = moved / np.sqrt(np.where(weight > 0, weight, np.inf))
+        together += steps.T @ steps
+    return _along(together, most)
+
+
+def _along(like: Array, variance: Array) -> Array:
+    """Covariance (n, n) with the diagonal `variance` (n,) and the correlations of another one."""
+    size = np.sqrt(np.diag(like))
+    scale = np.sqrt(variance) / np.where(size > 0, size, np.inf)
+    return like * np.outer(scale, scale)
 
 
 PART = 0.05
