@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from upright import gains as design
-from upright.control import Scores
+from upright.control import Scores, score, trial
 from upright.control.preflight import Task, largest, preflight, words
 from upright.control.score import outcomes
 from upright.errors import BadInput
@@ -108,6 +108,25 @@ def test_every_end_of_a_run_has_its_word():
     )  # fmt: skip
     assert words(found) == ["regulates", "saturates", "too weak", "too weak", "too weak", "falls"]
     assert found.held.tolist() == [True, True, True, False, False, False]
+
+
+@pytest.mark.parametrize("force_limit", [math.inf, 1.5])
+def test_one_run_and_many_of_its_start_say_the_same(force_limit):
+    """Sample by sample: starts from easy to lost, each on a rig with a gain and a friction of its own."""
+    rig = replace(RIG, limit=4.0, more={"actuator.force_limit": force_limit})
+    angles = np.linspace(0.02, 0.9, 12)
+    starts = np.zeros((angles.size, 4))
+    starts[:, 2] = angles
+    own = {"actuator.gain": rig.gain * np.linspace(0.9, 1.1, angles.size)[::-1], "b_1c": np.linspace(4e-3, 9e-3, 12)}
+    many = outcomes(rig, law(3), at="inverted", starts=starts, seconds=3.0, parameters=own)
+    assert 0 < np.sum(many.at_limit > 5e-3) < angles.size
+    assert 0 < np.sum(many.held) < angles.size
+    for i, start in enumerate(starts):
+        alone = replace(rig.changed(b_1c=own["b_1c"][i]), gain=own["actuator.gain"][i])
+        one = score(trial(alone, law(3), at="inverted", start=start, seconds=3.0))
+        for name, value in vars(one).items():
+            # of what fell, the last digit of many turns is the order in which a processor adds
+            np.testing.assert_allclose(getattr(many, name)[..., i], value, rtol=1e-9, err_msg=f"{name} of start {i}")
 
 
 def test_no_direction_is_no_question():

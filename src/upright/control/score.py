@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upright.control.trial import SUBSTEPS, ServoRig, Trial, at_work
+from upright.control.trial import SUBSTEPS, ServoRig, Trial, at_work, saturation
 from upright.errors import BadInput
 from upright.laws import Law
 from upright.progress import Progress, silent
@@ -109,20 +109,23 @@ def score(run: Trial, *, watched: str = "", fallen: float = FALLEN, band: float 
 
 
 def scores(
-    rig: ServoRig, t: Array, away: Array, u: Array, *, watched: str = "", fallen: float = FALLEN, band: float = BAND
-) -> Scores:
+    rig: ServoRig, t: Array, away: Array, u: Array, *, full: ArrayLike | None = None, watched: str = "",
+    fallen: float = FALLEN, band: float = BAND,
+) -> Scores:  # fmt: skip
     """Figures of runs side by side.
 
     Parameters
     ----------
     rig : ServoRig
-        For its limit, its travel and the names of its coordinates.
+        For its saturation, its travel and the names of its coordinates.
     t : array, shape (N,)
         Evenly spaced [s].
     away : array, shape (N, coordinates, lanes)
         Deviations from the equilibrium.
     u : array, shape (N, lanes)
         Commands as put out.
+    full : array, shape (lanes,), optional
+        Smallest command at which each drive gives all that it can; the rig's own when omitted.
     watched, fallen, band
         As in `score`.
     """
@@ -144,7 +147,8 @@ def scores(
     settled = np.where(inside.all(axis=0), t[0], t[np.minimum(after, t.size - 1)])
     lost = np.isfinite(fell) | np.isfinite(ran_out) | ~inside[-1]
     end = away[-max(2, t.size // 3) :]
-    full = before & (np.abs(u) >= rig.saturation * (1 - 1e-9))
+    level = np.asarray(rig.saturation if full is None else full, dtype=np.float64)
+    limited = before & (np.abs(u) >= level * (1 - 1e-9))
     return Scores(
         fell=fell,
         ran_out=ran_out,
@@ -153,8 +157,8 @@ def scores(
         final=(end.max(axis=0) - end.min(axis=0)) / 2,
         effort_peak=np.where(before, np.abs(u), 0.0).max(axis=0),
         effort_rms=np.sqrt(np.sum(np.where(before, u**2, 0.0), axis=0) / before.sum(axis=0)),
-        saturated=full.sum(axis=0) / before.sum(axis=0),
-        at_limit=float(t[1] - t[0]) * full.sum(axis=0),
+        saturated=limited.sum(axis=0) / before.sum(axis=0),
+        at_limit=float(t[1] - t[0]) * limited.sum(axis=0),
     )
 
 
@@ -163,10 +167,10 @@ def _first(t: Array, when: NDArray[np.bool_]) -> Array:
     return np.where(when.any(axis=0), t[np.argmax(when, axis=0)], np.inf)
 
 
-EVERY = 4
-"""Servo periods from sample to sample of what is scored."""
-BLOCK = 64
-"""Lanes run at once, which bounds the memory; one piece of work for whoever shares it."""
+BLOCK, LEAST = 64, 16
+"""Most and fewest lanes run at once; one piece of work for whoever shares it."""
+ROWS = 8192
+"""Samples of a run, such as 7 s of an ECP rig's, beyond which fewer lanes are run at once, to bound the memory."""
 
 
 def outcomes(
@@ -206,7 +210,8 @@ def outcomes(
     first = np.atleast_2d(np.asarray(starts, dtype=np.float64))
     lanes = first.shape[0]
     given = {name: np.broadcast_to(np.asarray(v, dtype=np.float64), (lanes,)) for name, v in (parameters or {}).items()}
-    blocks = [(first[part], {n: v[part] for n, v in given.items()}) for part in cut(lanes, BLOCK)]
+    size = max(LEAST, min(BLOCK, BLOCK * ROWS // (round(seconds / rig.period) + 1)))
+    blocks = [(first[part], {n: v[part] for n, v in given.items()}) for part in cut(lanes, size)]
     work = partial(_outcomes, rig, law, at, seconds)
     found = spread(work, blocks, workers=workers, progress=progress, what="block of rigs").all()
     if len(found) == 1:
@@ -219,16 +224,17 @@ def _outcomes(
 ) -> Scores:
     """Figures of one block: starts (lanes, states) and the parameters of its lanes."""
     starts, given = block
-    rows = round(seconds / rig.period / EVERY) + 1
-    t = np.arange(rows, dtype=np.float64) * (rig.period * EVERY)
+    rows = round(seconds / rig.period) + 1
+    t = np.arange(rows, dtype=np.float64) * rig.period
     point = np.array(list(rig.plant.equilibrium(at).values()))
     x0 = rig.plant.state(at) + starts
+    drives = [{**rig.drive, **{n: float(v[i]) for n, v in given.items()}} for i in range(len(x0))]
     motion = simulate(
         rig.plant, {**rig.drive, **given}, x0, None, rig.period, samples=rows, substeps=SUBSTEPS,
-        loop=at_work(rig, law, point), every=EVERY,
+        loop=at_work(rig, law, point),
     )  # fmt: skip
     away = motion[:, 0 : x0.shape[1] : 2] - point[:, None]
-    return scores(rig, t, away, motion[:, x0.shape[1]])
+    return scores(rig, t, away, motion[:, x0.shape[1]], full=[saturation(drive) for drive in drives])
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -109,7 +109,7 @@ class ServoRig:
     @property
     def saturation(self) -> float:
         """Smallest command at which the drive gives all that it can, at rest: that of its command or of its force."""
-        return min(self.limit, full_command({**self.more, GAIN: self.gain}))
+        return saturation(self.drive)
 
     @property
     def quantum(self) -> Array:
@@ -151,6 +151,11 @@ def full_command(drive: Mapping[str, float]) -> float:
     force, gain = drive.get("actuator.force_limit", math.inf), abs(drive[GAIN])
     left = gain - force * drive.get("actuator.droop", 0.0) if math.isfinite(force) else 0.0
     return force / left if left > 0 else math.inf
+
+
+def saturation(drive: Mapping[str, float]) -> float:
+    """Smallest command at which a drive gives all that it can, at rest: that of its command or of its force."""
+    return min(drive["actuator.limit"], full_command(drive))
 
 
 SUBSTEPS = 2
