@@ -7,6 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from upright import gains
+from upright.control.score import outcomes
 from upright.errors import BadInput
 from upright.experiments.identified import IdentifiedRig
 from upright.experiments.makes import described_make, make_rig
@@ -81,9 +83,42 @@ def test_what_the_fit_leaves_out_is_taken_as_said():
     assert (rig.lag, rig.delay, rig.limit) == (said.lag, said.delay, said.limit)
     assert plain.make.key == "furuta"
     drawn = plain.allowed(rig, 4000, seed=1)
-    assert set(drawn) == {"b_1c", "b_2c"}
+    assert set(drawn) == {"b_1c", "b_2c", "b_1s", "b_2s", "v_1s", "v_2s"}
     # 13 % from run to run; of 4000 draws the spread is known to one part in 90, three of which are allowed
     assert np.std(np.log(drawn["b_1c"])) == pytest.approx(0.13, rel=3 / 90)
+
+
+def test_friction_close_to_rest_is_drawn_where_the_fit_is_blind_of_it():
+    """Uniform up to half of what slides (mean 1/4, variance 1/48), on the day's level; speeds even in logarithm."""
+    known = fit_of(make_rig("linear"), spread=0.0)
+    rig = known.rig()
+    drawn = known.allowed(rig, 4000, seed=2)
+    for c, s in (("b_1c", "b_1s"), ("b_2c", "b_2s")):
+        excess = drawn[s] / drawn[c] - 1
+        assert excess.min() >= 0
+        assert excess.max() <= 0.5
+        assert np.mean(excess) == pytest.approx(0.25, abs=3 / math.sqrt(48 * 4000))
+        assert abs(np.corrcoef(excess, drawn[c])[0, 1]) < 3 / math.sqrt(4000)
+    assert np.median(drawn["v_1s"]) == pytest.approx(math.sqrt(0.005 * 0.05), rel=0.1)
+    told = rig.changed(b_1s=1.2 * rig.plant.b_1c, v_1s=0.01)
+    kept = known.allowed(told, 100, seed=2)
+    np.testing.assert_allclose(kept["b_1s"] / kept["b_1c"], 1.2)
+    assert "v_1s" not in kept
+    assert "b_2s" in kept
+
+
+def test_a_cart_whose_friction_is_larger_close_to_rest_hunts():
+    """About an unstable point feedback hunts where static friction exceeds that of sliding, and rests where not."""
+    known = fit_of(make_rig("linear"), spread=0.0)
+    rig = known.rig()
+    model = rig.linear("inverted")
+    sampled = gains.hold(model, rig.period, rig.delay / rig.period)
+    K = gains.place(model.A, model.B, RegulationRequest().poles["set 2"]).K
+    law = gains.feedback(gains.filtered(sampled, 0.5), K)
+    sticks = {"b_1s": rig.plant.b_1c * np.array([1.0, 1.5]), "v_1s": [0.05, 0.05]}
+    found = outcomes(rig, law, at="inverted", starts=[[0, 0, 0.05, 0]] * 2, seconds=6.0, parameters=sticks)
+    assert found.final[0, 0] <= rig.quantum[0]
+    assert found.final[0, 1] > 10 * rig.quantum[0]
 
 
 @pytest.mark.parametrize(
