@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from upright.control.encoders import Mounting
 from upright.errors import BadInput
 from upright.laws import Law, Rule
 from upright.physics import Linear, Plant
@@ -50,6 +51,9 @@ class ServoRig:
         Encoder counts per m or rad, one for each coordinate.
     scales : tuple of float
         What the encoders show over what is true; 1 where the counts per unit are as said.
+    mounting : Mounting, optional
+        What else the encoders show: play and shafts off centre. Logs have both; a loop, which stays about one point,
+        has the error and the slope that a shaft off centre has there.
     period : float
         Servo period [s].
     travel : float
@@ -76,6 +80,7 @@ class ServoRig:
     offset: float = 0.0
     unit: str = "V"
     scales: tuple[float, ...] = ()
+    mounting: Mounting | None = None
     travel: float = math.inf
     speed_limit: float = math.inf
     more: Mapping[str, float] = field(default_factory=dict[str, float])
@@ -262,9 +267,10 @@ def trial(
 
 
 def readings(rig: ServoRig, q: ArrayLike) -> Array:
-    """What the encoders show [m or rad] at coordinates, shape (..., coordinates)."""
+    """What the encoders show [m or rad] of motions, shape (N, ..., coordinates)."""
     step = rig.quantum / rig.shown  # a count is what its true length is; the program multiplies by the said one
-    return np.floor(np.asarray(q, dtype=np.float64) / step + 0.5) * rig.quantum
+    felt = np.asarray(q, dtype=np.float64) if rig.mounting is None else rig.mounting.felt(q)
+    return np.floor(felt / step + 0.5) * rig.quantum
 
 
 def at_work(rig: ServoRig, law: Law, rest: ArrayLike, reference: ArrayLike | None = None) -> Law:
@@ -278,10 +284,15 @@ def at_work(rig: ServoRig, law: Law, rest: ArrayLike, reference: ArrayLike | Non
         What it takes for the readings at the equilibrium.
     reference : array, shape (T,), optional
     """
-    made = law.in_units(rig.shown, -np.asarray(rest, dtype=np.float64), 1.0)
+    point, scale = np.asarray(rest, dtype=np.float64), rig.shown
+    offset = -point
+    if rig.mounting is not None:
+        scale = rig.shown * rig.mounting.slope(point)
+        offset = rig.shown * rig.mounting.turned(point) - scale * point - point
+    made = law.in_units(scale, offset, 1.0)
     return replace(
         made, references=law.references if reference is None else reference, delay=0.0,
-        quantum=np.abs(rig.quantum / rig.shown), command_quantum=rig.converter,
+        quantum=np.abs(rig.quantum / scale), command_quantum=rig.converter,
     )  # fmt: skip
 
 

@@ -387,7 +387,7 @@ def make_named(key: str, among: tuple[str, ...] = tuple(MAKES), *, option: str =
 def make_of(plant: Plant, refusal: str = "") -> Make:
     """Make whose plant this is; where none has such a plant, `BadInput` says so, or the `refusal`."""
     for make in MAKES.values():
-        if type(make.plant) is type(plant):
+        if isinstance(plant, type(make.plant)):
             return make
     raise BadInput(refusal or f"none of the makes {', '.join(MAKES)} is a {type(plant).__name__}.")
 

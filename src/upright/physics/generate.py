@@ -12,13 +12,15 @@ from upright.physics import BUILT_IN
 from upright.physics.equations import Derived
 from upright.physics.lagrange import derive
 from upright.physics.plant import Plant, module_name
+from upright.physics.worn import WornCartPendulum, WornFuruta
 
 FOLDER = Path(__file__).parent / "generated"
 
 
 def variants() -> list[tuple[type[Plant], frozenset[str]]]:
-    """Every built-in plant, whole and with all its optional parameters left out."""
-    return [(cls, frozenset(w)) for cls in BUILT_IN.values() for w in ([(), cls.optional] if cls.optional else [()])]
+    """Every built-in plant and those that twins are made of, whole and with all its optional parameters left out."""
+    plants = (*BUILT_IN.values(), WornCartPendulum, WornFuruta)
+    return [(cls, frozenset(w)) for cls in plants for w in ([(), cls.optional] if cls.optional else [()])]
 
 
 def source(derived: Derived) -> str:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.control import ServoRig
-from upright.control.trial import twin_log
+from upright.control.trial import readings, twin_log
 from upright.errors import BadInput
 from upright.experiments.makes import Make, make_rig
 from upright.identification.frequency.detection import Tone, by_period, detect, settled
@@ -109,9 +109,7 @@ def sines(rig: ServoRig, lengths: NDArray[np.int64], amplitude: Array, seconds: 
     x = simulate(
         rig.plant, rig.drive, rig.plant.state(), tape.ravel(), rig.period, samples=rows, every=EVERY, start=start
     )
-    shown = x[:, 0::2] * rig.shown[None, :, None]
-    counts = 1 / rig.quantum[None, :, None]
-    return u[::EVERY], np.round(shown * counts) / counts
+    return u[::EVERY], readings(rig, x[:, 0::2].swapaxes(1, 2)).swapaxes(1, 2)
 
 
 def stepped_sine(rig: ServoRig, make: Make, *, count: int = 28, seconds: float = 40.0, periods: int = 6) -> Sweep:
@@ -259,4 +257,4 @@ def _moved(rig: ServoRig, u: Array) -> Array:
 
     held = np.repeat(u, EVERY)
     x = simulate(rig.plant, rig.drive, rig.plant.state(), held, rig.period, samples=u.size, every=EVERY)[:, 0::2, 0]
-    return np.round(x * rig.shown / rig.quantum) * rig.quantum
+    return readings(rig, x)

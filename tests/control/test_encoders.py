@@ -1,0 +1,64 @@
+"""Do encoders with play and off centre show what geometry says, in a log and in a loop?"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from upright.control import trial
+from upright.control.encoders import Mounting
+from upright.control.trial import readings
+from upright.experiments.makes import make_rig
+from upright.gains import feedback, filtered, hold, place
+
+RIG = make_rig("furuta")
+TURN = (2 * math.pi, 2 * math.pi)
+
+
+def mounted(play=(0.0, 0.0), off_centre=(0.0, 0.0), phase=(0.0, 0.0)):
+    return replace(RIG, mounting=Mounting(play=play, off_centre=off_centre, phase=phase, turn=TURN))
+
+
+def test_after_a_reversal_play_is_lost_before_the_encoder_follows():
+    there = np.linspace(0.0, 1.0, 1001)
+    q = np.repeat(np.concatenate([there, there[::-1]])[:, None], 2, axis=1)
+    shown = readings(mounted(play=(0.02, 0.0)), q)
+    lost = shown[:1001] - shown[:1000:-1]  # the same place on the way out and back
+    step = RIG.quantum[0]
+    inside = slice(30, 970)  # from where the play is taken up on either way
+    assert np.abs(np.abs(lost[inside, 0]) - 0.02).max() <= step * (1 + 1e-9)
+    assert np.abs(lost[:, 1]).max() == 0.0
+
+
+def test_many_motions_are_read_as_each_alone():
+    q = np.cumsum(np.random.default_rng(3).normal(0, 0.01, (200, 5, 2)), axis=0)
+    rig = mounted(play=(0.02, 0.01), off_centre=(0.002, 0.001), phase=(0.3, 2.0))
+    together = readings(rig, q)
+    for i in range(5):
+        np.testing.assert_array_equal(together[:, i], readings(rig, q[:, i]))
+
+
+def test_a_shaft_off_centre_errs_once_a_turn_from_where_it_was_zeroed():
+    turns = np.linspace(0.0, 4 * math.pi, 401)
+    error, phase = 0.01, 0.7
+    shown = readings(mounted(off_centre=(error, 0.0), phase=(phase, 0.0)), np.column_stack([turns, turns]))
+    expected = turns + error * (np.sin(turns + phase) - math.sin(phase))
+    assert np.abs(shown[:, 0] - expected).max() <= RIG.quantum[0] / 2 * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.7, 2.5])
+def test_a_loop_reads_the_same_as_its_log_close_to_upright(phase):
+    """By the first command, -K of what is shown; what the tangent leaves out is e d^2/2 of a deviation d."""
+    model = RIG.linear("inverted")
+    K = place(model.A, model.B, [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220]).K
+    law = feedback(filtered(hold(model, RIG.period, RIG.delay / RIG.period), 0.5), K)
+    error, tilt = 0.01, 0.05
+    rig = mounted(off_centre=(0.0, error), phase=(0.0, phase))
+    run = trial(rig, law, at="inverted", start=[0, 0, tilt, 0], seconds=0.01)
+    expected = tilt + error * (math.sin(math.pi + tilt + phase) - math.sin(phase))
+    rounding = RIG.converter / 2 + abs(K[0, 2]) * (RIG.quantum[1] / 2 + error * tilt**2 / 2)
+    assert run.u[0] == pytest.approx(-K[0, 2] * expected, abs=rounding)
+    assert run.record["theta"][0] - math.pi == pytest.approx(expected, abs=RIG.quantum[1] / 2)

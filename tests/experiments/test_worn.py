@@ -1,0 +1,57 @@
+"""Are the flaws of worn twins those that are told, and the rest of the rig as it was?"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from upright.experiments.makes import PENDULUMS, make_of, make_rig
+from upright.experiments.worn import worn
+from upright.physics.equations import mass_and_force
+from upright.simulation import simulate
+
+
+def force_at_rest(plant, q):
+    """Generalized forces (coordinates,) without motion and command."""
+    names = plant.derived().coordinates
+    still = {n: 0.0 for c in names for n in (c, f"{c}_dot")} | {i.name: 0.0 for i in plant.inputs}
+    return mass_and_force(plant.derived(), {**plant.parameters(), **still, **dict(zip(names, q, strict=True))})[1]
+
+
+@pytest.mark.parametrize("key", PENDULUMS)
+def test_a_worn_rig_has_the_same_numbers_and_flaws_within_the_sizes_told(key):
+    sound = make_rig(key, 5)
+    for seed in range(1, 30):
+        rig = worn(sound, seed)
+        plant = rig.plant
+        assert make_of(plant).key == key
+        same = [n for n in sound.plant.names() if not n.startswith(("tilt", "b_1s", "b_2s", "v_"))]
+        assert [getattr(plant, n) for n in same] == [getattr(sound.plant, n) for n in same]
+        assert 1.1 <= plant.b_1s / plant.b_1c <= 1.5
+        assert 0 <= rig.delay - sound.delay <= 2e-3
+        assert all(
+            0 <= p <= {"rad": 1e-3, "m": 5e-5}[c.unit]
+            for p, c in zip(rig.mounting.play, plant.coordinates, strict=True)
+        )
+        np.testing.assert_array_equal(plant.linear("inverted").A, sound.plant.linear("inverted").A)
+
+
+def test_the_torque_of_a_worn_furuta_ripples_with_its_angle():
+    plant = worn(make_rig("furuta", 5), 2).plant.replace(tilt_x=0.0, tilt_y=0.0)
+    for psi in (-0.4, 0.0, 1.3):
+        f = force_at_rest(plant, (psi, 0.0))
+        assert f[0] == pytest.approx(plant.T_r * math.sin(plant.n_r * psi + plant.phi_r), abs=1e-12)
+        assert f[1] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_worn_cart_without_friction_rolls_down_its_slope():
+    """The centre of mass of cart and hanging pendulum gains g times the slope, whatever swings below."""
+    plant = worn(make_rig("linear", 5), 2).plant
+    bare = plant.replace(F_r=0.0, **dict.fromkeys(("b_1", "b_2", "b_1c", "b_2c", "b_1s", "b_2s"), 0.0))
+    x, _, theta, _ = simulate(bare, {}, np.zeros(4), None, 1e-3, samples=2001)[-1, :, 0]
+    centre = x + bare.m_p * bare.l_cg * math.sin(theta) / (bare.m_c + bare.m_p)
+    assert centre == pytest.approx(9.81 * plant.slope * 2.0**2 / 2, rel=1e-6)
+    rippling = force_at_rest(plant.replace(slope=0.0), (0.01, 0.0))
+    assert rippling[0] == pytest.approx(plant.F_r * math.sin(plant.n_r * 0.01 + plant.phi_r), abs=1e-12)
