@@ -21,6 +21,7 @@ from upright.errors import BadInput, UprightError
 from upright.experiments.abreast import run_abreast
 from upright.experiments.makes import MAKES, PENDULUMS, SHAFTS, make_rig
 from upright.experiments.weighing_1a.run import Known
+from upright.experiments.worn import worn as worn_twin
 from upright.files import read_text, write_json
 from upright.progress import Progress, silent
 from upright.report.page import Book, Chapter, Step, as_plain, from_plain
@@ -209,9 +210,15 @@ class Session:
     seed: int
     folder: Path
     asked: tuple[Experiment, ...]
+    worn: bool = False
     results: list[ExperimentResult] = field(default_factory=list[ExperimentResult])
     interrupted: bool = False
     seconds: float = 0.0
+
+    def rig(self, make: str) -> ServoRig:
+        """The twin that is run on."""
+        rig = make_rig(make, self.seed)
+        return worn_twin(rig, self.seed) if self.worn else rig
 
     @property
     def missing(self) -> tuple[Experiment, ...]:
@@ -268,6 +275,7 @@ def run_laboratory(
     *,
     fresh: bool = False,
     workers: Workers = HERE,
+    worn: bool = False,
 ) -> Session:
     """Run experiments on a seeded rig; Ctrl-C stops and keeps what is there.
 
@@ -289,6 +297,8 @@ def run_laboratory(
         Make everything again.
     workers : Workers, optional
         Who runs experiments that need nothing of each other; processes of this machine, since they share the folder.
+    worn : bool
+        Take twins with physics that models leave out; see `upright.experiments.worn`.
 
     Raises
     ------
@@ -296,8 +306,8 @@ def run_laboratory(
         When there is no such experiment, or not on this rig.
     """
     began = time.perf_counter()
-    session = Session(make=make, seed=seed, folder=folder, asked=choose(asked, make))
-    digests = _digests(make, seed)
+    session = Session(make=make, seed=seed, folder=folder, asked=choose(asked, make), worn=worn)
+    digests = _digests(make, seed, worn)
     whole = sum(e.seconds for e in session.asked)
     behind = 0.0
     if not workers.alone:
@@ -350,11 +360,18 @@ def _brought(key: str, told: Mapping[str, Any]) -> ExperimentResult:
     return ExperimentResult(**values)
 
 
-def _digests(make: str, seed: int) -> dict[str, str]:
+def _digests(make: str, seed: int, worn: bool) -> dict[str, str]:
     """Digest of what each experiment is made of: the program, its rig and seed, the experiments it builds on."""
     digests: dict[str, str] = {}
     for e in _there(make):
-        parts = (_program(), e.key, e.make(make), str(seed), *(digests[n] for n in _needs(e, make)))
+        parts = (
+            _program(),
+            e.key,
+            e.make(make),
+            str(seed),
+            "worn" if worn else "",
+            *(digests[n] for n in _needs(e, make)),
+        )
         digests[e.key] = sha256("\n".join(parts).encode()).hexdigest()
     return digests
 
@@ -386,7 +403,7 @@ def _with_kept(session: Session, digests: Mapping[str, str]) -> list[ExperimentR
         found = None if e.key in told else _kept(session.folder / e.key, digests[e.key])
         if found:
             make = e.make(session.make)
-            name = make_rig(make, session.seed).name
+            name = session.rig(make).name
             told[e.key] = ExperimentResult(experiment=e, make=make, rig=name, chapter=found, state="kept", seconds=0.0)
     return [told[e.key] for e in _there(session.make) if e.key in told]
 
@@ -397,7 +414,7 @@ def _one(
     """One experiment, from an earlier run where that still holds."""
     began = time.perf_counter()
     make, needs = e.make(session.make), _needs(e, session.make)
-    rig, folder = make_rig(make, session.seed), session.folder / e.key
+    rig, folder = session.rig(make), session.folder / e.key
     folder.mkdir(parents=True, exist_ok=True)
     progress("starting", 0.0)
     state, chapter = "kept", None if fresh else _kept(folder, digest)
@@ -430,6 +447,10 @@ def _failed(e: Experiment, why: str) -> Chapter:
     return Chapter(key=e.key, title=e.title, verdict="This experiment could not be finished.", detail=why, sound=False)
 
 
+WORN = (
+    "They are worn: friction larger close to rest, a drive that ripples and comes late, a frame out of level, encoders "
+    "with play and off centre. No model has this, and what remains of it is told."
+)
 TITLE = "The laboratory: identify it hanging, hold it upright"
 
 
@@ -447,7 +468,8 @@ def book(session: Session, day: date) -> Book:
         title=TITLE,
         facts=(
             ("Rig", "; ".join(rigs) or f"seed {session.seed}"),
-            ("Data", "Digital twins: dry friction, encoder counts, delay and limits as on rigs; none was touched."),
+            ("Data", "Digital twins: dry friction, encoder counts, delay and limits as on rigs; none was touched."
+             + (f" {WORN}" if session.worn else "")),
             ("Experiments", ", ".join(t.experiment.key for t in session.results) or "none"),
             ("Made", f"{day.isoformat()}, upright {__version__}, Python {platform.python_version()}"),
             ("Again", command(session)),
@@ -473,6 +495,8 @@ def command(session: Session, seed: int | None = None) -> str:
         shown += [f"--experiment {e.key}" for e in there if e.key in told]
     if seed:
         shown.append(f"--seed {seed}")
+    if session.worn:
+        shown.append("--worn")
     return " ".join(shown)
 
 
@@ -496,6 +520,7 @@ def summary(session: Session, report: Path, pdf: Path | None) -> dict[str, Any]:
     return {
         "seed": session.seed,
         "rig": session.make or None,
+        "worn": session.worn,
         "folder": str(session.folder),
         "report": str(report),
         "pdf": str(pdf) if pdf else None,

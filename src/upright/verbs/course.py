@@ -40,7 +40,7 @@ class Laboratory:
 
 def lab(
     *, experiment: Sequence[str] | str = (), rig: str = "", seed: int = 0, out: str | os.PathLike[str] | None = None,
-    fresh: bool = False, workers: int = 1, progress: Progress = silent,
+    fresh: bool = False, workers: int = 1, worn: bool = False, progress: Progress = silent,
 ) -> Answer[Laboratory]:  # fmt: skip
     """The experiments of the paper on simulated rigs: identify, flip, design, hold, track, swing, and report.
 
@@ -56,11 +56,13 @@ def lab(
     seed : int
         Which rig of the make; 0 is the one as designed.
     out : path, optional
-        Folder; upright-lab[-KIND][-SEED] when omitted.
+        Folder; upright-lab[-KIND][-SEED][-worn] when omitted.
     fresh : bool
         Make again what the folder holds already.
     workers : int
         Processes of this machine that run experiments which need nothing of each other.
+    worn : bool
+        Twins with physics that models leave out, of which fits read as those of real rigs do.
     progress : callable, optional
         Told the step at work and the share done.
 
@@ -80,7 +82,9 @@ def lab(
         raise BadInput(f"--seed needs a whole number of at least 0, got {seed}.")
     if rig:
         make_named(rig)
-    named = "-".join(["upright-lab", *([rig] if rig else []), *([str(seed)] if seed else [])])
+    named = "-".join(
+        ["upright-lab", *([rig] if rig else []), *([str(seed)] if seed else []), *(["worn"] if worn else [])]
+    )
     at = Path(named if out is None else out)
     if at.exists() and not at.is_dir():
         raise BadInput(f"results need a folder, but {at} is a file; name another with -o.")
@@ -97,7 +101,7 @@ def lab(
     laboratory.choose(asked, rig)  # says what is wrong with the call before anything is written
     with _ctrl_c() as pressed:
         session = laboratory.run_laboratory(
-            asked, rig, seed, at, progress, stopped=lambda: pressed.times > 0, fresh=fresh, workers=shared
+            asked, rig, seed, at, progress, stopped=lambda: pressed.times > 0, fresh=fresh, workers=shared, worn=worn
         )
         pressed.patient = True
         progress("writing the report", 1.0)

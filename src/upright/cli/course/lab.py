@@ -27,10 +27,14 @@ def lab(
     ] = "",
     seed: Annotated[int, typer.Option(help="Which rig of the make; 0 is the one as designed.")] = 0,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", metavar="DIR", help="Folder; upright-lab[-KIND][-SEED] without it.")
+        Path | None,
+        typer.Option("-o", "--out", metavar="DIR", help="Folder; upright-lab[-KIND][-SEED][-worn] without it."),
     ] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Make again what the folder holds already.")] = False,
     workers: Processes = 1,
+    worn: Annotated[
+        bool, typer.Option("--worn", help="Rigs with physics that no model has, such as stiction, ripple and play.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON instead of sentences.")] = False,
 ) -> None:
     r"""Run the experiments of the paper on simulated rigs: identify, flip, design, hold, track, swing, and report.
@@ -45,13 +49,14 @@ def lab(
     \b
     upright lab
     upright lab --rig linear --seed 3
+    upright lab --rig furuta --worn
     upright lab --experiment 1b --experiment 2 -o out
     """
     from upright.verbs import course as verbs
 
     with progress_bar(quiet=as_json) as bar:
         done = verbs.lab(
-            experiment=experiment or (), rig=rig, seed=seed, out=out, fresh=fresh, workers=workers,
+            experiment=experiment or (), rig=rig, seed=seed, out=out, fresh=fresh, workers=workers, worn=worn,
             progress=bar,
         )  # fmt: skip
     if as_json:
