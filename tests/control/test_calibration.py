@@ -27,6 +27,8 @@ def test_spiegelhalter_s_z_is_standard_normal_for_right_chances_and_not_for_bold
         z.append(calibration(chances, rng.random(200) < chances).z)
     # of 400 draws, mean and standard deviation are known to 1/20 and 1/28; three of each are allowed
     assert abs(np.mean(z)) < 3 / 20
+    told = np.full(100, 0.5)
+    assert calibration(told, np.arange(100) < 60).z_of_all == pytest.approx(2.0)  # 10 more than 50, of sd 5
     assert np.std(z) == pytest.approx(1.0, abs=3 / math.sqrt(800))
     truth = rng.uniform(0.3, 0.7, 500)
     bold = np.where(truth > 0.5, 0.95, 0.05)
