@@ -199,7 +199,7 @@ class Calibration:
     """Brier score and Murphy's parts of it (1973), over bins of equal width.
 
     brier = reliability - resolution + uncertainty, but for what varies inside a bin; `expected` is the score of
-    chances that are right, `z` is Spiegelhalter's (1986), standard normal then; so is `z_of_all`, of how many came true.
+    chances that are right, `z` is Spiegelhalter's (1986), standard normal then, as is `z_of_all`, of how many came.
     """
 
     brier: float
