@@ -85,6 +85,17 @@ def test_numbers_that_differ_from_block_to_block_scatter_as_random_effects() -> 
     assert added[0, 0] == pytest.approx((1 + 1 / blocks) * between * quantiles, rel=1e-6)
 
 
+def test_what_is_known_beforehand_does_not_spread_with_blocks_that_hardly_tell_it() -> None:
+    """A weighed mass, of which each block says something wild, but with a thousandth of the balance's weight."""
+    parts = {4: [(np.array([g]), np.eye(1)) for g in (30.0, -10.0, 40.0, -60.0)]}
+    known = 1 / 4004.0
+    added = between_blocks(parts, np.array([[4004.0]]), np.array([True]), np.array([known]), 100.0)
+    # all four may err by a block's spread alike, (4 w)^2, and each by its own, 4 w^2; each moved the mean by w of it
+    quantiles = (stats.t.ppf(0.975, 3) / stats.t.ppf(0.975, 100)) ** 2
+    expected = (16 + 4) / 4 * np.sum((np.array([30.0, -10.0, 40.0, -60.0]) / 4003.0) ** 2) * quantiles
+    assert added[0, 0] == pytest.approx(expected, rel=0.01)
+
+
 def test_a_ratio_that_every_block_agrees_on_stays_known() -> None:
     """Of (1 + d, 2 + 2 d) with a d for every block the sum is not known; twice the one less the other is."""
     each = np.array([0.3, -0.1, 0.4, -0.6])

@@ -176,7 +176,8 @@ def between_blocks(
     Of a number to which block b contributes the share w of what is known, the variance without it is ``known / (1 -
     w)`` under a right model, and the number moves by the difference, in the square (Hausman 1978). Where every block
     has a value of its own, with the variance `spread` and a mean weighted by w, it moves by as much more as follows
-    from one-way analysis of variance. The truth is as one more block, away from that mean by ``spread (1 + sum w^2)``.
+    from one-way analysis of variance. The truth is as one more block, away from that mean by ``spread (s^2 + sum
+    w^2)``, s the sum of w: 1, or less where a number was known beforehand.
 
     Numbers are correlated as they move together when a block is left out: widened one by one, two whose ratio every
     block agrees on would lose it.
@@ -196,7 +197,8 @@ def between_blocks(
         weight = np.sum(share**2 + odds**2 * (squares - share**2), axis=0)
         excess = np.maximum(np.sum(moved**2, axis=0) - known * odds.sum(axis=0), 0.0)
         spread = excess / np.where(weight > 0, weight, np.inf)
-        most = np.maximum(most, spread * (1 + squares) * (student(len(parts) - 1) / student(freedom)) ** 2)
+        away = np.minimum(share.sum(axis=0), 1.0) ** 2 + squares
+        most = np.maximum(most, spread * away * (student(len(parts) - 1) / student(freedom)) ** 2)
         steps = moved / np.sqrt(np.where(weight > 0, weight, np.inf))
         together += steps.T @ steps
     return _along(together, most)
