@@ -30,7 +30,7 @@ KINDS = ("sines", "multisine", "sweep")
 @keeps_its_inputs
 def predict(
     model: str | os.PathLike[str], study: str | os.PathLike[str], *, data: str | os.PathLike[str] | None = None,
-    out: str | os.PathLike[str] | None = None,
+    out: str | os.PathLike[str] | None = None, pdf: bool = False,
 ) -> Answer[dict[str, RunScore]]:  # fmt: skip
     """How well a model that was fitted before explains other runs.
 
@@ -47,6 +47,8 @@ def predict(
         Folder the runs' files are in; the study's own when omitted.
     out : path, optional
         Folder for prediction.json and prediction.html.
+    pdf : bool
+        Write the page as PDF too.
 
     Returns
     -------
@@ -67,6 +69,7 @@ def predict(
     from upright.study.fitted import read_fit
     from upright.study.load import load_study
 
+    pdf_has_folder(out, pdf)
     model, study = Path(model), Path(study)
     for file, what in ((model, "the model"), (study, "the study")):
         if not file.exists():
@@ -111,7 +114,7 @@ def predict(
         return Answer(scores, told)
     at = folder(out)
     return Answer(
-        scores, told, [write_json(at / "prediction.json", numbers), *write_page(told, at / "prediction.html", False)]
+        scores, told, [write_json(at / "prediction.json", numbers), *write_page(told, at / "prediction.html", pdf)]
     )
 
 

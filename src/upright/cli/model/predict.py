@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from upright.cli.terminal import Data, tell
+from upright.cli.terminal import Data, Pdf, tell
 
 WORSE = 3
 
@@ -19,6 +19,7 @@ def predict(
     out: Annotated[
         Path | None, typer.Option("-o", "--out", metavar="OUT", help="Folder for prediction.json and prediction.html.")
     ] = None,
+    pdf: Pdf = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the scores as JSON instead of a table.")] = False,
 ) -> None:
     r"""Score other runs with a model that was fitted before.
@@ -37,7 +38,7 @@ def predict(
     """
     from upright.verbs import model as verbs
 
-    scored = verbs.predict(model, study, data=data, out=out)
+    scored = verbs.predict(model, study, data=data, out=out, pdf=pdf)
     tell(scored.chapter, scored.files, scored.numbers if as_json else None)
     if not scored.chapter.sound:
         raise typer.Exit(WORSE)
