@@ -8,7 +8,7 @@ A wrong model pulls its numbers one way in one part of the runs and another way 
 autocorrelation reaches. So every block of the runs is left out in turn (the jackknife of Quenouille and Tukey, each in
 one Gauss-Newton step). What the estimates then scatter beyond the sandwich is a spread from block to block, as of
 random effects (DerSimonian and Laird 1986), and the truth counts as one more block: on rigs with physics that their
-models lack 92 % of the 95 % intervals held the truth, 83 % without (`python -m benchmarks misfit`).
+models lack 93 % of the 95 % intervals held the truth, 83 % without (`python -m benchmarks misfit`).
 
 Combinations of numbers that change no output are told with the one number that would fix each: a free swing without a
 known force or inertia sees only ratios, since masses, forces and frictions scale together.
