@@ -243,6 +243,7 @@ def _conclude(asked: Rig, runs: Sequence[Run], problem: Problem, found: Descent,
             memory=best.memory,
             period=min(t.period for t in problem.tracks),
             standing=None if found.interrupted or seen.hidden else standing(best),
+            driven=any(np.any(track.u) or track.run.loop is not None for track in problem.tracks),
         )
     )
     return Fit(

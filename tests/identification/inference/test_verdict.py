@@ -187,6 +187,12 @@ def test_the_pole_upright_and_the_loops_that_hold() -> None:
     assert rough.growth.interval[1] - rough.growth.interval[0] > told.growth.interval[1] - told.growth.interval[0]
 
 
+def test_a_drive_that_never_acted_is_not_judged() -> None:
+    fit = identify(rig(Pendulum, PENDULUM, {"J_p": 3e-3, "b_2": 1e-3}), [noisy(swing(), 1e-3, seed=15)])
+    assert fit.answers[2].answer == "not tested"
+    assert "no fitted run was driven" in fit.answers[2].headline
+
+
 def test_what_cannot_fall_asks_for_no_loop() -> None:
     assert _judged({"a": _score("fit", 99.0, None)})[2].answer == "not asked"
 

@@ -41,7 +41,7 @@ class Evidence:
 
     `unseen` and `conventions` are sentences on what the data cannot see and on signs or zeros that look wrong. The
     residuals are autocorrelated over `memory` seconds, the motion takes `period` seconds for one period. `standing`
-    says how a rig within the intervals stands upright, if this plant can.
+    says how a rig within the intervals stands upright, if this plant can, `driven` whether a command acted in a run.
     """
 
     rig: Rig
@@ -55,6 +55,7 @@ class Evidence:
     memory: float
     period: float
     standing: Standing | None
+    driven: bool = True
 
 
 def judge(found: Evidence) -> tuple[Judgement, ...]:
@@ -188,6 +189,12 @@ def _loop(found: Evidence) -> Judgement:
         )  # fmt: skip
     where = f"{s.at}, the fastest pole is {s.growth.value:.3g} 1/s ({s.growth.interval[0]:.3g} to "
     where = f"{where}{s.growth.interval[1]:.3g})"
+    if not found.driven:
+        return Judgement(
+            question=LOOP, answer="not tested",
+            headline=f"{where[0].upper()}{where[1:]}; no fitted run was driven, so what the drive does is not known.",
+            advice="Add a run in which it acts.",
+        )  # fmt: skip
     half = (s.growth.interval[1] - s.growth.interval[0]) / 2 / s.growth.value
     held = f"a loop whose poles are as fast as that holds {100 * s.share:.0f} % of the rigs within the intervals"
     answer = "no"
