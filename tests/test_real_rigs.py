@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from pathlib import Path
 
 import pytest
@@ -23,6 +24,8 @@ MODES = {"ecp205_spinup": 3.55}
 STAIRCASES = ("ecp210_closed_loop",)
 """Carts that climb in stairs, whose cost is a staircase too: on some processors a search has to admit that it is not
 done."""
+
+FAR_AHEAD = ("qube_balance",)
 
 DATA = os.environ.get("UPRIGHT_REAL_DATA", "")
 
@@ -44,7 +47,11 @@ def test_a_real_rig_is_explained_and_predicted(name):
     # hangs on the last digits, and those on the processor.
     claimed = {a: a.reached(left_out if a.how == "left out" else fit.runs) for a in asked if not a.missed}
     assert {a: values for a, values in claimed.items() if not a.met(values)} == {}
-    assert fit.trusted or (name in STAIRCASES and "had not settled" in fit.verdict), fit.verdict
+    if name in FAR_AHEAD:  # what is explained at 50 ms is not at 200 ms, and a verdict is that of all that was asked
+        assert not fit.trusted
+        assert "are not explained" in fit.answers[0].text()
+    else:
+        assert fit.trusted or (name in STAIRCASES and "had not settled" in fit.verdict), fit.verdict
     if name in MODES:
         ((at, mode),) = [(at, p) for at, poles in fit.poles.items() for p in poles if p.imag.value > 0]
         low, high = (end / (2 * math.pi) for end in mode.imag.interval)
@@ -61,8 +68,9 @@ def test_a_run_that_excites_itself_is_named_and_left_out(tmp_path):
     study = load_study(tmp_path / "more.toml", data=DATA)
     fit, clean = identify(study.rig, study.runs), identify(asked.rig, asked.runs)
     (told,) = [w for w in fit.warnings if w.startswith("Outlier")]
-    assert told.startswith("Outlier: 9:26, 5.")
-    assert "to 10 s: self-excited" in told
+    begins = re.match(r"Outlier: 9:26, ([\d.]+) to 10 s: self-excited", told)
+    assert begins is not None
+    assert float(begins[1]) == pytest.approx(5.0, abs=0.1)
     assert not any(w.startswith("Outlier") for w in clean.warnings)
     assert fit.runs["9:26"].role == "predict"
     for name, e in clean.estimates.items():

@@ -39,8 +39,9 @@ def test_scatter_matches_the_reported_errors(memory: float) -> None:
     # 80 draws at 95 %: three sigma of the binomial is 7 %
     assert np.all(share >= 0.88), share
     # the spread of a standard deviation from 80 draws is 8 %; Bartlett's window loses some of a long memory
-    ratio = np.mean(claimed, axis=0) / np.std(found, axis=0, ddof=1)
-    assert np.all((ratio > 0.75) & (ratio < 1.35)), ratio
+    # 1.5 times as wide may they become by the spread between blocks, and a tenth is the scatter of this ratio
+    ratio = np.median(claimed, axis=0) / np.std(found, axis=0, ddof=1)
+    assert np.all((ratio > 0.75) & (ratio < 1.65)), ratio
 
 
 @pytest.mark.slow

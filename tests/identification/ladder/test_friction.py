@@ -54,7 +54,7 @@ def test_intervals_hold_the_truth_whatever_was_left_out():
     # Coulomb friction hard to tell from viscous in 8 s of noise: often left out or at its bound, and b_2 takes its part
     from benchmarks.rigs import MAKES, outcome
 
-    held = [outcome(MAKES[0], seed)[0] for seed in range(20)]
+    held = [outcome(MAKES[0], seed).held for seed in range(20)]
     for name in ("J_p", "b_2", "b_2c"):
         # fewer than 16 of 20 honest 95 % intervals: one chance in 390 (binomial)
         assert sum(h[name] for h in held) >= 16

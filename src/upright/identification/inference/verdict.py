@@ -26,6 +26,9 @@ MARGIN = 2.0
 VAGUE = 10.0
 """An interval of a positive number whose ends are this many times apart leaves it undetermined."""
 
+ESSENTIAL = ("J_", "m_", "k_", "l_", "actuator.gain")
+"""Numbers without which a model is none: inertias, stiffnesses, lengths, the drive; friction is often vague."""
+
 NARROW, SOME = 0.1, 0.3
 """Half an interval of the growth rate upright, relative to it, within which a loop can be designed, or perhaps."""
 
@@ -125,7 +128,7 @@ def _usable(found: Evidence, *, confirmed: bool) -> Judgement:
     no = bool(found.unseen)
     if asked and not firm and not found.unseen:
         no = True
-        reasons.append("None of the numbers asked is determined well, so others would explain the runs as well.")
+        reasons.append("No number asked is determined well, so others would explain the runs as well.")
     for n, e in asked.items():
         low, high = e.interval
         limit = found.rig.bounds(n) if n in found.rig.parameters else (-math.inf, math.inf)
@@ -140,8 +143,7 @@ def _usable(found: Evidence, *, confirmed: bool) -> Judgement:
                 f"{n} reached its lower limit, 0: these data give no evidence for it (at most {_shown(high, e)})."
             )
         elif e.status == "weak" and low > 0 and high > VAGUE * low:
-            essential = not n.startswith(("b_", "c_", "f_", "actuator.")) or n == "actuator.gain"
-            no = no or essential
+            no = no or n.startswith(ESSENTIAL)
             reasons.append(f"{n} lies anywhere from {low:.2g} to {_shown(high, e)}: it is not determined.")
         elif e.status == "weak":
             reasons.append(f"{n} is known poorly, {low:.2g} to {_shown(high, e)}.")
