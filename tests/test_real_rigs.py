@@ -26,6 +26,7 @@ STAIRCASES = ("ecp210_closed_loop",)
 done."""
 
 FAR_AHEAD = ("qube_balance",)
+VAGUE = {"furuta_sines": "J_d"}
 
 DATA = os.environ.get("UPRIGHT_REAL_DATA", "")
 
@@ -50,6 +51,9 @@ def test_a_real_rig_is_explained_and_predicted(name):
     if name in FAR_AHEAD:  # what is explained at 50 ms is not at 200 ms, and a verdict is that of all that was asked
         assert not fit.trusted
         assert "are not explained" in fit.answers[0].text()
+    elif name in VAGUE:  # its arm is light beside the pendulum: J_d may be anything below 3e-4 kg m^2
+        assert not fit.trusted
+        assert any(f"{VAGUE[name]} lies anywhere" in reason for reason in fit.answers[1].reasons)
     else:
         assert fit.trusted or (name in STAIRCASES and "had not settled" in fit.verdict), fit.verdict
     if name in MODES:
