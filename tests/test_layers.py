@@ -38,6 +38,7 @@ identification
 study
 study.draft
 control
+rigs
 report
 report.fit
 report.ladder report.law report.log
@@ -65,6 +66,7 @@ BLIND = {
     "simulation": {"units", "signals", "records", "readers"},
     "gains": {"signals", "records", "readers", "simulation", "simulation.kernel"},
     "control": {"readers", "identification", "study"},
+    "rigs": {"identification"},
     "questionnaire": {"records", "readers", "physics", "simulation", "identification", "study", "control"},
 }
 # How a page is written is one thing, what it says another.

@@ -22,6 +22,10 @@ class NotIdentifiable(UprightError, RuntimeError):
     """The data cannot answer the question asked."""
 
 
+class RigStopped(UprightError, RuntimeError):
+    """A rig refused, or stopped itself; its command was zero before this was raised."""
+
+
 class WorkersLost(UprightError, RuntimeError):
     """Processes or machines that were to share the work died, again and again."""
 
