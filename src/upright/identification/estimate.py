@@ -16,6 +16,7 @@ from upright.identification.checks.conventions import wrong_conventions
 from upright.identification.checks.outliers import refit_without_outliers
 from upright.identification.inference.assumptions import assumptions, sentences
 from upright.identification.inference.bands import calibrated
+from upright.identification.inference.black_box import black_box
 from upright.identification.inference.covariance import Identifiability, Optimum, assess, identifiability
 from upright.identification.inference.intervals import run_estimates, shared_estimates, widened, with_model_uncertainty
 from upright.identification.inference.loop import standing
@@ -285,7 +286,10 @@ def _scores(
     values = {n: e.value for n, e in estimates.items()}
     known = {label: {n: e.value for n, e in group.items()} for label, group in groups.items()}
     foreseen = [r for r in runs if r.role != "fit"]
-    found |= predict(values, rig, foreseen, groups=known, bands=bands, progress=log.progress)
+    pace = min(t.period for t in problem.tracks)
+    for label, told in predict(values, rig, foreseen, groups=known, bands=bands, progress=log.progress).items():
+        asked = next(run for run in foreseen if run.label == label)
+        found[label] = replace(told, black_box=black_box(fitted, asked, pace))
     return {run.label: found[run.label] for run in runs}
 
 

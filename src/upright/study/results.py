@@ -61,7 +61,7 @@ def write_fit(fit: Fit, study: Study, path: Path, crossed: CrossValidation | Non
         **_fields(fit, "per_run groups"),
         "runs": {
             label: {
-                **_fields(score, "role fit_percent horizon score_from naive adapted offer inside beyond"),
+                **_fields(score, "role fit_percent horizon score_from naive black_box adapted offer inside beyond"),
                 "ahead": [{"horizon": h, "fit_percent": percents} for h, percents in score.ahead.items()],
             }
             for label, score in fit.runs.items()

@@ -117,7 +117,13 @@ def _predicts(found: Evidence) -> Judgement:
             advice="Hold a run or a tail out (role = \"predict\", or --hold-out).", reasons=tuple(notes),
         )  # fmt: skip
     part = "in part" if blank else "yes"
-    headline = f"{explains}It predicts {_range(predicted)} of runs it has not seen{_held_speed(found.runs)}."
+    headline = f"{explains}It predicts {_range(predicted)} of runs it has not seen{_beside(found.runs)}."
+    beaten = _beaten(found.runs)
+    if beaten:
+        notes.append(
+            f"An equation without physics, fitted to the same runs, predicts better ({', '.join(beaten)}), so the "
+            "model misses something that these data show."
+        )
     return Judgement(question=PREDICTS, answer=part, headline=headline, reasons=tuple(notes))
 
 
@@ -228,12 +234,27 @@ def _percents(runs: Mapping[str, RunScore], role: str) -> dict[str, float]:
     return found
 
 
-def _held_speed(runs: Mapping[str, RunScore]) -> str:
-    """What holding the measured speed reaches where runs are predicted from restarts."""
-    naive = {
-        f"{label} {signal}": p for label, s in runs.items() if s.role == "predict" for signal, p in s.naive.items()
-    }
-    return f" (holding the measured speed: {_range(naive)})" if naive else ""
+def _beside(runs: Mapping[str, RunScore]) -> str:
+    """What holding the measured speed and a black box reach of the runs that are predicted."""
+    told: list[str] = []
+    for what, reached in (
+        ("holding the measured speed", lambda s: s.naive),
+        ("an equation without physics", lambda s: s.black_box),
+    ):
+        found = {f"{label} {n}": p for label, s in runs.items() if s.role == "predict" for n, p in reached(s).items()}
+        if found:
+            told.append(f"{what}: {_range({n: max(p, 0.0) for n, p in found.items()})}")
+    return f" ({'; '.join(told)})" if told else ""
+
+
+def _beaten(runs: Mapping[str, RunScore]) -> list[str]:
+    """Predicted signals that the black box predicts clearly better."""
+    return [
+        f"{label} {signal} {percent:.1f} %"
+        for label, s in runs.items()
+        for signal, percent in s.black_box.items()
+        if percent > s.fit_percent[signal] + MARGIN
+    ]
 
 
 def uninformative(runs: Mapping[str, RunScore]) -> list[tuple[str, str]]:

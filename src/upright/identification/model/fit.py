@@ -109,6 +109,8 @@ class RunScore:
     Scores count from `score_from` seconds after the first sample on.
     `naive` is the fit percent that holding the measured speed reaches from the same restarts, empty for a free run: a
     horizon at which the model is hardly better tells nothing about the model.
+    `black_box` is the fit percent that a linear equation without physics reaches, fitted to the same runs; empty for
+    a run that was fitted, and where none was like it.
     `adapted` names what was estimated from the run itself: a prediction that chose its own gain is less of one.
     `offer` is a factor of the run's own that would mend a prediction which falls short.
     `ahead` is the fit percent by horizon [s] and signal of samples predicted exactly so far ahead, from a filter that
@@ -126,6 +128,7 @@ class RunScore:
     measured: tuple[str, ...]
     score_from: float = 0.0
     naive: Mapping[str, float] = field(default_factory=dict[str, float])
+    black_box: Mapping[str, float] = field(default_factory=dict[str, float])
     adapted: tuple[str, ...] = ()
     offer: Offer | None = None
     ahead: Mapping[float, Mapping[str, float]] = field(default_factory=dict[float, Mapping[str, float]])

@@ -122,6 +122,7 @@ def interval(e: Estimate) -> str:
 def score_table(runs: Mapping[str, RunScore]) -> Table:
     """Fit percent of every signal of every run, fitted runs first."""
     windowed = any(score.naive for score in runs.values())
+    boxed = any(score.black_box for score in runs.values())
     banded = any(score.band for score in runs.values())
     rows: list[tuple[str, ...]] = []
     for label, score in sorted(runs.items(), key=lambda item: item[1].role != "fit"):
@@ -129,17 +130,18 @@ def score_table(runs: Mapping[str, RunScore]) -> Table:
         further = [(f"{horizon:g} s ahead", percents) for horizon, percents in list(score.ahead.items())[1:]]
         for how, percents in ((_compared(score), score.fit_percent), *further):
             for name, value in percents.items():
-                held = percent(score.naive[name]) if percents is score.fit_percent and name in score.naive else ""
-                inside = percent(score.inside[name]) if percents is score.fit_percent and name in score.band else ""
-                beside = (*((held,) if windowed else ()), *((inside,) if banded else ()))
+                first = percents is score.fit_percent  # of several horizons the shortest alone is compared
+                told = [of for of, some in ((score.naive, windowed), (score.black_box, boxed)) if some]
+                told += [score.inside] if banded else []
+                beside = [percent(of[name]) if first and name in of else "" for of in told]
                 rows.append((label, role, plain(name), percent(value), *beside, how))
     return Table(
         caption="Fit percent, 100 (1 − |y − ŷ| / |y − mean y|), of every signal",
         headings=(
-            "run", "role", "signal", "fit", *(("held speed",) if windowed else ()),
+            "run", "role", "signal", "fit", *(("held speed",) if windowed else ()), *(("black box",) if boxed else ()),
             *(("in 90 % band",) if banded else ()), "simulated",
         ),
-        rows=tuple(rows), numbers=tuple(range(3, 4 + windowed + banded)),
+        rows=tuple(rows), numbers=tuple(range(3, 4 + windowed + boxed + banded)),
     )  # fmt: skip
 
 

@@ -1,0 +1,58 @@
+"""The prediction without physics that a model is compared with: exact where the truth is a difference equation."""
+
+import numpy as np
+import pytest
+from scipy.signal import StateSpace, lsim
+
+from upright.identification.inference.black_box import black_box
+from upright.identification.model.runs import Run
+
+DT = 0.01
+
+
+def oscillator(seed: int, *, seconds: float = 12.0, **about: object) -> Run:
+    """A mass on a spring under steps of force held over 0.1 s, by scipy; exactly a difference equation of order 2."""
+    t = np.arange(0, seconds, DT)
+    u = np.repeat(np.random.default_rng(seed).normal(size=len(t) // 10 + 1), 10)[: len(t)]
+    plant = StateSpace([[0, 1], [-30.0, -0.8]], [[0], [1.0]], [[1, 0]], [[0]])
+    _, y, _ = lsim(plant, u, t, interp=False)
+    base: dict[str, object] = {"label": f"run {seed}", "role": "fit", "t": t, "u": u[:, None], "y": y[:, None]}
+    return Run(**(base | {"measured": ("x1",)} | about))
+
+
+@pytest.mark.parametrize("horizon", [None, 0.5])
+def test_a_linear_plant_is_predicted_exactly(horizon: float | None) -> None:
+    seen, asked = oscillator(1), oscillator(2, horizon=horizon, role="predict")
+    assert black_box([seen], asked, period=20 * DT)["x1"] == pytest.approx(100, abs=1e-3)
+
+
+def test_what_it_cannot_know_is_not_predicted() -> None:
+    """White noise has no past: no equation does better than its mean."""
+    g = np.random.default_rng(5)
+    seen, asked = (oscillator(k) for k in (1, 2))
+    noise = [Run(label=r.label, role="fit", t=r.t, u=0 * r.u, y=g.normal(size=r.y.shape), measured=("x1",))
+             for r in (seen, asked)]  # fmt: skip
+    assert black_box(noise[:1], noise[1], period=1.0)["x1"] == pytest.approx(0, abs=5)
+
+
+def test_held_motion_drives_it_and_is_not_predicted() -> None:
+    """A mass on a spring whose other end is moved: the end's motion is an input."""
+
+    def pulled(seed: int) -> Run:
+        r = oscillator(seed)
+        end = r.u[:, 0] / 30.0
+        return Run(
+            label=r.label, role="fit", t=r.t, u=0 * r.u, y=np.hstack([end[:, None], r.y]), measured=("x1", "x2"),
+            held={"x1": end},
+        )  # fmt: skip
+
+    found = black_box([pulled(1)], pulled(2), period=20 * DT)
+    assert found.keys() == {"x2"}
+    assert found["x2"] == pytest.approx(100, abs=1e-3)
+
+
+def test_runs_that_are_not_alike_are_passed_over() -> None:
+    asked = oscillator(2, role="predict")
+    other = oscillator(1, measured=("x2",))
+    short = oscillator(3, seconds=0.02)
+    assert black_box([other, short], asked, period=1.0) == {}
