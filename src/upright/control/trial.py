@@ -60,6 +60,8 @@ class ServoRig:
         How far the driven coordinate may go either way before a stop or a cable ends it [m or rad].
     speed_limit : float
         Speed of the driven coordinate at which the drive trips [m/s or rad/s].
+    twist : float
+        How far the last coordinate may go from the first before the shaft between them trips the rig [m or rad].
     more : mapping of str to float
         What else the drive does: numbers of `physics.actuator.ACTUATOR`, such as ``"actuator.force_limit"``.
     sources : mapping of str to str
@@ -83,6 +85,7 @@ class ServoRig:
     mounting: Mounting | None = None
     travel: float = math.inf
     speed_limit: float = math.inf
+    twist: float = math.inf
     more: Mapping[str, float] = field(default_factory=dict[str, float])
     sources: Mapping[str, str] = field(default_factory=dict[str, str])
     seed: int = 0

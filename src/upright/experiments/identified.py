@@ -177,7 +177,7 @@ class IdentifiedRig:
             unit=self.unit or "V",
             counts=tuple(said.entries[f"counts.{c.name}"].value / turn_of(c.unit) for c in self.plant.coordinates),
             period=said.entries["servo_period"].value, travel=said.value("travel", math.inf),
-            speed_limit=said.value("speed_limit", math.inf), more=self.more,
+            speed_limit=said.value("speed_limit", math.inf), twist=said.value("twist", math.inf), more=self.more,
         )  # fmt: skip
 
     def twin(self, rig: ServoRig, said: RigDescription, seed: int) -> ServoRig:

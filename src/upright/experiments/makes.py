@@ -403,6 +403,8 @@ def sheet(vendor: str, plant: Plant, unit: str = "V") -> dict[str, Entry]:
         said |= {"converter": (CONVERTER, "V")} | ({"limit": (make.limit, "V")} if make else {})
     if make and math.isfinite(make.travel):
         said |= {"travel": (make.travel, driven_unit(type(plant)))}
+    if make and math.isfinite(make.twist):
+        said |= {"twist": (make.twist, driven_unit(type(plant)))}
     return {name: Entry(value=value, unit=unit, source=source) for name, (value, unit) in said.items()}
 
 
@@ -453,6 +455,7 @@ def make_rig(key: str, seed: int = 0) -> ServoRig:
         counts=make.counts,
         period=SERVO,
         travel=make.travel,
+        twist=make.twist,
         seed=seed,
     )
 

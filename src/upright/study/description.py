@@ -21,7 +21,7 @@ from upright.units import parse
 
 VENDORS = ("ECP 205", "ECP 210")
 """Whose data sheets are known; `experiments.makes` has them."""
-SERVO = {"servo_period": "s", "travel": "", "speed_limit": "/s"}
+SERVO = {"servo_period": "s", "travel": "", "speed_limit": "/s", "twist": ""}
 """Numbers under [rig]; what is "" or "/s" is in the unit of the driven coordinate, or per second of it."""
 
 
@@ -53,7 +53,7 @@ class RigDescription:
         One of `VENDORS` whose data sheet says what is left out here; empty for a rig of one's own.
     entries : mapping of str to Entry
         ``"limit"``, ``"lag"`` and so on as under [actuator]; ``"converter"``; ``"servo_period"``, ``"travel"``,
-        ``"speed_limit"``; and by coordinate ``"counts.theta"`` (per turn or metre), ``"sign.theta"`` and
+        ``"speed_limit"``, ``"twist"``; and by coordinate ``"counts.theta"`` (per turn or metre), ``"sign.theta"`` and
         ``"offset.theta"``.
     """
 
@@ -126,6 +126,7 @@ def meaning_of(name: str) -> str:
     return {
         "converter": "smallest step of the command", "servo_period": "servo period",
         "travel": "how far the driven body may go either way", "speed_limit": "speed at which the drive trips",
+        "twist": "how far the ends of the shaft may go apart",
         "counts": f"encoder counts of {of}", "sign": f"sign of the encoder of {of}",
         "offset": f"reading at which {of} is zero",
     }[kind]  # fmt: skip

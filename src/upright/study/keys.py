@@ -120,6 +120,7 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
             Key("servo_period", '"2 ms"', "time between two commands of the controller; a value as below"),
             Key("travel", '"0.2 m"', "how far the driven body may go either way; a value as below"),
             Key("speed_limit", '"1.5 m/s"', "speed of the driven body at which the drive trips; a value as below"),
+            Key("twist", '"20 deg"', "how far the ends of a flexible shaft may go apart; a value as below"),
         ),
     ),
     "value": (

@@ -32,7 +32,7 @@ from upright.experiments.tracking_3.laws import (
     tune,
     with_sum,
 )
-from upright.experiments.tracking_3.pulses import fitted, identify_shaft, shaft_make
+from upright.experiments.tracking_3.pulses import fitted, identify_shaft
 from upright.experiments.weighing_1a.run import Known
 from upright.identification.model.fit import Fit
 from upright.progress import Progress, silent
@@ -248,8 +248,9 @@ def stiffest_damped(model: ServoRig, kp: float) -> Tracker:
 def choose(model: ServoRig, laws: Sequence[Tracker], step: float | None = None) -> Chosen:
     """The largest step of two digits that keeps every law within effort, twist and travel, by the linear model."""
     most = RESERVE * model.limit / max(abs(law.k_pf) for law in laws)
-    unit = [outcome(model, model, law, 0.5 * most).measured for law in laws]
-    twist = 0.6 * shaft_make(model.plant, model.name).twist * 0.5 * most / max(r.twist for r in unit)
+    free = replace(model, twist=math.inf, travel=math.inf)  # a trip would cut short what is to be scaled
+    unit = [outcome(free, free, law, 0.5 * most).measured for law in laws]
+    twist = 0.6 * model.twist * 0.5 * most / max(r.twist for r in unit)
     travel = 0.6 * model.travel * 0.5 * most / max(r.travel for r in unit)
     bounds = {"effort": most, "twist": twist, "travel": travel}
     what = min(bounds, key=lambda name: bounds[name])
@@ -276,9 +277,9 @@ def attempt(rig: ServoRig, law: Tracker, step: float) -> StepTrial:
         rig, law.law, at=AT, start=np.zeros(2 * len(rig.plant.coordinates)), seconds=end * rig.period,
         reference=np.append(np.zeros(before), step), pushes=pushes,
     )  # fmt: skip
-    q, twist = done.x[:, ::2], shaft_make(rig.plant, rig.name).twist
+    q = done.x[:, ::2]
     apart, away = np.abs(q[:, -1] - q[:, 0]), np.abs(q).max(axis=1)
-    beyond = np.flatnonzero((apart > twist) | (away > rig.travel))
+    beyond = np.flatnonzero((apart > rig.twist) | (away > rig.travel))
     tripped = float(done.t[beyond[0]]) if beyond.size else math.inf
     last = min(at, int(beyond[0]) if beyond.size else at)
     y = done.record[done.record.outputs[-1]]
