@@ -46,6 +46,10 @@ def source(data: bytes) -> Source:
         (logs.ecp_export()[:2000], "cut short|torn"),
         (logs.ecp_export().replace(b";", b" ", 1), "line 3.*expected ';'"),
         (logs.ros_bag().replace(b",0.050000000", b",", 1), "line 7, column 4 .*this cell is empty"),
+        (
+            logs.ros_bag().replace(b"1707681595.549459725", b"1E661466613"),
+            "line 3.*expected a time stamp in s",
+        ),
         (logs.ros_bag()[:-8], "torn"),
     ],
 )

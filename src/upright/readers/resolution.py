@@ -50,7 +50,7 @@ def exact_seconds(
             value = Decimal(text.strip())
         except InvalidOperation:
             value = Decimal("nan")
-        if not (value.is_finite() and abs(value) < 10**15):
+        if not (value.is_finite() and value.copy_abs() < 10**15):
             raise source.bad(
                 f"expected a time stamp in s, got {text.strip()[:40]!r}; mend or delete the row",
                 line=line,
