@@ -2,7 +2,7 @@
 
 Of each plant 40 rigs of `misfit` are fitted to the first two thirds of a record and predict its last third. One in four
 is asked too little (viscous friction alone, the truth four times as dry), one in four has a record of a second and a
-half. What came is as long a piece of another record, under other commands (80 % of each signal are asked); each number,
+half. What came is a whole other record as long, under other commands (80 % of each signal are asked); each number,
 within its interval or a fifth of the truth where it was called usable, not within a twentieth where it was not; and the
 plant upright under the loop that the fit would place. Of real rigs with three fitted runs or more all but two
 are fitted, one is predicted, and the last is what came. Asked: a wrong yes in at most 5 of 100 cases, a wrong no in at
@@ -93,7 +93,7 @@ def answered(case: Case) -> Told:
     runs = [run("seen", "fit", u[:cut], y[:cut]), run("unseen", "predict", u[cut:length], y[cut:length])]
     fit = identify(rig, runs)
     predicts, _, loop = fit.answers
-    came = predict(fit, rig, [run("other", "predict", u2[: length - cut], y2[: length - cut])])["other"].fit_percent
+    came = predict(fit, rig, [run("other", "predict", u2[:length], y2[:length])])["other"].fit_percent
     told: Told = [(predicts.question, predicts.answer, min(came.values()) >= GOOD)]
     for n, e in fit.estimates.items():
         if e.status in ("firm", "weak", "at bound", "unseen"):
@@ -149,6 +149,7 @@ def run(
             every += rehearsed(name)
     lines = [_line(question, [one[1:] for one in every if one[0] == question]) for question in
              dict.fromkeys(question for question, *_ in every)]  # fmt: skip
+    lines.append(_line("all of them", [one[1:] for one in every]))
     if markdown is not None:
         publish(markdown, "verdicts", "Verdicts", __doc__, lines)
     return lines
