@@ -123,6 +123,8 @@ def rehearsed(name: str) -> Told:
     if len(fitted) < 3:
         return []
     *seen, told, last = fitted
+    if not {last.measured[k] for k in last.free} <= {r.measured[k] for r in seen for k in r.free}:
+        return []  # a body that no fitted run moves is not promised either
     runs = [*seen, replace(told, role="predict"), replace(last, role="predict", label="what came")]
     fit = identify(study.rig, runs[:-1])
     from upright.identification.estimate import predict
