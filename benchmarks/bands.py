@@ -21,7 +21,7 @@ from benchmarks.asked import studies
 from benchmarks.measure import Line, of_each, page
 from benchmarks.misfit import Flaws, moved, read
 from benchmarks.real import STUDIES
-from benchmarks.rigs import DT, MAKES, Make, drawn, sensed
+from benchmarks.rigs import MAKES, Make, asked, drawn, logged, sensed
 from upright.workers import HERE, Workers
 
 SLOW = ("ecp205_spinup", "ecp205_closed_loop", "qube_balance")
@@ -65,10 +65,6 @@ def unseen(name: str, data: str) -> list[Seen]:
 
 def twins(make: Make, place: int, count: int) -> list[tuple[Any, list[Any]]]:
     """Flawed rigs of a make with guesses, each with a run to fit and one to predict."""
-    from upright.identification import Parameter, Rig, Run
-    from upright.physics import find
-
-    plant = find(make.plant)
     generators = [np.random.default_rng(50_000 + 1000 * place + k) for k in range(count)]
     drafts = [drawn(make, g) for g in generators]
     truths, first = [d[0] for d in drafts], [d[1] for d in drafts]
@@ -84,15 +80,11 @@ def twins(make: Make, place: int, count: int) -> list[tuple[Any, list[Any]]]:
     for k, (truth, g) in enumerate(zip(truths, generators, strict=True)):
         memory = g.uniform(0, 0.95)
         runs = [
-            Run(label=label, role=role, t=np.arange(float(len(u))) * DT, u=u[:, [k]], quantum=make.quantum,  # type: ignore[arg-type]
-                y=sensed(make, read(make, motion[:, :, k], flaws, k), memory, 0.003, g),
-                measured=tuple(c.name for c in plant.coordinates))
+            logged(make, label, role, u[:, [k]], sensed(make, read(make, motion[:, :, k], flaws, k), memory, 0.003, g))
             for label, role, u, motion in motions
-        ]  # fmt: skip
+        ]
         off = {n: v * (1 + g.choice([-1, 1]) * g.uniform(0.2, 0.4)) for n, v in truth.items()}
-        parameters = {n: Parameter(name=n, value=v) for n, v in make.known.items()}
-        parameters |= {n: Parameter(name=n, value=v, estimate=True, lower=0.0) for n, v in off.items()}
-        out.append((Rig(plant=plant, parameters=parameters, substeps=2), runs))
+        out.append((asked(make, off), runs))
     return out
 
 

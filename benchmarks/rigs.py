@@ -111,23 +111,34 @@ def sensed(make: Make, clean: np.ndarray, memory: float, loud: float, generator:
     return np.round((clean + rough) / make.quantum) * np.array(make.quantum)
 
 
+def logged(make: Make, label: str, role: Any, u: np.ndarray, y: np.ndarray) -> Any:
+    """A run of commands and positions."""
+    from upright.identification import Run
+    from upright.physics import find
+
+    measured = tuple(c.name for c in find(make.plant).coordinates)
+    t = np.arange(float(len(u))) * DT
+    return Run(label=label, role=role, t=t, u=u, y=y, measured=measured, quantum=make.quantum)
+
+
+def asked(make: Make, guesses: dict[str, float], known: dict[str, float] | None = None) -> Any:
+    """A rig whose numbers are asked from guesses, besides what is known of its make and more."""
+    from upright.identification import Parameter, Rig
+    from upright.physics import find
+
+    parameters = {n: Parameter(name=n, value=v) for n, v in {**make.known, **(known or {})}.items()}
+    parameters |= {n: Parameter(name=n, value=v, estimate=True, lower=0.0) for n, v in guesses.items()}
+    return Rig(plant=find(make.plant), parameters=parameters, substeps=2)
+
+
 def judged(
     make: Make, truth: dict[str, float], u: np.ndarray, y: np.ndarray, generator: np.random.Generator
 ) -> Outcome:
     """What a fit of commands and positions says, beside the truth."""
-    from upright.identification import Parameter, Rig, Run
     from upright.identification.estimate import identify
-    from upright.physics import find
 
-    plant = find(make.plant)
-    run = Run(label="run", role="fit", t=np.arange(float(len(u))) * DT, u=u, y=y,
-              measured=tuple(c.name for c in plant.coordinates), quantum=make.quantum)  # fmt: skip
-    parameters: dict[str, Any] = {n: Parameter(name=n, value=v) for n, v in make.known.items()}
-    for n, v in truth.items():
-        off = 1 + generator.choice([-1, 1]) * generator.uniform(0.2, 0.4)
-        lower = 0.0
-        parameters[n] = Parameter(name=n, value=v * off, estimate=True, lower=lower)
-    fit = identify(Rig(plant=plant, parameters=parameters, substeps=2), [run])
+    guesses = {n: v * (1 + generator.choice([-1, 1]) * generator.uniform(0.2, 0.4)) for n, v in truth.items()}
+    fit = identify(asked(make, guesses), [logged(make, "run", "fit", u, y)])
     said = {n: fit.estimates[n] for n in truth}
     return Outcome(
         held={n: e.interval[0] <= truth[n] <= e.interval[1] for n, e in said.items()},
