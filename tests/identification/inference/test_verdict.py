@@ -143,6 +143,14 @@ def test_an_inertia_over_four_decades_is_no_number_to_use() -> None:
     assert _judged({"a": _score("fit", 99.0, None)}, {"b_2": firm})[1].answer == "yes"
 
 
+def test_no_answer_is_better_than_the_prediction_it_rests_on() -> None:
+    """A firm number of a model that misses its runs is that model's number, not the rig's."""
+    firm = Estimate(value=2e-3, stderr=1e-5, interval=(1.9e-3, 2.1e-3), unit="N m s/rad")
+    answers = _judged({"a": _score("fit", 39.0, None)}, {"b_2": firm})
+    assert [a.answer for a in answers[:2]] == ["no", "in part"]
+    assert "does not predict" in answers[1].reasons[0]
+
+
 def test_friction_at_zero_is_said_to_have_no_evidence() -> None:
     none = Estimate(value=0.0, stderr=0.0, interval=(0.0, 3e-4), unit="N m", status="at bound")
     firm = Estimate(value=2e-3, stderr=1e-5, interval=(1.9e-3, 2.1e-3), unit="kg m^2")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from upright.identification.inference.assumptions import proportional
 from upright.identification.inference.loop import Standing
@@ -64,7 +64,18 @@ class Evidence:
 def judge(found: Evidence) -> tuple[Judgement, ...]:
     """The three answers."""
     predicts = _predicts(found)
-    return predicts, _usable(found, confirmed=predicts.answer == "yes"), _loop(found)
+    others = _usable(found, confirmed=predicts.answer == "yes"), _loop(found)
+    if predicts.answer != "no":
+        return predicts, *others
+    return predicts, *(_no_better(a) for a in others)
+
+
+def _no_better(a: Judgement) -> Judgement:
+    """An answer that rests on a model which does not predict."""
+    reason = (
+        "They are numbers of a model that does not predict." if a.question == USABLE else "The model does not predict."
+    )
+    return replace(a, answer="in part", reasons=(reason, *a.reasons)) if a.answer == "yes" else a
 
 
 def trusted(answers: Sequence[Judgement]) -> bool:
