@@ -20,9 +20,11 @@ quantities
 units
 signals
 records
+logs
 readers
 physics
 laws
+logs.replay
 simulation.lowering
 simulation.kernel
 simulation
@@ -84,6 +86,8 @@ DOORS = {
     "typst": "report",
     "pint": "units",
     "typer": "cli",
+    "mcap": "logs",
+    "zstandard": "logs",
     "loky": "workers",
     "cloudpickle": "workers",
     "distributed": "workers",

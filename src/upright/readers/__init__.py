@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from upright.errors import BadInput, nearest
-from upright.readers import delimited, ecp, matlab, rosbag
+from upright.readers import delimited, ecp, matlab, rosbag, run
 from upright.readers.inspection import Inspection, inspect_record
 from upright.readers.source import Source, load
 from upright.records import PathLike, Record
@@ -17,6 +17,7 @@ READERS = {
     "table": delimited.read,
     "ros-bag": rosbag.read,
     "matlab": matlab.read,
+    "mcap": run.read,
     "upright": delimited.read_written,
 }
 
@@ -58,6 +59,8 @@ def read_source(source: Source, *, reader: str | None = None) -> Record:
 
 def recognise(source: Source) -> str:
     """Name of the reader for this content."""
+    if run.recognise(source.data):
+        return "mcap"
     if matlab.recognise(source.data, source.file):
         return "matlab"
     text = source.text

@@ -1,0 +1,103 @@
+"""A law sample by sample, with the same bits at a rig, in a replay of its log and on any machine.
+
+A sum of floats depends on its order, and libraries choose theirs by processor and version (Python's own `sum` changed
+with 3.12). Here it goes from left to right in plain multiplications and additions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import floor, inf
+
+import numpy as np
+
+from upright.errors import BadInput
+from upright.laws.linear import Array, Controller, Law
+from upright.laws.rule import Numbers, Rule
+
+AtWork = Callable[[float, Sequence[float]], Numbers]
+"""Commands for a time since the start [s] and the readings then; remembers what the law remembers."""
+
+
+def at_work(law: Law | Rule) -> AtWork:
+    """The law from its first sample on, one call for each.
+
+    Commands are rounded and limited as the law says; its `delay` is left to the computer and the converter that have
+    it, and its `quantum` to the encoders.
+
+    Raises
+    ------
+    BadInput
+        When the law has lanes.
+    """
+    if any(width > 1 for width in law.widths().values()):
+        raise BadInput("a law at work has one lane; take it from those it has with of_lanes(slice(k, k + 1)).")
+    return _linear(law) if isinstance(law, Law) else _function(law)
+
+
+def _linear(law: Law) -> AtWork:
+    a, b, c, d = ([_row(row) for row in getattr(law, name).reshape(getattr(law, name).shape[:2])] for name in "ABCD")
+    numbers = {name: _row(values[:, 0]) for name, values in law.by_lane(1).items() if name in ("initial", "target")}
+    target, z, n = numbers["target"], numbers["initial"], law.readings
+    begin = None if law.begin is None else [_row(row) for row in law.begin]
+    sums = [law.windup == "hold" and row == _row(unit) for row, unit in zip(a, np.eye(len(a)), strict=True)]
+    referred, finish = _references(law), _finish(law)
+    k = 0
+
+    def step(t: float, y: Sequence[float]) -> Numbers:
+        nonlocal z, begin, k
+        w = (*(y[i] - target[i] for i in range(n)), *referred(k))
+        if begin is not None:
+            z, begin = tuple(x + _dot(row, w[:n]) for x, row in zip(z, begin, strict=True)), None
+        u, beyond = finish([_dot(to, w) + _dot(of, z) for of, to in zip(c, d, strict=True)])
+        after = tuple(_dot(of, z) + _dot(to, w) for of, to in zip(a, b, strict=True))
+        z = tuple(x if beyond and held else new for x, new, held in zip(z, after, sums, strict=True))
+        k += 1
+        return u
+
+    return step
+
+
+def _function(law: Rule) -> AtWork:
+    p, z = (_row(values[:, 0]) for values in law.by_lane(1).values())
+    referred, finish = _references(law), _finish(law)
+    k = 0
+
+    def step(t: float, y: Sequence[float]) -> Numbers:
+        nonlocal z, k
+        u, z = law.function(t, tuple(y), referred(k), z, p)
+        k += 1
+        return finish(u)[0]
+
+    return step
+
+
+def _references(law: Controller) -> Callable[[int], Numbers]:
+    """References at sample k; the last are held."""
+    r = [_row(row) for row in law.signal()]
+    return lambda k: r[min(k, len(r) - 1)]
+
+
+def _finish(law: Controller) -> Callable[[Sequence[float]], tuple[Numbers, bool]]:
+    """Commands rounded and limited, and whether one was beyond the limit."""
+    limit, given = law.limit, np.asarray(law.command_quantum, dtype=np.float64)
+
+    def finish(u: Sequence[float]) -> tuple[Numbers, bool]:
+        steps = _row(np.broadcast_to(given, (len(u),)))
+        values = [
+            floor(x / q + 0.5) * q if q > 0.0 and abs(x) < inf else float(x) for x, q in zip(u, steps, strict=True)
+        ]
+        return tuple(min(max(x, -limit), limit) for x in values), any(abs(x) > limit for x in values)
+
+    return finish
+
+
+def _row(values: Array) -> Numbers:
+    return tuple(np.asarray(values, dtype=np.float64).tolist())
+
+
+def _dot(row: Numbers, x: Sequence[float]) -> float:
+    total = 0.0
+    for factor, value in zip(row, x, strict=True):
+        total += factor * value
+    return total
