@@ -12,10 +12,12 @@
     up.simulate(rig, gains, start={"theta": 0.2}, seconds=5).plot()
 
 Every verb of the command line, `upright NAME`, stands here under the same name and takes the same options
-(`upright plan-inertias` is `up.plan_inertias`). Numbers are in SI and radians; text wears its unit: ``"12 deg"``.
+(`upright plan-inertias` is `up.plan_inertias`, `upright log show` is `up.log_show`). Numbers are in SI and radians;
+text wears its unit: ``"12 deg"``.
 
 ==========  ==================================================================================================
 Log         read, show, doctor, init, law; Record
+Runs        log_show, log_tail, log_recover, log_convert, log_replay
 Model       identify, predict, ladder, frequency, loadings, plan_inertias
 Plants      Pendulum, CartPendulum, Furuta, DoublePendulum, DoublePendulumAbsolute, FlexibleLink, chain
 Control     place, lqr, dlqr, prefilter, hold, margins, simulate, chance, design, regulate,
@@ -57,6 +59,7 @@ if TYPE_CHECKING:
     from upright.verbs.feedback import dlqr, hold, lqr, margins, place, prefilter
     from upright.verbs.fitting import identify
     from upright.verbs.log import doctor, init, law, read, show
+    from upright.verbs.logs import log_convert, log_recover, log_replay, log_show, log_tail
     from upright.verbs.model import frequency, ladder, loadings, plan_inertias, predict
     from upright.verbs.motion import simulate
 
@@ -84,6 +87,7 @@ _HOMES = {
     "verbs.control": ("design", "regulate", "swing_up", "track"),
     "verbs.course": ("lab", "reproduce", "survey"),
     "verbs.log": ("doctor", "init", "law", "read", "show"),
+    "verbs.logs": ("log_convert", "log_recover", "log_replay", "log_show", "log_tail"),
     "verbs.feedback": ("dlqr", "hold", "lqr", "margins", "place", "prefilter"),
     "verbs.fitting": ("identify",),
     "verbs.model": ("frequency", "ladder", "loadings", "plan_inertias", "predict"),
@@ -95,8 +99,9 @@ __all__ = [
     "BadInput", "CartPendulum", "Coordinate", "DoublePendulum", "DoublePendulumAbsolute", "FlexibleLink", "Furuta",
     "ImpossiblePhysics", "Input", "Joint", "Law", "NotIdentifiable", "Pendulum", "Plant", "Record", "Rule",
     "UprightError", "__version__", "chain", "chance", "design", "dlqr", "doctor", "frequency", "hold", "identify",
-    "init", "lab", "ladder", "law", "loadings", "lqr", "margins", "place", "plan_inertias", "predict", "prefilter",
-    "quantity", "read", "regulate", "reproduce", "show", "simulate", "survey", "swing_up", "track",
+    "init", "lab", "ladder", "law", "loadings", "log_convert", "log_recover", "log_replay", "log_show", "log_tail",
+    "lqr", "margins", "place", "plan_inertias", "predict", "prefilter", "quantity", "read", "regulate", "reproduce",
+    "show", "simulate", "survey", "swing_up", "track",
 ]  # fmt: skip
 
 

@@ -47,6 +47,16 @@ GROUPS = {
         "survey": "Evaluate ratings before and after a course; check printed means and percentages.",
     },
 }
+NESTED = {
+    "log": {
+        "show": "Print what a run's log holds: rig, law, duration, rate, modes, faults, events, what is missing.",
+        "tail": "Print what reaches a log that is being written.",
+        "recover": "Write the rows of a torn log, up to its first error, to a whole file.",
+        "convert": "Write a run's log as CSV, Parquet or MATLAB file.",
+        "replay": "Pass the logged measurements through the logged law; say whether its commands are the same.",
+    },
+}
+"""Commands of two words, ``upright log show``: each in `upright/cli/logs/show.py`, its folder the first word with s."""
 COMMANDS = {name: line for commands in GROUPS.values() for name, line in commands.items()}
 
 SETTINGS = {"help_option_names": ["-h", "--help"]}
@@ -66,7 +76,8 @@ class LazyGroup(TyperGroup):
         """Replace the stand-in that carried the help line by the command itself."""
         name, command, rest = super().resolve_command(ctx, args)
         if name in COMMANDS:
-            command = _load(name)
+            group = next(group for group, commands in GROUPS.items() if name in commands)
+            command = _load(group.lower(), name, COMMANDS[name])
         return name, command, rest
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
@@ -78,6 +89,9 @@ class LazyGroup(TyperGroup):
         for group, commands in GROUPS.items():
             with formatter.section(group):
                 formatter.write_dl(list(commands.items()))
+        for first, commands in NESTED.items():
+            with formatter.section(f"upright {first}"):
+                formatter.write_dl([(f"{first} {name}", line) for name, line in commands.items()])
 
     def invoke(self, ctx: Any) -> Any:
         """Run a command; what a person got wrong becomes a sentence and an exit code."""
@@ -86,11 +100,20 @@ class LazyGroup(TyperGroup):
             return super().invoke(ctx)
 
 
-def _load(name: str) -> Any:
+class LazyNested(TyperGroup):
+    """The commands of two words that share the first."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Replace the stand-in by the command itself."""
+        name, command, rest = super().resolve_command(ctx, args)
+        lines = NESTED.get(str(self.name), {})
+        return name, _load(f"{self.name}s", name, lines[name]) if name in lines else command, rest
+
+
+def _load(folder: str, name: str, line: str) -> Any:
     module = name.replace("-", "_")
-    group = next(group for group, commands in GROUPS.items() if name in commands)
-    function = getattr(import_module(f"upright.cli.{group.lower()}.{module}"), module)
-    text = function.__doc__ or COMMANDS[name]
+    function = getattr(import_module(f"upright.cli.{folder}.{module}"), module)
+    text = function.__doc__ or line
     one = typer.Typer(add_completion=False, rich_markup_mode="rich", context_settings=SETTINGS)
     # Docstrings are raw, for rich's escapes; \b keeps the line breaks of a paragraph.
     # The laboratory goes on in the folder that it reads; every other command leaves what it reads as it is.
@@ -193,6 +216,12 @@ def _upright(
 
 for _name, _help in COMMANDS.items():
     app.command(_name, help=_help)(lambda: None)
+
+for _first, _lines in NESTED.items():
+    _nested = typer.Typer(cls=LazyNested, no_args_is_help=True, rich_markup_mode="rich", context_settings=SETTINGS)
+    for _name, _help in _lines.items():
+        _nested.command(_name, help=_help)(lambda: None)
+    app.add_typer(_nested, name=_first, help=f"{', '.join(_lines)}: see below.")
 
 
 def main() -> None:

@@ -7,7 +7,7 @@ with 3.12). Here it goes from left to right in plain multiplications and additio
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import floor, inf
+from math import floor, isfinite
 
 import numpy as np
 
@@ -80,16 +80,18 @@ def _references(law: Controller) -> Callable[[int], Numbers]:
 
 def _finish(law: Controller) -> Callable[[Sequence[float]], tuple[Numbers, bool]]:
     """Commands rounded and limited, and whether one was beyond the limit."""
-    limit, given = law.limit, np.asarray(law.command_quantum, dtype=np.float64)
+    limit, quantum = law.limit, np.asarray(law.command_quantum, dtype=np.float64)
+    quanta = _row(quantum) if quantum.ndim else (float(quantum),)
 
     def finish(u: Sequence[float]) -> tuple[Numbers, bool]:
-        steps = _row(np.broadcast_to(given, (len(u),)))
-        values = [
-            floor(x / q + 0.5) * q if q > 0.0 and abs(x) < inf else float(x) for x, q in zip(u, steps, strict=True)
-        ]
+        values = [_rounded(x, q) for x, q in zip(u, quanta if len(quanta) > 1 else quanta * len(u), strict=True)]
         return tuple(min(max(x, -limit), limit) for x in values), any(abs(x) > limit for x in values)
 
     return finish
+
+
+def _rounded(x: float, step: float) -> float:
+    return floor(x / step + 0.5) * step if step > 0.0 and isfinite(x) else float(x)
 
 
 def _row(values: Array) -> Numbers:

@@ -20,7 +20,9 @@ from upright.errors import BadInput
 from upright.laws.linear import Law
 from upright.laws.rule import KNOWN, Function, Rule
 
-_BUILT_IN = (abs, min, max, float, int, range, len, round, bool)
+_CALLED = {name: getattr(math, name) for name in sorted(KNOWN)} | {
+    made.__name__: made for made in (abs, min, max, float, int, range, len, round, bool)
+}
 _ALLOWED = (
     ast.Module, ast.FunctionDef, ast.arguments, ast.arg, ast.Return, ast.Assign, ast.AugAssign, ast.AnnAssign, ast.Expr,
     ast.If, ast.For, ast.While, ast.Break, ast.Continue, ast.Pass, ast.BoolOp, ast.BinOp, ast.UnaryOp, ast.IfExp,
@@ -38,8 +40,8 @@ def as_values(law: Law | Rule) -> dict[str, Any]:
         value = getattr(law, field.name)
         if field.name == "function":
             out["text"] = law.compiled_in.text  # type: ignore[union-attr]
-        elif field.name != "_" and (field.default is MISSING or not _same(value, field.default)):
-            out[field.name] = np.asarray(value).tolist() if not isinstance(value, str | tuple) else _plain(value)
+        elif field.default is MISSING or not _same(value, field.default):
+            out[field.name] = value if isinstance(value, str) else np.asarray(value).tolist()
     return out
 
 
@@ -51,17 +53,15 @@ def of_values(values: Mapping[str, Any]) -> Law | Rule:
     BadInput
         When the values are no law's.
     """
-    given = dict(values)
+    given: dict[str, Any] = dict(values)
     kind = given.pop("kind", None)
     try:
         if kind == "linear":
-            z = np.shape(given["C"])[1] if np.ndim(given["C"]) > 1 else 0
-            for name, width in (("A", z), ("B", np.shape(given["D"])[1])):
-                given[name] = np.asarray(given[name], dtype=np.float64).reshape(-1, width, *np.shape(given[name])[2:])
-            if given.get("begin") is not None:
-                given["begin"] = np.asarray(given["begin"], dtype=np.float64)
-            names = {name: tuple(given[name]) for name in ("measured", "reference_names") if name in given}
-            return Law(**{**given, **names})
+            if np.shape(given["C"])[1] == 0:  # rows of no numbers are none in a list
+                given |= {"A": np.zeros((0, 0)), "B": np.zeros((0, np.shape(given["D"])[1]))}
+            given |= {n: tuple(given[n]) for n in ("measured", "reference_names") if n in given}
+            given |= {n: np.asarray(given[n], dtype=np.float64) for n in (*"ABCD", "begin") if n in given}
+            return Law(**given)
         if kind == "rule":
             return Rule(function=_function(str(given.pop("text"))), **given)
     except (TypeError, ValueError, KeyError, IndexError) as error:
@@ -77,39 +77,30 @@ def _same(value: Any, default: Any) -> bool:
     return np.ndim(value) == 0 and value == default
 
 
-def _plain(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else value
-
-
 def _function(text: str) -> Function:
     """Function of a rule's text, which it can be asked for again."""
     try:
         tree = ast.parse(text)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise BadInput(f"the text of the rule is no Python ({error}).") from None
-    called = {node.func.id for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
-    strange = {type(node).__name__ for node in ast.walk(tree) if not isinstance(node, _ALLOWED)}
-    strange |= {f"a call of {name}" for name in called - KNOWN - {f.__name__ for f in _BUILT_IN}}
-    strange |= {
-        "a call of no name"
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Call) and not isinstance(node.func, ast.Name)
-    }
-    strange |= {
-        "a text" for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str | bytes)
-    }
-    strange |= {"a name with __" for node in ast.walk(tree) if isinstance(node, ast.Name) and "__" in node.id}
-    if len(tree.body) != 1 or not isinstance(tree.body[0], ast.FunctionDef):
-        strange.add("something beside one function")
-    elif tree.body[0].decorator_list or tree.body[0].args.defaults or tree.body[0].args.kw_defaults:
-        strange.add("decorators or defaults")
-    if strange:
-        raise BadInput(
-            f"the text of the rule is not run: it has {', '.join(sorted(strange))}, where numbers are enough."
-        )
+    made = tree.body[0] if len(tree.body) == 1 else None
+    if not isinstance(made, ast.FunctionDef) or made.decorator_list or made.args.defaults or made.args.kw_defaults:
+        raise BadInput("the text of the rule is not run: it is not one plain function.")
+    if strange := sorted({word for node in ast.walk(tree) if (word := _strange(node))}):
+        raise BadInput(f"the text of the rule is not run: it has {', '.join(strange)}, where numbers are enough.")
     file = f"<rule {sha256(text.encode()).hexdigest()[:16]}>"
     linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)  # where `inspect` looks for it
-    known = {name: getattr(math, name) for name in KNOWN} | {f.__name__: f for f in _BUILT_IN}
-    space: dict[str, Any] = {"__builtins__": {}, **known}
+    space: dict[str, Any] = {"__builtins__": {}, **_CALLED}
     exec(compile(tree, file, "exec"), space)
-    return space[tree.body[0].name]  # type: ignore[union-attr]
+    return space[made.name]
+
+
+def _strange(node: ast.AST) -> str:
+    """What a part of a rule's text has that no arithmetic needs; empty when it has nothing."""
+    if not isinstance(node, _ALLOWED):
+        return type(node).__name__
+    if isinstance(node, ast.Call) and not (isinstance(node.func, ast.Name) and node.func.id in _CALLED):
+        return f"a call of {ast.unparse(node.func)[:40]}"
+    if isinstance(node, ast.Constant) and isinstance(node.value, str | bytes):
+        return "text"
+    return "names with __" if isinstance(node, ast.Name) and "__" in node.id else ""

@@ -105,6 +105,9 @@ class Container:
     _counts: dict[str, int] = field(default_factory=dict[str, int])
     _headed: bool = False
 
+    def __post_init__(self) -> None:
+        library()  # said before the first chunk, whose mistakes are a file's
+
     def read(self, data: bytes) -> Iterator[list[Message]]:
         """Messages of each further whole chunk in `data`, which continues the file at `at`.
 

@@ -22,7 +22,7 @@ Columns = dict[str, NDArray[Any]]
 
 @dataclass(frozen=True, kw_only=True)
 class RunEvent:
-    """Something that happened at a time [s], behind so many rows of the file; so many rows of the loop were `dropped`."""
+    """Something that happened at a time [s], behind so many rows; so many were `dropped` there."""
 
     t: float
     kind: str
@@ -94,7 +94,7 @@ class RunLog:
             )
         applied = f"{self.header.command}_applied"
         return Record(
-            t=t, signals=signals, units={column.name: column.unit for column in self.header.columns},
+            t=t, signals=signals, units={column.name: column.unit for column in self.header.columns[1:]},
             inputs=(applied,), outputs=tuple(name for name, _ in self.header.coordinates),
             provenance=(provenance or Provenance(file=self.file, reader="mcap")).note(*notes),
         )  # fmt: skip

@@ -1,0 +1,1 @@
+"""The log of a run: `upright log show`, `tail`, `recover`, `convert`, `replay`."""

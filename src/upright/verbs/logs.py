@@ -1,0 +1,190 @@
+"""What happened in this run? Logs that `upright` writes beside a loop: looked at, mended, handed on, replayed."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from upright.errors import BadInput
+from upright.files import PathLike, check_output, keeps_its_inputs
+from upright.verbs.answer import Answer
+from upright.verbs.pages import folder
+
+if TYPE_CHECKING:
+    from upright.logs import RunLog
+    from upright.logs.replay import Replay
+    from upright.logs.salvage import Recovered
+    from upright.logs.tail import Fresh
+    from upright.records import Record
+
+_CONVERTED = (".csv", ".parquet", ".mat")
+
+
+@keeps_its_inputs
+def log_show(log: PathLike, *, out: PathLike | None = None, plot: bool = False) -> Answer[RunLog]:
+    """What ran, for how long, under which law, and what happened: the log of a run.
+
+    Parameters
+    ----------
+    log : path
+        Log of a run (MCAP), whole, torn, or still being written.
+    out : path, optional
+        Folder for the picture show-LOG.svg.
+    plot : bool
+        Draw the columns also where no `out` is named: into the folder at hand.
+
+    Returns
+    -------
+    Answer
+        Of a `RunLog`: header, columns, events, what is missing.
+
+    Raises
+    ------
+    BadInput
+        When nothing of it can be read.
+    """
+    from upright.logs import read_log
+    from upright.report.run import chapter, draw_run
+    from upright.verbs.log import picture_path
+
+    found = read_log(log)
+    files: list[Path] = []
+    if (plot or out is not None) and len(found) > 1:
+        from upright.report.drawing import save
+
+        files.append(picture_path(Path(log), folder(Path() if out is None else out)))
+        save(draw_run(found), files[-1])
+    return Answer(found, chapter(found), files)
+
+
+def log_tail(log: PathLike, *, patience: float = 0.0) -> Iterator[Fresh]:
+    """Rows of a log as they reach its file, from the first on, until its writer ends it.
+
+    Parameters
+    ----------
+    log : path
+        Log of a run (MCAP) that may still be being written.
+    patience : float
+        End when nothing has come for so long [s]; 0 to wait for ever.
+
+    Returns
+    -------
+    iterator
+        Of header, columns and events of one chunk after the other; a chunk has at most 100 rows.
+
+    Raises
+    ------
+    BadInput
+        When it is no log of a run, or is damaged.
+    """
+    from upright.logs import follow
+
+    if not Path(log).exists():
+        raise BadInput(f"There is no file '{log}'; check the path, or start the run first.")
+    clock, last = threading.Event(), time.monotonic()
+
+    def wait() -> bool:
+        clock.wait(0.05)
+        return not 0 < patience < time.monotonic() - last
+
+    for fresh in follow(log, wait):
+        yield fresh
+        last = time.monotonic()
+
+
+@keeps_its_inputs
+def log_recover(log: PathLike, *, out: PathLike | None = None) -> Answer[Recovered]:
+    """Rows of a torn or damaged log, up to its first error, as a whole file.
+
+    Parameters
+    ----------
+    log : path
+        Log of a run (MCAP); it stays as it is.
+    out : path, optional
+        File to write; LOG-recovered.mcap here when omitted.
+
+    Returns
+    -------
+    Answer
+        Of what was kept and what was not.
+
+    Raises
+    ------
+    BadInput
+        When nothing of it can be read, or `out` may not be written.
+    """
+    from upright.logs import recover
+    from upright.report.run import recovered
+
+    at = Path(f"{Path(log).stem}-recovered.mcap") if out is None else Path(out)
+    found = recover(log, at)
+    return Answer(found, recovered(found), [at])
+
+
+@keeps_its_inputs
+def log_convert(log: PathLike, *, out: PathLike | None = None) -> Answer[Record]:
+    """Log of a run as a table for other programs.
+
+    Parameters
+    ----------
+    log : path
+        Log of a run (MCAP).
+    out : path, optional
+        File to write; its ending says the format: .csv, .parquet or .mat. LOG.csv here when omitted.
+
+    Returns
+    -------
+    Answer
+        Of a `Record`.
+
+    Raises
+    ------
+    BadInput
+        When the log has fewer than two rows, or there is no such format.
+    """
+    from upright.logs import read_log
+    from upright.report.page import Chapter, Part, Points
+
+    at = Path(f"{Path(log).stem}.csv") if out is None else Path(out)
+    if at.suffix not in _CONVERTED:
+        raise BadInput(f"a log is converted to a file ending in {', '.join(_CONVERTED)}, got '{os.fspath(at)}'.")
+    check_output(at, log)
+    record = read_log(log).record()
+    {".csv": record.to_csv, ".parquet": record.to_parquet, ".mat": record.to_mat}[at.suffix](at)
+    notes = (Part("Notes", (Points(record.provenance.notes),)),) if record.provenance.notes else ()
+    told = Chapter(
+        title=f"{Path(log).name} as {at.name}", verdict=f"{len(record)} rows of {len(record.names) + 1} columns.",
+        parts=notes, numbers={"rows": len(record), "columns": ["t", *record.names], "file": str(at)},
+    )  # fmt: skip
+    return Answer(record, told, [at])
+
+
+def log_replay(log: PathLike) -> Answer[Replay]:
+    """Whether the logged law gives the logged commands again, to the last bit, from the logged measurements.
+
+    Parameters
+    ----------
+    log : path
+        Log of a run (MCAP).
+
+    Returns
+    -------
+    Answer
+        Of a `Replay`; `identical` says it, `first` names the first difference.
+
+    Raises
+    ------
+    BadInput
+        When the log has no law, or no row in which it gave the command.
+    """
+    from upright.logs import read_log
+    from upright.logs.replay import replay
+    from upright.report.run import replayed
+
+    found = read_log(log)
+    again = replay(found)
+    return Answer(again, replayed(found, again))

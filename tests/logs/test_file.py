@@ -1,0 +1,226 @@
+"""Does a log give back what was put into it, to this reader and to MCAP's own, and never anything else?"""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+
+import upright as up
+from tests.logs.runs import HEADER, row, written, wrong
+from upright.errors import BadInput
+from upright.logs import LogHeader, follow, recover
+from upright.logs.layout import RunFile
+from upright.logs.whole import log_of
+
+NUMBER = st.floats(allow_nan=False, allow_infinity=False)
+WHOLE = st.integers(-(2**63), 2**63 - 1)
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.lists(st.tuples(NUMBER, WHOLE, WHOLE, NUMBER, NUMBER, NUMBER, WHOLE, WHOLE), max_size=5))
+def test_every_number_comes_back_to_the_last_bit(rows):
+    header = LogHeader(rig="", law={}, coordinates=(("x", "m"),), command_unit="A", period=1.0, versions={})
+    stream = io.BytesIO()
+    file = RunFile(stream, header)
+    for numbers in rows:
+        file.row(numbers)
+    file.finish()
+    log = log_of(stream.getvalue(), "x.mcap")
+    assert [repr(log.row(k)) for k in range(len(log))] == [repr(numbers) for numbers in rows]
+    assert log.complaint == ""
+
+
+def test_a_header_comes_back_as_it_was():
+    law = {"kind": "linear", "C": [[]], "D": [[0.1 + 0.2]]}
+    header = LogHeader(
+        rig='"ä" = 1\n', law=law, coordinates=(("θ", "rad"),), command_unit="N m", period=0.1, driven=(2,),
+        modes={2: "HOST"}, faults={1: "WATCHDOG"}, start=1.7e9, versions={"upright": "1"},
+    )  # fmt: skip
+    stream = io.BytesIO()
+    RunFile(stream, header).finish()
+    assert log_of(stream.getvalue(), "x").header == header
+    assert header.fault_names(3) == ("WATCHDOG", "fault 2")
+
+
+def test_mcap_itself_reads_rows_units_and_metadata():
+    reader = make_reader(io.BytesIO(written(250)), validate_crcs=True)
+    messages = list(reader.iter_messages(topics=["/samples"]))
+    names = [column.name for column in HEADER.columns]
+    assert [json.loads(m.data) for _, _, m in messages] == [dict(zip(names, row(k), strict=True)) for k in range(250)]
+    assert [m.log_time for _, _, m in messages] == [k * 1_000_000 for k in range(250)]
+    schema, channel, _ = messages[0]
+    assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
+    units = {name: field["unit"] for name, field in json.loads(schema.data)["properties"].items()}
+    assert units == {
+        "t": "s", "tick": "1", "psi_counts": "counts", "theta_counts": "counts", "psi": "rad", "theta": "rad",
+        "u": "V", "u_applied": "V", "mode": "1", "faults": "1",
+    }  # fmt: skip
+    assert {m.name: m.metadata for m in reader.iter_metadata()}["rig"]["file"] == HEADER.rig
+    assert reader.get_summary().statistics.message_count == 251
+
+
+def test_a_number_that_is_none_is_null_and_leaves_the_record():
+    stream = io.BytesIO()
+    file = RunFile(stream, HEADER)
+    for k in range(4):
+        file.row((*row(k)[:6], float("inf") if k == 1 else 0.0, 0.0, 2, 0))
+    file.finish()
+    log = log_of(stream.getvalue(), "x")
+    assert np.isnan(log.columns["u"]).tolist() == [False, True, False, False]
+    assert log.record()["tick"].tolist() == [0, 2, 3]
+    assert "1 rows left out" in log.record().provenance.notes[0]
+
+
+def test_a_log_is_a_record_like_any_other(tmp_path):
+    path = tmp_path / "renamed.dat"
+    path.write_bytes(written(300))
+    record = up.read(path)
+    assert record.provenance.reader == "mcap"
+    assert (record.inputs, record.outputs) == (("u_applied",), ("psi", "theta"))
+    assert (record.units["theta"], record.units["u"], record.units["psi_counts"]) == ("rad", "V", "counts")
+    np.testing.assert_array_equal(record["theta"], [row(k)[5] for k in range(300)])
+    np.testing.assert_array_equal(record.t, 1e-3 * np.arange(300))
+
+
+def test_a_torn_log_gives_its_whole_chunks_and_never_a_wrong_row():
+    """Every row stands in one chunk of 50, so that what is read is a multiple of it: the chunks that are whole."""
+    data = written(400, every=50, finish=False)
+    ends = chunk_ends(data)
+    for cut in np.random.default_rng(0).integers(ends[0], len(data), 80).tolist():
+        for tail in (b"", bytes(cut % 1000)):  # zeros are what a file system leaves that had not written yet
+            log = log_of(data[:cut] + tail, "x")
+            assert len(log) == 50 * min(sum(end <= cut for end in ends), 8)
+            assert wrong(log) == []
+            assert ("stopped" in log.complaint) or ("Damaged" in log.complaint)
+
+
+def chunk_ends(data: bytes) -> list[int]:
+    """Where each chunk ends, by MCAP's own reader."""
+    from mcap.records import Chunk
+    from mcap.stream_reader import StreamReader
+
+    stream, ends = io.BytesIO(data), []
+    try:
+        for record in StreamReader(stream, emit_chunks=True).records:
+            if isinstance(record, Chunk):
+                ends.append(stream.tell())
+    except Exception:  # it ends without a footer
+        pass
+    return ends
+
+
+@pytest.mark.parametrize("finish", [True, False])
+def test_a_changed_byte_never_gives_a_wrong_row(finish):
+    data = written(300, every=50, finish=finish)
+    rng = np.random.default_rng(1)
+    kept = []
+    for at, by in zip(rng.integers(0, len(data), 300), rng.integers(1, 256, 300), strict=True):
+        damaged = bytearray(data)
+        damaged[at] ^= int(by)
+        try:
+            log = log_of(bytes(damaged), "x")
+        except BadInput:
+            continue
+        kept.append(len(log))
+        assert wrong(log) == []
+        assert log.columns["tick"].tolist() == list(range(len(log)))
+        # a change that costs rows is told of
+        assert log.complaint if finish and len(log) < 300 else True
+    assert len(kept) > 200
+    assert max(kept) == 300
+
+
+def test_text_that_was_changed_is_said_to_be_lost():
+    data = written(100).replace(b'name = "twin"', b'name = "twim"')
+    log = log_of(data, "x")
+    assert log.header.rig == ""
+    assert "Damaged: the text of rig" in log.complaint
+    assert len(log) == 100
+
+
+def test_a_chunk_that_is_missing_ends_the_reading():
+    data = written(300, finish=False)
+    ends = chunk_ends(data)
+    log = log_of(data[: ends[0]] + data[ends[1] :], "x")
+    assert len(log) == 100
+    assert "message 100 of /samples is missing" in log.complaint
+
+
+def test_what_is_recovered_is_whole_to_mcap_itself(tmp_path):
+    torn = tmp_path / "torn.mcap"
+    torn.write_bytes(written(400, finish=False)[:-3000])
+    found = recover(torn, tmp_path / "whole.mcap")
+    rows = list(make_reader(open(tmp_path / "whole.mcap", "rb"), validate_crcs=True).iter_messages(["/samples"]))
+    assert len(rows) == len(found.log) == 300
+    log = log_of((tmp_path / "whole.mcap").read_bytes(), "whole.mcap")
+    assert (log.complaint, wrong(log), log.header) == ("", [], HEADER)
+    assert log.events[-1].kind == "recovered"
+    assert found.lost_bytes == torn.stat().st_size - found.log.readable
+    with pytest.raises(BadInput, match="would be overwritten"):
+        recover(torn, torn)
+
+
+def test_the_tail_of_a_growing_log_is_every_row_once(tmp_path):
+    """The file grows by a few bytes whenever nothing new was found, so that chunks are met half written."""
+    data, path = written(300, every=30), tmp_path / "run.mcap"
+    path.write_bytes(b"")
+    at = 0
+
+    def grow() -> bool:
+        nonlocal at
+        with open(path, "ab") as file:
+            file.write(data[at : at + 700])
+        at += 700
+        return True
+
+    parts = list(follow(path, grow))
+    assert np.concatenate([part.columns["tick"] for part in parts]).tolist() == list(range(300))
+    assert [event.kind for part in parts for event in part.events] == ["stop"]
+    assert len(parts) > 5
+
+
+def test_a_tail_ends_when_the_wait_is_over(tmp_path):
+    path = tmp_path / "run.mcap"
+    path.write_bytes(written(200, finish=False))
+    assert sum(part.columns["t"].size for part in follow(path, lambda: False)) == 200
+
+
+@pytest.mark.parametrize(
+    ("data", "sentence"),
+    [
+        (b"t,x\n0,1\n", "no log of a run"),
+        (b"\x89MCAP0\r\n", "says nothing of its columns"),
+        (written(10).replace(b"\x07\x00\x00\x00upright", b"\x07\x00\x00\x00else???"), "its profile is 'else\\?\\?\\?'"),
+    ],
+)
+def test_what_is_no_log_of_ours_gets_a_sentence(data, sentence):
+    with pytest.raises(BadInput, match=sentence):
+        log_of(data, "x")
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"coordinates": ()}, "at least one"),
+        ({"period": 0.0}, "above 0"),
+        ({"coordinates": (("u", "rad"),)}, "u would stand there twice"),
+    ],
+)
+def test_a_header_that_makes_no_rows_gets_a_sentence(changes, sentence):
+    given = {"rig": "", "law": {}, "coordinates": (("x", "m"),), "command_unit": "V", "period": 1.0, "versions": {}}
+    with pytest.raises(BadInput, match=sentence):
+        LogHeader(**{**given, **changes})
+
+
+def test_without_the_extra_its_name_is_given(monkeypatch):
+    data = written(10)
+    monkeypatch.setitem(sys.modules, "mcap.writer", None)
+    with pytest.raises(BadInput, match=r"pip install 'upright\[rig\]'"):
+        log_of(data, "x")
