@@ -43,7 +43,8 @@ control
 rigs
 report
 report.fit
-report.ladder report.law report.log report.run
+report.ladder report.law report.log
+report.run
 diagnosis questionnaire
 paper
 experiments.abreast experiments.makes

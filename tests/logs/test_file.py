@@ -157,9 +157,10 @@ def test_what_is_recovered_is_whole_to_mcap_itself(tmp_path):
     torn = tmp_path / "torn.mcap"
     torn.write_bytes(written(400, finish=False)[:-3000])
     found = recover(torn, tmp_path / "whole.mcap")
-    rows = list(make_reader(open(tmp_path / "whole.mcap", "rb"), validate_crcs=True).iter_messages(["/samples"]))
+    data = (tmp_path / "whole.mcap").read_bytes()
+    rows = list(make_reader(io.BytesIO(data), validate_crcs=True).iter_messages(["/samples"]))
     assert len(rows) == len(found.log) == 300
-    log = log_of((tmp_path / "whole.mcap").read_bytes(), "whole.mcap")
+    log = log_of(data, "whole.mcap")
     assert (log.complaint, wrong(log), log.header) == ("", [], HEADER)
     assert log.events[-1].kind == "recovered"
     assert found.lost_bytes == torn.stat().st_size - found.log.readable

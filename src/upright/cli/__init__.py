@@ -50,7 +50,7 @@ GROUPS = {
 NESTED = {
     "log": {
         "show": "Print what a run's log holds: rig, law, duration, rate, modes, faults, events, what is missing.",
-        "tail": "Print what reaches a log that is being written.",
+        "tail": "Print the last row of every chunk as it reaches a log that is being written, and every event.",
         "recover": "Write the rows of a torn log, up to its first error, to a whole file.",
         "convert": "Write a run's log as CSV, Parquet or MATLAB file.",
         "replay": "Pass the logged measurements through the logged law; say whether its commands are the same.",

@@ -99,6 +99,8 @@ def _strange(node: ast.AST) -> str:
     """What a part of a rule's text has that no arithmetic needs; empty when it has nothing."""
     if not isinstance(node, _ALLOWED):
         return type(node).__name__
+    if (isinstance(node, ast.arg) and node.annotation) or (isinstance(node, ast.FunctionDef) and node.returns):
+        return "annotations"
     if isinstance(node, ast.Call) and not (isinstance(node.func, ast.Name) and node.func.id in _CALLED):
         return f"a call of {ast.unparse(node.func)[:40]}"
     if isinstance(node, ast.Constant) and isinstance(node.value, str | bytes):

@@ -132,7 +132,7 @@ class RunFile:
         writer, _ = library()
         self._file = writer.Writer(stream)
         self._message = row_writer(header.columns)
-        self._epoch = round(header.start * 1e9)
+        self._epoch = round(header.start * 1e9) if 0.0 <= header.start < 1e10 else 0
         self._file.start(profile=PROFILE, library=f"upright {header.versions.get('upright', '')}".strip())
         metadata = header.as_metadata()
         for name, texts in metadata.items():
@@ -161,8 +161,8 @@ class RunFile:
         self.events += 1
 
     def _add(self, channel: int, t: float, content: bytes, number: int) -> None:
-        # the format counts in whole nanoseconds and has no time before 0
-        at = min(max(self._epoch + round(t * 1e9), 0), (1 << 64) - 1) if isfinite(t) else self._epoch
+        # the format counts in nanoseconds from 0 to 2^64; the row has the time itself
+        at = self._epoch + (round(t * 1e9) if 0.0 <= t < 1e9 else 0)
         self._file.add_message(self._channels[channel], at, content, at, number & 0xFFFFFFFF)
 
     def flush(self) -> None:

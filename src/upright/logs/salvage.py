@@ -12,7 +12,7 @@ from upright.logs.whole import RunEvent, RunLog, read_log
 
 
 @dataclass(frozen=True, kw_only=True)
-class Recovered:
+class Salvaged:
     """What was kept of a log, and what was not.
 
     Attributes
@@ -33,7 +33,7 @@ class Recovered:
     lost_rows: int
 
 
-def recover(path: PathLike, out: PathLike) -> Recovered:
+def recover(path: PathLike, out: PathLike) -> Salvaged:
     """Write the rows and events of a log, up to its first error, as a whole file; the log itself stays as it is.
 
     Raises
@@ -60,7 +60,7 @@ def recover(path: PathLike, out: PathLike) -> Recovered:
             t = float(log.columns["t"][-1]) if len(log) else 0.0
             file.event(t, "recovered", f"{len(log)} rows of {Path(log.file).name}. {log.complaint}")
         file.finish()
-    return Recovered(log=log, file=Path(out), lost_bytes=lost, lost_rows=rows)
+    return Salvaged(log=log, file=Path(out), lost_bytes=lost, lost_rows=rows)
 
 
 def _event(file: RunFile, event: RunEvent) -> None:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from upright.logs.replay import Replay
-    from upright.logs.salvage import Recovered
+    from upright.logs.salvage import Salvaged
 
 _MOST = 40  # events in a table
 
@@ -118,7 +118,7 @@ def draw_run(log: RunLog) -> Figure:
     return draw_columns(record, inspect(record))
 
 
-def recovered(found: Recovered) -> Chapter:
+def recovered(found: Salvaged) -> Chapter:
     """What was kept of a torn log."""
     log = found.log
     lost = (

@@ -17,7 +17,7 @@ from upright.verbs.pages import folder
 if TYPE_CHECKING:
     from upright.logs import RunLog
     from upright.logs.replay import Replay
-    from upright.logs.salvage import Recovered
+    from upright.logs.salvage import Salvaged
     from upright.logs.tail import Fresh
     from upright.records import Record
 
@@ -97,7 +97,7 @@ def log_tail(log: PathLike, *, patience: float = 0.0) -> Iterator[Fresh]:
 
 
 @keeps_its_inputs
-def log_recover(log: PathLike, *, out: PathLike | None = None) -> Answer[Recovered]:
+def log_recover(log: PathLike, *, out: PathLike | None = None) -> Answer[Salvaged]:
     """Rows of a torn or damaged log, up to its first error, as a whole file.
 
     Parameters
