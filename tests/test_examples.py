@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from upright.cli import COMMANDS, app
+from upright.cli import COMMANDS, NESTED, app
 from upright.physics import Plant, find
 from upright.simulation import simulate
 
@@ -129,14 +129,17 @@ def test_a_study_finds_its_logs_and_says_whose_they_are(path, monkeypatch):
 
 def commands(page: Path) -> list[tuple[str, list[str]]]:
     """Every `upright COMMAND --option` shown on a page."""
-    shown = re.findall(r"upright ([a-z]+(?:-[a-z]+)*)((?: [^\s`#|&;]+)*)", page.read_text(encoding="utf-8"))
-    return [(name, re.findall(r"(?<!\S)(--?[a-z][a-z-]*)", rest)) for name, rest in shown if name in COMMANDS]
+    words = "|".join(f"{first} {name}" for first, names in NESTED.items() for name in names)
+    pattern = rf"upright ({words}|[a-z]+(?:-[a-z]+)*)((?: [^\s`#|&;]+)*)"
+    known = {*COMMANDS, *words.split("|")}
+    shown = re.findall(pattern, page.read_text(encoding="utf-8"))
+    return [(name, re.findall(r"(?<!\S)(--?[a-z][a-z-]*)", rest)) for name, rest in shown if name in known]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_pages_show_options_that_exist(page):
     for name, options in commands(page):
-        listing = CliRunner().invoke(app, [name, "--help"], terminal_width=200).stdout
+        listing = CliRunner().invoke(app, [*name.split(), "--help"], terminal_width=200).stdout
         for option in options:
             assert re.search(rf"{re.escape(option)}\b", listing), f"{page.name}: upright {name} has no {option}"
 

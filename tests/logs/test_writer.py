@@ -8,7 +8,6 @@ import subprocess
 import sys
 import threading
 import time
-from pathlib import Path
 
 import pytest
 
@@ -28,19 +27,7 @@ def until(true, patience: float = 20.0) -> None:
         CLOCK.wait(0.005)
 
 
-def process_of(path) -> int:
-    """Number of the process that writes a log, by its command line."""
-    for entry in os.listdir("/proc"):
-        try:
-            command = Path(f"/proc/{entry}/cmdline").read_bytes().split(b"\0")
-        except (OSError, ValueError):
-            continue
-        if b"upright.logs.process" in command and str(path).encode() in command:
-            return int(entry)
-    raise AssertionError("no process writes this log")
-
-
-LINUX = pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="finds the process in /proc")
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="/proc and prlimit of Linux")
 
 
 def test_rows_and_events_come_back_in_their_order(tmp_path):
@@ -60,19 +47,19 @@ def test_rows_and_events_come_back_in_their_order(tmp_path):
     assert log.close() == status
 
 
-@LINUX
+@POSIX
 def test_rows_that_find_no_place_are_counted_and_told_where(tmp_path):
     """A process that is stopped takes nothing: 64 rows wait, the other 36 are dropped, and what comes later is kept."""
     path = tmp_path / "run.mcap"
     log = LogWriter(path, header=HEADER, rows=64)
-    os.kill(process_of(path), signal.SIGSTOP)
+    os.kill(log.pid, signal.SIGSTOP)
     try:
         for k in range(100):
             log.row(row(k))
         assert log.status().dropped == 36
         assert "36 rows dropped: 64 waited already" in log.status().message
     finally:
-        os.kill(process_of(path), signal.SIGCONT)
+        os.kill(log.pid, signal.SIGCONT)
     until(lambda: log.status().rows == 64)
     for k in range(100, 110):
         log.row(row(k))
@@ -84,14 +71,14 @@ def test_rows_that_find_no_place_are_counted_and_told_where(tmp_path):
     assert wrong(read) == []
 
 
-@LINUX
+@POSIX
 def test_a_killed_process_leaves_its_chunks_and_the_loop_runs(tmp_path):
     path = tmp_path / "run.mcap"
     log = LogWriter(path, header=HEADER)
     for k in range(250):
         log.row(row(k))
     until(lambda: log.status().rows == 250)
-    os.kill(process_of(path), signal.SIGKILL)
+    os.kill(log.pid, signal.SIGKILL)
     until(lambda: log.status().message != "")
     for k in range(250, 300):
         log.row(row(k))
@@ -119,14 +106,14 @@ def test_a_killed_loop_loses_no_row_that_it_handed_over(tmp_path):
     assert wrong(read_log(path)) == []
 
 
-@pytest.mark.skipif(not hasattr(__import__("os"), "sched_getscheduler"), reason="limits another process")
+@LINUX
 def test_a_full_disk_ends_the_log_and_not_the_loop(tmp_path):
     """The file may not pass 8 kB, which for the process is a disk that takes no more."""
     from resource import RLIMIT_FSIZE, prlimit
 
     path = tmp_path / "run.mcap"
     log = LogWriter(path, header=HEADER)
-    prlimit(process_of(path), RLIMIT_FSIZE, (8192, 8192))
+    prlimit(log.pid, RLIMIT_FSIZE, (8192, 8192))
     for k in range(1000):
         log.row(row(k))
     until(lambda: log.status().message != "")

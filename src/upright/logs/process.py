@@ -25,7 +25,7 @@ from upright.logs.ring import Ring, join
 
 BATCH = 100
 """Rows in a chunk at most, and"""
-LATEST = 0.05
+LATEST = 0.04
 """seconds that a row waits for others at most: two of them, with all else, stay below 100 ms."""
 PAUSE, SYNC = 0.01, 1.0
 _FULL = (errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC))

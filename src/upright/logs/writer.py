@@ -108,6 +108,11 @@ class LogWriter:
             with suppress(OSError):
                 Path(about).unlink()
 
+    @property
+    def pid(self) -> int:
+        """Number of the process that writes."""
+        return self._process.pid
+
     def row(self, sample: Sequence[float]) -> None:
         """Hand over one row: t, tick, counts, readings, command, applied command, mode, faults; see `LogHeader`."""
         if self._ring is None:
