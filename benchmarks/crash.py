@@ -263,7 +263,7 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
         for what, harm in harms.items():
             read, bad, shares = damaged(rows, trials, harm)
             note = (
-                f"{trials} files of {rows} rows: {read} give rows, {trials - read} are refused; wrong rows {bad}; "
+                f"{trials} files of {rows} rows: rows from {read}, refused {trials - read}; wrong rows {bad}; "
                 f"median of the rows kept {100 * float(np.median(shares)):.0f} %"
             )
             lines.append(Line(contender=what, error=float(bad), note=note))

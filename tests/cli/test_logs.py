@@ -36,7 +36,7 @@ def test_show_says_what_ran_and_what_is_missing(torn, tmp_path):
     assert code == 0
     for words in ("300 whole rows", "Its writer was stopped", "every 1 ms", "HOST", 'name = "twin"', "upright 0.1.0"):
         assert words in told
-    assert "theta_counts" in (tmp_path / "show-run.svg").read_text(encoding="utf-8")
+    assert "u_applied" in (tmp_path / "show-run.svg").read_text(encoding="utf-8")
     numbers = json.loads(log("show", torn, "--json")[1])
     assert (numbers["rows"], numbers["columns"]["theta"]) == (300, "rad")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import sys
+import tomllib
 
 import numpy as np
 import pytest
@@ -84,7 +85,9 @@ def test_a_log_is_a_record_like_any_other(tmp_path):
     record = up.read(path)
     assert record.provenance.reader == "mcap"
     assert (record.inputs, record.outputs) == (("u_applied",), ("psi", "theta"))
-    assert (record.units["theta"], record.units["u"], record.units["psi_counts"]) == ("rad", "V", "counts")
+    assert (record.units["theta"], record.units["u"]) == ("rad", "V")
+    assert record.names == ("tick", "psi", "theta", "u", "u_applied", "mode", "faults")
+    assert "theta_counts" in log_of(path.read_bytes(), "x").record(counts=True).names
     np.testing.assert_array_equal(record["theta"], [row(k)[5] for k in range(300)])
     np.testing.assert_array_equal(record.t, 1e-3 * np.arange(300))
 
@@ -225,3 +228,12 @@ def test_without_the_extra_its_name_is_given(monkeypatch):
     monkeypatch.setitem(sys.modules, "mcap.writer", None)
     with pytest.raises(BadInput, match=r"pip install 'upright\[rig\]'"):
         log_of(data, "x")
+
+
+def test_doctor_and_init_go_by_what_the_log_says_of_its_columns(tmp_path):
+    """The command asked for repeats the one applied, and is neither a position nor the drive."""
+    path = tmp_path / "run.mcap"
+    path.write_bytes(written(3000))
+    assert not up.doctor(path).wrong
+    drive = tomllib.loads(up.init(path, plant="furuta").value)["drive"]
+    assert (drive["column"], drive["unit"]) == ("u_applied", "V")

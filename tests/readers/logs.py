@@ -72,6 +72,13 @@ def mat_vectors(n: int = 60, **more: object) -> bytes:
     return file.getvalue()
 
 
+def run() -> bytes:
+    """Log of a run, a chunk every 20 rows, as its writer left it when it was stopped."""
+    from tests.logs.runs import written
+
+    return written(60, every=20, finish=False)
+
+
 SYNTHETIC = {
     "ecp.csv": ecp_export,
     "front end.txt": tab_export,
@@ -80,4 +87,5 @@ SYNTHETIC = {
     "hash.txt": hash_text,
     "bag.csv": ros_bag,
     "plain.mat": mat_vectors,
+    "run.mcap": run,
 }

@@ -33,6 +33,7 @@ def source(data: bytes, name: str = "log.csv") -> Source:
         ("hash.txt", "table"),
         ("bag.csv", "ros-bag"),
         ("plain.mat", "matlab"),
+        ("run.mcap", "mcap"),
     ],
 )
 def test_the_format_is_told_by_the_content_not_by_the_suffix(name: str, reader: str) -> None:

@@ -101,11 +101,14 @@ class Case:
 
     @property
     def measured(self) -> tuple[Column, ...]:
-        """Columns that measure a place: those of the coordinates, else whatever looks like one."""
+        """Columns that measure a place: those of the coordinates, the record's outputs, else what looks like one."""
         named = [p.column for p in self.places.values()]
         if named:
             return tuple(self.inspection.column(name) for name in named)
-        return tuple(c for c in self.inspection.columns if not (c.drive or c.constant or tells_time(c)))
+        stated = self.record.outputs or self.record.names
+        return tuple(
+            c for c in self.inspection.columns if c.name in stated and not (c.drive or c.constant or tells_time(c))
+        )
 
     @property
     def driven(self) -> bool:

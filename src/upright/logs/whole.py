@@ -68,15 +68,18 @@ class RunLog:
         """Numbers of a row, as the loop handed them over."""
         return tuple(column[k].item() for column in self.columns.values())
 
-    def record(self, provenance: Provenance | None = None) -> Record:
+    def record(self, provenance: Provenance | None = None, *, counts: bool = False) -> Record:
         """The rows as a record: the applied command is its input, the measured coordinates its outputs.
+
+        Left out, unless `counts` are asked for, are the encoders' counts, of which the coordinates are multiples.
 
         Raises
         ------
         BadInput
             When there are fewer than two rows, or the time does not increase.
         """
-        t, signals = self.columns["t"], {name: x for name, x in self.columns.items() if name != "t"}
+        raw = {"t"} if counts else {"t", *(f"{name}_counts" for name, _ in self.header.coordinates)}
+        t, signals = self.columns["t"], {name: x for name, x in self.columns.items() if name not in raw}
         finite = np.isfinite(np.array([np.asarray(x, dtype=np.float64) for x in self.columns.values()])).all(axis=0)
         notes = list(filter(None, [self.complaint]))
         if not finite.all():
@@ -94,7 +97,7 @@ class RunLog:
             )
         applied = f"{self.header.command}_applied"
         return Record(
-            t=t, signals=signals, units={column.name: column.unit for column in self.header.columns[1:]},
+            t=t, signals=signals, units={c.name: c.unit for c in self.header.columns if c.name in signals},
             inputs=(applied,), outputs=tuple(name for name, _ in self.header.coordinates),
             provenance=(provenance or Provenance(file=self.file, reader="mcap")).note(*notes),
         )  # fmt: skip

@@ -30,7 +30,7 @@ def read(file: Log, *, reader: str = "") -> Record:
     Parameters
     ----------
     file : path, Record or pandas.DataFrame
-        CSV, tab-separated text, MATLAB, ECP export, ROS bag as CSV; recognised from the content.
+        CSV, tab-separated text, MATLAB, ECP export, ROS bag as CSV, log of a run (MCAP); recognised from the content.
     reader : str, optional
         Reader of the log, when it is not recognised.
 

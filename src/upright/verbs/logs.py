@@ -153,7 +153,7 @@ def log_convert(log: PathLike, *, out: PathLike | None = None) -> Answer[Record]
     if at.suffix not in _CONVERTED:
         raise BadInput(f"a log is converted to a file ending in {', '.join(_CONVERTED)}, got '{os.fspath(at)}'.")
     check_output(at, log)
-    record = read_log(log).record()
+    record = read_log(log).record(counts=True)
     {".csv": record.to_csv, ".parquet": record.to_parquet, ".mat": record.to_mat}[at.suffix](at)
     notes = (Part("Notes", (Points(record.provenance.notes),)),) if record.provenance.notes else ()
     told = Chapter(

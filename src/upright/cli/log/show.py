@@ -21,8 +21,8 @@ def show(
     """Print and draw what a log holds: columns, sample rate, quanta, gaps, lying columns.
 
     Readable are ECP exports, tab-separated and comma-separated text with or
-    without names, MATLAB version 5 and CSV exports of ROS bags; the format is
-    recognised from the content.
+    without names, MATLAB version 5, CSV exports of ROS bags and upright's own logs
+    of runs (MCAP); the format is recognised from the content.
 
     upright show swing.csv
     """

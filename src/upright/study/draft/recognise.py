@@ -174,7 +174,14 @@ def in_dac_counts(c: Column) -> bool:
 
 
 def drive_column(record: Record, seen: Inspection) -> Column | None:
-    """What commands the rig: the column in converter counts, else one called like an effort, else one that looks so."""
+    """What commands the rig.
+
+    That is the record's input, else the column in converter counts, else one called like an effort, else one that
+    looks so.
+    """
+    if record.inputs:
+        stated = seen.column(record.inputs[0])
+        return None if stated.constant else stated
     dac = next((c for c in seen.columns if in_dac_counts(c)), None)
     if dac is not None:
         return dac
