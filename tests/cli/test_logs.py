@@ -76,7 +76,7 @@ def test_tail_prints_a_line_for_each_chunk_and_the_events(tmp_path):
     code, told, _ = log("tail", path)
     assert code == 0
     assert told.count("rows)") == 3
-    assert "(300 rows)" in told
+    assert f"u_applied {row(299)[7]:.5g} V HOST (300 rows)" in told
     assert "stop: asked" in told
     assert log("tail", tmp_path / "gone.mcap")[0] == 2
 

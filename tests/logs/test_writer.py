@@ -164,3 +164,20 @@ def test_a_file_that_cannot_be_made_is_said_before_the_loop_begins():
 def test_what_wrote_a_log_is_known():
     assert versions()["upright"]
     assert set(versions()) == {"upright", "git", "python"}
+
+
+def test_the_process_beside_the_loop_loads_no_numerical_library():
+    code = "import sys, upright.logs.process; print([n for n in ('numpy', 'pandas', 'scipy') if n in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
+@pytest.mark.slow
+@POSIX
+def test_kills_at_any_moment_lose_at_most_100_ms_and_no_row_is_wrong(tmp_path):
+    """40 of those that `python -m benchmarks crash` does; one row is 1 ms."""
+    from benchmarks.crash import busy, paced
+
+    kills = [*paced(tmp_path, 32, 11), *busy(tmp_path, 8, 12)]
+    assert all(kill.read >= kill.said > 0 for kill in kills)
+    assert all(kill.wrong == 0 and "the loop goes on" in kill.message for kill in kills)
+    assert max(kill.handed - kill.read for kill in kills[:32]) <= 100

@@ -14,7 +14,6 @@ import sys
 import threading
 import time
 from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
 from upright.errors import UprightError
@@ -198,10 +197,10 @@ def _ordinary_priority() -> None:
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))  # type: ignore[attr-defined]
 
 
-def main(path: str, header: str, memory: str, rows: int) -> None:
-    """Write one log from a ring that another process made."""
+def main(path: str, memory: str, rows: int) -> None:
+    """Write one log, its header the first line of this process's input, from a ring that another process made."""
     _ordinary_priority()
-    about = LogHeader.of_metadata(json.loads(Path(header).read_text(encoding="utf-8")))
+    about = LogHeader.of_metadata(json.loads(sys.stdin.buffer.readline()))
     ring = Ring(join(memory, Ring.size(len(about.columns), rows)), about.columns, rows)
     gone = _loop_is_gone()
     try:
@@ -225,5 +224,5 @@ def main(path: str, header: str, memory: str, rows: int) -> None:
 
 
 if __name__ == "__main__":
-    _path, _header, _memory, _rows = sys.argv[1:]
-    main(_path, _header, _memory, int(_rows))
+    _path, _memory, _rows = sys.argv[1:]
+    main(_path, _memory, int(_rows))

@@ -132,8 +132,9 @@ def log_of(data: bytes, file: str) -> RunLog:
         fault = summary_fault(data, container.at, container.count())
         readable, complaint = (readable, f"Every chunk was read, but {fault}.") if fault else (len(data), "")
     elif not complaint:
-        complaint = f"Its writer was stopped: it ends at byte {container.at}" + (
-            f", and {len(data) - container.at} bytes of a torn record follow." if len(data) > container.at else "."
+        torn = len(data) - container.at
+        complaint = f"Its writer was stopped, or is still at work: it ends at byte {container.at}" + (
+            f", and {torn} bytes of a torn record follow." if torn else "."
         )
     if container.lost:
         complaint = " ".join([complaint, f"Damaged: the text of {', '.join(container.lost)}."]).strip()

@@ -6,12 +6,10 @@ import json
 import os
 import subprocess
 import sys
-import tempfile
 import threading
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -75,38 +73,35 @@ class LogWriter:
         memory, name, inherited = share(Ring.size(len(header.columns), rows))
         self._ring: Ring | None = Ring(memory, header.columns, rows)
         self._columns, self._unfit, self._full = header.columns, 0, 0
-        self._last = LogStatus(rows=0, dropped=0)
+        self._last, self._clock = LogStatus(rows=0, dropped=0), threading.Event()
         self._process = self._begin(header, name, inherited, rows)
+        for _ in range(round(_START / 0.005)):
+            if self._ring.marks[of.STATE] != of.STARTING or self._process.poll() is not None:
+                break
+            self._clock.wait(0.005)
+        if self._ring.marks[of.STATE] != of.WRITING:
+            said = self._ring.said() or "its process did not begin"
+            _end(self._process, 0.0)
+            raise BadInput(f"the log '{path}' cannot be written: {said}; name another file.")
 
     def _begin(self, header: LogHeader, name: str, inherited: tuple[int, ...], rows: int) -> subprocess.Popen[bytes]:
-        """The process, once it has its file."""
-        assert self._ring is not None
-        file, about = tempfile.mkstemp(prefix="upright-log-", suffix=".json")
+        """The process, told the header by its input, whose end tells it later that the loop is gone."""
         try:
-            with open(file, "w", encoding="utf-8") as text:
-                json.dump(header.as_metadata(), text)
             process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "upright.logs.process", str(self._path), about, name, str(rows)],
+                [sys.executable, "-P", "-m", "upright.logs.process", str(self._path), name, str(rows)],
                 stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, pass_fds=inherited,
                 env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
                 # Ctrl-C is for the loop, which then closes the log
                 start_new_session=os.name != "nt", creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
             )  # fmt: skip
+        finally:
             for end in inherited:
                 os.close(end)
-            clock = threading.Event()
-            for _ in range(round(_START / 0.005)):
-                if self._ring.marks[of.STATE] != of.STARTING or process.poll() is not None:
-                    break
-                clock.wait(0.005)
-            if self._ring.marks[of.STATE] == of.WRITING:
-                return process
-            said = self._ring.said() or "its process did not begin"
-            _end(process, 0.0)
-            raise BadInput(f"the log '{self._path}' cannot be written: {said}; name another file.")
-        finally:
-            with suppress(OSError):
-                Path(about).unlink()
+        assert process.stdin is not None
+        with suppress(OSError):
+            process.stdin.write(json.dumps(header.as_metadata()).encode() + b"\n")
+            process.stdin.flush()
+        return process
 
     @property
     def pid(self) -> int:

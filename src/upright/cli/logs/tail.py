@@ -28,6 +28,9 @@ def tail(
             typer.echo(f"{event.t:10.3f} s  {event.kind}: {event.text}")
         if new := fresh.columns["t"].size:
             rows += new
-            shown = [c for c in fresh.header.columns if c.name not in ("t", "tick") and c.unit != "counts"]
-            values = (f"{c.name} {fresh.columns[c.name][-1]:.5g}{f' {c.unit}' * (c.unit != '1')}" for c in shown)
-            typer.echo(f"{fresh.columns['t'][-1]:10.3f} s  {'  '.join(values)}  ({rows} rows)")
+            last = {name: column[-1].item() for name, column in fresh.columns.items()}
+            shown = [c for c in fresh.header.columns if c.unit not in ("s", "1", "counts")]
+            values = "  ".join(f"{c.name} {last[c.name]:.5g} {c.unit}" for c in shown)
+            mode = fresh.header.modes.get(last["mode"], f"mode {last['mode']}")
+            state = " ".join((mode, *fresh.header.fault_names(last["faults"])))
+            typer.echo(f"{last['t']:10.3f} s  {values}  {state}  ({rows} rows)")
