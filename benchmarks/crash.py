@@ -4,7 +4,7 @@ Rows are handed over at 1 kHz of the clock on the wall, to several logs side by 
 (`kill -9`) at a random moment, and what is then in the file is read. Every row is a function of its number, so that a
 wrong one cannot hide. A second series hands rows over as fast as they are taken, so that kills land inside writes.
 Torn files are cut at a random byte, every other one with zeros behind; changed files have one random byte changed.
-What a row costs the loop is timed by the clock on the wall: the longest are moments in which the machine did other work.
+What a row costs the loop is timed by the clock on the wall: the longest are when the machine did other work.
 """
 
 from __future__ import annotations
@@ -271,7 +271,7 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
         progress("a full disk")
         if sys.platform == "linux":
             on, message, said, there, bad = full(30_000)
-            note = f'on {on}: "{message}"; rows said to be there {said}, read {there}, wrong {bad}; the loop ran to its end'
+            note = f'on {on}: "{message}"; rows said to be there {said}, read {there}, wrong {bad}; the loop ran on'
             lines.append(Line(contender="disk full", error=float(bad), note=note))
         else:
             lines.append(Line(contender="disk full", note="left out: needs tmpfs or prlimit of Linux"))
