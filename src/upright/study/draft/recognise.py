@@ -176,12 +176,9 @@ def in_dac_counts(c: Column) -> bool:
 def drive_column(record: Record, seen: Inspection) -> Column | None:
     """What commands the rig.
 
-    That is the record's input, else the column in converter counts, else one called like an effort, else one that
-    looks so.
+    That is the column in converter counts, else one called like an effort, else one that looks so; where such a column
+    is not the input that the record states, it is that input.
     """
-    if record.inputs:
-        stated = seen.column(record.inputs[0])
-        return None if stated.constant else stated
     dac = next((c for c in seen.columns if in_dac_counts(c)), None)
     if dac is not None:
         return dac
@@ -189,7 +186,11 @@ def drive_column(record: Record, seen: Inspection) -> Column | None:
     candidates = [c for c in candidates if all(lie.startswith("the first samples are outliers") for lie in c.lies)]
     candidates = [c for c in candidates if not REFERENCE.search(c.name)]
     effort = [c for c in candidates if _EFFORT.search(c.name)]
-    return (effort or candidates or [None])[0]
+    found = (effort or candidates or [None])[0]
+    if found is None or not record.inputs or found.name in record.inputs:
+        return found
+    stated = seen.column(record.inputs[0])
+    return found if stated.constant else stated
 
 
 def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
