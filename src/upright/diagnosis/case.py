@@ -230,7 +230,7 @@ def _study(path: Path, log: str) -> KnownRig:
             run = Section(text, ("runs", i), values)
             break
     run = run.over(study.section("defaults"))
-    sensors = {n: s for n, (s, _) in read_sensors(study, run, plant).items()}
+    sensors = {n: s for n, (s, _) in read_sensors(study, run, plant).items() if not s.of}
     drives = read_drives(study, run, plant)
     drive = drives[0] if drives and drives[0].what and "loop" not in run else None
     locked: object = run.values.get("locked", ())

@@ -15,7 +15,7 @@ from upright.errors import BadInput, nearest
 from upright.identification import Rig
 from upright.physics import Plant
 from upright.physics.actuator import ACTUATOR
-from upright.study.sensors import Sensor, read_sensor
+from upright.study.sensors import Sensor, read_sensors
 from upright.study.text import Section, number, source_of
 from upright.units import parse
 
@@ -185,10 +185,8 @@ def read_description(study: Section, plant: type[Plant], rig: Rig, logs: Collect
         if key in table:
             value, source = table.stated(key, unit)
             entries[key] = Entry(value=value, unit=unit, source=source)
-    shared = study.section("sensors")
-    for c in plant.coordinates:
-        if c.name in shared:
-            entries |= _encoder(shared.section(c.name), read_sensor(shared.section(c.name), c))
+    for sensor, place in read_sensors(study, Section(study.text, (), {}), plant).values():
+        entries |= {} if sensor.of else _encoder(place, sensor)  # counts of a sum are not those of its coordinate
     named = {*logs}.pop() if len({*logs}) == 1 else ""
     return RigDescription(name=called or named, vendor=vendor, entries=entries)
 

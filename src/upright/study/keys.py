@@ -19,6 +19,11 @@ class Key(NamedTuple):
 
 _SENSOR = (
     Key("column", '"theta"', "column of the log that measures this coordinate; the coordinate's own name if left out"),
+    Key(
+        "expression",
+        '"theta_2 - theta_1"',
+        "sum of coordinates that the column measures, in the unit of this one; the coordinate itself if left out",
+    ),
     Key("unit", '"counts"', "unit of the column (rad, deg, rev, m, mm, counts, ...); as the log states it if left out"),
     Key("counts_per_rev", "14400", "encoder counts per turn: scale of a column in counts, else its resolution only"),
     Key("counts_per_m", "226629", "the same for a coordinate in m"),

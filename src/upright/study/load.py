@@ -24,6 +24,7 @@ from upright.physics import Plant
 from upright.physics.actuator import ACTUATOR
 from upright.records import Array, Record
 from upright.study.clock import check_clock
+from upright.study.coordinates import Sensors
 from upright.study.description import RigDescription, read_description
 from upright.study.keys import names
 from upright.study.loop import Scene, read_loop, state_units
@@ -174,16 +175,22 @@ def read_ladder(study: Section, plant: type[Plant]) -> tuple[Rung, ...]:
         raise study.error("ladder", 'a ladder is a list of rungs: [[ladder]], then name = "Coulomb" below it')
     terms = (*plant.names(), *ACTUATOR)
     nuisances = (*PER_RUN, *sensor_nuisances(plant))
+    sensors = read_sensors(study, Section(study.text, (), {}), plant).values()
+    summed = {c for sensor, _ in sensors for c in sensor.of}
     rungs: list[Rung] = []
     for i, values in enumerate(entries):
         rung = Section(study.text, ("ladder", i), values)
         rung.check(names("ladder"))
+        unknown = rung.names("unknown", nuisances)
+        for kind, _, of in (name.partition(".") for name in unknown):
+            if of in summed:
+                raise rung.error("unknown", _not_alone(kind, of))
         rungs.append(
             Rung(
                 name=rung.text_of("name", "Coulomb friction"),
                 adds=rung.names("adds", terms),
                 drops=rung.names("drops", terms),
-                unknown=rung.names("unknown", nuisances),
+                unknown=unknown,
             )
         )
     return tuple(rungs)
@@ -241,6 +248,8 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
     readings: dict[str, Array] = {}
     quanta: dict[str, float] = {}
     sensors = read_sensors(study, run, plant)
+    told = Sensors(by_coordinate=sensors, locked=locked)
+    _check_sums(run, told, plant)
     wanted = run.names("measured", coordinates, tuple(n for n in sensors if n not in locked and n not in held_names))
     for name in (*wanted, *held_names):
         if name not in sensors:
@@ -248,9 +257,7 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
             raise run.error(key, f'{name} has no sensor; add [sensors.{name}] with column = "..."')
         if name in locked:
             raise run.error("locked", f"{name} is locked in this run, so it is neither held nor measured")
-        sensor, place = sensors[name]
-        with run.text.at(place.place("column") if "column" in place else place.path):
-            values, quanta[name], noticed = sensor.read(record)
+        values, quanta[name], noticed = told.read(record, name)
         readings[name] = grid.outputs(values)
         notes += noticed
     measured = tuple(n for n in coordinates if n in wanted and n not in held_names)
@@ -265,9 +272,8 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
             u[:, k] = grid.commands(drive.read(record))
     loop = None
     if "loop" in run:
-        known = {name: sensor for name, (sensor, _) in sensors.items()}
         scene = Scene(
-            plant=plant, record=record, grid=grid, sensors=known, drive=drives[0], unit=drive_unit(study),
+            plant=plant, record=record, grid=grid, coordinates=told, drive=drives[0], unit=drive_unit(study),
             command=str(study.section("drive").values.get("column", "")),
         )  # fmt: skip
         loop = read_loop(run, scene)
@@ -355,6 +361,21 @@ def _nuisances(run: Section, key: str, plant: type[Plant]) -> list[tuple[str, Se
                 raise inner.error(last, f"{key} has no '{whole}'; {nearest(whole, valid)}")
             found.append((whole, inner, last))
     return found
+
+
+def _check_sums(run: Section, told: Sensors, plant: type[Plant]) -> None:
+    """Refuse a zero or a scale of one sensor that several coordinates are read from."""
+    asked = {"unknown": run.names("unknown", (*PER_RUN, *sensor_nuisances(plant)))}
+    asked["shared"] = tuple(name for name, _, _ in _nuisances(run, "shared", plant))
+    for key, wanted in asked.items():
+        for kind, _, of in (name.partition(".") for name in wanted):
+            if of and not told.one_sensor(kind, of):
+                raise run.error(key, _not_alone(kind, of))
+
+
+def _not_alone(kind: str, of: str) -> str:
+    instead = "ask for offset, one of each coordinate" if kind == "offset" else "state the plant in what is measured"
+    return f"{kind}.{of} is of one sensor, and a sensor here measures a sum with {of} in it; {instead}"
 
 
 def _states(run: Section, plant: type[Plant]) -> dict[str, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,6 +15,7 @@ from upright.laws import Law, state_feedback
 from upright.physics import Plant
 from upright.records import Array, Record
 from upright.study import expressions
+from upright.study.coordinates import Sensors
 from upright.study.keys import names
 from upright.study.rig import per
 from upright.study.sensors import Drive, Grid, Sensor, read_sign
@@ -24,15 +25,20 @@ from upright.units import in_unit
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """What a loop is read against: the run's data, sensors by coordinate, drive, the command's unit and its column."""
+    """What a loop is read against: the run's data, coordinates, drive, the command's unit and its column."""
 
     plant: type[Plant]
     record: Record
     grid: Grid
-    sensors: Mapping[str, Sensor]
+    coordinates: Sensors
     drive: Drive
     unit: str
     command: str
+
+    @property
+    def sensors(self) -> dict[str, Sensor]:
+        """Sensors by coordinate."""
+        return {name: sensor for name, (sensor, _) in self.coordinates.by_coordinate.items()}
 
     @property
     def period(self) -> float:
@@ -53,11 +59,23 @@ def read_loop(run: Section, scene: Scene) -> ClosedLoop | None:
         return None
     section = run.section("loop")
     section.check(names("loop"))
+    _check_sums(section, scene)
     kind = section.values.get("kind", "state")
     if kind not in tuple(KINDS):  # it may be no word at all
         near = nearest(str(kind), KINDS)
         raise section.error("kind", f"kind must be one of {', '.join(KINDS)}, got {show(kind)}; {near}")
     return KINDS[kind](section, scene)
+
+
+def _check_sums(section: Section, scene: Scene) -> None:
+    """Refuse a law between columns, or on counts, where a column measures a sum of coordinates."""
+    summed = next((sensor.column for sensor in scene.sensors.values() if sensor.of), "")
+    key = "kind" if section.values.get("kind") == "recover" else "units" if is_raw(section) else "quantized"
+    if summed and (key != "quantized" or section.flag("quantized")):
+        raise section.error(
+            key, f"'{summed}' measures a sum of coordinates, and this law would read it as it is; write the law in SI"
+            " on the coordinates, not quantized, or leave loop out and let the recorded command drive the plant",
+        )  # fmt: skip
 
 
 def _state(section: Section, scene: Scene) -> ClosedLoop:
@@ -269,10 +287,13 @@ def gain_unit(unit: str, coordinate: str, time: str) -> str:
 
 def first_of(scene: Scene, name: str, *, raw: bool = False) -> float:
     """First reading of a coordinate, as the law sees it."""
-    sensor = scene.sensors.get(name)
-    if sensor is None:
+    if name not in scene.sensors:
         return 0.0
-    return float(scene.record[sensor.column][0]) if raw else float(sensor.read(scene.record)[0][0])
+    if raw:
+        return float(scene.record[scene.sensors[name].column][0])
+    if name in scene.coordinates.locked:
+        return scene.coordinates.locked[name]
+    return float(scene.coordinates.read(scene.record, name)[0][0])
 
 
 def gain(section: Section, key: str, above: str, below: str) -> float:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from upright import units
 from upright.errors import BadInput
 from upright.physics import Coordinate, Plant
+from upright.physics.combination import combination
 from upright.records import Array, Record
 from upright.study import expressions
 from upright.study.keys import names
@@ -24,15 +26,16 @@ _GAP, _HOPELESS = 5, 100  # periods without a sample: told, refused
 
 @dataclass(frozen=True, kw_only=True)
 class Sensor:
-    """Column of a log that measures one coordinate: ``sign * scale * (reading - offset)``.
+    """Column of a log that measures one coordinate, or a sum `of` several: ``sign * scale * (reading - offset)``.
 
-    `unit` "" means as the log says. `scale` None means that unit and counts say all; on a column of another
-    kind, such as V, it is SI per unit of the column. `offset` is a reading, as text or in the column's unit.
-    `resolution` is in SI; 0 means not given.
+    `of` has the factor of each coordinate in the sum; empty is the coordinate itself. `unit` "" means as the log says.
+    `scale` None means that unit and counts say all; on a column of another kind, such as V, it is SI per unit of the
+    column. `offset` is a reading, as text or in the column's unit. `resolution` is in SI; 0 means not given.
     """
 
     coordinate: Coordinate
     column: str
+    of: Mapping[str, float] = field(default_factory=dict[str, float])
     unit: str = ""
     counts_per_rev: float = 0.0
     counts_per_m: float = 0.0
@@ -84,7 +87,7 @@ class Sensor:
         return self.sign * factor, zero
 
     def read(self, record: Record) -> tuple[Array, float, tuple[str, ...]]:
-        """Coordinate (N,) [SI] at the record's own instants, its resolution [SI], and what was noticed."""
+        """What is measured (N,) [SI] at the record's own instants, its resolution [SI], and what was noticed."""
         readings = record[self.column]
         factor, zero = self.line(record)
         values = factor * (readings - zero)
@@ -207,11 +210,11 @@ def read_sensors(study: Section, run: Section, plant: type[Plant]) -> dict[str, 
             for table in (shared, own):
                 table.section(name).check(names("sensors"))
             section = own.section(name).over(shared.section(name))
-            out[name] = read_sensor(section, coordinate), section
+            out[name] = read_sensor(section, coordinate, plant), section
     return out
 
 
-def read_sensor(section: Section, coordinate: Coordinate) -> Sensor:
+def read_sensor(section: Section, coordinate: Coordinate, plant: type[Plant]) -> Sensor:
     """One sensor."""
     name = coordinate.name
     for key, needed in (("counts_per_rev", "rad"), ("counts_per_m", "m")):
@@ -225,6 +228,7 @@ def read_sensor(section: Section, coordinate: Coordinate) -> Sensor:
     return Sensor(
         coordinate=coordinate,
         column=section.text_of("column", name) if "column" in section else name,
+        of=_sum(section, coordinate, plant) if "expression" in section else {},
         unit=read_unit(section),
         scale=_scale(section, coordinate) if "scale" in section else None,
         sign=read_sign(section),
@@ -232,6 +236,19 @@ def read_sensor(section: Section, coordinate: Coordinate) -> Sensor:
         resolution=section.stated("resolution", coordinate.unit)[0] if "resolution" in section else 0.0,
         **per,
     )
+
+
+def _sum(section: Section, coordinate: Coordinate, plant: type[Plant]) -> dict[str, float]:
+    """Factors of the coordinates that a column measures the sum of; empty for the coordinate itself."""
+    text = section.text_of("expression", "theta_2 - theta_1")
+    with section.at("expression"):
+        factors = combination(text, [c.name for c in plant.coordinates])
+        if not all(math.isfinite(f) for f in factors.values()):
+            raise BadInput(f"'{text}' has factors beyond 1e300")
+    if coordinate.name not in factors:
+        raise section.error("expression", f"[sensors.{coordinate.name}] measures '{text}', without {coordinate.name} in"
+                            f" it; call it [sensors.{next(iter(factors))}], or mend the expression")  # fmt: skip
+    return {} if factors == {coordinate.name: 1.0} else factors
 
 
 def read_unit(section: Section) -> str:
