@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from upright import units
 from upright.errors import BadInput, nearest
 from upright.readers.resolution import Quantum, find_quantum, rounding
 from upright.records import Array, Record
@@ -25,6 +26,7 @@ _RATE = re.compile(r"velocity|speed|rate|_dot|omega|qd", re.IGNORECASE)
 _COUNTS = re.compile(r"enc|count|cart\d*pos|\bpos\b", re.IGNORECASE)
 _LENGTH = re.compile(r"^(z|x|pos(ition)?|distance|displacement)\d*$", re.IGNORECASE)
 _VOLTS = re.compile(r"volt|plant_input|control_output|feedforward|^(u|v)$", re.IGNORECASE)
+_EFFORT = re.compile(r"(?i:u|v|i|f|t|tau)_?\d?(?:\s*[\[(]\s*([^\[\]()]+?)\s*[\])]|_(m?[VA]|Nm?))\s*")
 _DRIVE = re.compile(
     r"^(u|v|i)$|effort|control|command|cmd|input|volt|current|torque|target|duty|feedforward|pwm|ref", re.IGNORECASE
 )
@@ -153,7 +155,7 @@ def _column(record: Record, name: str) -> Column:
     low, high = float(x.min()), float(x.max())
     step = find_quantum(x)
     unit = record.units[name]
-    guess = unit or ("1" if sample_index(x) else _guess_unit(name, x, step))
+    guess = unit or ("1" if sample_index(x) else effort_unit(name) or _guess_unit(name, x, step))
     constant = low == high
     drive = _is_drive(name, x, guess)
     if step.counts_per_rev and guess != "rad":
@@ -193,9 +195,17 @@ def _guess_unit(name: str, values: Array, step: Quantum) -> str:
     return "m" if _LENGTH.search(name) else ""
 
 
+def effort_unit(name: str) -> str:
+    """Unit of a column called like an effort with the unit of one, ``u [V]`` or ``tau_Nm``; empty for another."""
+    match = _EFFORT.fullmatch(name)
+    unit = (match[1] or match[2]).replace("Nm", "N m") if match else ""
+    known = unit and units.known(unit)
+    return unit if known and any(units.same_dimension(unit, effort) for effort in ("V", "A", "N", "N m")) else ""
+
+
 def _is_drive(name: str, values: Array, unit: str) -> bool:
     """Whether a column drives rather than is measured: by name, or because it moves in a few steps only."""
-    if _DRIVE.search(name):
+    if _DRIVE.search(name) or effort_unit(name):
         return True
     changes = int(np.count_nonzero(np.diff(values)))
     levels = np.unique(values).size

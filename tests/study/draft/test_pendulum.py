@@ -2,6 +2,7 @@
 
 import math
 import os
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -200,3 +201,32 @@ def test_the_place_of_a_pendulum_that_moves_when_the_command_comes_is_not_its_ze
 def test_a_clock_in_microseconds_is_told_not_fitted(drafted):
     with pytest.raises(BadInput, match=r"every 2 s, got one every 1e\+04 s; its clock may count microseconds"):
         drafted(t=1e6 * T, theta=SWING)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("u [V]", "V"),
+        ("u_V", "V"),
+        ("v (mV)", "mV"),
+        ("i_A", "A"),
+        ("F [N]", "N"),
+        ("tau_Nm", "N m"),
+        ("T [Nm]", "N m"),
+    ],
+)
+def test_a_command_may_wear_its_unit(drafted, name, unit):
+    t = np.arange(4000) * 0.01
+    u = 2 * np.sin(3 * t) + np.sin(7.3 * t)
+    text, study = drafted("cart-pendulum", **{"x": 0.05 * np.sin(2 * t), "theta": 0.3 * np.cos(6 * t), name: u})
+    drive = tomllib.loads(text)["drive"]
+    assert (drive["column"], drive["unit"]) == (name, unit)
+    np.testing.assert_allclose(np.abs(study.runs[0].u).max(), np.abs(u).max(), rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["v [m/s]", "f [Hz]", "i_a", "t_amb [K]", "theta [V]"])
+def test_what_only_begins_like_a_command_drives_nothing(drafted, name):
+    t = np.arange(4000) * 0.01
+    other = 2 * np.sin(3 * t) + np.sin(7.3 * t)
+    text, _ = drafted("cart-pendulum", x=0.05 * np.sin(2 * t), theta=0.3 * np.cos(6 * t), **{name: other})
+    assert "drive" not in tomllib.loads(text)

@@ -10,7 +10,7 @@ import numpy as np
 
 from upright.errors import BadInput
 from upright.physics import Plant, find
-from upright.readers.inspection import Column, Inspection
+from upright.readers.inspection import Column, Inspection, effort_unit
 from upright.records import Array, Record
 from upright.signals.smoothing import savitzky_golay
 from upright.study.draft.release import release_of
@@ -185,7 +185,7 @@ def drive_column(record: Record, seen: Inspection) -> Column | None:
     candidates = [c for c in seen.columns if c.drive and not c.constant]
     candidates = [c for c in candidates if all(lie.startswith("the first samples are outliers") for lie in c.lies)]
     candidates = [c for c in candidates if not REFERENCE.search(c.name)]
-    effort = [c for c in candidates if _EFFORT.search(c.name)]
+    effort = [c for c in candidates if _EFFORT.search(c.name) or effort_unit(c.name)]
     found = (effort or candidates or [None])[0]
     if found is None or not record.inputs or found.name in record.inputs:
         return found
