@@ -230,3 +230,11 @@ def test_what_only_begins_like_a_command_drives_nothing(drafted, name):
     other = 2 * np.sin(3 * t) + np.sin(7.3 * t)
     text, _ = drafted("cart-pendulum", x=0.05 * np.sin(2 * t), theta=0.3 * np.cos(6 * t), **{name: other})
     assert "drive" not in tomllib.loads(text)
+
+
+def test_an_arm_that_turns_to_and_fro_stays_in_rad_where_its_steps_are_parts_of_a_turn(drafted):
+    t = np.arange(4000) * 0.01
+    step = 2 * math.pi / 4096
+    arm, rod = (np.round(x / step) * step for x in (8 * np.sin(2 * t), 0.5 * np.cos(6 * t)))
+    text, _ = drafted("furuta", psi=arm, theta=rod, u=np.cos(2 * t))
+    assert tomllib.loads(text)["sensors"]["psi"]["unit"] == "rad"
