@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
+
+from upright.errors import BadInput
+from upright.readers import inspect
 from upright.readers.inspection import Inspection
 from upright.records import Record
 from upright.study.clock import check_clock
 from upright.study.draft.chain import chain_tables
 from upright.study.draft.chain_log import read_chain
+from upright.study.draft.compare import CLEAR, DOUBTFUL, LONGEST, explained
 from upright.study.draft.described import describe
 from upright.study.draft.pendulum import pendulum_tables
-from upright.study.draft.recognise import recognise
-from upright.study.draft.suits import plants_that_suit
+from upright.study.draft.recognise import Recognised, recognise
+from upright.study.draft.suits import COUNTED, plants_that_suit
 from upright.study.text import TomlTable, study_text
 
 CHAINS = ("rectilinear", "torsional")
@@ -49,11 +55,7 @@ def draft(record: Record, seen: Inspection, log: Path, study: Path, *, plant: st
     if not plant:
         rig = next(t for t in tables if t.lines and t.lines[0].startswith("[rig]"))
         rig.key("guessed", True, "nobody named the plant: take this out once you know it is this one")
-    doubts = list(found.doubts)
-    told = bool(plant) or (found.plant.startswith(CHAINS) and len(found.columns) > 1)  # carts from disks, and why
-    others = [name for name in plants_that_suit(record, seen) if name != found.plant and name not in " ".join(doubts)]
-    if others and not told:
-        doubts.append(f"Taken for {found.plant}; the columns could be of {' or '.join(others)}: --plant says which.")
+    doubts = [*found.doubts, *([] if plant else alike(record, seen, found))]
     head = TomlTable()
     head.line(f"# Study of {log.name}, drafted by `upright init`. Check it, then: upright identify THIS_FILE -o OUT")
     head.line("# A number in quotes wears its unit; { guess = ... } asks for it; a plain text or number is known.")
@@ -62,3 +64,35 @@ def draft(record: Record, seen: Inspection, log: Path, study: Path, *, plant: st
         head.line(f"# GUESSED: {doubt}")
     head.key("title", log.stem)
     return study_text([head, *tables])
+
+
+def alike(record: Record, seen: Inspection, found: Recognised) -> list[str]:
+    """Sentence on the other plants that the columns could be of, and what each explains where it can be told.
+
+    Counts of an unknown encoder do not tell: a pendulum's angle has to be an angle. Carts from disks they never tell,
+    and what was recognised says so already.
+    """
+    counted = any(c.guess in COUNTED for c in found.columns.values())
+    others = [n for n in plants_that_suit(record, seen) if n != found.plant and n not in " ".join(found.doubts)]
+    if not others or (counted and found.plant.startswith(CHAINS) and len(found.columns) > 1):
+        return []
+    taken = f"Taken for {found.plant}"
+    by_columns = [f"{taken}; the columns could be of {' or '.join(others)}: --plant says which."]
+    if counted:
+        return by_columns
+    if record.t.size > LONGEST:
+        first = min(int(np.searchsorted(record.t, found.window[0])), record.t.size - LONGEST)
+        record = record.window(record.t[first], record.t[first + LONGEST - 1])
+        seen = inspect(record)
+    log, drafts = Path("log.csv"), dict[str, str]()
+    for name in (found.plant, *others):
+        with suppress(BadInput):  # it is not tried then, and said so
+            drafts[name] = draft(record, seen, log, log.with_suffix(".toml"), plant=name)
+    shares = explained(record, drafts, log.name)
+    if found.plant not in shares:
+        return by_columns
+    own, best = shares[found.plant], next(iter(shares))
+    told = ", ".join(f"{n} {100 * shares[n]:.0f} %" if n in shares else f"{n} was not tried" for n in others)
+    better = own < 1 - DOUBTFUL and 1 - shares[best] < CLEAR * (1 - own)
+    remedy = f"--plant {best} drafts what explains them far better" if better else "--plant says which"
+    return [f"{taken} by its columns. Of the accelerations it explains {100 * own:.0f} %, {told}: {remedy}."]
