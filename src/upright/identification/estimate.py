@@ -19,6 +19,7 @@ from upright.identification.inference.bands import calibrated
 from upright.identification.inference.black_box import black_box
 from upright.identification.inference.covariance import Identifiability, Optimum, assess, identifiability
 from upright.identification.inference.intervals import run_estimates, shared_estimates, widened, with_model_uncertainty
+from upright.identification.inference.lateness import lateness
 from upright.identification.inference.loop import standing
 from upright.identification.inference.poles import poles, shared_values
 from upright.identification.inference.scoring import fit_percent, predict, score
@@ -231,6 +232,7 @@ def _conclude(asked: Rig, runs: Sequence[Run], problem: Problem, found: Descent,
     worst = min((p for s in scores.values() if s.role == "fit" for p in s.fit_percent.values()), default=100.0)
     conventions = tuple(log.conventions()) if worst < GOOD else ()
     assumed = () if found.interrupted else assumptions(best, estimates)
+    warnings += () if found.interrupted or little or conventions else lateness(best)
     answers = judge(
         Evidence(
             rig=problem.rig,
