@@ -164,7 +164,7 @@ def starts_upright(balanced: Balanced, plant: str) -> PendulumStarts:
 
 
 def starts_hanging(found: Recognised, plant: type[Plant]) -> PendulumStarts:
-    """Numbers of a pendulum that swings about where it hangs; of any other plant, its first parameter as known."""
+    """Numbers of a pendulum that swings about where it hangs; any other plant has sizes that swing as slowly."""
     w = found.frequency or 6.0
     length = G / w**2
     known = {"m_p": (1.0, f"{SCALE}; a swing alone sees only ratios"), "J_p": (0.0, SIMPLE)}
@@ -187,7 +187,14 @@ def starts_hanging(found: Recognised, plant: type[Plant]) -> PendulumStarts:
             asked |= {"b_1": INERTIA[found.plant] * 1.0, "b_1c": INERTIA[found.plant] * 0.1}
         return PendulumStarts(known=known, asked=asked)
     required = [f.name for f in fields(plant) if f.default is MISSING]  # type: ignore[arg-type]
-    return PendulumStarts(known=dict.fromkeys(required[:1], (1.0, "MEASURE")), asked=dict.fromkeys(required[1:], 1.0))
+    sizes = {"m": length, "kg m^2": length**2, "N m/rad": (w * length) ** 2}
+    viscous = {"N m s/rad": 0.002 * w * length**2, "N s/m": 0.002 * w}
+    rubbed = {n: viscous[unit] for n in plant.names() if (unit := plant.quantity(n).unit) in viscous}
+    rubbed |= {j.coulomb: 0.002 * G * length for j in plant.joints if j.coulomb}
+    return PendulumStarts(
+        known=dict.fromkeys(required[:1], (1.0, "MEASURE")),
+        asked={n: sizes.get(plant.quantity(n).unit, 1.0) for n in required[1:]} | rubbed,
+    )
 
 
 INERTIA = {"furuta": 2e-3, "cart-pendulum": 1.1}
