@@ -83,6 +83,7 @@ WRONG = [
     ('label = "b"', 'label = "a"', 27, "taken by the run on line"),
     ('label = "a"\nfile = "log.csv"', 'label = "a"\nfile = "lgo.csv"', 23, "did you mean 'log.csv'?"),
     ('label = "a"\nfile = "log.csv"', 'label = "a"\nfile = "far/away"', 23, "--data DIR names another folder"),
+    ('label = "a"\nfile = "log.csv"', f'label = "a"\nfile = "{"far/" + 400 * "x"}"', 23, "does not exist"),
     ('label = "a"\nfile = "log.csv"', 'label = "a"', 21, "needs file as text"),
     ('label = "a"\nfile = "log.csv"', 'label = "a"\nfile = "bad_plant.py"', 23, "bad_plant.py"),
     ('label = "a"\nfile = "log.csv"', 'label = "a"\nfile = "silent.csv"', 24, "silent from t = 3.99 to 6.01 s"),

@@ -148,8 +148,8 @@ def _log(run: Section, folder: Path, logs: dict[tuple[str, str, str], Record]) -
     key = (name, reader, time)
     if key not in logs:
         file = folder / name
-        if not file.exists():
-            raise run.error("file", f"the log {file} does not exist; {_instead(file, folder)}")
+        if not os.path.exists(file):  # Path.exists raises for a name that is too long
+            raise run.error("file", f"the log {str(file)[-200:]} does not exist; {_instead(file, folder)}")
         with run.at("reader" if reader else "file"):
             record = read(file, reader=reader or None)
         with run.at("time"):
@@ -161,7 +161,7 @@ def _instead(file: Path, folder: Path) -> str:
     """Where the file may be instead."""
     from difflib import get_close_matches
 
-    here = sorted(p.name for p in file.parent.iterdir() if p.is_file()) if file.parent.is_dir() else []
+    here = sorted(p.name for p in file.parent.iterdir() if p.is_file()) if os.path.isdir(file.parent) else []
     close = get_close_matches(file.name, here, n=1, cutoff=0.6)
     if close:
         return f"did you mean '{close[0]}'?"
