@@ -2,6 +2,19 @@
 
 from __future__ import annotations
 
+from upright.rigs.board import Board, Port
 from upright.rigs.protocol import Capabilities, Fault, Limits, LiveRig, Mode, SelfTest, Tick
+from upright.rigs.twin import TwinPort
 
-__all__ = ["Capabilities", "Fault", "Limits", "LiveRig", "Mode", "SelfTest", "Tick"]
+__all__ = [
+    "Board",
+    "Capabilities",
+    "Fault",
+    "Limits",
+    "LiveRig",
+    "Mode",
+    "Port",
+    "SelfTest",
+    "Tick",
+    "TwinPort",
+]
