@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from upright.rigs.board import Board, Port
 from upright.rigs.protocol import Capabilities, Fault, Limits, LiveRig, Mode, SelfTest, Tick
+from upright.rigs.replay import ReplayPort
 from upright.rigs.twin import TwinPort
 
 __all__ = [
@@ -14,6 +15,7 @@ __all__ = [
     "LiveRig",
     "Mode",
     "Port",
+    "ReplayPort",
     "SelfTest",
     "Tick",
     "TwinPort",

@@ -37,7 +37,11 @@ class Port(Protocol):
         ...
 
     def read(self) -> tuple[int, ...]:
-        """Counts of the encoders since the board was switched on."""
+        """Counts of the encoders since they were zeroed."""
+        ...
+
+    def zero(self) -> None:
+        """Count from here on."""
         ...
 
     def close(self) -> None:
@@ -84,8 +88,7 @@ class Board:
         self._limits: Limits | None = None
         self._mode, self._faults = Mode.IDLE, Fault.RESET
         self._tick, self._time, self._applied = 0, 0.0, 0.0
-        self._raw: tuple[int, ...] = ()
-        self._zero: tuple[int, ...] = ()
+        self._counts: tuple[int, ...] = ()
         self._before: tuple[int, ...] = ()
         self._command, self._fed, self._full = 0.0, 0.0, 0.0
         self._still: list[list[float]] = []
@@ -94,8 +97,7 @@ class Board:
     def open(self) -> Capabilities:
         """Connect; a board that was just switched on stands in FAULT with `Fault.RESET`."""
         self._capabilities = self.port.open()
-        self._raw = self.port.read()
-        self._zero = self._before = self._raw
+        self._counts = self._before = self.port.read()
         self._mode, self._faults, self._limits = Mode.FAULT, Fault.RESET, None
         return self._capabilities
 
@@ -113,16 +115,22 @@ class Board:
         command = math.floor(limits.command / c.step + 1e-9) * c.step
         if not command > 0:
             raise self._refusal(f"the limit on the command is less than a step of {c.step:g} {c.command_unit}")
-        self._limits = replace(
-            limits, travel=_down(limits.travel, c.counts), start=_down(limits.start, c.counts),
-            speed=_down(limits.speed, [n * c.period for n in c.counts]), command=command,
-        )  # fmt: skip
+        per = [abs(n) for n in c.counts]
+        held = {
+            "travel": _down(limits.travel, per), "start": _down(limits.start, per),
+            "speed": _down(limits.speed, [n * c.period for n in per]),
+        }  # fmt: skip
+        for name, values in held.items():
+            if not all(values):
+                raise self._refusal(f"the limit on {name} is less than a count; ask for more")
+        self._limits = replace(limits, command=command, **held)
         return self._limits
 
     def zero(self) -> None:
         """Count from here on."""
         self._must("zero", Mode.IDLE)
-        self._zero = self._raw = self._before = self.port.read()
+        self.port.zero()
+        self._counts = self._before = self.port.read()
 
     def self_test(self, pulse: float, seconds: float) -> SelfTest:
         """The farthest that each coordinate went under a pulse and for as long after it."""
@@ -133,12 +141,12 @@ class Board:
                 f"a self-test takes a pulse up to {limits.command:g} {c.command_unit} for up to 5 s, got {pulse:g} "
                 f"{c.command_unit} for {seconds:g} s"
             )
-        first, farthest, ticks = self._raw, [0] * len(self._raw), max(1, round(seconds / c.period))
+        first, farthest, ticks = self._counts, [0] * len(self._counts), max(1, round(seconds / c.period))
         for k in range(2 * ticks):
             self._pass(pulse if k < ticks else 0.0)
             if self._faults:
                 raise self._stopped()
-            for i, (now, then) in enumerate(zip(self._raw, first, strict=True)):
+            for i, (now, then) in enumerate(zip(self._counts, first, strict=True)):
                 farthest[i] = now - then if abs(now - then) > abs(farthest[i]) else farthest[i]
         self._pass(0.0)
         moved = {n: k / per for n, k, per in zip(c.coordinates, farthest, c.counts, strict=True)}
@@ -154,12 +162,12 @@ class Board:
         if self._faults:
             raise self._refusal(f"it is not cleared ({told(self._faults)})")
         c, limits = self._there(), self._held()
-        self._raw = self._before = self.port.read()
+        self._counts = self._before = self.port.read()
         for name, q, most in zip(c.coordinates, self._at(), limits.start, strict=True):
             if abs(q) > most:
                 self._faults |= Fault.START
                 raise self._refusal(f"{name} is at {q:.4g}, and a run starts within {most:.4g} of zero")
-        self._still = [[0.0] * len(self._raw) for _ in self._raw]
+        self._still = [[0.0] * len(self._counts) for _ in self._counts]
         self._full, self._applied, self._command = 0.0, 0.0, 0.0
         self.port.write(0.0)
         self.port.enable(True)
@@ -197,7 +205,7 @@ class Board:
     def sample(self) -> Tick:
         """The newest sample."""
         return Tick(
-            tick=self._tick, time=self._time, counts=self._counts(), applied=self._applied, mode=self._mode,
+            tick=self._tick, time=self._time, counts=self._counts, applied=self._applied, mode=self._mode,
             faults=self._faults,
         )  # fmt: skip
 
@@ -252,7 +260,7 @@ class Board:
         self.port.write(put)
         self._applied = put
         self._time = self.port.advance()
-        self._before, self._raw = self._raw, self.port.read()
+        self._before, self._counts = self._counts, self.port.read()
         self._tick += 1
         if self._mode not in (Mode.IDLE, Mode.FAULT) and (found := self._beyond()):
             self._trip(found)
@@ -261,7 +269,7 @@ class Board:
         """Limits that the newest sample passes."""
         c, limits, found = self._there(), self._held(), NO_FAULT
         at = self._at()
-        steps = [(b - a) / per for a, b, per in zip(self._before, self._raw, c.counts, strict=True)]
+        steps = [(b - a) / per for a, b, per in zip(self._before, self._counts, c.counts, strict=True)]
         if any(abs(q) > most for q, most in zip(at, limits.travel, strict=True)):
             found |= Fault.OVERTRAVEL
         if any(abs(s) > most * c.period * (1 + 1e-9) for s, most in zip(steps, limits.speed, strict=True)):
@@ -289,11 +297,8 @@ class Board:
         self.port.write(0.0)
         self.port.enable(False)
 
-    def _counts(self) -> tuple[int, ...]:
-        return tuple(raw - zero for raw, zero in zip(self._raw, self._zero, strict=True))
-
     def _at(self) -> list[float]:
-        return [n / per for n, per in zip(self._counts(), self._there().counts, strict=True)]
+        return [n / per for n, per in zip(self._counts, self._there().counts, strict=True)]
 
     def _there(self) -> Capabilities:
         if self._capabilities is None:
@@ -328,9 +333,9 @@ def absurdity(law: Law, about: Capabilities, limits: Limits) -> str:
     if len(law.D) != 1 or law.D.ndim != 2 or law.readings != len(about.counts):
         return f"the law reads {law.readings} coordinates and gives {len(law.D)} commands; it has {len(about.counts)}"
     for name, d, per in zip(about.coordinates, law.D[0], about.counts, strict=False):
-        if not abs(d) / per < limits.command:
+        if not abs(d / per) < limits.command:
             return (
-                f"its gain on {name} is absurd: one count changes the command by {abs(d) / per:.3g} "
+                f"its gain on {name} is absurd: one count changes the command by {abs(d / per):.3g} "
                 f"{about.command_unit}, and {limits.command:g} {about.command_unit} is all that it may be"
             )
     return ""

@@ -72,13 +72,13 @@ class TwinPort:
     ----------
     rig : ServoRig
         As it truly is.
-    at : str
-        Equilibrium.
+    at : str, optional
+        Equilibrium; the first of the plant when empty.
     full_scale : float, optional
         Of the converter [command unit]; twice the drive's limit when omitted.
     """
 
-    def __init__(self, rig: ServoRig, at: str = "hanging", full_scale: float | None = None) -> None:
+    def __init__(self, rig: ServoRig, at: str = "", full_scale: float | None = None) -> None:
         idle = {j.presliding: 0.0 for j in rig.plant.joints if j.presliding}
         self.rig = replace(rig, plant=rig.plant.replace(**idle)) if idle else rig
         drive = {n: v for n, v in self.rig.drive.items() if n not in _FORGOTTEN}
@@ -91,8 +91,9 @@ class TwinPort:
         self._start = np.array([reach], dtype=np.int64)
         self._full_scale = full_scale or 2.0 * rig.limit
         self._per = np.array(rig.counts) * rig.shown
-        self.x: Array = np.array(self.rig.plant.state(at), dtype=np.float64)
+        self.x: Array = np.array(self.rig.plant.state(at or next(iter(rig.plant.equilibria))), dtype=np.float64)
         self._felt = self.x[0::2].copy()
+        self._origin = (0,) * len(rig.counts)
         self.encoders = BrokenEncoders(len(rig.counts))
         self._held, self._enabled, self._command, self._periods = False, False, 0.0, 0
 
@@ -133,7 +134,11 @@ class TwinPort:
             self._felt = np.minimum(np.maximum(self._felt, q - half), q + half)
             q = mounting.turned(self._felt)
         true: list[float] = (q * self._per).tolist()
-        return self.encoders.show(true)
+        return tuple(n - zero for n, zero in zip(self.encoders.show(true), self._origin, strict=True))
+
+    def zero(self) -> None:
+        """Count from here on."""
+        self._origin = tuple(n + zero for n, zero in zip(self.read(), self._origin, strict=True))
 
     def close(self) -> None:
         """Nothing is held open."""

@@ -1,0 +1,195 @@
+"""RIG.toml: what a rig is, how it is reached, where its description is, and how far it may go.
+
+A twin of a fit::
+
+    kind = "twin"
+    fit = "out/fit.json"
+
+A rig of one's own behind a wire, whose limits nobody may leave out::
+
+    kind = "serial"
+    port = "/dev/ttyACM0"
+    fit = "out/fit.json"
+
+    [limits]
+    command = "5 V"
+    watchdog = "20 ms"
+    lean = "25 deg"
+
+    [limits.psi]
+    travel = "1.5 rad"
+    speed = "20 rad/s"
+    start = "0.3 rad"
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from upright.rigs.protocol import Limits
+from upright.study.text import Section, StudyText
+
+KINDS = ("twin", "replay", "serial", "quanser", "nidaqmx")
+HARDWARE = ("serial", "quanser", "nidaqmx")
+KEYS = (
+    "kind", "name", "fit", "study", "make", "seed", "vendor", "port", "record", "at", "zero", "limits", "board",
+)  # fmt: skip
+_EACH = ("travel", "speed", "start")
+_ALL = ("command", "watchdog", "saturation", "frozen", "twist", "lean")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RigFile:
+    """What a RIG.toml says.
+
+    Attributes
+    ----------
+    path : Path
+        The file itself.
+    kind : str
+        One of `KINDS`.
+    name : str
+        As its owner calls it; may be empty.
+    known : Path or None
+        fit.json or study that describes it.
+    make : str
+        Key of the make whose twin it is, where there is no description; with `seed`.
+    vendor : str
+        Whose data sheet says the rest; may be empty.
+    port : str
+        Of a serial rig.
+    record : Path or None
+        That a replay plays.
+    at, zero : str
+        Equilibrium that is held, and the one at which the encoders are zeroed.
+    board : mapping of str to any
+        What a vendor's port takes by name.
+    """
+
+    path: Path
+    kind: str
+    name: str = ""
+    known: Path | None = None
+    make: str = ""
+    seed: int = 0
+    vendor: str = ""
+    port: str = ""
+    record: Path | None = None
+    at: str = "inverted"
+    zero: str = "hanging"
+    board: Mapping[str, Any] = field(default_factory=dict[str, Any])
+
+    @property
+    def hardware(self) -> bool:
+        """Whether something can really move."""
+        return self.kind in HARDWARE
+
+    def limits(self, units: Mapping[str, str], command_unit: str, default: Limits | None = None) -> Limits | None:
+        """How far the rig may go; the default where the file says nothing, None where hardware has no limits.
+
+        Parameters
+        ----------
+        units : mapping of str to str
+            ``"rad"`` or ``"m"`` by coordinate, in the plant's order.
+        command_unit : str
+        default : Limits, optional
+            For what the file leaves out; of hardware nothing is ever filled in.
+
+        Raises
+        ------
+        BadInput
+            When limits of hardware leave out what must be said.
+        """
+        section = _root(self.path).section("limits")
+        if not section.values:
+            return None if self.hardware else default
+        section.check((*_ALL, *units), "limit or coordinate")
+        base = None if self.hardware else default
+        if "command" not in section and base is None:
+            raise section.error("command", f'[limits] needs the largest command, such as command = "5 {command_unit}"')
+        rows: dict[str, list[float]] = {name: [] for name in _EACH}
+        for i, (name, unit) in enumerate(units.items()):
+            own = section.section(name)
+            own.check(_EACH, "limit")
+            for kind in _EACH:
+                if kind not in own and base is None and i == 0:
+                    raise section.error(
+                        name,
+                        f"[limits.{name}] needs {kind}, since {name} is what the drive moves; write "
+                        f'{kind} = "... {_unit(kind, unit)}"',
+                    )
+                usual = math.inf if base is None else getattr(base, kind)[i]
+                rows[kind].append(own.positive(kind, _unit(kind, unit), usual))
+        first = next(iter(units.values()))
+        usual = base or Limits(travel=(1.0,), speed=(1.0,), start=(1.0,), command=1.0)
+        with section.at("command"):
+            return Limits(
+                travel=tuple(rows["travel"]), speed=tuple(rows["speed"]), start=tuple(rows["start"]),
+                command=section.positive("command", command_unit, usual.command),
+                watchdog=section.positive("watchdog", "s", usual.watchdog),
+                saturation=section.positive("saturation", "s", usual.saturation),
+                frozen=section.number("frozen", first, usual.frozen),
+                twist=section.positive("twist", first, usual.twist),
+            )  # fmt: skip
+
+    def lean(self, unit: str, default: float) -> float:
+        """How far the last coordinate may be from what is held [rad or m]."""
+        return _root(self.path).section("limits").positive("lean", unit, default)
+
+
+def _unit(kind: str, unit: str) -> str:
+    return f"{unit}/s" if kind == "speed" else unit
+
+
+def _root(path: Path) -> Section:
+    return StudyText(path).root()
+
+
+def read_rig_file(path: Path) -> RigFile:
+    """Content of a RIG.toml.
+
+    Raises
+    ------
+    BadInput
+        When it is none, or contradicts itself; with file and line.
+    """
+    root = _root(path)
+    root.check(KEYS)
+    if "kind" not in root:
+        raise root.error("kind", f'a rig needs kind, one of {", ".join(KINDS)}, such as kind = "twin"')
+    kind = root.choice("kind", KINDS, "twin")
+    texts = {k: root.text_of(k, e) for k, e in _EXAMPLES.items() if k in root}
+    if "fit" in texts and "study" in texts:
+        raise root.error("study", "a rig is described by a fit or by a study; leave one out")
+    known = texts.get("fit") or texts.get("study")
+    place = path.parent
+    if known is not None and not (place / known).exists():
+        raise root.error("fit" if "fit" in texts else "study", f"{place / known} does not exist")
+    if known is None and not ("make" in texts and kind in ("twin", "replay")):
+        other = ' or make = "furuta"' if kind in ("twin", "replay") else ""
+        raise root.error("kind", f'a rig needs what describes it: fit = "out/fit.json" or study = "study.toml"{other}')
+    for key, kinds in {"port": ("serial",), "record": ("replay",)}.items():
+        if kind in kinds and key not in texts:
+            raise root.error("kind", f'kind = "{kind}" needs {key} = "{_EXAMPLES[key]}"')
+        if kind not in kinds and key in texts:
+            raise root.error(key, f'kind = "{kind}" has no {key}; leave it out')
+    seed = root.values.get("seed", 0)
+    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+        raise root.error("seed", f"seed is a whole number from 0 on, got {seed!r}")
+    board = root.section("board").values
+    return RigFile(
+        path=path, kind=kind, name=texts.get("name", ""), known=None if known is None else place / known,
+        make=texts.get("make", ""), seed=seed, vendor=texts.get("vendor", ""), port=texts.get("port", ""),
+        record=place / texts["record"] if "record" in texts else None, at=texts.get("at", "inverted"),
+        zero=texts.get("zero", "hanging"), board=board,
+    )  # fmt: skip
+
+
+_EXAMPLES = {
+    "name": "bench 3", "fit": "out/fit.json", "study": "study.toml", "make": "furuta", "vendor": "ECP 205",
+    "port": "/dev/ttyACM0", "record": "run.csv", "at": "inverted", "zero": "hanging",
+}  # fmt: skip

@@ -1,0 +1,71 @@
+"""Does a run that is played back give the commands that were logged, to the last bit?"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.rigs.test_twin import LAW, RIG, started
+from upright.control.trial import at_work
+from upright.errors import BadInput, RigStopped
+from upright.laws import Running
+from upright.records import Record
+from upright.rigs import Board, Limits, Mode, ReplayPort
+
+TICKS = 400
+REST = (0.0, np.pi)
+WIDE = Limits(travel=(np.inf,) * 2, speed=(np.inf,) * 2, start=(np.inf,) * 2, command=RIG.limit, saturation=10.0)
+
+
+def angles(counts):
+    return [n / per for n, per in zip(counts, RIG.counts, strict=True)]
+
+
+@pytest.fixture(scope="module")
+def logged():
+    """Commands of a run on the twin, and its record as it came back from a file."""
+    _, board = started(Mode.HOST)
+    running = Running(at_work(RIG, LAW, REST), RIG.period)
+    tick, rows = board.exchange(0.0), []
+    for _ in range(TICKS):
+        command = running.step(angles(tick.counts))
+        rows.append((tick.time, command, *angles(tick.counts)))
+        tick = board.exchange(command)
+    t, u, psi, theta = np.array(rows).T
+    return u, Record(t=t, signals={"u": u, "psi": psi, "theta": theta}, units={"u": "V"}, inputs=("u",),
+                     outputs=("psi", "theta"))  # fmt: skip
+
+
+def played(record, law):
+    board = Board(ReplayPort(record, RIG.counts, 2 * RIG.limit, RIG.converter))
+    board.open()
+    board.clear_fault()
+    board.configure(WIDE)
+    board.zero()
+    board.arm()
+    board.start(Mode.HOST)
+    running, tick, said = Running(law, RIG.period), board.exchange(0.0), []
+    for k in range(TICKS):
+        said.append(running.step(angles(tick.counts)))
+        if k < TICKS - 1:
+            tick = board.exchange(said[-1])
+    with pytest.raises(RigStopped, match=f"ends after {TICKS} samples"):
+        board.exchange(0.0)
+    return np.array(said)
+
+
+def test_the_law_that_was_logged_gives_the_same_bits(logged, tmp_path):
+    commands, record = logged
+    record.to_csv(tmp_path / "run.csv")
+    assert played(Record.from_csv(tmp_path / "run.csv"), at_work(RIG, LAW, REST)).tobytes() == commands.tobytes()
+
+
+def test_another_law_is_told_from_it(logged):
+    commands, record = logged
+    other = at_work(RIG, LAW, (0.0, np.pi + 1e-9))
+    assert played(record, other).tobytes() != commands.tobytes()
+
+
+def test_counts_have_to_be_known(logged):
+    with pytest.raises(BadInput, match="counts for each"):
+        ReplayPort(logged[1], (16_000.0,), 10.0, 1e-3)
