@@ -8,9 +8,9 @@ import pytest
 from tests.rigs.test_twin import LAW, RIG, started
 from upright.control.trial import at_work
 from upright.errors import BadInput, RigStopped
-from upright.laws import Running
 from upright.records import Record
 from upright.rigs import Board, Limits, Mode, ReplayPort
+from upright.rigs.law import RunningLaw
 
 TICKS = 400
 REST = (0.0, np.pi)
@@ -25,7 +25,7 @@ def angles(counts):
 def logged():
     """Commands of a run on the twin, and its record as it came back from a file."""
     _, board = started(Mode.HOST)
-    running = Running(at_work(RIG, LAW, REST), RIG.period)
+    running = RunningLaw(at_work(RIG, LAW, REST), RIG.period)
     tick, rows = board.exchange(0.0), []
     for _ in range(TICKS):
         command = running.step(angles(tick.counts))
@@ -44,7 +44,7 @@ def played(record, law):
     board.zero()
     board.arm()
     board.start(Mode.HOST)
-    running, tick, said = Running(law, RIG.period), board.exchange(0.0), []
+    running, tick, said = RunningLaw(law, RIG.period), board.exchange(0.0), []
     for k in range(TICKS):
         said.append(running.step(angles(tick.counts)))
         if k < TICKS - 1:

@@ -10,8 +10,8 @@ import pytest
 from upright.control.trial import at_work, trial
 from upright.experiments.makes import make_rig
 from upright.gains import feedback, filtered, hold, place
-from upright.laws import Running
 from upright.rigs import Board, Limits, Mode, TwinPort
+from upright.rigs.law import RunningLaw
 
 RIG = make_rig("furuta")
 SAMPLED = hold(RIG.linear("inverted"), RIG.period, RIG.delay / RIG.period)
@@ -44,7 +44,7 @@ def compiled():
 def test_a_twin_under_the_hosts_law_moves_as_the_compiled_loop(compiled):
     run, law = compiled
     port, board = started(Mode.HOST)
-    running = Running(law, RIG.period)
+    running = RunningLaw(law, RIG.period)
     counts, put, states = [board.sample.counts], [], [port.x]
     for _ in range(TICKS):
         tick = board.exchange(running.step([n / per for n, per in zip(counts[-1], RIG.counts, strict=True)]))
@@ -62,7 +62,7 @@ def test_its_own_loop_gives_the_same_commands_as_the_hosts(compiled):
     _, law = compiled
     _, board = started(Mode.MCU, law)
     _, other = started(Mode.HOST)
-    running, counts = Running(law, RIG.period), other.sample.counts
+    running, counts = RunningLaw(law, RIG.period), other.sample.counts
     for _ in range(TICKS):
         said = running.step([n / per for n, per in zip(counts, RIG.counts, strict=True)], 0.0)
         theirs, ours = other.exchange(said), board.exchange(0.0)

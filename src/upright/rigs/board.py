@@ -13,7 +13,8 @@ from dataclasses import replace
 from typing import Protocol
 
 from upright.errors import RigStopped
-from upright.laws import Law, Running
+from upright.laws import Law
+from upright.rigs.law import RunningLaw, absurdity, for_rig
 from upright.rigs.protocol import NO_FAULT, Capabilities, Fault, Limits, Mode, SelfTest, Tick
 
 
@@ -92,7 +93,7 @@ class Board:
         self._before: tuple[int, ...] = ()
         self._command, self._fed, self._full = 0.0, 0.0, 0.0
         self._still: list[list[float]] = []
-        self._law: Running | None = None
+        self._law: RunningLaw | None = None
 
     def open(self) -> Capabilities:
         """Connect; a board that was just switched on stands in FAULT with `Fault.RESET`."""
@@ -182,10 +183,11 @@ class Board:
         if mode == Mode.MCU:
             if law is None:
                 raise self._refusal("its own loop needs a law")
+            fitted = for_rig(law, c, limits)
             if absurd := absurdity(law, c, limits):
                 self._trip(Fault.GAINS)
                 raise self._refusal(absurd)
-            self._law = Running(replace(law, command_quantum=c.step), c.period, limits.command)
+            self._law = RunningLaw(fitted, c.period)
         self._command, self._fed, self._mode = 0.0, self._time, mode
 
     def exchange(self, command: float) -> Tick:
@@ -323,22 +325,6 @@ class Board:
 
     def _refusal(self, why: str) -> RigStopped:
         return RigStopped(f"{self._there().name} refused: {why}.")
-
-
-def absurdity(law: Law, about: Capabilities, limits: Limits) -> str:
-    """Why no rig may be given these gains, as a clause; empty when it may.
-
-    Gains with which one count more or less moves the command by all that it may be amplify nothing but rounding.
-    """
-    if len(law.D) != 1 or law.D.ndim != 2 or law.readings != len(about.counts):
-        return f"the law reads {law.readings} coordinates and gives {len(law.D)} commands; it has {len(about.counts)}"
-    for name, d, per in zip(about.coordinates, law.D[0], about.counts, strict=False):
-        if not abs(d / per) < limits.command:
-            return (
-                f"its gain on {name} is absurd: one count changes the command by {abs(d / per):.3g} "
-                f"{about.command_unit}, and {limits.command:g} {about.command_unit} is all that it may be"
-            )
-    return ""
 
 
 def _down(values: Sequence[float], per: Sequence[float]) -> tuple[float, ...]:

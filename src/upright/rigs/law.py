@@ -1,0 +1,91 @@
+"""A law as a rig runs it: with its converter and limit, about what is held, a reference handed over each tick."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from upright.errors import BadInput
+from upright.laws import Law, Rule, at_work
+from upright.rigs.protocol import Capabilities, Limits
+
+
+def for_rig(law: Law | Rule, about: Capabilities, limits: Limits, target: Sequence[float] | None = None) -> Law | Rule:
+    """The law with the rig's converter and the limits' command; with other targets of its readings, where given.
+
+    Raises
+    ------
+    BadInput
+        When it is of several lanes or commands, reads something else, or is made for another period.
+    """
+    name = about.name
+    if any(width > 1 for width in law.widths().values()):
+        raise BadInput("a rig runs one law, and this one is of several lanes; take one of them (of_lanes).")
+    changes = {"command_quantum": about.step, "limit": min(law.limit, limits.command), "delay": 0.0, "quantum": 0.0}
+    if isinstance(law, Rule):
+        return replace(law, **changes)
+    if len(law.D) != 1 or law.readings != len(about.coordinates):
+        raise BadInput(
+            f"{name} shows {', '.join(about.coordinates)} and takes one command; this law reads {law.readings} signals "
+            f"and gives {len(law.D)}."
+        )
+    if law.period and not math.isclose(law.period, about.period, rel_tol=1e-3):
+        raise BadInput(
+            f"this law is made for a period of {1e3 * law.period:.6g} ms, and {name} ticks every "
+            f'{1e3 * about.period:.6g} ms; design for that: --period "{1e3 * about.period:.6g} ms".'
+        )
+    return replace(law, **changes, **({} if target is None else {"target": np.array(target, dtype=np.float64)}))
+
+
+class RunningLaw:
+    """A law at work, called once per tick with the readings and, where it has one, its reference.
+
+    The references are readings of their own here, so that whoever runs the loop can change them.
+    """
+
+    def __init__(self, law: Law | Rule, period: float) -> None:
+        self.period, self.ticks = period, 0
+        self._signal: list[list[float]] = law.signal().tolist()
+        self._own = isinstance(law, Rule)
+        if isinstance(law, Law) and (m := law.signal().shape[1]):
+            n = law.readings
+            begin = None if law.begin is None else np.hstack([law.begin, np.zeros((len(law.begin), m))])
+            target = np.append(np.broadcast_to(np.asarray(law.target, dtype=np.float64), (n,)), np.zeros(m))
+            law = replace(law, references=None, reference_names=(), measured=(), target=target, begin=begin)
+        self._step = at_work(law)
+
+    def step(self, readings: Sequence[float], reference: float | None = None) -> float:
+        """Command of this tick, rounded and limited.
+
+        Parameters
+        ----------
+        readings : sequence of float
+            As the encoders show them [rad or m].
+        reference : float, optional
+            First reference now; the law's own signal when omitted.
+        """
+        row = list(self._signal[min(self.ticks, len(self._signal) - 1)])
+        if reference is not None and row:
+            row[0] = reference
+        given = readings if self._own else (*readings, *row)
+        self.ticks += 1
+        return self._step((self.ticks - 1) * self.period, given)[0]
+
+
+def absurdity(law: Law | Rule, about: Capabilities, limits: Limits) -> str:
+    """Why no rig may be given these gains, as a clause; empty when it may.
+
+    Gains with which one count more or less moves the command by all that it may be amplify nothing but rounding.
+    """
+    if isinstance(law, Rule):
+        return ""
+    for name, d, per in zip(about.coordinates, law.D[0], about.counts, strict=False):
+        if not abs(d / per) < limits.command:
+            return (
+                f"its gain on {name} is absurd: one count changes the command by {abs(d / per):.3g} "
+                f"{about.command_unit}, and {limits.command:g} {about.command_unit} is all that it may be"
+            )
+    return ""
