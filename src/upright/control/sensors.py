@@ -257,6 +257,7 @@ SAFE = math.radians(6)
 FORGOTTEN = 0.4
 """Time constant with which evidence fades [s]: a little that the model always has wrong must not add up for ever."""
 _SETTLING = 400
+_NEVER = np.iinfo(np.int64).max
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -365,6 +366,7 @@ class Watch:
         self.gains, self._S, self._size = np.array(gains), np.array(weights), np.array(sizes)
         self._x: Array = np.zeros((0, len(scales), n))
         self._k = 0
+        self._since: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
         self.likelihood: Array = np.zeros((0, len(scales)))
 
     def see(self, reading: ArrayLike, command: ArrayLike) -> Array:
@@ -379,6 +381,7 @@ class Watch:
         if self._k == 0:
             self._x = np.zeros((len(y), *self._x.shape[1:]))
             self.likelihood = np.zeros((len(y), self._x.shape[1]))
+            self._since = np.full(len(y), _NEVER, dtype=np.int64)
         k = min(self._k, _SETTLING - 1)
         miss = y[:, None] - np.einsum("hpn,lhn->lhp", self._C, self._x)
         square = np.einsum("lhp,hpq,lhq->lh", miss, self._S[k], miss)
@@ -387,26 +390,32 @@ class Watch:
         x = self._x + np.einsum("hnp,lhp->lhn", self.gains[k], miss)
         u = np.broadcast_to(np.asarray(command, dtype=np.float64), len(y))
         self._x = x @ self._A.T + u[:, None, None] * self._B
+        odds = self.likelihood[:, 1:].max(axis=1) - self.likelihood[:, 0]
+        self._since = np.where(odds > self._bound, np.minimum(self._since, self._k), _NEVER)
         self._k += 1
-        return self.likelihood[:, 1:].max(axis=1) - self.likelihood[:, 0]
+        return odds
+
+    def speaks(self) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+        """Whether the drive is to be switched off after the last reading, and for which suspicion, lane by lane."""
+        best = 1 + np.argmax(self.likelihood[:, 1:], axis=1)
+        every, k = np.arange(len(best)), self._k - 1
+        second = np.partition(self.likelihood, -2, axis=1)[:, -2]
+        leads = self.likelihood[every, best] - second > math.log(NAMED)
+        far = np.abs(self._x[every, best, 2]) > SAFE
+        late = k - self._since >= PATIENCE / self.model.period
+        return (self._since <= k) & (leads | far | late), best
 
     def over(self, readings: Array, commands: Array) -> Alarm:
         """Watch whole runs: deviations from rest, shape (N, coordinates[, lanes]), and commands, shape (N[, lanes])."""
         y = readings[:, :, None] if readings.ndim == 2 else readings
         u = commands[:, None] if commands.ndim == 1 else commands
-        lanes, every = y.shape[2], np.arange(y.shape[2])
-        sample, since = np.full(lanes, -1, dtype=np.int64), np.full(lanes, len(y), dtype=np.int64)
-        which = np.zeros(lanes, dtype=np.int64)
+        lanes = y.shape[2]
+        sample, which = np.full(lanes, -1, dtype=np.int64), np.zeros(lanes, dtype=np.int64)
         odds = np.empty((len(y), lanes))
         self._k = 0
         for k in range(len(y)):
             odds[k] = self.see(y[k].T, u[k])
-            since = np.where(odds[k] > self._bound, np.minimum(since, k), len(y))
-            best = 1 + np.argmax(self.likelihood[:, 1:], axis=1)
-            second = np.partition(self.likelihood, -2, axis=1)[:, -2]
-            leads = self.likelihood[every, best] - second > math.log(NAMED)
-            far = np.abs(self._x[every, best, 2]) > SAFE
-            late = k - since >= PATIENCE / self.model.period
-            now = (sample < 0) & (since <= k) & (leads | far | late)
+            said, best = self.speaks()
+            now = (sample < 0) & said
             sample[now], which[now] = k, best[now]
         return Alarm(sample=sample, what=tuple(self.suspicions[i] for i in which.tolist()), odds=odds)
