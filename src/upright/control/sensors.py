@@ -256,6 +256,10 @@ SAFE = math.radians(6)
 """Deviation [rad] beyond which nobody waits to find out."""
 FORGOTTEN = 0.4
 """Time constant with which evidence fades [s]: a little that the model always has wrong must not add up for ever."""
+MOVED, WITHIN = 0.04, 0.1
+"""A sample is evidence when a sensor moved, within so many seconds [s], by such a share of what the drive could have
+moved it from rest. Close to rest dry friction, which the filters do not know, holds a pendulum that leans, and
+rounding repeats itself: after two seconds of that, sound sensors looked as if they showed four times what is true."""
 _SETTLING = 400
 _NEVER = np.iinfo(np.int64).max
 
@@ -343,10 +347,13 @@ class Watch:
         for i, s in enumerate(self.suspicions[1:], start=1):
             scales[i, names.index(s.name)] = s.factor
         self._C = scales[:, :, None] * sampled.C
+        self._earlier, self._shown = max(1, round(WITHIN / model.period)), list[Array]()
         self._bound, self._kept = math.log(odds), math.exp(-model.period / forgotten)
         noise = model.quantum**2 / 12
         # in what is shown, all suspicions expect the same disturbance: they are told apart by motions, not by noise
-        shaking = unknown * model.limit * np.abs(linear.B[1::2, 0]) / np.abs(scales)
+        driven = model.limit * np.abs(linear.B[1::2, 0])
+        self._moved = MOVED * driven * WITHIN**2 / 2
+        shaking = unknown * driven / np.abs(scales)
         W = np.array([shaken(sampled, a) for a in shaking])
         # the start is known to a rad or m, and at rest to a rad/s or m/s; commands on their way are known
         P = np.zeros((len(scales), n, n))
@@ -382,11 +389,14 @@ class Watch:
             self._x = np.zeros((len(y), *self._x.shape[1:]))
             self.likelihood = np.zeros((len(y), self._x.shape[1]))
             self._since = np.full(len(y), _NEVER, dtype=np.int64)
+            self._shown = []
         k = min(self._k, _SETTLING - 1)
         miss = y[:, None] - np.einsum("hpn,lhn->lhp", self._C, self._x)
         square = np.einsum("lhp,hpq,lhq->lh", miss, self._S[k], miss)
+        self._shown = [*self._shown[-self._earlier :], y]
+        moves = np.any(np.abs(y - self._shown[0]) > self._moved, axis=1, keepdims=True)
         if self._k > 1:  # the first two readings are the start, of which nothing is known
-            self.likelihood = self._kept * self.likelihood - 0.5 * (square + self._size[k])
+            self.likelihood = self._kept * self.likelihood - np.where(moves, 0.5 * (square + self._size[k]), 0.0)
         x = self._x + np.einsum("hnp,lhp->lhn", self.gains[k], miss)
         u = np.broadcast_to(np.asarray(command, dtype=np.float64), len(y))
         self._x = x @ self._A.T + u[:, None, None] * self._B
