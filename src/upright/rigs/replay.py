@@ -60,6 +60,7 @@ class ReplayPort:
             name=f"the replay of {self.record.provenance.file or self.record.provenance.rig or 'a record'}",
             coordinates=self.names, counts=self.per, command_unit=unit, full_scale=steps * self._step, steps=steps,
             period=self.record.period, modes=frozenset({Mode.HOST, Mode.MCU}), virtual=True, hardware=False,
+            replayed=True,
         )  # fmt: skip
 
     def write(self, command: float) -> None:

@@ -1,0 +1,391 @@
+"""What stands between a law and a rig on the host's side: nothing is armed unasked, and zero goes out before a word.
+
+The order is fixed: open and read limits back, zero the encoders where it hangs, a small pulse whose answer is compared
+with the model's, the start window, a start without a jump; then, tick by tick, a look at the rig's own faults, at
+samples that do not go on, at travel, at how far it leans, at the command, and at the innovations of a bank of Kalman
+filters, which see an encoder that lies. Every way out goes through `LiveRig.estop` first.
+
+This is supervision in software on a computer that may hang, not a rated safety function: a rig needs a stop in
+hardware.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from upright.control.sensors import Watch
+from upright.control.trial import ServoRig
+from upright.errors import BadInput, RigStopped
+from upright.gains import hold
+from upright.gains.loop import closed
+from upright.laws import Law, Rule
+from upright.rigs.board import Board, told
+from upright.rigs.law import RunningLaw, absurdity, for_rig
+from upright.rigs.protocol import NO_FAULT, Capabilities, Fault, Limits, LiveRig, Mode, SelfTest, Tick
+from upright.rigs.twin import TwinPort
+
+ALIKE = 1.5
+"""Factor by which the answer to a pulse may differ from the model's: friction of the day, but no doubled counts."""
+PULSES = (0.02, 0.05, 0.1, 0.2, 0.4)
+"""Pulses that are tried on the model, in shares of the largest command, until every coordinate would show `PLAIN`."""
+PLAIN = 60
+"""Counts that a pulse must move a coordinate by to say anything of it."""
+PULSE = 0.15
+"""Length of the pulse [s]."""
+REST = 0.5
+"""Time without a count after which a rig is at rest [s]."""
+
+Event = Callable[[float, str, str], None]
+
+
+def silent(_t: float, _kind: str, _text: str) -> None:
+    """Events that nobody asked for."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Duty:
+    """What a rig is to hold, and how it is looked after.
+
+    Attributes
+    ----------
+    limits : Limits or None
+        How far it may go; without them nothing is armed.
+    model : ServoRig or None
+        As identified; what is compared with a model is left out without one.
+    at, zero : str
+        Equilibrium that is held, and the one at which its encoders are zeroed, of the model's plant.
+    lean : float
+        How far the last coordinate may be from what is held [rad or m].
+    near : float
+        The same for a start.
+    watch : bool
+        Whether the bank of filters runs beside the loop; for a pendulum that is held upright.
+    """
+
+    limits: Limits | None
+    model: ServoRig | None = None
+    at: str = ""
+    zero: str = ""
+    lean: float = math.inf
+    near: float = math.inf
+    watch: bool = True
+
+    @property
+    def watched(self) -> bool:
+        """Whether a bank of filters can say something of it."""
+        return self.watch and self.model is not None and self.at == "inverted" and len(self.model.counts) == 2
+
+
+@dataclass(eq=False)
+class Supervisor:
+    """A rig with somebody beside it.
+
+    Attributes
+    ----------
+    rig : LiveRig
+    duty : Duty
+    event : callable
+        Told ``(time, kind, text)`` of what happens.
+    stopped : callable
+        Asked at every tick whether somebody wants it to stop; answers with a sentence, or with an empty one.
+    """
+
+    rig: LiveRig
+    duty: Duty
+    event: Event = silent
+    stopped: Callable[[], str] = field(default=lambda: "")
+    about: Capabilities = field(init=False)
+    held: Limits = field(init=False)
+    law: Law | Rule = field(init=False)
+    faults: Fault = field(init=False, default=NO_FAULT)
+    target: tuple[float, ...] = field(init=False, default=())
+    _running: RunningLaw | None = field(init=False, default=None)
+    _watch: Watch | None = field(init=False, default=None)
+    _last: Tick | None = field(init=False, default=None)
+    _command: float = field(init=False, default=0.0)
+    _stale: int = field(init=False, default=0)
+    _mode: Mode = field(init=False, default=Mode.IDLE)
+
+    def prepare(self, *, zero: bool = True) -> Capabilities:
+        """Open the rig, hand limits over and read them back; zero its encoders where it is now.
+
+        Raises
+        ------
+        RigStopped
+            When there are no limits, they do not come back as they were sent, or it has a fault that nobody looked at.
+        """
+        self.about = self.rig.open()
+        if self.duty.limits is None:
+            self._give_up(
+                NO_FAULT, f"{self.about.name} has no limits, and nothing is armed without: write [limits] with "
+                f"command, and [limits.{self.about.coordinates[0]}] with travel, speed and start into its RIG.toml.",
+            )  # fmt: skip
+        asked = self.duty.limits
+        assert asked is not None  # as was just asked
+        left = self.rig.exchange(0.0).faults & ~Fault.RESET
+        if left:
+            self._give_up(left, f"{self.about.name} stopped before: {told(left)}. Look at it, then clear its fault "
+                          "(upright rig doctor --clear).")  # fmt: skip
+        self.rig.clear_fault()
+        self.held = self.rig.configure(asked)
+        if wrong := _wider(self.held, asked, self.about):
+            self._give_up(NO_FAULT, f"{self.about.name} holds other limits than it was given: {wrong}; do not run it.")
+        if zero:
+            self.rig.zero()
+        return self.about
+
+    def check(self) -> SelfTest:
+        """Answer of the resting rig to a small pulse, beside the model's; leaves it in IDLE.
+
+        Raises
+        ------
+        RigStopped
+            When it does not come to rest, or does not answer as the model does.
+        """
+        self.rig.arm()
+        self._await_rest()
+        pulse, expected = self._expected()
+        found = self.rig.self_test(pulse, PULSE)
+        self.rig.stop()
+        complaint = found.complaint or unlike(found, expected)
+        told_of = ", ".join(f"{n} {v:.4g}" for n, v in found.moved.items())
+        self.event(self._time, "self-test", f"a pulse of {pulse:.3g} {self.about.command_unit} moved {told_of}")
+        if complaint:
+            self._give_up(Fault.SELF_TEST, complaint)
+        return replace(found, complaint="")
+
+    def start(self, law: Law | Rule, mode: Mode = Mode.HOST) -> Law | Rule:
+        """Arm the rig where it is and give it to the law; the law as it runs.
+
+        The law holds the driven coordinate where it is now, and a coordinate that turns at the nearest turn of what is
+        to be held: neither jumps.
+
+        Raises
+        ------
+        RigStopped
+            When it is off its start window, or the law would begin with more than the command may be.
+        BadInput
+            When the law is for another rig or period, would let the model fall, or has absurd gains.
+        """
+        fitted = for_rig(law, self.about, self.held)
+        if absurd := absurdity(fitted, self.about, self.held):
+            self._give_up(Fault.GAINS, f"{self.about.name} is not started: {absurd}.")
+        if complaint := self._falls(fitted):
+            self._give_up(Fault.GAINS, complaint)
+        # what takes time is done before anything is switched on
+        watch = Watch(self.duty.model, self.duty.at) if self.duty.watched and self.duty.model else None
+        self.rig.arm()
+        tick = self.rig.exchange(0.0) if not self.about.replayed else None
+        readings = self.readings(tick) if tick else [0.0] * len(self.about.counts)
+        if tick is not None and tick.mode != Mode.ARMED:
+            self._give_up(tick.faults, f"{self.about.name} is not armed: {told(tick.faults)}.")
+        self.target = self._own_target(fitted) if self.about.replayed else self._targets(fitted, readings)
+        if tick is not None and abs(readings[-1] - self.target[-1]) > self.duty.near:
+            self._give_up(
+                Fault.START, f"{self.about.coordinates[-1]} is {self._shown(readings[-1] - self.target[-1])} from "
+                f"where it is to be held, and a run starts within {self._shown(self.duty.near)}; bring it there.",
+            )  # fmt: skip
+        fitted = for_rig(law, self.about, self.held, self.target) if isinstance(law, Law) else fitted
+        first = RunningLaw(fitted, self.about.period).step(readings)
+        if tick is not None and abs(first) >= self.held.command:
+            self._give_up(
+                Fault.START, f"the law would begin with its largest command, {first:.3g} {self.about.command_unit}; "
+                "bring the rig closer to where it is to be held, and let it rest.",
+            )  # fmt: skip
+        self.rig.start(mode, fitted if mode == Mode.MCU and isinstance(fitted, Law) else None)
+        self.law, self._running, self._mode = fitted, RunningLaw(fitted, self.about.period), mode
+        self._watch = watch
+        self._last, self._command, self._stale = None, 0.0, 0
+        self.event(self._time, "start", f"{mode.name} holds {', '.join(f'{t:.4g}' for t in self.target)}")
+        return fitted
+
+    def step(self, tick: Tick, reference: float | None = None) -> float:
+        """Command for this tick; in MCU mode the reference is passed on.
+
+        Raises
+        ------
+        RigStopped
+            When something is wrong; the command was zero before.
+        """
+        if wish := self.stopped():
+            self._give_up(Fault.STOP, wish)
+        if tick.mode != self._mode or tick.faults:
+            self._give_up(tick.faults, f"{self.about.name} stopped itself: {told(tick.faults)}.")
+        if self._last is not None and tick.tick <= self._last.tick:
+            self._stale += 1
+            if self._stale * self.about.period > self.held.watchdog:
+                self._give_up(Fault.STALE, f"{self.about.name} has shown the same sample {self._stale + 1} times.")
+            return self._command  # nothing new to answer
+        self._stale, self._last = 0, tick
+        readings = self.readings(tick)
+        self._look(readings)
+        if self._running is None:
+            raise BadInput("the loop was not started; call start first.")
+        command = self._running.step(readings, reference)
+        if not math.isfinite(command):
+            self._give_up(Fault.GAINS, f"the law gave {command} for a command.")
+        if self._watch is not None and self.duty.model is not None:
+            away = [q - t for q, t in zip(readings, self.target, strict=True)]
+            self._watch.see([away], min(max(command, -self.held.command), self.held.command))
+            said, which = self._watch.speaks()
+            if said[0]:
+                what = self._watch.suspicions[int(which[0])]
+                self._give_up(
+                    Fault.MODEL, f"{self.about.name} does not move as its model does; likeliest is {what}. Check that "
+                    "encoder's wiring and counts (upright rig doctor); if a hand pushed it, start again.",
+                )  # fmt: skip
+        self._command = command if self._mode == Mode.HOST else (reference or 0.0)
+        return self._command
+
+    def finish(self) -> None:
+        """The end of a run: command to zero, power stage off, IDLE."""
+        self.rig.stop()
+        self.event(self._time, "stop", "the run is over")
+
+    def give_up(self, fault: Fault, why: str) -> None:
+        """Zero first, then the message.
+
+        Raises
+        ------
+        RigStopped
+            Always.
+        """
+        self._give_up(fault, why)
+
+    def readings(self, tick: Tick) -> list[float]:
+        """Coordinates of a sample [rad or m]."""
+        return [n / per for n, per in zip(tick.counts, self.about.counts, strict=True)]
+
+    @property
+    def _time(self) -> float:
+        return 0.0 if self._last is None else self._last.time
+
+    def _look(self, readings: Sequence[float]) -> None:
+        for name, q, most in zip(self.about.coordinates, readings, self.held.travel, strict=True):
+            if abs(q) > most:
+                self._give_up(Fault.OVERTRAVEL, f"{name} is at {q:.4g}, beyond its travel of {most:.4g}.")
+        if abs(readings[-1] - self.target[-1]) > self.duty.lean:
+            self._give_up(
+                Fault.OVERTRAVEL, f"{self.about.coordinates[-1]} left what is held by "
+                f"{self._shown(readings[-1] - self.target[-1])}, more than {self._shown(self.duty.lean)}: it fell.",
+            )  # fmt: skip
+
+    def _give_up(self, fault: Fault, why: str) -> None:
+        self.rig.estop()
+        self.faults |= fault
+        self.event(self._time, "fault", why)
+        raise RigStopped(why[0].upper() + why[1:])
+
+    def _await_rest(self, patience: float = 30.0) -> None:
+        first = moved = self.rig.exchange(0.0)
+        while moved.time - first.time < patience:
+            tick = self.rig.exchange(0.0)
+            moved = tick if tick.counts != moved.counts or tick.mode != Mode.ARMED else moved
+            if tick.mode != Mode.ARMED:
+                self._give_up(tick.faults, f"{self.about.name} stopped itself: {told(tick.faults)}.")
+            if tick.time - moved.time >= REST:
+                return
+        self._give_up(Fault.SELF_TEST, f"{self.about.name} does not come to rest within {patience:g} s; hold it still.")
+
+    def _expected(self) -> tuple[float, SelfTest | None]:
+        """Pulse for the self-test, and what the model does under it."""
+        model = self.duty.model
+        if model is None:
+            return PULSES[1] * self.held.command, None
+        found = None
+        for share in PULSES:
+            board = Board(TwinPort(replace(model, scales=()), self.duty.zero))
+            about = board.open()
+            board.clear_fault()
+            board.configure(replace(_free(about), command=self.held.command))
+            board.arm()
+            found = board.self_test(share * self.held.command, PULSE)
+            counts = [abs(v * per) for v, per in zip(found.moved.values(), about.counts, strict=True)]
+            if min(counts) >= PLAIN:
+                return share * self.held.command, found
+        return PULSES[-1] * self.held.command, found
+
+    def _own_target(self, law: Law | Rule) -> tuple[float, ...]:
+        own = law.target if isinstance(law, Law) else 0.0
+        return tuple(np.broadcast_to(np.asarray(own, dtype=np.float64), (len(self.about.counts),)).tolist())
+
+    def _targets(self, law: Law | Rule, readings: Sequence[float]) -> tuple[float, ...]:
+        """What is held, as the encoders show it."""
+        model = self.duty.model
+        if model is None:
+            return self._own_target(law)
+        held, zero = (model.plant.equilibrium(n or None) for n in (self.duty.at, self.duty.zero))
+        point = [held[c.name] - zero[c.name] for c in model.plant.coordinates]
+        turns = [c.unit == "rad" for c in model.plant.coordinates]
+        out = [
+            p + math.tau * round((q - p) / math.tau) if turn else p
+            for p, q, turn in zip(point, readings, turns, strict=True)
+        ]
+        i = [c.name for c in model.plant.coordinates].index(model.plant.inputs[0].on)
+        out[i] = readings[i] if not any(_stiffness(model, self.duty.at, i)) else out[i]
+        return tuple(out)
+
+    def _falls(self, law: Law | Rule) -> str:
+        """Why the model falls under this law; empty when it stands, or nobody knows."""
+        model = self.duty.model
+        if model is None or isinstance(law, Rule):
+            return ""
+        sampled = hold(model.linear(self.duty.at or next(iter(model.plant.equilibria))), model.period,
+                       model.delay / model.period, model.lag)  # fmt: skip
+        largest = float(np.abs(np.linalg.eigvals(closed(sampled, law))).max())
+        if largest < 1.0 + 1e-9:
+            return ""
+        return (
+            f"{self.about.name} is not started: under this law its model falls, e-fold in "
+            f"{model.period / math.log(largest):.3g} s; design again for it (upright design)."
+        )
+
+    def _shown(self, value: float) -> str:
+        unit = "rad" if self.duty.model is None else self.duty.model.plant.coordinates[-1].unit
+        return f"{math.degrees(abs(value)):.3g} degrees" if unit == "rad" else f"{1e3 * abs(value):.3g} mm"
+
+
+def _stiffness(model: ServoRig, at: str, i: int) -> list[float]:
+    """Accelerations of all coordinates per displacement of one, which is free to stand anywhere when they are zero."""
+    A = model.linear(at or next(iter(model.plant.equilibria))).A
+    return [float(a) for a in A[1::2, 2 * i]]
+
+
+def _free(about: Capabilities) -> Limits:
+    wide = (math.inf,) * len(about.counts)
+    return Limits(travel=wide, speed=wide, start=wide, command=about.full_scale, watchdog=1e9, saturation=1e9)
+
+
+def _wider(held: Limits, asked: Limits, about: Capabilities) -> str:
+    """What a rig holds wider, or far narrower, than it was asked to."""
+    for name in ("travel", "speed", "start"):
+        for which, mine, theirs in zip(about.coordinates, getattr(asked, name), getattr(held, name), strict=True):
+            if theirs > mine * (1 + 1e-6) or not theirs > 0:
+                return f"{name} of {which} {theirs:g} instead of {mine:g}"
+    for name in ("command", "watchdog", "saturation"):
+        mine, theirs = getattr(asked, name), getattr(held, name)
+        if theirs > mine * (1 + 1e-6) + (about.period if name != "command" else 0.0):
+            return f"{name} {theirs:g} instead of {mine:g}"
+    return ""
+
+
+def unlike(found: SelfTest, expected: SelfTest | None) -> str:
+    """Why the answer to a pulse is not the model's, as sentences; empty when it is."""
+    if expected is None:
+        return ""
+    out: list[str] = []
+    for name, wanted in expected.moved.items():
+        moved = found.moved.get(name, 0.0)
+        ratio = moved / wanted if wanted else 1.0
+        if abs(ratio) < 0.1:
+            out.append(f"{name} hardly moved ({moved:.3g}, its model {wanted:.3g}): is its encoder connected?")
+        elif ratio < 0:
+            out.append(f"{name} went the wrong way ({moved:.3g}, its model {wanted:.3g}): swap its encoder's channels, "
+                       "or the motor's leads if all went the wrong way.")  # fmt: skip
+        elif not 1 / ALIKE < ratio < ALIKE:
+            out.append(f"{name} showed {ratio:.2g} times its model's motion: correct its counts per turn.")
+    return " ".join(out)

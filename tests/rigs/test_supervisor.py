@@ -1,0 +1,213 @@
+"""Does whoever stands beside a rig stop it in time, zero first, and start it without a jump?"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from upright.errors import BadInput, RigStopped
+from upright.experiments.makes import make_rig
+from upright.gains import feedback, filtered, hold, place
+from upright.laws import Rule
+from upright.rigs import Board, Fault, Limits, Mode, TwinPort
+from upright.rigs.supervisor import Duty, Supervisor
+
+RIG = make_rig("furuta")
+MODEL = RIG.linear("inverted")
+SAMPLED = hold(MODEL, RIG.period, RIG.delay / RIG.period)
+POLES = [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220]
+LAW = feedback(filtered(SAMPLED, 0.5), place(MODEL.A, MODEL.B, POLES).K)
+LIMITS = Limits(travel=(2.0, math.inf), speed=(40.0, 60.0), start=(2.0, math.inf), command=RIG.limit)
+DUTY = Duty(limits=LIMITS, model=RIG, at="inverted", zero="hanging", lean=math.radians(25), near=math.radians(10))
+
+
+class Scene:
+    """A twin, its supervisor, and a hand."""
+
+    def __init__(self, duty=DUTY, truth=RIG):
+        self.port = TwinPort(truth)
+        self.rig = Board(self.port)
+        self.told: list[tuple[str, float, bool]] = []
+        self.beside = Supervisor(self.rig, duty, event=self._hear)
+
+    def _hear(self, _t, kind, text):
+        self.told.append((kind, self.rig.sample.applied, self.port._enabled))
+
+    def started(self, tilt=0.05, law=LAW, mode=Mode.HOST):
+        self.beside.prepare()
+        self.port.hold("inverted", [0.0, 0.0, tilt, 0.0])
+        self.beside.start(law, mode)
+        self.port.let_go()
+        return self
+
+    def run(self, seconds, then=None, after=0.3):
+        """Ticks of the loop; `then` is called after so many seconds."""
+        tick, ticks = self.rig.exchange(0.0), []
+        n = round(seconds / RIG.period)
+        for k in range(n):
+            if then is not None and k == round(after / RIG.period):
+                then(self.port)
+            tick = self.rig.exchange(self.beside.step(tick))
+            ticks.append(tick)
+        return ticks
+
+
+def test_a_sound_rig_passes_its_check_and_is_held():
+    scene = Scene()
+    scene.beside.prepare()
+    found = scene.beside.check()
+    assert all(v != 0 for v in found.moved.values())
+    scene.port.hold("inverted", [0.0, 0.0, 0.05, 0.0])
+    scene.beside.start(LAW)
+    scene.port.let_go()
+    ticks = scene.run(2.0)
+    assert abs(ticks[-1].counts[1] / RIG.counts[1] - math.pi) < 0.01
+    scene.beside.finish()
+    assert scene.rig.sample.mode == Mode.IDLE
+    assert [kind for kind, _, _ in scene.told] == ["self-test", "start", "stop"]
+
+
+@pytest.mark.parametrize("seed", range(1, 6))
+def test_rigs_of_a_make_pass_by_the_model_of_another(seed):
+    scene = Scene(truth=make_rig("furuta", seed))
+    scene.beside.prepare()
+    scene.beside.check()
+
+
+@pytest.mark.parametrize(
+    ("broken", "said"),
+    [
+        (lambda e: e.dead(1), "theta showed not"),
+        (lambda e: e.dead(0), "psi showed not"),
+        (lambda e: e.scaled(1, -1.0), "Theta went the wrong way"),
+        (lambda e: e.scaled(0, -1.0), "Psi went the wrong way"),
+        (lambda e: e.scaled(0, 2.0), r"Psi showed (2|1\.9\d*) times"),
+        (lambda e: e.scaled(1, 0.25), r"Theta showed 0\.2\d* times"),
+        (lambda e: e.scaled(1, 4.0), r"Theta showed (4|3\.9\d*|4\.0\d*) times"),
+    ],
+)
+def test_a_broken_encoder_fails_the_check(broken, said):
+    scene = Scene()
+    scene.beside.prepare()
+    broken(scene.port.encoders)
+    with pytest.raises(RigStopped, match=said):
+        scene.beside.check()
+    assert Fault.STOP in scene.rig.sample.faults
+
+
+def test_without_limits_nothing_is_armed():
+    scene = Scene(replace(DUTY, limits=None))
+    with pytest.raises(RigStopped, match=r"\[limits\]"):
+        scene.beside.prepare()
+
+
+def test_a_rig_that_holds_other_limits_is_not_run():
+    class Careless(Board):
+        def configure(self, limits):
+            return super().configure(replace(limits, travel=(9.0, math.inf)))
+
+    beside = Supervisor(Careless(TwinPort(RIG)), DUTY)
+    with pytest.raises(RigStopped, match="instead of 2; do not run it"):
+        beside.prepare()
+
+
+def test_a_start_off_its_window_is_refused():
+    with pytest.raises(RigStopped, match=r"11\.5 degrees"):
+        Scene().started(tilt=0.2)
+
+
+@pytest.mark.parametrize("factor", [0.25, 0.5, 2.0, 4.0])
+def test_half_a_turn_by_hand_shows_a_wrong_scale_at_the_start(factor):
+    scene = Scene()
+    scene.port.encoders.scaled(1, factor)
+    with pytest.raises(RigStopped, match="a run starts within"):
+        scene.started(tilt=0.0)
+
+
+def test_a_start_does_not_yank_the_arm_and_takes_the_nearest_turn():
+    scene = Scene()
+    scene.beside.prepare()
+    scene.port.hold("inverted", [0.7, 0.0, -math.tau, 0.0])
+    scene.beside.start(LAW)
+    scene.port.let_go()
+    assert scene.beside.target == pytest.approx((0.7, -math.pi), abs=1e-3)
+    ticks = scene.run(0.5)
+    assert max(abs(t.applied) for t in ticks) < 0.05  # upright and at rest: rounding of the encoders alone
+
+
+def test_gains_that_let_the_model_fall_are_refused_before_arming():
+    wrong = replace(LAW, C=-LAW.C, D=-LAW.D)
+    scene = Scene()
+    with pytest.raises(RigStopped, match="its model falls, e-fold"):
+        scene.started(law=wrong)
+    assert not scene.port._enabled
+
+
+def test_absurd_gains_and_foreign_laws_are_refused():
+    with pytest.raises(RigStopped, match="absurd"):
+        Scene().started(law=replace(LAW, D=LAW.D * 1e6))
+    with pytest.raises(BadInput, match="period"):
+        Scene().started(law=replace(LAW, period=2e-3))
+
+
+@pytest.mark.parametrize(
+    ("what", "fault"),
+    [
+        (lambda p: p.encoders.dead(1), Fault.MODEL),
+        (lambda p: p.encoders.scaled(1, -1.0), Fault.MODEL),
+        (lambda p: p.encoders.lost(1, 2000), Fault.OVERTRAVEL | Fault.OVERSPEED | Fault.MODEL),
+        (lambda p: p.push([0.0, 8.0]), Fault.OVERTRAVEL | Fault.MODEL),
+    ],
+    ids=["dead", "flipped", "lost counts", "pushed over"],
+)
+def test_what_goes_wrong_in_the_loop_ends_it_with_zero_before_the_word(what, fault):
+    scene = Scene().started(tilt=0.08)
+    with pytest.raises(RigStopped):
+        scene.run(2.5, then=what)
+    assert scene.beside.faults & fault
+    kind, applied, enabled = scene.told[-1]
+    assert (kind, applied, enabled) == ("fault", 0.0, False)
+    assert scene.rig.sample.mode == Mode.FAULT
+
+
+def test_a_rule_that_gives_no_number_is_stopped():
+    def mad(t, y, r, z, p):
+        return (p[0] if t < 0.01 else p[1],), ()
+
+    rule = Rule(function=mad, initial=[], parameters=[0.0, math.nan])
+    scene = Scene().started(tilt=0.0, law=rule)
+    with pytest.raises(RigStopped, match=r"gave|stopped itself"):
+        scene.run(0.1)
+    assert scene.rig.sample.applied == 0.0
+
+
+def test_a_wish_to_stop_is_heard_at_the_next_tick():
+    scene = Scene().started()
+    wishes = iter(["", "", "Stopped by Esc."])
+    scene.beside.stopped = lambda: next(wishes)
+    with pytest.raises(RigStopped, match="Esc"):
+        scene.run(1.0)
+    assert scene.rig.sample.tick <= 5
+
+
+def test_a_sample_that_comes_again_and_again_ends_it():
+    scene = Scene().started()
+    scene.run(0.1)
+    tick = scene.rig.exchange(0.0)
+    with pytest.raises(RigStopped, match="same sample"):
+        [scene.beside.step(tick) for _ in range(100)]
+    assert scene.beside.faults & Fault.STALE
+
+
+def test_its_own_loop_is_watched_too():
+    scene = Scene().started(mode=Mode.MCU)
+    ticks = scene.run(1.0)
+    assert ticks[-1].mode == Mode.MCU
+    assert abs(ticks[-1].counts[1] / RIG.counts[1] - math.pi) < 0.02
+    assert np.ptp([t.applied for t in ticks]) > 0
+    again = Scene().started(tilt=0.1, mode=Mode.MCU)
+    with pytest.raises(RigStopped):
+        again.run(2.5, then=lambda p: p.encoders.dead(1))
