@@ -41,6 +41,7 @@ study
 study.draft
 control
 rigs
+realtime
 report
 report.fit
 report.ladder report.law report.log
@@ -70,6 +71,7 @@ BLIND = {
     "gains": {"signals", "records", "readers", "simulation", "simulation.kernel"},
     "control": {"readers", "identification", "study"},
     "rigs": {"identification"},
+    "realtime": {"identification", "study", "readers"},
     "questionnaire": {"records", "readers", "physics", "simulation", "identification", "study", "control"},
 }
 # How a page is written is one thing, what it says another.

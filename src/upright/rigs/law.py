@@ -57,7 +57,7 @@ class RunningLaw:
             law = replace(law, references=None, reference_names=(), measured=(), target=target, begin=begin)
         self._step = at_work(law)
 
-    def step(self, readings: Sequence[float], reference: float | None = None) -> float:
+    def step(self, readings: Sequence[float], reference: float | None = None, time: float | None = None) -> float:
         """Command of this tick, rounded and limited.
 
         Parameters
@@ -66,13 +66,15 @@ class RunningLaw:
             As the encoders show them [rad or m].
         reference : float, optional
             First reference now; the law's own signal when omitted.
+        time : float, optional
+            Since the first tick [s]; so many periods as ticks have passed when omitted.
         """
         row = list(self._signal[min(self.ticks, len(self._signal) - 1)])
         if reference is not None and row:
             row[0] = reference
         given = readings if self._own else (*readings, *row)
         self.ticks += 1
-        return self._step((self.ticks - 1) * self.period, given)[0]
+        return self._step((self.ticks - 1) * self.period if time is None else time, given)[0]
 
 
 def absurdity(law: Law | Rule, about: Capabilities, limits: Limits) -> str:

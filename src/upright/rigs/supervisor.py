@@ -106,6 +106,7 @@ class Supervisor:
     _running: RunningLaw | None = field(init=False, default=None)
     _watch: Watch | None = field(init=False, default=None)
     _last: Tick | None = field(init=False, default=None)
+    _first: Tick | None = field(init=False, default=None)
     _command: float = field(init=False, default=0.0)
     _stale: int = field(init=False, default=0)
     _mode: Mode = field(init=False, default=Mode.IDLE)
@@ -158,50 +159,74 @@ class Supervisor:
             self._give_up(Fault.SELF_TEST, complaint)
         return replace(found, complaint="")
 
-    def start(self, law: Law | Rule, mode: Mode = Mode.HOST) -> Law | Rule:
-        """Arm the rig where it is and give it to the law; the law as it runs.
+    def aim(self, law: Law | Rule) -> Law | Rule:
+        """The law as it will run from where the rig is now; still in IDLE, so that a log can be opened with it.
 
-        The law holds the driven coordinate where it is now, and a coordinate that turns at the nearest turn of what is
-        to be held: neither jumps.
+        It holds the driven coordinate where that is now, and a coordinate that turns at the nearest turn of what is to
+        be held: neither jumps.
 
         Raises
         ------
         RigStopped
-            When it is off its start window, or the law would begin with more than the command may be.
+            When the rig is off its start window, the law has absurd gains, would let the model fall, or would begin
+            with all that the command may be.
         BadInput
-            When the law is for another rig or period, would let the model fall, or has absurd gains.
+            When the law is for another rig or period.
         """
         fitted = for_rig(law, self.about, self.held)
         if absurd := absurdity(fitted, self.about, self.held):
             self._give_up(Fault.GAINS, f"{self.about.name} is not started: {absurd}.")
         if complaint := self._falls(fitted):
             self._give_up(Fault.GAINS, complaint)
+        if self.about.replayed:
+            self.target = self._own_target(fitted)
+        else:
+            self.target = self._targets(fitted, self.readings(self.rig.exchange(0.0)))
+            fitted = for_rig(law, self.about, self.held, self.target) if isinstance(law, Law) else fitted
+        self.law = fitted
+        self._in_window()
         # what takes time is done before anything is switched on
-        watch = Watch(self.duty.model, self.duty.at) if self.duty.watched and self.duty.model else None
+        self._watch = Watch(self.duty.model, self.duty.at) if self.duty.watched and self.duty.model else None
+        return fitted
+
+    def start(self, mode: Mode = Mode.HOST) -> None:
+        """Arm the rig, and give it to the law that was aimed.
+
+        Raises
+        ------
+        RigStopped
+            When it has left its start window, or refuses.
+        """
         self.rig.arm()
-        tick = self.rig.exchange(0.0) if not self.about.replayed else None
-        readings = self.readings(tick) if tick else [0.0] * len(self.about.counts)
-        if tick is not None and tick.mode != Mode.ARMED:
-            self._give_up(tick.faults, f"{self.about.name} is not armed: {told(tick.faults)}.")
-        self.target = self._own_target(fitted) if self.about.replayed else self._targets(fitted, readings)
-        if tick is not None and abs(readings[-1] - self.target[-1]) > self.duty.near:
+        self._in_window()
+        self.rig.start(mode, self.law if mode == Mode.MCU and isinstance(self.law, Law) else None)
+        self._running, self._mode = RunningLaw(self.law, self.about.period), mode
+        self._last, self._first, self._command, self._stale = None, None, 0.0, 0
+        self.event(self._time, "start", f"{mode.name} holds {', '.join(f'{t:.4g}' for t in self.target)}")
+
+    def near(self) -> bool:
+        """Whether the rig is where a run may start."""
+        readings = self.readings(self.rig.exchange(0.0))
+        return abs(readings[-1] - self._targets(self.law, readings)[-1]) <= self.duty.near
+
+    def _in_window(self) -> None:
+        if self.about.replayed:
+            return
+        tick = self.rig.exchange(0.0)
+        if tick.faults:
+            self._give_up(tick.faults, f"{self.about.name} is not started: {told(tick.faults)}.")
+        readings = self.readings(tick)
+        if abs(readings[-1] - self.target[-1]) > self.duty.near:
             self._give_up(
                 Fault.START, f"{self.about.coordinates[-1]} is {self._shown(readings[-1] - self.target[-1])} from "
                 f"where it is to be held, and a run starts within {self._shown(self.duty.near)}; bring it there.",
             )  # fmt: skip
-        fitted = for_rig(law, self.about, self.held, self.target) if isinstance(law, Law) else fitted
-        first = RunningLaw(fitted, self.about.period).step(readings)
-        if tick is not None and abs(first) >= self.held.command:
+        first = RunningLaw(self.law, self.about.period).step(readings)
+        if abs(first) >= self.held.command:
             self._give_up(
                 Fault.START, f"the law would begin with its largest command, {first:.3g} {self.about.command_unit}; "
                 "bring the rig closer to where it is to be held, and let it rest.",
             )  # fmt: skip
-        self.rig.start(mode, fitted if mode == Mode.MCU and isinstance(fitted, Law) else None)
-        self.law, self._running, self._mode = fitted, RunningLaw(fitted, self.about.period), mode
-        self._watch = watch
-        self._last, self._command, self._stale = None, 0.0, 0
-        self.event(self._time, "start", f"{mode.name} holds {', '.join(f'{t:.4g}' for t in self.target)}")
-        return fitted
 
     def step(self, tick: Tick, reference: float | None = None) -> float:
         """Command for this tick; in MCU mode the reference is passed on.
@@ -220,12 +245,12 @@ class Supervisor:
             if self._stale * self.about.period > self.held.watchdog:
                 self._give_up(Fault.STALE, f"{self.about.name} has shown the same sample {self._stale + 1} times.")
             return self._command  # nothing new to answer
-        self._stale, self._last = 0, tick
+        self._stale, self._last, self._first = 0, tick, self._first or tick
         readings = self.readings(tick)
         self._look(readings)
         if self._running is None:
             raise BadInput("the loop was not started; call start first.")
-        command = self._running.step(readings, reference)
+        command = self._running.step(readings, reference, tick.time - self._first.time)
         if not math.isfinite(command):
             self._give_up(Fault.GAINS, f"the law gave {command} for a command.")
         if self._watch is not None and self.duty.model is not None:
@@ -259,6 +284,11 @@ class Supervisor:
     def readings(self, tick: Tick) -> list[float]:
         """Coordinates of a sample [rad or m]."""
         return [n / per for n, per in zip(tick.counts, self.about.counts, strict=True)]
+
+    @property
+    def stale(self) -> bool:
+        """Whether the last sample was one that had come before."""
+        return self._stale > 0
 
     @property
     def _time(self) -> float:

@@ -1,0 +1,96 @@
+"""Absolute deadlines: tick k is due k periods after the first, however late the one before was.
+
+A tick is late when its deadline had passed before the loop was back to wait for it, or when it was woken a period or
+more behind. Late ticks are counted and passed over, never caught up: two commands in one period help nobody.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+import threading
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+_ABSOLUTE = 1  # TIMER_ABSTIME
+_MONOTONIC = 1  # CLOCK_MONOTONIC
+
+
+class Pace(Protocol):
+    """When the next tick is."""
+
+    late: int
+
+    def wait(self) -> float:
+        """Wait for the next deadline; how far behind it we were woken [s]."""
+        ...
+
+
+class Virtual:
+    """Time that passes with the samples: nothing is waited for."""
+
+    late = 0
+
+    def wait(self) -> float:
+        """Return at once."""
+        return 0.0
+
+
+class _Time(ctypes.Structure):
+    _fields_ = (("seconds", ctypes.c_int64), ("nanoseconds", ctypes.c_long))
+
+
+def _sleeper() -> Callable[[int], None]:
+    """Sleep until a time of the monotonic clock [ns]."""
+    if sys.platform == "linux":
+        libc = ctypes.CDLL(None, use_errno=True)
+        due = _Time()
+        place = ctypes.byref(due)
+
+        def sleep_to(deadline: int) -> None:
+            due.seconds, due.nanoseconds = divmod(deadline, 1_000_000_000)
+            while libc.clock_nanosleep(_MONOTONIC, _ABSOLUTE, place, None):
+                pass  # a signal came; the deadline is the same
+
+        return sleep_to
+    never = threading.Event()
+
+    def wait_to(deadline: int) -> None:
+        while (left := deadline - time.monotonic_ns()) > 0:
+            never.wait(1e-9 * left)
+
+    return wait_to
+
+
+class WallClock:
+    """Deadlines by the clock on the wall, the first of them a period from the first `wait`.
+
+    Parameters
+    ----------
+    period : float
+        [s].
+    """
+
+    def __init__(self, period: float) -> None:
+        self.period, self.late = period, 0
+        self._sleep = _sleeper()
+        self._first, self._tick = 0, 0
+
+    def wait(self) -> float:
+        """Wait for the next deadline; how far behind it we were woken [s]."""
+        now = time.monotonic_ns()
+        if self._first == 0:
+            self._first = now
+        self._tick += 1
+        due = self._first + round(1e9 * self._tick * self.period)
+        if now > due:
+            self.late += 1
+        else:
+            self._sleep(due)
+        behind = 1e-9 * (time.monotonic_ns() - due)
+        if behind >= self.period:
+            missed = int(behind / self.period)
+            self.late += missed
+            self._tick += missed
+        return behind

@@ -1,0 +1,192 @@
+"""A run in a process of its own: nothing that the parent does, draws or collects makes a tick late.
+
+The child shows how it goes in shared memory, reads one flag that asks it to stop, and zeroes its rig when its parent is
+gone: an orphan that goes on driving a rig is the worst that can happen here.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import pickle
+import sys
+import traceback
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+from upright.errors import BadInput, RigStopped, UprightError
+from upright.laws import of_values
+from upright.realtime.pace import Pace, Virtual, WallClock
+from upright.realtime.priority import step_forward
+from upright.realtime.session import RunEnd, RunOrder, RunState, carry_out
+from upright.rigs.protocol import Fault, Mode
+
+_READINGS = 8
+_FIELDS = 8
+_SEEN = 0.05  # s between two looks of the parent
+WISH = "Stopped by hand."
+
+
+class _Window:
+    """State of a run in shared memory, one writer: a number that is odd while it is written, then the state."""
+
+    def __init__(self, memory: Any, phase: Any) -> None:
+        self._memory, self._phase = memory, phase
+
+    def put(self, state: RunState) -> None:
+        m = self._memory
+        m[0] += 1
+        m[1:_FIELDS] = (
+            state.time, state.tick, state.late, int(state.mode), int(state.faults), state.command, state.applied,
+        )  # fmt: skip
+        m[_FIELDS] = len(state.readings)
+        m[_FIELDS + 1 : _FIELDS + 1 + len(state.readings)] = state.readings[:_READINGS]
+        if state.phase != self._said:
+            self._said = state.phase
+            self._phase.value = state.phase.encode()[:200]
+        m[0] += 1
+
+    _said = ""
+
+    def get(self) -> RunState:
+        while True:
+            before = self._memory[0]
+            m = list(self._memory)
+            if before == self._memory[0] and before % 2 == 0:
+                break
+        n = int(m[_FIELDS])
+        return RunState(
+            phase=self._phase.value.decode(errors="replace"), time=m[1], tick=int(m[2]), late=int(m[3]),
+            mode=Mode(int(m[4])), faults=Fault(int(m[5])), command=m[6], applied=m[7],
+            readings=tuple(m[_FIELDS + 1 : _FIELDS + 1 + n]),
+        )  # fmt: skip
+
+
+def run_in_process(
+    order: RunOrder, *, watch: Callable[[RunState], str] = lambda _: "", paced: bool = True
+) -> RunEnd:  # fmt: skip
+    """Run a law on a rig in a process of its own.
+
+    Parameters
+    ----------
+    order : RunOrder
+    watch : callable
+        Shown the state some twenty times a second; answers with a sentence when it wants the run to end.
+    paced : bool
+        Whether ticks wait for the clock on the wall; twins and replays can do without.
+
+    Raises
+    ------
+    UprightError
+        That the run ended with before it began.
+    """
+    context = multiprocessing.get_context("spawn")
+    try:
+        pickle.dumps(order)
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        raise BadInput(f"this run cannot be sent to a process of its own ({error}); run it inline.") from None
+    memory = context.RawArray("d", _FIELDS + 1 + _READINGS)
+    phase = context.RawArray("c", 201)
+    wish = context.RawValue("b", 0)
+    ours, theirs = context.Pipe(duplex=False)
+    child = context.Process(target=_child, args=(order, memory, phase, wish, theirs, paced), name="upright loop")
+    with _no_interrupt_for_the_child():
+        child.start()
+    theirs.close()
+    window = _Window(memory, phase)
+    answer: Any = None
+    try:
+        while not wait([ours, child.sentinel], _SEEN):
+            _ask(wish, watch, window)
+        answer = ours.recv() if ours.poll(1.0) else None
+    except EOFError:
+        answer = None
+    except KeyboardInterrupt:
+        wish.value = 1
+        answer = ours.recv() if ours.poll(10.0) else None
+    finally:
+        wish.value = 1
+        child.join(10.0)
+        if child.is_alive():
+            child.kill()
+            child.join()
+        ours.close()
+    if isinstance(answer, UprightError):
+        raise answer
+    if isinstance(answer, RunEnd):
+        return answer
+    if isinstance(answer, str):
+        raise RuntimeError(f"the loop's process failed:\n{answer}")
+    state = window.get()
+    return RunEnd(
+        ticks=state.tick, late=state.late,
+        stopped=f"The loop's process was killed (code {child.exitcode}) {state.time:.3g} s into the run; the rig's own "
+        "watchdog zeroes its command. The log holds what came before.",
+        faults=Fault.WATCHDOG,
+    )  # fmt: skip
+
+
+def _ask(wish: Any, watch: Callable[[RunState], str], window: _Window) -> None:
+    if watch(window.get()):
+        wish.value = 1
+
+
+@contextmanager
+def _no_interrupt_for_the_child() -> Generator[None]:
+    """Ctrl-C reaches a whole group of processes; the child is to be asked by its flag, and starts deaf to it."""
+    import signal
+    import threading
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _child(order: RunOrder, memory: Any, phase: Any, wish: Any, pipe: Connection, paced: bool) -> None:
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    window, orphan = _Window(memory, phase), _orphaned()
+
+    def stopped() -> str:
+        if wish.value:
+            return WISH
+        return "The program that started the loop is gone." if orphan() else ""
+
+    def clock(period: float) -> tuple[Pace, str]:
+        if not paced:
+            return Virtual(), ""
+        return WallClock(period), step_forward(fifo=order.fifo).warning
+
+    answer: Any
+    try:
+        answer = carry_out(order, law=of_values(order.law), show=window.put, stopped=stopped, pace=clock)
+    except UprightError as error:
+        answer = error if isinstance(error, RigStopped | BadInput) else RigStopped(str(error))
+    except BaseException:
+        answer = traceback.format_exc()
+    if not orphan():
+        pipe.send(answer)
+    pipe.close()
+
+
+def _orphaned() -> Callable[[], bool]:
+    """Whether the parent is gone; asked at every tick."""
+    if sys.platform != "win32":
+        parent = os.getppid()
+        return lambda: os.getppid() != parent
+    process, asked = multiprocessing.parent_process(), 0
+
+    def gone() -> bool:
+        nonlocal asked
+        asked += 1
+        return asked % 20 == 0 and process is not None and not process.is_alive()
+
+    return gone

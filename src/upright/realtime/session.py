@@ -1,0 +1,278 @@
+"""One run of a law on a rig, from opening it to letting go; the same in virtual time and in a process of its own."""
+
+from __future__ import annotations
+
+import math
+import time as clock
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from upright.errors import RigStopped, UprightError
+from upright.laws import Law, Rule, as_values
+from upright.logs import LogHeader, LogWriter
+from upright.realtime.pace import Pace, Virtual
+from upright.rigs.board import SENTENCES, told
+from upright.rigs.protocol import NO_FAULT, Capabilities, Fault, Limits, Mode, Tick
+from upright.rigs.supervisor import Supervisor
+
+PATIENCE = 120.0
+"""How long a person may take to bring the rig where it is to be held [s]."""
+QUIET = 0.3
+"""How long it must be there before the loop starts [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stage:
+    """A rig with its supervisor, and the hands that bring it where a run starts and let it go.
+
+    `bring` and `let_go` act on a twin; with a rig of its own a person does it, and both do nothing.
+    """
+
+    supervisor: Supervisor
+    bring: Callable[[], None]
+    let_go: Callable[[], None]
+    units: tuple[str, ...]
+    advice: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOrder:
+    """What is to be run; it can be sent to another process.
+
+    Attributes
+    ----------
+    make : callable
+        Makes the stage, where the run will be.
+    law : dict of str to any
+        As `upright.laws.as_values` gives it.
+    seconds : float
+    mode : Mode
+    check : bool
+        Whether a pulse is given first.
+    log : Path
+    rig_text : str
+        Of the rig's file, for the log.
+    fifo : bool
+        Whether a process of its own asks for FIFO priority.
+    """
+
+    make: Callable[[], Stage]
+    law: dict[str, Any]
+    seconds: float
+    log: Path
+    mode: Mode = Mode.HOST
+    check: bool = True
+    rig_text: str = ""
+    fifo: bool = True
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunState:
+    """How a run goes; ``readings`` are deviations from what is held."""
+
+    phase: str
+    time: float = 0.0
+    tick: int = 0
+    late: int = 0
+    mode: Mode = Mode.IDLE
+    faults: Fault = NO_FAULT
+    command: float = 0.0
+    applied: float = 0.0
+    readings: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunEnd:
+    """How a run ended.
+
+    Attributes
+    ----------
+    ticks, late : int
+        Of the loop.
+    stopped : str
+        Why it ended early, as a sentence; empty when it ran to its end.
+    faults : Fault
+    about : Capabilities or None
+        What the rig said of itself; None when it did not answer.
+    held : Limits or None
+        As read back.
+    target : tuple of float
+        What was held, as the encoders show it.
+    rows, dropped : int
+        Of the log.
+    log_message : str
+        What is wrong with the log, as a sentence.
+    events : tuple of (float, str, str)
+    warning : str
+        About the priority that the loop got.
+    seconds : float
+        Clock time of the loop.
+    """
+
+    ticks: int = 0
+    late: int = 0
+    stopped: str = ""
+    faults: Fault = NO_FAULT
+    about: Capabilities | None = None
+    held: Limits | None = None
+    target: tuple[float, ...] = ()
+    rows: int = 0
+    dropped: int = 0
+    log_message: str = ""
+    events: tuple[tuple[float, str, str], ...] = ()
+    warning: str = ""
+    seconds: float = 0.0
+
+
+@dataclass(eq=False)
+class _Told:
+    """Events of a run, to the log as soon as there is one."""
+
+    events: list[tuple[float, str, str]] = field(default_factory=list[tuple[float, str, str]])
+    log: LogWriter | None = None
+
+    def __call__(self, t: float, kind: str, text: str) -> None:
+        self.events.append((t, kind, text))
+        if self.log is not None:
+            self.log.event(t, kind, text)
+
+
+def carry_out(
+    order: RunOrder,
+    *,
+    law: Law | Rule,
+    show: Callable[[RunState], None] = lambda _: None,
+    stopped: Callable[[], str] = lambda: "",
+    pace: Callable[[float], tuple[Pace, str]] = lambda _: (Virtual(), ""),
+) -> RunEnd:
+    """Run a law on a rig, whatever happens with zero at the end.
+
+    Parameters
+    ----------
+    order : RunOrder
+    law : Law or Rule
+    show : callable
+        Told how it goes, at every tick; has to be quick.
+    stopped : callable
+        Asked at every tick whether somebody wants it to end: a sentence, or an empty one.
+    pace : callable
+        Gives, for a period [s], the clock of the loop and a warning about it; called when all is ready.
+    """
+    hear = _Told()
+    stage = order.make()
+    beside = stage.supervisor
+    beside.event, beside.stopped = hear, stopped
+    end: dict[str, Any] = {"ticks": 0, "late": 0}
+    try:
+        about = beside.prepare()
+        end |= {"about": about, "held": beside.held}
+        if order.check and not about.replayed:
+            show(RunState(phase="testing: a small pulse"))
+            beside.check()
+        _bring(stage, law, show, stopped)
+        fitted = beside.aim(law)
+        end["target"] = beside.target
+        hear.log = LogWriter(order.log, header=_header(order, stage, fitted))
+        for event in hear.events:
+            hear.log.event(*event)
+        ticking, warning = pace(about.period)
+        end["warning"] = warning
+        beside.start(order.mode)
+        stage.let_go()
+        _loop(order, beside, ticking, hear.log, show, end)
+        beside.finish()
+    except RigStopped as stop:
+        beside.rig.estop()
+        end["stopped"] = str(stop)
+    except KeyboardInterrupt:
+        beside.rig.estop()
+        hear(0.0, "fault", "stopped by Ctrl-C")
+        end["stopped"] = "Stopped by Ctrl-C."
+    finally:
+        beside.rig.estop()
+        beside.rig.close()
+        if hear.log is not None:
+            status = hear.log.close()
+            end |= {"rows": status.rows, "dropped": status.dropped, "log_message": status.message}
+    return RunEnd(faults=beside.faults, events=tuple(hear.events), **end)
+
+
+def _loop(
+    order: RunOrder, beside: Supervisor, pace: Pace, log: LogWriter, show: Callable[[RunState], None],
+    end: dict[str, Any],
+) -> None:  # fmt: skip
+    """The only loop: answer a sample, wait for the deadline, hand over the answer and take the next sample."""
+    rig, about, began = beside.rig, beside.about, clock.monotonic()
+    tick = rig.exchange(0.0)
+    try:
+        for _ in range(max(1, math.ceil(order.seconds / about.period - 1e-9))):
+            command = beside.step(tick)
+            pace.wait()
+            following = rig.exchange(command)
+            if not beside.stale:
+                _row(log, beside, tick, following, command)
+            end["ticks"] += 1
+            if pace.late != end["late"]:
+                end["late"] = pace.late
+            show(_state(beside, following, command, pace.late))
+            tick = following
+        beside.step(tick)  # a fault of the last sample is one too
+    finally:
+        end["seconds"] = clock.monotonic() - began
+
+
+def _row(log: LogWriter, beside: Supervisor, tick: Tick, following: Tick, command: float) -> None:
+    """Sample, the answer to it, and what of that the converter put out."""
+    log.row(
+        (tick.time, tick.tick, *tick.counts, *beside.readings(tick), command, following.applied, int(tick.mode),
+         int(tick.faults))
+    )  # fmt: skip
+
+
+def _state(beside: Supervisor, tick: Tick, command: float, late: int) -> RunState:
+    away = tuple(q - t for q, t in zip(beside.readings(tick), beside.target, strict=True))
+    return RunState(
+        phase="running", time=tick.time, tick=tick.tick, late=late, mode=tick.mode, faults=tick.faults,
+        command=command, applied=tick.applied, readings=away,
+    )  # fmt: skip
+
+
+def _bring(
+    stage: Stage, law: Law | Rule, show: Callable[[RunState], None], stopped: Callable[[], str]
+) -> None:  # fmt: skip
+    """Wait until the rig is where it is to be held, for as long as a person may take."""
+    stage.bring()
+    beside = stage.supervisor
+    if beside.about.replayed or math.isinf(beside.duty.near):
+        return
+    beside.law = law
+    first = there = beside.rig.exchange(0.0).time
+    while True:
+        now = beside.rig.exchange(0.0)
+        if wish := stopped():
+            beside.give_up(Fault.STOP, wish)
+        if now.faults:
+            beside.give_up(now.faults, f"{beside.about.name} stopped itself: {told(now.faults)}.")
+        if not beside.near():
+            there = now.time
+        if now.time - there >= QUIET:
+            return
+        if now.time - first > PATIENCE:
+            beside.give_up(Fault.START, f"nobody brought it where it is to be held within {PATIENCE:g} s.")
+        show(RunState(phase=stage.advice or "waiting", time=now.time, tick=now.tick, mode=now.mode))
+
+
+def _header(order: RunOrder, stage: Stage, law: Law | Rule) -> LogHeader:
+    about = stage.supervisor.about
+    return LogHeader(
+        rig=order.rig_text, law=as_values(law), coordinates=tuple(zip(about.coordinates, stage.units, strict=True)),
+        command_unit=about.command_unit, period=about.period, modes={int(m): m.name for m in Mode},
+        faults={int(f): text for f, text in SENTENCES.items()}, driven=(int(Mode.HOST),), start=clock.time(),
+    )  # fmt: skip
+
+
+def refused(error: UprightError) -> RunEnd:
+    """The end of a run that did not come to its start."""
+    return RunEnd(stopped=str(error))
