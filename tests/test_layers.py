@@ -50,7 +50,7 @@ diagnosis questionnaire
 paper
 experiments.abreast experiments.makes
 experiments.identified
-experiments.designing experiments.weighing_1a
+experiments.designing experiments.weighing_1a experiments.running
 experiments.frequency_1b
 experiments.regulation_2
 experiments.swing_up_2b experiments.tracking_3 experiments.free_swing_4

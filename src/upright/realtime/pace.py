@@ -28,9 +28,10 @@ class Pace(Protocol):
 
 
 class Virtual:
-    """Time that passes with the samples: nothing is waited for."""
+    """Time that passes with the samples, as on a twin or by a rig's own clock: nothing is waited for."""
 
-    late = 0
+    def __init__(self) -> None:
+        self.late = 0
 
     def wait(self) -> float:
         """Return at once."""

@@ -21,7 +21,7 @@ from upright.laws import of_values
 from upright.realtime.pace import Pace, Virtual, WallClock
 from upright.realtime.priority import step_forward
 from upright.realtime.session import RunEnd, RunOrder, RunState, carry_out
-from upright.rigs.protocol import Fault, Mode
+from upright.rigs.protocol import Capabilities, Fault, Mode
 
 _READINGS = 8
 _FIELDS = 8
@@ -160,10 +160,11 @@ def _child(order: RunOrder, memory: Any, phase: Any, wish: Any, pipe: Connection
             return WISH
         return "The program that started the loop is gone." if orphan() else ""
 
-    def clock(period: float) -> tuple[Pace, str]:
+    def clock(about: Capabilities) -> tuple[Pace, str]:
         if not paced:
             return Virtual(), ""
-        return WallClock(period), step_forward(fifo=order.fifo).warning
+        warning = step_forward(fifo=order.fifo).warning
+        return Virtual() if about.paced else WallClock(about.period), warning
 
     answer: Any
     try:

@@ -145,7 +145,7 @@ def carry_out(
     law: Law | Rule,
     show: Callable[[RunState], None] = lambda _: None,
     stopped: Callable[[], str] = lambda: "",
-    pace: Callable[[float], tuple[Pace, str]] = lambda _: (Virtual(), ""),
+    pace: Callable[[Capabilities], tuple[Pace, str]] = lambda _: (Virtual(), ""),
 ) -> RunEnd:
     """Run a law on a rig, whatever happens with zero at the end.
 
@@ -158,7 +158,7 @@ def carry_out(
     stopped : callable
         Asked at every tick whether somebody wants it to end: a sentence, or an empty one.
     pace : callable
-        Gives, for a period [s], the clock of the loop and a warning about it; called when all is ready.
+        Gives the clock of the loop for a rig, and a warning about it; called when all is ready.
     """
     hear = _Told()
     stage = order.make()
@@ -174,10 +174,12 @@ def carry_out(
         _bring(stage, law, show, stopped)
         fitted = beside.aim(law)
         end["target"] = beside.target
-        hear.log = LogWriter(order.log, header=_header(order, stage, fitted))
+        # in virtual time the loop may be ahead of the log by all of the run
+        waiting = min(round(order.seconds / about.period) + 100, 1 << 20) if about.virtual else 0
+        hear.log = LogWriter(order.log, header=_header(order, stage, fitted), rows=max(8192, waiting))
         for event in hear.events:
             hear.log.event(*event)
-        ticking, warning = pace(about.period)
+        ticking, warning = pace(about)
         end["warning"] = warning
         beside.start(order.mode)
         stage.let_go()
@@ -213,9 +215,9 @@ def _loop(
             following = rig.exchange(command)
             if not beside.stale:
                 _row(log, beside, tick, following, command)
-            end["ticks"] += 1
-            if pace.late != end["late"]:
-                end["late"] = pace.late
+            if about.paced:
+                pace.late += max(0, following.tick - tick.tick - 1)
+            end["ticks"], end["late"] = end["ticks"] + 1, pace.late
             show(_state(beside, following, command, pace.late))
             tick = following
         beside.step(tick)  # a fault of the last sample is one too

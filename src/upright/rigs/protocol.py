@@ -79,6 +79,8 @@ class Capabilities:
         Whether time passes only while a sample is exchanged, as on a twin, instead of by the clock on the wall.
     hardware : bool
         Whether something can really move; then limits are demanded.
+    paced : bool
+        Whether `exchange` comes back at the rig's own tick, so that the rig's clock paces the loop.
     replayed : bool
         Whether its samples come as they were stored, whatever it is commanded.
     """
@@ -93,6 +95,7 @@ class Capabilities:
     modes: frozenset[Mode] = frozenset({Mode.HOST})
     virtual: bool = False
     hardware: bool = True
+    paced: bool = False
     replayed: bool = False
 
     @property

@@ -14,6 +14,7 @@ from upright.gains import Sampled, spelled_out
 from upright.gains.lqr import locus
 from upright.gains.requests import Roots, written
 from upright.gains.sampled import to_s
+from upright.laws import as_values
 from upright.report.drawing import BLACK, BLUE, VERMILLION, Poles, locus_figure, pole_map, swing_figure
 from upright.report.page import Block, Chapter, Part, Picture, Points, Step, Table
 from upright.report.symbols import number, percent, plain
@@ -199,6 +200,7 @@ def _numbers(done: Designed) -> dict[str, Any]:
         "peak_command_sampled": done.peak_sampled,
         "chance_over_the_fit": done.chance,
         "law": spelled_out(done.law) | {"inputs": "readings, readings at rest, reference"},
+        "as_run": as_values(done.law),
         "verdict": done.verdict,
     }
 

@@ -1,0 +1,1 @@
+"""A law on a rig that is there: in virtual time, or by the clock on the wall."""

@@ -1,0 +1,220 @@
+"""From a RIG.toml to a rig with its supervisor and, for a twin, the hand that brings it where it is to be held."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from upright.control.trial import ServoRig
+from upright.errors import BadInput, nearest
+from upright.experiments.identified import read_identified
+from upright.experiments.makes import make_named, make_rig
+from upright.files import read_text
+from upright.laws import Law, Rule, of_values
+from upright.readers import read
+from upright.realtime.session import Stage
+from upright.records import Array
+from upright.rigs import Board, Capabilities, Limits, LiveRig, Mode, ReplayPort, TwinPort
+from upright.rigs.rigfile import RigFile, read_rig_file
+from upright.rigs.supervisor import Duty, Supervisor
+
+LEAN, NEAR = math.radians(30), math.radians(10)
+"""How far a pendulum may lean in a run and at its start, where RIG.toml does not say."""
+FULL_SCALE = 10.0
+"""Of converters of vendors' boards, where [board] does not say [V]."""
+
+
+def described(file: RigFile) -> tuple[ServoRig, ServoRig]:
+    """The rig as it is known, and the one that a twin of it truly is."""
+    if file.known is None:
+        make = make_named(file.make, option="make")
+        return make_rig(make.key), make_rig(make.key, file.seed)
+    known = read_identified(file.known, seed=file.seed)
+    said = known.described(vendor=file.vendor, who="a run on a rig")
+    model = known.rig(said)
+    truth = known.twin(model, said, file.seed) if file.kind == "twin" and file.seed else model
+    return (replace(model, name=file.name), truth) if file.name else (model, truth)
+
+
+def live_rig(file: RigFile, model: ServoRig, truth: ServoRig) -> LiveRig:
+    """The rig itself; a twin or a replay has its port as `port`.
+
+    Raises
+    ------
+    BadInput
+        When what it takes is not installed, or RIG.toml leaves out what it needs.
+    """
+    names = tuple(c.name for c in model.plant.coordinates)
+    if file.kind == "twin":
+        return Board(TwinPort(truth, file.zero if file.zero in model.plant.equilibria else ""))
+    if file.kind == "replay":
+        assert file.record is not None  # as `read_rig_file` made sure
+        step = model.converter or 2.0 * model.limit / (1 << 23)
+        return Board(ReplayPort(read(file.record), model.counts, 2.0 * model.limit, step, names))
+    given = dict(file.board)
+    full_scale = float(given.pop("full_scale", FULL_SCALE))
+    if file.kind == "serial":
+        rig = import_module("upright.rigs.serial").SerialRig
+        return rig(file.port, coordinates=names, counts=model.counts, command_unit=model.unit, full_scale=full_scale,
+                   **given)  # fmt: skip
+    about = Capabilities(
+        name=file.name or file.kind, coordinates=names, counts=model.counts, command_unit=model.unit,
+        full_scale=full_scale, steps=int(given.pop("steps", 1 << 15)), period=model.period,
+        modes=frozenset({Mode.HOST}),
+    )  # fmt: skip
+    module = import_module(f"upright.rigs.vendor.{file.kind}")
+    port = {"quanser": "QuanserPort", "nidaqmx": "NidaqmxPort"}[file.kind]
+    try:
+        return Board(getattr(module, port)(about, **given))
+    except TypeError as error:
+        raise BadInput(f"{file.path}: [board] does not fit {port} ({error}); see help(upright.rigs.vendor).") from None
+
+
+def usual_limits(rig: ServoRig) -> Limits:
+    """Limits of a twin, from what is known of the rig; nothing real may go by these."""
+    names = [c.name for c in rig.plant.coordinates]
+    free = [math.inf] * len(names)
+    driven = names.index(rig.plant.inputs[0].on)
+    travel, speed = free.copy(), free.copy()
+    travel[driven], speed[driven] = rig.travel, rig.speed_limit
+    return Limits(
+        travel=tuple(travel), speed=tuple(speed), start=tuple(travel), command=rig.limit,
+        watchdog=max(0.02, 10 * rig.period),
+    )  # fmt: skip
+
+
+def stage_of(path: Path, *, balance: bool = True, tilt: float = 0.0, watch: bool = True) -> Stage:
+    """Rig, supervisor and hands of a RIG.toml.
+
+    Parameters
+    ----------
+    path : Path
+    balance : bool
+        Whether an equilibrium is held that nothing holds by itself; else the rig stays where its encoders are zeroed.
+    tilt : float
+        Of the last coordinate when the hand of a twin lets go [rad or m].
+    watch : bool
+        Whether the bank of filters runs beside the loop.
+
+    Raises
+    ------
+    BadInput
+        When RIG.toml does not say what is needed.
+    """
+    file = read_rig_file(path)
+    model, truth = described(file)
+    kinds = model.plant.equilibria
+    zero = file.zero if file.zero in kinds else next(iter(kinds))
+    at = file.at if balance else zero
+    at = at if at in kinds or file.at != "inverted" else zero
+    if at not in kinds:
+        raise BadInput(f"{path}: {model.name} has no equilibrium '{at}'; {nearest(at, kinds)}")
+    units = {c.name: c.unit for c in model.plant.coordinates}
+    upright = at != zero
+    last = list(units.values())[-1]
+    lean = file.lean(last, LEAN if last == "rad" and upright else math.inf)
+    duty = Duty(
+        limits=file.limits(units, model.unit, usual_limits(model)), model=model, at=at, zero=zero, lean=lean,
+        near=min(NEAR, lean) if upright else math.inf, watch=watch,
+    )  # fmt: skip
+    rig = live_rig(file, model, truth)
+    bring, let_go, advice = _nothing, _nothing, ""
+    if isinstance(rig, Board) and isinstance(rig.port, TwinPort):
+        away = np.zeros(2 * len(units))
+        away[-2] = tilt
+        bring, let_go = partial(rig.port.hold, at, away), rig.port.let_go
+        if not upright and not tilt:
+            bring = _nothing
+    elif upright:
+        advice = f"bring {list(units)[-1]} to '{at}' and hold it still; let go when it is held"
+    return Stage(
+        supervisor=Supervisor(rig, duty), bring=bring, let_go=let_go, units=tuple(units.values()), advice=advice
+    )
+
+
+def _nothing() -> None:
+    """What a person does."""
+
+
+def read_law(path: Path, model: ServoRig, at: str, zero: str) -> Law | Rule:
+    """Law of a design.json, or of a file that `upright.laws.as_values` filled; about what is held.
+
+    Raises
+    ------
+    BadInput
+        When it is neither.
+    """
+    try:
+        content: Any = json.loads(read_text(path))
+    except (ValueError, RecursionError):
+        raise BadInput(f"{path} is no JSON; name the design.json of `upright design`.") from None
+    values = content.get("as_run", content) if isinstance(content, dict) else None
+    if not isinstance(values, dict) or "kind" not in values:
+        raise BadInput(f"{path} holds no law that can run; design again: upright design FIT -o FOLDER.")
+    law = of_values(values)
+    if isinstance(law, Rule):
+        return law
+    held, from_zero = model.plant.equilibrium(at), model.plant.equilibrium(zero)
+    return replace(law, target=np.array([held[c.name] - from_zero[c.name] for c in model.plant.coordinates]))
+
+
+SHAPES = ("free", "step", "square", "sine", "sweep")
+
+
+def signal(text: str, unit: str, period: float, seconds: float) -> list[float]:
+    """Samples of a signal that a command line says.
+
+    ``free``; ``step SIZE``; ``square SIZE PERIOD``; ``sine SIZE FREQUENCY``; ``sweep SIZE FROM TO``; each number with
+    its unit in quotes or in SI: ``"sweep 0.5 0.5 10"``, in `unit`, Hz and s.
+
+    Raises
+    ------
+    BadInput
+        When it says none of these.
+    """
+    kind, *words = text.split() or [""]
+    wanted = dict(zip(SHAPES, (0, 1, 2, 2, 3), strict=True))
+    try:
+        numbers = [float(w) for w in words]
+    except ValueError:
+        numbers = []
+    if kind not in wanted or len(numbers) != wanted[kind] or not all(math.isfinite(n) for n in numbers):
+        raise BadInput(
+            "a signal is free, step SIZE, square SIZE PERIOD, sine SIZE FREQUENCY or sweep SIZE FROM TO, with sizes in "
+            f"{unit}, s and Hz, got '{text}'."
+        )
+    if any(n <= 0 for n in numbers[1:]):
+        raise BadInput(f"periods and frequencies are above zero, got '{text}'.")
+    t: Array = np.arange(math.ceil(seconds / period) + 1, dtype=np.float64) * period
+    return _shape(kind, numbers, t, seconds).tolist()
+
+
+def _shape(kind: str, numbers: Sequence[float], t: Array, seconds: float) -> Array:
+    if kind == "free":
+        return np.zeros_like(t)
+    size, rest = numbers[0], numbers[1:]
+    if kind == "step":
+        return np.full_like(t, size)
+    if kind == "square":
+        return np.where(np.floor(2 * t / rest[0]) % 2 == 0, size, -size)
+    if kind == "sine":
+        return size * np.sin(2 * math.pi * rest[0] * t)
+    growth = math.log(rest[1] / rest[0]) / seconds
+    cycles = rest[0] * t if growth == 0 else rest[0] * np.expm1(growth * t) / growth
+    return size * np.sin(2 * math.pi * cycles)
+
+
+def open_loop(samples: Sequence[float], coordinates: int, period: float) -> Law:
+    """A law that looks at nothing and puts a signal out."""
+    return Law(
+        np.zeros((0, 0)), np.zeros((0, coordinates + 1)), np.zeros((1, 0)), np.eye(1, coordinates + 1, coordinates),
+        references=np.asarray(samples, dtype=np.float64), reference_names=("excitation",), period=period,
+    )  # fmt: skip

@@ -1,0 +1,195 @@
+"""A run of a law, or of a signal, on the rig of a RIG.toml, and what it came to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from upright.control.trial import ServoRig
+from upright.errors import BadInput
+from upright.experiments.running.rig import described, open_loop, read_law, signal, stage_of
+from upright.files import read_text
+from upright.laws import Law, Rule, as_values
+from upright.logs import RunLog, read_log
+from upright.realtime.jitter import TOLERATED
+from upright.realtime.process import run_in_process
+from upright.realtime.session import RunEnd, RunOrder, RunState, carry_out
+from upright.records import Array
+from upright.rigs.protocol import Mode
+from upright.rigs.rigfile import RigFile, read_rig_file
+
+MODES = {"host": Mode.HOST, "mcu": Mode.MCU}
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunRequest:
+    """What is asked of a run.
+
+    `law` is a file, None for a signal that is put out blindly, `excite`; `reference` is a signal that the law follows.
+    `own_process` puts a twin or a replay into a process of its own as well, where a rig always is.
+    """
+
+    rig: Path
+    law: Path | None = None
+    excite: str = ""
+    reference: str = ""
+    seconds: float = 30.0
+    mode: str = "host"
+    tilt: float = 0.0
+    check: bool = True
+    watch: bool = True
+    own_process: bool = False
+
+    def __post_init__(self) -> None:
+        if (self.law is None) == (not self.excite):
+            raise BadInput('a run needs a law (--law design.json) or a signal (--excite "sine 0.5 2"), one of them.')
+        if not 0 < self.seconds <= 86_400:
+            raise BadInput(f"a run takes more than 0 and at most 86400 s, got {self.seconds:g} s.")
+        if self.mode not in MODES:
+            raise BadInput(f"--mode is host or mcu, got '{self.mode}'.")
+        if self.reference and self.law is None:
+            raise BadInput("a reference is for a law; a signal that is put out blindly is --excite.")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RigRun:
+    """What a run came to.
+
+    Attributes
+    ----------
+    wish : RunRequest
+    file : RigFile
+    model : ServoRig
+        As it is known.
+    end : RunEnd
+    log : RunLog or None
+        None where no loop began.
+    log_path : Path
+    """
+
+    wish: RunRequest
+    file: RigFile
+    model: ServoRig
+    end: RunEnd
+    log: RunLog | None
+    log_path: Path
+
+    @property
+    def t(self) -> Array:
+        """Time since the loop began [s]."""
+        t: Array = np.zeros(0) if self.log is None else self.log.columns["t"]
+        return t - t[0] if t.size else t
+
+    @property
+    def away(self) -> Array:
+        """Deviations from what was held, shape (N, coordinates)."""
+        if self.log is None:
+            return np.zeros((0, len(self.model.counts)))
+        return np.column_stack([self.log.columns[c.name] for c in self.model.plant.coordinates]) - self.end.target
+
+    @property
+    def unrest(self) -> tuple[float, ...]:
+        """Root mean square of the deviations over the second half [rad or m]; less their mean with a reference."""
+        half = self.away[len(self.away) // 2 :]
+        return tuple(np.sqrt(np.mean(half**2, axis=0)).tolist()) if half.size else ()
+
+    @property
+    def complete(self) -> bool:
+        """Whether every row of the loop is in the log."""
+        return self.log is not None and not self.log.complaint and not self.end.dropped
+
+    @property
+    def sound(self) -> bool:
+        """Whether it ran to its end, in time, with a whole log."""
+        return not self.end.stopped and self.complete and self.end.late <= TOLERATED * max(self.end.ticks, 1)
+
+    @property
+    def verdict(self) -> str:
+        """What it came to, in a sentence or two."""
+        end = self.end
+        if end.stopped:
+            ran = f" after {self.t[-1]:.3g} s" if self.t.size else " before its loop began"
+            return f"Stopped{ran}: {end.stopped}"
+        how = f"{self.wish.seconds:g} s, {end.ticks} ticks"
+        late = f", {end.late} of them late" if end.late else ", none late"
+        log = "" if self.complete else f" The log is not whole: {end.log_message or 'rows are missing'}."
+        if self.wish.law is None:
+            return f"The signal was put out for {how}{late}.{log}"
+        last = self.model.plant.coordinates[-1]
+        unrest = math.degrees(self.unrest[-1]) if last.unit == "rad" else 1e3 * self.unrest[-1]
+        unit = "degrees" if last.unit == "rad" else "mm"
+        return f"Held for {how}{late}; {last.name} stayed within {unrest:.2g} {unit} (rms, second half).{log}"
+
+
+def run_rig(
+    wish: RunRequest, folder: Path, *, watch: Callable[[RunState], str] = lambda _: ""
+) -> RigRun:  # fmt: skip
+    """Run what is asked, log it, and say what it came to.
+
+    Parameters
+    ----------
+    wish : RunRequest
+    folder : Path
+        Takes the log.
+    watch : callable
+        Shown how it goes; answers with a sentence when it wants the run to end.
+
+    Raises
+    ------
+    BadInput
+        When files contradict each other.
+    """
+    file = read_rig_file(wish.rig)
+    model, _ = described(file)
+    balance = wish.law is not None
+    zero = file.zero if file.zero in model.plant.equilibria else next(iter(model.plant.equilibria))
+    at = file.at if file.at in model.plant.equilibria else zero
+    if wish.law is not None:
+        law = read_law(wish.law, model, at, zero)
+        if wish.reference:
+            if not isinstance(law, Law) or not law.reference_names or not np.any(law.D[:, law.readings :]):
+                raise BadInput(f"the law of {wish.law} follows no reference; design it with --track COORDINATE.")
+            unit = model.plant.coordinates[0].unit
+            law = replace(law, references=np.array(signal(wish.reference, unit, model.period, wish.seconds)))
+    else:
+        samples = signal(wish.excite, model.unit, model.period, wish.seconds)
+        law = open_loop(samples, len(model.counts), model.period)
+    folder.mkdir(parents=True, exist_ok=True)
+    path = fresh(folder, "run", ".mcap")
+    order = RunOrder(
+        make=partial(stage_of, wish.rig, balance=balance, tilt=wish.tilt, watch=wish.watch), law=as_values(law),
+        seconds=wish.seconds, log=path, mode=MODES[wish.mode], check=wish.check, rig_text=read_text(wish.rig),
+    )  # fmt: skip
+    if file.hardware or wish.own_process:
+        end = run_in_process(order, watch=watch, paced=file.hardware)
+    else:
+        end = _inline(order, law, watch)
+    log = read_log(path) if path.exists() else None
+    return RigRun(wish=wish, file=file, model=model, end=end, log=log, log_path=path)
+
+
+def _inline(order: RunOrder, law: Law | Rule, watch: Callable[[RunState], str]) -> RunEnd:
+    """The same in this process, in virtual time."""
+    said, seen = "", 0
+
+    def show(state: RunState) -> None:
+        nonlocal said, seen
+        seen += 1
+        if seen % 100 == 0:  # often enough for an eye, in virtual time
+            said = said or watch(state)
+
+    return carry_out(order, law=law, show=show, stopped=lambda: said)
+
+
+def fresh(folder: Path, stem: str, ending: str) -> Path:
+    """A name in a folder that no file has yet: run.mcap, run-2.mcap, ..."""
+    path, n = folder / f"{stem}{ending}", 1
+    while path.exists():
+        n += 1
+        path = folder / f"{stem}-{n}{ending}"
+    return path

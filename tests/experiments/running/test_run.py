@@ -1,0 +1,107 @@
+"""A law from a design runs on the twin of a RIG.toml; the log is whole, and the logged law gives its commands again."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from upright.errors import BadInput
+from upright.experiments.makes import make_rig
+from upright.experiments.running.run import RunRequest, run_rig
+from upright.gains import feedback, filtered, hold, place, prefilter
+from upright.laws import as_values
+from upright.logs import read_log
+from upright.logs.replay import replay
+from upright.rigs import Fault
+
+RIG = make_rig("furuta")
+POLES = [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """RIG.toml of a twin with numbers of its own, and a law."""
+    place_of = tmp_path_factory.mktemp("bench")
+    (place_of / "RIG.toml").write_text('kind = "twin"\nmake = "furuta"\nseed = 3\n', encoding="utf-8")
+    model = RIG.linear("inverted")
+    sampled = hold(model, RIG.period, RIG.delay / RIG.period)
+    K = place(model.A, model.B, POLES).K
+    law = feedback(filtered(sampled, 0.5), K, prefilter(model.A, model.B, model.C[0], K))
+    (place_of / "design.json").write_text(json.dumps({"as_run": as_values(law)}), encoding="utf-8")
+    return place_of
+
+
+def test_a_law_holds_the_twin_and_its_log_replays_to_the_last_bit(folder, tmp_path):
+    done = run_rig(RunRequest(rig=folder / "RIG.toml", law=folder / "design.json", seconds=2.0, tilt=0.05), tmp_path)
+    assert not done.end.stopped
+    assert done.sound
+    assert done.end.ticks == math.ceil(2.0 / RIG.period)
+    assert len(done.log) == done.end.ticks
+    assert abs(done.away[-1, 1]) < math.radians(1)
+    again = replay(read_log(done.log_path))
+    assert again.rows.size == done.end.ticks
+    assert again.identical
+
+
+def test_a_reference_is_followed_and_replays(folder, tmp_path):
+    wish = RunRequest(rig=folder / "RIG.toml", law=folder / "design.json", seconds=4.0, reference="step 0.4")
+    done = run_rig(wish, tmp_path)
+    assert not done.end.stopped
+    assert done.away[-1, 0] == pytest.approx(0.4, abs=0.1)  # dry friction stops the arm short of it
+    assert replay(read_log(done.log_path)).identical
+
+
+def test_a_record_is_played_back_as_a_rig(folder, tmp_path):
+    first = run_rig(RunRequest(rig=folder / "RIG.toml", law=folder / "design.json", seconds=0.5, tilt=0.05), tmp_path)
+    first.log.record().to_csv(tmp_path / "run.csv")
+    (tmp_path / "REPLAY.toml").write_text('kind = "replay"\nmake = "furuta"\nrecord = "run.csv"\n', encoding="utf-8")
+    (tmp_path / "law.json").write_text(json.dumps(dict(first.log.header.law)), encoding="utf-8")
+    done = run_rig(RunRequest(rig=tmp_path / "REPLAY.toml", law=tmp_path / "law.json", seconds=0.4), tmp_path)
+    n = len(done.log)
+    assert n > 400
+    assert done.log.columns["u"].tobytes() == first.log.columns["u"][:n].tobytes()
+
+
+def test_a_signal_swings_the_hanging_twin_and_free_does_not(folder, tmp_path):
+    swung = run_rig(RunRequest(rig=folder / "RIG.toml", excite="sine 0.5 1.2", seconds=2.0), tmp_path)
+    still = run_rig(RunRequest(rig=folder / "RIG.toml", excite="free", seconds=0.5, check=False), tmp_path)
+    assert swung.sound
+    assert np.ptp(swung.away[:, 1]) > 0.1
+    t = np.arange(len(swung.log)) * RIG.period
+    np.testing.assert_allclose(swung.log.columns["u"], 0.5 * np.sin(2 * math.pi * 1.2 * t), atol=RIG.converter)
+    assert np.ptp(still.away[:, 1]) == 0
+
+
+def test_it_runs_in_a_process_of_its_own_just_the_same(folder, tmp_path):
+    wish = {"rig": folder / "RIG.toml", "law": folder / "design.json", "seconds": 0.3, "tilt": 0.05, "check": False}
+    inline = run_rig(RunRequest(**wish), tmp_path)
+    seen = []
+    own = run_rig(RunRequest(**wish, own_process=True), tmp_path, watch=lambda s: seen.append(s.phase) or "")
+    assert own.end.ticks == inline.end.ticks
+    assert own.log.columns["u"].tobytes() == inline.log.columns["u"].tobytes()
+    assert own.log_path != inline.log_path
+
+
+def test_a_limit_ends_a_run_and_the_verdict_says_which(folder, tmp_path):
+    text = 'kind = "twin"\nmake = "furuta"\n[limits]\ncommand = "5 V"\n[limits.psi]\ntravel = "3 deg"\n'
+    (tmp_path / "RIG.toml").write_text(text, encoding="utf-8")
+    wish = RunRequest(rig=tmp_path / "RIG.toml", law=folder / "design.json", seconds=2.0, tilt=0.08, check=False)
+    done = run_rig(wish, tmp_path)
+    assert done.end.faults & Fault.OVERTRAVEL
+    assert "travel" in done.verdict
+    assert not done.sound
+    assert done.log.columns["u_applied"][-1] == 0.0
+    assert any(event.kind == "fault" for event in done.log.events)
+
+
+def test_what_contradicts_itself_is_refused(folder, tmp_path):
+    with pytest.raises(BadInput, match="one of them"):
+        RunRequest(rig=folder / "RIG.toml")
+    (tmp_path / "law.json").write_text("{}", encoding="utf-8")
+    with pytest.raises(BadInput, match="design again"):
+        run_rig(RunRequest(rig=folder / "RIG.toml", law=tmp_path / "law.json"), tmp_path)
+    with pytest.raises(BadInput, match="sweep SIZE FROM TO"):
+        run_rig(RunRequest(rig=folder / "RIG.toml", excite="sweep 1"), tmp_path)
