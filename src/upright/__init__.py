@@ -17,7 +17,7 @@ text wears its unit: ``"12 deg"``.
 
 ==========  ==================================================================================================
 Log         read, show, doctor, init, law; Record
-Runs        log_show, log_tail, log_recover, log_convert, log_replay
+Runs        run, rig_doctor, rig_check; log_show, log_tail, log_recover, log_convert, log_replay
 Model       identify, predict, ladder, frequency, loadings, plan_inertias
 Plants      Pendulum, CartPendulum, Furuta, DoublePendulum, DoublePendulumAbsolute, FlexibleLink, chain
 Control     place, lqr, dlqr, prefilter, hold, margins, simulate, chance, design, regulate,
@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from upright.verbs.course import lab, reproduce, survey
     from upright.verbs.feedback import dlqr, hold, lqr, margins, place, prefilter
     from upright.verbs.fitting import identify
+    from upright.verbs.live import rig_check, rig_doctor, run
     from upright.verbs.log import doctor, init, law, read, show
     from upright.verbs.logs import log_convert, log_recover, log_replay, log_show, log_tail
     from upright.verbs.model import frequency, ladder, loadings, plan_inertias, predict
@@ -86,6 +87,7 @@ _HOMES = {
     "verbs.chance": ("chance",),
     "verbs.control": ("design", "regulate", "swing_up", "track"),
     "verbs.course": ("lab", "reproduce", "survey"),
+    "verbs.live": ("rig_check", "rig_doctor", "run"),
     "verbs.log": ("doctor", "init", "law", "read", "show"),
     "verbs.logs": ("log_convert", "log_recover", "log_replay", "log_show", "log_tail"),
     "verbs.feedback": ("dlqr", "hold", "lqr", "margins", "place", "prefilter"),
@@ -101,7 +103,7 @@ __all__ = [
     "UprightError", "__version__", "chain", "chance", "design", "dlqr", "doctor", "frequency", "hold", "identify",
     "init", "lab", "ladder", "law", "loadings", "log_convert", "log_recover", "log_replay", "log_show", "log_tail",
     "lqr", "margins", "place", "plan_inertias", "predict", "prefilter", "quantity", "read", "regulate", "reproduce",
-    "show", "simulate", "survey", "swing_up", "track",
+    "rig_check", "rig_doctor", "run", "show", "simulate", "survey", "swing_up", "track",
 ]  # fmt: skip
 
 

@@ -40,6 +40,7 @@ GROUPS = {
         "regulate": "Hold an identified rig upright; say beforehand what each pole set will come to.",
         "swing-up": "Swing a hanging pendulum up by its own drive and catch it, once its encoders are trusted.",
         "track": "Make the far inertia of a flexible shaft follow a step, by state feedback and by PD.",
+        "run": "Run a law, or a signal, on a rig: supervised, watched, logged, judged.",
     },
     "Course": {
         "lab": "Run the experiments of the paper on simulated rigs, and report what they say.",
@@ -48,6 +49,10 @@ GROUPS = {
     },
 }
 NESTED = {
+    "rig": {
+        "doctor": "Look at a rig before any loop: link, limits, encoders by hand, a small pulse.",
+        "check": "Measure how late this machine wakes a loop, and say what rate it can hold.",
+    },
     "log": {
         "show": "Print what a run's log holds: rig, law, duration, rate, modes, faults, events, what is missing.",
         "tail": "Print the last row of every chunk as it reaches a log that is being written, and every event.",

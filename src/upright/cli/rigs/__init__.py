@@ -1,0 +1,1 @@
+"""Commands of two words that begin with rig."""

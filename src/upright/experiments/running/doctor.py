@@ -1,0 +1,145 @@
+"""Is this rig wired as it is described? Asked before any loop: link, limits, encoders by hand, a small pulse."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from upright.control.trial import ServoRig
+from upright.errors import RigStopped
+from upright.experiments.running.rig import described, stage_of
+from upright.rigs import Board, Fault, LiveRig, TwinPort
+from upright.rigs.board import told
+from upright.rigs.rigfile import read_rig_file
+
+MOVED = 0.05
+"""How far a hand has to move a coordinate [rad, or 5 mm of a metre]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """One thing that was looked at; `good` is None where it was not."""
+
+    what: str
+    found: str
+    good: bool | None = True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Checkup:
+    """What was found on a rig."""
+
+    name: str
+    findings: tuple[Finding, ...]
+
+    @property
+    def sound(self) -> bool:
+        """Whether a loop may be closed, as far as this can tell."""
+        return all(f.good is not False for f in self.findings)
+
+    @property
+    def verdict(self) -> str:
+        """The first thing that is wrong, or that nothing is."""
+        wrong = [f for f in self.findings if f.good is False]
+        if wrong:
+            return f"Do not close a loop: {wrong[0].what}: {wrong[0].found}"
+        left = [f.what for f in self.findings if f.good is None]
+        rest = f" Not looked at: {', '.join(left)}." if left else ""
+        return f"Link, limits and encoders of {self.name} answer as they should.{rest}"
+
+
+def check_up(
+    path: Path, *, hand: Callable[[str], bool] | None = None, clear: bool = False, pulse: bool = True
+) -> Checkup:  # fmt: skip
+    """Look at the rig of a RIG.toml.
+
+    Parameters
+    ----------
+    path : Path
+    hand : callable, optional
+        Asked, with a sentence, to move a coordinate by hand in its positive sense; answers whether that was done.
+        A twin's own hand does it when omitted.
+    clear : bool
+        Whether latched faults are forgotten first.
+    pulse : bool
+        Whether the self-test's pulse is given.
+
+    Raises
+    ------
+    BadInput
+        When RIG.toml cannot be used.
+    """
+    file = read_rig_file(path)
+    model, _ = described(file)
+    stage = stage_of(path, balance=False)
+    beside, rig, out = stage.supervisor, stage.supervisor.rig, list[Finding]()
+    try:
+        if clear:
+            about = rig.open()
+            rig.clear_fault()
+            rig.close()
+        about = beside.prepare()
+        out.append(Finding(what="link", found=f"{about.name}, {len(about.counts)} encoders, a tick every "
+                           f"{1e3 * about.period:.4g} ms"))  # fmt: skip
+        out += _described(model, about.period, about.counts)
+        held = ", ".join(f"{n} {v:.4g}" for n, v in zip(about.coordinates, beside.held.travel, strict=True))
+        out.append(Finding(what="limits, read back", found=f"travel {held}; command {beside.held.command:.4g} "
+                           f"{about.command_unit}; watchdog {1e3 * beside.held.watchdog:.4g} ms"))  # fmt: skip
+        for i, name in enumerate(about.coordinates):
+            out.append(_by_hand(rig, model, i, name, hand))
+        if not pulse or about.replayed:
+            out.append(Finding(what="a small pulse", found="not given", good=None))
+        else:
+            if isinstance(rig, Board) and isinstance(rig.port, TwinPort):
+                rig.port.hold(beside.duty.zero)
+                rig.port.let_go()
+            moved = beside.check().moved
+            out.append(Finding(what="a small pulse", found=", ".join(f"{n} {v:.4g}" for n, v in moved.items())))
+    except RigStopped as stop:
+        out.append(Finding(what="a small pulse" if beside.faults & Fault.SELF_TEST else "stopped", found=str(stop),
+                           good=False))  # fmt: skip
+    finally:
+        rig.estop()
+        rig.close()
+    return Checkup(name=model.name, findings=tuple(out))
+
+
+def _described(model: ServoRig, period: float, counts: tuple[float, ...]) -> list[Finding]:
+    """Whether the rig is the one that was described."""
+    same = math.isclose(period, model.period, rel_tol=1e-3)
+    out = [Finding(what="servo period", found=f"{1e3 * period:.4g} ms, described as {1e3 * model.period:.4g} ms",
+                   good=same)]  # fmt: skip
+    alike = np.allclose(np.abs(counts), model.counts, rtol=1e-6)
+    return [*out, Finding(what="counts", found=", ".join(f"{c:.6g}" for c in counts), good=bool(alike))]
+
+
+def _by_hand(
+    rig: LiveRig, model: ServoRig, i: int, name: str, hand: Callable[[str], bool] | None
+) -> Finding:  # fmt: skip
+    """One encoder, moved by hand in its positive sense."""
+    unit, per = model.plant.coordinates[i].unit, model.counts[i]
+    size = MOVED if unit == "rad" else MOVED / 10
+    before = rig.exchange(0.0)
+    if before.faults:
+        return Finding(what=f"{name} by hand", found=told(before.faults), good=False)
+    what = f"{name} by hand"
+    if hand is not None:
+        if not hand(f"Move {name} by hand in its positive sense by some {'degrees' if unit == 'rad' else 'mm'}."):
+            return Finding(what=what, found="not moved", good=None)
+    elif isinstance(rig, Board) and isinstance(rig.port, TwinPort):
+        away = np.zeros(2 * len(model.counts))
+        away[2 * i] = 2 * size
+        rig.port.hold(next(iter(model.plant.equilibria)), away)
+    else:
+        return Finding(what=what, found="nobody moved it", good=None)
+    moved = (rig.exchange(0.0).counts[i] - before.counts[i]) / per
+    shown = f"{math.degrees(moved):.3g} degrees" if unit == "rad" else f"{1e3 * moved:.3g} mm"
+    if abs(moved) < size / 10:
+        return Finding(what=what, found=f"showed {shown}: it is not connected, or not this channel", good=False)
+    if moved < 0:
+        return Finding(what=what, found=f"showed {shown}: it counts the wrong way, swap its channels", good=False)
+    return Finding(what=what, found=f"showed {shown}")
