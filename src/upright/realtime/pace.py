@@ -71,17 +71,23 @@ class WallClock:
     ----------
     period : float
         [s].
+    now : callable
+        Time of a clock that never goes back [ns].
+    sleep : callable, optional
+        Sleeps until a time of that clock; the operating system's when omitted.
     """
 
-    def __init__(self, period: float) -> None:
+    def __init__(
+        self, period: float, now: Callable[[], int] = time.monotonic_ns, sleep: Callable[[int], None] | None = None
+    ) -> None:
         self.period, self.late = period, 0
-        self._sleep = _sleeper()
-        self._first, self._tick = 0, 0
+        self._now, self._sleep = now, sleep or _sleeper()
+        self._first, self._tick = -1, 0
 
     def wait(self) -> float:
         """Wait for the next deadline; how far behind it we were woken [s]."""
-        now = time.monotonic_ns()
-        if self._first == 0:
+        now = self._now()
+        if self._first < 0:
             self._first = now
         self._tick += 1
         due = self._first + round(1e9 * self._tick * self.period)
@@ -89,7 +95,7 @@ class WallClock:
             self.late += 1
         else:
             self._sleep(due)
-        behind = 1e-9 * (time.monotonic_ns() - due)
+        behind = 1e-9 * (self._now() - due)
         if behind >= self.period:
             missed = int(behind / self.period)
             self.late += missed

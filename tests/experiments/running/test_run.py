@@ -75,6 +75,7 @@ def test_a_signal_swings_the_hanging_twin_and_free_does_not(folder, tmp_path):
     assert np.ptp(still.away[:, 1]) == 0
 
 
+@pytest.mark.slow
 def test_it_runs_in_a_process_of_its_own_just_the_same(folder, tmp_path):
     wish = {"rig": folder / "RIG.toml", "law": folder / "design.json", "seconds": 0.3, "tilt": 0.05, "check": False}
     inline = run_rig(RunRequest(**wish), tmp_path)
