@@ -7,7 +7,7 @@ with 3.12). Here it goes from left to right in plain multiplications and additio
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import floor, isfinite
+from math import floor, isfinite, nan
 
 import numpy as np
 
@@ -85,7 +85,9 @@ def _finish(law: Controller) -> Callable[[Sequence[float]], tuple[Numbers, bool]
 
     def finish(u: Sequence[float]) -> tuple[Numbers, bool]:
         values = [_rounded(x, q) for x, q in zip(u, quanta if len(quanta) > 1 else quanta * len(u), strict=True)]
-        return tuple(min(max(x, -limit), limit) for x in values), any(abs(x) > limit for x in values)
+        # a command that is infinite is none: the limit would make all that the drive can of it
+        given = tuple(min(max(x, -limit), limit) if isfinite(x) else nan for x in values)
+        return given, any(abs(x) > limit for x in values)
 
     return finish
 
