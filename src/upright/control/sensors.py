@@ -258,8 +258,14 @@ FORGOTTEN = 0.4
 """Time constant with which evidence fades [s]: a little that the model always has wrong must not add up for ever."""
 MOVED, WITHIN = 0.04, 0.1
 """A sample is evidence when a sensor moved, within so many seconds [s], by such a share of what the drive could have
-moved it from rest. Close to rest dry friction, which the filters do not know, holds a pendulum that leans, and
-rounding repeats itself: after two seconds of that, sound sensors looked as if they showed four times what is true."""
+moved it from rest. Close to rest dry friction, which the filters do not know, holds a pendulum that leans, and rounding
+repeats itself: after two seconds of that, sound sensors looked as if they showed four times what is true."""
+PLAINLY = 3.0
+"""It is evidence too when the mean command of that time is so many times what dry friction takes: something had to
+move, and an encoder that is dead shows that nothing did."""
+SURPRISE = 15.0
+"""Most that one sample counts against a suspicion. What the filters know brings more in one of 1800 (chi-square of two
+readings: exp(-15/2)); a tap, of which they know nothing, brings hundreds, and says nothing of sensors."""
 _SETTLING = 400
 _NEVER = np.iinfo(np.int64).max
 
@@ -325,6 +331,13 @@ def watched(
     return (free if k < 0 else run((k + 1) * rig.period)), alarm
 
 
+def sticking(model: ServoRig) -> float:
+    """Command that dry friction of what the drive moves takes, as far as the model knows of it."""
+    on = model.plant.inputs[0].on
+    names = [n for j in model.plant.joints if j.on == on for n in (j.coulomb, j.stiction) if n]
+    return max((float(getattr(model.plant, n)) for n in names), default=0.0) / abs(model.gain)
+
+
 class Watch:
     """Bank of Kalman filters about an equilibrium, for one loop or many lanes of it, fed sample by sample."""
 
@@ -348,6 +361,8 @@ class Watch:
             scales[i, names.index(s.name)] = s.factor
         self._C = scales[:, :, None] * sampled.C
         self._earlier, self._shown = max(1, round(WITHIN / model.period)), list[Array]()
+        self._told = np.zeros((0, 0))
+        self._plain = max(0.005 * model.limit, PLAINLY * sticking(model))
         self._bound, self._kept = math.log(odds), math.exp(-model.period / forgotten)
         noise = model.quantum**2 / 12
         # in what is shown, all suspicions expect the same disturbance: they are told apart by motions, not by noise
@@ -389,16 +404,18 @@ class Watch:
             self._x = np.zeros((len(y), *self._x.shape[1:]))
             self.likelihood = np.zeros((len(y), self._x.shape[1]))
             self._since = np.full(len(y), _NEVER, dtype=np.int64)
-            self._shown = []
+            self._shown, self._told = [], np.zeros((self._earlier, len(y)))
         k = min(self._k, _SETTLING - 1)
         miss = y[:, None] - np.einsum("hpn,lhn->lhp", self._C, self._x)
-        square = np.einsum("lhp,hpq,lhq->lh", miss, self._S[k], miss)
+        square = np.minimum(np.einsum("lhp,hpq,lhq->lh", miss, self._S[k], miss), SURPRISE)
         self._shown = [*self._shown[-self._earlier :], y]
         moves = np.any(np.abs(y - self._shown[0]) > self._moved, axis=1, keepdims=True)
+        moves |= (np.abs(self._told.mean(axis=0)) > self._plain)[:, None]
         if self._k > 1:  # the first two readings are the start, of which nothing is known
             self.likelihood = self._kept * self.likelihood - np.where(moves, 0.5 * (square + self._size[k]), 0.0)
         x = self._x + np.einsum("hnp,lhp->lhn", self.gains[k], miss)
         u = np.broadcast_to(np.asarray(command, dtype=np.float64), len(y))
+        self._told[self._k % self._earlier] = u
         self._x = x @ self._A.T + u[:, None, None] * self._B
         odds = self.likelihood[:, 1:].max(axis=1) - self.likelihood[:, 0]
         self._since = np.where(odds > self._bound, np.minimum(self._since, self._k), _NEVER)
