@@ -176,11 +176,27 @@ def test_what_goes_wrong_in_the_loop_ends_it_with_zero_before_the_word(what, fau
     assert scene.rig.sample.mode == Mode.FAULT
 
 
-def test_a_rule_that_gives_no_number_is_stopped():
+@pytest.mark.parametrize("speed", [-2.0, 0.5, 2.0])
+def test_a_tap_is_not_taken_for_a_lying_encoder(speed):
+    scene = Scene().started(tilt=0.02)
+    scene.run(1.5, then=lambda p: p.push([0.0, speed]))
+    assert not scene.beside.faults
+
+
+def test_a_dead_encoder_of_the_arm_is_missed_by_its_motion():
+    scene = Scene().started(tilt=0.08)
+    with pytest.raises(RigStopped, match=r"psi shows not a single count|Psi shows not a single count|psi shown"):
+        scene.run(4.0, then=lambda p: p.encoders.dead(0))
+    # found before the arm is half a turn away, which the loop itself never notices
+    assert abs(scene.port.x[0] - scene.beside.target[0]) < math.pi / 2
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_a_rule_that_gives_no_number_is_stopped(value):
     def mad(t, y, r, z, p):
         return (p[0] if t < 0.01 else p[1],), ()
 
-    rule = Rule(function=mad, initial=[], parameters=[0.0, math.nan])
+    rule = Rule(function=mad, initial=[], parameters=[0.0, value])
     scene = Scene().started(tilt=0.0, law=rule)
     with pytest.raises(RigStopped, match=r"gave|stopped itself"):
         scene.run(0.1)

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from upright.control.sensors import Watch
+from upright.control.sensors import Watch, sticking
 from upright.control.trial import ServoRig
 from upright.errors import BadInput, RigStopped
 from upright.gains import hold
@@ -38,6 +38,12 @@ PULSE = 0.15
 """Length of the pulse [s]."""
 REST = 0.5
 """Time without a count after which a rig is at rest [s]."""
+
+HELD_BY, UNSEEN = 2.0, 100
+"""A driven body is held at most by so many times the dry friction that the model knows of; it cannot have moved by so
+many counts without its encoder showing one."""
+DRY = 0.01
+"""Share of the largest command that dry friction is taken for where the model knows of none."""
 
 Event = Callable[[float, str, str], None]
 
@@ -80,6 +86,35 @@ class Duty:
         return self.watch and self.model is not None and self.at == "inverted" and len(self.model.counts) == 2
 
 
+class StillDrive:
+    """Whether the driven body shows not a single count although what acts on it must have moved it.
+
+    A dead encoder there is what a bank of filters sees last: the loop stands, and the arm runs away under it slowly.
+    """
+
+    def __init__(self, model: ServoRig, at: str) -> None:
+        linear = model.linear(at)
+        names = [c.name for c in model.plant.coordinates]
+        self.name = model.plant.inputs[0].on
+        self.which = names.index(self.name)
+        row = 2 * self.which + 1
+        self._pull = [float(a) for a in linear.A[row, 0::2]]
+        self._drive, self._period = float(linear.B[row, 0]), model.period
+        known = HELD_BY * sticking(model)
+        self._held = abs(self._drive) * (known or DRY * model.limit)
+        self._least = UNSEEN / model.counts[self.which]
+        self._shown, self._sum, self._ticks = math.nan, 0.0, 0
+
+    def sees(self, reading: float, away: Sequence[float], command: float) -> bool:
+        """Take a sample with its deviations and command; whether the body must have moved since its last count."""
+        if reading != self._shown:
+            self._shown, self._sum, self._ticks = reading, 0.0, 0
+        self._sum += sum(a * q for a, q in zip(self._pull, away, strict=True)) + self._drive * command
+        self._ticks += 1
+        t = self._ticks * self._period
+        return (abs(self._sum) / self._ticks - self._held) * t**2 / 2 > self._least
+
+
 @dataclass(eq=False)
 class Supervisor:
     """A rig with somebody beside it.
@@ -105,6 +140,7 @@ class Supervisor:
     target: tuple[float, ...] = field(init=False, default=())
     _running: RunningLaw | None = field(init=False, default=None)
     _watch: Watch | None = field(init=False, default=None)
+    _still: StillDrive | None = field(init=False, default=None)
     _last: Tick | None = field(init=False, default=None)
     _first: Tick | None = field(init=False, default=None)
     _command: float = field(init=False, default=0.0)
@@ -186,7 +222,9 @@ class Supervisor:
         self.law = fitted
         self._in_window()
         # what takes time is done before anything is switched on
-        self._watch = Watch(self.duty.model, self.duty.at) if self.duty.watched and self.duty.model else None
+        watched = self.duty.model if self.duty.watched else None
+        self._watch = Watch(watched, self.duty.at) if watched else None
+        self._still = StillDrive(watched, self.duty.at) if watched else None
         return fitted
 
     def start(self, mode: Mode = Mode.HOST) -> None:
@@ -253,16 +291,8 @@ class Supervisor:
         command = self._running.step(readings, reference, tick.time - self._first.time)
         if not math.isfinite(command):
             self._give_up(Fault.GAINS, f"the law gave {command} for a command.")
-        if self._watch is not None and self.duty.model is not None:
-            away = [q - t for q, t in zip(readings, self.target, strict=True)]
-            self._watch.see([away], min(max(command, -self.held.command), self.held.command))
-            said, which = self._watch.speaks()
-            if said[0]:
-                what = self._watch.suspicions[int(which[0])]
-                self._give_up(
-                    Fault.MODEL, f"{self.about.name} does not move as its model does; likeliest is {what}. Check that "
-                    "encoder's wiring and counts (upright rig doctor); if a hand pushed it, start again.",
-                )  # fmt: skip
+        if self._watch is not None and self._still is not None:
+            self._suspect(self._watch, self._still, readings, min(max(command, -self.held.command), self.held.command))
         self._command = command if self._mode == Mode.HOST else (reference or 0.0)
         return self._command
 
@@ -302,6 +332,23 @@ class Supervisor:
             self._give_up(
                 Fault.OVERTRAVEL, f"{self.about.coordinates[-1]} left what is held by "
                 f"{self._shown(readings[-1] - self.target[-1])}, more than {self._shown(self.duty.lean)}: it fell.",
+            )  # fmt: skip
+
+    def _suspect(self, watch: Watch, still: StillDrive, readings: Sequence[float], command: float) -> None:
+        """Stop when an encoder lies, or must have died."""
+        away = [q - t for q, t in zip(readings, self.target, strict=True)]
+        watch.see([away], command)
+        said, which = watch.speaks()
+        if said[0]:
+            what = watch.suspicions[int(which[0])]
+            self._give_up(
+                Fault.MODEL, f"{self.about.name} does not move as its model does; likeliest is {what}. Check that "
+                "encoder's wiring and counts (upright rig doctor); if a hand pushed it, start again.",
+            )  # fmt: skip
+        if still.sees(readings[still.which], away, command):
+            self._give_up(
+                Fault.ENCODER, f"{still.name} shows not a single count although its command must have moved it: its "
+                "encoder is dead, or something holds it fast.",
             )  # fmt: skip
 
     def _give_up(self, fault: Fault, why: str) -> None:
