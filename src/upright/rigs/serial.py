@@ -33,7 +33,7 @@ class SerialRig:
     """A `LiveRig` over a serial port, a pty or any `Line`.
 
     The sample that `exchange` gives is that of the tick after the command arrived, so that the board's clock paces the
-    loop. On firmware in lockstep time passes by that tick only.
+    loop. On firmware in lockstep (`port_host.c`, `simrig.c`) time passes by that tick only.
 
     Parameters
     ----------
@@ -49,9 +49,10 @@ class SerialRig:
         Command at the converter's last step [command unit].
     patience : float
         How long an answer may take before the link is taken for lost [s].
+    lockstep : bool
+        Whether the board is simulated in lockstep although its firmware does not know it.
     resend : float, optional
-        After which time a request is repeated [s]; 0.02 by default, and never on firmware in lockstep, whose time
-        would pass by it.
+        After which time a request is repeated [s]; 0.02 by default, and never in lockstep, where time passes by it.
     clock : callable
         Seconds of a clock that never goes back.
     """
@@ -65,6 +66,7 @@ class SerialRig:
         command_unit: str,
         full_scale: float,
         patience: float = 1.0,
+        lockstep: bool = False,
         resend: float | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -78,7 +80,7 @@ class SerialRig:
         self._given, self._line = line, None if isinstance(line, str) else line
         self._coordinates, self._counts = tuple(coordinates), tuple(float(n) for n in counts)
         self._unit, self._full_scale = command_unit, full_scale
-        self._patience, self._resend, self._clock = patience, resend, clock
+        self._patience, self._lockstep, self._resend, self._clock = patience, lockstep, resend, clock
         self._again = math.inf
         self._parser = wire.Parser()
         self._sequence = 0
@@ -96,19 +98,19 @@ class SerialRig:
         """Find the firmware; a board that was switched on stands in FAULT with `Fault.RESET`."""
         if self._line is None:
             self._line = open_line(str(self._given))
-        self._again = 0.3 if self._resend is None else self._resend
+        self._again = 0.3  # a board that resets when its port is opened hears nothing for a while
         hello = self._hello = wire.hello(self._ask(Kind.HELLO, patience=max(_BOOT, self._patience)))
         if hello.protocol != wire.PROTOCOL:
             raise RigStopped(
                 f"The firmware '{hello.name}' speaks version {hello.protocol} of the protocol and this program version "
                 f"{wire.PROTOCOL}; flash the firmware of this release."
             )
-        if self._resend is None:
-            self._again = math.inf if hello.virtual else 0.02
+        virtual = self._lockstep or hello.virtual
+        self._again = self._resend or (math.inf if virtual else 0.02)
         self._about = Capabilities(
             name=f"{hello.name} on {self._line.name}", coordinates=self._coordinates, counts=self._counts,
             command_unit=self._unit, full_scale=self._full_scale, steps=hello.full_scale, period=1e-6 * hello.period,
-            modes=frozenset({Mode.HOST, Mode.MCU}), virtual=hello.virtual, hardware=not hello.virtual,
+            modes=frozenset({Mode.HOST, Mode.MCU}), virtual=virtual, hardware=not virtual,
         )  # fmt: skip
         return self._about
 
