@@ -8,7 +8,9 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
+from upright.rigs.line import Line
 from upright.rigs.serial import SerialRig
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"
@@ -54,14 +56,8 @@ class Board:
         """Tick, psi, psi', theta, theta', command [steps], enable line, mode."""
         return [float(number) for number in self.say("state").split()]
 
-    def rig(self, **how: object) -> SerialRig:
-        return SerialRig(
-            self.port,
-            **{  # type: ignore[arg-type]
-                "coordinates": ("psi", "theta"), "counts": (COUNTS, COUNTS), "command_unit": "V",
-                "full_scale": FULL_SCALE, **how,
-            },
-        )  # fmt: skip
+    def rig(self, **how: Any) -> SerialRig:
+        return rig_on(self.port, **how)
 
     def close(self) -> None:
         assert self.process.stdin is not None
@@ -69,6 +65,12 @@ class Board:
         self.process.stdin.close()
         self.process.wait(10)
         self.process.stdout.close()
+
+
+def rig_on(line: str | Line, **how: Any) -> SerialRig:
+    """A rig with ECP's encoders and converter at the end of a line."""
+    same = {"coordinates": ("psi", "theta"), "counts": (COUNTS, COUNTS), "command_unit": "V", "full_scale": FULL_SCALE}
+    return SerialRig(line, **{**same, **how})
 
 
 def plant(parameters: Mapping[str, float], gain: float, **start: float) -> list[str]:
