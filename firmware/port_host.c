@@ -70,9 +70,11 @@ static void pass(uint32_t ticks, uint16_t late) {
         double torque = enabled ? plant.gain * plant.step * command : 0;
         for (uint32_t i = 0; i < ticks * SUBSTEPS; i++) furuta_move(&plant, torque, 1e-9 * PERIOD_NS / SUBSTEPS);
     }
+    static long shown[CHANNELS];
     for (int i = 0; simulated && i < CHANNELS; i++) {
-        long before = mishaps.encoder[i].shown;
-        counter[i] += (uint32_t)(encoder_shows(&mishaps.encoder[i], furuta_counts(&plant, i)) - before);
+        long before = shown[i];
+        shown[i] = encoder_shows(&mishaps.encoder[i], furuta_counts(&plant, i));
+        counter[i] += (uint32_t)(shown[i] - before); /* on from wherever a wrap has put it */
     }
     rig_tick(tick += ticks, late);
     rig_poll();
