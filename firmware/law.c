@@ -1,71 +1,66 @@
 #include "law.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "bytes.h"
 
 /* Entries that are not zero, row by row, so that a tick costs what the law needs and not what it could need. */
-static struct {
-    uint8_t row, column;
+typedef struct {
     float entry;
-} terms[OUTPUTS * INPUTS];
-static uint8_t term_count;
+    uint8_t column;
+    bool one;
+} term_t;
+static term_t terms[OUTPUTS * INPUTS];
+static uint8_t terms_in[OUTPUTS];
 static float memory[MEMORIES];
 static bool begun;
 
-static float number(const uint8_t **at) {
-    float value = get_float(*at);
-    *at += 4;
-    return value;
-}
-
-static bool sane(const float *values, uint8_t n, float most) {
-    for (uint8_t i = 0; i < n; i++)
-        if (!(fabsf(values[i]) <= most)) return false; /* NaN fails every comparison */
-    return true;
-}
-
 bool law_take(law_t *law, const uint8_t body[LAW_BYTES], int16_t most) {
     law_t offered;
-    const uint8_t *at = body;
-    float *numbers[] = {&offered.matrix[0][0], offered.target, offered.initial, &offered.begin[0][0], &offered.limit};
-    const uint8_t sizes[] = {OUTPUTS * INPUTS, READINGS, MEMORIES, MEMORIES * READINGS, 1};
-    for (uint8_t part = 0; part < sizeof sizes; part++) {
-        for (uint8_t i = 0; i < sizes[part]; i++) numbers[part][i] = number(&at);
-        if (!sane(numbers[part], sizes[part], ABSURD)) return false;
-    }
-    offered.held_sums = at[0];
-    offered.every = at[1];
-    if (offered.every == 0 || !(offered.limit > 0 && offered.limit <= 32767)) return false;
+    float *numbers[] = {&offered.matrix[0][0], offered.target, offered.initial, &offered.begin[0][0]};
+    const uint8_t sizes[] = {OUTPUTS * INPUTS, READINGS, MEMORIES, MEMORIES * READINGS};
+    for (uint8_t part = 0; part < sizeof sizes; part++)
+        for (uint8_t i = 0; i < sizes[part]; i++, body += 4) {
+            numbers[part][i] = get_float(body);
+            if (!sane(numbers[part][i])) return false;
+        }
+    offered.limit = (int16_t)get_u16(body);
+    offered.held_sums = body[2];
+    offered.every = body[3];
+    if (offered.every == 0 || offered.limit <= 0) return false;
     for (uint8_t i = 0; i < READINGS; i++)
         if (!(fabsf(offered.matrix[COMMAND_ROW][MEMORIES + i]) < most)) return false;
 
     *law = offered;
-    term_count = 0;
-    for (uint8_t row = 0; row < OUTPUTS; row++)
-        for (uint8_t column = 0; column < INPUTS; column++)
-            if (law->matrix[row][column] != 0) {
-                terms[term_count].row = row;
-                terms[term_count].column = column;
-                terms[term_count++].entry = law->matrix[row][column];
-            }
+    uint8_t count = 0;
+    for (uint8_t row = 0; row < OUTPUTS; row++) {
+        uint8_t before = count;
+        for (uint8_t column = 0; column < INPUTS; column++) {
+            float entry = law->matrix[row][column];
+            if (entry == 0) continue;
+            terms[count].entry = entry;
+            terms[count].column = column;
+            terms[count++].one = entry == 1;
+        }
+        terms_in[row] = count - before;
+    }
     return true;
 }
 
 void law_give(const law_t *law, uint8_t body[LAW_BYTES]) {
-    const float *numbers[] = {&law->matrix[0][0], law->target, law->initial, &law->begin[0][0], &law->limit};
-    const uint8_t sizes[] = {OUTPUTS * INPUTS, READINGS, MEMORIES, MEMORIES * READINGS, 1};
+    const float *numbers[] = {&law->matrix[0][0], law->target, law->initial, &law->begin[0][0]};
+    const uint8_t sizes[] = {OUTPUTS * INPUTS, READINGS, MEMORIES, MEMORIES * READINGS};
     for (uint8_t part = 0; part < sizeof sizes; part++)
         for (uint8_t i = 0; i < sizes[part]; i++, body += 4) put_float(body, numbers[part][i]);
-    body[0] = law->held_sums;
-    body[1] = law->every;
+    put_u16(body, (uint16_t)law->limit);
+    body[2] = law->held_sums;
+    body[3] = law->every;
 }
 
 void law_start(void) { begun = false; }
 
-bool law_step(const law_t *law, const int32_t q[READINGS], float reference, float rig_limit, float *command) {
-    float in[INPUTS], out[OUTPUTS] = {0};
+bool law_step(const law_t *law, const int32_t q[READINGS], float reference, int16_t rig_limit, int16_t *command) {
+    float in[INPUTS], out[OUTPUTS];
     float *w = in + MEMORIES;
     for (uint8_t i = 0; i < READINGS; i++) w[i] = (float)q[i] - law->target[i];
     w[READINGS] = reference;
@@ -77,14 +72,21 @@ bool law_step(const law_t *law, const int32_t q[READINGS], float reference, floa
         begun = true;
     }
     memcpy(in, memory, sizeof memory);
-    for (uint8_t i = 0; i < term_count; i++) {
-        float value = in[terms[i].column];
-        out[terms[i].row] += terms[i].entry == 1 ? value : terms[i].entry * value;
+    const term_t *term = terms;
+    for (uint8_t row = 0; row < OUTPUTS; row++) {
+        float sum = 0;
+        for (uint8_t left = terms_in[row]; left; left--, term++) {
+            float value = in[term->column];
+            sum += term->one ? value : term->entry * value;
+        }
+        if (!sane(sum)) return false;
+        out[row] = sum;
     }
-    float u = out[COMMAND_ROW], limit = law->limit < rig_limit ? law->limit : rig_limit;
-    bool beyond = fabsf(floorf(u + 0.5f)) > limit;
+    int32_t asked = (int32_t)floorf(out[COMMAND_ROW] + 0.5f);
+    int16_t limit = law->limit < rig_limit ? law->limit : rig_limit;
+    bool beyond = asked > limit || asked < -limit;
     for (uint8_t i = 0; i < MEMORIES; i++)
         if (!(beyond && law->held_sums >> i & 1)) memory[i] = out[i];
-    *command = u > law->limit ? law->limit : u < -law->limit ? -law->limit : u;
-    return sane(&u, 1, ABSURD) && sane(memory, MEMORIES, ABSURD * 1e3f);
+    *command = asked > law->limit ? law->limit : asked < -law->limit ? -law->limit : (int16_t)asked;
+    return true;
 }

@@ -222,7 +222,6 @@ int main(void) {
             uint8_t byte = received[received_from];
             received_from++;
             rig_receive(byte);
-            rig_poll();
         }
         rig_poll();
     }

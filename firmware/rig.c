@@ -1,6 +1,5 @@
 #include "rig.h"
 
-#include <math.h>
 #include <string.h>
 
 #include "bytes.h"
@@ -101,17 +100,18 @@ static void trip(uint16_t fault) {
     faults |= fault;
 }
 
-/* Counts into the memory of the last ticks, on a straight line over ticks that never came; returns the step. */
+/* Counts into the memory of the last ticks; returns the step since the last one. */
 static int32_t remember(uint8_t channel, uint32_t counts, uint32_t tick, uint32_t elapsed) {
     const uint8_t mask = SPEED_WINDOW - 1;
     uint32_t previous = past[(tick - elapsed) & mask][channel];
     int32_t step = (int32_t)(counts - previous);
-    for (uint32_t left = elapsed <= 2 * SPEED_WINDOW ? elapsed : 2 * SPEED_WINDOW; left--;) {
-        uint32_t *oldest = &past[(tick - left) & mask][channel];
-        uint32_t then = left ? previous + (uint32_t)((int64_t)step * (elapsed - left) / elapsed) : counts;
-        moved[channel] = (int32_t)(then - *oldest);
-        *oldest = then;
+    if (elapsed > 1) { /* a straight line over ticks that never came */
+        uint32_t left = elapsed <= SPEED_WINDOW ? elapsed : SPEED_WINDOW;
+        while (--left) past[(tick - left) & mask][channel] = previous + (uint32_t)((int64_t)step * (elapsed - left) / elapsed);
     }
+    uint32_t *oldest = &past[tick & mask][channel];
+    moved[channel] = elapsed < SPEED_WINDOW ? (int32_t)(counts - *oldest) : (int32_t)((int64_t)step * SPEED_WINDOW / elapsed);
+    *oldest = counts;
     return step;
 }
 
@@ -153,12 +153,9 @@ static void follow_law(void) {
         return;
     }
     until_law = law.every - 1;
-    float u;
-    if (!law_step(&law, now.q, reference, limits.command, &u)) {
-        trip(F_GAINS);
-        return;
-    }
-    put_out((int16_t)floorf(u + 0.5f)); /* the law's limit is within int16 */
+    int16_t command;
+    if (law_step(&law, now.q, reference, limits.command, &command)) put_out(command);
+    else trip(F_GAINS);
 }
 
 void rig_tick(uint32_t tick, uint16_t late) {
@@ -322,7 +319,7 @@ static void exchange(uint8_t sequence, const uint8_t *b) {
     uint16_t answered = get_u16(b + 6);
     uint32_t before = port_lock();
     if (running() && (uint16_t)((uint16_t)now.tick - answered) > limits.watchdog) trip(F_STALE);
-    if (running() && !(fabsf(offered) < ABSURD)) trip(F_GAINS);
+    if (running() && !sane(offered)) trip(F_GAINS);
     if (mode == HOST) put_out((int16_t)get_u16(b));
     reference = offered;
     silence = 0;
@@ -414,7 +411,8 @@ static uint8_t *put_answer(uint8_t kind, uint8_t *b) {
     return b;
 }
 
-static void answer(const uint8_t *request, uint16_t n) {
+/* Not inlined: a byte from the wire must not save all the registers that a whole frame needs. */
+__attribute__((noinline)) static void answer(const uint8_t *request, uint16_t n) {
     uint8_t kind = request[0], sequence = request[1], result;
     /* A host that missed the reply asks again by the same number: it is told once more, but nothing is done twice. */
     if (kind == last_kind && sequence == last_sequence && kind != HELLO && kind != EXCHANGE) {

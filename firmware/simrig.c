@@ -9,7 +9,8 @@
  *     illegal         both phases of encoder 1 change at once
  *     hang            the processor stops in a loop with its interrupts off
  *     run TICKS       time passes without the host
- *     state           answers: milliseconds, psi, psi', theta, theta', converter [steps], enable line, worst tick [cycles]
+ *     state           answers: milliseconds, psi, psi', theta, theta', converter [steps], enable line, the longest
+ *                     tick since it was last asked [cycles]
  * It ends with its standard input. */
 #define _GNU_SOURCE
 #include <fcntl.h>
@@ -35,8 +36,8 @@
 #define SLICE 800          /* cycles between two looks at plant and wire: 0.05 ms */
 #define SLICES_PER_TICK 20
 #define BYTES_PER_SLICE 5  /* 1 Mbaud */
-#define EDGES_PER_SLICE 6  /* of one encoder; more than an interrupt each 130 cycles no encoder is let make */
-#define LONGEST_ANSWER 120 /* slices */
+#define EDGES_PER_SLICE 4  /* of one encoder, at most; its interrupt takes 110 cycles each time */
+#define LONGEST_ANSWER(bytes) (60 + 2 * (bytes)) /* slices; a law takes its time */
 #define WRITE_AND_UPDATE 0x03
 #define RAM 0x800000
 
@@ -166,6 +167,7 @@ static void obey(const char *line) {
     } else if (!strcmp(line, "state")) {
         printf("%g %.17g %.17g %.17g %.17g %d %d %d\n", (double)slices / SLICES_PER_TICK, plant.x[0], plant.x[1],
                plant.x[2], plant.x[3], converter, enabled, (int)worst_tick);
+        worst_tick = 0;
         fflush(stdout);
         return;
     } else if (!mishaps_line(&mishaps, &plant, line)) {
@@ -197,7 +199,7 @@ static void listen_to_lines(void) {
 static void hand_over(int wire, const uint8_t *frame, size_t n) {
     size_t fed = 0;
     answered = false;
-    for (int left = LONGEST_ANSWER; left > 0 && !answered;) {
+    for (size_t left = LONGEST_ANSWER(n); left > 0 && !answered;) {
         for (int i = 0; i < BYTES_PER_SLICE && fed < n && uart_ready; i++) avr_raise_irq(to_uart, frame[fed++]);
         slice();
         if (fed == n) left--;

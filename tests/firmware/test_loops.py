@@ -45,15 +45,15 @@ def held(board, mode, law, seconds, kicks, lockstep=False):
     rig.zero()
     rig.arm()
     rig.start(mode, law if mode == Mode.MCU else None)
-    samples, command = round(seconds / PERIOD), 0.0
-    step, at = on_the_host(law), {round(t / PERIOD): v for t, v in kicks.items()}
-    rows = []
-    for k in range(samples):
-        if k in at:
-            board.do(f"kick {at[k]!r}")
+    step, command = on_the_host(law), 0.0
+    first, to_come, rows = rig.exchange(0.0), sorted(kicks), []
+    tick = first
+    while tick.time - first.time < seconds:
+        if to_come and tick.time - first.time >= to_come[0]:
+            board.do(f"kick {kicks[to_come.pop(0)]!r}")
         tick = rig.exchange(command)
         assert tick.mode == mode, tick
-        rows.append((tick.tick, *tick.counts, round(tick.applied / STEP)))
+        rows.append((tick.tick - first.tick, *tick.counts, round(tick.applied / STEP)))
         if mode == Mode.HOST:
             command = step(tick.counts)
     return np.array(rows), rig
@@ -61,8 +61,10 @@ def held(board, mode, law, seconds, kicks, lockstep=False):
 
 def settled(rows, kicks):
     """Largest angle of the pendulum just before each kick and at the end [counts], and over all of the run."""
-    before = [rows[max(0, round(t / PERIOD) - 50) : round(t / PERIOD), 2] for t in kicks]
-    return max(np.abs(part).max() for part in [*before, rows[-50:, 2]]), np.abs(rows[:, 2]).max()
+    before = [
+        rows[(rows[:, 0] > k - 50) & (rows[:, 0] <= k), 2] for k in [*(round(t / PERIOD) for t in kicks), rows[-1, 0]]
+    ]
+    return max(np.abs(part).max() for part in before), np.abs(rows[:, 2]).max()
 
 
 @pytest.mark.parametrize("mode", [Mode.MCU, Mode.HOST])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,8 @@ Float32 = NDArray[np.float32]
 MEMORIES, READINGS, REFERENCES = 4, 2, 1
 """What the firmware has room for."""
 _LONGEST = 255  # ticks from one sample to the next
-_LARGEST = 1e9  # of any number, as the firmware has it
+_LARGEST = 1e9  # of any number; the firmware takes what is below 2^30
+_END = struct.Struct("<hBB")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -49,8 +51,8 @@ class OnboardLaw:
 
     def body(self) -> bytes:
         """As the firmware reads it, and gives it back."""
-        numbers = (self.matrix, self.target, self.initial, self.begin, np.float32(self.limit))
-        return b"".join(np.asarray(n, dtype="<f4").tobytes() for n in numbers) + bytes((self.held_sums, self.every))
+        numbers = (self.matrix, self.target, self.initial, self.begin)
+        return b"".join(n.astype("<f4").tobytes() for n in numbers) + _END.pack(self.limit, self.held_sums, self.every)
 
 
 def onboard(law: Law, about: Capabilities) -> OnboardLaw:
