@@ -360,6 +360,11 @@ static uint8_t perform(uint8_t kind, const uint8_t *b) {
     }
     uint32_t before = port_lock();
     switch (kind) {
+    case HELLO: /* of a new host: whatever the one before it has left is over */
+        power_off(FAULT);
+        faults |= F_RESET;
+        configured = has_law = false;
+        break;
     case ZERO:
         for (uint8_t i = 0; i < CHANNELS; i++) {
             zero[i] = port_counts(i);

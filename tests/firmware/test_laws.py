@@ -175,7 +175,6 @@ def test_a_law_is_compared_bit_by_bit_with_what_the_board_holds(host):
         (replace(inverted(), period=0.3), "300 ms"),
         (replace(inverted(), measured=("psi", "alpha")), "reads alpha"),
         (replace(inverted(), limit=1e-5), "converter's step"),
-        (replace(inverted(), C=1e9 * inverted().C), "gains and units"),
         (state_feedback(np.ones((1, 4, 2)), PERIOD), "several lanes"),
     ],
 )

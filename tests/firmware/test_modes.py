@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.firmware.boards import COUNTS, STEP, rig_on
-from upright.errors import BadInput, RigStopped
+from upright.errors import RigStopped
 from upright.laws import Law
 from upright.rigs.line import TerminalLine
 from upright.rigs.protocol import Fault, Limits, Mode
@@ -20,9 +20,9 @@ PULL = Law(np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((1, 0)), np.array([[1.0,
 """One volt for each radian of the first coordinate."""
 
 
-def running(host, mode=Mode.HOST, limits=WIDE, law=PULL):
+def running(host, mode=Mode.HOST, limits=WIDE, law=PULL, **how):
     board = host()
-    rig = board.rig()
+    rig = board.rig(**how)
     rig.open()
     rig.clear_fault()
     rig.configure(limits)
@@ -281,8 +281,11 @@ def test_gains_by_which_one_count_is_everything_are_refused(host):
     with pytest.raises(RigStopped, match="GAINS"):
         rig.start(Mode.MCU, law(1.01 * WIDE.command * COUNTS))
     assert dead(board)
-    with pytest.raises(BadInput, match="gains and units"):
-        running(host)[1].start(Mode.MCU, law(1e12))
+    for beyond in (1e12, 1e200):
+        rig.clear_fault()
+        rig.arm()
+        with pytest.raises(RigStopped, match="gains and units"):
+            rig.start(Mode.MCU, law(beyond))
 
 
 def test_a_law_that_runs_away_stops_the_rig_before_its_number_overflows(host):
@@ -325,6 +328,30 @@ def test_a_self_test_pushes_for_its_time_and_tells_who_moved(host):
         rig.self_test(6.0, 0.01)
     with pytest.raises(RigStopped, match="beyond"):
         rig.self_test(0.5, 6.0)
+
+
+def test_a_new_host_finds_the_rig_stopped_and_without_limits(host):
+    board, rig = running(host, patience=0.05)
+    rig.exchange(1.0)
+    board.do("cut")
+    rig.close()  # whose word to stop is lost
+    board.do("join")
+    assert board.state()[5:] == [math.floor(1.0 / STEP + 0.5), 1.0, Mode.HOST]
+    again = board.rig()
+    again.open()
+    assert dead(board)
+    assert again.exchange(0.0).faults == Fault.RESET
+    again.clear_fault()
+    with pytest.raises(RigStopped, match="limits"):
+        again.arm()
+
+
+def test_less_than_a_count_is_no_limit(host):
+    rig = host().rig()
+    rig.open()
+    rig.clear_fault()
+    with pytest.raises(RigStopped, match="less than a count"):
+        rig.configure(replace(WIDE, travel=(0.4 / COUNTS, 1.0)))
 
 
 def test_a_cut_link_is_told_as_one_and_the_rig_stops_itself(host):

@@ -79,6 +79,10 @@ class Capabilities:
         Whether time passes only while a sample is exchanged, as on a twin, instead of by the clock on the wall.
     hardware : bool
         Whether something can really move; then limits are demanded.
+    paced : bool
+        Whether `exchange` comes back at the rig's own tick, so that the rig's clock paces the loop.
+    replayed : bool
+        Whether its samples come as they were stored, whatever it is commanded.
     """
 
     name: str
@@ -91,6 +95,8 @@ class Capabilities:
     modes: frozenset[Mode] = frozenset({Mode.HOST})
     virtual: bool = False
     hardware: bool = True
+    paced: bool = False
+    replayed: bool = False
 
     @property
     def step(self) -> float:
@@ -187,7 +193,8 @@ class LiveRig(Protocol):
     Raises
     ------
     RigStopped
-        From any call, when the rig refuses or has stopped itself; the command is zero before it is raised.
+        From any call, when the rig refuses or does not answer; the command is zero before it is raised. A rig that has
+        stopped itself answers `exchange` with a `Tick` that tells why.
     """
 
     def open(self) -> Capabilities:

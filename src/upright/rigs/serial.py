@@ -110,7 +110,7 @@ class SerialRig:
         self._about = Capabilities(
             name=f"{hello.name} on {self._line.name}", coordinates=self._coordinates, counts=self._counts,
             command_unit=self._unit, full_scale=self._full_scale, steps=hello.full_scale, period=1e-6 * hello.period,
-            modes=frozenset({Mode.HOST, Mode.MCU}), virtual=virtual, hardware=not virtual,
+            modes=frozenset({Mode.HOST, Mode.MCU}), virtual=virtual, hardware=not virtual, paced=not virtual,
         )  # fmt: skip
         return self._about
 
@@ -158,7 +158,15 @@ class SerialRig:
             if law is None:
                 raise self._refusal("its own loop needs a law")
             body = onboard(law, c).body()
-            held = self._ask(Kind.LAW, body)
+            try:
+                held = self._ask(Kind.LAW, body)
+            except RigStopped:
+                if self._status.result != Result.WRONG_VALUE:
+                    raise
+                raise self._refusal(
+                    "the law's numbers are absurd: one count more or less may not move the command by all that it may "
+                    "be, and none may reach 2^30 in counts and steps; look at gains and units"
+                ) from None
             if held != body:
                 self._distrust("law", held.hex(), body.hex())
         self._ask(Kind.START, bytes((mode,)))
@@ -286,16 +294,18 @@ class SerialRig:
         return wire.LimitsOnWire(
             travel=self._pair(limits.travel), start=self._pair(limits.start),
             speed=self._pair([v * window for v in limits.speed]),
-            frozen=(0, 0) if n < 2 or not limits.frozen else self._pair([limits.frozen] * n, least=1),
+            frozen=(0, 0) if n < 2 or not limits.frozen else self._pair([limits.frozen] * n),
             twist=twist, watchdog=watchdog, command=command,
             saturation=min(_down(limits.saturation / c.period), wire.FOREVER - 1)
             if math.isfinite(limits.saturation) else wire.FOREVER,
         )  # fmt: skip
 
-    def _pair(self, values: Sequence[float], least: int = 0) -> tuple[int, int]:
-        """Distances in counts of both encoders; no limit on one that is not there."""
-        pairs = zip(values, self._counts, strict=True)
-        counts = [wire.NO_LIMIT if math.isinf(v) else max(least, _down(v * abs(n))) for v, n in pairs]
+    def _pair(self, values: Sequence[float]) -> tuple[int, int]:
+        """Distances in counts of both encoders, at least one; no limit on one that is not there."""
+        pairs = [*zip(values, self._counts, strict=True)]
+        counts = [wire.NO_LIMIT if math.isinf(v) else _down(v * abs(n)) for v, n in pairs]
+        if 0 in counts:
+            raise self._refusal(f"a limit is less than a count; {self._coordinates} have {self._counts} counts per unit")
         first, second = (*counts, wire.NO_LIMIT)[:2]
         return min(first, wire.NO_LIMIT), min(second, wire.NO_LIMIT)
 
