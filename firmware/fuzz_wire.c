@@ -15,7 +15,7 @@
 const char port_name[] = "fuzz";
 bool port_virtual = true;
 const uint16_t port_period = 1000;
-const int16_t port_full_scale = 32767;
+const uint16_t port_steps = 32768;
 
 static uint32_t counts[CHANNELS];
 static uint16_t illegal;

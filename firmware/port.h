@@ -9,7 +9,7 @@
 extern const char port_name[];          /* of the board, as a person would call it */
 extern bool port_virtual;               /* time passes only while samples are exchanged */
 extern const uint16_t port_period;      /* of the tick [us] */
-extern const int16_t port_full_scale;   /* steps of the converter from zero to full scale */
+extern const uint16_t port_steps;       /* of the converter from zero to full scale */
 
 uint32_t port_counts(uint8_t channel);  /* of an encoder; runs over at 2^32 */
 uint16_t port_illegal(void);            /* quadrature transitions so far that no encoder makes */

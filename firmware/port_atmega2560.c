@@ -21,7 +21,7 @@
 const char port_name[] = "upright firmware, ATmega2560";
 bool port_virtual = false;
 const uint16_t port_period = PERIOD_US;
-const int16_t port_full_scale = 32767;
+const uint16_t port_steps = 32768;
 
 /* Encoders: x4 decoding in one interrupt for both. */
 

@@ -11,7 +11,7 @@
 const char port_name[] = "upright firmware, Cortex-M3";
 bool port_virtual = false;
 const uint16_t port_period = PERIOD_US;
-const int16_t port_full_scale = 32767;
+const uint16_t port_steps = 32768;
 
 typedef volatile uint32_t register_t;
 #define UART ((register_t *)0x40004000)

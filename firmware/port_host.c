@@ -33,7 +33,7 @@
 const char port_name[] = "upright firmware, host";
 bool port_virtual;
 const uint16_t port_period = PERIOD_NS / 1000;
-const int16_t port_full_scale = 32767;
+const uint16_t port_steps = 32768;
 
 static int wire;
 static bool simulated, enabled;

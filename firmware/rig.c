@@ -244,7 +244,7 @@ static uint8_t configure(const uint8_t *b) {
     offered.watchdog = get_u16(b + 8);
     offered.command = (int16_t)get_u16(b + 10);
     if (!offered.watchdog || offered.watchdog > LONGEST_WATCHDOG || !offered.saturation) return WRONG_VALUE;
-    if (offered.command <= 0 || offered.command > port_full_scale || offered.twist > NO_LIMIT) return WRONG_VALUE;
+    if (offered.command <= 0 || offered.command > (int32_t)port_steps || offered.twist > NO_LIMIT) return WRONG_VALUE;
     uint32_t before = port_lock();
     limits = offered;
     configured = true;
@@ -392,7 +392,7 @@ static uint8_t *put_answer(uint8_t kind, uint8_t *b) {
         b[3] = SPEED_WINDOW;
         b[4] = port_reset_cause();
         put_u16(b + 5, port_period);
-        put_u16(b + 7, (uint16_t)port_full_scale);
+        put_u16(b + 7, port_steps);
         memcpy(b + 9, port_name, n);
         return b + 9 + n;
     }

@@ -16,7 +16,7 @@ from upright.rigs.serial import SerialRig
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 COUNTS = 16_000 / (2 * math.pi)
 FULL_SCALE = 10.0
-STEPS = 32767
+STEPS = 32768
 STEP = FULL_SCALE / STEPS
 
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput
 from upright.laws import Law
+from upright.rigs import wire
 from upright.rigs.protocol import Capabilities
 
 Float32 = NDArray[np.float32]
@@ -90,7 +91,7 @@ def onboard(law: Law, about: Capabilities) -> OnboardLaw:
     matrix[:z, columns] = np.hstack([wired.A, wired.B])
     matrix[MEMORIES, columns] = np.hstack([wired.C, wired.D])[0]
     sums = (np.eye(z) == wired.A).all(axis=1) & (wired.windup == "hold")
-    limit = math.floor(min(wired.limit, about.steps) + 1e-6)
+    limit = math.floor(min(wired.limit + 1e-6, about.steps, wire.MOST))
     if limit < 1:
         raise BadInput(
             f"the law's limit of {law.limit:g} {about.command_unit} is less than the converter's step of "

@@ -16,7 +16,6 @@ from upright.rigs.protocol import NO_FAULT, Capabilities, Fault, Limits, Mode, S
 from upright.rigs.wire import Frame, Kind, Result, Status
 
 _BOOT = 4.0  # s; a board that resets when its port is opened waits for its boot loader
-_MOST_STEPS = 32767
 
 _WHY = {
     Result.WRONG_LENGTH: "the frame has not the length that it expects; is its firmware as old as this program?",
@@ -109,7 +108,7 @@ class SerialRig:
         self._again = self._resend or (math.inf if virtual else 0.02)
         self._about = Capabilities(
             name=f"{hello.name} on {self._line.name}", coordinates=self._coordinates, counts=self._counts,
-            command_unit=self._unit, full_scale=self._full_scale, steps=hello.full_scale, period=1e-6 * hello.period,
+            command_unit=self._unit, full_scale=self._full_scale, steps=hello.steps, period=1e-6 * hello.period,
             modes=frozenset({Mode.HOST, Mode.MCU}), virtual=virtual, hardware=not virtual, paced=not virtual,
         )  # fmt: skip
         return self._about
@@ -277,7 +276,7 @@ class SerialRig:
                 f"the limit on the command is {limits.command:g} {c.command_unit}, beyond the converter's "
                 f"{c.full_scale:g} {c.command_unit}"
             )
-        command, watchdog = _down(limits.command / c.step), _down(limits.watchdog / c.period)
+        command, watchdog = min(_down(limits.command / c.step), wire.MOST), _down(limits.watchdog / c.period)
         if command < 1:
             raise self._refusal(f"the limit on the command is less than a step of {c.step:g} {c.command_unit}")
         if not 1 <= watchdog <= 5000:
@@ -305,7 +304,9 @@ class SerialRig:
         pairs = [*zip(values, self._counts, strict=True)]
         counts = [wire.NO_LIMIT if math.isinf(v) else _down(v * abs(n)) for v, n in pairs]
         if 0 in counts:
-            raise self._refusal(f"a limit is less than a count; {self._coordinates} have {self._counts} counts per unit")
+            raise self._refusal(
+                f"a limit is less than a count; {self._coordinates} have {self._counts} counts per unit"
+            )
         first, second = (*counts, wire.NO_LIMIT)[:2]
         return min(first, wire.NO_LIMIT), min(second, wire.NO_LIMIT)
 
@@ -327,7 +328,7 @@ class SerialRig:
     def _steps(self, command: float) -> int:
         """A command in steps, as far as the wire has room; the firmware holds it to its limit."""
         steps = math.floor(command / self._there().step + 0.5)
-        return min(max(steps, -_MOST_STEPS), _MOST_STEPS)
+        return min(max(steps, -wire.MOST), wire.MOST)
 
     def _there(self) -> Capabilities:
         if self._about is None:

@@ -25,6 +25,8 @@ NO_LIMIT = 0x7FFFFFFF
 FOREVER = 0xFFFFFFFF
 CHANNELS = 2
 """Encoders of the firmware."""
+MOST = 32767
+"""Largest command [steps]; of a converter of 16 bits one less than it has to either side."""
 _CRC = struct.Struct("<I")
 _REPLY = 0x80
 
@@ -166,7 +168,7 @@ class Sample(NamedTuple):
 
 
 class Hello(NamedTuple):
-    """What the firmware says of itself."""
+    """What the firmware says of itself; its tick's period in us, its converter's steps from zero to full scale."""
 
     protocol: int
     virtual: bool
@@ -174,7 +176,7 @@ class Hello(NamedTuple):
     speed_window: int
     reset_cause: int
     period: int
-    full_scale: int
+    steps: int
     name: str
 
 
@@ -218,7 +220,7 @@ class Snapshot(NamedTuple):
 
 _STATUS = struct.Struct("<BBHI")
 _SAMPLE = struct.Struct("<Hiih")
-_HELLO = struct.Struct("<BBBBBHh")
+_HELLO = struct.Struct("<BBBBBHH")
 _LIMITS = struct.Struct("<10IHh")
 _EXCHANGE = struct.Struct("<hfH")
 _SELF_TEST = struct.Struct("<hH")
