@@ -13,7 +13,7 @@ from upright.rigs import wire
 from upright.rigs.line import Line, open_line
 from upright.rigs.onboard import onboard
 from upright.rigs.protocol import NO_FAULT, Capabilities, Fault, Limits, Mode, SelfTest, Tick
-from upright.rigs.wire import Frame, Kind, Result, Status
+from upright.rigs.wire import Kind, Packet, Result, Status
 
 _BOOT = 4.0  # s; a board that resets when its port is opened waits for its boot loader
 
@@ -250,7 +250,7 @@ class SerialRig:
             f"({self._parser.dropped} damaged frames came). Its watchdog stops it; look at cable, port and power."
         )
 
-    def _answer(self, frame: Frame, kind: Kind) -> bytes | None:
+    def _answer(self, frame: Packet, kind: Kind) -> bytes | None:
         """What a frame says to the last request; None when it is no answer to that."""
         if not frame.answers(kind) or frame.sequence != self._sequence:
             return None

@@ -61,7 +61,7 @@ class Result(IntEnum):
     UNKNOWN = 7
 
 
-class Frame(NamedTuple):
+class Packet(NamedTuple):
     """One sound frame."""
 
     kind: int
@@ -100,7 +100,7 @@ def pack(kind: int, sequence: int, body: bytes = b"") -> bytes:
     return cobs(payload + _CRC.pack(zlib.crc32(payload))) + b"\0"
 
 
-def unpack(stuffed: bytes) -> Frame | None:
+def unpack(stuffed: bytes) -> Packet | None:
     """What stands between two zeros, or None when it is no sound frame."""
     data = from_cobs(stuffed)
     if data is None or len(data) < 2 + _CRC.size:
@@ -108,7 +108,7 @@ def unpack(stuffed: bytes) -> Frame | None:
     payload = data[: -_CRC.size]
     if _CRC.unpack_from(data, len(payload))[0] != zlib.crc32(payload):
         return None
-    return Frame(payload[0], payload[1], payload[2:])
+    return Packet(payload[0], payload[1], payload[2:])
 
 
 class Parser:
@@ -125,9 +125,9 @@ class Parser:
         self._begun = bytearray()
         self._overlong = False
 
-    def feed(self, data: bytes) -> list[Frame]:
+    def feed(self, data: bytes) -> list[Packet]:
         """Frames that these bytes complete, in their order."""
-        frames: list[Frame] = []
+        frames: list[Packet] = []
         *ended, begun = data.split(b"\0")
         for part in ended:
             self._take(part)
@@ -159,7 +159,7 @@ class Status(NamedTuple):
     tick: int
 
 
-class Sample(NamedTuple):
+class Readout(NamedTuple):
     """What a tick saw and did: how late it began [us], counts since they were zeroed, command put out [steps]."""
 
     late: int
@@ -211,7 +211,7 @@ class Snapshot(NamedTuple):
     mode: Mode
     faults: Fault
     tick: int
-    sample: Sample
+    sample: Readout
     moved: tuple[int, int]
     asked: int
     lost: int
@@ -237,10 +237,10 @@ def status(body: bytes) -> tuple[Status, bytes] | None:
         return None
 
 
-def sample(body: bytes) -> Sample:
+def sample(body: bytes) -> Readout:
     """Of a reply to `Kind.EXCHANGE`, after its status."""
     late, first, second, applied = _SAMPLE.unpack(body)
-    return Sample(late, (first, second), applied)
+    return Readout(late, (first, second), applied)
 
 
 def hello(body: bytes) -> Hello:
