@@ -8,7 +8,9 @@
  *     counts A B      the encoders' counters, where no pendulum is simulated
  *     wrap CHANNEL V  the counter's own number, without that anything moved
  *     illegal         a quadrature transition that no encoder makes
+ *     overrun         a tick comes due during the one before
  *     run TICKS       time passes without the host
+ *     skip TICKS      the same, but of these ticks only the last one comes
  *     state           answers: tick, psi, psi', theta, theta', command [steps], enable line, mode
  * It ends with its standard input. */
 #define _GNU_SOURCE
@@ -89,8 +91,12 @@ static void obey(const char *line) {
         counter[a] = (uint32_t)b;
     } else if (!strcmp(line, "illegal")) {
         illegal++;
+    } else if (!strcmp(line, "overrun")) {
+        rig_overrun();
     } else if (sscanf(line, "run %ld", &a) == 1 && port_virtual) {
         while (a-- > 0) pass(1, 0);
+    } else if (sscanf(line, "skip %ld", &a) == 1 && port_virtual && a > 0) {
+        pass((uint32_t)a, 0);
     } else if (!strcmp(line, "state")) {
         printf("%u %.17g %.17g %.17g %.17g %d %d %d\n", tick, plant.x[0], plant.x[1], plant.x[2], plant.x[3], command,
                enabled, rig_mode());

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -98,6 +99,17 @@ def test_edges_are_counted_at_every_speed_that_the_tick_leaves_room_for(avr):
     # 15 rad/s are 38 edges a tick
     assert abs(ticks[-1].counts[1] - (board.state()[3] - first) * COUNTS) < 60
     assert ticks[-1].counts[1] > 10_000
+
+
+def test_a_processor_that_cannot_keep_up_stops(avr):
+    far_too_fast = {"psi_dot": 20.0, "theta_dot": 20.0}  # 100,000 edges a second, and a law besides
+    board = avr(*plant({**PARAMETERS, "b_1": 0.0, "b_2": 0.0, "g": 1e-9, "r": 1e-9}, GAIN, **far_too_fast))
+    rig = started(board, Mode.MCU, inverted(), FREE)
+    with suppress(RigStopped):  # it may not come to answer
+        for _ in range(50):
+            rig.exchange(0.0)
+    board.do("run 25")
+    assert board.state()[6] == 0.0
 
 
 @pytest.mark.parametrize(

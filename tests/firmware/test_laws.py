@@ -21,12 +21,13 @@ ABOUT = Capabilities(
     name="a board", coordinates=("psi", "theta"), counts=(COUNTS, COUNTS), command_unit="V", full_scale=STEP * STEPS,
     steps=STEPS, period=PERIOD,
 )  # fmt: skip
-FREE = replace(LIMITS, travel=(math.inf,) * 2, speed=(math.inf,) * 2, saturation=math.inf, command=10.0)
+FREE = replace(LIMITS, travel=(math.inf,) * 2, speed=(math.inf,) * 2, saturation=math.inf, command=6.0)
 LAWS = {
     "inverted": inverted(),
     "inverted, plain difference": inverted(memory=0.0),
     "swing-free": swing_free(),
     "PI that stands still at its limit": pid(),
+    "PI that stands still at the rig's limit": replace(pid(), limit=math.inf, C=20 * pid().C, D=20 * pid().D),
     "one reading by name": replace(
         state_feedback([3.0, 0.2], PERIOD, measured=("theta",)), initial=[0.01], begin=None, limit=math.inf
     ),

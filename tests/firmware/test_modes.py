@@ -13,7 +13,7 @@ from upright.errors import RigStopped
 from upright.laws import Law
 from upright.rigs.line import TerminalLine
 from upright.rigs.protocol import Fault, Limits, Mode
-from upright.rigs.wire import Kind, exchange, pack
+from upright.rigs.wire import Kind, Parser, Result, exchange, pack, status
 
 WIDE = Limits(travel=(3.0, 4.0), speed=(20.0, 20.0), start=(0.5, 0.5), command=5.0, watchdog=0.02, saturation=0.1)
 PULL = Law(np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((1, 0)), np.array([[1.0, 0.0]]))
@@ -125,9 +125,9 @@ SLOW = int(19.0 * COUNTS * 8e-3)
 """Counts that one coordinate may move in the speed window of 8 ticks."""
 
 
-def ramp(board, rig, to, by):
+def ramp(board, rig, to, by, at=(0, 0)):
     """Both encoders or one moved in steps, a tick each, until the rig stops or is there; the last sample."""
-    at, tick = np.zeros(2), rig.exchange(0.0)
+    at, tick = np.array(at), rig.exchange(0.0)
     while not tick.faults and (at != to).any():
         at = at + np.clip(np.asarray(to) - at, -by, by)
         board.do(f"counts {int(at[0])} {int(at[1])}")
@@ -175,6 +175,39 @@ def test_a_limit_that_is_passed_stops_the_rig_in_that_tick(host, mode, limits, t
 def test_what_stays_within_the_limits_goes_on(host, limits, to, by):
     board, rig = running(host, Mode.HOST, limits)
     assert ramp(board, rig, to, by).mode == Mode.HOST
+
+
+def test_a_hand_may_turn_one_coordinate_alone_before_a_run(host):
+    board = host()
+    rig = board.rig()
+    rig.open()
+    rig.clear_fault()
+    rig.configure(replace(WIDE, frozen=0.2))
+    ramp(board, rig, (1200, 0), 20)
+    rig.arm()
+    assert rig.exchange(0.0).mode == Mode.ARMED
+    assert ramp(board, rig, (1200 + 2000, 0), 20, (1200, 0)).faults == Fault.ENCODER
+
+
+def test_a_request_whose_answer_was_lost_is_told_again_and_not_done_again(host):
+    line = TerminalLine(host().port)
+    rig = rig_on(line)
+    rig.open()
+    rig.clear_fault()
+    rig.configure(WIDE)
+
+    def ask(kind, sequence):
+        line.write(pack(kind, sequence))
+        (reply,) = Parser().feed(line.read(1.0))
+        read = status(reply.body)
+        assert read is not None
+        return read[0].result
+
+    assert ask(Kind.ARM, 77) == Result.DONE
+    assert ask(Kind.ARM, 77) == Result.DONE
+    assert ask(Kind.ARM, 78) == Result.WRONG_MODE
+    assert ask(Kind.ARM, 78) == Result.WRONG_MODE
+    assert rig.exchange(0.0).mode == Mode.ARMED
 
 
 def test_a_run_starts_within_its_window_only(host):
@@ -248,11 +281,46 @@ def test_a_command_that_answers_an_old_sample_is_not_followed(host):
     assert tick.applied == 0.0
 
 
+def test_a_board_that_cannot_keep_its_ticks_stops(host):
+    board, rig = running(host)
+    board.do("skip 20")
+    assert rig.exchange(0.1).mode == Mode.HOST
+    board.do("skip 20")
+    assert rig.exchange(0.1).faults == Fault.WATCHDOG  # 21 ticks of silence
+    board, rig = running(host)
+    rig.exchange(0.1)
+    board.do("skip 21")
+    assert dead(board)
+    assert rig.exchange(0.1).faults == Fault.OVERRUN
+    assert rig.snapshot().lost == 20
+    board, rig = running(host)
+    board.do("overrun")
+    assert rig.exchange(0.1).faults == Fault.OVERRUN
+    assert dead(board)
+
+
+@pytest.mark.parametrize("skipped", [2, 5, 8, 15])
+@pytest.mark.parametrize(("by", "fault"), [(45, Fault(0)), (56, Fault.OVERSPEED)])
+def test_a_speed_is_seen_alike_when_ticks_are_late(host, skipped, by, fault):
+    board, rig = running(host)  # 20 rad/s are 50.9 counts a tick
+    tick, at = rig.exchange(0.0), 0
+    for _ in range(4):
+        at += skipped * by
+        board.do(f"counts 0 {at}", f"skip {skipped}")
+        at += by
+        board.do(f"counts 0 {at}")
+        tick = rig.exchange(0.0)
+    assert tick.faults == fault
+
+
 def test_a_transition_that_no_encoder_makes_stops_the_rig(host):
     board, rig = running(host)
     board.do("illegal")
-    assert rig.exchange(0.1).faults == Fault.ENCODER
+    assert rig.exchange(7.0).faults == Fault.ENCODER
     assert dead(board)
+    seen = rig.snapshot()
+    assert seen.asked == math.floor(7.0 / STEP + 0.5)
+    assert seen.sample.applied == math.floor(WIDE.command / STEP)
 
 
 @pytest.mark.parametrize("mode", [Mode.HOST, Mode.MCU])
