@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 
 import pytest
 
@@ -26,17 +27,14 @@ def test_a_rig_answers_over_every_line(host, make):
 
 
 def test_firmware_by_the_clock_on_the_wall_paces_its_host(host):
-    # its 1 ms against this clock: a busy machine may make it later, never earlier
-    import time
-
     rig = host(lockstep=False).rig()
     assert not rig.open().virtual
-    first, began = rig.exchange(0.0), time.monotonic()
-    for _ in range(30):
-        last = rig.exchange(0.0)
+    began = time.monotonic()
+    ticks = [rig.exchange(0.0) for _ in range(31)]
     passed = time.monotonic() - began
-    assert last.tick - first.tick >= 30
-    assert last.time - first.time <= passed + 2e-3
+    assert ticks[-1].tick - ticks[0].tick >= 30
+    # every tick came after the exchange that it answers, however busy the machine; 1 us is how its lateness is told
+    assert ticks[-1].time - ticks[0].time <= passed + 2e-6
 
 
 @needs_linux

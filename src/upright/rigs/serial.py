@@ -232,8 +232,9 @@ class SerialRig:
         line = self._line
         if line is None or (self._about is None and kind != Kind.HELLO):
             raise RigStopped("The rig is not open; open it first.")
-        now = self._clock()
-        given_up, again = now + (self._patience if patience is None else patience), now
+        now = again = self._clock()
+        patience = self._patience if patience is None else patience
+        given_up = now + patience
         # An exchange that is repeated is a new one; anything else is done once, however often it is asked for.
         self._sequence = (self._sequence + 1) & 0xFF
         while now < given_up:
@@ -246,8 +247,8 @@ class SerialRig:
                     return answer
             now = self._clock()
         raise RigStopped(
-            f"{self._name()} did not answer for {given_up - now + (patience or self._patience):.3g} s "
-            f"({self._parser.dropped} damaged frames came). Its watchdog stops it; look at cable, port and power."
+            f"{self._name()} did not answer for {patience:g} s ({self._parser.dropped} damaged frames came). "
+            "Its watchdog stops it; look at cable, port and power."
         )
 
     def _answer(self, frame: Packet, kind: Kind) -> bytes | None:
