@@ -91,6 +91,7 @@ DOORS = {
     "typer": "cli",
     "mcap": "logs",
     "zstandard": "logs",
+    "serial": "line",
     "loky": "workers",
     "cloudpickle": "workers",
     "distributed": "workers",

@@ -1,0 +1,104 @@
+/* libFuzzer on everything that comes over the wire: make fuzz && build/fuzz-wire -max_total_time=60
+ *
+ * The first byte says whether the rest comes raw or cut into payloads that are framed properly, so that the requests
+ * behind the CRC are reached as well, and whether the rig has been armed before. Between frames encoders move and ticks pass as the input says. Whatever comes:
+ * power and command only where a host has armed the rig, never beyond the limit, and no fault without zero output. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bytes.h"
+#include "frame.h"
+#include "port.h"
+#include "rig.h"
+
+const char port_name[] = "fuzz";
+bool port_virtual = true;
+const uint16_t port_period = 1000;
+const uint16_t port_steps = 32768;
+
+static uint32_t counts[CHANNELS];
+static uint16_t illegal;
+static int16_t command;
+static bool power;
+
+uint32_t port_counts(uint8_t channel) { return counts[channel]; }
+uint16_t port_illegal(void) { return illegal; }
+void port_command(int16_t steps) { command = steps; }
+void port_enable(bool on) { power = on; }
+uint8_t port_reset_cause(void) { return 0; }
+uint32_t port_lock(void) { return 0; }
+void port_unlock(uint32_t before) { (void)before; }
+
+static int16_t limit; /* as the firmware told that it holds it */
+
+static void claim(bool held, const char *what) {
+    if (!held) fprintf(stderr, "not so: %s\n", what), abort();
+}
+
+void port_send(const uint8_t *bytes, uint16_t n) {
+    static receiver_t host;
+    for (uint16_t i = 0; i < n; i++) {
+        uint16_t payload = frame_receive(&host, bytes[i]);
+        claim(payload || i + 1 < n, "every frame that is sent is sound");
+        if (payload && host.bytes[0] == (CONFIGURE | REPLY) && host.bytes[2] == DONE) limit = (int16_t)get_u16(host.bytes + 52);
+    }
+}
+
+static void check(void) {
+    enum mode mode = rig_mode();
+    bool may_move = mode == ARMED || mode == HOST || mode == MCU;
+    claim(may_move == power, "power is on where the rig is armed, and nowhere else");
+    claim(may_move || command == 0, "the command is zero in IDLE and FAULT");
+    claim(command <= limit && command >= -limit, "the command stays within its limit");
+}
+
+static void ask(uint8_t *payload, size_t n) {
+    uint8_t frame[FRAME_MOST];
+    uint16_t length = frame_make(payload, (uint16_t)n, frame);
+    for (uint16_t i = 0; i < length; i++) rig_receive(frame[i]);
+}
+
+static void arm(void) {
+    uint8_t payload[60] = {CLEAR};
+    ask(payload, 2);
+    payload[0] = CONFIGURE;
+    for (int i = 0; i < 10; i++) put_u32(payload + 2 + 4 * i, i == 6 || i == 7 ? 50 : 1000);
+    put_u16(payload + 42, 20);
+    put_u16(payload + 44, 3000);
+    ask(payload, 46);
+    payload[0] = ARM;
+    ask(payload, 2);
+    claim(rig_mode() == ARMED, "a rig that was cleared and configured can be armed");
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+    uint32_t tick = 0;
+    if (!size--) return 0;
+    bool framed = *data & 1, armed = *data++ & 2;
+    memset(counts, 0, sizeof counts);
+    limit = 0;
+    rig_reset();
+    if (armed) arm();
+    while (size >= 2) {
+        uint8_t payload[PAYLOAD_MOST + CRC_BYTES];
+        size_t n = 1 + *data++ % 220;
+        if (n > --size) n = size;
+        if (framed) {
+            memcpy(payload, data, n);
+            ask(payload, n);
+        } else {
+            for (size_t i = 0; i < n; i++) rig_receive(data[i]);
+        }
+        check();
+        counts[0] += data[n - 1];
+        counts[1] -= data[0];
+        illegal += data[0] == 0xFF;
+        rig_tick(tick += 1 + data[n / 2] / 128, 0);
+        rig_poll();
+        check();
+        data += n;
+        size -= n;
+    }
+    return 0;
+}

@@ -1,0 +1,92 @@
+#include "law.h"
+
+#include <math.h>
+
+#include "bytes.h"
+
+/* Entries that are not zero, row by row, so that a tick costs what the law needs and not what it could need. */
+typedef struct {
+    float entry;
+    uint8_t column;
+    bool one;
+} term_t;
+static term_t terms[OUTPUTS * INPUTS];
+static uint8_t terms_in[OUTPUTS];
+static float memory[MEMORIES];
+static bool begun;
+
+bool law_take(law_t *law, const uint8_t body[LAW_BYTES], int16_t most) {
+    law_t offered;
+    float *numbers[] = {&offered.matrix[0][0], offered.target, offered.initial, &offered.begin[0][0]};
+    const uint8_t sizes[] = {OUTPUTS * INPUTS, READINGS, MEMORIES, MEMORIES * READINGS};
+    for (uint8_t part = 0; part < sizeof sizes; part++)
+        for (uint8_t i = 0; i < sizes[part]; i++, body += 4) {
+            numbers[part][i] = get_float(body);
+            if (!sane(numbers[part][i])) return false;
+        }
+    offered.limit = (int16_t)get_u16(body);
+    offered.held_sums = body[2];
+    offered.every = body[3];
+    if (offered.every == 0 || offered.limit <= 0) return false;
+    for (uint8_t i = 0; i < READINGS; i++)
+        if (!(fabsf(offered.matrix[COMMAND_ROW][MEMORIES + i]) < most)) return false;
+
+    *law = offered;
+    uint8_t count = 0;
+    for (uint8_t row = 0; row < OUTPUTS; row++) {
+        uint8_t before = count;
+        for (uint8_t column = 0; column < INPUTS; column++) {
+            float entry = law->matrix[row][column];
+            if (entry == 0) continue;
+            terms[count].entry = entry;
+            terms[count].column = column;
+            terms[count++].one = entry == 1;
+        }
+        terms_in[row] = count - before;
+    }
+    return true;
+}
+
+void law_give(const law_t *law, uint8_t body[LAW_BYTES]) {
+    const float *numbers[] = {&law->matrix[0][0], law->target, law->initial, &law->begin[0][0]};
+    const uint8_t sizes[] = {OUTPUTS * INPUTS, READINGS, MEMORIES, MEMORIES * READINGS};
+    for (uint8_t part = 0; part < sizeof sizes; part++)
+        for (uint8_t i = 0; i < sizes[part]; i++, body += 4) put_float(body, numbers[part][i]);
+    put_u16(body, (uint16_t)law->limit);
+    body[2] = law->held_sums;
+    body[3] = law->every;
+}
+
+void law_start(void) { begun = false; }
+
+bool law_step(const law_t *law, const int32_t q[READINGS], float reference, int16_t rig_limit, int16_t *command) {
+    float in[INPUTS], out[OUTPUTS];
+    float *w = in + MEMORIES;
+    for (uint8_t i = 0; i < READINGS; i++) w[i] = (float)q[i] - law->target[i];
+    w[READINGS] = reference;
+    if (!begun) {
+        for (uint8_t i = 0; i < MEMORIES; i++) {
+            memory[i] = law->initial[i];
+            for (uint8_t j = 0; j < READINGS; j++) memory[i] += law->begin[i][j] * w[j];
+        }
+        begun = true;
+    }
+    memcpy(in, memory, sizeof memory);
+    const term_t *term = terms;
+    for (uint8_t row = 0; row < OUTPUTS; row++) {
+        float sum = 0;
+        for (uint8_t left = terms_in[row]; left; left--, term++) {
+            float value = in[term->column];
+            sum += term->one ? value : term->entry * value;
+        }
+        if (!sane(sum)) return false;
+        out[row] = sum;
+    }
+    int32_t asked = (int32_t)floorf(out[COMMAND_ROW] + 0.5f);
+    int16_t limit = law->limit < rig_limit ? law->limit : rig_limit;
+    bool beyond = asked > limit || asked < -limit;
+    for (uint8_t i = 0; i < MEMORIES; i++)
+        if (!(beyond && law->held_sums >> i & 1)) memory[i] = out[i];
+    *command = asked > law->limit ? law->limit : asked < -law->limit ? -law->limit : (int16_t)asked;
+    return true;
+}

@@ -1,0 +1,33 @@
+/* What can go wrong between a simulated rig and the firmware, asked for in lines of text. */
+#ifndef MISHAP_H
+#define MISHAP_H
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "furuta.h"
+
+typedef struct {
+    double scale; /* counts shown per true count: -1 for swapped wires, 2 or 4 for a decoder that counts other edges */
+    bool dead;
+    long shown, seen;
+    double rest;
+} encoder_t;
+
+typedef struct {
+    encoder_t encoder[2];
+    double corruption; /* probability that a byte on the wire comes with a flipped bit */
+    uint64_t random;
+    bool cut; /* nothing comes from the host any more */
+} mishaps_t;
+
+void mishaps_prepare(mishaps_t *now, const furuta_t *rig);
+/* Counts that an encoder shows when the true ones are these. */
+long encoder_shows(encoder_t *encoder, long counts);
+uint8_t over_the_wire(mishaps_t *now, uint8_t byte);
+
+/*     dead CHANNEL            alive CHANNEL          flip CHANNEL           scale CHANNEL FACTOR
+ *     lose CHANNEL COUNTS     corrupt CHANCE SEED    cut                    join
+ *     kick SPEED [rad/s]      release                put PSI PSI' THETA THETA'
+ * false for a line that is none of them. */
+bool mishaps_line(mishaps_t *now, furuta_t *rig, const char *line);
+#endif

@@ -1,0 +1,363 @@
+"""A rig at the end of a wire: firmware on a board, on a simulated board, or in a process, all by the same frames."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from typing import NoReturn
+
+from upright.errors import BadInput, RigStopped
+from upright.laws import Law
+from upright.rigs import wire
+from upright.rigs.line import Line, open_line
+from upright.rigs.onboard import onboard
+from upright.rigs.protocol import NO_FAULT, Capabilities, Fault, Limits, Mode, SelfTest, Tick
+from upright.rigs.wire import Kind, Packet, Result, Status
+
+_BOOT = 4.0  # s; a board that resets when its port is opened waits for its boot loader
+
+_WHY = {
+    Result.WRONG_LENGTH: "the frame has not the length that it expects; is its firmware as old as this program?",
+    Result.WRONG_MODE: "it is in the wrong mode for that",
+    Result.WRONG_VALUE: "a value is beyond what it takes",
+    Result.NOT_CONFIGURED: "it has no limits or no law yet; configure them first",
+    Result.FAULTED: "it stands in a fault that has to be cleared first",
+    Result.OFF_START: "it is off its start window",
+    Result.UNKNOWN: "it does not know that request; is its firmware as old as this program?",
+}
+
+
+class SerialRig:
+    """A `LiveRig` over a serial port, a pty or any `Line`.
+
+    The sample that `exchange` gives is that of the tick after the command arrived, so that the board's clock paces the
+    loop. On firmware in lockstep (`port_host.c`, `simrig.c`) time passes by that tick only.
+
+    Parameters
+    ----------
+    line : str or Line
+        Port such as ``/dev/ttyACM0``, ``COM4`` or ``/dev/pts/4``.
+    coordinates : sequence of str
+        What each encoder measures, in the plant's order; one or two.
+    counts : sequence of float
+        Signed counts per rad or m of each encoder.
+    command_unit : str
+        ``"V"``, ``"A"``, ...
+    full_scale : float
+        Command at the converter's last step [command unit].
+    patience : float
+        How long an answer may take before the link is taken for lost [s].
+    lockstep : bool
+        Whether the board is simulated in lockstep although its firmware does not know it.
+    resend : float, optional
+        After which time a request is repeated [s]; 0.02 by default, and never in lockstep, where time passes by it.
+    clock : callable
+        Seconds of a clock that never goes back.
+    """
+
+    def __init__(
+        self,
+        line: str | Line,
+        *,
+        coordinates: Sequence[str],
+        counts: Sequence[float],
+        command_unit: str,
+        full_scale: float,
+        patience: float = 1.0,
+        lockstep: bool = False,
+        resend: float | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        if not 1 <= len(coordinates) <= wire.CHANNELS or len(counts) != len(coordinates):
+            raise BadInput(
+                f"the firmware reads 1 or {wire.CHANNELS} encoders, each with its counts; got {len(coordinates)} "
+                f"coordinates and {len(counts)} counts."
+            )
+        if not all(math.isfinite(n) and n != 0.0 for n in counts) or not 0.0 < full_scale < math.inf:
+            raise BadInput(f"counts must not be zero and the full scale above it, got {counts} and {full_scale:g}.")
+        self._given, self._line = line, None if isinstance(line, str) else line
+        self._coordinates, self._counts = tuple(coordinates), tuple(float(n) for n in counts)
+        self._unit, self._full_scale = command_unit, full_scale
+        self._patience, self._lockstep, self._resend, self._clock = patience, lockstep, resend, clock
+        self._again = math.inf
+        self._parser = wire.Parser()
+        self._sequence = 0
+        self._about: Capabilities | None = None
+        self._hello: wire.Hello | None = None
+        self._status = Status(Result.DONE, Mode.FAULT, Fault.RESET, 0)
+        self._at: tuple[int, ...] = (0,) * len(self._counts)
+
+    @property
+    def dropped(self) -> int:
+        """Frames that came damaged since the port was opened."""
+        return self._parser.dropped
+
+    def open(self) -> Capabilities:
+        """Find the firmware; a board that was switched on stands in FAULT with `Fault.RESET`."""
+        if self._line is None:
+            self._line = open_line(str(self._given))
+        self._again = 0.3  # a board that resets when its port is opened hears nothing for a while
+        hello = self._hello = wire.hello(self._ask(Kind.HELLO, patience=max(_BOOT, self._patience)))
+        if hello.protocol != wire.PROTOCOL:
+            raise RigStopped(
+                f"The firmware '{hello.name}' speaks version {hello.protocol} of the protocol and this program version "
+                f"{wire.PROTOCOL}; flash the firmware of this release."
+            )
+        virtual = self._lockstep or hello.virtual
+        self._again = self._resend or (math.inf if virtual else 0.02)
+        self._about = Capabilities(
+            name=f"{hello.name} on {self._line.name}", coordinates=self._coordinates, counts=self._counts,
+            command_unit=self._unit, full_scale=self._full_scale, steps=hello.steps, period=1e-6 * hello.period,
+            modes=frozenset({Mode.HOST, Mode.MCU}), virtual=virtual, hardware=not virtual, paced=not virtual,
+        )  # fmt: skip
+        return self._about
+
+    def configure(self, limits: Limits) -> Limits:
+        """Hold limits, rounded towards the safe side to counts, steps and ticks; what came back is compared."""
+        asked = self._on_wire(limits)
+        held = self._ask(Kind.CONFIGURE, asked.body())
+        if held != asked.body():
+            self._distrust("limits", wire.limits(held), asked)
+        return self._from_wire(wire.limits(held))
+
+    def zero(self) -> None:
+        """Count from here on."""
+        self._ask(Kind.ZERO)
+
+    def self_test(self, pulse: float, seconds: float) -> SelfTest:
+        """The farthest that each coordinate went under a pulse and for as long after it."""
+        c = self._there()
+        ticks = max(1, round(seconds / c.period)) if math.isfinite(seconds) else 0
+        first = self.exchange(0.0).counts
+        self._ask(Kind.SELF_TEST, wire.self_test(self._steps(pulse), ticks & 0xFFFF))
+        farthest, until = [0] * len(first), self._status.tick + 2 * ticks + 1
+        while self._status.tick < until:
+            tick = self.exchange(0.0)
+            if tick.faults:
+                raise self._stopped()
+            for i, (now, then) in enumerate(zip(tick.counts, first, strict=True)):
+                farthest[i] = max(farthest[i], now - then, key=abs)
+        moved = {n: k / per for n, k, per in zip(c.coordinates, farthest, c.counts, strict=True)}
+        dead = [n for n, v in moved.items() if v == 0.0]
+        return SelfTest(
+            moved=moved, complaint=f"Nothing moved: {', '.join(dead)} showed not a single count." if dead else ""
+        )
+
+    def arm(self) -> None:
+        """Switch the power stage on at zero command."""
+        self._ask(Kind.ARM)
+
+    def start(self, mode: Mode, law: Law | None = None) -> None:
+        """Give it to the host, or to the firmware's loop with a law in float32 that is read back bit by bit."""
+        c = self._there()
+        if mode not in c.modes:
+            raise self._refusal(f"it has no mode {mode.name}, only {', '.join(sorted(m.name for m in c.modes))}")
+        if mode == Mode.MCU:
+            if law is None:
+                raise self._refusal("its own loop needs a law")
+            body = onboard(law, c).body()
+            try:
+                held = self._ask(Kind.LAW, body)
+            except RigStopped:
+                if self._status.result != Result.WRONG_VALUE:
+                    raise
+                raise self._refusal(
+                    "the law's numbers are absurd: one count more or less may not move the command by all that it may "
+                    "be, and none may reach 2^30 in counts and steps; look at gains and units"
+                ) from None
+            if held != body:
+                self._distrust("law", held.hex(), body.hex())
+        self._ask(Kind.START, bytes((mode,)))
+
+    def exchange(self, command: float) -> Tick:
+        """Hand a command over and take the sample of the next tick; faults are in the sample."""
+        c = self._there()
+        reference, steps = 0.0, 0
+        if not math.isfinite(command):
+            reference = math.nan  # the firmware stops on it
+        elif self._status.mode == Mode.MCU:
+            reference = command
+        elif self._status.mode == Mode.HOST:
+            steps = self._steps(command)
+        try:
+            body = wire.exchange(steps, reference, self._status.tick)
+        except OverflowError:
+            body = wire.exchange(steps, math.nan, self._status.tick)
+        sample = wire.sample(self._ask(Kind.EXCHANGE, body))
+        self._at = sample.counts[: len(self._counts)]
+        return Tick(
+            tick=self._status.tick, time=self._status.tick * c.period + 1e-6 * sample.late, counts=self._at,
+            applied=sample.applied * c.step, mode=self._status.mode, faults=self._status.faults,
+        )  # fmt: skip
+
+    def snapshot(self) -> wire.Snapshot:
+        """How it was when the first fault since the last clearing came."""
+        return wire.snapshot(self._ask(Kind.SNAPSHOT))
+
+    def stop(self) -> None:
+        """Zero, power stage off, IDLE; in FAULT it stays there."""
+        self._ask(Kind.STOP)
+
+    def estop(self) -> None:
+        """The same from anywhere, latched."""
+        if self._about is not None:
+            try:
+                self._ask(Kind.ESTOP)
+            except (RigStopped, OSError):
+                return  # the watchdog does it then
+
+    def clear_fault(self) -> None:
+        """Forget faults."""
+        self._ask(Kind.CLEAR)
+
+    def close(self) -> None:
+        """Stop and let go of the line."""
+        line, self._line = self._line, None
+        if line is None:
+            return
+        try:
+            if self._about is not None:
+                self._line = line
+                self._ask(Kind.STOP)
+        except (RigStopped, OSError):
+            pass
+        finally:
+            self._line = None
+            self._about = None
+            line.close()
+
+    def _ask(self, kind: Kind, body: bytes = b"", patience: float | None = None) -> bytes:
+        """Body of the answer, behind its status; repeated while none comes."""
+        line = self._line
+        if line is None or (self._about is None and kind != Kind.HELLO):
+            raise RigStopped("The rig is not open; open it first.")
+        now = again = self._clock()
+        patience = self._patience if patience is None else patience
+        given_up = now + patience
+        # An exchange that is repeated is a new one; anything else is done once, however often it is asked for.
+        self._sequence = (self._sequence + 1) & 0xFF
+        while now < given_up:
+            if now >= again:
+                line.write(wire.pack(kind, self._sequence, body))
+                again = now + self._again
+            for frame in self._parser.feed(line.read(min(again, given_up) - now)):
+                answer = self._answer(frame, kind)
+                if answer is not None:
+                    return answer
+            now = self._clock()
+        raise RigStopped(
+            f"{self._name()} did not answer for {patience:g} s ({self._parser.dropped} damaged frames came). "
+            "Its watchdog stops it; look at cable, port and power."
+        )
+
+    def _answer(self, frame: Packet, kind: Kind) -> bytes | None:
+        """What a frame says to the last request; None when it is no answer to that."""
+        if not frame.answers(kind) or frame.sequence != self._sequence:
+            return None
+        read = wire.status(frame.body)
+        if read is None:
+            return None
+        self._status, rest = read
+        if self._status.result == Result.DONE:
+            return rest
+        if self._status.result == Result.OFF_START:
+            raise self._refusal(f"{_WHY[Result.OFF_START]}: bring it nearer to its zero, and clear the fault")
+        raise self._refusal(_WHY[self._status.result])
+
+    def _on_wire(self, limits: Limits) -> wire.LimitsOnWire:
+        """Limits in the firmware's units, never wider than asked for."""
+        c, hello = self._there(), self._hello
+        assert hello is not None
+        n = len(c.coordinates)
+        if len(limits.travel) != n:
+            raise self._refusal(f"limits are for {len(limits.travel)} coordinates, and it has {n}")
+        if limits.command > c.full_scale * (1 + 1e-9):
+            raise self._refusal(
+                f"the limit on the command is {limits.command:g} {c.command_unit}, beyond the converter's "
+                f"{c.full_scale:g} {c.command_unit}"
+            )
+        command, watchdog = min(_down(limits.command / c.step), wire.MOST), _down(limits.watchdog / c.period)
+        if command < 1:
+            raise self._refusal(f"the limit on the command is less than a step of {c.step:g} {c.command_unit}")
+        if not 1 <= watchdog <= 5000:
+            raise self._refusal(f"the watchdog takes {c.period:g} to {5000 * c.period:g} s, got {limits.watchdog:g} s")
+        twist = wire.NO_LIMIT
+        if math.isfinite(limits.twist):
+            if n < 2 or c.counts[0] != c.counts[1]:
+                raise self._refusal(
+                    f"it compares counts for a twist, which takes two encoders of the same counts and sign; they are "
+                    f"{', '.join(f'{k:g}' for k in c.counts)} (swap A and B of one that runs the other way)"
+                )
+            twist = _down(limits.twist * abs(c.counts[0]))
+        window = hello.speed_window * c.period
+        return wire.LimitsOnWire(
+            travel=self._pair(limits.travel), start=self._pair(limits.start),
+            speed=self._pair([v * window for v in limits.speed]),
+            frozen=(0, 0) if n < 2 or not limits.frozen else self._pair([limits.frozen] * n),
+            twist=twist, watchdog=watchdog, command=command,
+            saturation=min(_down(limits.saturation / c.period), wire.FOREVER - 1)
+            if math.isfinite(limits.saturation) else wire.FOREVER,
+        )  # fmt: skip
+
+    def _pair(self, values: Sequence[float]) -> tuple[int, int]:
+        """Distances in counts of both encoders, at least one; no limit on one that is not there."""
+        pairs = [*zip(values, self._counts, strict=True)]
+        counts = [wire.NO_LIMIT if math.isinf(v) else _down(v * abs(n)) for v, n in pairs]
+        if 0 in counts:
+            raise self._refusal(
+                f"a limit is less than a count; {self._coordinates} have {self._counts} counts per unit"
+            )
+        first, second = (*counts, wire.NO_LIMIT)[:2]
+        return min(first, wire.NO_LIMIT), min(second, wire.NO_LIMIT)
+
+    def _from_wire(self, held: wire.LimitsOnWire) -> Limits:
+        c, hello = self._there(), self._hello
+        assert hello is not None
+
+        def back(pair: tuple[int, int], per: float = 1.0) -> tuple[float, ...]:
+            each = zip(pair, self._counts, strict=False)
+            return tuple(math.inf if k == wire.NO_LIMIT else k / (abs(n) * per) for k, n in each)
+
+        return Limits(
+            travel=back(held.travel), speed=back(held.speed, hello.speed_window * c.period), start=back(held.start),
+            command=held.command * c.step, watchdog=held.watchdog * c.period, frozen=max(back(held.frozen)),
+            saturation=math.inf if held.saturation == wire.FOREVER else held.saturation * c.period,
+            twist=math.inf if held.twist == wire.NO_LIMIT else held.twist / abs(c.counts[0]),
+        )  # fmt: skip
+
+    def _steps(self, command: float) -> int:
+        """A command in steps, as far as the wire has room; the firmware holds it to its limit."""
+        steps = math.floor(command / self._there().step + 0.5)
+        return min(max(steps, -wire.MOST), wire.MOST)
+
+    def _there(self) -> Capabilities:
+        if self._about is None:
+            raise RigStopped("The rig is not open; open it first.")
+        return self._about
+
+    def _name(self) -> str:
+        if self._about is not None:
+            return self._about.name
+        return f"The board on {self._line.name}" if self._line is not None else "The board"
+
+    def _distrust(self, what: str, held: object, asked: object) -> NoReturn:
+        self.estop()
+        raise self._refusal(f"it holds another {what} than it was given ({held} instead of {asked})")
+
+    def _stopped(self) -> RigStopped:
+        return RigStopped(f"{self._name()} stopped: {_names(self._status.faults)}. Look at it before it is cleared.")
+
+    def _refusal(self, why: str) -> RigStopped:
+        faults = self._status.faults
+        state = f" It is in {self._status.mode.name}" + (f" after {_names(faults)}." if faults != NO_FAULT else ".")
+        return RigStopped(f"{self._name()} refused: {why}.{state}")
+
+
+def _names(faults: Fault) -> str:
+    return ", ".join(fault.name or "" for fault in Fault if fault in faults)
+
+
+def _down(value: float) -> int:
+    """Whole number below, but for rounding of the last digits."""
+    return math.floor(min(value + 1e-9 * max(1.0, value), 2.0**40))

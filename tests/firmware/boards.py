@@ -1,0 +1,82 @@
+"""Firmware in a process of its own: built once, asked by lines what goes wrong, spoken to over its pty."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from upright.rigs.line import Line
+from upright.rigs.serial import SerialRig
+
+FIRMWARE = Path(__file__).parents[2] / "firmware"
+COUNTS = 16_000 / (2 * math.pi)
+FULL_SCALE = 10.0
+STEPS = 32768
+STEP = FULL_SCALE / STEPS
+
+
+def build(target: str, folder: Path, needs: str) -> str:
+    """Why it cannot be built here; empty when it was."""
+    if not sys.platform.startswith("linux"):
+        return "the firmware's simulated boards need Linux"
+    if missing := [tool for tool in ("make", *needs.split()) if shutil.which(tool) is None]:
+        return f"{', '.join(missing)} is missing"
+    subprocess.run(["make", "-C", str(FIRMWARE), f"B={folder}", target], check=True, capture_output=True)
+    return ""
+
+
+class Board:
+    """A process that behaves like a board."""
+
+    def __init__(self, *command: str | Path) -> None:
+        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.port = self._line()
+
+    def _line(self) -> str:
+        assert self.process.stdout is not None
+        return self.process.stdout.readline().strip()
+
+    def say(self, line: str) -> str:
+        """What it answers to a line."""
+        assert self.process.stdin is not None
+        self.process.stdin.write(line + "\n")
+        self.process.stdin.flush()
+        return self._line()
+
+    def do(self, *lines: str) -> None:
+        for line in lines:
+            assert self.say(line) == "ok", line
+
+    def state(self) -> list[float]:
+        """Tick, psi, psi', theta, theta', command [steps], enable line, mode."""
+        return [float(number) for number in self.say("state").split()]
+
+    def rig(self, **how: Any) -> SerialRig:
+        return rig_on(self.port, **how)
+
+    def close(self) -> None:
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        self.process.stdin.close()
+        self.process.wait(10)
+        self.process.stdout.close()
+
+
+def rig_on(line: str | Line, **how: Any) -> SerialRig:
+    """A rig with ECP's encoders and converter at the end of a line."""
+    same = {"coordinates": ("psi", "theta"), "counts": (COUNTS, COUNTS), "command_unit": "V", "full_scale": FULL_SCALE}
+    return SerialRig(line, **{**same, **how})
+
+
+def plant(parameters: Mapping[str, float], gain: float, **start: float) -> list[str]:
+    """Arguments of a board with a Furuta pendulum on it."""
+    numbers = {
+        **{n: parameters[n] for n in ("m_p", "l_cg", "r", "J_d", "J_p", "J_a", "b_1", "b_2", "g")},
+        "gain": gain, "step": STEP, "counts_psi": COUNTS, "counts_theta": COUNTS, **start,
+    }  # fmt: skip
+    return [f"{name}={value!r}" for name, value in numbers.items()]

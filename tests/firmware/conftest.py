@@ -1,0 +1,57 @@
+"""Boards for the tests: the firmware on the host, and the ATmega2560's under simavr."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.firmware.boards import Board, build
+
+Start = Callable[..., Board]
+
+
+@pytest.fixture(scope="session")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], Path]:
+    """Folder with what was built of a target, or a skip with the reason."""
+    folder = tmp_path_factory.mktemp("firmware")
+    reasons: dict[str, str] = {}
+
+    def make(target: str, needs: str) -> Path:
+        if target not in reasons:
+            reasons[target] = build(target, folder, needs)
+        if reasons[target]:
+            pytest.skip(reasons[target])
+        return folder
+
+    return make
+
+
+@pytest.fixture
+def host(built: Callable[[str, str], Path]) -> Iterator[Start]:
+    """Starts the firmware as a process, in lockstep unless told otherwise."""
+    folder, boards = built("host", "cc"), []
+
+    def start(*arguments: str, lockstep: bool = True) -> Board:
+        boards.append(Board(folder / "rig-host", *(["lockstep"] if lockstep else []), *arguments))
+        return boards[-1]
+
+    yield start
+    for board in boards:
+        board.close()
+
+
+@pytest.fixture
+def avr(built: Callable[[str, str], Path]) -> Iterator[Start]:
+    """Starts the ATmega2560's firmware under simavr with a plant."""
+    folder, boards = built("avr", "avr-gcc"), []
+    built("simrig", "cc simavr")
+
+    def start(*arguments: str) -> Board:
+        boards.append(Board(folder / "simrig", folder / "atmega2560.elf", *arguments))
+        return boards[-1]
+
+    yield start
+    for board in boards:
+        board.close()

@@ -1,0 +1,31 @@
+"""Does the firmware keep the protocol that every rig keeps?"""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.firmware.boards import plant
+from tests.firmware.designs import GAIN, PARAMETERS
+
+conformance = pytest.importorskip("tests.rigs.conformance")
+HANGING = plant(PARAMETERS, GAIN)
+
+
+@pytest.fixture(params=["host", pytest.param("avr", marks=pytest.mark.slow)])
+def specimen(request):
+    start, boards = request.getfixturevalue(request.param), {}
+
+    def make():
+        board = start(*HANGING)
+        rig = board.rig(patience=20.0, lockstep=True)
+        boards[rig] = board
+        return rig
+
+    def silence(rig, seconds):
+        boards[rig].do(f"run {round(seconds / 1e-3)}")
+
+    return conformance.Specimen(name=request.param, make=make, silence=silence)
+
+
+class TestFirmware(conformance.Conformance):
+    """All rules, on the host and on the ATmega2560."""

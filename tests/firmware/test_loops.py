@@ -1,0 +1,197 @@
+"""Is the pendulum held, by the firmware's own loop and by the host's through the wire, and the same each time?"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.firmware.boards import COUNTS, STEP, plant
+from tests.firmware.designs import FURUTA, GAIN, LIMITS, PARAMETERS, PERIOD, inverted, swing_free
+from upright.rigs.protocol import Fault, Mode
+from upright.simulation import simulate
+
+UPRIGHT = plant(PARAMETERS, GAIN, theta=math.pi)
+HANGING = plant(PARAMETERS, GAIN)
+KICKS = {0.5: 0.6, 2.0: -0.9}
+"""Speed that a tap adds to the pendulum [rad/s], by time [s]."""
+
+
+def on_the_host(law):
+    """The law sample by sample in double precision, as a loop on the host has it; a function of counts."""
+    z = None
+    target = np.broadcast_to(np.asarray(law.target), 2)
+
+    def step(counts):
+        nonlocal z
+        w = np.array(counts) / COUNTS - target
+        if z is None:
+            z = law.begin @ w
+        u = float((law.C @ z + law.D @ w)[0])
+        z = law.A @ z + law.B @ w
+        return u
+
+    return step
+
+
+def held(board, mode, law, seconds, kicks, lockstep=False):
+    """Samples (tick, counts, steps applied) of a run that is kicked, and the rig afterwards."""
+    rig = board.rig(lockstep=lockstep, patience=20.0)
+    rig.open()
+    rig.clear_fault()
+    rig.configure(LIMITS)
+    rig.zero()
+    rig.arm()
+    rig.start(mode, law if mode == Mode.MCU else None)
+    step, command = on_the_host(law), 0.0
+    first, to_come, rows = rig.exchange(0.0), sorted(kicks), []
+    tick = first
+    while tick.time - first.time < seconds:
+        if to_come and tick.time - first.time >= to_come[0]:
+            board.do(f"kick {kicks[to_come.pop(0)]!r}")
+        tick = rig.exchange(command)
+        assert tick.mode == mode, tick
+        rows.append((tick.tick - first.tick, *tick.counts, round(tick.applied / STEP)))
+        if mode == Mode.HOST:
+            command = step(tick.counts)
+    return np.array(rows), rig
+
+
+def settled(rows, kicks):
+    """Largest angle of the pendulum just before each kick and at the end [counts], and over all of the run."""
+    before = [
+        rows[(rows[:, 0] > k - 50) & (rows[:, 0] <= k), 2] for k in [*(round(t / PERIOD) for t in kicks), rows[-1, 0]]
+    ]
+    return max(np.abs(part).max() for part in before), np.abs(rows[:, 2]).max()
+
+
+@pytest.mark.parametrize("mode", [Mode.MCU, Mode.HOST])
+def test_the_inverted_pendulum_is_held_through_kicks_the_same_each_time(host, mode):
+    first, rig = held(host(*UPRIGHT), mode, inverted(), 4.0, KICKS)
+    again, _ = held(host(*UPRIGHT), mode, inverted(), 4.0, KICKS)
+    assert np.array_equal(first, again)
+    assert np.array_equal(np.diff(first[:, 0]), np.ones(len(first) - 1))  # no sample is lost
+    rest, farthest = settled(first, KICKS)
+    # the slowest pole, 3.2/s, leaves 1 % of a kick after 1.45 s, and a kick of 0.9 rad/s about 0.1 rad at most
+    assert rest < 0.02 * COUNTS
+    assert 0.05 * COUNTS < farthest < 0.3 * COUNTS
+    rig.stop()
+    assert rig.exchange(0.0).mode == Mode.IDLE
+
+
+def test_without_a_law_it_falls_and_the_rig_stops_at_its_travel(host):
+    board = host(*UPRIGHT)
+    rig = board.rig()
+    rig.open()
+    rig.clear_fault()
+    rig.configure(LIMITS)
+    rig.arm()
+    rig.start(Mode.HOST)
+    board.do("kick 0.1")
+    # exp(8 t) takes 0.1/8 rad to the travel of 1.2 rad in 0.57 s
+    ticks = [rig.exchange(0.0) for _ in range(800)]
+    assert ticks[-1].faults == Fault.OVERTRAVEL
+    assert board.state()[5:7] == [0.0, 0.0]
+
+
+def test_the_arm_is_taken_to_its_reference_without_swinging_by_the_same_code(host):
+    board = host(*HANGING)
+    rig = board.rig()
+    rig.open()
+    rig.clear_fault()
+    rig.configure(LIMITS)
+    rig.arm()
+    rig.start(Mode.MCU, swing_free())
+    ticks = [rig.exchange(0.5) for _ in range(3000)]
+    psi, theta = (np.array([t.counts[i] for t in ticks]) / COUNTS for i in (0, 1))
+    # the slowest pole, 5/s, leaves exp(-12) of it after 2.5 s, far less than the count that an encoder rounds to
+    assert np.abs(psi[2500:] - 0.5).max() < 1.5 / COUNTS
+    assert np.abs(theta[2500:]).max() < 1.5 / COUNTS
+    assert np.abs(theta).max() > 20 / COUNTS
+
+
+@pytest.mark.parametrize(
+    ("mishap", "faults"),
+    [
+        ("dead 1", Fault.OVERTRAVEL | Fault.OVERSPEED | Fault.ENCODER | Fault.SATURATION),
+        ("flip 1", Fault.OVERTRAVEL | Fault.OVERSPEED | Fault.SATURATION),
+        ("flip 0", Fault.OVERTRAVEL | Fault.OVERSPEED | Fault.SATURATION),
+        ("scale 1 0.25", Fault.OVERTRAVEL | Fault.OVERSPEED | Fault.SATURATION),
+        ("lose 1 2000", Fault.OVERTRAVEL | Fault.OVERSPEED | Fault.SATURATION),
+    ],
+)
+def test_a_lying_encoder_ends_in_a_fault_with_the_power_off(host, mishap, faults):
+    board = host(*UPRIGHT)
+    rig = board.rig()
+    rig.open()
+    rig.clear_fault()
+    rig.configure(replace(LIMITS, frozen=0.2))
+    rig.arm()
+    rig.start(Mode.MCU, inverted())
+    board.do("kick 0.2")
+    for _ in range(200):
+        assert rig.exchange(0.0).mode == Mode.MCU
+    board.do(mishap)
+    stopped = next(tick for _ in range(5000) if (tick := rig.exchange(0.0)).mode == Mode.FAULT)
+    assert stopped.faults & faults == stopped.faults
+    assert board.state()[5:7] == [0.0, 0.0]
+
+
+def test_encoders_show_what_their_mishaps_say(host):
+    board = host(*HANGING)
+    rig = board.rig()
+    rig.open()
+    board.do("put 0.1 0 -0.2 0", "scale 0 2", "scale 1 4")
+    psi, theta = round(0.1 * COUNTS), -round(0.2 * COUNTS)
+    assert rig.exchange(0.0).counts == (2 * psi, 4 * theta)
+    board.do("dead 0", "flip 1", "put 0 0 -0.1 0")
+    assert rig.exchange(0.0).counts == (2 * psi, 4 * theta - 4 * (-round(0.1 * COUNTS) - theta))
+    board.do("alive 0", "lose 0 100", "scale 1 1")
+    assert rig.exchange(0.0).counts[0] == 2 * psi - 100
+
+
+def test_a_wire_that_spoils_bytes_costs_samples_but_changes_none(host):
+    board = host(*UPRIGHT)
+    rig = board.rig(resend=0.002)
+    rig.open()
+    rig.clear_fault()
+    rig.configure(replace(LIMITS, watchdog=0.1))
+    rig.arm()
+    rig.start(Mode.MCU, inverted())
+    board.do("kick 0.2", "corrupt 0.002 1")  # a tenth of the exchanges
+    ticks = [rig.exchange(0.0) for _ in range(1000)]
+    board.do("corrupt 0 1")
+    assert {t.mode for t in ticks} == {Mode.MCU}
+    assert max(abs(t.counts[1]) for t in ticks) < 0.1 * COUNTS
+    assert (np.diff([t.tick for t in ticks]) >= 1).all()
+    assert rig.dropped + rig.snapshot().dropped > 20
+
+
+def test_the_boards_pendulum_moves_as_the_project_says(host):
+    start = {"psi": 0.3, "psi_dot": -1.0, "theta": 2.0, "theta_dot": 3.0}
+    board = host(*plant(PARAMETERS, GAIN, **start))
+    board.do("release")
+    rows = []
+    for _ in range(10):
+        board.do("run 100")
+        rows.append(board.state()[1:5])
+    x = simulate(FURUTA, {}, [*start.values()], None, PERIOD, samples=1001, substeps=10)[:, :, 0]
+    # both take Runge-Kutta steps of 0.1 ms: at 20 rad/s (20 * 1e-4)^4/120 of the motion a second is far below rounding
+    np.testing.assert_allclose(rows, x[100::100], atol=1e-9)
+
+
+def test_the_boards_drive_pushes_as_the_projects_does(host):
+    board = host(*HANGING)
+    rig = board.rig()
+    rig.open()
+    rig.clear_fault()
+    rig.configure(LIMITS)
+    rig.arm()
+    rig.start(Mode.HOST)
+    commands = np.round(0.1 * np.sin(np.arange(600) * 0.02) / STEP) * STEP
+    for u in commands:
+        assert rig.exchange(u).mode == Mode.HOST
+    x = simulate(FURUTA, {"actuator.gain": GAIN}, np.zeros(4), commands, PERIOD, samples=601, substeps=10)[-1, :, 0]
+    np.testing.assert_allclose(board.state()[1:5], x, atol=1e-9)

@@ -1,0 +1,441 @@
+"""Does the firmware do what the protocol says, and stop, with its command at zero first, whenever a limit is passed?"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.firmware.boards import COUNTS, STEP, rig_on
+from upright.errors import RigStopped
+from upright.laws import Law
+from upright.rigs.line import TerminalLine
+from upright.rigs.protocol import Fault, Limits, Mode
+from upright.rigs.wire import Kind, Parser, Result, exchange, pack, status
+
+WIDE = Limits(travel=(3.0, 4.0), speed=(20.0, 20.0), start=(0.5, 0.5), command=5.0, watchdog=0.02, saturation=0.1)
+PULL = Law(np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((1, 0)), np.array([[1.0, 0.0]]))
+"""One volt for each radian of the first coordinate."""
+
+
+def running(host, mode=Mode.HOST, limits=WIDE, law=PULL, **how):
+    board = host()
+    rig = board.rig(**how)
+    rig.open()
+    rig.clear_fault()
+    rig.configure(limits)
+    rig.arm()
+    rig.start(mode, law if mode == Mode.MCU else None)
+    return board, rig
+
+
+def dead(board):
+    """Converter at zero and power stage off, read on the board's side."""
+    return board.state()[5:7] == [0.0, 0.0]
+
+
+def test_a_reset_ends_in_a_fault_that_has_to_be_cleared(host):
+    board = host()
+    rig = board.rig()
+    about = rig.open()
+    assert about.modes == {Mode.HOST, Mode.MCU}
+    assert about.virtual
+    assert about.period == 1e-3
+    assert about.step == STEP
+    assert rig.exchange(0.0).faults == Fault.RESET
+    for forbidden in (rig.arm, rig.zero, lambda: rig.configure(WIDE), lambda: rig.start(Mode.HOST)):
+        with pytest.raises(RigStopped, match="cleared"):
+            forbidden()
+    rig.clear_fault()
+    assert rig.exchange(0.0).mode == Mode.IDLE
+    with pytest.raises(RigStopped, match="limits"):
+        rig.arm()
+    assert dead(board)
+
+
+def test_modes_follow_one_another_as_the_protocol_says(host):
+    board, rig = running(host)
+    assert rig.exchange(1.0).mode == Mode.HOST
+    assert board.state()[5:7] == [math.floor(1.0 / STEP + 0.5), 1.0]
+    for forbidden in (rig.arm, rig.zero, rig.clear_fault, lambda: rig.start(Mode.MCU, PULL)):
+        with pytest.raises(RigStopped, match="wrong mode"):
+            forbidden()
+    rig.stop()
+    assert rig.exchange(1.0).mode == Mode.IDLE
+    assert dead(board)
+    with pytest.raises(RigStopped):
+        rig.start(Mode.HOST)  # from ARMED only
+    rig.arm()
+    assert rig.exchange(1.0).mode == Mode.ARMED
+    assert board.state()[5:7] == [0.0, 1.0]
+    rig.estop()
+    assert rig.exchange(0.0).faults == Fault.STOP
+    assert dead(board)
+
+
+def test_limits_are_held_in_counts_and_steps_never_wider_than_asked(host):
+    rig = host().rig()
+    rig.open()
+    rig.clear_fault()
+    asked = Limits(
+        travel=(2.0, math.inf), speed=(7.0, 9.0), start=(0.3, math.inf), command=4.0, watchdog=0.0127, saturation=0.5,
+        frozen=0.2, twist=0.4,
+    )  # fmt: skip
+    held = rig.configure(asked)
+    window = 8e-3
+    for name, count in {"travel": 1 / COUNTS, "speed": 1 / (COUNTS * window), "start": 1 / COUNTS}.items():
+        for wanted, got in zip(getattr(asked, name), getattr(held, name), strict=True):
+            assert got == wanted if math.isinf(wanted) else 0 <= wanted - got < count * (1 + 1e-9)
+    assert 0 <= asked.command - held.command < STEP
+    assert held.watchdog == 0.012
+    assert held.saturation == 0.5
+    assert 0 <= asked.twist - held.twist < 1 / COUNTS
+    assert 0 <= asked.frozen - held.frozen < 1 / COUNTS
+
+
+@pytest.mark.parametrize(
+    ("limits", "why"),
+    [
+        (replace(WIDE, command=10.1), "beyond the converter"),
+        (replace(WIDE, command=1e-5), "less than a step"),
+        (replace(WIDE, watchdog=6.0), "watchdog"),
+        (replace(WIDE, watchdog=5e-4), "watchdog"),
+        (Limits(travel=(1.0,), speed=(1.0,), start=(1.0,), command=1.0), "1 coordinates"),
+    ],
+)
+def test_limits_that_cannot_be_held_are_refused(host, limits, why):
+    rig = host().rig()
+    rig.open()
+    rig.clear_fault()
+    with pytest.raises(RigStopped, match=why):
+        rig.configure(limits)
+
+
+def test_a_twist_is_measured_between_like_encoders_only(host):
+    rig = host().rig(counts=(COUNTS, -COUNTS))
+    rig.open()
+    rig.clear_fault()
+    with pytest.raises(RigStopped, match="same counts and sign"):
+        rig.configure(replace(WIDE, twist=0.4))
+
+
+SLOW = int(19.0 * COUNTS * 8e-3)
+"""Counts that one coordinate may move in the speed window of 8 ticks."""
+
+
+def ramp(board, rig, to, by, at=(0, 0)):
+    """Both encoders or one moved in steps, a tick each, until the rig stops or is there; the last sample."""
+    at, tick = np.array(at), rig.exchange(0.0)
+    while not tick.faults and (at != to).any():
+        at = at + np.clip(np.asarray(to) - at, -by, by)
+        board.do(f"counts {int(at[0])} {int(at[1])}")
+        tick = rig.exchange(0.0)
+    return tick
+
+
+@pytest.mark.parametrize("mode", [Mode.HOST, Mode.MCU])
+@pytest.mark.parametrize(
+    ("limits", "to", "by", "fault"),
+    [
+        (WIDE, (0, 10**5), 45, Fault.OVERTRAVEL),
+        (WIDE, (-(10**5), 0), 45, Fault.OVERTRAVEL),
+        (WIDE, (0, 4000), 60, Fault.OVERSPEED),
+        (WIDE, (0, -(2**30)), 2**30, Fault.OVERTRAVEL | Fault.OVERSPEED),
+        (replace(WIDE, twist=0.4), (1000, -1000), 10, Fault.TWIST),
+        (replace(WIDE, frozen=0.2), (0, 1000), 20, Fault.ENCODER),
+    ],
+)
+def test_a_limit_that_is_passed_stops_the_rig_in_that_tick(host, mode, limits, to, by, fault):
+    board, rig = running(host, mode, limits)
+    tick = ramp(board, rig, to, by)
+    assert tick.mode == Mode.FAULT
+    assert tick.faults == fault
+    assert tick.applied == 0.0
+    assert dead(board)
+    seen = rig.snapshot()
+    assert seen.faults == fault
+    assert seen.mode == mode
+    assert seen.tick == tick.tick
+    assert seen.sample.counts == tick.counts
+    with pytest.raises(RigStopped, match="cleared"):
+        rig.arm()
+
+
+@pytest.mark.parametrize(
+    ("limits", "to", "by"),
+    [
+        (WIDE, (int(2.99 * COUNTS), int(-3.99 * COUNTS)), SLOW // 8),
+        (replace(WIDE, twist=0.4), (5000, 5900), 10),
+        (replace(WIDE, frozen=0.5), (0, 1200), 20),
+        (replace(WIDE, frozen=0.2), (1000, 1000), 20),
+    ],
+)
+def test_what_stays_within_the_limits_goes_on(host, limits, to, by):
+    board, rig = running(host, Mode.HOST, limits)
+    assert ramp(board, rig, to, by).mode == Mode.HOST
+
+
+def test_a_hand_may_turn_one_coordinate_alone_before_a_run(host):
+    board = host()
+    rig = board.rig()
+    rig.open()
+    rig.clear_fault()
+    rig.configure(replace(WIDE, frozen=0.2))
+    ramp(board, rig, (1200, 0), 20)
+    rig.arm()
+    assert rig.exchange(0.0).mode == Mode.ARMED
+    assert ramp(board, rig, (1200 + 2000, 0), 20, (1200, 0)).faults == Fault.ENCODER
+
+
+def test_a_request_whose_answer_was_lost_is_told_again_and_not_done_again(host):
+    line = TerminalLine(host().port)
+    rig = rig_on(line)
+    rig.open()
+    rig.clear_fault()
+    rig.configure(WIDE)
+
+    def ask(kind, sequence):
+        line.write(pack(kind, sequence))
+        (reply,) = Parser().feed(line.read(1.0))
+        read = status(reply.body)
+        assert read is not None
+        return read[0].result
+
+    assert ask(Kind.ARM, 77) == Result.DONE
+    assert ask(Kind.ARM, 77) == Result.DONE
+    assert ask(Kind.ARM, 78) == Result.WRONG_MODE
+    assert ask(Kind.ARM, 78) == Result.WRONG_MODE
+    assert rig.exchange(0.0).mode == Mode.ARMED
+
+
+def test_a_run_starts_within_its_window_only(host):
+    board = host()
+    rig = board.rig()
+    rig.open()
+    rig.clear_fault()
+    rig.configure(WIDE)
+    board.do(f"counts {int(0.6 * COUNTS)} 0")
+    rig.exchange(0.0)
+    with pytest.raises(RigStopped, match="START"):
+        rig.arm()
+    assert dead(board)
+    rig.clear_fault()
+    rig.zero()
+    rig.arm()
+    assert rig.exchange(0.0).counts == (0, 0)
+
+
+def test_commands_stay_within_their_limit_and_not_for_long_at_it(host):
+    board, rig = running(host)
+    held = math.floor(WIDE.command / STEP)
+    for _ in range(100):
+        tick = rig.exchange(-9.0)
+    assert round(tick.applied / STEP) == -held
+    assert board.state()[5] == -held
+    assert tick.mode == Mode.HOST
+    assert rig.exchange(-9.0).faults == Fault.SATURATION
+    assert dead(board)
+
+
+@pytest.mark.parametrize("mode", [Mode.HOST, Mode.MCU])
+def test_a_silent_host_is_waited_for_no_longer_than_the_watchdog(host, mode):
+    board, rig = running(host, mode)
+    rig.exchange(0.1)
+    board.do("run 19")  # 20 ticks since the command, its own among them
+    assert board.state()[7] == mode
+    board.do("run 1")
+    assert board.state()[7] == Mode.FAULT
+    assert dead(board)
+    assert rig.exchange(0.1).faults == Fault.WATCHDOG
+
+
+def test_an_armed_rig_whose_host_went_away_is_switched_off(host):
+    board, rig = running(host)
+    rig.stop()
+    rig.arm()
+    board.do("run 10000")
+    assert board.state()[6:] == [1.0, Mode.ARMED]
+    board.do("run 1")
+    assert dead(board)
+    assert rig.exchange(0.0).faults == Fault.WATCHDOG
+
+
+def test_a_command_that_answers_an_old_sample_is_not_followed(host):
+    line = TerminalLine(host().port)
+    rig = rig_on(line)
+    rig.open()
+    rig.clear_fault()
+    rig.configure(WIDE)
+    rig.arm()
+    rig.start(Mode.HOST)
+    old = rig.exchange(0.1).tick
+    for _ in range(20):
+        assert rig.exchange(0.2).mode == Mode.HOST
+    line.write(pack(Kind.EXCHANGE, 200, exchange(1000, 0.0, old)))  # as it may lie in a driver's buffer
+    assert rig.exchange(0.2).mode == Mode.HOST  # 20 ticks old: the watchdog allows for as many
+    line.write(pack(Kind.EXCHANGE, 201, exchange(1000, 0.0, old)))
+    tick = rig.exchange(0.2)
+    assert tick.faults == Fault.STALE
+    assert tick.applied == 0.0
+
+
+def test_a_board_that_cannot_keep_its_ticks_stops(host):
+    board, rig = running(host)
+    board.do("skip 20")
+    assert rig.exchange(0.1).mode == Mode.HOST
+    board.do("skip 20")
+    assert rig.exchange(0.1).faults == Fault.WATCHDOG  # 21 ticks of silence
+    board, rig = running(host)
+    rig.exchange(0.1)
+    board.do("skip 21")
+    assert dead(board)
+    assert rig.exchange(0.1).faults == Fault.OVERRUN
+    assert rig.snapshot().lost == 20
+    board, rig = running(host)
+    board.do("overrun")
+    assert rig.exchange(0.1).faults == Fault.OVERRUN
+    assert dead(board)
+
+
+@pytest.mark.parametrize("skipped", [2, 5, 8, 15])
+@pytest.mark.parametrize(("by", "fault"), [(45, Fault(0)), (56, Fault.OVERSPEED)])
+def test_a_speed_is_seen_alike_when_ticks_are_late(host, skipped, by, fault):
+    board, rig = running(host)  # 20 rad/s are 50.9 counts a tick
+    tick, at = rig.exchange(0.0), 0
+    for _ in range(4):
+        at += skipped * by
+        board.do(f"counts 0 {at}", f"skip {skipped}")
+        at += by
+        board.do(f"counts 0 {at}")
+        tick = rig.exchange(0.0)
+    assert tick.faults == fault
+
+
+def test_a_transition_that_no_encoder_makes_stops_the_rig(host):
+    board, rig = running(host)
+    board.do("illegal")
+    assert rig.exchange(7.0).faults == Fault.ENCODER
+    assert dead(board)
+    seen = rig.snapshot()
+    assert seen.asked == math.floor(7.0 / STEP + 0.5)
+    assert seen.sample.applied == math.floor(WIDE.command / STEP)
+
+
+@pytest.mark.parametrize("mode", [Mode.HOST, Mode.MCU])
+@pytest.mark.parametrize("absurd", [math.nan, math.inf, -math.inf, 1e30, 1e300])
+def test_a_command_that_is_no_number_stops_the_rig(host, mode, absurd):
+    board, rig = running(host, mode)
+    tick = rig.exchange(absurd)
+    if mode == Mode.HOST and math.isfinite(absurd):
+        assert round(tick.applied / STEP) == math.floor(WIDE.command / STEP)
+    else:
+        assert tick.faults == Fault.GAINS
+        assert dead(board)
+
+
+def law(D, z=0.0):
+    return Law(np.array([[z]]), np.zeros((1, 2)), np.ones((1, 1)), np.array([[D, 0.0]]), initial=[1.0])
+
+
+def test_gains_by_which_one_count_is_everything_are_refused(host):
+    board, rig = running(host)
+    rig.stop()
+    rig.arm()
+    rig.start(Mode.MCU, law(0.99 * WIDE.command * COUNTS))
+    rig.stop()
+    rig.arm()
+    with pytest.raises(RigStopped, match="GAINS"):
+        rig.start(Mode.MCU, law(1.01 * WIDE.command * COUNTS))
+    assert dead(board)
+    for beyond in (1e12, 1e200):
+        rig.clear_fault()
+        rig.arm()
+        with pytest.raises(RigStopped, match="gains and units"):
+            rig.start(Mode.MCU, law(beyond))
+
+
+def test_a_law_that_runs_away_stops_the_rig_before_its_number_overflows(host):
+    board, rig = running(host, Mode.MCU, replace(WIDE, saturation=math.inf), law(0.0, z=10.0))
+    ticks = [rig.exchange(0.0) for _ in range(12)]
+    assert ticks[-1].faults == Fault.GAINS
+    assert dead(board)
+    assert max(abs(t.applied) for t in ticks) <= WIDE.command
+
+
+def test_a_counter_may_run_over_while_nobody_notices(host):
+    board = host()
+    rig = board.rig()
+    rig.open()
+    rig.clear_fault()
+    rig.configure(WIDE)
+    board.do(f"wrap 0 {2**31 - 10}", f"wrap 1 {2**32 - 10}")
+    board.do("run 8")  # until no speed is seen in it
+    rig.zero()
+    rig.arm()
+    rig.start(Mode.HOST)
+    board.do(f"wrap 0 {2**31 + 10}", "wrap 1 7")
+    tick = rig.exchange(0.0)
+    assert tick.counts == (20, 17)
+    assert tick.mode == Mode.HOST
+
+
+def test_a_self_test_pushes_for_its_time_and_tells_who_moved(host):
+    board = host()
+    rig = board.rig()
+    rig.open()
+    rig.clear_fault()
+    rig.configure(WIDE)
+    rig.arm()
+    told = rig.self_test(0.5, 0.01)
+    assert told.moved == {"psi": 0.0, "theta": 0.0}
+    assert "psi, theta" in told.complaint
+    assert board.state()[5:] == [0.0, 1.0, Mode.ARMED]
+    with pytest.raises(RigStopped, match="beyond"):
+        rig.self_test(6.0, 0.01)
+    with pytest.raises(RigStopped, match="beyond"):
+        rig.self_test(0.5, 6.0)
+
+
+def test_a_new_host_finds_the_rig_stopped_and_without_limits(host):
+    board, rig = running(host, patience=0.05)
+    rig.exchange(1.0)
+    board.do("cut")
+    rig.close()  # whose word to stop is lost
+    board.do("join")
+    assert board.state()[5:] == [math.floor(1.0 / STEP + 0.5), 1.0, Mode.HOST]
+    again = board.rig()
+    again.open()
+    assert dead(board)
+    assert again.exchange(0.0).faults == Fault.RESET
+    again.clear_fault()
+    with pytest.raises(RigStopped, match="limits"):
+        again.arm()
+
+
+def test_less_than_a_count_is_no_limit(host):
+    rig = host().rig()
+    rig.open()
+    rig.clear_fault()
+    with pytest.raises(RigStopped, match="less than a count"):
+        rig.configure(replace(WIDE, travel=(0.4 / COUNTS, 1.0)))
+
+
+def test_a_cut_link_is_told_as_one_and_the_rig_stops_itself(host):
+    board = host()
+    rig = board.rig(patience=0.05)
+    rig.open()
+    rig.clear_fault()
+    rig.configure(WIDE)
+    rig.arm()
+    rig.start(Mode.HOST)
+    rig.exchange(1.0)
+    board.do("cut")
+    with pytest.raises(RigStopped, match="did not answer"):
+        rig.exchange(1.0)
+    board.do("run 20")
+    assert dead(board)
+    rig.estop()  # says nothing on a dead line
+    rig.close()
+    rig.close()

@@ -1,0 +1,103 @@
+"""Do frames survive any wire, and does nothing else pass for one?"""
+
+from __future__ import annotations
+
+import zlib
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from upright.errors import BadInput
+from upright.rigs.wire import LONGEST, Parser, cobs, from_cobs, pack, unpack
+
+BODIES = st.binary(max_size=LONGEST - 2)
+BYTE = st.integers(0, 255)
+
+
+@pytest.mark.parametrize(
+    ("data", "stuffed"),
+    [  # the examples of S. Cheshire, M. Baker: Consistent Overhead Byte Stuffing, as every description has them
+        (b"\x00", "0101"),
+        (b"\x00\x00", "010101"),
+        (b"\x00\x11\x00", "01021101"),
+        (b"\x11\x22\x00\x33", "0311220233"),
+        (b"\x11\x22\x33\x44", "0511223344"),
+        (b"\x11\x00\x00\x00", "0211010101"),
+        (bytes(range(1, 254)), "fe" + bytes(range(1, 254)).hex()),
+    ],
+)
+def test_zeros_are_stuffed_as_published(data, stuffed):
+    assert cobs(data).hex() == stuffed
+    assert from_cobs(bytes.fromhex(stuffed)) == data
+
+
+def test_the_crc_is_the_one_whose_check_value_is_published():
+    # CRC-32/ISO-HDLC of "123456789" is cbf43926 in every catalogue
+    assert from_cobs(pack(ord("1"), ord("2"), b"3456789")[:-1]) == b"123456789" + bytes.fromhex("2639f4cb")
+
+
+@given(kind=BYTE, sequence=BYTE, body=BODIES)
+def test_a_frame_comes_back_as_it_went(kind, sequence, body):
+    frame = pack(kind, sequence, body)
+    assert frame.index(0) == len(frame) - 1 == len(body) + 2 + 4 + 1
+    assert Parser().feed(frame) == [(kind, sequence, body)]
+
+
+@given(
+    bodies=st.lists(BODIES, max_size=4), noise=st.lists(st.binary(max_size=600), max_size=5), chunk=st.integers(1, 70)
+)
+@settings(max_examples=150)
+def test_garbage_costs_no_frame_after_its_zero_and_never_raises(bodies, noise, chunk):
+    stream, expected = b"", []
+    for k, body in enumerate(bodies):
+        garbage = noise[k] if k < len(noise) else b""
+        stream += garbage + b"\0" + pack(7, k, body)
+        # garbage may hold sound frames of its own, by chance or by hypothesis
+        expected += [f for part in garbage.split(b"\0") if (f := unpack(part)) is not None] + [(7, k, body)]
+    whole, parser = Parser(), Parser()
+    at_once = whole.feed(stream)
+    assert at_once == expected
+    assert [f for k in range(0, len(stream), chunk) for f in parser.feed(stream[k : k + chunk])] == at_once
+    assert parser.dropped == whole.dropped
+
+
+@given(st.binary(max_size=400))
+def test_no_bytes_are_refused_but_as_no_frame(data):
+    frame = unpack(data)
+    assert frame is None or pack(*frame) == data + b"\0"
+    assert from_cobs(data) is None or isinstance(from_cobs(data), bytes)
+
+
+def test_no_frame_with_a_flipped_bit_or_a_burst_passes():
+    frame = pack(0x87, 12, bytes(range(0, 250, 11)))
+    spoiled = [
+        frame[:at] + bytes([frame[at] ^ mask]) + frame[at + 1 :] for at in range(len(frame)) for mask in range(1, 256)
+    ]
+    spoiled += [frame[:at] + b"\0\0\0" + frame[at + 3 :] for at in range(len(frame) - 3)]
+    spoiled += [frame[:at] + frame[at + 1 :] for at in range(len(frame) - 1)]
+    for stream in spoiled:
+        parser = Parser()
+        assert parser.feed(stream + b"\0") == []
+        assert parser.dropped >= 1
+        assert parser.feed(frame) == [(0x87, 12, frame_body(frame))]
+
+
+def frame_body(frame: bytes) -> bytes:
+    payload = from_cobs(frame[:-1])
+    assert payload is not None
+    assert zlib.crc32(payload[:-4]).to_bytes(4, "little") == payload[-4:]
+    return payload[2:-4]
+
+
+def test_a_stream_without_an_end_takes_no_room():
+    parser = Parser()
+    for _ in range(1000):
+        assert parser.feed(b"x" * 4096) == []
+    assert parser.feed(b"\0" + pack(1, 2, b"on")) == [(1, 2, b"on")]
+    assert parser.dropped == 1
+
+
+def test_what_no_frame_can_hold_is_refused():
+    with pytest.raises(BadInput, match="248 bytes"):
+        pack(1, 1, bytes(LONGEST - 1))
