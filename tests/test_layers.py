@@ -41,6 +41,7 @@ study
 study.draft
 control
 rigs
+exports
 report
 report.fit
 report.ladder report.law report.log
