@@ -41,7 +41,6 @@ study
 study.draft
 control
 rigs
-exports
 report
 report.fit
 report.ladder report.law report.log
@@ -55,6 +54,7 @@ experiments.frequency_1b
 experiments.regulation_2
 experiments.swing_up_2b experiments.tracking_3 experiments.free_swing_4
 experiments
+exports
 verbs
 views
 cli
@@ -90,6 +90,7 @@ DOORS = {
     "typer": "cli",
     "mcap": "logs",
     "zstandard": "logs",
+    "gymnasium": "environment",
     "loky": "workers",
     "cloudpickle": "workers",
     "distributed": "workers",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,26 +19,33 @@ if TYPE_CHECKING:
 
 LAWS = ("c", "arduino", "python", "matlab", "simulink")
 """Forms of a law, `exports.targets.TARGETS`."""
+RIGS = ("gymnasium",)
+"""Forms of an identified rig."""
 
 
 @keeps_its_inputs
 def export(
-    source: Any, *, to: str, out: str | os.PathLike[str] = "upright-export", single: bool = False
+    source: Any, *, to: str, out: str | os.PathLike[str] = "upright-export", single: bool = False,
+    limit: float | None = None,
 ) -> Answer[tuple[str, ...]]:  # fmt: skip
-    """A designed law as a program for the computer that closes the loop, with a replay by which it tests itself.
+    """A designed law as a program for the computer that closes the loop, or an identified rig for other simulators.
 
-    The program repeats the commands of upright's own kernel bit for bit in double precision.
+    A program repeats the commands of upright's own kernel bit for bit in double precision, and carries a replay by
+    which it tests itself.
 
     Parameters
     ----------
     source : path, answer of `design`, or Law
-        design.json or its folder.
+        Of a law design.json or its folder; of a rig fit.json or its folder.
     to : str
-        The law as ``"c"``, ``"arduino"``, ``"python"``, ``"matlab"`` (GNU Octave too) or ``"simulink"``.
+        A law as ``"c"``, ``"arduino"``, ``"python"``, ``"matlab"`` (GNU Octave too) or ``"simulink"``; a rig as
+        ``"gymnasium"``, an environment whose every episode has another rig that the fit allows.
     out : path
         Folder for the files.
     single : bool
-        Single precision (the command line's ``--float``); its commands miss by a converter's step at times.
+        Of a law, single precision (the command line's ``--float``); its commands miss by a converter's step at times.
+    limit : float, optional
+        Of a rig, the largest command, in its unit; the fit's when omitted.
 
     Returns
     -------
@@ -49,10 +57,18 @@ def export(
     BadInput
         When there is no such form, or what was given cannot be written in it.
     """
-    if to not in LAWS:
-        raise BadInput(f"--to is one of {', '.join(LAWS)}, got '{to}'; {nearest(to, LAWS)}")
-    made, name = _controller(source)
-    return _law(made, name, to, folder(out), single)
+    if to not in (*LAWS, *RIGS):
+        raise BadInput(f"--to is one of {', '.join((*LAWS, *RIGS))}, got '{to}'; {nearest(to, (*LAWS, *RIGS))}")
+    if to in LAWS:
+        if limit is not None:
+            raise BadInput("the limit of a law is the one that it was designed with; give --limit to upright design.")
+        made, name = _controller(source)
+        return _law(made, name, to, folder(out), single)
+    if single:
+        raise BadInput("--float is of laws; a rig is simulated in double precision.")
+    if not isinstance(source, str | os.PathLike):
+        raise BadInput(f"a rig is exported from its fit.json or the folder of it, got {type(source).__name__}.")
+    return _RIG[to](Path(source), folder(out), limit)
 
 
 def _controller(source: Any) -> tuple[SampledController, str]:
@@ -110,3 +126,40 @@ def _law(made: SampledController, name: str, to: str, at: Path, single: bool) ->
         },
     )  # fmt: skip
     return Answer(tuple(str(f) for f in files), told, files)
+
+
+def _gymnasium(source: Path, at: Path, limit: float | None) -> Answer[tuple[str, ...]]:
+    from upright.experiments.identified import read_identified
+    from upright.exports.episodes import DRAWS, Episodes
+    from upright.exports.registration import module
+    from upright.report.page import Chapter, Part, Points, Step
+    from upright.report.symbols import number, typed
+
+    rig = read_identified(source, draws=DRAWS)
+    lanes = Episodes(rig, 1, limit=limit)
+    path = source / "fit.json" if source.is_dir() else source
+    name, text = module(rig.name, os.path.relpath(path.resolve(), at.resolve()), limit)
+    file = replace_file(at / "rig_env.py", text.encode())
+    drawn = f"every episode has one of {len(rig.draws)} rigs drawn from its covariance"
+    warnings = () if rig.draws else ("The fit has no covariance, so every episode has the same rig.",)
+    told = Chapter(
+        title=f"{rig.name} for Gymnasium",
+        verdict=f"{path} is the environment {name}" + (f"; {drawn}." if rig.draws else "."),
+        parts=(
+            Part("What it takes and gives", (Points((
+                f"Actions from -1 to 1, in {number(lanes.limit, 4)} {rig.unit}, held for {lanes.period:g} s.",
+                f"Observations: {', '.join(lanes.names)}.",
+            )),)),
+        ),
+        warnings=warnings,
+        steps=(
+            Step("Let it run a thousand rigs at once.", f"pip install 'upright[gym]' && python {typed(file)}"),
+            Step(f'import rig_env; gymnasium.make_vec("{name}", num_envs=1024), or gymnasium.make("{name}"); '
+                 'task="swing_up" begins hanging.'),
+        ),
+        numbers={"to": "gymnasium", "files": [str(file)], "environment": name, "draws": len(rig.draws)},
+    )  # fmt: skip
+    return Answer((str(file),), told, [file])
+
+
+_RIG: Mapping[str, Callable[[Path, Path, float | None], Answer[tuple[str, ...]]]] = {"gymnasium": _gymnasium}
