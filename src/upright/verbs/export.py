@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 LAWS = ("c", "arduino", "python", "matlab", "simulink")
 """Forms of a law, `exports.targets.TARGETS`."""
-RIGS = ("gymnasium",)
+RIGS = ("gymnasium", "mjcf")
 """Forms of an identified rig."""
 
 
@@ -39,7 +39,8 @@ def export(
         Of a law design.json or its folder; of a rig fit.json or its folder.
     to : str
         A law as ``"c"``, ``"arduino"``, ``"python"``, ``"matlab"`` (GNU Octave too) or ``"simulink"``; a rig as
-        ``"gymnasium"``, an environment whose every episode has another rig that the fit allows.
+        ``"gymnasium"``, an environment whose every episode has another rig that the fit allows, or ``"mjcf"``, a
+        model of MuJoCo.
     out : path
         Folder for the files.
     single : bool
@@ -162,4 +163,28 @@ def _gymnasium(source: Path, at: Path, limit: float | None) -> Answer[tuple[str,
     return Answer((str(file),), told, [file])
 
 
-_RIG: Mapping[str, Callable[[Path, Path, float | None], Answer[tuple[str, ...]]]] = {"gymnasium": _gymnasium}
+def _mjcf(source: Path, at: Path, limit: float | None) -> Answer[tuple[str, ...]]:
+    from upright.experiments.identified import read_identified
+    from upright.exports.mjcf import model
+    from upright.report.page import Chapter, Step
+    from upright.report.symbols import typed
+
+    rig = read_identified(source, draws=0)
+    if limit is not None:
+        raise BadInput("a model of MuJoCo has the limit of the fit; --limit is for --to gymnasium.")
+    text, told = model(rig)
+    file = replace_file(at / "rig.xml", text.encode())
+    numbers = {"to": "mjcf", "files": [str(file)], "remarks": list(told)}
+    viscous = "springs, viscous friction and the drive are those of the fit" + "." * (not told)
+    chapter = Chapter(
+        title=f"{rig.name} for MuJoCo", verdict=f"{source} is written as MJCF; {viscous}"
+        + (", and what MuJoCo has otherwise is said below." if told else ""), warnings=told, numbers=numbers,
+        steps=(Step("Look at it.", f"pip install mujoco && python -m mujoco.viewer --mjcf={typed(file)}"),),
+    )  # fmt: skip
+    return Answer((str(file),), chapter, [file])
+
+
+_RIG: Mapping[str, Callable[[Path, Path, float | None], Answer[tuple[str, ...]]]] = {
+    "gymnasium": _gymnasium,
+    "mjcf": _mjcf,
+}

@@ -15,7 +15,9 @@ def export(
     source: Annotated[Path, typer.Argument(metavar="GAINS_OR_FIT", help="design.json or fit.json, or its folder.")],
     to: Annotated[
         str,
-        typer.Option(metavar="FORM", help="A law as c, arduino, python, matlab or simulink; a rig as gymnasium."),
+        typer.Option(
+            metavar="FORM", help="A law as c, arduino, python, matlab or simulink; a rig as gymnasium, mjcf, fmu."
+        ),
     ],
     out: Annotated[
         Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for all files.", callback=folder)
