@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 LAWS = ("c", "arduino", "python", "matlab", "simulink")
 """Forms of a law, `exports.targets.TARGETS`."""
-RIGS = ("gymnasium", "mjcf")
+RIGS = ("gymnasium", "mjcf", "fmu")
 """Forms of an identified rig."""
 
 
@@ -39,8 +39,8 @@ def export(
         Of a law design.json or its folder; of a rig fit.json or its folder.
     to : str
         A law as ``"c"``, ``"arduino"``, ``"python"``, ``"matlab"`` (GNU Octave too) or ``"simulink"``; a rig as
-        ``"gymnasium"``, an environment whose every episode has another rig that the fit allows, or ``"mjcf"``, a
-        model of MuJoCo.
+        ``"gymnasium"``, an environment whose every episode has another rig that the fit allows, ``"mjcf"``, a
+        model of MuJoCo, or ``"fmu"``, a unit for co-simulation (FMI 3.0).
     out : path
         Folder for the files.
     single : bool
@@ -171,7 +171,7 @@ def _mjcf(source: Path, at: Path, limit: float | None) -> Answer[tuple[str, ...]
 
     rig = read_identified(source, draws=0)
     if limit is not None:
-        raise BadInput("a model of MuJoCo has the limit of the fit; --limit is for --to gymnasium.")
+        raise BadInput(_LIMIT)
     text, told = model(rig)
     file = replace_file(at / "rig.xml", text.encode())
     numbers = {"to": "mjcf", "files": [str(file)], "remarks": list(told)}
@@ -184,7 +184,41 @@ def _mjcf(source: Path, at: Path, limit: float | None) -> Answer[tuple[str, ...]
     return Answer((str(file),), chapter, [file])
 
 
+def _fmu(source: Path, at: Path, limit: float | None) -> Answer[tuple[str, ...]]:
+    from upright.experiments.identified import read_identified
+    from upright.exports.fmu import build, unit_of
+    from upright.report.page import Chapter, Part, Points, Step
+    from upright.report.symbols import typed
+
+    if limit is not None:
+        raise BadInput(_LIMIT)
+    rig = read_identified(source, draws=0)
+    unit = unit_of(rig)
+    content, where = build(unit)
+    file = replace_file(at / "rig.fmu", content)
+    warnings = unit.told if where else (*unit.told, "No C compiler was found, so the unit has its sources alone.")
+    taken, given = (", ".join(f"{v.name} [{v.unit or '1'}]" for v in group) for group in (unit.inputs, unit.states))
+    told = Chapter(
+        title=f"{rig.name} for co-simulation", warnings=warnings,
+        verdict=f"{source} is a unit of FMI 3.0" + (f" with a library for {where}." if where else "."),
+        parts=(Part("What it takes and gives", (Points((
+            f"Inputs: {taken or 'none'}; outputs: {given}.",
+            f"Parameters, to be set before the first step: {', '.join(v.name for v in unit.parameters)}; where it "
+            f"begins: {', '.join(v.name for v in unit.starts)}.",
+            "Steps of whole milliseconds; an input is held for a step.",
+        )),)),),
+        steps=(
+            Step("Check and run it.", f"pip install fmpy && fmpy validate {typed(file)} && fmpy simulate {typed(file)} "
+                 f"--start-values {unit.states[-2].name}_start 0.5 --show-plot"),
+        ),
+        numbers={"to": "fmu", "files": [str(file)], "platform": where},
+    )  # fmt: skip
+    return Answer((str(file),), told, [file])
+
+
+_LIMIT = "the limit is that of the fit; --limit is for --to gymnasium."
 _RIG: Mapping[str, Callable[[Path, Path, float | None], Answer[tuple[str, ...]]]] = {
     "gymnasium": _gymnasium,
     "mjcf": _mjcf,
+    "fmu": _fmu,
 }
