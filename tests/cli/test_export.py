@@ -91,6 +91,21 @@ def test_what_is_no_law_to_be_run_is_refused(change, words, designed, tmp_path):
     assert not (tmp_path / "law.c").exists()
 
 
+def test_a_fit_is_told_from_a_design(tmp_path):
+    path = tmp_path / "fit.json"
+    path.write_text('{"plant": "furuta", "parameters": {}}')
+    assert "--to gymnasium, mjcf or fmu" in upright("export", path, "--to", "c").stderr
+
+
+def test_what_design_prints_as_json_is_taken_too(designed, tmp_path):
+    asked = ("--poles", "-4+-2j", "--period", "5 ms", "--limit", 10, "--speed", "observer", "--json", "-o", tmp_path)
+    path = tmp_path / "gains.json"
+    path.write_text(upright("design", "--matrices", designed / "model.toml", *asked).stdout)
+    assert upright("export", path, "--to", "python", "-o", tmp_path).exit_code == 0
+    upright("export", designed, "--to", "python", "-o", tmp_path / "other")
+    assert (tmp_path / "law.py").read_text() == (tmp_path / "other" / "law.py").read_text()
+
+
 def test_forms_and_files_that_do_not_exist_are_refused(designed, tmp_path):
     assert "did you mean 'arduino'" in upright("export", designed, "--to", "arduin").stderr
     assert "does not exist" in upright("export", tmp_path / "nothing.json", "--to", "c").stderr

@@ -76,6 +76,25 @@ def test_a_processor_that_fuses_products_and_sums_changes_no_bit(tmp_path):
     assert PASSED in said(compiled(folder, "-std=gnu11", "-O3", "-march=native"))
 
 
+def x87() -> bool:
+    """Whether the compiler can be told to keep more digits than a double has."""
+    return shutil.which("gcc") is not None and not subprocess.run(
+        ["gcc", "-mfpmath=387", "-E", "-x", "c", "/dev/null"], capture_output=True, check=False
+    ).returncode  # fmt: skip
+
+
+@pytest.mark.skipif(not x87(), reason="gcc makes no code for an x87 here")
+def test_a_processor_with_more_digits_is_no_error(tmp_path):
+    program = compiled(written("dense", "c", tmp_path), "-std=c99", "-O2", "-mfpmath=387")
+    assert PASSED in said(program)
+
+
+@pytest.mark.parametrize("name", ["filtered", "pid"])
+def test_single_precision_moves_a_command_by_a_converter_step_at_most(name):
+    """Two parts in a million more, for the step itself is rounded."""
+    assert self_test(LAWS[name]).single <= LAWS[name].converter[0] * (1 + 1e-3)
+
+
 @needs("gcc")
 def test_a_law_that_is_off_in_its_last_digit_is_found(tmp_path):
     folder = written("dense", "c", tmp_path)

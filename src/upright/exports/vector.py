@@ -86,29 +86,40 @@ def commanded(law: Law, readings: Array) -> Array:
 
 
 def _single_precision(made: SampledController, law: Law, readings: Array) -> float:
-    """Largest error of the commands in single precision, bounded to first order along the replay.
+    """Largest error of the commands in single precision, to first order along the replay.
 
-    A sum of m terms errs by at most m + 2 roundings of the sum of their sizes, coefficients and products included;
-    errors of the memory are handed on by A. A command off its true value may be rounded to the converter's next step,
-    and one about the limit may hold a sum or let it run on.
+    Readings and their targets are rounded as they are, and the law answers what that moves them by. A sum of m terms
+    errs by at most m + 2 roundings of the sum of their sizes, coefficients and products included; what the memory errs
+    by comes back through powers of A. A command off its true value may be rounded to the converter's next step, and one
+    about the limit may hold a sum or let it run on.
     """
     memory = law.follow(readings)[1]
     target, signal, p = law.arrays()["target"][0], law.signal(), readings.shape[1]
     w = np.hstack([readings - target, np.broadcast_to(signal, (len(readings), signal.shape[1]))])
     A, B, C, D = (np.abs(getattr(law, name)) for name in "ABCD")
     roundings = (A.shape[0] + D.shape[1] + 2) * SINGLE
-    wrong = SINGLE * np.abs(w)
-    wrong[:, :p] += SINGLE * (np.abs(readings) + np.abs(target))
+    free = replace(law, limit=math.inf, command_quantum=0.0, target=0.0, initial=None, delay=0.0, windup="free")
+    moved = np.abs(replace(free, references=_rounding(signal)).follow(_rounding(readings) - _rounding(target))[0])
     asked = memory @ law.C.T + w @ law.D.T
     jump = np.abs(memory @ law.A.T + w @ law.B.T - memory) * (law.windup == "hold")
-    size = np.abs(memory) @ C.T + np.abs(w) @ D.T
-    moved = np.abs(memory) @ A.T + np.abs(w) @ B.T
-    z = np.zeros(len(A)) if law.begin is None else np.abs(law.begin) @ (wrong[0, :p] + roundings * np.abs(w[0, :p]))
-    worst, step = np.zeros(len(C)), made.converter
+    begin = 0.0 if law.begin is None else np.abs(law.begin) @ np.abs(w[0, :p])
+    # what a sample adds to the error of the memory, and what that is later, by the samples in between
+    added = [roundings * (begin + np.abs(memory[0]))]
+    later = [np.abs(law.C)]
+    power, step, worst = np.eye(len(A)), made.converter, np.zeros(len(C))
     for k in range(len(readings)):
-        error = C @ z + D @ wrong[k] + roundings * size[k]
+        error = moved[k] + roundings * (C @ np.abs(memory[k]) + D @ np.abs(w[k])) + SINGLE * (D @ np.abs(w[k]))
+        error = error + sum((m @ e for m, e in zip(reversed(later), added, strict=True)), np.zeros(len(C)))
         worst = np.maximum(worst, error)
         near = bool((np.abs(np.abs(asked[k]) - law.limit) <= error + step).any())
-        z = A @ z + B @ wrong[k] + roundings * moved[k] + near * jump[k]
+        summed = A @ np.abs(memory[k]) + B @ np.abs(w[k])
+        added.append(roundings * summed + SINGLE * (B @ np.abs(w[k])) + near * jump[k])
+        power = law.A @ power
+        later.append(np.abs(law.C @ power))
     on_steps = np.where(step > 0, step * np.ceil(worst / np.where(step > 0, step, 1.0)), worst)
     return float(on_steps.max(initial=0.0)) + 4 * SINGLE * min(law.limit, float(np.abs(asked).max(initial=0.0)))
+
+
+def _rounding(values: Array) -> Array:
+    """What single precision makes of numbers, less what they are."""
+    return values.astype(np.float32).astype(np.float64) - values
