@@ -120,7 +120,7 @@ def replay(test: SelfTest, *, single: bool) -> str:
     given = _table("given", test.readings, single)
     asked = _table("asked", test.references, single) if test.references.shape[1] else ""
     reference = "asked[k]" if asked else "0"
-    exact = "0" if single else "sizeof(law_real) >= 8 && FLT_EVAL_METHOD >= 0 && FLT_EVAL_METHOD <= 1"
+    exact = "0" if single else "LAW_EXACT"
     return f"""\
 /* {count} samples with the commands that upright's own kernel answers, to be replayed wherever the law runs. */
 #ifndef LAW_SELFTEST_H
@@ -133,6 +133,11 @@ def replay(test: SelfTest, *, single: bool) -> str:
 /* Bit for bit in double precision. In single precision, where double means single, and on processors that keep more
    digits than a double has (FLT_EVAL_METHOD), rounding may add up to: */
 #define LAW_SINGLE_MISSES {number(test.single, single)}
+#if defined(FLT_EVAL_METHOD) && (FLT_EVAL_METHOD < 0 || FLT_EVAL_METHOD > 1)
+#define LAW_EXACT 0
+#else
+#define LAW_EXACT (sizeof(law_real) >= 8)
+#endif
 
 /* The first sample whose command is not the expected one, -1 when all are. */
 static long law_selftest(void)

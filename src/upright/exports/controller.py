@@ -132,8 +132,8 @@ def of_design(content: Any, source: str) -> SampledController:
     """
     if isinstance(content, Mapping) and {"plant", "parameters"} <= content.keys():
         raise BadInput(
-            f"{source} is a fit, and a law is what `upright design {source} --poles ... -o FOLDER` makes of it; the rig "
-            "itself goes --to gymnasium, mjcf or fmu."
+            f"{source} is a fit, and a law is what `upright design {source} --poles ... -o FOLDER` makes of it; the "
+            "rig itself goes --to gymnasium, mjcf or fmu."
         )
     if not isinstance(content, Mapping) or not {"law", "K", "period"} <= content.keys():
         raise BadInput(f"{source} is no design.json; it needs the keys law, K and period: {AGAIN}.")
