@@ -18,7 +18,7 @@ from upright.errors import BadInput
 from upright.exports.controller import of_law
 from upright.exports.targets import TARGETS
 from upright.exports.vector import self_test
-from upright.laws import Law, Rule
+from upright.laws import Law, Rule, at_work
 from upright.simulation import simulate
 
 LAWS = laws()
@@ -55,6 +55,15 @@ def test_the_replay_meets_limit_and_memory(name):
     at_limit = np.abs(test.commands) == limit
     assert np.ptp(test.commands) > 0
     assert not math.isfinite(limit) or 0 < at_limit.mean() < 0.7
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_a_law_at_work_on_a_rig_gives_the_kernel_s_commands_bit_for_bit(name):
+    """What drives a rig from Python, what simulates it and what is exported are one law."""
+    test, law = self_test(LAWS[name]), LAWS[name].law
+    step = at_work(replace(law, references=test.references))
+    found = [step(k * law.period, y) for k, y in enumerate(test.readings.tolist())]
+    np.testing.assert_array_equal(found, test.commands)
 
 
 @pytest.mark.parametrize("name", LAWS)
