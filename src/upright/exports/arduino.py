@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from upright.exports import c
 from upright.exports.controller import SampledController, identifiers
-from upright.exports.vector import SelfTest
+from upright.exports.vector import ReplayVector
 
 
-def files(made: SampledController, test: SelfTest, *, single: bool) -> dict[str, str]:
+def files(made: SampledController, test: ReplayVector, *, single: bool) -> dict[str, str]:
     """Texts by file name, in the folder ``law`` that the sketch has to be called after."""
     texts = c.files(made, test, single=single)
     del texts["law_selftest.c"]

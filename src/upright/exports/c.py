@@ -6,7 +6,7 @@ import numpy as np
 
 from upright.exports.arithmetic import Language, statements
 from upright.exports.controller import SampledController, identifiers
-from upright.exports.vector import SelfTest
+from upright.exports.vector import ReplayVector
 from upright.laws.linear import Array
 
 _EXACT = """\
@@ -21,7 +21,7 @@ _EXACT = """\
 """
 
 
-def files(made: SampledController, test: SelfTest, *, single: bool) -> dict[str, str]:
+def files(made: SampledController, test: ReplayVector, *, single: bool) -> dict[str, str]:
     """Texts by file name."""
     return {
         "law.h": header(made, single=single),
@@ -114,7 +114,7 @@ void law_step(law_state *s, const law_real *y, const law_real *r, law_real *u)
 """
 
 
-def replay(test: SelfTest, *, single: bool) -> str:
+def replay(test: ReplayVector, *, single: bool) -> str:
     """Text of ``law_selftest.h``."""
     count = len(test.readings)
     given = _table("given", test.readings, single)

@@ -6,16 +6,16 @@ import numpy as np
 
 from upright.exports.arithmetic import Language, statements
 from upright.exports.controller import SampledController
-from upright.exports.vector import SelfTest
+from upright.exports.vector import ReplayVector
 from upright.laws.linear import Array
 
 
-def files(made: SampledController, test: SelfTest, *, single: bool) -> dict[str, str]:
+def files(made: SampledController, test: ReplayVector, *, single: bool) -> dict[str, str]:
     """Texts by file name."""
     return {"law_step.m": step(made, single=single), "law_selftest.m": replay(test, single=single)}
 
 
-def block(made: SampledController, test: SelfTest, *, single: bool) -> dict[str, str]:
+def block(made: SampledController, test: ReplayVector, *, single: bool) -> dict[str, str]:
     """Texts by file name for Simulink: the same function, a level-2 S-function that calls it, what makes its block."""
     return {**files(made, test, single=single), "law_sfun.m": _s_function(made, single=single), "law_block.m": _BLOCK}
 
@@ -50,7 +50,7 @@ end
 """
 
 
-def replay(test: SelfTest, *, single: bool) -> str:
+def replay(test: ReplayVector, *, single: bool) -> str:
     """Text of ``law_selftest.m``."""
     with_r = ", asked(k, :)" if test.references.shape[1] else ""
     asked = _table("asked", test.references) if with_r else ""

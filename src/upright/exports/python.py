@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from upright.exports.arithmetic import Language, statements
 from upright.exports.controller import SampledController
-from upright.exports.vector import SelfTest
+from upright.exports.vector import ReplayVector
 
 _LANGUAGE = Language(
     number=lambda x: repr(float(x)), reading="y[{}]".format, reference="r[{}]".format, memory="z[{}]".format,
@@ -15,7 +15,7 @@ _LANGUAGE = Language(
 )  # fmt: skip
 
 
-def files(made: SampledController, test: SelfTest) -> dict[str, str]:
+def files(made: SampledController, test: ReplayVector) -> dict[str, str]:
     """Text by file name."""
     body = "\n".join(f"        {line}" for line in statements(made, _LANGUAGE))
     about = "\n".join(made.facts)

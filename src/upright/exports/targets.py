@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from upright.errors import BadInput
 from upright.exports import arduino, c, matlab, python
 from upright.exports.controller import SampledController
-from upright.exports.vector import SelfTest
+from upright.exports.vector import ReplayVector
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,12 +16,12 @@ class Target:
     """One form: its name, what writes its texts (single precision or not), and how to run its self-test."""
 
     name: str
-    write: Callable[[SampledController, SelfTest, bool], Mapping[str, str]]
+    write: Callable[[SampledController, ReplayVector, bool], Mapping[str, str]]
     test: str
     onward: str
 
 
-def _python(made: SampledController, test: SelfTest, single: bool) -> Mapping[str, str]:
+def _python(made: SampledController, test: ReplayVector, single: bool) -> Mapping[str, str]:
     if single:
         raise BadInput("Python's numbers are doubles; leave --float out, or take --to c.")
     return python.files(made, test)

@@ -22,7 +22,7 @@ SINGLE = 2.0**-24
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SelfTest:
+class ReplayVector:
     """One replay.
 
     Attributes
@@ -41,7 +41,7 @@ class SelfTest:
     single: float
 
 
-def self_test(made: SampledController) -> SelfTest:
+def self_test(made: SampledController) -> ReplayVector:
     """Readings that swing about rest, faster and faster, on the steps of the encoders; a reference that steps.
 
     The commands are those of the compiled kernel with the readings as prescribed motion: of the one that simulates
@@ -60,7 +60,7 @@ def self_test(made: SampledController) -> SelfTest:
     readings = np.where(step > 0, on_steps, readings)
     references = size * signal
     full = replace(law, references=references, delay=0.0)
-    return SelfTest(
+    return ReplayVector(
         readings=readings, references=references, commands=commanded(full, readings),
         single=_single_precision(made, full, readings),
     )  # fmt: skip
