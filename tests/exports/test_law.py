@@ -240,6 +240,18 @@ def test_what_cannot_be_exported_is_refused_with_what_to_try(law, words):
         of_law(law)
 
 
+@needs("gcc")
+def test_a_name_cannot_end_the_comment_that_it_stands_in(tmp_path):
+    strange = ('*/ int x; /*"""', "\n%{\\")
+    made = of_law(replace(LAWS["filtered"].law, measured=strange))
+    test = self_test(made)
+    for to in ("c", "python"):
+        for file, text in TARGETS[to].write(made, test, False).items():
+            (tmp_path / file).write_text(text, encoding="utf-8")
+    assert PASSED in said(compiled(tmp_path, "-std=c99"))
+    assert PASSED in said(sys.executable, "-I", tmp_path / "law.py")
+
+
 def hop(t, y, r, z, p):
     return (p[0],), z
 

@@ -81,10 +81,13 @@ def statements(made: SampledController, say: Language) -> list[str]:
         lines += say.first([f"{say.memory(i)} = {start}{say.end}" for i, start in enumerate(starts)])
     memory = [say.memory(i) for i in range(len(A))]
     unit = f" [{made.command_unit}]" if made.command_unit else ""
+    of = [*(f"memory {i}" for i in range(len(A))), *(f"{n}{u}" for n, u in zip(made.readings, units, strict=True))]
+    of += list(made.references)
     for j, name in enumerate(made.commands):
-        put(f"{say.let}c{j} = {say.number(0.0)}", f"{name}{unit} from memory, readings and references in turn")
-        for term in _terms([*C[j], *D[j]], [*memory, *signals], say):
-            put(f"c{j} = c{j} + {term}")
+        put(f"{say.let}c{j} = {say.number(0.0)}", f"{name}{unit}")
+        for k, value, what in zip([*C[j], *D[j]], [*memory, *signals], of, strict=True):
+            for term in _terms([k], [value], say):
+                put(f"c{j} = c{j} + {term}", f"of {what}")
         step = float(made.converter[j])
         if step:
             put(

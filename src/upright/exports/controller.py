@@ -74,7 +74,8 @@ class SampledController:
         if self.states_from:
             said.append(f"States from readings: {self.states_from}.")
         if self.delay is not None:
-            said.append(f"Designed for commands that act {self.delay:g} samples late in all.")
+            samples = "sample" if self.delay == 1 else "samples"
+            said.append(f"Designed for commands that act {self.delay:g} {samples} late in all.")
         return said
 
 
@@ -103,8 +104,8 @@ def of_law(law: Any) -> SampledController:
         raise BadInput("an exported law needs its sample period; give it: dataclasses.replace(law, period=1e-3).")
     single = {name: a[..., 0] for name, (a, axes) in law.arrays().items() if a.ndim > axes}
     made = replace(law, **single) if single else law
-    readings = law.measured or tuple(f"y{i}" for i in range(law.readings))
-    references = law.reference_names or tuple(f"r{i}" for i in range(law.signal().shape[1]))
+    readings = tuple(map(plain, law.measured)) or tuple(f"y{i}" for i in range(law.readings))
+    references = tuple(map(plain, law.reference_names)) or tuple(f"r{i}" for i in range(law.signal().shape[1]))
     inputs = len(law.C)
     return _without_idle_references(
         SampledController(
@@ -168,10 +169,11 @@ def _read(content: Mapping[str, Any]) -> SampledController:
     )  # fmt: skip
     at = f" at '{content['at']}'" if content.get("at") else ""
     return SampledController(
-        law=law, readings=names, reading_units=tuple(str(r["unit"]) for r in readings), commands=(content["command"],),
-        references=law.reference_names, command_unit=str(content.get("command_unit") or ""),
+        law=law, readings=tuple(map(plain, names)), reading_units=tuple(plain(str(r["unit"])) for r in readings),
+        commands=(plain(content["command"]),), references=law.reference_names,
+        command_unit=plain(str(content.get("command_unit") or "")),
         signs=tuple(float(described.get(f"sign.{n}", {}).get("value", 1.0)) for n in names),
-        title=f"{content.get('plant', 'a rig')}{at}", states_from=str(content.get("states_from", "")),
+        title=plain(f"{content.get('plant', 'a rig')}{at}"), states_from=plain(str(content.get("states_from", ""))),
         delay=content.get("delay_samples"),
     )  # fmt: skip
 
@@ -186,6 +188,12 @@ def _without_idle_references(made: SampledController) -> SampledController:
         made, references=names,
         law=replace(law, B=law.B[:, keep], D=law.D[:, keep], reference_names=names, references=None),
     )  # fmt: skip
+
+
+def plain(text: str) -> str:
+    """A name as it can stand in a comment or a text of any language, ending neither."""
+    kept = "".join(c if c.isprintable() else " " for c in text)
+    return kept.replace("\\", "/").replace("*/", "* /").replace("/*", "/ *").replace('"', "'")
 
 
 def identifiers(names: Sequence[str]) -> list[str]:

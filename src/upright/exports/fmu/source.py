@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from upright.exports.controller import plain
 from upright.exports.fmu.translation import HELPERS, Kind, translated
 from upright.exports.fmu.unit import STEP, Unit
 from upright.simulation.kernel.compiled import source as kernel_text
@@ -24,7 +25,7 @@ def source(unit: Unit, token: str) -> str:
     numbers = ", ".join(repr(v).replace("inf", "HUGE_VAL") for v in rows)
     places = ", ".join(str(p.row) for p in unit.parameters) or "0"
     return f"""\
-/* {unit.rig.name}, written by upright export: the kernel that simulates the rig there, and FMI 3.0 around it. */
+/* {plain(unit.rig.name)}, written by upright export: the kernel that simulates the rig there, and FMI 3.0 around it. */
 #include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
