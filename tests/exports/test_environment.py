@@ -151,6 +151,7 @@ def test_a_cart_ends_at_its_travel(tmp_path):
         ({"task": "jump"}, "balance or swing_up"),
         ({"at": "sideways"}, "no equilibrium 'sideways'"),
         ({"period": 0.0}, "1e-4 to 1 s"),
+        ({"limit": -1.0}, "limit of an environment"),
     ],
 )
 def test_what_cannot_be_asked_is_refused(fit, options, words):

@@ -128,6 +128,14 @@ def test_a_step_of_a_fraction_of_a_millisecond_is_refused(tmp_path):
     shutil.rmtree(run.folder, ignore_errors=True)
 
 
+def test_a_fast_motion_is_stepped_as_finely_as_it_needs(tmp_path):
+    """400 rad/s, of which a step of 1 ms is 0.4 rad: the closed form x cos(w t) after 50 ms, to 8e-6 a step."""
+    plant = chain(1)(m_1=0.5, k_1=0.5 * 400.0**2)
+    (tmp_path / "rig.fmu").write_bytes(build(unit_of(identified(tmp_path, plant)))[0])
+    there = walked(tmp_path / "rig.fmu", plant, [0.01, 0.0], [0.0] * 50, 1e-3)
+    assert there[-1, 0] == pytest.approx(0.01 * np.cos(400.0 * 0.05), abs=0.01 * 100 * 8e-6)
+
+
 def test_the_same_rig_gives_the_same_file(tmp_path):
     rig = identified(tmp_path, SMOOTH["pendulum"])
     assert build(unit_of(rig))[0] == build(unit_of(rig))[0]

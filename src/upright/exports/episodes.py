@@ -14,6 +14,7 @@ import numpy as np
 from upright.control.trial import GAIN, full_command
 from upright.errors import BadInput, nearest
 from upright.experiments.identified import IdentifiedRig
+from upright.exports.steps import substeps
 from upright.laws.linear import Array
 from upright.simulation import Simulator, choose
 
@@ -24,8 +25,6 @@ FALLEN = math.radians(12)
 """Deviation at which a balanced pendulum counts as fallen, that of the public CartPole-v1."""
 DRAWS = 1024
 """Rigs drawn from a fit's covariance, one of which every episode gets."""
-TURN = 0.25
-"""Longest Runge-Kutta step, in radians of the fastest mode at rest: it errs by ``TURN**5/120``, 8e-6 of that mode."""
 EFFORT = 0.01
 """What full command costs of the reward of a swing-up, which is at most 1."""
 
@@ -83,6 +82,9 @@ class Episodes:
                 "braking that builds up (actuator.relaxation) is remembered from step to step, which an environment "
                 "does not; identify without it, or set it to 0 in the fit."
             )
+        for what, value in (("limit", limit), ("travel", travel)):
+            if value is not None and not 0 < value < 1e9:
+                raise BadInput(f"the {what} of an environment lies above 0 and below 1e9, got {value:g}.")
         most = limit or min(said.value("limit", math.inf), full_command({**rig.more, GAIN: rig.gain}))
         if not math.isfinite(most):
             raise BadInput("an environment needs the largest command: limit=10, or [actuator] limit in the study.")
@@ -110,10 +112,9 @@ class Episodes:
     def simulator(self) -> Simulator:
         """What steps them; its steps are short enough for the fastest mode of the rig."""
         derived = self.rig.plant.derived_for(self._values)
-        fastest = max(np.abs(np.linalg.eigvals(self.rig.linear(at).A)).max() for at in self.rig.plant.equilibria)
         return Simulator(
             derived=derived, flavour=choose(derived, self._values), dt=self.period,
-            substeps=math.ceil(self.period * fastest / TURN),
+            substeps=substeps(self.rig, self.period),
         )  # fmt: skip
 
     @property

@@ -9,6 +9,7 @@ from functools import cached_property
 from upright.control.trial import GAIN
 from upright.errors import BadInput
 from upright.experiments.identified import IdentifiedRig
+from upright.exports.steps import substeps
 from upright.simulation import Simulator, choose
 
 STEP = 1e-3
@@ -111,7 +112,9 @@ def unit_of(rig: IdentifiedRig) -> Unit:
     drive = {f"actuator.{n}": said.value(n, 0.0) for n in ("delay", "lag", "offset")}
     values = {**values, **rig.more, **drive, GAIN: rig.gain, "actuator.limit": said.value("limit", math.inf)}
     derived = plant.derived_for(values)
-    simulator = Simulator(derived=derived, flavour=choose(derived, values), dt=STEP)
+    simulator = Simulator(
+        derived=derived, flavour=choose(derived, values), dt=STEP, substeps=substeps(rig, STEP)
+    )  # fmt: skip
     told = (
         f"Joint {j.on} slides at once: the unit does not remember how far it has deflected before."
         for j in plant.joints if plant.parameters().get(j.presliding)
