@@ -190,13 +190,13 @@ class Episodes:
 
         Of what turns over, sine and cosine.
         """
-        out, k = np.empty((self.lanes, len(self.names)), dtype=np.float32), 0
+        out, k = np.empty((len(self.names), self.lanes), dtype=np.float32), 0
         for i, turns in enumerate(self.turning.tolist()):
             off = self.x[2 * i] - self.target[i]
             for seen in (np.sin(off), np.cos(off)) if turns else (off,):
-                out[:, k], k = seen, k + 1
-        out[:, k:] = self.x[1::2].T
-        return out
+                out[k], k = seen, k + 1
+        out[k:] = self.x[1::2]
+        return out.T
 
     @property
     def names(self) -> list[str]:
