@@ -23,25 +23,15 @@ from upright.workers import Workers
 NAMES = (
     "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "frequency", "swing_up", "tracking", "lab",
     "doctor", "rigs", "misfit", "verdicts", "regulation", "real", "agree", "bands", "starts", "startup",
-    "workers", "long", "gpu", "crash", "safety", "jitter",
+    "workers", "long", "gpu", "crash", "safety", "jitter", "gym",
 )  # fmt: skip
 PUBLISHED = (
-    "real",
-    "agree",
-    "bands",
-    "rigs",
-    "misfit",
-    "verdicts",
-    "regulation",
-    "workers",
-    "crash",
-    "safety",
-    "jitter",
-)
+    "real", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "workers", "crash", "safety", "jitter", "gym",
+)  # fmt: skip
 SHARED = ("coverage", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "starts")
 """Those whose table is a page, and those whose work processes may share."""
 
-LIBRARIES = ("upright", "numpy", "scipy", "llvmlite", "control", "casadi", "jax", "mujoco")
+LIBRARIES = ("upright", "numpy", "scipy", "llvmlite", "control", "casadi", "jax", "mujoco", "gymnasium")
 
 
 def amount(seconds: float) -> str:

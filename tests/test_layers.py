@@ -55,6 +55,7 @@ experiments.frequency_1b
 experiments.regulation_2
 experiments.swing_up_2b experiments.tracking_3 experiments.free_swing_4
 experiments
+exports
 verbs
 views
 cli
@@ -92,6 +93,7 @@ DOORS = {
     "mcap": "logs",
     "zstandard": "logs",
     "serial": "line",
+    "gymnasium": "environment",
     "loky": "workers",
     "cloudpickle": "workers",
     "distributed": "workers",

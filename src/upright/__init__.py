@@ -20,8 +20,8 @@ Log         read, show, doctor, init, law; Record
 Runs        run, rig_doctor, rig_check; log_show, log_tail, log_recover, log_convert, log_replay
 Model       identify, predict, ladder, frequency, loadings, plan_inertias
 Plants      Pendulum, CartPendulum, Furuta, DoublePendulum, DoublePendulumAbsolute, FlexibleLink, chain
-Control     place, lqr, dlqr, prefilter, hold, margins, simulate, chance, design, regulate,
-            swing_up, track; Law, Rule
+Control     place, lqr, dlqr, prefilter, hold, margins, simulate, chance, design, export,
+            regulate, swing_up, track; Law, Rule
 Course      lab, reproduce, survey
 Own plants  Plant, Coordinate, Input, Joint, quantity
 ==========  ==================================================================================================
@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from upright.verbs.chance import chance
     from upright.verbs.control import design, regulate, swing_up, track
     from upright.verbs.course import lab, reproduce, survey
+    from upright.verbs.export import export
     from upright.verbs.feedback import dlqr, hold, lqr, margins, place, prefilter
     from upright.verbs.fitting import identify
     from upright.verbs.live import rig_check, rig_doctor, run
@@ -87,6 +88,7 @@ _HOMES = {
     "verbs.chance": ("chance",),
     "verbs.control": ("design", "regulate", "swing_up", "track"),
     "verbs.course": ("lab", "reproduce", "survey"),
+    "verbs.export": ("export",),
     "verbs.live": ("rig_check", "rig_doctor", "run"),
     "verbs.log": ("doctor", "init", "law", "read", "show"),
     "verbs.logs": ("log_convert", "log_recover", "log_replay", "log_show", "log_tail"),
@@ -100,10 +102,10 @@ _HOME = {name: home for home, names in _HOMES.items() for name in names}
 __all__ = [
     "BadInput", "CartPendulum", "Coordinate", "DoublePendulum", "DoublePendulumAbsolute", "FlexibleLink", "Furuta",
     "ImpossiblePhysics", "Input", "Joint", "Law", "NotIdentifiable", "Pendulum", "Plant", "Record", "Rule",
-    "UprightError", "__version__", "chain", "chance", "design", "dlqr", "doctor", "frequency", "hold", "identify",
-    "init", "lab", "ladder", "law", "loadings", "log_convert", "log_recover", "log_replay", "log_show", "log_tail",
-    "lqr", "margins", "place", "plan_inertias", "predict", "prefilter", "quantity", "read", "regulate", "reproduce",
-    "rig_check", "rig_doctor", "run", "show", "simulate", "survey", "swing_up", "track",
+    "UprightError", "__version__", "chain", "chance", "design", "dlqr", "doctor", "export", "frequency", "hold",
+    "identify", "init", "lab", "ladder", "law", "loadings", "log_convert", "log_recover", "log_replay", "log_show",
+    "log_tail", "lqr", "margins", "place", "plan_inertias", "predict", "prefilter", "quantity", "read", "regulate",
+    "reproduce", "rig_check", "rig_doctor", "run", "show", "simulate", "survey", "swing_up", "track",
 ]  # fmt: skip
 
 

@@ -219,3 +219,40 @@ def test_a_wrong_law_is_answered_in_a_sentence(block):
         simulate(block, SPRING, np.zeros((3, 2)), None, DT, samples=2, loop=law)
     with pytest.raises(BadInput, match="without a flavour for it"):
         Simulator(derived=block, flavour=choose(block, SPRING), dt=DT, loop=Law(**good))
+
+
+def plain_sum(terms):
+    """From left to right, each operation rounded by itself, as IEEE 754 says and Python does."""
+    total = 0.0
+    for factor, value in terms:
+        total += factor * value
+    return total
+
+
+@pytest.mark.parametrize(("lanes", "step"), [(1, 0.0), (2, 0.0), (2, 0.003)])
+def test_commands_are_those_of_the_sums_written_out_bit_for_bit(rotary, lanes, step):
+    """What a rig's own computer finds from the same readings, so that a program on it can be checked by this one."""
+    rng, n, dt = np.random.default_rng(5), 200, 1e-3
+    quantum, target = 2 * math.pi / 16000, [0.1, math.pi]
+    C, D = rng.normal(size=(1, 3)), np.array([[0.7, -3.1, 0.2]])
+    law = Law(
+        A=[[0.3, 0.1, 0.0], [0.0, 1.0, 0.0], [0.1, 0.2, 0.5]], B=rng.normal(size=(3, 3)) * 0.01, C=C * 0.1, D=D,
+        begin=rng.normal(size=(3, 2)), target=target, references=rng.normal(size=(n, 1)) * 0.1, quantum=quantum,
+        command_quantum=step,
+    )  # fmt: skip
+    x0 = [0.0, 0.0, math.pi + 0.05, 0.0]
+    motion = simulate(rotary, {**FURUTA, "actuator.limit": 0.3}, [x0] * lanes, None, dt, samples=n, loop=law)[:, :, -1]
+    r = law.signal()[:, 0].tolist()
+    per, z, expected = 1.0 / quantum, [0.0] * 3, []
+    for k, x in enumerate(motion[:, [0, 2]].tolist()):
+        y = [math.floor(q * per + 0.5) * quantum - rest for q, rest in zip(x, target, strict=True)]
+        if k == 0:
+            z = [plain_sum(zip(row, y, strict=True)) for row in law.begin.tolist()]
+        w = [*y, r[k]]
+        c = plain_sum(zip([*law.C[0].tolist(), *law.D[0].tolist()], [*z, *w], strict=True))
+        c = math.floor(c * (1.0 / step) + 0.5) * step if step else c
+        expected.append(min(max(c, -0.3), 0.3))
+        rows = zip(law.A.tolist(), law.B.tolist(), strict=True)
+        z = [plain_sum(zip([*a, *b], [*z, *w], strict=True)) for a, b in rows]
+    assert 0 < np.mean(np.abs(expected) == 0.3) < 1
+    assert motion[:, 4].tolist() == expected

@@ -37,6 +37,7 @@ GROUPS = {
     },
     "Control": {
         "design": "Find the gains that hold a rig, and what they are worth in the loop a computer runs.",
+        "export": "Write a designed law as a program that tests itself, or an identified rig for other simulators.",
         "regulate": "Hold an identified rig upright; say beforehand what each pole set will come to.",
         "swing-up": "Swing a hanging pendulum up by its own drive and catch it, once its encoders are trusted.",
         "track": "Make the far inertia of a flexible shaft follow a step, by state feedback and by PD.",

@@ -1,7 +1,8 @@
 """A law sample by sample, with the same bits at a rig, in a replay of its log and on any machine.
 
 A sum of floats depends on its order, and libraries choose theirs by processor and version (Python's own `sum` changed
-with 3.12). Here it goes from left to right in plain multiplications and additions.
+with 3.12). Here it goes from left to right in plain multiplications and additions, memory before readings, as in the
+compiled kernel and in what `upright export` writes.
 """
 
 from __future__ import annotations
@@ -48,9 +49,9 @@ def _linear(law: Law) -> AtWork:
         nonlocal z, begin, k
         w = (*(y[i] - target[i] for i in range(n)), *referred(k))
         if begin is not None:
-            z, begin = tuple(x + _dot(row, w[:n]) for x, row in zip(z, begin, strict=True)), None
-        u, beyond = finish([_dot(to, w) + _dot(of, z) for of, to in zip(c, d, strict=True)])
-        after = tuple(_dot(of, z) + _dot(to, w) for of, to in zip(a, b, strict=True))
+            z, begin = tuple(_dot(row, w[:n], x) for x, row in zip(z, begin, strict=True)), None
+        u, beyond = finish([_dot(to, w, _dot(of, z)) for of, to in zip(c, d, strict=True)])
+        after = tuple(_dot(to, w, _dot(of, z)) for of, to in zip(a, b, strict=True))
         z = tuple(x if beyond and held else new for x, new, held in zip(z, after, sums, strict=True))
         k += 1
         return u
@@ -93,15 +94,15 @@ def _finish(law: Controller) -> Callable[[Sequence[float]], tuple[Numbers, bool]
 
 
 def _rounded(x: float, step: float) -> float:
-    return floor(x / step + 0.5) * step if step > 0.0 and isfinite(x) else float(x)
+    return floor(x * (1.0 / step) + 0.5) * step if step > 0.0 and isfinite(x) else float(x)
 
 
 def _row(values: Array) -> Numbers:
     return tuple(np.asarray(values, dtype=np.float64).tolist())
 
 
-def _dot(row: Numbers, x: Sequence[float]) -> float:
-    total = 0.0
+def _dot(row: Numbers, x: Sequence[float], total: float = 0.0) -> float:
+    """Sum of products on top of a total."""
     for factor, value in zip(row, x, strict=True):
         total += factor * value
     return total

@@ -221,7 +221,9 @@ class Law(Controller):
         parts = self.by_lane(lanes)
         if self.begin is not None:
             quantum = np.broadcast_to(np.asarray(self.quantum, dtype=np.float64), (n,))
-            parts["initial"] = parts["initial"] + self.begin @ (rounded(q, quantum[:, None]) - parts["target"])
+            w = rounded(q, quantum[:, None]) - parts["target"]
+            for column, value in zip(self.begin.T, w, strict=True):  # in this order, as `@` has none that is its own
+                parts["initial"] = parts["initial"] + column[:, None] * value
         for name, pattern in (("A", self.compiled_in.A), ("B", self.compiled_in.B)):
             parts[name] = parts[name][[value is None for row in pattern for value in row]]
         return np.concatenate(list(parts.values()))

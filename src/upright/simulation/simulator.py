@@ -252,13 +252,13 @@ class Simulator:
         width = 1 if lanes == 1 or device == "gpu" else WIDTH
         blocks = -(-lanes // width)
         law = _NONE[0] if self.loop is None else self.loop.rows(nu, lanes, x0[::2])
-        P = padded(params, blocks * width, extra=len(law))
+        P = ready(params, blocks * width) if self.loop is None else padded(params, blocks * width, extra=len(law))
         if self.loop is not None:
             P[len(params) :, :lanes] = law
             P[len(params) :, lanes:] = law[:, -1:]
             limit = self.names.index("actuator.limit")
             P[limit : limit + nu] = np.minimum(P[limit : limit + nu], self.loop.limit)
-        X0 = padded(x0, blocks * width)
+        X0 = ready(x0, blocks * width)
         begin = np.zeros(blocks * width, np.int64)
         if start is not None:
             if np.shape(start) != (lanes,) or np.min(start) < 0:
@@ -302,6 +302,11 @@ class Simulator:
         else:
             share(step, blocks, threads)
         return out[:, :, :lanes] if f.record else reduced[:, :lanes]
+
+
+def ready(a: Array, width: int) -> Array:
+    """The array itself where machine code can read it as it stands, else a `padded` copy."""
+    return a if a.shape[1] == width and a.dtype == np.float64 and a.flags.carray else padded(a, width)
 
 
 def padded(a: Array, width: int, extra: int = 0) -> Array:

@@ -20,7 +20,7 @@ def functions(text: str) -> dict[str, Any]:
     def as_it_is(function: Callable[..., Any]) -> Callable[..., Any]:
         return function
 
-    names = dict.fromkeys(("inline", "inline_strict", "scalar", "entry", "separate"), as_it_is)
+    names = dict.fromkeys(("inline", "inline_strict", "exact", "scalar", "entry", "separate"), as_it_is)
     space: dict[str, Any] = names | {n: getattr(math, n) for n in ("sin", "cos", "tan", "sqrt", "exp", "pi", "nan")}
     space |= {"floor": np.floor, "ldexp": math.ldexp}
     exec(compile(text, "kernel", "exec"), space)

@@ -199,10 +199,32 @@ def _numbers(done: Designed) -> dict[str, Any]:
         "peak_command": done.peak,
         "peak_command_sampled": done.peak_sampled,
         "chance_over_the_fit": done.chance,
+        "readings": _readings(done),
+        "states_from": done.chosen.name,
+        "begin": done.law.begin,
+        "command": done.rig.inputs[0] if isinstance(done.rig, Matrices) else "u",
+        "converter": 0.0 if wish.said is None else wish.said.value("converter", 0.0),
         "law": spelled_out(done.law) | {"inputs": "readings, readings at rest, reference"},
         "as_run": as_values(done.law),
         "verdict": done.verdict,
     }
+
+
+def _readings(done: Designed) -> list[dict[str, Any]]:
+    """What the law reads, one by one: encoder's step, sign and zero as described, and the reading at rest."""
+    rig, said = done.rig, done.wish.said
+    rest = rig.plant.equilibrium(done.wish.at) if isinstance(rig, IdentifiedRig) else {}
+    steps = dict(zip(rig.outputs, done.wish.quantum, strict=False))
+    return [
+        {
+            "name": name,
+            "unit": unit,
+            "at_rest": rest.get(name, 0.0),
+            "step": steps.get(name, 0.0),
+            "sign": 1.0 if said is None else said.value(f"sign.{name}", 1.0),
+        }
+        for name, unit in zip(rig.outputs, rig.output_units, strict=True)
+    ]
 
 
 def _effort(done: Designed) -> str:
@@ -234,6 +256,11 @@ def _next_steps(done: Designed, source: str, folder: str) -> list[Step]:
         steps.append(
             Step("See what the uncertainty of the numbers does to the poles: design from a fit.json.",
                  "upright identify STUDY.toml -o OUT && upright design OUT/fit.json")
+        )  # fmt: skip
+    if done.chosen.margins is not None:
+        steps.append(
+            Step("Take the law to the computer that closes the loop: c, arduino, python, matlab or simulink.",
+                 f"upright export {folder}/design.json --to c")
         )  # fmt: skip
     steps.append(
         Step(f"Simulate it: upright.laws.Law takes A, B, C and D of law in {folder}/design.json, its "

@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from upright.errors import BadInput
-from upright.laws.linear import Law
+from upright.laws.linear import Law, Structure
 from upright.laws.rule import Rule, Written, line_in
 from upright.simulation.kernel.equations import ELEMENTARY, acceleration, step, terms
 from upright.simulation.kernel.events import events, places
 from upright.simulation.kernel.flavour import Layout
-from upright.simulation.kernel.lanes import RUN_ARGUMENTS, run
+from upright.simulation.kernel.lanes import ROUNDING, RUN_ARGUMENTS, law, run
 from upright.simulation.lowering import cache as kept
 from upright.simulation.lowering.gpu import threads
 from upright.simulation.lowering.module import Module, Platform
@@ -43,6 +43,8 @@ def source(p: Layout) -> str:
     """Text of the module that steps one plant in one flavour."""
     parts = [f'"""Generated kernel of {p.derived.name}; {p.flavour}"""', ELEMENTARY, acceleration(p), step(p)]
     parts += [f"@inline_strict\n{p.flavour.loop.text}\n"] if isinstance(p.flavour.loop, Written) else []
+    parts += [ROUNDING] if p.flavour.loop else []
+    parts += [law(p)] if isinstance(p.flavour.loop, Structure) else []
     if p.flavour.dry:
         parts += [terms(p, places(p)), events(p)]
     return "\n\n".join([*parts, run(p, 1), run(p, WIDTH)])

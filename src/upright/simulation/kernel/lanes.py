@@ -186,11 +186,13 @@ def controller(w: Writer) -> None:
                 w.add(*_asked(w, j, f"{{{name}{j}}}", "_c"))
 
 
-def _encoder(w: Writer, i: int) -> None:
-    w.add(
-        f"_y{i} = floor({{q{i}}} * _per{i} + 0.5) * _quantum{i}",
-        f"_y{i} = _y{i} if _quantum{i} > 0.0 else {{q{i}}}",
-    )
+ROUNDING = """
+@exact
+def rounded(x, per, step):
+    \"\"\"A number as an encoder or a converter rounds it; a step of 0 is none.\"\"\"
+    y = floor(x * per + 0.5) * step
+    return y if step > 0.0 else x
+"""
 
 
 def _put(w: Writer, j: int) -> None:
@@ -214,12 +216,7 @@ def _read(w: Writer) -> None:
         w.add(f"_step{j} = FL[{p.n + 2 + j}]", f"_steps{j} = 1.0 / _step{j} if _step{j} > 0.0 else 0.0")
     w.lanes()
     for i in range(p.n):
-        _encoder(w, i)
-
-
-def _converted(j: int) -> tuple[str, str]:
-    """Command ``_c`` as the converter rounds it."""
-    return (f"_z = floor(_c * _steps{j} + 0.5) * _step{j}", f"_c = _z if _step{j} > 0.0 else _c")
+        w.add(f"_y{i} = rounded({{q{i}}}, _per{i}, _quantum{i})")
 
 
 def _rule(w: Writer) -> None:
@@ -237,37 +234,61 @@ def _rule(w: Writer) -> None:
     given = ", ".join(f"({''.join(f'{name}, ' for name in group)})" for group in names)
     w.add(f"_put, _kept = rule((START[_base + _i] + _k) * _dt, {given})")
     for j in range(p.nu):
-        w.add(f"_c = {{ff{j}}} + _put[{j}]", *_converted(j))
+        w.add(f"_c = rounded({{ff{j}}} + _put[{j}], _steps{j}, _step{j})")
         _put(w, j)
     w.add(*(f"{{z{i}}} = _kept[{i}]" for i in range(rule.states)))
 
 
 def _law(w: Writer) -> None:
-    """A linear controller with a state of its own, `Law`; what is 0 or 1 of its A and B is not computed."""
+    """A linear controller with a state of its own, `Law`."""
     p, law = w.p, w.p.flavour.loop
     assert isinstance(law, Structure)  # asked before
     _read(w)
-    w.add(*(f"_y{i} = _y{i} - {{tg{i}}}" for i in range(p.n)))
-    memory = [f"{{z{i}}}" for i in range(len(law.A))]
-    signals = [f"_y{i}" for i in range(p.n)] + [f"{{ref{c}}}" for c in range(law.references)]
+    given = [name if name.startswith("_") else f"{{{name}}}" for name in _law_arguments(p, law)]
+    found = [f"_c{j}" for j in range(p.nu)] + [f"{{z{i}}}" for i in range(len(law.A))]
+    w.add(f"({', '.join(found)},) = law({', '.join(given)})")
+    for j in range(p.nu):
+        w.add(f"_c = _c{j}")
+        _put(w, j)
+
+
+def _law_arguments(p: Layout, law: Structure) -> list[str]:
+    readings, inputs = range(p.n), range(p.nu)
+    rounding = [f"_step{s}{j}" for j in inputs for s in ("s", "")]
+    limits = [f"lim{j}" for j in inputs] if law.hold else []
+    references = [f"ref{c}" for c in range(law.references)]
+    return [*(f"ff{j}" for j in inputs), *(f"_y{i}" for i in readings), *references, *p.numbers, *rounding, *limits]
+
+
+def law(p: Layout) -> str:
+    """Text of ``law(...)``: commands, rounded, and what a `Law` remembers next; 0 and 1 of its A and B are left out.
+
+    Every operation is rounded by itself and sums run from left to right, so that the law on a rig's own computer can
+    repeat the commands bit for bit.
+    """
+    law = p.flavour.loop
+    assert isinstance(law, Structure)  # asked before
+    memory = [f"z{i}" for i in range(len(law.A))]
+    signals = [f"_w{i}" for i in range(p.n)] + [f"ref{c}" for c in range(law.references)]
 
     def terms(of: str, row: int, values: list[str], known: Sequence[float | None]) -> list[str]:
-        factors = ["" if k == 1 else f"{{l{of}{row}_{i}}} * " for i, k in enumerate(known)]
+        factors = ["" if k == 1 else f"l{of}{row}_{i} * " for i, k in enumerate(known)]
         return [f + x for f, x, k in zip(factors, values, known, strict=True) if k != 0]
 
-    w.add(*["_over = 0.0"] * law.hold)
+    lines = [f"_w{i} = _y{i} - tg{i}" for i in range(p.n)] + ["_over = 0.0"] * law.hold
     for j in range(p.nu):
         both = terms("C", j, memory, [None] * len(memory)) + terms("D", j, signals, [None] * len(signals))
-        w.add(f"_c = {' + '.join([f'{{ff{j}}}', *both])}", *_converted(j))
-        w.add(*[f"_over = 1.0 if abs(_c) > {{lim{j}}} else _over"] * law.hold)
-        _put(w, j)
+        lines.append(f"_c{j} = rounded({' + '.join([f'ff{j}', *both])}, _steps{j}, _step{j})")
+        lines += [f"_over = 1.0 if abs(_c{j}) > lim{j} else _over"] * law.hold
     for i, (a, b) in enumerate(zip(law.A, law.B, strict=True)):
-        w.add(f"_z{i} = {' + '.join(terms('A', i, memory, a) + terms('B', i, signals, b)) or '0.0'}")
+        lines.append(f"_z{i} = {' + '.join(terms('A', i, memory, a) + terms('B', i, signals, b)) or '0.0'}")
     for i, row in enumerate(law.A):  # at the limit sums stand still; what differences and filters remember goes on
         if law.hold and all(k in (None, float(i == j)) for j, k in enumerate(row)):
-            sums = "".join(f" & ({{lA{i}_{j}}} == {float(i == j)})" for j, k in enumerate(row) if k is None)
-            w.add(f"_z = {{z{i}}}", f"_z{i} = _z if (_over != 0.0){sums} else _z{i}")
-        w.add(f"{{z{i}}} = _z{i}")
+            sums = "".join(f" & (lA{i}_{j} == {float(i == j)})" for j, k in enumerate(row) if k is None)
+            lines.append(f"_z{i} = z{i} if (_over != 0.0){sums} else _z{i}")
+    found = [f"_c{j}" for j in range(p.nu)] + [f"_z{i}" for i in range(len(law.A))]
+    body = "\n".join(f"    {line}" for line in [*lines, f"return ({', '.join(found)},)"])
+    return f"@exact\ndef law({', '.join(_law_arguments(p, law))}):\n{body}\n"
 
 
 RUN_ARGUMENTS = (

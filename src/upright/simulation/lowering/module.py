@@ -1,9 +1,9 @@
 """All functions of one text as a module of LLVM's text, with one of them to be called from outside.
 
-The text marks each function with a decorator: ``inline`` and ``inline_strict`` stand where they are called, ``scalar``
-is called, ``entry`` is called from outside, ``separate`` is a module of its own and called by its address, unless all
-stand together. What floats may be rearranged to differs too: no `nnan` or `ninf` anywhere, because a lane that diverges
-must stay visible as NaN.
+The text marks each function with a decorator: ``inline``, ``inline_strict`` and ``exact`` stand where they are called,
+``scalar`` is called, ``entry`` is called from outside, ``separate`` is a module of its own and called by its address,
+unless all stand together. What floats may be rearranged to differs too, nothing in an ``exact`` one: no `nnan` or
+`ninf` anywhere, because a lane that diverges must stay visible as NaN.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ _FAST, _CONTRACT = "reassoc nsz arcp contract afn ", "contract "
 _MARKS = {
     "inline": (_FAST, "alwaysinline"),
     "inline_strict": (_CONTRACT, "alwaysinline"),
+    "exact": ("", "alwaysinline"),
     "scalar": (_CONTRACT, "noinline"),
     "entry": (_FAST, "alwaysinline"),
     "separate": ("", "alwaysinline"),

@@ -1,0 +1,114 @@
+"""How many steps a second does a learner get, beside the public environment of the same kind?
+
+A step is 20 ms of a Furuta pendulum with exact dry friction on both joints (once without any, as the public one has
+none), on a rig that was drawn from a covariance, with reward, ends and new beginnings; the action is another one in
+every lane. The public one is CartPole-v1 without friction in one Euler step of 20 ms: as Gymnasium runs any environment
+in a vector (`SyncVectorEnv`), and in the version of it that was written by hand for NumPy, which no other environment
+has. CPU seconds of one thread, in turns.
+"""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.measure import Contender, Line, Target, compare, page
+
+ASKED = 50.0
+STEPS = 1e6
+
+
+def drawn(dry: float) -> Any:
+    """A rig of the size of a laboratory's, its numbers known to a percent, with so much of its dry friction."""
+    from upright.experiments.identified import IdentifiedRig
+    from upright.physics import Furuta
+    from upright.study.description import Entry, RigDescription
+
+    plant = Furuta(m_p=0.135, l_cg=0.19, r=0.16, J_d=0.011, J_p=6e-4, b_1=6e-4, b_2=1e-4, b_1c=2e-3 * dry,
+                   b_2c=1e-4 * dry)  # fmt: skip
+    rng = np.random.default_rng(0)
+    names = ("m_p", "l_cg", "J_d", "J_p", "b_1", "b_2", "b_1c", "b_2c")
+    rows = 1 + 0.01 * rng.normal(size=(1024, len(names) + 1))
+    draws = tuple(
+        (plant.replace(**{n: getattr(plant, n) * by for n, by in zip(names, row, strict=False)}), 0.05 * row[-1])
+        for row in rows.tolist()
+    )
+    limit = {"limit": Entry(value=5.0, unit="V", source="known")}
+    return IdentifiedRig(
+        plant=plant, name="furuta", gain=0.05, unit="V", draws=draws, description=RigDescription(entries=limit)
+    )
+
+
+def ours(lanes: int, task: str, dry: float = 1.0) -> Callable[[], Contender]:
+    """This project's vector environment."""
+
+    def build() -> Contender:
+        from upright.exports.environment import RigVectorEnv
+
+        asked = Target(most=1 / ASKED) if lanes > 1000 else None  # fewer hardly pay for the call
+        return stepped(RigVectorEnv(drawn(dry), lanes, task=task), target=asked)
+
+    return build
+
+
+def public(lanes: int, mode: str) -> Callable[[], Contender]:
+    """CartPole-v1 of Gymnasium."""
+
+    def build() -> Contender:
+        import gymnasium
+
+        return stepped(gymnasium.make_vec("CartPole-v1", num_envs=lanes, vectorization_mode=mode))
+
+    return build
+
+
+def stepped(env: Any, target: Target | None = None) -> Contender:
+    """A vector environment under random actions."""
+    env.reset(seed=0)
+    env.action_space.seed(0)
+    actions = [env.action_space.sample() for _ in range(20)]
+
+    def run() -> None:
+        for action in actions:
+            env.step(action)
+
+    return Contender(name="", run=run, share=env.num_envs * len(actions) / STEPS, target=target)
+
+
+def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None = None) -> list[Line]:
+    """CPU seconds per million steps of an environment."""
+    builders = {
+        "CartPole-v1, SyncVectorEnv, 64 lanes": public(64, "sync"),
+        "CartPole-v1 by hand for NumPy, 4,096 lanes": public(4096, "vector_entry_point"),
+    }
+    builders |= {
+        f"upright, {task}, {lanes:,} lanes": ours(lanes, task)
+        for task in ("balance", "swing_up")
+        for lanes in (256, 4096)
+    }
+    builders["upright, balance, no dry friction, 4,096 lanes"] = ours(4096, "balance", 0.0)
+    named = {name: lambda name=name, build=build: replace(build(), name=name) for name, build in builders.items()}
+    lines = compare(named, rounds=5 if quick else 25, progress=progress)
+    if markdown is not None:
+        markdown.write_text(_page(lines), encoding="utf-8")
+    return lines
+
+
+def _page(lines: list[Line]) -> str:
+    rows = [f"Measured on one core ({platform.machine()}), Python {platform.python_version()}.", ""]
+    rows += ["| | million steps a second (quartiles) | times the first (quartiles) |", "|---|---|---|"]
+    for line in lines:
+        if line.seconds is None or line.ratio is None:
+            rows.append(f"| {line.contender} | {line.note} | |")
+            continue
+        rate, high, low = (1 / s for s in line.seconds)
+        ratio, most, least = (1 / r for r in line.ratio)
+        asked = f", asked {ASKED:g}" if line.target else ""
+        speed, times = f"{rate:.3g} ({low:.3g} to {high:.3g})", f"{ratio:.3g} ({least:.3g} to {most:.3g})"
+        rows.append(f"| {line.contender} | {speed} | {times}{asked} |")
+    return page("gym", "Steps of an environment", __doc__, ["", *rows])

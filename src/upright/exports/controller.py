@@ -1,0 +1,206 @@
+"""The sampled law that a program elsewhere is to run, with names, units and what it was designed for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from upright.errors import BadInput
+from upright.laws import Law, Rule
+
+AGAIN = "write it again with `upright design ... -o FOLDER`"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SampledController:
+    """One lane of a `Law` with its period, limit and rounding, and how its signals are called.
+
+    Attributes
+    ----------
+    law : Law
+    readings, references, commands : tuple of str
+    reading_units : tuple of str
+    command_unit : str
+    signs : tuple of float
+        Of the encoders, one for each reading.
+    title : str
+        Rig and equilibrium.
+    states_from : str
+        How speeds are made of readings.
+    delay : float
+        How late a command acts, as the design assumed [samples].
+    """
+
+    law: Law
+    readings: tuple[str, ...]
+    commands: tuple[str, ...]
+    references: tuple[str, ...] = ()
+    reading_units: tuple[str, ...] = ()
+    command_unit: str = ""
+    signs: tuple[float, ...] = ()
+    title: str = "a sampled law"
+    states_from: str = ""
+    delay: float | None = None
+
+    @property
+    def converter(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Step of each command's converter, 0 for none."""
+        return np.broadcast_to(np.asarray(self.law.command_quantum, dtype=np.float64), (len(self.commands),))
+
+    @property
+    def encoder(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Step of each encoder, 0 for none."""
+        return np.broadcast_to(np.asarray(self.law.quantum, dtype=np.float64), (len(self.readings),))
+
+    @property
+    def facts(self) -> list[str]:
+        """What a reader of the program has to know, a sentence each."""
+        units = [f"{n} [{u}]" if u else n for n, u in zip(self.readings, self.reading_units, strict=True)]
+        unit = f" [{self.command_unit}]" if self.command_unit else ""
+        rest = [f"{v!r}" for v in self.law.arrays()["target"][0].tolist()]
+        said = [
+            f"Call it every {self.law.period!r} s, with readings taken just before, and put the command out at once.",
+            f"Readings: {', '.join(units)}; at rest {', '.join(rest)}.",
+            f"Commands: {', '.join(self.commands)}{unit}; "
+            + (f"none beyond {self.law.limit!r}" if math.isfinite(self.law.limit) else "NO LIMIT WAS SAID")
+            + (f", in steps of {self.converter.max():g}." if self.converter.any() else ", not rounded."),
+        ]
+        if self.references:
+            said.append(f"References: {', '.join(self.references)}, as deviations from rest.")
+        if self.states_from:
+            said.append(f"States from readings: {self.states_from}.")
+        if self.delay is not None:
+            samples = "sample" if self.delay == 1 else "samples"
+            said.append(f"Designed for commands that act {self.delay:g} {samples} late in all.")
+        return said
+
+
+def of_law(law: Any) -> SampledController:
+    """A law that was made in Python.
+
+    Raises
+    ------
+    BadInput
+        When it is none that can be written out: no period, several lanes, a function.
+    """
+    if isinstance(law, Rule):
+        raise BadInput(
+            "an exported law is a linear one, a Law, and this is a Rule, a function in Python; its text can be taken "
+            "to a computer that runs Python as it is, and Rule.follow calls it on logged readings."
+        )
+    if not isinstance(law, Law):
+        raise BadInput(
+            f"export takes design.json or its folder, what design(...) answers, or a Law, got {type(law).__name__}; "
+            "for gains alone make a Law: upright.laws.state_feedback(K, period)."
+        )
+    lanes = max(law.widths().values())
+    if lanes > 1:
+        raise BadInput(f"one law can be exported, and this one is given for {lanes} lanes; take one: law.of_lanes(...)")
+    if not law.period:
+        raise BadInput("an exported law needs its sample period; give it: dataclasses.replace(law, period=1e-3).")
+    single = {name: a[..., 0] for name, (a, axes) in law.arrays().items() if a.ndim > axes}
+    made = replace(law, **single) if single else law
+    readings = tuple(map(plain, law.measured)) or tuple(f"y{i}" for i in range(law.readings))
+    references = tuple(map(plain, law.reference_names)) or tuple(f"r{i}" for i in range(law.signal().shape[1]))
+    inputs = len(law.C)
+    return _without_idle_references(
+        SampledController(
+            law=made, readings=readings, references=references, reading_units=("",) * len(readings),
+            signs=(1.0,) * len(readings), commands=("u",) if inputs == 1 else tuple(f"u{j}" for j in range(inputs)),
+            delay=law.delay or None,
+        )
+    )  # fmt: skip
+
+
+def of_design(content: Any, source: str) -> SampledController:
+    """The law of `design.json`.
+
+    Parameters
+    ----------
+    content : mapping
+        What the file holds.
+    source : str
+        As it was called, for sentences about it.
+
+    Raises
+    ------
+    BadInput
+        When it is no design, was written before laws could be exported, or its loop falls.
+    """
+    if isinstance(content, Mapping) and {"plant", "parameters"} <= content.keys():
+        raise BadInput(
+            f"{source} is a fit, and a law is what `upright design {source} --poles ... -o FOLDER` makes of it; the "
+            "rig itself goes --to gymnasium, mjcf or fmu."
+        )
+    if not isinstance(content, Mapping) or not {"law", "K", "period"} <= content.keys():
+        raise BadInput(f"{source} is no design.json; it needs the keys law, K and period: {AGAIN}.")
+    missing = [key for key in ("readings", "begin", "converter", "command", "margins") if key not in content]
+    if missing:
+        raise BadInput(f"{source} lacks {', '.join(missing)}, as older versions wrote it; {AGAIN}.")
+    if content["margins"] is None:
+        raise BadInput(
+            f"the loop of {source} falls, so its law is not exported: {content.get('verdict', '')} Design it so that "
+            "it stands first."
+        )
+    try:
+        return _without_idle_references(_read(content))
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise BadInput(f"{source} does not hold a law ({error}); {AGAIN}.") from None
+
+
+def _read(content: Mapping[str, Any]) -> SampledController:
+    told, readings = content["law"], list(content["readings"])
+    A, B, C, D = (np.array(told[name], dtype=np.float64) for name in "ABCD")
+    p, z = len(readings), len(content["law"]["A"])
+    keep = [*range(p), *range(2 * p, D.shape[1])]  # less what is subtracted at rest
+    limit, names = content["limit"], tuple(str(r["name"]) for r in readings)
+    described = (content.get("described") or {}).get("entries", {})
+    law = Law(
+        A.reshape(z, z), B.reshape(z, D.shape[1])[:, keep], C.reshape(-1, z), D[:, keep],
+        begin=np.array(content["begin"], dtype=np.float64).reshape(z, p), measured=names,
+        reference_names=tuple("reference" for _ in keep[p:]), period=float(content["period"]),
+        target=np.array([r["at_rest"] for r in readings], dtype=np.float64),
+        limit=math.inf if limit is None else float(limit), command_quantum=float(content["converter"]),
+        quantum=np.array([r["step"] for r in readings], dtype=np.float64),
+    )  # fmt: skip
+    at = f" at '{content['at']}'" if content.get("at") else ""
+    return SampledController(
+        law=law, readings=tuple(map(plain, names)), reading_units=tuple(plain(str(r["unit"])) for r in readings),
+        commands=(plain(content["command"]),), references=law.reference_names,
+        command_unit=plain(str(content.get("command_unit") or "")),
+        signs=tuple(float(described.get(f"sign.{n}", {}).get("value", 1.0)) for n in names),
+        title=plain(f"{content.get('plant', 'a rig')}{at}"), states_from=plain(str(content.get("states_from", ""))),
+        delay=content.get("delay_samples"),
+    )  # fmt: skip
+
+
+def _without_idle_references(made: SampledController) -> SampledController:
+    """The same without references that nothing depends on."""
+    law, p = made.law, len(made.readings)
+    used = [c for c in range(law.D.shape[1] - p) if law.B[:, p + c].any() or law.D[:, p + c].any()]
+    keep = [*range(p), *(p + c for c in used)]
+    names = tuple(made.references[c] for c in used)
+    return replace(
+        made, references=names,
+        law=replace(law, B=law.B[:, keep], D=law.D[:, keep], reference_names=names, references=None),
+    )  # fmt: skip
+
+
+def plain(text: str) -> str:
+    """A name as it can stand in a comment or a text of any language, ending neither."""
+    kept = "".join(c if c.isprintable() else " " for c in text)
+    return kept.replace("\\", "/").replace("*/", "* /").replace("/*", "/ *").replace('"', "'")
+
+
+def identifiers(names: Sequence[str]) -> list[str]:
+    """Names as programs can spell them, each another."""
+    made: list[str] = []
+    for i, name in enumerate(names):
+        plain = "".join(c if c.isascii() and (c.isalnum() or c == "_") else "_" for c in name).strip("_") or f"y{i}"
+        plain = plain if not plain[0].isdigit() else f"y_{plain}"
+        made.append(plain if plain not in made else f"{plain}_{i}")
+    return made

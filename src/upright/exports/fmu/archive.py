@@ -1,0 +1,124 @@
+"""The unit as a file: description, sources and, where there is a compiler, the library for this machine."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import platform
+import shutil
+import subprocess
+import tempfile
+import uuid
+import zipfile
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+from upright import __version__
+from upright.errors import BadInput
+from upright.exports.fmu.source import source
+from upright.exports.fmu.unit import STEP, Unit, Variable
+
+NAME = "rig"
+_ENDINGS = {"Linux": ("linux", "so"), "Darwin": ("darwin", "dylib"), "Windows": ("windows", "dll")}
+
+
+def build(unit: Unit) -> tuple[bytes, str]:
+    """Bytes of the archive, and the platform that its library is for; "" where no C compiler is found."""
+    text = source(unit, "{TOKEN}")
+    token = "{" + str(uuid.uuid5(uuid.NAMESPACE_URL, hashlib.sha256(text.encode()).hexdigest())) + "}"
+    text = text.replace("{TOKEN}", token)
+    files = {
+        "modelDescription.xml": description(unit, token).encode(),
+        f"sources/{NAME}.c": text.encode(),
+        "sources/buildDescription.xml": _BUILD.encode(),
+    }
+    library = compiled(text)
+    system, ending = _ENDINGS.get(platform.system(), ("", ""))
+    where = f"{_machine()}-{system}"
+    if library is not None:
+        files[f"binaries/{where}/{NAME}.{ending}"] = library
+    held = io.BytesIO()
+    with zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in files.items():
+            archive.writestr(zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0)), content, zipfile.ZIP_DEFLATED)
+    return held.getvalue(), where if library is not None else ""
+
+
+def compiled(text: str) -> bytes | None:
+    """The library, None where there is no C compiler.
+
+    Raises
+    ------
+    BadInput
+        When there is one and it fails.
+    """
+    compiler = next((c for c in ("cc", "gcc", "clang") if shutil.which(c)), None)
+    if compiler is None or platform.system() not in _ENDINGS:
+        return None
+    with tempfile.TemporaryDirectory() as folder:
+        file, library = Path(folder) / f"{NAME}.c", Path(folder) / NAME
+        file.write_text(text, encoding="utf-8")
+        options = ["-std=c99", "-O2", "-shared", "-fPIC", "-fvisibility=hidden"]
+        done = subprocess.run(
+            [compiler, *options, str(file), "-o", str(library), "-lm"], capture_output=True, check=False
+        )  # fmt: skip
+        if done.returncode:
+            said = (done.stderr.decode(errors="replace").strip() or "nothing said").splitlines()[0]
+            raise BadInput(
+                f"the C compiler {compiler} did not make the unit's library: {said}; does it work otherwise?"
+            )
+        return library.read_bytes()
+
+
+def _machine() -> str:
+    machine = platform.machine().lower()
+    return {"amd64": "x86_64", "arm64": "aarch64"}.get(machine, machine)
+
+
+def description(unit: Unit, token: str) -> str:
+    """Text of ``modelDescription.xml``."""
+    variables = [
+        '    <Float64 name="time" valueReference="0" causality="independent" variability="continuous" unit="s"/>'
+    ]
+    outputs: list[str] = []
+    for number, v in enumerate([*unit.inputs, *unit.states, *unit.starts, *unit.parameters], start=1):
+        variables.append(_variable(v, number))
+        outputs += [str(number)] if v.causality == "output" else []
+    units = sorted({v.unit for v in [*unit.inputs, *unit.states, *unit.parameters] if v.unit} | {"s"})
+    structure = [f'    <{kind} valueReference="{n}"/>' for kind in ("Output", "InitialUnknown") for n in outputs]
+    return "\n".join([
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        f'<fmiModelDescription fmiVersion="3.0" modelName={quoteattr(unit.rig.name)} instantiationToken="{token}"',
+        f'    generationTool="upright {__version__}" variableNamingConvention="flat">',
+        f'  <CoSimulation modelIdentifier="{NAME}" canHandleVariableCommunicationStepSize="true"',
+        f'      fixedInternalStepSize="{STEP!r}"/>',
+        "  <UnitDefinitions>", *(f"    <Unit name={quoteattr(u)}/>" for u in units), "  </UnitDefinitions>",
+        '  <LogCategories>', '    <Category name="logStatusError"/>', "  </LogCategories>",
+        f'  <DefaultExperiment startTime="0.0" stopTime="5.0" stepSize="{10 * STEP!r}"/>',
+        "  <ModelVariables>", *variables, "  </ModelVariables>",
+        "  <ModelStructure>", *structure, "  </ModelStructure>",
+        "</fmiModelDescription>", "",
+    ])  # fmt: skip
+
+
+def _variable(v: Variable, number: int) -> str:
+    about = f'name={quoteattr(v.name)} valueReference="{number}" description={quoteattr(v.meaning)}'
+    about += f" unit={quoteattr(v.unit)}" if v.unit else ""
+    kind = {
+        "input": f'causality="input" variability="continuous" start="{v.value!r}"',
+        "output": 'causality="output" variability="continuous" initial="calculated"',
+        "parameter": f'causality="parameter" variability="fixed" initial="exact" start="{v.value!r}"',
+    }[v.causality]
+    return f"    <Float64 {about} {kind}/>"
+
+
+_BUILD = f"""\
+<?xml version="1.0" encoding="UTF-8"?>
+<fmiBuildDescription fmiVersion="3.0">
+  <BuildConfiguration modelIdentifier="{NAME}">
+    <SourceFileSet language="C99">
+      <SourceFile name="{NAME}.c"/>
+    </SourceFileSet>
+  </BuildConfiguration>
+</fmiBuildDescription>
+"""

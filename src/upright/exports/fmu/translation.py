@@ -1,0 +1,329 @@
+"""The kernel's text as C: the same loop, the same events of dry friction, one function each.
+
+The text is a small part of Python: numbers, arrays of numbers by index, loops over ranges, functions that return one
+number or a tuple of them. Whole numbers become long, all others double; a name is whole if it holds nothing else.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+Kind = Literal["long", "double", "double *", "long *"]
+Arrays = Mapping[str, tuple[Kind, tuple[int, ...]]]
+"""Kind of each array argument, and what each of its indices is multiplied by."""
+
+_OPERATORS: dict[type[ast.AST], str] = {
+    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "/", ast.Mod: "%", ast.BitAnd: "&",
+    ast.BitOr: "|", ast.BitXor: "^", ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==",
+    ast.NotEq: "!=", ast.And: "&&", ast.Or: "||", ast.USub: "-", ast.UAdd: "+", ast.Not: "!",
+}  # fmt: skip
+_LIBRARY = {"floor", "sqrt", "exp", "sin", "cos", "tan", "log", "ldexp"}
+_CONSTANTS = {"nan": "NAN", "pi": "3.141592653589793"}
+_KEYWORDS = {
+    "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum", "extern", "float",
+    "for", "goto", "if", "inline", "int", "long", "register", "restrict", "return", "short", "signed", "sizeof",
+    "static", "struct", "switch", "typedef", "union", "unsigned", "void", "volatile", "while",
+}  # fmt: skip
+
+HELPERS = """\
+static long least_l(long a, long b) { return b < a ? b : a; }
+static long most_l(long a, long b) { return b > a ? b : a; }
+static double least_d(double a, double b) { return b < a ? b : a; }
+static double most_d(double a, double b) { return b > a ? b : a; }
+"""
+"""What `min` and `max` become: the first unless the second is better."""
+
+
+@dataclass
+class _Known:
+    """What is known of a function: kinds of its names, and what it returns; a tuple through its last argument."""
+
+    node: ast.FunctionDef
+    kinds: dict[str, Kind] = field(default_factory=dict[str, Kind])
+    gives: Literal["nothing", "number", "tuple"] = "nothing"
+    result: Kind = "long"
+
+    @property
+    def arguments(self) -> list[str]:
+        return [a.arg for a in self.node.args.args]
+
+
+def translated(text: str, entry: str, arrays: Arrays, sizes: Mapping[str, str]) -> str:
+    """Functions in C that `entry` needs, itself the last.
+
+    Parameters
+    ----------
+    text : str
+        Of a kernel, `simulation.kernel.compiled.source`.
+    entry : str
+    arrays : mapping
+        Of the entry.
+    sizes : mapping of str to str
+        In C, what ``X.size`` and ``X.shape[0]`` are, by ``"X"``.
+    """
+    functions = {n.name: _Known(n) for n in ast.parse(text).body if isinstance(n, ast.FunctionDef)}
+    needed = _needed(functions, entry)
+    for name in functions[entry].arguments:
+        functions[entry].kinds[name] = arrays[name][0] if name in arrays else "double" if name == "_dt" else "long"
+    for known in functions.values():
+        returns = [n.value for n in ast.walk(known.node) if isinstance(n, ast.Return) and n.value is not None]
+        if returns:
+            known.gives = "tuple" if isinstance(returns[0], ast.Tuple) else "number"
+    while _infer(functions, needed):
+        pass
+    return "\n".join(_Writer(functions[n], functions, arrays, sizes).text() for n in needed)
+
+
+def _needed(functions: Mapping[str, _Known], entry: str) -> list[str]:
+    """Functions by name, each after those that it calls."""
+    out: list[str] = []
+
+    def visit(name: str) -> None:
+        for node in ast.walk(functions[name].node):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in functions:
+                visit(node.func.id)
+        if name not in out:
+            out.append(name)
+
+    visit(entry)
+    return out
+
+
+def _infer(functions: Mapping[str, _Known], needed: list[str]) -> bool:
+    """Let names hold what they are given; whether any kind changed."""
+    changed = False
+
+    def widen(known: _Known, name: str, kind: Kind) -> None:
+        nonlocal changed
+        before = known.kinds.get(name)
+        wanted = kind if before in (None, "long") else before
+        if wanted != before:
+            known.kinds[name], changed = wanted, True
+
+    for name in needed:
+        known = functions[name]
+        for node in ast.walk(known.node):
+            if isinstance(node, ast.Assign):
+                for target in node.targets:
+                    pairs = [(target, node.value)]
+                    if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple):
+                        pairs = list(zip(target.elts, node.value.elts, strict=True))
+                    elif isinstance(target, ast.Tuple):
+                        pairs = [(t, ast.Constant(0.0)) for t in target.elts]
+                    for t, value in pairs:
+                        if isinstance(t, ast.Name):
+                            widen(known, t.id, _kind(value, known, functions))
+            elif isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name):
+                widen(known, node.target.id, _kind(ast.BinOp(node.target, node.op, node.value), known, functions))
+            elif isinstance(node, ast.For) and isinstance(node.target, ast.Name):
+                widen(known, node.target.id, "long")
+            elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in functions:
+                called = functions[node.func.id]
+                for argument, value in zip(called.arguments, node.args, strict=True):
+                    widen(called, argument, _kind(value, known, functions))
+            elif isinstance(node, ast.Return) and node.value is not None and known.gives == "number":
+                kind = _kind(node.value, known, functions)
+                if known.result == "long" and kind == "double":
+                    known.result, changed = "double", True
+    return changed
+
+
+def _kind(node: ast.expr, known: _Known, functions: Mapping[str, _Known]) -> Kind:
+    """What an expression is."""
+
+    def of(*nodes: ast.expr) -> Kind:
+        return "double" if any(_kind(n, known, functions) == "double" for n in nodes) else "long"
+
+    match node:
+        case ast.Constant(value=value):
+            return "double" if isinstance(value, float) else "long"
+        case ast.Name(id=name):
+            return "double" if name in _CONSTANTS else known.kinds.get(name, "long")
+        case ast.BinOp(left=left, op=op, right=right):
+            return "double" if isinstance(op, ast.Div | ast.Pow) else of(left, right)
+        case ast.UnaryOp(op=op, operand=operand):
+            return "long" if isinstance(op, ast.Not) else of(operand)
+        case ast.IfExp(body=body, orelse=orelse):
+            return of(body, orelse)
+        case ast.Call(func=ast.Name(id=name), args=args):
+            if name in functions:
+                return functions[name].result
+            return of(*args) if name in ("abs", "min", "max") else "long" if name == "int" else "double"
+        case ast.Subscript(value=ast.Name(id=name), slice=ast.Slice()):
+            return known.kinds.get(name, "double *")
+        case ast.Subscript(value=ast.Name(id=name)):
+            return "long" if known.kinds.get(name) == "long *" else "double"
+        case _:
+            return "long"  # comparisons, sizes
+
+
+class _Writer:
+    """Writes one function."""
+
+    def __init__(
+        self, known: _Known, functions: Mapping[str, _Known], arrays: Arrays, sizes: Mapping[str, str]
+    ) -> None:
+        self.known, self.functions, self.arrays, self.sizes = known, functions, arrays, sizes
+        self.lines: list[str] = []
+        self.depth = 1
+        self.temporaries = 0
+
+    def text(self) -> str:
+        known = self.known
+        given = [_declared(known.kinds.get(a, "double"), _name(a)) for a in known.arguments]
+        given += ["double *result_"] if known.gives == "tuple" else []
+        result = known.result if known.gives == "number" else "void"
+        head = f"static {result} k_{known.node.name}({', '.join(given)})"
+        for statement in known.node.body:
+            self.statement(statement)
+        own = {n: k for n, k in known.kinds.items() if n not in known.arguments}
+        declared = [
+            f"    {kind} " + ", ".join(f"{_name(n)} = 0" for n, k in own.items() if k == kind) + ";"
+            for kind in ("long", "double")
+            if kind in own.values()
+        ]
+        return "\n".join([head, "{", *declared, *self.lines, "}", ""])
+
+    def add(self, line: str) -> None:
+        self.lines.append("    " * self.depth + line)
+
+    def block(self, body: list[ast.stmt]) -> None:
+        self.depth += 1
+        for statement in body:
+            self.statement(statement)
+        self.depth -= 1
+
+    def statement(self, node: ast.stmt) -> None:
+        match node:
+            case ast.Assign(targets=[target], value=value):
+                self.assign(target, value)
+            case ast.AugAssign(target=target, op=op, value=value):
+                self.add(f"{self.value(target)} {_OPERATORS[type(op)]}= {self.value(value)};")
+            case ast.For(target=ast.Name(id=name), iter=ast.Call(args=[*ends])):
+                low, high = ("0", self.value(ends[0])) if len(ends) == 1 else (self.value(e) for e in ends)
+                i = _name(name)
+                self.add(f"for ({i} = {low}; {i} < {high}; {i}++) {{")
+                self.block(node.body)
+                self.add("}")
+            case ast.If(test=test, body=body, orelse=orelse):
+                self.add(f"if ({self.value(test)}) {{")
+                self.block(body)
+                if orelse:
+                    self.add("} else {")
+                    self.block(orelse)
+                self.add("}")
+            case ast.Return(value=None):
+                self.add("return;")
+            case ast.Return(value=ast.Tuple(elts=elts)):
+                for k, part in enumerate(elts):
+                    self.add(f"result_[{k}] = {self.value(part)};")
+                self.add("return;")
+            case ast.Return(value=value) if value is not None:
+                self.add(f"return {self.value(value)};")
+            case ast.Expr(value=ast.Call() as call):
+                self.add(f"{self.value(call)};")
+            case ast.Expr():
+                pass  # what a function says of itself
+            case ast.Break() | ast.Continue():
+                self.add(f"{type(node).__name__.lower()};")
+            case _:
+                raise NotImplementedError(ast.unparse(node))
+
+    def assign(self, target: ast.expr, value: ast.expr) -> None:
+        if isinstance(target, ast.Tuple):
+            self.temporaries += 1
+            several = f"several_{self.temporaries}"
+            count = len(target.elts)
+            self.add("{")
+            self.depth += 1
+            if isinstance(value, ast.Tuple):  # whole numbers up to 2^53 are doubles, too
+                self.add(f"const double {several}[{count}] = {{{', '.join(self.value(v) for v in value.elts)}}};")
+            else:
+                self.add(f"double {several}[{count}];")
+                self.add(f"{self.value(value)[:-1]}, {several});")
+            for k, part in enumerate(target.elts):
+                cast = "(long)" if _kind(part, self.known, self.functions) == "long" else ""
+                self.add(f"{self.value(part)} = {cast}{several}[{k}];")
+            self.depth -= 1
+            self.add("}")
+        elif isinstance(target, ast.Subscript) and isinstance(target.slice, ast.Slice):
+            array = ast.unparse(target.value)
+            self.add(f"memset({_name(array)}, 0, sizeof(double) * {self.sizes[array]});")
+        else:
+            self.add(f"{self.value(target)} = {self.value(value)};")
+
+    def value(self, node: ast.expr) -> str:
+        match node:
+            case ast.Constant(value=bool() as value):
+                return str(int(value))
+            case ast.Constant(value=int() | float() as value):
+                return repr(value)
+            case ast.Name(id=name):
+                return _CONSTANTS.get(name, _name(name))
+            case ast.BinOp(left=left, op=ast.Pow(), right=right):
+                return f"pow({self.value(left)}, {self.value(right)})"
+            case ast.BinOp(left=left, op=op, right=right):
+                whole = isinstance(op, ast.Div) and _kind(left, self.known, self.functions) == "long"
+                return f"({'(double)' * whole}{self.value(left)} {_OPERATORS[type(op)]} {self.value(right)})"
+            case ast.UnaryOp(op=op, operand=operand):
+                return f"({_OPERATORS[type(op)]}{self.value(operand)})"
+            case ast.BoolOp(op=op, values=values):
+                return "(" + f" {_OPERATORS[type(op)]} ".join(self.value(v) for v in values) + ")"
+            case ast.Compare(left=left, ops=ops, comparators=rights):
+                ends = [left, *rights]
+                pairs = zip(ends, ops, rights, strict=False)
+                return "(" + " && ".join(
+                    f"({self.value(a)} {_OPERATORS[type(op)]} {self.value(b)})" for a, op, b in pairs
+                ) + ")"  # fmt: skip
+            case ast.IfExp(test=test, body=body, orelse=orelse):
+                return f"({self.value(test)} ? {self.value(body)} : {self.value(orelse)})"
+            case ast.Call(func=ast.Name(id=name), args=args):
+                return self.call(name, args, node)
+            case ast.Subscript():
+                return self.element(node)
+            case ast.Attribute(value=ast.Name(id=name), attr="size"):
+                return self.sizes[name]
+            case _:
+                raise NotImplementedError(ast.unparse(node))
+
+    def call(self, name: str, args: list[ast.expr], node: ast.expr) -> str:
+        given = ", ".join(self.value(a) for a in args)
+        if name in self.functions:
+            return f"k_{name}({given})"
+        if name in _LIBRARY:
+            return f"{name}({'(double)' if name != 'ldexp' and len(args) == 1 else ''}{given})"
+        whole = _kind(node, self.known, self.functions) == "long"
+        if name == "abs":
+            return f"labs({given})" if whole else f"fabs({given})"
+        if name in ("min", "max"):
+            return f"{'least' if name == 'min' else 'most'}_{'l' if whole else 'd'}({given})"
+        if name in ("int", "float"):
+            return f"({'long' if name == 'int' else 'double'})({given})"
+        raise NotImplementedError(name)
+
+    def element(self, node: ast.Subscript) -> str:
+        if isinstance(node.value, ast.Attribute):  # X.shape[0]
+            return self.sizes[ast.unparse(node.value.value)]
+        array = ast.unparse(node.value)
+        if isinstance(node.slice, ast.Slice):
+            assert node.slice.lower is not None
+            return f"({_name(array)} + {self.value(node.slice.lower)})"
+        indices = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+        by = self.arrays[array][1] if array in self.arrays and len(indices) > 1 else (1,)
+        at = " + ".join(
+            self.value(i) if step == 1 else f"{step} * {self.value(i)}" for i, step in zip(indices, by, strict=True)
+        )
+        return f"{_name(array)}[{at}]"
+
+
+def _declared(kind: Kind, name: str) -> str:
+    return f"{kind}{name}" if kind.endswith("*") else f"{kind} {name}"
+
+
+def _name(name: str) -> str:
+    """A name that C does not keep for itself."""
+    plain = f"{name.lstrip('_') or 'turn'}_" if name.startswith("_") else name
+    return f"{plain}_" if plain in _KEYWORDS else plain

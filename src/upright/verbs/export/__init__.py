@@ -1,0 +1,66 @@
+"""A designed law or an identified rig, written for a loop that runs elsewhere."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from upright.errors import BadInput, nearest
+from upright.files import keeps_its_inputs
+from upright.verbs.answer import Answer
+from upright.verbs.export.law import controller, write_law
+from upright.verbs.export.rig import FORMS
+from upright.verbs.pages import folder
+
+LAWS = ("c", "arduino", "python", "matlab", "simulink")
+"""Forms of a law, `exports.targets.TARGETS`."""
+
+
+@keeps_its_inputs
+def export(
+    source: Any, *, to: str, out: str | os.PathLike[str] = "upright-export", single: bool = False,
+    limit: float | None = None,
+) -> Answer[tuple[str, ...]]:  # fmt: skip
+    """A designed law as a program for the computer that closes the loop, or an identified rig for other simulators.
+
+    A program repeats the commands of upright's own kernel bit for bit in double precision, and carries a replay by
+    which it tests itself.
+
+    Parameters
+    ----------
+    source : path, answer of `design`, or Law
+        Of a law design.json or its folder; of a rig fit.json or its folder.
+    to : str
+        A law as ``"c"``, ``"arduino"``, ``"python"``, ``"matlab"`` (GNU Octave too) or ``"simulink"``; a rig as
+        ``"gymnasium"``, an environment whose every episode has another rig that the fit allows, ``"mjcf"``, a
+        model of MuJoCo, or ``"fmu"``, a unit for co-simulation (FMI 3.0).
+    out : path
+        Folder for the files.
+    single : bool
+        Of a law, single precision (the command line's ``--float``); its commands miss by a converter's step at times.
+    limit : float, optional
+        Of a rig, the largest command, in its unit; the fit's when omitted.
+
+    Returns
+    -------
+    Answer
+        Of the names of the files.
+
+    Raises
+    ------
+    BadInput
+        When there is no such form, or what was given cannot be written in it.
+    """
+    if to not in (*LAWS, *FORMS):
+        raise BadInput(f"--to is one of {', '.join((*LAWS, *FORMS))}, got '{to}'; {nearest(to, (*LAWS, *FORMS))}")
+    if to in LAWS:
+        if limit is not None:
+            raise BadInput("the limit of a law is the one that it was designed with; give --limit to upright design.")
+        made, name = controller(source)
+        return write_law(made, name, to, folder(out), single)
+    if single:
+        raise BadInput("--float is of laws; a rig is simulated in double precision.")
+    if not isinstance(source, str | os.PathLike):
+        raise BadInput(f"a rig is exported from its fit.json or the folder of it, got {type(source).__name__}.")
+    return FORMS[to](Path(source), folder(out), limit)

@@ -1,0 +1,74 @@
+"""A designed law, written as a program."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from upright.errors import BadInput
+from upright.files import read_text, replace_file
+from upright.verbs.answer import Answer
+
+if TYPE_CHECKING:
+    from upright.exports.controller import SampledController
+
+
+def controller(source: Any) -> tuple[SampledController, str]:
+    """The law to be written, and what it is called by."""
+    from upright.exports.controller import of_design, of_law
+
+    if isinstance(source, Answer) and "law" in (source.numbers or {}):
+        from upright.files import plain_values
+
+        return of_design(plain_values(source.numbers), "this design"), "this design"
+    if not isinstance(source, str | os.PathLike):
+        return of_law(source), "this law"
+    path = Path(source)
+    path = path / "design.json" if path.is_dir() else path
+    if not path.exists():
+        raise BadInput(f"{path} does not exist; `upright design ... -o FOLDER` writes FOLDER/design.json.")
+    try:
+        content = json.loads(read_text(path))
+    except (UnicodeDecodeError, ValueError, RecursionError):
+        raise BadInput(f"{path} is no design.json; `upright design ... -o FOLDER` writes one.") from None
+    return of_design(content, str(path)), str(path)
+
+
+def write_law(made: SampledController, name: str, to: str, at: Path, single: bool) -> Answer[tuple[str, ...]]:
+    """The law in one form, its files in a folder."""
+    from upright.exports.targets import TARGETS
+    from upright.exports.vector import self_test
+    from upright.report.page import Chapter, Part, Points, Step
+    from upright.report.symbols import number, typed
+
+    target, test = TARGETS[to], self_test(made)
+    texts = target.write(made, test, single)
+    files = [replace_file(at / file, text.encode()) for file, text in texts.items()]
+    unit, step = made.command_unit, float(made.converter.max(initial=0.0))
+    warnings: list[str] = []
+    if not math.isfinite(made.law.limit):
+        warnings.append("Nobody said how large a command may be, so the program limits none: design with --limit.")
+    exact = f"{len(test.readings)} samples are replayed and compared bit for bit"
+    miss = f"{number(test.single, 2)} {unit}".strip()
+    if single:
+        exact = f"{len(test.readings)} samples are replayed and may miss by {miss} in single precision"
+        if test.single > step * 1.001:
+            than = f"more than the converter's step of {number(step, 2)} {unit}" if step else "which no converter hides"
+            warnings.append(f"Single precision may move a command by {miss}, {than}; a slower period moves it less.")
+    elif to == "arduino":
+        warnings.append(f"On boards whose double has 32 bits commands may miss by {miss}.")
+    told = Chapter(
+        title=f"{made.title} for {target.name}", verdict=f"{name} is written for {target.name}; {exact}.",
+        parts=(Part("What it takes and gives", (Points(tuple(made.facts)),)),), warnings=tuple(warnings),
+        steps=(
+            Step("Let it test itself where it will run.", target.test.format(folder=typed(at))), Step(target.onward)
+        ),
+        numbers={
+            "to": to, "files": [str(f) for f in files], "period": made.law.period, "limit": made.law.limit,
+            "samples": len(test.readings), "single_precision_misses": test.single,
+        },
+    )  # fmt: skip
+    return Answer(tuple(str(f) for f in files), told, files)

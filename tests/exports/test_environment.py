@@ -1,0 +1,174 @@
+"""Is an exported rig an environment as Gymnasium wants it, and does it move as the rig does?"""
+
+from __future__ import annotations
+
+import runpy
+import warnings
+
+import numpy as np
+import pytest
+
+from tests.exports.rigs import fit_file
+from upright.errors import BadInput
+from upright.experiments.identified import read_identified
+from upright.exports.episodes import Episodes
+from upright.physics import CartPendulum, Furuta, Pendulum, find
+from upright.simulation import simulate
+from upright.verbs.export import export
+
+gymnasium = pytest.importorskip("gymnasium", reason="gymnasium is not installed")
+from gymnasium.utils.env_checker import check_env  # noqa: E402
+
+from upright.exports.environment import RigEnv, RigVectorEnv  # noqa: E402
+
+FURUTA = Furuta(m_p=0.135, l_cg=0.19, r=0.16, J_d=0.011, J_p=6e-4, b_1=6e-4, b_1c=2e-3, b_2c=1e-4)
+
+
+@pytest.fixture(scope="module")
+def fit(tmp_path_factory):
+    errors = {"m_p": 0.004, "b_1c": 2e-4, "actuator.gain": 0.01}
+    return fit_file(tmp_path_factory.mktemp("fit"), FURUTA, name="furuta", stderr=errors)
+
+
+@pytest.mark.parametrize("task", ["balance", "swing_up"])
+def test_gymnasium_s_own_checker_finds_nothing(fit, task):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", message=".*Box observation space.*infinity", category=UserWarning)
+        check_env(RigEnv(fit, task=task), skip_render_check=True)
+
+
+def test_a_step_is_the_motion_of_the_rig_that_was_drawn(fit):
+    """A lane under its own commands is that rig simulated alone, drawn friction and gain included."""
+    lanes = Episodes(read_identified(fit, draws=50), 40)
+    lanes.reset(np.ones(40, dtype=bool), np.random.default_rng(3))
+    x0, params = lanes.x.copy(), lanes.params.copy()
+    actions = np.random.default_rng(4).uniform(-1, 1, (6, 40, 1))
+    for action in actions:
+        lanes.step(action)
+    names = lanes.simulator.names
+    for lane in (0, 7, 39):
+        own = dict(zip(names, params[:, lane].tolist(), strict=True))
+        u = 5.0 * actions[:, lane]
+        alone = simulate(FURUTA, own, x0[:, lane], u, 0.02, samples=7, substeps=lanes.simulator.substeps)
+        np.testing.assert_array_equal(lanes.x[:, lane], alone[-1, :, 0])
+    assert len({params[names.index("m_p"), k] for k in range(40)}) > 20
+
+
+def test_a_drive_that_is_late_remembers_its_commands_from_step_to_step(fit):
+    """Dead time and lag longer than a step: the same motion as in one run."""
+    from dataclasses import replace
+
+    from upright.study.description import Entry
+
+    known = read_identified(fit, draws=1)
+    late = {n: Entry(value=v, unit="s", source="known") for n, v in (("delay", 0.031), ("lag", 0.012))}
+    lanes = Episodes(replace(known, draws=(), description=known.description.given(late)), 2)
+    lanes.reset(np.ones(2, dtype=bool), np.random.default_rng(3))
+    x0, actions = lanes.x.copy(), np.random.default_rng(4).uniform(-1, 1, (8, 2, 1))
+    for action in actions:
+        lanes.step(action)
+    u = np.vstack([np.zeros((60, 1)), 5.0 * actions[:, 1]])
+    drive = {"actuator.gain": 0.5, "actuator.delay": 0.031, "actuator.lag": 0.012}
+    alone = simulate(FURUTA, drive, x0[:, 1], u, 0.02, samples=9, substeps=lanes.simulator.substeps, start=60)
+    # the lag is settled anew at every step, on 40 time constants: e^-40 of a command; the rest is rounding
+    np.testing.assert_allclose(lanes.x[:, 1], alone[-1, :, 0], rtol=0, atol=1e-9)
+
+
+def test_draws_scatter_as_the_fit_says(fit):
+    lanes = Episodes(read_identified(fit, draws=2000), 4000)
+    lanes.reset(np.ones(4000, dtype=bool), np.random.default_rng(1))
+    masses = lanes.params[lanes.simulator.names.index("m_p")]
+    # of 2000 normal draws the deviation's own error is 1/sqrt(4000), 1.6 %; four of them
+    assert masses.std() == pytest.approx(0.004, rel=0.064)
+    assert masses.mean() == pytest.approx(0.135, abs=4 * 0.004 / np.sqrt(2000))
+
+
+def test_who_has_fallen_begins_anew_at_the_next_step(fit):
+    env = RigVectorEnv(fit, 64, max_episode_steps=30)
+    seen, _ = env.reset(seed=2)
+    assert env.observation_space.contains(seen)
+    lengths, steps = [], np.zeros(64, dtype=int)
+    ended = np.zeros(64, dtype=bool)
+    for _ in range(80):
+        seen, reward, terminated, truncated, _ = env.step(np.ones((64, 1), dtype=np.float32))
+        angle = np.abs(np.arctan2(seen[:, 1], seen[:, 2]))
+        assert (reward == np.where(ended, 0.0, 1.0)).all()
+        assert ((angle > np.radians(12)) == terminated).all()
+        assert (angle[ended] <= 0.05 + 1e-6).all()  # where an episode begins
+        steps = np.where(ended, 0, steps + 1)
+        ended = terminated | truncated
+        lengths += steps[ended].tolist()
+    assert max(lengths) <= 30
+    assert len(lengths) > 64
+
+
+def test_the_same_seed_gives_the_same_rigs_and_motions(fit):
+    one, other = (RigVectorEnv(fit, 16) for _ in range(2))
+    a, b = (env.reset(seed=5)[0] for env in (one, other))
+    np.testing.assert_array_equal(a, b)
+    actions = np.full((16, 1), 0.3, dtype=np.float32)
+    np.testing.assert_array_equal(one.step(actions)[0], other.step(actions)[0])
+
+
+def test_hanging_still_is_worth_nothing_and_standing_still_one(fit):
+    lanes = Episodes(read_identified(fit), 2, task="swing_up")
+    lanes.reset(np.ones(2, dtype=bool), np.random.default_rng(0))
+    lanes.x[:] = 0.0
+    lanes.x[2, 1] = np.pi
+    reward, fallen = lanes.step(np.zeros((2, 1)))
+    np.testing.assert_allclose(reward, [0.0, 1.0], atol=1e-9)
+    assert not fallen.any()
+
+
+def test_the_exported_module_registers_single_and_vector(fit, tmp_path):
+    done = export(fit, to="gymnasium", out=tmp_path)
+    runpy.run_path(done.value[0])
+    env = gymnasium.make_vec(done.numbers["environment"], num_envs=3)
+    assert env.reset(seed=0)[0].shape == (3, 5)
+    single = gymnasium.make(done.numbers["environment"], task="swing_up")
+    single.reset(seed=0)
+    assert single.step(single.action_space.sample())[4] == {}
+
+
+def test_a_cart_ends_at_its_travel(tmp_path):
+    plant = CartPendulum(m_c=0.5, m_p=0.2, l_cg=0.3, J_p=0.006)
+    travel = {"value": 0.1, "unit": "m", "source": "known"}
+    path = fit_file(tmp_path, plant, name="cart-pendulum", unit="N", travel=travel)
+    env = RigVectorEnv(path, 4, task="swing_up")
+    env.reset(seed=0)
+    for _ in range(200):
+        seen, _, terminated, _, _ = env.step(np.ones((4, 1), dtype=np.float32))
+        if terminated.any():
+            break
+    assert (np.abs(seen[terminated, 0]) > 0.1).all()
+    assert terminated.any()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"task": "jump"}, "balance or swing_up"),
+        ({"at": "sideways"}, "no equilibrium 'sideways'"),
+        ({"period": 0.0}, "1e-4 to 1 s"),
+        ({"limit": -1.0}, "limit of an environment"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused(fit, options, words):
+    with pytest.raises(BadInput, match=words):
+        RigEnv(fit, **options)
+
+
+def test_a_rig_that_cannot_stand_is_refused(tmp_path):
+    chain = find("torsional-1")(J_1=0.01, k_1=1.0)
+    path = fit_file(tmp_path, chain, name="torsional-1")
+    with pytest.raises(BadInput, match="hangs or stands"):
+        RigEnv(path)
+
+
+def test_a_rig_without_a_limit_is_asked_for_one(tmp_path):
+    path = fit_file(tmp_path, Pendulum(m_p=0.2, l_cg=0.2, J_p=1e-3), name="pendulum", limit={})
+    path.write_text(path.read_text().replace('"limit": {}', ""))
+    with pytest.raises(BadInput, match="largest command"):
+        export(path, to="gymnasium", out=tmp_path)
+    assert export(path, to="gymnasium", out=tmp_path, limit=2.0).numbers["draws"] == 0

@@ -1,0 +1,151 @@
+"""Does the unit for co-simulation move, step by step of another tool, as the rig moves here?"""
+
+from __future__ import annotations
+
+import shutil
+import zipfile
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tests.exports.rigs import fit_file
+from tests.physics.specimens import SPECIMENS
+from upright.errors import BadInput
+from upright.experiments.identified import read_identified
+from upright.exports.fmu import build, unit_of
+from upright.physics import BUILT_IN, CartPendulum, Furuta, chain
+from upright.simulation import simulate
+from upright.verbs.export import export
+
+fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed")
+pytestmark = pytest.mark.skipif(
+    not any(shutil.which(c) for c in ("cc", "gcc", "clang")), reason="there is no C compiler on this machine"
+)
+
+DRY = Furuta(
+    m_p=0.135, l_cg=0.19, r=0.16, J_d=0.011, J_p=6e-4, b_1=6e-4, b_1c=4e-3, b_2c=1e-3, b_1s=6e-3, v_1s=0.1, b_2q=1e-5
+)
+DRIVE = {"actuator.gain": 0.5, "actuator.delay": 4.3e-3, "actuator.lag": 0.012, "actuator.slope": 2e-3}
+
+
+def identified(folder, plant, **more):
+    name = next((n for n, kind in BUILT_IN.items() if kind is type(plant)), "rectilinear-4")
+    return read_identified(fit_file(folder, plant, name=name, **more))
+
+
+def running(path, x0, names):
+    """The unit in fmpy, begun at x0."""
+    about = fmpy.read_model_description(str(path), validate=True)
+    references = {v.name: v.valueReference for v in about.modelVariables}
+    folder = fmpy.extract(str(path))
+    unit = fmpy.fmi3.FMU3Slave(
+        guid=about.guid, unzipDirectory=folder, modelIdentifier=about.coSimulation.modelIdentifier, instanceName="one"
+    )
+    unit.instantiate(loggingOn=True)
+    unit.enterInitializationMode(startTime=0.0)
+    unit.setFloat64([references[f"{n}_start"] for n in names], x0)
+    unit.exitInitializationMode()
+    return SimpleNamespace(unit=unit, references=references, folder=folder)
+
+
+def walked(path, plant, x0, commands, step):
+    """States after every step, shape (steps, states)."""
+    names = plant.state_names()
+    run = running(path, x0, names)
+    out = []
+    for k, u in enumerate(commands):
+        run.unit.setFloat64([run.references["u"]], [u])
+        run.unit.doStep(currentCommunicationPoint=k * step, communicationStepSize=step)
+        out.append(run.unit.getFloat64([run.references[n] for n in names]))
+    run.unit.terminate()
+    run.unit.freeInstance()
+    shutil.rmtree(run.folder, ignore_errors=True)
+    return np.array(out)
+
+
+def here(plant, drive, x0, commands, step):
+    u = np.vstack([np.zeros((1000, 1)), np.repeat(np.asarray(commands), round(step / 1e-3))[:, None]])
+    motion = simulate(plant, drive, x0, u, 1e-3, samples=len(commands) + 1, every=round(step / 1e-3), start=1000)
+    return motion[1:, :, 0]
+
+
+def test_stick_slip_delay_and_lag_are_those_of_the_kernel(tmp_path):
+    """The same steps and events: rounding alone differs, which 2 s of a pendulum that only swings do not magnify."""
+    values = {n: v for n, v in DRIVE.items() if n != "actuator.gain"}
+    rig = identified(tmp_path, DRY, values=values)
+    (tmp_path / "rig.fmu").write_bytes(build(unit_of(rig))[0])
+    x0, step = [0.3, 0.0, 0.02, 0.0], 0.01
+    commands = np.where(np.arange(200) % 70 < 20, 0.02, 0.0)
+    ours = here(DRY, {**DRIVE, "actuator.limit": 5.0}, x0, commands, step)
+    theirs = walked(tmp_path / "rig.fmu", DRY, x0, commands, step)
+    assert (np.abs(ours[:, 1]) < 1e-12).any()  # it sticks
+    assert np.ptp(ours[:, 0]) > 0.01  # and slips
+    assert np.abs(ours - theirs).max() < 1e-9
+
+
+SMOOTH = {n: s.plant for n, s in SPECIMENS.items() if n != "double pendulum"}
+
+
+@pytest.mark.parametrize(
+    "name", [n if n in ("cart-pendulum", "torsional-2") else pytest.param(n, marks=pytest.mark.slow) for n in SMOOTH]
+)
+def test_every_plant_moves_as_here(name, tmp_path):
+    plant = SMOOTH[name]
+    (tmp_path / "rig.fmu").write_bytes(build(unit_of(identified(tmp_path, plant)))[0])
+    x0 = np.random.default_rng(1).uniform(-0.3, 0.3, 2 * len(plant.coordinates)).tolist()
+    commands = np.sin(np.arange(50) * 0.3)
+    ours = here(plant, {"actuator.gain": 0.5, "actuator.limit": 5.0}, x0, commands, 0.02)
+    assert np.abs(ours - walked(tmp_path / "rig.fmu", plant, x0, commands, 0.02)).max() < 1e-9
+
+
+def test_fmpy_s_validator_finds_nothing_and_its_simulation_agrees(tmp_path):
+    plant = CartPendulum(m_c=0.5, m_p=0.2, l_cg=0.3, J_p=6e-3, b_1=0.4, b_2=1e-3)
+    done = export(fit_file(tmp_path, plant, name="cart-pendulum", unit="N"), to="fmu", out=tmp_path)
+    from fmpy.validation import validate_fmu
+
+    assert validate_fmu(done.value[0]) == []
+    found = fmpy.simulate_fmu(
+        done.value[0], stop_time=1.0, output_interval=0.01, start_values={"theta_start": 0.5, "m_p": 0.25}
+    )
+    ours = simulate(plant.replace(m_p=0.25), {}, [0, 0, 0.5, 0], None, 1e-3, samples=101, every=10)[:, :, 0]
+    for i, name in enumerate(plant.state_names()):
+        np.testing.assert_allclose(found[name], ours[:, i], rtol=0, atol=1e-10)
+    with zipfile.ZipFile(done.value[0]) as archive:
+        assert {"sources/rig.c", "sources/buildDescription.xml", "modelDescription.xml"} <= set(archive.namelist())
+
+
+def test_a_step_of_a_fraction_of_a_millisecond_is_refused(tmp_path):
+    plant = SMOOTH["pendulum"]
+    (tmp_path / "rig.fmu").write_bytes(build(unit_of(identified(tmp_path, plant)))[0])
+    run = running(tmp_path / "rig.fmu", [0.1, 0.0], plant.state_names())
+    with pytest.raises(fmpy.fmi1.FMICallException):
+        run.unit.doStep(currentCommunicationPoint=0.0, communicationStepSize=1.5e-3)
+    with pytest.raises(fmpy.fmi1.FMICallException):  # a parameter, once it runs
+        run.unit.setFloat64([run.references["m_p"]], [1.0])
+    run.unit.freeInstance()
+    shutil.rmtree(run.folder, ignore_errors=True)
+
+
+def test_a_fast_motion_is_stepped_as_finely_as_it_needs(tmp_path):
+    """400 rad/s, of which a step of 1 ms is 0.4 rad: the closed form x cos(w t) after 50 ms, to 8e-6 a step."""
+    plant = chain(1)(m_1=0.5, k_1=0.5 * 400.0**2)
+    (tmp_path / "rig.fmu").write_bytes(build(unit_of(identified(tmp_path, plant)))[0])
+    there = walked(tmp_path / "rig.fmu", plant, [0.01, 0.0], [0.0] * 50, 1e-3)
+    assert there[-1, 0] == pytest.approx(0.01 * np.cos(400.0 * 0.05), abs=0.01 * 100 * 8e-6)
+
+
+def test_the_same_rig_gives_the_same_file(tmp_path):
+    rig = identified(tmp_path, SMOOTH["pendulum"])
+    assert build(unit_of(rig))[0] == build(unit_of(rig))[0]
+
+
+def test_what_a_unit_does_not_remember_is_said_or_refused(tmp_path):
+    soft = chain(1)(m_1=0.5, k_1=10.0, f_1c=0.1, delta_1=1e-3)
+    assert any("slides at once" in line for line in unit_of(identified(tmp_path, soft)).told)
+    entry = {"relaxation": {"value": 0.01, "unit": "s", "source": "known"}}
+    slow = identified(tmp_path, soft, **entry)
+    with pytest.raises(BadInput, match="relaxation"):
+        unit_of(slow)
+    assert unit_of(replace(slow, description=replace(slow.description, entries={}))).told
