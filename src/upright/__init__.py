@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     from upright.verbs.control import design, regulate, swing_up, track
     from upright.verbs.course import lab, reproduce, survey
     from upright.verbs.export import export
-    from upright.verbs.feedback import dlqr, hold, lqr, margins, place, prefilter
+    from upright.verbs.linear.feedback import dlqr, hold, lqr, margins, place, prefilter
     from upright.verbs.fitting import identify
     from upright.verbs.live import rig_check, rig_doctor, run
     from upright.verbs.log import doctor, init, law, read, show
@@ -92,7 +92,7 @@ _HOMES = {
     "verbs.live": ("rig_check", "rig_doctor", "run"),
     "verbs.log": ("doctor", "init", "law", "read", "show"),
     "verbs.logs": ("log_convert", "log_recover", "log_replay", "log_show", "log_tail"),
-    "verbs.feedback": ("dlqr", "hold", "lqr", "margins", "place", "prefilter"),
+    "verbs.linear.feedback": ("dlqr", "hold", "lqr", "margins", "place", "prefilter"),
     "verbs.fitting": ("identify",),
     "verbs.model": ("frequency", "ladder", "loadings", "plan_inertias", "predict"),
     "verbs.motion": ("simulate",),

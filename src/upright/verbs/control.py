@@ -13,7 +13,7 @@ from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
 from upright.progress import Progress, part, silent
 from upright.verbs.answer import Answer
-from upright.verbs.matrices import matrices_of, read_matrices
+from upright.verbs.linear.matrices import matrices_of, read_matrices
 from upright.verbs.pages import folder_if_given, page_folder, write_page
 from upright.verbs.rig import Counts, as_typed, rig_options
 from upright.verbs.values import open_log, poles, si, si_if_given

@@ -13,7 +13,7 @@ from upright.errors import BadInput, nearest
 from upright.laws import Law, Rule, state_feedback
 from upright.physics import Plant
 from upright.records import Provenance, Record
-from upright.verbs.feedback import Gains
+from upright.verbs.linear.feedback import Gains
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from upright.report.html import fragment
 from upright.report.page import Chapter, Part, Picture, Symbol, Table
 from upright.report.symbols import number, unit
 from upright.verbs.answer import text as chapter_text
-from upright.verbs.feedback import Gains
+from upright.verbs.linear.feedback import Gains
 
 MOST_ROWS, MOST_PANELS = 24, 6
 

@@ -11,7 +11,7 @@ from upright.errors import BadInput, nearest
 if TYPE_CHECKING:
     from upright.experiments.designing.matrices import Matrices
     from upright.study.text import Section
-    from upright.verbs.feedback import NamedModel
+    from upright.verbs.linear.feedback import NamedModel
 
 KEYS = ("A", "B", "C", "D", "dt", "states", "inputs", "outputs", "units")
 
@@ -24,7 +24,7 @@ def matrices_of(model: Any) -> Matrices:
     BadInput
         When it is none of these, or sampled without saying how often.
     """
-    from upright.verbs.feedback import read_model
+    from upright.verbs.linear.feedback import read_model
 
     if not isinstance(model, tuple) and not (hasattr(model, "A") and hasattr(model, "B")):
         raise BadInput(
@@ -48,7 +48,7 @@ def read_matrices(path: str | os.PathLike[str]) -> Matrices:
 
     from upright import units
     from upright.study.text import StudyText
-    from upright.verbs.feedback import named_model
+    from upright.verbs.linear.feedback import named_model
 
     path = Path(path)
     if not path.exists():
