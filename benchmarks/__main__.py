@@ -23,12 +23,13 @@ from upright.workers import Workers
 NAMES = (
     "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "frequency", "swing_up", "tracking", "lab",
     "doctor", "rigs", "misfit", "verdicts", "regulation", "real", "agree", "bands", "starts", "startup",
-    "workers", "long", "gpu", "crash", "safety", "jitter", "gym",
+    "workers", "long", "gpu", "crash", "safety", "soak", "jitter", "gym",
 )  # fmt: skip
 PUBLISHED = (
-    "real", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "workers", "crash", "safety", "jitter", "gym",
+    "real", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "workers", "crash", "safety", "soak",
+    "jitter", "gym",
 )  # fmt: skip
-SHARED = ("coverage", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "starts")
+SHARED = ("coverage", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "starts", "soak")
 """Those whose table is a page, and those whose work processes may share."""
 
 LIBRARIES = ("upright", "numpy", "scipy", "llvmlite", "control", "casadi", "jax", "mujoco", "gymnasium")

@@ -57,8 +57,8 @@ if TYPE_CHECKING:
     from upright.verbs.control import design, regulate, swing_up, track
     from upright.verbs.course import lab, reproduce, survey
     from upright.verbs.export import export
-    from upright.verbs.linear.feedback import dlqr, hold, lqr, margins, place, prefilter
     from upright.verbs.fitting import identify
+    from upright.verbs.linear.feedback import dlqr, hold, lqr, margins, place, prefilter
     from upright.verbs.live import rig_check, rig_doctor, run
     from upright.verbs.log import doctor, init, law, read, show
     from upright.verbs.logs import log_convert, log_recover, log_replay, log_show, log_tail
