@@ -116,6 +116,22 @@ def test_a_rig_that_holds_other_limits_is_not_run():
         beside.prepare()
 
 
+@pytest.mark.parametrize(("fault", "starts"), [(Fault.STOP, True), (Fault.OVERTRAVEL, False)])
+def test_a_fault_that_nobody_looked_at_is_not_cleared_in_passing(fault, starts):
+    class Remembers(Board):
+        def open(self):
+            about = super().open()
+            self._faults |= fault
+            return about
+
+    beside = Supervisor(Remembers(TwinPort(RIG)), DUTY)
+    if starts:
+        beside.prepare()
+    else:
+        with pytest.raises(RigStopped, match="stopped before"):
+            beside.prepare()
+
+
 def test_a_start_off_its_window_is_refused():
     with pytest.raises(RigStopped, match=r"11\.5 degrees"):
         Scene().started(tilt=0.2)

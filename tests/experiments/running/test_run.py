@@ -98,6 +98,17 @@ def test_a_limit_ends_a_run_and_the_verdict_says_which(folder, tmp_path):
     assert any(event.kind == "fault" for event in done.log.events)
 
 
+def test_a_run_that_ended_well_leaves_no_fault_in_the_rig(folder, tmp_path):
+    from upright.experiments.running.rig import open_loop, stage_of
+    from upright.realtime.session import RunOrder, carry_out
+
+    stage = stage_of(folder / "RIG.toml", balance=False)
+    law = open_loop([0.0], 2, RIG.period)
+    order = RunOrder(make=lambda: stage, law=as_values(law), seconds=0.1, log=tmp_path / "run.mcap", check=False)
+    assert not carry_out(order, law=law).stopped
+    assert stage.supervisor.rig.sample.faults == Fault(0)
+
+
 def test_what_contradicts_itself_is_refused(folder, tmp_path):
     with pytest.raises(BadInput, match="one of them"):
         RunRequest(rig=folder / "RIG.toml")

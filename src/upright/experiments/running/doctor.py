@@ -83,12 +83,13 @@ def check_up(
             rig.clear_fault()
             rig.close()
         about = beside.prepare()
-        out.append(CheckupFinding(what="link", found=f"{about.name}, {len(about.counts)} encoders, a tick every "
-                           f"{1e3 * about.period:.4g} ms"))  # fmt: skip
+        ticks = f"{about.name}, {len(about.counts)} encoders, a tick every {1e3 * about.period:.4g} ms"
+        out.append(CheckupFinding(what="link", found=ticks))
         out += _described(model, about.period, about.counts)
         held = ", ".join(f"{n} {v:.4g}" for n, v in zip(about.coordinates, beside.held.travel, strict=True))
-        out.append(CheckupFinding(what="limits, read back", found=f"travel {held}; command {beside.held.command:.4g} "
-                           f"{about.command_unit}; watchdog {1e3 * beside.held.watchdog:.4g} ms"))  # fmt: skip
+        volts, silence = f"{beside.held.command:.4g} {about.command_unit}", f"{1e3 * beside.held.watchdog:.4g} ms"
+        held = f"travel {held}; command {volts}; watchdog {silence}"
+        out.append(CheckupFinding(what="limits, read back", found=held))
         for i, name in enumerate(about.coordinates):
             out.append(_by_hand(rig, model, i, name, hand))
         if not pulse or about.replayed:
@@ -101,8 +102,8 @@ def check_up(
             shown = ", ".join(f"{n} {v:.4g}" for n, v in moved.items())
             out.append(CheckupFinding(what="a small pulse", found=shown))
     except RigStopped as stop:
-        out.append(CheckupFinding(what="a small pulse" if beside.faults & Fault.SELF_TEST else "stopped", found=str(stop),
-                           good=False))  # fmt: skip
+        what = "a small pulse" if beside.faults & Fault.SELF_TEST else "stopped"
+        out.append(CheckupFinding(what=what, found=str(stop), good=False))
     finally:
         rig.estop()
         rig.close()
@@ -112,8 +113,8 @@ def check_up(
 def _described(model: ServoRig, period: float, counts: tuple[float, ...]) -> list[CheckupFinding]:
     """Whether the rig is the one that was described."""
     same = math.isclose(period, model.period, rel_tol=1e-3)
-    out = [CheckupFinding(what="servo period", found=f"{1e3 * period:.4g} ms, described as {1e3 * model.period:.4g} ms",
-                   good=same)]  # fmt: skip
+    told_of = f"{1e3 * period:.4g} ms, described as {1e3 * model.period:.4g} ms"
+    out = [CheckupFinding(what="servo period", found=told_of, good=same)]
     alike = np.allclose(np.abs(counts), model.counts, rtol=1e-6)
     return [*out, CheckupFinding(what="counts", found=", ".join(f"{c:.6g}" for c in counts), good=bool(alike))]
 
