@@ -59,11 +59,11 @@ if TYPE_CHECKING:
     from upright.verbs.export import export
     from upright.verbs.fitting import identify
     from upright.verbs.linear.feedback import dlqr, hold, lqr, margins, place, prefilter
-    from upright.verbs.live import rig_check, rig_doctor, run
     from upright.verbs.log import doctor, init, law, read, show
     from upright.verbs.logs import log_convert, log_recover, log_replay, log_show, log_tail
     from upright.verbs.model import frequency, ladder, loadings, plan_inertias, predict
     from upright.verbs.motion import simulate
+    from upright.verbs.rig import rig_check, rig_doctor, run
 
 __version__ = "0.1.0"
 
@@ -89,7 +89,7 @@ _HOMES = {
     "verbs.control": ("design", "regulate", "swing_up", "track"),
     "verbs.course": ("lab", "reproduce", "survey"),
     "verbs.export": ("export",),
-    "verbs.live": ("rig_check", "rig_doctor", "run"),
+    "verbs.rig": ("rig_check", "rig_doctor", "run"),
     "verbs.log": ("doctor", "init", "law", "read", "show"),
     "verbs.logs": ("log_convert", "log_recover", "log_replay", "log_show", "log_tail"),
     "verbs.linear.feedback": ("dlqr", "hold", "lqr", "margins", "place", "prefilter"),

@@ -65,7 +65,7 @@ def test_a_sound_rig_passes_its_check_and_is_held():
     scene.beside.aim(LAW)
     scene.beside.start()
     scene.port.let_go()
-    ticks = scene.run(2.0)
+    ticks = scene.run(1.2)
     assert abs(ticks[-1].counts[1] / RIG.counts[1] - math.pi) < 0.01
     scene.beside.finish()
     assert scene.rig.sample.mode == Mode.IDLE
@@ -114,6 +114,22 @@ def test_a_rig_that_holds_other_limits_is_not_run():
     beside = Supervisor(Careless(TwinPort(RIG)), DUTY)
     with pytest.raises(RigStopped, match="instead of 2; do not run it"):
         beside.prepare()
+
+
+@pytest.mark.parametrize(("fault", "starts"), [(Fault.STOP, True), (Fault.OVERTRAVEL, False)])
+def test_a_fault_that_nobody_looked_at_is_not_cleared_in_passing(fault, starts):
+    class Remembers(Board):
+        def open(self):
+            about = super().open()
+            self._faults |= fault
+            return about
+
+    beside = Supervisor(Remembers(TwinPort(RIG)), DUTY)
+    if starts:
+        beside.prepare()
+    else:
+        with pytest.raises(RigStopped, match="stopped before"):
+            beside.prepare()
 
 
 def test_a_start_off_its_window_is_refused():
@@ -179,7 +195,7 @@ def test_what_goes_wrong_in_the_loop_ends_it_with_zero_before_the_word(what, fau
 @pytest.mark.parametrize("speed", [-2.0, 0.5, 2.0])
 def test_a_tap_is_not_taken_for_a_lying_encoder(speed):
     scene = Scene().started(tilt=0.02)
-    scene.run(1.5, then=lambda p: p.push([0.0, speed]))
+    scene.run(1.0, then=lambda p: p.push([0.0, speed]))
     assert not scene.beside.faults
 
 

@@ -164,7 +164,7 @@ def _child(order: RunOrder, memory: Any, phase: Any, wish: Any, pipe: Connection
         if not paced:
             return Virtual(), ""
         warning = step_forward(fifo=order.fifo).warning
-        return Virtual() if about.paced else WallClock(about.period), warning
+        return Virtual() if about.paced or about.virtual else WallClock(about.period), warning
 
     answer: Any
     try:

@@ -165,6 +165,7 @@ def carry_out(
     beside = stage.supervisor
     beside.event, beside.stopped = hear, stopped
     end: dict[str, Any] = {"ticks": 0, "late": 0}
+    finished = False
     try:
         about = beside.prepare()
         end |= {"about": about, "held": beside.held}
@@ -185,15 +186,16 @@ def carry_out(
         stage.let_go()
         _loop(order, beside, ticking, hear.log, show, end)
         beside.finish()
+        finished = True
     except RigStopped as stop:
-        beside.rig.estop()
         end["stopped"] = str(stop)
     except KeyboardInterrupt:
         beside.rig.estop()
         hear(0.0, "fault", "stopped by Ctrl-C")
         end["stopped"] = "Stopped by Ctrl-C."
     finally:
-        beside.rig.estop()
+        if not finished:
+            beside.rig.estop()
         beside.rig.close()
         if hear.log is not None:
             status = hear.log.close()

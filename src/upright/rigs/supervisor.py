@@ -163,7 +163,8 @@ class Supervisor:
             )  # fmt: skip
         asked = self.duty.limits
         assert asked is not None  # as was just asked
-        left = self.rig.exchange(0.0).faults & ~Fault.RESET
+        # who stopped it by hand knows, and starts it again on purpose
+        left = self.rig.exchange(0.0).faults & ~(Fault.RESET | Fault.STOP)
         if left:
             self._give_up(left, f"{self.about.name} stopped before: {told(left)}. Look at it, then clear its fault "
                           "(upright rig doctor --clear).")  # fmt: skip

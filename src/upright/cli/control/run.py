@@ -48,7 +48,7 @@ def run(
     upright run --rig RIG.toml --law design/design.json --duration 30
     upright run --rig RIG.toml --excite "sweep 0.5 0.5 8" --duration 60
     """
-    from upright.verbs import live as verbs
+    from upright.verbs import rig as verbs
 
     with _view(quiet=as_json) as observe:
         done = verbs.run(

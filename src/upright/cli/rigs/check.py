@@ -23,7 +23,7 @@ def check(
 
     upright rig check --seconds 60
     """
-    from upright.verbs import live as verbs
+    from upright.verbs import rig as verbs
 
     done = verbs.rig_check(seconds=seconds, rate=rate, fifo=fifo, out=out)
     tell(done.chapter, done.files, done.numbers if as_json else None)

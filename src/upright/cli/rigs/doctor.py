@@ -24,7 +24,7 @@ def doctor(
     upright rig doctor RIG.toml
     """
     from upright.rigs.rigfile import read_rig_file
-    from upright.verbs import live as verbs
+    from upright.verbs import rig as verbs
 
     asked = _asks if read_rig_file(rig).hardware and sys.stdin.isatty() else None
     done = verbs.rig_doctor(rig, clear=clear, pulse=pulse, hand=asked)

@@ -266,6 +266,9 @@ def _next_steps(done: Designed, source: str, folder: str) -> list[Step]:
         Step(f"Simulate it: upright.laws.Law takes A, B, C and D of law in {folder}/design.json, its "
              "references being the readings at rest and then the reference.")
     )  # fmt: skip
+    if not plain_matrices:
+        steps.append(Step("Run it on the rig, or on its twin (RIG.toml: docs/rigs.md).",
+                          f"upright run --rig RIG.toml --law {folder}/design.json"))  # fmt: skip
     return steps
 
 

@@ -21,7 +21,7 @@ MOVED = 0.05
 
 
 @dataclass(frozen=True, kw_only=True)
-class Finding:
+class CheckupFinding:
     """One thing that was looked at; `good` is None where it was not."""
 
     what: str
@@ -34,7 +34,7 @@ class Checkup:
     """What was found on a rig."""
 
     name: str
-    findings: tuple[Finding, ...]
+    findings: tuple[CheckupFinding, ...]
 
     @property
     def sound(self) -> bool:
@@ -76,70 +76,74 @@ def check_up(
     file = read_rig_file(path)
     model, _ = described(file)
     stage = stage_of(path, balance=False)
-    beside, rig, out = stage.supervisor, stage.supervisor.rig, list[Finding]()
+    beside, rig, out = stage.supervisor, stage.supervisor.rig, list[CheckupFinding]()
     try:
         if clear:
             about = rig.open()
             rig.clear_fault()
             rig.close()
         about = beside.prepare()
-        out.append(Finding(what="link", found=f"{about.name}, {len(about.counts)} encoders, a tick every "
-                           f"{1e3 * about.period:.4g} ms"))  # fmt: skip
+        ticks = f"{about.name}, {len(about.counts)} encoders, a tick every {1e3 * about.period:.4g} ms"
+        out.append(CheckupFinding(what="link", found=ticks))
         out += _described(model, about.period, about.counts)
         held = ", ".join(f"{n} {v:.4g}" for n, v in zip(about.coordinates, beside.held.travel, strict=True))
-        out.append(Finding(what="limits, read back", found=f"travel {held}; command {beside.held.command:.4g} "
-                           f"{about.command_unit}; watchdog {1e3 * beside.held.watchdog:.4g} ms"))  # fmt: skip
+        volts, silence = f"{beside.held.command:.4g} {about.command_unit}", f"{1e3 * beside.held.watchdog:.4g} ms"
+        held = f"travel {held}; command {volts}; watchdog {silence}"
+        out.append(CheckupFinding(what="limits, read back", found=held))
         for i, name in enumerate(about.coordinates):
             out.append(_by_hand(rig, model, i, name, hand))
         if not pulse or about.replayed:
-            out.append(Finding(what="a small pulse", found="not given", good=None))
+            out.append(CheckupFinding(what="a small pulse", found="not given", good=None))
         else:
             if isinstance(rig, Board) and isinstance(rig.port, TwinPort):
                 rig.port.hold(beside.duty.zero)
                 rig.port.let_go()
             moved = beside.check().moved
-            out.append(Finding(what="a small pulse", found=", ".join(f"{n} {v:.4g}" for n, v in moved.items())))
+            shown = ", ".join(f"{n} {v:.4g}" for n, v in moved.items())
+            out.append(CheckupFinding(what="a small pulse", found=shown))
     except RigStopped as stop:
-        out.append(Finding(what="a small pulse" if beside.faults & Fault.SELF_TEST else "stopped", found=str(stop),
-                           good=False))  # fmt: skip
+        what = "a small pulse" if beside.faults & Fault.SELF_TEST else "stopped"
+        out.append(CheckupFinding(what=what, found=str(stop), good=False))
     finally:
         rig.estop()
         rig.close()
     return Checkup(name=model.name, findings=tuple(out))
 
 
-def _described(model: ServoRig, period: float, counts: tuple[float, ...]) -> list[Finding]:
+def _described(model: ServoRig, period: float, counts: tuple[float, ...]) -> list[CheckupFinding]:
     """Whether the rig is the one that was described."""
     same = math.isclose(period, model.period, rel_tol=1e-3)
-    out = [Finding(what="servo period", found=f"{1e3 * period:.4g} ms, described as {1e3 * model.period:.4g} ms",
-                   good=same)]  # fmt: skip
+    told_of = f"{1e3 * period:.4g} ms, described as {1e3 * model.period:.4g} ms"
+    out = [CheckupFinding(what="servo period", found=told_of, good=same)]
     alike = np.allclose(np.abs(counts), model.counts, rtol=1e-6)
-    return [*out, Finding(what="counts", found=", ".join(f"{c:.6g}" for c in counts), good=bool(alike))]
+    return [*out, CheckupFinding(what="counts", found=", ".join(f"{c:.6g}" for c in counts), good=bool(alike))]
 
 
 def _by_hand(
     rig: LiveRig, model: ServoRig, i: int, name: str, hand: Callable[[str], bool] | None
-) -> Finding:  # fmt: skip
+) -> CheckupFinding:  # fmt: skip
     """One encoder, moved by hand in its positive sense."""
     unit, per = model.plant.coordinates[i].unit, model.counts[i]
     size = MOVED if unit == "rad" else MOVED / 10
     before = rig.exchange(0.0)
     if before.faults:
-        return Finding(what=f"{name} by hand", found=told(before.faults), good=False)
+        return CheckupFinding(what=f"{name} by hand", found=told(before.faults), good=False)
     what = f"{name} by hand"
     if hand is not None:
         if not hand(f"Move {name} by hand in its positive sense by some {'degrees' if unit == 'rad' else 'mm'}."):
-            return Finding(what=what, found="not moved", good=None)
+            return CheckupFinding(what=what, found="not moved", good=None)
     elif isinstance(rig, Board) and isinstance(rig.port, TwinPort):
         away = np.zeros(2 * len(model.counts))
         away[2 * i] = 2 * size
         rig.port.hold(next(iter(model.plant.equilibria)), away)
     else:
-        return Finding(what=what, found="nobody moved it", good=None)
+        return CheckupFinding(what=what, found="nobody moved it", good=None)
     moved = (rig.exchange(0.0).counts[i] - before.counts[i]) / per
     shown = f"{math.degrees(moved):.3g} degrees" if unit == "rad" else f"{1e3 * moved:.3g} mm"
     if abs(moved) < size / 10:
-        return Finding(what=what, found=f"showed {shown}: it is not connected, or not this channel", good=False)
+        return CheckupFinding(what=what, found=f"showed {shown}: not connected, or not this channel", good=False)
     if moved < 0:
-        return Finding(what=what, found=f"showed {shown}: it counts the wrong way, swap its channels", good=False)
-    return Finding(what=what, found=f"showed {shown}")
+        return CheckupFinding(
+            what=what, found=f"showed {shown}: it counts the wrong way, swap its channels", good=False
+        )
+    return CheckupFinding(what=what, found=f"showed {shown}")

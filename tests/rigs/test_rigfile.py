@@ -1,0 +1,149 @@
+"""Is a RIG.toml read as it is meant, and is hardware without limits never armed?"""
+
+from __future__ import annotations
+
+import math
+import sys
+from itertools import pairwise
+
+import pytest
+
+from upright.errors import BadInput, RigStopped
+from upright.experiments.makes import make_rig
+from upright.experiments.running.rig import signal, stage_of, usual_limits
+from upright.rigs import Capabilities, Limits
+from upright.rigs.rigfile import read_rig_file
+from upright.rigs.supervisor import Duty, Supervisor
+from upright.rigs.vendor.nidaqmx import NidaqmxPort
+from upright.rigs.vendor.quanser import QuanserPort
+
+UNITS = {"psi": "rad", "theta": "rad"}
+WHOLE = """
+kind = "serial"
+port = "/dev/ttyACM0"
+study = "study.toml"
+[limits]
+command = "5 V"
+watchdog = "20 ms"
+twist = "20 deg"
+lean = "25 deg"
+[limits.psi]
+travel = "90 deg"
+speed = "20 rad/s"
+start = 0.3
+"""
+
+
+@pytest.fixture
+def written(tmp_path):
+    (tmp_path / "study.toml").write_text("", encoding="utf-8")
+    (tmp_path / "run.csv").write_text("", encoding="utf-8")
+
+    def write(text):
+        (tmp_path / "RIG.toml").write_text(text, encoding="utf-8")
+        return read_rig_file(tmp_path / "RIG.toml")
+
+    return write
+
+
+def test_limits_are_read_with_their_units(written):
+    file = written(WHOLE)
+    held = file.limits(UNITS, "V")
+    assert file.hardware
+    assert held.travel == pytest.approx((math.pi / 2, math.inf))
+    assert held.speed == (20.0, math.inf)
+    assert held.start == (0.3, math.inf)
+    assert (held.command, held.watchdog) == pytest.approx((5.0, 0.02))
+    assert held.twist == pytest.approx(math.radians(20))
+    assert file.lean("rad", 1.0) == pytest.approx(math.radians(25))
+
+
+def test_hardware_without_limits_gets_none_and_a_twin_those_of_its_rig(written):
+    serial = 'kind = "serial"\nport = "COM4"\nstudy = "study.toml"\n'
+    usual = usual_limits(make_rig("furuta"))
+    assert written(serial).limits(UNITS, "V", usual) is None
+    assert written('kind = "twin"\nmake = "furuta"\n').limits(UNITS, "V", usual) == usual
+    some = written('kind = "twin"\nmake = "furuta"\n[limits]\ncommand = 2\n').limits(UNITS, "V", usual)
+    assert some.command == 2.0
+    assert some.travel == usual.travel
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "a rig needs kind"),
+        ('kind = "robot"', "kind must be"),
+        ('kind = "twin"', "what describes it"),
+        ('kind = "twin"\nfit = "nowhere.json"', "does not exist"),
+        ('kind = "twin"\nstudy = "study.toml"\nfit = "study.toml"', "leave one out"),
+        ('kind = "serial"\nstudy = "study.toml"', "needs port"),
+        ('kind = "serial"\nmake = "furuta"\nport = "COM4"', "what describes it"),
+        ('kind = "replay"\nmake = "furuta"', "needs record"),
+        ('kind = "twin"\nmake = "furuta"\nport = "COM4"', "has no port"),
+        ('kind = "twin"\nmake = "furuta"\nseed = -1', "whole number"),
+        ('kind = "twin"\nmake = "furuta"\nlimit = 3', "did you mean 'limits'"),
+    ],
+)
+def test_what_contradicts_itself_is_refused_with_its_line(written, text, said):
+    with pytest.raises(BadInput, match=said) as complaint:
+        written(text)
+    assert "RIG.toml, line" in str(complaint.value)
+
+
+@pytest.mark.parametrize(
+    ("limits", "said"),
+    [
+        ("[limits]\nwatchdog = 0.02", "largest command"),
+        ("[limits]\ncommand = 5", "needs travel"),
+        ("[limits]\ncommand = 5\n[limits.psi]\ntravel = 1", "needs speed"),
+        ('[limits]\ncommand = "5 m"\n[limits.psi]\ntravel = 1\nspeed = 1\nstart = 1', "V"),
+        ("[limits]\ncommand = -5\n[limits.psi]\ntravel = 1\nspeed = 1\nstart = 1", "above zero"),
+        ("[limits]\ncommand = 5\n[limits.phi]\ntravel = 1", "no limit or coordinate 'phi'"),
+    ],
+)
+def test_limits_of_hardware_leave_nothing_out(written, limits, said):
+    file = written(f'kind = "serial"\nport = "COM4"\nstudy = "study.toml"\n{limits}\n')
+    with pytest.raises(BadInput, match=said):
+        file.limits(UNITS, "V", usual_limits(make_rig("furuta")))
+
+
+def test_a_twin_takes_the_limits_of_its_file(tmp_path):
+    text = 'kind = "twin"\nmake = "furuta"\n[limits]\ncommand = "2 V"\n[limits.psi]\ntravel = "1 rad"\n'
+    (tmp_path / "RIG.toml").write_text(text, encoding="utf-8")
+    stage = stage_of(tmp_path / "RIG.toml")
+    stage.supervisor.prepare()
+    assert stage.supervisor.held.command == pytest.approx(2.0, abs=1e-3)
+    assert stage.supervisor.held.travel[0] == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(("port", "said"), [(QuanserPort, "QUARC or the Quanser SDK"), (NidaqmxPort, "NI-DAQmx")])
+def test_a_vendors_board_without_its_kit_is_refused_in_a_sentence(port, said, monkeypatch):
+    for kit in ("quanser", "quanser.hardware", "nidaqmx"):
+        monkeypatch.setitem(sys.modules, kit, None)  # as if it were not installed
+    about = Capabilities(name="bench", coordinates=("psi",), counts=(1.0,), command_unit="V", full_scale=10.0,
+                         steps=10, period=1e-3)  # fmt: skip
+    with pytest.raises(BadInput, match=said):
+        port(about, "board")
+
+
+def test_signals_are_what_they_are_called():
+    period, seconds = 1e-3, 4.0
+    t = [k * period for k in range(4001)]
+    assert signal("step 0.5", "V", period, seconds) == [0.5] * 4001
+    sine = signal("sine 2 1.5", "V", period, seconds)
+    assert sine[500] == pytest.approx(2 * math.sin(2 * math.pi * 1.5 * t[500]))
+    square = signal("square 1 2", "V", period, seconds)
+    assert [square[k] for k in (100, 900, 1100, 1900, 2100)] == [1, 1, -1, -1, 1]
+    sweep = signal("sweep 1 1 8", "V", period, seconds)
+    # octaves take equal times: 1 to 8 Hz in 4 s has (8 - 1) 4/ln 8 cycles
+    crossings = sum(a < 0 <= b for a, b in pairwise(sweep))
+    assert abs(crossings - 7 * 4 / math.log(8)) <= 1
+
+
+def test_limits_have_to_be_there_before_anything_is_armed():
+    from upright.rigs import Board, TwinPort
+
+    with pytest.raises(RigStopped, match=r"\[limits.psi\]"):
+        Supervisor(Board(TwinPort(make_rig("furuta"))), Duty(limits=None)).prepare()
+    with pytest.raises(BadInput):
+        Limits(travel=(0.0,), speed=(1.0,), start=(1.0,), command=1.0)
