@@ -118,7 +118,7 @@ static void slice(void) {
     long edges[2], most = 1;
     for (int i = 0; i < 2; i++) {
         edges[i] = encoder_shows(&mishaps.encoder[i], furuta_counts(&plant, i)) - position[i];
-        edges[i] = edges[i] > EDGES_PER_SLICE ? EDGES_PER_SLICE : edges[i] < -EDGES_PER_SLICE ? -EDGES_PER_SLICE : edges[i];
+        if (labs(edges[i]) > EDGES_PER_SLICE) edges[i] = edges[i] < 0 ? -EDGES_PER_SLICE : EDGES_PER_SLICE;
         if (labs(edges[i]) > most) most = labs(edges[i]);
     }
     avr_cycle_count_t start = (avr_cycle_count_t)slices * SLICE;
