@@ -64,6 +64,8 @@ static uint8_t until_law;                              /* ticks to the law's nex
 static uint16_t lost;                                  /* ticks that never came */
 static bool overran;                                   /* a tick came due during this one */
 static bool awaited, due;                              /* an exchange; the sample that answers it */
+static uint8_t answer_every = 1;                       /* ticks */
+static uint32_t answer_at;                             /* the next tick that may answer */
 static uint8_t awaited_sequence;
 
 /* Outside of the tick. */
@@ -184,10 +186,10 @@ void rig_tick(uint32_t tick, uint16_t late) {
     }
     now.mode = mode;
     now.faults = faults;
-    if (awaited) {
-        awaited = false;
-        due = true;
-    }
+    if ((int32_t)(tick - answer_at) < 0) return;
+    due |= awaited;
+    awaited = false;
+    while ((int32_t)(tick - answer_at) >= 0) answer_at += answer_every;
 }
 
 void rig_overrun(void) { overran = true; }
@@ -355,7 +357,7 @@ static bool allowed(uint8_t kind) {
 }
 
 static const uint8_t length_of[] = {
-    [HELLO] = 0, [CONFIGURE] = LIMITS_BYTES, [ZERO] = 0, [SELF_TEST] = 4, [ARM] = 0, [START] = 1, [EXCHANGE] = 8,
+    [HELLO] = 1, [CONFIGURE] = LIMITS_BYTES, [ZERO] = 0, [SELF_TEST] = 4, [ARM] = 0, [START] = 1, [EXCHANGE] = 8,
     [STOP] = 0, [ESTOP] = 0, [CLEAR] = 0, [LAW] = LAW_BYTES, [SNAPSHOT] = 0,
 };
 
@@ -376,6 +378,8 @@ static uint8_t perform(uint8_t kind, const uint8_t *b) {
         power_off(FAULT);
         faults |= F_RESET;
         configured = has_law = false;
+        answer_every = b[0] ? b[0] : 1;
+        answer_at = now.tick - now.tick % answer_every + answer_every;
         break;
     case ZERO:
         for (uint8_t i = 0; i < CHANNELS; i++) {
@@ -471,6 +475,8 @@ void rig_reset(void) {
     configured = has_law = awaited = due = overran = false;
     last_kind = 0;
     lost = 0;
+    answer_every = 1;
+    answer_at = 0;
     illegal = port_illegal();
     for (uint8_t i = 0; i < CHANNELS; i++) {
         zero[i] = port_counts(i);

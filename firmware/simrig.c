@@ -37,7 +37,7 @@
 #define SLICES_PER_TICK 20
 #define BYTES_PER_SLICE 5  /* 1 Mbaud */
 #define EDGES_PER_SLICE 4  /* of one encoder, at most; its interrupt takes 110 cycles each time */
-#define LONGEST_ANSWER(bytes) (60 + 2 * (bytes)) /* slices; a law takes its time */
+#define LONGEST_ANSWER(bytes) (260 + 2 * (bytes)) /* slices; a host may exchange at every tenth tick only */
 #define WRITE_AND_UPDATE 0x03
 #define RAM 0x800000
 
