@@ -374,9 +374,9 @@ static uint8_t perform(uint8_t kind, const uint8_t *b) {
     }
     uint32_t before = port_lock();
     switch (kind) {
-    case HELLO: /* of a new host: whatever the one before it has left is over */
+    case HELLO: /* of a new host: whatever the one before it was at is over, its word to stop as well */
         power_off(FAULT);
-        faults |= F_RESET;
+        faults = (faults & ~F_STOP) | F_RESET;
         configured = has_law = false;
         answer_every = b[0] ? b[0] : 1;
         answer_at = now.tick - now.tick % answer_every + answer_every;

@@ -414,6 +414,22 @@ def test_a_new_host_finds_the_rig_stopped_and_without_limits(host):
         again.arm()
 
 
+@pytest.mark.parametrize(("left", "found"), [("stopped", Fault.RESET), ("silent", Fault.RESET | Fault.WATCHDOG)])
+def test_a_new_host_is_told_what_the_rig_found_but_not_what_hosts_said(host, left, found):
+    board, rig = running(host)
+    rig.exchange(0.1)
+    if left == "stopped":
+        rig.estop()
+    else:
+        board.do("run 20")
+    rig.close()
+    again = board.rig()
+    again.open()
+    assert again.exchange(0.0).faults == found
+    again.clear_fault()
+    assert again.exchange(0.0).faults == Fault(0)
+
+
 def test_less_than_a_count_is_no_limit(host):
     rig = host().rig()
     rig.open()
