@@ -41,7 +41,8 @@ void port_send(const uint8_t *bytes, uint16_t n) {
     for (uint16_t i = 0; i < n; i++) {
         uint16_t payload = frame_receive(&host, bytes[i]);
         claim(payload || i + 1 < n, "every frame that is sent is sound");
-        if (payload && host.bytes[0] == (CONFIGURE | REPLY) && host.bytes[2] == DONE) limit = (int16_t)get_u16(host.bytes + 52);
+        if (payload && host.bytes[0] == (CONFIGURE | REPLY) && host.bytes[2] == DONE)
+            limit = (int16_t)get_u16(host.bytes + 52);
     }
 }
 

@@ -67,7 +67,7 @@ uint16_t port_illegal(void) {
 
 #define WRITE_AND_UPDATE 0x03
 #define WRITE_CONTROL 0x04
-/* Range +-10 V, two's complement, internal reference, thermal shutdown on, middle of the range at power-up and CLEAR. */
+/* +-10 V, two's complement, internal reference, thermal shutdown on, middle of the range at power-up and CLEAR. */
 #define CONTROL 0x02E8
 
 /* One byte an interrupt, so that encoders are heard meanwhile; of commands that come during one the last one counts. */

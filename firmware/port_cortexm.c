@@ -48,7 +48,8 @@ static void on_byte(void) {
 static void on_tick(void) { rig_tick(++tick, 0); }
 
 __attribute__((section(".vectors"), used)) static void (*const vectors[])(void) = {
-    (void (*)(void)) & stack_top, reset, fail, fail, fail, fail, fail, 0, 0, 0, 0, fail, fail, 0, fail, on_tick, on_byte,
+    (void (*)(void)) & stack_top, reset, fail, fail, fail, fail, fail, 0, 0, 0, 0, fail, fail, 0, fail, on_tick,
+    on_byte,
 };
 
 uint32_t port_counts(uint8_t channel) { return encoder_counts[channel]; }

@@ -1,7 +1,7 @@
 /* The firmware as a process on Linux, its wire a pty whose name it prints: for tests without a board.
  *
  *     rig-host                            1 kHz by the clock on the wall
- *     rig-host lockstep                   a tick for every exchange, and none else: runs are the same to the last bit
+ *     rig-host lockstep                   ticks for every exchange, and none else: runs are the same to the last bit
  *     rig-host ... m_p=0.2 l_cg=0.15 ...  a Furuta pendulum on it (furuta.h); without one the encoders stand still
  *
  * Lines on standard input, each answered on standard output: those of mishap.h, and
@@ -135,7 +135,7 @@ static void listen_to_wire(void) {
         uint8_t byte = over_the_wire(&mishaps, bytes[i]);
         if (mishaps.cut) continue;
         rig_receive(byte);
-        if (port_virtual && rig_waiting()) pass(1, 0);
+        while (port_virtual && rig_waiting()) pass(1, 0);
     }
 }
 

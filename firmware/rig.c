@@ -28,7 +28,7 @@ typedef struct {
     uint32_t tick;
     uint16_t late;
     int32_t q[CHANNELS]; /* counts since they were zeroed */
-    int16_t applied; /* command that was put out until then */
+    int16_t applied;     /* command that was put out until then */
     uint8_t mode;
     uint16_t faults;
 } sample_t;
@@ -64,6 +64,8 @@ static uint8_t until_law;                              /* ticks to the law's nex
 static uint16_t lost;                                  /* ticks that never came */
 static bool overran;                                   /* a tick came due during this one */
 static bool awaited, due;                              /* an exchange; the sample that answers it */
+static uint8_t answer_every = 1;                       /* ticks */
+static uint32_t answer_at;                             /* the next tick that may answer */
 static uint8_t awaited_sequence;
 
 /* Outside of the tick. */
@@ -106,11 +108,15 @@ static int32_t remember(uint8_t channel, uint32_t counts, uint32_t tick, uint32_
     uint32_t previous = past[(tick - elapsed) & mask][channel];
     int32_t step = (int32_t)(counts - previous);
     if (elapsed > 1) { /* a straight line over ticks that never came */
-        uint32_t left = elapsed <= SPEED_WINDOW ? elapsed : SPEED_WINDOW;
-        while (--left) past[(tick - left) & mask][channel] = previous + (uint32_t)((int64_t)step * (elapsed - left) / elapsed);
+        uint32_t left = elapsed < SPEED_WINDOW ? elapsed : SPEED_WINDOW;
+        while (--left) {
+            int64_t gone = (int64_t)step * (elapsed - left) / elapsed;
+            past[(tick - left) & mask][channel] = previous + (uint32_t)gone;
+        }
     }
     uint32_t *oldest = &past[tick & mask][channel];
-    moved[channel] = elapsed < SPEED_WINDOW ? (int32_t)(counts - *oldest) : (int32_t)((int64_t)step * SPEED_WINDOW / elapsed);
+    moved[channel] = (int32_t)(counts - *oldest);
+    if (elapsed >= SPEED_WINDOW) moved[channel] = (int32_t)((int64_t)step * SPEED_WINDOW / elapsed);
     *oldest = counts;
     return step;
 }
@@ -180,10 +186,10 @@ void rig_tick(uint32_t tick, uint16_t late) {
     }
     now.mode = mode;
     now.faults = faults;
-    if (awaited) {
-        awaited = false;
-        due = true;
-    }
+    if ((int32_t)(tick - answer_at) < 0) return;
+    due |= awaited;
+    awaited = false;
+    while ((int32_t)(tick - answer_at) >= 0) answer_at += answer_every;
 }
 
 void rig_overrun(void) { overran = true; }
@@ -283,13 +289,19 @@ static uint8_t arm(void) {
     return off ? OFF_START : DONE;
 }
 
-static void start(enum mode whose) {
+/* A tick may have stopped the rig since it was found to be armed. */
+static uint8_t start(enum mode whose) {
     uint32_t before = port_lock();
-    silence = until_law = 0;
-    pulse_left = 0;
-    law_start();
-    mode = whose;
+    bool armed = mode == ARMED;
+    if (armed) {
+        silence = until_law = 0;
+        pulse_left = 0;
+        put_out(0);
+        law_start();
+        mode = whose;
+    }
     port_unlock(before);
+    return armed ? DONE : FAULTED;
 }
 
 static uint8_t self_test(const uint8_t *b) {
@@ -297,10 +309,13 @@ static uint8_t self_test(const uint8_t *b) {
     uint16_t ticks = get_u16(b + 2);
     if (size_of(height) > (uint32_t)limits.command || !ticks || ticks > LONGEST_PULSE) return WRONG_VALUE;
     uint32_t before = port_lock();
-    pulse = height;
-    pulse_left = ticks + 1;
+    bool armed = mode == ARMED;
+    if (armed) {
+        pulse = height;
+        pulse_left = ticks + 1;
+    }
     port_unlock(before);
-    return DONE;
+    return armed ? DONE : FAULTED;
 }
 
 static uint8_t take_law(const uint8_t *b) {
@@ -342,7 +357,7 @@ static bool allowed(uint8_t kind) {
 }
 
 static const uint8_t length_of[] = {
-    [HELLO] = 0, [CONFIGURE] = LIMITS_BYTES, [ZERO] = 0, [SELF_TEST] = 4, [ARM] = 0, [START] = 1, [EXCHANGE] = 8,
+    [HELLO] = 1, [CONFIGURE] = LIMITS_BYTES, [ZERO] = 0, [SELF_TEST] = 4, [ARM] = 0, [START] = 1, [EXCHANGE] = 8,
     [STOP] = 0, [ESTOP] = 0, [CLEAR] = 0, [LAW] = LAW_BYTES, [SNAPSHOT] = 0,
 };
 
@@ -355,15 +370,16 @@ static uint8_t perform(uint8_t kind, const uint8_t *b) {
     case START:
         if (b[0] != HOST && b[0] != MCU) return WRONG_VALUE;
         if (b[0] == MCU && !has_law) return NOT_CONFIGURED;
-        start((enum mode)b[0]);
-        return DONE;
+        return start((enum mode)b[0]);
     }
     uint32_t before = port_lock();
     switch (kind) {
-    case HELLO: /* of a new host: whatever the one before it has left is over */
+    case HELLO: /* of a new host: whatever the one before it was at is over, its word to stop as well */
         power_off(FAULT);
-        faults |= F_RESET;
+        faults = (faults & ~F_STOP) | F_RESET;
         configured = has_law = false;
+        answer_every = b[0] ? b[0] : 1;
+        answer_at = now.tick - now.tick % answer_every + answer_every;
         break;
     case ZERO:
         for (uint8_t i = 0; i < CHANNELS; i++) {
@@ -440,7 +456,7 @@ __attribute__((noinline)) static void answer(const uint8_t *request, uint16_t n)
     last_result = result;
     sample_t at = latest();
     bool told = result == DONE || kind == CONFIGURE || kind == LAW;
-    reply(kind, sequence, result, &at, told && kind < sizeof length_of ? put_answer(kind, payload + BODY) : payload + BODY);
+    reply(kind, sequence, result, &at, told ? put_answer(kind, payload + BODY) : payload + BODY);
 }
 
 void rig_receive(uint8_t byte) {
@@ -459,6 +475,8 @@ void rig_reset(void) {
     configured = has_law = awaited = due = overran = false;
     last_kind = 0;
     lost = 0;
+    answer_every = 1;
+    answer_at = 0;
     illegal = port_illegal();
     for (uint8_t i = 0; i < CHANNELS; i++) {
         zero[i] = port_counts(i);

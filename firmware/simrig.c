@@ -37,7 +37,7 @@
 #define SLICES_PER_TICK 20
 #define BYTES_PER_SLICE 5  /* 1 Mbaud */
 #define EDGES_PER_SLICE 4  /* of one encoder, at most; its interrupt takes 110 cycles each time */
-#define LONGEST_ANSWER(bytes) (60 + 2 * (bytes)) /* slices; a law takes its time */
+#define LONGEST_ANSWER(bytes) (260 + 2 * (bytes)) /* slices; a host may exchange at every tenth tick only */
 #define WRITE_AND_UPDATE 0x03
 #define RAM 0x800000
 
@@ -118,7 +118,7 @@ static void slice(void) {
     long edges[2], most = 1;
     for (int i = 0; i < 2; i++) {
         edges[i] = encoder_shows(&mishaps.encoder[i], furuta_counts(&plant, i)) - position[i];
-        edges[i] = edges[i] > EDGES_PER_SLICE ? EDGES_PER_SLICE : edges[i] < -EDGES_PER_SLICE ? -EDGES_PER_SLICE : edges[i];
+        if (labs(edges[i]) > EDGES_PER_SLICE) edges[i] = edges[i] < 0 ? -EDGES_PER_SLICE : EDGES_PER_SLICE;
         if (labs(edges[i]) > most) most = labs(edges[i]);
     }
     avr_cycle_count_t start = (avr_cycle_count_t)slices * SLICE;

@@ -34,7 +34,7 @@ class Board:
     """A process that behaves like a board."""
 
     def __init__(self, *command: str | Path) -> None:
-        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, encoding="utf-8")
         self.port = self._line()
 
     def _line(self) -> str:

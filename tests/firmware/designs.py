@@ -28,9 +28,9 @@ def gains(at: str, poles: tuple[complex, ...]) -> np.ndarray:
     return place(model.A, GAIN * model.B, poles).K[0]
 
 
-def inverted(memory: float = 0.8) -> Law:
+def inverted(memory: float = 0.8, period: float = PERIOD) -> Law:
     """Holds it upright, where it was zeroed."""
-    return state_feedback(gains("inverted", SET_1), PERIOD, memory=memory, limit=LIMITS.command)
+    return state_feedback(gains("inverted", SET_1), period, memory=memory, limit=LIMITS.command)
 
 
 def swing_free() -> Law:

@@ -18,7 +18,6 @@ from upright.laws import state_feedback
 from upright.rigs.protocol import Fault, Mode
 from upright.simulation import simulate
 
-pytestmark = pytest.mark.slow
 TICK = 16_000
 """Cycles of the processor."""
 KICKS = {float(t): (-1) ** t * 0.8 for t in range(2, 60, 3)}
@@ -35,6 +34,7 @@ def started(board, mode, law=None, limits=LIMITS):
     return rig
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", [Mode.MCU, Mode.HOST])
 def test_it_is_held_for_a_minute_through_kicks_without_a_lost_tick(avr, mode):
     board = avr(*UPRIGHT)
@@ -50,6 +50,7 @@ def test_it_is_held_for_a_minute_through_kicks_without_a_lost_tick(avr, mode):
     assert worst < 0.7 * TICK
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", [Mode.MCU, Mode.HOST])
 def test_runs_are_the_same_to_the_last_bit(avr, mode):
     kicks = {0.5: 0.6, 1.5: -0.9}
@@ -79,6 +80,7 @@ def test_its_arithmetic_is_that_of_every_other_board(avr):
     assert len(fits) == 1
 
 
+@pytest.mark.slow
 def test_its_pendulum_moves_as_the_project_says(avr):
     start = {"psi": 0.3, "psi_dot": -1.0, "theta": 2.0, "theta_dot": 3.0}
     board = avr(*plant(PARAMETERS, GAIN, **start))
@@ -87,6 +89,7 @@ def test_its_pendulum_moves_as_the_project_says(avr):
     np.testing.assert_allclose(board.state()[1:5], x, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_edges_are_counted_at_every_speed_that_the_tick_leaves_room_for(avr):
     board = avr(*plant({**PARAMETERS, "b_1": 0.0, "b_2": 0.0, "g": 1e-9}, GAIN, psi_dot=0.0, theta_dot=15.0))
     board.do("release")
@@ -112,6 +115,7 @@ def test_a_processor_that_cannot_keep_up_stops(avr):
     assert board.state()[6] == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mishap", "faults"),
     [

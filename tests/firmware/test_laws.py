@@ -63,7 +63,7 @@ def told(host, law, q, references):
 
 def in_float32(law, q, references, most):
     """The law written out, every product and sum rounded to float32, entries that are zero skipped."""
-    f, b = np.float32, onboard(law, ABOUT)
+    f, b = np.float32, onboard(law, ABOUT, PERIOD)
     z, out, u = None, [], 0
     limit = min(f(b.limit), f(most))
     with np.errstate(over="ignore"):
@@ -100,7 +100,7 @@ def test_commands_are_those_of_the_law_in_float32_to_the_last_step(host, name):
     expected = in_float32(law, q, r, most)
     assert np.array_equal(told(host, law, q, r), expected)
 
-    every = onboard(law, ABOUT).every
+    every = onboard(law, ABOUT, PERIOD).every
     whole = law.over(ABOUT.coordinates, 1) if law.measured else law
     limit = math.floor(min(law.limit, FREE.command) / STEP + 1e-9) * STEP
     references = r[::every] if law.signal().shape[1] else None
@@ -181,11 +181,11 @@ def test_a_law_is_compared_bit_by_bit_with_what_the_board_holds(host):
 )
 def test_a_law_that_does_not_fit_is_refused_in_a_sentence(law, why):
     with pytest.raises(BadInput, match=why):
-        onboard(law, ABOUT)
+        onboard(law, ABOUT, PERIOD)
 
 
 def test_counts_with_a_sign_turn_the_law_about(host):
     turned = replace(ABOUT, counts=(COUNTS, -COUNTS))
-    one, other = onboard(inverted(), ABOUT), onboard(inverted(), turned)
+    one, other = onboard(inverted(), ABOUT, PERIOD), onboard(inverted(), turned, PERIOD)
     w = np.array([3.0, -7.0])
     assert np.array_equal(one.matrix[:, 4:6] @ w, other.matrix[:, 4:6] @ (w * [1.0, -1.0]))

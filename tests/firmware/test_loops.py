@@ -10,6 +10,7 @@ import pytest
 
 from tests.firmware.boards import COUNTS, STEP, plant
 from tests.firmware.designs import FURUTA, GAIN, LIMITS, PARAMETERS, PERIOD, inverted, swing_free
+from upright.errors import BadInput
 from upright.rigs.protocol import Fault, Mode
 from upright.simulation import simulate
 
@@ -36,9 +37,9 @@ def on_the_host(law):
     return step
 
 
-def held(board, mode, law, seconds, kicks, lockstep=False):
+def held(board, mode, law, seconds, kicks, **how):
     """Samples (tick, counts, steps applied) of a run that is kicked, and the rig afterwards."""
-    rig = board.rig(lockstep=lockstep, patience=20.0)
+    rig = board.rig(patience=20.0, **how)
     rig.open()
     rig.clear_fault()
     rig.configure(LIMITS)
@@ -79,6 +80,26 @@ def test_the_inverted_pendulum_is_held_through_kicks_the_same_each_time(host, mo
     assert 0.05 * COUNTS < farthest < 0.3 * COUNTS
     rig.stop()
     assert rig.exchange(0.0).mode == Mode.IDLE
+
+
+def test_a_host_that_takes_its_time_is_paced_at_every_fourth_tick(host):
+    rows, rig = held(host(*UPRIGHT), Mode.HOST, inverted(0.2, 4 * PERIOD), 4.0, KICKS, period=4 * PERIOD)
+    assert len(rows) == 1000
+    assert np.array_equal(np.diff(rows[:, 0]), np.ones(len(rows) - 1))
+    rows[:, 0] *= 4
+    rest, farthest = settled(rows, KICKS)
+    assert rest < 0.02 * COUNTS
+    assert farthest < 0.3 * COUNTS
+    first = rig.exchange(0.0)
+    second = rig.exchange(0.0)
+    assert second.tick - first.tick == 1
+    assert second.time - first.time == pytest.approx(4 * PERIOD)
+    assert rig.snapshot().lost == 0
+
+
+def test_a_period_that_is_no_multiple_of_the_tick_is_refused(host):
+    with pytest.raises(BadInput, match=r"0\.884 ms"):
+        host().rig(period=0.884e-3).open()
 
 
 def test_without_a_law_it_falls_and_the_rig_stops_at_its_travel(host):

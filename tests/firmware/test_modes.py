@@ -13,7 +13,7 @@ from upright.errors import RigStopped
 from upright.laws import Law
 from upright.rigs.line import TerminalLine
 from upright.rigs.protocol import Fault, Limits, Mode
-from upright.rigs.wire import Kind, Parser, Result, exchange, pack, status
+from upright.rigs.wire import Kind, Parser, Result, exchange, pack, self_test, status
 
 WIDE = Limits(travel=(3.0, 4.0), speed=(20.0, 20.0), start=(0.5, 0.5), command=5.0, watchdog=0.02, saturation=0.1)
 PULL = Law(np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((1, 0)), np.array([[1.0, 0.0]]))
@@ -414,12 +414,44 @@ def test_a_new_host_finds_the_rig_stopped_and_without_limits(host):
         again.arm()
 
 
+@pytest.mark.parametrize(("left", "found"), [("stopped", Fault.RESET), ("silent", Fault.RESET | Fault.WATCHDOG)])
+def test_a_new_host_is_told_what_the_rig_found_but_not_what_hosts_said(host, left, found):
+    board, rig = running(host)
+    rig.exchange(0.1)
+    if left == "stopped":
+        rig.estop()
+    else:
+        board.do("run 20")
+    rig.close()
+    again = board.rig()
+    again.open()
+    assert again.exchange(0.0).faults == found
+    again.clear_fault()
+    assert again.exchange(0.0).faults == Fault(0)
+
+
 def test_less_than_a_count_is_no_limit(host):
     rig = host().rig()
     rig.open()
     rig.clear_fault()
     with pytest.raises(RigStopped, match="less than a count"):
         rig.configure(replace(WIDE, travel=(0.4 / COUNTS, 1.0)))
+
+
+def test_a_run_that_starts_during_a_self_test_starts_at_zero(host):
+    board = host()
+    line = TerminalLine(board.port)
+    rig = rig_on(line)
+    rig.open()
+    rig.clear_fault()
+    rig.configure(WIDE)
+    rig.arm()
+    line.write(pack(Kind.SELF_TEST, 99, self_test(500, 50)))
+    assert line.read(1.0)
+    rig.exchange(0.0)
+    assert board.state()[5] == 500
+    rig.start(Mode.HOST)
+    assert board.state()[5:] == [0.0, 1.0, Mode.HOST]
 
 
 def test_a_cut_link_is_told_as_one_and_the_rig_stops_itself(host):

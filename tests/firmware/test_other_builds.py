@@ -21,7 +21,7 @@ def test_a_cortex_m3_answers_in_qemu(built):
     qemu = subprocess.Popen(
         ["qemu-system-arm", "-M", "mps2-an385", "-nographic", "-monitor", "none", "-serial", "pty",
          "-kernel", str(folder / "cortexm.elf")],
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8",
     )  # fmt: skip
     try:
         assert qemu.stdout is not None
@@ -43,6 +43,6 @@ def test_a_fuzzer_finds_nothing_that_breaks_it(built):
     folder = built("fuzz", "clang")
     found = subprocess.run(
         [folder / "fuzz-wire", "-seed=1", "-runs=100000", "-max_len=2000", f"-artifact_prefix={folder}/"],
-        capture_output=True, text=True, check=False,
+        capture_output=True, encoding="utf-8", check=False,
     )  # fmt: skip
     assert found.returncode == 0, found.stderr[-2000:]

@@ -55,8 +55,8 @@ class OnboardLaw:
         return b"".join(n.astype("<f4").tobytes() for n in numbers) + _END.pack(self.limit, self.held_sums, self.every)
 
 
-def onboard(law: Law, about: Capabilities) -> OnboardLaw:
-    """The same law in a board's units; its references come with every exchange.
+def onboard(law: Law, about: Capabilities, tick: float) -> OnboardLaw:
+    """The same law in the units of a board with that tick [s]; its references come with every exchange.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def onboard(law: Law, about: Capabilities) -> OnboardLaw:
     ):  # fmt: skip
         if has > room:
             raise BadInput(f"the firmware has room for {room} {what}, and this law has {has}; run it on the host.")
-    every = _ticks(law.period, about.period) if law.period else 1
+    every = ticks(law.period, tick) if law.period else 1
     wired = law.in_units(1.0 / np.array(about.counts), 0.0, 1.0 / about.step)
     z, n = len(law.A), law.readings
     matrix = np.zeros((MEMORIES + 1, MEMORIES + READINGS + REFERENCES))
@@ -105,15 +105,15 @@ def onboard(law: Law, about: Capabilities) -> OnboardLaw:
     )  # fmt: skip
 
 
-def _ticks(period: float, tick: float) -> int:
-    """A law's period in ticks of the board."""
-    ticks = round(period / tick)
-    if not 1 <= ticks <= _LONGEST or not math.isclose(ticks * tick, period, rel_tol=1e-3):
+def ticks(period: float, tick: float) -> int:
+    """A period in ticks of the board."""
+    whole = round(period / tick)
+    if not 1 <= whole <= _LONGEST or not math.isclose(whole * tick, period, rel_tol=1e-3):
         raise BadInput(
-            f"this law is made for a period of {1e3 * period:.6g} ms, and the rig ticks every {1e3 * tick:.6g} ms; "
-            f'design for that or up to {_LONGEST} times as much: --period "{1e3 * tick:.6g} ms".'
+            f"a period of {1e3 * period:.6g} ms is asked for, and the rig ticks every {1e3 * tick:.6g} ms; design for "
+            f'that or up to {_LONGEST} times as much: --period "{1e3 * tick:.6g} ms".'
         )
-    return ticks
+    return whole
 
 
 def _padded(values: ArrayLike, *shape: int) -> Float32:

@@ -11,7 +11,7 @@ from upright.errors import BadInput, RigStopped
 from upright.laws import Law
 from upright.rigs import wire
 from upright.rigs.line import Line, open_line
-from upright.rigs.onboard import onboard
+from upright.rigs.onboard import onboard, ticks
 from upright.rigs.protocol import NO_FAULT, Capabilities, Fault, Limits, Mode, SelfTest, Tick
 from upright.rigs.wire import Kind, Packet, Result, Status
 
@@ -46,6 +46,9 @@ class SerialRig:
         ``"V"``, ``"A"``, ...
     full_scale : float
         Command at the converter's last step [command unit].
+    period : float, optional
+        Between two exchanges [s], a multiple of the board's tick; that itself when omitted. Over USB an answer takes 2
+        to 3 ms, and a loop on the host needs the same time for each.
     patience : float
         How long an answer may take before the link is taken for lost [s].
     lockstep : bool
@@ -64,6 +67,7 @@ class SerialRig:
         counts: Sequence[float],
         command_unit: str,
         full_scale: float,
+        period: float | None = None,
         patience: float = 1.0,
         lockstep: bool = False,
         resend: float | None = None,
@@ -78,11 +82,12 @@ class SerialRig:
             raise BadInput(f"counts must not be zero and the full scale above it, got {counts} and {full_scale:g}.")
         self._given, self._line = line, None if isinstance(line, str) else line
         self._coordinates, self._counts = tuple(coordinates), tuple(float(n) for n in counts)
-        self._unit, self._full_scale = command_unit, full_scale
+        self._unit, self._full_scale, self._period = command_unit, full_scale, period
         self._patience, self._lockstep, self._resend, self._clock = patience, lockstep, resend, clock
         self._again = math.inf
         self._parser = wire.Parser()
         self._sequence = 0
+        self._every, self._tick = 1, 1e-3
         self._about: Capabilities | None = None
         self._hello: wire.Hello | None = None
         self._status = Status(Result.DONE, Mode.FAULT, Fault.RESET, 0)
@@ -98,7 +103,10 @@ class SerialRig:
         if self._line is None:
             self._line = open_line(str(self._given))
         self._again = 0.3  # a board that resets when its port is opened hears nothing for a while
-        hello = self._hello = wire.hello(self._ask(Kind.HELLO, patience=max(_BOOT, self._patience)))
+        hello = self._greet(1)
+        self._every = ticks(self._period, 1e-6 * hello.period) if self._period else 1
+        if self._every > 1:
+            hello = self._greet(self._every)
         if hello.protocol != wire.PROTOCOL:
             raise RigStopped(
                 f"The firmware '{hello.name}' speaks version {hello.protocol} of the protocol and this program version "
@@ -108,10 +116,16 @@ class SerialRig:
         self._again = self._resend or (math.inf if virtual else 0.02)
         self._about = Capabilities(
             name=f"{hello.name} on {self._line.name}", coordinates=self._coordinates, counts=self._counts,
-            command_unit=self._unit, full_scale=self._full_scale, steps=hello.steps, period=1e-6 * hello.period,
+            command_unit=self._unit, full_scale=self._full_scale, steps=hello.steps, period=self._every * self._tick,
             modes=frozenset({Mode.HOST, Mode.MCU}), virtual=virtual, hardware=not virtual, paced=not virtual,
         )  # fmt: skip
         return self._about
+
+    def _greet(self, every: int) -> wire.Hello:
+        """What the firmware says of itself when it is told how many ticks there are between two exchanges."""
+        hello = self._hello = wire.hello(self._ask(Kind.HELLO, bytes((every,)), max(_BOOT, self._patience)))
+        self._tick = 1e-6 * hello.period
+        return hello
 
     def configure(self, limits: Limits) -> Limits:
         """Hold limits, rounded towards the safe side to counts, steps and ticks; what came back is compared."""
@@ -128,10 +142,10 @@ class SerialRig:
     def self_test(self, pulse: float, seconds: float) -> SelfTest:
         """The farthest that each coordinate went under a pulse and for as long after it."""
         c = self._there()
-        ticks = max(1, round(seconds / c.period)) if math.isfinite(seconds) else 0
+        length = max(1, round(seconds / self._tick)) if 0.0 < seconds < math.inf else 0
         first = self.exchange(0.0).counts
-        self._ask(Kind.SELF_TEST, wire.self_test(self._steps(pulse), ticks & 0xFFFF))
-        farthest, until = [0] * len(first), self._status.tick + 2 * ticks + 1
+        self._ask(Kind.SELF_TEST, wire.self_test(self._steps(pulse), min(length, 0xFFFF)))
+        farthest, until = [0] * len(first), self._status.tick + 2 * length + 1
         while self._status.tick < until:
             tick = self.exchange(0.0)
             if tick.faults:
@@ -156,7 +170,7 @@ class SerialRig:
         if mode == Mode.MCU:
             if law is None:
                 raise self._refusal("its own loop needs a law")
-            body = onboard(law, c).body()
+            body = onboard(law, c, self._tick).body()
             try:
                 held = self._ask(Kind.LAW, body)
             except RigStopped:
@@ -187,7 +201,8 @@ class SerialRig:
         sample = wire.sample(self._ask(Kind.EXCHANGE, body))
         self._at = sample.counts[: len(self._counts)]
         return Tick(
-            tick=self._status.tick, time=self._status.tick * c.period + 1e-6 * sample.late, counts=self._at,
+            tick=self._status.tick // self._every, time=self._status.tick * self._tick + 1e-6 * sample.late,
+            counts=self._at,
             applied=sample.applied * c.step, mode=self._status.mode, faults=self._status.faults,
         )  # fmt: skip
 
@@ -277,11 +292,13 @@ class SerialRig:
                 f"the limit on the command is {limits.command:g} {c.command_unit}, beyond the converter's "
                 f"{c.full_scale:g} {c.command_unit}"
             )
-        command, watchdog = min(_down(limits.command / c.step), wire.MOST), _down(limits.watchdog / c.period)
+        command, watchdog = min(_down(limits.command / c.step), wire.MOST), _down(limits.watchdog / self._tick)
         if command < 1:
             raise self._refusal(f"the limit on the command is less than a step of {c.step:g} {c.command_unit}")
-        if not 1 <= watchdog <= 5000:
-            raise self._refusal(f"the watchdog takes {c.period:g} to {5000 * c.period:g} s, got {limits.watchdog:g} s")
+        if not self._every <= watchdog <= 5000:
+            raise self._refusal(
+                f"the watchdog takes {c.period:g} to {5000 * self._tick:g} s, got {limits.watchdog:g} s"
+            )
         twist = wire.NO_LIMIT
         if math.isfinite(limits.twist):
             if n < 2 or c.counts[0] != c.counts[1]:
@@ -290,13 +307,13 @@ class SerialRig:
                     f"{', '.join(f'{k:g}' for k in c.counts)} (swap A and B of one that runs the other way)"
                 )
             twist = _down(limits.twist * abs(c.counts[0]))
-        window = hello.speed_window * c.period
+        window = hello.speed_window * self._tick
         return wire.LimitsOnWire(
             travel=self._pair(limits.travel), start=self._pair(limits.start),
             speed=self._pair([v * window for v in limits.speed]),
             frozen=(0, 0) if n < 2 or not limits.frozen else self._pair([limits.frozen] * n),
             twist=twist, watchdog=watchdog, command=command,
-            saturation=min(_down(limits.saturation / c.period), wire.FOREVER - 1)
+            saturation=min(_down(limits.saturation / self._tick), wire.FOREVER - 1)
             if math.isfinite(limits.saturation) else wire.FOREVER,
         )  # fmt: skip
 
@@ -320,9 +337,9 @@ class SerialRig:
             return tuple(math.inf if k == wire.NO_LIMIT else k / (abs(n) * per) for k, n in each)
 
         return Limits(
-            travel=back(held.travel), speed=back(held.speed, hello.speed_window * c.period), start=back(held.start),
-            command=held.command * c.step, watchdog=held.watchdog * c.period, frozen=max(back(held.frozen)),
-            saturation=math.inf if held.saturation == wire.FOREVER else held.saturation * c.period,
+            travel=back(held.travel), speed=back(held.speed, hello.speed_window * self._tick), start=back(held.start),
+            command=held.command * c.step, watchdog=held.watchdog * self._tick, frozen=max(back(held.frozen)),
+            saturation=math.inf if held.saturation == wire.FOREVER else held.saturation * self._tick,
             twist=math.inf if held.twist == wire.NO_LIMIT else held.twist / abs(c.counts[0]),
         )  # fmt: skip
 
