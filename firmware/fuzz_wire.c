@@ -1,7 +1,7 @@
 /* libFuzzer on everything that comes over the wire: make fuzz && build/fuzz-wire -max_total_time=60
  *
  * The first byte says whether the rest comes raw or cut into payloads that are framed properly, so that the requests
- * behind the CRC are reached as well, and whether the rig has been armed before. Between frames encoders move and ticks pass as the input says. Whatever comes:
+ * behind the CRC are reached as well, and whether a loop runs before. Between frames encoders move and ticks pass as the input says. Whatever comes:
  * power and command only where a host has armed the rig, never beyond the limit, and no fault without zero output. */
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,6 +9,7 @@
 
 #include "bytes.h"
 #include "frame.h"
+#include "law.h"
 #include "port.h"
 #include "rig.h"
 
@@ -60,8 +61,19 @@ static void ask(uint8_t *payload, size_t n) {
     for (uint16_t i = 0; i < length; i++) rig_receive(frame[i]);
 }
 
-static void arm(void) {
-    uint8_t payload[60] = {CLEAR};
+/* Requests as a host makes them, so that the fuzzer need not find lengths and ages by chance. */
+static size_t proper(uint8_t *payload, size_t n, uint32_t tick) {
+    static const uint8_t body[] = {
+        [HELLO] = 1, [CONFIGURE] = 44, [SELF_TEST] = 4, [START] = 1, [EXCHANGE] = 8, [LAW] = LAW_BYTES, [SNAPSHOT] = 0,
+    };
+    payload[0] = 1 + payload[0] % SNAPSHOT;
+    if (n < 2 + (size_t)body[payload[0]]) memset(payload + n, 0, 2 + body[payload[0]] - n);
+    if (payload[0] == EXCHANGE) put_u16(payload + 8, (uint16_t)tick);
+    return 2 + body[payload[0]];
+}
+
+static void begin(enum mode mode) {
+    uint8_t payload[PAYLOAD_MOST + CRC_BYTES] = {CLEAR};
     ask(payload, 2);
     payload[0] = CONFIGURE;
     for (int i = 0; i < 10; i++) put_u32(payload + 2 + 4 * i, i == 6 || i == 7 ? 50 : 1000);
@@ -70,24 +82,34 @@ static void arm(void) {
     ask(payload, 46);
     payload[0] = ARM;
     ask(payload, 2);
-    claim(rig_mode() == ARMED, "a rig that was cleared and configured can be armed");
+    memset(payload, 0, sizeof payload);
+    payload[0] = LAW; /* 10 steps for each count of encoder 1 */
+    put_float(payload + 2 + 4 * (COMMAND_ROW * INPUTS + MEMORIES), 10);
+    put_u16(payload + 2 + LAW_BYTES - 4, 32767);
+    payload[2 + LAW_BYTES - 1] = 1;
+    ask(payload, 2 + LAW_BYTES);
+    payload[0] = START;
+    payload[2] = mode;
+    ask(payload, 3);
+    claim(rig_mode() == mode, "a rig that was cleared, configured and armed can be started");
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     uint32_t tick = 0;
     if (!size--) return 0;
-    bool framed = *data & 1, armed = *data++ & 2;
+    uint8_t how = *data++;
+    bool framed = how & 1;
     memset(counts, 0, sizeof counts);
     limit = 0;
     rig_reset();
-    if (armed) arm();
+    if (how & 2) begin(how & 4 ? MCU : HOST);
     while (size >= 2) {
-        uint8_t payload[PAYLOAD_MOST + CRC_BYTES];
-        size_t n = 1 + *data++ % 220;
+        uint8_t payload[PAYLOAD_MOST + CRC_BYTES], shape = *data++;
+        size_t n = 1 + shape % 128;
         if (n > --size) n = size;
         if (framed) {
             memcpy(payload, data, n);
-            ask(payload, n);
+            ask(payload, shape & 128 ? proper(payload, n, tick) : n);
         } else {
             for (size_t i = 0; i < n; i++) rig_receive(data[i]);
         }

@@ -68,8 +68,9 @@ class Board:
 
 
 def rig_on(line: str | Line, **how: Any) -> SerialRig:
-    """A rig with ECP's encoders and converter at the end of a line."""
-    same = {"coordinates": ("psi", "theta"), "counts": (COUNTS, COUNTS), "command_unit": "V", "full_scale": FULL_SCALE}
+    """A rig with ECP's encoders and converter at the end of a line, as patient as a busy machine needs."""
+    same = {"coordinates": ("psi", "theta"), "counts": (COUNTS, COUNTS), "command_unit": "V", "full_scale": FULL_SCALE,
+            "patience": 20.0}  # fmt: skip
     return SerialRig(line, **{**same, **how})
 
 

@@ -24,7 +24,7 @@ KICKS = {float(t): (-1) ** t * 0.8 for t in range(2, 60, 3)}
 
 
 def started(board, mode, law=None, limits=LIMITS):
-    rig = board.rig(lockstep=True, patience=20.0)
+    rig = board.rig(lockstep=True)
     rig.open()
     rig.clear_fault()
     rig.configure(limits)
@@ -93,7 +93,7 @@ def test_its_pendulum_moves_as_the_project_says(avr):
 def test_edges_are_counted_at_every_speed_that_the_tick_leaves_room_for(avr):
     board = avr(*plant({**PARAMETERS, "b_1": 0.0, "b_2": 0.0, "g": 1e-9}, GAIN, psi_dot=0.0, theta_dot=15.0))
     board.do("release")
-    rig = board.rig(lockstep=True, patience=20.0)
+    rig = board.rig(lockstep=True)
     rig.open()
     rig.clear_fault()
     rig.zero()
@@ -153,7 +153,7 @@ def test_a_processor_that_hangs_is_reset_with_the_power_off(avr):
 
 def test_a_cut_link_stops_it_and_a_counter_may_run_over(avr):
     board = avr(*UPRIGHT)
-    rig = board.rig(lockstep=True, patience=20.0)
+    rig = board.rig(lockstep=True)
     rig.open()
     rig.clear_fault()
     rig.configure(LIMITS)

@@ -17,7 +17,7 @@ def specimen(request):
 
     def make():
         board = start(*HANGING)
-        rig = board.rig(patience=20.0, lockstep=True)
+        rig = board.rig(lockstep=True)
         boards[rig] = board
         return rig
 

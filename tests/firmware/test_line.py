@@ -24,6 +24,8 @@ def test_a_rig_answers_over_every_line(host, make):
     rig.clear_fault()
     assert [rig.exchange(0.0).tick for _ in range(3)] == [1, 2, 3]
     rig.close()
+    with pytest.raises(RigStopped, match="another line"):
+        rig.open()
 
 
 def test_firmware_by_the_clock_on_the_wall_paces_its_host(host):

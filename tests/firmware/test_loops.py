@@ -39,7 +39,7 @@ def on_the_host(law):
 
 def held(board, mode, law, seconds, kicks, **how):
     """Samples (tick, counts, steps applied) of a run that is kicked, and the rig afterwards."""
-    rig = board.rig(patience=20.0, **how)
+    rig = board.rig(**how)
     rig.open()
     rig.clear_fault()
     rig.configure(LIMITS)

@@ -101,7 +101,10 @@ class SerialRig:
     def open(self) -> Capabilities:
         """Find the firmware; a board that was switched on stands in FAULT with `Fault.RESET`."""
         if self._line is None:
-            self._line = open_line(str(self._given))
+            if not isinstance(self._given, str):
+                raise RigStopped("Its line was closed; make the rig anew with another line.")
+            self._line = open_line(self._given)
+        self._parser = wire.Parser()
         self._again = 0.3  # a board that resets when its port is opened hears nothing for a while
         hello = self._greet(1)
         self._every = ticks(self._period, 1e-6 * hello.period) if self._period else 1
