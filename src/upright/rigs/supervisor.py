@@ -148,12 +148,13 @@ class Supervisor:
     _mode: Mode = field(init=False, default=Mode.IDLE)
 
     def prepare(self, *, zero: bool = True) -> Capabilities:
-        """Open the rig, hand limits over and read them back; zero its encoders where it is now.
+        """Open the rig, hand limits over and read them back; zero its encoders once it rests.
 
         Raises
         ------
         RigStopped
-            When there are no limits, they do not come back as they were sent, or it has a fault that nobody looked at.
+            When there are no limits, they do not come back as they were sent, it has a fault that nobody looked at, or
+            it does not come to rest.
         """
         self.about = self.rig.open()
         if self.duty.limits is None:
@@ -172,7 +173,8 @@ class Supervisor:
         self.held = self.rig.configure(asked)
         if wrong := _wider(self.held, asked, self.about):
             self._give_up(NO_FAULT, f"{self.about.name} holds other limits than it was given: {wrong}; do not run it.")
-        if zero:
+        if zero and not self.about.replayed:
+            self._await_rest()
             self.rig.zero()
         return self.about
 
@@ -184,9 +186,9 @@ class Supervisor:
         RigStopped
             When it does not come to rest, or does not answer as the model does.
         """
-        self.rig.arm()
-        self._await_rest()
         pulse, expected = self._expected()
+        self._await_rest()
+        self.rig.arm()
         found = self.rig.self_test(pulse, PULSE)
         self.rig.stop()
         complaint = found.complaint or unlike(found, expected)
@@ -260,7 +262,7 @@ class Supervisor:
                 Fault.START, f"{self.about.coordinates[-1]} is {self._shown(readings[-1] - self.target[-1])} from "
                 f"where it is to be held, and a run starts within {self._shown(self.duty.near)}; bring it there.",
             )  # fmt: skip
-        first = RunningLaw(self.law, self.about.period).step(readings)
+        first = RunningLaw(self.law, self.about.period).step(readings, 0.0)  # a reference may ask for all there is
         if abs(first) >= self.held.command:
             self._give_up(
                 Fault.START, f"the law would begin with its largest command, {first:.3g} {self.about.command_unit}; "
@@ -359,11 +361,12 @@ class Supervisor:
         raise RigStopped(why[0].upper() + why[1:])
 
     def _await_rest(self, patience: float = 30.0) -> None:
+        """Wait with the power stage off, so that nothing drives what is still moving."""
         first = moved = self.rig.exchange(0.0)
         while moved.time - first.time < patience:
             tick = self.rig.exchange(0.0)
-            moved = tick if tick.counts != moved.counts or tick.mode != Mode.ARMED else moved
-            if tick.mode != Mode.ARMED:
+            moved = tick if tick.counts != moved.counts else moved
+            if tick.mode != Mode.IDLE:
                 self._give_up(tick.faults, f"{self.about.name} stopped itself: {told(tick.faults)}.")
             if tick.time - moved.time >= REST:
                 return

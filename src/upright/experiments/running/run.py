@@ -16,6 +16,7 @@ from upright.experiments.running.rig import described, open_loop, read_law, sign
 from upright.files import read_text
 from upright.laws import Law, Rule, as_values
 from upright.logs import RunLog, read_log
+from upright.logs.layout import library
 from upright.realtime.jitter import TOLERATED
 from upright.realtime.process import run_in_process
 from upright.realtime.session import RunEnd, RunOrder, RunState, carry_out
@@ -94,8 +95,9 @@ class RigRun:
 
     @property
     def unrest(self) -> tuple[float, ...]:
-        """Root mean square of the deviations over the second half [rad or m]; less their mean with a reference."""
+        """Root mean square of the deviations over the second half [rad or m]; from their mean with a reference."""
         half = self.away[len(self.away) // 2 :]
+        half = half - half.mean(axis=0) if self.wish.reference and half.size else half
         return tuple(np.sqrt(np.mean(half**2, axis=0)).tolist()) if half.size else ()
 
     @property
@@ -123,7 +125,8 @@ class RigRun:
         last = self.model.plant.coordinates[-1]
         unrest = math.degrees(self.unrest[-1]) if last.unit == "rad" else 1e3 * self.unrest[-1]
         unit = "degrees" if last.unit == "rad" else "mm"
-        return f"Held for {how}{late}; {last.name} stayed within {unrest:.2g} {unit} (rms, second half).{log}"
+        what = f"varied by {unrest:.2g} {unit}" if self.wish.reference else f"stayed within {unrest:.2g} {unit}"
+        return f"Held for {how}{late}; {last.name} {what} (rms, second half).{log}"
 
 
 def run_rig(
@@ -144,6 +147,7 @@ def run_rig(
     BadInput
         When files contradict each other.
     """
+    library()  # what a log needs is missed before anything moves
     file = read_rig_file(wish.rig)
     model, _ = described(file)
     balance = wish.law is not None
