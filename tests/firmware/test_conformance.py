@@ -6,8 +6,8 @@ import pytest
 
 from tests.firmware.boards import plant
 from tests.firmware.designs import GAIN, PARAMETERS
+from tests.rigs import conformance
 
-conformance = pytest.importorskip("tests.rigs.conformance")
 HANGING = plant(PARAMETERS, GAIN)
 
 
