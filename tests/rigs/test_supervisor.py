@@ -11,7 +11,7 @@ import pytest
 from upright.errors import BadInput, RigStopped
 from upright.experiments.makes import make_rig
 from upright.gains import feedback, filtered, hold, place
-from upright.laws import Rule
+from upright.laws import Rule, state_feedback
 from upright.rigs import Board, Fault, Limits, Mode, TwinPort
 from upright.rigs.supervisor import Duty, Supervisor
 
@@ -247,3 +247,22 @@ def test_its_own_loop_is_watched_too():
     again = Scene().started(tilt=0.1, mode=Mode.MCU)
     with pytest.raises(RigStopped):
         again.run(2.5, then=lambda p: p.encoders.dead(1))
+
+
+def test_a_reference_is_followed_alike_by_the_host_s_loop_and_by_the_rig_s_own():
+    """The arm goes to 0.3 rad with the pendulum hanging; both loops answer the same samples with the same commands."""
+    model = RIG.linear("hanging")
+    K = place(model.A, model.B, [-6.0 + 6.0j, -6.0 - 6.0j, -5.0, -7.0]).K
+    moved = np.where(np.arange(4000) < 500, 0.0, 0.3)
+    law = replace(state_feedback(K[0], RIG.period, memory=0.8, k_pf=K[0, 0], limit=RIG.limit), references=moved)
+    runs = []
+    for mode in (Mode.HOST, Mode.MCU):
+        scene = Scene(replace(DUTY, at="hanging", lean=math.inf, near=math.inf, watch=False))
+        scene.beside.prepare()
+        scene.beside.aim(law)
+        scene.beside.start(mode)
+        runs.append(scene.run(3.0))
+    host, own = ([(t.counts, t.applied) for t in ticks] for ticks in runs)
+    assert host == own
+    # friction holds the arm off by at most the torque that it takes over the gain
+    assert runs[1][-1].counts[0] / RIG.counts[0] == pytest.approx(0.3, abs=RIG.plant.b_1c / (RIG.gain * K[0, 0]))

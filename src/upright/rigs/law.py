@@ -48,6 +48,7 @@ class RunningLaw:
 
     def __init__(self, law: Law | Rule, period: float) -> None:
         self.period, self.ticks = period, 0
+        self.followed = 0.0  # first reference at the tick that was answered last
         self._signal: list[list[float]] = law.signal().tolist()
         self._own = isinstance(law, Rule)
         if isinstance(law, Law) and (m := law.signal().shape[1]):
@@ -72,6 +73,7 @@ class RunningLaw:
         row = list(self._signal[min(self.ticks, len(self._signal) - 1)])
         if reference is not None and row:
             row[0] = reference
+        self.followed = row[0] if row else 0.0
         given = readings if self._own else (*readings, *row)
         self.ticks += 1
         return self._step((self.ticks - 1) * self.period if time is None else time, given)[0]

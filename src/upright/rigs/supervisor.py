@@ -270,7 +270,7 @@ class Supervisor:
             )  # fmt: skip
 
     def step(self, tick: Tick, reference: float | None = None) -> float:
-        """Command for this tick; in MCU mode the reference is passed on.
+        """Command for this tick; in MCU mode the reference, the law's own when omitted.
 
         Raises
         ------
@@ -296,7 +296,7 @@ class Supervisor:
             self._give_up(Fault.GAINS, f"the law gave {command} for a command.")
         if self._watch is not None and self._still is not None:
             self._suspect(self._watch, self._still, readings, min(max(command, -self.held.command), self.held.command))
-        self._command = command if self._mode == Mode.HOST else (reference or 0.0)
+        self._command = command if self._mode == Mode.HOST else self._running.followed
         return self._command
 
     def finish(self) -> None:
