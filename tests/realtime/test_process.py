@@ -65,7 +65,9 @@ def test_a_run_by_the_clock_ends_at_zero_with_a_whole_log(tmp_path):
 
 @pytest.mark.slow
 def test_a_wish_stops_it(tmp_path):
-    end = run_in_process(order(tmp_path, seconds=60.0), watch=lambda s: "enough" if s.tick > 900 else "")
+    end = run_in_process(
+        order(tmp_path, seconds=60.0), watch=lambda s: "enough" if s.phase == "running" and s.tick > 1700 else ""
+    )
     assert "Stopped by hand" in end.stopped
     assert put_out(tmp_path / "out")[:2] == (0.0, 0)
 
@@ -74,7 +76,7 @@ def test_a_wish_stops_it(tmp_path):
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_a_loop_that_is_killed_leaves_its_rows_and_a_sentence(tmp_path):
     def kill(state):
-        if state.tick > 900:
+        if state.phase == "running" and state.tick > 1700:
             for child in multiprocessing.active_children():
                 if child.name == "upright loop":
                     os.kill(child.pid, signal.SIGKILL)
@@ -89,13 +91,28 @@ def test_a_loop_that_is_killed_leaves_its_rows_and_a_sentence(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_a_loop_that_is_asked_to_end_zeroes_first(tmp_path):
+    def end_it(state):
+        if state.phase == "running" and state.tick > 1700:
+            for child in multiprocessing.active_children():
+                if child.name == "upright loop":
+                    os.kill(child.pid, signal.SIGTERM)
+        return ""
+
+    end = run_in_process(order(tmp_path, seconds=60.0), watch=end_it)
+    assert "a signal" in end.stopped
+    assert put_out(tmp_path / "out")[:2] == (0.0, 0)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_an_orphan_zeroes_its_rig_and_ends(tmp_path):
     (tmp_path / "out").write_bytes(bytes(24))
     (tmp_path / "parent.py").write_text(PARENT, encoding="utf-8")
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), *filter(None, sys.path)])}
     parent = subprocess.Popen([sys.executable, str(tmp_path / "parent.py"), str(tmp_path)], env=environment, cwd=ROOT)
     try:
-        assert until(lambda: put_out(tmp_path / "out")[1] == 1 and put_out(tmp_path / "out")[2] > 1500)
+        assert until(lambda: put_out(tmp_path / "out")[1] == 1 and put_out(tmp_path / "out")[2] > 3000)
     finally:
         parent.kill()
         parent.wait()

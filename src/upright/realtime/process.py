@@ -153,6 +153,7 @@ def _child(order: RunOrder, memory: Any, phase: Any, wish: Any, pipe: Connection
     import signal
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # to be ended is to be zeroed first
     window, orphan = _Window(memory, phase), _orphaned()
 
     def stopped() -> str:

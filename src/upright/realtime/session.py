@@ -191,8 +191,8 @@ def carry_out(
         end["stopped"] = str(stop)
     except KeyboardInterrupt:
         beside.rig.estop()
-        hear(0.0, "fault", "stopped by Ctrl-C")
-        end["stopped"] = "Stopped by Ctrl-C."
+        hear(0.0, "fault", "stopped by Ctrl-C or a signal")
+        end["stopped"] = "Stopped by Ctrl-C or a signal."
     finally:
         if not finished:
             beside.rig.estop()

@@ -366,6 +366,8 @@ class Supervisor:
         while moved.time - first.time < patience:
             tick = self.rig.exchange(0.0)
             moved = tick if tick.counts != moved.counts else moved
+            if wish := self.stopped():
+                self._give_up(Fault.STOP, wish)
             if tick.mode != Mode.IDLE:
                 self._give_up(tick.faults, f"{self.about.name} stopped itself: {told(tick.faults)}.")
             if tick.time - moved.time >= REST:
