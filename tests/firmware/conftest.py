@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.firmware.boards import Board, build
+from benchmarks.boards import Board, build
 
 Start = Callable[..., Board]
 

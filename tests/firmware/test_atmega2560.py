@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.firmware.boards import COUNTS, STEP, plant
+from benchmarks.boards import COUNTS, STEP, plant
 from tests.firmware.designs import FURUTA, GAIN, LIMITS, PARAMETERS, PERIOD, inverted
 from tests.firmware.test_laws import FREE, in_float32
 from tests.firmware.test_loops import UPRIGHT, held, settled

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.firmware.boards import plant
+from benchmarks.boards import plant
 from tests.firmware.designs import GAIN, PARAMETERS
 from tests.rigs import conformance
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.firmware.boards import COUNTS, STEP, STEPS, rig_on
+from benchmarks.boards import COUNTS, STEP, STEPS, rig_on
 from tests.firmware.designs import LIMITS, PERIOD, inverted, pid, swing_free
 from upright.errors import BadInput, RigStopped
 from upright.laws import Law, state_feedback

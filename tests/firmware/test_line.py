@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from tests.firmware.boards import rig_on
+from benchmarks.boards import rig_on
 from upright.errors import BadInput, RigStopped
 from upright.rigs.line import PySerialLine, TerminalLine, open_line
 

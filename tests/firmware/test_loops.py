@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.firmware.boards import COUNTS, STEP, plant
+from benchmarks.boards import COUNTS, STEP, plant
 from tests.firmware.designs import FURUTA, GAIN, LIMITS, PARAMETERS, PERIOD, inverted, swing_free
 from upright.errors import BadInput
 from upright.rigs.protocol import Fault, Mode

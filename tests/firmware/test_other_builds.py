@@ -8,7 +8,7 @@ import subprocess
 
 import pytest
 
-from tests.firmware.boards import rig_on
+from benchmarks.boards import rig_on
 from upright.rigs.protocol import Fault, Mode
 
 pytestmark = pytest.mark.slow

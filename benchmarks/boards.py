@@ -13,7 +13,7 @@ from typing import Any
 from upright.rigs.line import Line
 from upright.rigs.serial import SerialRig
 
-FIRMWARE = Path(__file__).parents[2] / "firmware"
+FIRMWARE = Path(__file__).parents[1] / "firmware"
 COUNTS = 16_000 / (2 * math.pi)
 FULL_SCALE = 10.0
 STEPS = 32768
@@ -69,8 +69,10 @@ class Board:
 
 def rig_on(line: str | Line, **how: Any) -> SerialRig:
     """A rig with ECP's encoders and converter at the end of a line, as patient as a busy machine needs."""
-    same = {"coordinates": ("psi", "theta"), "counts": (COUNTS, COUNTS), "command_unit": "V", "full_scale": FULL_SCALE,
-            "patience": 20.0}  # fmt: skip
+    same: dict[str, Any] = {
+        "coordinates": ("psi", "theta"), "counts": (COUNTS, COUNTS), "command_unit": "V", "full_scale": FULL_SCALE,
+        "patience": 20.0,
+    }  # fmt: skip
     return SerialRig(line, **{**same, **how})
 
 
