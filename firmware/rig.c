@@ -77,6 +77,10 @@ static bool running(void) { return mode == HOST || mode == MCU; }
 static bool powered(void) { return mode == ARMED || running(); }
 static uint32_t size_of(int32_t v) { return v < 0 ? 0UL - (uint32_t)v : (uint32_t)v; }
 static bool beyond(uint32_t size, uint32_t limit) { return limit != NO_LIMIT && size > limit; }
+/* Twice the speed's limit in a single tick: a jump of counts that the window would take for a slow motion. */
+static bool jumps(int32_t step, uint32_t speed) {
+    return speed != NO_LIMIT && size_of(step) > speed / (SPEED_WINDOW / 2) + 2; /* rounding of both ends */
+}
 
 /* Zero output before anything else. */
 static void power_off(enum mode next) {
@@ -130,7 +134,7 @@ static void look(uint32_t tick, uint32_t elapsed) {
         step[i] = remember(i, counts, tick, elapsed);
         now.q[i] = (int32_t)(counts - zero[i]);
         if (beyond(size_of(now.q[i]), limits.travel[i])) fault |= F_OVERTRAVEL;
-        if (beyond(size_of(moved[i]), limits.speed[i])) fault |= F_OVERSPEED;
+        if (beyond(size_of(moved[i]), limits.speed[i]) || (elapsed == 1 && jumps(step[i], limits.speed[i]))) fault |= F_OVERSPEED;
     }
     for (uint8_t i = 0; i < CHANNELS; i++) {
         uint8_t other = CHANNELS - 1 - i;

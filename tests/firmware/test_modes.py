@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.firmware.boards import COUNTS, STEP, rig_on
+from benchmarks.boards import COUNTS, STEP, rig_on
 from upright.errors import RigStopped
 from upright.laws import Law
 from upright.rigs.line import TerminalLine
@@ -311,6 +311,15 @@ def test_a_speed_is_seen_alike_when_ticks_are_late(host, skipped, by, fault):
         board.do(f"counts 0 {at}")
         tick = rig.exchange(0.0)
     assert tick.faults == fault
+
+
+@pytest.mark.parametrize(
+    ("counts", "faults"), [(90, Fault(0)), (-90, Fault(0)), (110, Fault.OVERSPEED), (-110, Fault.OVERSPEED)]
+)
+def test_counts_that_jump_are_no_slow_motion(host, counts, faults):
+    board, rig = running(host)  # 20 rad/s are 50.9 counts a tick, and 407 in the window
+    board.do(f"counts 0 {counts}")
+    assert rig.exchange(0.0).faults == faults
 
 
 def test_a_transition_that_no_encoder_makes_stops_the_rig(host):
