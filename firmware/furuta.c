@@ -69,6 +69,7 @@ static void speeds(const furuta_t *p, const double x[4], double T, double x_dot[
 }
 
 void furuta_move(furuta_t *rig, double torque, double dt) {
+    if (rig->held) return;
     static const double at[4] = {0, 0.5, 0.5, 1}, weight[4] = {1, 2, 2, 1};
     double slope[4] = {0}, sum[4] = {0}, x[4];
     for (int stage = 0; stage < 4; stage++) {

@@ -11,6 +11,7 @@ typedef struct {
     double counts[2]; /* per rad */
     double x[4];      /* psi, psi', theta, theta' */
     bool running;     /* until the first run the rig is held where it is */
+    bool held;        /* fast by a hand, whatever drives it */
 } furuta_t;
 
 /* One `name=value` of the command line; false for a name that it does not have. */

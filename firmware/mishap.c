@@ -38,7 +38,8 @@ bool mishaps_line(mishaps_t *now, furuta_t *rig, const char *line) {
     unsigned long long seed;
     if (!strcmp(line, "cut")) return now->cut = true;
     if (!strcmp(line, "join")) return now->cut = false, true;
-    if (!strcmp(line, "release")) return rig->running = true;
+    if (!strcmp(line, "hold")) return rig->held = true;
+    if (!strcmp(line, "release")) return rig->held = false, rig->running = true;
     if (sscanf(line, "kick %lf", &value) == 1) return rig->x[3] += value, true;
     if (sscanf(line, "put %lf %lf %lf %lf", x, x + 1, x + 2, x + 3) == 4) return memcpy(rig->x, x, sizeof x), true;
     if (sscanf(line, "corrupt %lf %llu", &value, &seed) == 2)

@@ -27,7 +27,8 @@ uint8_t over_the_wire(mishaps_t *now, uint8_t byte);
 
 /*     dead CHANNEL            alive CHANNEL          flip CHANNEL           scale CHANNEL FACTOR
  *     lose CHANNEL COUNTS     corrupt CHANCE SEED    cut                    join
- *     kick SPEED [rad/s]      release                put PSI PSI' THETA THETA'
+ *     kick SPEED [rad/s]      hold                   release
+ *     put PSI PSI' THETA THETA'
  * false for a line that is none of them. */
 bool mishaps_line(mishaps_t *now, furuta_t *rig, const char *line);
 #endif
