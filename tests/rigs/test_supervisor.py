@@ -266,3 +266,30 @@ def test_a_reference_is_followed_alike_by_the_host_s_loop_and_by_the_rig_s_own()
     assert host == own
     # friction holds the arm off by at most the torque that it takes over the gain
     assert runs[1][-1].counts[0] / RIG.counts[0] == pytest.approx(0.3, abs=RIG.plant.b_1c / (RIG.gain * K[0, 0]))
+
+
+class EverySecond:
+    """A rig whose loop goes on while only every second sample reaches the host, as on a busy wire."""
+
+    def __init__(self, rig):
+        self._rig = rig
+
+    def __getattr__(self, name):
+        return getattr(self._rig, name)
+
+    def exchange(self, command):
+        if self._rig.sample.mode == Mode.MCU:
+            self._rig.alone(RIG.period)
+        return self._rig.exchange(command)
+
+
+def test_samples_that_do_not_come_are_not_taken_for_a_lying_encoder():
+    scene = Scene()
+    scene.rig = scene.beside.rig = EverySecond(scene.rig)
+    scene.started(tilt=0.02, mode=Mode.MCU)
+    ticks = scene.run(1.0, then=lambda p: p.push([0.0, 1.0]))
+    assert set(np.diff([t.tick for t in ticks])) == {2}
+    assert ticks[-1].mode == Mode.MCU
+    assert np.ptp([t.counts[1] for t in ticks]) > 100
+    with pytest.raises(RigStopped, match="theta shown"):
+        scene.run(2.0, then=lambda p: (p.encoders.dead(1), p.push([0.0, 1.0])))

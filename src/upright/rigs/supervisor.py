@@ -12,7 +12,7 @@ hardware.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -286,18 +286,31 @@ class Supervisor:
             if self._stale * self.about.period > self.held.watchdog:
                 self._give_up(Fault.STALE, f"{self.about.name} has shown the same sample {self._stale + 1} times.")
             return self._command  # nothing new to answer
-        self._stale, self._last, self._first = 0, tick, self._first or tick
-        readings = self.readings(tick)
-        self._look(readings)
+        before, self._last, self._first, self._stale = self._last or tick, tick, self._first or tick, 0
+        self._look(self.readings(tick))
         if self._running is None:
             raise BadInput("the loop was not started; call start first.")
-        command = self._running.step(readings, reference, tick.time - self._first.time)
-        if not math.isfinite(command):
-            self._give_up(Fault.GAINS, f"the law gave {command} for a command.")
-        if self._watch is not None and self._still is not None:
-            self._suspect(self._watch, self._still, readings, min(max(command, -self.held.command), self.held.command))
+        command = self._command
+        for time, readings in self._since(before, tick):
+            command = self._running.step(readings, reference, time - self._first.time)
+            if not math.isfinite(command):
+                self._give_up(Fault.GAINS, f"the law gave {command} for a command.")
+            if self._watch is not None and self._still is not None:
+                # until the host has answered, its last command is what drives the rig
+                drives = command if self._mode == Mode.MCU or time == tick.time else self._command
+                drives = min(max(drives, -self.held.command), self.held.command)
+                self._suspect(self._watch, self._still, readings, drives)
         self._command = command if self._mode == Mode.HOST else self._running.followed
         return self._command
+
+    def _since(self, before: Tick, tick: Tick) -> Iterator[tuple[float, list[float]]]:
+        """Time and readings of every tick after one, on a straight line where samples in between did not come."""
+        first, last, ticks = self.readings(before), self.readings(tick), tick.tick - before.tick
+        for k in range(1, ticks):
+            share = k / ticks
+            between = [a + share * (b - a) for a, b in zip(first, last, strict=True)]
+            yield before.time + share * (tick.time - before.time), between
+        yield tick.time, last
 
     def finish(self) -> None:
         """The end of a run: command to zero, power stage off, IDLE."""
