@@ -15,6 +15,8 @@ from upright.rigs.onboard import onboard, ticks
 from upright.rigs.protocol import NO_FAULT, Capabilities, Fault, Limits, Mode, SelfTest, Tick
 from upright.rigs.wire import Kind, Packet, Result, Status
 
+_AGAIN = 0.02  # s; after which a request is repeated, as long as there is no watchdog that would not wait for it
+_TRIES = 4  # repetitions within the watchdog's time
 _BOOT = 4.0  # s; a board that resets when its port is opened waits for its boot loader
 
 _WHY = {
@@ -54,7 +56,8 @@ class SerialRig:
     lockstep : bool
         Whether the board is simulated in lockstep although its firmware does not know it.
     resend : float, optional
-        After which time a request is repeated [s]; 0.02 by default, and never in lockstep, where time passes by it.
+        After which time a request is repeated [s]; by default a quarter of the watchdog's time, so that it stands a
+        few frames lost in a row, and never in lockstep, where time passes by it.
     clock : callable
         Seconds of a clock that never goes back.
     """
@@ -116,7 +119,7 @@ class SerialRig:
                 f"{wire.PROTOCOL}; flash the firmware of this release."
             )
         virtual = self._lockstep or hello.virtual
-        self._again = self._resend or (math.inf if virtual else 0.02)
+        self._again = self._resend or (math.inf if virtual else _AGAIN)
         self._about = Capabilities(
             name=f"{hello.name} on {self._line.name}", coordinates=self._coordinates, counts=self._counts,
             command_unit=self._unit, full_scale=self._full_scale, steps=hello.steps, period=self._every * self._tick,
@@ -136,6 +139,8 @@ class SerialRig:
         held = self._ask(Kind.CONFIGURE, asked.body())
         if held != asked.body():
             self._distrust("limits", wire.limits(held), asked)
+        if self._resend is None and math.isfinite(self._again):
+            self._again = min(_AGAIN, limits.watchdog / _TRIES)
         return self._from_wire(wire.limits(held))
 
     def zero(self) -> None:
