@@ -30,10 +30,10 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks import boards
+from benchmarks.designs import GAIN, LIMITS, PARAMETERS, inverted
 from benchmarks.measure import Line, of_each
 from benchmarks.rigs import publish
-from tests.firmware import boards
-from tests.firmware.designs import GAIN, LIMITS, PARAMETERS, inverted
 from upright.errors import RigStopped
 from upright.experiments.makes import make_rig
 from upright.gains import feedback, filtered, hold, place

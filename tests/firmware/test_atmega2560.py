@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks.boards import COUNTS, STEP, plant
-from tests.firmware.designs import FURUTA, GAIN, LIMITS, PARAMETERS, PERIOD, inverted
+from benchmarks.designs import FURUTA, GAIN, LIMITS, PARAMETERS, PERIOD, inverted
 from tests.firmware.test_laws import FREE, in_float32
 from tests.firmware.test_loops import UPRIGHT, held, settled
 from upright.errors import RigStopped

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from benchmarks.boards import plant
-from tests.firmware.designs import GAIN, PARAMETERS
+from benchmarks.designs import GAIN, PARAMETERS
 from tests.rigs import conformance
 
 HANGING = plant(PARAMETERS, GAIN)

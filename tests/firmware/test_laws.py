@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.boards import COUNTS, STEP, STEPS, rig_on
-from tests.firmware.designs import LIMITS, PERIOD, inverted, pid, swing_free
+from benchmarks.designs import LIMITS, PERIOD, inverted, pid, swing_free
 from upright.errors import BadInput, RigStopped
 from upright.laws import Law, state_feedback
 from upright.rigs.line import TerminalLine

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.boards import COUNTS, STEP, plant
-from tests.firmware.designs import FURUTA, GAIN, LIMITS, PARAMETERS, PERIOD, inverted, swing_free
+from benchmarks.designs import FURUTA, GAIN, LIMITS, PARAMETERS, PERIOD, inverted, swing_free
 from upright.errors import BadInput
 from upright.rigs.protocol import Fault, Mode
 from upright.simulation import simulate
