@@ -15,6 +15,7 @@ from tests.physics.specimens import SPECIMENS
 from upright.errors import BadInput
 from upright.experiments.identified import read_identified
 from upright.exports.fmu import build, unit_of
+from upright.exports.fmu.translation import translated
 from upright.physics import BUILT_IN, CartPendulum, Furuta, chain
 from upright.simulation import simulate
 from upright.verbs.export import export
@@ -114,6 +115,20 @@ def test_fmpy_s_validator_finds_nothing_and_its_simulation_agrees(tmp_path):
         np.testing.assert_allclose(found[name], ours[:, i], rtol=0, atol=1e-10)
     with zipfile.ZipFile(done.value[0]) as archive:
         assert {"sources/rig.c", "sources/buildDescription.xml", "modelDescription.xml"} <= set(archive.namelist())
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "while n > 0: n = n - 1", "n = n << 2", "n = round(0.5)", "n = 0.5 % 2", "n = [1, 2]", "n + 1",
+        "for i in range(0, 9, 2): n = i",
+    ],
+)  # fmt: skip
+def test_what_has_no_counterpart_in_c_is_refused_by_its_text(line):
+    """Another program than the kernel's text would be worse than none."""
+    with pytest.raises(BadInput, match="does not write as C; --to gymnasium") as refused:
+        translated(f"def run_1(n):\n    {line}\n", "run_1", {}, {})
+    assert line.partition("n = ")[2].split(" ")[0] in str(refused.value)
 
 
 def test_a_step_of_a_fraction_of_a_millisecond_is_refused(tmp_path):

@@ -2,6 +2,7 @@
 
 The text is a small part of Python: numbers, arrays of numbers by index, loops over ranges, functions that return one
 number or a tuple of them. Whole numbers become long, all others double; a name is whole if it holds nothing else.
+The kernel's writer keeps to that part; a construct beyond it is refused, never written as something like it.
 """
 
 from __future__ import annotations
@@ -10,6 +11,8 @@ import ast
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
+
+from upright.errors import BadInput
 
 Kind = Literal["long", "double", "double *", "long *"]
 Arrays = Mapping[str, tuple[Kind, tuple[int, ...]]]
@@ -63,6 +66,11 @@ def translated(text: str, entry: str, arrays: Arrays, sizes: Mapping[str, str]) 
         Of the entry.
     sizes : mapping of str to str
         In C, what ``X.size`` and ``X.shape[0]`` are, by ``"X"``.
+
+    Raises
+    ------
+    BadInput
+        When the text holds what has no counterpart here.
     """
     functions = {n.name: _Known(n) for n in ast.parse(text).body if isinstance(n, ast.FunctionDef)}
     needed = _needed(functions, entry)
@@ -201,8 +209,8 @@ class _Writer:
             case ast.Assign(targets=[target], value=value):
                 self.assign(target, value)
             case ast.AugAssign(target=target, op=op, value=value):
-                self.add(f"{self.value(target)} {_OPERATORS[type(op)]}= {self.value(value)};")
-            case ast.For(target=ast.Name(id=name), iter=ast.Call(args=[*ends])):
+                self.add(f"{self.value(target)} {_operator(op, node)}= {self.value(value)};")
+            case ast.For(target=ast.Name(id=name), iter=ast.Call(args=[_] | [_, _] as ends)):
                 low, high = ("0", self.value(ends[0])) if len(ends) == 1 else (self.value(e) for e in ends)
                 i = _name(name)
                 self.add(f"for ({i} = {low}; {i} < {high}; {i}++) {{")
@@ -225,12 +233,12 @@ class _Writer:
                 self.add(f"return {self.value(value)};")
             case ast.Expr(value=ast.Call() as call):
                 self.add(f"{self.value(call)};")
-            case ast.Expr():
+            case ast.Expr(value=ast.Constant()):
                 pass  # what a function says of itself
             case ast.Break() | ast.Continue():
                 self.add(f"{type(node).__name__.lower()};")
             case _:
-                raise NotImplementedError(ast.unparse(node))
+                raise _refusal(node)
 
     def assign(self, target: ast.expr, value: ast.expr) -> None:
         if isinstance(target, ast.Tuple):
@@ -266,17 +274,19 @@ class _Writer:
             case ast.BinOp(left=left, op=ast.Pow(), right=right):
                 return f"pow({self.value(left)}, {self.value(right)})"
             case ast.BinOp(left=left, op=op, right=right):
+                if isinstance(op, ast.FloorDiv | ast.Mod) and _kind(node, self.known, self.functions) != "long":
+                    raise _refusal(node)  # C's are for whole numbers, of which the kernel divides none below zero
                 whole = isinstance(op, ast.Div) and _kind(left, self.known, self.functions) == "long"
-                return f"({'(double)' * whole}{self.value(left)} {_OPERATORS[type(op)]} {self.value(right)})"
+                return f"({'(double)' * whole}{self.value(left)} {_operator(op, node)} {self.value(right)})"
             case ast.UnaryOp(op=op, operand=operand):
-                return f"({_OPERATORS[type(op)]}{self.value(operand)})"
+                return f"({_operator(op, node)}{self.value(operand)})"
             case ast.BoolOp(op=op, values=values):
-                return "(" + f" {_OPERATORS[type(op)]} ".join(self.value(v) for v in values) + ")"
+                return "(" + f" {_operator(op, node)} ".join(self.value(v) for v in values) + ")"
             case ast.Compare(left=left, ops=ops, comparators=rights):
                 ends = [left, *rights]
                 pairs = zip(ends, ops, rights, strict=False)
                 return "(" + " && ".join(
-                    f"({self.value(a)} {_OPERATORS[type(op)]} {self.value(b)})" for a, op, b in pairs
+                    f"({self.value(a)} {_operator(op, node)} {self.value(b)})" for a, op, b in pairs
                 ) + ")"  # fmt: skip
             case ast.IfExp(test=test, body=body, orelse=orelse):
                 return f"({self.value(test)} ? {self.value(body)} : {self.value(orelse)})"
@@ -287,7 +297,7 @@ class _Writer:
             case ast.Attribute(value=ast.Name(id=name), attr="size"):
                 return self.sizes[name]
             case _:
-                raise NotImplementedError(ast.unparse(node))
+                raise _refusal(node)
 
     def call(self, name: str, args: list[ast.expr], node: ast.expr) -> str:
         given = ", ".join(self.value(a) for a in args)
@@ -302,7 +312,7 @@ class _Writer:
             return f"{'least' if name == 'min' else 'most'}_{'l' if whole else 'd'}({given})"
         if name in ("int", "float"):
             return f"({'long' if name == 'int' else 'double'})({given})"
-        raise NotImplementedError(name)
+        raise _refusal(node)
 
     def element(self, node: ast.Subscript) -> str:
         if isinstance(node.value, ast.Attribute):  # X.shape[0]
@@ -317,6 +327,19 @@ class _Writer:
             self.value(i) if step == 1 else f"{step} * {self.value(i)}" for i, step in zip(indices, by, strict=True)
         )
         return f"{_name(array)}[{at}]"
+
+
+def _operator(op: ast.AST, node: ast.AST) -> str:
+    if type(op) not in _OPERATORS:
+        raise _refusal(node)
+    return _OPERATORS[type(op)]
+
+
+def _refusal(node: ast.AST) -> BadInput:
+    return BadInput(
+        f"the kernel of this rig holds '{ast.unparse(node)[:80]}', which this program does not write as C; --to "
+        "gymnasium runs the kernel itself."
+    )
 
 
 def _declared(kind: Kind, name: str) -> str:
