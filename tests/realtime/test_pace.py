@@ -68,6 +68,31 @@ def test_a_wake_up_a_little_late_is_told_and_one_a_period_late_is_a_late_tick(cl
     assert pace.late == 1
 
 
+def test_whoever_keeps_vigil_sleeps_less_and_is_never_early(clock):
+    class Watched(Clock):
+        def __call__(self):
+            self.now += 0.001  # looking takes time
+            return super().__call__()
+
+    clock = Watched()
+    pace = WallClock(2e-3, clock, clock.sleep, vigil=0.2e-3)
+    delays = [pace.wait() for _ in range(4)]
+    assert clock.woken == pytest.approx([101.8, 103.8, 105.8, 107.8], abs=0.01)
+    assert max(delays) < 5e-6
+    assert min(delays) >= 0
+
+
+def test_a_vigil_is_a_fifth_of_a_period_at_most(clock):
+    WallClock(1e-3, lambda: round(1e6 * clock.now) + 1_000_000 * len(clock.woken), clock.sleep, vigil=1.0).wait()
+    assert clock.woken == pytest.approx([100.8])
+
+
+def test_a_host_that_took_the_processor_is_named_with_the_late_ticks():
+    found = Jitter(period=1e-3, behind=np.full(1000, 3e-4), late=1000, work=1e-5, stolen=0.31,
+                   standing=LoopPriority(priority="FIFO", locked=True))  # fmt: skip
+    assert "Its host took its processors away for 0.31 s meanwhile." in found.verdict
+
+
 def test_the_systems_sleep_is_never_early():
     pace = WallClock(2e-3)
     assert min(pace.wait() for _ in range(20)) >= 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -37,6 +38,8 @@ class Jitter:
     work : float
         Median time that the work of a tick took [s].
     standing : LoopPriority
+    stolen : float
+        Time for which the host of a virtual machine gave its processors to others meanwhile, over all of them [s].
     """
 
     period: float
@@ -44,6 +47,7 @@ class Jitter:
     late: int
     work: float
     standing: LoopPriority
+    stolen: float = 0.0
 
     @property
     def quantiles(self) -> dict[str, float]:
@@ -69,9 +73,13 @@ class Jitter:
         head = f"{self.late} of {self.behind.size} ticks were late at {asked:.4g} Hz ({self.standing.priority})"
         if self.late <= TOLERATED * self.behind.size:
             return f"{head}: this machine holds {asked:.4g} Hz as it is now."
+        theft = f"Its host took its processors away for {self.stolen:.2g} s meanwhile." if self.stolen else ""
         if self.rate == 0:
-            return f"{head}, and it would not hold {RATES[-1]} Hz: run on an idle machine, or on the rig's controller."
-        return f"{head}: this machine held {self.rate} Hz as it is now. {self.standing.warning}".strip()
+            head = f"{head}, and it would not hold {RATES[-1]} Hz"
+            return f"{head}: run on an idle machine, or on the rig's controller. {theft}".strip()
+        return " ".join(
+            filter(None, (f"{head}: this machine held {self.rate} Hz as it is now.", theft, self.standing.warning))
+        )
 
 
 def measure(seconds: float, rate: float = 1000.0, *, fifo: bool = True) -> Jitter:
@@ -94,6 +102,7 @@ def measure(seconds: float, rate: float = 1000.0, *, fifo: bool = True) -> Jitte
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe(duplex=False)
     child = context.Process(target=_measured, args=(theirs, seconds, rate, fifo), daemon=True)
+    before = _stolen()
     child.start()
     theirs.close()
     try:
@@ -103,7 +112,17 @@ def measure(seconds: float, rate: float = 1000.0, *, fifo: bool = True) -> Jitte
     finally:
         child.join(5.0)
         ours.close()
-    return Jitter(period=1.0 / rate, behind=behind, late=late, work=work, standing=standing)
+    stolen = _stolen() - before
+    return Jitter(period=1.0 / rate, behind=behind, late=late, work=work, standing=standing, stolen=stolen)
+
+
+def _stolen() -> float:
+    """Time that a host gave to others since the start [s]; none is told where there is no host, or no Linux."""
+    try:
+        with open("/proc/stat", encoding="ascii") as file:
+            return int(file.readline().split()[8]) / os.sysconf("SC_CLK_TCK")
+    except (OSError, IndexError, AttributeError):
+        return 0.0
 
 
 def _measured(pipe: Any, seconds: float, rate: float, fifo: bool) -> None:
@@ -114,7 +133,7 @@ def _measured(pipe: Any, seconds: float, rate: float, fifo: bool) -> None:
     behind, work = np.zeros(ticks), np.zeros(ticks)
     step: Callable[..., float] = law.step
     standing = step_forward(fifo=fifo)
-    pace = WallClock(1.0 / rate)
+    pace = WallClock(1.0 / rate, vigil=standing.vigil)
     for k in range(ticks):
         behind[k] = pace.wait()
         began = monotonic_ns()

@@ -75,13 +75,18 @@ class WallClock:
         Time of a clock that never goes back [ns].
     sleep : callable, optional
         Sleeps until a time of that clock; the operating system's when omitted.
+    vigil : float
+        How long before each deadline to wake and watch the clock instead of sleeping [s]; a fifth of a period at most,
+        so that others have the processor for most of it.
     """
 
     def __init__(
-        self, period: float, now: Callable[[], int] = time.monotonic_ns, sleep: Callable[[int], None] | None = None
-    ) -> None:
+        self, period: float, now: Callable[[], int] = time.monotonic_ns, sleep: Callable[[int], None] | None = None,
+        *, vigil: float = 0.0,
+    ) -> None:  # fmt: skip
         self.period, self.late = period, 0
         self._now, self._sleep = now, sleep or _sleeper()
+        self._vigil = round(1e9 * min(vigil, period / 5))
         self._first, self._tick = -1, 0
 
     def wait(self) -> float:
@@ -94,7 +99,9 @@ class WallClock:
         if now > due:
             self.late += 1
         else:
-            self._sleep(due)
+            self._sleep(due - self._vigil)
+            while self._now() < due:
+                pass
         behind = 1e-9 * (self._now() - due)
         if behind >= self.period:
             missed = int(behind / self.period)

@@ -2,6 +2,9 @@
 
 Linux gives FIFO priority to whoever may have it (root, CAP_SYS_NICE, an rtprio limit). Else, from 6.12 on, a short
 slice makes the ordinary scheduler wake the process early; else nothing helps but an idle machine, and that is said.
+
+A processor that sleeps between ticks wakes late, and a virtual one is given to others by its host meanwhile: whoever
+may have FIFO also asks for processors that stay awake (measured in `benchmarks.jitter`).
 """
 
 from __future__ import annotations
@@ -17,6 +20,9 @@ FIFO_PRIORITY = 50
 SLICE = 100_000
 """Slice asked of the ordinary scheduler [ns]; the shortest it takes."""
 _SCHED_SETATTR = {"x86_64": 314, "aarch64": 274}
+_WAKE_LATENCY = "/dev/cpu_dma_latency"
+"""Holds processors to a time [us] in which they wake, for as long as the file is open."""
+_VIGIL = 200e-6
 _LOCK_ALL = 3  # MCL_CURRENT | MCL_FUTURE
 _TIMER_SLACK = 29  # PR_SET_TIMERSLACK
 
@@ -31,13 +37,21 @@ class LoopPriority:
         ``"FIFO"``, ``"short slice"`` or ``"ordinary"``.
     locked : bool
         Whether its memory stays where it is.
+    awake : bool
+        Whether the processors are kept from sleep for as long as this process lives.
     warning : str
         What to do for more, as a sentence; empty with FIFO.
     """
 
     priority: str
     locked: bool
+    awake: bool = False
     warning: str = ""
+
+    @property
+    def vigil(self) -> float:
+        """How long before a deadline to watch the clock [s]: with FIFO only, else it costs the place in the queue."""
+        return _VIGIL if self.priority == "FIFO" else 0.0
 
 
 class _Attributes(ctypes.Structure):
@@ -71,11 +85,20 @@ def step_forward(*, fifo: bool = True) -> LoopPriority:
     if fifo:
         with contextlib.suppress(PermissionError, OSError):
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(FIFO_PRIORITY))
-            return LoopPriority(priority="FIFO", locked=locked)
+            return LoopPriority(priority="FIFO", locked=locked, awake=_stay_awake())
     advice = "give yourself real-time priority (ulimit -r 50, or `@lab - rtprio 50` in /etc/security/limits.conf)."
     if _short_slice(libc):
         return LoopPriority(priority="short slice", locked=locked, warning=f"No FIFO priority here; {advice}")
     return LoopPriority(priority="ordinary", locked=locked, warning=f"Neither FIFO nor a short slice here; {advice}")
+
+
+def _stay_awake() -> bool:
+    try:
+        held = os.open(_WAKE_LATENCY, os.O_WRONLY)  # never closed: the wish ends with the process
+        os.write(held, (0).to_bytes(4, sys.byteorder))
+    except OSError:
+        return False
+    return True
 
 
 def _short_slice(libc: ctypes.CDLL) -> bool:

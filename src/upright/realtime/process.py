@@ -164,8 +164,10 @@ def _child(order: RunOrder, memory: Any, phase: Any, wish: Any, pipe: Connection
     def clock(about: Capabilities) -> tuple[Pace, str]:
         if not paced:
             return Virtual(), ""
-        warning = step_forward(fifo=order.fifo).warning
-        return Virtual() if about.paced or about.virtual else WallClock(about.period), warning
+        standing = step_forward(fifo=order.fifo)
+        if about.paced or about.virtual:
+            return Virtual(), standing.warning
+        return WallClock(about.period, vigil=standing.vigil), standing.warning
 
     answer: Any
     try:

@@ -97,6 +97,8 @@ def jitter_chapter(found: Jitter) -> Chapter:
     facts = Facts((
         *q.items(), ("late ticks", f"{found.late} of {found.behind.size}"), ("priority", found.standing.priority),
         ("memory", "locked" if found.standing.locked else "not locked"),
+        ("processors", "kept awake" if found.standing.awake else "may sleep between ticks"),
+        *((("taken by the host", f"{found.stolen:.2g} s"),) if found.stolen else ()),
         ("work of a tick", f"{1e6 * found.work:.3g} µs"),
         ("rate held", f"{found.rate} Hz" if found.rate else "none"),
     ))  # fmt: skip
@@ -113,6 +115,7 @@ def jitter_chapter(found: Jitter) -> Chapter:
         numbers={
             "period": found.period, "ticks": found.behind.size, "late": found.late, "late_share": late,
             **{f"behind_{n}": v for n, v in found.quantiles.items()}, "priority": found.standing.priority,
-            "locked": found.standing.locked, "rate": found.rate, "verdict": found.verdict,
+            "locked": found.standing.locked, "awake": found.standing.awake, "stolen": found.stolen,
+            "rate": found.rate, "verdict": found.verdict,
         },
     )  # fmt: skip
