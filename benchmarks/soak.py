@@ -10,6 +10,8 @@ Counted are stops that left a command or the power stage on when they were told 
 stopped nor outlived within 5 s, stops without a fault, rows of the log or samples against ticks of the rig (asked:
 all), and the memory and open files of the process at the end against those after its first tenth (asked: none lost).
 
+Of the firmware a sample that does not follow on from the one before it, as after each silence of the host, is no row.
+
 Frames are corrupted by the million on their way to the host's parser: bytes changed, lost, doubled, cut short, run
 together; a frame that nobody sent and that is accepted is counted (asked: none). What the firmware makes of a million
 inputs, sound frames among them, is asked of libFuzzer with its address and undefined-behaviour sanitizers.
