@@ -129,6 +129,13 @@ def test_one_run_and_many_of_its_start_say_the_same(force_limit):
             np.testing.assert_allclose(getattr(many, name)[..., i], value, rtol=1e-9, err_msg=f"{name} of start {i}")
 
 
+def test_runs_too_long_for_a_whole_block_say_what_short_ones_say():
+    """Of equals at rest at their equilibrium, nothing moves however long it takes and however the lanes are cut."""
+    found = outcomes(RIG, law(3), at="inverted", starts=np.zeros((50, 4)), seconds=9.0)
+    assert found.held.all()
+    assert found.peaks.max() == 0
+
+
 def test_no_direction_is_no_question():
     with pytest.raises(BadInput, match="not zero"):
         largest(RIG, law(0), "inverted", [0, 0, 0, 0], most=1.0)

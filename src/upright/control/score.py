@@ -210,7 +210,7 @@ def outcomes(
     first = np.atleast_2d(np.asarray(starts, dtype=np.float64))
     lanes = first.shape[0]
     given = {name: np.broadcast_to(np.asarray(v, dtype=np.float64), (lanes,)) for name, v in (parameters or {}).items()}
-    size = max(LEAST, min(BLOCK, BLOCK * ROWS // (round(seconds / rig.period) + 1)))
+    size = max(LEAST, min(BLOCK, BLOCK * ROWS // (round(seconds / rig.period) + 1)) // LEAST * LEAST)
     blocks = [(first[part], {n: v[part] for n, v in given.items()}) for part in cut(lanes, size)]
     work = partial(_outcomes, rig, law, at, seconds)
     found = spread(work, blocks, workers=workers, progress=progress, what="block of rigs").all()
