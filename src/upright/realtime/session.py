@@ -191,6 +191,7 @@ def carry_out(
         end["stopped"] = str(stop)
     except KeyboardInterrupt:
         beside.rig.estop()
+        beside.faults |= Fault.STOP
         hear(0.0, "fault", "stopped by Ctrl-C or a signal")
         end["stopped"] = "Stopped by Ctrl-C or a signal."
     finally:

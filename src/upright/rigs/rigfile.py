@@ -25,13 +25,15 @@ A rig of one's own behind a wire, whose limits nobody may leave out::
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from upright.files import replace_file
 from upright.rigs.protocol import Limits
-from upright.study.text import Section, StudyText
+from upright.study.text import Section, StudyText, toml
 
 KINDS = ("twin", "replay", "serial", "quanser", "nidaqmx")
 HARDWARE = ("serial", "quanser", "nidaqmx")
@@ -57,7 +59,7 @@ class RigFile:
     known : Path or None
         fit.json or study that describes it.
     make : str
-        Key of the make whose twin it is, where there is no description; with `seed`.
+        Key of the make whose twin it is, with `seed`; beside a description, which is then what is known of it.
     vendor : str
         Whose data sheet says the rest; may be empty.
     port : str
@@ -87,6 +89,11 @@ class RigFile:
     def hardware(self) -> bool:
         """Whether something can really move."""
         return self.kind in HARDWARE
+
+    @property
+    def limited(self) -> bool:
+        """Whether it says how far the rig may go."""
+        return "limits" in _root(self.path)
 
     def limits(self, units: Mapping[str, str], command_unit: str, default: Limits | None = None) -> Limits | None:
         """How far the rig may go; the default where the file says nothing, None where hardware has no limits.
@@ -135,6 +142,12 @@ class RigFile:
                 frozen=section.number("frozen", first, usual.frozen),
                 twist=section.positive("twist", first, usual.twist),
             )  # fmt: skip
+
+    def with_fit(self, fit: Path, path: Path) -> Path:
+        """Write the same file with a fit for its description."""
+        values = {k: v for k, v in _root(self.path).values.items() if k not in ("fit", "study", "record")}
+        values["fit"] = os.path.relpath(fit, path.parent)
+        return replace_file(path, "".join(f"{k} = {toml(v, 17)}\n" for k, v in values.items()).encode())
 
     def lean(self, unit: str, default: float) -> float:
         """How far the last coordinate may be from what is held [rad or m]."""

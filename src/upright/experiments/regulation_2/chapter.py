@@ -47,16 +47,15 @@ def _verdict(done: Regulation) -> str:
     share = best.before.words["regulates"]
     sure = f"{round(share * done.wish.draws)} of {done.wish.draws} rigs that the identification allows regulate with it"
     head = f"{'Take' if share >= 0.5 else 'None is to be trusted with this start; best is'} {best.name}: {sure}."
-    if done.truth is None:
+    ran = done.ran
+    if not ran:
         return head + " Nothing was run: this is what the model says."
-    as_told = [a for a in done.attempts if a.word == a.before.word]
-    if len(as_told) == len(done.attempts):
-        return (
-            f"{head} All {len(done.attempts)} runs came as told." if len(done.attempts) > 1 else f"{head} So it came."
-        )
-    others = ", ".join(f"{a.name} ({a.word}, told {100 * a.before.words[a.word]:.0f} %)" for a in done.attempts
+    as_told = [a for a in ran if a.word == a.before.word]
+    if len(as_told) == len(ran):
+        return f"{head} All {len(ran)} runs came as told." if len(ran) > 1 else f"{head} So it came."
+    others = ", ".join(f"{a.name} ({a.word}, told {100 * a.before.words[a.word]:.0f} %)" for a in ran
                        if a not in as_told)  # fmt: skip
-    return f"{head} {len(as_told)} of {len(done.attempts)} runs came as most of those rigs did; not so {others}."
+    return f"{head} {len(as_told)} of {len(ran)} runs came as most of those rigs did; not so {others}."
 
 
 def _detail(done: Regulation) -> str:
@@ -82,9 +81,9 @@ def _sentence(done: Regulation, a: Attempt) -> str:
         f"{a.name[:1].upper()}{a.name[1:]}: told to be held with a chance of {100 * b.chance:.0f} %"
         f" ({_shares(a)}); {reach}; the command was to peak at {b.score.effort_peak:.2g} of {rig.limit:g} {rig.unit}."
     )
-    if a.score is None:
-        return told
-    return f"{told} {_came(done, a.score)}"
+    if a.came is None:
+        return f"{told} It was not run." if done.ran else told
+    return f"{told} {_came(done, a.came.score)} {a.came.ended}".rstrip()
 
 
 def _shares(a: Attempt) -> str:
@@ -254,7 +253,7 @@ def _run_pictures(done: Regulation) -> list[Picture]:
 def _steps(done: Regulation) -> list[Step]:
     seed = f" --seed {done.truth.seed}" if done.truth is not None else ""
     base = f"upright regulate {done.source}{seed}"
-    first = [] if done.truth is not None else [
+    first = [] if done.ran else [
         Step("Run the laws on another rig: of this make, or one that the fit allows.",
              f"upright regulate {done.source} --seed 0")
     ]  # fmt: skip
@@ -279,7 +278,7 @@ def _numbers(done: Regulation) -> dict[str, Any]:
         "described": done.said.plain(),
         "command_unit": done.rig.unit,
         "recommended": done.best.name,
-        "as_told": sum(a.word == a.before.word for a in done.attempts) if done.truth is not None else None,
+        "as_told": sum(a.word == a.before.word for a in done.ran) if done.ran else None,
         "sets": {a.name: _set(a) for a in done.attempts},
         "velocities": {
             w.name: {"noise": w.noise, "change_per_sample": w.restless, **_scored(w.score)} for w in done.ways
@@ -289,6 +288,7 @@ def _numbers(done: Regulation) -> dict[str, Any]:
 
 def _set(a: Attempt) -> dict[str, Any]:
     b = a.before
+    came = a.came
     return {
         "poles": a.placement.asked,
         "K": a.placement.K[0],
@@ -298,7 +298,7 @@ def _set(a: Attempt) -> dict[str, Any]:
             "margins": b.margins,
             **_scored(b.score),
         },
-        "after": None if a.score is None else {"word": a.word, **_scored(a.score)},
+        "after": None if came is None else {"word": a.word, "ended": came.ended, **_scored(came.score)},
     }  # fmt: skip
 
 

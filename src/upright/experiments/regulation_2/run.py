@@ -10,6 +10,7 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -62,6 +63,19 @@ class RegulationRequest:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Came:
+    """What came of a law: the run with its figures, and why it ended early, as a sentence."""
+
+    trial: Trial
+    score: Score
+    ended: str = ""
+
+
+Try = Callable[[str, Law, Preflight], Came | None]
+"""Runs a law, by its name and with what is expected of it; None where it is not run."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Attempt:
     """One pole set: gains, what was told beforehand, and what came of it; None where nothing was run."""
 
@@ -69,8 +83,17 @@ class Attempt:
     placement: Placement
     law: Law
     before: Preflight
-    after: Trial | None
-    score: Score | None
+    came: Came | None
+
+    @property
+    def after(self) -> Trial | None:
+        """The run itself."""
+        return None if self.came is None else self.came.trial
+
+    @property
+    def score(self) -> Score | None:
+        """Its figures."""
+        return None if self.came is None else self.came.score
 
     @property
     def word(self) -> str:
@@ -137,6 +160,11 @@ class Regulation:
     seconds: float = 0.0
 
     @property
+    def ran(self) -> tuple[Attempt, ...]:
+        """The sets that were run."""
+        return tuple(a for a in self.attempts if a.came is not None)
+
+    @property
     def best(self) -> Attempt:
         """The set to recommend beforehand: the surest to regulate, of equals the one that bears the hardest tap."""
         return max(self.attempts, key=lambda a: (round(a.before.words["regulates"], 2), a.before.push))
@@ -162,7 +190,7 @@ def _check_upright(known: IdentifiedRig) -> None:
 def run_regulation(
     known: IdentifiedRig, truth: ServoRig | None, seed: int, folder: Path, progress: Progress = silent,
     stopped: Callable[[], bool] = lambda: False, wish: RegulationRequest | None = None, source: str = "FIT",
-    workers: Workers = HERE, said: RigDescription | None = None,
+    workers: Workers = HERE, said: RigDescription | None = None, tried: Try | None = None,
 ) -> Regulation:  # fmt: skip
     """Design for the rig as identified, say what will come, and run on the rig itself.
 
@@ -187,6 +215,8 @@ def run_regulation(
         Who simulates the rigs that the fit allows.
     said : RigDescription, optional
         Drive, encoders and servo; what the fit says of them when omitted.
+    tried : callable, optional
+        Runs the laws in the place of `truth`.
     """
     began = time.perf_counter()
     wish = wish or RegulationRequest()
@@ -199,13 +229,15 @@ def run_regulation(
     tilt, push = (w if w is not None else s for w, s in zip((wish.tilt, wish.push), usual, strict=True))
     task = Task(start=(0.0, 0.0, tilt, push), hand=(0.0, 0.0, *HAND), seconds=wish.seconds)
     others = known.allowed(rig, wish.draws, seed)
+    if tried is None and truth is not None:
+        tried = partial(_on_twin, truth, task, seed)
     attempts: list[Attempt] = []
     interrupted = False
     for i, (name, poles) in enumerate(wish.poles.items()):
         whole = len(wish.poles) + 1
         tell = part(progress, i / whole, (i + 1) / whole, f"regulating with {name}")
         tell("designing", 0.0)
-        attempts.append(_attempt(name, poles, rig, truth, model, sampled, task, others, wish, seed, workers, tell))
+        attempts.append(_attempt(name, poles, rig, tried, model, sampled, task, others, wish, seed, workers, tell))
         if stopped():
             interrupted = True
             break
@@ -228,7 +260,7 @@ def actual_start(task: Task, seed: int) -> Array:
 
 
 def _attempt(
-    name: str, poles: Roots, rig: ServoRig, truth: ServoRig | None, model: Linear, sampled: Sampled, task: Task,
+    name: str, poles: Roots, rig: ServoRig, tried: Try | None, model: Linear, sampled: Sampled, task: Task,
     others: Mapping[str, Array], wish: RegulationRequest, seed: int, workers: Workers, progress: Progress,
 ) -> Attempt:  # fmt: skip
     placed = place(model.A, model.B, poles)
@@ -237,12 +269,13 @@ def _attempt(
         rig, model, sampled, law, task, parameters=others, lanes=wish.draws, seed=seed, workers=workers,
         progress=progress,
     )  # fmt: skip
-    after = None
-    if truth is not None:
-        after = trial(truth, law, at=task.at, start=actual_start(task, seed), seconds=task.seconds)
-    return Attempt(
-        name=name, placement=placed, law=law, before=told, after=after, score=None if after is None else score(after)
-    )  # fmt: skip
+    came = None if tried is None else tried(name, law, told)
+    return Attempt(name=name, placement=placed, law=law, before=told, came=came)
+
+
+def _on_twin(truth: ServoRig, task: Task, seed: int, _name: str, law: Law, _told: Preflight) -> Came:
+    went = trial(truth, law, at=task.at, start=actual_start(task, seed), seconds=task.seconds)
+    return Came(trial=went, score=score(went))
 
 
 def _ways(done: Regulation, model: Linear, sampled: Sampled) -> list[VelocityRun]:

@@ -40,7 +40,11 @@ def described(file: RigFile) -> tuple[ServoRig, ServoRig]:
     known = read_identified(file.known, seed=file.seed)
     said = known.described(vendor=file.vendor, who="a run on a rig")
     model = known.rig(said)
-    truth = known.twin(model, said, file.seed) if file.kind == "twin" and file.seed else model
+    truth = model
+    if file.kind == "twin" and file.make:
+        truth = make_rig(make_named(file.make, option="make").key, file.seed)
+    elif file.kind == "twin" and file.seed:
+        truth = known.twin(model, said, file.seed)
     return (replace(model, name=file.name), truth) if file.name else (model, truth)
 
 
@@ -120,7 +124,7 @@ def stage_of(path: Path, *, balance: bool = True, tilt: float = 0.0, watch: bool
     units = {c.name: c.unit for c in model.plant.coordinates}
     upright = at != zero
     last = list(units.values())[-1]
-    lean = file.lean(last, LEAN if last == "rad" and upright else math.inf)
+    lean = file.lean(last, LEAN if last == "rad" else math.inf) if upright else math.inf
     duty = Duty(
         limits=file.limits(units, model.unit, usual_limits(model)), model=model, at=at, zero=zero, lean=lean,
         near=min(NEAR, lean) if upright else math.inf, watch=watch,

@@ -1,0 +1,173 @@
+"""Experiment 1b at a rig: all frequencies at once while it hangs, as strongly as its travel allows, and fits of that.
+
+Short probes, each stronger than the one before, show what a unit of command does on this rig; the last and longest run
+asks for motion that keeps clear of dry friction and counts and stays well within the travel. Its response is told
+frequency by frequency; the numbers come from the motion itself, which knows dry friction for what it is, and are held
+against the last probe, which they have not seen.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from upright.errors import BadInput
+from upright.experiments.frequency_1b.run import LoggedResponse, LogRequest, response_of_logs
+from upright.experiments.hands_on.rig import RigAtHand
+from upright.experiments.hands_on.studies import write_study
+from upright.experiments.makes import MAKES, Make
+from upright.identification.estimate import identify
+from upright.identification.frequency.spectra import multisine, odd_lines
+from upright.identification.model.fit import Fit
+from upright.progress import Progress, part
+from upright.readers import read
+from upright.records import Array
+from upright.study.load import Study, load_study
+from upright.study.results import write_fit
+
+BELOW, ABOVE = 0.4, 4.0
+"""Ends of the band beside the slowest and the fastest swing of a rig that nobody makes."""
+REACH = {"rad": math.radians(12), "m": 0.02}
+"""Amplitude that is wanted of a coordinate of such a rig."""
+OF_TRAVEL = 0.25
+"""Most amplitude of the driven coordinate, as a share of its travel."""
+LINES, RESOLVED = 20, 4
+"""Frequencies, and how many times the period of the multisine holds that of the slowest."""
+PROBES = (0.15, 0.4, 0.8)
+"""Commands of the probes, as shares of what the guesses call for; what came of each bounds the next."""
+PROBED, PERIODS = 2, 8
+"""Periods of a probe, and of the run."""
+SHARE = 0.8
+"""Of the drive's limit."""
+GROWTH = 3.0
+"""Most by which a run is stronger than the one before."""
+STILL = 0.5
+"""Time at rest before a signal [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Question:
+    """What the rig is asked: a band [rad/s], amplitudes wanted [m or rad], and one period of the command that asks."""
+
+    band: tuple[float, float]
+    reach: Array
+    wave: Array
+
+
+def question(rig: RigAtHand) -> Question:
+    """Of the rig as its owner describes it.
+
+    Raises
+    ------
+    BadInput
+        When it does not swing where it rests.
+    """
+    model, at = rig.model, rig.resting
+    make = _make(rig)
+    linear = model.linear(at)
+    if make is not None:
+        band, reach = make.band, np.array(make.reach)
+    else:
+        swings = [abs(p) for p in linear.poles() if abs(p.imag) > 1e-3 * abs(p)]
+        if not swings:
+            raise BadInput(f"{model.name} does not swing about '{at}', so no band of frequencies can be told.")
+        band = (BELOW * min(swings), ABOVE * max(swings))
+        reach = np.array([REACH[c.unit] for c in model.plant.coordinates])
+    driven = [c.name for c in model.plant.coordinates].index(model.plant.inputs[0].on)
+    reach[driven] = min(reach[driven], OF_TRAVEL * _travel(rig, driven))
+    length = 1 << math.ceil(math.log2(RESOLVED * 2 * math.pi / (band[0] * model.period)))
+    base = 2 * math.pi / (length * model.period)
+    lines = odd_lines(*band, LINES, base)
+    moved = np.abs(linear.response(lines * base)[:, :, 0])
+    level = np.minimum(model.limit, np.min(reach / moved, axis=1))
+    wave = multisine(lines, level, length)
+    return Question(band=band, reach=reach, wave=wave / np.abs(wave).max())
+
+
+def _make(rig: RigAtHand) -> Make | None:
+    """The make that it is said to be of; a rig of one's own is of none."""
+    file = rig.file
+    if file.known is None:
+        return MAKES[file.make]
+    return next((m for m in MAKES.values() if m.vendor == file.vendor and isinstance(rig.model.plant, type(m.plant))),
+                None)  # fmt: skip
+
+
+def _travel(rig: RigAtHand, driven: int) -> float:
+    """How far the driven coordinate may go: the description's, or less where RIG.toml says so."""
+    units = {c.name: c.unit for c in rig.model.plant.coordinates}
+    held = rig.file.limits(units, rig.model.unit) if rig.file.limited else None
+    return min(rig.model.travel, math.inf if held is None else held.travel[driven])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Hanging:
+    """What the rig answered: its response with a fit, and a fit of the motion, with the study that repeats it."""
+
+    response: LoggedResponse
+    study: Study
+    fit: Fit
+
+
+def run_hanging(rig: RigAtHand, folder: Path, progress: Progress) -> Hanging:
+    """Ask the rig, and fit what it answered; leaves logs, `study.toml`, `fit.json` and the response in a folder.
+
+    Raises
+    ------
+    RigStopped
+        When the rig was stopped by a limit, or was not left to rest.
+    """
+    asked = question(rig)
+    names = [c.name for c in rig.model.plant.coordinates]
+    rig.requested(f"Let {names[-1]} hang at rest, with {names[0]} in the middle of its travel and room around it.")
+    most = SHARE * rig.model.limit
+    right = _level(rig, asked, most)  # by the guesses
+    level, stronger = PROBES[0] * right, right
+    for i, share in enumerate(PROBES):
+        progress(f"probing, {i + 1} of {len(PROBES)}", 0.3 * i / len(PROBES))
+        level = min(share * stronger, GROWTH * level, most)
+        log = rig.put_out(_from_rest(rig, level * asked.wave, PROBED), folder, "probe")
+        stronger = min(level / max(_share(log, names, asked), 1e-3), most)
+    level, probe = min(stronger, GROWTH * level), log
+    seconds = PERIODS * asked.wave.size * rig.model.period
+    progress(f"asking all frequencies at once for {seconds:.0f} s", 0.3)
+    log = rig.put_out(_from_rest(rig, level * asked.wave, PERIODS), folder, "multisine")
+    runs = [{"label": "multisine", "file": log.name}, {"label": "probe", "file": probe.name, "role": "predict"}]
+    path = write_study(rig, folder / "study.toml", f"Hanging: {rig.model.name}", runs)
+    wish = LogRequest(kind="multisine", hold=rig.model.period, band=asked.band, signals={}, counts={}, known={})
+    t = read(log).t
+    asking = {**runs[0], "file": f"../{log.name}", "window": [float(t[-PERIODS * asked.wave.size]), float(t[-1])]}
+    answered = write_study(rig, folder / "response" / "study.toml", f"Response: {rig.model.name}", [asking])
+    response = response_of_logs(
+        [answered], wish, answered.parent, tell=part(progress, 0.5, 0.6, "fitting the response")
+    )
+    study = load_study(path)
+    fit = identify(study.rig, study.runs, progress=part(progress, 0.6, 1.0, "fitting the motion"))
+    write_fit(fit, study, folder / "fit.json")
+    return Hanging(response=response, study=study, fit=fit)
+
+
+def _from_rest(rig: RigAtHand, wave: Array, periods: int) -> list[float]:
+    """Samples that begin at rest: what a drive with a lag does first depends on what it was told before."""
+    return [0.0] * math.ceil(STILL / rig.model.period) + np.tile(wave, periods).tolist()
+
+
+def _level(rig: RigAtHand, asked: Question, most: float) -> float:
+    """Largest command that by the guesses moves no coordinate further than wanted."""
+    spectrum = np.fft.rfft(asked.wave)
+    omega = 2 * math.pi * np.arange(spectrum.size) / (asked.wave.size * rig.model.period)
+    lines = np.flatnonzero(np.abs(spectrum) > 1e-6 * np.abs(spectrum).max())
+    answer = np.zeros((asked.reach.size, spectrum.size), dtype=np.complex128)
+    answer[:, lines] = rig.model.linear(rig.resting).response(omega[lines])[:, :, 0].T * spectrum[lines]
+    peaks = np.ptp(np.fft.irfft(answer, asked.wave.size, axis=1), axis=1) / 2
+    return float(min(most, np.min(asked.reach / np.maximum(peaks, 1e-12))))
+
+
+def _share(log: Path, names: list[str], asked: Question) -> float:
+    """Largest amplitude over the last period of a probe, beside the one that is wanted."""
+    record = read(log)
+    seen = np.column_stack([record[n] for n in names])[-asked.wave.size :]
+    return float(np.max(np.ptp(seen, axis=0) / (2 * asked.reach)))

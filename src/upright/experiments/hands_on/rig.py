@@ -1,0 +1,136 @@
+"""A rig at hand: signals are put out, laws run, and a person is asked for what no drive can do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from upright.control.trial import ServoRig
+from upright.errors import BadInput, RigStopped
+from upright.experiments.running.rig import described
+from upright.experiments.running.run import RigRun, RunRequest, run_rig
+from upright.files import write_json
+from upright.laws import Law, as_values
+from upright.realtime.session import RunState
+from upright.rigs.protocol import Fault
+from upright.rigs.rigfile import RigFile, read_rig_file
+
+
+def nobody(_sentence: str) -> bool:
+    """Hands of a twin: what a person would be asked for is done already."""
+    return True
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RigAtHand:
+    """A rig that experiments are made on.
+
+    Attributes
+    ----------
+    file : RigFile
+    model, truth : ServoRig
+        As its owner describes it, and what a twin truly is; the same of hardware.
+    ask : callable
+        Asks a person for something, in a sentence; answers whether it was done.
+    watch : callable
+        Shown how a run goes; answers with a sentence when it wants the run to end.
+    """
+
+    file: RigFile
+    model: ServoRig
+    truth: ServoRig
+    ask: Callable[[str], bool] = nobody
+    watch: Callable[[RunState], str] = field(default=lambda _: "")
+
+    @property
+    def resting(self) -> str:
+        """Equilibrium at which the encoders are zeroed."""
+        kinds = self.model.plant.equilibria
+        return self.file.zero if self.file.zero in kinds else next(iter(kinds))
+
+    def requested(self, sentence: str) -> None:
+        """Ask a person for something.
+
+        Raises
+        ------
+        RigStopped
+            When it was not done.
+        """
+        if not self.ask(sentence):
+            raise RigStopped(f"This was asked for and not done: {sentence}")
+
+    def put_out(self, samples: Sequence[float], folder: Path, stem: str, *, lifted: float = 0.0) -> Path:
+        """Log of a signal put out blindly, a sample each period, from rest.
+
+        Parameters
+        ----------
+        samples : sequence of float
+            [command unit].
+        folder, stem
+            Where the log goes.
+        lifted : float
+            How far a hand lifts the last coordinate before it lets go; done for a twin here, by a person else.
+
+        Raises
+        ------
+        RigStopped
+            When it did not run to its end.
+        KeyboardInterrupt
+            When somebody stopped it.
+        """
+        wish = RunRequest(
+            rig=self.file.path, samples=tuple(samples), seconds=len(samples) * self.model.period, tilt=lifted,
+            check=False, watch=False, stem=stem,
+        )  # fmt: skip
+        done = self._run(wish, folder)
+        if done.end.stopped:
+            raise RigStopped(done.end.stopped)
+        return done.log_path
+
+    def hold(
+        self, law: Law, folder: Path, stem: str, seconds: float, *, tilt: float = 0.0, reference: Sequence[float] = ()
+    ) -> RigRun:  # fmt: skip
+        """A run of a law, with the pulse before it and the filters beside it; a twin's hand lets go at the `tilt`.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            When somebody stopped it.
+        """
+        folder.mkdir(parents=True, exist_ok=True)
+        path = write_json(folder / f"law_{stem}.json", as_values(law))
+        wish = RunRequest(
+            rig=self.file.path, law=path, seconds=seconds, stem=stem, samples=tuple(reference), tilt=tilt,
+        )  # fmt: skip
+        return self._run(wish, folder)
+
+    def _run(self, wish: RunRequest, folder: Path) -> RigRun:
+        done = run_rig(wish, folder, watch=self.watch)
+        if done.end.faults & Fault.STOP:
+            raise KeyboardInterrupt
+        return done
+
+    def described_by(self, fit: Path, path: Path) -> RigAtHand:
+        """The same rig described by a fit; its RIG.toml is written to `path`."""
+        self.file.with_fit(fit, path)
+        return rig_at_hand(path, self.ask, self.watch)
+
+
+def rig_at_hand(
+    path: Path, ask: Callable[[str], bool] = nobody, watch: Callable[[RunState], str] = lambda _: ""
+) -> RigAtHand:  # fmt: skip
+    """The rig of a RIG.toml.
+
+    Raises
+    ------
+    BadInput
+        When it is one on which nothing can be tried.
+    """
+    file = read_rig_file(path)
+    if file.kind == "replay":
+        raise BadInput(
+            f'{path}: a replay answers nothing that is asked of it; experiments need a rig or kind = "twin".'
+        )
+    model, truth = described(file)
+    return RigAtHand(file=file, model=model, truth=replace(truth, name=model.name), ask=ask, watch=watch)

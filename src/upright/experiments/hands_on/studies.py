@@ -1,0 +1,93 @@
+"""The study of what was logged at a rig: numbers as its owner wrote them, runs as they came."""
+
+from __future__ import annotations
+
+import math
+import os
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from upright.errors import BadInput
+from upright.experiments.frequency_1b.run import asked, bench
+from upright.experiments.hands_on.rig import RigAtHand
+from upright.experiments.makes import make_of
+from upright.files import read_text, replace_file
+from upright.study.text import TomlTable, number, study_text, table
+
+Tables = dict[str, dict[str, Any]]
+
+
+def can_identify(rig: RigAtHand) -> bool:
+    """Whether it is said what a fit may start from: in a study, or by the make of a twin."""
+    return rig.file.known is None or rig.file.known.suffix == ".toml"
+
+
+def write_study(
+    rig: RigAtHand, path: Path, title: str, runs: Sequence[Mapping[str, Any]], *,
+    known: Mapping[str, Mapping[str, Any]] | None = None, drive: bool = True,
+) -> Path:  # fmt: skip
+    """A study of logs of this rig.
+
+    Parameters
+    ----------
+    rig : RigAtHand
+    path : Path
+    title : str
+    runs : sequence of mappings
+        As `[[runs]]` has them.
+    known : mapping of str to mapping, optional
+        Numbers that an earlier experiment found, in the place of what the owner wrote: ``value``, ``uncertainty``.
+    drive : bool
+        Whether something drove; what stands between command and force is otherwise left as it is guessed.
+    """
+    said = _said(rig)
+    parameters = said.get("parameters", {}) | dict(known or {})
+    written = table("[parameters]")
+    for name, value in parameters.items():
+        written.key(name, value)
+    tables: list[TomlTable] = [
+        table("", title=title, source=f"logs of {rig.model.name}"),
+        table("[rig]", digits=10, **({"servo_period": f"{rig.model.period:.10g} s"} | said["rig"])),
+        written,
+    ]
+    if drive:
+        tables += [table("[actuator]", digits=10, **said.get("actuator", {})),
+                   table("[drive]", column="u_applied", unit=rig.model.unit)]  # fmt: skip
+    for c, per in zip(rig.model.plant.coordinates, rig.model.counts, strict=True):
+        counts = {"counts_per_rev": per * 2 * math.pi} if c.unit == "rad" else {"counts_per_m": per}
+        tables.append(table(f"[sensors.{c.name}]", digits=10, column=c.name, unit=c.unit, **counts))
+    tables += [table("[defaults]", unknown=["initial"]), *(table("[[runs]]", digits=10, **run) for run in runs)]
+    replace_file(path, study_text(tables).encode())
+    return path
+
+
+def _said(rig: RigAtHand) -> Tables:
+    """Tables of the owner's study, a plant of his own still found from where the new one lies."""
+    source = rig.file.known
+    if source is None:
+        return _of_make(rig)
+    if not can_identify(rig):
+        raise BadInput(f"{rig.file.path} names a fit, and what is to be identified begins with a study; name that.")
+    tables: Tables = tomllib.loads(read_text(source))
+    plant = str(tables["rig"].get("plant", ""))
+    if ".py:" in plant:
+        file, _, name = plant.rpartition(":")
+        tables["rig"]["plant"] = f"{os.path.abspath(source.parent / file)}:{name}"
+    return {k: tables[k] for k in ("rig", "parameters", "actuator") if k in tables}
+
+
+def _of_make(rig: RigAtHand) -> Tables:
+    """What the maker designed, and what the bench says of this twin."""
+    make = make_of(rig.model.plant)
+    start = asked(make, bench(rig.truth, make), make.bench)
+    values: Tables = {"parameters": {}, "actuator": {}}
+    for name, p in start.parameters.items():
+        where, _, key = name.rpartition(".")
+        told = number(p.value, p.unit, 10)
+        entry: Any = {"guess": told, "min": 0} if p.estimate else told
+        if p.uncertainty:
+            entry = {"value": told, "uncertainty": number(p.uncertainty, p.unit, 4)}
+        values[where or "parameters"][key] = entry
+    return {"rig": {"plant": make.plant_name, "vendor": make.vendor}, **values}

@@ -1,0 +1,87 @@
+"""Experiment 4 at a rig: a hand lifts the pendulum and lets go, twice; one swing is fitted, the other predicted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from upright.errors import NotIdentifiable
+from upright.experiments.hands_on.rig import RigAtHand
+from upright.experiments.hands_on.studies import write_study
+from upright.experiments.makes import MAKES
+from upright.identification.estimate import identify
+from upright.identification.model.fit import Fit
+from upright.progress import Progress, part
+from upright.readers import read
+from upright.study.draft.release import release_of
+from upright.study.load import Study, load_study
+from upright.study.results import write_fit
+
+HIGH, LOW = math.radians(75), math.radians(50)
+"""How high the pendulum is lifted, for the run that is fitted and the one that is predicted."""
+HAND, SWING = 15.0, 15.0
+"""Time that a person has to lift it and let go, and time for which it swings [s]."""
+CLEAR = math.radians(15)
+"""A pendulum that was lifted less was not lifted."""
+
+
+def run_swings(
+    rig: RigAtHand, folder: Path, progress: Progress, found: Mapping[str, Mapping[str, Any]]
+) -> tuple[Study, Fit]:  # fmt: skip
+    """Let it swing and fit; leaves logs, `study.toml` and `fit.json`.
+
+    Parameters
+    ----------
+    rig : RigAtHand
+    folder : Path
+    progress : callable
+    found : mapping
+        What earlier experiments say of the body that carries the pendulum: nothing else gives a free swing its scale.
+
+    Raises
+    ------
+    RigStopped
+        When the rig was stopped by a limit.
+    NotIdentifiable
+        When no release is seen.
+    """
+    names = [c.name for c in rig.model.plant.coordinates]
+    runs: list[dict[str, Any]] = []
+    for i, (role, angle) in enumerate((("fit", HIGH), ("predict", LOW))):
+        progress(f"swinging from about {math.degrees(angle):.0f} degrees", 0.2 * i)
+        rig.requested(
+            f"The drive will be silent. Within {HAND:.0f} s lift {names[-1]} to about {math.degrees(angle):.0f} degrees"
+            f", hold it and {names[0]} still, let both go together, and keep away."
+        )
+        seconds = SWING + (HAND if rig.file.hardware else 0.0)
+        samples = [0.0] * math.ceil(seconds / rig.model.period)
+        log = rig.put_out(samples, folder, f"release_{math.degrees(angle):.0f}", lifted=angle)
+        begin, end = _window(rig, log)
+        runs.append({"label": log.stem, "file": log.name, "window": [begin, end], "role": role})
+    study = load_study(
+        write_study(rig, folder / "study.toml", f"Free swings of {rig.model.name}", runs, known=found, drive=False)
+    )
+    fit = identify(study.rig, study.runs, progress=part(progress, 0.4, 1.0, "fitting the swings"))
+    write_fit(fit, study, folder / "fit.json")
+    return study, fit
+
+
+def _window(rig: RigAtHand, log: Path) -> tuple[float, float]:
+    record = read(log)
+    pivot, swing = (c.name for c in rig.model.plant.coordinates)
+    theta = record[swing]
+    if abs(theta).max() < CLEAR:
+        raise NotIdentifiable(
+            f"{swing} went no further than {math.degrees(abs(theta).max()):.2g} degrees in {log.name}: it was not lifted "
+            "in time; run the experiment again."
+        )
+    swings = max(abs(p.imag) for p in rig.model.linear(rig.resting).poles())
+    begin = release_of(record.t, theta, swings, record[pivot])
+    return begin, float(record.t[-1])
+
+
+def carrier_of(rig: RigAtHand) -> str:
+    """Inertia of the body that carries the pendulum; empty where no make has such a plant."""
+    return next((m.body for m in MAKES.values() if m.pendulum and isinstance(rig.model.plant, type(m.plant))), "")
