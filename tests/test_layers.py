@@ -54,6 +54,7 @@ experiments.designing experiments.weighing_1a experiments.running
 experiments.frequency_1b
 experiments.regulation_2
 experiments.swing_up_2b experiments.tracking_3 experiments.free_swing_4
+experiments.hands_on
 experiments
 exports
 verbs

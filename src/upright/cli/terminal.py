@@ -60,6 +60,21 @@ def progress_bar(*, quiet: bool = False) -> Generator[Progress]:
         yield lambda step, share: bar.update(task, description=step, completed=share)
 
 
+@contextmanager
+def step_lines(*, quiet: bool = False) -> Generator[Progress]:
+    """Each new step as a line on stderr, for work that asks and shows things in between."""
+    screen, said = console(error=True), ""
+
+    def progress(step: str, _share: float) -> None:
+        nonlocal said
+        head = ": ".join(step.split(": ")[:2])  # counts of evaluations are no steps
+        if not quiet and head != said:
+            said = head
+            screen.print(step, style="dim", markup=False)
+
+    yield progress
+
+
 def tell(chapter: Chapter, files: Sequence[Path] = (), numbers: Any = None) -> None:
     """Print a chapter, the files that were written, and what next; or, where they are given, its `numbers` as JSON."""
     if numbers is not None:

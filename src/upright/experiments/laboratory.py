@@ -19,6 +19,7 @@ from upright import __version__
 from upright.control.trial import ServoRig
 from upright.errors import BadInput, UprightError
 from upright.experiments.abreast import run_abreast
+from upright.experiments.hands_on.rig import RigAtHand
 from upright.experiments.makes import MAKES, PENDULUMS, SHAFTS, make_rig
 from upright.experiments.weighing_1a.run import Known
 from upright.experiments.worn import worn as worn_twin
@@ -34,7 +35,10 @@ CHAPTER_FILE = "chapter.json"
 
 @dataclass(frozen=True, kw_only=True)
 class ExperimentInput:
-    """What an experiment is given: rig and folder, what finished ones it builds on said and where they wrote."""
+    """What an experiment is given: rig and folder, what finished ones it builds on said and where they wrote.
+
+    `hands` is the rig itself where one is at hand, of which `rig` is the description.
+    """
 
     make: str
     rig: ServoRig
@@ -44,6 +48,7 @@ class ExperimentInput:
     folders: Mapping[str, Path]
     progress: Progress
     stopped: Callable[[], bool]
+    hands: RigAtHand | None = None
 
     @property
     def weighed(self) -> tuple[Known, ...]:
@@ -211,12 +216,16 @@ class Session:
     folder: Path
     asked: tuple[Experiment, ...]
     worn: bool = False
+    table: tuple[Experiment, ...] = EXPERIMENTS
+    hands: RigAtHand | None = None
     results: list[ExperimentResult] = field(default_factory=list[ExperimentResult])
     interrupted: bool = False
     seconds: float = 0.0
 
     def rig(self, make: str) -> ServoRig:
-        """The twin that is run on."""
+        """The twin that is run on, or what is known of the rig at hand."""
+        if self.hands is not None:
+            return self.hands.model
         rig = make_rig(make, self.seed)
         return worn_twin(rig, self.seed) if self.worn else rig
 
@@ -226,7 +235,9 @@ class Session:
         return tuple(e for e in self.asked if e.key not in {t.experiment.key for t in self.results})
 
 
-def choose(asked: Sequence[str], make: str) -> tuple[Experiment, ...]:
+def choose(
+    asked: Sequence[str], make: str, table: tuple[Experiment, ...] = EXPERIMENTS
+) -> tuple[Experiment, ...]:  # fmt: skip
     """The experiments asked for, with those whose numbers they take; all that the rig has when none is named.
 
     Raises
@@ -234,12 +245,12 @@ def choose(asked: Sequence[str], make: str) -> tuple[Experiment, ...]:
     BadInput
         When there is no such experiment, or not on this rig.
     """
-    there = _there(make)
+    there = _there(make, table)
     wanted: set[str] = set()
     for name in asked:
-        found = [e for e in EXPERIMENTS if name in (e.key, e.part_of)]
+        found = [e for e in table if name in (e.key, e.part_of)]
         if not found:
-            valid = dict.fromkeys(n for e in EXPERIMENTS for n in (e.part_of, e.key))
+            valid = dict.fromkeys(n for e in table for n in (e.part_of, e.key))
             raise BadInput(f"there is no experiment '{name}'; take one of {', '.join(sorted(valid))}.")
         if not any(e in there for e in found):
             raise BadInput(
@@ -251,18 +262,18 @@ def choose(asked: Sequence[str], make: str) -> tuple[Experiment, ...]:
         wanted = {e.key for e in there}
     for e in reversed(there):  # who builds on another comes after it
         if e.key in wanted:
-            wanted |= set(_needs(e, make))
+            wanted |= set(_needs(e, make, table))
     return tuple(e for e in there if e.key in wanted)
 
 
-def _there(make: str) -> list[Experiment]:
+def _there(make: str, table: tuple[Experiment, ...]) -> list[Experiment]:
     """Experiments that a rig can have; all for the paper's."""
-    return [e for e in EXPERIMENTS if not make or make in e.makes]
+    return [e for e in table if not make or make in e.makes]
 
 
-def _needs(e: Experiment, make: str) -> list[str]:
+def _needs(e: Experiment, make: str, table: tuple[Experiment, ...]) -> list[str]:
     """What it takes numbers from: earlier experiments on the same rig."""
-    return [n.key for n in _there(make) if n.key in e.needs and n.make(make) == e.make(make)]
+    return [n.key for n in _there(make, table) if n.key in e.needs and n.make(make) == e.make(make)]
 
 
 def run_laboratory(
@@ -276,6 +287,8 @@ def run_laboratory(
     fresh: bool = False,
     workers: Workers = HERE,
     worn: bool = False,
+    table: tuple[Experiment, ...] = EXPERIMENTS,
+    hands: RigAtHand | None = None,
 ) -> Session:
     """Run experiments on a seeded rig; Ctrl-C stops and keeps what is there.
 
@@ -299,6 +312,10 @@ def run_laboratory(
         Who runs experiments that need nothing of each other; processes of this machine, since they share the folder.
     worn : bool
         Take twins with physics that models leave out; see `upright.experiments.worn`.
+    table : tuple of Experiment
+        What can be run.
+    hands : RigAtHand, optional
+        The rig itself, where one is at hand; `make` is then what it is asked for by.
 
     Raises
     ------
@@ -306,8 +323,9 @@ def run_laboratory(
         When there is no such experiment, or not on this rig.
     """
     began = time.perf_counter()
-    session = Session(make=make, seed=seed, folder=folder, asked=choose(asked, make), worn=worn)
-    digests = _digests(make, seed, worn)
+    session = Session(make=make, seed=seed, folder=folder, asked=choose(asked, make, table), worn=worn, table=table,
+                      hands=hands)  # fmt: skip
+    digests = _digests(session)
     whole = sum(e.seconds for e in session.asked)
     behind = 0.0
     if not workers.alone:
@@ -335,7 +353,7 @@ def _run_abreast(
     fresh: bool,
 ) -> None:  # fmt: skip
     asked = {e.key: e for e in session.asked}
-    needs = {key: _needs(e, session.make) for key, e in asked.items()}
+    needs = {key: _needs(e, session.make, session.table) for key, e in asked.items()}
     run = partial(_apart, replace(session, asked=()), digests, stopped, fresh)
     found, interrupted = run_abreast({k: e.seconds for k, e in asked.items()}, needs, run, workers, progress)
     session.results += [_brought(key, told) for key, told in found.items()]
@@ -360,17 +378,20 @@ def _brought(key: str, told: Mapping[str, Any]) -> ExperimentResult:
     return ExperimentResult(**values)
 
 
-def _digests(make: str, seed: int, worn: bool) -> dict[str, str]:
-    """Digest of what each experiment is made of: the program, its rig and seed, the experiments it builds on."""
+def _digests(session: Session) -> dict[str, str]:
+    """Digest of what each experiment is made of: the program, its rig and seed, the experiments it builds on.
+
+    What was measured on a rig outlasts another version of the program.
+    """
     digests: dict[str, str] = {}
-    for e in _there(make):
+    for e in _there(session.make, session.table):
         parts = (
-            _program(),
+            _program() if session.hands is None else session.hands.text,
             e.key,
-            e.make(make),
-            str(seed),
-            "worn" if worn else "",
-            *(digests[n] for n in _needs(e, make)),
+            e.make(session.make),
+            str(session.seed),
+            "worn" if session.worn else "",
+            *(digests[n] for n in _needs(e, session.make, session.table)),
         )
         digests[e.key] = sha256("\n".join(parts).encode()).hexdigest()
     return digests
@@ -399,13 +420,13 @@ def _kept(folder: Path, digest: str) -> Chapter | None:
 def _with_kept(session: Session, digests: Mapping[str, str]) -> list[ExperimentResult]:
     """What was told, and what else is there from an earlier run on the same rig."""
     told = {t.experiment.key: t for t in session.results}
-    for e in _there(session.make):
+    for e in _there(session.make, session.table):
         found = None if e.key in told else _kept(session.folder / e.key, digests[e.key])
         if found:
             make = e.make(session.make)
             name = session.rig(make).name
             told[e.key] = ExperimentResult(experiment=e, make=make, rig=name, chapter=found, state="kept", seconds=0.0)
-    return [told[e.key] for e in _there(session.make) if e.key in told]
+    return [told[e.key] for e in _there(session.make, session.table) if e.key in told]
 
 
 def _one(
@@ -413,7 +434,7 @@ def _one(
 ) -> ExperimentResult:
     """One experiment, from an earlier run where that still holds."""
     began = time.perf_counter()
-    make, needs = e.make(session.make), _needs(e, session.make)
+    make, needs = e.make(session.make), _needs(e, session.make, session.table)
     rig, folder = session.rig(make), session.folder / e.key
     folder.mkdir(parents=True, exist_ok=True)
     progress("starting", 0.0)
@@ -426,7 +447,7 @@ def _one(
                 for t in session.results
                 if t.experiment.key in needs and t.state in ("done", "kept")
             },
-            folders={n: session.folder / n for n in needs},
+            folders={n: session.folder / n for n in needs}, hands=session.hands,
         )  # fmt: skip
         try:
             chapter, whole = e.tell(at)
@@ -451,12 +472,15 @@ WORN = (
     "They are worn: friction larger close to rest, a drive that ripples and comes late, a frame out of level, encoders "
     "with play and off centre. No model has this, and what remains of it is told."
 )
+TWINS = "Digital twins: dry friction, encoder counts, delay and limits as on rigs; none was touched."
 TITLE = "The laboratory: identify it hanging, hold it upright"
 
 
 def book(session: Session, day: date) -> Book:
     """Everything the session has to say."""
-    rigs = dict.fromkeys(f"{t.rig} (seed {session.seed})" for t in session.results)
+    hands = session.hands
+    seeded = "" if hands is not None else f" (seed {session.seed})"
+    rigs = dict.fromkeys(f"{t.rig}{seeded}" for t in session.results)
     notes: list[str] = []
     if session.interrupted:
         left = ", ".join(e.key for e in session.missing)
@@ -467,9 +491,8 @@ def book(session: Session, day: date) -> Book:
     return Book(
         title=TITLE,
         facts=(
-            ("Rig", "; ".join(rigs) or f"seed {session.seed}"),
-            ("Data", "Digital twins: dry friction, encoder counts, delay and limits as on rigs; none was touched."
-             + (f" {WORN}" if session.worn else "")),
+            ("Rig", "; ".join(rigs) or (session.make if hands is not None else f"seed {session.seed}")),
+            ("Data", hands.source if hands is not None else TWINS + (f" {WORN}" if session.worn else "")),
             ("Experiments", ", ".join(t.experiment.key for t in session.results) or "none"),
             ("Made", f"{day.isoformat()}, upright {__version__}, Python {platform.python_version()}"),
             ("Again", command(session)),
@@ -489,7 +512,7 @@ def command(session: Session, seed: int | None = None) -> str:
     shown = ["upright lab"]
     if session.make:
         shown.append(f"--rig {session.make}")
-    there = [e for e in EXPERIMENTS if not session.make or session.make in e.makes]
+    there = _there(session.make, session.table)
     told = {e.key for e in session.asked} | {t.experiment.key for t in session.results}
     if len(told) < len(there):
         shown += [f"--experiment {e.key}" for e in there if e.key in told]
@@ -508,6 +531,14 @@ def next_steps(session: Session) -> tuple[Step, ...]:
             Step("Go on where this stopped; what is finished is kept.",
                  f"{command(session)} -o {typed(session.folder)}")
         )  # fmt: skip
+    if session.hands is not None:
+        held = next((t.chapter.numbers for t in session.results if t.experiment.key == "2"), {})
+        if "recommended" in held:
+            rig, stem = session.folder / "2" / "rig.toml", held["recommended"].replace(" ", "_")
+            law = rig.with_name(f"law_regulation_{stem}.json")
+            again = f"upright run --rig {typed(rig)} --law {typed(law)} --duration 60"
+            steps.append(Step("Run the best law for longer.", again))
+        return tuple(steps)
     steps.append(Step("Take another rig of the same make.", command(session, session.seed + 1)))
     other = "linear" if session.make != "linear" else "furuta"
     steps.append(Step("Run the laboratory on another kind of rig.", f"upright lab --rig {other}"))

@@ -146,7 +146,7 @@ class RigFile:
     def with_fit(self, fit: Path, path: Path) -> Path:
         """Write the same file with a fit for its description."""
         values = {k: v for k, v in _root(self.path).values.items() if k not in ("fit", "study", "record")}
-        values["fit"] = os.path.relpath(fit, path.parent)
+        values["fit"] = Path(os.path.relpath(fit, path.parent)).as_posix()
         return replace_file(path, "".join(f"{k} = {toml(v, 17)}\n" for k, v in values.items()).encode())
 
     def lean(self, unit: str, default: float) -> float:
@@ -200,6 +200,24 @@ def read_rig_file(path: Path) -> RigFile:
         record=place / texts["record"] if "record" in texts else None, at=texts.get("at", "inverted"),
         zero=texts.get("zero", "hanging"), board=board,
     )  # fmt: skip
+
+
+def template(port: str) -> str:
+    """RIG.toml of a serial rig that its owner has yet to fill in; it is refused, with a sentence, until then."""
+    return f"""kind = "serial"
+port = {toml(port)}
+study = "study.toml"       # the rig with guesses of its numbers: [rig], [parameters], [actuator], [sensors]
+
+[limits]
+# command = "5 V"          # largest command
+watchdog = "20 ms"
+lean = "25 deg"            # how far the pendulum may be from upright
+
+# [limits.psi]             # what the drive moves, as the plant calls it
+# travel = "1.5 rad"
+# speed = "15 rad/s"
+# start = "0.3 rad"
+"""
 
 
 _EXAMPLES = {

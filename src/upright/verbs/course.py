@@ -6,8 +6,8 @@ import os
 import re
 import signal
 import threading
-from collections.abc import Generator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Generator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,9 +20,11 @@ from upright.verbs.pages import folder_if_given, write_page
 from upright.verbs.values import texts
 
 if TYPE_CHECKING:
+    from upright.experiments.hands_on.rig import RigAtHand
     from upright.experiments.laboratory import Session
     from upright.paper.reproduce import Reproduced
     from upright.questionnaire.sheet import Means, Ratings, Shares
+    from upright.realtime.session import RunState
     from upright.report.page import Book
 
 
@@ -41,8 +43,10 @@ class Laboratory:
 def lab(
     *, experiment: Sequence[str] | str = (), rig: str = "", seed: int = 0, out: str | os.PathLike[str] | None = None,
     fresh: bool = False, workers: int = 1, worn: bool = False, progress: Progress = silent,
+    ask: Callable[[str], bool] | None = None,
+    watching: Callable[[], AbstractContextManager[Callable[[RunState], str]]] | None = None,
 ) -> Answer[Laboratory]:  # fmt: skip
-    """The experiments of the paper on simulated rigs: identify, flip, design, hold, track, swing, and report.
+    """The experiments of the paper on simulated rigs, or on one at hand: identify, flip, design, hold, swing, report.
 
     Every log, study and fit is written to the folder for the other verbs, and one report.html tells it all (report.pdf
     with the pdf extra). Ctrl-C keeps and reports what is there; the same call goes on from there.
@@ -52,9 +56,10 @@ def lab(
     experiment : str or sequence of str, optional
         Only these of 1, 1a, 1b, 2, 2b, 3, 4, and what they stand on.
     rig : str, optional
-        linear, furuta, rectilinear or torsional; else the paper's.
+        Twin of a make, linear, furuta, rectilinear or torsional, else the paper's; or the RIG.toml of a rig at hand
+        (experiments 1b, 2 and 4); ``"serial:PORT"`` writes one to be filled in.
     seed : int
-        Which rig of the make; 0 is the one as designed.
+        Which rig of the make; 0 is the one as designed. Of a rig at hand, that of the rigs drawn from its fit.
     out : path, optional
         Folder; upright-lab[-KIND][-SEED][-worn] when omitted.
     fresh : bool
@@ -65,6 +70,10 @@ def lab(
         Twins with physics that models leave out, of which fits read as those of real rigs do.
     progress : callable, optional
         Told the step at work and the share done.
+    ask : callable, optional
+        Asks the person beside a rig for something, in a sentence; answers whether it was done. Hardware needs it.
+    watching : callable, optional
+        Opens a view for each run at a rig: shown how it goes, it answers with a sentence to end the run.
 
     Returns
     -------
@@ -80,10 +89,12 @@ def lab(
 
     if seed < 0:
         raise BadInput(f"--seed needs a whole number of at least 0, got {seed}.")
-    if rig:
+    at_hand = rig.endswith(".toml") or rig.startswith("serial:")
+    if rig and not at_hand:
         make_named(rig)
+    kind = Path(rig).stem if at_hand else rig
     named = "-".join(
-        ["upright-lab", *([rig] if rig else []), *([str(seed)] if seed else []), *(["worn"] if worn else [])]
+        ["upright-lab", *([kind] if kind else []), *([str(seed)] if seed else []), *(["worn"] if worn else [])]
     )
     at = Path(named if out is None else out)
     if at.exists() and not at.is_dir():
@@ -91,18 +102,24 @@ def lab(
     from datetime import date
 
     from upright.experiments import laboratory
+    from upright.experiments.at_hand import experiments_for
     from upright.report.html import write_html
     from upright.report.page import Chapter
     from upright.report.pdf import available, write_pdf
+    from upright.report.symbols import typed
     from upright.workers import Workers
 
     shared = Workers(number=workers)
     asked = texts(experiment)
-    laboratory.choose(asked, rig)  # says what is wrong with the call before anything is written
+    hands = _at_hand(rig, at, ask, watching, worn=worn, workers=workers) if at_hand else None
+    rig = rig if hands is None else typed(hands.file.path)
+    table = laboratory.EXPERIMENTS if hands is None else experiments_for(hands, rig)
+    laboratory.choose(asked, rig, table)  # says what is wrong with the call before anything is written
     with _ctrl_c() as pressed:
         session = laboratory.run_laboratory(
-            asked, rig, seed, at, progress, stopped=lambda: pressed.times > 0, fresh=fresh, workers=shared, worn=worn
-        )
+            asked, rig, seed, at, progress, stopped=lambda: pressed.times > 0, fresh=fresh, workers=shared, worn=worn,
+            table=table, hands=hands,
+        )  # fmt: skip
         pressed.patient = True
         progress("writing the report", 1.0)
         book = laboratory.book(session, date.today())
@@ -116,6 +133,36 @@ def lab(
     )  # fmt: skip
     done = Laboratory(session=session, book=book, interrupted=session.interrupted or pressed.times > 0)
     return Answer(done, told, [report] if pdf is None else [report, pdf])
+
+
+def _at_hand(
+    rig: str, folder: Path, ask: Callable[[str], bool] | None,
+    watching: Callable[[], AbstractContextManager[Callable[[RunState], str]]] | None, *, worn: bool, workers: int,
+) -> RigAtHand:  # fmt: skip
+    """The rig of a RIG.toml; what cannot be had of it is said first."""
+    from upright.experiments.hands_on.rig import nobody, nobody_watches, rig_at_hand
+    from upright.files import replace_file
+    from upright.report.symbols import typed
+    from upright.rigs.rigfile import template
+
+    if worn or workers != 1:
+        raise BadInput("--worn and --workers are for twins of makes; a rig at hand is as it is, and there is one.")
+    if rig.startswith("serial:"):
+        path = folder / "RIG.toml"
+        if not path.exists():
+            replace_file(path, template(rig.removeprefix("serial:")).encode())
+        raise BadInput(
+            "a rig of hardware needs a description and limits, which nobody else can know: fill in "
+            f"{path} (docs/rigs.md), then run upright lab --rig {typed(path)}"
+        )
+    if not Path(rig).exists():
+        raise BadInput(f"there is no file '{rig}'; name the RIG.toml of a rig, or a make: linear, furuta, ...")
+    hands = rig_at_hand(Path(rig), ask or nobody, watching or nobody_watches)
+    if hands.file.hardware and ask is None:
+        raise BadInput(
+            "experiments on hardware need a person beside it who is asked: run upright lab in a terminal, or give ask."
+        )
+    return hands
 
 
 @dataclass

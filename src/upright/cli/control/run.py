@@ -50,7 +50,7 @@ def run(
     """
     from upright.verbs import rig as verbs
 
-    with _view(quiet=as_json) as observe:
+    with view(quiet=as_json) as observe:
         done = verbs.run(
             rig, law=law, excite=excite, reference=reference, duration=duration, mode=mode, tilt=tilt, check=check,
             watch=watch, out=out, pdf=pdf, observe=observe,
@@ -61,7 +61,7 @@ def run(
 
 
 @contextmanager
-def _view(*, quiet: bool) -> Generator[Callable[[RunState], str]]:
+def view(*, quiet: bool) -> Generator[Callable[[RunState], str]]:
     """State of the run on stderr, and whether a key was pressed; neither when nobody watches."""
     screen = console(error=True)
     if quiet or not screen.is_terminal:

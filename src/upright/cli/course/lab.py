@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from upright.cli.terminal import Processes, console, print_json, progress_bar
+from upright.cli.control.run import view
+from upright.cli.terminal import Processes, console, print_json, progress_bar, step_lines
 
 if TYPE_CHECKING:
     from upright.verbs.course import Laboratory
@@ -23,7 +26,12 @@ def lab(
         typer.Option("--experiment", "-e", metavar="1|1a|1b|2|2b|3|4", help="Only this one, and what it stands on."),
     ] = None,
     rig: Annotated[
-        str, typer.Option("--rig", metavar="KIND", help="linear, furuta, rectilinear or torsional; else the paper's.")
+        str,
+        typer.Option(
+            "--rig",
+            metavar="KIND|RIG.toml",
+            help="linear, furuta, rectilinear or torsional, else the paper's; or a rig at hand.",
+        ),
     ] = "",
     seed: Annotated[int, typer.Option(help="Which rig of the make; 0 is the one as designed.")] = 0,
     out: Annotated[
@@ -37,10 +45,12 @@ def lab(
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON instead of sentences.")] = False,
 ) -> None:
-    r"""Run the experiments of the paper on simulated rigs: identify, flip, design, hold, track, swing, and report.
+    r"""Run the experiments of the paper on simulated rigs, or on yours: identify, flip, design, hold, swing, report.
 
     1a weighs the rig with known added masses, 1b fits its frequency response hanging, 2 holds it upright with gains
     from that fit, 2b swings it up and catches it, 3 tracks through a flexible shaft, 4 lets the pendulum swing freely.
+
+    With a RIG.toml 1b, 2 and 4 are made on the rig itself; you are asked for what no drive can do.
 
     Every log, study and fit is written to DIR for the ordinary commands, and one report.html tells it all (report.pdf
     with the pdf extra).
@@ -51,13 +61,16 @@ def lab(
     upright lab --rig linear --seed 3
     upright lab --rig furuta --worn
     upright lab --experiment 1b --experiment 2 -o out
+    upright lab --rig RIG.toml
     """
     from upright.verbs import course as verbs
 
-    with progress_bar(quiet=as_json) as bar:
+    at_hand = rig.endswith(".toml")
+    with step_lines(quiet=as_json) if at_hand else progress_bar(quiet=as_json) as progress:
         done = verbs.lab(
             experiment=experiment or (), rig=rig, seed=seed, out=out, fresh=fresh, workers=workers, worn=worn,
-            progress=bar,
+            progress=progress, ask=_asks if at_hand and sys.stdin.isatty() else None,
+            watching=partial(view, quiet=as_json) if at_hand else None,
         )  # fmt: skip
     if as_json:
         print_json(done.numbers)
@@ -65,6 +78,10 @@ def lab(
         _tell(done.value, done.files)
     if done.value.interrupted:
         raise typer.Exit(INTERRUPTED)
+
+
+def _asks(sentence: str) -> bool:
+    return typer.confirm(f"{sentence} Ready?", default=True, err=True)
 
 
 def _tell(done: Laboratory, files: Sequence[Path]) -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from upright.errors import BadInput
+from upright.errors import BadInput, NotIdentifiable
 from upright.experiments.frequency_1b.run import LoggedResponse, LogRequest, response_of_logs
 from upright.experiments.hands_on.rig import RigAtHand
 from upright.experiments.hands_on.studies import write_study
@@ -49,7 +49,7 @@ STILL = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
-class Question:
+class Asking:
     """What the rig is asked: a band [rad/s], amplitudes wanted [m or rad], and one period of the command that asks."""
 
     band: tuple[float, float]
@@ -57,7 +57,7 @@ class Question:
     wave: Array
 
 
-def question(rig: RigAtHand) -> Question:
+def asking(rig: RigAtHand) -> Asking:
     """Of the rig as its owner describes it.
 
     Raises
@@ -84,7 +84,7 @@ def question(rig: RigAtHand) -> Question:
     moved = np.abs(linear.response(lines * base)[:, :, 0])
     level = np.minimum(model.limit, np.min(reach / moved, axis=1))
     wave = multisine(lines, level, length)
-    return Question(band=band, reach=reach, wave=wave / np.abs(wave).max())
+    return Asking(band=band, reach=reach, wave=wave / np.abs(wave).max())
 
 
 def _make(rig: RigAtHand) -> Make | None:
@@ -105,9 +105,9 @@ def _travel(rig: RigAtHand, driven: int) -> float:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Hanging:
-    """What the rig answered: its response with a fit, and a fit of the motion, with the study that repeats it."""
+    """What the rig answered: its response, if it has one, and a fit of the motion with the study that repeats it."""
 
-    response: LoggedResponse
+    response: LoggedResponse | None
     study: Study
     fit: Fit
 
@@ -120,30 +120,34 @@ def run_hanging(rig: RigAtHand, folder: Path, progress: Progress) -> Hanging:
     RigStopped
         When the rig was stopped by a limit, or was not left to rest.
     """
-    asked = question(rig)
+    asked = asking(rig)
     names = [c.name for c in rig.model.plant.coordinates]
-    rig.requested(f"Let {names[-1]} hang at rest, with {names[0]} in the middle of its travel and room around it.")
+    still = f"Let {names[-1]} hang at rest, with {names[0]} in the middle of its travel and room around it"
     most = SHARE * rig.model.limit
     right = _level(rig, asked, most)  # by the guesses
-    level, stronger = PROBES[0] * right, right
+    level, stronger, probe = PROBES[0] * right, right, Path()
     for i, share in enumerate(PROBES):
         progress(f"probing, {i + 1} of {len(PROBES)}", 0.3 * i / len(PROBES))
         level = min(share * stronger, GROWTH * level, most)
-        log = rig.put_out(_from_rest(rig, level * asked.wave, PROBED), folder, "probe")
-        stronger = min(level / max(_share(log, names, asked), 1e-3), most)
-    level, probe = min(stronger, GROWTH * level), log
+        rig.requested(f"{still}; probe {i + 1} of {len(PROBES)} follows.")
+        probe = rig.put_out(_from_rest(rig, level * asked.wave, PROBED), folder, "probe")
+        stronger = min(level / max(_share(probe, names, asked), 1e-3), most)
+    level = min(stronger, GROWTH * level)
     seconds = PERIODS * asked.wave.size * rig.model.period
+    rig.requested(f"{still}; all frequencies at once follow for {seconds:.0f} s.")
     progress(f"asking all frequencies at once for {seconds:.0f} s", 0.3)
     log = rig.put_out(_from_rest(rig, level * asked.wave, PERIODS), folder, "multisine")
     runs = [{"label": "multisine", "file": log.name}, {"label": "probe", "file": probe.name, "role": "predict"}]
     path = write_study(rig, folder / "study.toml", f"Hanging: {rig.model.name}", runs)
     wish = LogRequest(kind="multisine", hold=rig.model.period, band=asked.band, signals={}, counts={}, known={})
     t = read(log).t
-    asking = {**runs[0], "file": f"../{log.name}", "window": [float(t[-PERIODS * asked.wave.size]), float(t[-1])]}
-    answered = write_study(rig, folder / "response" / "study.toml", f"Response: {rig.model.name}", [asking])
-    response = response_of_logs(
-        [answered], wish, answered.parent, tell=part(progress, 0.5, 0.6, "fitting the response")
-    )
+    alone = {**runs[0], "file": f"../{log.name}", "window": [float(t[-PERIODS * asked.wave.size]), float(t[-1])]}
+    answered = write_study(rig, folder / "response" / "study.toml", f"Response: {rig.model.name}", [alone])
+    tell = part(progress, 0.5, 0.6, "fitting the response")
+    try:
+        response = response_of_logs([answered], wish, answered.parent, tell=tell)
+    except NotIdentifiable:  # friction may leave too few frequencies; the motion says more
+        response = None
     study = load_study(path)
     fit = identify(study.rig, study.runs, progress=part(progress, 0.6, 1.0, "fitting the motion"))
     write_fit(fit, study, folder / "fit.json")
@@ -151,11 +155,15 @@ def run_hanging(rig: RigAtHand, folder: Path, progress: Progress) -> Hanging:
 
 
 def _from_rest(rig: RigAtHand, wave: Array, periods: int) -> list[float]:
-    """Samples that begin at rest: what a drive with a lag does first depends on what it was told before."""
-    return [0.0] * math.ceil(STILL / rig.model.period) + np.tile(wave, periods).tolist()
+    """Samples that begin at rest, since a drive with a lag looks back, and grow over a period before those asked for.
+
+    What begins at once gives a free axis a push, on which it drifts out of its travel.
+    """
+    growing = wave * (1 - np.cos(np.linspace(0.0, math.pi, wave.size))) / 2
+    return np.concatenate([np.zeros(math.ceil(STILL / rig.model.period)), growing, np.tile(wave, periods)]).tolist()
 
 
-def _level(rig: RigAtHand, asked: Question, most: float) -> float:
+def _level(rig: RigAtHand, asked: Asking, most: float) -> float:
     """Largest command that by the guesses moves no coordinate further than wanted."""
     spectrum = np.fft.rfft(asked.wave)
     omega = 2 * math.pi * np.arange(spectrum.size) / (asked.wave.size * rig.model.period)
@@ -166,7 +174,7 @@ def _level(rig: RigAtHand, asked: Question, most: float) -> float:
     return float(min(most, np.min(asked.reach / np.maximum(peaks, 1e-12))))
 
 
-def _share(log: Path, names: list[str], asked: Question) -> float:
+def _share(log: Path, names: list[str], asked: Asking) -> float:
     """Largest amplitude over the last period of a probe, beside the one that is wanted."""
     record = read(log)
     seen = np.column_stack([record[n] for n in names])[-asked.wave.size :]

@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from upright.control.trial import ServoRig
 from upright.errors import BadInput, RigStopped
 from upright.experiments.running.rig import described
 from upright.experiments.running.run import RigRun, RunRequest, run_rig
-from upright.files import write_json
+from upright.files import read_text, write_json
 from upright.laws import Law, as_values
 from upright.realtime.session import RunState
 from upright.rigs.protocol import Fault
 from upright.rigs.rigfile import RigFile, read_rig_file
+
+Watch = Callable[[RunState], str]
+
+
+def nobody_watches() -> AbstractContextManager[Watch]:
+    """No view."""
+    return nullcontext(lambda _: "")
 
 
 def nobody(_sentence: str) -> bool:
@@ -33,21 +41,34 @@ class RigAtHand:
         As its owner describes it, and what a twin truly is; the same of hardware.
     ask : callable
         Asks a person for something, in a sentence; answers whether it was done.
-    watch : callable
-        Shown how a run goes; answers with a sentence when it wants the run to end.
+    watching : callable
+        Opens a view for a run: a callable that is shown how it goes, and answers with a sentence to end it.
     """
 
     file: RigFile
     model: ServoRig
     truth: ServoRig
     ask: Callable[[str], bool] = nobody
-    watch: Callable[[RunState], str] = field(default=lambda _: "")
+    watching: Callable[[], AbstractContextManager[Watch]] = nobody_watches
 
     @property
     def resting(self) -> str:
         """Equilibrium at which the encoders are zeroed."""
         kinds = self.model.plant.equilibria
         return self.file.zero if self.file.zero in kinds else next(iter(kinds))
+
+    @property
+    def text(self) -> str:
+        """What is said of it: RIG.toml, and what describes the rig."""
+        known = self.file.known
+        return read_text(self.file.path) + ("" if known is None else read_text(known))
+
+    @property
+    def source(self) -> str:
+        """Where its data come from, as a sentence."""
+        if self.file.hardware:
+            return f"Measured on {self.model.name}: {self.file.kind} {self.file.port}".rstrip() + "."
+        return "A digital twin behind the protocol of rigs, run as hardware is; none was touched."
 
     def requested(self, sentence: str) -> None:
         """Ask a person for something.
@@ -106,7 +127,8 @@ class RigAtHand:
         return self._run(wish, folder)
 
     def _run(self, wish: RunRequest, folder: Path) -> RigRun:
-        done = run_rig(wish, folder, watch=self.watch)
+        with self.watching() as watch:
+            done = run_rig(wish, folder, watch=watch)
         if done.end.faults & Fault.STOP:
             raise KeyboardInterrupt
         return done
@@ -114,11 +136,12 @@ class RigAtHand:
     def described_by(self, fit: Path, path: Path) -> RigAtHand:
         """The same rig described by a fit; its RIG.toml is written to `path`."""
         self.file.with_fit(fit, path)
-        return rig_at_hand(path, self.ask, self.watch)
+        return rig_at_hand(path, self.ask, self.watching)
 
 
 def rig_at_hand(
-    path: Path, ask: Callable[[str], bool] = nobody, watch: Callable[[RunState], str] = lambda _: ""
+    path: Path, ask: Callable[[str], bool] = nobody,
+    watching: Callable[[], AbstractContextManager[Watch]] = nobody_watches,
 ) -> RigAtHand:  # fmt: skip
     """The rig of a RIG.toml.
 
@@ -133,4 +156,10 @@ def rig_at_hand(
             f'{path}: a replay answers nothing that is asked of it; experiments need a rig or kind = "twin".'
         )
     model, truth = described(file)
-    return RigAtHand(file=file, model=model, truth=replace(truth, name=model.name), ask=ask, watch=watch)
+    units = {c.name: c.unit for c in model.plant.coordinates}
+    if file.hardware and file.limits(units, model.unit) is None:
+        raise BadInput(
+            f"{path}: hardware is not driven without limits; write [limits] with command, and "
+            f"[limits.{next(iter(units))}] with travel, speed and start."
+        )
+    return RigAtHand(file=file, model=model, truth=replace(truth, name=model.name), ask=ask, watching=watching)

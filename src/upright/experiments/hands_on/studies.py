@@ -42,7 +42,7 @@ def write_study(
     drive : bool
         Whether something drove; what stands between command and force is otherwise left as it is guessed.
     """
-    said = _said(rig)
+    said = _said(rig, path.parent)
     parameters = said.get("parameters", {}) | dict(known or {})
     written = table("[parameters]")
     for name, value in parameters.items():
@@ -63,7 +63,7 @@ def write_study(
     return path
 
 
-def _said(rig: RigAtHand) -> Tables:
+def _said(rig: RigAtHand, folder: Path) -> Tables:
     """Tables of the owner's study, a plant of his own still found from where the new one lies."""
     source = rig.file.known
     if source is None:
@@ -74,7 +74,7 @@ def _said(rig: RigAtHand) -> Tables:
     plant = str(tables["rig"].get("plant", ""))
     if ".py:" in plant:
         file, _, name = plant.rpartition(":")
-        tables["rig"]["plant"] = f"{os.path.abspath(source.parent / file)}:{name}"
+        tables["rig"]["plant"] = f"{Path(os.path.relpath(source.parent / file, folder)).as_posix()}:{name}"
     return {k: tables[k] for k in ("rig", "parameters", "actuator") if k in tables}
 
 

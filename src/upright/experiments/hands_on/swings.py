@@ -74,8 +74,8 @@ def _window(rig: RigAtHand, log: Path) -> tuple[float, float]:
     theta = record[swing]
     if abs(theta).max() < CLEAR:
         raise NotIdentifiable(
-            f"{swing} went no further than {math.degrees(abs(theta).max()):.2g} degrees in {log.name}: it was not lifted "
-            "in time; run the experiment again."
+            f"{swing} went no further than {math.degrees(abs(theta).max()):.2g} degrees in {log.name}: it was not "
+            "lifted in time; run the experiment again."
         )
     swings = max(abs(p.imag) for p in rig.model.linear(rig.resting).poles())
     begin = release_of(record.t, theta, swings, record[pivot])

@@ -14,6 +14,7 @@ import numpy as np
 
 from upright.control import Trial, score
 from upright.control.preflight import Preflight
+from upright.errors import RigStopped
 from upright.experiments.hands_on.rig import RigAtHand
 from upright.experiments.identified import IdentifiedRig, read_identified
 from upright.experiments.makes import MAKES
@@ -52,10 +53,16 @@ class _Trier:
         return came(done)
 
 
-def came(done: RigRun) -> Came | None:
-    """A run on a rig as a trial with its figures; None where no loop began."""
+def came(done: RigRun) -> Came:
+    """A run on a rig as a trial with its figures.
+
+    Raises
+    ------
+    RigStopped
+        When no loop began.
+    """
     if done.log is None or len(done.log) < 3:
-        return None
+        raise RigStopped(done.end.stopped)
     t, away = done.t, done.away
     x = np.empty((t.size, 2 * away.shape[1]))
     point = np.array(list(done.model.plant.equilibrium("inverted").values()))
@@ -78,7 +85,7 @@ def sets(rig: RigAtHand, known: IdentifiedRig) -> Mapping[str, Roots]:
     if rig.file.known is None or known.made_by(rig.file.vendor or known.description.vendor) is not None:
         return printed
     falls = [float(p.linear("inverted").poles().real.max()) for p in (known.plant, MAKES["furuta"].plant)]
-    return {f"{name}, {falls[0] / falls[1]:.2g} times as fast": falls[0] / falls[1] * p for name, p in printed.items()}
+    return {f"{name} x{falls[0] / falls[1]:.2g}": falls[0] / falls[1] * p for name, p in printed.items()}
 
 
 def run_upright(

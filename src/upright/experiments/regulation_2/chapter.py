@@ -32,8 +32,9 @@ def chapter(done: Regulation) -> Chapter:
         steps=tuple(_steps(done)),
         findings=tuple(
             KeyNumber(
-                what=f"chance that {a.name} holds", value=f"{100 * a.before.chance:.0f} %",
-                truth="" if a.score is None else a.word,
+                what=f"chance that {a.name} holds",
+                value=f"{100 * a.before.chance:.0f} %" + (f"; it {a.word}" if a.word and done.truth is None else ""),
+                truth="" if done.truth is None else a.word,
             )
             for a in done.attempts
         ),

@@ -1,0 +1,84 @@
+"""Which experiments can be made on a rig at hand, and what they ask of the person beside it?"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from upright.errors import BadInput
+from upright.experiments.hands_on.rig import RigAtHand
+from upright.experiments.hands_on.studies import can_identify
+from upright.experiments.laboratory import Experiment, ExperimentInput
+from upright.physics import Plant
+from upright.report.page import Chapter
+
+
+def experiments_for(rig: RigAtHand, name: str) -> tuple[Experiment, ...]:
+    """The experiments that a rig can have, which is asked for by this name.
+
+    Raises
+    ------
+    BadInput
+        When there is none.
+    """
+    plant, makes = rig.model.plant, (name,)
+    pendulum = _pendulum(plant)
+    hanging = Experiment(key="1b", part_of="1", title="Frequency response", makes=makes, needs=(), seconds=40.0,
+                         tell=_hanging)  # fmt: skip
+    upright = Experiment(key="2", part_of="2", title="Holding it upright", makes=makes, needs=("1b",), seconds=30.0,
+                         tell=_upright)  # fmt: skip
+    swings = Experiment(key="4", part_of="4", title="Large free swing", makes=makes, needs=("1b",), seconds=15.0,
+                        tell=_swings)  # fmt: skip
+    out = [hanging] if can_identify(rig) else []
+    out += [upright] if pendulum else []
+    out += [swings] if pendulum and can_identify(rig) else []
+    if not out:
+        raise BadInput(
+            f"{rig.file.path} names a fit of a rig without a pendulum; identification begins with a study: name that."
+        )
+    return tuple(out)
+
+
+def _pendulum(plant: Plant) -> bool:
+    return "inverted" in plant.equilibria and len(plant.coordinates) == 2
+
+
+def _at(given: ExperimentInput) -> RigAtHand:
+    assert given.hands is not None  # as the table says
+    return given.hands
+
+
+def _hanging(at: ExperimentInput) -> tuple[Chapter, bool]:
+    from upright.experiments.hands_on.chapters import hanging_chapter
+    from upright.experiments.hands_on.hanging import run_hanging
+
+    done = run_hanging(_at(at), at.folder, at.progress)
+    return hanging_chapter(done, at.folder), not done.fit.interrupted
+
+
+def _upright(at: ExperimentInput) -> tuple[Chapter, bool]:
+    from upright.experiments.hands_on.upright import run_upright
+    from upright.experiments.regulation_2.chapter import chapter
+
+    rig = _at(at)
+    fit = at.fit if can_identify(rig) or rig.file.known is None else rig.file.known
+    done = run_upright(rig, fit, at.seed, at.folder, at.progress, at.stopped)
+    return chapter(done), not done.interrupted
+
+
+def _swings(at: ExperimentInput) -> tuple[Chapter, bool]:
+    from upright.experiments.hands_on.chapters import fit_chapter
+    from upright.experiments.hands_on.swings import carrier_of, run_swings
+
+    rig = _at(at)
+    study, fit = run_swings(rig, at.folder, at.progress, _weighed(at, carrier_of(rig)))
+    return fit_chapter(study, fit, at.folder), not fit.interrupted
+
+
+def _weighed(at: ExperimentInput, body: str) -> dict[str, dict[str, Any]]:
+    """What experiment 1b says of the body that carries the pendulum."""
+    chapter = at.earlier.get("1b")
+    told = chapter.numbers.get("parameters", {}).get(body) if chapter else None
+    if not told or not told.get("stderr"):
+        return {}
+    unit = told["unit"]
+    return {body: {"value": f"{told['value']:.10g} {unit}", "uncertainty": f"{told['stderr']:.4g} {unit}"}}

@@ -1,0 +1,177 @@
+"""Experiments on a rig at hand: what is asked of it is within its travel, and what it answered is told as it was."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+
+import numpy as np
+import pytest
+from scipy.signal import lsim
+
+import upright as up
+from upright.errors import BadInput
+from upright.experiments.at_hand import experiments_for
+from upright.experiments.hands_on.hanging import SHARE, _level, asking
+from upright.experiments.hands_on.rig import rig_at_hand
+from upright.experiments.hands_on.studies import write_study
+from upright.experiments.hands_on.upright import came
+from upright.experiments.makes import make_rig
+from upright.experiments.running.run import RunRequest, run_rig
+from upright.gains import feedback, filtered, hold, place
+from upright.laws import as_values
+from upright.study.load import load_study
+
+OWN = """
+[rig]
+plant = "furuta"
+name = "qube 7"
+servo_period = "2 ms"
+travel = "2 rad"
+[parameters]
+m_p = { value = "24 g", measured = true }
+l_cg = { value = "64.5 mm", uncertainty = "0.5 mm" }
+r = { value = "85 mm", measured = true }
+J_d = { guess = "8e-5 kg m^2", min = 0 }
+J_p = { guess = "3.3e-5 kg m^2", min = 0 }
+J_a = "0 kg m^2"
+b_1 = { guess = "1.5e-4 N m s/rad", min = 0 }
+b_2 = { guess = "1e-5 N m s/rad", min = 0 }
+[actuator]
+gain = { guess = "0.005 N m/V", min = 0 }
+limit = { value = "10 V", measured = true }
+delay = "2 ms"
+[sensors.psi]
+column = "psi"
+counts_per_rev = { value = 2048, measured = true }
+[sensors.theta]
+column = "theta"
+counts_per_rev = { value = 2048, measured = true }
+"""
+
+
+@pytest.fixture
+def own(tmp_path):
+    """A twin of a rig that only its owner's study tells of."""
+    (tmp_path / "study.toml").write_text(OWN, encoding="utf-8")
+    (tmp_path / "RIG.toml").write_text('kind = "twin"\nstudy = "study.toml"\n', encoding="utf-8")
+    return rig_at_hand(tmp_path / "RIG.toml")
+
+
+def made(folder, text='kind = "twin"\nmake = "furuta"\nseed = 3\n'):
+    (folder / "RIG.toml").write_text(text, encoding="utf-8")
+    return rig_at_hand(folder / "RIG.toml")
+
+
+def test_the_band_holds_the_swing_of_a_rig_that_nobody_makes(own):
+    asked = asking(own)
+    p = own.model.plant
+    # arm free: the pendulum swings faster than on a fixed hinge, by the inertia that it takes along
+    J, arm = p.J_p + p.m_p * p.l_cg**2, p.J_d + p.m_p * p.r**2
+    swing = math.sqrt(p.m_p * p.g * p.l_cg / (J - (p.m_p * p.l_cg * p.r) ** 2 / arm))
+    assert asked.band[0] < swing < asked.band[1]
+    assert asked.band[0] == pytest.approx(0.4 * swing, rel=0.01)
+    assert asked.reach[0] <= 0.25 * 2.0
+
+
+def test_no_coordinate_is_to_go_further_than_asked(own):
+    """By scipy's simulation of the model, after its transient."""
+    asked = asking(own)
+    level = _level(own, asked, SHARE * own.model.limit)
+    u = level * np.tile(asked.wave, 6)
+    model = own.model.linear("hanging")
+    # the arm drifts freely, which is no answer to the wave: only what repeats is looked at
+    t = np.arange(u.size) * own.model.period
+    _, y, _ = lsim((model.A, model.B, model.C, np.zeros((2, 1))), u, t)
+    last = y[-asked.wave.size :]
+    swings = np.ptp(last - np.linspace(last[0], last[-1], len(last)), axis=0) / 2
+    assert np.max(swings / asked.reach) == pytest.approx(1.0, abs=0.05)
+
+
+def test_the_study_of_its_logs_says_what_its_owner_says(own, tmp_path):
+    text = write_study(own, tmp_path / "1b" / "study.toml", "Hanging", []).read_text("utf-8")
+    rows = "".join(f"{0.002 * k},0,0,{0.02 * k}\n" for k in range(11))
+    (tmp_path / "log.csv").write_text(f"t,u_applied,psi,theta\n{rows}", "utf-8")
+    study = load_study(tmp_path / "x.toml", text=text + '\n[[runs]]\nfile = "log.csv"\n')
+    asked = study.rig.parameters
+    assert {n for n, p in asked.items() if p.estimate} == {"J_d", "J_p", "b_1", "b_2", "actuator.gain"}
+    assert asked["l_cg"].value == pytest.approx(0.0645)
+    assert asked["l_cg"].uncertainty == pytest.approx(5e-4)
+    assert study.description.entries["counts.theta"].value == pytest.approx(2048)
+    assert study.description.entries["travel"].value == 2.0
+    assert study.runs[0].y[-1, 1] == pytest.approx(0.2)
+
+
+def test_a_rig_described_by_a_fit_is_that_rig_still(tmp_path):
+    rig = made(tmp_path)
+    known = rig_at_hand(rig.file.path)
+    (tmp_path / "1b").mkdir()
+    write_study(known, tmp_path / "1b" / "fit.toml", "any", [])
+    text = 'kind = "twin"\nmake = "furuta"\nseed = 3\n[limits]\ncommand = "4 V"\n[limits.psi]\ntravel = "1 rad"\n'
+    copied = made(tmp_path, text).file.with_fit(tmp_path / "1b" / "fit.json", tmp_path / "2" / "rig.toml")
+    told = copied.read_text("utf-8")
+    assert 'fit = "../1b/fit.json"' in told
+    assert "seed = 3" in told
+    assert 'travel = "1 rad"' in told
+
+
+def test_a_fit_alone_is_not_identified_again(own, tmp_path):
+    (tmp_path / "fit.json").write_text("{}", encoding="utf-8")
+    assert [e.key for e in experiments_for(own, "RIG.toml")] == ["1b", "2", "4"]
+
+
+def test_a_run_that_the_supervisor_ends_was_lost_there(tmp_path):
+    """The law's arm leaves a travel of 3 degrees long before its pendulum falls."""
+    model = make_rig("furuta")
+    linear = model.linear("inverted")
+    sampled = hold(linear, model.period, model.delay / model.period)
+    law = feedback(filtered(sampled, 0.5), place(linear.A, linear.B, [-4 + 2j, -4 - 2j, -17, -3]).K)
+    up_law = tmp_path / "law.json"
+    up_law.write_text(json.dumps(as_values(law)), encoding="utf-8")
+    made(tmp_path, 'kind = "twin"\nmake = "furuta"\n[limits]\ncommand = "5 V"\n[limits.psi]\ntravel = "3 deg"\n')
+    wish = RunRequest(rig=tmp_path / "RIG.toml", law=up_law, seconds=2.0, tilt=0.08, check=False)
+    found = came(run_rig(wish, tmp_path))
+    assert not found.score.held
+    assert found.score.ran_out == pytest.approx(found.trial.t[-1])
+    assert math.isinf(found.score.settled)
+    assert "travel" in found.ended
+
+
+def test_what_is_no_rig_at_hand_is_refused(tmp_path):
+    with pytest.raises(BadInput, match="no file"):
+        up.lab(rig=str(tmp_path / "NONE.toml"), out=tmp_path / "out")
+    made(tmp_path)
+    with pytest.raises(BadInput, match="as it is, and there is one"):
+        up.lab(rig=str(tmp_path / "RIG.toml"), worn=True, out=tmp_path / "out")
+    (tmp_path / "run.csv").write_text("t,u,psi,theta\n0,0,0,0\n0.001,0,0,0\n", encoding="utf-8")
+    with pytest.raises(BadInput, match="a replay answers nothing"):
+        made(tmp_path, 'kind = "replay"\nmake = "furuta"\nrecord = "run.csv"\n')
+
+
+def test_a_port_alone_is_not_driven_but_given_a_file_to_fill_in(tmp_path):
+    with pytest.raises(BadInput, match="fill in"):
+        up.lab(rig="serial:/dev/ttyACM7", out=tmp_path / "out")
+    path = tmp_path / "out" / "RIG.toml"
+    assert 'port = "/dev/ttyACM7"' in path.read_text("utf-8")
+    with pytest.raises(BadInput, match=r"study\.toml does not exist"):
+        up.lab(rig=str(path), out=tmp_path / "out")
+    (tmp_path / "out" / "study.toml").write_text(OWN, encoding="utf-8")
+    with pytest.raises(BadInput, match=r"\[limits\] needs the largest command"):
+        up.lab(rig=str(path), ask=lambda _: True, out=tmp_path / "out")
+    path.write_text(re.sub("(?m)^# ", "", path.read_text("utf-8")), encoding="utf-8")
+    with pytest.raises(BadInput, match="need a person"):
+        up.lab(rig=str(path), out=tmp_path / "out")
+
+
+@pytest.mark.slow
+def test_a_twin_with_dry_friction_is_identified_through_the_protocol(tmp_path):
+    done = up.lab(rig=str(made(tmp_path).file.path), experiment="1b", out=tmp_path / "out")
+    told = done.numbers["experiments"]["1b"]
+    assert told["state"] == "done"
+    truth = make_rig("furuta", 3)
+    for name, true in {**truth.plant.parameters(), "actuator.gain": truth.gain, "actuator.lag": truth.lag}.items():
+        e = told["numbers"]["parameters"].get(name)
+        if e is not None and e["status"] == "firm":
+            assert e["interval"][0] <= true <= e["interval"][1], name
+    assert told["numbers"]["trusted"]
