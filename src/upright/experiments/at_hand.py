@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from upright.errors import BadInput
 from upright.experiments.hands_on.rig import RigAtHand
 from upright.experiments.hands_on.studies import can_identify
 from upright.experiments.laboratory import Experiment, ExperimentInput
+from upright.experiments.makes import MAKES, SHAFTS
 from upright.physics import Plant
 from upright.report.page import Chapter
 
@@ -26,20 +28,34 @@ def experiments_for(rig: RigAtHand, name: str) -> tuple[Experiment, ...]:
                          tell=_hanging)  # fmt: skip
     upright = Experiment(key="2", part_of="2", title="Holding it upright", makes=makes, needs=("1b",), seconds=30.0,
                          tell=_upright)  # fmt: skip
+    shaft = Experiment(key="3", part_of="3", title="Tracking through a flexible shaft", makes=makes, needs=("1b",),
+                       seconds=30.0, tell=_tracking)  # fmt: skip
     swings = Experiment(key="4", part_of="4", title="Large free swing", makes=makes, needs=("1b",), seconds=15.0,
                         tell=_swings)  # fmt: skip
     out = [hanging] if can_identify(rig) else []
     out += [upright] if pendulum else []
+    out += [shaft] if _shaft(plant) else []
     out += [swings] if pendulum and can_identify(rig) else []
     if not out:
         raise BadInput(
-            f"{rig.file.path} names a fit of a rig without a pendulum; identification begins with a study: name that."
+            f"{rig.file.path} names a fit of a rig with neither pendulum nor shaft; identification begins with a "
+            "study: name that."
         )
     return tuple(out)
 
 
 def _pendulum(plant: Plant) -> bool:
     return "inverted" in plant.equilibria and len(plant.coordinates) == 2
+
+
+def _shaft(plant: Plant) -> bool:
+    return any(isinstance(plant, type(MAKES[key].plant)) for key in SHAFTS)
+
+
+def _fit(at: ExperimentInput) -> Path:
+    """That of experiment 1b, or the one that describes the rig."""
+    known = _at(at).file.known
+    return at.fit if known is None or can_identify(_at(at)) else known
 
 
 def _at(given: ExperimentInput) -> RigAtHand:
@@ -59,9 +75,15 @@ def _upright(at: ExperimentInput) -> tuple[Chapter, bool]:
     from upright.experiments.hands_on.upright import run_upright
     from upright.experiments.regulation_2.chapter import chapter
 
-    rig = _at(at)
-    fit = at.fit if can_identify(rig) or rig.file.known is None else rig.file.known
-    done = run_upright(rig, fit, at.seed, at.folder, at.progress, at.stopped)
+    done = run_upright(_at(at), _fit(at), at.seed, at.folder, at.progress, at.stopped)
+    return chapter(done), not done.interrupted
+
+
+def _tracking(at: ExperimentInput) -> tuple[Chapter, bool]:
+    from upright.experiments.hands_on.shaft import run_shaft
+    from upright.experiments.tracking_3.chapter import chapter
+
+    done = run_shaft(_at(at), _fit(at), at.folder, at.progress, at.stopped)
     return chapter(done), not done.interrupted
 
 

@@ -422,8 +422,8 @@ class Supervisor:
             for p, q, turn in zip(point, readings, turns, strict=True)
         ]
         i = [c.name for c in model.plant.coordinates].index(model.plant.inputs[0].on)
-        out[i] = readings[i] if not any(_stiffness(model, self.duty.at, i)) else out[i]
-        return tuple(out)
+        along = _free_with(model, self.duty.at, i)
+        return tuple(p + d * (readings[i] - point[i]) for p, d in zip(out, along, strict=True))
 
     def _falls(self, law: Law | Rule) -> str:
         """Why the model falls under this law; empty when it stands, or nobody knows."""
@@ -445,10 +445,17 @@ class Supervisor:
         return f"{math.degrees(abs(value)):.3g} degrees" if unit == "rad" else f"{1e3 * abs(value):.3g} mm"
 
 
-def _stiffness(model: ServoRig, at: str, i: int) -> list[float]:
-    """Accelerations of all coordinates per displacement of one, which is free to stand anywhere when they are zero."""
-    A = model.linear(at or next(iter(model.plant.equilibria))).A
-    return [float(a) for a in A[1::2, 2 * i]]
+def _free_with(model: ServoRig, at: str, i: int) -> list[float]:
+    """How all coordinates go along when one is displaced and nothing pulls back, as on a shaft without a spring to
+    ground; zeros where something does.
+    """
+    stiffness = model.linear(at or next(iter(model.plant.equilibria))).A[1::2, 0::2]
+    others = np.delete(stiffness, i, axis=1)
+    along, *_ = np.linalg.lstsq(others, -stiffness[:, i], rcond=None)
+    left = stiffness[:, i] + others @ along
+    if np.abs(left).max() > 1e-9 * np.abs(stiffness).max():
+        return [0.0] * len(stiffness)
+    return np.insert(along, i, 1.0).tolist()
 
 
 def _free(about: Capabilities) -> Limits:

@@ -14,7 +14,7 @@ from upright.experiments.makes import MAKES, SHAFTS, make_rig
 from upright.experiments.tracking_3 import laws as pd
 from upright.experiments.tracking_3.laws import AT, EXTRA, closed_by, paper_sets, tracker, with_sum
 from upright.experiments.tracking_3.pulses import fitted, identify_shaft, pulses
-from upright.experiments.tracking_3.run import RESERVE, choose, outcome, run_tracking
+from upright.experiments.tracking_3.run import RESERVE, attempt, choose, run_tracking
 from upright.experiments.weighing_1a.run import Known
 from upright.gains import hold, place, prefilter
 from upright.gains.loop import swing
@@ -165,11 +165,11 @@ def test_the_step_keeps_to_the_shaft_of_the_rig_at_hand(twist):
     chosen = choose(rig, laws)
     other = choose(replace(rig, twist=2 * twist), laws)
     assert other.by_twist == pytest.approx(2 * chosen.by_twist, rel=1e-9)  # from the same run
-    done = outcome(rig, rig, laws[1], chosen.size)
-    assert done.measured.twist < twist
-    assert math.isinf(done.measured.tripped)
-    tight = replace(rig, twist=0.5 * done.measured.twist)
-    assert outcome(tight, rig, laws[1], chosen.size).measured.tripped < 1.0
+    done = attempt(rig, laws[1], chosen.size)
+    assert done.twist < twist
+    assert math.isinf(done.tripped)
+    tight = replace(rig, twist=0.5 * done.twist)
+    assert attempt(tight, laws[1], chosen.size).tripped < 1.0
 
 
 def test_pulses_stay_within_travel_and_twist():

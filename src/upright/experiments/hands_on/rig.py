@@ -7,13 +7,16 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from upright.control.trial import ServoRig
+import numpy as np
+
+from upright.control.trial import ServoRig, Trial
 from upright.errors import BadInput, RigStopped
 from upright.experiments.running.rig import described
 from upright.experiments.running.run import RigRun, RunRequest, run_rig
 from upright.files import read_text, write_json
 from upright.laws import Law, as_values
 from upright.realtime.session import RunState
+from upright.records import Array
 from upright.rigs.protocol import Fault
 from upright.rigs.rigfile import RigFile, read_rig_file
 
@@ -110,7 +113,7 @@ class RigAtHand:
         return done.log_path
 
     def hold(
-        self, law: Law, folder: Path, stem: str, seconds: float, *, tilt: float = 0.0, reference: Sequence[float] = ()
+        self, law: Law, folder: Path, stem: str, seconds: float, *, tilt: float = 0.0
     ) -> RigRun:  # fmt: skip
         """A run of a law, with the pulse before it and the filters beside it; a twin's hand lets go at the `tilt`.
 
@@ -122,7 +125,7 @@ class RigAtHand:
         folder.mkdir(parents=True, exist_ok=True)
         path = write_json(folder / f"law_{stem}.json", as_values(law))
         wish = RunRequest(
-            rig=self.file.path, law=path, seconds=seconds, stem=stem, samples=tuple(reference), tilt=tilt,
+            rig=self.file.path, law=path, seconds=seconds, stem=stem, tilt=tilt,
         )  # fmt: skip
         return self._run(wish, folder)
 
@@ -137,6 +140,20 @@ class RigAtHand:
         """The same rig described by a fit; its RIG.toml is written to `path`."""
         self.file.with_fit(fit, path)
         return rig_at_hand(path, self.ask, self.watching)
+
+
+def trial_of(done: RigRun, at: str) -> Trial:
+    """A logged run as a trial: states are the readings and their differences, counted from what was held."""
+    assert done.log is not None
+    t, away = done.t, done.away
+    x = np.empty((t.size, 2 * away.shape[1]))
+    point = np.array(list(done.model.plant.equilibrium(at).values()))
+    x[:, 0::2], x[:, 1::2] = away + point, np.gradient(away, t, axis=0)
+    u: Array = done.log.columns["u_applied"]
+    signals = {c.name: x[:, 2 * i] for i, c in enumerate(done.model.plant.coordinates)}
+    record = done.log.record()
+    shown = record.replace(signals={n: signals.get(n, v) for n, v in record.signals.items()})
+    return Trial(rig=done.model, at=at, t=t, x=x, u=u, rest=point, record=shown)
 
 
 def rig_at_hand(

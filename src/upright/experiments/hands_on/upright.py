@@ -10,12 +10,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
-from upright.control import Trial, score
+from upright.control import score
 from upright.control.preflight import Preflight
 from upright.errors import RigStopped
-from upright.experiments.hands_on.rig import RigAtHand
+from upright.experiments.hands_on.rig import RigAtHand, trial_of
 from upright.experiments.identified import IdentifiedRig, read_identified
 from upright.experiments.makes import MAKES
 from upright.experiments.regulation_2.run import SETS, Came, Regulation, RegulationRequest, run_regulation
@@ -23,7 +21,6 @@ from upright.experiments.running.run import RigRun
 from upright.gains.requests import Roots, read_poles
 from upright.laws import Law
 from upright.progress import Progress
-from upright.records import Array
 from upright.report.symbols import typed
 from upright.rigs.protocol import Fault
 
@@ -63,17 +60,10 @@ def came(done: RigRun) -> Came:
     """
     if done.log is None or len(done.log) < 3:
         raise RigStopped(done.end.stopped)
-    t, away = done.t, done.away
-    x = np.empty((t.size, 2 * away.shape[1]))
-    point = np.array(list(done.model.plant.equilibrium("inverted").values()))
-    x[:, 0::2], x[:, 1::2] = away + point, np.gradient(away, t, axis=0)
-    u: Array = done.log.columns["u_applied"]
-    went = Trial(
-        rig=done.model, at="inverted", t=t, x=x, u=u, rest=np.array(done.end.target), record=done.log.record()
-    )  # fmt: skip
+    went = trial_of(done, "inverted")
     found = score(went)
     if done.end.stopped:  # by the supervisor, before it could hit anything
-        end = float(t[-1])
+        end = float(went.t[-1])
         lost = {"ran_out": end} if done.end.faults & Fault.OVERTRAVEL else {"fell": end}
         found = replace(found, settled=math.inf, **lost)
     return Came(trial=went, score=found, ended=done.end.stopped)

@@ -32,7 +32,7 @@ class RunRequest:
     """What is asked of a run.
 
     `law` is a file, None for a signal that is put out blindly, `excite`; `reference` is a signal that the law follows.
-    `samples` are either of them sample by sample instead of in words; logs are called after the `stem`.
+    `samples` are what is put out, sample by sample instead of in words; logs are called after the `stem`.
     `own_process` puts a twin or a replay into a process of its own as well, where a rig always is.
     """
 
@@ -50,7 +50,7 @@ class RunRequest:
     own_process: bool = False
 
     def __post_init__(self) -> None:
-        if (self.law is None) == (not self.excite and not (self.law is None and self.samples)):
+        if (self.law is None) == (not self.excite and not self.samples):
             raise BadInput('a run needs a law (--law design.json) or a signal (--excite "sine 0.5 2"), one of them.')
         if not 0 < self.seconds <= 86_400:
             raise BadInput(f"a run takes more than 0 and at most 86400 s, got {self.seconds:g} s.")
@@ -58,11 +58,6 @@ class RunRequest:
             raise BadInput(f"--mode is host or mcu, got '{self.mode}'.")
         if self.reference and self.law is None:
             raise BadInput("a reference is for a law; a signal that is put out blindly is --excite.")
-
-    @property
-    def follows(self) -> bool:
-        """Whether a law is given a reference."""
-        return self.law is not None and bool(self.reference or self.samples)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -105,7 +100,7 @@ class RigRun:
     def unrest(self) -> tuple[float, ...]:
         """Root mean square of the deviations over the second half [rad or m]; from their mean with a reference."""
         half = self.away[len(self.away) // 2 :]
-        half = half - half.mean(axis=0) if self.wish.follows and half.size else half
+        half = half - half.mean(axis=0) if self.wish.reference and half.size else half
         return tuple(np.sqrt(np.mean(half**2, axis=0)).tolist()) if half.size else ()
 
     @property
@@ -133,7 +128,7 @@ class RigRun:
         last = self.model.plant.coordinates[-1]
         unrest = math.degrees(self.unrest[-1]) if last.unit == "rad" else 1e3 * self.unrest[-1]
         unit = "degrees" if last.unit == "rad" else "mm"
-        what = f"varied by {unrest:.2g} {unit}" if self.wish.follows else f"stayed within {unrest:.2g} {unit}"
+        what = f"varied by {unrest:.2g} {unit}" if self.wish.reference else f"stayed within {unrest:.2g} {unit}"
         return f"Held for {how}{late}; {last.name} {what} (rms, second half).{log}"
 
 
@@ -163,12 +158,11 @@ def run_rig(
     at = file.at if file.at in model.plant.equilibria else zero
     if wish.law is not None:
         law = read_law(wish.law, model, at, zero)
-        if wish.reference or wish.samples:
+        if wish.reference:
             if not isinstance(law, Law) or not law.reference_names or not np.any(law.D[:, law.readings :]):
                 raise BadInput(f"the law of {wish.law} follows no reference; design it with --track COORDINATE.")
             unit = model.plant.coordinates[0].unit
-            samples = wish.samples or signal(wish.reference, unit, model.period, wish.seconds)
-            law = replace(law, references=np.array(samples))
+            law = replace(law, references=np.array(signal(wish.reference, unit, model.period, wish.seconds)))
     else:
         samples = wish.samples or signal(wish.excite, model.unit, model.period, wish.seconds)
         law = open_loop(samples, len(model.counts), model.period)

@@ -37,8 +37,9 @@ def chapter(done: Tracking) -> Chapter:
     if done.pd is not None and done.stiff is not None and done.far is not None:
         parts.append(_why(done, done.pd, done.stiff, done.far, near, far))
     told = " It was interrupted; what was finished is told." if done.interrupted else ""
-    detail = "Seen on the twin: no rig was touched." if done.simulated else (
-        "Foreseen on the fitted numbers; no rig was touched.")  # fmt: skip
+    detail = "Foreseen on the fitted numbers; no rig was touched."
+    if done.found:
+        detail = "Seen on the twin: no rig was touched." if done.simulated else "Tried on the rig."
     return Chapter(
         key="3", title="Tracking through a flexible shaft",
         question=f"Can the drive at one end of a flexible shaft make the other end, {far}, follow a step, within its "
@@ -206,7 +207,7 @@ def _loop(done: Tracking, near: str, far: str) -> Part:
     best = _strongest(done)
     off = abs(best.measured.effort.peak / best.predicted.effort.peak - 1)
     told = f"Largest command, of the drive's limit: {shares}."
-    if done.simulated:
+    if done.found:
         told += (
             f" Foreseen for {best.law.name}: "
             f"{best.predicted.effort.peak:.3g} {done.rig.unit} ({share(best.predicted.effort.share)}); found "
@@ -352,7 +353,7 @@ def _numbers(done: Tracking) -> dict[str, Any]:
                 "K": o.law.K, "k_pf": o.law.k_pf, "poles_asked": o.law.asked,
                 "poles": o.law.poles, "decay": o.law.decay, "damping": o.law.damping,
                 "static_force_per_error": o.law.stiffness, "error_at_most": o.law.play, "foreseen": run(o.predicted),
-                "found": run(o.measured) if done.simulated else None, "within_limits": o.within,
+                "found": run(o.measured) if o.measured is not o.predicted else None, "within_limits": o.within,
             } for o in tables.outcomes(done)
         },
         "seconds": done.seconds,

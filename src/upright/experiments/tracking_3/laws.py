@@ -114,9 +114,10 @@ def check(which: Sequence[int], own: Roots | None) -> None:
         raise BadInput("nothing to follow with: name a set of Table 2 or poles.")
 
 
-def paper_sets(rig: ServoRig, which: Sequence[int] = (1, 2, 3, 4)) -> tuple[Tracker, ...]:
-    """State feedback by the sets of Table 2."""
-    return tuple(by_poles(rig, f"set {i}", poles(TABLE_2[i - 1])[0]) for i in which)
+def paper_sets(rig: ServoRig, which: Sequence[int] = (1, 2, 3, 4), faster: float = 1.0) -> tuple[Tracker, ...]:
+    """State feedback by the sets of Table 2, or by poles that are so many times as fast."""
+    times = "" if faster == 1.0 else f" x{faster:.2g}"
+    return tuple(by_poles(rig, f"set {i}{times}", faster * poles(TABLE_2[i - 1])[0]) for i in which)
 
 
 def far(model: Linear) -> Array:

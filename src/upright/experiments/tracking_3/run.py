@@ -36,6 +36,7 @@ from upright.experiments.tracking_3.pulses import fitted, identify_shaft
 from upright.experiments.weighing_1a.run import Known
 from upright.identification.model.fit import Fit
 from upright.progress import Progress, silent
+from upright.records import Array
 from upright.study.load import Study
 
 RESERVE = 0.95
@@ -148,6 +149,12 @@ class Tracking:
         """Whether a twin stood in for the rig, so that its truth is known."""
         return self.fit is not None
 
+    @property
+    def found(self) -> bool:
+        """Whether anything was tried, beside what the model foresees."""
+        laws = (*self.sets, self.summed, self.pd, self.stiff, self.far)
+        return any(o is not None and o.measured is not o.predicted for o in laws)
+
 
 def run_tracking(
     rig: str | ServoRig, seed: int, folder: Path, progress: Progress = silent,
@@ -206,37 +213,52 @@ def another_day(rig: ServoRig, seed: int) -> ServoRig:
     return rig.changed(**{n: v * math.exp(rng.normal(0, DAILY)) for n, v in dry.items()})
 
 
+Try = Callable[[Tracker, StepTrial, float], StepTrial | None]
+"""Tries a law, of which so much is expected, with a step of that size; None where it is not tried."""
+
+
 def follow(
     rig: ServoRig, model: ServoRig, folder: Path, study: Study | None, fit: Fit | None, progress: Progress,
     stopped: Callable[[], bool] = lambda: False, *, which: Sequence[int] = (1, 2, 3, 4),
-    poles: NDArray[np.complex128] | None = None, step: float | None = None,
+    poles: NDArray[np.complex128] | None = None, step: float | None = None, faster: float = 1.0,
+    tried: Try | None = None,
 ) -> Tracking:  # fmt: skip
-    """Design on the model, try on the rig; see `run_tracking`."""
+    """Design on the model, try on the rig; see `run_tracking`.
+
+    `faster` is what the poles of Table 2 are multiplied by; `tried` tries laws in the place of a simulated `rig`.
+    """
     check(which, poles)
-    laws = list(paper_sets(model, which))
+    laws = list(paper_sets(model, which, faster))
+
+    def outcome(law: Tracker) -> Outcome:
+        predicted = attempt(model, law, chosen.size)
+        if tried is not None:
+            measured = tried(law, predicted, chosen.size)
+        else:
+            measured = None if rig is model else attempt(rig, law, chosen.size)
+        return Outcome(law=law, predicted=predicted, measured=measured or predicted)
+
     if poles is not None:
         laws.append(by_poles(model, "own set", poles))
     chosen = choose(model, laws, step)
     progress("stepping", 0.35)
     done = Tracking(
         rig=rig, model=model, true=rig, folder=folder, study=study, fit=fit, step=chosen,
-        sets=tuple(outcome(rig, model, law, chosen.size) for law in laws),
+        sets=tuple(outcome(law) for law in laws),
     )  # fmt: skip
     if stopped():
         return replace(done, interrupted=True)
     strongest = laws[int(np.argmax([law.k_pf for law in laws]))]
-    done = replace(done, summed=outcome(rig, model, with_sum(model, strongest, "with a sum"), chosen.size))
+    done = replace(done, summed=outcome(with_sum(model, strongest, "with a sum")))
     progress("tuning a PD", 0.55)
     pd, search = tune(model, chosen.size, RESERVE * model.limit)
-    done = replace(done, pd=outcome(rig, model, pd, chosen.size), search=search)
+    done = replace(done, pd=outcome(pd), search=search)
     if stopped():
         return replace(done, interrupted=True)
     progress("comparing", 0.9)
     stiff = stiffest_damped(model, strongest.k_pf)
     far = far_pd(model, "PD, far encoder", pd.k_pf, float(pd.K[1]))
-    return replace(
-        done, stiff=outcome(rig, model, stiff, chosen.size), far=outcome(rig, model, far, chosen.size)
-    )  # fmt: skip
+    return replace(done, stiff=outcome(stiff), far=outcome(far))
 
 
 def stiffest_damped(model: ServoRig, kp: float) -> Tracker:
@@ -249,7 +271,7 @@ def choose(model: ServoRig, laws: Sequence[Tracker], step: float | None = None) 
     """The largest step of two digits that keeps every law within effort, twist and travel, by the linear model."""
     most = RESERVE * model.limit / max(abs(law.k_pf) for law in laws)
     free = replace(model, twist=math.inf, travel=math.inf)  # a trip would cut short what is to be scaled
-    unit = [outcome(free, free, law, 0.5 * most).measured for law in laws]
+    unit = [attempt(free, law, 0.5 * most) for law in laws]
     twist = 0.6 * model.twist * 0.5 * most / max(r.twist for r in unit)
     travel = 0.6 * model.travel * 0.5 * most / max(r.travel for r in unit)
     bounds = {"effort": most, "twist": twist, "travel": travel}
@@ -262,29 +284,43 @@ def choose(model: ServoRig, laws: Sequence[Tracker], step: float | None = None) 
     return Chosen(size=size, reason=reason, by_effort=most, by_twist=twist, by_travel=travel)
 
 
-def outcome(rig: ServoRig, model: ServoRig, law: Tracker, step: float) -> Outcome:
-    """A law on the model and on the rig."""
-    predicted = attempt(model, law, step)
-    return Outcome(law=law, predicted=predicted, measured=predicted if rig is model else attempt(rig, law, step))
+def asked_of(rig: ServoRig, step: float) -> tuple[Array, Array]:
+    """Reference and push, sample by sample: zero, the step, then a steady push while the reference stays."""
+    before, at, end = _ticks(rig)
+    reference, pushes = np.zeros(end + 1), np.zeros(end + 1)
+    reference[before:], pushes[at:] = step, PUSH * rig.limit
+    return reference, pushes
+
+
+def _ticks(rig: ServoRig) -> tuple[int, int, int]:
+    before, at, end = (round(s / rig.period) for s in (BEFORE, BEFORE + DWELL, BEFORE + DWELL + PUSHED))
+    return before, at, end
 
 
 def attempt(rig: ServoRig, law: Tracker, step: float) -> StepTrial:
-    """Zero, the step, then a steady push while the reference stays."""
-    before, at, end = (round(s / rig.period) for s in (BEFORE, BEFORE + DWELL, BEFORE + DWELL + PUSHED))
-    pushes = np.zeros(end + 1)
-    pushes[at:] = PUSH * rig.limit
-    done = trial(
-        rig, law.law, at=AT, start=np.zeros(2 * len(rig.plant.coordinates)), seconds=end * rig.period,
-        reference=np.append(np.zeros(before), step), pushes=pushes,
+    """A law on a simulated rig."""
+    reference, pushes = asked_of(rig, step)
+    start = np.zeros(2 * len(rig.plant.coordinates))
+    return figured(
+        trial(rig, law.law, at=AT, start=start, seconds=(reference.size - 1) * rig.period, reference=reference,
+              pushes=pushes), step,
     )  # fmt: skip
+
+
+def figured(done: Trial, step: float) -> StepTrial:
+    """Figures of a trial, which may have ended before its time."""
+    rig = done.rig
+    before, at, end = _ticks(rig)
     q = done.x[:, ::2]
     apart, away = np.abs(q[:, -1] - q[:, 0]), np.abs(q).max(axis=1)
     beyond = np.flatnonzero((apart > rig.twist) | (away > rig.travel))
-    tripped = float(done.t[beyond[0]]) if beyond.size else math.inf
-    last = min(at, int(beyond[0]) if beyond.size else at)
+    first = int(beyond[0]) if beyond.size else done.t.size - 1
+    ended = bool(beyond.size) or done.t.size <= end
+    tripped = float(done.t[first]) if ended else math.inf
+    last = min(at, first)
     y = done.record[done.record.outputs[-1]]
     figures = None
-    if not beyond.size:
+    if not ended:
         try:
             figures = step_figures(
                 done.t[before:at], y[before:at], before=0.0, reference=step, quantum=float(rig.quantum[-1])
@@ -294,5 +330,5 @@ def attempt(rig: ServoRig, law: Tracker, step: float) -> StepTrial:
     return StepTrial(
         trial=done, figures=figures, effort=effort(done.u[before : last + 1], rig.limit, rig.converter),
         twist=float(apart[: last + 1].max()), travel=float(away[: last + 1].max()),
-        give=math.inf if beyond.size else float(abs(np.mean(y[-50:]) - np.mean(y[at - 50 : at]))), tripped=tripped,
+        give=math.inf if ended else float(abs(np.mean(y[-50:]) - np.mean(y[at - 50 : at]))), tripped=tripped,
     )  # fmt: skip

@@ -73,7 +73,7 @@ def step_table(done: Tracking) -> Table:
     """Step figures, foreseen on the fitted model and found on the rig."""
     rows: list[tuple[str, ...]] = []
     for o in outcomes(done):
-        both = (("foreseen", o.predicted), ("found", o.measured)) if done.simulated else (("foreseen", o.predicted),)
+        both = (("foreseen", o.predicted), ("found", o.measured)) if done.found else (("foreseen", o.predicted),)
         rows += [(o.law.name if what == both[0][0] else "", what, *_figures(run)) for what, run in both]
     return Table(
         caption=f"A step of {length(done, done.step.size)} of the far body: rise 10 to 90 %, overshoot, time of the "
@@ -99,7 +99,7 @@ def _figures(run: StepTrial) -> tuple[str, ...]:
 def friction_table(done: Tracking) -> Table:
     """What dry friction leaves at rest, and how far a steady push moves the far body."""
     size = done.step.size
-    seen = ("foreseen", "found") if done.simulated else ("foreseen",)
+    seen = ("foreseen", "found") if done.found else ("foreseen",)
     rows: list[tuple[str, ...]] = []
     for o in outcomes(done):
         runs = (o.predicted, o.measured)[: len(seen)]
