@@ -106,7 +106,7 @@ def test_a_rig_behind_a_wire_is_identified_and_held(host, tmp_path):
     person = Person(board)
     done = up.lab(rig=str(tmp_path / "RIG.toml"), ask=person, out=tmp_path / "out")
     told = done.numbers["experiments"]
-    assert {key: e["state"] for key, e in told.items()} == {"1b": "done", "2": "done", "4": "done"}
+    assert {key: e["state"] for key, e in told.items()} == {"1b": "done", "2": "done", "2b": "done", "4": "done"}
     estimates = told["1b"]["numbers"]["parameters"]
     true = {**TRUTH.parameters(), "actuator.gain": GAIN}
     for name in ("J_d", "J_p", "b_1", "b_2", "actuator.gain"):
@@ -114,4 +114,5 @@ def test_a_rig_behind_a_wire_is_identified_and_held(host, tmp_path):
         assert low <= true[name] <= high, name
     sets = told["2"]["numbers"]["sets"].values()
     assert [s["after"]["word"] for s in sets] == ["regulates"] * 4
-    assert len(person.asked) == 4 + 4 + 2
+    assert told["2b"]["sound"]
+    assert len(person.asked) == 4 + 4 + 2 + 2

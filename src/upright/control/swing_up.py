@@ -415,6 +415,12 @@ def swing_up(
     run = trial(
         rig, rule, at="inverted", start=x0 - rig.plant.state("inverted"), seconds=seconds, pushes=pushes
     )  # fmt: skip
+    return ascent_of(run, law, rule)
+
+
+def ascent_of(run: Trial, law: SwingUp, rule: Rule) -> Ascent:
+    """What a run of a swing-up came to, by its readings and what the law made of them."""
+    rig = run.rig
     names = [c.name for c in rig.plant.coordinates]
     seen = np.column_stack([run.record[n] for n in names])
     memory = rule.follow(seen / rig.shown, rig.period)[1]

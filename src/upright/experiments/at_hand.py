@@ -28,12 +28,14 @@ def experiments_for(rig: RigAtHand, name: str) -> tuple[Experiment, ...]:
                          tell=_hanging)  # fmt: skip
     upright = Experiment(key="2", part_of="2", title="Holding it upright", makes=makes, needs=("1b",), seconds=30.0,
                          tell=_upright)  # fmt: skip
+    swing_up = Experiment(key="2b", part_of="2", title="Swinging up and catching", makes=makes, needs=("1b",),
+                          seconds=10.0, tell=_swing_up)  # fmt: skip
     shaft = Experiment(key="3", part_of="3", title="Tracking through a flexible shaft", makes=makes, needs=("1b",),
                        seconds=30.0, tell=_tracking)  # fmt: skip
     swings = Experiment(key="4", part_of="4", title="Large free swing", makes=makes, needs=("1b",), seconds=15.0,
                         tell=_swings)  # fmt: skip
     out = [hanging] if can_identify(rig) else []
-    out += [upright] if pendulum else []
+    out += [upright, swing_up] if pendulum else []
     out += [shaft] if _shaft(plant) else []
     out += [swings] if pendulum and can_identify(rig) else []
     if not out:
@@ -77,6 +79,14 @@ def _upright(at: ExperimentInput) -> tuple[Chapter, bool]:
 
     done = run_upright(_at(at), _fit(at), at.seed, at.folder, at.progress, at.stopped)
     return chapter(done), not done.interrupted
+
+
+def _swing_up(at: ExperimentInput) -> tuple[Chapter, bool]:
+    from upright.experiments.hands_on.upwards import run_upwards
+    from upright.experiments.swing_up_2b.chapter import chapter
+
+    done = run_upwards(_at(at), _fit(at), at.folder, at.progress, at.stopped)
+    return chapter(done), not at.stopped()
 
 
 def _tracking(at: ExperimentInput) -> tuple[Chapter, bool]:

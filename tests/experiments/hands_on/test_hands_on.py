@@ -118,7 +118,7 @@ def test_a_rig_described_by_a_fit_is_that_rig_still(tmp_path):
 
 def test_a_fit_alone_is_not_identified_again(own, tmp_path):
     (tmp_path / "fit.json").write_text("{}", encoding="utf-8")
-    assert [e.key for e in experiments_for(own, "RIG.toml")] == ["1b", "2", "4"]
+    assert [e.key for e in experiments_for(own, "RIG.toml")] == ["1b", "2", "2b", "4"]
 
 
 def test_a_run_that_the_supervisor_ends_was_lost_there(tmp_path):

@@ -14,7 +14,7 @@ from upright.errors import BadInput, RigStopped
 from upright.experiments.running.rig import described
 from upright.experiments.running.run import RigRun, RunRequest, run_rig
 from upright.files import read_text, write_json
-from upright.laws import Law, as_values
+from upright.laws import Law, Rule, as_values
 from upright.realtime.session import RunState
 from upright.records import Array
 from upright.rigs.protocol import Fault
@@ -113,9 +113,11 @@ class RigAtHand:
         return done.log_path
 
     def hold(
-        self, law: Law, folder: Path, stem: str, seconds: float, *, tilt: float = 0.0
+        self, law: Law | Rule, folder: Path, stem: str, seconds: float, *, tilt: float = 0.0, from_rest: bool = False
     ) -> RigRun:  # fmt: skip
         """A run of a law, with the pulse before it and the filters beside it; a twin's hand lets go at the `tilt`.
+
+        What begins `from_rest` has no filters beside it, and may lean as it will.
 
         Raises
         ------
@@ -125,7 +127,7 @@ class RigAtHand:
         folder.mkdir(parents=True, exist_ok=True)
         path = write_json(folder / f"law_{stem}.json", as_values(law))
         wish = RunRequest(
-            rig=self.file.path, law=path, seconds=seconds, stem=stem, tilt=tilt,
+            rig=self.file.path, law=path, seconds=seconds, stem=stem, tilt=tilt, from_rest=from_rest,
         )  # fmt: skip
         return self._run(wish, folder)
 

@@ -95,7 +95,8 @@ def usual_limits(rig: ServoRig) -> Limits:
     )  # fmt: skip
 
 
-def stage_of(path: Path, *, balance: bool = True, tilt: float = 0.0, watch: bool = True) -> Stage:
+def stage_of(path: Path, *, balance: bool = True, tilt: float = 0.0, watch: bool = True,
+             from_rest: bool = False) -> Stage:  # fmt: skip
     """Rig, supervisor and hands of a RIG.toml.
 
     Parameters
@@ -107,6 +108,8 @@ def stage_of(path: Path, *, balance: bool = True, tilt: float = 0.0, watch: bool
         Of the last coordinate when the hand of a twin lets go [rad or m].
     watch : bool
         Whether the bank of filters runs beside the loop.
+    from_rest : bool
+        Whether a run begins where the rig rests, and may lean as it will: a swing-up.
 
     Raises
     ------
@@ -124,10 +127,11 @@ def stage_of(path: Path, *, balance: bool = True, tilt: float = 0.0, watch: bool
     units = {c.name: c.unit for c in model.plant.coordinates}
     upright = at != zero
     last = list(units.values())[-1]
-    lean = file.lean(last, LEAN if last == "rad" else math.inf) if upright else math.inf
+    held = upright and not from_rest
+    lean = file.lean(last, LEAN if last == "rad" else math.inf) if held else math.inf
     duty = Duty(
         limits=file.limits(units, model.unit, usual_limits(model)), model=model, at=at, zero=zero, lean=lean,
-        near=min(NEAR, lean) if upright else math.inf, watch=watch,
+        near=min(NEAR, lean) if held else math.inf, watch=watch and not from_rest,
     )  # fmt: skip
     rig = live_rig(file, model, truth)
     bring, let_go, advice = _nothing, _nothing, ""
@@ -135,9 +139,9 @@ def stage_of(path: Path, *, balance: bool = True, tilt: float = 0.0, watch: bool
         away = np.zeros(2 * len(units))
         away[-2] = tilt
         bring, let_go = partial(rig.port.hold, at, away), rig.port.let_go
-        if not upright and not tilt:
+        if from_rest or (not upright and not tilt):
             bring = _nothing
-    elif upright:
+    elif held:
         advice = f"bring {list(units)[-1]} to '{at}' and hold it still; let go when it is held"
     return Stage(
         supervisor=Supervisor(rig, duty), bring=bring, let_go=let_go, units=tuple(units.values()), advice=advice

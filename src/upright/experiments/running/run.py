@@ -32,6 +32,7 @@ class RunRequest:
     """What is asked of a run.
 
     `law` is a file, None for a signal that is put out blindly, `excite`; `reference` is a signal that the law follows.
+    `from_rest` begins where the rig rests, however far that is from what is held, as a swing-up does.
     `samples` are what is put out, sample by sample instead of in words; logs are called after the `stem`.
     `own_process` puts a twin or a replay into a process of its own as well, where a rig always is.
     """
@@ -47,6 +48,7 @@ class RunRequest:
     tilt: float = 0.0
     check: bool = True
     watch: bool = True
+    from_rest: bool = False
     own_process: bool = False
 
     def __post_init__(self) -> None:
@@ -169,7 +171,8 @@ def run_rig(
     folder.mkdir(parents=True, exist_ok=True)
     path = fresh(folder, wish.stem, ".mcap")
     order = RunOrder(
-        make=partial(stage_of, wish.rig, balance=balance, tilt=wish.tilt, watch=wish.watch), law=as_values(law),
+        make=partial(stage_of, wish.rig, balance=balance, tilt=wish.tilt, watch=wish.watch,
+                     from_rest=wish.from_rest), law=as_values(law),
         seconds=wish.seconds, log=path, mode=MODES[wish.mode], check=wish.check, rig_text=read_text(wish.rig),
     )  # fmt: skip
     if file.hardware or wish.own_process:

@@ -24,13 +24,14 @@ QUESTION = (
 def chapter(done: SwingUpRun) -> Chapter:
     """Sensors, swing-up, lies; as far as the experiment has them."""
     source = "numbers identified hanging" if done.source else "the numbers of the make as designed"
+    seed = "" if done.truth is done.model else f", seed {done.truth.seed}"
     parts = [_sensor_part(done.model, done.check)]
     if done.ascent is not None:
         parts.append(_swing_part(done, done.ascent))
     if done.lies:
         parts.append(_lie_part(done))
     return Chapter(
-        key="2b", title=f"Swing-up and catch: {done.truth.name}, seed {done.truth.seed}", question=QUESTION,
+        key="2b", title=f"Swing-up and catch: {done.truth.name}{seed}", question=QUESTION,
         verdict=done.verdict, detail=f"Law and check were made from {source}; they met a rig with numbers of its own.",
         sound=done.caught, parts=tuple(parts), steps=_steps(done), findings=_findings(done), numbers=_numbers(done),
     )  # fmt: skip

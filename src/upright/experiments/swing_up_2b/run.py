@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -191,6 +192,18 @@ def scales_of_log(model: ServoRig, log: Record, known: Mapping[str, float] | Non
     return found
 
 
+class Hands(Protocol):
+    """Who does on a rig what is otherwise simulated."""
+
+    def coast(self, command: Array, /) -> Record:
+        """Log of a hanging rig under commands put out blindly: readings [m or rad] and ``u``."""
+        ...
+
+    def ascend(self, law: SwingUp, seconds: float, /) -> Ascent:
+        """Swing it up."""
+        ...
+
+
 def run_swing_up(
     model: ServoRig,
     truth: ServoRig,
@@ -203,6 +216,7 @@ def run_swing_up(
     travel: float | None = None,
     lies: bool = True,
     source: str = "",
+    at_hand: Hands | None = None,
 ) -> SwingUpRun:
     """Check the encoders of a hanging rig, swing it up and hold it; then try what lying encoders would have done.
 
@@ -227,16 +241,20 @@ def run_swing_up(
     lies : bool
     source : str
         File that the model comes from, as typed.
+    at_hand : Hands, optional
+        The rig itself, in the place of the simulated `truth`.
     """
     began = time.perf_counter()
     progress("designing swing-up and catch", 0.0)
     law = design_swing_up(model, travel=travel)
     progress("asking the encoders", 0.3)
     command = probe(model, law)
-    log = put_out(truth, command)
+    log = put_out(truth, command) if at_hand is None else at_hand.coast(command)
     check = scales(model, log, known)
     progress("swinging up", 0.4)
-    ascent = swing_up(truth, law, seconds=seconds) if check.sound else None
+    ascent = None
+    if check.sound:
+        ascent = swing_up(truth, law, seconds=seconds) if at_hand is None else at_hand.ascend(law, seconds)
     progress("trying encoders that lie", 0.6)
     tried = _lies(model, truth, law, command, known) if lies and check.sound and not stopped() else ()
     folder.mkdir(parents=True, exist_ok=True)
