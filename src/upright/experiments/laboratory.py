@@ -216,7 +216,7 @@ class Session:
     folder: Path
     asked: tuple[Experiment, ...]
     worn: bool = False
-    table: tuple[Experiment, ...] = EXPERIMENTS
+    table: tuple[Experiment, ...] = field(default_factory=lambda: EXPERIMENTS)
     hands: RigAtHand | None = None
     results: list[ExperimentResult] = field(default_factory=list[ExperimentResult])
     interrupted: bool = False
@@ -236,7 +236,7 @@ class Session:
 
 
 def choose(
-    asked: Sequence[str], make: str, table: tuple[Experiment, ...] = EXPERIMENTS
+    asked: Sequence[str], make: str, table: tuple[Experiment, ...] | None = None
 ) -> tuple[Experiment, ...]:  # fmt: skip
     """The experiments asked for, with those whose numbers they take; all that the rig has when none is named.
 
@@ -245,6 +245,7 @@ def choose(
     BadInput
         When there is no such experiment, or not on this rig.
     """
+    table = EXPERIMENTS if table is None else table
     there = _there(make, table)
     wanted: set[str] = set()
     for name in asked:
@@ -287,7 +288,7 @@ def run_laboratory(
     fresh: bool = False,
     workers: Workers = HERE,
     worn: bool = False,
-    table: tuple[Experiment, ...] = EXPERIMENTS,
+    table: tuple[Experiment, ...] | None = None,
     hands: RigAtHand | None = None,
 ) -> Session:
     """Run experiments on a seeded rig; Ctrl-C stops and keeps what is there.
@@ -312,8 +313,8 @@ def run_laboratory(
         Who runs experiments that need nothing of each other; processes of this machine, since they share the folder.
     worn : bool
         Take twins with physics that models leave out; see `upright.experiments.worn`.
-    table : tuple of Experiment
-        What can be run.
+    table : tuple of Experiment, optional
+        What can be run; `EXPERIMENTS` when omitted.
     hands : RigAtHand, optional
         The rig itself, where one is at hand; `make` is then what it is asked for by.
 
@@ -323,6 +324,7 @@ def run_laboratory(
         When there is no such experiment, or not on this rig.
     """
     began = time.perf_counter()
+    table = EXPERIMENTS if table is None else table
     session = Session(make=make, seed=seed, folder=folder, asked=choose(asked, make, table), worn=worn, table=table,
                       hands=hands)  # fmt: skip
     digests = _digests(session)
@@ -397,6 +399,14 @@ def _digests(session: Session) -> dict[str, str]:
     return digests
 
 
+def _with_measured(session: Session, e: Experiment, digest: str) -> str:
+    """The digest with the fits that it takes numbers from: a rig that is measured again answers otherwise."""
+    if session.hands is None:
+        return digest
+    fits = [session.folder / n / "fit.json" for n in _needs(e, session.make, session.table)]
+    return sha256(b"".join([digest.encode(), *(f.read_bytes() for f in fits if f.exists())])).hexdigest()
+
+
 @cache
 def _program() -> str:
     """Digest of the program as it stands: another version, or a changed line, is another experiment."""
@@ -421,7 +431,7 @@ def _with_kept(session: Session, digests: Mapping[str, str]) -> list[ExperimentR
     """What was told, and what else is there from an earlier run on the same rig."""
     told = {t.experiment.key: t for t in session.results}
     for e in _there(session.make, session.table):
-        found = None if e.key in told else _kept(session.folder / e.key, digests[e.key])
+        found = None if e.key in told else _kept(session.folder / e.key, _with_measured(session, e, digests[e.key]))
         if found:
             make = e.make(session.make)
             name = session.rig(make).name
@@ -436,6 +446,7 @@ def _one(
     began = time.perf_counter()
     make, needs = e.make(session.make), _needs(e, session.make, session.table)
     rig, folder = session.rig(make), session.folder / e.key
+    digest = _with_measured(session, e, digest)
     folder.mkdir(parents=True, exist_ok=True)
     progress("starting", 0.0)
     state, chapter = "kept", None if fresh else _kept(folder, digest)

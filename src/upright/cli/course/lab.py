@@ -81,7 +81,10 @@ def lab(
 
 
 def _asks(sentence: str) -> bool:
-    return typer.confirm(f"{sentence} Ready?", default=True, err=True)
+    try:
+        return typer.confirm(f"{sentence} Ready?", default=True, err=True)
+    except typer.Abort:
+        raise KeyboardInterrupt from None
 
 
 def _tell(done: Laboratory, files: Sequence[Path]) -> None:

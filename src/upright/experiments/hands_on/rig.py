@@ -181,4 +181,7 @@ def rig_at_hand(
             f"{path}: hardware is not driven without limits; write [limits] with command, and "
             f"[limits.{next(iter(units))}] with travel, speed and start."
         )
-    return RigAtHand(file=file, model=model, truth=replace(truth, name=model.name), ask=ask, watching=watching)
+    return RigAtHand(
+        file=file, model=model, truth=replace(truth, name=model.name), ask=ask if file.hardware else nobody,
+        watching=watching,
+    )  # fmt: skip

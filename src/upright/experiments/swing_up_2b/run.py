@@ -255,8 +255,10 @@ def run_swing_up(
     ascent = None
     if check.sound:
         ascent = swing_up(truth, law, seconds=seconds) if at_hand is None else at_hand.ascend(law, seconds)
-    progress("trying encoders that lie", 0.6)
-    tried = _lies(model, truth, law, command, known) if lies and check.sound and not stopped() else ()
+    tried: tuple[Lie, ...] = ()
+    if lies and check.sound and not stopped():
+        progress("trying encoders that lie", 0.6)
+        tried = _lies(model, truth, law, command, known)
     folder.mkdir(parents=True, exist_ok=True)
     log.to_csv(folder / "sensors.csv")
     if ascent is not None:
