@@ -202,24 +202,6 @@ def read_rig_file(path: Path) -> RigFile:
     )  # fmt: skip
 
 
-def template(port: str) -> str:
-    """RIG.toml of a serial rig that its owner has yet to fill in; it is refused, with a sentence, until then."""
-    return f"""kind = "serial"
-port = {toml(port)}
-study = "study.toml"       # the rig with guesses of its numbers: [rig], [parameters], [actuator], [sensors]
-
-[limits]
-# command = "5 V"          # largest command
-watchdog = "20 ms"
-lean = "25 deg"            # how far the pendulum may be from upright
-
-# [limits.psi]             # what the drive moves, as the plant calls it
-# travel = "1.5 rad"
-# speed = "15 rad/s"
-# start = "0.3 rad"
-"""
-
-
 _EXAMPLES = {
     "name": "bench 3", "fit": "out/fit.json", "study": "study.toml", "make": "furuta", "vendor": "ECP 205",
     "port": "/dev/ttyACM0", "record": "run.csv", "at": "inverted", "zero": "hanging",

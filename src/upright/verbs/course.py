@@ -57,7 +57,7 @@ def lab(
         Only these of 1, 1a, 1b, 2, 2b, 3, 4, and what they stand on.
     rig : str, optional
         Twin of a make, linear, furuta, rectilinear or torsional, else the paper's; or the RIG.toml of a rig at hand
-        (all experiments that it can have but 1a); ``"serial:PORT"`` writes one to be filled in.
+        (all experiments that it can have but 1a); ``"serial:PORT"`` writes one, and a study, to be filled in.
     seed : int
         Which rig of the make; 0 is the one as designed. Of a rig at hand, that of the rigs drawn from its fit.
     out : path, optional
@@ -141,19 +141,16 @@ def _at_hand(
 ) -> RigAtHand:  # fmt: skip
     """The rig of a RIG.toml; what cannot be had of it is said first."""
     from upright.experiments.hands_on.rig import nobody, nobody_watches, rig_at_hand
-    from upright.files import replace_file
+    from upright.experiments.hands_on.templates import write_templates
     from upright.report.symbols import typed
-    from upright.rigs.rigfile import template
 
     if worn or workers != 1:
         raise BadInput("--worn and --workers are for twins of makes; a rig at hand is as it is, and there is one.")
     if rig.startswith("serial:"):
-        path = folder / "RIG.toml"
-        if not path.exists():
-            replace_file(path, template(rig.removeprefix("serial:")).encode())
+        path = write_templates(folder, rig.removeprefix("serial:"))
         raise BadInput(
             "a rig of hardware needs a description and limits, which nobody else can know: fill in "
-            f"{path} (docs/rigs.md), then run upright lab --rig {typed(path)}"
+            f"{path.with_name('study.toml')} and {path}, then run upright lab --rig {typed(path)}"
         )
     if not Path(rig).exists():
         raise BadInput(f"there is no file '{rig}'; name the RIG.toml of a rig, or a make: linear, furuta, ...")

@@ -154,14 +154,24 @@ def test_a_port_alone_is_not_driven_but_given_a_file_to_fill_in(tmp_path):
         up.lab(rig="serial:/dev/ttyACM7", out=tmp_path / "out")
     path = tmp_path / "out" / "RIG.toml"
     assert 'port = "/dev/ttyACM7"' in path.read_text("utf-8")
-    with pytest.raises(BadInput, match=r"study\.toml does not exist"):
+    study = path.with_name("study.toml")
+    with pytest.raises(BadInput, match="m_p"):
         up.lab(rig=str(path), out=tmp_path / "out")
-    (tmp_path / "out" / "study.toml").write_text(OWN, encoding="utf-8")
+    fill_in(study)
     with pytest.raises(BadInput, match=r"\[limits\] needs the largest command"):
         up.lab(rig=str(path), ask=lambda _: True, out=tmp_path / "out")
-    path.write_text(re.sub("(?m)^# ", "", path.read_text("utf-8")), encoding="utf-8")
+    fill_in(path)
     with pytest.raises(BadInput, match="need a person"):
         up.lab(rig=str(path), out=tmp_path / "out")
+    asked: list[str] = []
+    done = up.lab(rig=str(path), ask=asked.append, out=tmp_path / "out")  # who answers nothing has not done it
+    assert "not done" in done.numbers["experiments"]["1b"]["detail"]
+    assert not any("bring it up" in sentence for sentence in asked)  # nothing is held upright without a fit
+
+
+def fill_in(path):
+    """Every question answered as its example does."""
+    path.write_text(re.sub(r"(?m)^# (?=[\[\w]+ ?[=.])", "", path.read_text("utf-8")), encoding="utf-8")
 
 
 @pytest.mark.slow
