@@ -22,7 +22,7 @@ def functions(text: str) -> dict[str, Any]:
 
     names = dict.fromkeys(("inline", "inline_strict", "exact", "scalar", "entry", "separate"), as_it_is)
     space: dict[str, Any] = names | {n: getattr(math, n) for n in ("sin", "cos", "tan", "sqrt", "exp", "pi", "nan")}
-    space |= {"floor": np.floor, "ldexp": math.ldexp}
+    space |= {"floor": np.floor, "ldexp": math.ldexp, "frexp": math.frexp}
     exec(compile(text, "kernel", "exec"), space)
     return space
 

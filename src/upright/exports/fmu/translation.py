@@ -36,8 +36,9 @@ static long least_l(long a, long b) { return b < a ? b : a; }
 static long most_l(long a, long b) { return b > a ? b : a; }
 static double least_d(double a, double b) { return b < a ? b : a; }
 static double most_d(double a, double b) { return b > a ? b : a; }
+static void parted_d(double x, double *result) { int n; result[0] = frexp(x, &n); result[1] = n; }
 """
-"""What `min` and `max` become: the first unless the second is better."""
+"""What `min` and `max` become, the first unless the second is better; and `frexp`, with its pair."""
 
 
 @dataclass
@@ -305,6 +306,8 @@ class _Writer:
             return f"k_{name}({given})"
         if name in _LIBRARY:
             return f"{name}({'(double)' if name != 'ldexp' and len(args) == 1 else ''}{given})"
+        if name == "frexp":
+            return f"parted_d({given})"
         whole = _kind(node, self.known, self.functions) == "long"
         if name == "abs":
             return f"labs({given})" if whole else f"fabs({given})"

@@ -13,7 +13,8 @@ from typing import Any
 from upright.errors import BadInput
 from upright.laws.linear import Law, Structure
 from upright.laws.rule import Rule, Written, line_in
-from upright.simulation.kernel.equations import ELEMENTARY, acceleration, step, terms
+from upright.simulation.kernel.elementary import ALWAYS, called
+from upright.simulation.kernel.equations import acceleration, step, terms
 from upright.simulation.kernel.events import events, places
 from upright.simulation.kernel.flavour import Layout
 from upright.simulation.kernel.lanes import ROUNDING, RUN_ARGUMENTS, law, run
@@ -41,7 +42,10 @@ EVENTS: tuple[Type, ...] = (ArrayOf(0), ArrayOf(0), INT, FLOAT)
 
 def source(p: Layout) -> str:
     """Text of the module that steps one plant in one flavour."""
-    parts = [f'"""Generated kernel of {p.derived.name}; {p.flavour}"""', ELEMENTARY, acceleration(p), step(p)]
+    d = p.derived
+    functions = called(*d.lumps, *(of for _, _, of in d.trig), *(text for _, text in d.steps), *d.mass, *d.force)
+    parts = [f'"""Generated kernel of {d.name}; {p.flavour}"""', ALWAYS, *[functions] * bool(functions)]
+    parts += [acceleration(p), step(p)]
     parts += [f"@inline_strict\n{p.flavour.loop.text}\n"] if isinstance(p.flavour.loop, Written) else []
     parts += [ROUNDING] if p.flavour.loop else []
     parts += [law(p)] if isinstance(p.flavour.loop, Structure) else []

@@ -12,43 +12,6 @@ from upright.physics.combination import spelled
 from upright.simulation.kernel.drive import force, nodes
 from upright.simulation.kernel.flavour import Layout
 
-ELEMENTARY = '''
-@inline_strict
-def sincos(x):
-    """Sine and cosine; reduction by pi/2 in two parts, exact products up to 1e6 rad, then Cephes' polynomials."""
-    n = floor(x * 0.63661977236758134308 + 0.5)
-    r = (x - n * 1.57079632673412561417e00) - n * 6.07710050650619224932e-11
-    z = r * r
-    p = (((1.58962301576546568060e-10 * z - 2.50507477628578072866e-8) * z + 2.75573136213857245213e-6) * z
-         - 1.98412698295895385996e-4)
-    p = (p * z + 8.33333333332211858878e-3) * z - 1.66666666666666307295e-1
-    sn = r + r * z * p
-    p = (((-1.13585365213876817300e-11 * z + 2.08757008419747316778e-9) * z - 2.75573141792967388112e-7) * z
-         + 2.48015872888517045348e-5)
-    p = (p * z - 1.38888888888730564116e-3) * z + 4.16666666666665929218e-2
-    cs = 1.0 - 0.5 * z + z * z * p
-    h = n * 0.5
-    odd = h - floor(h)
-    h = n * 0.25
-    quadrant = h - floor(h)
-    a = cs if odd > 0.25 else sn
-    b = sn if odd > 0.25 else cs
-    return (-a if quadrant >= 0.5 else a), (-b if (quadrant > 0.125) & (quadrant < 0.625) else b)
-
-
-@inline_strict
-def falling(x):
-    """exp(-x) for x >= 0, by Cephes' rational function; 0 beyond 700."""
-    y = 0.0 - (700.0 if x > 700.0 else x)
-    n = floor(y * 1.4426950408889634 + 0.5)
-    r = (y - n * 6.93145751953125e-1) - n * 1.42860682030941723212e-6
-    z = r * r
-    p = r * ((1.26177193074810590878e-4 * z + 3.02994407707441961300e-2) * z + 9.99999999999999999910e-1)
-    q = ((3.00198505138664455042e-6 * z + 2.52448340349684104192e-3) * z + 2.27265548208155028766e-1) * z + 2.0
-    e = ldexp(1.0 + 2.0 * p / (q - p), int(n))
-    return 0.0 if x >= 700.0 else e
-'''
-
 
 def arguments(p: Layout) -> list[str]:
     """Arguments of the acceleration, in order."""

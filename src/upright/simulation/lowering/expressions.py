@@ -275,6 +275,8 @@ class Expressions:
             return whole(len(args[0].items))
         if name == "ldexp" and len(args) == 2:
             return w.scaled(args[0], args[1])
+        if name == "frexp" and len(args) == 1:
+            return w.parted(args[0])
         if name == "round" and len(args) == 2:
             raise Unsupported("round takes one number here")
         if len(args) != 1:

@@ -435,6 +435,19 @@ class Instructions:
         factor = self.emit(wanted, f"bitcast {self.named(t)} {self.packed(bits)} to {self.named(wanted)}")
         return self.binary_number("*", x, factor)
 
+    def parted(self, x: Operand) -> Group:
+        """Of a number above 0 and finite, m from 1/2 to 1 and n with x = m 2^n; of any other, some m and n."""
+        v = self.number(self.vector(x))
+        reals, t = (FLOATS, INTS) if v.type.lanes else (FLOAT, INT)
+        v = self.number(self.convert(v, reals))
+        subnormal = self.compare("<", v, real(2.0**-1022))
+        v = self.choose_number(subnormal, self.binary_number("*", v, real(2.0**54)), v)
+        bits = self.emit(t, f"bitcast {self.named(reals)} {v.text} to {self.named(t)}")
+        digits = self.binary_number("|", self.binary_number("&", bits, whole(2**52 - 1)), whole(1022 << 52))
+        m = self.emit(reals, f"bitcast {self.named(t)} {digits.text} to {self.named(reals)}")
+        n = self.binary_number("-", self.binary_number(">>", bits, whole(52)), whole(1022))
+        return Group([m, self.binary_number("-", n, self.choose_number(subnormal, whole(54), whole(0)))])
+
     def sum_of_lanes(self, v: Value) -> Value:
         """All lanes added up."""
         v = self.number(self.convert(v, FLOATS))
