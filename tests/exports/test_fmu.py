@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 from tests.exports.rigs import fit_file
+from tests.physics import bumpers
+from tests.physics.bumpers import BUMPERS
 from tests.physics.specimens import SPECIMENS
 from upright.errors import BadInput
 from upright.experiments.identified import read_identified
@@ -97,6 +99,17 @@ def test_every_plant_moves_as_here(name, tmp_path):
     (tmp_path / "rig.fmu").write_bytes(build(unit_of(identified(tmp_path, plant)))[0])
     x0 = np.random.default_rng(1).uniform(-0.3, 0.3, 2 * len(plant.coordinates)).tolist()
     commands = np.sin(np.arange(50) * 0.3)
+    ours = here(plant, {"actuator.gain": 0.5, "actuator.limit": 5.0}, x0, commands, 0.02)
+    assert np.abs(ours - walked(tmp_path / "rig.fmu", plant, x0, commands, 0.02)).max() < 1e-9
+
+
+@pytest.mark.parametrize("gap", [0.03, 0.0])
+def test_elementary_functions_and_kinks_are_those_of_the_kernel(gap, tmp_path):
+    """With the bumpers where the cart rests it has no linear model, and steps as the stiffer side asks."""
+    plant = BUMPERS.replace(gap=gap)
+    rig = read_identified(fit_file(tmp_path, plant, name=f"{bumpers.__file__}:Bumpers", unit="N"))
+    (tmp_path / "rig.fmu").write_bytes(build(unit_of(rig))[0])
+    x0, commands = [0.02, 0.0, 0.4, 0.0], 3.0 * np.sin(np.arange(30) * 0.3)
     ours = here(plant, {"actuator.gain": 0.5, "actuator.limit": 5.0}, x0, commands, 0.02)
     assert np.abs(ours - walked(tmp_path / "rig.fmu", plant, x0, commands, 0.02)).max() < 1e-9
 

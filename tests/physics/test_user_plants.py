@@ -79,6 +79,34 @@ WHEN_DERIVED = {
         "import sympy\n" + RIGHT.replace("/ 2, 0, 0", "/ 2, sympy.Symbol('h'), 0"),
         "uses h, which is none of its own symbols; take them from p, q and v",
     ),
+    "function beyond the elementary ones": (
+        "import sympy\n" + RIGHT.replace("/ 2, 0, 0", "/ 2, sympy.erf(q[0]) + sympy.floor(q[0]), 0"),
+        r"uses erf, floor, which the kernel does not know; it knows SymPy's sin, cos, tan, asin, .* and Piecewise",
+    ),
+    "function without a definition": (
+        "import sympy\n" + RIGHT.replace("/ 2, 0, 0", "/ 2, sympy.Function('V')(q[0]), 0"),
+        "uses V, which the kernel does not know",
+    ),
+    "number that is not real": (
+        "import sympy\n" + RIGHT.replace("/ 2, 0, 0", "/ 2, sympy.I * q[0], 0"),
+        "uses ImaginaryUnit, which the kernel does not know",
+    ),
+    "pieces that leave cases open": (
+        "import sympy\n" + RIGHT.replace("/ 2, 0, 0", "/ 2, sympy.Piecewise((q[0]**2, q[0] > 1)), 0"),
+        r"Piecewise\(\(x\*\*2, x > 1\)\) leaves cases open; let its last piece hold for True",
+    ),
+    "energy that jumps": (
+        "import sympy\n" + RIGHT.replace("/ 2, 0, 0", "/ 2, sympy.Heaviside(q[0] - p.m), 0"),
+        "its potential energy V jumps where m - x = 0, and the kernel steps over jumps; let it rise over",
+    ),
+    "force that jumps": (
+        "import sympy\n" + RIGHT.replace("/ 2, 0, 0", "/ 2, sympy.Abs(sympy.sin(q[0])), 0"),
+        r"the force on x jumps where sin\(x\) = 0",
+    ),
+    "dry friction among the viscous": (
+        "import sympy\n" + RIGHT.replace("/ 2, 0, 0", "/ 2, 0, p.m * sympy.Abs(v[0])"),
+        "the force on x jumps where x_dot = 0, .* state dry friction in a Joint",
+    ),
     "self in energies": (RIGHT.replace("(p, q, v)", "(self, p, q, v)"), "does not run: TypeError"),
 }
 

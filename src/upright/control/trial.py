@@ -138,13 +138,13 @@ class ServoRig:
         return replace(self, plant=self.plant.replace(**parameters))
 
 
-def driven(plant: Plant, drive: Mapping[str, float], at: str) -> Linear:
+def driven(plant: Plant, drive: Mapping[str, float], at: str, *, side: float = 0.0) -> Linear:
     """Model about an equilibrium from the command to the coordinates, with what the drive takes for speed.
 
     The drive gives gain u less its slope and its braking, times the speed of what it drives; that braking is at work
     while a loop runs.
     """
-    model = plant.linear(at)
+    model = plant.linear(at, side=side)
     A, names = model.A, plant.state_names()
     taken = sum(drive.get(f"actuator.{n}", 0.0) for n in ("slope", "damping", "standby"))
     if taken:

@@ -113,9 +113,9 @@ class IdentifiedRig:
         """Unit of every output."""
         return [c.unit for c in self.plant.coordinates]
 
-    def linear(self, at: str) -> Linear:
-        """Model about an equilibrium, from the command to the coordinates."""
-        return driven(self.plant, {**self.more, GAIN: self.gain}, at)
+    def linear(self, at: str, *, side: float = 0.0) -> Linear:
+        """Model about an equilibrium, from the command to the coordinates; see `linearize`."""
+        return driven(self.plant, {**self.more, GAIN: self.gain}, at, side=side)
 
     def spread(self, at: str) -> list[Linear]:
         """The same for the draws."""

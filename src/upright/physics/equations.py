@@ -6,10 +6,11 @@ numbers or on arrays, and nowhere else but in compiled code.
 
 from __future__ import annotations
 
+import ast
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, reduce
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,11 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 Scope = Mapping[str, Any]
 Program = Callable[[Scope], tuple[tuple[Any, ...], ...]]
+
+FUNCTIONS = (
+    "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "abs", "pi",
+)  # fmt: skip
+"""What the text of equations calls by name."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +63,8 @@ class Derived:
         Generalized forces: inputs, gravity, springs, gyroscopic and viscous terms, no dry friction.
     stiffness, damping, gain : tuple of str
         ``-df/dq``, ``-df/dv`` (n x n, row by row) and ``df/du`` (n x inputs) at rest without input,
-        in parameters and coordinates, with ``sin`` and ``cos`` written out.
+        in parameters and coordinates, with ``sin`` and ``cos`` written out; where pieces are chosen by speeds, in
+        these too.
     kinetic, potential, power_lost : str
         Energies [J] and viscous power [W], in parameters, coordinates and velocities.
     joints : tuple of DryJoint
@@ -82,9 +89,17 @@ class Derived:
     joints: tuple[DryJoint, ...] = ()
 
 
+def chooses(text: str) -> bool:
+    """Whether an expression has several pieces."""
+    return " if " in text
+
+
 def evaluate(expression: str, scope: Scope) -> Array:
     """Value of one derived expression; names are looked up in `scope`, elementwise on arrays."""
-    value = eval(_code(expression), {"__builtins__": {}, **_functions(np)}, dict(scope))  # our own text
+    if chooses(expression):
+        scope = _arrays(scope)
+    with np.errstate(**_quiet(expression)):
+        value = eval(_code(expression), {"__builtins__": {}, **_functions(np)}, dict(scope))  # our own text
     return np.asarray(value, dtype=np.float64) + 0.0
 
 
@@ -167,12 +182,40 @@ def _scalar(scope: Scope) -> bool:
 
 
 def _functions(library: Any) -> dict[str, Any]:
-    return {name: getattr(library, name) for name in ("sin", "cos", "sqrt", "tan", "exp", "log", "pi")}
+    """What the text calls; `abs` is Python's own."""
+    return {"abs": abs, "where": np.where, **{name: getattr(library, name) for name in FUNCTIONS if name != "abs"}}
+
+
+class _ForArrays(ast.NodeTransformer):
+    """Choices and conditions element by element."""
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
+        self.generic_visit(node)
+        return ast.Call(ast.Name("where", ast.Load()), [node.test, node.body, node.orelse], [])
+
+    def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:
+        self.generic_visit(node)
+        op = ast.BitAnd() if isinstance(node.op, ast.And) else ast.BitOr()
+        return reduce(lambda a, b: ast.BinOp(a, op, b), node.values)
+
+
+def _for_arrays(tree: Any) -> Any:
+    return ast.fix_missing_locations(_ForArrays().visit(tree))
+
+
+def _arrays(scope: Scope) -> Scope:
+    """Numbers as arrays: of what is not chosen Python's own would raise, or leave the real axis."""
+    return {name: np.asarray(value, dtype=np.float64) for name, value in scope.items()}
+
+
+def _quiet(text: str) -> dict[str, Any]:
+    """For `numpy.errstate`: what is not chosen is computed too, and need not exist."""
+    return {"divide": "ignore", "invalid": "ignore"} if chooses(text) else {}
 
 
 @cache
 def _code(expression: str) -> Any:
-    return compile(expression, "<derived>", "eval")
+    return compile(_for_arrays(ast.parse(expression, mode="eval")), "<derived>", "eval")
 
 
 @cache
@@ -186,6 +229,12 @@ def _program(derived: Derived, parts: tuple[str, ...], scalar: bool) -> Program:
     lines += [f"    {name} = {text}" for name, text in derived.steps]
     results = ["(" + "".join(f"{text}, " for text in getattr(derived, part)) + ")" for part in parts]
     text = "\n".join(["def run(p):", *lines, f"    return {', '.join(results)}"])
-    scope = _functions(math if scalar else np)
-    exec(compile(text, f"<{derived.name}>", "exec"), scope)  # our own text
-    return scope["run"]
+    scope = _functions(math if scalar and not chooses(text) else np)
+    exec(compile(_for_arrays(ast.parse(text)), f"<{derived.name}>", "exec"), scope)  # our own text
+    run = scope["run"]
+
+    def chosen(p: Scope) -> tuple[tuple[Any, ...], ...]:
+        with np.errstate(**_quiet(text)):
+            return run(_arrays(p))
+
+    return chosen if chooses(text) else run

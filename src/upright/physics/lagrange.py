@@ -6,20 +6,38 @@ Euler and Lagrange: with L = T - V, ``M = d2L/dv2`` and
 
 The text is cheap to evaluate, for code that knows no symbols: every constant combination of parameters is computed once
 (k0, k1, ...), every sine and cosine once (s0, c0, ...), what is left in common once (w0, w1, ...).
+What has a kink (Abs, Max, ...) becomes a choice between smooth pieces, so that derivatives hold no impulses.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection
+from contextlib import suppress
 from types import SimpleNamespace
 from typing import Any
 
 import sympy as sp
+from sympy.core.relational import Relational
+from sympy.functions.elementary.piecewise import ExprCondPair
+from sympy.logic.boolalg import BooleanAtom
 from sympy.printing.pycode import PythonCodePrinter
 
 from upright.errors import BadInput, nearest
-from upright.physics.equations import Derived, DryJoint
+from upright.physics.equations import FUNCTIONS, Derived, DryJoint
 from upright.physics.statement import Statement
+
+_KINKED: dict[Any, Any] = {
+    sp.Abs: lambda a: sp.Piecewise((a, a >= 0), (-a, True)),
+    sp.sign: lambda a: sp.Piecewise((1, a > 0), (-1, a < 0), (0, True)),
+    sp.Heaviside: lambda a, half=sp.S.Half: sp.Piecewise((1, a > 0), (0, a < 0), (half, True)),
+    sp.Max: lambda *a: sp.Piecewise(*((x, sp.And(*(x >= y for y in a if y != x))) for x in a[1:]), (a[0], True)),
+    sp.Min: lambda *a: sp.Piecewise(*((x, sp.And(*(x <= y for y in a if y != x))) for x in a[1:]), (a[0], True)),
+}
+_SMOOTH = tuple(getattr(sp, name) for name in FUNCTIONS if name not in ("sqrt", "abs", "pi"))
+_KNOWN = (
+    sp.Add, sp.Mul, sp.Pow, sp.Number, sp.NumberSymbol, sp.Symbol, *_SMOOTH, *_KINKED, sp.Piecewise, ExprCondPair,
+    Relational, sp.And, sp.Or, sp.Not, BooleanAtom,
+)  # fmt: skip
 
 
 def symbols(cls: type[Statement]) -> tuple[SimpleNamespace, list[Any], list[Any], list[Any]]:
@@ -61,6 +79,7 @@ def energies(cls: type[Statement]) -> tuple[Any, Any, Any]:
     if foreign:
         names = ", ".join(sorted(str(s) for s in foreign))
         raise BadInput(f"{where} uses {names}, which is none of its own symbols; take them from p, q and v.")
+    _check_functions(where, T, V, D)
     if V.has(*v):
         raise BadInput(f"{where}: the potential energy V must not depend on velocities; move that term to T or D.")
     M = sp.hessian(T, v)
@@ -68,6 +87,33 @@ def energies(cls: type[Statement]) -> tuple[Any, Any, Any]:
         raise BadInput(f"{where}: the kinetic energy T must be quadratic in the velocities; drag belongs to D.")
     _check_inertia(cls, M)
     return T, V, D
+
+
+def _check_functions(where: str, *stated: Any) -> None:
+    unknown = {x.func.__name__ for e in stated for x in sp.preorder_traversal(e) if not isinstance(x, _KNOWN)}
+    if unknown:
+        raise BadInput(
+            f"{where} uses {', '.join(sorted(unknown))}, which the kernel does not know; it knows SymPy's "
+            f"{', '.join([*(f for f in FUNCTIONS if f not in ('abs', 'pi')), *(f.__name__ for f in _KINKED)])} and "
+            "Piecewise."
+        )
+    for choice in (c for e in stated for c in e.atoms(sp.Piecewise)):
+        if sp.Or(*(c for _, c in choice.args)) is not sp.true:
+            raise BadInput(f"{where}: {choice} leaves cases open; let its last piece hold for True.")
+
+
+def _in_pieces(e: Any) -> Any:
+    """The same with every kink as a choice between smooth pieces."""
+    for kinked, pieces in _KINKED.items():
+        e = e.replace(kinked, pieces)
+    return e.replace(sp.Piecewise, lambda *pairs: sp.Piecewise(*pairs[:-1], (pairs[-1][0], True)))
+
+
+def _stated(cls: type[Statement], without: Collection[str]) -> tuple[Any, Any, Any]:
+    """T, V and D in smooth pieces, some parameters zero."""
+    T, V, D = energies(cls)
+    p = symbols(cls)[0]
+    return tuple(_in_pieces(e.subs({getattr(p, name): 0 for name in without})) for e in (T, V, D))
 
 
 def _check_inertia(cls: type[Statement], M: Any) -> None:
@@ -81,13 +127,59 @@ def _check_inertia(cls: type[Statement], M: Any) -> None:
     raise BadInput(f"{cls.__name__}: {what}, so its acceleration is undefined; give it a mass or leave it out.")
 
 
+def _check_jumps(cls: type[Statement], V: Any, M: Any, f: Any) -> None:
+    """Runge and Kutta's steps need forces without jumps; tried at arbitrary values on both sides of each border."""
+    _, q, v, _ = symbols(cls)
+    parts = [("its potential energy V", V), *(("its mass matrix", e) for e in M)]
+    parts += [(f"the force on {c.name}", e) for c, e in zip(cls.coordinates, f, strict=True)]
+    for what, e in parts:
+        conditions = {r for choice in e.atoms(sp.Piecewise) for _, c in choice.args for r in c.atoms(Relational)}
+        for g in sorted({r.lhs - r.rhs for r in conditions if r.has(*q, *v)}, key=sp.default_sort_key):
+            s = next(x for x in (*q, *v) if g.has(x))
+            some = {x: (1 + sp.sqrt(2 + i)).evalf(60) for i, x in enumerate(sorted(e.free_symbols - {s}, key=str))}
+            for place in _zeros(g.subs(some), s):
+                one, other = (_value(e, {**some, s: place + d * sp.Float("1e-24", 60)}) for d in (1, -1))
+                if abs(one - other) > 1e-9 * max(abs(one) + abs(other), 1.0):
+                    raise BadInput(
+                        f"{cls.__name__}: {what} jumps where {g} = 0, and the kernel steps over jumps; let it rise "
+                        "over a short way, as tanh does, and state dry friction in a Joint."
+                    )
+
+
+def _zeros(g: Any, s: Any) -> list[Any]:
+    """Where an expression of one symbol is zero: everywhere for a straight line, else near a few values."""
+    slope = sp.diff(g, s)
+    if not slope.has(s):
+        return [-g.subs(s, 0) / slope]
+    found: list[Any] = []
+    for start in (0.3, -0.3, 2.0):
+        with suppress(ValueError, TypeError, ZeroDivisionError):  # none is found from here
+            found.append(sp.nsolve(g, s, start, prec=60))
+    return found
+
+
+def _value(e: Any, at: dict[Any, Any]) -> complex:
+    """NaN where there is none."""
+    try:
+        return complex(e.subs(at).evalf(60))
+    except (TypeError, ValueError):
+        return complex("nan")
+
+
+def _steady(e: Any) -> Any:
+    """A quotient of hyperbolic sine and cosine, as the slope of log(cosh(v/w)), by what is finite for all speeds."""
+    for a in {c.args[0] for c in e.atoms(sp.cosh)}:
+        e = e.subs(sp.sinh(a) / sp.cosh(a), sp.tanh(a))
+    return e
+
+
 def motion(cls: type[Statement], *, without: Collection[str] = ()) -> tuple[Any, Any]:
     """Mass matrix M and force vector f of ``M a = f(q, v, u)``, as SymPy matrices, dry friction left out.
 
     Parameters named in `without` are zero.
     """
-    p, q, v, u = symbols(cls)
-    T, V, D = (e.subs({getattr(p, name): 0 for name in without}) for e in energies(cls))
+    _, q, v, u = symbols(cls)
+    T, V, D = _stated(cls, without)
     lagrangian = T - V
     Q = [sum((ui for ui, i in zip(u, cls.inputs, strict=True) if i.on == c.name), sp.S.Zero) for c in cls.coordinates]
     f = sp.Matrix(
@@ -97,7 +189,7 @@ def motion(cls: type[Statement], *, without: Collection[str] = ()) -> tuple[Any,
             for qi, vi, Qi in zip(q, v, Q, strict=True)
         ]
     )  # fmt: skip
-    return sp.hessian(T, v), f
+    return sp.hessian(T, v), f.applyfunc(_steady)
 
 
 def derive(cls: type[Statement], *, without: frozenset[str] = frozenset()) -> Derived:
@@ -109,9 +201,9 @@ def derive(cls: type[Statement], *, without: frozenset[str] = frozenset()) -> De
         When the energies are not those of a mechanical system in these coordinates.
     """
     p, q, v, u = symbols(cls)
-    zero = {getattr(p, n): 0 for n in without}
     M, f = motion(cls, without=without)
-    T, V, D = (e.subs(zero) for e in energies(cls))
+    T, V, D = _stated(cls, without)
+    _check_jumps(cls, V, M, f)
     n = len(q)
     entries = [M[i, j] for i in range(n) for j in range(i, n)] + list(f)
     lumps: list[Any] = []
@@ -119,6 +211,11 @@ def derive(cls: type[Statement], *, without: frozenset[str] = frozenset()) -> De
     entries = _lump(entries, [*(s for t in trig for s in t[:2]), *q, *v, *u], list(vars(p).values()), lumps)
     steps, entries = sp.cse(entries, symbols=(sp.Symbol(f"w{i}") for i in range(1000)), optimizations="basic")
     rest = {**dict.fromkeys(v, 0), **dict.fromkeys(u, 0)}
+
+    def at_rest(e: Any) -> Any:
+        """What chooses by a speed has two sides there: its names stay."""
+        return e if any(c.has(*v) for choice in e.atoms(sp.Piecewise) for _, c in choice.args) else e.subs(rest)
+
     index = {c.name: i for i, c in enumerate(cls.coordinates)}
     momentum_energy = sum(vi * sp.diff(T, vi) for vi in v) - T  # T without its velocity-linear terms
     return Derived(
@@ -131,25 +228,30 @@ def derive(cls: type[Statement], *, without: frozenset[str] = frozenset()) -> De
         steps=tuple((s.name, text(e)) for s, e in steps),
         mass=tuple(text(e) for e in list(entries)[:-n]),
         force=tuple(text(e) for e in list(entries)[-n:]),
-        stiffness=tuple(text(e) for e in -f.jacobian(q).subs(rest)),
-        damping=tuple(text(e) for e in -f.jacobian(v).subs(rest)),
+        stiffness=tuple(text(at_rest(e)) for e in -f.jacobian(q)),
+        damping=tuple(text(at_rest(e)) for e in -f.jacobian(v)),
         gain=tuple(text(e) for e in f.jacobian(u).subs(rest)) if u else (),
         kinetic=text(sp.expand(momentum_energy) if momentum_energy.is_polynomial(*v) else momentum_energy),
         potential=text(V),
-        power_lost=text(sum(vi * sp.diff(D, vi) for vi in v)),
+        power_lost=text(sum(vi * _steady(sp.diff(D, vi)) for vi in v)),
         joints=tuple(DryJoint(direction=j.direction(index), **j.parameters()) for j in cls.joints),
     )
 
 
 class _Printer(PythonCodePrinter):
-    """Small integer powers as products, which every compiler turns into multiplications."""
+    """Small integer powers as products, which every compiler turns into multiplications; halves by square roots."""
 
     def _print_Pow(self, expr: Any, rational: bool = False) -> str:
         base, exponent = expr.args
-        if exponent.is_Integer and 2 <= int(exponent) <= 4:
+        whole = sp.floor(exponent) if exponent.is_Rational and exponent.q <= 2 else 0
+        if 2 <= exponent <= 4 if exponent.is_Integer else 1 <= whole <= 4:
             factor = self._print(base) if base.is_Symbol else f"({self._print(base)})"
-            return "(" + "*".join([factor] * int(exponent)) + ")"
+            root = [] if exponent.is_Integer else [f"sqrt({self._print(base)})"]
+            return "(" + "*".join([factor] * int(whole) + root) + ")"
         return super()._print_Pow(expr, rational=rational)
+
+    def _print_NumberSymbol(self, expr: Any) -> str:
+        return "pi" if expr is sp.pi else repr(float(expr))
 
 
 _PRINTER = _Printer({"fully_qualified_modules": False})

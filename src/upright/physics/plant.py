@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import ImpossiblePhysics, NotIdentifiable
-from upright.physics.equations import Derived, evaluate, mass_and_force, small_motions
+from upright.physics.equations import Derived, chooses, evaluate, mass_and_force, small_motions
 from upright.physics.statement import Statement
 from upright.shown import Shown
 
@@ -66,22 +66,29 @@ class Linear(Shown):
         return control.StateSpace(self.A, self.B, self.C, self.D, **names)
 
 
-def linearize(plant: Statement, derived: Derived, at: str | None = None) -> Linear:
+def linearize(plant: Statement, derived: Derived, at: str | None = None, side: float = 0.0) -> Linear:
     """Linear model about a named equilibrium; with the rig out of level, about the equilibrium nearest to it.
+
+    With a kink there it has one on each `side`, so far off in every state.
 
     Raises
     ------
     NotIdentifiable
-        When the named point is no equilibrium and none is found near it.
+        When the named point is no equilibrium and none is found near it, or it lies on a kink.
     ImpossiblePhysics
         When the mass matrix there is not positive definite.
     """
     point = _rest(plant, derived, plant.equilibrium(at))
-    mass, damping, stiffness, gain = small_motions(derived, {**plant.parameters(), **point})
+    here = {**plant.parameters(), **point}
+    if side:
+        here |= {state: here.get(state, 0.0) + side for state in plant.state_names()}
+    mass, damping, stiffness, gain = small_motions(derived, here)
     if np.linalg.eigvalsh(mass).min() <= 0:
         raise ImpossiblePhysics(
             f"{type(plant).__name__} needs a positive definite mass matrix, got {mass.tolist()}; check its inertias."
         )
+    if not side:
+        _check_kinks(plant, derived, point)
     n, m = gain.shape
     solve = np.linalg.solve(mass, np.hstack([-stiffness, -damping, gain]))
     A, B, C = np.zeros((2 * n, 2 * n)), np.zeros((2 * n, m)), np.zeros((n, 2 * n))
@@ -91,6 +98,27 @@ def linearize(plant: Statement, derived: Derived, at: str | None = None) -> Line
         A=A, B=B, C=C, mass=mass, point=point, states=plant.state_names(), inputs=derived.inputs,
         outputs=derived.coordinates,
     )  # fmt: skip
+
+
+def _check_kinks(plant: Statement, derived: Derived, point: dict[str, float]) -> None:
+    """Small motions are those of one linear model only where stiffness and damping are the same on all sides."""
+    if not any(chooses(text) for text in (*derived.stiffness, *derived.damping)):
+        return
+    at = {**plant.parameters(), **point}
+    size = max(float(np.abs(m).max()) for m in small_motions(derived, at)[1:3])
+    for name in (*derived.coordinates, *(f"{c}_dot" for c in derived.coordinates)):
+        near, far = (_across(derived, at, name, way) for way in (1e-9, 1e-6))
+        if near > max(0.5 * far, 1e-9 * size):  # what has no jump shrinks with the distance
+            raise NotIdentifiable(
+                f"{type(plant).__name__} has no linear model at {point}: stiffness or damping differ to either side in "
+                f"{name}; name an equilibrium on one side, or round the kink."
+            )
+
+
+def _across(derived: Derived, at: dict[str, float], name: str, way: float) -> float:
+    """Largest difference between stiffness or damping so far to either side."""
+    one, other = (small_motions(derived, {**at, name: at.get(name, 0.0) + d})[1:3] for d in (way, -way))
+    return max(float(np.abs(a - b).max()) for a, b in zip(one, other, strict=True))
 
 
 def _rest(plant: Statement, derived: Derived, point: dict[str, float]) -> dict[str, float]:
@@ -151,9 +179,9 @@ class Plant(Shown, Statement, abstract=True):
         states = {name: x[..., i] for i, name in enumerate(self.state_names())}
         return {**self.parameters(), **states}
 
-    def linear(self, at: str | None = None) -> Linear:
-        """State space about an equilibrium, friction viscous only; see `upright.physics.plant`."""
-        return linearize(self, self.derived_for(self.parameters()), at)
+    def linear(self, at: str | None = None, *, side: float = 0.0) -> Linear:
+        """State space about an equilibrium, friction viscous only; see `linearize`."""
+        return linearize(self, self.derived_for(self.parameters()), at, side)
 
 
 @cache

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from upright.errors import BadInput, nearest
 from upright.physics.combination import combination
+from upright.physics.equations import FUNCTIONS
 from upright.quantities import Quantity, quantities, quantity
 
 
@@ -163,7 +164,6 @@ class Statement:
         return {c.name: float(self.equilibria[at].get(c.name, 0.0)) for c in self.coordinates}
 
 
-FUNCTIONS = ("sin", "cos", "tan", "sqrt", "exp", "log", "pi")
 INTERMEDIATE = re.compile(r"[kscw]\d+")  # k0, s0, c0, w0: what `Derived` calls its own intermediate results
 QUANTITY = 'quantity("kg", "what it is")'
 

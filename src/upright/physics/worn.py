@@ -29,9 +29,10 @@ class WornFuruta(Furuta):
         T, V, D = Furuta.energies(p, q, v)
         return T, V + p.T_r / p.n_r * cos(p.n_r * q[0] + p.phi_r), D
 
-    def linear(self, at: str | None = None) -> Linear:
+    def linear(self, at: str | None = None, *, side: float = 0.0) -> Linear:
         """That of the rig without ripple and tilt, which are local."""
-        return Furuta(**{n: getattr(self, n) for n in Furuta.names()}).replace(tilt_x=0.0, tilt_y=0.0).linear(at)
+        plant = Furuta(**{n: getattr(self, n) for n in Furuta.names()})
+        return plant.replace(tilt_x=0.0, tilt_y=0.0).linear(at, side=side)
 
 
 class WornCartPendulum(CartPendulum):
@@ -53,6 +54,6 @@ class WornCartPendulum(CartPendulum):
         V += p.F_r / p.n_r * cos(p.n_r * q[0] + p.phi_r) - (p.m_c + p.m_p) * p.g * p.slope * q[0]
         return T, V, D
 
-    def linear(self, at: str | None = None) -> Linear:
+    def linear(self, at: str | None = None, *, side: float = 0.0) -> Linear:
         """That of the rig without ripple and slope, which are local."""
-        return CartPendulum(**{n: getattr(self, n) for n in CartPendulum.names()}).linear(at)
+        return CartPendulum(**{n: getattr(self, n) for n in CartPendulum.names()}).linear(at, side=side)

@@ -5,6 +5,7 @@ from html.parser import HTMLParser
 
 import pytest
 
+from tests.physics.bumpers import Bumpers
 from upright.physics import BUILT_IN, CartPendulum, Furuta, Pendulum, find
 from upright.report.fit.equations import equations
 from upright.report.symbols import symbol
@@ -50,6 +51,13 @@ def test_a_term_whose_parameter_is_zero_is_left_out():
     assert "tilt" not in text
     assert "b_1ψ˙" not in text
     assert "b_2θ˙" in text
+
+
+def test_a_force_in_pieces_is_written_with_its_conditions():
+    x = read(equations(Bumpers))[0]
+    assert "k(2(gap+x)ifgap+x≤0else0)" in x  # a spring that only pushes, and |x|^3 as -x^2 sgn(x) - 2 x |x|
+    assert "−(1ifx≥0else−1)x^2" in x
+    assert "−2(xifx≥0else−x)x" in x
 
 
 class Balanced(HTMLParser):

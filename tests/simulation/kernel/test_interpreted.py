@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.physics.bumpers import BUMPERS
 from tests.simulation.kernel.interpreter import interpreted
 from upright.laws import Law, Rule
 from upright.physics import Furuta, chain
@@ -63,6 +64,7 @@ CASES = {
     "a held arm": (FURUTA, {"b_2c": 0.004}, None, {"psi": Held(q=0.2 * np.sin(0.1 * np.arange(SAMPLES)))}),
     "a linear law": (FURUTA, LATE, linear, {}),
     "a rule": (FURUTA, {}, rule, {}),
+    "elementary functions and kinks": (BUMPERS, {}, None, {}),
 }
 
 

@@ -17,6 +17,8 @@ _ZERO = ast.Constant(0)
 _WEAK, _SUM, _PRODUCT, _POWER = 0, 1, 2, 3
 _LINE = 38  # names on one line of an equation
 _THIN = '<mspace width="0.17em"/>'
+_SPACE = 2 * _THIN
+_RELATIONS: dict[type[ast.cmpop], str] = {ast.Lt: "&lt;", ast.LtE: "≤", ast.Gt: "&gt;", ast.GtE: "≥", ast.Eq: "="}
 
 
 def equations(plant: type[Plant], *, zero: Collection[str] = ()) -> str:
@@ -167,6 +169,14 @@ class MathWriter:
                 return f"<mrow><mo>|</mo>{self(inner)}<mo>|</mo></mrow>"
             case ast.Call(func=ast.Name(id=name), args=[inner]):
                 return self._function(name, inner)
+            case ast.IfExp(test=test, body=body, orelse=orelse):
+                words = f"{self(body)}{_word('if')}{self(test)}{_word('else')}{self(orelse)}"
+                return _bracket(words, around > _WEAK)
+            case ast.Compare(left=a, ops=[op], comparators=[b]) if type(op) in _RELATIONS:
+                return f"<mrow>{self(a)}<mo>{_RELATIONS[type(op)]}</mo>{self(b)}</mrow>"
+            case ast.BoolOp(op=op, values=values):
+                word = _word("and" if isinstance(op, ast.And) else "or")
+                return _bracket(word.join(self(v) for v in values), around > _WEAK)
             case _:
                 return f"<mtext>{escape(ast.unparse(node))}</mtext>"
 
@@ -217,6 +227,10 @@ class MathWriter:
                 return self._function(name, inner, power)
             case _:
                 return f"<msup><mrow>{self(e, _POWER)}</mrow>{power}</msup>"
+
+
+def _word(word: str) -> str:
+    return f"{_SPACE}<mtext>{word}</mtext>{_SPACE}"
 
 
 def _bracket(inner: str, needed: bool) -> str:
