@@ -116,7 +116,7 @@ def waving(t, y, r, z, p):
 
 def test_a_rule_that_needs_the_c_library_is_refused_by_what_it_needs(monkeypatch):
     monkeypatch.setattr(gpu, "door", Driver)
-    with pytest.raises(BadInput, match="a GPU has no C library, and the rule or plant needs exp, pow, sin of it"):
+    with pytest.raises(BadInput, match="a GPU has no C library, and the rule or plant needs pow of it"):
         ensemble(CARTS, {}, np.zeros(4), None, DT, samples=9, loop=Rule(function=waving), device="gpu")
 
 

@@ -26,7 +26,9 @@ Array = NDArray[np.float64]
 Numbers = tuple[float, ...]
 Function = Callable[[float, Any, Any, Any, Any], tuple[Any, Any]]
 
-KNOWN = frozenset({"sin", "cos", "tan", "exp", "sqrt", "floor", "pi"})
+KNOWN = frozenset(
+    {"sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "floor", "pi"}
+)
 """Names from `math` that the function may use."""
 _BUILT_IN = frozenset({"abs", "min", "max", "float", "int", "range", "len", "round", "bool"})
 _SIGNATURE = 5

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from tests.simulation.lowering.machine_code import compiled
+from upright.laws.rule import KNOWN
+from upright.physics.equations import FUNCTIONS
 from upright.simulation.kernel.elementary import ALWAYS, NAMES, called
 
 ULP = 3.0
@@ -82,6 +84,8 @@ def test_the_angle_of_a_point(lanes):
 
 def test_nothing_is_left_out():
     assert {*RANGES, "atan2"} == NAMES
+    assert NAMES | {"sqrt", "floor", "pi"} == KNOWN
+    assert NAMES | {"sqrt", "abs", "pi"} == {*FUNCTIONS}
 
 
 @pytest.mark.parametrize("lanes", [1, 16])

@@ -43,10 +43,12 @@ EVENTS: tuple[Type, ...] = (ArrayOf(0), ArrayOf(0), INT, FLOAT)
 def source(p: Layout) -> str:
     """Text of the module that steps one plant in one flavour."""
     d = p.derived
-    functions = called(*d.lumps, *(of for _, _, of in d.trig), *(text for _, text in d.steps), *d.mass, *d.force)
+    texts = [*d.lumps, *(of for _, _, of in d.trig), *(text for _, text in d.steps), *d.mass, *d.force]
+    texts += [p.flavour.loop.text] if isinstance(p.flavour.loop, Written) else []
+    functions = called(*texts)
     parts = [f'"""Generated kernel of {d.name}; {p.flavour}"""', ALWAYS, *[functions] * bool(functions)]
     parts += [acceleration(p), step(p)]
-    parts += [f"@inline_strict\n{p.flavour.loop.text}\n"] if isinstance(p.flavour.loop, Written) else []
+    parts += [f"@exact\n{p.flavour.loop.text}\n"] if isinstance(p.flavour.loop, Written) else []
     parts += [ROUNDING] if p.flavour.loop else []
     parts += [law(p)] if isinstance(p.flavour.loop, Structure) else []
     if p.flavour.dry:
