@@ -133,7 +133,7 @@ def test_fmpy_s_validator_finds_nothing_and_its_simulation_agrees(tmp_path):
 @pytest.mark.parametrize(
     "line",
     [
-        "while n > 0: n = n - 1", "n = n << 2", "n = round(0.5)", "n = 0.5 % 2", "n = [1, 2]", "n + 1",
+        "assert n > 0", "n = n << 2", "n = round(0.5, 1)", "n = len(n)", "n = [1, 2]", "n + 1",
         "for i in range(0, 9, 2): n = i",
     ],
 )  # fmt: skip

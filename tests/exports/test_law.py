@@ -18,7 +18,7 @@ from upright.errors import BadInput
 from upright.exports.controller import of_law
 from upright.exports.targets import TARGETS
 from upright.exports.vector import self_test
-from upright.laws import Law, Rule, at_work
+from upright.laws import Law, at_work
 from upright.simulation import simulate
 
 LAWS = laws()
@@ -250,12 +250,3 @@ def test_a_name_cannot_end_the_comment_that_it_stands_in(tmp_path):
             (tmp_path / file).write_text(text, encoding="utf-8")
     assert PASSED in said(compiled(tmp_path, "-std=c99"))
     assert PASSED in said(sys.executable, "-I", tmp_path / "law.py")
-
-
-def hop(t, y, r, z, p):
-    return (p[0],), z
-
-
-def test_a_rule_is_told_from_a_law():
-    with pytest.raises(BadInput, match="function in Python"):
-        of_law(Rule(function=hop, parameters=[1.0]))

@@ -235,6 +235,7 @@ class SwingUp:
             function=swing_and_hold, parameters=[numbers[n] for n in PARAMETERS],
             initial=np.array([at[..., 0], at[..., 1], speeds[..., 0], speeds[..., 1], mode, zero, zero, zero - 1.0]),
             quantum=np.abs(rig.quantum / rig.shown), command_quantum=rig.converter,
+            measured=tuple(c.name for c in rig.plant.coordinates), period=self.period,
         )  # fmt: skip
 
 

@@ -56,7 +56,7 @@ class Language:
 
 def statements(made: SampledController, say: Language) -> list[str]:
     """One sample of the law."""
-    law, limit = made.law, made.law.limit
+    law, limit = made.linear, made.linear.limit
     A, B, C, D = (getattr(law, name).tolist() for name in "ABCD")
     target, initial = (law.arrays()[name][0].tolist() for name in ("target", "initial"))
     hold = law.windup == "hold" and math.isfinite(limit)
@@ -88,18 +88,13 @@ def statements(made: SampledController, say: Language) -> list[str]:
         for k, value, what in zip([*C[j], *D[j]], [*memory, *signals], of, strict=True):
             for term in _terms([k], [value], say):
                 put(f"c{j} = c{j} + {term}", f"of {what}")
-        step = float(made.converter[j])
-        if step:
-            put(
-                f"c{j} = {say.floor}(c{j} * {say.number(1.0 / step)} + {say.number(0.5)}) * {say.number(step)}",
-                "to the converter's steps",
-            )
+        if step := float(made.converter[j]):
+            put(_rounded(j, step, say), "to the converter's steps")
     if hold:
         beyond = f" {say.either} ".join(f"{say.absolute}(c{j}) > {say.number(limit)}" for j in range(len(C)))
         put(f"{say.let}beyond = {beyond}", "sums then stand still")
     for j in range(len(C)):
-        given = say.limited(f"c{j}", say.number(limit)) if math.isfinite(limit) else f"c{j}"
-        put(f"{say.command(j)} = {given}")
+        put(_given(j, limit, say))
     for i, (a, b) in enumerate(zip(A, B, strict=True)):
         terms = _terms([*a, *b], [*memory, *signals], say)
         remark = "" if i else "what is remembered until the next sample"
@@ -109,6 +104,22 @@ def statements(made: SampledController, say: Language) -> list[str]:
         stands = hold and all(value == float(i == j) for j, value in enumerate(row))
         lines += say.hold(kept) if stands else [kept]
     return lines
+
+
+def put_out(made: SampledController, say: Language) -> list[str]:
+    """What becomes of the commands c0, c1, ... of a rule."""
+    rounded = [_rounded(j, step, say) for j, step in enumerate(made.converter.tolist()) if step]
+    given = [_given(j, made.law.limit, say) for j in range(len(made.commands))]
+    return [f"{line}{say.end}" for line in (*rounded, *given)]
+
+
+def _rounded(j: int, step: float, say: Language) -> str:
+    return f"c{j} = {say.floor}(c{j} * {say.number(1.0 / step)} + {say.number(0.5)}) * {say.number(step)}"
+
+
+def _given(j: int, limit: float, say: Language) -> str:
+    limited = say.limited(f"c{j}", say.number(limit)) if math.isfinite(limit) else f"c{j}"
+    return f"{say.command(j)} = {limited}"
 
 
 def _terms(factors: list[float], values: list[str], say: Language) -> list[str]:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from upright.exports.arithmetic import Language, statements
+from upright.exports import rule
+from upright.exports.arithmetic import Language, put_out, statements
 from upright.exports.controller import SampledController, identifiers
 from upright.exports.vector import ReplayVector
+from upright.laws import Rule
 from upright.laws.linear import Array
 
 _EXACT = """\
@@ -62,8 +64,8 @@ typedef {"float" if single else "double"} law_real;
 #define LAW_COMMANDS {len(made.commands)}
 {steps}
 typedef struct {{
-    law_real z[{max(len(made.law.A), 1)}];
-    int running;
+    law_real z[{max(made.memories, 1)}];
+    {"unsigned long samples" if isinstance(made.law, Rule) else "int running"};
 }} law_state;
 
 /* Before the first sample: forget, so that no jump is taken for a speed. */
@@ -89,6 +91,8 @@ def source(made: SampledController, *, single: bool) -> str:
         first=lambda lines: ["if (!s->running) {", *(f"    {line}" for line in lines), "}"],
         hold=lambda line: ["if (!beyond)", f"    {line}"], either="||",
     )  # fmt: skip
+    if isinstance(made.law, Rule):
+        return _of_rule(made, put_out(made, say))
     body = "\n".join(f"    {line}".replace("law_real beyond", "int beyond") for line in statements(made, say))
     unused = "" if made.references else "    (void)r;\n"
     return f"""\
@@ -110,6 +114,48 @@ void law_step(law_state *s, const law_real *y, const law_real *r, law_real *u)
 {{
 {unused}{body}
     s->running = 1;
+}}
+"""
+
+
+def _of_rule(made: SampledController, last: list[str]) -> str:
+    inputs, states = len(made.commands), made.memories
+    parameters, initial = (", ".join(number(x, False) for x in values) or "0" for values in rule.numbers(made))
+    commands = "\n".join(f"    law_real c{j} = found[{j}];" for j in range(inputs))
+    body = "\n".join(f"    {line}" for line in last)
+    copied = "for (i = 0; i < LAW_REFERENCES; i++)\n        asked[i] = r[i];" if made.references else "(void)r;"
+    return f"""\
+/* {made.title}, written by upright export; see law.h. */
+{_EXACT}
+#include "law.h"
+
+#include <math.h>
+
+{rule.in_c(made)}
+static double parameters[] = {{{parameters}}};
+static const double initial[] = {{{initial}}};
+
+void law_start(law_state *s)
+{{
+    unsigned i;
+    for (i = 0; i < sizeof initial / sizeof initial[0]; i++)
+        s->z[i] = initial[i];
+    s->samples = 0;
+}}
+
+void law_step(law_state *s, const law_real *y, const law_real *r, law_real *u)
+{{
+    double given[LAW_READINGS], asked[LAW_REFERENCES + 1] = {{0}}, found[{inputs + states}];
+    int i;
+    for (i = 0; i < LAW_READINGS; i++)
+        given[i] = y[i];
+    {copied}
+    k_rule(s->samples * LAW_PERIOD, given, asked, s->z, parameters, found);
+{commands}
+{body}
+    for (i = 0; i < {states}; i++)
+        s->z[i] = found[{inputs} + i];
+    s->samples++;
 }}
 """
 

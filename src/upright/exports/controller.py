@@ -21,7 +21,7 @@ class SampledController:
 
     Attributes
     ----------
-    law : Law
+    law : Law or Rule
     readings, references, commands : tuple of str
     reading_units : tuple of str
     command_unit : str
@@ -35,7 +35,7 @@ class SampledController:
         How late a command acts, as the design assumed [samples].
     """
 
-    law: Law
+    law: Law | Rule
     readings: tuple[str, ...]
     commands: tuple[str, ...]
     references: tuple[str, ...] = ()
@@ -45,6 +45,17 @@ class SampledController:
     title: str = "a sampled law"
     states_from: str = ""
     delay: float | None = None
+
+    @property
+    def linear(self) -> Law:
+        """The law, where it is one of matrices."""
+        assert isinstance(self.law, Law)  # asked before
+        return self.law
+
+    @property
+    def memories(self) -> int:
+        """How many numbers it remembers."""
+        return len(self.law.A) if isinstance(self.law, Law) else self.law.compiled_in.states
 
     @property
     def converter(self) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -61,16 +72,16 @@ class SampledController:
         """What a reader of the program has to know, a sentence each."""
         units = [f"{n} [{u}]" if u else n for n, u in zip(self.readings, self.reading_units, strict=True)]
         unit = f" [{self.command_unit}]" if self.command_unit else ""
-        rest = [f"{v!r}" for v in self.law.arrays()["target"][0].tolist()]
+        rest = [f"{v!r}" for v in self.law.arrays()["target"][0].tolist()] if isinstance(self.law, Law) else []
         said = [
             f"Call it every {self.law.period!r} s, with readings taken just before, and put the command out at once.",
-            f"Readings: {', '.join(units)}; at rest {', '.join(rest)}.",
+            f"Readings: {', '.join(units)}" + (f"; at rest {', '.join(rest)}." if rest else "."),
             f"Commands: {', '.join(self.commands)}{unit}; "
             + (f"none beyond {self.law.limit!r}" if math.isfinite(self.law.limit) else "NO LIMIT WAS SAID")
             + (f", in steps of {self.converter.max():g}." if self.converter.any() else ", not rounded."),
         ]
         if self.references:
-            said.append(f"References: {', '.join(self.references)}, as deviations from rest.")
+            said.append(f"References: {', '.join(self.references)}" + (", as deviations from rest." if rest else "."))
         if self.states_from:
             said.append(f"States from readings: {self.states_from}.")
         if self.delay is not None:
@@ -85,17 +96,12 @@ def of_law(law: Any) -> SampledController:
     Raises
     ------
     BadInput
-        When it is none that can be written out: no period, several lanes, a function.
+        When it is none that can be written out: no period, several lanes, a rule without names of its readings.
     """
-    if isinstance(law, Rule):
+    if not isinstance(law, Law | Rule):
         raise BadInput(
-            "an exported law is a linear one, a Law, and this is a Rule, a function in Python; its text can be taken "
-            "to a computer that runs Python as it is, and Rule.follow calls it on logged readings."
-        )
-    if not isinstance(law, Law):
-        raise BadInput(
-            f"export takes design.json or its folder, what design(...) answers, or a Law, got {type(law).__name__}; "
-            "for gains alone make a Law: upright.laws.state_feedback(K, period)."
+            f"export takes design.json or its folder, what design(...) answers, a Law or a Rule, got "
+            f"{type(law).__name__}; for gains alone make a Law: upright.laws.state_feedback(K, period)."
         )
     lanes = max(law.widths().values())
     if lanes > 1:
@@ -104,16 +110,22 @@ def of_law(law: Any) -> SampledController:
         raise BadInput("an exported law needs its sample period; give it: dataclasses.replace(law, period=1e-3).")
     single = {name: a[..., 0] for name, (a, axes) in law.arrays().items() if a.ndim > axes}
     made = replace(law, **single) if single else law
-    readings = tuple(map(plain, law.measured)) or tuple(f"y{i}" for i in range(law.readings))
-    references = tuple(map(plain, law.reference_names)) or tuple(f"r{i}" for i in range(law.signal().shape[1]))
-    inputs = len(law.C)
-    return _without_idle_references(
-        SampledController(
-            law=made, readings=readings, references=references, reading_units=("",) * len(readings),
-            signs=(1.0,) * len(readings), commands=("u",) if inputs == 1 else tuple(f"u{j}" for j in range(inputs)),
-            delay=law.delay or None,
-        )
+    references = tuple(f"r{i}" for i in range(law.signal().shape[1]))
+    if isinstance(law, Rule):
+        if not law.measured:
+            raise BadInput(
+                'an exported rule needs its readings\' names: dataclasses.replace(rule, measured=("theta",)).'
+            )
+        readings, inputs = law.measured, law.commands(len(law.measured))
+    else:
+        readings = law.measured or tuple(f"y{i}" for i in range(law.readings))
+        references, inputs = law.reference_names or references, len(law.C)
+    written = SampledController(
+        law=made, readings=tuple(map(plain, readings)), references=tuple(map(plain, references)),
+        reading_units=("",) * len(readings), signs=(1.0,) * len(readings),
+        commands=("u",) if inputs == 1 else tuple(f"u{j}" for j in range(inputs)), delay=law.delay or None,
     )  # fmt: skip
+    return written if isinstance(law, Rule) else _without_idle_references(written)
 
 
 def of_design(content: Any, source: str) -> SampledController:
@@ -180,7 +192,7 @@ def _read(content: Mapping[str, Any]) -> SampledController:
 
 def _without_idle_references(made: SampledController) -> SampledController:
     """The same without references that nothing depends on."""
-    law, p = made.law, len(made.readings)
+    law, p = made.linear, len(made.readings)
     used = [c for c in range(law.D.shape[1] - p) if law.B[:, p + c].any() or law.D[:, p + c].any()]
     keep = [*range(p), *(p + c for c in used)]
     names = tuple(made.references[c] for c in used)

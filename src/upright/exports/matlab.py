@@ -40,7 +40,7 @@ function [u, s] = law_step(s, y{with_r})
 {about}
 %#codegen
     if isempty(s)
-        s = struct('z', zeros({max(len(made.law.A), 1)}, 1, '{number}'), 'running', false);
+        s = struct('z', zeros({max(made.memories, 1)}, 1, '{number}'), 'running', false);
     end
     y = {number}(y);
     u = zeros({len(made.commands)}, 1, '{number}');
@@ -78,7 +78,7 @@ def _table(name: str, rows: Array) -> str:
 
 def _s_function(made: SampledController, *, single: bool) -> str:
     """Text of ``law_sfun.m``, which keeps memory in Simulink's own, so that stored states can be restored."""
-    m, z, number = len(made.references), max(len(made.law.A), 1), "single" if single else "double"
+    m, z, number = len(made.references), max(made.memories, 1), "single" if single else "double"
     r = ", block.InputPort(2).Data" if m else ""
     second = (
         f"    block.InputPort(2).Dimensions = {m};\n    block.InputPort(2).DirectFeedthrough = true;\n" if m else ""

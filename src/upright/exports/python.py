@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from upright.exports.arithmetic import Language, statements
+from upright.exports import rule
+from upright.exports.arithmetic import Language, put_out, statements
 from upright.exports.controller import SampledController
 from upright.exports.vector import ReplayVector
+from upright.laws import Rule
 
 _LANGUAGE = Language(
     number=lambda x: repr(float(x)), reading="y[{}]".format, reference="r[{}]".format, memory="z[{}]".format,
@@ -17,9 +19,22 @@ _LANGUAGE = Language(
 
 def files(made: SampledController, test: ReplayVector) -> dict[str, str]:
     """Text by file name."""
-    body = "\n".join(f"        {line}" for line in statements(made, _LANGUAGE))
     about = "\n".join(made.facts)
-    needs = "from math import floor\n\n" if "floor(" in body else ""
+    if isinstance(made.law, Rule):
+        needs, before = "from math import floor, frexp, nan, pi, sqrt\n\n", f"\n\n{rule.in_python(made)}\n"
+        parameters, initial = (tuple(values) for values in rule.numbers(made))
+        begin = [f"self.z = {initial!r}", "self.samples = 0"]
+        inputs = range(len(made.commands))
+        lines = [
+            f"found, self.z = rule(self.samples * PERIOD, tuple(y), tuple(r), self.z, {parameters!r})",
+            *(f"c{j} = found[{j}]" for j in inputs), f"u = [0.0] * {len(made.commands)}", *put_out(made, _LANGUAGE),
+            "self.samples += 1",
+        ]  # fmt: skip
+    else:
+        before, begin = "", [f"self.z = [0.0] * {made.memories}", "self.running = False"]
+        lines = [f"z, u = self.z, [0.0] * {len(made.commands)}", *statements(made, _LANGUAGE), "self.running = True"]
+        needs = "from math import floor\n\n" if any("floor(" in line for line in lines) else ""
+    first, body = ("\n".join(f"        {line}" for line in part) for part in (begin, lines))
     rows = zip(test.readings.tolist(), test.references.tolist(), test.commands.tolist(), strict=True)
     table = "\n".join(f"    ({y}, {r}, {u})," for y, r, u in rows)
     return {
@@ -34,20 +49,17 @@ Run this file to test it: the commands are compared with those of upright's own 
 READINGS = {made.readings!r}
 REFERENCES = {made.references!r}
 COMMANDS = {made.commands!r}
-
+{before}
 
 class Law:
     """One run of the law; make another one for the next run."""
 
     def __init__(self):
-        self.z = [0.0] * {len(made.law.A)}
-        self.running = False
+{first}
 
     def step(self, y, r=()):
         """Commands for the readings `y` and references `r` of one sample."""
-        z, u = self.z, [0.0] * {len(made.commands)}
 {body}
-        self.running = True
         return u
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from upright.exports.controller import SampledController
-from upright.laws import Law
+from upright.laws import Law, Rule
 from upright.laws.linear import Array
 from upright.physics.equations import Derived
 from upright.simulation import Held, simulate
@@ -47,28 +47,49 @@ def self_test(made: SampledController) -> ReplayVector:
     The commands are those of the compiled kernel with the readings as prescribed motion: of the one that simulates
     this law on a rig.
     """
-    law, k = made.law, np.arange(SAMPLES)
-    n, target = len(made.readings), made.law.arrays()["target"][0]
+    if isinstance(made.law, Rule):
+        return _of_rule(made)
+    law, k = made.linear, np.arange(SAMPLES)
+    n, target = len(made.readings), law.arrays()["target"][0]
     shape = np.column_stack([np.cos(0.006 * (i + 2) * k**1.6 + i) for i in range(n)])
     signal = np.repeat(np.where(k < SAMPLES // 2, 0.0, 0.5)[:, None], len(made.references), axis=1)
     unit = replace(law, references=signal, limit=math.inf, command_quantum=0.0, quantum=0.0, delay=0.0)
     peak = float(np.abs(unit.follow(target + shape)[0]).max(initial=0.0))
     size = BEYOND * law.limit / peak if math.isfinite(law.limit) and peak > 0 else 0.1
-    readings = target + size * shape
-    step = made.encoder
-    on_steps = np.floor(readings / np.where(step > 0, step, 1.0) + 0.5) * step
-    readings = np.where(step > 0, on_steps, readings)
+    readings = _on_steps(made, target + size * shape)
     references = size * signal
     full = replace(law, references=references, delay=0.0)
     return ReplayVector(
-        readings=readings, references=references, commands=commanded(full, readings),
+        readings=readings, references=references, commands=commanded(full, readings, len(law.C)),
         single=_single_precision(made, full, readings),
     )  # fmt: skip
 
 
-def commanded(law: Law, readings: Array) -> Array:
+def _of_rule(made: SampledController) -> ReplayVector:
+    """Readings that swing about zero, further and further, as far as a turn: a function switches nobody knows where.
+
+    How far single precision may then miss nobody knows either.
+    """
+    k, law = np.arange(SAMPLES), made.law
+    size = np.geomspace(1e-3, 2 * math.pi, SAMPLES)[:, None]
+    shape = np.column_stack([np.cos(0.02 * (i + 2) * k**1.6 + i) for i in range(len(made.readings))])
+    readings = _on_steps(made, size * shape)
+    references = np.repeat(np.where(k < SAMPLES // 2, 0.0, 0.5)[:, None], len(made.references), axis=1)
+    full = replace(law, references=references, delay=0.0)
+    commands = commanded(full, readings, len(made.commands))
+    return ReplayVector(readings=readings, references=references, commands=commands, single=0.0)
+
+
+def _on_steps(made: SampledController, readings: Array) -> Array:
+    """As the encoders show them."""
+    step = made.encoder
+    on_steps = np.floor(readings / np.where(step > 0, step, 1.0) + 0.5) * step
+    return np.where(step > 0, on_steps, readings)
+
+
+def commanded(law: Law | Rule, readings: Array, inputs: int) -> Array:
     """Commands of the kernel, shape (N, inputs), where every coordinate moves as prescribed."""
-    n, inputs = readings.shape[1], len(law.C)
+    n = readings.shape[1]
     names, forces = tuple(f"y{i}" for i in range(n)), tuple(f"u{j}" for j in range(inputs))
     nothing = Derived(
         name="Readings", coordinates=names, inputs=forces, parameters=(), lumps=(), trig=(), steps=(),

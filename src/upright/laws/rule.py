@@ -71,11 +71,17 @@ class Rule(Controller):
     initial : array, shape (z,) or (z, lanes)
         What it remembers at a lane's first sample.
     parameters : array, shape (p,) or (p, lanes)
+    measured : tuple of str
+        Names of the readings, where it is to be exported.
+    period : float
+        Time between two samples that it is made for [s], where it is known; 0 else.
     """
 
     function: Function
     initial: ArrayLike = ()
     parameters: ArrayLike = ()
+    measured: tuple[str, ...] = ()
+    period: float = 0.0
 
     def __post_init__(self) -> None:
         text_of(self.function)
@@ -97,6 +103,16 @@ class Rule(Controller):
     def arrays(self) -> dict[str, tuple[Array, int]]:
         """Parameters and first memory."""
         return {n: (np.asarray(getattr(self, n), dtype=np.float64), 1) for n in ("parameters", "initial")}
+
+    def commands(self, readings: int) -> int:
+        """How many commands it gives for so many readings."""
+        p, z = (_tuple(a[:, 0]) for a in self.by_lane(1).values())
+        try:
+            return len(self.function(0.0, (0.0,) * readings, _tuple(self.signal()[0]), z, p)[0])
+        except Exception as error:
+            raise BadInput(
+                f"the rule stops at readings of zero: {type(error).__name__}: {error}; it needs a command for any."
+            ) from error
 
     def rows(self, nu: int, lanes: int, q: Array) -> Array:
         """Numbers as the kernel reads them, shape (numbers, lanes), for lanes that begin at coordinates `q`."""

@@ -56,10 +56,10 @@ def of_values(values: Mapping[str, Any]) -> Law | Rule:
     given: dict[str, Any] = dict(values)
     kind = given.pop("kind", None)
     try:
+        given |= {n: tuple(given[n]) for n in ("measured", "reference_names") if n in given}
         if kind == "linear":
             if np.shape(given["C"])[1] == 0:  # rows of no numbers are none in a list
                 given |= {"A": np.zeros((0, 0)), "B": np.zeros((0, np.shape(given["D"])[1]))}
-            given |= {n: tuple(given[n]) for n in ("measured", "reference_names") if n in given}
             given |= {n: np.asarray(given[n], dtype=np.float64) for n in (*"ABCD", "begin") if n in given}
             return Law(**given)
         if kind == "rule":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from upright.exports.controller import plain
-from upright.exports.fmu.translation import HELPERS, Kind, translated
+from upright.exports.fmu.translation import Kind, helpers, translated
 from upright.exports.fmu.unit import STEP, Unit
 from upright.simulation.kernel.compiled import source as kernel_text
 from upright.simulation.kernel.flavour import lay_out
@@ -47,7 +47,7 @@ def source(unit: Unit, token: str) -> str:
 static const double NUMBERS[ROWS] = {{{numbers}}};
 static const int PLACES[] = {{{places}}};
 
-{HELPERS}
+{helpers(kernel)}
 {kernel}
 {_FMI}{"".join(map(_nothing, _TYPES))}{"".join(map(_refused, _REFUSED))}"""
 

@@ -13,13 +13,14 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from upright.errors import BadInput
+from upright.simulation.lowering.instructions import LARGEST_POWER
 
 Kind = Literal["long", "double", "double *", "long *"]
 Arrays = Mapping[str, tuple[Kind, tuple[int, ...]]]
 """Kind of each array argument, and what each of its indices is multiplied by."""
 
 _OPERATORS: dict[type[ast.AST], str] = {
-    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "/", ast.Mod: "%", ast.BitAnd: "&",
+    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.BitAnd: "&",
     ast.BitOr: "|", ast.BitXor: "^", ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==",
     ast.NotEq: "!=", ast.And: "&&", ast.Or: "||", ast.USub: "-", ast.UAdd: "+", ast.Not: "!",
 }  # fmt: skip
@@ -31,14 +32,34 @@ _KEYWORDS = {
     "static", "struct", "switch", "typedef", "union", "unsigned", "void", "volatile", "while",
 }  # fmt: skip
 
-HELPERS = """\
-static long least_l(long a, long b) { return b < a ? b : a; }
-static long most_l(long a, long b) { return b > a ? b : a; }
-static double least_d(double a, double b) { return b < a ? b : a; }
-static double most_d(double a, double b) { return b > a ? b : a; }
-static void parted_d(double x, double *result) { int n; result[0] = frexp(x, &n); result[1] = n; }
-"""
-"""What `min` and `max` become, the first unless the second is better; and `frexp`, with its pair."""
+_HELPERS = (
+    "static long least_l(long a, long b) { return b < a ? b : a; }\n",
+    "static long most_l(long a, long b) { return b > a ? b : a; }\n",
+    "static double least_d(double a, double b) { return b < a ? b : a; }\n",
+    "static double most_d(double a, double b) { return b > a ? b : a; }\n",
+    "static long quotient_l(long a, long b) { return b ? a / b - (a % b && (a < 0) != (b < 0)) : 0; }\n",
+    "static long rest_l(long a, long b) { return b ? a % b + (a % b && (a < 0) != (b < 0) ? b : 0) : 0; }\n",
+    "static double rest_d(double a, double b) { double r = fmod(a, b); return r && (r < 0) != (b < 0) ? r + b : r; }\n",
+    """\
+static double power_d(double x, int n)
+{
+    double out = n & 1 ? x : 1;
+    while (n >>= 1) {
+        x *= x;
+        out = n & 1 ? out * x : out;
+    }
+    return out;
+}
+""",
+    "static void parted_d(double x, double *result) { int n; result[0] = frexp(x, &n); result[1] = n; }\n",
+)
+"""Small functions by which C does as the kernel does: the first of two unless the second is better, whole quotients
+towards minus infinity, whole powers by products, `frexp` with both its results."""
+
+
+def helpers(text: str) -> str:
+    """Those that a text calls."""
+    return "".join(h for h in _HELPERS if f"{h.split('(')[0].split()[-1]}(" in text)
 
 
 @dataclass
@@ -150,7 +171,7 @@ def _kind(node: ast.expr, known: _Known, functions: Mapping[str, _Known]) -> Kin
         case ast.Constant(value=value):
             return "double" if isinstance(value, float) else "long"
         case ast.Name(id=name):
-            return "double" if name in _CONSTANTS else known.kinds.get(name, "long")
+            return known.kinds.get(name, "double" if name in _CONSTANTS else "long")
         case ast.BinOp(left=left, op=op, right=right):
             return "double" if isinstance(op, ast.Div | ast.Pow) else of(left, right)
         case ast.UnaryOp(op=op, operand=operand):
@@ -160,7 +181,7 @@ def _kind(node: ast.expr, known: _Known, functions: Mapping[str, _Known]) -> Kin
         case ast.Call(func=ast.Name(id=name), args=args):
             if name in functions:
                 return functions[name].result
-            return of(*args) if name in ("abs", "min", "max") else "long" if name == "int" else "double"
+            return of(*args) if name in ("abs", "min", "max") else "long" if name in ("int", "round") else "double"
         case ast.Subscript(value=ast.Name(id=name), slice=ast.Slice()):
             return known.kinds.get(name, "double *")
         case ast.Subscript(value=ast.Name(id=name)):
@@ -194,7 +215,9 @@ class _Writer:
             for kind in ("long", "double")
             if kind in own.values()
         ]
-        return "\n".join([head, "{", *declared, *self.lines, "}", ""])
+        read = {n.id for n in ast.walk(known.node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
+        unread = [f"    (void){_name(n)};" for n in {**dict.fromkeys(known.arguments), **own} if n not in read]
+        return "\n".join([head, "{", *declared, *unread, *self.lines, "}", ""])
 
     def add(self, line: str) -> None:
         self.lines.append("    " * self.depth + line)
@@ -210,12 +233,17 @@ class _Writer:
             case ast.Assign(targets=[target], value=value):
                 self.assign(target, value)
             case ast.AugAssign(target=target, op=op, value=value):
-                self.add(f"{self.value(target)} {_operator(op, node)}= {self.value(value)};")
+                whole = ast.copy_location(ast.BinOp(target, op, value), node)
+                self.add(f"{self.value(target)} = {self.value(whole)};")
             case ast.For(target=ast.Name(id=name), iter=ast.Call(args=[_] | [_, _] as ends)):
                 low, high = ("0", self.value(ends[0])) if len(ends) == 1 else (self.value(e) for e in ends)
                 i = _name(name)
                 self.add(f"for ({i} = {low}; {i} < {high}; {i}++) {{")
                 self.block(node.body)
+                self.add("}")
+            case ast.While(test=test, body=body, orelse=[]):
+                self.add(f"while ({self.value(test)}) {{")
+                self.block(body)
                 self.add("}")
             case ast.If(test=test, body=body, orelse=orelse):
                 self.add(f"if ({self.value(test)}) {{")
@@ -236,6 +264,8 @@ class _Writer:
                 self.add(f"{self.value(call)};")
             case ast.Expr(value=ast.Constant()):
                 pass  # what a function says of itself
+            case ast.Pass():
+                self.add(";")
             case ast.Break() | ast.Continue():
                 self.add(f"{type(node).__name__.lower()};")
             case _:
@@ -271,12 +301,14 @@ class _Writer:
             case ast.Constant(value=int() | float() as value):
                 return repr(value)
             case ast.Name(id=name):
-                return _CONSTANTS.get(name, _name(name))
+                return _name(name) if name in self.known.kinds else _CONSTANTS.get(name, _name(name))
+            case ast.BinOp(left=left, op=ast.Pow(), right=ast.Constant(value=int(n))) if 0 < n <= LARGEST_POWER:
+                return f"power_d({self.value(left)}, {n})"
             case ast.BinOp(left=left, op=ast.Pow(), right=right):
                 return f"pow({self.value(left)}, {self.value(right)})"
             case ast.BinOp(left=left, op=op, right=right):
-                if isinstance(op, ast.FloorDiv | ast.Mod) and _kind(node, self.known, self.functions) != "long":
-                    raise _refusal(node)  # C's are for whole numbers, of which the kernel divides none below zero
+                if isinstance(op, ast.FloorDiv | ast.Mod):
+                    return self.floored(op, left, right, _kind(node, self.known, self.functions) == "long")
                 whole = isinstance(op, ast.Div) and _kind(left, self.known, self.functions) == "long"
                 return f"({'(double)' * whole}{self.value(left)} {_operator(op, node)} {self.value(right)})"
             case ast.UnaryOp(op=op, operand=operand):
@@ -300,6 +332,13 @@ class _Writer:
             case _:
                 raise _refusal(node)
 
+    def floored(self, op: ast.operator, left: ast.expr, right: ast.expr, whole: bool) -> str:
+        """Quotient towards minus infinity, or its rest; C's own go towards zero."""
+        a, b = self.value(left), self.value(right)
+        if isinstance(op, ast.Mod):
+            return f"rest_{'l' if whole else 'd'}({a}, {b})"
+        return f"quotient_l({a}, {b})" if whole else f"floor((double){a} / {b})"
+
     def call(self, name: str, args: list[ast.expr], node: ast.expr) -> str:
         given = ", ".join(self.value(a) for a in args)
         if name in self.functions:
@@ -313,6 +352,8 @@ class _Writer:
             return f"labs({given})" if whole else f"fabs({given})"
         if name in ("min", "max"):
             return f"{'least' if name == 'min' else 'most'}_{'l' if whole else 'd'}({given})"
+        if name == "round" and len(args) == 1:
+            return f"(long)rint({given})"
         if name in ("int", "float"):
             return f"({'long' if name == 'int' else 'double'})({given})"
         raise _refusal(node)

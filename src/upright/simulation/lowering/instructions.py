@@ -48,7 +48,8 @@ _CONVERSIONS: dict[tuple[Kind, Kind], str] = {
     ("float", "int"): "fptosi",
 }
 _IN_VECTORS = ("floor", "fabs", "sqrt")
-_LARGEST_POWER = 16
+LARGEST_POWER = 16
+"""Up to this whole exponent powers are products."""
 
 
 class Crooked(Exception):
@@ -346,7 +347,7 @@ class Instructions:
 
     def power(self, a: Value, b: Value) -> Value:
         """A power: by multiplications where the exponent is a small whole number."""
-        if b.const is not None and 0 < b.const <= _LARGEST_POWER:
+        if b.const is not None and 0 < b.const <= LARGEST_POWER:
             out, square, n = None, a, b.const
             while n:
                 if n & 1:

@@ -29,7 +29,7 @@ def export(
 
     Parameters
     ----------
-    source : path, answer of `design`, or Law
+    source : path, answer of `design`, Law or Rule
         Of a law design.json or its folder; of a rig fit.json or its folder.
     to : str
         A law as ``"c"``, ``"arduino"``, ``"python"``, ``"matlab"`` (GNU Octave too) or ``"simulink"``; a rig as
@@ -39,6 +39,7 @@ def export(
         Folder for the files.
     single : bool
         Of a law, single precision (the command line's ``--float``); its commands miss by a converter's step at times.
+        Not of a rule.
     limit : float, optional
         Of a rig, the largest command, in its unit; the fit's when omitted.
 

@@ -15,6 +15,8 @@ from upright.verbs.answer import Answer
 if TYPE_CHECKING:
     from upright.exports.controller import SampledController
 
+_OF_RULES = ("c", "arduino", "python")
+
 
 def controller(source: Any) -> tuple[SampledController, str]:
     """The law to be written, and what it is called by."""
@@ -41,9 +43,16 @@ def write_law(made: SampledController, name: str, to: str, at: Path, single: boo
     """The law in one form, its files in a folder."""
     from upright.exports.targets import TARGETS
     from upright.exports.vector import self_test
+    from upright.laws import Rule
     from upright.report.page import Chapter, Part, Points, Step
     from upright.report.symbols import number, typed
 
+    function = isinstance(made.law, Rule)
+    if function and (single or to not in _OF_RULES):
+        raise BadInput(
+            f"a rule goes --to {', '.join(_OF_RULES)} in double precision, since nobody knows what it makes of a "
+            f"rounding; got {'--float' if single else to}."
+        )
     target, test = TARGETS[to], self_test(made)
     texts = target.write(made, test, single)
     files = [replace_file(at / file, text.encode()) for file, text in texts.items()]
@@ -58,6 +67,10 @@ def write_law(made: SampledController, name: str, to: str, at: Path, single: boo
         if test.single > step * 1.001:
             than = f"more than the converter's step of {number(step, 2)} {unit}" if step else "which no converter hides"
             warnings.append(f"Single precision may move a command by {miss}, {than}; a slower period moves it less.")
+    elif to == "arduino" and function:
+        warnings.append(
+            "On boards whose double has 32 bits (Uno, Mega, Nano) the self-test may fail, and nothing runs."
+        )
     elif to == "arduino":
         warnings.append(f"On boards whose double has 32 bits commands may miss by {miss}.")
     told = Chapter(
