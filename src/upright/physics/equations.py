@@ -182,8 +182,8 @@ def _scalar(scope: Scope) -> bool:
 
 
 def _functions(library: Any) -> dict[str, Any]:
-    """What the text calls; `abs` is Python's own."""
-    return {"abs": abs, "where": np.where, **{name: getattr(library, name) for name in FUNCTIONS if name != "abs"}}
+    """What the text calls; choices between arrays by a name of ours."""
+    return {"abs": abs, "_where": np.where, **{name: getattr(library, name) for name in FUNCTIONS if name != "abs"}}
 
 
 class _ForArrays(ast.NodeTransformer):
@@ -191,7 +191,7 @@ class _ForArrays(ast.NodeTransformer):
 
     def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
         self.generic_visit(node)
-        return ast.Call(ast.Name("where", ast.Load()), [node.test, node.body, node.orelse], [])
+        return ast.Call(ast.Name("_where", ast.Load()), [node.test, node.body, node.orelse], [])
 
     def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:
         self.generic_visit(node)

@@ -26,7 +26,9 @@ def ptx(case, *, record=True):
 
 
 @pytest.mark.parametrize("record", [True, False])
-@pytest.mark.parametrize("case", ["smooth", "a rule", "a linear law", "dry friction at two joints"])
+@pytest.mark.parametrize(
+    "case", ["smooth", "a rule", "a linear law", "dry friction at two joints", "elementary functions and kinks"]
+)
 def test_the_code_is_one_kernel_and_all_it_needs(case, record):
     code = ptx(case, record=record)
     assert re.findall(r"\.visible \.entry (\w+)\(", code) == ["lanes"]
