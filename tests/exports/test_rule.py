@@ -89,14 +89,24 @@ def test_python_repeats_every_command_bit_for_bit(name, tmp_path):
     assert PASSED in said(sys.executable, "-I", written(RULES[name](), "python", tmp_path) / "law.py")
 
 
-@COMPILER
 @pytest.mark.parametrize("options", [["-std=c99", "-pedantic", "-O2"], ["-std=gnu11", "-O3", "-march=native"]])
+@pytest.mark.parametrize(
+    "compiler",
+    [pytest.param(c, marks=pytest.mark.skipif(shutil.which(c) is None, reason=f"no {c}")) for c in ("gcc", "clang")],
+)
 @pytest.mark.parametrize("name", RULES)
-def test_c_repeats_every_command_bit_for_bit(name, options, tmp_path):
+def test_c_repeats_every_command_bit_for_bit(name, compiler, options, tmp_path):
     folder = written(RULES[name](), "c", tmp_path)
     sources = [folder / "law.c", folder / "law_selftest.c"]
-    said("gcc", "-Wall", "-Wextra", "-Werror", *options, *sources, "-o", folder / "law", "-lm")
+    said(compiler, "-Wall", "-Wextra", "-Werror", *options, *sources, "-o", folder / "law", "-lm")
     assert PASSED in said(folder / "law")
+
+
+@pytest.mark.skipif(shutil.which("avr-gcc") is None, reason="no avr-gcc")
+def test_an_arduino_s_compiler_takes_it(tmp_path):
+    folder = written(MIXED, "arduino", tmp_path) / "law"
+    options = ["-mmcu=atmega328p", "-std=gnu11", "-Os", "-Wall", "-Wextra", "-Werror"]
+    said("avr-gcc", *options, "-c", folder / "law.c", "-o", folder / "law.o")
 
 
 @COMPILER

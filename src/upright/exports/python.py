@@ -21,7 +21,7 @@ def files(made: SampledController, test: ReplayVector) -> dict[str, str]:
     """Text by file name."""
     about = "\n".join(made.facts)
     if isinstance(made.law, Rule):
-        needs, before = "from math import floor, frexp, nan, pi, sqrt\n\n", f"\n\n{rule.in_python(made)}\n"
+        needs, before = "from math import floor, frexp, inf, nan, pi, sqrt\n\n", f"\n\n{rule.in_python(made)}\n"
         parameters, initial = (tuple(values) for values in rule.numbers(made))
         begin = [f"self.z = {initial!r}", "self.samples = 0"]
         inputs = range(len(made.commands))

@@ -21,7 +21,8 @@ def functions(text: str) -> dict[str, Any]:
         return function
 
     names = dict.fromkeys(("inline", "inline_strict", "exact", "scalar", "entry", "separate"), as_it_is)
-    space: dict[str, Any] = names | {n: getattr(math, n) for n in ("sin", "cos", "tan", "sqrt", "exp", "pi", "nan")}
+    known = ("sin", "cos", "tan", "sqrt", "exp", "pi", "nan", "inf")
+    space: dict[str, Any] = names | {n: getattr(math, n) for n in known}
     space |= {"floor": np.floor, "ldexp": math.ldexp, "frexp": math.frexp}
     exec(compile(text, "kernel", "exec"), space)
     return space

@@ -25,7 +25,7 @@ _OPERATORS: dict[type[ast.AST], str] = {
     ast.NotEq: "!=", ast.And: "&&", ast.Or: "||", ast.USub: "-", ast.UAdd: "+", ast.Not: "!",
 }  # fmt: skip
 _LIBRARY = {"floor", "sqrt", "exp", "sin", "cos", "tan", "log", "ldexp"}
-_CONSTANTS = {"nan": "NAN", "pi": "3.141592653589793"}
+_CONSTANTS = {"nan": "NAN", "inf": "INFINITY", "pi": "3.141592653589793"}
 _KEYWORDS = {
     "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum", "extern", "float",
     "for", "goto", "if", "inline", "int", "long", "register", "restrict", "return", "short", "signed", "sizeof",
@@ -41,6 +41,13 @@ _HELPERS = (
     "static long rest_l(long a, long b) { return b ? a % b + (a % b && (a < 0) != (b < 0) ? b : 0) : 0; }\n",
     "static double rest_d(double a, double b) { double r = fmod(a, b); return r && (r < 0) != (b < 0) ? r + b : r; }\n",
     """\
+static long round_l(double x)
+{
+    const double whole = floor(x), rest = x - whole;
+    return (long)(rest > 0.5 || (rest == 0.5 && fmod(whole, 2) != 0) ? whole + 1 : whole);
+}
+""",
+    """\
 static double power_d(double x, int n)
 {
     double out = n & 1 ? x : 1;
@@ -54,7 +61,7 @@ static double power_d(double x, int n)
     "static void parted_d(double x, double *result) { int n; result[0] = frexp(x, &n); result[1] = n; }\n",
 )
 """Small functions by which C does as the kernel does: the first of two unless the second is better, whole quotients
-towards minus infinity, whole powers by products, `frexp` with both its results."""
+towards minus infinity, halves rounded to even, whole powers by products, `frexp` with both its results."""
 
 
 def helpers(text: str) -> str:
@@ -242,11 +249,11 @@ class _Writer:
                 self.block(node.body)
                 self.add("}")
             case ast.While(test=test, body=body, orelse=[]):
-                self.add(f"while ({self.value(test)}) {{")
+                self.add(f"while {_bracketed(self.value(test))} {{")
                 self.block(body)
                 self.add("}")
             case ast.If(test=test, body=body, orelse=orelse):
-                self.add(f"if ({self.value(test)}) {{")
+                self.add(f"if {_bracketed(self.value(test))} {{")
                 self.block(body)
                 if orelse:
                     self.add("} else {")
@@ -318,9 +325,8 @@ class _Writer:
             case ast.Compare(left=left, ops=ops, comparators=rights):
                 ends = [left, *rights]
                 pairs = zip(ends, ops, rights, strict=False)
-                return "(" + " && ".join(
-                    f"({self.value(a)} {_operator(op, node)} {self.value(b)})" for a, op, b in pairs
-                ) + ")"  # fmt: skip
+                each = [f"({self.value(a)} {_operator(op, node)} {self.value(b)})" for a, op, b in pairs]
+                return each[0] if len(each) == 1 else f"({' && '.join(each)})"
             case ast.IfExp(test=test, body=body, orelse=orelse):
                 return f"({self.value(test)} ? {self.value(body)} : {self.value(orelse)})"
             case ast.Call(func=ast.Name(id=name), args=args):
@@ -353,7 +359,7 @@ class _Writer:
         if name in ("min", "max"):
             return f"{'least' if name == 'min' else 'most'}_{'l' if whole else 'd'}({given})"
         if name == "round" and len(args) == 1:
-            return f"(long)rint({given})"
+            return f"round_l({given})"
         if name in ("int", "float"):
             return f"({'long' if name == 'int' else 'double'})({given})"
         raise _refusal(node)
@@ -384,6 +390,16 @@ def _refusal(node: ast.AST) -> BadInput:
         f"the kernel of this rig holds '{ast.unparse(node)[:80]}', which this program does not write as C; --to "
         "gymnasium runs the kernel itself."
     )
+
+
+def _bracketed(condition: str) -> str:
+    """In one pair of brackets: compilers take two for an assignment that was meant."""
+    depth = 0
+    for k, c in enumerate(condition):
+        depth += (c == "(") - (c == ")")
+        if not depth:
+            return condition if k == len(condition) - 1 and k else f"({condition})"
+    return f"({condition})"
 
 
 def _declared(kind: Kind, name: str) -> str:

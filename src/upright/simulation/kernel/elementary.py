@@ -99,8 +99,8 @@ def log(x):
                  + w * 1.479819860511658591e-1)))
     h = 0.5 * f * f
     y = k * 6.93147180369123816490e-1 - ((h - (s * (h + r) + k * 1.90821492927058770002e-10)) - f)
-    outside = x if x > 0.0 else (-1e308 * 10.0 if x == 0.0 else nan)
-    return y if (x > 0.0) & (x < 1e308 * 10.0) else outside
+    outside = x if x > 0.0 else (-inf if x == 0.0 else nan)
+    return y if (x > 0.0) & (x < inf) else outside
 """,
     "sinh": """
 @exact

@@ -38,7 +38,7 @@ _OPERATORS: dict[type[ast.operator], Operator] = {
 _RELATIONS: dict[type[ast.cmpop], Relation] = {
     ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
 }  # fmt: skip
-_CONSTANTS = {"nan": math.nan, "pi": math.pi}
+_CONSTANTS = {"nan": math.nan, "inf": math.inf, "pi": math.pi}
 _INTRINSICS = ("sin", "cos", "exp", "sqrt", "floor")
 _BRANCHES = ast.For | ast.While | ast.If
 _COSTLY = ast.Subscript | ast.Call | ast.IfExp | ast.BoolOp
