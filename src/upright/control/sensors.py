@@ -24,12 +24,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from upright.control.bank import TEXT
 from upright.control.swing_up import SwingUp
 from upright.control.trial import SUBSTEPS, ServoRig, Trial, logged, trial
 from upright.gains import hold, shaken
 from upright.laws import Law
 from upright.records import Array, Record
 from upright.simulation import simulate
+from upright.simulation.lowering.routine import Routine
 
 SWING = math.radians(100)
 """Angle to which the model is swung [rad]."""
@@ -267,7 +269,6 @@ SURPRISE = 15.0
 """Most that one sample counts against a suspicion. What the filters know brings more in one of 1800 (chi-square of two
 readings: exp(-15/2)); a tap, of which they know nothing, brings hundreds, and says nothing of sensors."""
 _SETTLING = 400
-_NEVER = np.iinfo(np.int64).max
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -355,13 +356,12 @@ class Watch:
         self.suspicions = (Suspicion(), *(Suspicion(name=n, factor=f) for f in FACTORS for n in names))
         linear = model.linear(at)
         sampled = hold(linear, model.period, (model.delay + model.lag) / model.period)
-        self._A, self._B, n = sampled.A, sampled.B[:, 0], sampled.A.shape[0]
+        self._A, self._B, n = sampled.A.copy(), sampled.B[:, 0].copy(), sampled.A.shape[0]
         scales = np.ones((len(self.suspicions), len(names)))
         for i, s in enumerate(self.suspicions[1:], start=1):
             scales[i, names.index(s.name)] = s.factor
         self._C = scales[:, :, None] * sampled.C
-        self._earlier, self._shown = max(1, round(WITHIN / model.period)), list[Array]()
-        self._told = np.zeros((0, 0))
+        self._earlier = max(1, round(WITHIN / model.period))
         self._plain = max(0.005 * model.limit, PLAINLY * sticking(model))
         self._bound, self._kept = math.log(odds), math.exp(-model.period / forgotten)
         noise = model.quantum**2 / 12
@@ -385,13 +385,25 @@ class Watch:
             sizes.append(np.asarray(np.linalg.slogdet(S)[1], dtype=np.float64))
             P = self._A @ (P - L @ CP) @ self._A.T + W
             P = 0.5 * (P + P.transpose(0, 2, 1))
-        self.gains, self._S, self._size = np.array(gains), np.array(weights), np.array(sizes)
-        self._x: Array = np.zeros((0, len(scales), n))
-        self._k = 0
-        self._since: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
-        self.likelihood: Array = np.zeros((0, len(scales)))
+        self.gains, self._weights, self._sizes = np.array(gains), np.array(weights), np.array(sizes)
+        self._begin(1)
 
-    def see(self, reading: ArrayLike, command: ArrayLike) -> Array:
+    def _begin(self, lanes: int) -> None:
+        """Forget all that was seen."""
+        filters, coordinates, states = self._C.shape
+        whole, patience = np.int64, PATIENCE / self.model.period
+        numbers = np.array([self._plain, self._bound, self._kept, SURPRISE, math.log(NAMED), SAFE, patience])
+        self._y, self._u = np.zeros((lanes, coordinates)), np.zeros(lanes)
+        self.likelihood: Array = np.zeros((lanes, filters))
+        self._odds, self._says, self._best = np.zeros(lanes), np.zeros(lanes, whole), np.zeros(lanes, whole)
+        self._sample = Routine(
+            TEXT, "see", np.zeros(1, whole), self._y, self._u, self._C, self._A, self._B, self.gains, self._weights,
+            self._sizes, self._moved, numbers, np.zeros((lanes, filters, states)),
+            np.zeros((self._earlier + 1, lanes, coordinates)), np.zeros((self._earlier, lanes)), self.likelihood,
+            np.full(lanes, -1, whole), np.zeros(coordinates + states), self._odds, self._says, self._best,
+        )  # fmt: skip
+
+    def see(self, reading: Array | Sequence[Sequence[float]], command: ArrayLike) -> Array:
         """Take one reading, shape (lanes, coordinates), as deviation from rest, and the command put out after it.
 
         Returns
@@ -399,38 +411,15 @@ class Watch:
         array, shape (lanes,)
             Logarithm of the odds of the best suspicion.
         """
-        y = np.atleast_2d(np.asarray(reading, dtype=np.float64))
-        if self._k == 0:
-            self._x = np.zeros((len(y), *self._x.shape[1:]))
-            self.likelihood = np.zeros((len(y), self._x.shape[1]))
-            self._since = np.full(len(y), _NEVER, dtype=np.int64)
-            self._shown, self._told = [], np.zeros((self._earlier, len(y)))
-        k = min(self._k, _SETTLING - 1)
-        miss = y[:, None] - np.einsum("hpn,lhn->lhp", self._C, self._x)
-        square = np.minimum(np.einsum("lhp,hpq,lhq->lh", miss, self._S[k], miss), SURPRISE)
-        self._shown = [*self._shown[-self._earlier :], y]
-        moves = np.any(np.abs(y - self._shown[0]) > self._moved, axis=1, keepdims=True)
-        moves |= (np.abs(self._told.mean(axis=0)) > self._plain)[:, None]
-        if self._k > 1:  # the first two readings are the start, of which nothing is known
-            self.likelihood = self._kept * self.likelihood - np.where(moves, 0.5 * (square + self._size[k]), 0.0)
-        x = self._x + np.einsum("hnp,lhp->lhn", self.gains[k], miss)
-        u = np.broadcast_to(np.asarray(command, dtype=np.float64), len(y))
-        self._told[self._k % self._earlier] = u
-        self._x = x @ self._A.T + u[:, None, None] * self._B
-        odds = self.likelihood[:, 1:].max(axis=1) - self.likelihood[:, 0]
-        self._since = np.where(odds > self._bound, np.minimum(self._since, self._k), _NEVER)
-        self._k += 1
-        return odds
+        if len(reading) != len(self._y):
+            self._begin(len(reading))
+        self._y[:], self._u[:] = reading, command
+        self._sample()
+        return self._odds.copy()
 
     def speaks(self) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
         """Whether the drive is to be switched off after the last reading, and for which suspicion, lane by lane."""
-        best = 1 + np.argmax(self.likelihood[:, 1:], axis=1)
-        every, k = np.arange(len(best)), self._k - 1
-        second = np.partition(self.likelihood, -2, axis=1)[:, -2]
-        leads = self.likelihood[every, best] - second > math.log(NAMED)
-        far = np.abs(self._x[every, best, 2]) > SAFE
-        late = k - self._since >= PATIENCE / self.model.period
-        return (self._since <= k) & (leads | far | late), best
+        return self._says > 0, self._best.copy()
 
     def over(self, readings: Array, commands: Array) -> Alarm:
         """Watch whole runs: deviations from rest, shape (N, coordinates[, lanes]), and commands, shape (N[, lanes])."""
@@ -439,7 +428,7 @@ class Watch:
         lanes = y.shape[2]
         sample, which = np.full(lanes, -1, dtype=np.int64), np.zeros(lanes, dtype=np.int64)
         odds = np.empty((len(y), lanes))
-        self._k = 0
+        self._begin(lanes)
         for k in range(len(y)):
             odds[k] = self.see(y[k].T, u[k])
             said, best = self.speaks()

@@ -58,12 +58,8 @@ def source(p: Layout) -> str:
 
 @cache
 def _version() -> str:
-    """What the machine code depends on besides the text: this processor, LLVM, and how the text is lowered."""
-    from upright.simulation.lowering import machine
-
-    files = [Path(__file__), *sorted(Path(machine.__file__).parent.glob("*.py"))]
-    own = [path.read_bytes() for path in files]
-    return f"{machine.identity()} {hashlib.sha256(b''.join(own)).hexdigest()}"
+    """What the machine code depends on besides the text."""
+    return f"{kept.lowered_by()} {hashlib.sha256(Path(__file__).read_bytes()).hexdigest()}"
 
 
 class Kernel:
@@ -101,13 +97,11 @@ class Kernel:
         return machine.load(self._code(name, lambda: machine.compiled(lowered(self.text, name))), name)
 
     def _code(self, name: str, compiled: Callable[[], bytes]) -> bytes:
-        key = kept.key(_version(), name, self.text)
-        code = kept.read(key)
-        if code is None:
+        def noted() -> bytes:
             self.compiled.append(name)
-            code = compiled()
-            kept.write(key, code)
-        return code
+            return compiled()
+
+        return kept.code(kept.key(_version(), name, self.text), noted)
 
 
 def _steps(address: int) -> Callable[..., None]:

@@ -10,6 +10,7 @@ import hashlib
 import os
 import stat
 import tempfile
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -39,9 +40,27 @@ def _only_ours(found: os.stat_result) -> bool:
     return not hasattr(os, "getuid") or (found.st_uid == os.getuid() and not found.st_mode & 0o022)
 
 
+@cache
+def lowered_by() -> str:
+    """What machine code depends on besides its text: this processor, LLVM, and how the text is lowered."""
+    from upright.simulation.lowering import machine
+
+    own = [path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py"))]
+    return f"{machine.identity()} {hashlib.sha256(b''.join(own)).hexdigest()}"
+
+
 def key(*parts: str) -> str:
     """Name of what depends on these texts."""
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:40]
+
+
+def code(name: str, compiled: Callable[[], bytes]) -> bytes:
+    """What was kept under a name; where there is nothing, what is compiled now, which is kept."""
+    found = read(name)
+    if found is None:
+        found = compiled()
+        write(name, found)
+    return found
 
 
 def read(name: str) -> bytes | None:
