@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from math import floor, isfinite, nan
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from upright.laws.rule import Numbers, Rule
 
 AtWork = Callable[[float, Sequence[float]], Numbers]
 """Commands for a time since the start [s] and the readings then; remembers what the law remembers."""
+_TERMS = 50  # Python's compiler goes as deep as an expression is long
 
 
 def at_work(law: Law | Rule) -> AtWork:
@@ -37,11 +39,12 @@ def at_work(law: Law | Rule) -> AtWork:
 
 
 def _linear(law: Law) -> AtWork:
-    a, b, c, d = ([_row(row) for row in getattr(law, name).reshape(getattr(law, name).shape[:2])] for name in "ABCD")
+    a, b, c, d = (getattr(law, name).reshape(getattr(law, name).shape[:2]).tolist() for name in "ABCD")
+    command, after = _sums(c, d), _sums(a, b)
     numbers = {name: _row(values[:, 0]) for name, values in law.by_lane(1).items() if name in ("initial", "target")}
     target, z, n = numbers["target"], numbers["initial"], law.readings
     begin = None if law.begin is None else [_row(row) for row in law.begin]
-    sums = [law.windup == "hold" and row == _row(unit) for row, unit in zip(a, np.eye(len(a)), strict=True)]
+    held = [law.windup == "hold" and row == unit for row, unit in zip(a, np.eye(len(a)).tolist(), strict=True)]
     referred, finish = _references(law), _finish(law)
     k = 0
 
@@ -50,13 +53,27 @@ def _linear(law: Law) -> AtWork:
         w = (*(y[i] - target[i] for i in range(n)), *referred(k))
         if begin is not None:
             z, begin = tuple(_dot(row, w[:n], x) for x, row in zip(z, begin, strict=True)), None
-        u, beyond = finish([_dot(to, w, _dot(of, z)) for of, to in zip(c, d, strict=True)])
-        after = tuple(_dot(to, w, _dot(of, z)) for of, to in zip(a, b, strict=True))
-        z = tuple(x if beyond and held else new for x, new, held in zip(z, after, sums, strict=True))
+        u, beyond = finish(command(z, w))
+        new = after(z, w)
+        z = tuple(x if stays else y for x, y, stays in zip(z, new, held, strict=True)) if beyond else new
         k += 1
         return u
 
     return step
+
+
+def _sums(of: list[list[float]], to: list[list[float]]) -> Callable[[Numbers, Numbers], Numbers]:
+    """Rows of ``of z + to w`` as `_dot` sums them, written out; in loops they take most of a tick's time."""
+    lines = [f"    {'z%d, ' * len(row) % tuple(range(len(row)))}= z" for row in of[:1] if row]
+    lines += [f"    {'w%d, ' * len(row) % tuple(range(len(row)))}= w" for row in to[:1] if row]
+    for i, (memory, measured) in enumerate(zip(of, to, strict=True)):
+        terms = [f"{a!r} * z{j}" for j, a in enumerate(memory)] + [f"{a!r} * w{j}" for j, a in enumerate(measured)]
+        lines += [f"    u{i} = 0.0"]
+        lines += [f"    u{i} = u{i} + {' + '.join(terms[j : j + _TERMS])}" for j in range(0, len(terms), _TERMS)]
+    lines += [f"    return ({'u%d, ' * len(of) % tuple(range(len(of)))})"]
+    space: dict[str, Any] = {}
+    exec("\n".join(["def sums(z, w):", *lines]), space)
+    return space["sums"]
 
 
 def _function(law: Rule) -> AtWork:
