@@ -24,6 +24,14 @@ class Clock:
         self.woken.append(self.now)
 
 
+class Watched(Clock):
+    """Whoever looks at it takes a microsecond for that."""
+
+    def __call__(self):
+        self.now += 0.001
+        return super().__call__()
+
+
 @pytest.fixture
 def clock():
     return Clock()
@@ -68,12 +76,7 @@ def test_a_wake_up_a_little_late_is_told_and_one_a_period_late_is_a_late_tick(cl
     assert pace.late == 1
 
 
-def test_whoever_keeps_vigil_sleeps_less_and_is_never_early(clock):
-    class Watched(Clock):
-        def __call__(self):
-            self.now += 0.001  # looking takes time
-            return super().__call__()
-
+def test_whoever_keeps_vigil_sleeps_less_and_is_never_early():
     clock = Watched()
     pace = WallClock(2e-3, clock, clock.sleep, vigil=0.2e-3)
     delays = [pace.wait() for _ in range(4)]
@@ -87,10 +90,29 @@ def test_a_vigil_is_a_fifth_of_a_period_at_most(clock):
     assert clock.woken == pytest.approx([100.8])
 
 
+def found(behind=0.0, *, late=0, work=1e-5, overslept=0.0, priority="FIFO", rate=1000.0, **more):
+    """A thousand ticks, all alike."""
+    behind, overslept, work = (np.full(1000, v) for v in (behind, overslept, work))
+    standing = LoopPriority(priority=priority, locked=True)
+    return Jitter(period=1 / rate, behind=behind, overslept=overslept, late=late, work=work, standing=standing, **more)
+
+
 def test_a_host_that_took_the_processor_is_named_with_the_late_ticks():
-    found = Jitter(period=1e-3, behind=np.full(1000, 3e-4), late=1000, work=1e-5, stolen=0.31,
-                   standing=LoopPriority(priority="FIFO", locked=True))  # fmt: skip
-    assert "Its host took its processors away for 0.31 s meanwhile." in found.verdict
+    assert "Its host took its processors away for 0.31 s meanwhile." in found(3e-4, late=1000, stolen=0.31).verdict
+
+
+def test_how_late_a_sleep_ends_is_told_although_a_vigil_hides_it():
+    clock = Watched()
+    pace = WallClock(2e-3, clock, clock.sleep, vigil=0.2e-3)
+    clock.oversleeps = 0.15
+    assert pace.wait() < 5e-6
+    assert pace.overslept == pytest.approx(0.15e-3, abs=5e-6)
+    clock.now = 103.9  # back within the vigil: there is no time to sleep
+    assert pace.wait() < 5e-6
+    assert pace.overslept == 0.0
+    clock.now = 107.0  # late
+    pace.wait()
+    assert pace.overslept == 0.0
 
 
 def test_the_systems_sleep_is_never_early():
@@ -106,8 +128,31 @@ def test_a_machine_is_measured_and_judged():
     assert "ticks were late at 200 Hz" in found.verdict
 
 
-@pytest.mark.parametrize(("behind", "rate"), [(5e-6, 10_000), (3e-4, 2_000), (8e-3, 100), (0.1, 0)])
-def test_the_rate_held_is_the_fastest_whose_period_exceeds_the_delay(behind, rate):
-    found = Jitter(period=1e-3, behind=np.full(1000, behind), late=1000, work=1e-5,
-                   standing=LoopPriority(priority="ordinary", locked=False))  # fmt: skip
-    assert found.rate == rate
+@pytest.mark.parametrize(("behind", "rate"), [(3e-4, 2000), (8e-3, 100), (0.1, 0)])
+def test_a_rate_that_was_not_held_gives_way_to_the_fastest_below_whose_period_exceeds_the_delay(behind, rate):
+    assert found(behind, late=1000, rate=10_000.0, priority="ordinary").rate == rate
+
+
+@pytest.mark.parametrize("rate", [1000.0, 1131.0, 490.0])
+def test_a_rate_that_was_held_is_the_one_that_was_tried_and_no_faster_one(rate):
+    measured = found(5e-6, rate=rate)
+    assert measured.rate == pytest.approx(rate)
+    assert measured.held
+    assert f"holds {rate:.4g} Hz" in measured.verdict
+
+
+@pytest.mark.parametrize(
+    ("work", "overslept", "rate"),
+    [
+        (1e-5, 0.0, 10_000),  # 10 us of work and a vigil of 20 in 100
+        (8e-5, 0.0, 5_000),  # 80 and 20 leave nothing for anybody in 100
+        (1.2e-4, 0.0, 5_000),  # 120 and 40 in 200
+        (1.6e-4, 0.0, 2_000),  # 160 and 40 in 200, all of the processor
+        (1e-5, 1.8e-4, 5_000),  # hidden by a vigil of 200; that of 40 leaves 140 of 200, that of 20 160 of 100
+        (4e-4, 0.0, 0),  # 400 and 100 in 500
+    ],
+)
+def test_a_faster_rate_is_promising_where_work_vigil_and_late_wake_ups_leave_time(work, overslept, rate):
+    measured = found(work=work, overslept=overslept)
+    assert measured.promising == rate
+    assert ("which was not tried" in measured.verdict) == (rate > 0)

@@ -1,4 +1,8 @@
-"""How late is this machine? The loop's own deadlines with the loop's own work, and nothing at its other end."""
+"""How late is this machine? The loop's own deadlines with the loop's own work, and nothing at its other end.
+
+What was held is what was tried. Slower rates are judged by the same delays; of faster ones it is only said whether
+delays and work leave time for them: more of a period goes into them, and less of it hides how late a sleep ends.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from upright.errors import BadInput
+from upright.errors import BadInput, UprightError
 from upright.laws import state_feedback
-from upright.realtime.pace import WallClock
+from upright.realtime.pace import WallClock, vigil_within
 from upright.realtime.priority import LoopPriority, step_forward
 from upright.records import Array
 from upright.rigs.law import RunningLaw
@@ -21,6 +25,17 @@ RATES = (10_000, 5_000, 2_000, 1_000, 500, 200, 100)
 """Rates that are spoken of [Hz]."""
 TOLERATED = 30 / 60_000
 """Share of late ticks with which a rate counts as held: 30 in a minute at 1 kHz."""
+_SHARE = 0.95
+"""Of a processor that Linux leaves to real-time processes (sched_rt_runtime_us), then it stops them for a while."""
+
+Work = tuple[Callable[[], object], Callable[[], object]]
+"""What a tick has to do, and what happens between two, in the place of a rig's exchange; the first is timed."""
+
+
+def law_alone() -> Work:
+    """A state feedback on two readings."""
+    law = RunningLaw(state_feedback([1.0, 0.1, 2.0, 0.2], 1e-3, memory=0.5, k_pf=1.0), 1e-3)
+    return lambda: law.step((0.01, 0.02), 0.0), lambda: None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -33,10 +48,12 @@ class Jitter:
         [s].
     behind : array, shape (N,)
         How far behind its deadline each tick was woken [s].
+    overslept : array, shape (N,)
+        How much later than asked the sleep before it ended [s]; see `realtime.pace`.
     late : int
         Ticks that were late: see `realtime.pace`.
-    work : float
-        Median time that the work of a tick took [s].
+    work : array, shape (N,)
+        Time that the work of each tick took [s].
     standing : LoopPriority
     stolen : float
         Time for which the host of a virtual machine gave its processors to others meanwhile, over all of them [s].
@@ -44,8 +61,9 @@ class Jitter:
 
     period: float
     behind: Array
+    overslept: Array
     late: int
-    work: float
+    work: Array
     standing: LoopPriority
     stolen: float = 0.0
 
@@ -56,33 +74,50 @@ class Jitter:
         return {"p50": p50, "p99": p99, "p99.9": p999, "max": most}
 
     @property
-    def rate(self) -> int:
-        """Fastest of `RATES` that this machine would have held in this time [Hz]; 0 for none.
+    def held(self) -> bool:
+        """Whether the rate that was tried is held."""
+        return self.late <= TOLERATED * self.behind.size
 
-        A tick of that rate would have been late when it was woken, and its work done, after a period.
-        """
+    @property
+    def rate(self) -> float:
+        """Rate that is held [Hz]: the one that was tried, else the fastest of `RATES` below it; 0 for none."""
+        tried = 1.0 / self.period
+        if self.held:
+            return tried
+        return next((rate for rate in RATES if rate < tried and self._missed(rate) <= TOLERATED), 0)
+
+    @property
+    def promising(self) -> int:
+        """Fastest of `RATES` above the one that was tried for which there seems to be time [Hz]; 0 for none."""
         for rate in RATES:
-            if np.mean(self.behind + self.work > 1.0 / rate) <= TOLERATED:
+            share = rate * (float(np.mean(self.work)) + vigil_within(1.0 / rate, self.standing.vigil))
+            if rate * self.period > 1.0 + 1e-9 and share <= _SHARE and self._missed(rate) <= TOLERATED:
                 return rate
         return 0
+
+    def _missed(self, rate: float) -> float:
+        """Share of ticks that, with these delays, would not have been woken and done within a period of a rate."""
+        woken = np.maximum(self.behind, self.overslept - vigil_within(1.0 / rate, self.standing.vigil))
+        return float(np.mean(woken + self.work > 1.0 / rate))
 
     @property
     def verdict(self) -> str:
         """What it says of this machine, in a sentence or two."""
-        asked = 1.0 / self.period
-        head = f"{self.late} of {self.behind.size} ticks were late at {asked:.4g} Hz ({self.standing.priority})"
-        if self.late <= TOLERATED * self.behind.size:
-            return f"{head}: this machine holds {asked:.4g} Hz as it is now."
+        tried = 1.0 / self.period
+        head = f"{self.late} of {self.behind.size} ticks were late at {tried:.4g} Hz ({self.standing.priority})"
+        if self.held:
+            more = f" There seems to be time for {self.promising} Hz, which was not tried." if self.promising else ""
+            return f"{head}: this machine holds {tried:.4g} Hz as it is now.{more}"
         theft = f"Its host took its processors away for {self.stolen:.2g} s meanwhile." if self.stolen else ""
         if self.rate == 0:
             head = f"{head}, and it would not hold {RATES[-1]} Hz"
             return f"{head}: run on an idle machine, or on the rig's controller. {theft}".strip()
-        return " ".join(
-            filter(None, (f"{head}: this machine held {self.rate} Hz as it is now.", theft, self.standing.warning))
-        )
+        return " ".join(filter(None, (f"{head}: it would have held {self.rate:g} Hz.", theft, self.standing.warning)))
 
 
-def measure(seconds: float, rate: float = 1000.0, *, fifo: bool = True) -> Jitter:
+def measure(
+    seconds: float, rate: float = 1000.0, *, fifo: bool = True, make: Callable[[], Work] = law_alone
+) -> Jitter:  # fmt: skip
     """Jitter of a loop of its own process on this machine, now.
 
     Parameters
@@ -91,6 +126,8 @@ def measure(seconds: float, rate: float = 1000.0, *, fifo: bool = True) -> Jitte
         [s], [Hz].
     fifo : bool
         Whether to ask for FIFO priority.
+    make : callable
+        Makes the work of a tick, in that process.
 
     Raises
     ------
@@ -101,19 +138,20 @@ def measure(seconds: float, rate: float = 1000.0, *, fifo: bool = True) -> Jitte
         raise BadInput(f"a loop is measured at 1 to 20000 Hz for 0.1 to 3600 s, got {rate:g} Hz for {seconds:g} s.")
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe(duplex=False)
-    child = context.Process(target=_measured, args=(theirs, seconds, rate, fifo), daemon=True)
+    child = context.Process(target=_measured, args=(theirs, seconds, rate, fifo, make), daemon=True)
     before = _stolen()
     child.start()
     theirs.close()
     try:
-        behind, late, work, standing = ours.recv()
+        found: dict[str, Any] | UprightError = ours.recv()
     except EOFError:
         raise BadInput("the process that measures did not come back; is there memory left?") from None
     finally:
         child.join(5.0)
         ours.close()
-    stolen = _stolen() - before
-    return Jitter(period=1.0 / rate, behind=behind, late=late, work=work, standing=standing, stolen=stolen)
+    if isinstance(found, UprightError):
+        raise found
+    return Jitter(period=1.0 / rate, stolen=_stolen() - before, **found)
 
 
 def _stolen() -> float:
@@ -125,19 +163,24 @@ def _stolen() -> float:
         return 0.0
 
 
-def _measured(pipe: Any, seconds: float, rate: float, fifo: bool) -> None:
+def _measured(pipe: Any, seconds: float, rate: float, fifo: bool, make: Callable[[], Work]) -> None:
     from time import monotonic_ns
 
-    law = RunningLaw(state_feedback([1.0, 0.1, 2.0, 0.2], 1.0 / rate, memory=0.5, k_pf=1.0), 1.0 / rate)
     ticks = round(seconds * rate)
-    behind, work = np.zeros(ticks), np.zeros(ticks)
-    step: Callable[..., float] = law.step
-    standing = step_forward(fifo=fifo)
-    pace = WallClock(1.0 / rate, vigil=standing.vigil)
-    for k in range(ticks):
-        behind[k] = pace.wait()
-        began = monotonic_ns()
-        step((0.01, 0.02), 0.0)
-        work[k] = monotonic_ns() - began
-    pipe.send((behind, pace.late, 1e-9 * float(np.median(work)), standing))
+    behind, overslept, work = np.zeros(ticks), np.zeros(ticks), np.zeros(ticks)
+    try:
+        step, between = make()
+        standing = step_forward(fifo=fifo)
+        pace = WallClock(1.0 / rate, vigil=standing.vigil)
+        for k in range(ticks):
+            behind[k], overslept[k] = pace.wait(), pace.overslept
+            began = monotonic_ns()
+            step()
+            work[k] = 1e-9 * (monotonic_ns() - began)
+            between()
+    except UprightError as error:
+        pipe.send(error)
+    else:
+        found = {"behind": behind, "overslept": overslept, "work": work, "late": pace.late, "standing": standing}
+        pipe.send(found)
     pipe.close()

@@ -27,6 +27,11 @@ class Pace(Protocol):
         ...
 
 
+def vigil_within(period: float, vigil: float) -> float:
+    """How long before a deadline to watch the clock [s]: a fifth of a period at most, the rest is for others."""
+    return min(vigil, period / 5)
+
+
 class Virtual:
     """Time that passes with the samples, as on a twin or by a rig's own clock: nothing is waited for."""
 
@@ -76,17 +81,23 @@ class WallClock:
     sleep : callable, optional
         Sleeps until a time of that clock; the operating system's when omitted.
     vigil : float
-        How long before each deadline to wake and watch the clock instead of sleeping [s]; a fifth of a period at most,
-        so that others have the processor for most of it.
+        How long before each deadline to wake and watch the clock instead of sleeping [s]; see `vigil_within`.
+
+    Attributes
+    ----------
+    late : int
+        Ticks that were late so far.
+    overslept : float
+        How much later than asked the last sleep ended, most of which a vigil hides [s]; 0 where there was no sleep.
     """
 
     def __init__(
         self, period: float, now: Callable[[], int] = time.monotonic_ns, sleep: Callable[[int], None] | None = None,
         *, vigil: float = 0.0,
     ) -> None:  # fmt: skip
-        self.period, self.late = period, 0
+        self.period, self.late, self.overslept = period, 0, 0.0
         self._now, self._sleep = now, sleep or _sleeper()
-        self._vigil = round(1e9 * min(vigil, period / 5))
+        self._vigil = round(1e9 * vigil_within(period, vigil))
         self._first, self._tick = -1, 0
 
     def wait(self) -> float:
@@ -96,10 +107,13 @@ class WallClock:
             self._first = now
         self._tick += 1
         due = self._first + round(1e9 * self._tick * self.period)
+        wake, self.overslept = due - self._vigil, 0.0
         if now > due:
             self.late += 1
         else:
-            self._sleep(due - self._vigil)
+            if now < wake:
+                self._sleep(wake)
+                self.overslept = 1e-9 * (self._now() - wake)
             while self._now() < due:
                 pass
         behind = 1e-9 * (self._now() - due)

@@ -170,7 +170,7 @@ def run(
 def rig_check(
     *, seconds: float = 60.0, rate: float = 1000.0, fifo: bool = True, out: str | os.PathLike[str] | None = None
 ) -> Answer[Jitter]:
-    """How late this machine wakes a loop, and what rate it can hold.
+    """How late this machine wakes a loop with law and supervision of a run, and whether it holds a rate.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def rig_check(
     Returns
     -------
     Answer
-        Of a `Jitter`: `quantiles` [s], `late` ticks, `rate` held [Hz].
+        Of a `Jitter`: `quantiles` [s], `late` ticks, `rate` held [Hz], a faster one that is `promising`.
 
     Raises
     ------
@@ -193,11 +193,12 @@ def rig_check(
     """
     from upright.experiments.running.chapter import jitter_chapter
     from upright.experiments.running.figures import jitter_figure
+    from upright.experiments.running.tick import supervised
     from upright.realtime.jitter import measure
     from upright.report.drawing import save
 
     folder = folder_if_given(out)
-    found = measure(seconds, rate, fifo=fifo)
+    found = measure(seconds, rate, fifo=fifo, make=supervised)
     files: list[Path] = []
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)

@@ -17,8 +17,9 @@ def check(
     out: Out = Path("rig-check"),
     as_json: AsJson = False,
 ) -> None:
-    """Measure how late this machine wakes a loop, and say what rate it can hold; histogram in jitter.svg.
+    """Measure how late this machine wakes a loop with law and supervision, and say whether it holds a rate.
 
+    A histogram goes to jitter.svg.
     Measure with everything running that will run beside the loop.
 
     upright rig check --seconds 60

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from upright.experiments.running.doctor import Checkup
 from upright.experiments.running.figures import jitter_figure
 from upright.experiments.running.run import RigRun
@@ -94,28 +96,34 @@ def checkup_chapter(found: Checkup, rig: str) -> Chapter:
 def jitter_chapter(found: Jitter) -> Chapter:
     """How late this machine is."""
     q = {n: f"{1e6 * v:.3g} µs" for n, v in found.quantiles.items()}
+    work, longer = np.percentile(found.work, [50, 99]).tolist()
     facts = Facts((
         *q.items(), ("late ticks", f"{found.late} of {found.behind.size}"), ("priority", found.standing.priority),
         ("memory", "locked" if found.standing.locked else "not locked"),
         ("processors", "kept awake" if found.standing.awake else "may sleep between ticks"),
         *((("taken by the host", f"{found.stolen:.2g} s"),) if found.stolen else ()),
-        ("work of a tick", f"{1e6 * found.work:.3g} µs"),
-        ("rate held", f"{found.rate} Hz" if found.rate else "none"),
+        ("law and supervision of a tick", f"{1e6 * work:.3g} µs (p99 {1e6 * longer:.3g} µs)"),
+        ("rate held", f"{found.rate:g} Hz" if found.rate else "none"),
+        *((("time left for", f"{found.promising} Hz, not tried"),) if found.promising else ()),
     ))  # fmt: skip
     picture = Picture(
         name="jitter", draw=lambda: jitter_figure(found), caption="How far behind its deadline each tick was woken.",
         description="Histogram of the lateness of all ticks, both axes logarithmic.",
     )  # fmt: skip
     late = found.late / found.behind.size
+    steps = [Step("Measure longer, with what else will run beside the loop.", "upright rig check --seconds 600")]
+    if found.promising and found.held:
+        steps.append(Step("Try a faster loop.", f"upright rig check --rate {found.promising}"))
     return Chapter(
-        title="How late is this machine?", verdict=found.verdict, sound=found.rate * found.period >= 1,
+        title="How late is this machine?", verdict=found.verdict, sound=found.held,
         warnings=(found.standing.warning,) if found.standing.warning else (),
         parts=(Part(f"{found.behind.size * found.period:.3g} s at {1 / found.period:.4g} Hz", (facts, picture)),),
-        steps=(Step("Measure longer, with what else will run beside the loop.", "upright rig check --seconds 600"),),
+        steps=tuple(steps),
         numbers={
             "period": found.period, "ticks": found.behind.size, "late": found.late, "late_share": late,
             **{f"behind_{n}": v for n, v in found.quantiles.items()}, "priority": found.standing.priority,
             "locked": found.standing.locked, "awake": found.standing.awake, "stolen": found.stolen,
-            "rate": found.rate, "verdict": found.verdict,
+            "work_p50": work, "work_p99": longer, "rate": found.rate, "promising": found.promising,
+            "verdict": found.verdict,
         },
     )  # fmt: skip
