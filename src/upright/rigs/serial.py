@@ -10,6 +10,7 @@ from typing import NoReturn
 from upright.errors import BadInput, RigStopped
 from upright.laws import Law
 from upright.rigs import wire
+from upright.rigs.board import told
 from upright.rigs.line import Line, open_line
 from upright.rigs.onboard import onboard, ticks
 from upright.rigs.protocol import NO_FAULT, Capabilities, Fault, Limits, Mode, SelfTest, Tick
@@ -371,16 +372,12 @@ class SerialRig:
         raise self._refusal(f"it holds another {what} than it was given ({held} instead of {asked})")
 
     def _stopped(self) -> RigStopped:
-        return RigStopped(f"{self._name()} stopped: {_names(self._status.faults)}. Look at it before it is cleared.")
+        return RigStopped(f"{self._name()} stopped: {told(self._status.faults)}. Look at it before it is cleared.")
 
     def _refusal(self, why: str) -> RigStopped:
         faults = self._status.faults
-        state = f" It is in {self._status.mode.name}" + (f" after {_names(faults)}." if faults != NO_FAULT else ".")
+        state = f" It is in {self._status.mode.name}" + (f": {told(faults)}." if faults != NO_FAULT else ".")
         return RigStopped(f"{self._name()} refused: {why}.{state}")
-
-
-def _names(faults: Fault) -> str:
-    return ", ".join(fault.name or "" for fault in Fault if fault in faults)
 
 
 def _down(value: float) -> int:
