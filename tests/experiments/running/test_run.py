@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from upright.errors import BadInput
 from upright.experiments.makes import make_rig
+from upright.experiments.running.chapter import run_chapter
 from upright.experiments.running.run import RunRequest, run_rig
 from upright.gains import feedback, filtered, hold, place, prefilter
 from upright.laws import as_values
@@ -44,6 +46,19 @@ def test_a_law_holds_the_twin_and_its_log_replays_to_the_last_bit(folder, tmp_pa
     again = replay(read_log(done.log_path))
     assert again.rows.size == done.end.ticks
     assert again.identical
+
+
+def test_a_rest_within_one_count_is_said_in_counts(folder, tmp_path):
+    """A twin that is its model, let go upright: no count changes. 16,000 counts a turn are 0.0225 degrees each."""
+    (tmp_path / "RIG.toml").write_text('kind = "twin"\nmake = "furuta"\n', encoding="utf-8")
+    wish = RunRequest(rig=tmp_path / "RIG.toml", law=folder / "design.json", seconds=0.3, check=False)
+    done = run_rig(wish, tmp_path)
+    assert done.unrest[-1] < 1e-9
+    assert "theta stayed within one encoder count, 0.022 degrees (rms" in done.verdict
+    told = dict(run_chapter(done).parts[0].content[0].pairs)
+    assert told["theta, rms of the second half"] == "below a count, 3.9·10⁻⁴ rad"
+    moved = run_rig(replace(wish, tilt=0.05), tmp_path)
+    assert f"theta stayed within {math.degrees(moved.unrest[-1]):.2g} degrees" in moved.verdict
 
 
 @pytest.mark.slow

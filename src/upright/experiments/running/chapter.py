@@ -29,9 +29,10 @@ def run_chapter(done: RigRun) -> Chapter:
               ("log", f"{done.log_path.name}: {end.rows} rows, {end.dropped} dropped")]  # fmt: skip
     if done.unrest:
         facts += [
-            (f"{c.name}, rms of the second half", f"{number(v, 3)} {c.unit}")
-            for c, v in zip(done.model.plant.coordinates, done.unrest, strict=True)
-        ]
+            (f"{c.name}, rms of the second half",
+             f"below a count, {number(count, 2)} {c.unit}" if v < count else f"{number(v, 3)} {c.unit}")
+            for c, v, count in zip(done.model.plant.coordinates, done.unrest, done.count, strict=True)
+        ]  # fmt: skip
     parts = [Part("The run", (Facts(tuple(facts)), *_events(done)))]
     if log is not None and len(log) > 2:
         parts.append(Part("What was logged", (

@@ -106,6 +106,11 @@ class RigRun:
         return tuple(np.sqrt(np.mean(half**2, axis=0)).tolist()) if half.size else ()
 
     @property
+    def count(self) -> tuple[float, ...]:
+        """One count of each encoder [rad or m]; a deviation below that is not a number that anybody read."""
+        return tuple(1.0 / abs(n) for n in self.model.counts)
+
+    @property
     def complete(self) -> bool:
         """Whether every row of the loop is in the log."""
         return self.log is not None and not self.log.complaint and not self.end.dropped
@@ -128,10 +133,11 @@ class RigRun:
         if self.wish.law is None:
             return f"The signal was put out for {how}{late}.{log}"
         last = self.model.plant.coordinates[-1]
-        unrest = math.degrees(self.unrest[-1]) if last.unit == "rad" else 1e3 * self.unrest[-1]
-        unit = "degrees" if last.unit == "rad" else "mm"
-        what = f"varied by {unrest:.2g} {unit}" if self.wish.reference else f"stayed within {unrest:.2g} {unit}"
-        return f"Held for {how}{late}; {last.name} {what} (rms, second half).{log}"
+        size = max(self.unrest[-1], self.count[-1])
+        size = f"{math.degrees(size):.2g} degrees" if last.unit == "rad" else f"{1e3 * size:.2g} mm"
+        size = f"one encoder count, {size}" if self.unrest[-1] < self.count[-1] else size
+        what = "varied by" if self.wish.reference else "stayed within"
+        return f"Held for {how}{late}; {last.name} {what} {size} (rms, second half).{log}"
 
 
 def run_rig(
