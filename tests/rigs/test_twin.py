@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from upright.control.trial import at_work, trial
+from upright.control.trial import SUBSTEPS, at_work, trial
 from upright.experiments.makes import make_rig
 from upright.gains import feedback, filtered, hold, place
 from upright.rigs import Board, Limits, Mode, TwinPort
 from upright.rigs.law import RunningLaw
+from upright.simulation import simulate
 
 RIG = make_rig("furuta")
 SAMPLED = hold(RIG.linear("inverted"), RIG.period, RIG.delay / RIG.period)
@@ -56,6 +58,59 @@ def test_a_twin_under_the_hosts_law_moves_as_the_compiled_loop(compiled):
     assert np.all(np.abs(np.array(states) - run.x) < 1e-4 * np.ptp(run.x, axis=0))
     shown = np.column_stack([run.record["psi"], run.record["theta"]]) * np.array(RIG.counts)
     assert np.abs(np.array(counts) - shown).max() <= 1.0 + 1e-6
+
+
+SLOW_TO_FORGET = {
+    "presliding": replace(RIG, plant=RIG.plant.replace(delta_1=0.02, delta_2=0.05, b_2c=2e-4)),
+    "relaxation": replace(RIG, more={"actuator.damping": 0.02, "actuator.relaxation": 0.05}),
+    "relaxation beyond a knee": replace(
+        RIG, more={"actuator.damping": 0.02, "actuator.relaxation": 0.05, "actuator.knee": 0.5, "actuator.fade": 0.1}
+    ),
+}
+
+
+@pytest.mark.parametrize("what", SLOW_TO_FORGET)
+def test_what_outlasts_a_period_is_remembered(what):
+    """Moved a period at a time and in one piece, by commands put out blindly; without memory the motion is another."""
+    rig = SLOW_TO_FORGET[what]
+    rng = np.random.default_rng(2)
+    command = np.append(0.0, np.repeat(rng.choice([-2.0, 0.0, 1.5], size=30), 40))
+    port = TwinPort(rig)
+    port.enable(True)
+    states = [port.x]
+    for u in command.tolist():
+        port.write(u)
+        port.advance()
+        states.append(port.x)
+    whole, plain = (
+        simulate(r.plant, r.drive, r.plant.state("hanging"), command, r.period, samples=len(states), substeps=SUBSTEPS)
+        for r in (rig, replace(RIG, plant=rig.plant.replace(delta_1=0.0, delta_2=0.0)))
+    )
+    size = np.ptp(whole[:, :, 0], axis=0)
+    # restarts add roundings of 1e-16, which 1.1 s of a pendulum that swings multiply by some thousands
+    assert np.all(np.abs(np.array(states) - whole[:, :, 0]) < 1e-10 * size)
+    assert np.any(np.abs(plain - whole)[:, :, 0] > 1e-4 * size)
+
+
+def test_a_hand_makes_a_twin_forget():
+    """Held and let go where it was, it moves as one that was never moved before."""
+    rig = SLOW_TO_FORGET["presliding"]
+    used, fresh = TwinPort(rig), TwinPort(rig)
+    used.enable(True)
+    for k in range(100):
+        used.write(3.0 * math.sin(0.1 * k))
+        used.advance()
+    used.enable(False)
+    for _ in range(40):  # the drive's lag
+        used.advance()
+    for port in (used, fresh):
+        port.hold("hanging", [0.0, 0.0, 0.3, 0.0])
+        for _ in range(60):
+            port.advance()
+        port.let_go()
+        for _ in range(200):
+            port.advance()
+    np.testing.assert_array_equal(used.x, fresh.x)
 
 
 def test_its_own_loop_gives_the_same_commands_as_the_hosts(compiled):

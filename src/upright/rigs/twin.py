@@ -66,7 +66,7 @@ def _wrap(count: int, bits: int) -> int:
 class TwinPort:
     """The board of a twin, at rest at an equilibrium when it is made.
 
-    Presliding and the relaxation of braking are left out: both have a memory that does not outlast a period here.
+    Its drive does not trip: moments at which one went on or off belong to a record.
 
     Parameters
     ----------
@@ -79,12 +79,13 @@ class TwinPort:
     """
 
     def __init__(self, rig: ServoRig, at: str = "", full_scale: float | None = None) -> None:
-        idle = {j.presliding: 0.0 for j in rig.plant.joints if j.presliding}
-        self.rig = replace(rig, plant=rig.plant.replace(**idle)) if idle else rig
-        drive = {n: v for n, v in self.rig.drive.items() if n not in _FORGOTTEN}
-        values = {**self.rig.plant.parameters(), **drive}
-        derived = self.rig.plant.derived_for(values)
-        self._stepper = Simulator(derived=derived, flavour=choose(derived, values), dt=rig.period, substeps=SUBSTEPS)
+        self.rig = rig
+        drive = {n: v for n, v in rig.drive.items() if n not in ("actuator.start", "actuator.end")}
+        values = {**rig.plant.parameters(), **drive}
+        derived = rig.plant.derived_for(values)
+        flavour = choose(derived, values)
+        flavour = replace(flavour, carried=bool(flavour.dahl or flavour.relaxation))
+        self._stepper = Simulator(derived=derived, flavour=flavour, dt=rig.period, substeps=SUBSTEPS)
         self._table = self._stepper.table(values, 1)
         reach = math.ceil(rig.delay / rig.period) + math.ceil(_LAGS * rig.lag / rig.period) + 2
         self._commands = np.zeros((reach + 1, 1))
@@ -92,6 +93,7 @@ class TwinPort:
         self._full_scale = full_scale or 2.0 * rig.limit
         self._per = np.array(rig.counts) * rig.shown
         self.x: Array = np.array(self.rig.plant.state(at or next(iter(rig.plant.equilibria))), dtype=np.float64)
+        self._carried = np.zeros(self._stepper.carried)
         self._felt = self.x[0::2].copy()
         self._origin = (0,) * len(rig.counts)
         self.encoders = BrokenEncoders(len(rig.counts))
@@ -121,8 +123,9 @@ class TwinPort:
         self._commands[:-1] = self._commands[1:]
         self._commands[-1] = self._command if self._enabled else 0.0
         if not self._held:
-            x0 = self.x[:, None]
-            self.x = self._stepper.run(self._table, x0, self._commands, samples=2, start=self._start)[1, :, 0].copy()
+            x0 = np.concatenate([self.x, self._carried])[:, None]
+            after = self._stepper.run(self._table, x0, self._commands, samples=2, start=self._start)[1, :, 0]
+            self.x, self._carried = after[: self.x.size].copy(), after[self.x.size :].copy()
         self._periods += 1
         return self._periods * self.rig.period
 
@@ -146,6 +149,7 @@ class TwinPort:
     def hold(self, at: str, away: ArrayLike = 0.0) -> None:
         """A hand holds it somewhere: deviation of the states from an equilibrium, shape (states,)."""
         self.x = np.asarray(self.rig.plant.state(at), dtype=np.float64) + np.asarray(away, dtype=np.float64)
+        self._carried = np.zeros(self._stepper.carried)
         self._held = True
 
     def let_go(self) -> None:
@@ -156,6 +160,3 @@ class TwinPort:
         """A tap adds to the speeds of the coordinates [rad/s or m/s]."""
         self.x = self.x.copy()
         self.x[1::2] += np.asarray(speeds, dtype=np.float64)
-
-
-_FORGOTTEN = ("actuator.relaxation", "actuator.start", "actuator.end")

@@ -150,6 +150,11 @@ class Simulator:
         return (*self.derived.parameters, *(name for name in ACTUATOR for _ in self.derived.inputs))
 
     @cached_property
+    def carried(self) -> int:
+        """How many rows `run` takes and gives behind the states, all zero where a motion begins anew."""
+        return len(self._layout.carried)
+
+    @cached_property
     def _layout(self) -> Layout:
         return lay_out(self.derived, self.flavour)
 
@@ -205,7 +210,8 @@ class Simulator:
         params : array, shape (rows, lanes)
             In the order of `names`.
         x0 : array, shape (states, lanes)
-            Initial states in the paper's order: coordinate, its velocity, next coordinate, ...
+            Initial states in the paper's order: coordinate, its velocity, next coordinate, ...; where the flavour
+            carries more, that behind them.
         u : array, shape (T, inputs), optional
             Input at the samples, held between them and after the last; nothing when omitted.
         samples : int
@@ -228,8 +234,9 @@ class Simulator:
         Returns
         -------
         array, shape (samples, states, lanes), or (samples, states + inputs, lanes) with a loop
-            States, then the command of the controller after its limit. A lane that diverges holds NaN or
-            infinity from there on, and only there. When the flavour records nothing: the rows of `ensemble`.
+            States, then the command of the controller after its limit, then what the flavour carries. A lane that
+            diverges holds NaN or infinity from there on, and only there. When the flavour records nothing: the rows of
+            `ensemble`.
 
         Raises
         ------
@@ -242,8 +249,10 @@ class Simulator:
         lanes = params.shape[1] if params.ndim == 2 else 0
         if lanes == 0 or params.shape[0] != len(self.names):
             raise BadInput(f"params needs shape ({len(self.names)}, lanes), got {params.shape}; see Simulator.names.")
-        if x0.shape != (2 * n, lanes):
-            raise BadInput(f"x0 needs shape ({2 * n}, {lanes}): states first, lanes last; got {x0.shape}.")
+        if x0.shape != (2 * n + self.carried, lanes):
+            raise BadInput(
+                f"x0 needs shape ({2 * n + self.carried}, {lanes}): states first, lanes last; got {x0.shape}."
+            )
         if samples < 1 or every < 1:
             raise BadInput(f"samples and every must be at least 1, got {samples} and {every}.")
         u = np.zeros((0, nu)) if u is None else np.require(u, np.float64, _KIND)
@@ -251,7 +260,7 @@ class Simulator:
             raise BadInput(f"u needs shape (T, {nu}): time first, one column for each input; got {u.shape}.")
         width = 1 if lanes == 1 or device == "gpu" else WIDTH
         blocks = -(-lanes // width)
-        law = _NONE[0] if self.loop is None else self.loop.rows(nu, lanes, x0[::2])
+        law = _NONE[0] if self.loop is None else self.loop.rows(nu, lanes, x0[: 2 * n : 2])
         P = ready(params, blocks * width) if self.loop is None else padded(params, blocks * width, extra=len(law))
         if self.loop is not None:
             P[len(params) :, :lanes] = law
@@ -280,7 +289,7 @@ class Simulator:
         scalars[n + 1] = math.ceil(settle / self.dt - 1e-9)
         out, reduced = _NONE, _NONE[0]
         if f.record:
-            out = recorded((samples, 2 * n + (nu if f.loop else 0), blocks * width), memory)
+            out = recorded((samples, 2 * n + (nu if f.loop else 0) + self.carried, blocks * width), memory)
         else:
             reduced = np.empty((4 * n + nu, blocks * width))
         size = room(self._layout, width, buffer)

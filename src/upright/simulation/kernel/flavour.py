@@ -60,6 +60,9 @@ class Flavour:
         What is compiled in of the `Law` or `Rule` that computes the input.
     record : bool
         The motion is returned, not only what it reduces to.
+    carried : bool
+        What joints and braking remember goes in and comes out behind the states, so that a motion can be taken up where
+        another ended.
     """
 
     dry: tuple[int, ...] = ()
@@ -77,6 +80,7 @@ class Flavour:
     droop: bool = False
     loop: Structure | Written | None = None
     record: bool = True
+    carried: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -168,6 +172,13 @@ class Layout:
         names += [f"lB{i}_{j}" for i in z for j in w if law.B[i][j] is None]
         names += [f"l{c}{i}_{j}" for c, columns in (("C", z), ("D", w)) for i in u for j in columns]
         return (*names, *(f"z{i}" for i in z), *(f"tg{i}" for i in range(self.n)))
+
+    @cached_property
+    def carried(self) -> tuple[str, ...]:
+        """Numbers that go in and out behind the states: deflections of joints, braking as it has built up."""
+        f = self.flavour
+        braking = ["bk", "vp", "dmm", *["csm"] * f.curve] if f.relaxation else []
+        return (*(f"y{i}" for i in f.dahl), *(f"{c}{j}" for c in braking for j in range(self.nu))) if f.carried else ()
 
     @cached_property
     def rows(self) -> dict[str, int]:

@@ -55,6 +55,12 @@ def start(w: Writer) -> None:
             _actuator(w, j, first)
     law = first + len(ACTUATOR) * p.nu
     w.add(*(f"{{{name}}} = P[{law + r}, _m]" for r, name in enumerate(p.numbers)))
+    w.add(*(f"{{{name}}} = {_from_now(p, name)}X0[{2 * p.n + k}, _m]" for k, name in enumerate(p.carried)))
+
+
+def _from_now(p: Layout, name: str) -> str:
+    """The speed before a substep is handed on as what has been gained since, so that a tap later does not count."""
+    return f"{{v{p.drives[int(name[2:])]}}} - " if name.startswith("vp") else ""
 
 
 def _actuator(w: Writer, j: int, first: int) -> None:
@@ -351,6 +357,8 @@ def _record(w: Writer) -> None:
     for c, name in enumerate(columns):
         # ua holds the command only between controller and substep, where this line stands
         w.add(f"for _i in range({w.width}):", f"    OUT[_row, {c}, _base + _i] = {{{name}}}")
+    for c, name in enumerate(p.carried, len(columns)):
+        w.add(f"for _i in range({w.width}):", f"    OUT[_row, {c}, _base + _i] = {_from_now(p, name)}{{{name}}}")
 
 
 def _reduce(w: Writer) -> None:
