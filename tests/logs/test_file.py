@@ -6,6 +6,7 @@ import io
 import json
 import sys
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -47,6 +48,12 @@ def test_a_header_comes_back_as_it_was():
     stream = io.BytesIO()
     RunFile(stream, header).finish()
     assert log_of(stream.getvalue(), "x").header == header
+    followed = replace(header, references=(("r", "rad"),))
+    texts = followed.as_metadata()
+    assert LogHeader.of_metadata(texts) == followed
+    assert [c.name for c in followed.columns][3:6] == ["θ", "r", "u"]
+    old = {k: v for k, v in json.loads(texts["log"]["json"]).items() if k != "references"}
+    assert LogHeader.of_metadata(texts | {"log": {"json": json.dumps(old)}}) == header
     assert header.fault_names(3) == ("WATCHDOG", "fault 2")
 
 

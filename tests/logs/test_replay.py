@@ -55,6 +55,26 @@ def run(
     return log_of(stream.getvalue(), "run.mcap")
 
 
+def test_a_reference_that_somebody_changed_is_replayed_from_its_column():
+    law = state_feedback([-1.2, -0.3, 9.1, 1.1], 1e-3, memory=0.5, k_pf=-1.2)
+    wanted = np.where(np.arange(300) < 120, 0.0, 0.25) + 0.1 * np.sin(0.3 * np.arange(300))
+    step, rng, stream = at_work(replace(law, references=wanted)), np.random.default_rng(8), io.BytesIO()
+    file = RunFile(stream, replace(HEADER, law=as_values(law), references=(("reference", "rad"),), driven=(2,)))
+    for k, r in enumerate(wanted.tolist()):
+        counts = rng.integers(-200, 200, 2).tolist()
+        y = tuple(count * 2 * math.pi / 4096 for count in counts)
+        mode = 0 if k == 200 else 2  # off and on again: the law begins anew where it is then
+        if k == 201:
+            step = at_work(replace(law, references=wanted[k:]))
+        u = step(k * 1e-3, y)[0] if mode else 0.0
+        file.row((k * 1e-3, k, *counts, *y, r, u, u, mode, 0))
+    file.finish()
+    log = log_of(stream.getvalue(), "run.mcap")
+    assert replay(log).identical
+    assert replay(log).starts == 2
+    assert not replay(replace(log, header=replace(log.header, references=()))).identical
+
+
 @pytest.mark.parametrize("law", [LAW, Rule(function=damped, initial=[0.0], parameters=[0.3, 1e-3], limit=0.4)])
 def test_a_law_gives_its_own_commands_again(law):
     found = replay(run(law))

@@ -39,6 +39,8 @@ class LogHeader:
     command_unit : str
     period : float
         Of the control tick [s].
+    references : tuple of (str, str)
+        Name and unit of each reference as the law was given it; none where nothing is followed, and in old logs.
     command : str
         Name of the command's column.
     modes, faults : mapping of int to str
@@ -56,6 +58,7 @@ class LogHeader:
     coordinates: tuple[tuple[str, str], ...]
     command_unit: str
     period: float
+    references: tuple[tuple[str, str], ...] = ()
     command: str = "u"
     modes: Mapping[int, str] = field(default_factory=dict[int, str])
     faults: Mapping[int, str] = field(default_factory=dict[int, str])
@@ -72,13 +75,16 @@ class LogHeader:
         if twice := sorted({name for name in names if names.count(name) > 1}):
             raise BadInput(
                 f"the columns of a log need names of their own, and {', '.join(twice)} would stand there twice;"
-                " rename the coordinate or the command."
+                " rename the coordinate, the reference or the command."
             )
 
     @property
     def columns(self) -> tuple[LogColumn, ...]:
-        """The numbers of a row, in their order: t, tick, counts, readings, command, applied command, mode, faults."""
-        measured = [LogColumn(name, unit) for name, unit in self.coordinates]
+        """The numbers of a row, in their order.
+
+        These are t, tick, counts, readings, references, command, applied command, mode, faults.
+        """
+        measured = [LogColumn(name, unit) for name, unit in (*self.coordinates, *self.references)]
         counts = [LogColumn(f"{name}_counts", "counts", whole=True) for name, _ in self.coordinates]
         commands = [LogColumn(name, self.command_unit) for name in (self.command, f"{self.command}_applied")]
         states = [LogColumn(name, "1", whole=True) for name in ("mode", "faults")]
@@ -87,9 +93,9 @@ class LogHeader:
     def as_metadata(self) -> dict[str, dict[str, str]]:
         """Texts by name for the records of a file."""
         rest = {
-            "coordinates": self.coordinates, "command": self.command, "command_unit": self.command_unit,
-            "period": self.period, "modes": self.modes, "faults": self.faults, "driven": self.driven,
-            "start": self.start,
+            "coordinates": self.coordinates, "references": self.references, "command": self.command,
+            "command_unit": self.command_unit, "period": self.period, "modes": self.modes, "faults": self.faults,
+            "driven": self.driven, "start": self.start,
         }  # fmt: skip
         return {
             "rig": {"file": self.rig},
@@ -106,6 +112,7 @@ class LogHeader:
         return cls(
             rig=texts.get("rig", {}).get("file", ""), law=json.loads(texts.get("law", {}).get("json", "{}")),
             coordinates=tuple((str(name), str(unit)) for name, unit in rest["coordinates"]),
+            references=tuple((str(name), str(unit)) for name, unit in rest.get("references", ())),
             command=str(rest["command"]), command_unit=str(rest["command_unit"]), period=float(rest["period"]),
             driven=tuple(int(mode) for mode in rest["driven"]), start=float(rest["start"]),
             versions=dict(texts.get("versions", {})), **named,

@@ -49,6 +49,7 @@ def row_schema(header: LogHeader) -> bytes:
     notes = {
         "mode": _numbered(header.modes, "one of"), "faults": _numbered(header.faults, "sum of"),
         f"{header.command}_applied": "what the converter really put out", header.command: "what the law asked for",
+        **{name: "what the law followed" for name, _ in header.references},
     }  # fmt: skip
     fields = {
         column.name: {"type": "integer" if column.whole else "number", "unit": column.unit}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +64,8 @@ def replay(log: RunLog, law: Law | Rule | None = None) -> Replay:
     """The logged law on the logged measurements, called as the loop calls it.
 
     That is `upright.laws.at_work`, made anew where the law begins to command, and called once for each row with the
-    time since the first of them and the readings in the header's order.
+    time since the first of them, the readings in the header's order, and the references that were logged, where there
+    are any: somebody may have changed them meanwhile.
 
     Parameters
     ----------
@@ -89,7 +90,7 @@ def replay(log: RunLog, law: Law | Rule | None = None) -> Replay:
     commands: list[float] = []
     starts = over = 0
     for begin, known, end in _stretches(log):
-        step, starts, over = at_work(law), starts + 1, over + end - known
+        step, starts, over = at_work(_following(law, log, begin, known)), starts + 1, over + end - known
         for k in range(begin, known):
             try:
                 u = step(float(t[k]) - float(t[begin]), tuple(readings[k].tolist()))
@@ -112,6 +113,14 @@ def replay(log: RunLog, law: Law | Rule | None = None) -> Replay:
         rows=np.array(rows, dtype=np.intp), commands=given, starts=starts, differing=int(other.size),
         largest=float(np.nanmax(np.abs(given - there)[other], initial=0.0)), first=first, passed_over=over,
     )  # fmt: skip
+
+
+def _following(law: Law | Rule, log: RunLog, begin: int, end: int) -> Law | Rule:
+    """The law with the logged references of some rows for its own."""
+    names = [name for name, _ in log.header.references]
+    if not names or law.signal().shape[1] != len(names):
+        return law
+    return replace(law, references=np.column_stack([log.columns[name][begin:end] for name in names]))
 
 
 def _logged(log: RunLog) -> Law | Rule:

@@ -109,7 +109,7 @@ class LogWriter:
         return self._process.pid
 
     def row(self, sample: Sequence[float]) -> None:
-        """Hand over one row: t, tick, counts, readings, command, applied command, mode, faults; see `LogHeader`."""
+        """Hand over one row in the order of `LogHeader.columns`."""
         if self._ring is None:
             return
         if refused := self._ring.put(sample):

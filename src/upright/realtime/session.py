@@ -54,6 +54,8 @@ class RunOrder:
     log : Path
     rig_text : str
         Of the rig's file, for the log.
+    references : tuple of (str, str)
+        Name and unit of each reference that the law follows, for the log; none where there is nothing to log.
     fifo : bool
         Whether a process of its own asks for FIFO priority.
     """
@@ -65,6 +67,7 @@ class RunOrder:
     mode: Mode = Mode.HOST
     check: bool = True
     rig_text: str = ""
+    references: tuple[tuple[str, str], ...] = ()
     fifo: bool = True
 
 
@@ -217,7 +220,7 @@ def _loop(
             pace.wait()
             following = rig.exchange(command)
             if not beside.stale:
-                _row(log, beside, tick, following, command)
+                _row(log, beside, tick, following, command, beside.references if order.references else ())
             if about.paced:
                 pace.late += max(0, following.tick - tick.tick - 1)
             end["ticks"], end["late"] = end["ticks"] + 1, pace.late
@@ -228,11 +231,13 @@ def _loop(
         end["seconds"] = clock.monotonic() - began
 
 
-def _row(log: LogWriter, beside: Supervisor, tick: Tick, following: Tick, command: float) -> None:
-    """Sample, the answer to it, and what of that the converter put out."""
+def _row(
+    log: LogWriter, beside: Supervisor, tick: Tick, following: Tick, command: float, references: tuple[float, ...]
+) -> None:  # fmt: skip
+    """Sample, what was followed, the answer, and what of that the converter put out."""
     log.row(
-        (tick.time, tick.tick, *tick.counts, *beside.readings(tick), command, following.applied, int(tick.mode),
-         int(tick.faults))
+        (tick.time, tick.tick, *tick.counts, *beside.readings(tick), *references, command, following.applied,
+         int(tick.mode), int(tick.faults))
     )  # fmt: skip
 
 
@@ -273,8 +278,9 @@ def _header(order: RunOrder, stage: Stage, law: Law | Rule) -> LogHeader:
     about = stage.supervisor.about
     return LogHeader(
         rig=order.rig_text, law=as_values(law), coordinates=tuple(zip(about.coordinates, stage.units, strict=True)),
-        command_unit=about.command_unit, period=about.period, modes={int(m): m.name for m in Mode},
-        faults={int(f): text for f, text in SENTENCES.items()}, driven=(int(Mode.HOST),), start=clock.time(),
+        command_unit=about.command_unit, period=about.period, references=order.references,
+        modes={int(m): m.name for m in Mode}, faults={int(f): text for f, text in SENTENCES.items()},
+        driven=(int(Mode.HOST),), start=clock.time(),
     )  # fmt: skip
 
 

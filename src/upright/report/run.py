@@ -36,6 +36,7 @@ def chapter(log: RunLog) -> Chapter:
     facts += [
         ("dropped", f"{log.dropped} rows of the loop" if log.dropped else "none"),
         ("law", law_in_words(log.header)),
+        *(("followed", f"{name} [{unit}]") for name, unit in log.header.references),
         ("written by", ", ".join(f"{name} {version}" for name, version in log.header.versions.items() if version)),
     ]
     parts = [Part("Run", (Facts(tuple(facts)),))]

@@ -48,7 +48,7 @@ class RunningLaw:
 
     def __init__(self, law: Law | Rule, period: float) -> None:
         self.period, self.ticks = period, 0
-        self.followed = 0.0  # first reference at the tick that was answered last
+        self.references: tuple[float, ...] = ()  # at the tick that was answered last
         self._signal: list[list[float]] = law.signal().tolist()
         self._own = isinstance(law, Rule)
         if isinstance(law, Law) and (m := law.signal().shape[1]):
@@ -57,6 +57,11 @@ class RunningLaw:
             target = np.append(np.broadcast_to(np.asarray(law.target, dtype=np.float64), (n,)), np.zeros(m))
             law = replace(law, references=None, reference_names=(), measured=(), target=target, begin=begin)
         self._step = at_work(law)
+
+    @property
+    def followed(self) -> float:
+        """First of the references; 0 without any."""
+        return self.references[0] if self.references else 0.0
 
     def step(self, readings: Sequence[float], reference: float | None = None, time: float | None = None) -> float:
         """Command of this tick, rounded and limited.
@@ -73,7 +78,7 @@ class RunningLaw:
         row = list(self._signal[min(self.ticks, len(self._signal) - 1)])
         if reference is not None and row:
             row[0] = reference
-        self.followed = row[0] if row else 0.0
+        self.references = tuple(row)
         given = readings if self._own else (*readings, *row)
         self.ticks += 1
         return self._step((self.ticks - 1) * self.period if time is None else time, given)[0]

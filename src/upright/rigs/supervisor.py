@@ -332,6 +332,11 @@ class Supervisor:
         return [n / per for n, per in zip(tick.counts, self.about.counts, strict=True)]
 
     @property
+    def references(self) -> tuple[float, ...]:
+        """What the law followed at the tick that was answered last."""
+        return () if self._running is None else self._running.references
+
+    @property
     def stale(self) -> bool:
         """Whether the last sample was one that had come before."""
         return self._stale > 0

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import upright as up
 from upright.errors import BadInput
 from upright.experiments.makes import make_rig
 from upright.experiments.running.chapter import run_chapter
@@ -17,6 +18,7 @@ from upright.gains import feedback, filtered, hold, place, prefilter
 from upright.laws import as_values
 from upright.logs import read_log
 from upright.logs.replay import replay
+from upright.report.run import chapter
 from upright.rigs import Fault
 
 RIG = make_rig("furuta")
@@ -59,6 +61,22 @@ def test_a_rest_within_one_count_is_said_in_counts(folder, tmp_path):
     assert told["theta, rms of the second half"] == "below a count, 3.9·10⁻⁴ rad"
     moved = run_rig(replace(wish, tilt=0.05), tmp_path)
     assert f"theta stayed within {math.degrees(moved.unrest[-1]):.2g} degrees" in moved.verdict
+
+
+def test_a_reference_is_in_the_log_with_its_unit_and_a_law_without_one_has_no_column(folder, tmp_path):
+    wish = RunRequest(rig=folder / "RIG.toml", law=folder / "design.json", seconds=0.4, reference="sine 0.1 2.5")
+    done = run_rig(wish, tmp_path)
+    t = np.arange(len(done.log)) * RIG.period
+    np.testing.assert_allclose(done.log.columns["reference"], 0.1 * np.sin(5 * math.pi * t), atol=1e-12)
+    assert done.log.header.references == (("reference", "rad"),)
+    assert replay(read_log(done.log_path)).identical
+    assert ("followed", "reference [rad]") in chapter(done.log).parts[0].content[0].pairs
+    assert up.read(str(done.log_path)).units["reference"] == "rad"
+    up.log_convert(done.log_path, out=tmp_path / "run.csv")
+    assert np.array_equal(up.read(str(tmp_path / "run.csv"))["reference"], done.log.columns["reference"])
+    plain = run_rig(replace(wish, reference="", tilt=0.02), tmp_path)
+    assert "reference" not in plain.log.columns
+    assert "excitation" not in run_rig(replace(wish, law=None, reference="", excite="free"), tmp_path).log.columns
 
 
 @pytest.mark.slow

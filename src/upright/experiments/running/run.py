@@ -174,12 +174,14 @@ def run_rig(
     else:
         samples = wish.samples or signal(wish.excite, model.unit, model.period, wish.seconds)
         law = open_loop(samples, len(model.counts), model.period)
+    references = _references(law, model) if wish.law is not None else ()
     folder.mkdir(parents=True, exist_ok=True)
     path = fresh(folder, wish.stem, ".mcap")
     order = RunOrder(
         make=partial(stage_of, wish.rig, balance=balance, tilt=wish.tilt, watch=wish.watch,
                      from_rest=wish.from_rest), law=as_values(law),
         seconds=wish.seconds, log=path, mode=MODES[wish.mode], check=wish.check, rig_text=read_text(wish.rig),
+        references=references,
     )  # fmt: skip
     if file.hardware or wish.own_process:
         end = run_in_process(order, watch=watch, paced=file.hardware)
@@ -187,6 +189,16 @@ def run_rig(
         end = _inline(order, law, watch)
     log = read_log(path) if path.exists() else None
     return RigRun(wish=wish, file=file, model=model, end=end, log=log, log_path=path)
+
+
+def _references(law: Law | Rule, model: ServoRig) -> tuple[tuple[str, str], ...]:
+    """Names and units for the log of what the law follows; of signals that it came with or was given."""
+    if not isinstance(law, Law) or law.references is None:
+        return ()
+    coordinates = {c.name for c in model.plant.coordinates}
+    names = law.reference_names or tuple(f"reference_{i + 1}" for i in range(law.signal().shape[1]))
+    unit = model.plant.coordinates[0].unit
+    return tuple((f"{n}_reference" if n in coordinates else n, unit) for n in names)
 
 
 def _inline(order: RunOrder, law: Law | Rule, watch: Callable[[RunState], str]) -> RunEnd:
