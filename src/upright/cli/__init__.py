@@ -52,7 +52,7 @@ GROUPS = {
 NESTED = {
     "rig": {
         "doctor": "Look at a rig before any loop: link, limits, encoders by hand, a small pulse.",
-        "check": "Measure how late this machine wakes a loop, and say what rate it can hold.",
+        "check": "Measure how late this machine wakes a loop, and say whether it holds a rate.",
     },
     "log": {
         "show": "Print what a run's log holds: rig, law, duration, rate, modes, faults, events, what is missing.",

@@ -88,8 +88,8 @@ class Jitter:
 
     @property
     def promising(self) -> int:
-        """Fastest of `RATES` above the one that was tried for which there seems to be time [Hz]; 0 for none."""
-        for rate in RATES:
+        """Fastest of `RATES` above one that was held for which there seems to be time [Hz]; 0 for none."""
+        for rate in RATES if self.held else ():
             share = rate * (float(np.mean(self.work)) + vigil_within(1.0 / rate, self.standing.vigil))
             if rate * self.period > 1.0 + 1e-9 and share <= _SHARE and self._missed(rate) <= TOLERATED:
                 return rate

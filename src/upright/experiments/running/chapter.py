@@ -113,7 +113,7 @@ def jitter_chapter(found: Jitter) -> Chapter:
     )  # fmt: skip
     late = found.late / found.behind.size
     steps = [Step("Measure longer, with what else will run beside the loop.", "upright rig check --seconds 600")]
-    if found.promising and found.held:
+    if found.promising:
         steps.append(Step("Try a faster loop.", f"upright rig check --rate {found.promising}"))
     return Chapter(
         title="How late is this machine?", verdict=found.verdict, sound=found.held,
