@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import timeit
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -178,17 +177,6 @@ def test_a_likelihood_is_that_of_all_readings_at_once(which):
                     for m in (4, 2 * samples))  # fmt: skip
     # the condition of the covariance, 1 rad to a count, leaves half of the digits
     assert watch.likelihood[0, which] == pytest.approx(-0.5 * (whole - begun), rel=1e-6)
-
-
-def test_a_sample_of_the_bank_is_a_small_part_of_a_tick():
-    """At 2 kHz a tick has 500 us, of which the law's own sums in Python take 20; 11 filters as matrices took 70."""
-    watch = Watch(make_rig("furuta"))
-
-    def sample():
-        watch.see([[0.01, 0.02]], 0.1)
-        watch.speaks()
-
-    assert min(timeit.repeat(sample, number=100, repeat=30)) / 100 < 30e-6
 
 
 def test_sound_sensors_are_seldom_suspected():

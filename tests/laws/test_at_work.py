@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import timeit
 from fractions import Fraction
 
 import numpy as np
@@ -64,12 +63,6 @@ def test_the_sum_goes_from_left_to_right_in_rounded_products(d, y):
         total = Fraction(float(total + Fraction(product)))
     law = Law(np.zeros((0, 0)), np.zeros((0, len(d))), np.zeros((1, 0)), [d])
     assert at_work(law)(0.0, y) == (float(total),)
-
-
-def test_a_state_feedback_takes_some_microseconds_of_a_tick():
-    """Four products of 4 and 2 numbers in loops took 16."""
-    step = at_work(LAWS["filtered differences"])
-    assert min(timeit.repeat(lambda: step(0.0, (0.1, 0.2)), number=100, repeat=30)) / 100 < 10e-6
 
 
 def test_a_rule_is_called_with_time_and_its_own_memory():
