@@ -13,6 +13,7 @@ from upright.experiments.makes import make_rig
 from upright.gains import feedback, filtered, hold, place
 from upright.laws import Rule, state_feedback
 from upright.rigs import Board, Fault, Limits, Mode, TwinPort
+from upright.rigs.driven import StillDrive
 from upright.rigs.supervisor import Duty, Supervisor
 
 RIG = make_rig("furuta")
@@ -293,3 +294,19 @@ def test_samples_that_do_not_come_are_not_taken_for_a_lying_encoder():
     assert np.ptp([t.counts[1] for t in ticks]) > 100
     with pytest.raises(RigStopped, match="theta shown"):
         scene.run(2.0, then=lambda p: (p.encoders.dead(1), p.push([0.0, 1.0])))
+
+
+def test_a_command_that_has_just_jumped_has_not_yet_moved_the_arm_that_friction_held():
+    """0.2 s of rest in dry friction, then a step of the reference: 5 V for 3 ms move it by 3 counts, not by 100."""
+    still = StillDrive(RIG, "inverted")
+    speed, way = 0.0, 0.0
+    for command in [0.0] * 226 + [5.0] * 4:
+        way, speed = way + speed * RIG.period, speed + MODEL.B[1, 0] * command * RIG.period
+        assert not still.sees(0.1, [0.0, 0.0], command)
+    assert way * RIG.counts[0] < 10
+    for _ in range(100):
+        if still.sees(0.1, [0.0, 0.0], 5.0):
+            break
+        way, speed = way + speed * RIG.period, speed + MODEL.B[1, 0] * 5.0 * RIG.period
+    # free of friction it had gone `UNSEEN` counts by then, and not much more: friction takes 0.5 % of 5 V
+    assert way * RIG.counts[0] == pytest.approx(100, rel=0.2)

@@ -17,13 +17,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from upright.control.sensors import Watch, sticking
+from upright.control.sensors import Watch
 from upright.control.trial import ServoRig
 from upright.errors import BadInput, RigStopped
 from upright.gains import hold
 from upright.gains.loop import closed
 from upright.laws import Law, Rule
 from upright.rigs.board import Board, told
+from upright.rigs.driven import StillDrive
 from upright.rigs.law import RunningLaw, absurdity, for_rig
 from upright.rigs.protocol import NO_FAULT, Capabilities, Fault, Limits, LiveRig, Mode, SelfTest, Tick
 from upright.rigs.twin import TwinPort
@@ -38,12 +39,6 @@ PULSE = 0.15
 """Length of the pulse [s]."""
 REST = 0.5
 """Time without a count after which a rig is at rest [s]."""
-
-HELD_BY, UNSEEN = 2.0, 100
-"""A driven body is held at most by so many times the dry friction that the model knows of; it cannot have moved by so
-many counts without its encoder showing one."""
-DRY = 0.01
-"""Share of the largest command that dry friction is taken for where the model knows of none."""
 
 Event = Callable[[float, str, str], None]
 
@@ -84,35 +79,6 @@ class Duty:
     def watched(self) -> bool:
         """Whether a bank of filters can say something of it."""
         return self.watch and self.model is not None and self.at == "inverted" and len(self.model.counts) == 2
-
-
-class StillDrive:
-    """Whether the driven body shows not a single count although what acts on it must have moved it.
-
-    A dead encoder there is what a bank of filters sees last: the loop stands, and the arm runs away under it slowly.
-    """
-
-    def __init__(self, model: ServoRig, at: str) -> None:
-        linear = model.linear(at)
-        names = [c.name for c in model.plant.coordinates]
-        self.name = model.plant.inputs[0].on
-        self.which = names.index(self.name)
-        row = 2 * self.which + 1
-        self._pull = [float(a) for a in linear.A[row, 0::2]]
-        self._drive, self._period = float(linear.B[row, 0]), model.period
-        known = HELD_BY * sticking(model)
-        self._held = abs(self._drive) * (known or DRY * model.limit)
-        self._least = UNSEEN / model.counts[self.which]
-        self._shown, self._sum, self._ticks = math.nan, 0.0, 0
-
-    def sees(self, reading: float, away: Sequence[float], command: float) -> bool:
-        """Take a sample with its deviations and command; whether the body must have moved since its last count."""
-        if reading != self._shown:
-            self._shown, self._sum, self._ticks = reading, 0.0, 0
-        self._sum += sum(a * q for a, q in zip(self._pull, away, strict=True)) + self._drive * command
-        self._ticks += 1
-        t = self._ticks * self._period
-        return (abs(self._sum) / self._ticks - self._held) * t**2 / 2 > self._least
 
 
 @dataclass(eq=False)
