@@ -2,8 +2,9 @@
 
 The order is fixed: open and read limits back, zero the encoders where it hangs, a small pulse whose answer is compared
 with the model's, the start window, a start without a jump; then, tick by tick, a look at the rig's own faults, at
-samples that do not go on, at travel, at how far it leans, at the command, and at the innovations of a bank of Kalman
-filters, which see an encoder that lies. Every way out goes through `LiveRig.estop` first.
+samples that do not go on, at travel, at how far it leans, at the command, at whether the driven body moves as its
+command and the pendulum on it say, and at the innovations of a bank of Kalman filters, which see an encoder that lies.
+Every way out goes through `LiveRig.estop` first.
 
 This is supervision in software on a computer that may hang, not a rated safety function: a rig needs a stop in
 hardware.
@@ -24,7 +25,7 @@ from upright.gains import hold
 from upright.gains.loop import closed
 from upright.laws import Law, Rule
 from upright.rigs.board import Board, told
-from upright.rigs.driven import StillDrive
+from upright.rigs.driven import DrivenScale, StillDrive
 from upright.rigs.law import RunningLaw, absurdity, for_rig
 from upright.rigs.protocol import NO_FAULT, Capabilities, Fault, Limits, LiveRig, Mode, SelfTest, Tick
 from upright.rigs.twin import TwinPort
@@ -107,6 +108,7 @@ class Supervisor:
     _running: RunningLaw | None = field(init=False, default=None)
     _watch: Watch | None = field(init=False, default=None)
     _still: StillDrive | None = field(init=False, default=None)
+    _scale: DrivenScale | None = field(init=False, default=None)
     _last: Tick | None = field(init=False, default=None)
     _first: Tick | None = field(init=False, default=None)
     _command: float = field(init=False, default=0.0)
@@ -194,6 +196,7 @@ class Supervisor:
         watched = self.duty.model if self.duty.watched else None
         self._watch = Watch(watched, self.duty.at) if watched else None
         self._still = StillDrive(watched, self.duty.at) if watched else None
+        self._scale = DrivenScale(watched, self.duty.at) if watched else None
         return fitted
 
     def start(self, mode: Mode = Mode.HOST) -> None:
@@ -261,11 +264,11 @@ class Supervisor:
             command = self._running.step(readings, reference, time - self._first.time)
             if not math.isfinite(command):
                 self._give_up(Fault.GAINS, f"the law gave {command} for a command.")
-            if self._watch is not None and self._still is not None:
+            if self._watch is not None and self._still is not None and self._scale is not None:
                 # until the host has answered, its last command is what drives the rig
                 drives = command if self._mode == Mode.MCU or time == tick.time else self._command
                 drives = min(max(drives, -self.held.command), self.held.command)
-                self._suspect(self._watch, self._still, readings, drives)
+                self._suspect(self._watch, self._still, self._scale, readings, drives)
         self._command = command if self._mode == Mode.HOST else self._running.followed
         return self._command
 
@@ -321,7 +324,9 @@ class Supervisor:
                 f"{self._shown(readings[-1] - self.target[-1])}, more than {self._shown(self.duty.lean)}: it fell.",
             )  # fmt: skip
 
-    def _suspect(self, watch: Watch, still: StillDrive, readings: Sequence[float], command: float) -> None:
+    def _suspect(
+        self, watch: Watch, still: StillDrive, scale: DrivenScale, readings: Sequence[float], command: float
+    ) -> None:
         """Stop when an encoder lies, or must have died."""
         away = [q - t for q, t in zip(readings, self.target, strict=True)]
         watch.see([away], command)
@@ -332,7 +337,14 @@ class Supervisor:
                 Fault.MODEL, f"{self.about.name} does not move as its model does; likeliest is {what}. Check that "
                 "encoder's wiring and counts (upright rig doctor); if a hand pushed it, start again.",
             )  # fmt: skip
-        if still.sees(readings[still.which], away, command):
+        wrong = scale.sees(away, command)
+        if wrong == "wrong way round":
+            self._give_up(
+                Fault.MODEL, f"{scale.name} is shown the wrong way round: command and pendulum say that it moves "
+                "against what its encoder shows. Check that encoder's channels (upright rig doctor); if a hand pushed "
+                "it, start again.",
+            )  # fmt: skip
+        if still.sees(readings[still.which], away, command) or wrong:
             self._give_up(
                 Fault.ENCODER, f"{still.name} shows not a single count although its command must have moved it: its "
                 "encoder is dead, or something holds it fast.",
