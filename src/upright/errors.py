@@ -25,6 +25,9 @@ class NotIdentifiable(UprightError, RuntimeError):
 class RigStopped(UprightError, RuntimeError):
     """A rig refused, or stopped itself; its command was zero before this was raised."""
 
+    def __init__(self, sentence: str) -> None:
+        super().__init__(sentence[:1].upper() + sentence[1:])  # many begin with a rig's name, which is written small
+
 
 class WorkersLost(UprightError, RuntimeError):
     """Processes or machines that were to share the work died, again and again."""

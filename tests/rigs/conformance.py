@@ -95,8 +95,9 @@ class Conformance:
         tick = rig.exchange(0.0)
         assert tick.mode == Mode.FAULT
         assert Fault.RESET in tick.faults
-        with pytest.raises(RigStopped):
+        with pytest.raises(RigStopped) as refused:
             rig.configure(limits_of(about))
+        assert str(refused.value)[0].isupper()  # as sentences begin, also one that begins with the rig's name
         rig.clear_fault()
         assert rig.exchange(0.0).mode == Mode.IDLE
 

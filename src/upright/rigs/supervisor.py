@@ -354,7 +354,7 @@ class Supervisor:
         self.rig.estop()
         self.faults |= fault
         self.event(self._time, "fault", why)
-        raise RigStopped(why[0].upper() + why[1:])
+        raise RigStopped(why)
 
     def _await_rest(self, patience: float = 30.0) -> None:
         """Wait with the power stage off, so that nothing drives what is still moving."""
