@@ -170,6 +170,11 @@ COUNTERS = (
     Hazard(what="a transition that no encoder makes", by=F.ENCODER, within=0.0, tell=in_loop(board.says("illegal"))),
 )  # fmt: skip
 CUT = Hazard(what="link cut", by=F.WATCHDOG, within=LIMITS.watchdog, tell=in_loop(lambda s: s.on.cut()))
+CORRUPTED = tuple(
+    Hazard(what=f"1 of {1 / chance:,.0f} bytes corrupted, both ways", by=F.WATCHDOG | F.STALE, stands=True,
+           tell=board.corrupted(chance, seconds)) for chance, seconds in
+    ((1e-6, 30.0), (1e-5, 15.0), (1e-4, 4.0), (1e-3, 4.0), (1e-2, 4.0))
+)  # fmt: skip
 ON_FIRMWARE = (
     *SOUND, *ENCODERS, *COUNTERS, *TIMES,
     Hazard(what="15 ticks of the board never come", by=F(0), stands=True, tell=in_loop(board.says("skip 15"))),
@@ -180,9 +185,7 @@ ON_FIRMWARE = (
     Hazard(what="host killed (-9), by the clock on the wall", by=F.WATCHDOG, within=LIMITS.watchdog,
            ticks=10, tell=BY_THE_WALL),
     CUT,
-    *(Hazard(what=f"1 of {1 / chance:,.0f} bytes corrupted, both ways", by=F.WATCHDOG | F.STALE, stands=True,
-             tell=board.corrupted(chance, seconds)) for chance, seconds in
-      ((1e-6, 30.0), (1e-5, 15.0), (1e-4, 4.0), (1e-3, 4.0), (1e-2, 4.0))),
+    *CORRUPTED,
     Hazard(what="full command that waited for 50 ms in a buffer", by=F.STALE, within=0.0,
            tell=in_loop(board.in_a_buffer)),
     Hazard(what="3 requests in a row do not arrive", by=F(0), stands=True, tell=in_loop(board.missed(3))),
@@ -211,8 +214,7 @@ IN_SILICON = (
     *(h for h in ENCODERS if h.what.endswith(("dead, moving", "flips, moving"))),
     *COUNTERS,
     Hazard(what="loop late by 50 ms", by=F.WATCHDOG, within=LIMITS.watchdog, tell=silent(0.05)),
-    CUT,
-    # no corrupted frames: simrig lets up to 16 ms pass for a frame that its firmware does not answer
+    CUT, *CORRUPTED,
 )
 COLUMNS = (
     Column(name="twin", known=twin.KNOWN, make=twin.TwinHazards),

@@ -3,7 +3,8 @@
  *     simrig atmega2560.elf m_p=0.2 l_cg=0.15 ...     every number of furuta.h
  *
  * Virtual time in lockstep: a frame from the host starts it, and it stands still when the answer has left, so that
- * runs are the same to the last bit whatever else the machine does. The name of the pty comes first on standard output.
+ * runs are the same to the last bit whatever else the machine does. A frame that the firmware will not answer, because
+ * it was spoiled, takes no longer than its bytes do: who waits for an answer lets time pass by `run`. The name of the pty comes first on standard output.
  * Lines on standard input, each answered: those of mishap.h, and
  *     wrap CHANNEL V  the counter's own number, without that anything moved
  *     illegal         both phases of encoder 1 change at once
@@ -27,6 +28,7 @@
 #include "avr_ioport.h"
 #include "avr_spi.h"
 #include "avr_uart.h"
+#include "frame.h"
 #include "furuta.h"
 #include "mishap.h"
 #include "sim_avr.h"
@@ -195,14 +197,17 @@ static void listen_to_lines(void) {
     memmove(text, line, n);
 }
 
-/* One frame to the firmware, and time until its answer has left. */
+/* One frame to the firmware, and time until its answer has left, if it is one that has an answer. */
 static void hand_over(int wire, const uint8_t *frame, size_t n) {
+    static receiver_t as_firmware;
+    bool sound = false;
+    for (size_t i = 0; i < n; i++) sound = frame_receive(&as_firmware, frame[i]) >= 2;
     size_t fed = 0;
     answered = false;
     for (size_t left = LONGEST_ANSWER(n); left > 0 && !answered;) {
         for (int i = 0; i < BYTES_PER_SLICE && fed < n && uart_ready; i++) avr_raise_irq(to_uart, frame[fed++]);
         slice();
-        if (fed == n) left--;
+        if (fed == n) left = sound ? left - 1 : 0;
     }
     for (size_t i = 0; i < answer_bytes;) {
         ssize_t written = write(wire, answer + i, answer_bytes - i);
@@ -270,6 +275,7 @@ int main(int count, char **arguments) {
         if (!furuta_set(&plant, arguments[i])) return fprintf(stderr, "%s is not understood\n", arguments[i]), 2;
     if (furuta_missing(&plant)) return fprintf(stderr, "%s is missing\n", furuta_missing(&plant)), 2;
     mishaps_prepare(&mishaps, &plant);
+    frame_prepare();
     make_board(arguments[1]);
 
     int wire, host_end; /* kept open, so that a host may come and go */
