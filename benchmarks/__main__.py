@@ -23,7 +23,7 @@ from upright.workers import Workers
 NAMES = (
     "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "frequency", "swing_up", "tracking", "lab",
     "doctor", "rigs", "misfit", "verdicts", "regulation", "real", "agree", "bands", "starts", "startup",
-    "workers", "long", "gpu", "crash", "safety", "soak", "jitter", "gym",
+    "workers", "long", "gpu", "crash", "safety", "minute", "soak", "jitter", "gym",
 )  # fmt: skip
 PUBLISHED = (
     "real", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "workers", "crash", "safety", "soak",

@@ -214,7 +214,8 @@ IN_SILICON = (
     *(h for h in ENCODERS if h.what.endswith(("dead, moving", "flips, moving"))),
     *COUNTERS,
     Hazard(what="loop late by 50 ms", by=F.WATCHDOG, within=LIMITS.watchdog, tell=silent(0.05)),
-    CUT, *CORRUPTED,
+    CUT,
+    *CORRUPTED,
 )
 COLUMNS = (
     Column(name="twin", known=twin.KNOWN, make=twin.TwinHazards),

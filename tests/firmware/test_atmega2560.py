@@ -11,16 +11,13 @@ import pytest
 
 from benchmarks.boards import COUNTS, STEP, plant
 from benchmarks.designs import FURUTA, GAIN, LIMITS, PARAMETERS, PERIOD, inverted
+from benchmarks.minute import KICKS, TICK, UPRIGHT, held
 from tests.firmware.test_laws import FREE, in_float32
-from tests.firmware.test_loops import UPRIGHT, held, settled
+from tests.firmware.test_loops import settled
 from upright.errors import RigStopped
 from upright.laws import state_feedback
 from upright.rigs.protocol import Fault, Mode
 from upright.simulation import simulate
-
-TICK = 16_000
-"""Cycles of the processor."""
-KICKS = {float(t): (-1) ** t * 0.8 for t in range(2, 60, 3)}
 
 
 def started(board, mode, law=None, limits=LIMITS):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -10,54 +9,14 @@ import pytest
 
 from benchmarks.boards import COUNTS, STEP, plant
 from benchmarks.designs import FURUTA, GAIN, LIMITS, PARAMETERS, PERIOD, inverted, swing_free
+from benchmarks.minute import UPRIGHT, held
 from upright.errors import BadInput
 from upright.rigs.protocol import Fault, Mode
 from upright.simulation import simulate
 
-UPRIGHT = plant(PARAMETERS, GAIN, theta=math.pi)
 HANGING = plant(PARAMETERS, GAIN)
 KICKS = {0.5: 0.6, 2.0: -0.9}
 """Speed that a tap adds to the pendulum [rad/s], by time [s]."""
-
-
-def on_the_host(law):
-    """The law sample by sample in double precision, as a loop on the host has it; a function of counts."""
-    z = None
-    target = np.broadcast_to(np.asarray(law.target), 2)
-
-    def step(counts):
-        nonlocal z
-        w = np.array(counts) / COUNTS - target
-        if z is None:
-            z = law.begin @ w
-        u = float((law.C @ z + law.D @ w)[0])
-        z = law.A @ z + law.B @ w
-        return u
-
-    return step
-
-
-def held(board, mode, law, seconds, kicks, **how):
-    """Samples (tick, counts, steps applied) of a run that is kicked, and the rig afterwards."""
-    rig = board.rig(**how)
-    rig.open()
-    rig.clear_fault()
-    rig.configure(LIMITS)
-    rig.zero()
-    rig.arm()
-    rig.start(mode, law if mode == Mode.MCU else None)
-    step, command = on_the_host(law), 0.0
-    first, to_come, rows = rig.exchange(0.0), sorted(kicks), []
-    tick = first
-    while tick.time - first.time < seconds:
-        if to_come and tick.time - first.time >= to_come[0]:
-            board.do(f"kick {kicks[to_come.pop(0)]!r}")
-        tick = rig.exchange(command)
-        assert tick.mode == mode, tick
-        rows.append((tick.tick - first.tick, *tick.counts, round(tick.applied / STEP)))
-        if mode == Mode.HOST:
-            command = step(tick.counts)
-    return np.array(rows), rig
 
 
 def settled(rows, kicks):
