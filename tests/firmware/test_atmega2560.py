@@ -9,13 +9,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.boards import COUNTS, STEP, plant
+from benchmarks.boards import COUNTS, STEP, plant, rig_on
 from benchmarks.designs import FURUTA, GAIN, LIMITS, PARAMETERS, PERIOD, inverted
 from benchmarks.minute import KICKS, TICK, UPRIGHT, held
 from tests.firmware.test_laws import FREE, in_float32
 from tests.firmware.test_loops import settled
 from upright.errors import RigStopped
 from upright.laws import state_feedback
+from upright.rigs.line import TerminalLine
 from upright.rigs.protocol import Fault, Mode
 from upright.simulation import simulate
 
@@ -166,3 +167,17 @@ def test_a_cut_link_stops_it_and_a_counter_may_run_over(avr):
     assert board.state()[5:7] == [0.0, 0.0]
     board.do("join")
     assert rig.exchange(0.0).faults == Fault.WATCHDOG
+
+
+def test_a_spoiled_request_takes_no_longer_than_its_bytes(avr):
+    """Whoever waits for its answer lets time pass: 16 ms of it for each would outlast every watchdog."""
+    board = avr(*UPRIGHT)
+    line = TerminalLine(board.port)
+    rig = rig_on(line, lockstep=True)
+    rig.open()
+    before = board.state()[0]
+    line.write(bytes([7]) + b"not COBS" + bytes([0]))
+    board.state()
+    spoiled = board.state()[0]
+    assert spoiled - before < 1.0  # 10 bytes at 1 Mbaud take 0.1 ms
+    assert rig.snapshot().dropped == 1
