@@ -27,7 +27,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from benchmarks.hazards import board, firmware, logs, twin
+from benchmarks.hazards import board, firmware, logs, sound, twin
 from benchmarks.hazards.killed import killed
 from benchmarks.hazards.story import (
     LIMITS,
@@ -246,6 +246,35 @@ def judged(hazard: Hazard, column: Column, found: Happened) -> Line:
     )
 
 
+def left_alone(*, quick: bool, progress: Callable[[str], None]) -> tuple[list[Line], list[str]]:
+    """Loops in which nothing is broken, as lines of the benchmark and of the page."""
+    lines: list[Line] = []
+    body = ["", "## Nothing broken", "", *str(sound.__doc__).splitlines()[2:], "", *SOUND_HEAD]
+    for make in sound.MAKES:
+        for kind in sound.KINDS:
+            progress(f"nothing broken: {make}, {kind}")
+            found = sound.all_of(make, kind, sound.QUICK if quick else sound.SEEDS)
+            stopped = (found.still + found.scale) / found.runs
+            note = f"{found.runs} runs; {found.filters} stopped by the bank of filters"
+            lines.append(
+                Line(
+                    contender=f"nothing broken: {found.make}, {kind}",
+                    ratio=(stopped, stopped, stopped),
+                    target=Target(most=0.0),
+                    note=note,
+                )
+            )
+            row = found.make, kind, found.runs, found.scale, found.still, found.filters
+            body.append(f"| {' | '.join(map(str, row))} |")
+    return lines, body
+
+
+SOUND_HEAD = (
+    "| rig | loop | runs | stopped by command and pendulum | by a count that does not come | by the bank of filters |",
+    "|---|---|--:|--:|--:|--:|",
+)
+
+
 def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None = None) -> list[Line]:
     """Break everything in turn, on every column that can run here."""
     lines: list[Line] = []
@@ -271,6 +300,9 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
             if found.overran:
                 after = 1e3 * (found.zero_after or 0.0)
                 late.append(f"- {column.name}: {hazard.what} ({found.stopped_by} after {after:.0f} ms)")
+    alone, table = left_alone(quick=quick, progress=progress)
+    lines += alone
+    body += table
     if markdown:
         missed = [f"- {line.contender} ({line.note})" for line in lines if line.reached is False]
         travel = f"{math.degrees(LIMITS.travel[0]):.0f} degrees"
