@@ -21,6 +21,7 @@ from upright.control.sensors import watched as guarded
 from upright.control.trial import readings
 from upright.experiments.makes import make_rig
 from upright.experiments.swing_up_2b.run import scales_of_log
+from upright.experiments.worn import worn
 from upright.physics import Furuta
 from upright.readers import read
 from upright.records import Record
@@ -265,3 +266,24 @@ def test_a_sound_loop_that_has_come_to_rest_is_not_suspected(make, tilt):
     run = trial(model, law, at="inverted", start=[0.0, 0.0, tilt, 0.0], seconds=5.0)
     shown = np.column_stack([run.record[c.name] for c in model.plant.coordinates]) - run.rest
     assert Watch(model).over(shown, run.u).sample[0] == -1
+
+
+@pytest.mark.parametrize(("make", "far", "seed"), [("furuta", 0.4, 1), ("linear", 0.05, 2)])
+def test_rounding_of_coarse_encoders_is_not_taken_for_a_lie(make, far, seed):
+    """2,000 counts a turn at 1.1 kHz: the same rounding for six samples is no evidence six times over."""
+
+    def coarse(rig):
+        return replace(rig, counts=tuple(c / 8 for c in rig.counts))
+
+    model = coarse(make_rig(make))
+    linear = model.linear("inverted")
+    sampled = design.hold(linear, model.period, model.delay / model.period)
+    gains = design.place(linear.A, linear.B, [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220])
+    law = design.feedback(design.filtered(sampled, 0.5), gains.K)
+    truth, watch = coarse(worn(make_rig(make, seed), seed)), Watch(model)
+    _, alarm = guarded(watch, truth, law, start=[far, 0.0, 0.02, 0.0], seconds=2.0)
+    assert alarm.sample[0] == -1
+    swapped = replace(truth, scales=(1.0, -1.0))
+    _, alarm = guarded(watch, swapped, law, start=[far, 0.0, 0.02, 0.0], seconds=2.0)
+    assert alarm.what[0].name == "theta"
+    assert 0 <= alarm.sample[0] * model.period < 0.1

@@ -364,10 +364,12 @@ class Watch:
         self._earlier = max(1, round(WITHIN / model.period))
         self._plain = max(0.005 * model.limit, PLAINLY * sticking(model))
         self._bound, self._kept = math.log(odds), math.exp(-model.period / forgotten)
-        noise = model.quantum**2 / 12
         # in what is shown, all suspicions expect the same disturbance: they are told apart by motions, not by noise
         driven = model.limit * np.abs(linear.B[1::2, 0])
         self._moved = MOVED * driven * WITHIN**2 / 2
+        # rounding repeats itself for as many samples as a count takes at the speeds that are evidence: as one sample
+        repeated = np.maximum(1.0, model.quantum / (self._moved / WITHIN * model.period))
+        noise = repeated * model.quantum**2 / 12
         shaking = unknown * driven / np.abs(scales)
         W = np.array([shaken(sampled, a) for a in shaking])
         # the start is known to a rad or m, and at rest to a rad/s or m/s; commands on their way are known
