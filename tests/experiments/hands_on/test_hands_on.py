@@ -176,10 +176,11 @@ def fill_in(path):
 
 @pytest.mark.slow
 def test_a_twin_with_dry_friction_is_identified_through_the_protocol(tmp_path):
-    done = up.lab(rig=str(made(tmp_path).file.path), experiment="1b", out=tmp_path / "out")
+    rig = made(tmp_path, 'kind = "twin"\nmake = "rectilinear"\nseed = 3\n')
+    done = up.lab(rig=str(rig.file.path), experiment="1b", out=tmp_path / "out")
     told = done.numbers["experiments"]["1b"]
     assert told["state"] == "done"
-    truth = make_rig("furuta", 3)
+    truth = make_rig("rectilinear", 3)
     for name, true in {**truth.plant.parameters(), "actuator.gain": truth.gain, "actuator.lag": truth.lag}.items():
         e = told["numbers"]["parameters"].get(name)
         if e is not None and e["status"] == "firm":

@@ -38,7 +38,7 @@ LINES, RESOLVED = 20, 4
 """Frequencies, and how many times the period of the multisine holds that of the slowest."""
 PROBES = (0.15, 0.4, 0.8)
 """Commands of the probes, as shares of what the guesses call for; what came of each bounds the next."""
-PROBED, PERIODS = 2, 8
+PROBED, PERIODS = 1, 8
 """Periods of a probe, and of the run."""
 SHARE = 0.8
 """Of the drive's limit."""
@@ -78,7 +78,7 @@ def asking(rig: RigAtHand) -> Asking:
         reach = np.array([REACH[c.unit] for c in model.plant.coordinates])
     driven = [c.name for c in model.plant.coordinates].index(model.plant.inputs[0].on)
     reach[driven] = min(reach[driven], OF_TRAVEL * _travel(rig, driven))
-    length = 1 << math.ceil(math.log2(RESOLVED * 2 * math.pi / (band[0] * model.period)))
+    length = 64 * math.ceil(RESOLVED * 2 * math.pi / (64 * band[0] * model.period))
     base = 2 * math.pi / (length * model.period)
     lines = odd_lines(*band, LINES, base)
     moved = np.abs(linear.response(lines * base)[:, :, 0])
