@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from upright.control.trial import GAIN, full_command
 from upright.errors import BadInput, nearest
@@ -117,40 +118,40 @@ class Episodes:
             substeps=substeps(self.rig, self.period),
         )  # fmt: skip
 
-    @property
+    @cached_property
     def _remembered(self) -> int:
         """Commands that delay and lag of the drive still hold: a lag has forgotten after 40 time constants."""
         late, lag = (self._values[f"actuator.{n}"] / self.period for n in ("delay", "lag"))
         return math.ceil(late) + math.ceil(40 * lag) + 2 if late or lag else 0
 
     @cached_property
-    def _pool(self) -> tuple[list[int], Array]:
+    def _pool(self) -> tuple[NDArray[np.intp], Array]:
         """Rows of the parameters in which the rigs that the fit allows differ, and their values, one rig a column."""
         names = [*self.rig.plant.names(), GAIN]
         rows = [[getattr(plant, n) for n in self.rig.plant.names()] + [gain] for plant, gain in self.rig.draws]
         values = np.array(rows, dtype=np.float64).reshape(len(rows), len(names)).T
         differ = [i for i, row in enumerate(values) if row.size and np.ptp(row) > 0]
-        return [self.simulator.names.index(names[i]) for i in differ], values[differ]
+        places = np.array([self.simulator.names.index(names[i]) for i in differ], dtype=np.intp)
+        return places[:, None], values[differ]
 
-    def reset(self, which: np.ndarray[tuple[int], np.dtype[np.bool_]], rng: np.random.Generator) -> None:
+    def reset(self, which: NDArray[np.bool_], rng: np.random.Generator) -> None:
         """Begin anew in some lanes, each with a rig drawn from those that the fit allows."""
         lanes = np.flatnonzero(which)
         if not lanes.size:
             return
         rows, values = self._pool
-        if rows:
+        if rows.size:
             drawn = rng.integers(values.shape[1], size=lanes.size)
-            for row, allowed in zip(rows, values, strict=True):
-                self.params[row, lanes] = allowed[drawn]
-        for row, near in zip(self.x, rng.uniform(-NEAR, NEAR, (len(self.x), lanes.size)), strict=True):
-            row[lanes] = near
-        for row, begin in zip(self.x[::2], self.begin.tolist(), strict=True):
-            row[lanes] += begin
+            self.params[rows, lanes] = values.take(drawn, axis=1)
+        near = rng.uniform(-NEAR, NEAR, (len(self.x), lanes.size))
+        near[::2] += self.begin[:, None]
+        self.x[:, lanes] = near
         self.steps[lanes] = 0
-        self._commands[lanes] = 0.0
+        if self._remembered:
+            self._commands[lanes] = 0.0
         self.done[lanes] = False
 
-    def step(self, action: Array) -> tuple[Array, np.ndarray[tuple[int], np.dtype[np.bool_]]]:
+    def step(self, action: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Hold the commands, `action` (lanes, inputs) times the limit, for a period: rewards, and who has fallen."""
         if self._remembered:
             self._commands[:, :-1] = self._commands[:, 1:]
@@ -185,20 +186,20 @@ class Episodes:
         return np.empty(2 * len(self.x) * (self.lanes if self.lanes == 1 else -(-self.lanes // 16) * 16))
 
     @property
-    def observation(self) -> np.ndarray[tuple[int, int], np.dtype[np.float32]]:
+    def observation(self) -> NDArray[np.float32]:
         """What a learner sees, shape (lanes, numbers): deviations from the target, then the speeds.
 
         Of what turns over, sine and cosine.
         """
         out, k = np.empty((len(self.names), self.lanes), dtype=np.float32), 0
         for i, turns in enumerate(self.turning.tolist()):
-            off = self.x[2 * i] - self.target[i]
+            off = (self.x[2 * i] - self.target[i]).astype(np.float32)
             for seen in (np.sin(off), np.cos(off)) if turns else (off,):
                 out[k], k = seen, k + 1
         out[k:] = self.x[1::2]
         return out.T
 
-    @property
+    @cached_property
     def names(self) -> list[str]:
         """What the numbers of an observation are."""
         out: list[str] = []
