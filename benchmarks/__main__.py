@@ -23,13 +23,13 @@ from upright.workers import Workers
 NAMES = (
     "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "frequency", "swing_up", "tracking", "lab",
     "doctor", "rigs", "misfit", "verdicts", "regulation", "real", "agree", "bands", "starts", "startup",
-    "workers", "long", "gpu", "crash", "safety", "minute", "soak", "jitter", "gym",
+    "workers", "long", "gpu", "crash", "safety", "minute", "soak", "jitter", "gym", "at_hand",
 )  # fmt: skip
 PUBLISHED = (
     "real", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "workers", "crash", "safety", "soak",
     "jitter", "gym",
 )  # fmt: skip
-SHARED = ("coverage", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "starts", "soak")
+SHARED = ("coverage", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "starts", "soak", "at_hand")
 """Those whose table is a page, and those whose work processes may share."""
 
 LIBRARIES = ("upright", "numpy", "scipy", "llvmlite", "control", "casadi", "jax", "mujoco", "gymnasium")

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -38,7 +39,7 @@ LINES, RESOLVED = 20, 4
 """Frequencies, and how many times the period of the multisine holds that of the slowest."""
 PROBES = (0.15, 0.4, 0.8)
 """Commands of the probes, as shares of what the guesses call for; what came of each bounds the next."""
-PROBED, PERIODS = 1, 8
+PROBED, PERIODS = 2, 8
 """Periods of a probe, and of the run."""
 SHARE = 0.8
 """Of the drive's limit."""
@@ -137,11 +138,10 @@ def run_hanging(rig: RigAtHand, folder: Path, progress: Progress) -> Hanging:
     rig.requested(f"{still}; all frequencies at once follow for {seconds:.0f} s.")
     progress(f"asking all frequencies at once for {seconds:.0f} s", 0.3)
     log = rig.put_out(_from_rest(rig, level * asked.wave, PERIODS), folder, "multisine")
-    runs = [{"label": "multisine", "file": log.name}, {"label": "probe", "file": probe.name, "role": "predict"}]
+    runs = [_run("multisine", log, asked, PERIODS), _run("probe", probe, asked, PROBED) | {"role": "predict"}]
     path = write_study(rig, folder / "study.toml", f"Hanging: {rig.model.name}", runs)
     wish = LogRequest(kind="multisine", hold=rig.model.period, band=asked.band, signals={}, counts={}, known={})
-    t = read(log).t
-    alone = {**runs[0], "file": f"../{log.name}", "window": [float(t[-PERIODS * asked.wave.size]), float(t[-1])]}
+    alone = {**runs[0], "file": f"../{log.name}"}
     answered = write_study(rig, folder / "response" / "study.toml", f"Response: {rig.model.name}", [alone])
     tell = part(progress, 0.5, 0.6, "fitting the response")
     try:
@@ -152,6 +152,14 @@ def run_hanging(rig: RigAtHand, folder: Path, progress: Progress) -> Hanging:
     fit = identify(study.rig, study.runs, progress=part(progress, 0.6, 1.0, "fitting the motion"))
     write_fit(fit, study, folder / "fit.json")
     return Hanging(response=response, study=study, fit=fit)
+
+
+def _run(label: str, log: Path, asked: Asking, periods: int) -> dict[str, Any]:
+    """The part of a log in which the command was whole: while it grows, what sticks and slips hardly moves, and a
+    simulation that errs there is lost from there on.
+    """
+    t = read(log).t
+    return {"label": label, "file": log.name, "window": [float(t[-periods * asked.wave.size]), float(t[-1])]}
 
 
 def _from_rest(rig: RigAtHand, wave: Array, periods: int) -> list[float]:
