@@ -11,9 +11,11 @@ The last column says for how long the host of a virtual machine gave its process
 
 from __future__ import annotations
 
+import math
 import os
 import platform
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +27,8 @@ from upright.realtime.jitter import TOLERATED, Jitter, measure
 SECONDS, QUICK = 60.0, 5.0
 WORK = 1e-4
 """What law and supervision of a tick may take [s]: a fifth of a period at 2 kHz."""
+EDGES = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
+"""Of the histogram [us]."""
 KINDS = ((1000.0, True), (1000.0, False), (2000.0, True))
 """Rate [Hz], and whether FIFO is asked for; the first is what is asked."""
 
@@ -32,19 +36,21 @@ KINDS = ((1000.0, True), (1000.0, False), (2000.0, True))
 def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None = None) -> list[Line]:
     """One loop after the other; only the first has targets, of its late ticks and of their work."""
     lines: list[Line] = []
-    rows: list[str] = []
+    all_of_them: list[Jitter] = []
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
     for rate, fifo in KINDS:
         progress(f"{rate:g} Hz, {'FIFO' if fifo else 'ordinary priority'}")
         found = measure(QUICK if quick else SECONDS, rate, fifo=fifo, make=supervised)
         lines += _lines(found, asked=(rate, fifo) == KINDS[0])
-        rows.append(_row(found))
+        all_of_them.append(found)
     if markdown:
         where = f"{platform.system()} {platform.release()}, {os.cpu_count()} processors, load {load:.2f} at the start."
         head = ["", where, "", "| rate | priority | late | p50 | p99 | p99.9 | largest | work p50 | work p99 | "
                 "rate held | time for | taken by host |",
                 "|--:|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|"]  # fmt: skip
-        markdown.write_text(page("jitter", "Jitter", __doc__, [*head, *rows]), encoding="utf-8")
+        rows = [_row(found) for found in all_of_them]
+        content = [*head, *rows, "", *_histogram(all_of_them)]
+        markdown.write_text(page("jitter", "Jitter", __doc__, content), encoding="utf-8")
     return lines
 
 
@@ -67,6 +73,15 @@ def _lines(found: Jitter, *, asked: bool) -> list[Line]:
         note=f"p50 {1e6 * np.median(found.work):.0f}, p99 {1e6 * np.percentile(found.work, 99):.0f} us",
     )
     return [late, work]
+
+
+def _histogram(loops: list[Jitter]) -> list[str]:
+    """Ticks by how far behind their deadline they were woken."""
+    names = [f"{1 / f.period:.0f} Hz, {f.standing.priority}" for f in loops]
+    counts = np.array([np.histogram(1e6 * f.behind, bins=[-math.inf, *EDGES, math.inf])[0] for f in loops])
+    ranges = [f"up to {EDGES[0]} µs", *(f"{a} to {b} µs" for a, b in pairwise(EDGES)), f"beyond {EDGES[-1]} µs"]
+    rows = [f"| {what} | {' | '.join(str(n) for n in column)} |" for what, column in zip(ranges, counts.T, strict=True)]
+    return [f"| woken behind the deadline | {' | '.join(names)} |", f"|---|{'--:|' * len(names)}", *rows]
 
 
 def _row(found: Jitter) -> str:
