@@ -111,7 +111,8 @@ def lab(
 
     shared = Workers(number=workers)
     asked = texts(experiment)
-    hands = _at_hand(rig, at, ask, watching, worn=worn, workers=workers) if at_hand else None
+    beside = Path() if out is None else at
+    hands = _at_hand(rig, beside, ask, watching, worn=worn, workers=workers) if at_hand else None
     rig = rig if hands is None else typed(hands.file.path)
     table = laboratory.EXPERIMENTS if hands is None else experiments_for(hands, rig)
     laboratory.choose(asked, rig, table)  # says what is wrong with the call before anything is written
