@@ -12,6 +12,7 @@ from upright.experiments.laboratory import Experiment, ExperimentInput
 from upright.experiments.makes import MAKES, SHAFTS
 from upright.physics import Plant
 from upright.report.page import Chapter
+from upright.study.text import number
 
 
 def experiments_for(rig: RigAtHand, name: str) -> tuple[Experiment, ...]:
@@ -113,4 +114,4 @@ def _weighed(at: ExperimentInput, body: str) -> dict[str, dict[str, Any]]:
     if not told or not told.get("stderr"):
         return {}
     unit = told["unit"]
-    return {body: {"value": f"{told['value']:.10g} {unit}", "uncertainty": f"{told['stderr']:.4g} {unit}"}}
+    return {body: {"value": number(told["value"], unit, 10), "uncertainty": number(told["stderr"], unit, 4)}}

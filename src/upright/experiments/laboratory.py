@@ -215,8 +215,8 @@ class Session:
     seed: int
     folder: Path
     asked: tuple[Experiment, ...]
+    table: tuple[Experiment, ...]
     worn: bool = False
-    table: tuple[Experiment, ...] = field(default_factory=lambda: EXPERIMENTS)
     hands: RigAtHand | None = None
     results: list[ExperimentResult] = field(default_factory=list[ExperimentResult])
     interrupted: bool = False

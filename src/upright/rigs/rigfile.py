@@ -90,11 +90,6 @@ class RigFile:
         """Whether something can really move."""
         return self.kind in HARDWARE
 
-    @property
-    def limited(self) -> bool:
-        """Whether it says how far the rig may go."""
-        return "limits" in _root(self.path)
-
     def limits(self, units: Mapping[str, str], command_unit: str, default: Limits | None = None) -> Limits | None:
         """How far the rig may go; the default where the file says nothing, None where hardware has no limits.
 

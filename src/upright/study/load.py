@@ -67,6 +67,16 @@ class Study:
     ladder: tuple[Rung, ...] = ()
     description: RigDescription = field(default_factory=RigDescription)
 
+    @property
+    def provenance(self) -> dict[str, object]:
+        """Where its numbers come from, for a page."""
+        return {
+            "study": self.path.name,
+            "sha256 of the study": self.sha256,
+            "data": self.source or "not stated",
+            "runs": {run.label: run.source for run in self.runs},
+        }
+
     def hold_out(self, *labels: str) -> Study:
         """The same study with some of its fitted runs predicted instead.
 

@@ -227,7 +227,6 @@ def identify(
     from upright.report.symbols import typed
     from upright.study.results import write_fit
     from upright.verbs.pages import folder_if_given, write_page
-    from upright.verbs.study import provenance
     from upright.workers import Workers
 
     folder, shared = folder_if_given(out, pdf), Workers(number=workers, cluster=cluster)
@@ -259,7 +258,7 @@ def identify(
         if folder is not None:
             write_fit(fit, asked, written[0], crossed)
     told = chapter(
-        fit, title=asked.title or asked.path.stem.replace("_", " "), provenance=provenance(asked), crossed=crossed,
+        fit, title=asked.title or asked.path.stem.replace("_", " "), provenance=asked.provenance, crossed=crossed,
         study=typed(label) + (f" --data {typed(data)}" if data is not None else ""),
         folder=typed(folder) if folder is not None else "OUT",
     )  # fmt: skip

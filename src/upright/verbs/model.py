@@ -14,7 +14,7 @@ from upright.files import check_output, keeps_its_inputs
 from upright.progress import Progress, silent
 from upright.verbs.answer import Answer
 from upright.verbs.pages import folder, folder_if_given, page_folder, pdf_has_folder, write_page
-from upright.verbs.study import folder_beside, provenance, read_study
+from upright.verbs.study import folder_beside, read_study
 from upright.verbs.values import open_log, pairs, paths, si, texts
 
 if TYPE_CHECKING:
@@ -184,7 +184,7 @@ def ladder(
             files.append(replace_file(at / "study.toml", chosen_study(asked, climbed).encode()))
     where = typed(Path(data) if data is not None else study.parent)
     told = chapter(
-        climbed, title=f"Ladder: {asked.title or asked.path.stem.replace('_', ' ')}", provenance=provenance(asked),
+        climbed, title=f"Ladder: {asked.title or asked.path.stem.replace('_', ' ')}", provenance=asked.provenance,
         steps=next_steps(climbed, study=typed(study), folder=typed(at), data=where, trimmed=trimmed),
     )  # fmt: skip
     if out is not None and (report or pdf):

@@ -36,13 +36,3 @@ def folder_beside(study: Path, what: str) -> Path:
     if study.is_dir():
         raise BadInput(f"'{study}' is a folder, and a study is a TOML file; name the file inside it.")
     return study.with_name(f"{study.stem}-{what}")
-
-
-def provenance(asked: Study) -> dict[str, object]:
-    """Where the numbers of a study come from."""
-    return {
-        "study": asked.path.name,
-        "sha256 of the study": asked.sha256,
-        "data": asked.source or "not stated",
-        "runs": {run.label: run.source for run in asked.runs},
-    }

@@ -11,13 +11,14 @@ import pytest
 from scipy.signal import lsim
 
 import upright as up
+from tests.exports.rigs import fit_file
 from upright.errors import BadInput
 from upright.experiments.at_hand import experiments_for
 from upright.experiments.hands_on.hanging import SHARE, _level, asking
 from upright.experiments.hands_on.rig import rig_at_hand
 from upright.experiments.hands_on.studies import write_study
 from upright.experiments.hands_on.upright import came
-from upright.experiments.makes import make_rig
+from upright.experiments.makes import MAKES, make_rig
 from upright.experiments.running.run import RunRequest, run_rig
 from upright.gains import feedback, filtered, hold, place
 from upright.laws import as_values
@@ -104,10 +105,6 @@ def test_the_study_of_its_logs_says_what_its_owner_says(own, tmp_path):
 
 
 def test_a_rig_described_by_a_fit_is_that_rig_still(tmp_path):
-    rig = made(tmp_path)
-    known = rig_at_hand(rig.file.path)
-    (tmp_path / "1b").mkdir()
-    write_study(known, tmp_path / "1b" / "fit.toml", "any", [])
     text = 'kind = "twin"\nmake = "furuta"\nseed = 3\n[limits]\ncommand = "4 V"\n[limits.psi]\ntravel = "1 rad"\n'
     copied = made(tmp_path, text).file.with_fit(tmp_path / "1b" / "fit.json", tmp_path / "2" / "rig.toml")
     told = copied.read_text("utf-8")
@@ -116,9 +113,34 @@ def test_a_rig_described_by_a_fit_is_that_rig_still(tmp_path):
     assert 'travel = "1 rad"' in told
 
 
+def test_a_limit_of_the_file_bounds_what_is_asked_and_the_rest_is_the_descriptions(tmp_path):
+    assert asking(made(tmp_path)).reach[0] == MAKES["furuta"].reach[0]
+    limited = 'kind = "twin"\nmake = "furuta"\n[limits]\ncommand = "4 V"\n'
+    assert asking(made(tmp_path, limited)).reach[0] == MAKES["furuta"].reach[0]
+    narrow = asking(made(tmp_path, limited + '[limits.psi]\ntravel = "1 rad"\n'))
+    assert narrow.reach[0] == pytest.approx(0.25)
+
+
+def test_whose_rig_it_is_may_be_said_by_either_file(own, tmp_path):
+    assert own.make is None
+    said = tmp_path / "study.toml"
+    said.write_text(OWN.replace('name = "qube 7"', 'vendor = "ECP 205"'), encoding="utf-8")
+    assert rig_at_hand(tmp_path / "RIG.toml").make is MAKES["furuta"]
+    said.write_text(OWN, encoding="utf-8")
+    assert made(tmp_path, 'kind = "twin"\nstudy = "study.toml"\nvendor = "ECP 205"\n').make is MAKES["furuta"]
+
+
 def test_a_fit_alone_is_not_identified_again(own, tmp_path):
-    (tmp_path / "fit.json").write_text("{}", encoding="utf-8")
     assert [e.key for e in experiments_for(own, "RIG.toml")] == ["1b", "2", "2b", "4"]
+    counts = {"value": 2048.0, "unit": "1/rev", "source": "known"}
+    said = {
+        "servo_period": {"value": 2e-3, "unit": "s", "source": "known"},
+        "counts.psi": counts,
+        "counts.theta": counts,
+    }
+    fit_file(tmp_path, own.model.plant, name="furuta", **said)
+    alone = made(tmp_path, 'kind = "twin"\nfit = "fit.json"\n')
+    assert [e.key for e in experiments_for(alone, "RIG.toml")] == ["2", "2b"]
 
 
 def test_a_run_that_the_supervisor_ends_was_lost_there(tmp_path):

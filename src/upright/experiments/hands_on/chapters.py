@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,8 +31,6 @@ def hanging_chapter(done: Hanging, folder: Path) -> Chapter:
 
 def fit_chapter(study: Study, fit: Fit, folder: Path) -> Chapter:
     """As `upright identify` tells it."""
-    runs: Mapping[str, object] = {run.label: run.source for run in study.runs}
-    data = {"study": study.path.name, "sha256 of the study": study.sha256, "data": study.source, "runs": runs}
-    told = chapter(fit, title=study.title, provenance=data, study=typed(study.path), folder=typed(folder))
+    told = chapter(fit, title=study.title, provenance=study.provenance, study=typed(study.path), folder=typed(folder))
     numbers = {n: {**plain_estimate(e), "unit": e.unit, "status": e.status} for n, e in fit.estimates.items()}
     return replace(told, numbers={"trusted": fit.trusted, "verdict": fit.verdict, "parameters": numbers})

@@ -19,7 +19,7 @@ from upright.errors import BadInput, NotIdentifiable
 from upright.experiments.frequency_1b.run import LoggedResponse, LogRequest, response_of_logs
 from upright.experiments.hands_on.rig import RigAtHand
 from upright.experiments.hands_on.studies import write_study
-from upright.experiments.makes import MAKES, Make
+from upright.experiments.running.rig import usual_limits
 from upright.identification.estimate import identify
 from upright.identification.frequency.spectra import multisine, odd_lines
 from upright.identification.model.fit import Fit
@@ -67,17 +67,16 @@ def asking(rig: RigAtHand) -> Asking:
         When it does not swing where it rests.
     """
     model, at = rig.model, rig.resting
-    make = _make(rig)
     linear = model.linear(at)
-    if make is not None:
-        band, reach = make.band, np.array(make.reach)
+    if rig.make is not None:
+        band, reach = rig.make.band, np.array(rig.make.reach)
     else:
         swings = [abs(p) for p in linear.poles() if abs(p.imag) > 1e-3 * abs(p)]
         if not swings:
             raise BadInput(f"{model.name} does not swing about '{at}', so no band of frequencies can be told.")
         band = (BELOW * min(swings), ABOVE * max(swings))
         reach = np.array([REACH[c.unit] for c in model.plant.coordinates])
-    driven = [c.name for c in model.plant.coordinates].index(model.plant.inputs[0].on)
+    driven = rig.names.index(model.plant.inputs[0].on)
     reach[driven] = min(reach[driven], OF_TRAVEL * _travel(rig, driven))
     length = 64 * math.ceil(RESOLVED * 2 * math.pi / (64 * band[0] * model.period))
     base = 2 * math.pi / (length * model.period)
@@ -88,20 +87,12 @@ def asking(rig: RigAtHand) -> Asking:
     return Asking(band=band, reach=reach, wave=wave / np.abs(wave).max())
 
 
-def _make(rig: RigAtHand) -> Make | None:
-    """The make that it is said to be of; a rig of one's own is of none."""
-    file = rig.file
-    if file.known is None:
-        return MAKES[file.make]
-    return next((m for m in MAKES.values() if m.vendor == file.vendor and isinstance(rig.model.plant, type(m.plant))),
-                None)  # fmt: skip
-
-
 def _travel(rig: RigAtHand, driven: int) -> float:
     """How far the driven coordinate may go: the description's, or less where RIG.toml says so."""
     units = {c.name: c.unit for c in rig.model.plant.coordinates}
-    held = rig.file.limits(units, rig.model.unit) if rig.file.limited else None
-    return min(rig.model.travel, math.inf if held is None else held.travel[driven])
+    held = rig.file.limits(units, rig.model.unit, usual_limits(rig.model))
+    assert held is not None  # hardware without limits is no rig at hand
+    return min(rig.model.travel, held.travel[driven])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -122,7 +113,7 @@ def run_hanging(rig: RigAtHand, folder: Path, progress: Progress) -> Hanging:
         When the rig was stopped by a limit, or was not left to rest.
     """
     asked = asking(rig)
-    names = [c.name for c in rig.model.plant.coordinates]
+    names = rig.names
     still = f"Let {names[-1]} hang at rest, with {names[0]} in the middle of its travel and room around it"
     most = SHARE * rig.model.limit
     right = _level(rig, asked, most)  # by the guesses

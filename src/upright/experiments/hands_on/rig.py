@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from upright.control.trial import ServoRig, Trial
 from upright.errors import BadInput, RigStopped
+from upright.experiments.identified import read_identified
+from upright.experiments.makes import MAKES, Make
 from upright.experiments.running.rig import described
 from upright.experiments.running.run import RigRun, RunRequest, run_rig
 from upright.files import read_text, write_json
@@ -53,6 +56,19 @@ class RigAtHand:
     truth: ServoRig
     ask: Callable[[str], bool] = nobody
     watching: Callable[[], AbstractContextManager[Watch]] = nobody_watches
+
+    @cached_property
+    def make(self) -> Make | None:
+        """The make that RIG.toml or the description says it is of; a rig of one's own is of none."""
+        if self.file.known is None:
+            return MAKES[self.file.make]
+        known = read_identified(self.file.known)
+        return known.made_by(self.file.vendor or known.description.vendor)
+
+    @property
+    def names(self) -> list[str]:
+        """Coordinates, in the plant's order."""
+        return [c.name for c in self.model.plant.coordinates]
 
     @property
     def resting(self) -> str:
@@ -121,6 +137,8 @@ class RigAtHand:
 
         Raises
         ------
+        RigStopped
+            When no loop began.
         KeyboardInterrupt
             When somebody stopped it.
         """
@@ -129,7 +147,10 @@ class RigAtHand:
         wish = RunRequest(
             rig=self.file.path, law=path, seconds=seconds, stem=stem, tilt=tilt, from_rest=from_rest,
         )  # fmt: skip
-        return self._run(wish, folder)
+        done = self._run(wish, folder)
+        if done.log is None or len(done.log) < 3:
+            raise RigStopped(done.end.stopped)
+        return done
 
     def _run(self, wish: RunRequest, folder: Path) -> RigRun:
         with self.watching() as watch:

@@ -47,7 +47,7 @@ def run_swings(
     NotIdentifiable
         When no release is seen.
     """
-    names = [c.name for c in rig.model.plant.coordinates]
+    names = rig.names
     runs: list[dict[str, Any]] = []
     for i, (role, angle) in enumerate((("fit", HIGH), ("predict", LOW))):
         progress(f"swinging from about {math.degrees(angle):.0f} degrees", 0.2 * i)
@@ -70,7 +70,7 @@ def run_swings(
 
 def _window(rig: RigAtHand, log: Path) -> tuple[float, float]:
     record = read(log)
-    pivot, swing = (c.name for c in rig.model.plant.coordinates)
+    pivot, swing = rig.names
     theta = record[swing]
     if abs(theta).max() < CLEAR:
         raise NotIdentifiable(

@@ -12,7 +12,6 @@ from pathlib import Path
 
 from upright.control import score
 from upright.control.preflight import Preflight
-from upright.errors import RigStopped
 from upright.experiments.hands_on.rig import RigAtHand, trial_of
 from upright.experiments.identified import IdentifiedRig, read_identified
 from upright.experiments.makes import MAKES
@@ -41,25 +40,16 @@ class _Trier:
     def __call__(self, name: str, law: Law, before: Preflight) -> Came | None:
         if before.chance < AT_LEAST:
             return None
-        names = [c.name for c in self.rig.model.plant.coordinates]
         self.rig.requested(
-            f"Next is {name}, expected to hold with a chance of {100 * before.chance:.0f} %. Let {names[-1]} hang at "
-            f"rest; after a small pulse bring it up, hold it there until the loop takes it, and let go."
+            f"Next is {name}, expected to hold with a chance of {100 * before.chance:.0f} %. Let {self.rig.names[-1]} "
+            f"hang at rest; after a small pulse bring it up, hold it there until the loop takes it, and let go."
         )
         done = self.rig.hold(law, self.folder, f"regulation_{name.replace(' ', '_')}", SECONDS, tilt=TILT)
         return came(done)
 
 
 def came(done: RigRun) -> Came:
-    """A run on a rig as a trial with its figures.
-
-    Raises
-    ------
-    RigStopped
-        When no loop began.
-    """
-    if done.log is None or len(done.log) < 3:
-        raise RigStopped(done.end.stopped)
+    """A run on a rig as a trial with its figures."""
     went = trial_of(done, "inverted")
     found = score(went)
     if done.end.stopped:  # by the supervisor, before it could hit anything
@@ -72,7 +62,7 @@ def came(done: RigRun) -> Came:
 def sets(rig: RigAtHand, known: IdentifiedRig) -> Mapping[str, Roots]:
     """Pole sets of Table 1 for a maker's rig; for one of one's own all of them as much faster as it falls faster."""
     printed = {name: read_poles(text) for name, text in SETS.items()}
-    if rig.file.known is None or known.made_by(rig.file.vendor or known.description.vendor) is not None:
+    if rig.make is not None:
         return printed
     falls = [float(p.linear("inverted").poles().real.max()) for p in (known.plant, MAKES["furuta"].plant)]
     return {f"{name} x{falls[0] / falls[1]:.2g}": falls[0] / falls[1] * p for name, p in printed.items()}

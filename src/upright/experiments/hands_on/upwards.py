@@ -26,7 +26,7 @@ class _Hands:
     def coast(self, command: Array) -> Record:
         self._rest("the drive swings it, then lets it coast")
         log = read(self.rig.put_out([*command.tolist(), 0.0], self.folder, "sensors"))
-        names = [c.name for c in self.rig.model.plant.coordinates]
+        names = self.rig.names
         signals = {"u": log["u_applied"], **{n: log[n] - log[n][0] for n in names}}
         units = {"u": self.rig.model.unit, **{n: log.units[n] for n in names}}
         return log.replace(
@@ -38,14 +38,12 @@ class _Hands:
         model = self.rig.model
         rule = law.rule(model, model.plant.state(self.rig.resting))
         done = self.rig.hold(rule, self.folder, "swing_up", seconds, from_rest=True)
-        if done.log is None or len(done.log) < 3:
-            raise RigStopped(done.end.stopped)
         if done.end.stopped:
             raise RigStopped(f"The swing-up was stopped {done.t[-1]:.3g} s after its start: {done.end.stopped}")
         return ascent_of(trial_of(done, "inverted"), law, rule)
 
     def _rest(self, what: str) -> None:
-        names = [c.name for c in self.rig.model.plant.coordinates]
+        names = self.rig.names
         self.rig.requested(f"Let {names[-1]} hang at rest, with {names[0]} in the middle of its travel; {what}.")
 
 
@@ -60,9 +58,7 @@ def run_upwards(
         When the rig was stopped, or did not begin.
     """
     held = rig.described_by(fit, folder / "rig.toml")
-    known = read_identified(fit)
-    model = known.rig(known.described(vendor=rig.file.vendor, who="a run on a rig"))
     return run_swing_up(
-        model, model, folder, progress, stopped, known=known_of(known), lies=False, source=typed(fit),
-        at_hand=_Hands(rig=held, folder=folder),
+        held.model, held.model, folder, progress, stopped, known=known_of(read_identified(fit)), lies=False,
+        source=typed(fit), at_hand=_Hands(rig=held, folder=folder),
     )  # fmt: skip

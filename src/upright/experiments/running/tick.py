@@ -8,10 +8,11 @@ from collections.abc import Callable
 from upright.experiments.makes import make_rig
 from upright.experiments.running.rig import LEAN, NEAR, usual_limits
 from upright.gains import feedback, filtered, hold, place
+from upright.gains.requests import read_poles
+from upright.paper.reproduce import TABLE_1
 from upright.rigs import Board, Mode, Tick, TwinPort
 from upright.rigs.supervisor import Duty, Supervisor
 
-_POLES = (-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220)  # Table 1, set 1
 _TILT = math.radians(2)
 
 
@@ -30,7 +31,7 @@ def supervised() -> tuple[Callable[[], float], Callable[[], Tick]]:
     )
     beside.prepare()
     port.hold("inverted", [0.0, 0.0, _TILT, 0.0])
-    beside.aim(feedback(estimator, place(linear.A, linear.B, _POLES).K))
+    beside.aim(feedback(estimator, place(linear.A, linear.B, read_poles(TABLE_1[0])).K))
     beside.start(Mode.HOST)
     port.let_go()
     tick, command = rig.exchange(0.0), 0.0
