@@ -133,6 +133,20 @@ def test_a_sum_makes_up_for_a_push_and_follows_the_step_as_before(kind):
     assert ends[1] == pytest.approx(step, abs=abs(ends[0] - step) * 3 * math.exp(3 * EXTRA) + 2 * rig.quantum[1])
 
 
+@pytest.mark.parametrize("summed", [False, True])
+@pytest.mark.parametrize("kind", SHAFTS)
+def test_a_law_begins_where_the_rig_rests_without_a_jump(kind, summed):
+    """Dry friction leaves a shaft twisted; at rest state feedback asks for -K q, its speeds being zero."""
+    rig = make_rig(kind, 2)
+    law = paper_sets(rig, (4,))[0]
+    law = with_sum(rig, law, "") if summed else law
+    q = np.array([3.0, -2.0]) * rig.quantum
+    u, _ = law.law.follow(np.tile(q, (4, 1)))
+    assert u[0] == pytest.approx(-law.K[::2] @ q, rel=1e-9)
+    growth = -law.law.C[0, -1] * rig.period * q[1] if summed else 0.0
+    np.testing.assert_allclose(np.diff(u, axis=0), growth, atol=1e-9 * abs(law.K[::2] @ q))
+
+
 @pytest.mark.slow
 def test_disks_move_as_carts_do_in_other_units():
     """m - J, k - k_t, c - c_t, F - T: with factors that are powers of two even the rounding is the same."""

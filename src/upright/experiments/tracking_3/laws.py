@@ -156,9 +156,8 @@ def with_sum(rig: ServoRig, base: Tracker, name: str) -> Tracker:
     inner[:z, :z], inner[z, z] = law.A, 1.0
     into = np.zeros((z + 1, c + 1))
     into[:z], into[z, c - 1], into[z, c] = law.B, -rig.period, rig.period
-    summed = Law(
-        inner, into, np.hstack([law.C, [[-K[n]]]]), law.D, reference_names=law.reference_names, windup="hold"
-    )  # fmt: skip
+    begin = None if law.begin is None else np.vstack([law.begin, np.zeros((1, c))])
+    summed = replace(law, A=inner, B=into, C=np.hstack([law.C, [[-K[n]]]]), begin=begin, windup="hold")
     return replace(plain, law=summed, poles=loop_poles(rig, summed), play=0.0)
 
 
