@@ -31,8 +31,8 @@ def measured(item: tuple[str, int]) -> tuple[str, bool, int, int]:
         (folder / "RIG.toml").write_text(f'kind = "twin"\nmake = "{make}"\nseed = {seed}\n', encoding="utf-8")
         rig = rig_at_hand(folder / "RIG.toml")
         fit = run_hanging(rig, folder / "1b", lambda _step, _share: None).fit
-    true = {**rig.truth.plant.parameters(), "actuator.gain": rig.truth.gain}
-    firm = [(true[n], e) for n, e in fit.estimates.items() if e.status == "firm" and n in true]
+    numbers = [*rig.truth.plant.parameters(), "actuator.gain"]
+    firm = [(rig.true_values[n], e) for n, e in fit.estimates.items() if e.status == "firm" and n in numbers]
     return make, fit.trusted, sum(e.interval[0] <= t <= e.interval[1] for t, e in firm), len(firm)
 
 

@@ -1,4 +1,4 @@
-"""Unit, meaning and bounds of a parameter.
+"""Unit, meaning and bounds of a parameter, and how many of its figures mean something.
 
 A parameter says so once, in `quantity()`; tables, axis labels, forms and the
 nomenclature are generated from that line.
@@ -75,3 +75,10 @@ def quantity(
 def quantities(owner: object) -> dict[str, Quantity]:
     """Quantities of a dataclass or of an instance of one, by field name, in order."""
     return {f.name: f.metadata["quantity"] for f in fields(owner) if "quantity" in f.metadata}  # type: ignore[arg-type]
+
+
+def figures(value: float, stderr: float) -> int:
+    """How many significant figures of `value` its standard error leaves, two of the error included."""
+    if not (math.isfinite(stderr) and math.isfinite(value)) or stderr <= 0 or value == 0:
+        return 4
+    return min(max(math.floor(math.log10(abs(value))) - math.floor(math.log10(stderr)) + 2, 2), 8)

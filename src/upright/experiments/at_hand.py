@@ -71,7 +71,7 @@ def _hanging(at: ExperimentInput) -> tuple[Chapter, bool]:
     from upright.experiments.hands_on.hanging import run_hanging
 
     done = run_hanging(_at(at), at.folder, at.progress)
-    return hanging_chapter(done, at.folder), not done.fit.interrupted
+    return hanging_chapter(done, at.folder, _at(at).true_values), not done.fit.interrupted
 
 
 def _upright(at: ExperimentInput) -> tuple[Chapter, bool]:
@@ -104,7 +104,7 @@ def _swings(at: ExperimentInput) -> tuple[Chapter, bool]:
 
     rig = _at(at)
     study, fit = run_swings(rig, at.folder, at.progress, _weighed(at, carrier_of(rig)))
-    return fit_chapter(study, fit, at.folder), not fit.interrupted
+    return fit_chapter(study, fit, at.folder, rig.true_values), not fit.interrupted
 
 
 def _weighed(at: ExperimentInput, body: str) -> dict[str, dict[str, Any]]:

@@ -213,9 +213,11 @@ class Chapter:
 READING = (
     "A verdict is sound when what it says may be built on; with reservations, when its chapter says what stands in the "
     "way. Intervals are meant to hold the truth in 95 of 100 rigs. Data go one way: later experiments take what "
-    "earlier ones found, with its errors. No fit sees the twin's truth, which stands beside the result to judge it."
+    "earlier ones found, with its errors."
 )
 """How the cover is meant."""
+TWIN = "No fit sees the twin's truth, which stands beside the result to judge it."
+"""How the truth on it is meant, where there is one."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -254,15 +256,20 @@ class Book:
             headings=("", "experiment", "rig", "verdict", "it is"), rows=tuple(glance), badge=4,
             anchors=tuple(c.anchor for c in self.chapters),
         )  # fmt: skip
+        twin = any(f.truth for _, f in found)
         numbers = Table(
-            caption="Key numbers with 95 % intervals, beside the truth that only a twin can tell",
-            headings=("from", "quantity", "value", "95 % interval", "truth"),
-            rows=tuple((c.key, f.what, f.value, f.interval, f.truth) for c, f in found), numbers=(2, 3, 4),
-            anchors=tuple(c.anchor for c, _ in found),
+            caption="Key numbers with 95 % intervals" + (", beside the truth that only a twin can tell" * twin),
+            headings=("from", "quantity", "value", "95 % interval", "truth")[: 4 + twin],
+            rows=tuple((c.key, f.what, f.value, f.interval, f.truth)[: 4 + twin] for c, f in found),
+            numbers=(2, 3, 4)[: 2 + twin], anchors=tuple(c.anchor for c, _ in found),
         )  # fmt: skip
         return (
             Part("", (Facts(self.facts),)),
-            Part(title="Verdicts at a glance", key="verdicts", content=(verdicts, READING)),
+            Part(
+                title="Verdicts at a glance",
+                key="verdicts",
+                content=(verdicts, f"{READING} {TWIN}" if twin else READING),
+            ),
             *((Part(title="What was found", key="numbers", content=(numbers,)),) if found else ()),
         )
 

@@ -9,6 +9,8 @@ from functools import cache
 from html import escape
 from pathlib import Path
 
+from upright.quantities import figures
+
 _LETTERS = (
     "alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi omicron pi rho sigmaf sigma tau upsilon"
     " phi chi psi omega"
@@ -94,13 +96,6 @@ def number(value: float, digits: int = 4) -> str:
         return text.replace("-", "−")
     mantissa, power = f"{value:.{digits - 1}e}".split("e")
     return f"{mantissa}·10{str(int(power)).translate(_SUPERSCRIPT)}".replace("-", "−")
-
-
-def figures(value: float, stderr: float) -> int:
-    """How many significant figures of `value` its standard error leaves, two of the error included."""
-    if not (math.isfinite(stderr) and math.isfinite(value)) or stderr <= 0 or value == 0:
-        return 4
-    return min(max(math.floor(math.log10(abs(value))) - math.floor(math.log10(stderr)) + 2, 2), 8)
 
 
 def measured(value: float, stderr: float) -> tuple[str, str]:

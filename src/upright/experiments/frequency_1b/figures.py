@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -124,6 +125,18 @@ def _frequencies(axes: Any, data: FrequencyResponse) -> None:
     axes.set_xlabel("frequency [rad/s]")
 
 
+def _whole_decades(axes: Any) -> None:
+    """Whole powers of ten at either end, which alone are labelled: the labels between are longer than the margin."""
+    from matplotlib.ticker import NullFormatter
+
+    axes.set_yscale("log")
+    shown = np.concatenate([line.get_ydata() for line in axes.get_lines()])
+    shown = shown[shown > 0]
+    low, high = math.floor(math.log10(shown.min())), math.ceil(math.log10(shown.max()))
+    axes.set_ylim(10.0**low, 10.0 ** max(high, low + 1))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+
+
 @styled
 def quality_figure(data: FrequencyResponse) -> Figure:
     """What each point is worth: what is not coherent, harmonics, stated error, and the motion it was measured at."""
@@ -145,7 +158,7 @@ def quality_figure(data: FrequencyResponse) -> Figure:
                 axes.plot(data.omega, values[:, j], mark, color=colour, markersize=3.5, label=plain(name) + of)
         axes.set_ylabel(label)
         if values.any():
-            axes.set_yscale("log")
+            _whole_decades(axes)
         else:
             axes.set_yticks([])
             axes.text(0.5, 0.5, "not told by a sweep", transform=axes.transAxes, ha="center", color=GREY)
@@ -153,6 +166,7 @@ def quality_figure(data: FrequencyResponse) -> Figure:
     panels[1, 1].plot(data.omega, np.abs(data.drive), "x", color=BLACK, markersize=4,
                       label=f"command [{unit(data.units[-1])}]" if unit(data.units[-1]) else "command")  # fmt: skip
     panels[1, 1].legend(loc="best", fontsize=7.5)
+    _whole_decades(panels[1, 1])
     for axes in panels[1]:
         _frequencies(axes, data)
     return drawing

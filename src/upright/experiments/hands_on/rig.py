@@ -77,6 +77,11 @@ class RigAtHand:
         return self.file.zero if self.file.zero in kinds else next(iter(kinds))
 
     @property
+    def true_values(self) -> dict[str, float]:
+        """Numbers of a twin by name, `actuator.*` included; empty of hardware, whose nobody knows."""
+        return {} if self.file.hardware else {**self.truth.plant.parameters(), **self.truth.drive}
+
+    @property
     def text(self) -> str:
         """What is said of it: RIG.toml, and what describes the rig."""
         known = self.file.known

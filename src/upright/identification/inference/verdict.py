@@ -13,6 +13,7 @@ from upright.identification.inference.assumptions import proportional
 from upright.identification.inference.loop import Standing
 from upright.identification.model.fit import Assumption, Estimate, Judgement, RunScore
 from upright.identification.model.rig import Rig
+from upright.quantities import figures
 
 GOOD = 80.0
 """Fit percent below which a run counts as not explained."""
@@ -182,9 +183,9 @@ def _usable(found: Evidence, *, confirmed: bool) -> Judgement:
     elif guessed:
         answer, headline = "in part", "As numbers of a plant that was guessed."
     elif reasons:
-        answer, headline = "in part", f"Usable: {', '.join(free)}." if free else "Only their ratios."
+        answer, headline = "in part", f"These numbers can be used: {', '.join(free)}." if free else "Only their ratios."
     else:
-        answer, headline = "yes", f"All: {', '.join(firm)}." if firm else "Nothing was asked."
+        answer, headline = "yes", f"All numbers can be used: {', '.join(firm)}." if firm else "Nothing was asked."
     advice = ""
     if any(e.status in ("weak", "unseen") for e in asked.values()):
         advice = "Measure one of the others on the bench and give it as known, or add a run that moves it more."
@@ -206,8 +207,9 @@ def _loop(found: Evidence) -> Judgement:
             question=LOOP, answer="not asked",
             headline="No equilibrium of this plant is unstable, or no drive acts on it.",
         )  # fmt: skip
-    where = f"{s.at}, the fastest pole is {s.growth.value:.3g} 1/s ({s.growth.interval[0]:.3g} to "
-    where = f"{where}{s.growth.interval[1]:.3g})"
+    grows, digits = s.growth, figures(s.growth.value, s.growth.stderr)
+    value, low, high = (f"{v:#.{digits}g}".rstrip(".") for v in (grows.value, *grows.interval))
+    where = f"{s.at}, the fastest pole is {value} 1/s ({low} to {high})"
     if not found.driven:
         return Judgement(
             question=LOOP, answer="not tested",
@@ -282,8 +284,8 @@ def uninformative(runs: Mapping[str, RunScore]) -> list[tuple[str, str]]:
 
 
 def _range(percents: Mapping[str, float]) -> str:
-    low, high = min(percents.values()), max(percents.values())
-    return f"{low:.1f} %" if high - low < 0.05 else f"{low:.1f} to {high:.1f} %"
+    low, high = (f"{p:.1f}" for p in (min(percents.values()), max(percents.values())))
+    return f"{low} %" if low == high else f"{low} to {high} %"
 
 
 def _worse(runs: Mapping[str, RunScore]) -> list[str]:

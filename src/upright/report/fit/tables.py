@@ -10,8 +10,9 @@ from upright.identification.ladder.cross_validation import CrossValidation
 from upright.identification.model.fit import Estimate, Fit, Pole, RunScore
 from upright.identification.model.rig import Parameter
 from upright.physics.actuator import ACTUATOR
+from upright.quantities import figures
 from upright.report.page import KeyNumber, Symbol, Table
-from upright.report.symbols import figures, measured, number, percent, plain, unit
+from upright.report.symbols import measured, number, percent, plain, unit
 
 _ESTIMATE = ("value", "std. error", "95 % interval", "unit", "status", "name and meaning")
 _OF_THE_RIG = "Parameters of the rig; standard errors allow for autocorrelated residuals"
