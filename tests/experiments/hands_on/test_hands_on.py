@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import sys
 
 import numpy as np
 import pytest
@@ -49,6 +50,23 @@ counts_per_rev = { value = 2048, measured = true }
 [sensors.theta]
 column = "theta"
 counts_per_rev = { value = 2048, measured = true }
+"""
+
+LOOSE = """
+[rig]
+plant = "rectilinear-1"
+servo_period = "1 ms"
+travel = "0.1 m"
+[parameters]
+m_1 = { guess = "1 kg", min = 0 }
+k_1 = "0 N/m"
+c_1 = { guess = "1 N s/m", min = 0 }
+[actuator]
+gain = { guess = "2 N/V", min = 0 }
+limit = { value = "5 V", measured = true }
+[sensors.x_1]
+column = "x_1"
+counts_per_m = { value = 20000, measured = true }
 """
 
 
@@ -169,6 +187,21 @@ def test_what_is_no_rig_at_hand_is_refused(tmp_path):
     (tmp_path / "run.csv").write_text("t,u,psi,theta\n0,0,0,0\n0.001,0,0,0\n", encoding="utf-8")
     with pytest.raises(BadInput, match="a replay answers nothing"):
         made(tmp_path, 'kind = "replay"\nmake = "furuta"\nrecord = "run.csv"\n')
+
+
+def test_nothing_is_tried_where_no_log_can_be_kept(tmp_path, monkeypatch):
+    (tmp_path / "RIG.toml").write_text('kind = "twin"\nmake = "torsional"\n', encoding="utf-8")
+    monkeypatch.setitem(sys.modules, "mcap", None)
+    monkeypatch.setitem(sys.modules, "mcap.writer", None)
+    with pytest.raises(BadInput, match=r"pip install 'upright\[rig\]'"):
+        rig_at_hand(tmp_path / "RIG.toml")
+
+
+def test_what_does_not_swing_is_told_what_else_identifies_it(tmp_path):
+    (tmp_path / "study.toml").write_text(LOOSE, encoding="utf-8")
+    (tmp_path / "RIG.toml").write_text('kind = "twin"\nstudy = "study.toml"\n', encoding="utf-8")
+    with pytest.raises(BadInput, match="does not swing.*upright identify"):
+        asking(rig_at_hand(tmp_path / "RIG.toml"))
 
 
 def test_a_port_alone_is_not_driven_but_given_a_file_to_fill_in(tmp_path):

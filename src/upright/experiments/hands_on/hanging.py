@@ -73,7 +73,10 @@ def asking(rig: RigAtHand) -> Asking:
     else:
         swings = [abs(p) for p in linear.poles() if abs(p.imag) > 1e-3 * abs(p)]
         if not swings:
-            raise BadInput(f"{model.name} does not swing about '{at}', so no band of frequencies can be told.")
+            raise BadInput(
+                f"{model.name} does not swing about '{at}', and the band of frequencies it is asked is told from its "
+                "swings; log a step of it instead (upright run --excite), and fit that (upright identify)."
+            )
         band = (BELOW * min(swings), ABOVE * max(swings))
         reach = np.array([REACH[c.unit] for c in model.plant.coordinates])
     driven = rig.names.index(model.plant.inputs[0].on)

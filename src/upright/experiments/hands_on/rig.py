@@ -18,6 +18,7 @@ from upright.experiments.running.rig import described
 from upright.experiments.running.run import RigRun, RunRequest, run_rig
 from upright.files import read_text, write_json
 from upright.laws import Law, Rule, as_values
+from upright.logs.layout import library
 from upright.realtime.session import RunState
 from upright.records import Array
 from upright.rigs.protocol import Fault
@@ -193,8 +194,9 @@ def rig_at_hand(
     Raises
     ------
     BadInput
-        When it is one on which nothing can be tried.
+        When it is one on which nothing can be tried, or what keeps a log is not installed.
     """
+    library()
     file = read_rig_file(path)
     if file.kind == "replay":
         raise BadInput(
