@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from upright.errors import BadInput
+from upright.experiments.hands_on.loaded import kind_of, run_loaded
 from upright.experiments.hands_on.rig import RigAtHand
 from upright.experiments.hands_on.studies import can_identify
 from upright.experiments.laboratory import Experiment, ExperimentInput
@@ -25,7 +26,9 @@ def experiments_for(rig: RigAtHand, name: str) -> tuple[Experiment, ...]:
     """
     plant, makes = rig.model.plant, (name,)
     pendulum = _pendulum(plant)
-    hanging = Experiment(key="1b", part_of="1", title="Frequency response", makes=makes, needs=(), seconds=40.0,
+    loaded = Experiment(key="1a", part_of="1", title="Added loads", makes=makes, needs=(), seconds=15.0,
+                        tell=_loaded)  # fmt: skip
+    hanging = Experiment(key="1b", part_of="1", title="Frequency response", makes=makes, needs=("1a",), seconds=40.0,
                          tell=_hanging)  # fmt: skip
     upright = Experiment(key="2", part_of="2", title="Holding it upright", makes=makes, needs=("1b",), seconds=30.0,
                          tell=_upright)  # fmt: skip
@@ -35,7 +38,8 @@ def experiments_for(rig: RigAtHand, name: str) -> tuple[Experiment, ...]:
                        seconds=30.0, tell=_tracking)  # fmt: skip
     swings = Experiment(key="4", part_of="4", title="Large free swing", makes=makes, needs=("1b",), seconds=15.0,
                         tell=_swings)  # fmt: skip
-    out = [hanging] if can_identify(rig) else []
+    out = [loaded] if kind_of(plant) and rig.file.added else []
+    out += [hanging] if can_identify(rig) else []
     out += [upright, swing_up] if pendulum else []
     out += [shaft] if _shaft(plant) else []
     out += [swings] if pendulum and can_identify(rig) else []
@@ -66,11 +70,19 @@ def _at(given: ExperimentInput) -> RigAtHand:
     return given.hands
 
 
+def _loaded(at: ExperimentInput) -> tuple[Chapter, bool]:
+    from upright.experiments.hands_on.chapters import loaded_chapter
+
+    return loaded_chapter(run_loaded(_at(at), at.folder, at.progress), at.folder), True
+
+
 def _hanging(at: ExperimentInput) -> tuple[Chapter, bool]:
     from upright.experiments.hands_on.chapters import hanging_chapter
     from upright.experiments.hands_on.hanging import run_hanging
 
-    done = run_hanging(_at(at), at.folder, at.progress)
+    rig = _at(at)
+    known = _found(at, "1a", rig.model.plant.names()[0]) if kind_of(rig.model.plant) else {}
+    done = run_hanging(rig, at.folder, at.progress, known)
     return hanging_chapter(done, at.folder, _at(at).true_values), not done.fit.interrupted
 
 
@@ -103,13 +115,13 @@ def _swings(at: ExperimentInput) -> tuple[Chapter, bool]:
     from upright.experiments.hands_on.swings import carrier_of, run_swings
 
     rig = _at(at)
-    study, fit = run_swings(rig, at.folder, at.progress, _weighed(at, carrier_of(rig)))
+    study, fit = run_swings(rig, at.folder, at.progress, _found(at, "1b", carrier_of(rig)))
     return fit_chapter(study, fit, at.folder, rig.true_values), not fit.interrupted
 
 
-def _weighed(at: ExperimentInput, body: str) -> dict[str, dict[str, Any]]:
-    """What experiment 1b says of the body that carries the pendulum."""
-    chapter = at.earlier.get("1b")
+def _found(at: ExperimentInput, key: str, body: str) -> dict[str, dict[str, Any]]:
+    """What an earlier experiment says of a body's inertia, as a study has it."""
+    chapter = at.earlier.get(key)
     told = chapter.numbers.get("parameters", {}).get(body) if chapter else None
     if not told or not told.get("stderr"):
         return {}

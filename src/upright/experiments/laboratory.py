@@ -252,6 +252,11 @@ def choose(
         found = [e for e in table if name in (e.key, e.part_of)]
         if not found:
             valid = dict.fromkeys(n for e in table for n in (e.part_of, e.key))
+            if any(name in (e.key, e.part_of) for e in EXPERIMENTS):
+                raise BadInput(
+                    f"experiment {name} cannot be made on {make}, which has experiments "
+                    f"{', '.join(e.key for e in there)}; docs/lab.md says what each asks of a rig."
+                )
             raise BadInput(f"there is no experiment '{name}'; take one of {', '.join(sorted(valid))}.")
         if not any(e in there for e in found):
             raise BadInput(

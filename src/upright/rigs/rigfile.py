@@ -39,6 +39,7 @@ KINDS = ("twin", "replay", "serial", "quanser", "nidaqmx")
 HARDWARE = ("serial", "quanser", "nidaqmx")
 KEYS = (
     "kind", "name", "fit", "study", "make", "seed", "vendor", "port", "record", "at", "zero", "limits", "board",
+    "loadings",
 )  # fmt: skip
 _EACH = ("travel", "speed", "start")
 _ALL = ("command", "watchdog", "saturation", "frozen", "twist", "lean")
@@ -70,6 +71,9 @@ class RigFile:
         Equilibrium that is held, and the one at which the encoders are zeroed.
     board : mapping of str to any
         What a vendor's port takes by name.
+    added, tolerance : tuple of str, float
+        Known inertias that experiment 1a bolts to the rig one after the other, as their owner says them, and the
+        relative standard uncertainty of a piece.
     """
 
     path: Path
@@ -84,6 +88,8 @@ class RigFile:
     at: str = "inverted"
     zero: str = "hanging"
     board: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    added: tuple[str, ...] = ()
+    tolerance: float = 0.0
 
     @property
     def hardware(self) -> bool:
@@ -188,12 +194,17 @@ def read_rig_file(path: Path) -> RigFile:
     seed = root.values.get("seed", 0)
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
         raise root.error("seed", f"seed is a whole number from 0 on, got {seed!r}")
-    board = root.section("board").values
+    board, loadings = root.section("board").values, root.section("loadings")
+    loadings.check(("added", "tolerance"))
+    tolerance = loadings.number("tolerance", "1", 0.0)
+    if not 0 <= tolerance < 1:
+        raise loadings.error("tolerance", 'tolerance is a share of a piece from 0 to below 1, such as "0.2 %"')
     return RigFile(
         path=path, kind=kind, name=texts.get("name", ""), known=None if known is None else place / known,
         make=texts.get("make", ""), seed=seed, vendor=texts.get("vendor", ""), port=texts.get("port", ""),
         record=place / texts["record"] if "record" in texts else None, at=texts.get("at", "inverted"),
-        zero=texts.get("zero", "hanging"), board=board,
+        zero=texts.get("zero", "hanging"), board=board, tolerance=tolerance,
+        added=tuple(str(a) for a in loadings.entries("added")),
     )  # fmt: skip
 
 

@@ -57,7 +57,7 @@ def lab(
         Only these of 1, 1a, 1b, 2, 2b, 3, 4, and what they stand on.
     rig : str, optional
         Twin of a make, linear, furuta, rectilinear or torsional, else the paper's; or the RIG.toml of a rig at hand
-        (all experiments that it can have but 1a); ``"serial:PORT"`` writes one, and a study, to be filled in.
+        (all experiments that it can have); ``"serial:PORT"`` writes one, and a study, to be filled in.
     seed : int
         Which rig of the make; 0 is the one as designed. Of a rig at hand, that of the rigs drawn from its fit.
     out : path, optional

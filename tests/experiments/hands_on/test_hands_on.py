@@ -200,7 +200,7 @@ def test_nothing_is_tried_where_no_log_can_be_kept(tmp_path, monkeypatch):
 def test_what_does_not_swing_is_told_what_else_identifies_it(tmp_path):
     (tmp_path / "study.toml").write_text(LOOSE, encoding="utf-8")
     (tmp_path / "RIG.toml").write_text('kind = "twin"\nstudy = "study.toml"\n', encoding="utf-8")
-    with pytest.raises(BadInput, match="does not swing.*upright identify"):
+    with pytest.raises(BadInput, match=r"does not swing.*upright identify"):
         asking(rig_at_hand(tmp_path / "RIG.toml"))
 
 

@@ -50,7 +50,7 @@ def lab(
     1a weighs the rig with known added masses, 1b fits its frequency response hanging, 2 holds it upright with gains
     from that fit, 2b swings it up and catches it, 3 tracks through a flexible shaft, 4 lets the pendulum swing freely.
 
-    With a RIG.toml all but 1a are made on the rig itself; you are asked for what no drive can do.
+    With a RIG.toml they are made on the rig itself; you are asked for what no drive can do.
 
     Every log, study and fit is written to DIR for the ordinary commands, and one report.html tells it all (report.pdf
     with the pdf extra).

@@ -8,10 +8,13 @@ from pathlib import Path
 
 from upright.experiments.frequency_1b.chapter import log_chapter
 from upright.experiments.hands_on.hanging import Hanging
+from upright.experiments.hands_on.loaded import Weighed
+from upright.experiments.makes import OSCILLATORS
+from upright.experiments.weighing_1a.chapter import loading_chapter
 from upright.identification.model.fit import Fit
 from upright.report.fit.chapter import chapter
 from upright.report.fit.tables import finding, plain_estimate
-from upright.report.page import Chapter, Symbol
+from upright.report.page import Chapter, Step, Symbol
 from upright.report.symbols import typed, unit
 from upright.study.load import Study
 
@@ -28,6 +31,33 @@ def hanging_chapter(done: Hanging, folder: Path, truth: Mapping[str, float]) -> 
         told, question=question, parts=(*asked.parts[:2], *told.parts),
         numbers={**told.numbers, "response": asked.numbers},
     )  # fmt: skip
+
+
+def loaded_chapter(done: Weighed, folder: Path) -> Chapter:
+    """The swings and their line, beside the truth of a twin."""
+    found, body, (column,) = done.loadings, OSCILLATORS[done.kind], done.rig.names
+    bare = body.inertia.replace("1", "0")
+    true = done.rig.true_values
+    truth = {"k": true["k_1"], bare: true[body.inertia], "c": true["c_1"]} if true else {}
+    logs = " ".join(typed(folder / file) for file in done.files.values())
+    added = " ".join(f"--added {typed(a)}" for a in done.rig.file.added)
+    told = loading_chapter(
+        found, kind=done.kind, title="Stiffness and inertia from added loads", logs=done.logs,
+        signals=dict.fromkeys(done.logs, column), left_out=done.left_out, truth=truth or None,
+        steps=(
+            Step("Weigh it again from one log of each loading, as you would from logs of your own.",
+                 f"upright loadings {logs} {added} --signal {column} --command u_applied"),
+            Step(f"Write {body.inertia} into the study of what is built on this body, what is mounted on it added."),
+        ),
+    )  # fmt: skip
+    named = (("k", found.k, "stiffness"), (bare, found.bare, "inertia"), ("c", found.damping, "damping"))
+    units = {"stiffness": "k_1", "inertia": body.inertia, "damping": "c_1"}
+    findings = tuple(
+        finding(Symbol(f"{n} [{unit(body.plant.quantity(units[what]).unit)}]"), e, truth.get(n))
+        for n, e, what in named
+    )  # fmt: skip
+    weighed = {body.inertia: {**plain_estimate(found.bare), "unit": body.unit}}
+    return replace(told, key="1a", findings=findings, numbers={**told.numbers, "parameters": weighed})
 
 
 def fit_chapter(study: Study, fit: Fit, folder: Path, truth: Mapping[str, float]) -> Chapter:

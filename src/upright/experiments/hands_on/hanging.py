@@ -9,6 +9,7 @@ against the last probe, which they have not seen.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -80,7 +81,7 @@ def asking(rig: RigAtHand) -> Asking:
         band = (BELOW * min(swings), ABOVE * max(swings))
         reach = np.array([REACH[c.unit] for c in model.plant.coordinates])
     driven = rig.names.index(model.plant.inputs[0].on)
-    reach[driven] = min(reach[driven], OF_TRAVEL * _travel(rig, driven))
+    reach[driven] = min(reach[driven], OF_TRAVEL * travel_of(rig, driven))
     length = 64 * math.ceil(RESOLVED * 2 * math.pi / (64 * band[0] * model.period))
     base = 2 * math.pi / (length * model.period)
     lines = odd_lines(*band, LINES, base)
@@ -90,7 +91,7 @@ def asking(rig: RigAtHand) -> Asking:
     return Asking(band=band, reach=reach, wave=wave / np.abs(wave).max())
 
 
-def _travel(rig: RigAtHand, driven: int) -> float:
+def travel_of(rig: RigAtHand, driven: int) -> float:
     """How far the driven coordinate may go: the description's, or less where RIG.toml says so."""
     units = {c.name: c.unit for c in rig.model.plant.coordinates}
     held = rig.file.limits(units, rig.model.unit, usual_limits(rig.model))
@@ -107,8 +108,12 @@ class Hanging:
     fit: Fit
 
 
-def run_hanging(rig: RigAtHand, folder: Path, progress: Progress) -> Hanging:
+def run_hanging(
+    rig: RigAtHand, folder: Path, progress: Progress, weighed: Mapping[str, Mapping[str, Any]] | None = None
+) -> Hanging:  # fmt: skip
     """Ask the rig, and fit what it answered; leaves logs, `study.toml`, `fit.json` and the response in a folder.
+
+    What experiment 1a `weighed` is known of its inertias.
 
     Raises
     ------
@@ -117,7 +122,9 @@ def run_hanging(rig: RigAtHand, folder: Path, progress: Progress) -> Hanging:
     """
     asked = asking(rig)
     names = rig.names
-    still = f"Let {names[-1]} hang at rest, with {names[0]} in the middle of its travel and room around it"
+    rests = f"{names[-1]} hang at rest" if rig.resting == "hanging" else "everything rest"
+    still = f"Let {rests}, with {names[0]} in the middle of its travel and room around it"
+    still = f"Take the added masses off. {still}" if weighed else still
     most = SHARE * rig.model.limit
     right = _level(rig, asked, most)  # by the guesses
     level, stronger, probe = PROBES[0] * right, right, Path()
@@ -133,10 +140,11 @@ def run_hanging(rig: RigAtHand, folder: Path, progress: Progress) -> Hanging:
     progress(f"asking all frequencies at once for {seconds:.0f} s", 0.3)
     log = rig.put_out(_from_rest(rig, level * asked.wave, PERIODS), folder, "multisine")
     runs = [_run("multisine", log, asked, PERIODS), _run("probe", probe, asked, PROBED) | {"role": "predict"}]
-    path = write_study(rig, folder / "study.toml", f"Hanging: {rig.model.name}", runs)
+    path = write_study(rig, folder / "study.toml", f"Hanging: {rig.model.name}", runs, known=weighed)
     wish = LogRequest(kind="multisine", hold=rig.model.period, band=asked.band, signals={}, counts={}, known={})
     alone = {**runs[0], "file": f"../{log.name}"}
-    answered = write_study(rig, folder / "response" / "study.toml", f"Response: {rig.model.name}", [alone])
+    answered = write_study(rig, folder / "response" / "study.toml", f"Response: {rig.model.name}", [alone],
+                           known=weighed)  # fmt: skip
     tell = part(progress, 0.5, 0.6, "fitting the response")
     try:
         response = response_of_logs([answered], wish, answered.parent, tell=tell)

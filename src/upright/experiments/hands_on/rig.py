@@ -106,7 +106,9 @@ class RigAtHand:
         if not self.ask(sentence):
             raise RigStopped(f"This was asked for and not done: {sentence}")
 
-    def put_out(self, samples: Sequence[float], folder: Path, stem: str, *, lifted: float = 0.0) -> Path:
+    def put_out(
+        self, samples: Sequence[float], folder: Path, stem: str, *, lifted: float = 0.0, bolted: float = 0.0
+    ) -> Path:  # fmt: skip
         """Log of a signal put out blindly, a sample each period, from rest.
 
         Parameters
@@ -117,6 +119,8 @@ class RigAtHand:
             Where the log goes.
         lifted : float
             How far a hand lifts the last coordinate before it lets go; done for a twin here, by a person else.
+        bolted : float
+            Inertia that a hand adds to the first body [kg or kg m^2]; likewise.
 
         Raises
         ------
@@ -127,7 +131,7 @@ class RigAtHand:
         """
         wish = RunRequest(
             rig=self.file.path, samples=tuple(samples), seconds=len(samples) * self.model.period, tilt=lifted,
-            check=False, watch=False, stem=stem,
+            bolted=bolted, check=False, watch=False, stem=stem,
         )  # fmt: skip
         done = self._run(wish, folder)
         if done.end.stopped:

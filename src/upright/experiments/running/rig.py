@@ -96,7 +96,7 @@ def usual_limits(rig: ServoRig) -> Limits:
 
 
 def stage_of(path: Path, *, balance: bool = True, tilt: float = 0.0, watch: bool = True,
-             from_rest: bool = False) -> Stage:  # fmt: skip
+             from_rest: bool = False, bolted: float = 0.0) -> Stage:  # fmt: skip
     """Rig, supervisor and hands of a RIG.toml.
 
     Parameters
@@ -110,6 +110,8 @@ def stage_of(path: Path, *, balance: bool = True, tilt: float = 0.0, watch: bool
         Whether the bank of filters runs beside the loop.
     from_rest : bool
         Whether a run begins where the rig rests, and may lean as it will: a swing-up.
+    bolted : float
+        Inertia that the hands of a twin have added to its first body [kg or kg m^2].
 
     Raises
     ------
@@ -118,6 +120,8 @@ def stage_of(path: Path, *, balance: bool = True, tilt: float = 0.0, watch: bool
     """
     file = read_rig_file(path)
     model, truth = described(file)
+    if bolted:
+        truth = truth.changed(a_1=truth.plant.parameters()["a_1"] + bolted)
     kinds = model.plant.equilibria
     zero = file.zero if file.zero in kinds else next(iter(kinds))
     at = file.at if balance else zero

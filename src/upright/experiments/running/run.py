@@ -34,6 +34,7 @@ class RunRequest:
     `law` is a file, None for a signal that is put out blindly, `excite`; `reference` is a signal that the law follows.
     `from_rest` begins where the rig rests, however far that is from what is held, as a swing-up does.
     `samples` are what is put out, sample by sample instead of in words; logs are called after the `stem`.
+    `bolted` is the inertia that a twin's hands add to its first body before it [kg or kg m^2].
     `own_process` puts a twin or a replay into a process of its own as well, where a rig always is.
     """
 
@@ -46,6 +47,7 @@ class RunRequest:
     seconds: float = 30.0
     mode: str = "host"
     tilt: float = 0.0
+    bolted: float = 0.0
     check: bool = True
     watch: bool = True
     from_rest: bool = False
@@ -179,7 +181,7 @@ def run_rig(
     path = fresh(folder, wish.stem, ".mcap")
     order = RunOrder(
         make=partial(stage_of, wish.rig, balance=balance, tilt=wish.tilt, watch=wish.watch,
-                     from_rest=wish.from_rest), law=as_values(law),
+                     from_rest=wish.from_rest, bolted=wish.bolted), law=as_values(law),
         seconds=wish.seconds, log=path, mode=MODES[wish.mode], check=wish.check, rig_text=read_text(wish.rig),
         references=references,
     )  # fmt: skip

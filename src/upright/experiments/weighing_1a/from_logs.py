@@ -45,7 +45,7 @@ def weigh_logs(
     NotIdentifiable
         When too few swings can be seen.
     """
-    values = [_inertia(text) for text in added]
+    values = [inertia_of(text) for text in added]
     kinds = {kind for _, kind in values if kind}
     if len(kinds) > 1:
         raise BadInput("Masses in kg and inertias in kg m^2 cannot be mixed; carts take masses, disks inertias.")
@@ -102,8 +102,14 @@ def weigh_twin(kind: str, seed: int, folder: Path | None) -> tuple[Loadings, Cha
     return done.loadings, told
 
 
-def _inertia(text: str) -> tuple[float, str]:
-    """Added inertia [SI] and the kind of rig it belongs to; none for a plain zero."""
+def inertia_of(text: str) -> tuple[float, str]:
+    """Added inertia [SI] and the kind of rig it belongs to; none for a plain zero.
+
+    Raises
+    ------
+    BadInput
+        When it is no inertia.
+    """
     if masses := _MASSES.fullmatch(text):
         radius = check_radius(parse(masses[2], "m"))
         return added_inertia(int(masses[1]), radius, mass_radius=MASS_RADIUS), "torsional"

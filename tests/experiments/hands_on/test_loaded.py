@@ -1,0 +1,132 @@
+"""Experiment 1a at a rig: masses that its owner names are bolted on one after the other, within its travel."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import upright as up
+from upright.errors import BadInput, RigStopped
+from upright.experiments.at_hand import experiments_for
+from upright.experiments.hands_on.loaded import PROBE, _bolted, run_loaded
+from upright.experiments.hands_on.rig import rig_at_hand
+from upright.experiments.hands_on.studies import write_study
+
+STUDY = """
+[rig]
+plant = "rectilinear-1"
+name = "cart 4"
+servo_period = "0.884 ms"
+travel = "60 mm"
+[parameters]
+m_1 = { guess = "0.6 kg", min = 0 }
+k_1 = { guess = "300 N/m", min = 0 }
+c_1 = { guess = "2 N s/m", min = 0 }
+f_1c = { guess = "0.2 N", min = 0 }
+[actuator]
+gain = { guess = "5 N/V", min = 0 }
+limit = { value = "5 V", measured = true }
+[sensors.x_1]
+column = "x_1"
+counts_per_m = 226000
+"""
+LOADINGS = """
+[loadings]
+added = ["0 kg", "1 kg", "2 kg"]
+tolerance = "0.2 %"
+"""
+
+
+def made(folder, loadings=LOADINGS):
+    """A twin of the cart, with what may be bolted to it."""
+    (folder / "study.toml").write_text(STUDY, encoding="utf-8")
+    (folder / "RIG.toml").write_text(f'kind = "twin"\nstudy = "study.toml"\n{loadings}', encoding="utf-8")
+    return rig_at_hand(folder / "RIG.toml")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("guessed", [300.0, 120.0])
+def test_a_cart_is_weighed_within_its_travel_whatever_was_guessed(tmp_path, guessed):
+    """A guess of a softer spring asks for less; what the probe shows makes up for it."""
+    rig = made(tmp_path, LOADINGS.replace("0.2 %", "0 %"))
+    told = replace(rig, model=rig.model.changed(k_1=guessed))
+    done = run_loaded(told, tmp_path / "1a", lambda _step, _share: None)
+    truth = rig.truth.plant.parameters()
+    for estimate, true in ((done.loadings.k, truth["k_1"]), (done.loadings.bare, truth["m_1"])):
+        assert estimate.interval[0] <= true <= estimate.interval[1]
+        assert estimate.stderr < 0.001 * true
+    assert len(done.loadings.swings) == 12  # four steps with each loading
+    wanted, held = 0.25 * 60e-3, truth["f_1c"] / truth["k_1"]  # of the travel; where friction holds it
+    probe = PROBE * wanted * guessed / truth["k_1"]
+    for log in done.logs.values():
+        # without friction a step swings to twice where it rests, L; from anywhere within f/k, with it, to 2 L - 2 f/k
+        # on one side and at most f/k more or less on the other, in the probe that told how large as well
+        swing = np.ptp(log["x_1"]) / 4
+        assert wanted - 1.5 * held < swing < wanted * probe / (probe - 1.5 * held)
+
+
+def test_pieces_add_up_and_err_by_their_tolerance(tmp_path):
+    rig = made(tmp_path, LOADINGS.replace("0.2 %", "0 %"))
+    assert _bolted(rig, [0.0, 1.0, 2.0, 1.0]) == pytest.approx([0.0, 1.0, 2.0, 1.0], abs=1e-15)
+    off = np.array(_bolted(made(tmp_path), [0.0, 1.0, 2.0, 1.0])) / [1.0, 1.0, 2.0, 1.0] - [0, 1, 1, 1]
+    assert off[0] == 0
+    assert off[1] == off[3] != 0  # the same piece
+    assert np.abs(off).max() < 5 * 0.002
+
+
+def test_a_rig_is_weighed_where_its_file_names_what_is_bolted_on(tmp_path):
+    assert [e.key for e in experiments_for(made(tmp_path), "RIG.toml")] == ["1a", "1b"]
+    assert [e.key for e in experiments_for(made(tmp_path, ""), "RIG.toml")] == ["1b"]
+    with pytest.raises(BadInput, match=r"1a cannot be made on .*, which has experiments 1b;"):
+        up.lab(rig=str(tmp_path / "RIG.toml"), experiment="1a", out=tmp_path / "out")
+
+
+@pytest.mark.parametrize(
+    ("loadings", "complaint"),
+    [
+        ('[loadings]\nadded = ["1 kg"]', "two or more different loadings in kg"),
+        ('[loadings]\nadded = ["0", "1e-3 kg m^2"]', "two or more different loadings in kg"),
+    ],
+)
+def test_loadings_that_make_no_line_are_told(tmp_path, loadings, complaint):
+    with pytest.raises(BadInput, match=complaint):
+        run_loaded(made(tmp_path, loadings), tmp_path / "1a", lambda _step, _share: None)
+
+
+@pytest.mark.parametrize(
+    ("loadings", "complaint"),
+    [
+        ('[loadings]\nadded = ["1 kg"]\ntolerance = "120 %"', "tolerance is a share"),
+        ('[loadings]\nmasses = ["1 kg"]', "has no key 'masses'"),
+    ],
+)
+def test_loadings_that_say_something_else_are_told_with_their_line(tmp_path, loadings, complaint):
+    with pytest.raises(BadInput, match=rf"line \d+: .*{complaint}"):
+        made(tmp_path, loadings)
+
+
+def test_a_person_is_asked_for_every_loading_by_the_owners_words(tmp_path):
+    asked: list[str] = []
+
+    def person(sentence):
+        asked.append(sentence)
+        return len(asked) < 2
+
+    rig = replace(made(tmp_path), ask=person)
+    with pytest.raises(RigStopped, match=r"asked for and not done: .*0 kg in all"):
+        run_loaded(rig, tmp_path / "1a", lambda _step, _share: None)
+
+
+@pytest.mark.parametrize(("said", "there"), [("", {"guess": "0.000884 s", "min": 0}), ("lag", "0.000884 s")])
+def test_a_delay_that_nobody_said_is_found_where_nothing_else_is_late(tmp_path, said, there):
+    """A loop acts a sample late at least; a fit that knows nothing of it explains 96 % of a twin's motion."""
+    rig = made(tmp_path)
+    if said:
+        study = STUDY.replace("limit =", 'lag = { guess = "1 ms", min = 0 }\nlimit =')
+        (tmp_path / "study.toml").write_text(study, encoding="utf-8")
+        rig = rig_at_hand(tmp_path / "RIG.toml")
+    written = write_study(rig, tmp_path / "found.toml", "", [])
+    assert tomllib.loads(written.read_text(encoding="utf-8"))["actuator"]["delay"] == there
