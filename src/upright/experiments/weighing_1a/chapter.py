@@ -11,8 +11,9 @@ from upright.experiments.makes import OSCILLATORS
 from upright.experiments.weighing_1a.figures import decrement_figure, line_figure, swing_figure
 from upright.experiments.weighing_1a.run import Known, Weighing, truth
 from upright.identification.loadings import Loaded, Loadings
+from upright.quantities import figures
 from upright.records import Record
-from upright.report.fit.tables import plain_estimate
+from upright.report.fit.tables import interval, plain_estimate
 from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Symbol, Table
 from upright.report.symbols import measured, number, typed, unit
 
@@ -33,12 +34,13 @@ def chapter(done: Weighing) -> Chapter:
         found, kind=on.design.kind, title="Stiffness and inertia from added loads", logs=done.campaign.logs,
         signals=dict.fromkeys(done.campaign.logs, column), left_out=done.campaign.left_out, truth=true,
     )  # fmt: skip
+    digits = {k.name: figures(k.value, k.stderr) for k in done.known}
     units = {k.name: unit(type(done.rig.plant).quantity(k.name).unit) for k in done.known}
     handed = Table(
         caption="What the later experiments take from here",
         headings=("symbol", "truth of the twin", "value", "std. error", "unit"),
         rows=tuple(
-            (Symbol(k.name), number(_truth(done, k)), *measured(k.value, k.stderr), units[k.name])
+            (Symbol(k.name), number(_truth(done, k), digits[k.name]), *measured(k.value, k.stderr), units[k.name])
             for k in done.known
         ),
         numbers=(1, 2, 3),
@@ -62,9 +64,10 @@ def chapter(done: Weighing) -> Chapter:
         findings=tuple(
             KeyNumber(
                 what=Symbol(f"{k.name} [{units[k.name]}]"),
-                value=number(k.value),
-                interval=f"{number(k.value - 1.96 * k.stderr)} to {number(k.value + 1.96 * k.stderr)}",
-                truth=number(_truth(done, k)),
+                value=number(k.value, digits[k.name]),
+                interval=f"{number(k.value - 1.96 * k.stderr, digits[k.name])} to "
+                f"{number(k.value + 1.96 * k.stderr, digits[k.name])}",
+                truth=number(_truth(done, k), digits[k.name]),
             )
             for k in done.known
         ),
@@ -155,8 +158,8 @@ def _found_table(found: Loadings, kind: str, truth: Mapping[str, float]) -> Tabl
     )
     rows = tuple(
         (
-            Symbol(name), *((number(truth[name]),) if truth else ()), number(w.value), number(w.stderr, 2),
-            f"{number(w.interval[0])} to {number(w.interval[1])}", unit(_unit(kind, what)), meaning,
+            Symbol(name), *((number(truth[name], figures(w.value, w.stderr)),) if truth else ()),
+            *measured(w.value, w.stderr), interval(w), unit(_unit(kind, what)), meaning,
         )
         for name, meaning, w, what in named
     )  # fmt: skip

@@ -64,6 +64,8 @@ def swing_figure(swings: Sequence[tuple[Loaded, Record, str]]) -> Figure:
 @styled
 def decrement_figure(swings: Sequence[Loaded]) -> Figure:
     """How far each extreme lies from the centre, on a logarithmic scale: dry friction bends the straight line."""
+    from matplotlib.ticker import FuncFormatter, MaxNLocator
+
     drawing = figure(3.0)
     axes = drawing.subplots()
     for (colour, style), loaded in zip(CYCLE, swings, strict=False):
@@ -73,6 +75,9 @@ def decrement_figure(swings: Sequence[Loaded]) -> Figure:
         axes.plot(np.abs(d.model - d.centre) / scale, color=colour, linestyle=style, label=loaded.label)
         axes.plot(viscous(d) / scale, color=colour, linewidth=0.7, alpha=0.6)
     axes.set_yscale("log")
+    for ticks in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
+        ticks(FuncFormatter(lambda v, _: f"{v:g}" if f"{v:e}"[0] in "125" else ""))
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlabel("half swings")
     axes.set_ylabel("height over the first")
     for text in axes.legend(loc="lower left").get_texts():
