@@ -232,7 +232,8 @@ def _conclude(asked: Rig, runs: Sequence[Run], problem: Problem, found: Descent,
     worst = min((p for s in scores.values() if s.role == "fit" for p in s.fit_percent.values()), default=100.0)
     conventions = tuple(log.conventions()) if worst < GOOD else ()
     assumed = () if found.interrupted else assumptions(best, estimates)
-    warnings += () if found.interrupted or little or conventions else lateness(best)
+    late = None if found.interrupted or little or conventions else lateness(best)
+    warnings += [late.sentence] if late else []
     answers = judge(
         Evidence(
             rig=problem.rig,
@@ -244,6 +245,7 @@ def _conclude(asked: Rig, runs: Sequence[Run], problem: Problem, found: Descent,
             converged=found.converged,
             interrupted=found.interrupted,
             memory=best.memory,
+            bent=late.bent if late else (),
             period=min(t.period for t in problem.tracks),
             standing=None if found.interrupted or seen.hidden else standing(best),
             driven=any(np.any(track.u) or track.run.loop is not None for track in problem.tracks),

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from upright.identification import Parameter, Rig, Run, identify
+from upright.identification.inference.verdict import USABLE
 from upright.physics import find
 from upright.simulation import simulate
 
@@ -48,7 +49,13 @@ def test_a_dead_time_that_nobody_asked_for_is_found_and_its_cost_told():
     ).groups())  # fmt: skip
     assert low < 10 * PERIOD * 1e3 < high
     assert before == pytest.approx(fit.runs["steps"].fit_percent["x_1"], abs=0.06)
-    assert "k_1" in sentence.partition("moves ")[2]
+    bent = sentence.partition("moves ")[2].partition(" out of")[0].split(", ")
+    assert "k_1" in bent
+    low, high = fit.estimates["k_1"].interval
+    assert not low <= TRUTH["k_1"] <= high  # so that nobody may build on it
+    (usable,) = [a for a in fit.answers if a.question == USABLE]
+    assert usable.answer != "yes"
+    assert not set(bent) & set(re.split(r"[ ,.:]+", usable.headline))
     with_it = identify(asked(**{"actuator.delay": 0.01}), [run(late=10)])
     assert after == pytest.approx(with_it.runs["steps"].fit_percent["x_1"], abs=0.06)
     assert not told(with_it)

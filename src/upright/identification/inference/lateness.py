@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,16 +28,27 @@ FITTED, NEAR = 40, 0.02
 DELAY, LAG = "actuator.delay", "actuator.lag"
 
 
-def lateness(best: Optimum) -> tuple[str, ...]:
-    """Sentence on the dead time of the drive that would explain what a fit misses, and on what it would cost.
+@dataclass(frozen=True, kw_only=True)
+class Lateness:
+    """A dead time of the drive that would explain what a fit misses: a `sentence` on it and on what it would cost.
 
-    Nothing where the drive's dead time or lag is asked or known already, or nothing is driven.
+    With it the numbers that are `bent` lie outside the intervals that the fit without it tells.
+    """
+
+    sentence: str
+    bent: tuple[str, ...]
+
+
+def lateness(best: Optimum) -> Lateness | None:
+    """The dead time that nobody asked for.
+
+    None where the drive's dead time or lag is asked or known already, or nothing is driven.
     """
     problem, x = best.problem, best.x
     rig = problem.rig
     stated = any(p.estimate or p.value for n, p in rig.parameters.items() if n in (DELAY, LAG))
     if stated or not any(np.any(track.u) or track.run.loop is not None for track in problem.tracks):
-        return ()
+        return None
     asked = Parameter(name=DELAY, value=0.0, unit="s", estimate=True, lower=0.0, upper=LATEST)
     (late,) = shared_unknowns(replace(rig, parameters={DELAY: asked}))
     wider = replace(problem, unknowns=[*problem.unknowns, late], steps=np.append(problem.steps, 1e-6))
@@ -48,29 +59,30 @@ def lateness(best: Optimum) -> tuple[str, ...]:
     slope = float(here.gradient[-1] - aside @ here.gradient[free])
     curvature = float(here.matrix[-1, -1] - aside @ here.matrix[free, -1])
     if slope >= 0 or not slope**2 > PROMISED * here.cost * curvature:
-        return ()
+        return None
     z[-1] = min(-slope / curvature, NEAR)
     found = descend(wider.normal, z, wider.lower, wider.upper, tolerance=1e-6, limit=FITTED)
     if found.normal.cost > MENDED**2 * here.cost:
-        return ()
+        return None
     told = assess(wider, found.x)
     delay, error = found.x[-1], told.quantile * told.sigma[-1]
     if not 0 < error < delay:
-        return ()
+        return None
     before, after = (
         {(track.run.label, s): p for i, track in enumerate(of.tracks) for s, p in score(of, i, at).fit_percent.items()}
         for of, at in ((problem, x), (wider, found.x))
     )
     run, signal = worst = min(before, key=lambda key: before[key])
     half = best.quantile * best.sigma
-    bent = [
+    bent = tuple(
         u.name for i, u in enumerate(problem.unknowns) if u.shared and u.asked and abs(found.x[i] - x[i]) > half[i] > 0
-    ]
+    )
     cost = f", and moves {', '.join(bent)} out of what the intervals say" if bent else ""
     ms = [f"{1e3 * value:.3g}" for value in (delay, delay - error, delay + error)]
-    return (
-        f"The drive seems to act {ms[0]} ms late ({ms[1]} to {ms[2]}): with that dead time {signal} of run '{run}'"
-        f" would be explained to {after[worst]:.1f} % instead of {before[worst]:.1f} %. Ask for it, or for a lag, which"
+    return Lateness(
+        sentence=f"The drive seems to act {ms[0]} ms late ({ms[1]} to {ms[2]}): with that dead time {signal} of run "
+        f"'{run}' would be explained to {after[worst]:.1f} % instead of {before[worst]:.1f} %. Ask for it, or for a lag, which"
         f' does much the same: [actuator] delay = {{ guess = "{1e3 * delay:.2g} ms", max = "{1e3 * LATEST:.0f} ms" }}.'
         f" It is one number more{cost}.",
+        bent=bent,
     )

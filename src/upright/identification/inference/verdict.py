@@ -46,6 +46,7 @@ class Evidence:
     `unseen` and `conventions` are sentences on what the data cannot see and on signs or zeros that look wrong. The
     residuals are autocorrelated over `memory` seconds, the motion takes `period` seconds for one period. `standing`
     says how a rig within the intervals stands upright, if this plant can, `driven` whether a command acted in a run.
+    Numbers that are `bent` leave their intervals with a dead time of the drive that would explain the runs better.
     """
 
     rig: Rig
@@ -60,6 +61,7 @@ class Evidence:
     period: float
     standing: Standing | None
     driven: bool = True
+    bent: Sequence[str] = ()
 
 
 def judge(found: Evidence) -> tuple[Judgement, ...]:
@@ -176,12 +178,19 @@ def _usable(found: Evidence, *, confirmed: bool) -> Judgement:
             "That the rig is of this kind was guessed from its columns, and no prediction of a run that was not fitted "
             "confirms it: name the plant, or hold a run out."
         )
+    if found.bent:
+        reasons.append(
+            f"{', '.join(found.bent)}: outside their intervals once the drive may act late, which explains the runs "
+            "better; ask for its delay."
+        )
     resting = {n for a in found.assumptions for n in proportional(a)}
-    free = [n for n in firm if n not in resting]
+    free = [n for n in firm if n not in resting and n not in found.bent]
     if no:
         answer, headline = "no", "Not all of them are determined."
     elif guessed:
         answer, headline = "in part", "As numbers of a plant that was guessed."
+    elif found.bent and not free:
+        answer, headline = "no", "None of them before the drive's delay is asked for."
     elif reasons:
         answer, headline = "in part", f"These numbers can be used: {', '.join(free)}." if free else "Only their ratios."
     else:
