@@ -176,7 +176,9 @@ class RigAtHand:
 
 
 def trial_of(done: RigRun, at: str) -> Trial:
-    """A logged run as a trial: states are the readings and their differences, counted from what was held."""
+    """A logged run as a trial, its time from where the loop began: states are the readings and their differences, counted
+    from what was held.
+    """
     assert done.log is not None
     t, away = done.t, done.away
     x = np.empty((t.size, 2 * away.shape[1]))
@@ -185,7 +187,7 @@ def trial_of(done: RigRun, at: str) -> Trial:
     u: Array = done.log.columns["u_applied"]
     signals = {c.name: x[:, 2 * i] for i, c in enumerate(done.model.plant.coordinates)}
     record = done.log.record()
-    shown = record.replace(signals={n: signals.get(n, v) for n, v in record.signals.items()})
+    shown = record.replace(t=t, signals={n: signals.get(n, v) for n, v in record.signals.items()})
     return Trial(rig=done.model, at=at, t=t, x=x, u=u, rest=point, record=shown)
 
 
