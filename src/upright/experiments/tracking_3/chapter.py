@@ -39,7 +39,10 @@ def chapter(done: Tracking) -> Chapter:
     told = " It was interrupted; what was finished is told." if done.interrupted else ""
     detail = "Foreseen on the fitted numbers; no rig was touched."
     if done.found:
+        left = [o.law.name for o in done.outcomes if not o.tried]
         detail = "Seen on the twin: no rig was touched." if done.simulated else "Tried on the rig."
+        if left:
+            detail = f"Tried on the rig, but for what is foreseen to leave the bounds: {', '.join(left)}."
     return Chapter(
         key="3", title="Tracking through a flexible shaft",
         question=f"Can the drive at one end of a flexible shaft make the other end, {far}, follow a step, within its "
@@ -264,6 +267,10 @@ def _why(done: Tracking, pd: Outcome, stiff: Outcome, other_end: Outcome, near: 
     compared = [best, *((done.summed,) if done.summed else ()), pd, stiff, other_end]
     trips = other_end.measured.tripped
     end = f"trips the rig {trips - BEFORE:.2g} s after the step" if math.isfinite(trips) else "does not trip the rig"
+    if done.found and not other_end.tried:
+        end = f"was not tried; it is foreseen that it {end}"
+    guessed = [o.law.name for o in compared if done.found and not o.tried]
+    foreseen = f" Foreseen, not tried: {', '.join(guessed)}." if guessed else ""
     tried = 0 if done.search is None else done.search.kp.size
     return Part(
         "Why state feedback",
@@ -285,7 +292,7 @@ def _why(done: Tracking, pd: Outcome, stiff: Outcome, other_end: Outcome, near: 
                 name="track-compared",
                 draw=lambda: steps_figure(done, compared, until=DWELL + 1.4, kick=None),
                 caption="The same step, then a steady push of the drive, which the command shown contains. A cross: "
-                "the rig has tripped.",
+                "the rig has tripped." + foreseen,
                 description=f"State feedback beside PD control: {_described(done)}",
             ),
             *_reasons(done, pd, stiff, bound),
@@ -353,7 +360,7 @@ def _numbers(done: Tracking) -> dict[str, Any]:
                 "K": o.law.K, "k_pf": o.law.k_pf, "poles_asked": o.law.asked,
                 "poles": o.law.poles, "decay": o.law.decay, "damping": o.law.damping,
                 "static_force_per_error": o.law.stiffness, "error_at_most": o.law.play, "foreseen": run(o.predicted),
-                "found": run(o.measured) if o.measured is not o.predicted else None, "within_limits": o.within,
+                "found": run(o.measured) if o.tried else None, "within_limits": o.within,
             } for o in tables.outcomes(done)
         },
         "seconds": done.seconds,

@@ -85,6 +85,11 @@ class Outcome:
     measured: StepTrial
 
     @property
+    def tried(self) -> bool:
+        """Whether the rig was stepped with it; else what is measured is what is foreseen."""
+        return self.measured is not self.predicted
+
+    @property
     def within(self) -> bool:
         """Whether the rig stayed within limit, travel and twist."""
         return math.isinf(self.measured.tripped) and self.measured.effort.saturated == 0
@@ -152,8 +157,13 @@ class Tracking:
     @property
     def found(self) -> bool:
         """Whether anything was tried, beside what the model foresees."""
+        return any(o.tried for o in self.outcomes)
+
+    @property
+    def outcomes(self) -> tuple[Outcome, ...]:
+        """Of all laws, as far as it came."""
         laws = (*self.sets, self.summed, self.pd, self.stiff, self.far)
-        return any(o is not None and o.measured is not o.predicted for o in laws)
+        return tuple(o for o in laws if o is not None)
 
 
 def run_tracking(
