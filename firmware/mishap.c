@@ -32,6 +32,12 @@ uint8_t over_the_wire(mishaps_t *now, uint8_t byte) {
     return chance < now->corruption ? byte ^ (uint8_t)(1u << (next_random(now) >> 61)) : byte;
 }
 
+void mishaps_move(mishaps_t *now, furuta_t *rig, bool on, int command, double dt) {
+    if (!rig->running) return;
+    hand_moves(&now->hand, rig, on, command, dt);
+    furuta_move(rig, on ? rig->gain * rig->step * command : 0, dt);
+}
+
 bool mishaps_line(mishaps_t *now, furuta_t *rig, const char *line) {
     int channel = 0;
     double value, x[4];
@@ -39,7 +45,8 @@ bool mishaps_line(mishaps_t *now, furuta_t *rig, const char *line) {
     if (!strcmp(line, "cut")) return now->cut = true;
     if (!strcmp(line, "join")) return now->cut = false, true;
     if (!strcmp(line, "hold")) return rig->held = true;
-    if (!strcmp(line, "release")) return rig->held = false, rig->running = true;
+    if (!strcmp(line, "release")) return now->hand.called = rig->held = false, rig->running = true;
+    if (sscanf(line, "lift %lf", &value) == 1) return hand_lifts(&now->hand, value), true;
     if (sscanf(line, "kick %lf", &value) == 1) return rig->x[3] += value, true;
     if (sscanf(line, "put %lf %lf %lf %lf", x, x + 1, x + 2, x + 3) == 4) return memcpy(rig->x, x, sizeof x), true;
     if (sscanf(line, "corrupt %lf %llu", &value, &seed) == 2)

@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #include "furuta.h"
+#include "hand.h"
 
 typedef struct {
     double scale; /* counts shown per true count: -1 for swapped wires, 2 or 4 for a decoder that counts other edges */
@@ -18,6 +19,7 @@ typedef struct {
     double corruption; /* probability that a byte on the wire comes with a flipped bit */
     uint64_t random;
     bool cut; /* nothing comes from the host any more */
+    hand_t hand;
 } mishaps_t;
 
 void mishaps_prepare(mishaps_t *now, const furuta_t *rig);
@@ -28,7 +30,9 @@ uint8_t over_the_wire(mishaps_t *now, uint8_t byte);
 /*     dead CHANNEL            alive CHANNEL          flip CHANNEL           scale CHANNEL FACTOR
  *     lose CHANNEL COUNTS     corrupt CHANCE SEED    cut                    join
  *     kick SPEED [rad/s]      hold                   release
- *     put PSI PSI' THETA THETA'
+ *     put PSI PSI' THETA THETA'                     lift THETA (hand.h)
  * false for a line that is none of them. */
 bool mishaps_line(mishaps_t *now, furuta_t *rig, const char *line);
+/* A step of the rig with a hand at it, the drive on or off at a command in steps of its converter. */
+void mishaps_move(mishaps_t *now, furuta_t *rig, bool on, int command, double dt);
 #endif

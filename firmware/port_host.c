@@ -68,10 +68,8 @@ void port_send(const uint8_t *bytes, uint16_t n) {
 }
 
 static void pass(uint32_t ticks, uint16_t late) {
-    if (simulated && plant.running) {
-        double torque = enabled ? plant.gain * plant.step * command : 0;
-        for (uint32_t i = 0; i < ticks * SUBSTEPS; i++) furuta_move(&plant, torque, 1e-9 * PERIOD_NS / SUBSTEPS);
-    }
+    for (uint32_t i = 0; simulated && i < ticks * SUBSTEPS; i++)
+        mishaps_move(&mishaps, &plant, enabled, command, 1e-9 * PERIOD_NS / SUBSTEPS);
     static long shown[CHANNELS];
     for (int i = 0; simulated && i < CHANNELS; i++) {
         long before = shown[i];

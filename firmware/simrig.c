@@ -116,7 +116,7 @@ static void run_until(avr_cycle_count_t cycle) {
 
 static void slice(void) {
     static const double dt = (double)SLICE / CLOCK;
-    if (plant.running) furuta_move(&plant, enabled ? plant.gain * plant.step * converter : 0, dt);
+    mishaps_move(&mishaps, &plant, enabled, converter, dt);
     long edges[2], most = 1;
     for (int i = 0; i < 2; i++) {
         edges[i] = encoder_shows(&mishaps.encoder[i], furuta_counts(&plant, i)) - position[i];

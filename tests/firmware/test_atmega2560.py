@@ -13,7 +13,7 @@ from benchmarks.boards import COUNTS, STEP, plant, rig_on
 from benchmarks.designs import FURUTA, GAIN, LIMITS, PARAMETERS, PERIOD, inverted
 from benchmarks.minute import KICKS, TICK, UPRIGHT, held
 from tests.firmware.test_laws import FREE, in_float32
-from tests.firmware.test_loops import settled
+from tests.firmware.test_loops import is_lifted_and_let_go, settled, swung
 from upright.errors import RigStopped
 from upright.laws import state_feedback
 from upright.rigs.line import TerminalLine
@@ -85,6 +85,10 @@ def test_its_pendulum_moves_as_the_project_says(avr):
     board.do("release", "run 1000")
     x = simulate(FURUTA, {}, [*start.values()], None, PERIOD, samples=1001, substeps=20)[-1, :, 0]
     np.testing.assert_allclose(board.state()[1:5], x, atol=1e-9)
+
+
+def test_the_hand_beside_it_is_that_of_the_host(avr):
+    assert is_lifted_and_let_go(swung(avr(*plant(PARAMETERS, GAIN)), lockstep=True))
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -175,3 +176,67 @@ def test_the_boards_drive_pushes_as_the_projects_does(host):
         assert rig.exchange(u).mode == Mode.HOST
     x = simulate(FURUTA, {"actuator.gain": GAIN}, np.zeros(4), commands, PERIOD, samples=601, substeps=10)[-1, :, 0]
     np.testing.assert_allclose(board.state()[1:5], x, atol=1e-9)
+
+
+FREE = (math.inf, math.inf)
+AT_HAND = replace(LIMITS, travel=FREE, start=FREE, speed=(math.inf, 10.0))
+
+
+def configured(board, **how):
+    rig = board.rig(**how)
+    rig.open()
+    rig.clear_fault()
+    rig.configure(AT_HAND)
+    return rig
+
+
+def test_a_hand_lifts_after_the_pulse_and_lets_go_as_the_drive_comes_on(host):
+    board = host(*HANGING)
+    rig = configured(board)
+    board.do("release", "lift 3.0", "run 3000")
+    assert board.state()[1:5] == [0.0, 0.0, 0.0, 0.0]  # no drive was seen yet
+    rig.arm()
+    rig.self_test(0.5, 0.15)
+    rig.stop()
+    board.do("run 800")
+    assert 0.0 < abs(board.state()[3]) < 0.2  # swings from the pulse
+    board.do("run 100")  # a second after its end
+    lifts = board.state()
+    board.do("run 1000")  # at 2 rad/s
+    assert board.state()[3] - lifts[3] == pytest.approx(2.0)
+    board.do("run 60000")
+    assert board.state()[1:5] == [0.0, 0.0, 3.0, 0.0]  # patient
+    rig.arm()
+    rig.start(Mode.HOST)
+    for _ in range(300):
+        assert rig.exchange(0.0).mode == Mode.HOST
+    fell = simulate(FURUTA, {}, [0.0, 0.0, 3.0, 0.0], None, PERIOD, samples=301, substeps=10)[-1, :, 0]
+    np.testing.assert_allclose(board.state()[1:5], fell, atol=1e-9)
+    assert abs(fell[2] - 3.0) > 0.1
+
+
+def swung(board, **how):
+    """Angle at each tick since the start of a silent drive, with a hand that lifts to 1 rad."""
+    rig = configured(board, **how)
+    board.do("lift 1.0")
+    rig.arm()
+    rig.start(Mode.HOST)
+    return np.array([rig.exchange(0.0).counts[1] for _ in range(3000)]) / COUNTS
+
+
+def is_lifted_and_let_go(theta):
+    """Nothing for a second, to 1 rad at 2 rad/s, held for a second, and then its own weight."""
+    falls = FURUTA.m_p * FURUTA.g * FURUTA.l_cg * math.sin(1.0) / (FURUTA.J_p + FURUTA.m_p * FURUTA.l_cg**2)
+    let_go = 2500 + np.argmax(theta[2500:] < 1.0 - 20 / COUNTS)
+    return (
+        not theta[:990].any()
+        and theta[1250] == pytest.approx(0.5, abs=0.01)
+        and np.allclose(theta[1510:2490], 1.0, atol=1 / COUNTS)
+        # 20 counts are 8 mrad; the arm, which gives way, makes it fall faster than on a fixed hinge
+        and 2500 < let_go < 2510 + 1e3 * math.sqrt(2 * 20 / COUNTS / falls)
+        and theta.min() < -0.8
+    )
+
+
+def test_a_hand_lifts_under_a_silent_drive_holds_still_and_lets_go(host):
+    assert is_lifted_and_let_go(swung(host(*HANGING)))
