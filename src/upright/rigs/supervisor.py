@@ -215,8 +215,10 @@ class Supervisor:
         self.event(self._time, "start", f"{mode.name} holds {', '.join(f'{t:.4g}' for t in self.target)}")
 
     def near(self) -> bool:
-        """Whether the rig is where a run may start."""
+        """Whether the rig is where a run may start; a pulse may have left the driven body off its start window."""
         readings = self.readings(self.rig.exchange(0.0))
+        if any(abs(q) > most for q, most in zip(readings[:-1], self.held.start, strict=False)):
+            return False
         return abs(readings[-1] - self._targets(self.law, readings)[-1]) <= self.duty.near
 
     def _in_window(self) -> None:

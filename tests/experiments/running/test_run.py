@@ -13,15 +13,18 @@ import upright as up
 from upright.errors import BadInput
 from upright.experiments.makes import make_rig
 from upright.experiments.running.chapter import run_chapter
+from upright.experiments.running.rig import open_loop, stage_of
 from upright.experiments.running.run import RunRequest, run_rig
 from upright.gains import feedback, filtered, hold, place, prefilter
 from upright.laws import as_values
 from upright.logs import read_log
 from upright.logs.replay import replay
+from upright.realtime.session import QUIET, RunOrder, carry_out
 from upright.report.run import chapter
 from upright.rigs import Fault
 
 RIG = make_rig("furuta")
+LINEAR = RIG.linear("inverted")
 POLES = [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220]
 
 
@@ -133,14 +136,33 @@ def test_a_limit_ends_a_run_and_the_verdict_says_which(folder, tmp_path):
 
 
 def test_a_run_that_ended_well_leaves_no_fault_in_the_rig(folder, tmp_path):
-    from upright.experiments.running.rig import open_loop, stage_of
-    from upright.realtime.session import RunOrder, carry_out
-
     stage = stage_of(folder / "RIG.toml", balance=False)
     law = open_loop([0.0], 2, RIG.period)
     order = RunOrder(make=lambda: stage, law=as_values(law), seconds=0.1, log=tmp_path / "run.mcap", check=False)
     assert not carry_out(order, law=law).stopped
     assert stage.supervisor.rig.sample.faults == Fault(0)
+
+
+def test_a_loop_waits_for_a_driven_body_that_is_off_its_start_window(folder, tmp_path):
+    text = 'kind = "twin"\nmake = "furuta"\nseed = 3\n[limits]\ncommand = "5 V"\n[limits.psi]\nstart = "0.2 rad"\n'
+    (tmp_path / "RIG.toml").write_text(text, encoding="utf-8")
+    stage = stage_of(tmp_path / "RIG.toml")
+    port, waited = stage.supervisor.rig.port, []
+
+    def person(state):
+        """Brings the pendulum up beside the window, then the arm into it."""
+        if state.phase == "waiting":
+            waited.append(state.time)
+            if waited[-1] - waited[0] > 2.0:
+                port.hold("inverted", [0.1, 0.0, 0.02, 0.0])
+
+    stage = replace(stage, bring=lambda: port.hold("inverted", [0.5, 0.0, 0.02, 0.0]))
+    law = feedback(filtered(hold(LINEAR, RIG.period, RIG.delay / RIG.period), 0.5), place(LINEAR.A, LINEAR.B, POLES).K)
+    order = RunOrder(make=lambda: stage, law=as_values(law), seconds=0.1, log=tmp_path / "run.mcap", check=False)
+    done = carry_out(order, law=law, show=person)
+    assert not done.stopped
+    assert done.target[0] == pytest.approx(0.1, abs=1e-3)
+    assert waited[-1] - waited[0] == pytest.approx(2.0 + QUIET, abs=0.01)
 
 
 def test_what_contradicts_itself_is_refused(folder, tmp_path):

@@ -146,7 +146,9 @@ def stage_of(path: Path, *, balance: bool = True, tilt: float = 0.0, watch: bool
         if from_rest or (not upright and not tilt):
             bring = _nothing
     elif held:
-        advice = f"bring {list(units)[-1]} to '{at}' and hold it still; let go when it is held"
+        *others, swings = units
+        middle = "".join(f", {name} in the middle of its travel," for name in others)
+        advice = f"bring {swings} to '{at}'{middle} and hold still; let go when it is held"
     return Stage(
         supervisor=Supervisor(rig, duty), bring=bring, let_go=let_go, units=tuple(units.values()), advice=advice
     )
