@@ -52,8 +52,9 @@ def run_swings(
     for i, (role, angle) in enumerate((("fit", HIGH), ("predict", LOW))):
         progress(f"swinging from about {math.degrees(angle):.0f} degrees", 0.2 * i)
         rig.requested(
-            f"The drive will be silent. Within {HAND:.0f} s lift {names[-1]} to about {math.degrees(angle):.0f} degrees"
-            f", hold it and {names[0]} still, let both go together, and keep away."
+            f"Let {names[-1]} hang at rest until the run begins; the drive is silent. Within {HAND:.0f} s from then "
+            f"lift {names[-1]} to about {math.degrees(angle):.0f} degrees, hold it and {names[0]} still, let both go "
+            "together, and keep away."
         )
         seconds = SWING + (HAND if rig.file.hardware else 0.0)
         samples = [0.0] * math.ceil(seconds / rig.model.period)
