@@ -9,10 +9,12 @@ from __future__ import annotations
 import math
 import re
 
+import numpy as np
 import pytest
 
 import upright as up
 from benchmarks.boards import COUNTS, FULL_SCALE, plant
+from upright.logs import read_log
 from upright.physics import Furuta
 
 TRUTH = Furuta(m_p=0.1331, l_cg=0.185, r=0.152, J_d=7.1e-3, J_p=6.1e-4, J_a=2e-5, b_1=2e-3, b_2=4e-5)
@@ -110,6 +112,9 @@ def test_a_rig_behind_a_wire_is_identified_held_swung_up_and_let_swing(host, tmp
 
     assert told["2b"]["swing_up"]["held"]
     assert told["2b"]["swing_up"]["tripped"] == math.inf
+    arm = read_log(tmp_path / "out" / "2b" / "swing_up.mcap").columns["psi"]
+    assert arm[0] > 0.1  # where the pulse has left it
+    assert told["2b"]["swing_up"]["travel"] == pytest.approx(np.abs(arm).max())
 
     assert told["4"]["trusted"]
     assert not misses(told["4"], ("J_p", "b_1", "b_2"))

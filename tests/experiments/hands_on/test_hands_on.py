@@ -13,16 +13,20 @@ from scipy.signal import lsim
 
 import upright as up
 from tests.exports.rigs import fit_file
+from upright.control.swing_up import MODE
 from upright.errors import BadInput
 from upright.experiments.at_hand import experiments_for
 from upright.experiments.hands_on.hanging import SHARE, _level, asking
 from upright.experiments.hands_on.rig import rig_at_hand
 from upright.experiments.hands_on.studies import write_study
 from upright.experiments.hands_on.upright import came
+from upright.experiments.hands_on.upwards import run_upwards
 from upright.experiments.makes import MAKES, make_rig
 from upright.experiments.running.run import RunRequest, run_rig
 from upright.gains import feedback, filtered, hold, place
-from upright.laws import as_values
+from upright.laws import as_values, of_values
+from upright.logs import read_log
+from upright.progress import silent
 from upright.study.load import load_study
 
 OWN = """
@@ -176,6 +180,30 @@ def test_a_run_that_the_supervisor_ends_was_lost_there(tmp_path):
     assert found.score.ran_out == pytest.approx(found.trial.t[-1])
     assert math.isinf(found.score.settled)
     assert "travel" in found.ended
+
+
+def test_a_swing_up_is_told_from_the_middle_wherever_its_pulse_left_the_arm(tmp_path):
+    plant = up.Furuta(m_p=0.1331, l_cg=0.185, r=0.152, J_d=7.1e-3, J_p=6.1e-4, J_a=2e-5, b_1=2e-3, b_2=4e-5)
+    counts = {"value": 16_000.0, "unit": "1/rev", "source": "known"}
+    said = {
+        "servo_period": {"value": 1e-3, "unit": "s", "source": "known"},
+        "travel": {"value": 2.0, "unit": "rad", "source": "known"},
+        "counts.psi": counts,
+        "counts.theta": counts,
+    }
+    fit = fit_file(tmp_path, plant, name="furuta", **said)
+    rig = made(tmp_path, 'kind = "twin"\nfit = "fit.json"\n')
+    done = run_upwards(rig, fit, tmp_path / "out", silent, lambda: False)
+    log = read_log(tmp_path / "out" / "swing_up.mcap")
+    arm = log.columns["psi"]
+    assert abs(arm[0]) > 0.05
+    assert done.ascent.travel == pytest.approx(np.abs(arm).max())
+    # what it is said to do at each moment is what it did: read as the encoders showed it, the law gives its commands
+    readings = np.column_stack([arm, log.columns["theta"]])
+    commands, memory = of_values(dict(log.header.law)).follow(readings, rig.model.period)
+    limit = rig.model.limit
+    np.testing.assert_allclose(np.clip(commands[:, 0], -limit, limit), log.columns["u"], atol=0.01)
+    assert np.array_equal(done.ascent.mode[:-1], memory[1:, MODE])
 
 
 def test_what_is_no_rig_at_hand_is_refused(tmp_path):

@@ -175,12 +175,14 @@ class RigAtHand:
         return rig_at_hand(path, self.ask, self.watching)
 
 
-def trial_of(done: RigRun, at: str) -> Trial:
-    """A logged run as a trial, its time from where the loop began: states are the readings and their differences, counted
-    from what was held.
+def trial_of(done: RigRun, at: str, origin: Sequence[float] | None = None) -> Trial:
+    """A logged run as a trial, its time from where the loop began: states are the readings and their differences,
+    counted from what was held, or from the readings of an origin.
     """
     assert done.log is not None
     t, away = done.t, done.away
+    if origin is not None:
+        away = away + np.subtract(done.end.target, origin)
     x = np.empty((t.size, 2 * away.shape[1]))
     point = np.array(list(done.model.plant.equilibrium(at).values()))
     x[:, 0::2], x[:, 1::2] = away + point, np.gradient(away, t, axis=0)

@@ -40,7 +40,9 @@ class _Hands:
         done = self.rig.hold(rule, self.folder, "swing_up", seconds, from_rest=True)
         if done.end.stopped:
             raise RigStopped(f"The swing-up was stopped {done.t[-1]:.3g} s after its start: {done.end.stopped}")
-        return ascent_of(trial_of(done, "inverted"), law, rule)
+        held, zero = (model.plant.equilibrium(n) for n in ("inverted", self.rig.resting))
+        # its law counts the driven body from where the encoders were zeroed, wherever the pulse has left it
+        return ascent_of(trial_of(done, "inverted", [held[n] - zero[n] for n in self.rig.names]), law, rule)
 
     def _rest(self, what: str) -> None:
         names = self.rig.names
