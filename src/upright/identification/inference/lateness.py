@@ -81,8 +81,9 @@ def lateness(best: Optimum) -> Lateness | None:
     ms = [f"{1e3 * value:.3g}" for value in (delay, delay - error, delay + error)]
     return Lateness(
         sentence=f"The drive seems to act {ms[0]} ms late ({ms[1]} to {ms[2]}): with that dead time {signal} of run "
-        f"'{run}' would be explained to {after[worst]:.1f} % instead of {before[worst]:.1f} %. Ask for it, or for a lag, which"
-        f' does much the same: [actuator] delay = {{ guess = "{1e3 * delay:.2g} ms", max = "{1e3 * LATEST:.0f} ms" }}.'
+        f"'{run}' would be explained to {after[worst]:.1f} % instead of {before[worst]:.1f} %. Ask for it, or for a "
+        f'lag, which does much the same: [actuator] delay = {{ guess = "{1e3 * delay:.2g} ms", max = "'
+        f'{1e3 * LATEST:.0f} ms" }}.'
         f" It is one number more{cost}.",
         bent=bent,
     )
