@@ -83,7 +83,7 @@ def _hanging(at: ExperimentInput) -> tuple[Chapter, bool]:
     rig = _at(at)
     known = _found(at, "1a", rig.model.plant.names()[0]) if kind_of(rig.model.plant) else {}
     done = run_hanging(rig, at.folder, at.progress, known)
-    return hanging_chapter(done, at.folder, _at(at).true_values), not done.fit.interrupted
+    return hanging_chapter(done, at.folder, rig.true_values), not done.fit.interrupted
 
 
 def _upright(at: ExperimentInput) -> tuple[Chapter, bool]:

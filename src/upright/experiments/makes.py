@@ -119,8 +119,13 @@ class Oscillator:
         return self.plant.names()[0]
 
     @property
+    def bare(self) -> str:
+        """Symbol of that without added masses: ``m_0`` or ``J_0``."""
+        return self.inertia.replace("1", "0")
+
+    @property
     def unit(self) -> str:
-        """Unit of that."""
+        """Unit of the inertia."""
         return self.plant.quantity(self.inertia).unit
 
 

@@ -36,11 +36,11 @@ def hanging_chapter(done: Hanging, folder: Path, truth: Mapping[str, float]) -> 
 def loaded_chapter(done: Weighed, folder: Path) -> Chapter:
     """The swings and their line, beside the truth of a twin."""
     found, body, (column,) = done.loadings, OSCILLATORS[done.kind], done.rig.names
-    bare = body.inertia.replace("1", "0")
     true = done.rig.true_values
-    truth = {"k": true["k_1"], bare: true[body.inertia], "c": true["c_1"]} if true else {}
+    truth = {"k": true["k_1"], body.bare: true[body.inertia], "c": true["c_1"]} if true else {}
     logs = " ".join(typed(folder / file) for file in done.files.values())
     added = " ".join(f"--added {typed(a)}" for a in done.rig.file.added)
+    added += f' --tolerance "{100 * done.rig.file.tolerance:g} %"' if done.rig.file.tolerance else ""
     told = loading_chapter(
         found, kind=done.kind, title="Stiffness and inertia from added loads", logs=done.logs,
         signals=dict.fromkeys(done.logs, column), left_out=done.left_out, truth=truth or None,
@@ -50,7 +50,7 @@ def loaded_chapter(done: Weighed, folder: Path) -> Chapter:
             Step(f"Write {body.inertia} into the study of what is built on this body, what is mounted on it added."),
         ),
     )  # fmt: skip
-    named = (("k", found.k, "stiffness"), (bare, found.bare, "inertia"), ("c", found.damping, "damping"))
+    named = (("k", found.k, "stiffness"), (body.bare, found.bare, "inertia"), ("c", found.damping, "damping"))
     units = {"stiffness": "k_1", "inertia": body.inertia, "damping": "c_1"}
     findings = tuple(
         finding(Symbol(f"{n} [{unit(body.plant.quantity(units[what]).unit)}]"), e, truth.get(n))

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from upright.errors import BadInput, NotIdentifiable
+from upright.errors import BadInput
 from upright.experiments.hands_on.hanging import GROWTH, OF_TRAVEL, REACH, SHARE, STILL, travel_of
 from upright.experiments.hands_on.rig import RigAtHand
 from upright.experiments.makes import OSCILLATORS
-from upright.experiments.weighing_1a.from_logs import inertia_of
-from upright.identification.loadings import Loaded, Loadings, fit_loadings, swings
+from upright.experiments.weighing_1a.from_logs import inertia_of, weigh
+from upright.identification.loadings import Loadings
 from upright.physics import Plant
 from upright.progress import Progress
 from upright.readers import read
@@ -78,35 +78,27 @@ def run_loaded(rig: RigAtHand, folder: Path, progress: Progress) -> Weighed:
     level = PROBE * min(SHARE * rig.model.limit, wanted * _stiffness(rig))
     logs: dict[str, Record] = {}
     files: dict[str, str] = {}
-    loaded: list[Loaded] = []
-    left_out: list[str] = []
-    said = rig.file.added
-    runs = [("probe", said[0], values[0], truly[0]), *zip(said, said, values, truly, strict=True)]
-    for i, (label, text, value, true) in enumerate(runs):
+    runs = list(zip(rig.file.added, truly, strict=True))
+    runs.insert(0, runs[0])  # the probe
+    for i, (text, true) in enumerate(runs):
         progress(f"stepping with {text} added", i / len(runs))
         rig.requested(
             f"Bolt on what makes {text} in all and nothing else, and let {name} rest on its spring with room to either "
             f"side; steps follow for {len(STEPS) * seconds:.0f} s."
         )
         signal = _steps(level, seconds, rig.model.period)
-        log = rig.put_out(signal, folder, "probe" if label == "probe" else f"loaded_{i}", bolted=true)
+        log = rig.put_out(signal, folder, f"loaded_{i}" if i else "probe", bolted=true)
         record = read(log)
-        if label == "probe":
+        if i == 0:
             seen = float(np.ptp(record[name])) / 4  # a step swings to twice where it rests, to either side
             level = min(SHARE * rig.model.limit, GROWTH / PROBE * level, level * wanted / max(seen, 1e-12))
             continue
-        label = label if label not in logs else f"{label}, run {i}"
+        label = text if text not in logs else f"{text}, run {i}"
         logs[label], files[label] = record, log.name
-        try:
-            loaded += swings(
-                record, added=value, label=label, signal=name, command="u_applied", quantum=1 / abs(rig.model.counts[0])
-            )
-        except NotIdentifiable as error:
-            left_out.append(str(error))
-    if left_out and len({s.added for s in loaded}) < 2:
-        raise NotIdentifiable(left_out[0])
-    found = fit_loadings(loaded, tolerance=rig.file.tolerance)
-    return Weighed(rig=rig, kind=kind, loadings=found, logs=logs, files=files, left_out=tuple(left_out))
+    found, left_out = weigh(
+        logs, values, dict.fromkeys(logs, name), dict.fromkeys(logs, "u_applied"), tolerance=rig.file.tolerance
+    )
+    return Weighed(rig=rig, kind=kind, loadings=found, logs=logs, files=files, left_out=left_out)
 
 
 def _added(rig: RigAtHand) -> list[float]:

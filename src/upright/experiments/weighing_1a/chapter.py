@@ -49,7 +49,7 @@ def chapter(done: Weighing) -> Chapter:
         f"{len(done.campaign.logs)} steps of the command, masses of 500 g added one by one, each loading twice; dry "
         "friction, encoder counts and converter steps are as on the rig."
     )
-    named = (("k", found.k), (on.design.inertia.replace("1", "0"), found.bare), ("c", found.damping))
+    named = (("k", found.k), (on.design.bare, found.bare), ("c", found.damping))
     handed_on = {k.name: {"value": k.value, "stderr": k.stderr, "truth": _truth(done, k)} for k in done.known}
     return replace(
         weighed,
@@ -153,7 +153,7 @@ def _found_table(found: Loadings, kind: str, truth: Mapping[str, float]) -> Tabl
     """What was found, beside the truth where a twin tells it."""
     named = (
         ("k", "stiffness", found.k, "stiffness"),
-        (OSCILLATORS[kind].inertia.replace("1", "0"), "inertia of the bare body", found.bare, "inertia"),
+        (OSCILLATORS[kind].bare, "inertia of the bare body", found.bare, "inertia"),
         ("c", "viscous friction", found.damping, "damping"),
     )
     rows = tuple(

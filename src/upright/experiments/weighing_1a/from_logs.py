@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from upright.errors import BadInput, NotIdentifiable
@@ -52,22 +52,12 @@ def weigh_logs(
     kind = kinds.pop() if kinds else "rectilinear"
     records: dict[str, Record] = {}
     signals: dict[str, str] = {}
-    found: list[Loaded] = []
-    left_out: list[str] = []
-    for (record, name), (value, _) in zip(logs, values, strict=True):
+    drives: dict[str, str] = {}
+    for record, name in logs:
         label = name if name not in records else f"{name} ({len(records) + 1})"
-        column = _column(record, signal, record.outputs, "--signal")
-        drive = _column(record, command, record.inputs, "--command") if command or record.inputs else ""
-        records[label], signals[label] = record, column
-        try:
-            seen = swings(record, added=value, label=label, signal=column, command=drive)
-        except NotIdentifiable as error:
-            left_out.append(str(error))
-            continue
-        found += [s for s in seen if not free or s.command == 0]
-    if left_out and len({s.added for s in found}) < 2:
-        raise NotIdentifiable(left_out[0])
-    weighed = fit_loadings(found, tolerance=tolerance)
+        records[label], signals[label] = record, _column(record, signal, record.outputs, "--signal")
+        drives[label] = _column(record, command, record.inputs, "--command") if command or record.inputs else ""
+    weighed, left_out = weigh(records, [v for v, _ in values], signals, drives, tolerance=tolerance, free=free)
     steps = [
         Step(
             "Fit the same logs with the equations of motion; give m_1 and k_1 these values as guesses.",
@@ -81,6 +71,42 @@ def weigh_logs(
     told = loading_chapter(weighed, kind=kind, title="Stiffness and bare inertia from added loads", logs=records,
                            signals=signals, left_out=left_out, steps=steps)  # fmt: skip
     return weighed, told
+
+
+def weigh(
+    logs: Mapping[str, Record], added: Sequence[float], signals: Mapping[str, str], commands: Mapping[str, str], *,
+    tolerance: float = 0.0, free: bool = False,
+) -> tuple[Loadings, tuple[str, ...]]:  # fmt: skip
+    """Stiffness and bare inertia of a rig from labelled logs, and why some of them did not count.
+
+    Parameters
+    ----------
+    logs : mapping of str to Record
+        By label.
+    added : sequence of float
+        Inertia that was on, log by log [kg or kg m^2].
+    signals, commands : mapping of str to str
+        Columns of position and command of each, the command's empty where there is none.
+    tolerance, free
+        See `weigh_logs`.
+
+    Raises
+    ------
+    NotIdentifiable
+        When too few swings can be seen.
+    """
+    found: list[Loaded] = []
+    left_out: list[str] = []
+    for (label, record), value in zip(logs.items(), added, strict=True):
+        try:
+            seen = swings(record, added=value, label=label, signal=signals[label], command=commands[label])
+        except NotIdentifiable as error:
+            left_out.append(str(error))
+            continue
+        found += [s for s in seen if not free or s.command == 0]
+    if left_out and len({s.added for s in found}) < 2:
+        raise NotIdentifiable(left_out[0])
+    return fit_loadings(found, tolerance=tolerance), tuple(left_out)
 
 
 def weigh_twin(kind: str, seed: int, folder: Path | None) -> tuple[Loadings, Chapter]:

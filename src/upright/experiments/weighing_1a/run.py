@@ -94,8 +94,7 @@ def acquire(on: LoadedTwin, count: int, *, shot: int = 0, seconds: float = 3.0) 
 
 def truth(on: LoadedTwin) -> dict[str, float]:
     """What only a twin can tell, by the symbols of the report."""
-    name = on.design.inertia.replace("1", "0")
-    return {"k": on.stiffness, name: on.bare, "c": on.truth.parameters()["c_1"]}
+    return {"k": on.stiffness, on.design.bare: on.bare, "c": on.truth.parameters()["c_1"]}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
