@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from upright.experiments.makes import NOMINAL
-from upright.gains import feedback, hold, kalman, place, shaken
+from upright.gains import feedback, kalman, place, shaken
 from upright.laws import Law, state_feedback
 from upright.rigs.protocol import Limits
 
@@ -37,7 +37,7 @@ def inverted(memory: float = 0.8, period: float = PERIOD) -> Law:
 def observed() -> Law:
     """The same by a Kalman observer of all four states, whose matrices have few zeros: the most that a board takes."""
     model = FURUTA.linear("inverted")
-    sampled = hold(replace(model, B=GAIN * model.B), PERIOD, 0.0)
+    sampled = replace(model, B=GAIN * model.B).to_sampled(PERIOD, 0.0)
     estimator = kalman(sampled, shaken(sampled, [30.0, 30.0]), math.tau / 16_000 / math.sqrt(12))
     return replace(feedback(estimator, gains("inverted", SET_1)), limit=LIMITS.command, period=PERIOD)
 

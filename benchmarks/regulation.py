@@ -165,7 +165,7 @@ def one(make: str, seed: int, *, swept: Path | None = None, flawed: bool = False
         truth, rig = replace(truth, limit=limit), replace(known.rig(), limit=limit)
         others = known.allowed(rig, LANES, seed)
     model = rig.linear("inverted")
-    sampled = gains.hold(model, rig.period, rig.delay / rig.period)
+    sampled = model.to_sampled(rig.period, rig.delay / rig.period)
     poles = read_poles(SETS[f"set {rng.integers(1, 5)}"])
     way = velocities(model, sampled, SPEEDS[rng.integers(3)], 0.5, rig.limit, rig.quantum)
     law = gains.feedback(way, gains.place(model.A, model.B, poles).K)

@@ -38,7 +38,7 @@ from benchmarks.measure import Line, of_each
 from benchmarks.rigs import publish
 from upright.errors import RigStopped
 from upright.experiments.makes import make_rig
-from upright.gains import feedback, filtered, hold, place
+from upright.gains import feedback, filtered, place
 from upright.laws import Law
 from upright.logs import LogHeader, LogWriter, read_log
 from upright.rigs import Board, Limits, Mode, TwinPort, wire
@@ -119,7 +119,7 @@ def law_of(kind: str) -> Law:
     """State feedback with filtered speeds, by poles about upright."""
     rig = make_rig(kind)
     model = rig.linear("inverted")
-    sampled = hold(model, rig.period, rig.delay / rig.period)
+    sampled = model.to_sampled(rig.period, rig.delay / rig.period)
     return feedback(filtered(sampled, 0.5), place(model.A, model.B, POLES[kind]).K)
 
 

@@ -86,7 +86,7 @@ def _sensors(make: str, count: int) -> list[Line]:
     names = [c.name for c in model.plant.coordinates]
     law = design_swing_up(model)
     command = probe(model, law)
-    sampled = gains.hold(model.linear("inverted"), model.period, (model.delay + model.lag) / model.period)
+    sampled = model.linear("inverted").to_sampled(model.period, (model.delay + model.lag) / model.period)
     estimator = gains.filtered(sampled, law.memory)
     # the paper's set 1, which is slow enough to fall in every way
     poles = [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220]

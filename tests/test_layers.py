@@ -22,6 +22,7 @@ signals
 records
 logs
 readers
+systems
 physics
 laws
 logs.replay
@@ -65,8 +66,9 @@ __main__
 FLOOR = {room: floor for floor, line in enumerate(FLOORS.split("\n")) for room in line.split()}
 # What a room has no business to know although it stands above it.
 BLIND = {
+    "systems": {"units", "signals", "records", "readers"},
     "physics": {"units", "signals", "records", "readers"},
-    "laws": {"units", "signals", "records", "readers", "physics"},
+    "laws": {"units", "signals", "records", "readers", "physics", "systems"},
     "simulation.lowering": {"units", "signals", "records", "readers", "physics", "laws"},
     "simulation.kernel": {"units", "signals", "records", "readers"},
     "simulation": {"units", "signals", "records", "readers"},

@@ -18,7 +18,7 @@ from upright.control.sensors import Watch
 from upright.control.trial import ServoRig
 from upright.experiments.makes import make_rig
 from upright.experiments.worn import worn
-from upright.gains import feedback, filtered, hold, place
+from upright.gains import feedback, filtered, place
 from upright.laws import Law
 from upright.records import Array
 from upright.rigs import Board, Limits, TwinPort
@@ -89,7 +89,7 @@ class Left:
 
 def _law(known: ServoRig) -> Law:
     model = known.linear("inverted")
-    sampled = hold(model, known.period, known.delay / known.period)
+    sampled = model.to_sampled(known.period, known.delay / known.period)
     K = place(model.A, model.B, POLES).K
     return replace(feedback(filtered(sampled, 0.5), K, k_pf=K[0, 0]), period=known.period)
 

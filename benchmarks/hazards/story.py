@@ -12,7 +12,7 @@ import numpy as np
 
 from upright.control.trial import ServoRig
 from upright.errors import RigStopped, UprightError
-from upright.gains import feedback, filtered, hold, place
+from upright.gains import feedback, filtered, place
 from upright.laws import Law, Rule, state_feedback
 from upright.rigs import Fault, Limits, LiveRig, Mode, Tick
 from upright.rigs.supervisor import Duty, Supervisor
@@ -89,7 +89,7 @@ class Column:
     def law(self) -> Law:
         """Holds it upright."""
         model = self.known.linear("inverted")
-        sampled = hold(model, self.period, self.known.delay / self.period)
+        sampled = model.to_sampled(self.period, self.known.delay / self.period)
         law = feedback(filtered(sampled, 0.5), place(model.A, model.B, POLES).K)
         return replace(law, period=self.period)
 

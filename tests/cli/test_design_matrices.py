@@ -239,7 +239,7 @@ def test_one_model_is_asked_for(tmp_path):
 @pytest.mark.parametrize(
     ("model", "words"),
     [
-        (control.tf([1], [1, 1]), "TransferFunction"),
+        (control.frd([1], [1]), "FrequencyResponseData"),
         (control.ss([[0.5]], [[1]], [[1]], 0, True), "does not say its period"),
         (control.ss([], [], [], 3), "1 to 30 states"),
         (([[math.nan]], [[1]]), "finite"),

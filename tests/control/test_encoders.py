@@ -12,7 +12,7 @@ from upright.control import trial
 from upright.control.encoders import Mounting
 from upright.control.trial import readings
 from upright.experiments.makes import make_rig
-from upright.gains import feedback, filtered, hold, place
+from upright.gains import feedback, filtered, place
 
 RIG = make_rig("furuta")
 TURN = (2 * math.pi, 2 * math.pi)
@@ -54,7 +54,7 @@ def test_a_loop_reads_the_same_as_its_log_close_to_upright(phase):
     """By the first command, -K of what is shown; what the tangent leaves out is e d^2/2 of a deviation d."""
     model = RIG.linear("inverted")
     K = place(model.A, model.B, [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220]).K
-    law = feedback(filtered(hold(model, RIG.period, RIG.delay / RIG.period), 0.5), K)
+    law = feedback(filtered(model.to_sampled(RIG.period, RIG.delay / RIG.period), 0.5), K)
     error, tilt = 0.01, 0.05
     rig = mounted(off_centre=(0.0, error), phase=(0.0, phase))
     run = trial(rig, law, at="inverted", start=[0, 0, tilt, 0], seconds=0.01)

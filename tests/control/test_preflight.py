@@ -19,7 +19,7 @@ from upright.paper.reproduce import TABLE_1
 
 RIG = make_rig("furuta")
 MODEL = RIG.linear("inverted")
-SAMPLED = design.hold(MODEL, RIG.period, RIG.delay / RIG.period)
+SAMPLED = MODEL.to_sampled(RIG.period, RIG.delay / RIG.period)
 # the same compiled terms as on the true rig, with next to nothing in them
 IDEAL = replace(RIG.changed(b_1c=1e-15, b_2c=1e-15), lag=0.0, converter=0.0, counts=(1e14, 1e14), travel=math.inf)
 
@@ -88,7 +88,7 @@ def test_what_is_sure_has_chance_one_or_none():
 
 def test_a_loop_too_slow_for_its_pole_falls_beforehand():
     """Forty milliseconds of further delay are beyond the margin of set 4, 24 ms."""
-    late = design.hold(MODEL, RIG.period, (RIG.delay + 0.04) / RIG.period)
+    late = MODEL.to_sampled(RIG.period, (RIG.delay + 0.04) / RIG.period)
     task = Task(start=(0, 0, 0.05, 0), seconds=3.0)
     found = preflight(
         replace(RIG, delay=RIG.delay + 0.04), MODEL, late, law(3), task, parameters={}, lanes=16, seed=0

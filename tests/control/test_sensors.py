@@ -100,7 +100,7 @@ def loop(make):
     """Watch, and the law it watches: set 1 of Table 1."""
     rig = make_rig(make)
     model = rig.linear("inverted")
-    sampled = design.hold(model, rig.period, (rig.delay + rig.lag) / rig.period)
+    sampled = model.to_sampled(rig.period, (rig.delay + rig.lag) / rig.period)
     estimator = design.filtered(sampled, 0.8)
     K = design.place_sampled(sampled, estimator, [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220])
     return Watch(rig), design.feedback(estimator, K)
@@ -138,7 +138,7 @@ def test_the_watch_speaks_before_the_fall(make):
 def test_the_filters_settle_on_the_riccati_gain():
     rig = make_rig("linear")
     watch, _ = loop("linear")
-    s = design.hold(rig.linear("inverted"), rig.period, (rig.delay + rig.lag) / rig.period)
+    s = rig.linear("inverted").to_sampled(rig.period, (rig.delay + rig.lag) / rig.period)
     W = design.shaken(s, UNKNOWN * rig.limit * np.abs(rig.linear("inverted").B[1::2, 0]))
     W[4:, 4:] += 1e-12 * np.eye(len(W) - 4)  # commands are known; scipy wants to be asked of something that moves
     P = solve_discrete_are(s.A.T, s.C.T, W, np.diag(rig.quantum**2 / 12))
@@ -153,7 +153,7 @@ def test_a_likelihood_is_that_of_all_readings_at_once(which):
     rig, samples = make_rig("furuta"), 12
     watch = Watch(rig, forgotten=math.inf)
     suspicion = watch.suspicions[which]
-    s = design.hold(rig.linear("inverted"), rig.period, (rig.delay + rig.lag) / rig.period)
+    s = rig.linear("inverted").to_sampled(rig.period, (rig.delay + rig.lag) / rig.period)
     scale = np.array([suspicion.factor if c.name == suspicion.name else 1.0 for c in rig.plant.coordinates])
     C, n, noise = scale[:, None] * s.C, len(s.A), rig.quantum**2 / 12
     rng = np.random.default_rng(which)
@@ -184,7 +184,7 @@ def test_sound_sensors_are_seldom_suspected():
     """Ville's inequality: where the model is right, no suspicion ever gets c times as likely more often than 1/c."""
     rig, runs, c = make_rig("furuta"), 200, 20.0
     watch = Watch(rig, forgotten=math.inf)
-    s = design.hold(rig.linear("inverted"), rig.period, (rig.delay + rig.lag) / rig.period)
+    s = rig.linear("inverted").to_sampled(rig.period, (rig.delay + rig.lag) / rig.period)
     rng = np.random.default_rng(11)
     sway = UNKNOWN * rig.limit * np.abs(rig.linear("inverted").B[1::2, 0])
     x = np.zeros((runs, s.A.shape[0]))
@@ -260,7 +260,7 @@ def test_a_sound_loop_that_has_come_to_rest_is_not_suspected(make, tilt):
     """Close to rest dry friction holds what the filters take for free; evidence of that adds up over seconds."""
     model = make_rig(make)
     linear = model.linear("inverted")
-    sampled = design.hold(linear, model.period, model.delay / model.period)
+    sampled = linear.to_sampled(model.period, model.delay / model.period)
     gains = design.place(linear.A, linear.B, [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220])
     law = design.feedback(design.filtered(sampled, 0.5), gains.K)
     run = trial(model, law, at="inverted", start=[0.0, 0.0, tilt, 0.0], seconds=5.0)
@@ -277,7 +277,7 @@ def test_rounding_of_coarse_encoders_is_not_taken_for_a_lie(make, far, seed):
 
     model = coarse(make_rig(make))
     linear = model.linear("inverted")
-    sampled = design.hold(linear, model.period, model.delay / model.period)
+    sampled = linear.to_sampled(model.period, model.delay / model.period)
     gains = design.place(linear.A, linear.B, [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220])
     law = design.feedback(design.filtered(sampled, 0.5), gains.K)
     truth, watch = coarse(worn(make_rig(make, seed), seed)), Watch(model)

@@ -12,13 +12,13 @@ from upright.control import Trial, score, trial
 from upright.control.trial import readings
 from upright.errors import BadInput
 from upright.experiments.makes import make_rig
-from upright.gains import feedback, filtered, hold, place
+from upright.gains import feedback, filtered, place
 from upright.gains.loop import closed
 from upright.records import Record
 
 RIG = make_rig("furuta")
 MODEL = RIG.linear("inverted")
-SAMPLED = hold(MODEL, RIG.period, RIG.delay / RIG.period)
+SAMPLED = MODEL.to_sampled(RIG.period, RIG.delay / RIG.period)
 SET_1 = [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220]
 GAINS = place(MODEL.A, MODEL.B, SET_1).K
 LAW = feedback(filtered(SAMPLED, 0.5), GAINS)

@@ -6,7 +6,7 @@ import numpy as np
 
 from tests.gains.furuta import RIG
 from upright.exports.controller import SampledController, of_law
-from upright.gains import feedback, filtered, hold, kalman, place, shaken
+from upright.gains import feedback, filtered, kalman, place, shaken
 from upright.laws import Law
 
 PERIOD, TURN = 2e-3, 2 * np.pi
@@ -17,7 +17,7 @@ POLES = [-4.15 + 1.63j, -4.15 - 1.63j, -16.9, -3.2]
 def designed(way: str) -> Law:
     """State feedback of the Furuta pendulum upright, speeds by filtered differences or by a Kalman filter."""
     model = RIG.linear("inverted")
-    sampled = hold(model, PERIOD, 1.0)
+    sampled = model.to_sampled(PERIOD, 1.0)
     K = place(model.A, model.B, POLES).K
     if way == "filtered":
         return feedback(filtered(sampled, 0.5), K, 0.2)

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from upright.errors import BadInput
-from upright.gains import hold, margins
-from upright.gains.margins import balanced, gain_bounds, modulus, phases, sampled_continuous
+from upright.gains import margins
+from upright.gains.margins import balanced, gain_bounds, gain_factors, modulus, phases, sampled_continuous
 from upright.laws import Law
-from upright.physics.plant import Linear
+from upright.systems import StateSpace
 
 
 def linear(A, B, C):
     A, B, C = (np.atleast_2d(np.array(m, dtype=float)) for m in (A, B, C))
     names = tuple(f"x{i}" for i in range(A.shape[0]))
     inputs = tuple(f"u{i}" for i in range(B.shape[1]))
-    return Linear(A=A, B=B, C=C, mass=np.eye(1), point={}, states=names, inputs=inputs, outputs=("y",))
+    return StateSpace(A, B, C, states=names, inputs=inputs, outputs=("y",))
 
 
 def proportional(gain: float, period: float) -> Law:
@@ -73,7 +73,7 @@ def test_three_hundred_random_loops_have_python_control_s_margins():
     apart = 0
     for A, B, C in random_loops(1, 300):
         L = balanced(A, B, C)
-        found = (*gain_bounds(L), np.abs(phases(L)[1]).min(initial=np.inf), modulus(L))
+        found = (*gain_bounds(gain_factors(L)[1]), np.abs(phases(L)[1]).min(initial=np.inf), modulus(L))
         if found != pytest.approx(by_python_control(A, B, C), rel=1e-3):
             apart += 1
             assert found == pytest.approx(searched(A, B, C), rel=1e-3)
@@ -90,7 +90,7 @@ def test_a_loop_far_below_the_sample_rate_has_its_continuous_margins(slow):
     w = slow * math.pi / T
     a = w * math.tan(math.radians(5.6))
     plant = linear([[0, 1], [0, -a]], [[0], [1]], [[1, 0]])
-    found = margins(plant, hold(plant, T), proportional(w * math.hypot(w, a), T))
+    found = margins(plant.to_sampled(T), proportional(w * math.hypot(w, a), T))
     phase = math.radians(5.6) - w * T / 2
     assert found.phase == pytest.approx(phase, rel=1e-3)
     assert found.delay == pytest.approx(phase / w, rel=1e-3)
@@ -120,7 +120,7 @@ def test_a_third_order_lag_in_closed_form(k, most):
     """L = k/(s + 1)^3 reaches -180 degrees at sqrt(3), where it is k/8 (Astrom and Murray, Feedback Systems)."""
     A = np.array([[-1.0, 1.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, -1.0]])
     L = sampled_continuous(A, np.array([[0.0], [0.0], [k]]), np.array([[1.0, 0.0, 0.0]]), 0.0, 1.7)
-    assert gain_bounds(L)[1] == pytest.approx(most, rel=1e-9)
+    assert gain_bounds(gain_factors(L)[1])[1] == pytest.approx(most, rel=1e-9)
     x = np.linspace(0, 20, 2_000_001)
     assert modulus(L) == pytest.approx(np.abs(1 + k / (1 + 1j * x) ** 3).min(), rel=1e-8)
 
@@ -132,15 +132,15 @@ def test_the_delay_is_that_at_which_the_late_loop_has_a_pole_on_the_circle():
     T = 0.4
     plant = linear([[0, 1], [2, -0.3]], [[0], [1]], [[1, 0]])
     pd = Law(np.zeros((1, 1)), np.ones((1, 1)), np.array([[2.0]]), np.array([[-5.0]]), period=T)
-    found = margins(plant, hold(plant, T), pd)
-    model = hold(plant, T, found.delay / T)
+    found = margins(plant.to_sampled(T), pd)
+    model = plant.to_sampled(T, found.delay / T)
     assert np.abs(np.linalg.eigvals(closed(model, pd))).max() == pytest.approx(1.0, abs=1e-6)
     for share in np.linspace(0, 0.99, 20):
-        assert np.abs(np.linalg.eigvals(closed(hold(plant, T, share * found.delay / T), pd))).max() < 1
+        assert np.abs(np.linalg.eigvals(closed(plant.to_sampled(T, share * found.delay / T), pd))).max() < 1
 
 
 def test_margins_of_two_inputs_are_refused():
     plant = linear([[-1, 0], [0, -2]], [[1, 0], [0, 1]], [[1, 0]])
     law = Law(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((2, 0)), np.array([[-0.1], [0.0]]), period=0.1)
     with pytest.raises(BadInput, match="for one input"):
-        margins(plant, hold(plant, 0.1), law)
+        margins(plant.to_sampled(0.1), law)

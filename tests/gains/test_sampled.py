@@ -14,7 +14,6 @@ from upright.gains import (
     dlqr,
     feedback,
     filtered,
-    hold,
     kalman,
     lqr,
     margins,
@@ -24,10 +23,9 @@ from upright.gains import (
     shaken,
 )
 from upright.gains.loop import closed, command_noise, loop_gain
-from upright.gains.sampled import to_s, to_z
 from upright.gains.velocity import observer
 from upright.physics import CartPendulum, Furuta, chain
-from upright.physics.plant import Linear
+from upright.systems import StateSpace, to_s, to_z
 
 RIG = Furuta(m_p=0.2, l_cg=0.15, r=0.2, J_d=0.01, J_p=5e-4, b_1=0.007, b_2=3e-4)
 UPRIGHT = RIG.linear("inverted")
@@ -39,7 +37,7 @@ CTMS = CartPendulum(m_c=0.5, m_p=0.2, b_1=0.1, l_cg=0.3, J_p=0.006, g=9.8).linea
 def linear(A, B, C):
     A, B, C = (np.atleast_2d(np.array(m, dtype=float)) for m in (A, B, C))
     names = tuple(f"x{i}" for i in range(A.shape[0]))
-    return Linear(A=A, B=B, C=C, mass=np.eye(1), point={}, states=names, inputs=("u",), outputs=("y",))
+    return StateSpace(A, B, C, states=names, inputs=("u",), outputs=("y",))
 
 
 DOUBLE_INTEGRATOR = linear([[0, 1], [0, 0]], [[0], [1]], [[1, 0]])
@@ -50,7 +48,7 @@ def test_double_integrator_with_a_late_command(delay):
     """Astrom and Wittenmark, Computer-Controlled Systems, 3rd ed., section 2.3: Gamma_0 and Gamma_1 in closed form."""
     h, whole = 0.4, math.floor(delay)
     tau = (delay - whole) * h
-    model = hold(DOUBLE_INTEGRATOR, h, delay)
+    model = DOUBLE_INTEGRATOR.to_sampled(h, delay)
     np.testing.assert_allclose(model.A[:2, :2], [[1, h], [0, 1]], rtol=1e-14)
     from_command = np.column_stack([model.B[:2], model.A[:2, 2:]])
     newest, older = [(h - tau) ** 2 / 2, h - tau], [tau * (h - tau / 2), tau]
@@ -64,7 +62,7 @@ def test_double_integrator_with_a_late_command(delay):
 def test_a_lag_with_a_late_command():
     """The same book, Example 2.8: x' = alpha x + beta u(t - tau)."""
     a, b, h, tau = -1.3, 2.0, 0.5, 0.2
-    model = hold(linear([[a]], [[b]], [[1]]), h, tau / h)
+    model = linear([[a]], [[b]], [[1]]).to_sampled(h, tau / h)
     assert model.A[0, 0] == pytest.approx(math.exp(a * h))
     assert model.B[0, 0] == pytest.approx(b / a * (math.exp(a * (h - tau)) - 1))
     assert model.A[0, 1] == pytest.approx(b / a * math.exp(a * (h - tau)) * (math.exp(a * tau) - 1))
@@ -72,7 +70,7 @@ def test_a_lag_with_a_late_command():
 
 def test_pendulum_sampled_at_10_ms():
     """Control Tutorials for MATLAB and Simulink, digital inverted pendulum: c2d and dlqr as printed there."""
-    model = hold(CTMS, 0.01)
+    model = CTMS.to_sampled(0.01)
     printed = [[1, 0.01, 0.0001, 0], [0, 0.9982, 0.0267, 0.0001], [0, 0, 1.0016, 0.01], [0, -0.0045, 0.3119, 1.0016]]
     np.testing.assert_allclose(model.A, printed, atol=6e-5)
     np.testing.assert_allclose(model.B[:, 0], [0.0001, 0.0182, 0.0002, 0.0454], atol=6e-5)
@@ -83,14 +81,14 @@ def test_pendulum_sampled_at_10_ms():
 def test_deadbeat_gains_of_the_double_integrator():
     """Astrom and Wittenmark, section 4.3: L = [1/h^2, 3/(2 h)] puts both poles at z = 0."""
     h = 0.25
-    model = hold(DOUBLE_INTEGRATOR, h)
+    model = DOUBLE_INTEGRATOR.to_sampled(h)
     np.testing.assert_allclose(place(model.A, model.B, [0, 0]).K[0], [1 / h**2, 3 / (2 * h)], rtol=1e-12)
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.5, 1.0, 2.25])
 def test_commands_on_their_way_are_states_that_can_be_placed(delay):
     """Full state feedback of the late plant; numpy finds the poles again."""
-    model = hold(UPRIGHT, 0.01, delay)
+    model = UPRIGHT.to_sampled(0.01, delay)
     asked = np.concatenate([to_z(SET_1, 0.01), np.zeros(model.remembered)])
     K = place(model.A, model.B, asked).K
     np.testing.assert_allclose(np.poly(model.A - model.B @ K), np.poly(asked).real, atol=1e-9)
@@ -101,7 +99,7 @@ def test_commands_on_their_way_are_states_that_can_be_placed(delay):
 @pytest.mark.parametrize("asked", [SET_1, [-5, -5, -5, -5], [-4 + 2j, -4 - 2j, -4 + 2j, -4 - 2j]])
 def test_gains_on_differenced_encoders_that_meet_the_poles(asked, memory, delay):
     """The loop's characteristic polynomial has the poles asked as roots, to the order in which they repeat."""
-    model = hold(UPRIGHT, 0.005, delay)
+    model = UPRIGHT.to_sampled(0.005, delay)
     estimator = filtered(model, memory)
     K = place_sampled(model, estimator, asked)
     poly = np.poly(closed(model, feedback(estimator, K))).real
@@ -114,7 +112,7 @@ def test_fast_sampling_comes_to_the_continuous_gains():
     K = place(UPRIGHT.A, UPRIGHT.B, SET_1).K
     off = []
     for period in (1e-3, 5e-4):
-        model = hold(UPRIGHT, period)
+        model = UPRIGHT.to_sampled(period)
         off.append(np.abs(place_sampled(model, difference(model), SET_1) - K).max())
     assert off[0] / off[1] == pytest.approx(2, rel=0.05)
 
@@ -132,7 +130,7 @@ def simulated(model, law, start, samples):
 @pytest.mark.parametrize("kind", ["plain", "filtered", "kalman"])
 def test_the_kernel_moves_as_the_sampled_loop_says(kind, delay):
     """Small tilt on the nonlinear rig, integrated by the kernel: same samples as powers of the loop's matrix."""
-    model = hold(UPRIGHT, 0.004, delay)
+    model = UPRIGHT.to_sampled(0.004, delay)
     estimator = {
         "plain": lambda: difference(model),
         "filtered": lambda: filtered(model, 0.5),
@@ -154,7 +152,7 @@ def test_the_kernel_moves_as_the_sampled_loop_says(kind, delay):
 
 def test_noise_of_differences_in_closed_form():
     """Plain: quantum/(T sqrt 6). Filtered: variance quantum^2/12 * 2 (1 - a)^2/((1 + a) T^2)."""
-    model, T = hold(UPRIGHT, 0.002), 0.002
+    model, T = UPRIGHT.to_sampled(0.002), 0.002
     assert difference(model).noise(COUNT)[1::2] == pytest.approx(COUNT / (T * math.sqrt(6)))
     for a in (0.2, 0.9):
         variance = COUNT**2 / 12 * 2 * (1 - a) ** 2 / ((1 + a) * T**2)
@@ -165,7 +163,7 @@ def test_noise_of_differences_in_closed_form():
 def test_kalman_filter_of_a_tracked_target(index):
     """Kalata (IEEE Trans. AES 20, 1984): alpha, beta from the tracking index, random acceleration over each period."""
     T = 0.1
-    model = hold(DOUBLE_INTEGRATOR, T)
+    model = DOUBLE_INTEGRATOR.to_sampled(T)
     gain = kalman(model, index / T**2, 1.0).D[:, 0]
     r = (4 + index - math.sqrt(8 * index + index**2)) / 4
     alpha = 1 - r**2
@@ -174,7 +172,7 @@ def test_kalman_filter_of_a_tracked_target(index):
 
 
 def test_a_shaken_double_integrator_is_one_whose_command_is_noise():
-    model = hold(DOUBLE_INTEGRATOR, 0.1)
+    model = DOUBLE_INTEGRATOR.to_sampled(0.1)
     np.testing.assert_allclose(shaken(model, 3.0), 9.0 * model.B @ model.B.T, rtol=1e-12)
 
 
@@ -182,7 +180,7 @@ def test_a_filter_that_expects_pushes_anywhere_corrects_faster_than_the_zeros_of
     """Noise in the command alone, however loud, leaves observer poles at mirrored zeros (Kwakernaak and Sivan, Linear
     Optimal Control Systems, 1972): here that of the arm's answer, the pendulum about a held arm.
     """
-    model = hold(UPRIGHT, 0.001)
+    model = UPRIGHT.to_sampled(0.001)
     zero = math.sqrt(RIG.m_p * RIG.g * RIG.l_cg / (RIG.J_p + RIG.m_p * RIG.l_cg**2))
     count = COUNT / math.sqrt(12)
     by_command, anywhere = (
@@ -195,13 +193,13 @@ def test_a_filter_that_expects_pushes_anywhere_corrects_faster_than_the_zeros_of
 
 def test_kalman_filter_of_a_random_walk():
     """q = r: the gain is 0.618, the golden ratio less one (Anderson and Moore, Optimal Filtering)."""
-    model = hold(linear([[0]], [[1]], [[1]]), 1.0)
+    model = linear([[0]], [[1]], [[1]]).to_sampled(1.0)
     assert kalman(model, [[1.0]], 1.0).D[0, 0] == pytest.approx((math.sqrt(5) - 1) / 2)
 
 
 def test_separation_of_observer_and_gains():
     """Poles of the loop are those of the gains and those of the observer."""
-    model = hold(UPRIGHT, 0.01)
+    model = UPRIGHT.to_sampled(0.01)
     estimator = kalman(model, 1e-2, COUNT / math.sqrt(12))
     K = dlqr(model.A, model.B, [1, 0, 1, 0], 1.0)
     found = np.poly(closed(model, feedback(estimator, K)))
@@ -211,7 +209,7 @@ def test_separation_of_observer_and_gains():
 
 def test_noise_of_the_command_is_what_a_long_run_shows():
     """White rounding errors through the loop by hand, against Lyapunov's equation."""
-    model = hold(UPRIGHT, 0.01)
+    model = UPRIGHT.to_sampled(0.01)
     law = feedback(filtered(model, 0.5), place(UPRIGHT.A, UPRIGHT.B, SET_1).K)
     rng = np.random.default_rng(3)
     B, D = law.B[:, :2], law.D[:, :2]
@@ -227,9 +225,9 @@ def test_noise_of_the_command_is_what_a_long_run_shows():
 def test_margins_agree_with_python_control():
     import control
 
-    model = hold(UPRIGHT, 0.005, 1.0)
+    model = UPRIGHT.to_sampled(0.005, 1.0)
     law = feedback(filtered(model, 0.5), place(UPRIGHT.A, UPRIGHT.B, SET_1).K)
-    found = margins(UPRIGHT, model, law)
+    found = margins(model, law)
     B, D = law.B[:, :2], law.D[:, :2]
     plant = control.ss(model.A, model.B, model.C, 0, model.period)
     L = -control.ss(law.A, B, law.C, D, model.period) * plant
@@ -246,23 +244,23 @@ def test_a_lag_before_an_integrator_in_closed_form():
     """f' = (u - f)/a, x' = f over a held command: exponentials by hand."""
     h, a = 0.3, 0.2
     e = math.exp(-h / a)
-    model = hold(linear([[0]], [[1]], [[1]]), h, lag=a)
+    model = linear([[0]], [[1]], [[1]]).to_sampled(h, lag=a)
     np.testing.assert_allclose(model.A, [[1, a * (1 - e)], [0, e]], atol=1e-15)
     np.testing.assert_allclose(model.B, [[h - a * (1 - e)], [1 - e]], atol=1e-15)
     assert model.remembered == 1
-    late = hold(linear([[0]], [[1]], [[1]]), h, 1.0, lag=a)
+    late = linear([[0]], [[1]], [[1]]).to_sampled(h, 1.0, lag=a)
     np.testing.assert_allclose(late.A[:2], np.hstack([model.A, model.B]), atol=1e-15)
 
 
 def test_sampled_gains_make_up_for_a_lag():
-    model = hold(UPRIGHT, 0.002, 1.0, lag=0.004)
+    model = UPRIGHT.to_sampled(0.002, 1.0, lag=0.004)
     estimator = filtered(model, 0.5)
     law = feedback(estimator, place_sampled(model, estimator, SET_1))
     found = to_s(np.linalg.eigvals(closed(model, law)), model.period)
     for pole in SET_1:
         assert np.abs(found - pole).min() < 1e-6
     plain = feedback(estimator, place(UPRIGHT.A, UPRIGHT.B, SET_1).K)
-    assert margins(UPRIGHT, model, plain).delay < margins(UPRIGHT, hold(UPRIGHT, 0.002, 1.0), plain).delay
+    assert margins(model, plain).delay < margins(UPRIGHT.to_sampled(0.002, 1.0), plain).delay
 
 
 @pytest.mark.slow
@@ -270,26 +268,26 @@ def test_margin_of_delay_is_the_phase_margin_over_the_crossover():
     """One lag and a gain, fast sampled: delay = phase margin / crossover (Astrom and Murray, section 10.3)."""
     plant = linear([[-1]], [[1]], [[1]])
     T, k = 1e-3, 5.0
-    model = hold(plant, T)
+    model = plant.to_sampled(T)
     law = feedback(observer(model, [[1.0]]), [[k]])
     w = math.sqrt(k**2 - 1)
     phase = math.pi - math.atan(w) - w * T / 2  # the hold itself is late by half a period
-    found = margins(plant, model, law)
+    found = margins(model, law)
     assert found.phase == pytest.approx(phase, abs=1e-3)
     assert found.delay == pytest.approx(phase / w, abs=1e-3)
 
 
 def test_a_loop_that_falls_has_no_margins():
-    model = hold(UPRIGHT, 0.05, 2.0)
+    model = UPRIGHT.to_sampled(0.05, 2.0)
     law = feedback(difference(model), place(UPRIGHT.A, UPRIGHT.B, SET_1).K)
     with pytest.raises(BadInput, match="not stable"):
-        margins(UPRIGHT, model, law)
+        margins(model, law)
 
 
 def test_prefilter_of_a_sampled_flexible_shaft():
     """Step on two disks with a spring to ground: the second disk stands at the reference (final value by hand)."""
     plant = chain(2, "torsional")(J_1=0.01, J_2=0.01, k_12=1.4, k_1=0.3, c_1=0.007, c_2=0.001).linear()
-    model = hold(plant, 0.01)
+    model = plant.to_sampled(0.01)
     K = lqr(plant.A, plant.B, [1, 0, 1, 0], 0.1)
     k_pf = prefilter(model.A, model.B, plant.C[1], K, sampled=True)
     x = np.zeros(4)
@@ -305,13 +303,16 @@ def test_poles_in_s_and_z_go_together():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: hold(UPRIGHT, 0.0), "period above 0"),
-        (lambda: hold(UPRIGHT, 0.01, -1.0), "delay must be"),
-        (lambda: hold(UPRIGHT, 0.01, lag=-1.0), "lag must be"),
-        (lambda: filtered(hold(UPRIGHT, 0.01), 1.0), "memory must be"),
-        (lambda: kalman(hold(UPRIGHT, 0.01), 1.0, 0.0), "noise above 0"),
-        (lambda: feedback(difference(hold(UPRIGHT, 0.01)), [[1, 2, 3, 4, 5]]), "shape"),
-        (lambda: place_sampled(hold(UPRIGHT, 0.01), difference(hold(UPRIGHT, 0.01)), [-1]), "needs 4 poles"),
+        (lambda: UPRIGHT.to_sampled(0.0), "period above 0"),
+        (lambda: UPRIGHT.to_sampled(0.01, -1.0), "delay must be"),
+        (lambda: UPRIGHT.to_sampled(0.01, lag=-1.0), "lag must be"),
+        (lambda: filtered(UPRIGHT.to_sampled(0.01), 1.0), "memory must be"),
+        (lambda: kalman(UPRIGHT.to_sampled(0.01), 1.0, 0.0), "noise above 0"),
+        (lambda: feedback(difference(UPRIGHT.to_sampled(0.01)), [[1, 2, 3, 4, 5]]), "shape"),
+        (
+            lambda: place_sampled(UPRIGHT.to_sampled(0.01), difference(UPRIGHT.to_sampled(0.01)), [-1]),
+            "needs 4 poles",
+        ),
     ],
 )
 def test_what_cannot_be_is_said(call, words):

@@ -8,14 +8,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from upright.experiments.makes import make_rig
-from upright.gains import feedback, filtered, hold, place
+from upright.gains import feedback, filtered, place
 from upright.realtime.session import Stage
 from upright.rigs import Board, Limits, TwinPort
 from upright.rigs.supervisor import Duty, Supervisor
 
 RIG = make_rig("furuta")
 MODEL = RIG.linear("inverted")
-SAMPLED = hold(MODEL, RIG.period, RIG.delay / RIG.period)
+SAMPLED = MODEL.to_sampled(RIG.period, RIG.delay / RIG.period)
 LAW = feedback(
     filtered(SAMPLED, 0.5), place(MODEL.A, MODEL.B, [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220]).K
 )

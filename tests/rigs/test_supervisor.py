@@ -10,7 +10,7 @@ import pytest
 
 from upright.errors import BadInput, RigStopped
 from upright.experiments.makes import make_rig
-from upright.gains import feedback, filtered, hold, place
+from upright.gains import feedback, filtered, place
 from upright.laws import Rule, state_feedback
 from upright.rigs import Board, Fault, Limits, Mode, TwinPort
 from upright.rigs.driven import StillDrive
@@ -18,7 +18,7 @@ from upright.rigs.supervisor import Duty, Supervisor
 
 RIG = make_rig("furuta")
 MODEL = RIG.linear("inverted")
-SAMPLED = hold(MODEL, RIG.period, RIG.delay / RIG.period)
+SAMPLED = MODEL.to_sampled(RIG.period, RIG.delay / RIG.period)
 POLES = [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220]
 LAW = feedback(filtered(SAMPLED, 0.5), place(MODEL.A, MODEL.B, POLES).K)
 LIMITS = Limits(travel=(2.0, math.inf), speed=(40.0, 60.0), start=(2.0, math.inf), command=RIG.limit)

@@ -10,13 +10,13 @@ import pytest
 
 from upright.control.trial import SUBSTEPS, at_work, trial
 from upright.experiments.makes import make_rig
-from upright.gains import feedback, filtered, hold, place
+from upright.gains import feedback, filtered, place
 from upright.rigs import Board, Limits, Mode, TwinPort
 from upright.rigs.law import RunningLaw
 from upright.simulation import simulate
 
 RIG = make_rig("furuta")
-SAMPLED = hold(RIG.linear("inverted"), RIG.period, RIG.delay / RIG.period)
+SAMPLED = RIG.linear("inverted").to_sampled(RIG.period, RIG.delay / RIG.period)
 POLES = [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220]
 LAW = feedback(filtered(SAMPLED, 0.5), place(RIG.linear("inverted").A, RIG.linear("inverted").B, POLES).K)
 ANY = Limits(travel=(math.inf,) * 2, speed=(math.inf,) * 2, start=(math.inf,) * 2, command=RIG.limit, saturation=10.0)

@@ -45,7 +45,7 @@ def test_a_first_order_hold_is_exact_for_a_ramp():
 def test_what_comes_through_is_as_late_as_the_command(delay, acts):
     """One command of 1: at the sample that it acts on, the reading shows it through D."""
     model = up.hold(([[-1.0]], [[0.0]], [[1.0]], [[3.0]]), 0.1, delay=delay)
-    assert model.D is None
+    assert not model.D.any()
     state, shown = model.B[:, 0], []
     for _ in range(4):
         shown.append(float((model.C @ state)[0]))
@@ -53,12 +53,17 @@ def test_what_comes_through_is_as_late_as_the_command(delay, acts):
     assert shown == pytest.approx([3.0 if k + 1 == acts else 0.0 for k in range(4)])
 
 
-@pytest.mark.parametrize("given", ["held", "control", "pair", "two"])
+@pytest.mark.parametrize("given", ["held", "control", "pair", "stepped"])
 def test_sampled_gains_of_least_cost_agree_with_python_control(given):
     control = pytest.importorskip("control")
     held, theirs = up.hold(MODEL, "10 ms"), control.c2d(MODEL.to_control(), 0.01)
     np.testing.assert_allclose(held.A, theirs.A, atol=1e-12)
-    system = {"held": (held,), "control": (theirs,), "pair": ((held.A, held.B),), "two": (held.A, held.B)}[given]
+    system = {
+        "held": (held,),
+        "control": (theirs,),
+        "pair": ((held.A, held.B),),
+        "stepped": ((held.A, held.B, None, None, 0.01),),
+    }[given]
     K, S, E = up.dlqr(*system, WEIGHTS, 2.0)
     K_c, S_c, E_c = control.dlqr(theirs, np.diag(WEIGHTS), 2.0)
     np.testing.assert_allclose(K, K_c, rtol=1e-6)
@@ -100,7 +105,7 @@ def test_the_margins_of_a_law_as_it_runs_come_through_the_same_door():
     law = feedback(filtered(held, 0.5), up.lqr(MODEL, WEIGHTS, 1.0).K)
     from upright.gains import margins
 
-    assert up.margins(MODEL, held, law) == margins(MODEL, held, law)
+    assert up.margins(held, law) == margins(held, law)
 
 
 @pytest.mark.parametrize("D", [0.0, 0.7])
@@ -109,7 +114,7 @@ def test_a_prefilter_brings_the_output_to_the_reference(D):
     from scipy.integrate import solve_ivp
 
     A, B, C = np.array([[0.0, 1.0], [-3.0, -0.5]]), np.array([[0.0], [2.0]]), np.array([[1.0, 0.2]])
-    K = up.lqr(A, B, [5, 1], 1.0).K
+    K = up.lqr((A, B), [5, 1], 1.0).K
     k_pf = up.prefilter((A, B, C, D), K)
     x = solve_ivp(lambda _, x: A @ x + B[:, 0] * (k_pf * 0.8 - K[0] @ x), (0, 30), [0, 0], rtol=1e-10, atol=1e-12).y[
         :, -1
@@ -130,7 +135,7 @@ def test_an_output_is_named_or_numbered():
         (lambda: up.margins(([[1]], [[1]], [[0.1]])), "not stable"),
         (lambda: up.margins(([[1]], [[1]], [[1, 2]])), r"C of shape \(p, 1\)"),
         (lambda: up.margins(MODEL, [1, 2]), r"K of shape \(1, 4\)"),
-        (lambda: up.margins(), "no model came"),
+        (lambda: up.margins(), r"margins is called as margins\(model, K=None\): missing"),
         (lambda: up.hold(up.hold(MODEL, 0.1), 0.1), "a period of 0.1 s already"),
         (lambda: up.hold(MODEL, 0.1, method="tustin"), '"zoh", or one, "foh"'),
         (lambda: up.hold(MODEL, 0.1, delay=0.5, method="foh"), "whole samples"),

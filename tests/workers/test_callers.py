@@ -21,7 +21,7 @@ from upright.workers import Workers
 def test_runs_of_other_rigs_come_to_the_same():
     rig, rng = make_rig("furuta"), np.random.default_rng(3)
     model = rig.linear("inverted")
-    sampled = design.hold(model, rig.period, rig.delay / rig.period)
+    sampled = model.to_sampled(rig.period, rig.delay / rig.period)
     law = design.feedback(design.filtered(sampled, 0.5), design.place(model.A, model.B, read_poles(TABLE_1[2])).K)
     starts = rng.normal(size=(200, 4)) * [0, 0, 0.5, 2.0]
     others = {"J_p": rig.plant.J_p * np.exp(rng.normal(0, 0.05, 200))}

@@ -16,13 +16,13 @@ from numpy.typing import ArrayLike
 from upright.control.score import Score, Scores, outcomes, score
 from upright.control.trial import ServoRig, Trial, trial
 from upright.errors import BadInput
-from upright.gains import Margins, Sampled, hold, margins
+from upright.gains import Margins, margins
 from upright.gains.loop import closed, command_noise
 from upright.gains.requests import poles_of
 from upright.laws import Law
-from upright.physics import Linear
 from upright.progress import Progress, silent
 from upright.records import Array
+from upright.systems import StateSpace
 from upright.workers import HERE, Workers
 
 WORDS = ("regulates", "saturates", "too weak", "falls")
@@ -99,8 +99,8 @@ class Preflight:
 
 def preflight(
     rig: ServoRig,
-    model: Linear,
-    sampled: Sampled,
+    model: StateSpace,
+    sampled: StateSpace,
     law: Law,
     task: Task,
     *,
@@ -116,7 +116,7 @@ def preflight(
     ----------
     rig : ServoRig
         As identified.
-    model, sampled : Linear, Sampled
+    model, sampled : StateSpace
         Its linear model about the equilibrium, and the same as the law was designed on; margins and noise count the
         rig's lag as well.
     law : Law
@@ -131,7 +131,7 @@ def preflight(
         Who computes the runs that the chance is taken from.
     progress : callable, optional
     """
-    driven = hold(model, sampled.period, sampled.delay, rig.lag)  # whatever the law was designed on
+    driven = model.to_sampled(sampled.period, sampled.delay, rig.lag)  # whatever the law was designed on
     stands = bool(np.abs(poles_of(closed(driven, law))).max() < 1)
     run = trial(rig, law, at=task.at, start=task.start, seconds=task.seconds)
     starts = task.starts(lanes, np.random.default_rng([seed, 52]))
@@ -144,7 +144,7 @@ def preflight(
     tilted, tapped = last.copy(), last.copy()
     tilted[-2], tapped[-1] = 1.0, 1.0
     return Preflight(
-        margins=margins(model, driven, law) if stands else None,
+        margins=margins(driven, law) if stands else None,
         noise=command_noise(driven, law, rig.quantum) if stands else None,
         run=run,
         score=score(run),

@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 from upright.control.bank import TEXT
 from upright.control.swing_up import SwingUp
 from upright.control.trial import SUBSTEPS, ServoRig, Trial, logged, trial
-from upright.gains import hold, shaken
+from upright.gains import shaken
 from upright.laws import Law
 from upright.records import Array, Record
 from upright.simulation import simulate
@@ -355,7 +355,7 @@ class Watch:
         self.model, self.at = model, at
         self.suspicions = (Suspicion(), *(Suspicion(name=n, factor=f) for f in FACTORS for n in names))
         linear = model.linear(at)
-        sampled = hold(linear, model.period, (model.delay + model.lag) / model.period)
+        sampled = linear.to_sampled(model.period, (model.delay + model.lag) / model.period)
         self._A, self._B, n = sampled.A.copy(), sampled.B[:, 0].copy(), sampled.A.shape[0]
         scales = np.ones((len(self.suspicions), len(names)))
         for i, s in enumerate(self.suspicions[1:], start=1):

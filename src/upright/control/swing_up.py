@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 
 from upright.control.trial import SUBSTEPS, ServoRig, Trial, readings, trial
 from upright.errors import BadInput
-from upright.gains import filtered, hold, place_sampled
+from upright.gains import filtered, place_sampled
 from upright.gains.requests import poles_of
 from upright.laws import Rule
 from upright.records import Array
@@ -153,7 +153,7 @@ def body(rig: ServoRig) -> Body:
     if len(names) != 2 or names[1] != "theta" or not {"hanging", "inverted"} <= set(plant.equilibria):
         raise BadInput(f"a swing-up needs a pendulum theta on a driven body, and {rig.name} has {', '.join(names)}.")
     hanging = rig.linear("hanging")
-    m = hanging.mass
+    m = plant.mass_matrix("hanging")
     stiffness, damping = (-(m @ hanging.A[1::2, i::2]) for i in (0, 1))
     moving, still = plant.energy([[0.0, 1.0, math.pi / 2, 0.0], [0.0, 0.0, math.pi / 2, 0.0]])
     return Body(
@@ -266,7 +266,7 @@ def design_swing_up(model: ServoRig, *, travel: float | None = None, memory: flo
     Q, R = np.diag([(4 / room) ** 2, 0.0, 4.0, 0.0]), (2 / model.saturation) ** 2
     P = np.asarray(solve_continuous_are(linear.A, linear.B, Q, np.array([[R]])), dtype=np.float64)
     K = (linear.B.T @ P / R)[0]
-    sampled = hold(linear, model.period, (model.delay + model.lag) / model.period)
+    sampled = linear.to_sampled(model.period, (model.delay + model.lag) / model.period)
     gains = place_sampled(sampled, filtered(sampled, memory), poles_of(linear.A - linear.B @ K[None]))
     sure = (2 * model.saturation) ** 2 / float(K @ np.linalg.solve(P, K))
     centre = 0.45 * b.omega

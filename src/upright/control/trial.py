@@ -16,10 +16,11 @@ from numpy.typing import ArrayLike
 from upright.control.encoders import Mounting
 from upright.errors import BadInput
 from upright.laws import Law, Rule
-from upright.physics import Linear, Plant
+from upright.physics import Plant
 from upright.records import Array, Record
 from upright.records.record import of_twin
 from upright.simulation import simulate
+from upright.systems import StateSpace
 
 GAIN = "actuator.gain"
 
@@ -129,7 +130,7 @@ class ServoRig:
         """What each encoder shows over what is true, shape (coordinates,)."""
         return np.array(self.scales) if self.scales else np.ones(len(self.counts))
 
-    def linear(self, at: str) -> Linear:
+    def linear(self, at: str) -> StateSpace:
         """Model about an equilibrium, from the command to the coordinates; dry friction, lag and counts left out."""
         return driven(self.plant, {**self.more, GAIN: self.gain}, at)
 
@@ -138,7 +139,7 @@ class ServoRig:
         return replace(self, plant=self.plant.replace(**parameters))
 
 
-def driven(plant: Plant, drive: Mapping[str, float], at: str, *, side: float = 0.0) -> Linear:
+def driven(plant: Plant, drive: Mapping[str, float], at: str, *, side: float = 0.0) -> StateSpace:
     """Model about an equilibrium from the command to the coordinates, with what the drive takes for speed.
 
     The drive gives gain u less its slope and its braking, times the speed of what it drives; that braking is at work

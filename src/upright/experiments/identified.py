@@ -12,7 +12,7 @@ import numpy as np
 from upright.control.trial import GAIN, ServoRig, driven
 from upright.errors import BadInput, ImpossiblePhysics
 from upright.experiments.makes import MAKES, Make, make_of, make_rig, sheet
-from upright.physics import Linear, Plant, find
+from upright.physics import Plant, find
 from upright.physics.actuator import ACTUATOR
 from upright.records import Array
 from upright.records.record import of_twin
@@ -29,6 +29,7 @@ from upright.study.fitted import FittedModel, read_fit
 from upright.study.rig import read_plant, read_rig
 from upright.study.sensors import drive_unit
 from upright.study.text import StudyText, number
+from upright.systems import StateSpace
 from upright.trust import before_running
 
 MORE = ACTUATOR.keys() - {f"actuator.{n}" for n in ("gain", "limit", "delay", "lag", "offset", "start", "end")}
@@ -113,11 +114,11 @@ class IdentifiedRig:
         """Unit of every output."""
         return [c.unit for c in self.plant.coordinates]
 
-    def linear(self, at: str, *, side: float = 0.0) -> Linear:
+    def linear(self, at: str, *, side: float = 0.0) -> StateSpace:
         """Model about an equilibrium, from the command to the coordinates; see `linearize`."""
         return driven(self.plant, {**self.more, GAIN: self.gain}, at, side=side)
 
-    def spread(self, at: str) -> list[Linear]:
+    def spread(self, at: str) -> list[StateSpace]:
         """The same for the draws."""
         return [driven(plant, {**self.more, GAIN: gain}, at) for plant, gain in self.draws]
 

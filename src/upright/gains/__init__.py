@@ -4,19 +4,16 @@ from upright.gains.loop import feedback, margins, place_sampled, spelled_out
 from upright.gains.lqr import dlqr, locus, lqr, weight_for_effort
 from upright.gains.margins import Margins
 from upright.gains.placement import Placement, place, prefilter
-from upright.gains.sampled import Sampled, hold, sampled_model
 from upright.gains.velocity import Estimator, difference, filtered, kalman, placed_observer, read_off, shaken
 
 __all__ = [
     "Estimator",
     "Margins",
     "Placement",
-    "Sampled",
     "difference",
     "dlqr",
     "feedback",
     "filtered",
-    "hold",
     "kalman",
     "locus",
     "lqr",
@@ -26,7 +23,6 @@ __all__ = [
     "placed_observer",
     "prefilter",
     "read_off",
-    "sampled_model",
     "shaken",
     "spelled_out",
     "weight_for_effort",

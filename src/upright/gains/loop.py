@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from upright.errors import BadInput
-from upright.gains.margins import Margins, Response, balanced, gain_bounds, modulus, phases, root
+from upright.gains.margins import Margins, Response, balanced, of_crossings, phases, root
 from upright.gains.requests import Roots, conjugate_poles, poles_of
-from upright.gains.sampled import Sampled, hold, to_z, without_feedthrough
-from upright.gains.velocity import Estimator, stationary
+from upright.gains.velocity import Estimator, stationary, without_feedthrough
 from upright.laws import Law
 from upright.laws.linear import Array
-
-if TYPE_CHECKING:
-    from upright.physics.plant import Linear
+from upright.systems import StateSpace, to_z
 
 
 def feedback(estimator: Estimator, K: ArrayLike, k_pf: float = 0.0) -> Law:
@@ -47,7 +43,7 @@ def spelled_out(law: Law) -> dict[str, Array]:
     return {"A": law.A, "B": B, "C": law.C, "D": D}
 
 
-def closed(model: Sampled, law: Law, gain: float = 1.0) -> Array:
+def closed(model: StateSpace, law: Law, gain: float = 1.0) -> Array:
     """Matrix of the loop, the model's states first; `gain` multiplies the command on its way to the plant."""
     without_feedthrough(model, "a loop")
     B, D = law.B[:, : law.readings], law.D[:, : law.readings]
@@ -55,7 +51,7 @@ def closed(model: Sampled, law: Law, gain: float = 1.0) -> Array:
     return np.vstack([top, np.hstack([B @ model.C, law.A])])
 
 
-def place_sampled(model: Sampled, estimator: Estimator, poles: ArrayLike) -> Array:
+def place_sampled(model: StateSpace, estimator: Estimator, poles: ArrayLike) -> Array:
     """Gains on *estimated* states that put as many poles of the sampled loop as there are gains exactly where asked.
 
     With G(z) from the command to the estimated states, held, late and differenced as they are, z is a pole of the loop
@@ -64,7 +60,7 @@ def place_sampled(model: Sampled, estimator: Estimator, poles: ArrayLike) -> Arr
 
     Parameters
     ----------
-    model : Sampled
+    model : StateSpace
         With one input.
     estimator : Estimator
     poles : array, shape (n,)
@@ -110,7 +106,7 @@ def place_sampled(model: Sampled, estimator: Estimator, poles: ArrayLike) -> Arr
     return K[None]
 
 
-def response(model: Sampled, law: Law) -> Response:
+def response(model: StateSpace, law: Law) -> Response:
     """The loop cut at the plant's one input, negative feedback: what a unit command comes back as, times -1.
 
     Raises
@@ -125,17 +121,14 @@ def response(model: Sampled, law: Law) -> Response:
     return balanced(A, np.vstack([model.B, np.zeros((law.A.shape[0], 1))]), -np.hstack([D @ model.C, law.C]))
 
 
-def margins(plant: Linear | None, model: Sampled, law: Law, *, D: Array | None = None) -> Margins:
+def margins(model: StateSpace, law: Law) -> Margins:
     """Margins of a stable sampled loop, from every crossing of the unit circle and of the real axis.
 
     Parameters
     ----------
-    plant : Linear or None
-        What was held; None for a model known at its samples alone, whose further delay is its phase over its frequency.
-    model : Sampled
+    model : StateSpace
+        Sampled; of one known at its samples alone the delay margin is its phase over its frequency.
     law : Law
-    D : array, shape (p, m), optional
-        Feedthrough of the plant.
 
     Raises
     ------
@@ -145,12 +138,8 @@ def margins(plant: Linear | None, model: Sampled, law: Law, *, D: Array | None =
     if not _stable(closed(model, law)):
         raise BadInput("the sampled loop is not stable, so it has no margins; ask for slower poles or sample faster.")
     L = response(model, law)
-    least, most = gain_bounds(L)
-    late = _turned(L) if plant is None else _delay(plant, model, law, D)
-    return Margins(
-        least_gain=least, most_gain=most, phase=float(np.abs(phases(L)[1]).min(initial=np.inf)),
-        delay=late * model.period, modulus=modulus(L),
-    )  # fmt: skip
+    late = _turned(L) if model.continuous is None else _delay(model.continuous, model, law)
+    return of_crossings(L, lambda angles: angles / model.period, late * model.period)
 
 
 def _turned(L: Response) -> float:
@@ -159,15 +148,15 @@ def _turned(L: Response) -> float:
     return float((np.mod(phase, 2 * np.pi) / w).min(initial=np.inf))
 
 
-def _delay(plant: Linear, model: Sampled, law: Law, D: Array | None) -> float:
+def _delay(plant: StateSpace, model: StateSpace, law: Law) -> float:
     """Further delay [samples] at which the loop falls.
 
     Below a sample, by its eigenvalues. Beyond: whole samples turn the loop gain and leave its size, so a loop that is
     already `part` of a sample late falls where its turned phase reaches -180 degrees; that sum hardly varies with part.
     """
 
-    def late(more: float) -> Sampled:
-        return hold(plant, model.period, model.delay + more, model.lag, D=D)
+    def late(more: float) -> StateSpace:
+        return plant.to_sampled(model.period, model.delay + more, model.lag)
 
     def stands(more: float) -> bool:
         return _stable(closed(late(more), law))
@@ -189,12 +178,12 @@ def _delay(plant: Linear, model: Sampled, law: Law, D: Array | None) -> float:
     return root(lambda delay: falls(delay % 1.0) - delay, float(steps[i - 1]), float(steps[i]))
 
 
-def swing(model: Sampled, law: Law, start: ArrayLike, samples: int) -> tuple[Array, Array]:
+def swing(model: StateSpace, law: Law, start: ArrayLike, samples: int) -> tuple[Array, Array]:
     """States (samples, n) and commands (samples, m) of the sampled loop, let go at rest in the law's eyes.
 
     Parameters
     ----------
-    model : Sampled
+    model : StateSpace
     law : Law
     start : array, shape (n,)
         Deviation of the model's states; drive and commands on their way are at zero.
@@ -213,7 +202,7 @@ def swing(model: Sampled, law: Law, start: ArrayLike, samples: int) -> tuple[Arr
     return rows[:, :n], rows @ out.T
 
 
-def loop_gain(model: Sampled, law: Law, omega: ArrayLike) -> Roots:
+def loop_gain(model: StateSpace, law: Law, omega: ArrayLike) -> Roots:
     """Frequency response of the loop cut at the plant's input, negative feedback, at `omega` [rad/s]; one input."""
     B, D = law.B[:, : law.readings], law.D[:, : law.readings]
     z = np.exp(1j * np.asarray(omega, dtype=np.float64) * model.period)[:, None, None]
@@ -227,7 +216,7 @@ def loop_gain(model: Sampled, law: Law, omega: ArrayLike) -> Roots:
     return found[:, 0, 0]
 
 
-def command_noise(model: Sampled, law: Law, quantum: ArrayLike) -> float:
+def command_noise(model: StateSpace, law: Law, quantum: ArrayLike) -> float:
     """Standard deviation of the command in the closed loop from the rounding of the encoders [the input's unit]."""
     B, D = law.B[:, : law.readings], law.D[:, : law.readings]
     sigma = np.broadcast_to(np.asarray(quantum, dtype=np.float64) / np.sqrt(12), (law.readings,))

@@ -58,18 +58,43 @@ def least_cost(
 
     a, b = checked(A, B)
     q, r = _square(Q, a.shape[0], "Q"), _square(R, b.shape[1], "R")
-    if np.linalg.eigvalsh(r).min() <= 0 or np.linalg.eigvalsh(q).min() < -1e-12 * np.abs(q).max(initial=0.0):
+    least = float(np.linalg.eigvalsh(r).min())
+    free = sampled and least == 0.0  # a sampled model may move for nothing, as far as its states cost
+    if (least <= 0 and not free) or np.linalg.eigvalsh(q).min() < -1e-12 * np.abs(q).max(initial=0.0):
         raise BadInput("weights must cost: R above 0 and no eigenvalue of Q below 0; check their signs.")
     solve: Any = scipy.linalg.solve_discrete_are if sampled else scipy.linalg.solve_continuous_are
+    solve = _cheap_riccati if free else solve
     try:
         S = np.asarray(solve(a, b, q, r), dtype=np.float64)
     except (np.linalg.LinAlgError, ValueError):
         raise BadInput(_why_none(a, b, q, sampled, states)) from None
-    K = np.linalg.solve(r + b.T @ S @ b, b.T @ S @ a) if sampled else np.linalg.solve(r, b.T @ S)
+    price = r + b.T @ S @ b if sampled else r
+    if free and np.linalg.eigvalsh(price).min() <= 1e-12 * np.abs(price).max(initial=1e-300):
+        raise BadInput("with R = 0 the weights of the states must see every input within a sample; weigh R too.")
+    K = np.linalg.solve(price, b.T @ S @ (a if sampled else np.eye(len(a))))
     E = poles_of(a - b @ K)
     if not _dies_out(E, sampled).all():
         raise BadInput(_why_none(a, b, q, sampled, states))
     return LeastCost(np.asarray(K, dtype=np.float64), S, E)
+
+
+def _cheap_riccati(A: Array, B: Array, Q: Array, R: Array) -> Array:
+    """Solution of the discrete Riccati equation where R is singular.
+
+    Stable deflating subspace of the extended symplectic pencil (Van Dooren, SIAM J. Sci. Stat. Comput. 2, 1981), which
+    scipy solves for regular R alone.
+    """
+    from scipy.linalg import ordqz, qr
+
+    n, m = B.shape
+    H, J = np.zeros((2 * n + m, 2 * n + m)), np.zeros((2 * n + m, 2 * n + m))
+    H[:n, :n], H[:n, 2 * n :], H[n : 2 * n, :n], H[2 * n :, 2 * n :] = A, B, -Q, R
+    H[n : 2 * n, n : 2 * n] = J[:n, :n] = np.eye(n)
+    J[n : 2 * n, n : 2 * n], J[2 * n :, n : 2 * n] = A.T, -B.T
+    away = np.asarray(qr(H[:, 2 * n :])[0], dtype=np.float64)[:, m:].T  # the input is eliminated
+    Z = np.asarray(ordqz(away @ H[:, : 2 * n], away @ J[:, : 2 * n], sort="iuc")[5], dtype=np.float64)
+    S = np.linalg.solve(Z[:n, :n].T, Z[n:, :n].T).T
+    return (S + S.T) / 2
 
 
 def _dies_out(poles: Roots, sampled: bool) -> NDArray[np.bool_]:

@@ -39,6 +39,10 @@ class Margins:
         Further delay that it bears [s].
     modulus : float
         Least distance of the loop's frequency response to -1, the inverse of the peak of the sensitivity.
+    gain_crossings : tuple of (float, float)
+        Every frequency [rad/s] at which the loop gain is 1, and the phase margin there, from -pi to pi [rad].
+    phase_crossings : tuple of (float, float)
+        Every frequency [rad/s] at which the loop gain is real and negative, and the gain margin there, a factor.
     """
 
     least_gain: float
@@ -46,6 +50,8 @@ class Margins:
     phase: float
     delay: float
     modulus: float
+    gain_crossings: tuple[tuple[float, float], ...] = ()
+    phase_crossings: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,15 +81,16 @@ class Response:
         right = _blocks([[np.eye(len(A)), None, B * 0], [C.T @ C, A.T, D * C.T], [C * 0, None, np.zeros((1, 1))]])
         return _crossings(_angles(left, right), lambda w: np.log(np.abs(self.at(w)) / radius))
 
-    def on_axis(self) -> Array:
-        """Real values that y/u takes on the circle, shape (crossings,)."""
+    def on_axis(self) -> tuple[Array, Array]:
+        """Angles at which y/u is real, and its values there, each of shape (crossings,)."""
         A, B, C = self.A, self.B, self.C
         # z x = A x + B u; p = z (A' p + C' u); C x = B' p
         left = _blocks([[A, None, B], [None, np.eye(len(A)), None], [C, -B.T, np.zeros((1, 1))]])
         right = _blocks([[np.eye(len(A)), None, B * 0], [None, A.T, C.T], [C * 0, None, np.zeros((1, 1))]])
         found = _crossings(_angles(left, right), lambda w: np.imag(self.at(w)) / np.abs(self.at(w)))
-        ends = [self._at_end(w) for w in (0.0, math.pi)]
-        return np.concatenate([self.at(found).real if found.size else found, [v for v in ends if math.isfinite(v)]])
+        values = self.at(found).real if found.size else found
+        ends = np.array([[w, v] for w in (0.0, math.pi) if math.isfinite(v := self._at_end(w))]).reshape(-1, 2)
+        return np.concatenate([found, ends[:, 0]]), np.concatenate([values, ends[:, 1]])
 
     def _at_end(self, angle: float) -> float:
         """Value at z = 1 or z = -1, infinite at a pole."""
@@ -132,10 +139,15 @@ def sampled_continuous(A: Array, B: Array, C: Array, D: float, rate: float) -> R
                     D + float((C @ inverse @ B)[0, 0]))  # fmt: skip
 
 
-def gain_bounds(L: Response) -> tuple[float, float]:
+def gain_factors(L: Response) -> tuple[Array, Array]:
+    """Angles at which the loop gain is real and negative, and the factors that take it to -1 there."""
+    angles, real = L.on_axis()
+    bound = real < -1.0 / NO_BOUND
+    return angles[bound], -1.0 / real[bound]
+
+
+def gain_bounds(factors: Array) -> tuple[float, float]:
     """Factors next below and above 1 on the loop gain at which the closed loop has a pole on the circle."""
-    real = L.on_axis()
-    factors = -1.0 / real[real < -1.0 / NO_BOUND]
     least = float(factors[factors < 1.0].max(initial=0.0))
     return (least if least > 1.0 / NO_BOUND else 0.0), float(factors[factors > 1.0].min(initial=math.inf))
 
@@ -172,13 +184,27 @@ def loop_margins(A: Array, B: Array, C: Array, D: float, period: float) -> Margi
         while np.abs(poles_of(A) - rate).min(initial=np.inf) < 0.1 * rate:  # no pole at infinity afterwards
             rate *= 1.3
         L = sampled_continuous(A, B, C, D, rate)
-    least, most = gain_bounds(L)
+
+    def omega(angles: Array) -> Array:
+        return angles / period if period else rate * np.tan(angles / 2)
+
     angles, phase = phases(L)
-    omega = angles / period if period else rate * np.tan(angles / 2)
+    late = (np.mod(phase, 2 * np.pi) / omega(angles)).min(initial=np.inf)
+    return of_crossings(L, omega, float(late))
+
+
+def of_crossings(L: Response, omega: Callable[[Array], Array], delay: float) -> Margins:
+    """Margins of a loop gain whose angles on the circle are frequencies `omega` [rad/s]."""
+    (angles, phase), (turned, factors) = phases(L), gain_factors(L)
+    least, most = gain_bounds(factors)
     return Margins(
-        least_gain=least, most_gain=most, phase=float(np.abs(phase).min(initial=np.inf)),
-        delay=float((np.mod(phase, 2 * np.pi) / omega).min(initial=np.inf)), modulus=modulus(L),
+        least_gain=least, most_gain=most, phase=float(np.abs(phase).min(initial=np.inf)), delay=delay,
+        modulus=modulus(L), gain_crossings=_pairs(omega(angles), phase), phase_crossings=_pairs(omega(turned), factors),
     )  # fmt: skip
+
+
+def _pairs(omega: Array, values: Array) -> tuple[tuple[float, float], ...]:
+    return tuple(sorted(zip(omega.tolist(), values.tolist(), strict=True)))
 
 
 def _blocks(rows: list[list[Array | None]]) -> Array:

@@ -65,7 +65,8 @@ def eigenvalues(A: Array, B: Array, K: Array) -> Roots:
 
     with mp.workdps(DIGITS):
         closed = mp.matrix(A.tolist()) - mp.matrix(B.tolist()) * mp.matrix(K.tolist())
-        found: Any = mp.eig(closed, left=False, right=False)
+        # of one number it gives back its vectors too, asked for or not
+        found: Any = mp.eig(closed, left=False, right=False) if len(A) > 1 else [closed[0, 0]]
         values = np.array([complex(z) for z in found], dtype=np.complex128)
         values.imag[np.abs(values.imag) < 1e-25 * np.abs(values)] = 0.0
         return values

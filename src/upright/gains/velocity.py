@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 from upright.errors import BadInput
 from upright.gains.placement import place
 from upright.gains.requests import conjugate_poles, lost_modes, written
-from upright.gains.sampled import Sampled, to_s, without_feedthrough
 from upright.laws.linear import Array, differences
+from upright.systems import StateSpace, to_s
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,12 +49,12 @@ class Estimator:
         return np.sqrt(np.diag(self.C @ spread @ self.C.T + (self.D * variance) @ self.D.T))
 
 
-def difference(model: Sampled) -> Estimator:
+def difference(model: StateSpace) -> Estimator:
     """Plain difference of two readings, ``v[k] = (y[k] - y[k-1])/T``; its noise is ``quantum/(T sqrt 6)``."""
     return filtered(model, 0.0)
 
 
-def filtered(model: Sampled, memory: float) -> Estimator:
+def filtered(model: StateSpace, memory: float) -> Estimator:
     """Difference through a low pass, ``v[k] = a v[k-1] + (1 - a) (y[k] - y[k-1])/T``.
 
     Its noise has the variance ``quantum^2/12 * 2 (1 - a)^2/((1 + a) T^2)``; it is late by about ``a/(1 - a)`` samples
@@ -62,7 +62,7 @@ def filtered(model: Sampled, memory: float) -> Estimator:
 
     Parameters
     ----------
-    model : Sampled
+    model : StateSpace
         Whose outputs are every second state: positions, each followed by its velocity.
     memory : float
         a, from 0 (plain difference) to below 1.
@@ -77,12 +77,12 @@ def filtered(model: Sampled, memory: float) -> Estimator:
     return Estimator(A=A, B=B, E=E, C=C, D=D, begin=np.eye(A.shape[0], p), period=model.period, name=name)
 
 
-def observer(model: Sampled, gain: ArrayLike, name: str = "observer") -> Estimator:
+def observer(model: StateSpace, gain: ArrayLike, name: str = "observer") -> Estimator:
     """Observer that corrects with the newest reading: ``x = x_p + L (y - C x_p)``, ``x_p[k+1] = A x[k] + B u[k]``.
 
     Parameters
     ----------
-    model : Sampled
+    model : StateSpace
     gain : array, shape (n, p)
         L, for instance from `kalman`.
     """
@@ -98,7 +98,7 @@ def observer(model: Sampled, gain: ArrayLike, name: str = "observer") -> Estimat
     )  # fmt: skip
 
 
-def placed_observer(model: Sampled, poles: ArrayLike) -> Estimator:
+def placed_observer(model: StateSpace, poles: ArrayLike) -> Estimator:
     """Observer whose error dies out with the `poles` asked [z]; drive and commands on their way need no correction.
 
     A model in which something dies out within one sample is corrected by the reading of the sample before, since its
@@ -106,7 +106,7 @@ def placed_observer(model: Sampled, poles: ArrayLike) -> Estimator:
 
     Parameters
     ----------
-    model : Sampled
+    model : StateSpace
     poles : array, shape (n,)
         In conjugate pairs; n without drive and commands on their way.
 
@@ -139,7 +139,7 @@ def placed_observer(model: Sampled, poles: ArrayLike) -> Estimator:
     )  # fmt: skip
 
 
-def read_off(model: Sampled) -> Estimator:
+def read_off(model: StateSpace) -> Estimator:
     """States read off the outputs, of which there are enough: nothing is estimated."""
     without_feedthrough(model, "reading states off the outputs")
     n = model.A.shape[0] - model.remembered
@@ -152,12 +152,12 @@ def read_off(model: Sampled) -> Estimator:
     )  # fmt: skip
 
 
-def kalman(model: Sampled, process: ArrayLike, noise: ArrayLike) -> Estimator:
+def kalman(model: StateSpace, process: ArrayLike, noise: ArrayLike) -> Estimator:
     """Steady Kalman filter, the observer with the least variance.
 
     Parameters
     ----------
-    model : Sampled
+    model : StateSpace
     process : float or array, shape (n, n)
         What shakes the states from sample to sample: a covariance, or one number, the standard deviation of a white
         force held over a period [the input's unit].
@@ -189,7 +189,7 @@ def kalman(model: Sampled, process: ArrayLike, noise: ArrayLike) -> Estimator:
     return observer(model, gain, "Kalman filter")
 
 
-def shaken(model: Sampled, accelerations: ArrayLike) -> Array:
+def shaken(model: StateSpace, accelerations: ArrayLike) -> Array:
     """Covariance of what shakes every coordinate by itself, for `kalman`: a white acceleration held over a period.
 
     A force that enters like the command alone is a poor guess where bodies are also pushed by hands and dry friction:
@@ -197,7 +197,7 @@ def shaken(model: Sampled, accelerations: ArrayLike) -> Array:
 
     Parameters
     ----------
-    model : Sampled
+    model : StateSpace
         Whose first states are coordinates, each followed by its velocity.
     accelerations : float or array, shape (p,)
         Standard deviation of the acceleration of each coordinate [m/s^2 or rad/s^2].
@@ -224,3 +224,18 @@ def stationary(A: Array, B: Array) -> Array:
         if np.abs(power).max(initial=0.0) < 1e-20:
             break
     return P
+
+
+def without_feedthrough(model: StateSpace, what: str) -> None:
+    """Refuse a model whose readings show the command of the same sample.
+
+    Raises
+    ------
+    BadInput
+        When D is not zero.
+    """
+    if model.D.any():
+        raise BadInput(
+            f"{what} needs readings that the command of the same sample does not change, and D is not zero here; let "
+            "the command come a sample late (hold(..., delay=1)), as a computer's does."
+        )

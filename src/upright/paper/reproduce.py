@@ -137,7 +137,7 @@ _FORMULAS: tuple[tuple[int, str, str, str, str, Value, Value, Value], ...] = (
     (
         1, "eqs. (1), (2)", "D_2 = J_A (J_d + m_p r²) + m_p² l_cg² r²", "… − m_p² l_cg² r²",
         "determinant of the mass matrix",
-        lambda s: s.D_2(1), lambda s: s.D_2(-1), lambda s: float(np.linalg.det(s.p.linear("hanging").mass)),
+        lambda s: s.D_2(1), lambda s: s.D_2(-1), lambda s: float(np.linalg.det(s.p.mass_matrix("hanging"))),
     ),
     (
         2, "eqs. (1), (2), A[4,2]", "m_p l_cg b_1 / D_2", "m_p l_cg r b_1 / D_2", "A of the model derived, inverted",
@@ -146,7 +146,7 @@ _FORMULAS: tuple[tuple[int, str, str, str, str, Value, Value, Value], ...] = (
     ),
     (
         3, "text under eq. (3)", "J_xx = J_p, transverse", "J_xx = J_a, axial", "mass matrix of the hanging rod",
-        lambda s: s.J + s.p.J_p, lambda s: s.J + s.p.J_a, lambda s: float(s.p.linear("hanging").mass[0, 0]),
+        lambda s: s.J + s.p.J_p, lambda s: s.J + s.p.J_a, lambda s: float(s.p.mass_matrix("hanging")[0, 0]),
     ),
     (
         4, "Δ_2", "leading D² s³ (D of the appendix)", "D_2² s³", "poles of the model derived",

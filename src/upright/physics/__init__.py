@@ -13,7 +13,7 @@ from upright.physics.equations import Derived, DryJoint
 from upright.physics.links import DoublePendulum, DoublePendulumAbsolute, FlexibleLink
 from upright.physics.oscillators import added_inertia, added_mass, chain
 from upright.physics.pendulums import CartPendulum, Furuta, Pendulum
-from upright.physics.plant import Linear, Plant
+from upright.physics.plant import Plant
 from upright.physics.statement import Coordinate, Input, Joint
 
 __all__ = [
@@ -28,7 +28,6 @@ __all__ = [
     "Furuta",
     "Input",
     "Joint",
-    "Linear",
     "Pendulum",
     "Plant",
     "added_inertia",

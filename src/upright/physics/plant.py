@@ -6,7 +6,6 @@ A subclass states kinetic energy, potential energy and Rayleigh's dissipation on
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
@@ -19,54 +18,12 @@ from upright.errors import ImpossiblePhysics, NotIdentifiable
 from upright.physics.equations import Derived, chooses, evaluate, mass_and_force, small_motions
 from upright.physics.statement import Statement
 from upright.shown import Shown
+from upright.systems import StateSpace
 
 Matrix = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
-class Linear(Shown):
-    """State space ``x' = A x + B u, y = C x`` about `point`, states in the paper's order.
-
-    `mass` is the mass matrix at that point; `outputs` are the coordinates.
-    """
-
-    A: Matrix
-    B: Matrix
-    C: Matrix
-    mass: Matrix
-    point: dict[str, float]
-    states: tuple[str, ...]
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-
-    @property
-    def D(self) -> Matrix:
-        """Direct feedthrough, zero for a mechanical system with measured positions."""
-        return np.zeros((self.C.shape[0], self.B.shape[1]))
-
-    def poles(self) -> NDArray[np.complex128]:
-        """Eigenvalues of A [1/s], the fastest growing first."""
-        poles = np.linalg.eigvals(self.A).astype(np.complex128)
-        return poles[np.lexsort((poles.imag, -poles.real))]
-
-    def response(self, omega: Any) -> NDArray[np.complex128]:
-        """Frequency response, shape (len(omega), outputs, inputs), at angular frequencies `omega` [rad/s]."""
-        s = 1j * np.atleast_1d(np.asarray(omega, dtype=np.float64))
-        n = self.A.shape[0]
-        return self.C @ np.linalg.solve(s[:, None, None] * np.eye(n) - self.A, self.B[None].astype(np.complex128))
-
-    def to_control(self) -> Any:
-        """The same model as a `control.StateSpace` with named signals.
-
-        ``control.ss2tf(model["psi", "T"]).minreal()`` is a transfer function of it.
-        """
-        import control
-
-        names = {"states": list(self.states), "inputs": list(self.inputs), "outputs": list(self.outputs)}
-        return control.StateSpace(self.A, self.B, self.C, self.D, **names)
-
-
-def linearize(plant: Statement, derived: Derived, at: str | None = None, side: float = 0.0) -> Linear:
+def linearize(plant: Statement, derived: Derived, at: str | None = None, side: float = 0.0) -> StateSpace:
     """Linear model about a named equilibrium; with the rig out of level, about the equilibrium nearest to it.
 
     With a kink there it has one on each `side`, so far off in every state.
@@ -94,9 +51,11 @@ def linearize(plant: Statement, derived: Derived, at: str | None = None, side: f
     A, B, C = np.zeros((2 * n, 2 * n)), np.zeros((2 * n, m)), np.zeros((n, 2 * n))
     A[0::2, 1::2] = C[:, 0::2] = np.eye(n)
     A[1::2, 0::2], A[1::2, 1::2], B[1::2] = solve[:, :n], solve[:, n : 2 * n], solve[:, 2 * n :]
-    return Linear(
-        A=A, B=B, C=C, mass=mass, point=point, states=plant.state_names(), inputs=derived.inputs,
-        outputs=derived.coordinates,
+    units = {c.name: c.unit for c in plant.coordinates}
+    units |= {f"{name}_dot": f"{unit}/s" for name, unit in units.items()} | {i.name: i.unit for i in plant.inputs}
+    return StateSpace(
+        A, B, C, point=point, states=plant.state_names(), inputs=derived.inputs,
+        outputs=derived.coordinates, units=units, name=type(plant).__name__,
     )  # fmt: skip
 
 
@@ -179,9 +138,14 @@ class Plant(Shown, Statement, abstract=True):
         states = {name: x[..., i] for i, name in enumerate(self.state_names())}
         return {**self.parameters(), **states}
 
-    def linear(self, at: str | None = None, *, side: float = 0.0) -> Linear:
+    def linear(self, at: str | None = None, *, side: float = 0.0) -> StateSpace:
         """State space about an equilibrium, friction viscous only; see `linearize`."""
         return linearize(self, self.derived_for(self.parameters()), at, side)
+
+    def mass_matrix(self, at: str | None = None) -> Matrix:
+        """Mass matrix at an equilibrium, shape (coordinates, coordinates)."""
+        derived = self.derived_for(self.parameters())
+        return small_motions(derived, {**self.parameters(), **_rest(self, derived, self.equilibrium(at))})[0]
 
 
 @cache

@@ -8,8 +8,8 @@ from __future__ import annotations
 from typing import Any
 
 from upright.physics.pendulums import CartPendulum, Furuta
-from upright.physics.plant import Linear
 from upright.quantities import quantity
+from upright.systems import StateSpace
 
 
 class WornFuruta(Furuta):
@@ -29,7 +29,7 @@ class WornFuruta(Furuta):
         T, V, D = Furuta.energies(p, q, v)
         return T, V + p.T_r / p.n_r * cos(p.n_r * q[0] + p.phi_r), D
 
-    def linear(self, at: str | None = None, *, side: float = 0.0) -> Linear:
+    def linear(self, at: str | None = None, *, side: float = 0.0) -> StateSpace:
         """That of the rig without ripple and tilt, which are local."""
         plant = Furuta(**{n: getattr(self, n) for n in Furuta.names()})
         return plant.replace(tilt_x=0.0, tilt_y=0.0).linear(at, side=side)
@@ -54,6 +54,6 @@ class WornCartPendulum(CartPendulum):
         V += p.F_r / p.n_r * cos(p.n_r * q[0] + p.phi_r) - (p.m_c + p.m_p) * p.g * p.slope * q[0]
         return T, V, D
 
-    def linear(self, at: str | None = None, *, side: float = 0.0) -> Linear:
+    def linear(self, at: str | None = None, *, side: float = 0.0) -> StateSpace:
         """That of the rig without ripple and slope, which are local."""
         return CartPendulum(**{n: getattr(self, n) for n in CartPendulum.names()}).linear(at, side=side)

@@ -21,7 +21,6 @@ import numpy as np
 from upright.control.sensors import Watch
 from upright.control.trial import ServoRig
 from upright.errors import BadInput, RigStopped
-from upright.gains import hold
 from upright.gains.loop import closed
 from upright.laws import Law, Rule
 from upright.rigs.board import Board, told
@@ -415,7 +414,7 @@ class Supervisor:
         model = self.duty.model
         if model is None or isinstance(law, Rule):
             return ""
-        sampled = hold(model.linear(self.duty.at or next(iter(model.plant.equilibria))), model.period,
+        sampled = model.linear(self.duty.at or next(iter(model.plant.equilibria))).to_sampled(model.period,
                        model.delay / model.period, model.lag)  # fmt: skip
         largest = float(np.abs(np.linalg.eigvals(closed(sampled, law))).max())
         if largest < 1.0 + 1e-9:

@@ -63,7 +63,7 @@ def chance(
     from upright.experiments.designing.run import SPEEDS, velocities
     from upright.experiments.identified import rig_table
     from upright.experiments.regulation_2.run import HAND, START
-    from upright.gains import feedback, hold
+    from upright.gains import feedback
     from upright.report.page import Chapter, Part, Table
     from upright.report.symbols import percent
     from upright.units import parse
@@ -92,7 +92,7 @@ def chance(
     K = np.atleast_2d(np.asarray(gains, dtype=np.float64))
     if K.shape != (1, len(model.states)):
         raise BadInput(f"gains for {known.name} need shape {(1, len(model.states))}, got {K.shape}.")
-    sampled = hold(model, rig.period, rig.delay / rig.period)
+    sampled = model.to_sampled(rig.period, rig.delay / rig.period)
     law = feedback(velocities(model, sampled, speed, memory, rig.limit, rig.quantum), K)
     begin = [
         s if w is None else parse(w, unit) if isinstance(w, str) else float(w)

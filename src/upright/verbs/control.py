@@ -13,7 +13,7 @@ from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
 from upright.progress import Progress, part, silent
 from upright.verbs.answer import Answer
-from upright.verbs.linear.matrices import matrices_of, read_matrices
+from upright.verbs.linear.matrices import linear_model, read_matrices
 from upright.verbs.pages import folder_if_given, page_folder, write_page
 from upright.verbs.rig import Counts, as_typed, rig_options
 from upright.verbs.values import open_log, poles, si, si_if_given
@@ -21,12 +21,12 @@ from upright.verbs.values import open_log, poles, si, si_if_given
 if TYPE_CHECKING:
     from upright.control import ServoRig
     from upright.control.sensors import Scales
-    from upright.experiments.designing.matrices import Matrices
     from upright.experiments.designing.run import Designed
     from upright.experiments.identified import IdentifiedRig
     from upright.experiments.regulation_2.run import Regulation, RegulationRequest
     from upright.experiments.swing_up_2b.run import SwingUpRun
     from upright.experiments.tracking_3.run import Tracking
+    from upright.systems import StateSpace
     from upright.verbs.values import Log
 
 _poles = poles  # the verbs have options of this name
@@ -69,7 +69,7 @@ def design(
     period : float or str, optional
         Between samples [s]; the study's servo period when omitted.
     delay : float, optional
-        How many samples late a command acts in all; when omitted the fit's delay, or one where it has none. Sampled
+        How many samples late a command acts in all; when omitted the fit's delay, or one where it has none. StateSpace
         matrices hold their own.
     speed : str
         Velocities by plain or filtered difference, or kalman; filtered when omitted. Of matrices measured, filtered,
@@ -123,7 +123,7 @@ def design(
     if matrices is not None or not isinstance(source, str | os.PathLike):
         if at or counts or vendor:
             raise BadInput("--at, --counts and --vendor are of a rig, and plain matrices are none; leave them out.")
-        rig = read_matrices(matrices) if matrices is not None else matrices_of(source)
+        rig = read_matrices(matrices) if matrices is not None else linear_model(source)
         wish = replace(wish, period=_sampling(rig, period), speed=speed, limit=limit, start=_start(rig, start))
         name = "--matrices " + (typed(Path(matrices)) if matrices is not None else "FILE")
     else:
@@ -153,17 +153,17 @@ def design(
     return Answer(done, told, files)
 
 
-def _sampling(model: Matrices, period: float | str) -> float:
+def _sampling(model: StateSpace, period: float | str) -> float:
     """Period of the loop [s]; that of sampled matrices is theirs."""
     asked = si_if_given(period, "s")
-    if asked is None and not model.period:
+    if asked is None and not model.dt:
         raise BadInput('these matrices are continuous, and a computer closes the loop: say how often, --period "2 ms".')
-    if asked is not None and model.period and not math.isclose(asked, model.period, rel_tol=1e-9):
+    if asked is not None and model.dt and not math.isclose(asked, model.dt, rel_tol=1e-9):
         raise BadInput(
-            f"these matrices are sampled every {1e3 * model.period:.6g} ms, and a period of {1e3 * asked:.6g} ms was "
+            f"these matrices are sampled every {1e3 * model.dt:.6g} ms, and a period of {1e3 * asked:.6g} ms was "
             "asked for; leave --period out, or give a continuous model."
         )
-    return model.period or asked or 0.0
+    return model.dt or asked or 0.0
 
 
 def _numbers(given: str | Iterable[float]) -> tuple[float, ...] | None:
@@ -177,7 +177,7 @@ def _numbers(given: str | Iterable[float]) -> tuple[float, ...] | None:
         raise BadInput(f'weights are numbers separated by commas, as in "1,0,1,0", got {given[:60]!r}.') from None
 
 
-def _start(rig: IdentifiedRig | Matrices, given: str | Mapping[str, float | str]) -> tuple[float, ...]:
+def _start(rig: IdentifiedRig | StateSpace, given: str | Mapping[str, float | str]) -> tuple[float, ...]:
     """Deviation, state by state in its unit; empty when none was given."""
     from upright.units import scale
 

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from upright.errors import BadInput, nearest
-from upright.physics import Linear, Plant
+from upright.physics import Plant
 from upright.records import Record
 from upright.report.drawing import BLUE, CYCLE, VERMILLION, decimated, figure, hide_inner_times, roots, s_plane, styled
 from upright.report.html import fragment
 from upright.report.page import Chapter, Part, Picture, Symbol, Table
 from upright.report.symbols import number, unit
+from upright.systems import StateSpace
 from upright.verbs.answer import text as chapter_text
 from upright.verbs.linear.feedback import Gains
 
@@ -92,17 +93,19 @@ def _(plant: Plant) -> Chapter:
 
 
 @summary.register
-def _(model: Linear) -> Chapter:
+def _(model: StateSpace) -> Chapter:
     rows = tuple(
-        (f"{state}'", *(number(x, 5) for x in (*a, *b)))
+        (f"{state}'" if model.dt is None else f"{state}[k+1]", *(number(x, 5) for x in (*a, *b)))
         for state, a, b in zip(model.states, model.A.tolist(), model.B.tolist(), strict=True)
     )
     headings = ("", *model.states, *model.inputs)
-    table = Table(caption="x' = A x + B u", headings=headings, rows=rows, numbers=tuple(range(1, len(headings))))
-    point = ", ".join(f"{name} = {value:.4g}" for name, value in model.point.items())
+    form = "x' = A x + B u" if model.dt is None else "x[k+1] = A x[k] + B u[k]"
+    table = Table(caption=form, headings=headings, rows=rows, numbers=tuple(range(1, len(headings))))
+    point = ", ".join(f"{name} = {value:.4g}" for name, value in (model.point or {}).items())
+    kind = "Linear model" if model.dt is None else f"Linear model sampled every {1e3 * model.dt:.4g} ms"
     return Chapter(
-        title=f"Linear model about {point}", verdict=f"Poles [1/s]: {_poles(model.poles())}.",
-        parts=(Part("", (table,)),),
+        title=f"{kind} about {point}" if point else kind,
+        verdict=f"Poles [{'1/s' if model.dt is None else 'z'}]: {_poles(model.poles())}.", parts=(Part("", (table,)),),
     )  # fmt: skip
 
 
@@ -154,7 +157,7 @@ def draw_poles(value: Any) -> Any:
     if isinstance(value, Plant):
         drawn = {f"about {at}": value.linear(at).poles() for at in value.equilibria}
     else:
-        drawn = {"poles": value.poles() if isinstance(value, Linear) else value.poles}
+        drawn = {"poles": value.poles() if isinstance(value, StateSpace) else value.poles}
     drawing = figure(2.6)
     axes = drawing.subplots()
     most = max(float(p.real.max()) for p in drawn.values())

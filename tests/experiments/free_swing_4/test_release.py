@@ -143,7 +143,7 @@ def test_out_of_level_gravity_begins_with_the_lever_of_the_arm():
     p = NOMINAL.replace(**FRICTIONLESS, tilt_y=lean)
     t, x = motion(with_plant(p), Release(angle=0.0), seconds=0.01, every=1)
     torque = np.array([p.m_p * p.g * p.r * lean, -p.m_p * p.g * p.l_cg * lean])
-    first = np.linalg.solve(NOMINAL.linear("hanging").mass, torque)[0]
+    first = np.linalg.solve(NOMINAL.mass_matrix("hanging"), torque)[0]
     assert x[-1, 0] == pytest.approx(first * t[-1] ** 2 / 2, rel=0.01)  # (8 rad/s x 0.01 s)^2, what theta has moved
 
 

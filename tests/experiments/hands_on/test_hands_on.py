@@ -23,7 +23,7 @@ from upright.experiments.hands_on.upright import came
 from upright.experiments.hands_on.upwards import run_upwards
 from upright.experiments.makes import MAKES, make_rig
 from upright.experiments.running.run import RunRequest, run_rig
-from upright.gains import feedback, filtered, hold, place
+from upright.gains import feedback, filtered, place
 from upright.laws import as_values, of_values
 from upright.logs import read_log
 from upright.progress import silent
@@ -169,7 +169,7 @@ def test_a_run_that_the_supervisor_ends_was_lost_there(tmp_path):
     """The law's arm leaves a travel of 3 degrees long before its pendulum falls."""
     model = make_rig("furuta")
     linear = model.linear("inverted")
-    sampled = hold(linear, model.period, model.delay / model.period)
+    sampled = linear.to_sampled(model.period, model.delay / model.period)
     law = feedback(filtered(sampled, 0.5), place(linear.A, linear.B, [-4 + 2j, -4 - 2j, -17, -3]).K)
     up_law = tmp_path / "law.json"
     up_law.write_text(json.dumps(as_values(law)), encoding="utf-8")

@@ -112,7 +112,7 @@ def test_a_cart_whose_friction_is_larger_close_to_rest_hunts():
     known = fit_of(make_rig("linear"), spread=0.0)
     rig = known.rig()
     model = rig.linear("inverted")
-    sampled = gains.hold(model, rig.period, rig.delay / rig.period)
+    sampled = model.to_sampled(rig.period, rig.delay / rig.period)
     K = gains.place(model.A, model.B, RegulationRequest().poles["set 2"]).K
     law = gains.feedback(gains.filtered(sampled, 0.5), K)
     sticks = {"b_1s": rig.plant.b_1c * np.array([1.0, 1.5]), "v_1s": [0.05, 0.05]}

@@ -15,7 +15,7 @@ from upright.experiments.makes import make_rig
 from upright.experiments.running.chapter import run_chapter
 from upright.experiments.running.rig import open_loop, stage_of
 from upright.experiments.running.run import RunRequest, run_rig
-from upright.gains import feedback, filtered, hold, place, prefilter
+from upright.gains import feedback, filtered, place, prefilter
 from upright.laws import as_values
 from upright.logs import read_log
 from upright.logs.replay import replay
@@ -34,7 +34,7 @@ def folder(tmp_path_factory):
     place_of = tmp_path_factory.mktemp("bench")
     (place_of / "RIG.toml").write_text('kind = "twin"\nmake = "furuta"\nseed = 3\n', encoding="utf-8")
     model = RIG.linear("inverted")
-    sampled = hold(model, RIG.period, RIG.delay / RIG.period)
+    sampled = model.to_sampled(RIG.period, RIG.delay / RIG.period)
     K = place(model.A, model.B, POLES).K
     law = feedback(filtered(sampled, 0.5), K, prefilter(model.A, model.B, model.C[0], K))
     (place_of / "design.json").write_text(json.dumps({"as_run": as_values(law)}), encoding="utf-8")
@@ -157,7 +157,9 @@ def test_a_loop_waits_for_a_driven_body_that_is_off_its_start_window(folder, tmp
                 port.hold("inverted", [0.1, 0.0, 0.02, 0.0])
 
     stage = replace(stage, bring=lambda: port.hold("inverted", [0.5, 0.0, 0.02, 0.0]))
-    law = feedback(filtered(hold(LINEAR, RIG.period, RIG.delay / RIG.period), 0.5), place(LINEAR.A, LINEAR.B, POLES).K)
+    law = feedback(
+        filtered(LINEAR.to_sampled(RIG.period, RIG.delay / RIG.period), 0.5), place(LINEAR.A, LINEAR.B, POLES).K
+    )
     order = RunOrder(make=lambda: stage, law=as_values(law), seconds=0.1, log=tmp_path / "run.mcap", check=False)
     done = carry_out(order, law=law, show=person)
     assert not done.stopped

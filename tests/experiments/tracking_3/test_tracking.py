@@ -16,7 +16,7 @@ from upright.experiments.tracking_3.laws import AT, EXTRA, closed_by, paper_sets
 from upright.experiments.tracking_3.pulses import fitted, identify_shaft, pulses
 from upright.experiments.tracking_3.run import RESERVE, attempt, choose, run_tracking
 from upright.experiments.weighing_1a.run import Known
-from upright.gains import hold, place, prefilter
+from upright.gains import place, prefilter
 from upright.gains.loop import swing
 from upright.identification.estimate import identify
 from upright.physics import chain
@@ -44,7 +44,7 @@ def test_the_sampled_model_with_delay_and_lag_moves_as_the_kernel():
     rig = replace(make_rig("rectilinear").changed(**FRICTIONLESS), counts=(1e12, 1e12), converter=0.0)
     law = paper_sets(rig, (4,))[0].law
     start = np.array([1e-3, 0.0, -2e-3, 0.02])
-    sampled = hold(rig.linear(AT), rig.period, rig.delay / rig.period, rig.lag)
+    sampled = rig.linear(AT).to_sampled(rig.period, rig.delay / rig.period, rig.lag)
     states, commands = swing(sampled, law, start, 400)
     done = trial(rig, law, at=AT, start=start, seconds=399 * rig.period)
     np.testing.assert_allclose(done.x, states[:, :4], atol=1e-6 * np.abs(states[:, :4]).max())

@@ -72,13 +72,14 @@ LEVELS = {"noise.psi": 5e-5, "noise.theta": 4e-6, "noise.T": 0.01}
 def test_the_model_of_the_filter_is_the_linear_plant_integrated_over_a_sample() -> None:
     problem = posed(balanced(0, seconds=3.0), LEVELS)
     track = problem.tracks[0]
-    linear = Furuta(**{**PLANT, "b_1c": 0.0}).linear("inverted")
+    plant = Furuta(**{**PLANT, "b_1c": 0.0})
+    linear = plant.linear("inverted")
     Phi, Q = discrete_model(problem.solver(0), track, {**problem.base}, 1)
     A = np.zeros((5, 5))
     A[:4, :4], A[:4, 4:] = linear.A, linear.B * VALUES["actuator.gain"]  # the fifth state drifts with the command
     np.testing.assert_allclose(Phi[0], expm(A * track.dt), rtol=1e-10, atol=1e-12)
     B = np.zeros((5, 3))
-    B[[1, 3], :2] = np.linalg.inv(linear.mass) * [LEVELS["noise.psi"], LEVELS["noise.theta"]]
+    B[[1, 3], :2] = np.linalg.inv(plant.mass_matrix("inverted")) * [LEVELS["noise.psi"], LEVELS["noise.theta"]]
     B[4, 2] = LEVELS["noise.T"]
     # Gauss-Legendre of degree 15 is exact to rounding for so short a sample
     s, w = np.polynomial.legendre.leggauss(8)
@@ -111,7 +112,8 @@ def test_a_filter_without_friction_is_the_textbook_kalman_filter() -> None:
     assert plan is not None
     found = restart_states(problem.solver(0), track, {**problem.base}, np.zeros((2, 1)), None)[:, 0, 0]
     Phi, Q = discrete_model(problem.solver(0), track, {**problem.base}, 1)
-    linear = Furuta(**{**PLANT, "b_1c": 0.0}).linear("inverted")
+    plant = Furuta(**{**PLANT, "b_1c": 0.0})
+    linear = plant.linear("inverted")
     A = np.zeros((5, 5))
     A[:4, :4], A[:4, 4:] = linear.A, linear.B * VALUES["actuator.gain"]
     C, R = np.eye(5)[[0, 2]], np.diag(plan.sensor)

@@ -7,18 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from upright.experiments.designing.matrices import Matrices
 from upright.experiments.designing.run import Designed, VelocityLoop
 from upright.experiments.identified import IdentifiedRig, rig_table
-from upright.gains import Sampled, spelled_out
+from upright.gains import spelled_out
 from upright.gains.lqr import locus
 from upright.gains.requests import Roots, written
-from upright.gains.sampled import to_s
 from upright.laws import as_values
 from upright.report.drawing import BLACK, BLUE, VERMILLION, Poles, locus_figure, pole_map, swing_figure
 from upright.report.page import Block, Chapter, Part, Picture, Points, Step, Table
 from upright.report.symbols import number, percent, plain
 from upright.report.symbols import unit as raised
+from upright.systems import StateSpace, to_s
 
 
 def chapter(done: Designed, *, source: str = "OUT/fit.json", folder: str = ".") -> Chapter:
@@ -33,7 +32,7 @@ def chapter(done: Designed, *, source: str = "OUT/fit.json", folder: str = ".") 
     if done.chance is not None:
         stand = f"{percent(100 * done.chance)} stand with these gains"
         sure.append(Points((f"Of the rigs that the fit's covariance allows, {stand}.",)))
-    plain_matrices = isinstance(done.rig, Matrices)
+    plain_matrices = isinstance(done.rig, StateSpace)
     loop = (
         f"Period {1e3 * done.wish.period:.4g} ms, command {done.sampled.delay:.3g} samples late "
         f"({_delay_from(done)}), drive's lag {1e3 * done.sampled.lag:.3g} ms, "
@@ -65,14 +64,14 @@ def _delay_from(done: Designed) -> str:
     """Who says how late a command acts."""
     if done.wish.delay is not None:
         return "as asked"
-    if isinstance(done.rig, Matrices):
-        return "besides what the matrices hold" if done.rig.period else "assumed"
+    if isinstance(done.rig, StateSpace):
+        return "besides what the matrices hold" if done.rig.dt else "assumed"
     return "as the file says" if done.rig.delay else "assumed"
 
 
 def _doubts(done: Designed) -> tuple[str, ...]:
     """What was not said of the rig, and whose number stands for it."""
-    if isinstance(done.rig, Matrices):
+    if isinstance(done.rig, StateSpace):
         left = "dry friction, steps of encoders" + ("" if done.wish.limit else ", the largest command of the drive")
         return (f"Plain matrices say nothing of a rig: {left} are in none of these numbers.",)
     told = done.rig.doubts(done.wish.said) if done.wish.said else ()
@@ -104,7 +103,7 @@ def _gain_table(done: Designed) -> Table:
 
 def _pole_table(done: Designed) -> Table:
     """Poles asked, attained by the gains on the continuous model, and of the loop as it runs."""
-    discrete = isinstance(done.model, Sampled)
+    discrete = done.model.dt is not None
     rows = [("model, open loop", _outlasting(done, done.open_loop, 5) if discrete else written(done.open_loop))]
     if done.placement is not None:
         rows.append(("asked", written(done.placement.asked)))
@@ -118,12 +117,12 @@ def _pole_table(done: Designed) -> Table:
 
 def _of_model(done: Designed) -> str:
     """Which model gains or poles belong to, before its loop."""
-    return "at the samples" if isinstance(done.model, Sampled) else "continuous"
+    return "at the samples" if done.model.dt is not None else "continuous"
 
 
 def _drawn(done: Designed, poles: Roots) -> Roots:
     """Poles that a picture has room for: of sampled matrices those whose motion outlasts a few samples."""
-    return poles[poles.real > -3.0 / done.wish.period] if isinstance(done.model, Sampled) else poles
+    return poles[poles.real > -3.0 / done.wish.period] if done.model.dt is not None else poles
 
 
 def _outlasting(done: Designed, poles: Roots, digits: int) -> str:
@@ -202,7 +201,7 @@ def _numbers(done: Designed) -> dict[str, Any]:
         "readings": _readings(done),
         "states_from": done.chosen.name,
         "begin": done.law.begin,
-        "command": done.rig.inputs[0] if isinstance(done.rig, Matrices) else "u",
+        "command": done.rig.inputs[0] if isinstance(done.rig, StateSpace) else "u",
         "converter": 0.0 if wish.said is None else wish.said.value("converter", 0.0),
         "law": spelled_out(done.law) | {"inputs": "readings, readings at rest, reference"},
         "as_run": as_values(done.law),
@@ -239,14 +238,14 @@ def _effort(done: Designed) -> str:
 def _next_steps(done: Designed, source: str, folder: str) -> list[Step]:
     """What to try after this design."""
     steps: list[Step] = []
-    plain_matrices = isinstance(done.rig, Matrices)
+    plain_matrices = isinstance(done.rig, StateSpace)
     base = f"upright design {source}" + ("" if plain_matrices else f" --at {done.wish.at}")
     if done.sampled_gains is not None and (done.chosen.margins is None or done.chosen.margins.modulus < 0.4):
         steps.append(
             Step("Make up for delay and differences: gains that meet the poles in the sampled loop.",
                  f'{base} --poles "{written(done.wanted)}" --sampled'.replace("±", "+-"))
         )  # fmt: skip
-    if done.wish.poles is not None and not isinstance(done.model, Sampled):
+    if done.wish.poles is not None and not done.model.dt is not None:
         limit = " --limit LIMIT" if done.wish.limit is None else ""
         steps.append(
             Step("Let the drive's limit choose: the cheapest effort that comes back from this start.",
@@ -290,7 +289,7 @@ def _pole_pictures(done: Designed) -> list[Picture]:
     if done.R is None:
         return pictures
     weights = done.wish.weights or (1.0,) * done.model.A.shape[0]
-    discrete = isinstance(done.model, Sampled)
+    discrete = done.model.dt is not None
     tracks = locus(done.model.A, done.model.B, weights, done.R * np.geomspace(100, 0.01, 300), sampled=discrete)
     tracks = to_s(tracks, done.wish.period) if discrete else tracks
     cheaper = Picture(

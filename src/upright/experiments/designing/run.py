@@ -9,16 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upright.errors import BadInput
-from upright.experiments.designing.matrices import Matrices
+from upright.experiments.designing.estimators import chosen, estimator, estimators
 from upright.experiments.identified import IdentifiedRig
 from upright.gains import (
     Estimator,
     Margins,
     Placement,
-    Sampled,
     feedback,
     filtered,
-    hold,
     kalman,
     margins,
     place,
@@ -31,11 +29,13 @@ from upright.gains import (
 from upright.gains.loop import closed, command_noise, swing
 from upright.gains.lqr import least_cost, motion
 from upright.gains.requests import Roots, conjugate_poles, poles_of, written
-from upright.gains.sampled import to_s, to_z
 from upright.laws import Law
-from upright.physics import Linear
 from upright.records import Array
 from upright.study.description import RigDescription, turn_of
+from upright.systems import StateSpace, to_s, to_z
+
+MOST_STATES = 30
+"""States from which 60 digits take longer than anyone waits."""
 
 SPEEDS = ("plain", "filtered", "kalman")
 """Ways to the velocities: differences of encoders, plain or through a low pass, and a Kalman filter."""
@@ -95,17 +95,17 @@ class VelocityLoop:
 class Designed:
     """Gains and what they are worth.
 
-    `model` is `Sampled` where plain matrices are those of samples; all poles are in s [1/s] all the same.
+    `model` is sampled where plain matrices are those of samples; all poles are in s [1/s] all the same.
     `peak` is the largest command that the start takes with continuous feedback, `peak_sampled` in the loop as it runs;
     `swing` is that way back: t, outputs, commands.
     K are the gains in force: the `continuous` ones of placement or least cost (`placement` is None then), or the
     `sampled_gains`, whose poles are met in the loop as it runs.
     """
 
-    rig: IdentifiedRig | Matrices
+    rig: IdentifiedRig | StateSpace
     wish: DesignRequest
-    model: Linear | Sampled
-    sampled: Sampled
+    model: StateSpace
+    sampled: StateSpace
     K: Array
     continuous: Array
     placement: Placement | None
@@ -170,13 +170,13 @@ class Designed:
         return f"{head}; the start asked for takes {100 * share:.0f} % of the drive's limit."
 
 
-def design_for(rig: IdentifiedRig | Matrices, wish: DesignRequest) -> Designed:
+def design_for(rig: IdentifiedRig | StateSpace, wish: DesignRequest) -> Designed:
     """Gains as wished, and their loop as a computer runs it.
 
     Parameters
     ----------
-    rig : IdentifiedRig or Matrices
-        Plain matrices know no encoders and no covariance, and need no equilibrium.
+    rig : IdentifiedRig or StateSpace
+        A plain model knows no encoders and no covariance, and needs no equilibrium.
     wish : DesignRequest
 
     Raises
@@ -184,75 +184,84 @@ def design_for(rig: IdentifiedRig | Matrices, wish: DesignRequest) -> Designed:
     BadInput
         When what is asked cannot be had; the sentence says why.
     """
-    through = None
-    if isinstance(rig, Matrices):
-        model, sampled, through = rig.linear(), _held(rig, wish), rig.D
+    if isinstance(rig, StateSpace):
+        model, sampled = _plain(rig), _held(_plain(rig), wish)
     else:
         model = rig.linear(wish.at)
-        sampled = hold(model, wish.period, _late(rig, wish), rig.lag if wish.lag is None else wish.lag)
+        sampled = model.to_sampled(wish.period, _late(rig, wish), rig.lag if wish.lag is None else wish.lag)
     start = np.array(wish.start) if wish.start else _tilt(rig)
     if model.B.shape[1] != 1:
         raise BadInput(f"upright design is for one input, and this model has {model.B.shape[1]}; use place.")
     K, placement, R = _gains(model, wish, start)
     wanted = placement.asked if placement is not None else _in_s(model, poles_of(model.A - model.B @ K))
     quantum: tuple[float, ...] | None = None
-    if isinstance(rig, Matrices):
-        speed = rig.way(wish.speed)
-        estimators = {s: rig.estimator(s, sampled, wish.memory, wanted) for s in dict.fromkeys((speed, *rig.ways[:-1]))}
+    if isinstance(rig, StateSpace):
+        speed = chosen(model, wish.speed)
+        known = dict.fromkeys((speed, *estimators(model)[:-1]))
+        ways = {s: estimator(s, sampled, wish.memory, wanted) for s in known}
     else:
-        speed, estimators, quantum = _from_encoders(rig, model, sampled, wish)
-    estimator = estimators[speed]
+        speed, ways, quantum = _from_encoders(rig, model, sampled, wish)
     observed = speed in ("kalman", "observer")
     if wish.sampled and observed:
         raise BadInput(
             f"--sampled is for states that no model estimates; with --speed {speed} the poles are met as they are."
         )
-    needed = wish.sampled or not isinstance(model, Sampled)  # gains of a sampled model are at its samples already
-    gains = place_sampled(sampled, estimator, wanted) if needed and not observed else None
+    needed = wish.sampled or model.dt is None  # gains of a sampled model are at its samples already
+    gains = place_sampled(sampled, ways[speed], wanted) if needed and not observed else None
     used = gains if wish.sampled and gains is not None else K
     k_pf = None
     if wish.track:
         if wish.track not in rig.outputs:
             raise BadInput(f"nothing called '{wish.track}' is measured; --track one of {', '.join(rig.outputs)}.")
         i = rig.outputs.index(wish.track)
-        D = 0.0 if through is None else float(through[i, 0])
-        k_pf = prefilter(model.A, model.B, model.C[i], used, D=D, sampled=isinstance(model, Sampled))
-    law = feedback(estimator, used, k_pf or 0.0)
+        D = float(model.D[i, 0])
+        k_pf = prefilter(model.A, model.B, model.C[i], used, D=D, sampled=model.dt is not None)
+    law = feedback(ways[speed], used, k_pf or 0.0)
     t, x, u = _way_back(model, K, start)
-    loops = {s: _velocity_loop(model, sampled, e, used, quantum, through) for s, e in estimators.items()}
+    loops = {s: _velocity_loop(model, sampled, e, used, quantum) for s, e in ways.items()}
     cloud, chance = _cloud(rig, wish, sampled, law)
     return Designed(
         rig=rig, wish=wish, model=model, sampled=sampled, K=used, continuous=K, placement=placement,
         sampled_gains=gains, R=R, law=law, poles=to_s(poles_of(closed(sampled, law)), sampled.period),
         ways=tuple(loops.values()), chosen=loops[speed], k_pf=k_pf, peak=float(np.abs(u).max()),
         peak_sampled=_peak(sampled, law, start, float(t[-1])),
-        swing=(t, x @ model.C.T + (0.0 if through is None else u @ through.T), u), chance=chance, cloud=cloud,
+        swing=(t, x @ model.C.T + u @ model.D.T, u), chance=chance, cloud=cloud,
     )  # fmt: skip
 
 
-def _held(model: Matrices, wish: DesignRequest) -> Sampled:
-    """Plain matrices as the loop meets them: a sample late unless they are those of samples, which hold their delay."""
-    late = wish.delay if wish.delay is not None else 0.0 if model.period else 1.0
+def _plain(model: StateSpace) -> StateSpace:
+    """A model to design for, commands on their way being states like any other where it is sampled."""
+    if not 1 <= len(model.states) <= MOST_STATES or not model.inputs or not model.outputs:
+        raise BadInput(
+            f"a model to design for has 1 to {MOST_STATES} states, an input and an output, got {len(model.states)} "
+            f"states, {len(model.inputs)} inputs and {len(model.outputs)} outputs."
+        )
+    return model if model.dt is None else replace(model, continuous=None, delay=0.0, lag=0.0)
+
+
+def _held(model: StateSpace, wish: DesignRequest) -> StateSpace:
+    """A plain model as the loop meets it: a sample late unless it is one of samples, which holds its delay."""
+    late = wish.delay if wish.delay is not None else 0.0 if model.dt else 1.0
     if model.D.any() and not late:
         raise BadInput(
             "with a D the readings show the command of the same sample, and no computer answers a reading by what "
             "changes it; let the command come a sample late: --delay 1."
         )
-    return model.at_samples(wish.period, late, wish.lag or 0.0)
+    return model.to_sampled(wish.period, late, wish.lag or 0.0)
 
 
-def _in_s(model: Linear | Sampled, poles: Roots) -> Roots:
+def _in_s(model: StateSpace, poles: Roots) -> Roots:
     """Poles in s [1/s] of those of the model."""
-    return to_s(poles, model.period) if isinstance(model, Sampled) else poles
+    return to_s(poles, model.period) if model.dt is not None else poles
 
 
-def _gains(model: Linear | Sampled, wish: DesignRequest, start: Array) -> tuple[Array, Placement | None, float | None]:
+def _gains(model: StateSpace, wish: DesignRequest, start: Array) -> tuple[Array, Placement | None, float | None]:
     """Gains as wished, how their poles were placed, in s, or the weight of the effort."""
     A, B = model.A, model.B
     if wish.poles is not None:
-        placement = _placed_samples(model, wish.poles) if isinstance(model, Sampled) else place(A, B, wish.poles)
+        placement = _placed_samples(model, wish.poles) if model.dt is not None else place(A, B, wish.poles)
         return placement.K, placement, wish.R
-    weights, R, discrete = wish.weights or (1.0,) * A.shape[0], wish.R, isinstance(model, Sampled)
+    weights, R, discrete = wish.weights or (1.0,) * A.shape[0], wish.R, model.dt is not None
     if R is None and (discrete or wish.limit is None):
         other = "" if discrete else " or a limit (--limit)"
         raise BadInput(f"least cost needs a weight of the effort (--effort-weight){other}; give one.")
@@ -261,7 +270,7 @@ def _gains(model: Linear | Sampled, wish: DesignRequest, start: Array) -> tuple[
     return least_cost(A, B, weights, R, sampled=discrete, states=model.states).K, None, R
 
 
-def _placed_samples(model: Sampled, poles: Roots) -> Placement:
+def _placed_samples(model: StateSpace, poles: Roots) -> Placement:
     """Gains of a model that is known at its samples, poles in s; placed as (z - 1)/T, which spreads those near 1."""
     asked, T = conjugate_poles(poles, model.A.shape[0]), model.period
     if np.abs(asked.imag).max() > math.pi / T:
@@ -274,19 +283,19 @@ def _placed_samples(model: Sampled, poles: Roots) -> Placement:
     return replace(found, asked=asked, attained=attained, miss=float(np.abs(attained - asked).max()))
 
 
-def _way_back(model: Linear | Sampled, K: Array, start: Array) -> tuple[Array, Array, Array]:
+def _way_back(model: StateSpace, K: Array, start: Array) -> tuple[Array, Array, Array]:
     """Motion of the model under ``u = -K x``: t (N,) [s], x (N, n) and u (N, m)."""
-    if not isinstance(model, Sampled):
+    if model.dt is None:
         return motion(model.A, model.B, K, start)
     slowest = float(np.abs(poles_of(model.A - model.B @ K)).max())
     samples = int(np.clip(10 / -math.log(slowest) if 0 < slowest < 1 else 0, 20, 20_000))
-    shown = replace(model, C=np.eye(model.A.shape[0]), D=None)
+    shown = replace(model, C=np.eye(model.A.shape[0]), D=None, outputs=())
     x, u = swing(shown, feedback(read_off(shown), K), start, samples)
     return np.arange(samples, dtype=np.float64) * model.period, x, u
 
 
 def _from_encoders(
-    rig: IdentifiedRig, model: Linear | Sampled, sampled: Sampled, wish: DesignRequest
+    rig: IdentifiedRig, model: StateSpace, sampled: StateSpace, wish: DesignRequest
 ) -> tuple[str, dict[str, Estimator], tuple[float, ...]]:
     """The way to the velocities that was asked for, all that a rig has, and the steps of its encoders."""
     quantum = wish.quantum or quanta(rig, rig.described(needs=("counts",), who="upright design"))
@@ -312,7 +321,7 @@ def quanta(rig: IdentifiedRig, said: RigDescription) -> tuple[float, ...]:
     return tuple(turn_of(c.unit) / said.entries[f"counts.{c.name}"].value for c in rig.plant.coordinates)
 
 
-def _peak(sampled: Sampled, law: Law, start: Array, seconds: float) -> float:
+def _peak(sampled: StateSpace, law: Law, start: Array, seconds: float) -> float:
     """Largest command of the loop as it runs; infinite when it falls."""
     if np.abs(poles_of(closed(sampled, law))).max() >= 1:
         return math.inf
@@ -320,9 +329,9 @@ def _peak(sampled: Sampled, law: Law, start: Array, seconds: float) -> float:
     return float(np.abs(swing(sampled, law, start, samples)[1]).max())
 
 
-def _tilt(rig: IdentifiedRig | Matrices) -> Array:
+def _tilt(rig: IdentifiedRig | StateSpace) -> Array:
     """Five degrees, or 5 cm, of the last coordinate; of plain matrices one unit of the first state."""
-    if isinstance(rig, Matrices):
+    if isinstance(rig, StateSpace):
         return np.eye(len(rig.states))[0]
     x = np.zeros(2 * len(rig.plant.coordinates))
     x[-2] = math.radians(5) if rig.plant.coordinates[-1].unit == "rad" else 0.05
@@ -330,13 +339,13 @@ def _tilt(rig: IdentifiedRig | Matrices) -> Array:
 
 
 def velocities(
-    model: Linear | Sampled, sampled: Sampled, speed: str, memory: float, limit: float, quantum: ArrayLike
+    model: StateSpace, sampled: StateSpace, speed: str, memory: float, limit: float, quantum: ArrayLike
 ) -> Estimator:
     """States from encoders in one of the ways of `SPEEDS`.
 
     Parameters
     ----------
-    model, sampled : Linear and Sampled
+    model, sampled : StateSpace
         From the command to the coordinates.
     speed : str
     memory : float
@@ -354,28 +363,26 @@ def velocities(
 
 
 def _velocity_loop(
-    model: Linear | Sampled, sampled: Sampled, estimator: Estimator, K: Array, quantum: tuple[float, ...] | None,
-    through: Array | None,
+    model: StateSpace, sampled: StateSpace, estimator: Estimator, K: Array, quantum: tuple[float, ...] | None,
 ) -> VelocityLoop:  # fmt: skip
     law = feedback(estimator, K)
     poles = poles_of(closed(sampled, law))
     stands = bool(np.abs(poles).max() < 1)
-    held = None if isinstance(model, Sampled) else model
     return VelocityLoop(
         name=estimator.name,
         speed_noise=None if quantum is None else estimator.noise(quantum)[1 : model.A.shape[0] : 2],
         command_noise=command_noise(sampled, law, quantum) if stands and quantum is not None else None,
-        margins=margins(held, sampled, law, D=through) if stands else None,
+        margins=margins(sampled, law) if stands else None,
         poles=to_s(poles, sampled.period),
     )
 
 
 def _cloud(
-    rig: IdentifiedRig | Matrices, wish: DesignRequest, nominal: Sampled, law: Law
+    rig: IdentifiedRig | StateSpace, wish: DesignRequest, nominal: StateSpace, law: Law
 ) -> tuple[Roots, float | None]:
     """Poles [1/s] of the loop with these gains on every rig that the fit allows, and the share that stands."""
-    others = [] if isinstance(rig, Matrices) else rig.spread(wish.at)
-    rows = [poles_of(closed(hold(m, wish.period, nominal.delay, nominal.lag), law)) for m in others]
+    others = [] if isinstance(rig, StateSpace) else rig.spread(wish.at)
+    rows = [poles_of(closed(m.to_sampled(wish.period, nominal.delay, nominal.lag), law)) for m in others]
     if not rows:
         return np.zeros(0, dtype=np.complex128), None
     z = np.array(rows)

@@ -22,15 +22,15 @@ from upright.experiments.designing.run import SPEEDS, velocities
 from upright.experiments.frequency_1b.run import run_frequency
 from upright.experiments.identified import IdentifiedRig, read_identified
 from upright.experiments.makes import PENDULUMS
-from upright.gains import Margins, Placement, Sampled, feedback, hold, margins, place
+from upright.gains import Margins, Placement, feedback, margins, place
 from upright.gains.loop import closed, command_noise
 from upright.gains.requests import Roots, poles_of, read_poles
 from upright.laws import Law
 from upright.paper.reproduce import TABLE_1
-from upright.physics import Linear
 from upright.progress import Progress, part, silent
 from upright.records import Array
 from upright.study.description import RigDescription
+from upright.systems import StateSpace
 from upright.workers import HERE, Workers
 
 START = (math.radians(5), 0.0)
@@ -225,7 +225,7 @@ def run_regulation(
     rig, make = known.rig(said), known.made_by(said.vendor)
     usual = make.start if make else START
     model = rig.linear("inverted")
-    sampled = hold(model, rig.period, rig.delay / rig.period)
+    sampled = model.to_sampled(rig.period, rig.delay / rig.period)
     tilt, push = (w if w is not None else s for w, s in zip((wish.tilt, wish.push), usual, strict=True))
     task = Task(start=(0.0, 0.0, tilt, push), hand=(0.0, 0.0, *HAND), seconds=wish.seconds)
     others = known.allowed(rig, wish.draws, seed)
@@ -260,7 +260,7 @@ def actual_start(task: Task, seed: int) -> Array:
 
 
 def _attempt(
-    name: str, poles: Roots, rig: ServoRig, tried: Try | None, model: Linear, sampled: Sampled, task: Task,
+    name: str, poles: Roots, rig: ServoRig, tried: Try | None, model: StateSpace, sampled: StateSpace, task: Task,
     others: Mapping[str, Array], wish: RegulationRequest, seed: int, workers: Workers, progress: Progress,
 ) -> Attempt:  # fmt: skip
     placed = place(model.A, model.B, poles)
@@ -278,9 +278,9 @@ def _on_twin(truth: ServoRig, task: Task, seed: int, _name: str, law: Law, _told
     return Came(trial=went, score=score(went))
 
 
-def _ways(done: Regulation, model: Linear, sampled: Sampled) -> list[VelocityRun]:
+def _ways(done: Regulation, model: StateSpace, sampled: StateSpace) -> list[VelocityRun]:
     on, K = done.truth or done.rig, done.best.placement.K
-    driven = hold(model, sampled.period, sampled.delay, done.rig.lag)
+    driven = model.to_sampled(sampled.period, sampled.delay, done.rig.lag)
     out: list[VelocityRun] = []
     for speed in SPEEDS:
         way = velocities(model, sampled, speed, done.wish.memory, done.rig.limit, done.rig.quantum)
@@ -291,7 +291,7 @@ def _ways(done: Regulation, model: Linear, sampled: Sampled) -> list[VelocityRun
             VelocityRun(
                 name=way.name,
                 noise=command_noise(driven, law, done.rig.quantum) if stands else None,
-                margins=margins(model, driven, law) if stands else None,
+                margins=margins(driven, law) if stands else None,
                 run=went,
                 score=score(went),
                 restless=float(np.sqrt(np.mean(np.diff(went.u[went.t <= 1.0]) ** 2))),

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from upright.experiments.makes import make_rig
 from upright.experiments.running.rig import LEAN, NEAR, usual_limits
-from upright.gains import feedback, filtered, hold, place
+from upright.gains import feedback, filtered, place
 from upright.gains.requests import read_poles
 from upright.paper.reproduce import TABLE_1
 from upright.rigs import Board, Mode, Tick, TwinPort
@@ -23,7 +23,7 @@ def supervised() -> tuple[Callable[[], float], Callable[[], Tick]]:
     """
     model = make_rig("furuta")
     linear = model.linear("inverted")
-    estimator = filtered(hold(linear, model.period, model.delay / model.period, model.lag), 0.5)
+    estimator = filtered(linear.to_sampled(model.period, model.delay / model.period, model.lag), 0.5)
     port = TwinPort(model)
     rig = Board(port)
     beside = Supervisor(

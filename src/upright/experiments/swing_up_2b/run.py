@@ -22,7 +22,7 @@ from upright.control.swing_up import Ascent, swing_up
 from upright.control.trial import readings
 from upright.errors import BadInput, NotIdentifiable, nearest
 from upright.experiments.identified import IdentifiedRig
-from upright.gains import feedback, filtered, hold
+from upright.gains import feedback, filtered
 from upright.progress import Progress, silent
 from upright.records import Array, Record
 from upright.units import same_dimension, scale
@@ -278,7 +278,7 @@ def _lies(
     seconds: float = 2.0,
 ) -> tuple[Lie, ...]:
     names = [c.name for c in model.plant.coordinates]
-    sampled = hold(model.linear("inverted"), model.period, (model.delay + model.lag) / model.period)
+    sampled = model.linear("inverted").to_sampled(model.period, (model.delay + model.lag) / model.period)
     law_upright = feedback(filtered(sampled, law.memory), law.K[None])
     told = [(name or names[0], factor) for name, factor in LIES]
     checks: list[Scales] = []

@@ -20,15 +20,14 @@ from upright.control import ServoRig
 from upright.control.score import step_figures
 from upright.control.trial import SUBSTEPS, at_work
 from upright.errors import BadInput
-from upright.gains import feedback, filtered, hold, place, prefilter
+from upright.gains import feedback, filtered, place, prefilter
 from upright.gains.loop import closed
 from upright.gains.requests import Roots, conjugate_poles, poles_of
-from upright.gains.sampled import to_s
 from upright.laws import Law
 from upright.paper.reproduce import TABLE_2, poles
-from upright.physics import Linear
 from upright.records import Array
 from upright.simulation import simulate
+from upright.systems import StateSpace, to_s
 
 AT = "rest"
 MEMORY = 0.5
@@ -93,7 +92,7 @@ def tracker(rig: ServoRig, name: str, K: Array, k_pf: float, *, asked: Roots | N
 
 def state_law(rig: ServoRig, K: Array, k_pf: float) -> Law:
     """The matrices of gains on differenced encoders."""
-    sampled = hold(rig.linear(AT), rig.period, 0.0)
+    sampled = rig.linear(AT).to_sampled(rig.period, 0.0)
     return feedback(filtered(sampled, MEMORY), K, k_pf)
 
 
@@ -120,7 +119,7 @@ def paper_sets(rig: ServoRig, which: Sequence[int] = (1, 2, 3, 4), faster: float
     return tuple(by_poles(rig, f"set {i}{times}", faster * poles(TABLE_2[i - 1])[0]) for i in which)
 
 
-def far(model: Linear) -> Array:
+def far(model: StateSpace) -> Array:
     """Row of the output that follows, the last."""
     return model.C[-1]
 
@@ -163,7 +162,7 @@ def with_sum(rig: ServoRig, base: Tracker, name: str) -> Tracker:
 
 def closed_by(rig: ServoRig, law: Law) -> Array:
     """Matrix of the sampled loop of a law on a rig, about rest; dry friction and rounding left out."""
-    return closed(hold(rig.linear(AT), rig.period, rig.delay / rig.period, rig.lag), law)
+    return closed(rig.linear(AT).to_sampled(rig.period, rig.delay / rig.period, rig.lag), law)
 
 
 def loop_poles(rig: ServoRig, law: Law) -> Roots:
@@ -224,7 +223,7 @@ def tune(rig: ServoRig, step: float, most: float) -> tuple[Tracker, GainSearch]:
 def tried(rig: ServoRig, pairs: Array, step: float) -> Array:
     """Arrival and settling to 5 % of many PD laws at once, shape (pairs, 2)."""
     c = len(rig.plant.coordinates)
-    estimator = filtered(hold(rig.linear(AT), rig.period, 0.0), MEMORY)
+    estimator = filtered(rig.linear(AT).to_sampled(rig.period, 0.0), MEMORY)
     laws = [feedback(estimator, _gains(rig, 0, kp, kd), kp) for kp, kd in pairs.tolist()]
     A, B, C, D = (np.stack([getattr(law, n) for law in laws], axis=-1) for n in "ABCD")
     many = Law(A, B, C, D, references=np.array([step]))
@@ -244,7 +243,7 @@ def tried(rig: ServoRig, pairs: Array, step: float) -> Array:
     return out
 
 
-def continuous(model: Linear) -> tuple[Array, Array, Array]:
+def continuous(model: StateSpace) -> tuple[Array, Array, Array]:
     """Matrix of the loop ``A + kp P + kd D`` of PD control of the near body, without computer."""
     P, D = (-model.B @ row[None] for row in np.eye(model.A.shape[0])[:2])
     return model.A, P, D
@@ -273,7 +272,7 @@ def best_decay(loop: tuple[Array, Array, Array], kp: Array, *, period: float = 0
     return decay
 
 
-def root_locus(model: Linear, body: int, rate: float, kp: Array) -> NDArray[np.complex128]:
+def root_locus(model: StateSpace, body: int, rate: float, kp: Array) -> NDArray[np.complex128]:
     """Poles of PD control of one body's position over kp, kd = kp times `rate`, shape (kp, states)."""
     K = np.zeros((kp.size, 1, model.A.shape[0]))
     K[:, 0, 2 * body], K[:, 0, 2 * body + 1] = kp, kp * rate

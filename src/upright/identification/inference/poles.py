@@ -106,7 +106,8 @@ def _of_one_sign(value: float, stderr: float, quantile: float, unit: str) -> Est
 
 def _poles(rig: Rig, values: Mapping[str, float], at: str, held: frozenset[str]) -> NDArray[np.complex128]:
     """Poles with the actuator's loss per speed as damping of the coordinates that it drives, some coordinates held."""
-    linear = rig.plant(**{n: values[n] for n in rig.plant.names()}).linear(at)
+    plant = rig.plant(**{n: values[n] for n in rig.plant.names()})
+    linear = plant.linear(at)
     A = linear.A.copy()
     driven = {c.name: i for i, c in enumerate(rig.plant.coordinates)}
     for k, source in enumerate(rig.plant.inputs):
@@ -115,9 +116,10 @@ def _poles(rig: Rig, values: Mapping[str, float], at: str, held: frozenset[str])
     if held:  # what holds them takes up the force in their rows
         free = [i for name, i in driven.items() if name not in held]
         states = [s for i in free for s in (2 * i, 2 * i + 1)]
-        force = linear.mass @ A[1::2]
+        mass = plant.mass_matrix(at)
+        force = mass @ A[1::2]
         A = A[np.ix_(states, states)]
-        A[1::2] = np.linalg.solve(linear.mass[np.ix_(free, free)], force[np.ix_(free, states)])
+        A[1::2] = np.linalg.solve(mass[np.ix_(free, free)], force[np.ix_(free, states)])
     found = np.linalg.eigvals(A).astype(np.complex128)
     # rounding splits a double pole, as that of a free body, by the root of what it is
     found.imag[np.abs(found.imag) < SPLIT * np.abs(found).max(initial=0.0)] = 0.0

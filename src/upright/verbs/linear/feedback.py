@@ -2,40 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import warnings
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from functools import wraps
+from inspect import signature
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import BadInput, nearest
 from upright.laws import Law
-from upright.physics import Linear, Plant
+from upright.physics import Plant
 from upright.shown import Shown
+from upright.systems import StateSpace
 
 if TYPE_CHECKING:
-    from upright.gains import Margins, Sampled
+    from upright.gains import Estimator, Margins
 
 Array = NDArray[np.float64]
+P = ParamSpec("P")
+R = TypeVar("R")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Gains(Shown):
     """State feedback ``u = -K x`` for one linear model; where an array is expected, it is K.
 
+    It unpacks as ``K, S, E = gains``, as python-control's `lqr` does.
+
     Attributes
     ----------
     K : array, shape (inputs, states)
     poles : array, shape (states,)
-        Of the loop [1/s, or z of a sampled model].
+        Of the closed loop [1/s, or z of a sampled model].
     S : array or None
-        Solution of the Riccati equation, of gains by least cost; then ``K, S, E = gains`` unpacks as python-control's.
-    states, inputs : tuple of str
-    point : mapping or None
-        Equilibrium that the model was linearized about, by coordinate; None for a model that names none.
-    period : float
-        Of a sampled model [s]; 0 for a continuous one.
+        Solution of the Riccati equation; None where poles were placed, since no cost was minimised.
+    model : StateSpace
+        What they were computed for; a simulation takes its point and its period.
     sentence : str
         How well conditioned the gains are.
     """
@@ -43,20 +48,17 @@ class Gains(Shown):
     K: Array
     poles: NDArray[np.complex128]
     S: Array | None
-    states: tuple[str, ...]
-    inputs: tuple[str, ...]
-    point: Mapping[str, float] | None
-    period: float
+    model: StateSpace
     sentence: str
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
         return np.array(self.K, dtype=dtype or np.float64)
 
     def __iter__(self) -> Iterator[Any]:
-        return iter(self.K if self.S is None else (self.K, self.S, self.poles))
+        return iter((self.K, self.S, self.poles))
 
     def __len__(self) -> int:
-        return len(self.K) if self.S is None else 3
+        return 3
 
     def __getitem__(self, key: Any) -> Any:
         return self.K[key]
@@ -69,6 +71,26 @@ class Gains(Shown):
         """Shape of K."""
         return self.K.shape
 
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states, a column of K each."""
+        return tuple(self.model.states)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the commands, a row of K each."""
+        return tuple(self.model.inputs)
+
+    @property
+    def point(self) -> Mapping[str, float] | None:
+        """Equilibrium about which the model holds, by coordinate; None for a model that names none."""
+        return self.model.point
+
+    @property
+    def period(self) -> float | None:
+        """Period of a sampled model [s]; None for a continuous one."""
+        return self.model.dt
+
     def to_pandas(self) -> Any:
         """K as a table, an input per row and a state per column."""
         import pandas as pd
@@ -76,13 +98,60 @@ class Gains(Shown):
         return pd.DataFrame(self.K, index=list(self.inputs), columns=list(self.states))
 
 
-def place(*system: Any, poles: Any = None) -> Gains:
+def _model_first(verb: Callable[P, R]) -> Callable[P, R]:
+    """A function of a linear model that is called with any form of one, see `StateSpace.of`.
+
+    Loose arrays ``A, B`` in front are taken for ``(A, B)``, for one version with a warning.
+    """
+    about = signature(verb)
+    name = verb.__name__
+
+    @wraps(verb)
+    def called(*args: Any, **kwargs: Any) -> Any:
+        if len(args) > 1 and isinstance(args[0], list | np.ndarray):
+            warnings.warn(
+                f"{name}(A, B, ...) is going: put the matrices into one argument, {name}((A, B), ...).",
+                DeprecationWarning, stacklevel=2,
+            )  # fmt: skip
+            args = ((args[0], args[1]), *args[2:])
+        try:
+            bound = about.bind(*args, **kwargs)
+        except TypeError as error:
+            raise BadInput(f"{name} is called as {name}{_form(about)}: {error}.") from None
+        bound.arguments["model"] = _read(bound.arguments["model"], name)
+        return verb(*bound.args, **bound.kwargs)
+
+    return called
+
+
+def _form(about: Any) -> str:
+    """Arguments of a call without their types."""
+    shown = [p.replace(annotation=p.empty) for p in about.parameters.values()]
+    return str(about.replace(parameters=shown, return_annotation=about.empty))
+
+
+def _read(model: Any, verb: str) -> StateSpace:
+    plant = model if isinstance(model, Plant) else getattr(model, "plant", None)
+    if isinstance(plant, Plant):
+        raise BadInput(
+            f"{verb} takes a linear model, and {type(plant).__name__} is none; say about which equilibrium: "
+            + " or ".join(f'.linear("{at}")' for at in plant.equilibria)
+            + "."
+        )
+    try:
+        return StateSpace.of(model)
+    except BadInput as error:
+        raise BadInput(f"{verb}: {error}") from None
+
+
+@_model_first
+def place(model: Any, poles: Any) -> Gains:
     """Gains that put the poles of a linear model where they are asked, by Ackermann's formula.
 
     Parameters
     ----------
-    *system
-        ``plant.linear("inverted")``, a `control.StateSpace`, ``(A, B)`` or ``A, B``; then the poles.
+    model : StateSpace, control.StateSpace or TransferFunction, or arrays (A, B)
+        Such as ``plant.linear("inverted")``, or what `hold` gives.
     poles : text or sequence of complex, shape (states,)
         In conjugate pairs [1/s; z for a sampled model], or as text: ``"-4+-2j, -17, -3"``.
 
@@ -98,26 +167,25 @@ def place(*system: Any, poles: Any = None) -> Gains:
     Examples
     --------
     >>> import upright as up
-    >>> up.place([[0, 1], [4, 0]], [0, 1], [-2, -3]).K
+    >>> up.place(([[0, 1], [4, 0]], [0, 1]), [-2, -3]).K
     array([[10.,  5.]])
     """
     from upright.gains import place as placed
     from upright.gains.requests import read_poles
 
-    model, rest = read_model(system, "place", ("poles",), (poles,))
-    (asked,) = rest
-    wanted = read_poles(asked) if isinstance(asked, str) else _complex(asked)
+    wanted = read_poles(poles) if isinstance(poles, str) else _complex(poles)
     found = placed(model.A, model.B, wanted)
-    return model.gains(found.K, found.attained, None, found.sentence)
+    return Gains(K=found.K, poles=found.attained, S=None, model=model, sentence=found.sentence)
 
 
-def lqr(*system: Any, Q: Any = None, R: Any = None) -> Gains:
+@_model_first
+def lqr(model: Any, Q: Any, R: Any) -> Gains:
     """Gains of least cost, the integral of ``x' Q x + u' R u``; ``K, S, E = lqr(...)`` as python-control gives it.
 
     Parameters
     ----------
-    *system
-        ``plant.linear("inverted")``, a `control.StateSpace`, ``(A, B)`` or ``A, B``; then Q and R.
+    model : StateSpace, control.StateSpace or TransferFunction, or arrays (A, B)
+        Of a sampled model the sum over its samples is minimised, as by `dlqr`.
     Q : array, shape (states, states) or (states,), or text
         Weights of the states; one number for each is the diagonal: ``[1, 0, 1, 0]`` or ``"1, 0, 1, 0"``.
     R : array, shape (inputs, inputs) or (inputs,), or float
@@ -126,31 +194,26 @@ def lqr(*system: Any, Q: Any = None, R: Any = None) -> Gains:
     Returns
     -------
     Gains
-        With the solution `S` of the Riccati equation; of a sampled `control.StateSpace` the discrete one.
+        With the solution `S` of the Riccati equation.
 
     Raises
     ------
     BadInput
         When the model or a weight cannot be read or has another size, or no such gains exist.
     """
-    from upright.gains.lqr import least_cost
-
-    model, (weights, effort) = read_model(system, "lqr", ("Q", "R"), (Q, R))
-    n, m = model.B.shape
-    q, r = _weights(weights, n, "Q", "states"), _weights(effort, m, "R", "inputs")
-    K, S, E = least_cost(model.A, model.B, q, r, sampled=model.period > 0, states=model.states)
-    return model.gains(K, E, S, "")
+    return _of_least_cost(model, Q, R)
 
 
-def dlqr(*system: Any, Q: Any = None, R: Any = None) -> Gains:
+@_model_first
+def dlqr(model: Any, Q: Any, R: Any) -> Gains:
     """Gains of least cost of a sampled model, the sum of ``x' Q x + u' R u``; ``K, S, E = dlqr(...)``.
 
     Parameters
     ----------
-    *system
-        What `hold` gives, a `control.StateSpace` with its period, ``(A, B)`` or ``A, B``; then Q and R as for `lqr`.
+    model : StateSpace, control.StateSpace or TransferFunction, or arrays (A, B)
+        What `hold` gives, or any model with its period; arrays without one are taken for a model at its samples.
     Q, R
-        Weights of the states and of the inputs.
+        Weights of the states and of the inputs, as for `lqr`; R may be 0 where ``B' S B`` is not.
 
     Returns
     -------
@@ -162,26 +225,29 @@ def dlqr(*system: Any, Q: Any = None, R: Any = None) -> Gains:
     BadInput
         When the model is continuous, it or a weight cannot be read, or no such gains exist.
     """
+    if model.dt is None:
+        if model.point is not None or model.name:
+            raise BadInput("dlqr takes a sampled model, and this one is continuous; sample it with hold, or use lqr.")
+        model = replace(model, dt=1.0)
+    return _of_least_cost(model, Q, R)
+
+
+def _of_least_cost(model: StateSpace, Q: Any, R: Any) -> Gains:
     from upright.gains.lqr import least_cost
 
-    model, (weights, effort) = read_model(system, "dlqr", ("Q", "R"), (Q, R))
-    if not model.period:
-        if not model.bare:
-            raise BadInput("dlqr takes a sampled model, and this one is continuous; sample it with hold, or use lqr.")
-        model = replace(model, period=1.0)
     n, m = model.B.shape
-    q, r = _weights(weights, n, "Q", "states"), _weights(effort, m, "R", "inputs")
-    K, S, E = least_cost(model.A, model.B, q, r, sampled=True, states=model.states)
-    return model.gains(K, E, S, "")
+    q, r = _weights(Q, n, "Q", "states"), _weights(R, m, "R", "inputs")
+    K, S, E = least_cost(model.A, model.B, q, r, sampled=model.dt is not None, states=tuple(model.states))
+    return Gains(K=K, poles=E, S=S, model=model, sentence="")
 
 
-def hold(*system: Any, period: Any = None, delay: float = 0.0, lag: float = 0.0, method: str = "zoh") -> Sampled:
+@_model_first
+def hold(model: Any, period: Any, delay: float = 0.0, lag: float = 0.0, method: str = "zoh") -> StateSpace:
     """A continuous linear model at its samples, exactly.
 
     Parameters
     ----------
-    *system
-        ``plant.linear("inverted")``, a `control.StateSpace`, ``(A, B[, C[, D]])`` or ``A, B``; then the period.
+    model : StateSpace, control.StateSpace or TransferFunction, or arrays (A, B[, C[, D]])
     period : float or text
         Time between samples, in s or as ``"2 ms"``.
     delay : float
@@ -193,45 +259,66 @@ def hold(*system: Any, period: Any = None, delay: float = 0.0, lag: float = 0.0,
 
     Returns
     -------
-    Sampled
-        A, B, C, D and `period`; `place`, `dlqr`, `prefilter` and `margins` take it.
+    StateSpace
+        With `dt`; its first states are the model's, about the same point.
 
     Raises
     ------
     BadInput
         When the model cannot be read or is sampled already, or a time is impossible.
     """
-    from upright.gains import hold as held
     from upright.verbs.values import si
 
-    model, (step,) = read_model(system, "hold", ("period",), (period,))
-    if model.period:
-        raise BadInput(f"hold samples a continuous model, and this one has a period of {model.period:g} s already.")
-    linear = Linear(
-        A=model.A, B=model.B, C=model.C, mass=np.zeros((0, 0)), point=dict(model.point or {}), states=model.states,
-        inputs=model.inputs, outputs=model.outputs,
-    )  # fmt: skip
-    return held(linear, si(step, "s"), delay, lag, D=model.D, method=method)
+    if model.dt is not None:
+        raise BadInput(f"hold samples a continuous model, and this one has a period of {model.dt:g} s already.")
+    return model.to_sampled(si(period, "s"), delay, lag, method=method)
 
 
-def margins(*system: Any, K: Any = None, period: float = 0.0) -> Margins:
-    """How much a loop stands: gain, phase and delay margin, and its least distance to -1, from every crossing.
+@_model_first
+def observer(model: Any, poles: Any) -> Estimator:
+    """Observer of a sampled model whose error dies out with the poles asked.
 
     Parameters
     ----------
-    *system
-        A loop gain of one input and one output (negative feedback around it) as `control.StateSpace` or
-        ``(A, B, C, D)``; or a model and the gains K of ``u = -K x``; or, as a computer runs it, a continuous model,
-        what `hold` made of it, and a `Law`.
-    K : array, shape (1, states), optional
-        Gains, where they are not the second argument.
-    period : float
-        Of matrices that belong to a sampled loop [s]; 0 for a continuous one.
+    model : StateSpace, control.StateSpace or TransferFunction, or arrays (A, B, C, D, dt)
+        Sampled, such as what `hold` gives.
+    poles : text or sequence of complex
+        In z, one for each state but those of drive and delay.
+
+    Returns
+    -------
+    Estimator
+        ``z[k+1] = A z[k] + B y[k] + E u[k]``, states ``x[k] = C z[k] + D y[k]``.
+
+    Raises
+    ------
+    BadInput
+        When the model is continuous, the outputs do not show a mode, or the poles cannot be had.
+    """
+    from upright.gains import placed_observer
+    from upright.gains.requests import read_poles
+
+    if model.dt is None:
+        raise BadInput("observer takes a sampled model, and this one is continuous; sample it: hold(model, period).")
+    return placed_observer(model, read_poles(poles) if isinstance(poles, str) else _complex(poles))
+
+
+@_model_first
+def margins(model: Any, K: Any = None) -> Margins:
+    """How much a loop stands: gain, phase and delay margins, its least distance to -1, and every crossing.
+
+    Parameters
+    ----------
+    model : StateSpace, control.StateSpace or TransferFunction, or arrays (A, B[, C[, D[, dt]]])
+        A loop gain of one input and one output with negative feedback around it; or, with K, what is controlled.
+    K : array, shape (1, states), Gains, or Law, optional
+        Gains of ``u = -K x``; or a sampled `Law` around a model that `hold` made, as a computer runs it.
 
     Returns
     -------
     Margins
-        `least_gain` and `most_gain` as factors, `phase` [rad], `delay` [s], `modulus`.
+        `least_gain` and `most_gain` as factors, `phase` [rad], `delay` [s], `modulus`; `gain_crossings` and
+        `phase_crossings` with every frequency [rad/s] and the margin there.
 
     Raises
     ------
@@ -241,13 +328,13 @@ def margins(*system: Any, K: Any = None, period: float = 0.0) -> Margins:
     from upright.gains import margins as as_it_runs
     from upright.gains.margins import loop_margins
 
-    if len(system) == 3 and isinstance(system[0], Linear) and isinstance(system[2], Law):
-        return as_it_runs(*system)
-    given, names = list(system), ("K",) if K is not None or len(system) == 2 else ()
-    model, rest = read_model(tuple(given), "margins", names, (K,))
-    period = model.period or period
-    if names:
-        gains = np.atleast_2d(np.asarray(rest[0], dtype=np.float64))
+    if isinstance(K, Law):
+        if model.dt is None:
+            raise BadInput("margins of a Law need the model at its samples: margins(hold(model, law.period), law).")
+        return as_it_runs(model, K)
+    period = model.dt or 0.0
+    if K is not None:
+        gains = np.atleast_2d(np.asarray(K, dtype=np.float64))
         if model.B.shape[1] != 1 or gains.shape != (1, model.A.shape[0]):
             raise BadInput(
                 f"margins are for one input, with K of shape (1, {model.A.shape[0]}), got {model.B.shape[1]} inputs "
@@ -262,13 +349,14 @@ def margins(*system: Any, K: Any = None, period: float = 0.0) -> Margins:
     return loop_margins(model.A, model.B, model.C, float(model.D[0, 0]), period)
 
 
-def prefilter(*system: Any, K: Any = None, output: int | str = 0) -> float:
+@_model_first
+def prefilter(model: Any, K: Any, output: int | str = 0) -> float:
     """Gain k_pf of ``u = k_pf r - K x`` with which an output comes to rest at the reference r.
 
     Parameters
     ----------
-    *system
-        A model with one input, as for `place`, or what `hold` gives; then its gains.
+    model : StateSpace, control.StateSpace or TransferFunction, or arrays (A, B, C[, D])
+        With one input.
     K : array, shape (1, states)
     output : int or str
         Which output follows, by number or by name.
@@ -284,116 +372,19 @@ def prefilter(*system: Any, K: Any = None, output: int | str = 0) -> float:
     """
     from upright.gains import prefilter as static
 
-    model, (gains,) = read_model(system, "prefilter", ("K",), (K,))
     names = model.outputs
     if isinstance(output, str) and output not in names:
         raise BadInput(f"this model has no output '{output}'; {nearest(output, names)}")
     i = names.index(output) if isinstance(output, str) else output
     if not 0 <= i < len(names):
         raise BadInput(f"output is a number from 0 to {len(names) - 1} or one of {', '.join(names)}, got {output}.")
-    k = np.atleast_2d(np.asarray(gains, dtype=np.float64))
+    k = np.atleast_2d(np.asarray(K, dtype=np.float64))
     if k.shape != (1, model.A.shape[0]) or model.B.shape[1] != 1:
         raise BadInput(
             f"a prefilter is for one input and K of shape (1, {model.A.shape[0]}), got {model.B.shape[1]} inputs and "
             f"K of shape {k.shape}."
         )
-    return static(model.A, model.B, model.C[i], k, D=float(model.D[i, 0]), sampled=model.period > 0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class NamedModel:
-    """A linear model as it was handed over; `bare` where it came as arrays, which say no period."""
-
-    A: Array
-    B: Array
-    C: Array
-    D: Array
-    states: tuple[str, ...]
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-    point: Mapping[str, float] | None = None
-    period: float = 0.0
-    bare: bool = False
-
-    def gains(self, K: Array, poles: NDArray[np.complex128], S: Array | None, sentence: str) -> Gains:
-        """Gains found for it."""
-        return Gains(
-            K=K, poles=poles, S=S, states=self.states, inputs=self.inputs, point=self.point, period=self.period,
-            sentence=sentence,
-        )  # fmt: skip
-
-
-def read_model(
-    given: tuple[Any, ...], verb: str, names: tuple[str, ...], by_name: tuple[Any, ...]
-) -> tuple[NamedModel, Any]:
-    """The model that the first arguments name, and the values that follow it."""
-    wanted = f'{verb} takes a model and {" and ".join(names)}: {verb}(plant.linear("inverted"), {", ".join(names)}), '
-    wanted += f"{verb}(A, B, {', '.join(names)}), or a control.StateSpace in the model's place"
-    if not names:
-        wanted = f"{verb} takes a loop gain: {verb}(control.StateSpace), {verb}((A, B, C, D)), or {verb}(model, K)"
-    if not given:
-        raise BadInput(f"{wanted}; no model came.")
-    first, rest = given[0], list(given[1:])
-    if isinstance(first, Plant) or isinstance(getattr(first, "plant", None), Plant):
-        plant = first if isinstance(first, Plant) else first.plant
-        raise BadInput(
-            f"{verb} takes a linear model, and {type(plant).__name__} is none; say about which equilibrium: "
-            + " or ".join(f'.linear("{at}")' for at in plant.equilibria)
-            + "."
-        )
-    if hasattr(first, "A") and hasattr(first, "B"):
-        model = named_model(verb, first.A, first.B, getattr(first, "C", None), getattr(first, "D", None))
-        step = getattr(first, "dt", None) or getattr(first, "period", None)
-        model = replace(
-            model, states=_labels(first, "state", model.states), inputs=_labels(first, "input", model.inputs),
-            outputs=_labels(first, "output", model.outputs), point=getattr(first, "point", None),
-            period=float(step) if step else 0.0, bare=False,
-        )  # fmt: skip
-    elif isinstance(first, tuple) and 2 <= len(first) <= 4:
-        model = named_model(verb, *first)
-    elif isinstance(first, list | np.ndarray) and rest:
-        model = named_model(verb, first, rest.pop(0))
-    else:
-        raise BadInput(f"{wanted}; got {type(first).__name__}.")
-    values = [*rest, *(v for v in by_name if v is not None)]
-    if len(values) != len(names):
-        raise BadInput(f"{wanted}; {len(values)} of {len(names)} came after the model.")
-    return model, values
-
-
-def _labels(system: Any, kind: str, default: tuple[str, ...]) -> tuple[str, ...]:
-    """Names as python-control or `Linear` has them."""
-    found = getattr(system, f"{kind}_labels", None)
-    found = getattr(system, f"{kind}s", None) if found is None else found
-    return tuple(found) if isinstance(found, list | tuple) and len(found) == len(default) else default
-
-
-def named_model(verb: str, A: Any, B: Any, C: Any = None, D: Any = None) -> NamedModel:
-    """Model of plain arrays; every state is measured where C is left out, and nothing comes through where D is."""
-    try:
-        a = np.atleast_2d(np.asarray(A, dtype=np.float64))
-        b = np.asarray(B, dtype=np.float64)
-        c = np.eye(len(a)) if C is None else np.atleast_2d(np.asarray(C, dtype=np.float64))
-        d = None if D is None else np.asarray(D, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise BadInput(f"{verb} needs A and B, C and D where they are given, as arrays of real numbers.") from None
-    b = b[:, None] if b.ndim == 1 else b
-    if a.ndim != 2 or a.shape[0] != a.shape[1] or b.ndim != 2 or b.shape[0] != a.shape[0]:
-        raise BadInput(f"{verb} needs A of shape (n, n) and B of shape (n, m), got {a.shape} and {b.shape}.")
-    if c.ndim != 2 or c.shape[1] != a.shape[0]:
-        raise BadInput(f"{verb} needs C of shape (p, {a.shape[0]}), got {c.shape}.")
-    if not all(np.isfinite(matrix).all() for matrix in (a, b, c) + (() if d is None else (d,))):
-        raise BadInput(f"{verb} needs matrices of finite numbers; one of them is infinite or no number at all.")
-    through = (c.shape[0], b.shape[1])
-    if d is None or not d.any():
-        d = np.zeros(through)
-    d = d.reshape(1, 1) if d.size == 1 else d
-    if d.shape != through:
-        raise BadInput(f"{verb} needs D of shape {through}, got {d.shape}.")
-    states, inputs, outputs = (
-        tuple(f"{letter}[{i}]" for i in range(size)) for letter, size in zip("xuy", (*b.shape, c.shape[0]), strict=True)
-    )
-    return NamedModel(A=a, B=b, C=c, D=d, states=states, inputs=inputs, outputs=outputs, bare=True)
+    return static(model.A, model.B, model.C[i], k, D=float(model.D[i, 0]), sampled=model.dt is not None)
 
 
 def _complex(poles: Any) -> NDArray[np.complex128]:

@@ -3,40 +3,39 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from upright.errors import BadInput, nearest
 
 if TYPE_CHECKING:
-    from upright.experiments.designing.matrices import Matrices
     from upright.study.text import Section
-    from upright.verbs.linear.feedback import NamedModel
+    from upright.systems import StateSpace
 
 KEYS = ("A", "B", "C", "D", "dt", "states", "inputs", "outputs", "units")
 
 
-def matrices_of(model: Any) -> Matrices:
-    """Model of a `control.StateSpace`, a plant's ``linear(...)``, what `hold` gives, or arrays ``(A, B[, C[, D]])``.
+def linear_model(model: Any) -> StateSpace:
+    """Model of a `control.StateSpace` or TransferFunction, a plant's ``linear(...)``, what `hold` gives, or arrays.
 
     Raises
     ------
     BadInput
         When it is none of these, or sampled without saying how often.
     """
-    from upright.verbs.linear.feedback import read_model
+    from upright.systems import StateSpace
 
-    if not isinstance(model, tuple) and not (hasattr(model, "A") and hasattr(model, "B")):
+    if not isinstance(model, tuple) and not any(hasattr(model, name) for name in ("A", "num")):
         raise BadInput(
             "design takes a fit.json, its folder or a study, or a linear model: a control.StateSpace, "
             f'plant.linear("inverted"), or arrays (A, B, C, D); got {type(model).__name__}.'
         )
-    if getattr(model, "dt", None) is True:
-        raise BadInput("this sampled model does not say its period; give its dt in seconds.")
-    return _to_design(read_model((model,), "design", (), ())[0], {}, "a linear model")
+    found = StateSpace.of(model)
+    return found if found.name else replace(found, name="a linear model")
 
 
-def read_matrices(path: str | os.PathLike[str]) -> Matrices:
+def read_matrices(path: str | os.PathLike[str]) -> StateSpace:
     """Model of a file in TOML: A and B, and where they are not what goes without saying C, D, dt, names and units.
 
     Raises
@@ -44,11 +43,9 @@ def read_matrices(path: str | os.PathLike[str]) -> Matrices:
     BadInput
         When the file cannot be read, or its matrices do not make a model.
     """
-    from dataclasses import replace
-
     from upright import units
     from upright.study.text import StudyText
-    from upright.verbs.linear.feedback import named_model
+    from upright.systems import StateSpace
 
     path = Path(path)
     if not path.exists():
@@ -61,8 +58,8 @@ def read_matrices(path: str | os.PathLike[str]) -> Matrices:
         if key not in root:
             raise BadInput(f"{path} has no {key}; a model needs A and B, as in {key} = [[0, 1], [20, 0]].")
     with root.at("A"):
-        model = named_model("a model", *(_rows(root, key) for key in "ABCD"))
-    names = {kind: _names(root, kind, getattr(model, kind)) for kind in ("states", "inputs", "outputs")}
+        model = StateSpace(*(_rows(root, key) for key in "ABCD"))  # type: ignore[arg-type] # None where there is none
+    names = {kind: _names(root, kind, tuple(getattr(model, kind))) for kind in ("states", "inputs", "outputs")}
     if "outputs" not in root and "C" not in root:
         names["outputs"] = names["states"]
     period = root.number("dt", "s", 0.0)
@@ -79,16 +76,7 @@ def read_matrices(path: str | os.PathLike[str]) -> Matrices:
             raise given.error(name, f'a unit is text, such as {name} = "rad", got {unit!r:.40}')
         with given.at(name):
             units.scale(unit)
-    return _to_design(replace(model, period=period, **names), dict(given.values), path.stem)
-
-
-def _to_design(model: NamedModel, units: dict[str, str], name: str) -> Matrices:
-    from upright.experiments.designing.matrices import Matrices
-
-    return Matrices(
-        A=model.A, B=model.B, C=model.C, D=model.D, states=model.states, inputs=model.inputs, outputs=model.outputs,
-        period=model.period, units=units, name=name,
-    )  # fmt: skip
+    return replace(model, dt=period or None, units=dict(given.values), name=path.stem, **names)
 
 
 def _rows(root: Section, key: str) -> list[list[float]] | None:
