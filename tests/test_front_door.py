@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import control
 import numpy as np
 import pandas as pd
 import pytest
@@ -117,16 +118,17 @@ def test_a_log_that_is_none_is_named():
         up.identify(3.0)
 
 
-@pytest.mark.parametrize("given", ["linear", "pair", "two", "control"])
+@pytest.mark.parametrize("given", ["linear", "pair", "control", "transfer"])
 def test_place_takes_every_kind_of_model_and_moves_its_poles(given):
     model = up.Furuta(**FURUTA).linear("inverted")
     system = {
-        "linear": (model,), "pair": ((model.A, model.B),), "two": (model.A, model.B), "control": (model.to_control(),),
-    }[given]  # fmt: skip
-    gains = up.place(*system, POLES)
-    closed = np.linalg.eigvals(model.A - model.B @ gains)  # numpy takes gains for the array K
+        "linear": lambda: model, "pair": lambda: (model.A, model.B), "control": model.to_control,
+        "transfer": lambda: control.ss2tf(model["theta", "T"].to_control()),
+    }[given]()  # fmt: skip
+    gains = up.place(system, POLES)
+    closed = np.linalg.eigvals(gains.model.A - gains.model.B @ gains)  # numpy takes gains for the array K
     assert np.sort_complex(closed) == pytest.approx(np.sort_complex(np.array(POLES)), abs=1e-6)
-    assert pytest.approx(gains.K) == up.place(*system, "-4+-2j, -17, -3").K
+    assert pytest.approx(gains.K) == up.place(system, "-4+-2j, -17, -3").K
     if given in ("linear", "control"):
         assert gains.states == ("psi", "psi_dot", "theta", "theta_dot")
 
@@ -140,7 +142,7 @@ def test_least_cost_agrees_with_python_control():
     assert pytest.approx(K_c, rel=1e-6) == K
     assert pytest.approx(S_c, rel=1e-6) == S
     assert np.sort_complex(E) == pytest.approx(np.sort_complex(E_c), rel=1e-6)
-    assert pytest.approx(K_c, rel=1e-6) == up.lqr(model.A, model.B, [1, 0, 10, 0], 2.0).K
+    assert pytest.approx(K_c, rel=1e-6) == up.lqr((model.A, model.B), [1, 0, 10, 0], 2.0).K
     sampled = control.c2d(model.to_control(), 0.01)
     assert pytest.approx(control.dlqr(sampled, Q, R)[0], rel=1e-6) == up.lqr(sampled, Q, R).K
 
@@ -148,17 +150,24 @@ def test_least_cost_agrees_with_python_control():
 @pytest.mark.parametrize(
     ("call", "sentence"),
     [
-        (lambda m: up.place(), "no model came"),
-        (lambda m: up.place(m), "0 of 1"),
+        (lambda m: up.place(), r"place\(model, poles\): missing a required argument: 'model'"),
+        (lambda m: up.place(m), "missing a required argument: 'poles'"),
         (lambda m: up.place(m, [-1, -2]), "poles"),
         (lambda m: up.place(up.Furuta(**FURUTA), POLES), r'\.linear\("inverted"\)'),
-        (lambda m: up.place([[0, 1], [1, 0]], [[1], [2], [3]], [-1, -2]), "shape"),
+        (lambda m: up.place(([[0, 1], [1, 0]], [[1], [2], [3]]), [-1, -2]), "shape"),
         (lambda m: up.lqr(m, [1, 2], 1.0), "Q needs shape"),
         (lambda m: up.lqr(m, "a,b,c,d", 1.0), "Q takes numbers"),
         (lambda m: up.simulate(up.Furuta), "a plant with numbers"),
         (lambda m: up.simulate(up.Furuta(**FURUTA), start={"thetaa": 1}), "did you mean 'theta'"),
         (lambda m: up.simulate(up.Furuta(**FURUTA), [1, 2]), "need shape"),
         (lambda m: up.simulate(up.Furuta(**FURUTA), seconds=-1), "above 0"),
+        (lambda m: up.simulate(up.Furuta(**FURUTA), start=[0.1, 0]), "or 4 numbers: psi, psi_dot, theta, theta_dot"),
+        (lambda m: up.simulate(up.Furuta(**FURUTA), up.place(m, POLES), at="hanging"), "which is inverted"),
+        (lambda m: up.simulate(up.Furuta(**FURUTA), slow(m), dt=1e-3), "for a period of 20 ms, and dt is 1 ms"),
+        (lambda m: up.Pendulum(m_p="100 m", l_cg=0.1), "mass of the pendulum|kg"),
+        (lambda m: up.Pendulum(m_p=None, l_cg=0.1), "a number in kg or a text with its unit"),
+        (lambda m: up.survey(3), "a CSV file or a pandas DataFrame"),
+        (lambda m: up.observer(m, [0.1]), "hold\\(model, period\\)"),
         (lambda m: up.simulate(up.Furuta(**FURUTA), actuator={"gian": 1}), "did you mean 'gain'"),
         (lambda m: up.chance(3, [1, 2, 3, 4]), "what up.identify answered"),
     ],
@@ -166,6 +175,73 @@ def test_least_cost_agrees_with_python_control():
 def test_a_wrong_argument_gets_one_sentence(call, sentence):
     with pytest.raises(up.BadInput, match=sentence):
         call(up.Furuta(**FURUTA).linear("inverted"))
+
+
+def slow(model):
+    """Gains for the model at samples of 20 ms."""
+    return up.place(up.hold(model, "20 ms"), np.exp(0.02 * np.array(POLES)))
+
+
+def test_gains_of_a_sampled_model_close_the_loop_about_its_point_at_its_period():
+    """Poles in z are those of the motion from sample to sample: 20 ms decay as exp(-3 t) in the end."""
+    rig = up.Furuta(**FURUTA)
+    run = up.simulate(rig, slow(rig.linear("inverted")), start=[0, 0, 1e-4, 0], seconds="4 s")
+    assert run.period == pytest.approx(0.02)
+    assert np.abs(run["theta"][-1] - np.pi) < 1e-4 * 20 * np.exp(-3 * 4)
+
+
+def test_a_law_that_was_designed_upright_starts_and_stays_upright():
+    rig = up.Furuta(**FURUTA)
+    law = up.design(rig.linear("inverted"), poles="-4+-2j, -17, -3", period="5 ms", limit=5).law
+    for at in (None, "inverted"):
+        run = up.simulate(rig, law, at=at, start={"theta": "2 deg"}, seconds=4)
+        assert run.period == pytest.approx(0.005)
+        assert run["theta"][-1] == pytest.approx(np.pi, abs=1e-4)
+    with pytest.raises(up.BadInput, match="regulates about"):
+        up.simulate(rig, law, at="hanging")
+
+
+def test_loose_matrices_are_read_for_one_version_with_a_warning():
+    with pytest.deprecated_call(match="place\\(\\(A, B\\), ...\\)"):
+        assert pytest.approx(np.array([[10.0, 5.0]])) == up.place([[0, 1], [4, 0]], [0, 1], [-2, -3]).K
+
+
+def test_a_plant_takes_its_numbers_with_their_units():
+    assert up.Pendulum(m_p="100 g", l_cg="20 cm", J_p=1e-3).parameters() == (
+        up.Pendulum(m_p=0.1, l_cg=0.2, J_p=1e-3).parameters()
+    )
+
+
+def test_gains_unpack_as_python_controls_do():
+    K, S, E = up.place(([[0, 1], [4, 0]], [0, 1]), [-2, -3])
+    assert S is None  # no cost was minimised
+    assert sorted(E.real) == pytest.approx([-3, -2])
+    assert pytest.approx(np.array([[10.0, 5.0]])) == K
+
+
+def test_effort_that_costs_nothing_settles_in_one_sample():
+    """R = 0: the cost of a scalar model is least where the next state is 0, K = a/b, at the cost of this sample."""
+    K, S, _ = up.dlqr(([[1.3]], [[0.5]]), [2.0], 0.0)
+    assert (K[0, 0], S[0, 0]) == pytest.approx((2.6, 2.0))
+
+
+def test_effort_that_costs_nothing_is_the_limit_of_effort_that_costs_little():
+    """The Riccati difference equation with R = 0, run to its end, on a model of three states."""
+    rng = np.random.default_rng(4)
+    A, B, Q = rng.normal(size=(3, 3)), rng.normal(size=(3, 2)), np.diag([1.0, 2.0, 0.5])
+    X = Q
+    for _ in range(500):
+        X = Q + A.T @ X @ A - A.T @ X @ B @ np.linalg.solve(B.T @ X @ B, B.T @ X @ A)
+    K, S, _ = up.dlqr((A, B), Q, [0.0, 0.0])
+    np.testing.assert_allclose(S, X, rtol=1e-8, atol=1e-10)
+    np.testing.assert_allclose(K, np.linalg.solve(B.T @ X @ B, B.T @ X @ A), rtol=1e-8, atol=1e-10)
+
+
+def test_a_survey_is_read_from_a_frame_as_from_its_file(tmp_path):
+    pd = pytest.importorskip("pandas")
+    frame = pd.DataFrame({"id": [1, 2, 3], "feedback pre": [1, 2, 2], "feedback post": [3, 3, 4]})
+    frame.to_csv(tmp_path / "survey.csv", index=False)
+    assert up.survey(frame).numbers["found"] == up.survey(tmp_path / "survey.csv").numbers["found"]
 
 
 def test_a_small_motion_in_the_loop_decays_as_its_poles_say():

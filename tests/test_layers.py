@@ -67,7 +67,7 @@ FLOOR = {room: floor for floor, line in enumerate(FLOORS.split("\n")) for room i
 # What a room has no business to know although it stands above it.
 BLIND = {
     "systems": {"units", "signals", "records", "readers"},
-    "physics": {"units", "signals", "records", "readers"},
+    "physics": {"signals", "records", "readers"},
     "laws": {"units", "signals", "records", "readers", "physics", "systems"},
     "simulation.lowering": {"units", "signals", "records", "readers", "physics", "laws"},
     "simulation.kernel": {"units", "signals", "records", "readers"},

@@ -20,7 +20,7 @@ Log         read, show, doctor, init, law; Record
 Runs        run, rig_doctor, rig_check; log_show, log_tail, log_recover, log_convert, log_replay
 Model       identify, predict, ladder, frequency, loadings, plan_inertias
 Plants      Pendulum, CartPendulum, Furuta, DoublePendulum, DoublePendulumAbsolute, FlexibleLink, chain
-Control     place, lqr, dlqr, prefilter, hold, margins, simulate, chance, design, export,
+Control     StateSpace, place, lqr, dlqr, prefilter, hold, observer, margins, simulate, chance, design, export,
             regulate, swing_up, track; Law, Rule
 Course      lab, reproduce, survey
 Own plants  Plant, Coordinate, Input, Joint, quantity
@@ -53,12 +53,13 @@ if TYPE_CHECKING:
     )
     from upright.quantities import quantity
     from upright.records import Record
+    from upright.systems import StateSpace
     from upright.verbs.chance import chance
     from upright.verbs.control import design, regulate, swing_up, track
     from upright.verbs.course import lab, reproduce, survey
     from upright.verbs.export import export
     from upright.verbs.fitting import identify
-    from upright.verbs.linear.feedback import dlqr, hold, lqr, margins, place, prefilter
+    from upright.verbs.linear.feedback import dlqr, hold, lqr, margins, observer, place, prefilter
     from upright.verbs.log import doctor, init, law, read, show
     from upright.verbs.logs import log_convert, log_recover, log_replay, log_show, log_tail
     from upright.verbs.model import frequency, ladder, loadings, plan_inertias, predict
@@ -92,7 +93,8 @@ _HOMES = {
     "verbs.rig": ("rig_check", "rig_doctor", "run"),
     "verbs.log": ("doctor", "init", "law", "read", "show"),
     "verbs.logs": ("log_convert", "log_recover", "log_replay", "log_show", "log_tail"),
-    "verbs.linear.feedback": ("dlqr", "hold", "lqr", "margins", "place", "prefilter"),
+    "systems": ("StateSpace",),
+    "verbs.linear.feedback": ("dlqr", "hold", "lqr", "margins", "observer", "place", "prefilter"),
     "verbs.fitting": ("identify",),
     "verbs.model": ("frequency", "ladder", "loadings", "plan_inertias", "predict"),
     "verbs.motion": ("simulate",),
@@ -102,9 +104,10 @@ _HOME = {name: home for home, names in _HOMES.items() for name in names}
 __all__ = [
     "BadInput", "CartPendulum", "Coordinate", "DoublePendulum", "DoublePendulumAbsolute", "FlexibleLink", "Furuta",
     "ImpossiblePhysics", "Input", "Joint", "Law", "NotIdentifiable", "Pendulum", "Plant", "Record", "Rule",
+    "StateSpace",
     "UprightError", "__version__", "chain", "chance", "design", "dlqr", "doctor", "export", "frequency", "hold",
     "identify", "init", "lab", "ladder", "law", "loadings", "log_convert", "log_recover", "log_replay", "log_show",
-    "log_tail", "lqr", "margins", "place", "plan_inertias", "predict", "prefilter", "quantity", "read", "regulate",
+    "log_tail", "lqr", "margins", "observer", "place", "plan_inertias", "predict", "prefilter", "quantity", "read", "regulate",
     "reproduce", "rig_check", "rig_doctor", "run", "show", "simulate", "survey", "swing_up", "track",
 ]  # fmt: skip
 

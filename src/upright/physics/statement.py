@@ -98,7 +98,19 @@ class Statement:
 
     def __post_init__(self) -> None:
         for name, what in quantities(self).items():
-            what.check(name, float(getattr(self, name)))
+            value = getattr(self, name)
+            if isinstance(value, str):
+                from upright.units import parse
+
+                value = parse(value, what.unit)
+                object.__setattr__(self, name, value)
+            try:
+                what.check(name, float(value))
+            except TypeError:
+                raise BadInput(
+                    f"{name} ({what.meaning}) must be a number in {what.unit} or a text with its unit, got "
+                    f"{value!r:.40}."
+                ) from None
 
     @staticmethod
     def energies(p: Any, q: Any, v: Any) -> tuple[Any, Any, Any]:

@@ -77,7 +77,12 @@ def read(path: Path, *, scale: tuple[int, int] = (1, 4)) -> Ratings | Means | Sh
     BadInput
         When the table is none of these, a rating is off the scale, or a person answers twice.
     """
-    header, rows = cells_of(path)
+    return read_table(decoded(path), path.name, scale=scale)
+
+
+def read_table(text: str, name: str, *, scale: tuple[int, int] = (1, 4)) -> Ratings | Means | Shares:
+    """The same of text that separates its cells so; `name` is what errors call it."""
+    header, rows = cells_of(text, name)
     words = [set(_words(h)) for h in header]
     if sum(h.strip().lower().replace("’", "'") in LIKERT for h in header) >= 3:
         return _shares(header, rows)
@@ -87,11 +92,11 @@ def read(path: Path, *, scale: tuple[int, int] = (1, 4)) -> Ratings | Means | Sh
     if when is not None and item is not None and answer is not None:
         person = _find(words, _PERSON)
         if person is None:
-            raise BadInput(f"'{path.name}': one row per answer needs a column that names the person, such as 'id'.")
+            raise BadInput(f"'{name}': one row per answer needs a column that names the person, such as 'id'.")
         return _long(rows, person, item, when, answer, scale)
     if not any(w & (_BEFORE | _AFTER) for w in words) and not _agreement(rows):
         raise BadInput(
-            f"'{path.name}' needs columns such as 'feedback pre' and 'feedback post', a column 'time' with pre and post"
+            f"'{name}' needs columns such as 'feedback pre' and 'feedback post', a column 'time' with pre and post"
             f" beside 'item' and 'rating', or agreement in words; it has {', '.join(header)[:120]}."
         )
     if item is not None and _find(words, _PERSON) is None:
@@ -234,23 +239,26 @@ def _shares(header: list[str], rows: Sequence[tuple[int, list[str]]]) -> Shares:
     return Shares(options=tuple(header[c] for c in columns), rows=tuple(found))
 
 
-def cells_of(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """Header and rows with their line numbers, blank rows left out."""
+def decoded(path: Path) -> str:
+    """Text of a file in UTF-8, UTF-16 or Windows' own encoding."""
     data = read_bytes(path, most=64)
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        text = data.decode("utf-16", errors="replace")
-    else:
-        try:
-            text = data.decode("utf-8-sig")
-        except UnicodeDecodeError:
-            text = data.decode("cp1252", errors="replace")
+        return data.decode("utf-16", errors="replace")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", errors="replace")
+
+
+def cells_of(text: str, name: str) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """Header and rows with their line numbers, blank rows left out."""
     lines = text.splitlines()
     skip = 0
     delimiter = ""
     if lines and (declared := re.fullmatch(r'"?sep=(.)"?', lines[0].strip())):
         delimiter, skip = declared[1], 1
     if len(lines) < skip + 2:
-        raise BadInput(f"'{path.name}' needs a line of headings and at least one row, and has {len(lines)} lines.")
+        raise BadInput(f"'{name}' needs a line of headings and at least one row, and has {len(lines)} lines.")
     bare = re.sub(r'"[^"]*"', "", lines[skip])
     delimiter = delimiter or max(";,\t", key=bare.count)
     table = list(csv.reader(lines[skip:], delimiter=delimiter))
@@ -262,13 +270,13 @@ def cells_of(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
             continue
         if len(cells) > len(header) and any(cells[len(header) :]):
             raise BadInput(
-                f"'{path.name}', line {number}: {len(cells)} cells under {len(header)} headings; a comma inside a text"
+                f"'{name}', line {number}: {len(cells)} cells under {len(header)} headings; a comma inside a text"
                 " needs quotes."
             )
         cells = (cells + [""] * len(header))[: len(header)]
         rows.append((number, [c.replace(",", ".") if delimiter == ";" and is_number(c) else c for c in cells]))
     if not rows:
-        raise BadInput(f"'{path.name}' has headings and no answers.")
+        raise BadInput(f"'{name}' has headings and no answers.")
     return header, rows
 
 

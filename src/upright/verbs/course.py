@@ -20,6 +20,8 @@ from upright.verbs.pages import folder_if_given, write_page
 from upright.verbs.values import texts
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from upright.experiments.hands_on.rig import RigAtHand
     from upright.experiments.laboratory import Session
     from upright.paper.reproduce import Reproduced
@@ -222,14 +224,14 @@ def reproduce(
 
 @keeps_its_inputs
 def survey(
-    file: str | os.PathLike[str], *, n: int | None = None, scale: str | tuple[int, int] = "1-4",
+    file: str | os.PathLike[str] | DataFrame, *, n: int | None = None, scale: str | tuple[int, int] = "1-4",
     out: str | os.PathLike[str] | None = None, pdf: bool = False,
 ) -> Answer[Ratings | Means | Shares]:  # fmt: skip
     """What ratings before and after a course say, and agreement with statements; printed summaries are checked.
 
     Parameters
     ----------
-    file : path
+    file : path or pandas.DataFrame
         CSV as a spreadsheet writes it: one row per person, one per answer, or what was printed.
     n : int, optional
         Answers behind printed means or shares, at least 2.
@@ -251,12 +253,11 @@ def survey(
         When the sheet cannot be read, or it is not told on how many answers it rests.
     """
     from upright.questionnaire.chapter import chapter
-    from upright.questionnaire.sheet import Ratings, read
+    from upright.questionnaire.sheet import Ratings, read, read_table
     from upright.report.page import Step
     from upright.report.symbols import typed
 
     at = folder_if_given(out, pdf)
-    file = Path(file)
     if n is not None and n < 2:
         raise BadInput(f"--n needs a whole number of at least 2, got {n}.")
     said = scale if isinstance(scale, str) else f"{scale[0]}-{scale[1]}"
@@ -264,16 +265,22 @@ def survey(
     if ends is None or int(ends[1]) >= int(ends[2]):
         raise BadInput(f"--scale needs its two ends, such as 1-4, got '{said}'.")
     limits = (int(ends[1]), int(ends[2]))
-    sheet = read(file, scale=limits)
+    if isinstance(file, str | os.PathLike):
+        file = Path(file)
+        sheet, name, command = read(file, scale=limits), file.name, f"upright survey {typed(file)}"
+    elif hasattr(file, "to_csv"):
+        sheet, name, command = read_table(file.to_csv(index=bool(file.index.name)), "frame", scale=limits), "frame", ""
+    else:
+        raise BadInput(f"survey takes a CSV file or a pandas DataFrame, got {type(file).__name__}.")
     if isinstance(sheet, Ratings):
         if n is not None:
-            raise BadInput(f"--n is for printed summaries; '{file.name}' holds single answers, which are counted.")
+            raise BadInput(f"--n is for printed summaries; '{name}' holds single answers, which are counted.")
     elif n is None:
-        raise BadInput(f"'{file.name}' holds printed numbers; say with --n how many answers they are said to rest on.")
-    again = f"upright survey {typed(file)}{'' if n is None else f' --n {n}'} --json"
+        raise BadInput(f"'{name}' holds printed numbers; say with --n how many answers they are said to rest on.")
+    again = f"{command}{'' if n is None else f' --n {n}'} --json"
     told = chapter(
-        sheet, title=f"Survey: {file.stem.replace('_', ' ')}", source=file.name, answers=n, scale=limits,
-        steps=(Step("Hand the numbers on.", again),),
+        sheet, title=f"Survey: {Path(name).stem.replace('_', ' ')}", source=name, answers=n, scale=limits,
+        steps=(Step("Hand the numbers on.", again),) if command else (),
     )  # fmt: skip
     files = [] if at is None else write_page(told, at / "report.html", pdf)
     return Answer(sheet, replace(told, numbers={**told.numbers, "report": str(files[0]) if files else ""}), files)

@@ -19,9 +19,9 @@ Array = NDArray[np.float64]
 
 
 def simulate(
-    plant: Any, law: Any = None, *, start: Mapping[str, Any] | None = None, seconds: float = 5.0, at: str | None = None,
-    u: float | Callable[[float], Any] | ArrayLike | None = None, dt: float = 1e-3, limit: float = math.inf,
-    counts: float | Mapping[str, float] | None = None, memory: float = 0.0,
+    plant: Any, law: Any = None, *, start: Mapping[str, Any] | ArrayLike | None = None, seconds: float | str = 5.0,
+    at: str | None = None, u: float | Callable[[float], Any] | ArrayLike | None = None, dt: float | str | None = None,
+    limit: float = math.inf, counts: float | Mapping[str, float] | None = None, memory: float = 0.0,
     actuator: Mapping[str, float] | None = None,
 ) -> Record:  # fmt: skip
     """Motion of a plant, free, driven, or with its loop closed by gains or a law.
@@ -31,15 +31,16 @@ def simulate(
     plant : Plant, or what has one, such as a fit
     law : Gains, array of gains, Law or Rule, optional
         Gains act on readings sampled every `dt`, less the equilibrium, and on their differences.
-    start : mapping of state to number or text, optional
-        Deviation from the equilibrium at the first instant: ``{"theta": 0.2}`` or ``{"theta": "12 deg"}``.
-    seconds : float
+    start : mapping of state to number or text, or array, shape (states,), optional
+        Deviation from the equilibrium at the first instant: ``{"theta": 0.2}``, ``{"theta": "12 deg"}``, ``[0.2, 0]``.
+    seconds : float or str
+        Length of the motion [s], or as ``"2 s"``.
     at : str, optional
-        Equilibrium; where the gains were designed, else the plant's first.
+        Equilibrium; the one that gains or law are for, else the plant's first.
     u : float, callable of time, or array, shape (N,) or (N, inputs), optional
         Command, in the unit of the input; it is added to the law's.
-    dt : float
-        Between samples [s].
+    dt : float or str, optional
+        Between samples [s]; the period that gains or law are for, else 1 ms.
     limit : float
         Largest command.
     counts : float or mapping of coordinate to float, optional
@@ -57,16 +58,18 @@ def simulate(
     Raises
     ------
     BadInput
-        When a name, a size or a number does not fit the plant.
+        When a name, a size or a number does not fit the plant, or gains or law are for another equilibrium or period.
     """
     from upright.physics.actuator import ACTUATOR
     from upright.simulation import simulate as motion
+    from upright.verbs.values import si
 
     plant = _plant(plant)
     point = _point(plant, law, at)
+    seconds, dt = si(seconds, "s"), _period(law, None if dt is None else si(dt, "s"))
     names = plant.state_names()
     units = [unit for c in plant.coordinates for unit in (c.unit, f"{c.unit}/s")]
-    x0 = _start(names, units, point, start or {})
+    x0 = _start(names, units, point, {} if start is None else start)
     if not (seconds > 0 and dt > 0 and seconds / dt < 1e8):
         raise BadInput(f"simulate needs seconds and dt above 0, got seconds={seconds:g} and dt={dt:g}.")
     samples = round(seconds / dt) + 1
@@ -106,19 +109,66 @@ def _plant(given: Any) -> Plant:
 
 
 def _point(plant: Plant, law: Any, at: str | None) -> dict[str, float]:
-    """Coordinates of the equilibrium that a motion is told from."""
-    if at is None and isinstance(law, Gains) and law.point is not None:
-        return {**plant.equilibrium(), **law.point}
-    return plant.equilibrium(at)
+    """Coordinates of the equilibrium about which a motion begins: the one named, or the one that the law is for."""
+    here, wanted = _own_point(plant, law), plant.equilibrium(at)
+    if here is None or (at is None and not isinstance(law, Law)):
+        return wanted if here is None else {**wanted, **here}
+    nearest_one = min(plant.equilibria, key=lambda name: _apart(plant.equilibrium(name), here))
+    if at is None:
+        return plant.equilibrium(nearest_one)
+    if _apart(wanted, here) > _apart(plant.equilibrium(nearest_one), here):
+        where = ", ".join(f"{name} = {value:.4g}" for name, value in here.items())
+        kind = "law" if isinstance(law, Law) else "loop of these gains"
+        raise BadInput(
+            f"the {kind} regulates about {where}, which is {nearest_one}, and the motion is to begin {at}; linearize "
+            f'there, .linear("{at}"), or pass the bare array to run it all the same.'
+        )
+    return wanted
 
 
-def _start(names: Sequence[str], units: Sequence[str], point: Mapping[str, float], start: Mapping[str, Any]) -> Array:
+def _own_point(plant: Plant, law: Any) -> dict[str, float] | None:
+    """Equilibrium that gains or a law are for, None where they do not say."""
+    if isinstance(law, Gains):
+        return None if law.point is None else {k: v for k, v in law.point.items() if k in plant.equilibrium()}
+    names = [c.name for c in plant.coordinates]
+    if not isinstance(law, Law) or law.readings != len(names) or np.ndim(law.target) > 1 or np.ndim(law.D) > 2:
+        return None
+    target = np.broadcast_to(np.asarray(law.target, dtype=np.float64), (len(names),))
+    return dict(zip(law.measured or names, target.tolist(), strict=True))
+
+
+def _apart(one: Mapping[str, float], other: Mapping[str, float]) -> float:
+    return sum(abs(one[name] - other[name]) for name in other if name in one)
+
+
+def _period(law: Any, dt: float | None) -> float:
+    """Time between samples: the one asked for, or the one that gains or a law are for."""
+    own = (law.period if isinstance(law, Gains | Law | Rule) else None) or None
+    if dt is not None and own is not None and not math.isclose(dt, own, rel_tol=1e-6):
+        raise BadInput(
+            f"these gains are for a period of {1e3 * own:.6g} ms, and dt is {1e3 * dt:.6g} ms; leave dt out, design "
+            "for that period, or pass the bare array K to run it all the same."
+        )
+    return dt or own or 1e-3
+
+
+def _start(names: Sequence[str], units: Sequence[str], point: Mapping[str, float], start: Any) -> Array:
     from upright.units import parse
 
     x = np.zeros(len(names))
     for name, value in point.items():
         x[names.index(name)] = value
-    for name, value in start.items():
+    if not isinstance(start, Mapping):
+        try:
+            aside = np.asarray(start, dtype=np.float64)
+        except (TypeError, ValueError):
+            aside = np.zeros(0)
+        if aside.shape != (len(names),):
+            raise BadInput(f"start is a deviation by state, such as {{'{names[0]}': 0.1}}, or {len(names)} numbers: "
+                           f"{', '.join(names)}; got {start!r:.40}.")  # fmt: skip
+        return x + aside
+    deviations: Mapping[str, Any] = start
+    for name, value in deviations.items():
         if name not in names:
             raise BadInput(f"start names states, got '{name}'; {nearest(name, names)} (they are {', '.join(names)})")
         i = names.index(name)

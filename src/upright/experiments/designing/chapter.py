@@ -212,13 +212,13 @@ def _numbers(done: Designed) -> dict[str, Any]:
 def _readings(done: Designed) -> list[dict[str, Any]]:
     """What the law reads, one by one: encoder's step, sign and zero as described, and the reading at rest."""
     rig, said = done.rig, done.wish.said
-    rest = rig.plant.equilibrium(done.wish.at) if isinstance(rig, IdentifiedRig) else {}
+    rest = dict(zip(rig.outputs, np.ravel(done.law.target).tolist(), strict=True))
     steps = dict(zip(rig.outputs, done.wish.quantum, strict=False))
     return [
         {
             "name": name,
             "unit": unit,
-            "at_rest": rest.get(name, 0.0),
+            "at_rest": rest[name],
             "step": steps.get(name, 0.0),
             "sign": 1.0 if said is None else said.value(f"sign.{name}", 1.0),
         }

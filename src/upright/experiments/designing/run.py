@@ -216,7 +216,7 @@ def design_for(rig: IdentifiedRig | StateSpace, wish: DesignRequest) -> Designed
         i = rig.outputs.index(wish.track)
         D = float(model.D[i, 0])
         k_pf = prefilter(model.A, model.B, model.C[i], used, D=D, sampled=model.dt is not None)
-    law = feedback(ways[speed], used, k_pf or 0.0)
+    law = replace(feedback(ways[speed], used, k_pf or 0.0), target=at_rest(model))
     t, x, u = _way_back(model, K, start)
     loops = {s: _velocity_loop(model, sampled, e, used, quantum) for s, e in ways.items()}
     cloud, chance = _cloud(rig, wish, sampled, law)
@@ -227,6 +227,12 @@ def design_for(rig: IdentifiedRig | StateSpace, wish: DesignRequest) -> Designed
         peak_sampled=_peak(sampled, law, start, float(t[-1])),
         swing=(t, x @ model.C.T + u @ model.D.T, u), chance=chance, cloud=cloud,
     )  # fmt: skip
+
+
+def at_rest(model: StateSpace) -> Array:
+    """Readings at the point about which a model holds; zero where it names none."""
+    point = model.point or {}
+    return np.array([point.get(name, 0.0) for name in model.outputs], dtype=np.float64)
 
 
 def _plain(model: StateSpace) -> StateSpace:
