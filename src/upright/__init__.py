@@ -107,8 +107,8 @@ __all__ = [
     "StateSpace",
     "UprightError", "__version__", "chain", "chance", "design", "dlqr", "doctor", "export", "frequency", "hold",
     "identify", "init", "lab", "ladder", "law", "loadings", "log_convert", "log_recover", "log_replay", "log_show",
-    "log_tail", "lqr", "margins", "observer", "place", "plan_inertias", "predict", "prefilter", "quantity", "read", "regulate",
-    "reproduce", "rig_check", "rig_doctor", "run", "show", "simulate", "survey", "swing_up", "track",
+    "log_tail", "lqr", "margins", "observer", "place", "plan_inertias", "predict", "prefilter", "quantity", "read",
+    "regulate", "reproduce", "rig_check", "rig_doctor", "run", "show", "simulate", "survey", "swing_up", "track",
 ]  # fmt: skip
 
 
