@@ -2,12 +2,13 @@
 
 import json
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from tests.logs.runs import written
+from tests.logs.runs import HEADER, written
 from upright.cli import app
 
 STUDY = """\
@@ -173,3 +174,10 @@ def test_a_file_of_no_known_ending_is_written_or_a_sentence(here, command, out):
         assert f"file ending in .{'csv' if 'convert' in command else 'svg'}" in done.stderr
         assert out in done.stderr
     assert (here / out).exists() == (done.exit_code != 2)
+
+
+def test_a_replay_of_a_rule_without_an_end_is_a_sentence(here, monkeypatch):
+    monkeypatch.setattr("upright.logs.replay.PATIENCE", (0.3, 0.0))
+    law = {"kind": "rule", "text": "def f(t, y, r, z, p):\n while True: pass"}
+    (here / "run.mcap").write_bytes(written(50, header=replace(HEADER, law=law)))
+    assert "the rule of 'run.mcap' was stopped" in sentence("log", "replay", "run.mcap")
