@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 from tests.logs.runs import HEADER, written
 from upright.cli import app
+from upright.identification.frequency.response import MARK
 
 STUDY = """\
 [rig]
@@ -181,3 +182,9 @@ def test_a_replay_of_a_rule_without_an_end_is_a_sentence(here, monkeypatch):
     law = {"kind": "rule", "text": "def f(t, y, r, z, p):\n while True: pass"}
     (here / "run.mcap").write_bytes(written(50, header=replace(HEADER, law=law)))
     assert "the rule of 'run.mcap' was stopped" in sentence("log", "replay", "run.mcap")
+
+
+def test_a_response_of_lists_in_one_another_is_a_sentence(here):
+    lists = "[" * 100_000 + "]" * 100_000
+    (here / "frequency.csv").write_text(f"{MARK}\n# {lists}\nomega\n1\n", encoding="utf-8")
+    assert "frequency.csv" in sentence("frequency", "frequency.csv")
