@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from upright.errors import BadInput
-from upright.files import check_output, keeps_its_inputs, read_bytes, read_text, replace_file
+from upright.files import check_output, keeps_its_inputs, read_bytes, read_text, replace_file, whole_file
 from upright.identification.frequency.response import FrequencyResponse, is_response
 from upright.questionnaire.sheet import read as read_sheet
 from upright.readers import read
@@ -117,6 +117,63 @@ def test_a_call_may_rewrite_what_it_wrote_itself_and_the_next_call_what_this_one
     replace_file(path, read_bytes(tmp_path / "new"))
     grow(b"b")
     assert (tmp_path / "new").read_bytes() == b"aabb"
+
+
+@posix
+def test_a_link_planted_under_the_name_of_an_unfinished_file_is_not_followed(tmp_path):
+    """As a neighbour in a shared folder may plant it, who knows what will be written."""
+    victim = tmp_path / "victim"
+    victim.write_bytes(b"of somebody else")
+    (tmp_path / ".fit.json.part").symlink_to(victim)
+    replace_file(tmp_path / "fit.json", b"a fit")
+    assert victim.read_bytes() == b"of somebody else"
+    assert (tmp_path / "fit.json").read_bytes() == b"a fit"
+    assert not (tmp_path / "fit.json").is_symlink()
+    assert (tmp_path / ".fit.json.part").is_symlink()
+
+
+def test_an_unfinished_file_has_another_name_each_time_and_is_gone_in_the_end(tmp_path):
+    names = set()
+
+    def write(content, error=None):
+        with whole_file(tmp_path / "fit.json") as half:
+            assert half.parent == tmp_path
+            names.add(half.name)
+            half.write_bytes(content)
+            if error:
+                raise error
+
+    for _ in range(3):
+        write(b"a fit")
+        with pytest.raises(KeyboardInterrupt):
+            write(b"half a fit", KeyboardInterrupt)
+    assert len(names) == 6
+    assert [p.name for p in tmp_path.iterdir()] == ["fit.json"]
+    assert (tmp_path / "fit.json").read_bytes() == b"a fit"
+
+
+@posix
+@pytest.mark.parametrize(("before", "after"), [(None, 0o640), (0o600, 0o600), (0o664, 0o664), (0o444, 0o444)])
+def test_a_new_file_has_the_usual_permissions_and_a_replaced_one_keeps_its_own(before, after, tmp_path):
+    """0o666 less a mask of 0o027 is 0o640; nobody may read more of a private file while it is written either."""
+    path = tmp_path / "fit.json"
+    usual = os.umask(0o027)
+    try:
+        if before is not None:
+            path.write_bytes(b"before")
+            path.chmod(before)
+        with whole_file(path) as half:
+            assert half.stat().st_mode & 0o077 & ~after == 0
+            half.write_bytes(b"after")
+    finally:
+        os.umask(usual)
+    assert (path.read_bytes(), path.stat().st_mode & 0o777) == (b"after", after)
+
+
+def test_a_name_as_long_as_names_may_be_is_written(tmp_path):
+    """255 characters, as ext4, NTFS and APFS have it; what is written meanwhile has a shorter one."""
+    name = "x" * (255 if os.name == "posix" else 100)
+    assert replace_file(tmp_path / name, b"x").read_bytes() == b"x"
 
 
 def log_of(path, name="theta"):

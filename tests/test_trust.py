@@ -61,14 +61,12 @@ def met_before(monkeypatch):
     monkeypatch.setattr("upright.trust._SINCE_START", set())
 
 
-def test_code_is_announced_once_for_content_and_once_for_a_path(elsewhere, capsys, monkeypatch):
+def test_code_is_announced_once_for_its_content_wherever_it_lies(elsewhere, capsys, monkeypatch):
     load_study(elsewhere / "study.toml")
     said = capsys.readouterr().err
     assert "study.toml runs the Python code of" in said
     assert said.count("\n") == 1
     met_before(monkeypatch)
-    load_study(elsewhere / "study.toml")
-    (elsewhere / "mine.py").write_text(PLANT + "\n# my own next version\n", encoding="utf-8")
     load_study(elsewhere / "study.toml")
     (elsewhere.parent / "mine.py").write_text(PLANT, encoding="utf-8")
     (elsewhere.parent / "log.csv").write_bytes((elsewhere / "log.csv").read_bytes())
@@ -82,6 +80,22 @@ def test_code_is_announced_once_for_content_and_once_for_a_path(elsewhere, capsy
     (other / "mine.py").write_text(PLANT + "\n# of somebody else\n", encoding="utf-8")
     load_study(other / "study.toml")
     assert "was not met here before" in capsys.readouterr().err
+
+
+def test_code_that_changed_at_a_known_path_is_announced_as_changed(elsewhere, capsys, monkeypatch):
+    load_study(elsewhere / "study.toml")
+    capsys.readouterr()
+    for version in ("# first of somebody else", "# second of somebody else"):
+        met_before(monkeypatch)
+        (elsewhere / "mine.py").write_text(f"{PLANT}\n{version}\n", encoding="utf-8")
+        load_study(elsewhere / "study.toml")
+        said = capsys.readouterr().err
+        assert "mine.py, which has changed since it was met here; look into it" in said
+        assert said.count("\n") == 1
+        load_study(elsewhere / "study.toml")
+        met_before(monkeypatch)
+        load_study(elsewhere / "study.toml")
+        assert capsys.readouterr().err == ""
 
 
 def test_where_nothing_can_be_remembered_it_is_said_again(elsewhere, capsys, monkeypatch):

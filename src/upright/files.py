@@ -10,11 +10,12 @@ import math
 import os
 import stat
 from collections.abc import Callable, Generator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field, is_dataclass
 from functools import wraps
 from pathlib import Path
+from secrets import token_hex
 from typing import Any, ParamSpec, TypeVar
 
 from upright.errors import BadInput
@@ -141,6 +142,8 @@ def check_output(path: PathLike, *inputs: PathLike) -> Path:
 def whole_file(path: PathLike) -> Generator[Path]:
     """Where to write a file, which is put into its place at the end: nobody meets half of it, no input is replaced.
 
+    A file that is replaced keeps its permissions.
+
     Raises
     ------
     BadInput
@@ -148,15 +151,32 @@ def whole_file(path: PathLike) -> Generator[Path]:
     """
     path = check_output(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    half = path.with_name(f".{path.name}.part")
+    half, mode = _aside(path)
     try:
         yield half
+        if mode is not None:
+            with suppress(OSError):  # not every file system has permissions
+                half.chmod(mode)
         half.replace(path)
     finally:
         half.unlink(missing_ok=True)
     call = _CALL.get()
     if call is not None:
         call.written.add(_identity(path.stat()))
+
+
+def _aside(path: Path) -> tuple[Path, int | None]:
+    """A new empty file beside another, and the permissions that it is to have in the end, where it replaces one.
+
+    Nobody can foresee its name, and a link or a file that is there already is refused, not followed. Unlike those of
+    `tempfile.mkstemp`, its permissions are those of any new file, but for one that replaces a more private one.
+    """
+    mode = None
+    with suppress(OSError):  # there is none yet
+        mode = stat.S_IMODE(path.stat().st_mode) & 0o777 if os.name == "posix" else None
+    half = path.with_name(f".{path.name[:32]}.{token_hex(8)}.part")
+    os.close(os.open(half, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666 if mode is None else mode | stat.S_IWUSR))
+    return half, mode
 
 
 OWN_FILE = "upright_user_"

@@ -1,7 +1,7 @@
 """Whose Python code runs here? A study or a fit may name a plant in a file beside it, and to read it is to run it.
 
-A file is met for the first time when neither its content nor its path was met before by this user; that is said on
-stderr before it runs. With ``--no-code`` on the command line, or ``UPRIGHT_NO_CODE=1``, such files are refused.
+A file whose content this user has not met before, at a new path or changed at a known one, is announced on stderr
+before it runs. With ``--no-code`` on the command line, or ``UPRIGHT_NO_CODE=1``, such files are refused.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def no_code(refused: bool = True) -> Generator[None]:
 
 
 def before_running(plant: str, by: Path) -> None:
-    """Say, once for each file, that `by` (a study or a fit) runs the code of the plant that it names.
+    """Say, once for each content, that `by` (a study or a fit) runs the code of the plant that it names.
 
     Raises
     ------
@@ -59,10 +59,12 @@ def before_running(plant: str, by: Path) -> None:
     except OSError:
         return  # who reads it says so
     where = sha256(str(file.resolve()).encode(errors="replace")).hexdigest()
-    if not {content, where} & _met() and sys.stderr is not None:
+    met = _met()
+    if content not in met and sys.stderr is not None:
+        what = "has changed since it was met here" if where in met else "was not met here before"
         print(
-            f"upright: {by} runs the Python code of {file}, which was not met here before; look into it if it is from"
-            " somebody else (--no-code refuses it).",
+            f"upright: {by} runs the Python code of {file}, which {what}; look into it if it is from somebody else"
+            " (--no-code refuses it).",
             file=sys.stderr,
         )
     _remember(content, where)

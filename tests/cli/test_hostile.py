@@ -2,12 +2,15 @@
 
 import json
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from tests.logs.runs import HEADER, written
 from upright.cli import app
+from upright.identification.frequency.response import MARK
 
 STUDY = """\
 [rig]
@@ -153,3 +156,35 @@ def test_a_servo_of_a_million_samples_per_row_is_not_drawn(here):
     words = ("law", "loop.csv", "--command", "u", "--measured", "theta", "--every")
     assert "2000 rows of 1000000 samples each are 2e+09 samples of the servo" in sentence(*words, 1_000_000)
     assert run(*words, 2).exit_code == 0
+
+
+FILES = (
+    "show swing.csv", "doctor swing.csv", "init swing.csv", "plan-inertias", "log show run.mcap --plot",
+    "log recover run.mcap", "log convert run.mcap",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("command", FILES)
+@pytest.mark.parametrize("out", ["x.exe", "x"])
+def test_a_file_of_no_known_ending_is_written_or_a_sentence(here, command, out):
+    (here / "run.mcap").write_bytes(written(50))
+    done = run(*command.split(), "-o", out)
+    assert done.exit_code in (0, 2, 3), done.output
+    if done.exit_code == 2:
+        assert done.stderr.count("\n") == 1
+        assert f"file ending in .{'csv' if 'convert' in command else 'svg'}" in done.stderr
+        assert out in done.stderr
+    assert (here / out).exists() == (done.exit_code != 2)
+
+
+def test_a_replay_of_a_rule_without_an_end_is_a_sentence(here, monkeypatch):
+    monkeypatch.setattr("upright.logs.replay.PATIENCE", (0.3, 0.0))
+    law = {"kind": "rule", "text": "def f(t, y, r, z, p):\n while True: pass"}
+    (here / "run.mcap").write_bytes(written(50, header=replace(HEADER, law=law)))
+    assert "the rule of 'run.mcap' was stopped" in sentence("log", "replay", "run.mcap")
+
+
+def test_a_response_of_lists_in_one_another_is_a_sentence(here):
+    lists = "[" * 100_000 + "]" * 100_000
+    (here / "frequency.csv").write_text(f"{MARK}\n# {lists}\nomega\n1\n", encoding="utf-8")
+    assert "frequency.csv" in sentence("frequency", "frequency.csv")

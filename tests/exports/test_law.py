@@ -211,6 +211,196 @@ printf('%g %d\\n', b.SampleTimes(1), k);
     assert said("octave-cli", "--eval", "drive", cwd=folder).split() == ["0.002", str(len(rows))]
 
 
+GOOD = 4
+"""Samples before each bad one."""
+BAD = ("nan", "inf", "-inf")
+
+
+def interrupted(name: str) -> tuple[list[str], np.ndarray]:
+    """Lines of samples, "start" where the law is restarted, and the commands that every program has for them.
+
+    Every input (readings, then references) is NaN, Inf and -Inf once, after good samples and before others. Good ones
+    are answered as in the replay until the bad one comes, with zero from there on, and as in the replay after a start.
+    """
+    test = self_test(LAWS[name])
+    good = np.hstack([test.readings, test.references])[:GOOD]
+    rows = [[repr(x) for x in row] for row in good.tolist()]
+    lines, commands, zero = [], [], np.zeros_like(test.commands[:1])
+    for i in range(good.shape[1]):
+        for bad in BAD:
+            last = [*rows[-1][:i], bad, *rows[-1][i + 1 :]]
+            lines += ["start", *(" ".join(row) for row in (*rows, last, *rows))]
+            commands += [test.commands[:GOOD], *[zero] * (1 + GOOD)]
+    lines += ["start", *(" ".join(row) for row in rows)]
+    return lines, np.vstack([*commands, test.commands[:GOOD]])
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_python_gives_zero_after_a_reading_that_is_no_number(name, tmp_path):
+    lines, expected = interrupted(name)
+    scope: dict[str, object] = {"__name__": "law"}
+    exec((written(name, "python", tmp_path) / "law.py").read_text(encoding="utf-8"), scope)
+    commands, run, p = [], None, len(LAWS[name].readings)
+    for line in lines:
+        if line == "start":
+            run = scope["Law"]()  # type: ignore[operator]
+        else:
+            values = [float(word) for word in line.split()]
+            commands.append(run.step(values[:p], values[p:]))
+    np.testing.assert_array_equal(commands, expected)
+
+
+DRIVER = """
+#include "law.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+int main(void)
+{
+    char word[64];
+    double in[LAW_READINGS + LAW_REFERENCES];
+    law_real y[LAW_READINGS], r[LAW_REFERENCES + 1], u[LAW_COMMANDS];
+    law_state s;
+    int i = 0, j;
+    while (scanf("%63s", word) == 1) {
+        if (strcmp(word, "start") == 0) {
+            law_start(&s);
+            continue;
+        }
+        in[i++] = strtod(word, 0);
+        if (i < LAW_READINGS + LAW_REFERENCES)
+            continue;
+        for (i = 0; i < LAW_READINGS; i++)
+            y[i] = (law_real)in[i];
+        for (i = 0; i < LAW_REFERENCES; i++)
+            r[i] = (law_real)in[LAW_READINGS + i];
+        law_step(&s, y, r, u);
+        for (j = 0; j < LAW_COMMANDS; j++)
+            printf("%.17g ", (double)u[j]);
+        printf("\\n");
+        i = 0;
+    }
+    return 0;
+}
+"""
+"""Hands samples from its input to the law; compiled by itself, so that options for the law are the law's alone."""
+
+
+def driven(folder: Path, lines: list[str], *options: str) -> np.ndarray:
+    """Commands of the C law in a folder."""
+    (folder / "driver.c").write_text(DRIVER)
+    said("gcc", "-std=c99", *options, "-c", folder / "law.c", "-o", folder / "law.o")
+    said("gcc", "-std=c99", "-O1", "-c", folder / "driver.c", "-o", folder / "driver.o")
+    said("gcc", folder / "driver.o", folder / "law.o", "-o", folder / "driver", "-lm")
+    done = subprocess.run(
+        [folder / "driver"], input="\n".join(lines), capture_output=True, text=True, timeout=60, check=True
+    )
+    return np.loadtxt(done.stdout.splitlines(), ndmin=2)
+
+
+@needs("gcc")
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("single", [False, True], ids=["double", "single"])
+@pytest.mark.parametrize("options", ["-O2", "-O3 -ffast-math"])
+def test_c_gives_zero_after_a_reading_that_is_no_number(name, single, options, tmp_path):
+    """Whatever the compiler takes for granted of comparisons and of the order of sums."""
+    lines, expected = interrupted(name)
+    commands = driven(written(name, "c", tmp_path, single), lines, *options.split())
+    exact = not single and options == "-O2"
+    step = LAWS[name].converter.max()  # sums in another order may round to the next step
+    np.testing.assert_allclose(commands, expected, rtol=0, atol=0 if exact else self_test(LAWS[name]).single + step)
+    np.testing.assert_array_equal(commands[(expected == 0).all(axis=1)], 0.0)
+
+
+OCTAVE = """
+s = []; file = fopen('lines.txt');
+while ischar(line = fgetl(file))
+  if strcmp(line, 'start'), s = []; continue; end
+  v = sscanf(line, '%f');
+  if numel(v) > COUNT, [u, s] = law_step(s, v(1:COUNT), v(COUNT + 1:end)); else, [u, s] = law_step(s, v); end
+  printf('%.17g ', u); printf('\\n');
+end
+"""
+
+
+@needs("octave-cli")
+@pytest.mark.parametrize("name", ["pid", "dense"])
+@pytest.mark.parametrize("single", [False, True], ids=["double", "single"])
+def test_octave_gives_zero_after_a_reading_that_is_no_number(name, single, tmp_path):
+    """Whose `max(NaN, -limit)` is the largest command there is."""
+    lines, expected = interrupted(name)
+    folder = written(name, "matlab", tmp_path, single)
+    (folder / "lines.txt").write_text("\n".join(lines) + "\n")
+    (folder / "drive.m").write_text(OCTAVE.replace("COUNT", str(len(LAWS[name].readings))))
+    commands = np.loadtxt(said("octave-cli", "--eval", "drive", cwd=folder).splitlines(), ndmin=2)
+    np.testing.assert_allclose(commands, expected, rtol=0, atol=self_test(LAWS[name]).single if single else 0)
+    np.testing.assert_array_equal(commands[(expected == 0).all(axis=1)], 0.0)
+
+
+@needs("octave-cli")
+def test_the_s_function_gives_zero_until_the_model_is_started_again(tmp_path):
+    folder = written("filtered", "simulink", tmp_path)
+    (folder / "FakeBlock.m").write_text(SIMULINK)
+    test = self_test(LAWS["filtered"])
+    rows = np.hstack([test.readings, test.references, test.commands])[:GOOD]
+    np.savetxt(folder / "rows.txt", rows, fmt="%.17g")
+    script = """
+b = FakeBlock(); rows = load('rows.txt'); law_sfun(b); b.call('PostPropagationSetup');
+for bad = [NaN, Inf, -Inf]
+  b.call('Start');
+  for k = [1:size(rows, 1), -1, 1:size(rows, 1)]
+    y = rows(abs(k), 1:2).'; if k < 0, y(2) = bad; end
+    b.InputPort(1).Data = y; b.InputPort(2).Data = rows(abs(k), 3);
+    b.call('Outputs'); b.call('Update'); printf('%.17g\\n', b.OutputPort(1).Data);
+  end
+end
+"""
+    (folder / "drive.m").write_text(script)
+    found = [float(line) for line in said("octave-cli", "--eval", "drive", cwd=folder).splitlines()]
+    assert found == [*rows[:, 3].tolist(), *[0.0] * (1 + GOOD)] * 3
+
+
+@needs("gcc")
+@pytest.mark.parametrize("reading", ["1e308", "-1e308"])
+def test_a_command_that_overflows_is_none(reading, tmp_path):
+    """-3.3 times 1e308 is beyond the largest double, 1.8e308: there is no such command."""
+    lines = ["start", "1.0", reading, "1.0", "start", "1.0"]
+    commands = [-3.3, 0.0, 0.0, -3.3]
+    assert driven(written("proportional", "c", tmp_path), lines, "-O2")[:, 0].tolist() == commands
+    scope: dict[str, object] = {"__name__": "law"}
+    exec((written("proportional", "python", tmp_path) / "law.py").read_text(encoding="utf-8"), scope)
+    run = scope["Law"]()  # type: ignore[operator]
+    assert [run.step([float(y)])[0] for y in lines[1:4]] == commands[:3]
+
+
+FORGETFUL = {
+    "c": ("law.c", "s->stopped = 1;", "s->stopped = 0;"),
+    "python": ("law.py", "self.stopped = True", "self.stopped = False"),
+    "matlab": ("law_step.m", "s.stopped = true;", "s.stopped = false;"),
+}
+"""How each program would forget a bad reading."""
+
+
+@pytest.mark.parametrize(
+    "to", ["python", pytest.param("c", marks=needs("gcc")), pytest.param("matlab", marks=needs("octave-cli"))]
+)
+def test_the_replay_finds_a_law_that_forgets_a_bad_reading(to, tmp_path):
+    folder = written("filtered", to, tmp_path)
+    file, latched, forgotten = FORGETFUL[to]
+    text = (folder / file).read_text(encoding="utf-8")
+    assert latched in text
+    (folder / file).write_text(text.replace(latched, forgotten), encoding="utf-8")
+    if to == "c":
+        command = [compiled(folder, "-std=c99")]
+    else:
+        command = {"python": [sys.executable, "-I", folder / "law.py"]}.get(
+            to, ["octave-cli", "--path", folder, "--eval", "law_selftest"]
+        )
+    wrong = subprocess.run([*map(str, command)], capture_output=True, text=True, timeout=60, check=False)
+    assert wrong.returncode == 1
+    assert "is not the expected one; do not run it" in wrong.stdout + wrong.stderr
+
+
 def test_the_module_holds_the_simulated_rig_with_the_kernel_s_commands(tmp_path):
     """Closed loop of the nonlinear rig: what its encoders showed, given to the Python module, one by one."""
     law = replace(designed("filtered"), **REST, command_quantum=1e-3)

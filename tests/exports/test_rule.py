@@ -102,6 +102,49 @@ def test_c_repeats_every_command_bit_for_bit(name, compiler, options, tmp_path):
     assert PASSED in said(folder / "law")
 
 
+@pytest.mark.parametrize("bad", [float("nan"), float("inf"), -float("inf")])
+def test_python_gives_zero_after_a_reading_that_is_no_number(bad, tmp_path):
+    """The relay itself would give -1 for NaN, since NaN is not above zero."""
+    scope = {"__name__": "law"}
+    exec((written(BARE, "python", tmp_path) / "law.py").read_text(encoding="utf-8"), scope)
+    run = scope["Law"]()
+    assert [run.step([y]) for y in (2.0, -2.0, bad, 2.0, -2.0)] == [[1.0], [-1.0], [0.0], [0.0], [0.0]]
+    assert scope["Law"]().step([2.0]) == [1.0]
+
+
+RELAY = """
+#include "law.h"
+#include <math.h>
+int main(void)
+{
+    const double bad[] = {NAN, INFINITY, -INFINITY}, plus = 2.0, minus = -2.0;
+    double u;
+    law_state s;
+    int i;
+    for (i = 0; i < 3; i++) {
+        law_start(&s);
+        law_step(&s, &plus, 0, &u);
+        if (u != 1.0) return 1;
+        law_step(&s, &bad[i], 0, &u);
+        if (u != 0.0) return 2;
+        law_step(&s, &minus, 0, &u);
+        if (u != 0.0) return 3;
+    }
+    return 0;
+}
+"""
+
+
+@COMPILER
+@pytest.mark.parametrize("options", [["-O2"], ["-O3", "-ffast-math"]])
+def test_c_gives_zero_after_a_reading_that_is_no_number(options, tmp_path):
+    folder = written(BARE, "c", tmp_path)
+    (folder / "main.c").write_text(RELAY)
+    said("gcc", "-std=c99", *options, "-c", folder / "law.c", "-o", folder / "law.o")
+    said("gcc", "-std=c99", folder / "main.c", folder / "law.o", "-o", folder / "main", "-lm")
+    said(folder / "main")
+
+
 @pytest.mark.skipif(shutil.which("avr-gcc") is None, reason="no avr-gcc")
 def test_an_arduino_s_compiler_takes_it(tmp_path):
     folder = written(MIXED, "arduino", tmp_path) / "law"

@@ -78,6 +78,29 @@ def test_a_rule_is_limited_and_rounded():
     assert step(1.0, (0.5,)) == (2.0,)
 
 
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize(
+    "law", [*LAWS.values(), Rule(function=hop, initial=[0.0], parameters=[2.0])], ids=[*LAWS, "a rule"]
+)
+def test_a_reading_that_is_no_number_leaves_no_command_until_the_law_begins_anew(law, bad):
+    """NaN is what a rig is stopped upon; the rule alone would push the one way, since NaN is not below anything."""
+    good = READINGS[0].tolist()
+    before = at_work(law)(0.0, good)
+    step = at_work(law)
+    assert step(0.0, good) == before
+    assert np.isnan(step(1e-3, [good[0] if isinstance(law, Law) else bad, bad])).all()
+    assert np.isnan([step(1e-3 * k, good) for k in range(2, 6)]).all()
+    assert at_work(law)(0.0, good) == before
+
+
+def test_a_command_that_overflows_is_none_and_raises_nothing():
+    """5e307 is a double, and so many steps of 0.01 are not."""
+    law = Law(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), [[1.0]], limit=2.0, command_quantum=0.01)
+    step = at_work(law)
+    assert step(0.0, (1.0,)) == (1.0,)
+    assert np.isnan(step(0.0, (5e307,))).all()
+
+
 def test_a_law_of_several_lanes_has_no_one_command():
     with pytest.raises(BadInput, match="one lane"):
         at_work(state_feedback(np.ones((1, 2, 3)), 1e-3))

@@ -216,6 +216,62 @@ def test_what_is_no_log_of_ours_gets_a_sentence(data, sentence):
         log_of(data, "x")
 
 
+DEEP = 200_000
+"""Lists in one another, where Python follows a thousand."""
+
+
+def nested(where: str, depth: int, monkeypatch) -> bytes:
+    """Log of ten rows with lists in one another at one place of its JSON."""
+    import upright.logs.layout as layout
+
+    lists, writer = "[" * depth + "]" * depth, layout.row_writer
+    if where == "schema":
+        monkeypatch.setattr(layout, "row_schema", lambda header: lists.encode())
+    elif where in ("row", "value", "unused"):
+        texts = {"row": lists, "value": f'{{"t":{lists},"was":', "unused": f'{{"more":{lists},"t":'}
+
+        def message(columns):
+            text = writer(columns)
+            return lambda row: texts[where].encode() + (b"" if where == "row" else text(row)[len(b'{"t":') :])
+
+        monkeypatch.setattr(layout, "row_writer", message)
+
+    class Header(LogHeader):
+        def as_metadata(self):
+            given = super().as_metadata()
+            if where == "law":
+                given["law"] = {"json": f'{{"kind":"linear","A":{lists}}}'}
+            elif where == "no law":
+                given["law"] = {"json": lists}
+            elif where == "header":
+                given["log"]["json"] = f'{given["log"]["json"][:-1]},"more":{lists}}}'
+            return given
+
+    return written(10, header=Header(**vars(HEADER)))
+
+
+@pytest.mark.parametrize("where", ["row", "value", "unused", "schema"])
+@pytest.mark.parametrize("depth", [2, 500, DEEP])
+def test_rows_that_are_lists_in_one_another_are_a_damage(where, depth, monkeypatch):
+    """But for what no row needs, as long as Python can follow it."""
+    log = log_of(nested(where, depth, monkeypatch), "x")
+    if where == "unused" and depth < DEEP:
+        assert (wrong(log), log.complaint) == ([], "")
+    else:
+        assert len(log) == 0
+        assert "a row or an event does not follow its schema" in log.complaint
+
+
+@pytest.mark.parametrize(
+    ("where", "depth"),
+    [("law", 500), ("law", DEEP), ("no law", 2), ("no law", DEEP), ("header", 500), ("header", DEEP)],
+)
+def test_a_header_of_lists_in_one_another_gets_a_sentence(where, depth, monkeypatch):
+    reason = "not a table of names and values" if depth == 2 else "nested too deeply"
+    with pytest.raises(BadInput, match=rf"says nothing of its columns \({reason}\)"):
+        log_of(nested(where, depth, monkeypatch), "x")
+
+
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -122,11 +123,39 @@ def test_what_lies_behind_dropped_rows_is_passed_over():
             lambda: replace_law(run(), {"kind": "rule", "text": "def f(t,y,r,z,p):\n return (1,2),z"}),
             "gives 2 commands",
         ),
+        (lambda: replace_law(run(), rule("if t < 0: q = 1", "q")), "fails at row 1, 5 s: cannot access local|local"),
+        (lambda: replace_law(run(), rule("pass", "1, (2,)")), "fails at row 1, 5 s"),
+        (lambda: replace_law(run(), rule("pass", "-" * 900 + "1")), "values are no law's"),
     ],
 )
 def test_what_cannot_be_replayed_gets_a_sentence(log, sentence):
     with pytest.raises(BadInput, match=sentence):
         replay(log())
+
+
+ENDLESS = ("while True: pass", "for a in range(10**12): pass", "x = 9\n for a in (1, 1, 1, 1): x = x**x")
+"""The last is no loop: one power in it has more digits than there is memory, and nothing interrupts it."""
+
+
+@pytest.mark.parametrize("line", ENDLESS)
+def test_a_rule_without_an_end_is_stopped(line, monkeypatch):
+    monkeypatch.setattr("upright.logs.replay.PATIENCE", (0.3, 0.001))
+    log = run(rows=100)
+    with pytest.raises(BadInput, match=r"was stopped: it gave no commands for 100 rows within 0\.4 s"):
+        replay(replace_law(log, rule(line, "1")))
+
+
+@pytest.mark.skipif(shutil.which("true") is None, reason="no program here that does nothing")
+def test_a_rule_that_ends_its_process_gets_a_sentence(monkeypatch):
+    """Such as one that takes all memory there is; here there is no program to run it."""
+    monkeypatch.setattr("sys.executable", shutil.which("true"))
+    with pytest.raises(BadInput, match="ended the process that it ran in"):
+        replay(replace_law(run(), rule("pass", "1")))
+
+
+def rule(line: str, commands: str) -> dict[str, str]:
+    """Values of a rule of two lines."""
+    return {"kind": "rule", "text": f"def f(t, y, r, z, p):\n {line}\n return ({commands},), z"}
 
 
 def replace_law(log: RunLog, law) -> RunLog:

@@ -2,6 +2,9 @@
 
 As in `simulation.kernel.lanes.law`: deviations from rest, commands summed from left to right from zero, memory first,
 then rounded and limited, then the next memory. Entries of zero are left out, and 1 is no factor: neither changes a bit.
+
+A reading, reference or command that is not finite stops the law: commands of zero until it is restarted. A comparison
+with NaN is false, so that a limit would make the largest command of it, and a memory would never lose it.
 """
 
 from __future__ import annotations
@@ -35,6 +38,12 @@ class Language:
         Statements for the first sample alone.
     hold : callable
         A statement for samples at which no command is beyond its limit.
+    stopped : str
+        Whether the law is stopped until it is restarted.
+    not_finite : callable
+        Whether a value is NaN or infinite.
+    stop : callable
+        Statements that, on a condition, stop the law and end the sample with commands of zero.
     either : str
     """
 
@@ -51,6 +60,9 @@ class Language:
     limited: Callable[[str, str], str]
     first: Callable[[list[str]], list[str]]
     hold: Callable[[str], list[str]]
+    stopped: str
+    not_finite: Callable[[str], str]
+    stop: Callable[[str], list[str]]
     either: str
 
 
@@ -66,6 +78,7 @@ def statements(made: SampledController, say: Language) -> list[str]:
     def put(text: str, remark: str = "") -> None:
         lines.append(f"{text}{say.end}" + (f"  {say.remark(remark)}" if remark else ""))
 
+    lines += check_inputs(made, say)
     for i, (name, unit) in enumerate(zip(made.readings, units, strict=True)):
         less = f" - {say.number(target[i])}" if target[i] else ""
         put(f"{say.let}w{i} = {say.reading(i)}{less}", f"{name} less its reading at rest{unit}")
@@ -88,7 +101,9 @@ def statements(made: SampledController, say: Language) -> list[str]:
         for k, value, what in zip([*C[j], *D[j]], [*memory, *signals], of, strict=True):
             for term in _terms([k], [value], say):
                 put(f"c{j} = c{j} + {term}", f"of {what}")
-        if step := float(made.converter[j]):
+    lines += _check_commands(made, say)
+    for j, step in enumerate(made.converter.tolist()):
+        if step:
             put(_rounded(j, step, say), "to the converter's steps")
     if hold:
         beyond = f" {say.either} ".join(f"{say.absolute}(c{j}) > {say.number(limit)}" for j in range(len(C)))
@@ -106,15 +121,31 @@ def statements(made: SampledController, say: Language) -> list[str]:
     return lines
 
 
+def check_inputs(made: SampledController, say: Language) -> list[str]:
+    """What every sample begins with: without finite readings and references there are no commands."""
+    readings, references = map(say.reading, range(len(made.readings))), map(say.reference, range(len(made.references)))
+    return say.stop(f" {say.either} ".join([say.stopped, *map(say.not_finite, (*readings, *references))]))
+
+
+def _check_commands(made: SampledController, say: Language) -> list[str]:
+    """Before they are rounded: numbers that are finite may overflow on their way."""
+    values = [_scaled(j, step, say) if step else f"c{j}" for j, step in enumerate(made.converter.tolist())]
+    return say.stop(f" {say.either} ".join(map(say.not_finite, values)))
+
+
 def put_out(made: SampledController, say: Language) -> list[str]:
     """What becomes of the commands c0, c1, ... of a rule."""
     rounded = [_rounded(j, step, say) for j, step in enumerate(made.converter.tolist()) if step]
     given = [_given(j, made.law.limit, say) for j in range(len(made.commands))]
-    return [f"{line}{say.end}" for line in (*rounded, *given)]
+    return [*_check_commands(made, say), *(f"{line}{say.end}" for line in (*rounded, *given))]
+
+
+def _scaled(j: int, step: float, say: Language) -> str:
+    return f"c{j} * {say.number(1.0 / step)}"
 
 
 def _rounded(j: int, step: float, say: Language) -> str:
-    return f"c{j} = {say.floor}(c{j} * {say.number(1.0 / step)} + {say.number(0.5)}) * {say.number(step)}"
+    return f"c{j} = {say.floor}({_scaled(j, step, say)} + {say.number(0.5)}) * {say.number(step)}"
 
 
 def _given(j: int, limit: float, say: Language) -> str:

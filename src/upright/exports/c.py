@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from upright.exports import rule
-from upright.exports.arithmetic import Language, put_out, statements
+from upright.exports.arithmetic import Language, check_inputs, put_out, statements
 from upright.exports.controller import SampledController, identifiers
 from upright.exports.vector import ReplayVector
 from upright.laws import Rule
@@ -66,6 +66,7 @@ typedef {"float" if single else "double"} law_real;
 typedef struct {{
     law_real z[{max(made.memories, 1)}];
     {"unsigned long samples" if isinstance(made.law, Rule) else "int running"};
+    int stopped; /* by a reading, reference or command that is not finite: every command is zero until law_start */
 }} law_state;
 
 /* Before the first sample: forget, so that no jump is taken for a speed. */
@@ -90,9 +91,11 @@ def source(made: SampledController, *, single: bool) -> str:
         absolute=f"fabs{f}", limited=lambda c, most: f"{c} > {most} ? {most} : {c} < -{most} ? -{most} : {c}",
         first=lambda lines: ["if (!s->running) {", *(f"    {line}" for line in lines), "}"],
         hold=lambda line: ["if (!beyond)", f"    {line}"], either="||",
+        stopped="s->stopped", not_finite="!is_finite({})".format,
+        stop=lambda when: [f"if ({when}) {{", "    stop(s, u);", "    return;", "}"],
     )  # fmt: skip
     if isinstance(made.law, Rule):
-        return _of_rule(made, put_out(made, say))
+        return _of_rule(made, check_inputs(made, say), put_out(made, say), single=single)
     body = "\n".join(f"    {line}".replace("law_real beyond", "int beyond") for line in statements(made, say))
     unused = "" if made.references else "    (void)r;\n"
     return f"""\
@@ -100,14 +103,18 @@ def source(made: SampledController, *, single: bool) -> str:
 {_EXACT}
 #include "law.h"
 
+#include <float.h>
 #include <math.h>
+#include <stdint.h>
 
+{_stop(single)}
 void law_start(law_state *s)
 {{
     unsigned i;
     for (i = 0; i < sizeof s->z / sizeof s->z[0]; i++)
         s->z[i] = 0;
     s->running = 0;
+    s->stopped = 0;
 }}
 
 void law_step(law_state *s, const law_real *y, const law_real *r, law_real *u)
@@ -118,19 +125,48 @@ void law_step(law_state *s, const law_real *y, const law_real *r, law_real *u)
 """
 
 
-def _of_rule(made: SampledController, last: list[str]) -> str:
+def _stop(single: bool) -> str:
+    return f"""\
+/* By its bits, since compilers may take it for granted that comparisons meet no NaN (-ffast-math). */
+static int is_finite(law_real x)
+{{
+#if {"FLT" if single else "DBL"}_MANT_DIG == 24
+    union {{ law_real value; uint32_t bits; }} as;
+    const uint32_t exponent = 0x7f800000;
+#else
+    union {{ law_real value; uint64_t bits; }} as;
+    const uint64_t exponent = 0x7ff0000000000000;
+#endif
+    as.value = x;
+    return (as.bits & exponent) != exponent;
+}}
+
+static void stop(law_state *s, law_real *u)
+{{
+    int j;
+    s->stopped = 1;
+    for (j = 0; j < LAW_COMMANDS; j++)
+        u[j] = 0;
+}}
+"""
+
+
+def _of_rule(made: SampledController, first: list[str], last: list[str], *, single: bool) -> str:
     inputs, states = len(made.commands), made.memories
     parameters, initial = (", ".join(number(x, False) for x in values) or "0" for values in rule.numbers(made))
     commands = "\n".join(f"    law_real c{j} = found[{j}];" for j in range(inputs))
-    body = "\n".join(f"    {line}" for line in last)
+    checked, body = ("\n".join(f"    {line}" for line in lines) for lines in (first, last))
     copied = "for (i = 0; i < LAW_REFERENCES; i++)\n        asked[i] = r[i];" if made.references else "(void)r;"
     return f"""\
 /* {made.title}, written by upright export; see law.h. */
 {_EXACT}
 #include "law.h"
 
+#include <float.h>
 #include <math.h>
+#include <stdint.h>
 
+{_stop(single)}
 {rule.in_c(made)}
 static double parameters[] = {{{parameters}}};
 static const double initial[] = {{{initial}}};
@@ -141,12 +177,14 @@ void law_start(law_state *s)
     for (i = 0; i < sizeof initial / sizeof initial[0]; i++)
         s->z[i] = initial[i];
     s->samples = 0;
+    s->stopped = 0;
 }}
 
 void law_step(law_state *s, const law_real *y, const law_real *r, law_real *u)
 {{
     double given[LAW_READINGS], asked[LAW_REFERENCES + 1] = {{0}}, found[{inputs + states}];
     int i;
+{checked}
     for (i = 0; i < LAW_READINGS; i++)
         given[i] = y[i];
     {copied}
@@ -165,7 +203,7 @@ def replay(test: ReplayVector, *, single: bool) -> str:
     count = len(test.readings)
     given = _table("given", test.readings, single)
     asked = _table("asked", test.references, single) if test.references.shape[1] else ""
-    reference = "asked[k]" if asked else "0"
+    reference, at_first = ("asked[k]", "asked[0]") if asked else ("0", "0")
     exact = "0" if single else "LAW_EXACT"
     return f"""\
 /* {count} samples with the commands that upright's own kernel answers, to be replayed wherever the law runs. */
@@ -175,6 +213,8 @@ def replay(test: ReplayVector, *, single: bool) -> str:
 #include "law.h"
 
 #include <float.h>
+#include <math.h>
+#include <string.h>
 
 /* Bit for bit in double precision. In single precision, where double means single, and on processors that keep more
    digits than a double has (FLT_EVAL_METHOD), rounding may add up to: */
@@ -185,23 +225,35 @@ def replay(test: ReplayVector, *, single: bool) -> str:
 #define LAW_EXACT (sizeof(law_real) >= 8)
 #endif
 
-/* The first sample whose command is not the expected one, -1 when all are. */
+/* The first sample whose command is not the expected one, -1 when all are.
+   Behind the samples comes a reading that is not finite, and a good one: both commands are zero, until a new start. */
 static long law_selftest(void)
 {{
 {given}{asked}{_table("expected", test.commands, single)}\
     const law_real allowed = ({exact}) ? 0 : LAW_SINGLE_MISSES;
+    static const law_real bad[] = {{NAN, INFINITY, -INFINITY}}, zero[LAW_COMMANDS] = {{0}};
+    law_real y[LAW_READINGS], u[LAW_COMMANDS];
     law_state s;
     long k;
-    int j;
-    law_start(&s);
-    for (k = 0; k < {count}; k++) {{
-        law_real u[LAW_COMMANDS];
-        law_step(&s, given[k], {reference}, u);
-        for (j = 0; j < LAW_COMMANDS; j++) {{
-            const law_real off = u[j] - expected[k][j];
-            if (!(off <= allowed && -off <= allowed))
-                return k;
+    int j, run;
+    for (run = 0; run < 3 * LAW_READINGS; run++) {{
+        law_start(&s);
+        for (k = 0; k < {count}; k++) {{
+            law_step(&s, given[k], {reference}, u);
+            for (j = 0; j < LAW_COMMANDS; j++) {{
+                const law_real off = u[j] - expected[k][j];
+                if (!(off <= allowed && -off <= allowed))
+                    return k;
+            }}
         }}
+        memcpy(y, given[0], sizeof y);
+        y[run / 3] = bad[run % 3];
+        law_step(&s, y, {at_first}, u);
+        if (memcmp(u, zero, sizeof u) != 0)
+            return {count};
+        law_step(&s, given[0], {at_first}, u);
+        if (memcmp(u, zero, sizeof u) != 0)
+            return {count + 1};
     }}
     return -1;
 }}

@@ -29,6 +29,8 @@ def step(made: SampledController, *, single: bool) -> str:
         floor="floor", absolute="abs", limited=lambda c, most: f"min(max({c}, -{most}), {most})",
         first=lambda lines: ["if ~s.running", *(f"    {line}" for line in lines), "end"],
         hold=lambda line: ["if ~beyond", f"    {line}", "end"], either="||",
+        stopped="s.stopped", not_finite="~isfinite({})".format,
+        stop=lambda when: [f"if {when}", "    s.stopped = true;", "    return;", "end"],
     )  # fmt: skip
     body = "\n".join(f"    {line}" for line in statements(made, say))
     about = "\n".join(f"% {fact}" for fact in made.facts)
@@ -36,11 +38,12 @@ def step(made: SampledController, *, single: bool) -> str:
     return f"""\
 function [u, s] = law_step(s, y{with_r})
 % Commands u and memory s of one sample; s is [] before the first, so that no jump is taken for a speed.
+% A reading, reference or command that is not finite sets s.stopped: u is zero until s is [] again.
 % {made.title}, written by upright export.
 {about}
 %#codegen
     if isempty(s)
-        s = struct('z', zeros({max(made.memories, 1)}, 1, '{number}'), 'running', false);
+        s = struct('z', zeros({max(made.memories, 1)}, 1, '{number}'), 'running', false, 'stopped', false);
     end
     y = {number}(y);
     u = zeros({len(made.commands)}, 1, '{number}');
@@ -52,18 +55,32 @@ end
 
 def replay(test: ReplayVector, *, single: bool) -> str:
     """Text of ``law_selftest.m``."""
-    with_r = ", asked(k, :)" if test.references.shape[1] else ""
+    with_r, first_r = (", asked(k, :)", ", asked(1, :)") if test.references.shape[1] else ("", "")
     asked = _table("asked", test.references) if with_r else ""
     return f"""\
 function law_selftest()
 % Compares the commands of a replay with those that upright's own kernel answers.
+% Behind the samples comes a reading that is not finite, and a good one: both commands are zero, until a new start.
 {_table("given", test.readings)}{asked}{_table("expected", test.commands)}\
     allowed = {f"{test.single if single else 0.0:.17g}"};
-    s = [];
-    for k = 1:size(given, 1)
-        [u, s] = law_step(s, given(k, :){with_r});
-        if ~all(abs(double(u(:)).' - expected(k, :)) <= allowed)
-            error('law:selftest', 'law: sample %d is not the expected one; do not run it', k);
+    wrong = 'law: sample %d is not the expected one; do not run it';
+    bad = [NaN, Inf, -Inf];
+    for run = 1:3 * size(given, 2)
+        s = [];
+        for k = 1:size(given, 1)
+            [u, s] = law_step(s, given(k, :){with_r});
+            if ~all(abs(double(u(:)).' - expected(k, :)) <= allowed)
+                error('law:selftest', wrong, k);
+            end
+        end
+        y = given(1, :);
+        y(ceil(run / 3)) = bad(mod(run, 3) + 1);
+        for k = 1:2
+            [u, s] = law_step(s, y{first_r});
+            if ~all(u(:) == 0)
+                error('law:selftest', wrong, size(given, 1) + k);
+            end
+            y = given(1, :);
         end
     end
     disp('law: every sample is the expected one');
@@ -105,14 +122,14 @@ end
 function allocate(block)
     block.NumDworks = 1;
     block.Dwork(1).Name = 'memory';
-    block.Dwork(1).Dimensions = {z + 1};
+    block.Dwork(1).Dimensions = {z + 2};
     block.Dwork(1).DatatypeID = 0;
     block.Dwork(1).Complexity = 'Real';
     block.Dwork(1).UsedAsDiscState = true;
 end
 
 function start(block)
-    block.Dwork(1).Data = zeros({z + 1}, 1);
+    block.Dwork(1).Data = zeros({z + 2}, 1);
 end
 
 function outputs(block)
@@ -121,15 +138,12 @@ end
 
 function update(block)
     [~, s] = law_step(memory(block), block.InputPort(1).Data{r});
-    block.Dwork(1).Data = [double(s.z); 1];
+    block.Dwork(1).Data = [double(s.z); double(s.running); double(s.stopped)];
 end
 
 function s = memory(block)
     kept = block.Dwork(1).Data;
-    s = [];
-    if kept(end)
-        s = struct('z', {number}(kept(1:end - 1)), 'running', true);
-    end
+    s = struct('z', {number}(kept(1:end - 2)), 'running', kept(end - 1) ~= 0, 'stopped', kept(end) ~= 0);
 end
 """
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from upright.exports import rule
-from upright.exports.arithmetic import Language, put_out, statements
+from upright.exports.arithmetic import Language, check_inputs, put_out, statements
 from upright.exports.controller import SampledController
 from upright.exports.vector import ReplayVector
 from upright.laws import Rule
@@ -14,6 +14,8 @@ _LANGUAGE = Language(
     limited=lambda c, most: f"min(max({c}, -{most}), {most})",
     first=lambda lines: ["if not self.running:", *(f"    {line}" for line in lines)],
     hold=lambda line: ["if not beyond:", f"    {line}"], either="or",
+    stopped="self.stopped", not_finite="not isfinite({})".format,
+    stop=lambda when: [f"if {when}:", "    self.stopped = True", "    return [0.0] * len(COMMANDS)"],
 )  # fmt: skip
 
 
@@ -21,11 +23,13 @@ def files(made: SampledController, test: ReplayVector) -> dict[str, str]:
     """Text by file name."""
     about = "\n".join(made.facts)
     if isinstance(made.law, Rule):
-        needs, before = "from math import floor, frexp, inf, nan, pi, sqrt\n\n", f"\n\n{rule.in_python(made)}\n"
+        needs = "from math import floor, frexp, inf, isfinite, nan, pi, sqrt\n\n"
+        before = f"\n\n{rule.in_python(made)}\n"
         parameters, initial = (tuple(values) for values in rule.numbers(made))
         begin = [f"self.z = {initial!r}", "self.samples = 0"]
         inputs = range(len(made.commands))
         lines = [
+            *check_inputs(made, _LANGUAGE),
             f"found, self.z = rule(self.samples * PERIOD, tuple(y), tuple(r), self.z, {parameters!r})",
             *(f"c{j} = found[{j}]" for j in inputs), f"u = [0.0] * {len(made.commands)}", *put_out(made, _LANGUAGE),
             "self.samples += 1",
@@ -33,7 +37,9 @@ def files(made: SampledController, test: ReplayVector) -> dict[str, str]:
     else:
         before, begin = "", [f"self.z = [0.0] * {made.memories}", "self.running = False"]
         lines = [f"z, u = self.z, [0.0] * {len(made.commands)}", *statements(made, _LANGUAGE), "self.running = True"]
-        needs = "from math import floor\n\n" if any("floor(" in line for line in lines) else ""
+        floor = "floor, " * any("floor(" in line for line in lines)
+        needs = f"from math import {floor}inf, isfinite, nan\n\n"
+    begin.append("self.stopped = False")
     first, body = ("\n".join(f"        {line}" for line in part) for part in (begin, lines))
     rows = zip(test.readings.tolist(), test.references.tolist(), test.commands.tolist(), strict=True)
     table = "\n".join(f"    ({y}, {r}, {u})," for y, r, u in rows)
@@ -52,7 +58,10 @@ COMMANDS = {made.commands!r}
 {before}
 
 class Law:
-    """One run of the law; make another one for the next run."""
+    """One run of the law; make another one for the next run.
+
+    A reading, reference or command that is not finite ends the run: `stopped`, and every command is zero from there on.
+    """
 
     def __init__(self):
 {first}
@@ -69,11 +78,21 @@ SELF_TEST = (  # readings, references, expected commands
 
 
 def self_test():
-    """Number of the first sample whose command is not the expected one, None when all are."""
-    law = Law()
-    for k, (y, r, expected) in enumerate(SELF_TEST):
-        if law.step(y, r) != expected:
-            return k
+    """Number of the first sample whose command is not the expected one, None when all are.
+
+    Behind the samples comes a reading that is not finite, and a good one: both commands are zero, until a new start.
+    """
+    count, (y, r, _), zero = len(SELF_TEST), SELF_TEST[0], [0.0] * len(COMMANDS)
+    for i in range(len(READINGS)):
+        for bad in (nan, inf, -inf):
+            law = Law()
+            for k, (readings, references, expected) in enumerate(SELF_TEST):
+                if law.step(readings, references) != expected:
+                    return k
+            if law.step([*y[:i], bad, *y[i + 1 :]], r) != zero:
+                return count
+            if law.step(y, r) != zero:
+                return count + 1
     return None
 
 

@@ -28,6 +28,9 @@ def at_work(law: Law | Rule) -> AtWork:
     Commands are rounded and limited as the law says; its `delay` is left to the computer and the converter that have
     it, and its `quantum` to the encoders.
 
+    A reading or a command that is not finite stops the law: it gives NaN from there on, upon which a rig's supervisor
+    stops the rig with a message. An exported program has nobody above it, and gives zero instead.
+
     Raises
     ------
     BadInput
@@ -35,7 +38,19 @@ def at_work(law: Law | Rule) -> AtWork:
     """
     if any(width > 1 for width in law.widths().values()):
         raise BadInput("a law at work has one lane; take it from those it has with of_lanes(slice(k, k + 1)).")
-    return _linear(law) if isinstance(law, Law) else _function(law)
+    running = _linear(law) if isinstance(law, Law) else _function(law)
+    stopped = False
+
+    def step(t: float, y: Sequence[float]) -> Numbers:
+        nonlocal stopped
+        if not stopped and all(map(isfinite, y)):
+            u = running(t, y)
+            stopped = not all(map(isfinite, u))
+        else:  # a rule would make a command of any comparison with NaN, and a memory would keep it
+            u, stopped = (nan,) * (len(law.D) if isinstance(law, Law) else law.commands(len(y))), True
+        return (nan,) * len(u) if stopped else u
+
+    return step
 
 
 def _linear(law: Law) -> AtWork:
@@ -111,7 +126,10 @@ def _finish(law: Controller) -> Callable[[Sequence[float]], tuple[Numbers, bool]
 
 
 def _rounded(x: float, step: float) -> float:
-    return floor(x * (1.0 / step) + 0.5) * step if step > 0.0 and isfinite(x) else float(x)
+    if not step > 0.0:
+        return float(x)
+    steps = x * (1.0 / step)
+    return floor(steps + 0.5) * step if isfinite(steps) else steps
 
 
 def _row(values: Array) -> Numbers:

@@ -64,7 +64,7 @@ def of_values(values: Mapping[str, Any]) -> Law | Rule:
             return Law(**given)
         if kind == "rule":
             return Rule(function=_function(str(given.pop("text"))), **given)
-    except (TypeError, ValueError, KeyError, IndexError) as error:
+    except (TypeError, ValueError, KeyError, IndexError, RecursionError, MemoryError) as error:
         if isinstance(error, BadInput):
             raise
         raise BadInput(f"the values are no law's ({error}); write them with upright.laws.as_values.") from None

@@ -15,6 +15,9 @@ from upright import __version__
 from upright.errors import BadInput
 from upright.files import plain_values
 
+_DEEPEST = 64
+"""Tables and lists in one another; the arrays of a law are 4."""
+
 
 class LogColumn(NamedTuple):
     """One number of each row; a whole one is kept to the last digit, up to 64 bits."""
@@ -106,11 +109,17 @@ class LogHeader:
 
     @classmethod
     def of_metadata(cls, texts: Mapping[str, Mapping[str, str]]) -> Self:
-        """The same header again; rig and law are empty where their texts are missing."""
-        rest: dict[str, Any] = json.loads(texts["log"]["json"])
+        """The same header again; rig and law are empty where their texts are missing.
+
+        Raises
+        ------
+        KeyError, TypeError, ValueError, AttributeError
+            When the texts are no header's.
+        """
+        rest = _table_of(texts["log"]["json"])
         named = {name: {int(number): str(word) for number, word in rest[name].items()} for name in ("modes", "faults")}
         return cls(
-            rig=texts.get("rig", {}).get("file", ""), law=json.loads(texts.get("law", {}).get("json", "{}")),
+            rig=texts.get("rig", {}).get("file", ""), law=_table_of(texts.get("law", {}).get("json", "{}")),
             coordinates=tuple((str(name), str(unit)) for name, unit in rest["coordinates"]),
             references=tuple((str(name), str(unit)) for name, unit in rest.get("references", ())),
             command=str(rest["command"]), command_unit=str(rest["command_unit"]), period=float(rest["period"]),
@@ -126,6 +135,23 @@ class LogHeader:
 
 def _text(values: Any) -> str:
     return json.dumps(plain_values(values), ensure_ascii=False, separators=(",", ":"))
+
+
+def _table_of(text: str) -> dict[str, Any]:
+    """Values of a JSON text by name, nested no deeper than what walks through them later can follow."""
+    try:
+        values: Any = json.loads(text)
+    except RecursionError:
+        raise ValueError("nested too deeply") from None
+    if not isinstance(values, dict):
+        raise ValueError("not a table of names and values")
+    level: list[Any] = [values]
+    for _ in range(_DEEPEST):
+        level = [item for inner in level for item in (inner.values() if isinstance(inner, dict) else inner)]
+        level = [item for item in level if isinstance(item, dict | list)]
+        if not level:
+            return values
+    raise ValueError("nested too deeply")
 
 
 def versions() -> dict[str, str]:

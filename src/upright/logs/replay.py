@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import BadInput
-from upright.laws import Law, Rule, at_work, of_values
+from upright.laws import Law, Rule, as_values, at_work, of_values
 from upright.logs.whole import RunLog
 
 Array = NDArray[np.float64]
+
+PATIENCE = (20.0, 2e-3)
+"""Longest time that a logged rule may take, by itself and for each row [s]; a rule takes some 20 us for a row."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +72,8 @@ def replay(log: RunLog, law: Law | Rule | None = None) -> Replay:
 
     That is `upright.laws.at_work`, made anew where the law begins to command, and called once for each row with the
     time since the first of them, the readings in the header's order, and the references that were logged, where there
-    are any: somebody may have changed them meanwhile.
+    are any: somebody may have changed them meanwhile. A rule that a log holds is anybody's function: it runs in a
+    process of its own, for as long as `PATIENCE` says.
 
     Parameters
     ----------
@@ -76,8 +84,9 @@ def replay(log: RunLog, law: Law | Rule | None = None) -> Replay:
     Raises
     ------
     BadInput
-        When the log has no law, or there is nothing to compare.
+        When the log has no law, its law fails or does not end, or there is nothing to compare.
     """
+    of_log = law is None
     law = law or _logged(log)
     t, logged = log.columns["t"], log.columns[log.header.command]
     readings = np.column_stack([log.columns[name] for name, _ in log.header.coordinates])
@@ -86,41 +95,100 @@ def replay(log: RunLog, law: Law | Rule | None = None) -> Replay:
             f"the law of '{log.file}' reads {law.readings} signals, and the log has"
             f" {', '.join(name for name, _ in log.header.coordinates)}."
         )
-    rows: list[int] = []
-    commands: list[float] = []
-    starts = over = 0
-    for begin, known, end in _stretches(log):
-        step, starts, over = at_work(_following(law, log, begin, known)), starts + 1, over + end - known
-        for k in range(begin, known):
-            try:
-                u = step(float(t[k]) - float(t[begin]), tuple(readings[k].tolist()))
-            except (ArithmeticError, ValueError, TypeError, IndexError) as error:
-                raise BadInput(f"the law of '{log.file}' fails at row {k + 1}, {t[k]:.6g} s: {error}.") from None
-            if len(u) != 1:
-                raise BadInput(f"the law of '{log.file}' gives {len(u)} commands, and the log has one.")
-            rows.append(k)
-            commands.append(u[0])
-    if not rows:
+    stretches = list(_stretches(log))
+    rows = np.concatenate([np.arange(begin, known) for begin, known, _ in stretches] or [[]]).astype(np.intp)
+    if not rows.size:
         raise BadInput(f"there is no row in '{log.file}' in which its law gave the command.")
-    given = np.array(commands, dtype=np.float64)
+    asked = [
+        Stretch(
+            first=begin, t=t[begin:known], readings=readings[begin:known], references=_asked(law, log, begin, known)
+        )
+        for begin, known, _ in stretches
+    ]
+    given = (_in_a_process if of_log and isinstance(law, Rule) else _commands)(law, asked, log.file)
     there = logged[rows]
     other = np.flatnonzero(given.view(np.int64) != there.view(np.int64))
     first = None
     if other.size:
         k = int(other[0])
-        first = Difference(row=rows[k] + 1, t=float(t[rows[k]]), logged=float(there[k]), replayed=float(given[k]))
+        first = Difference(row=int(rows[k]) + 1, t=float(t[rows[k]]), logged=float(there[k]), replayed=float(given[k]))
     return Replay(
-        rows=np.array(rows, dtype=np.intp), commands=given, starts=starts, differing=int(other.size),
-        largest=float(np.nanmax(np.abs(given - there)[other], initial=0.0)), first=first, passed_over=over,
+        rows=rows, commands=given, starts=len(stretches), differing=int(other.size),
+        largest=float(np.nanmax(np.abs(given - there)[other], initial=0.0)), first=first,
+        passed_over=sum(end - known for _, known, end in stretches),
     )  # fmt: skip
 
 
-def _following(law: Law | Rule, log: RunLog, begin: int, end: int) -> Law | Rule:
-    """The law with the logged references of some rows for its own."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stretch:
+    """Rows from one start of the law on: number of the first, times [s], readings, references where they are logged."""
+
+    first: int
+    t: Array
+    readings: Array
+    references: Array | None
+
+
+def _commands(law: Law | Rule, stretches: Sequence[Stretch], file: str) -> Array:
+    """What the law gives, begun anew with every stretch."""
+    commands: list[float] = []
+    for rows in stretches:
+        step = at_work(law if rows.references is None else replace(law, references=rows.references))
+        times = rows.t.tolist()
+        for k, (t, readings) in enumerate(zip(times, rows.readings.tolist(), strict=True)):
+            try:
+                u = step(t - times[0], tuple(readings))
+            except Exception as error:  # whatever a function of somebody's may raise
+                raise BadInput(f"the law of '{file}' fails at row {rows.first + k + 1}, {t:.6g} s: {error}.") from None
+            if len(u) != 1:
+                raise BadInput(f"the law of '{file}' gives {len(u)} commands, and the log has one.")
+            commands.append(u[0])
+    return np.array(commands, dtype=np.float64)
+
+
+def _in_a_process(law: Law | Rule, stretches: Sequence[Stretch], file: str) -> Array:
+    """The same, by a process that is stopped when it does not end: nothing else stops a loop without an end."""
+    once, each = PATIENCE
+    rows = sum(part.t.size for part in stretches)
+    deadline = once + each * rows
+    try:
+        done = subprocess.run(
+            [sys.executable, "-P", "-c", "from upright.logs.replay import answer; answer()"],
+            input=pickle.dumps((as_values(law), stretches, file)), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}, timeout=deadline, check=False,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        raise BadInput(
+            f"the rule of '{file}' was stopped: it gave no commands for {rows} rows within {deadline:.3g} s, as a loop"
+            " without an end does not; read its text with `upright log show --json`."
+        ) from None
+    verdict, content = done.stdout[:1], done.stdout[1:]
+    if verdict == _REFUSED:
+        raise BadInput(content.decode())
+    if verdict != _GIVEN or len(content) != 8 * rows:
+        raise BadInput(f"the rule of '{file}' ended the process that it ran in, so that there is nothing to compare.")
+    return np.frombuffer(content, dtype=np.float64)
+
+
+_GIVEN, _REFUSED = b"=", b"!"
+
+
+def answer() -> None:
+    """In the process of a logged rule: its commands, or why there are none, for what comes in."""
+    law, stretches, file = pickle.load(sys.stdin.buffer)
+    try:
+        content = _GIVEN + _commands(of_values(law), stretches, file).tobytes()
+    except BadInput as refusal:
+        content = _REFUSED + str(refusal).encode()
+    sys.stdout.buffer.write(content)
+
+
+def _asked(law: Law | Rule, log: RunLog, begin: int, end: int) -> Array | None:
+    """Logged references of some rows, where they are the law's."""
     names = [name for name, _ in log.header.references]
     if not names or law.signal().shape[1] != len(names):
-        return law
-    return replace(law, references=np.column_stack([log.columns[name][begin:end] for name in names]))
+        return None
+    return np.column_stack([log.columns[name][begin:end] for name in names])
 
 
 def _logged(log: RunLog) -> Law | Rule:

@@ -156,9 +156,10 @@ def header_of(container: Container, file: str, complaint: str = "") -> LogHeader
     inside = container.channel_texts.get(SAMPLES)  # in a chunk with its checksum
     try:
         return LogHeader.of_metadata(container.texts | ({"log": inside} if inside else {}))
-    except (KeyError, ValueError, TypeError, AttributeError):
+    except (KeyError, ValueError, TypeError, AttributeError) as error:
+        reason = f" ({error})" if type(error) is ValueError else ""
         raise BadInput(
-            f"'{file}' says nothing of its columns, so that no row can be read. {complaint}".strip()
+            f"'{file}' says nothing of its columns{reason}, so that no row can be read. {complaint}".strip()
         ) from None
 
 
@@ -186,7 +187,7 @@ class Rows:
                     self.events.append(RunEvent(**json.loads(message.content)))
             columns = columns_of(container.schemas[SAMPLES])
             part = _columns(columns, json.loads(b"[%s]" % b",".join(rows)))
-        except (ValueError, TypeError, KeyError, AttributeError, OverflowError) as error:
+        except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError) as error:
             raise Damaged(container.at, f"a row or an event does not follow its schema ({error})") from None
         if rows:
             self._parts.append(part)
@@ -199,7 +200,10 @@ class Rows:
 
 
 def _columns(columns: Iterable[LogColumn], rows: list[Mapping[str, Any]]) -> Columns:
-    return {
-        column.name: np.array([row[column.name] for row in rows], dtype=np.int64 if column.whole else np.float64)
-        for column in columns
-    }
+    made: Columns = {}
+    for column in columns:
+        values = np.array([row[column.name] for row in rows], dtype=np.int64 if column.whole else np.float64)
+        if values.ndim != 1:
+            raise ValueError(f"{column.name} is a list, where a number is needed")
+        made[column.name] = values
+    return made

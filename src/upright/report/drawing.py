@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.errors import BadInput
 from upright.files import whole_file
 from upright.report.symbols import axis, mathtext
 
@@ -146,14 +147,31 @@ def svg(drawing: Figure, name: str) -> str:
     return f'{responsive} style="max-width:{share:.0f}%" aria-hidden="true" focusable="false"{text[len(opening) :]}'
 
 
+PICTURES = (".svg", ".png")
+"""Endings of files that a picture is written to."""
+
+
+def picture_format(path: Path) -> str:
+    """Format of a picture, by the ending of its file.
+
+    Raises
+    ------
+    BadInput
+        When it is none of `PICTURES`.
+    """
+    if path.suffix.lower() not in PICTURES:
+        raise BadInput(f"a picture is a file ending in {' or '.join(PICTURES)}, got '{path}'; name one with -o.")
+    return path.suffix[1:].lower()
+
+
 @styled
 def save(drawing: Figure, path: Path) -> Path:
     """Write a figure by itself, as SVG or PNG by the ending of `path`."""
-    vector = path.suffix.lower() == ".svg"
+    form = picture_format(path)
     with whole_file(path) as half, _undisturbed():
         drawing.savefig(
-            half, format=path.suffix[1:].lower(), dpi=160, facecolor="white",
-            metadata={"Date": None, "Creator": None} if vector else {},
+            half, format=form, dpi=160, facecolor="white",
+            metadata={"Date": None, "Creator": None} if form == "svg" else {},
         )  # fmt: skip
     return path
 

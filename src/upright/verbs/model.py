@@ -439,13 +439,16 @@ def plan_inertias(
     Raises
     ------
     BadInput
-        When there is no such rig, or numbers contradict each other.
+        When there is no such rig or picture, or numbers contradict each other.
     """
     from upright.experiments.makes import OSCILLATORS
     from upright.experiments.weighing_1a.plan import chapter, choices, choose
     from upright.identification.loadings import plan_loadings
+    from upright.report.drawing import picture_format
     from upright.verbs.values import si_if_given
 
+    if out is not None:
+        picture_format(Path(out))  # before the work begins
     if rig not in OSCILLATORS:
         raise BadInput(f"--rig is {' or '.join(OSCILLATORS)}, got '{rig}'; {nearest(rig, OSCILLATORS)}")
     for value, option, most in ((runs, "--runs", 16), (levels, "--levels", 5)):

@@ -211,7 +211,7 @@ class FrequencyResponse:
                 dry=np.column_stack([both(f"{y}_dry") for y in outputs]), together=bool(told["together"]),
                 hold=float(told["hold"]), notes=tuple(told["notes"]),
             )  # fmt: skip
-        except (OSError, ValueError, KeyError, TypeError, StopIteration) as error:
+        except (OSError, ValueError, KeyError, TypeError, StopIteration, RecursionError) as error:
             if isinstance(error, BadInput):
                 raise
             raise BadInput(f"'{path}' must be a frequency response written by upright, but: {error}.") from None
