@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from upright.basis import DESCRIBED, Basis
 from upright.errors import BadInput
 from upright.experiments.designing.estimators import chosen, estimator, estimators
 from upright.experiments.identified import IdentifiedRig
@@ -138,6 +139,14 @@ class Designed:
     @property
     def verdict(self) -> str:
         """Whether this loop may be closed on a rig, in a sentence or two."""
+        return self.basis.qualified(self._loop_verdict())
+
+    @property
+    def basis(self) -> Basis:
+        """What the numbers of the model rest on; those of a plain linear model were given."""
+        return DESCRIBED if isinstance(self.rig, StateSpace) else self.rig.basis
+
+    def _loop_verdict(self) -> str:
         way, unit = self.chosen, self.rig.unit
         if way.margins is None:
             return (
