@@ -122,6 +122,34 @@ def test_ctrl_c_keeps_and_writes_the_best_so_far(bench, monkeypatch):
     assert json.loads((bench / "out" / "fit.json").read_text(encoding="utf-8"))["interrupted"] is True
 
 
+def test_an_interrupted_fit_says_everywhere_what_it_did_not_evaluate(bench, monkeypatch):
+    """Terminal, fit.json and page; two.csv was held out and is not predicted."""
+    from contextlib import contextmanager
+
+    from upright.cli.model import identify
+
+    @contextmanager
+    def impatient(**_):
+        def stop(step, share):
+            raise KeyboardInterrupt
+
+        yield stop
+
+    monkeypatch.setattr(identify, "progress_bar", impatient)
+    (bench / "study.toml").write_text(STUDY + STUDY[STUDY.index("[[runs]]") :].replace('"one"', '"third"', 1)
+                                      .replace('"two"', '"fourth"', 1), encoding="utf-8")  # fmt: skip
+    outcome = run("identify", "study.toml", "-o", "out", "--hold-out", "each")
+    assert outcome.exit_code == 130, outcome.output
+    page = (bench / "out" / "report.html").read_text(encoding="utf-8")
+    told = json.loads((bench / "out" / "fit.json").read_text(encoding="utf-8"))
+    assert set(told["runs"]) == {"one", "third"}
+    assert "cross-validation" in told["not_evaluated"]
+    for text in (" ".join(outcome.stdout.split()), page, told["verdict"]):
+        assert "Not evaluated: interrupted." in text
+        for claim in ("No equilibrium of this plant is unstable", "Every run was fitted", "can be used:"):
+            assert claim not in text
+
+
 @pytest.mark.slow
 def test_a_log_becomes_a_study_becomes_a_fit_without_an_edit(bench):
     made = run("init", "one.csv", "-o", "drafted.toml")

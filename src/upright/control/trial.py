@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from upright.basis import DESCRIBED, Basis
 from upright.control.encoders import Mounting
 from upright.errors import BadInput
 from upright.laws import Law, Rule
@@ -68,6 +69,8 @@ class ServoRig:
         What limit, counts and so on rest on, in a word or two by name; empty for a twin.
     seed : int
         Which rig of the make; 0 is the one as designed.
+    basis : Basis
+        Where its numbers come from, and how far they can be trusted.
     """
 
     name: str
@@ -89,6 +92,7 @@ class ServoRig:
     more: Mapping[str, float] = field(default_factory=dict[str, float])
     sources: Mapping[str, str] = field(default_factory=dict[str, str])
     seed: int = 0
+    basis: Basis = DESCRIBED
 
     def __post_init__(self) -> None:
         n = len(self.plant.coordinates)

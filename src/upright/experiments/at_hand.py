@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from upright.basis import Basis
 from upright.errors import BadInput
 from upright.experiments.hands_on.loaded import kind_of, run_loaded
 from upright.experiments.hands_on.rig import RigAtHand
@@ -12,7 +13,7 @@ from upright.experiments.hands_on.studies import can_identify
 from upright.experiments.laboratory import Experiment, ExperimentInput
 from upright.experiments.makes import MAKES, SHAFTS
 from upright.physics import Plant
-from upright.report.page import Chapter
+from upright.report.page import Chapter, resting_on
 from upright.study.text import number
 
 
@@ -91,7 +92,7 @@ def _upright(at: ExperimentInput) -> tuple[Chapter, bool]:
     from upright.experiments.regulation_2.chapter import chapter
 
     done = run_upright(_at(at), _fit(at), at.seed, at.folder, at.progress, at.stopped)
-    return chapter(done), not done.interrupted
+    return _performed(at, chapter(done), done.rig.basis), not done.interrupted
 
 
 def _swing_up(at: ExperimentInput) -> tuple[Chapter, bool]:
@@ -99,7 +100,7 @@ def _swing_up(at: ExperimentInput) -> tuple[Chapter, bool]:
     from upright.experiments.swing_up_2b.chapter import chapter
 
     done = run_upwards(_at(at), _fit(at), at.folder, at.progress, at.stopped)
-    return chapter(done), not at.stopped()
+    return _performed(at, chapter(done), done.model.basis), not at.stopped()
 
 
 def _tracking(at: ExperimentInput) -> tuple[Chapter, bool]:
@@ -107,7 +108,13 @@ def _tracking(at: ExperimentInput) -> tuple[Chapter, bool]:
     from upright.experiments.tracking_3.chapter import chapter
 
     done = run_shaft(_at(at), _fit(at), at.folder, at.progress, at.stopped)
-    return chapter(done), not done.interrupted
+    return _performed(at, chapter(done), done.model.basis), not done.interrupted
+
+
+def _performed(at: ExperimentInput, chapter: Chapter, basis: Basis) -> Chapter:
+    """The chapter, which says so where the rig at hand is none: a twin, or a replay."""
+    performed = _at(at).file.performed
+    return resting_on(chapter, basis, performed) if performed else chapter
 
 
 def _swings(at: ExperimentInput) -> tuple[Chapter, bool]:

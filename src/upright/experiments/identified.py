@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from upright.basis import DESCRIBED, Basis
 from upright.control.trial import GAIN, ServoRig, driven
 from upright.errors import BadInput, ImpossiblePhysics
 from upright.experiments.makes import MAKES, Make, make_of, make_rig, sheet
@@ -62,6 +63,8 @@ class IdentifiedRig:
         Plants and gains drawn from the fit's covariance; empty without one.
     description : RigDescription
         Drive, encoders and servo, as far as fit or study says.
+    basis : Basis
+        The fit's own verdict, or that there is no fit.
     """
 
     plant: Plant
@@ -72,6 +75,7 @@ class IdentifiedRig:
     lag: float = 0.0
     draws: tuple[tuple[Plant, float], ...] = ()
     description: RigDescription = field(default_factory=RigDescription)
+    basis: Basis = DESCRIBED
 
     @property
     def make(self) -> Make:
@@ -178,6 +182,7 @@ class IdentifiedRig:
             counts=tuple(said.entries[f"counts.{c.name}"].value / turn_of(c.unit) for c in self.plant.coordinates),
             period=said.entries["servo_period"].value, travel=said.value("travel", math.inf),
             speed_limit=said.value("speed_limit", math.inf), twist=said.value("twist", math.inf), more=self.more,
+            basis=self.basis,
         )  # fmt: skip
 
     def twin(self, rig: ServoRig, said: RigDescription, seed: int) -> ServoRig:
@@ -333,7 +338,7 @@ def _from_fit(path: Path, seed: int, draws: int) -> IdentifiedRig:
     per, force = fitted.unit(GAIN), _force(kind)
     unit = per.rpartition("/")[2].strip("()") if "/" in per and per != force else force
     known = _with_drive(plant, fitted.plant, fitted.values, unit)
-    known = replace(known, description=fitted.description)
+    known = replace(known, description=fitted.description, basis=fitted.basis)
     return replace(known, draws=tuple(_drawn(fitted, plant, known.gain, seed, draws)))
 
 

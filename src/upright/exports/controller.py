@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from upright.basis import DESCRIBED, Basis, of_plain
 from upright.errors import BadInput
 from upright.laws import Law, Rule
 
@@ -33,6 +34,8 @@ class SampledController:
         How speeds are made of readings.
     delay : float
         How late a command acts, as the design assumed [samples].
+    basis : Basis
+        What the law was designed from.
     """
 
     law: Law | Rule
@@ -45,6 +48,7 @@ class SampledController:
     title: str = "a sampled law"
     states_from: str = ""
     delay: float | None = None
+    basis: Basis = DESCRIBED
 
     @property
     def linear(self) -> Law:
@@ -74,6 +78,7 @@ class SampledController:
         unit = f" [{self.command_unit}]" if self.command_unit else ""
         rest = [f"{v!r}" for v in self.law.arrays()["target"][0].tolist()] if isinstance(self.law, Law) else []
         said = [
+            *filter(None, [plain(self.basis.first_line())]),
             f"Call it every {self.law.period!r} s, with readings taken just before, and put the command out at once.",
             f"Readings: {', '.join(units)}" + (f"; at rest {', '.join(rest)}." if rest else "."),
             f"Commands: {', '.join(self.commands)}{unit}; "
@@ -186,7 +191,7 @@ def _read(content: Mapping[str, Any]) -> SampledController:
         command_unit=plain(str(content.get("command_unit") or "")),
         signs=tuple(float(described.get(f"sign.{n}", {}).get("value", 1.0)) for n in names),
         title=plain(f"{content.get('plant', 'a rig')}{at}"), states_from=plain(str(content.get("states_from", ""))),
-        delay=content.get("delay_samples"),
+        delay=content.get("delay_samples"), basis=of_plain(content.get("basis"), "this design"),
     )  # fmt: skip
 
 

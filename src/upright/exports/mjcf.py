@@ -39,7 +39,7 @@ def model(rig: IdentifiedRig, *, timestep: float = 1e-3) -> tuple[str, tuple[str
         f"""\
 <mujoco model="{rig.name.rpartition(":")[2]}">
   <!-- Written by upright export. Joints are the coordinates: SI and radians, angles as the plant counts them. -->
-{"".join(f"  <!-- {line} -->{chr(10)}" for line in told)}\
+{"".join(f"  <!-- {line} -->{chr(10)}" for line in (*_first_line(rig), *told))}\
   <compiler angle="radian" autolimits="false" inertiafromgeom="false" balanceinertia="false"/>
   <option timestep="{timestep!r}" integrator="RK4" gravity="{_vector(gravity)}"><flag contact="disable"/></option>
   <worldbody>
@@ -52,6 +52,11 @@ def model(rig: IdentifiedRig, *, timestep: float = 1e-3) -> tuple[str, tuple[str
 """,
         tuple(told),
     )
+
+
+def _first_line(rig: IdentifiedRig) -> list[str]:
+    """How far the numbers can be trusted, as it can stand in a comment."""
+    return [line.replace("--", "- -") for line in [rig.basis.first_line()] if line]
 
 
 def _bodies(p: Any, name: str) -> tuple[str, str, tuple[float, float, float]]:

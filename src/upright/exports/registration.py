@@ -4,15 +4,21 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from upright.exports.controller import plain
 
-def module(rig: str, fit: str, limit: float | None) -> tuple[str, str]:
-    """Name of the environment, and text of a module that registers it; `fit` is a path from the module's folder."""
+
+def module(rig: str, fit: str, limit: float | None, first_line: str = "") -> tuple[str, str]:
+    """Name of the environment, and text of a module that registers it.
+
+    `fit` is a path from the module's folder, `first_line` what the module says of it first.
+    """
     name = f"upright/{''.join(c for c in rig.rpartition(':')[2] if c.isalnum()) or 'rig'}-v0"
+    head = plain(f"{first_line} ".lstrip())
     options = "" if limit is None else f', "limit": {limit!r}'
     return (
         name,
         f'''\
-"""The rig of {Path(fit).name} as an environment of Gymnasium, written by upright export."""
+"""{head}The rig of {Path(fit).name} as an environment of Gymnasium, written by upright export."""
 
 from pathlib import Path
 

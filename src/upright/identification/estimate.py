@@ -108,7 +108,7 @@ def identify(
         found = Descent(x=x, normal=problem.normal(x), converged=False, interrupted=True)
 
     def conclude(found: Descent) -> Fit:
-        fit = _conclude(rig, runs, problem, found, log)
+        fit = _conclude(rig, runs, problem, found, log, watch=watch)
         return replace(fit, method=method, seconds=time.perf_counter() - began)
 
     try:
@@ -191,7 +191,22 @@ def _check(rig: Rig, runs: Sequence[Run], method: str) -> None:
             raise BadInput(f"run '{run.label}' has {run.t.size} samples, at least 10 are needed; widen its window.")
 
 
-def _conclude(asked: Rig, runs: Sequence[Run], problem: Problem, found: Descent, log: SearchLog) -> Fit:
+def _skipped(runs: Sequence[Run], *, watch: bool) -> tuple[str, ...]:
+    """What an interrupted fit says nothing of, so that nobody takes silence for "looked at, and found nothing"."""
+    return (
+        *(["the prediction of runs that were held out"] if any(run.role != "fit" for run in runs) else []),
+        "profiles of the intervals, which are standard errors here",
+        "other models and assumed numbers that the estimates may rest on",
+        "a drive that acts late",
+        *(["stretches that something else than the input moved"] if watch else []),
+        "whether it is good enough for a loop",
+        "the band that predictions promise",
+    )
+
+
+def _conclude(
+    asked: Rig, runs: Sequence[Run], problem: Problem, found: Descent, log: SearchLog, *, watch: bool
+) -> Fit:  # fmt: skip
     """Everything known about an optimum; of an interrupted search only what takes no time, so no predictions."""
     best = assess(problem, found.x)
     seen = identifiability(best)
@@ -226,8 +241,9 @@ def _conclude(asked: Rig, runs: Sequence[Run], problem: Problem, found: Descent,
     scored = [run for run in runs if run.role == "fit" or not found.interrupted]
     bands = None if found.interrupted else calibrated(best)
     scores = _scores(best, scored, estimates, groups, bands, log)
-    if len(scored) < len(runs):
-        warnings.append("What was held out is not predicted, because the search was interrupted.")
+    skipped = _skipped(runs, watch=watch) if found.interrupted else ()
+    if skipped:
+        warnings.append(f"Not evaluated: interrupted. This concerns {', '.join(skipped)}.")
     unseen = seen.sentences({n: p.unit for n, p in asked.parameters.items()})
     worst = min((p for s in scores.values() if s.role == "fit" for p in s.fit_percent.values()), default=100.0)
     conventions = tuple(log.conventions()) if worst < GOOD else ()
@@ -272,6 +288,7 @@ def _conclude(asked: Rig, runs: Sequence[Run], problem: Problem, found: Descent,
         warnings=(*warnings, *conventions),
         history=tuple(log.history),
         interrupted=found.interrupted,
+        not_evaluated=skipped,
         poles={} if seen.hidden else _poles(best),  # a pole may depend on what the data cannot see
         assumptions=assumed,
         bands=bands,

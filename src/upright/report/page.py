@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
 from typing import Any
 
+from upright.basis import SIMULATED, Basis
 from upright.files import plain_values
 from upright.report.symbols import symbol
 
@@ -183,6 +184,8 @@ class Chapter:
         In a report of several: as the chapter is asked for, and what it is about.
     finished : bool
         False where the work was stopped or failed.
+    first_line : str
+        What stands before everything else: that it was simulated, that its model is not to be trusted.
     """
 
     title: str
@@ -198,6 +201,7 @@ class Chapter:
     key: str = ""
     about: str = ""
     finished: bool = True
+    first_line: str = ""
 
     @property
     def anchor(self) -> str:
@@ -208,6 +212,30 @@ class Chapter:
     def state(self) -> str:
         """How far the verdict carries, in a word or two."""
         return "not finished" if not self.finished else "sound" if self.sound else "with reservations"
+
+
+def resting_on(chapter: Chapter, basis: Basis, performed: str = "") -> Chapter:
+    """The chapter with the verdict of its model first, and its own verdict no better than that.
+
+    Parameters
+    ----------
+    chapter : Chapter
+    basis : Basis
+        The model that its results rest on.
+    performed : str
+        `basis.SIMULATED` or `basis.REPLAYED` where no rig was driven.
+    """
+    verdict, first = basis.qualified(chapter.verdict), basis.first_line(performed)
+    head = {"first_line": first, "basis": basis.plain()}
+    numbers = {**head, **chapter.numbers, **head}
+    if "verdict" in numbers:
+        numbers["verdict"] = verdict
+    return replace(chapter, first_line=first, verdict=verdict, sound=chapter.sound and basis.trusted, numbers=numbers)
+
+
+def simulated(chapter: Chapter) -> Chapter:
+    """The chapter of something that rests on no model but was measured on a twin, which it says first."""
+    return replace(chapter, first_line=SIMULATED, numbers={"first_line": SIMULATED, **chapter.numbers})
 
 
 READING = (

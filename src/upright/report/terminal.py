@@ -12,8 +12,12 @@ _COLUMN = 14  # characters a column of words is squeezed to before the last one 
 _GAP = 2
 
 
-def print_chapter(screen: Any, chapter: Chapter, files: Sequence[Path] = ()) -> None:
+def print_chapter(screen: Any, chapter: Chapter, files: Sequence[Path] = (), title: str = "") -> None:
     """Print what a chapter found on a rich console, its verdict last; `files` are those written."""
+    if chapter.first_line:
+        screen.print(chapter.first_line, style="bold", soft_wrap=True, markup=False)
+    if title:
+        screen.print(title, soft_wrap=True, markup=False)
     for part in chapter.parts:
         shown = [b for b in part.content if isinstance(b, Table | Points | Facts | Code)]
         if shown and not part.aside:
@@ -34,7 +38,7 @@ def print_book(screen: Any, book: Book, files: Sequence[Path] = ()) -> None:
     """Print verdict and numbers of every chapter, which files hold the rest, and what next."""
     for chapter in book.chapters:
         screen.print(f"Experiment {chapter.key}, {chapter.title} ({chapter.about})", soft_wrap=True, markup=False)
-        lines = [f"{chapter.verdict} {chapter.detail}".strip()]
+        lines = [*filter(None, [chapter.first_line]), f"{chapter.verdict} {chapter.detail}".strip()]
         for f in chapter.findings:
             interval = f", 95 % interval {f.interval}" if f.interval else ""
             lines.append(f"{f.what}: {f.value}{interval}" + (f"; truth {f.truth}" if f.truth else ""))

@@ -31,6 +31,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from upright.basis import REPLAYED, SIMULATED
 from upright.files import replace_file
 from upright.rigs.protocol import Limits
 from upright.study.text import Section, StudyText, toml
@@ -95,6 +96,11 @@ class RigFile:
     def hardware(self) -> bool:
         """Whether something can really move."""
         return self.kind in HARDWARE
+
+    @property
+    def performed(self) -> str:
+        """That no rig is driven, where that is so."""
+        return {"twin": SIMULATED, "replay": REPLAYED}.get(self.kind, "")
 
     def limits(self, units: Mapping[str, str], command_unit: str, default: Limits | None = None) -> Limits | None:
         """How far the rig may go; the default where the file says nothing, None where hardware has no limits.

@@ -7,17 +7,19 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.basis import NOT_TRUSTED, RESERVED, TRUSTED, Basis
 from upright.errors import BadInput, ImpossiblePhysics
 from upright.files import read_text
 from upright.identification.model.bands import Bands, Spread
+from upright.identification.model.fit import Judgement
 from upright.identification.model.rig import SUBSTEPS
 from upright.physics import BUILT_IN, find
 from upright.physics.actuator import ACTUATOR
@@ -26,13 +28,14 @@ from upright.study.description import Entry, RigDescription, check_vendor
 FORMAT = 1
 LARGEST = 1e12
 """Beyond any number of a laboratory rig in SI units."""
+SILENT = Basis(level=NOT_TRUSTED, sentence="This fit does not say whether it can be trusted.")
 
 
 @dataclass(frozen=True, kw_only=True)
 class FittedModel:
     """What is read of a `fit.json`: the plant's name, every parameter [SI], what groups share, the rig, all content.
 
-    `bands` are None in files that versions without them wrote.
+    `bands` are None in files that versions without them wrote. `basis` is the fit's own verdict, for what rests on it.
     """
 
     plant: str
@@ -43,6 +46,7 @@ class FittedModel:
     groups: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
     description: RigDescription = field(default_factory=RigDescription)
     bands: Bands | None = None
+    basis: Basis = SILENT
     content: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def unit(self, name: str) -> str:
@@ -88,7 +92,7 @@ def read_fit(path: Path) -> FittedModel:
         raise
     except (UnicodeDecodeError, ValueError, RecursionError):
         raise BadInput(f"{path} is no fit.json; the first argument is the file that `upright identify` wrote") from None
-    wanted = ("plant", "parameters", "verdict")
+    wanted = ("plant", "parameters")
     if not isinstance(content, dict) or any(key not in content for key in wanted):
         raise BadInput(f"{path} lacks the keys {', '.join(wanted)} of a fit.json; write it with `upright identify`")
     if content.get("format") != FORMAT:
@@ -102,7 +106,7 @@ def read_fit(path: Path) -> FittedModel:
 
 
 def _model(content: dict[str, Any]) -> FittedModel:
-    plant, verdict = (_text(content[key], key) for key in ("plant", "verdict"))
+    plant, verdict = (_text(content.get(key, ""), key) for key in ("plant", "verdict"))
     if not plant:
         raise BadInput("plant must be a name, got an empty one")
     entries = _table(content["parameters"], "parameters")
@@ -123,9 +127,40 @@ def _model(content: dict[str, Any]) -> FittedModel:
     }
     return FittedModel(
         plant=plant, values=values, substeps=substeps, verdict=verdict, trusted=trusted, groups=groups, content=content,
-        description=_description(content, values),
+        basis=_basis(content, verdict, trusted=trusted), description=_description(content, values),
         bands=None if content.get("bands") is None else _bands(content["bands"]),
     )  # fmt: skip
+
+
+def basis_of(verdict: str, answers: Sequence[Judgement], *, trusted: bool) -> Basis:
+    """A fit's own verdict for what rests on it: what speaks against it, else what was not tested or holds in part."""
+    against = [a for a in answers if a.answer == "no"]
+    if not trusted:
+        told = _told(against[0]) if against else verdict or "it is not to be trusted."
+        return Basis(level=NOT_TRUSTED, sentence=f"The fit's own verdict: {told}")
+    less = [*against, *(a for a in answers if a.answer in ("in part", "not tested"))]
+    if less:
+        return Basis(level=RESERVED, sentence=f"The fit has reservations: {_told(less[0])}")
+    return Basis(level=TRUSTED, sentence=verdict or "The fit is trusted.")
+
+
+def _told(a: Judgement) -> str:
+    """An answer with the first of its reasons."""
+    return replace(a, advice="", reasons=a.reasons[:1]).text()
+
+
+def _basis(content: Mapping[str, Any], verdict: str, *, trusted: bool) -> Basis:
+    if "trusted" not in content or "verdict" not in content:
+        return SILENT
+    answers = [_answer(answer) for answer in _list(content.get("answers", []), "answers")]
+    return basis_of(verdict, answers, trusted=trusted)
+
+
+def _answer(entry: Any) -> Judgement:
+    table = _table(entry, "answers")
+    question, answer, headline = (_text(table.get(n), f"answers.{n}") for n in ("question", "answer", "headline"))
+    reasons = [_text(reason, "answers.reasons") for reason in _list(table.get("reasons", []), "answers.reasons")]
+    return Judgement(question=question, answer=answer, headline=headline, reasons=tuple(reasons))
 
 
 def _description(content: Mapping[str, Any], values: Mapping[str, float]) -> RigDescription:

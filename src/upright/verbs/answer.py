@@ -103,6 +103,5 @@ def text(chapter: Chapter, files: Sequence[Path] = ()) -> str:
 
     # in a notebook, rich would show what is printed at once instead of writing it
     screen = Console(file=StringIO(), width=120, highlight=False, force_jupyter=False)
-    screen.print(chapter.title, markup=False)
-    print_chapter(screen, chapter, files)
+    print_chapter(screen, chapter, files, chapter.title)
     return screen.file.getvalue().strip()  # type: ignore[attr-defined]

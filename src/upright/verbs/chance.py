@@ -59,12 +59,13 @@ def chance(
     BadInput
         When something of the rig is not known, or the gains do not fit it.
     """
+    from upright.basis import SIMULATED
     from upright.control.preflight import WORDS, Task, preflight
     from upright.experiments.designing.run import SPEEDS, velocities
     from upright.experiments.identified import rig_table
     from upright.experiments.regulation_2.run import HAND, START
     from upright.gains import feedback, hold
-    from upright.report.page import Chapter, Part, Table
+    from upright.report.page import Chapter, Part, Table, resting_on
     from upright.report.symbols import percent
     from upright.units import parse
     from upright.verbs.fitting import identified
@@ -120,7 +121,7 @@ def chance(
         numbers={"chance": told.chance, "interval": (low, high), "words": dict(told.words), "tilt": told.tilt,
                  "push": told.push, "noise": told.noise, "draws": draws, "seed": seed},
     )  # fmt: skip
-    return Answer(told, chapter)
+    return Answer(told, resting_on(chapter, known.basis, SIMULATED))
 
 
 def _wilson(held: int, of: int) -> tuple[float, float]:

@@ -248,6 +248,9 @@ def identify(
     if not fitted:
         raise BadInput(f'{label}: every run has role = "predict"; at least one needs role = "fit"')
     fit = estimate(asked.rig, asked.runs, method=method, progress=progress)
+    if each and fit.interrupted:
+        said = "Not evaluated: interrupted. No run was predicted by a fit of the others (--hold-out each)."
+        fit = replace(fit, warnings=(*fit.warnings, said), not_evaluated=(*fit.not_evaluated, "cross-validation"))
     written: list[Path] = []
     crossed = None
     if folder is not None:

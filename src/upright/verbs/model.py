@@ -284,11 +284,12 @@ def frequency(
         from upright.experiments.frequency_1b.chapter import chapter
         from upright.experiments.frequency_1b.run import run_frequency
         from upright.experiments.makes import make_named
+        from upright.report.page import simulated
 
         make_named(rig)
         found = run_frequency(rig, seed, at, progress, kind=ask)
         files += [at / "sweep.csv", at / "fit.json"]
-        told = chapter(found)
+        told = simulated(chapter(found))
     files += write_page(told, at / "report.html", pdf)
     return Answer(found, told, files)
 
@@ -379,6 +380,7 @@ def loadings(
         When too few swings can be seen.
     """
     from upright.experiments.weighing_1a.from_logs import weigh_logs, weigh_twin
+    from upright.report.page import simulated
 
     at = folder_if_given(out, pdf)
     given = paths(logs)
@@ -386,6 +388,7 @@ def loadings(
         if given or added:
             raise BadInput("--twin steps a simulated rig and takes no logs; leave out either.")
         found, told = weigh_twin(twin, seed, at)
+        told = simulated(told)
     else:
         if not given or len(texts(added)) != len(given):
             raise BadInput(

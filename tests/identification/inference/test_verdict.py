@@ -205,6 +205,18 @@ def test_what_cannot_fall_asks_for_no_loop() -> None:
     assert _judged({"a": _score("fit", 99.0, None)})[2].answer == "not asked"
 
 
+def test_a_loop_that_rests_on_numbers_nobody_saw_is_not_evaluated() -> None:
+    """Torque and inertia of a driven rig scale together; that says nothing of whether it falls when upright."""
+    evidence = Evidence(
+        rig=rig(Pendulum, PENDULUM, {}), runs={"a": _score("fit", 99.0, None)}, estimates={},
+        unseen=("m_p and J_p scale together.",), conventions=(), assumptions=(), converged=True, interrupted=False,
+        memory=0.0, period=1.0, standing=None,
+    )  # fmt: skip
+    loop = judge(evidence)[2]
+    assert loop.answer == "not tested"
+    assert "Not evaluated" in loop.headline
+
+
 def _score(role: str, percent: float, horizon: float | None) -> RunScore:
     nothing = np.zeros((0, 1))
     return RunScore(

@@ -11,6 +11,7 @@ from tests.identification.twins import PENDULUM, noisy, rig, swing
 from upright.identification import Fit
 from upright.identification.estimate import METHODS, identify
 from upright.physics import Pendulum
+from upright.report.fit.chapter import chapter
 
 GUESSES = {"J_p": 3e-3, "b_2": 1e-3, "b_2c": 1e-3, "b_2q": 2e-3}
 
@@ -52,3 +53,24 @@ def test_interrupt_at_any_call_ends_the_fit(method: str) -> None:
         assert np.isfinite(fit.cost)
         (first if at < 9 else last).append(fit.cost)
     assert last[-1] < first[0], "what is kept gets better"
+
+
+@pytest.mark.parametrize("at", [2, 6])
+def test_what_an_interrupted_fit_did_not_look_at_is_said_to_be_not_evaluated(at: int) -> None:
+    """Silence would read as "looked at, and found nothing"."""
+    fit, _ = fitted("auto", at)
+    whole, _ = fitted("auto", 10**9)
+    assert whole.not_evaluated == ()
+    assert set(fit.runs) == {"swing"}, "what was held out is not predicted"
+    told = chapter(fit, title="t")
+    steps = " ".join(s.sentence for s in told.steps)
+    page = f"{told.verdict} {told.detail} {fit.verdict} {steps}"
+    for claim in ("No equilibrium of this plant is unstable", "Every run was fitted", "can be used:"):
+        assert claim not in page
+    for answer in fit.answers[1:]:
+        assert answer.answer in ("not tested", "no")
+        assert "Not evaluated: interrupted." in answer.text()
+    (warning,) = (w for w in told.warnings if "Not evaluated: interrupted." in w)
+    for what in fit.not_evaluated:
+        assert what in warning
+    assert any("held out" in what for what in fit.not_evaluated)

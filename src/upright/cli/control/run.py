@@ -56,7 +56,7 @@ def run(
             watch=watch, out=out, pdf=pdf, observe=observe,
         )  # fmt: skip
     tell(done.chapter, done.files, done.numbers if as_json else None)
-    if not done.chapter.sound:
+    if not done.value.sound:  # whether it ran, whatever its model is worth
         raise typer.Exit(3)
 
 

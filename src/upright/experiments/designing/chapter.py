@@ -16,7 +16,7 @@ from upright.gains.requests import Roots, written
 from upright.gains.sampled import to_s
 from upright.laws import as_values
 from upright.report.drawing import BLACK, BLUE, VERMILLION, Poles, locus_figure, pole_map, swing_figure
-from upright.report.page import Block, Chapter, Part, Picture, Points, Step, Table
+from upright.report.page import Block, Chapter, Part, Picture, Points, Step, Table, resting_on
 from upright.report.symbols import number, percent, plain
 from upright.report.symbols import unit as raised
 
@@ -43,7 +43,7 @@ def chapter(done: Designed, *, source: str = "OUT/fit.json", folder: str = ".") 
     what = f"{done.rig.name}, {done.wish.at}".removesuffix(", ")
     held = "the model" if plain_matrices else f"the rig at '{done.wish.at}'"
     trial = "sampling, delay and " + ("their way to the states" if plain_matrices else "differenced encoders")
-    return Chapter(
+    told = Chapter(
         title=f"Gains for {what}",
         verdict=done.verdict,
         sound=done.chosen.margins is not None and "reservations" not in done.verdict,
@@ -59,6 +59,7 @@ def chapter(done: Designed, *, source: str = "OUT/fit.json", folder: str = ".") 
         warnings=_doubts(done),
         numbers=_numbers(done),
     )
+    return resting_on(told, done.rig.basis)
 
 
 def _delay_from(done: Designed) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from upright.basis import DESCRIBED, Basis
 from upright.errors import BadInput, nearest
 from upright.gains import Estimator, Sampled, filtered, hold, placed_observer, read_off, sampled_model
 from upright.gains.requests import Roots
@@ -34,6 +35,8 @@ class Matrices:
     units : mapping of str to str
         By name; what has none is a pure number.
     name : str
+    basis : Basis
+        That they were given, not identified.
     """
 
     A: Array
@@ -46,6 +49,7 @@ class Matrices:
     period: float = 0.0
     units: Mapping[str, str] = field(default_factory=dict[str, str])
     name: str = "plain matrices"
+    basis: Basis = DESCRIBED
 
     def __post_init__(self) -> None:
         if not 1 <= len(self.states) <= MOST_STATES or not self.inputs or not self.outputs:

@@ -138,6 +138,9 @@ class Designed:
     @property
     def verdict(self) -> str:
         """Whether this loop may be closed on a rig, in a sentence or two."""
+        return self.rig.basis.qualified(self._loop_verdict())
+
+    def _loop_verdict(self) -> str:
         way, unit = self.chosen, self.rig.unit
         if way.margins is None:
             return (

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from upright.basis import SIMULATED
 from upright.control import Score, ServoRig
 from upright.control.preflight import FELT, WORDS, word
 from upright.experiments.identified import rig_table
 from upright.experiments.regulation_2.figures import chances_figure, runs_figure, ways_figure
 from upright.experiments.regulation_2.run import SETS, Attempt, Regulation, VelocityRun
 from upright.gains.requests import written
-from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Table
+from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Table, resting_on
 from upright.report.symbols import number, plain
 
 SHOWN = 2.5
@@ -20,7 +21,7 @@ SHOWN = 2.5
 
 def chapter(done: Regulation) -> Chapter:
     """What holding the rig upright came to."""
-    return Chapter(
+    told = Chapter(
         key="2",
         title="Holding it upright",
         question="Which of the pole sets hold the rig upright within its drive's limit, and can that be told before "
@@ -40,6 +41,7 @@ def chapter(done: Regulation) -> Chapter:
         ),
         numbers=_numbers(done),
     )  # fmt: skip
+    return resting_on(told, done.rig.basis, SIMULATED if done.simulated else "")
 
 
 def _verdict(done: Regulation) -> str:

@@ -165,6 +165,11 @@ class Regulation:
         return tuple(a for a in self.attempts if a.came is not None)
 
     @property
+    def simulated(self) -> bool:
+        """Whether nothing of it came from a rig: the laws ran on a twin, or nothing was run."""
+        return self.truth is not None or not self.ran
+
+    @property
     def best(self) -> Attempt:
         """The set to recommend beforehand: the surest to regulate, of equals the one that bears the hardest tap."""
         return max(self.attempts, key=lambda a: (round(a.before.words["regulates"], 2), a.before.push))

@@ -10,7 +10,7 @@ from upright.experiments.running.doctor import Checkup
 from upright.experiments.running.figures import jitter_figure
 from upright.experiments.running.run import RigRun
 from upright.realtime.jitter import Jitter
-from upright.report.page import Chapter, Facts, KeyNumber, Part, Picture, Step, Table
+from upright.report.page import Chapter, Facts, KeyNumber, Part, Picture, Step, Table, resting_on
 from upright.report.run import draw_run
 from upright.report.symbols import number, typed
 from upright.rigs.board import told
@@ -40,11 +40,12 @@ def run_chapter(done: RigRun) -> Chapter:
                     description="Readings and commands over time."),
         )))  # fmt: skip
     warnings = tuple(filter(None, (end.warning, NO_SAFETY if done.file.hardware else "", end.log_message)))
-    return Chapter(
+    chapter = Chapter(
         title=f"Run on {done.model.name}", verdict=done.verdict, sound=done.sound, parts=tuple(parts),
         warnings=warnings, steps=_steps(done, rig), numbers=_numbers(done),
         findings=(KeyNumber(what="late ticks", value=f"{end.late} of {end.ticks}"),),
     )  # fmt: skip
+    return resting_on(chapter, done.basis, done.file.performed)
 
 
 def _events(done: RigRun) -> tuple[Table, ...]:

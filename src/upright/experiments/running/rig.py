@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from upright.basis import DESCRIBED, Basis, of_plain
 from upright.control.trial import ServoRig
 from upright.errors import BadInput, nearest
 from upright.experiments.identified import read_identified
@@ -158,8 +159,8 @@ def _nothing() -> None:
     """What a person does."""
 
 
-def read_law(path: Path, model: ServoRig, at: str, zero: str) -> Law | Rule:
-    """Law of a design.json, or of a file that `upright.laws.as_values` filled; about what is held.
+def read_law(path: Path, model: ServoRig, at: str, zero: str) -> tuple[Law | Rule, Basis]:
+    """Law of a design.json, or of a file that `upright.laws.as_values` filled, about what is held; and its basis.
 
     Raises
     ------
@@ -174,10 +175,12 @@ def read_law(path: Path, model: ServoRig, at: str, zero: str) -> Law | Rule:
     if not isinstance(values, dict) or "kind" not in values:
         raise BadInput(f"{path} holds no law that can run; design again: upright design FIT -o FOLDER.")
     law = of_values(values)
+    basis = of_plain(content.get("basis"), "this design") if "as_run" in content else DESCRIBED
     if isinstance(law, Rule):
-        return law
+        return law, basis
     held, from_zero = model.plant.equilibrium(at), model.plant.equilibrium(zero)
-    return replace(law, target=np.array([held[c.name] - from_zero[c.name] for c in model.plant.coordinates]))
+    target = np.array([held[c.name] - from_zero[c.name] for c in model.plant.coordinates])
+    return replace(law, target=target), basis
 
 
 SHAPES = ("free", "step", "square", "sine", "sweep")

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from upright.basis import DESCRIBED, MEASURED, Basis
 from upright.control.trial import ServoRig
 from upright.errors import BadInput
 from upright.experiments.running.rig import described, open_loop, read_law, signal, stage_of
@@ -78,6 +79,8 @@ class RigRun:
     log : RunLog or None
         None where no loop began.
     log_path : Path
+    basis : Basis
+        Of the law, and of the model that the supervisor compared the rig with.
     """
 
     wish: RunRequest
@@ -86,6 +89,7 @@ class RigRun:
     end: RunEnd
     log: RunLog | None
     log_path: Path
+    basis: Basis = DESCRIBED
 
     @property
     def t(self) -> Array:
@@ -125,6 +129,9 @@ class RigRun:
     @property
     def verdict(self) -> str:
         """What it came to, in a sentence or two."""
+        return self.basis.qualified(self._outcome())
+
+    def _outcome(self) -> str:
         end = self.end
         if end.stopped:
             ran = f" after {self.t[-1]:.3g} s" if self.t.size else " before its loop began"
@@ -163,11 +170,12 @@ def run_rig(
     library()  # what a log needs is missed before anything moves
     file = read_rig_file(wish.rig)
     model, _ = described(file)
-    balance = wish.law is not None
+    balance, basis = wish.law is not None, MEASURED if file.hardware and wish.law is None else model.basis
     zero = file.zero if file.zero in model.plant.equilibria else next(iter(model.plant.equilibria))
     at = file.at if file.at in model.plant.equilibria else zero
     if wish.law is not None:
-        law = read_law(wish.law, model, at, zero)
+        law, designed = read_law(wish.law, model, at, zero)
+        basis &= designed
         if wish.reference:
             if not isinstance(law, Law) or not law.reference_names or not np.any(law.D[:, law.readings :]):
                 raise BadInput(f"the law of {wish.law} follows no reference; design it with --track COORDINATE.")
@@ -190,7 +198,7 @@ def run_rig(
     else:
         end = _inline(order, law, watch)
     log = read_log(path) if path.exists() else None
-    return RigRun(wish=wish, file=file, model=model, end=end, log=log, log_path=path)
+    return RigRun(wish=wish, file=file, model=model, end=end, log=log, log_path=path, basis=basis)
 
 
 def _references(law: Law | Rule, model: ServoRig) -> tuple[tuple[str, str], ...]:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from upright.basis import SIMULATED
 from upright.control import ServoRig
 from upright.control.sensors import Scales
 from upright.control.swing_up import Ascent
 from upright.experiments.makes import make_of
 from upright.experiments.swing_up_2b.figures import ascent_figure, check_figure, portrait_figure
 from upright.experiments.swing_up_2b.run import HELD, LIES, TILT, Lie, SwingUpRun
-from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Table
+from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Table, resting_on
 from upright.report.symbols import number, percent
 from upright.report.symbols import unit as raised
 
@@ -30,11 +31,12 @@ def chapter(done: SwingUpRun) -> Chapter:
         parts.append(_swing_part(done, done.ascent))
     if done.lies:
         parts.append(_lie_part(done))
-    return Chapter(
+    told = Chapter(
         key="2b", title=f"Swing-up and catch: {done.truth.name}{seed}", question=QUESTION,
         verdict=done.verdict, detail=f"Law and check were made from {source}; they met a rig with numbers of its own.",
         sound=done.caught, parts=tuple(parts), steps=_steps(done), findings=_findings(done), numbers=_numbers(done),
     )  # fmt: skip
+    return resting_on(told, done.model.basis, SIMULATED if done.simulated else "")
 
 
 def check_chapter(model: ServoRig, check: Scales, log: str, source: str = "FIT.json") -> Chapter:
@@ -42,11 +44,12 @@ def check_chapter(model: ServoRig, check: Scales, log: str, source: str = "FIT.j
     again = Step("Mend what is said above, log the hanging rig again, and check again.")
     onward = Step("The encoders may be trusted: find the gains that hold the rig.",
                   f"upright regulate {source}")  # fmt: skip
-    return Chapter(
+    told = Chapter(
         key="2b", title=f"Encoders of {model.name} in {log}", question="Do the encoders show what is true?",
         verdict=check.verdict, sound=check.sound, parts=(_sensor_part(model, check),),
         steps=(onward if check.sound else again,), numbers={"sensors": _scales(check), "verdict": check.verdict},
     )  # fmt: skip
+    return resting_on(told, model.basis)
 
 
 def _scales(check: Scales) -> dict[str, Any]:

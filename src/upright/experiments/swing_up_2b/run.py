@@ -95,6 +95,8 @@ class SwingUpRun:
     folder : Path
     seconds : float
         Computing time.
+    simulated : bool
+        Whether a twin stood in for the rig.
     """
 
     model: ServoRig
@@ -107,6 +109,7 @@ class SwingUpRun:
     source: str
     folder: Path
     seconds: float = 0.0
+    simulated: bool = True
 
     @property
     def caught(self) -> bool:
@@ -115,8 +118,16 @@ class SwingUpRun:
         return a is not None and a.up <= float(a.trial.t[-1]) - HELD
 
     @property
+    def sound(self) -> bool:
+        """Whether what was tried came off, whatever its model is worth."""
+        return self.caught
+
+    @property
     def verdict(self) -> str:
         """What came of it, in a sentence or two."""
+        return self.model.basis.qualified(self._outcome())
+
+    def _outcome(self) -> str:
         a, unit = self.ascent, self.model.unit
         if a is None:
             return f"No loop was closed. {self.check.verdict}"
@@ -265,7 +276,7 @@ def run_swing_up(
         ascent.trial.record.to_csv(folder / "swing_up.csv")
     return SwingUpRun(
         model=model, truth=truth, log=log, check=check, law=law, ascent=ascent, lies=tried,
-        source=source, folder=folder, seconds=time.perf_counter() - began,
+        source=source, folder=folder, seconds=time.perf_counter() - began, simulated=at_hand is None,
     )  # fmt: skip
 
 

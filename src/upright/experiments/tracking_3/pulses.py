@@ -24,6 +24,7 @@ from upright.physics import Plant
 from upright.progress import Progress, part, silent
 from upright.records import Record
 from upright.study.description import RigDescription
+from upright.study.fitted import basis_of
 from upright.study.load import Study
 from upright.study.text import TomlTable, counted_sensor, number, study_text, table
 
@@ -144,7 +145,8 @@ def identify_shaft(
 
 
 def fitted(rig: ServoRig, fit: Fit) -> ServoRig:
-    """The rig as the fit sees it: same drive, encoders and period, numbers of the plant and gain as estimated."""
+    """The rig as the fit sees it: same drive, encoders and period, plant, gain and verdict as estimated."""
     values = {n: p.value for n, p in fit.rig.parameters.items()} | {n: e.value for n, e in fit.estimates.items()}
     plant = rig.plant.replace(**{n: v for n, v in values.items() if n in rig.plant.names()})
-    return replace(rig, plant=plant, gain=values["actuator.gain"])
+    basis = basis_of(fit.verdict, fit.answers, trusted=fit.trusted)
+    return replace(rig, plant=plant, gain=values["actuator.gain"], basis=basis)

@@ -15,6 +15,7 @@ from xml.sax.saxutils import quoteattr
 
 from upright import __version__
 from upright.errors import BadInput
+from upright.exports.controller import plain
 from upright.exports.fmu.source import source
 from upright.exports.fmu.unit import STEP, Unit, Variable
 
@@ -77,6 +78,8 @@ def _machine() -> str:
 
 def description(unit: Unit, token: str) -> str:
     """Text of ``modelDescription.xml``."""
+    first_line = plain(unit.rig.basis.first_line())
+    told = f" description={quoteattr(first_line)}" if first_line else ""
     variables = [
         '    <Float64 name="time" valueReference="0" causality="independent" variability="continuous" unit="s"/>'
     ]
@@ -89,7 +92,7 @@ def description(unit: Unit, token: str) -> str:
     return "\n".join([
         '<?xml version="1.0" encoding="UTF-8"?>',
         f'<fmiModelDescription fmiVersion="3.0" modelName={quoteattr(unit.rig.name)} instantiationToken="{token}"',
-        f'    generationTool="upright {__version__}" variableNamingConvention="flat">',
+        f'    generationTool="upright {__version__}" variableNamingConvention="flat"{told}>',
         f'  <CoSimulation modelIdentifier="{NAME}" canHandleVariableCommunicationStepSize="true"',
         f'      fixedInternalStepSize="{STEP!r}"/>',
         "  <UnitDefinitions>", *(f"    <Unit name={quoteattr(u)}/>" for u in units), "  </UnitDefinitions>",

@@ -323,7 +323,8 @@ def refit_without_outliers(fit: Fit, rig: Rig, runs: Sequence[Run], again: Calla
     told = [f"Outlier: {o.sentence}" for o in found]
     if fit is first:
         return replace(fit, warnings=(*fit.warnings, *told))
-    missing = [replace(r, role="predict") for r in runs if r.label not in fit.runs]
+    absent = [r for r in runs if r.label not in fit.runs and (r.role == "fit" or not fit.interrupted)]
+    missing = [replace(r, role="predict") for r in absent]
     scores = {**fit.runs, **predict(fit, rig, missing)}
     known = [r.label for r in runs]
     order = sorted(scores, key=lambda label: next((i for i, k in enumerate(known) if label.startswith(k)), len(known)))

@@ -38,6 +38,8 @@ SURE, LIKELY = 0.99, 0.9
 
 PREDICTS, USABLE, LOOP = "Does it predict?", "Can its numbers be used?", "Is it good enough for the loop?"
 
+INTERRUPTED = "Not evaluated: interrupted."
+
 
 @dataclass(frozen=True, kw_only=True)
 class Evidence:
@@ -68,9 +70,18 @@ def judge(found: Evidence) -> tuple[Judgement, ...]:
     """The three answers."""
     predicts = _predicts(found)
     others = _usable(found, confirmed=predicts.answer == "yes"), _loop(found)
+    if found.interrupted:
+        return predicts, *map(_not_evaluated, others)
     if predicts.answer != "no":
         return predicts, *others
     return predicts, *(_no_better(a) for a in others)
+
+
+def _not_evaluated(a: Judgement) -> Judgement:
+    """An answer that an interrupted search did not come to; what speaks against the numbers already stays."""
+    if a.question == USABLE and a.answer == "no":
+        return replace(a, reasons=(f"{INTERRUPTED} This is from the best so far.", *a.reasons))
+    return Judgement(question=a.question, answer="not tested", headline=INTERRUPTED)
 
 
 def _no_better(a: Judgement) -> Judgement:
@@ -211,6 +222,11 @@ def _lumped(rig: Rig) -> list[str]:
 
 def _loop(found: Evidence) -> Judgement:
     s = found.standing
+    if s is None and found.unseen:
+        return Judgement(
+            question=LOOP, answer="not tested",
+            headline="Not evaluated: the poles rest on numbers that these data cannot see.",
+        )  # fmt: skip
     if s is None:
         return Judgement(
             question=LOOP, answer="not asked",

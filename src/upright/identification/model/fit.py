@@ -152,7 +152,7 @@ class Fit:
     fix it; `singular_values` belong to the scaled Jacobian, `directions` (rows) to them, in the order of `names`;
     `poles` are those at every equilibrium of the fitted plant. The `verdict` is what the `answers` say, one after
     another, and the model is `trusted` when none of the first two is "no". `bands` is what it
-    promises of predictions, None when it was interrupted.
+    promises of predictions, None when it was interrupted; `not_evaluated` names all that it then does not say.
     """
 
     rig: Rig
@@ -175,6 +175,7 @@ class Fit:
     warnings: tuple[str, ...] = ()
     history: tuple[tuple[str, float, int], ...] = ()
     interrupted: bool = False
+    not_evaluated: tuple[str, ...] = ()
     assumptions: tuple[Assumption, ...] = ()
     poles: Mapping[str, tuple[Pole, ...]] = field(default_factory=dict[str, tuple[Pole, ...]])
     bands: Bands | None = None

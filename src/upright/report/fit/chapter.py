@@ -298,7 +298,7 @@ def next_steps(fit: Fit, *, study: str = "STUDY.toml", folder: str = "OUT", cros
     """
     yield from (*_broken(fit), *_blind(fit), *_nuisances(fit), *_friction(fit, study, folder))
     untested = "Every run was fitted, so nothing tests the model yet; "
-    if not crossed and all(s.role == "fit" for s in fit.runs.values()):
+    if not (crossed or fit.interrupted) and all(s.role == "fit" for s in fit.runs.values()):
         if len(fit.runs) > 1:
             each = f"upright identify {study} -o {folder} --hold-out each"
             yield Step(f"{untested}predict each from a fit of the others.", each)

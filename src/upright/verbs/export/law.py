@@ -44,7 +44,7 @@ def write_law(made: SampledController, name: str, to: str, at: Path, single: boo
     from upright.exports.targets import TARGETS
     from upright.exports.vector import self_test
     from upright.laws import Rule
-    from upright.report.page import Chapter, Part, Points, Step
+    from upright.report.page import Chapter, Part, Points, Step, resting_on
     from upright.report.symbols import number, typed
 
     function = isinstance(made.law, Rule)
@@ -84,4 +84,4 @@ def write_law(made: SampledController, name: str, to: str, at: Path, single: boo
             "samples": len(test.readings), "single_precision_misses": test.single,
         },
     )  # fmt: skip
-    return Answer(tuple(str(f) for f in files), told, files)
+    return Answer(tuple(str(f) for f in files), resting_on(told, made.basis), files)

@@ -18,13 +18,13 @@ def gymnasium(source: Path, at: Path, limit: float | None) -> Answer[tuple[str, 
     from upright.experiments.identified import read_identified
     from upright.exports.episodes import DRAWS, Episodes
     from upright.exports.registration import module
-    from upright.report.page import Chapter, Part, Points, Step
+    from upright.report.page import Chapter, Part, Points, Step, resting_on
     from upright.report.symbols import number, typed
 
     rig = read_identified(source, draws=DRAWS)
     lanes = Episodes(rig, 1, limit=limit)
     path = source / "fit.json" if source.is_dir() else source
-    name, text = module(rig.name, os.path.relpath(path.resolve(), at.resolve()), limit)
+    name, text = module(rig.name, os.path.relpath(path.resolve(), at.resolve()), limit, rig.basis.first_line())
     file = replace_file(at / "rig_env.py", text.encode())
     drawn = f"every episode has one of {len(rig.draws)} rigs drawn from its covariance"
     warnings = () if rig.draws else ("The fit has no covariance, so every episode has the same rig.",)
@@ -45,14 +45,14 @@ def gymnasium(source: Path, at: Path, limit: float | None) -> Answer[tuple[str, 
         ),
         numbers={"to": "gymnasium", "files": [str(file)], "environment": name, "draws": len(rig.draws)},
     )  # fmt: skip
-    return Answer((str(file),), told, [file])
+    return Answer((str(file),), resting_on(told, rig.basis), [file])
 
 
 def mjcf(source: Path, at: Path, limit: float | None) -> Answer[tuple[str, ...]]:
     """A model of MuJoCo."""
     from upright.experiments.identified import read_identified
     from upright.exports.mjcf import model
-    from upright.report.page import Chapter, Step
+    from upright.report.page import Chapter, Step, resting_on
     from upright.report.symbols import typed
 
     rig = read_identified(source, draws=0)
@@ -67,14 +67,14 @@ def mjcf(source: Path, at: Path, limit: float | None) -> Answer[tuple[str, ...]]
         + (", and what MuJoCo has otherwise is said below." if told else ""), warnings=told, numbers=numbers,
         steps=(Step("Look at it.", f"pip install mujoco && python -m mujoco.viewer --mjcf={typed(file)}"),),
     )  # fmt: skip
-    return Answer((str(file),), chapter, [file])
+    return Answer((str(file),), resting_on(chapter, rig.basis), [file])
 
 
 def fmu(source: Path, at: Path, limit: float | None) -> Answer[tuple[str, ...]]:
     """A unit for co-simulation, FMI 3.0."""
     from upright.experiments.identified import read_identified
     from upright.exports.fmu import build, unit_of
-    from upright.report.page import Chapter, Part, Points, Step
+    from upright.report.page import Chapter, Part, Points, Step, resting_on
     from upright.report.symbols import typed
 
     if limit is not None:
@@ -100,7 +100,7 @@ def fmu(source: Path, at: Path, limit: float | None) -> Answer[tuple[str, ...]]:
         ),
         numbers={"to": "fmu", "files": [str(file)], "platform": where},
     )  # fmt: skip
-    return Answer((str(file),), told, [file])
+    return Answer((str(file),), resting_on(told, rig.basis), [file])
 
 
 FORMS: Mapping[str, Callable[[Path, Path, float | None], Answer[tuple[str, ...]]]] = {
