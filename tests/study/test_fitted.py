@@ -25,6 +25,9 @@ FIT = {
     "substeps": 2,
     "verdict": "The model can be trusted.",
     "trusted": True,
+    "answers": [
+        {"question": "Does it predict?", "answer": "in part", "headline": "It explains 90 %.", "reasons": ["Some."]}
+    ],
     "parameters": {n: number(v, CartPendulum.quantity(n).unit, 0.01 * v) for n, v in VALUES.items()}
     | {"actuator.gain": number(4.0, "N/V", 0.1), "actuator.delay": number(2e-3, "s"),
        "actuator.limit": {"value": None, "stderr": 0.0, "interval": [None, None], "unit": "V"}},
