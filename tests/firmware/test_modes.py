@@ -403,8 +403,65 @@ def test_a_self_test_pushes_for_its_time_and_tells_who_moved(host):
     assert board.state()[5:] == [0.0, 1.0, Mode.ARMED]
     with pytest.raises(RigStopped, match="beyond"):
         rig.self_test(6.0, 0.01)
-    with pytest.raises(RigStopped, match="beyond"):
-        rig.self_test(0.5, 6.0)
+    for seconds in (0.301, 0.0, -0.1, math.nan):
+        with pytest.raises(RigStopped, match=r"up to 0\.3 s"):
+            rig.self_test(0.5, seconds)
+
+
+FULL = math.floor(WIDE.command / STEP)
+
+
+def pulsed(host, ticks, watchdog=0.02):
+    """A board in a pulse of full command that its host asked for, and the answer that it gave."""
+    board = host()
+    line = TerminalLine(board.port)
+    rig = rig_on(line)
+    rig.open()
+    rig.clear_fault()
+    rig.configure(replace(WIDE, watchdog=watchdog, saturation=math.inf))
+    rig.arm()
+    board.do("run 5000")  # a long while armed
+    line.write(pack(Kind.SELF_TEST, 200, self_test(FULL, ticks)))
+    (reply,) = Parser().feed(line.read(1.0))
+    read = status(reply.body)
+    assert read is not None
+    return board, rig, read[0].result
+
+
+def test_a_host_that_dies_during_a_pulse_is_waited_for_no_longer_than_the_watchdog(host):
+    board, rig, result = pulsed(host, 300)
+    assert result == Result.DONE
+    board.do("run 20")
+    assert board.state()[5:] == [FULL, 1.0, Mode.ARMED]
+    board.do("run 1")
+    assert dead(board)
+    tick = rig.exchange(0.0)
+    assert (tick.mode, tick.faults) == (Mode.FAULT, Fault.WATCHDOG)
+
+
+def test_a_pulse_lasts_as_long_as_its_host_speaks(host):
+    board, rig, _ = pulsed(host, 300)
+    for _ in range(15):
+        assert rig.exchange(0.0).mode == Mode.ARMED
+        board.do("run 19")
+        assert board.state()[5:] == [FULL, 1.0, Mode.ARMED]
+    assert rig.exchange(0.0).mode == Mode.ARMED
+    assert board.state()[5:] == [0.0, 1.0, Mode.ARMED]
+
+
+@pytest.mark.parametrize("skipped", [1, 10])
+def test_no_pulse_is_longer_than_300_ms_whatever_the_watchdog_allows_and_ticks_are_late(host, skipped):
+    board, rig, result = pulsed(host, 301, watchdog=5.0)
+    assert result == Result.WRONG_VALUE
+    board.do("run 1")
+    assert board.state()[5:] == [0.0, 1.0, Mode.ARMED]
+    board, rig, result = pulsed(host, 300, watchdog=5.0)
+    assert result == Result.DONE
+    board.do(*[f"skip {skipped}"] * (300 // skipped))
+    assert board.state()[5:] == [FULL, 1.0, Mode.ARMED]
+    board.do("run 1")
+    assert board.state()[5:] == [0.0, 1.0, Mode.ARMED]
+    assert rig.exchange(0.0).faults == Fault(0)
 
 
 def test_a_new_host_finds_the_rig_stopped_and_without_limits(host):
