@@ -315,6 +315,27 @@ def test_a_speed_is_seen_alike_when_ticks_are_late(host, skipped, by, fault):
 
 
 @pytest.mark.parametrize(
+    ("skipped", "counts", "moved"),
+    [  # of a straight line over the ticks that never came, the part in the last 8 of them
+        (1, 50, 50), (5, 200, 200), (7, 210, 210), (8, 240, 240), (9, 270, 240), (15, 600, 320), (16, -640, -320),
+        (20, 100, 40), (20, 1017, 406), (20, -1017, -406),
+    ],
+)  # fmt: skip
+def test_counts_of_the_last_8_ticks_make_the_speed_however_late_a_tick_is(host, skipped, counts, moved):
+    board, rig = running(host)  # 20 rad/s are 407 counts in 8 ticks
+    board.do(f"counts 0 {counts}", f"skip {skipped}")
+    assert board.state()[7] == Mode.HOST
+    rig.estop()
+    assert rig.snapshot().moved == (0, moved)
+
+
+def test_a_speed_beyond_its_limit_is_seen_in_the_first_tick_that_comes_late(host):
+    board, _ = running(host)
+    board.do("counts 0 1020", "skip 20")  # 1020 * 8/20 = 408 counts in 8 ticks, and 407 are 20 rad/s
+    assert dead(board)
+
+
+@pytest.mark.parametrize(
     ("counts", "faults"), [(90, Fault(0)), (-90, Fault(0)), (110, Fault.OVERSPEED), (-110, Fault.OVERSPEED)]
 )
 def test_counts_that_jump_are_no_slow_motion(host, counts, faults):
