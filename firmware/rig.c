@@ -75,6 +75,7 @@ static uint8_t last_kind, last_sequence, last_result;
 
 static bool running(void) { return mode == HOST || mode == MCU; }
 static bool powered(void) { return mode == ARMED || running(); }
+static bool pulsing(void) { return mode == ARMED && pulse_left; }
 static uint32_t size_of(int32_t v) { return v < 0 ? 0UL - (uint32_t)v : (uint32_t)v; }
 static bool beyond(uint32_t size, uint32_t limit) { return limit != NO_LIMIT && size > limit; }
 /* Twice the speed's limit in a single tick: a jump of counts that the window would take for a slow motion. */
@@ -179,11 +180,14 @@ void rig_tick(uint32_t tick, uint16_t late) {
         silence += elapsed;
         saturated = size_of(output) < (uint32_t)limits.command ? 0 : saturated + elapsed;
         if (running() && elapsed > limits.watchdog) trip(F_OVERRUN);
-        else if (silence > (mode == ARMED ? PATIENCE_ARMED : limits.watchdog)) trip(F_WATCHDOG);
+        else if (silence > (running() || pulsing() ? limits.watchdog : PATIENCE_ARMED)) trip(F_WATCHDOG);
         else if (limits.saturation != FOREVER && saturated > limits.saturation) trip(F_SATURATION);
     }
     if (mode == MCU) follow_law();
-    else if (mode == ARMED && pulse_left) put_out(--pulse_left ? pulse : 0);
+    else if (pulsing()) {
+        pulse_left -= elapsed < pulse_left ? (uint16_t)elapsed : pulse_left;
+        put_out(pulse_left ? pulse : 0);
+    }
     if (overran) {
         overran = false;
         if (running()) trip(F_OVERRUN);
@@ -311,12 +315,14 @@ static uint8_t start(enum mode whose) {
 static uint8_t self_test(const uint8_t *b) {
     int16_t height = (int16_t)get_u16(b);
     uint16_t ticks = get_u16(b + 2);
-    if (size_of(height) > (uint32_t)limits.command || !ticks || ticks > LONGEST_PULSE) return WRONG_VALUE;
+    if (size_of(height) > (uint32_t)limits.command || !ticks) return WRONG_VALUE;
+    if ((uint32_t)ticks * port_period > LONGEST_PULSE) return WRONG_VALUE;
     uint32_t before = port_lock();
     bool armed = mode == ARMED;
     if (armed) {
         pulse = height;
         pulse_left = ticks + 1;
+        silence = 0; /* of the patience that an armed rig had until now */
     }
     port_unlock(before);
     return armed ? DONE : FAULTED;

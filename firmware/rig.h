@@ -51,9 +51,9 @@ enum request {
 enum result { DONE, WRONG_LENGTH, WRONG_MODE, WRONG_VALUE, NOT_CONFIGURED, FAULTED, OFF_START, UNKNOWN };
 
 #define SPEED_WINDOW 8        /* ticks over which a speed is measured; a power of two */
-#define PATIENCE_ARMED 10000  /* ticks that an armed rig waits for its host */
+#define PATIENCE_ARMED 10000  /* ticks that an armed rig at zero command waits for its host */
 #define LONGEST_WATCHDOG 5000 /* ticks */
-#define LONGEST_PULSE 5000    /* ticks of a self-test */
+#define LONGEST_PULSE 300000  /* of a self-test [us] */
 
 void rig_reset(void);
 void rig_receive(uint8_t byte); /* from the wire, outside of the tick */

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.boards import COUNTS, STEP, rig_on
+from tests.rigs.test_law import PATHS
 from upright.errors import RigStopped
 from upright.laws import Law
 from upright.rigs.line import TerminalLine
@@ -314,6 +315,27 @@ def test_a_speed_is_seen_alike_when_ticks_are_late(host, skipped, by, fault):
 
 
 @pytest.mark.parametrize(
+    ("skipped", "counts", "moved"),
+    [  # of a straight line over the ticks that never came, the part in the last 8 of them
+        (1, 50, 50), (5, 200, 200), (7, 210, 210), (8, 240, 240), (9, 270, 240), (15, 600, 320), (16, -640, -320),
+        (20, 100, 40), (20, 1017, 406), (20, -1017, -406),
+    ],
+)  # fmt: skip
+def test_counts_of_the_last_8_ticks_make_the_speed_however_late_a_tick_is(host, skipped, counts, moved):
+    board, rig = running(host)  # 20 rad/s are 407 counts in 8 ticks
+    board.do(f"counts 0 {counts}", f"skip {skipped}")
+    assert board.state()[7] == Mode.HOST
+    rig.estop()
+    assert rig.snapshot().moved == (0, moved)
+
+
+def test_a_speed_beyond_its_limit_is_seen_in_the_first_tick_that_comes_late(host):
+    board, _ = running(host)
+    board.do("counts 0 1020", "skip 20")  # 1020 * 8/20 = 408 counts in 8 ticks, and 407 are 20 rad/s
+    assert dead(board)
+
+
+@pytest.mark.parametrize(
     ("counts", "faults"), [(90, Fault(0)), (-90, Fault(0)), (110, Fault.OVERSPEED), (-110, Fault.OVERSPEED)]
 )
 def test_counts_that_jump_are_no_slow_motion(host, counts, faults):
@@ -365,6 +387,22 @@ def test_gains_by_which_one_count_is_everything_are_refused(host):
             rig.start(Mode.MCU, law(beyond))
 
 
+@pytest.mark.parametrize("path", PATHS)
+def test_a_count_that_is_everything_is_refused_whatever_way_it_takes(host, path):
+    """By 1 % to either side of the limit; float32 rounds by a hundred-thousandth of that."""
+    board, rig = running(host)
+    for share in (0.99, 1.01):
+        rig.stop()
+        rig.arm()
+        law = PATHS[path](share * WIDE.command * COUNTS)
+        if share < 1:
+            rig.start(Mode.MCU, law)
+        else:
+            with pytest.raises(RigStopped, match="its gains are absurd"):
+                rig.start(Mode.MCU, law)
+    assert dead(board)
+
+
 def test_a_law_that_runs_away_stops_the_rig_before_its_number_overflows(host):
     board, rig = running(host, Mode.MCU, replace(WIDE, saturation=math.inf), law(0.0, z=10.0))
     ticks = [rig.exchange(0.0) for _ in range(12)]
@@ -403,8 +441,65 @@ def test_a_self_test_pushes_for_its_time_and_tells_who_moved(host):
     assert board.state()[5:] == [0.0, 1.0, Mode.ARMED]
     with pytest.raises(RigStopped, match="beyond"):
         rig.self_test(6.0, 0.01)
-    with pytest.raises(RigStopped, match="beyond"):
-        rig.self_test(0.5, 6.0)
+    for seconds in (0.301, 0.0, -0.1, math.nan):
+        with pytest.raises(RigStopped, match=r"up to 0\.3 s"):
+            rig.self_test(0.5, seconds)
+
+
+FULL = math.floor(WIDE.command / STEP)
+
+
+def pulsed(host, ticks, watchdog=0.02):
+    """A board in a pulse of full command that its host asked for, and the answer that it gave."""
+    board = host()
+    line = TerminalLine(board.port)
+    rig = rig_on(line)
+    rig.open()
+    rig.clear_fault()
+    rig.configure(replace(WIDE, watchdog=watchdog, saturation=math.inf))
+    rig.arm()
+    board.do("run 5000")  # a long while armed
+    line.write(pack(Kind.SELF_TEST, 200, self_test(FULL, ticks)))
+    (reply,) = Parser().feed(line.read(1.0))
+    read = status(reply.body)
+    assert read is not None
+    return board, rig, read[0].result
+
+
+def test_a_host_that_dies_during_a_pulse_is_waited_for_no_longer_than_the_watchdog(host):
+    board, rig, result = pulsed(host, 300)
+    assert result == Result.DONE
+    board.do("run 20")
+    assert board.state()[5:] == [FULL, 1.0, Mode.ARMED]
+    board.do("run 1")
+    assert dead(board)
+    tick = rig.exchange(0.0)
+    assert (tick.mode, tick.faults) == (Mode.FAULT, Fault.WATCHDOG)
+
+
+def test_a_pulse_lasts_as_long_as_its_host_speaks(host):
+    board, rig, _ = pulsed(host, 300)
+    for _ in range(15):
+        assert rig.exchange(0.0).mode == Mode.ARMED
+        board.do("run 19")
+        assert board.state()[5:] == [FULL, 1.0, Mode.ARMED]
+    assert rig.exchange(0.0).mode == Mode.ARMED
+    assert board.state()[5:] == [0.0, 1.0, Mode.ARMED]
+
+
+@pytest.mark.parametrize("skipped", [1, 10])
+def test_no_pulse_is_longer_than_300_ms_whatever_the_watchdog_allows_and_ticks_are_late(host, skipped):
+    board, rig, result = pulsed(host, 301, watchdog=5.0)
+    assert result == Result.WRONG_VALUE
+    board.do("run 1")
+    assert board.state()[5:] == [0.0, 1.0, Mode.ARMED]
+    board, rig, result = pulsed(host, 300, watchdog=5.0)
+    assert result == Result.DONE
+    board.do(*[f"skip {skipped}"] * (300 // skipped))
+    assert board.state()[5:] == [FULL, 1.0, Mode.ARMED]
+    board.do("run 1")
+    assert board.state()[5:] == [0.0, 1.0, Mode.ARMED]
+    assert rig.exchange(0.0).faults == Fault(0)
 
 
 def test_a_new_host_finds_the_rig_stopped_and_without_limits(host):

@@ -13,11 +13,12 @@ from pathlib import Path
 
 import pytest
 
-from tests.realtime.rigs import LAW, put_out, witnessed
-from upright.laws import as_values
+from tests.realtime.rigs import BLANK, LAW, RIG, put_out, staged, witnessed
+from upright.laws import as_values, of_values
 from upright.logs import read_log
 from upright.realtime.process import run_in_process
-from upright.realtime.session import RunOrder
+from upright.realtime.session import RunOrder, carry_out
+from upright.rigs import TwinPort
 
 ROOT = Path(__file__).parents[2]
 PARENT = """
@@ -35,12 +36,45 @@ if __name__ == "__main__":
                      log=folder / "run.mcap", check=False, fifo=False)
     run_in_process(order)
 """
+DOOMED = """
+import multiprocessing, os, signal, sys, threading
+from functools import partial
+from pathlib import Path
+from tests.realtime.rigs import LAW, FatalBaggage, fatal, witnessed
+from upright.laws import as_values
+from upright.realtime.process import run_in_process
+from upright.realtime.session import RunOrder
+
+def die(after):
+    while not multiprocessing.active_children():
+        os.sched_yield()
+    threading.Event().wait(after)
+    os.kill(os.getpid(), signal.SIGKILL)
+
+if __name__ == "__main__":
+    out, event, parent = Path(sys.argv[1]) / "out", sys.argv[2], os.getpid()
+    make, paced = partial(witnessed, out, parent), False
+    if event == "unpacked":
+        make = partial(witnessed, out, parent, FatalBaggage())
+    elif event.startswith("after"):
+        paced = True
+        threading.Thread(target=die, args=(float(event.split()[1]),)).start()
+    else:
+        make = partial(fatal, out, parent, int(event.split()[1]), event.endswith("deaf"))
+    order = RunOrder(make=make, law=as_values(LAW), seconds=0.5, log=out.with_name("run.mcap"), check=False, fifo=False)
+    run_in_process(order, paced=paced)
+"""
 
 
 def order(folder, **more):
-    (folder / "out").write_bytes(bytes(24))
+    (folder / "out").write_bytes(BLANK)
     given = {"seconds": 0.5, "log": folder / "run.mcap", "check": False, "fifo": False}
     return RunOrder(make=partial(witnessed, folder / "out"), law=as_values(LAW), **(given | more))
+
+
+def ours():
+    """Environment of a program that sees the tests as this one does."""
+    return os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), *filter(None, sys.path)])}
 
 
 def until(done, seconds=30.0):
@@ -107,10 +141,9 @@ def test_a_loop_that_is_asked_to_end_zeroes_first(tmp_path):
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_an_orphan_zeroes_its_rig_and_ends(tmp_path):
-    (tmp_path / "out").write_bytes(bytes(24))
+    (tmp_path / "out").write_bytes(BLANK)
     (tmp_path / "parent.py").write_text(PARENT, encoding="utf-8")
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), *filter(None, sys.path)])}
-    parent = subprocess.Popen([sys.executable, str(tmp_path / "parent.py"), str(tmp_path)], env=environment, cwd=ROOT)
+    parent = subprocess.Popen([sys.executable, str(tmp_path / "parent.py"), str(tmp_path)], env=ours(), cwd=ROOT)
     try:
         assert until(lambda: put_out(tmp_path / "out")[1] == 1 and put_out(tmp_path / "out")[2] > 3000)
     finally:
@@ -123,3 +156,95 @@ def test_an_orphan_zeroes_its_rig_and_ends(tmp_path):
     log = read_log(tmp_path / "run.mcap")
     assert until(lambda: not read_log(tmp_path / "run.mcap").complaint, 10.0)
     assert len(log) > 300
+
+
+class CountedPort(TwinPort):
+    """A twin whose parent is gone from one of its calls on; counts what drives it from then on."""
+
+    def __init__(self, last):
+        super().__init__(RIG)
+        self.calls, self.armed, self.driven, self._last = 0, 0, 0, last
+
+    @property
+    def orphaned(self):
+        return self.calls >= self._last
+
+    def write(self, command):
+        self.calls += 1
+        super().write(command)
+        self.driven += self.orphaned and command != 0.0
+
+    def enable(self, on):
+        self.calls += 1
+        super().enable(on)
+        self.armed = self.armed or on * self.calls
+        self.driven += self.orphaned and on
+
+    def advance(self):
+        self.calls += 1
+        return super().advance()
+
+    def read(self):
+        self.calls += 1
+        return super().read()
+
+
+def started(folder, last):
+    """The port of a run whose parent is gone after so many calls."""
+    port = CountedPort(last)
+    run = RunOrder(
+        make=partial(staged, port), law=as_values(LAW), seconds=0.01, log=folder / f"{last}.mcap", check=False
+    )
+    carry_out(run, law=of_values(run.law), stopped=lambda: "The parent is gone." if port.orphaned else "")
+    return port
+
+
+ARM = 3
+"""Calls of the port by which a board arms: it reads, writes zero, and switches on."""
+
+
+def test_a_parent_that_is_gone_before_the_drive_is_on_leaves_it_off(tmp_path):
+    """At 25 instants from the first call to the last one before the rig is armed."""
+    armed = started(tmp_path, 10**9).armed
+    assert armed > 1000  # the instants reach from the opening through the rest to the aiming
+    for k in range(25):
+        assert started(tmp_path, 1 + k * (armed - ARM - 1) // 24).driven == 0
+
+
+def orphaned(folder, event):
+    """What is put out after the parent's death at an event, once all of its processes have ended."""
+    (folder / "out").write_bytes(BLANK)
+    (folder / "doomed.py").write_text(DOOMED, encoding="utf-8")
+    parent = subprocess.Popen(
+        [sys.executable, str(folder / "doomed.py"), str(folder), event], env=ours(), cwd=ROOT, stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+    )  # fmt: skip
+    said, _ = parent.communicate()  # ends with the last process that holds the other end
+    assert parent.returncode == -signal.SIGKILL, said
+    return put_out(folder / "out")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("event", ["unpacked", "call 2000 deaf"])
+def test_a_dead_parent_never_leaves_the_drive_on(tmp_path, event):
+    command, enabled, _, driven = orphaned(tmp_path, event)
+    assert (command, enabled, driven) == (0.0, 0, 0)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("event", [f"after {0.06 * k:.2f}" for k in range(1, 26)])
+def test_a_parent_may_die_at_any_instant_of_the_start(tmp_path, event):
+    command, enabled, _, driven = orphaned(tmp_path, event)
+    assert (command, enabled) == (0.0, 0)
+    assert driven <= 1  # the tick that was on its way
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("event", ["call 3200", "call 3200 deaf"])
+def test_a_drive_that_is_on_goes_off_with_the_parent(tmp_path, event):
+    command, enabled, writes, driven = orphaned(tmp_path, event)
+    assert (command, enabled) == (0.0, 0)
+    assert writes > 1000
+    assert driven <= 1

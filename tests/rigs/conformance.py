@@ -317,8 +317,16 @@ class Conformance:
         assert not found.complaint
         assert rig.exchange(0.0).mode == Mode.ARMED
         assert rig.exchange(0.0).applied == 0.0
-        with pytest.raises(RigStopped):
-            rig.self_test(about.full_scale, 0.1)
+        for pulse, seconds in ((about.full_scale, 0.1), (-about.full_scale, 0.1), (about.full_scale / 20, 0.31)):
+            with pytest.raises(RigStopped):
+                rig.self_test(pulse, seconds)
+
+    def test_a_pulse_the_other_way_moves_it_the_other_way(self, rig, specimen):
+        if not specimen.moves:
+            pytest.skip("nothing answers a pulse")
+        about = opened(rig)
+        rig.arm()
+        assert rig.self_test(-about.full_scale / 20, 0.1).moved[about.coordinates[0]] < 0
 
     def test_its_own_loop_needs_a_sound_law(self, rig):
         about = opened(rig)

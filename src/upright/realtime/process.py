@@ -1,7 +1,8 @@
 """A run in a process of its own: nothing that the parent does, draws or collects makes a tick late.
 
 The child shows how it goes in shared memory, reads one flag that asks it to stop, and zeroes its rig when its parent is
-gone: an orphan that goes on driving a rig is the worst that can happen here.
+gone: an orphan that goes on driving a rig is the worst that can happen here. Its parent is the process whose id was
+sent with the run, since one that dies while the child still starts is no longer there to be looked up.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from upright.rigs.protocol import Capabilities, Fault, Mode
 _READINGS = 8
 _FIELDS = 8
 _SEEN = 0.05  # s between two looks of the parent
+_PR_SET_PDEATHSIG = 1  # of linux/prctl.h
 WISH = "Stopped by hand."
 
 
@@ -91,7 +93,9 @@ def run_in_process(
     phase = context.RawArray("c", 201)
     wish = context.RawValue("b", 0)
     ours, theirs = context.Pipe(duplex=False)
-    child = context.Process(target=_child, args=(order, memory, phase, wish, theirs, paced), name="upright loop")
+    child = context.Process(
+        target=_child, args=(os.getpid(), order, memory, phase, wish, theirs, paced), name="upright loop"
+    )
     with _no_interrupt_for_the_child():
         child.start()
     theirs.close()
@@ -149,12 +153,17 @@ def _no_interrupt_for_the_child() -> Generator[None]:
         signal.signal(signal.SIGINT, before)
 
 
-def _child(order: RunOrder, memory: Any, phase: Any, wish: Any, pipe: Connection, paced: bool) -> None:
+def _child(
+    parent: int, order: RunOrder, memory: Any, phase: Any, wish: Any, pipe: Connection, paced: bool
+) -> None:  # fmt: skip
     import signal
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # to be ended is to be zeroed first
-    window, orphan = _Window(memory, phase), _orphaned()
+    signal.signal(signal.SIGTERM, _interrupt_once)  # to be ended is to be zeroed first
+    _end_with_parent()
+    window, orphan = _Window(memory, phase), _orphaned(parent)
+    if orphan():
+        return  # before anything is opened
 
     def stopped() -> str:
         if wish.value:
@@ -181,16 +190,31 @@ def _child(order: RunOrder, memory: Any, phase: Any, wish: Any, pipe: Connection
     pipe.close()
 
 
-def _orphaned() -> Callable[[], bool]:
-    """Whether the parent is gone; asked at every tick."""
+def _interrupt_once(_signal: int, _frame: object) -> None:
+    """A second signal must not interrupt the zeroing that the first one began."""
+    import signal
+
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    raise KeyboardInterrupt
+
+
+def _end_with_parent() -> None:
+    """Let the kernel send SIGTERM when the parent dies, also where no tick passes, as within a pulse or a wait.
+
+    It is sent when the *thread* ends that started this process; `run_in_process` waits there for as long as this
+    process lives. Nothing is sent for a parent that was gone before this call: compare its id afterwards.
+    """
+    if sys.platform == "linux":
+        import ctypes
+        import signal
+
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, ctypes.c_ulong(signal.SIGTERM))
+
+
+def _orphaned(parent: int) -> Callable[[], bool]:
+    """Whether the process of that id, which started this one, is gone; evaluated at every tick."""
     if sys.platform != "win32":
-        parent = os.getppid()
         return lambda: os.getppid() != parent
-    process, asked = multiprocessing.parent_process(), 0
-
-    def gone() -> bool:
-        nonlocal asked
-        asked += 1
-        return asked % 20 == 0 and process is not None and not process.is_alive()
-
-    return gone
+    # ids of the dead stay there, and a launcher may stand between; the handle was opened before anything was imported
+    process = multiprocessing.parent_process()
+    return lambda: process is not None and not process.is_alive()

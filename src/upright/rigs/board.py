@@ -15,7 +15,7 @@ from typing import Protocol
 from upright.errors import RigStopped
 from upright.laws import Law
 from upright.rigs.law import RunningLaw, absurdity, for_rig
-from upright.rigs.protocol import NO_FAULT, Capabilities, Fault, Limits, Mode, SelfTest, Tick
+from upright.rigs.protocol import LONGEST_PULSE, NO_FAULT, Capabilities, Fault, Limits, Mode, SelfTest, Tick
 
 
 class Port(Protocol):
@@ -137,10 +137,10 @@ class Board:
         """The farthest that each coordinate went under a pulse and for as long after it."""
         self._must("test", Mode.ARMED)
         c, limits = self._there(), self._held()
-        if not (0 < abs(pulse) <= limits.command and 0 < seconds <= 5.0):
+        if not (0 < abs(pulse) <= limits.command and 0 < seconds <= LONGEST_PULSE):
             raise self._refusal(
-                f"a self-test takes a pulse up to {limits.command:g} {c.command_unit} for up to 5 s, got {pulse:g} "
-                f"{c.command_unit} for {seconds:g} s"
+                f"a self-test takes a pulse up to {limits.command:g} {c.command_unit} for up to {LONGEST_PULSE:g} s, "
+                f"got {pulse:g} {c.command_unit} for {seconds:g} s"
             )
         first, farthest, ticks = self._counts, [0] * len(self._counts), max(1, round(seconds / c.period))
         for k in range(2 * ticks):

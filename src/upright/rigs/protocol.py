@@ -51,6 +51,8 @@ class Fault(IntFlag):
 
 
 NO_FAULT = Fault(0)
+LONGEST_PULSE = 0.3
+"""Of a self-test [s]; a board holds it by itself."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -210,7 +212,9 @@ class LiveRig(Protocol):
         ...
 
     def self_test(self, pulse: float, seconds: float) -> SelfTest:
-        """Give a small pulse [command unit] and look what moves; in ARMED only, and back in ARMED afterwards."""
+        """Give a small pulse [command unit] of up to `LONGEST_PULSE` and look what moves; in ARMED only, and back in
+        ARMED afterwards. The watchdog acts during the pulse as in a loop.
+        """
         ...
 
     def arm(self) -> None:

@@ -13,7 +13,7 @@ from upright.rigs import wire
 from upright.rigs.board import told
 from upright.rigs.line import Line, open_line
 from upright.rigs.onboard import onboard, ticks
-from upright.rigs.protocol import NO_FAULT, Capabilities, Fault, Limits, Mode, SelfTest, Tick
+from upright.rigs.protocol import LONGEST_PULSE, NO_FAULT, Capabilities, Fault, Limits, Mode, SelfTest, Tick
 from upright.rigs.wire import Kind, Packet, Result, Status
 
 _AGAIN = 0.02  # s; after which a request is repeated, as long as there is no watchdog that would not wait for it
@@ -149,11 +149,16 @@ class SerialRig:
         self._ask(Kind.ZERO)
 
     def self_test(self, pulse: float, seconds: float) -> SelfTest:
-        """The farthest that each coordinate went under a pulse and for as long after it."""
+        """The farthest that each coordinate went under a pulse and for as long after it.
+
+        Every tick of it is exchanged, which feeds the board's watchdog.
+        """
         c = self._there()
-        length = max(1, round(seconds / self._tick)) if 0.0 < seconds < math.inf else 0
+        if not 0.0 < seconds <= LONGEST_PULSE:
+            raise self._refusal(f"a self-test takes a pulse of up to {LONGEST_PULSE:g} s, got {seconds:g} s")
+        length = max(1, _down(seconds / self._tick))
         first = self.exchange(0.0).counts
-        self._ask(Kind.SELF_TEST, wire.self_test(self._steps(pulse), min(length, 0xFFFF)))
+        self._ask(Kind.SELF_TEST, wire.self_test(self._steps(pulse), length))
         farthest, until = [0] * len(first), self._status.tick + 2 * length + 1
         while self._status.tick < until:
             tick = self.exchange(0.0)

@@ -155,7 +155,7 @@ class Supervisor:
         """
         pulse, expected = self._expected()
         self._await_rest()
-        self.rig.arm()
+        self._arm()
         found = self.rig.self_test(pulse, PULSE)
         self.rig.stop()
         complaint = found.complaint or unlike(found, expected)
@@ -204,14 +204,20 @@ class Supervisor:
         Raises
         ------
         RigStopped
-            When it has left its start window, or refuses.
+            When it has left its start window, refuses, or is no longer wanted to run.
         """
-        self.rig.arm()
+        self._arm()
         self._in_window()
         self.rig.start(mode, self.law if mode == Mode.MCU and isinstance(self.law, Law) else None)
         self._running, self._mode = RunningLaw(self.law, self.about.period), mode
         self._last, self._first, self._command, self._stale = None, None, 0.0, 0
         self.event(self._time, "start", f"{mode.name} holds {', '.join(f'{t:.4g}' for t in self.target)}")
+
+    def _arm(self) -> None:
+        """Aiming and opening a log take time: whether the run is still wanted is evaluated just before."""
+        if wish := self.stopped():
+            self._give_up(Fault.STOP, wish)
+        self.rig.arm()
 
     def near(self) -> bool:
         """Whether the rig is where a run may start; a pulse may have left the driven body off its start window."""

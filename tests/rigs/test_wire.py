@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 import zlib
 
 import pytest
@@ -9,7 +10,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from upright.errors import BadInput
-from upright.rigs.wire import LONGEST, Parser, cobs, from_cobs, pack, unpack
+from upright.rigs import Fault, Mode
+from upright.rigs.wire import (
+    LONGEST,
+    Parser,
+    Result,
+    cobs,
+    exchange,
+    from_cobs,
+    limits,
+    pack,
+    sample,
+    self_test,
+    status,
+    unpack,
+)
 
 BODIES = st.binary(max_size=LONGEST - 2)
 BYTE = st.integers(0, 255)
@@ -91,11 +106,77 @@ def frame_body(frame: bytes) -> bytes:
 
 
 def test_a_stream_without_an_end_takes_no_room():
-    parser = Parser()
-    for _ in range(1000):
-        assert parser.feed(b"x" * 4096) == []
+    """Of 4 MB without a zero nothing is kept: there is room for what is fed at once and copies of it, and no more."""
+    parser, part = Parser(), b"x" * 4096
+    tracemalloc.start()
+    try:
+        for _ in range(1000):
+            assert parser.feed(part) == []
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert most < 10 * len(part)
     assert parser.feed(b"\0" + pack(1, 2, b"on")) == [(1, 2, b"on")]
     assert parser.dropped == 1
+
+
+@pytest.mark.parametrize("chunk", [1, 100, 1000])
+def test_the_longest_frame_passes_and_one_byte_more_does_not(chunk):
+    """Kind, sequence and 248 bytes make `LONGEST`; one byte more is stuffed and summed without a flaw, and too long."""
+
+    def fed(payload):
+        frame = cobs(payload + zlib.crc32(payload).to_bytes(4, "little")) + b"\0"
+        parser = Parser()
+        frames = [f for k in range(0, len(frame), chunk) for f in parser.feed(frame[k : k + chunk])]
+        return frames, parser.dropped
+
+    longest = bytes([7, 1]) + bytes(range(1, 249))
+    assert len(longest) == LONGEST
+    assert fed(longest) == ([(7, 1, longest[2:])], 0)
+    # zeros within, so that the blocks of COBS stay short of the 254 bytes that they can have
+    assert fed(longest[:100] + b"\0" + longest[100:]) == ([], 1)
+
+
+def test_a_frame_after_an_endless_one_is_not_taken_for_its_end():
+    parser = Parser()
+    assert parser.feed(b"x" * 300) == []
+    assert parser.feed(pack(1, 2, b"on")) == []  # its zero ends the endless one
+    assert parser.feed(pack(1, 3, b"on")) == [(1, 3, b"on")]
+
+
+def status_bytes(result, mode, faults, tick):
+    return bytes([result, mode, *faults.to_bytes(2, "little"), *tick.to_bytes(4, "little")])
+
+
+def test_a_status_is_read_as_docs_firmware_md_has_it():
+    read = status(status_bytes(4, 2, 1 + 64, 70_000) + b"more")
+    assert read == ((Result.NOT_CONFIGURED, Mode.HOST, Fault.WATCHDOG | Fault.ENCODER, 70_000), b"more")
+
+
+@pytest.mark.parametrize(
+    "body",
+    [b"", b"\0" * 7, status_bytes(8, 0, 0, 0), status_bytes(0, 5, 0, 0)],
+    ids=["none", "short", "result", "mode"],
+)
+def test_a_status_of_another_program_is_none(body):
+    assert status(body) is None
+
+
+def test_numbers_go_with_the_least_byte_first_and_ticks_run_over():
+    assert exchange(-2, 1.5, 0x12345).hex() == "feff" + "0000c03f" + "4523"  # 1.5 is 3fc00000
+    assert self_test(-300, 150).hex() == "d4fe" + "9600"
+    assert sample(bytes.fromhex("0a00" + "01000000" + "ffffffff" + "feff")) == (10, (1, -1), -2)
+
+
+def test_limits_come_back_as_they_went():
+    numbers = list(range(1, 11))
+    body = (
+        b"".join(n.to_bytes(4, "little") for n in numbers) + (20).to_bytes(2, "little") + (32767).to_bytes(2, "little")
+    )
+    held = limits(body)
+    assert (held.travel, held.speed, held.start, held.frozen) == ((1, 2), (3, 4), (5, 6), (7, 8))
+    assert (held.twist, held.saturation, held.watchdog, held.command) == (9, 10, 20, 32767)
+    assert held.body() == body
 
 
 def test_what_no_frame_can_hold_is_refused():
