@@ -13,7 +13,7 @@ from upright.basis import DESCRIBED, Basis
 from upright.control.trial import GAIN, ServoRig, driven
 from upright.errors import BadInput, ImpossiblePhysics
 from upright.experiments.makes import MAKES, Make, make_of, make_rig, sheet
-from upright.physics import Plant, find
+from upright.physics import BUILT_IN, Plant, find
 from upright.physics.actuator import ACTUATOR
 from upright.records import Array
 from upright.records.record import of_twin
@@ -27,6 +27,7 @@ from upright.study.description import (
     turn_of,
 )
 from upright.study.fitted import FittedModel, read_fit
+from upright.study.load import Study
 from upright.study.rig import read_plant, read_rig
 from upright.study.sensors import drive_unit
 from upright.study.text import StudyText, number
@@ -314,6 +315,22 @@ def read_identified(path: Path, *, seed: int = 0, draws: int = 200) -> Identifie
     return _from_fit(path, seed, draws) if path.suffix == ".json" else _from_study(path)
 
 
+def rig_of_study(study: Study) -> IdentifiedRig:
+    """The rig of a study, its guesses counting as its numbers."""
+    kind = study.rig.plant
+    values = {n: p.value for n, p in study.rig.parameters.items()}
+    plant = kind(**{n: values[n] for n in kind.names()})
+    gain = study.rig.parameters.get(GAIN)
+    known = _with_drive(plant, study.plant, values, _command_unit("" if gain is None else gain.unit, kind))
+    return replace(known, description=study.description)
+
+
+def rig_of_plant(plant: Plant) -> IdentifiedRig:
+    """A plant with the numbers that somebody gave, its command being its force."""
+    name = next((n for n, kind in BUILT_IN.items() if kind is type(plant)), type(plant).__name__)
+    return _with_drive(plant, name, {}, _force(type(plant)))
+
+
 def _from_study(path: Path) -> IdentifiedRig:
     study = StudyText(path).root()
     kind, unit = read_plant(study), drive_unit(study)
@@ -331,16 +348,30 @@ def _force(kind: type[Plant]) -> str:
 def _from_fit(path: Path, seed: int, draws: int) -> IdentifiedRig:
     fitted = read_fit(path)
     before_running(fitted.plant, path)
-    kind = find(fitted.plant, path.parent)
+    return rig_of_fit(fitted, find(fitted.plant, path.parent), seed=seed, draws=draws)
+
+
+def rig_of_fit(fitted: FittedModel, kind: type[Plant], *, seed: int = 0, draws: int = 200) -> IdentifiedRig:
+    """The rig of a fit of a plant of this kind, and rigs drawn from its covariance.
+
+    Raises
+    ------
+    BadInput
+        When a parameter of the plant is missing.
+    """
     try:
         plant = kind(**{n: v for n, v in fitted.values.items() if n in kind.names()})
     except TypeError:
-        raise BadInput(f"{path} does not hold every parameter of '{fitted.plant}'; identify again.") from None
-    per, force = fitted.unit(GAIN), _force(kind)
-    unit = per.rpartition("/")[2].strip("()") if "/" in per and per != force else force
-    known = _with_drive(plant, fitted.plant, fitted.values, unit)
+        raise BadInput(f"the fit does not hold every parameter of '{fitted.plant}'; identify again.") from None
+    known = _with_drive(plant, fitted.plant, fitted.values, _command_unit(fitted.unit(GAIN), kind))
     known = replace(known, description=fitted.description, basis=fitted.basis)
     return replace(known, draws=tuple(_drawn(fitted, plant, known.gain, seed, draws)))
+
+
+def _command_unit(per: str, kind: type[Plant]) -> str:
+    """Unit of the command from that of the drive's gain, ``N m/V``."""
+    force = _force(kind)
+    return per.rpartition("/")[2].strip("()") if "/" in per and per != force else force
 
 
 def _with_drive(plant: Plant, name: str, values: Mapping[str, float], unit: str) -> IdentifiedRig:

@@ -100,12 +100,13 @@ def read_fit(path: Path) -> FittedModel:
             f"{path} has format {_shown(content.get('format'))}, this version reads {FORMAT}; identify again"
         )
     try:
-        return _model(content)
+        return fitted_model(content)
     except (BadInput, ImpossiblePhysics) as error:
         raise BadInput(f"{path}: {str(error).rstrip('.')}; identify again, or put it right") from None
 
 
-def _model(content: dict[str, Any]) -> FittedModel:
+def fitted_model(content: dict[str, Any]) -> FittedModel:
+    """Model of what a `fit.json` holds; see `read_fit`."""
     plant, verdict = (_text(content.get(key, ""), key) for key in ("plant", "verdict"))
     if not plant:
         raise BadInput("plant must be a name, got an empty one")

@@ -25,7 +25,14 @@ from upright.study.text import StudyText
 
 
 def write_fit(fit: Fit, study: Study, path: Path, crossed: CrossValidation | None = None) -> dict[str, Any]:
-    """Write `fit.json` and return what it holds; `crossed` adds what each run's prediction by the others scored."""
+    """Write `fit.json` and return what it holds; see `fit_content`."""
+    content = fit_content(fit, study, crossed)
+    write_json(path, content)
+    return content
+
+
+def fit_content(fit: Fit, study: Study, crossed: CrossValidation | None = None) -> dict[str, Any]:
+    """What `fit.json` holds, as plain values; `crossed` adds what each run's prediction by the others scored."""
     known = {
         name: Estimate(
             value=p.value,
@@ -78,7 +85,6 @@ def write_fit(fit: Fit, study: Study, path: Path, crossed: CrossValidation | Non
             label: {"fit_percent": s.fit_percent, "blind": crossed.blind[label]}
             for label, s in crossed.predicted.items()
         }
-    write_json(path, content)
     return plain_values(content)
 
 

@@ -68,7 +68,7 @@ def chance(
     from upright.report.page import Chapter, Part, Table, resting_on
     from upright.report.symbols import percent
     from upright.units import parse
-    from upright.verbs.fitting import identified
+    from upright.verbs.handover import rig_of
     from upright.verbs.rig import rig_options
     from upright.workers import Workers
 
@@ -79,7 +79,7 @@ def chance(
     if draws < 1:
         raise BadInput(f"draws needs a whole number of at least 1, got {draws}.")
     shared = Workers(number=workers, cluster=cluster)
-    known = identified(fit, seed=seed, draws=draws)
+    known = rig_of(fit, "chance", seed=seed, draws=draws)
     names = [c.name for c in known.plant.coordinates]
     each = [counts] * len(names) if isinstance(counts, int | float) else list(counts or ())
     if each and len(each) != len(names):

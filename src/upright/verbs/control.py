@@ -13,6 +13,7 @@ from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
 from upright.progress import Progress, part, silent
 from upright.verbs.answer import Answer
+from upright.verbs.handover import called, rig_of
 from upright.verbs.linear.matrices import linear_model, read_matrices
 from upright.verbs.pages import folder_if_given, page_folder, write_page
 from upright.verbs.rig import Counts, as_typed, rig_options
@@ -48,9 +49,10 @@ def design(
 
     Parameters
     ----------
-    source : path or linear model, optional
-        fit.json, its folder, or a study (TOML); or a `control.StateSpace`, ``plant.linear("inverted")``, what `hold`
-        gives, or arrays ``(A, B[, C[, D]])``.
+    source : fit, path, plant or linear model, optional
+        What `identify` answered, a fit.json, its folder, or a study (TOML), or a plant with its numbers; or a
+        `control.StateSpace` or TransferFunction, ``plant.linear("inverted")``, what `hold` gives, or arrays
+        ``(A, B[, C[, D]])``.
     matrices : path, optional
         Instead of `source`, a file in TOML with A and B, and C, D, dt [s], names and units where there are any. Of a
         linear model there are no dry friction, no encoders and no covariance; a sampled one is designed for as it is.
@@ -106,7 +108,6 @@ def design(
     from upright.control.trial import GAIN, full_command
     from upright.experiments.designing.chapter import chapter
     from upright.experiments.designing.run import SPEEDS, DesignRequest, design_for, quanta
-    from upright.experiments.identified import read_identified
     from upright.files import write_json
     from upright.report.symbols import typed
 
@@ -120,7 +121,7 @@ def design(
         at="", poles=asked, weights=weights, R=effort_weight, delay=delay, lag=si_if_given(lag, "s"), memory=memory,
         track=track, sampled=sampled,
     )  # fmt: skip
-    if matrices is not None or not isinstance(source, str | os.PathLike):
+    if matrices is not None or _is_linear(source):
         if at or counts or vendor:
             raise BadInput("--at, --counts and --vendor are of a rig, and plain matrices are none; leave them out.")
         rig = read_matrices(matrices) if matrices is not None else linear_model(source)
@@ -129,7 +130,7 @@ def design(
     else:
         if (speed := speed or "filtered") not in SPEEDS:
             raise BadInput(f"--speed is plain, filtered or kalman, got '{speed}'.")
-        rig = read_identified(Path(source), seed=seed)
+        rig = rig_of(source, "design", seed=seed)
         here = at or list(rig.plant.equilibria)[-1]
         if here not in rig.plant.equilibria:
             raise BadInput(f"'{rig.name}' has no equilibrium '{here}'; {nearest(here, rig.plant.equilibria)}")
@@ -140,7 +141,7 @@ def design(
             wish, at=here, period=said.entries["servo_period"].value, speed=speed, quantum=quanta(rig, said),
             limit=most if math.isfinite(most) else None, start=_start(rig, start), said=said,
         )  # fmt: skip
-        name = typed(Path(source))
+        name = called(source)
     done = design_for(rig, wish)
     again = as_typed(limit=limit, period=period, counts=counts, vendor=vendor)
     told = chapter(done, source=name + again, folder=typed(folder_at or Path()))
@@ -151,6 +152,11 @@ def design(
             *write_page(told, folder_at / "design.html", pdf),
         ]
     return Answer(done, told, files)
+
+
+def _is_linear(source: Any) -> bool:
+    """Whether it is a linear model in one of its forms, rather than a rig."""
+    return isinstance(source, tuple) or any(hasattr(source, name) for name in ("A", "num", "frdata"))
 
 
 def _sampling(model: StateSpace, period: float | str) -> float:
@@ -202,7 +208,7 @@ def _start(rig: IdentifiedRig | StateSpace, given: str | Mapping[str, float | st
 
 @keeps_its_inputs
 def regulate(
-    source: str | os.PathLike[str] | None = None, *, rig: str = "", seed: int | None = None, which: int | str = "",
+    source: Any = None, *, rig: str = "", seed: int | None = None, which: int | str = "",
     poles: str | Iterable[complex] = "", speed: str = "filtered", memory: float = 0.5, tilt: float | str = "",
     push: float | str = "", seconds: float = 6.0, draws: int = 200, limit: float | None = None,
     period: float | str = "", counts: Counts = "", travel: float | None = None, vendor: str = "",
@@ -216,8 +222,9 @@ def regulate(
 
     Parameters
     ----------
-    source : path, optional
-        fit.json or its folder; a twin is identified when omitted.
+    source : fit, path or plant, optional
+        What `identify` answered, fit.json or its folder, or a plant with its numbers; a twin is identified when
+        omitted.
     rig : str, optional
         Twin to identify: furuta or linear; with a fit, the make whose vendor is chosen.
     seed : int, optional
@@ -268,10 +275,8 @@ def regulate(
     BadInput
         When the call contradicts itself or the fit, or poles cannot be placed.
     """
-    from upright.experiments.identified import read_identified
     from upright.experiments.regulation_2.chapter import chapter
     from upright.experiments.regulation_2.run import identify_make, run_regulation
-    from upright.report.symbols import typed
     from upright.workers import Workers
 
     shared = Workers(number=workers, cluster=cluster)
@@ -283,8 +288,8 @@ def regulate(
         known = identify_make(make, seed, at / "identified", part(progress, 0.0, 0.6, "identifying"), draws)
         name, base = f"--rig {make}", 0.6
     else:
-        known, name, base = read_identified(Path(source), seed=seed or 0, draws=draws), typed(Path(source)), 0.0
-        vendor = _vendor(known, rig, vendor, str(source))
+        known, name, base = rig_of(source, "regulate", seed=seed or 0, draws=draws), called(source), 0.0
+        vendor = _vendor(known, rig, vendor, name)
         name += as_typed(limit=limit, period=period, counts=counts, travel=travel, vendor=vendor)
     given = rig_options(known.plant, known.unit, limit=limit, period=period, counts=counts, travel=travel)
     said = known.described(given, vendor=vendor, who="upright regulate")
@@ -329,7 +334,7 @@ def _wish(
 
 @keeps_its_inputs
 def swing_up(
-    source: str | os.PathLike[str] | None = None, *, rig: str = "", seed: int = 1, seconds: float = 12.0,
+    source: Any = None, *, rig: str = "", seed: int = 1, seconds: float = 12.0,
     travel: float | None = None, limit: float | None = None, period: float | str = "", counts: Counts = "",
     vendor: str = "", lie: str | Mapping[str, float] = "", check: Log | None = None,
     out: str | os.PathLike[str] = "swing-up", pdf: bool = False,
@@ -338,8 +343,8 @@ def swing_up(
 
     Parameters
     ----------
-    source : path, optional
-        fit.json that the law is designed from; the make's data sheet when omitted.
+    source : fit, path or plant, optional
+        What `identify` answered, or the fit.json that the law is designed from; the make's data sheet when omitted.
     rig : str, optional
         furuta or linear; with a fit, the make whose vendor is chosen.
     seed : int
@@ -376,12 +381,10 @@ def swing_up(
     BadInput
         When the call contradicts itself or the fit, or the log cannot be used.
     """
-    from upright.experiments.identified import read_identified
     from upright.experiments.makes import make_rig
     from upright.experiments.swing_up_2b.chapter import chapter, check_chapter
     from upright.experiments.swing_up_2b.run import known_of, run_swing_up, scales_of_log
     from upright.files import write_json
-    from upright.report.symbols import typed
 
     at = page_folder(out, pdf)
     if not 1 <= seconds <= 120:
@@ -395,8 +398,8 @@ def swing_up(
                 raise BadInput(f"--{option} is for a rig of your own: name its fit.json first.")
         model, truth = make_rig(rig or "furuta"), make_rig(rig or "furuta", seed)
     else:
-        identified = read_identified(Path(source), seed=seed)
-        known, vendor = known_of(identified), _vendor(identified, rig, vendor, str(source))
+        identified = rig_of(source, "swing_up", seed=seed)
+        known, vendor = known_of(identified), _vendor(identified, rig, vendor, called(source))
         given = rig_options(
             identified.plant, identified.unit, limit=limit, period=period, counts=counts, travel=travel
         )  # fmt: skip
@@ -406,7 +409,7 @@ def swing_up(
         truth = model if check is not None else identified.twin(model, said, seed)
         doubts = identified.doubts(said, None if check is not None else truth)
     again = as_typed(travel=travel, limit=limit, period=period, counts=counts, vendor=vendor)
-    name = "" if source is None else typed(Path(source)) + again
+    name = "" if source is None else called(source) + again
     if check is not None:
         record, log = open_log(check)
         scales = scales_of_log(model, record, known)
@@ -446,7 +449,7 @@ def _lying(rig: ServoRig, lie: str | Mapping[str, float]) -> ServoRig:
 
 @keeps_its_inputs
 def track(
-    source: str | os.PathLike[str] | None = None, *, rig: str = "rectilinear", seed: int = 0,
+    source: Any = None, *, rig: str = "rectilinear", seed: int = 0,
     sets: str | int | Sequence[int] = "", poles: str | Iterable[complex] = "", step: float | str = "",
     limit: float | None = None, period: float | str = "", counts: Counts = "", vendor: str = "",
     out: str | os.PathLike[str] = "track", pdf: bool = False, progress: Progress = silent,
@@ -455,8 +458,9 @@ def track(
 
     Parameters
     ----------
-    source : path, optional
-        fit.json, its folder, or a study, on whose numbers the figures are foretold; a twin when omitted.
+    source : fit, path or plant, optional
+        What `identify` answered, fit.json, its folder, or a study, on whose numbers the figures are predicted; a twin
+        when omitted.
     rig : str
         Twin to run on: rectilinear (ECP 210) or torsional (ECP 205).
     seed : int
@@ -492,7 +496,6 @@ def track(
     BadInput
         When there is no such rig or set, or poles cannot be placed.
     """
-    from upright.experiments.identified import read_identified
     from upright.experiments.makes import SHAFTS, make_rig
     from upright.experiments.tracking_3.chapter import chapter
     from upright.experiments.tracking_3.pulses import rig_of_file, shaft_make
@@ -510,11 +513,11 @@ def track(
     if source is None:
         on = make_rig(rig, seed)
     else:
-        known = read_identified(Path(source))
+        known = rig_of(source, "track")
         shaft_make(known.plant, f"'{known.name}'")
         given = rig_options(known.plant, known.unit, limit=limit, period=period, counts=counts)
         said = known.described(given, vendor=vendor, who="upright track")
-        on, doubts = rig_of_file(known, said, Path(source).name), known.doubts(said)
+        on, doubts = rig_of_file(known, said, Path(called(source)).name), known.doubts(said)
     size = si_if_given(step, on.plant.coordinates[-1].unit)
     if size is not None and not size > 0:
         raise BadInput(f"--step needs a size above 0, got '{step}'.")
@@ -522,7 +525,7 @@ def track(
         on = replace(on, limit=limit or on.limit)
         done = run_tracking(on, seed, at, progress, which=which, poles=own, step=size)
     else:
-        done = follow(on, on, Path(source), None, None, progress, which=which, poles=own, step=size)
+        done = follow(on, on, Path(called(source)), None, None, progress, which=which, poles=own, step=size)
     told = chapter(done)
     told = replace(
         told, title=f"Experiment 3: {told.title.lower()}, {done.rig.name}",

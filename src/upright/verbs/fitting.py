@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from upright.errors import BadInput, nearest
@@ -15,7 +14,6 @@ from upright.verbs.answer import Answer
 from upright.verbs.values import open_log
 
 if TYPE_CHECKING:
-    from upright.experiments.identified import IdentifiedRig
     from upright.identification import Fit, RunScore
     from upright.identification.ladder.cross_validation import CrossValidation
     from upright.identification.model.bands import Bands
@@ -61,6 +59,15 @@ class FitAnswer(Answer["Fit"]):
     def fit(self) -> Fit:
         """The fit itself."""
         return self.value
+
+    def __getitem__(self, name: str) -> Any:
+        """The `Estimate` of a parameter, or the value of one that was known: ``fit["l_cg"].value``."""
+        rig, found = self.value.rig, self.value.estimates
+        if name in found:
+            return found[name]
+        if name not in rig.parameters:
+            raise BadInput(f"this fit has no parameter '{name}'; {nearest(name, [*found, *rig.parameters])}")
+        return rig.parameters[name]
 
     @property
     def parameters(self) -> Any:
@@ -299,20 +306,3 @@ def asked_study(given: Any, plant: Any = None, *, data: str | Path | None = None
 
 def _is_study(path: Path) -> bool:
     return path.suffix.lower() in (".toml", "")
-
-
-def identified(fit: Any, *, seed: int = 0, draws: int = 200) -> IdentifiedRig:
-    """The rig that a fit tells of: an answer of `identify` or `frequency`, or the path of a fit.json."""
-    from upright.experiments.identified import read_identified
-
-    if isinstance(fit, FitAnswer):
-        with TemporaryDirectory() as folder:
-            return read_identified(fit.save(Path(folder) / "fit.json"), seed=seed, draws=draws)
-    if isinstance(fit, Answer):
-        written = [f for f in fit.files if f.name == "fit.json"]
-        if written:
-            return read_identified(written[0], seed=seed, draws=draws)
-        raise BadInput("this answer holds no fit; pass what up.identify or up.frequency answered, or a fit.json.")
-    if isinstance(fit, str | Path):
-        return read_identified(Path(fit), seed=seed, draws=draws)
-    raise BadInput(f"a fit is what up.identify answered, or the path of a fit.json, got {type(fit).__name__}.")

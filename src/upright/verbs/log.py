@@ -19,6 +19,7 @@ from upright.verbs.values import open_log, texts
 if TYPE_CHECKING:
     from upright.closed_loop import Recovery
     from upright.diagnosis import Diagnosis
+    from upright.diagnosis.case import KnownRig
     from upright.readers import Inspection
     from upright.records import Record
     from upright.verbs.values import Log
@@ -105,7 +106,7 @@ def _stem(log: Path) -> str:
 
 @keeps_its_inputs
 def doctor(
-    log: Log, *, rig: str | os.PathLike[str] = "", html: str | os.PathLike[str] | None = None, pdf: bool = False,
+    log: Log, *, rig: Any = "", html: str | os.PathLike[str] | None = None, pdf: bool = False,
     reader: str = "",
 ) -> Answer[Diagnosis]:  # fmt: skip
     """What looks wrong with a log, on which evidence, and what to do.
@@ -113,8 +114,9 @@ def doctor(
     Parameters
     ----------
     log : path, Record or pandas.DataFrame
-    rig : str or path, optional
-        Plant, study (TOML) or fit.json of the rig; with it signs, and with known inertias scales, are examined too.
+    rig : str, path, fit or plant, optional
+        Name of the plant, study (TOML) or fit.json of the rig, or what `identify` answered; with it signs, and with
+        known inertias scales, are examined too.
     html : path, optional
         Page to write, with a picture of every finding.
     pdf : bool
@@ -132,8 +134,9 @@ def doctor(
     BadInput
         When the log or the rig cannot be read.
     """
-    from upright.diagnosis import Finding, examine, read_known
+    from upright.diagnosis import Finding, examine
     from upright.diagnosis.chapter import chapter
+    from upright.verbs.handover import called
 
     can_be_pdf(pdf)
     path = _file(log)
@@ -141,7 +144,7 @@ def doctor(
     if page is not None and page.is_dir():
         raise BadInput(f"--html needs a file, and {page} is a folder; name one in it, such as {page / 'doctor.html'}")
     mended: tuple[Finding, ...] = ()
-    known = read_known(str(rig), str(path or "")) if str(rig) else None
+    known = _known(rig, str(path or ""))
     if path is not None:
         from upright.diagnosis.clock import read_mended
 
@@ -149,9 +152,35 @@ def doctor(
     else:
         record, path = open_log(log)
     diagnosis = examine(record, known, before=mended)
-    told = chapter(diagnosis, log=path, rig=str(rig), page=page is not None)
+    told = chapter(diagnosis, log=path, rig=rig if isinstance(rig, str) else called(rig), page=page is not None)
     told = replace(told, numbers=_plain_diagnosis(diagnosis, page))
     return Answer(diagnosis, told, [] if page is None else write_page(told, page, pdf))
+
+
+def _known(rig: Any, log: str) -> KnownRig | None:
+    """What is known of the rig: a name or a file, or an object with its numbers."""
+    from upright.diagnosis.case import KnownRig, read_known
+    from upright.identification import Parameter
+    from upright.physics import Plant
+    from upright.verbs.fitting import FitAnswer
+    from upright.verbs.handover import SAVED
+
+    if isinstance(rig, str | os.PathLike):
+        return read_known(str(rig), log) if str(rig) else None
+    if isinstance(rig, type) and issubclass(rig, Plant):
+        return KnownRig(name=rig.__name__, plant=rig)
+    if isinstance(rig, Plant):
+        numbers = {n: Parameter(name=n, value=v) for n, v in rig.parameters().items()}
+        return KnownRig(name=type(rig).__name__, plant=type(rig), parameters=numbers)
+    if isinstance(rig, FitAnswer):
+        fit = rig.value
+        values = {n: p.value for n, p in fit.rig.parameters.items()} | {n: e.value for n, e in fit.estimates.items()}
+        numbers = {n: Parameter(name=n, value=v) for n, v in values.items()}
+        return KnownRig(name=SAVED, plant=fit.rig.plant, parameters=numbers)
+    raise BadInput(
+        "doctor takes a plant's name, a study (TOML), a fit.json or what up.identify answered as the rig, got "
+        f"{type(rig).__name__}."
+    )
 
 
 def _file(log: Log) -> Path | None:

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from upright.identification.inference.scoring import RunScore
     from upright.identification.ladder.growth import Ladder
     from upright.identification.loadings import Loadings, Plan
+    from upright.study.fitted import FittedModel
+    from upright.study.load import Study
     from upright.verbs.values import Log
 
 KINDS = ("sines", "multisine", "sweep")
@@ -29,7 +31,7 @@ KINDS = ("sines", "multisine", "sweep")
 
 @keeps_its_inputs
 def predict(
-    model: str | os.PathLike[str], study: str | os.PathLike[str], *, data: str | os.PathLike[str] | None = None,
+    model: Any, study: Any, *, data: str | os.PathLike[str] | None = None,
     out: str | os.PathLike[str] | None = None, pdf: bool = False,
 ) -> Answer[dict[str, RunScore]]:  # fmt: skip
     """How well a model that was fitted before explains other runs.
@@ -39,10 +41,10 @@ def predict(
 
     Parameters
     ----------
-    model : path
-        fit.json that `identify` wrote, or its folder.
-    study : path
-        Runs to score; its guesses are not used.
+    model : fit or path
+        What `identify` answered, or the fit.json that it wrote, or its folder.
+    study : path, Study, Record or pandas.DataFrame
+        Runs to score: a study, whose guesses are not used, or a log, whose columns are recognised.
     data : path, optional
         Folder the runs' files are in; the study's own when omitted.
     out : path, optional
@@ -66,22 +68,18 @@ def predict(
     from upright.report.fit.chapter import score_pictures
     from upright.report.fit.tables import score_table
     from upright.report.page import Chapter, Part
-    from upright.study.fitted import read_fit
-    from upright.study.load import load_study
+    from upright.verbs.handover import called, fitted_of
 
     pdf_has_folder(out, pdf)
-    model, study = Path(model), Path(study)
-    for file, what in ((model, "the model"), (study, "the study")):
-        if not file.exists():
-            raise BadInput(f"{what} {file} does not exist; the call is upright predict OUT/fit.json STUDY.toml")
-    if model.is_dir():
-        model = model / "fit.json"
-    fitted = read_fit(model)
-    asked = load_study(study, data=None if data is None else Path(data), fixed=fitted.values)
+    for given, what in ((model, "the model"), (study, "the study")):
+        if isinstance(given, str | os.PathLike) and not Path(given).exists():
+            raise BadInput(f"{what} {given} does not exist; the call is upright predict OUT/fit.json STUDY.toml")
+    fitted, of = fitted_of(model, "predict"), Path(called(model)).name
+    asked, on = _runs_to_predict(fitted, model, study, data)
     missing = [n for n in fitted.values if n not in asked.rig.parameters]
     if missing:
         raise BadInput(
-            f"{study}: the plant '{asked.plant}' has no parameter {missing[0]}, and {model} is a '{fitted.plant}';"
+            f"{on}: the plant '{asked.plant}' has no parameter {missing[0]}, and {of} is a '{fitted.plant}';"
             " both must be the same plant"
         )
     rig = replace(asked.rig, substeps=fitted.substeps)
@@ -90,15 +88,15 @@ def predict(
     found = promise(scores, fitted.bands, fitted.scores)
     said = ("role", "fit_percent", "horizon", "adapted", "offer", "inside", "beyond")
     numbers: dict[str, Any] = {
-        "model": model.name,
-        "study": study.name,
+        "model": of,
+        "study": on,
         "verdict": found.sentence,
         "as_promised": found.kept,
         "runs": {label: {name: getattr(s, name) for name in said} for label, s in scores.items()},
     }
     offers = [s.offer.sentence(label, s.fit_percent) for label, s in scores.items() if s.offer is not None]
     told = Chapter(
-        title=f"{model.name} on {study.name}", verdict=found.sentence, sound=found.kept, numbers=numbers,
+        title=f"{of} on {on}", verdict=found.sentence, sound=found.kept, numbers=numbers,
         parts=(
             Part(
                 "How much of each signal is explained",
@@ -118,9 +116,43 @@ def predict(
     )
 
 
+def _study(given: Any, verb: str) -> Study:
+    from upright.study.load import Study
+
+    if not isinstance(given, Study):
+        raise BadInput(f"{verb} takes a study: its file (TOML), or the .study of a fit, got {type(given).__name__}.")
+    return given
+
+
+def _runs_to_predict(
+    fitted: FittedModel, model: Any, given: Any, data: str | os.PathLike[str] | None
+) -> tuple[Study, str]:  # fmt: skip
+    """Study of the runs to score, and what it is called."""
+    from upright.physics import find
+    from upright.study.draft.from_record import study_of_record
+    from upright.study.load import Study, load_study
+    from upright.verbs.fitting import FitAnswer
+
+    if isinstance(given, Study):
+        return given, given.path.name
+    if isinstance(given, str | os.PathLike) and Path(given).suffix.lower() in (".toml", ""):
+        study = load_study(Path(given), data=None if data is None else Path(data), fixed=fitted.values)
+        return study, Path(given).name
+    if isinstance(model, FitAnswer):
+        kind = model.value.rig.plant
+    else:
+        kind = find(fitted.plant, Path(model).parent) if isinstance(model, str | os.PathLike) else find(fitted.plant)
+    record, path = open_log(given)
+    known = {n: v for n, v in fitted.values.items() if n in kind.names()}
+    whole = (float(record.t[0]), float(record.t[-1]))
+    study = study_of_record(record, kind, known=known, ask=[], window=whole)
+    drive = {n: replace(p, value=fitted.values.get(n, p.value)) for n, p in study.rig.parameters.items()}
+    return replace(study, rig=replace(study.rig, parameters=drive)), path.name
+
+
 @keeps_its_inputs
 def ladder(
-    study: str | os.PathLike[str], *, out: str | os.PathLike[str] | None = None,
+    study: str | os.PathLike[str] | Study, *, out: str | os.PathLike[str] | None = None,
     data: str | os.PathLike[str] | None = None, report: bool = True, pdf: bool = False, workers: int = 1,
     cluster: str = "", progress: Progress = silent,
 ) -> Answer[Ladder]:  # fmt: skip
@@ -128,7 +160,7 @@ def ladder(
 
     Parameters
     ----------
-    study : path
+    study : path or Study
         Rig, runs, guesses of everything the rig might have, and rungs of one's own where wanted.
     out : path, optional
         Folder for ladder.json, ladder.html and study.toml, the study of the chosen model.
@@ -164,9 +196,13 @@ def ladder(
 
     shared = Workers(number=workers, cluster=cluster)
     pdf_has_folder(out, pdf)
-    study = Path(study)
-    at = folder_beside(study, "ladder") if out is None else Path(out)
-    asked = read_study(study, at, None if data is None else Path(data))
+    if isinstance(study, str | os.PathLike):
+        study = Path(study)
+        at = folder_beside(study, "ladder") if out is None else Path(out)
+        asked = read_study(study, at, None if data is None else Path(data))
+    else:
+        asked, study = _study(study, "ladder"), study.path
+        at = folder_beside(study, "ladder") if out is None else Path(out)
     if out is not None:
         for name in ("ladder.json", "study.toml", "ladder.html"):
             check_output(at / name)
@@ -175,7 +211,7 @@ def ladder(
     climbed = climb(asked.rig, asked.runs, asked.ladder or None, progress=progress, workers=shared)
     if not climbed.steps:
         raise KeyboardInterrupt
-    trimmed = can_be_trimmed(asked, climbed)
+    trimmed = study.is_file() and can_be_trimmed(asked, climbed)
     files: list[Path] = []
     numbers = ladder_content(climbed, asked)
     if out is not None:

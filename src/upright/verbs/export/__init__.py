@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Any
 
 from upright.errors import BadInput, nearest
@@ -29,8 +28,8 @@ def export(
 
     Parameters
     ----------
-    source : path, answer of `design`, Law or Rule
-        Of a law design.json or its folder; of a rig fit.json or its folder.
+    source : path, answer of `design` or `identify`, Law, Rule or plant
+        Of a law design.json or its folder; of a rig what `identify` answered, fit.json or its folder, or a plant.
     to : str
         A law as ``"c"``, ``"arduino"``, ``"python"``, ``"matlab"`` (GNU Octave too) or ``"simulink"``; a rig as
         ``"gymnasium"``, an environment whose every episode has another rig that the fit allows, ``"mjcf"``, a
@@ -62,6 +61,4 @@ def export(
         return write_law(made, name, to, folder(out), single)
     if single:
         raise BadInput("--float is of laws; a rig is simulated in double precision.")
-    if not isinstance(source, str | os.PathLike):
-        raise BadInput(f"a rig is exported from its fit.json or the folder of it, got {type(source).__name__}.")
-    return FORMS[to](Path(source), folder(out), limit)
+    return FORMS[to](source, folder(out), limit)

@@ -1,0 +1,98 @@
+"""What a verb is handed, as the object that it stands for: a fit, a rig, a study or a plant, in memory or as a file."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from upright.errors import BadInput
+from upright.verbs.answer import Answer
+
+if TYPE_CHECKING:
+    from upright.experiments.identified import IdentifiedRig
+    from upright.study.fitted import FittedModel
+
+SAVED = "fit.json"
+"""What a command calls a fit that is in memory, once it is saved."""
+
+
+def rig_of(source: Any, verb: str, *, seed: int = 0, draws: int = 200) -> IdentifiedRig:
+    """The rig that a source tells of.
+
+    Parameters
+    ----------
+    source : path, Fit, Study, Plant or IdentifiedRig
+        A path is that of a fit.json, of its folder, or of a study.
+    verb : str
+        Who asks, for the sentence.
+    seed, draws : int
+        Of the rigs that are drawn from a fit's covariance, and how many.
+
+    Raises
+    ------
+    BadInput
+        When it is none of these, or its file cannot be read.
+    """
+    from upright.experiments import identified
+    from upright.physics import Plant
+    from upright.study.load import Study
+    from upright.verbs.fitting import FitAnswer
+
+    if isinstance(source, identified.IdentifiedRig):
+        return source
+    if isinstance(source, FitAnswer):
+        return identified.rig_of_fit(fitted_of(source, verb), source.value.rig.plant, seed=seed, draws=draws)
+    if isinstance(source, Study):
+        return identified.rig_of_study(source)
+    if isinstance(source, Plant):
+        return identified.rig_of_plant(source)
+    return identified.read_identified(_file(source, verb), seed=seed, draws=draws)
+
+
+def fitted_of(source: Any, verb: str) -> FittedModel:
+    """The fitted model of a fit in memory, of a fit.json or of its folder.
+
+    Raises
+    ------
+    BadInput
+        When it is none of these.
+    """
+    from upright.study.fitted import FittedModel, fitted_model, read_fit
+    from upright.study.results import fit_content
+    from upright.verbs.fitting import FitAnswer
+
+    if isinstance(source, FittedModel):
+        return source
+    if isinstance(source, FitAnswer):
+        return fitted_model(fit_content(source.value, source.study, source.crossed))
+    path = _file(source, verb)
+    return read_fit(path / SAVED if path.is_dir() else path)
+
+
+def called(source: Any) -> str:
+    """How a command would name a source: its path, or the file that it is saved to."""
+    from upright.report.symbols import typed
+
+    written = _written(source)
+    return typed(Path(source)) if isinstance(source, str | os.PathLike) else typed(written) if written else SAVED
+
+
+def _written(source: Any) -> Path | None:
+    """The fit.json that an answer wrote."""
+    files = source.files if isinstance(source, Answer) else ()
+    return next((f for f in files if f.name == SAVED), None)
+
+
+def _file(source: Any, verb: str) -> Path:
+    if isinstance(source, str | os.PathLike):
+        return Path(source)
+    written = _written(source)
+    if written is not None:
+        return written
+    if isinstance(source, type):
+        raise BadInput(f"{verb} needs numbers: {source.__name__}(...), or what up.identify answered.")
+    raise BadInput(
+        f"{verb} takes what up.identify answered, a fit.json or its folder, a study or a plant with its numbers, got "
+        f"{type(source).__name__}."
+    )
