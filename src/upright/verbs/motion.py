@@ -85,6 +85,7 @@ def simulate(
     loop = _loop(plant, law, point, dt, memory, limit, _steps(plant, counts))
     given = _command(u, t, len(plant.inputs))
     x = motion(plant, drive, x0, given, dt, samples=samples, substeps=2, loop=loop)[:, :, 0]
+    _check_bounded(t, x[:, : len(names)], names)
     signals = {name: x[:, i] for i, name in enumerate(names)}
     put_out = x[:, len(names) :] if loop is not None else given
     commands = {}
@@ -97,6 +98,17 @@ def simulate(
         provenance=Provenance(reader="simulation", rig=type(plant).__name__,
                               notes=("This log was simulated; no rig was touched.",)),
     )  # fmt: skip
+
+
+def _check_bounded(t: Array, x: Array, names: Sequence[str]) -> None:
+    """Refuse a motion that left all bounds."""
+    wild = ~(np.abs(x) < 1e15)
+    if wild.any():
+        k = int(np.argmax(wild.any(axis=1)))
+        raise BadInput(
+            f"the motion grows without bound: {names[int(np.argmax(wild[k]))]} is beyond 1e15 at {t[k]:.4g} s, so this "
+            "loop does not stabilize the plant; change its gains or its start, or simulate fewer seconds."
+        )
 
 
 def _plant(given: Any) -> Plant:
@@ -153,7 +165,7 @@ def _period(law: Any, dt: float | None) -> float:
 
 
 def _start(names: Sequence[str], units: Sequence[str], point: Mapping[str, float], start: Any) -> Array:
-    from upright.units import parse
+    from upright.verbs.values import si
 
     x = np.zeros(len(names))
     for name, value in point.items():
@@ -172,7 +184,7 @@ def _start(names: Sequence[str], units: Sequence[str], point: Mapping[str, float
         if name not in names:
             raise BadInput(f"start names states, got '{name}'; {nearest(name, names)} (they are {', '.join(names)})")
         i = names.index(name)
-        x[i] += parse(value, units[i]) if isinstance(value, str) else float(value)
+        x[i] += si(value, units[i])
     return x
 
 
@@ -212,7 +224,12 @@ def _loop(
 def _command(u: Any, t: Array, inputs: int) -> Array | None:
     if u is None:
         return None
-    values = np.array([u(float(s)) for s in t]) if callable(u) else np.asarray(u, dtype=np.float64)
+    try:
+        values = np.asarray([u(float(s)) for s in t] if callable(u) else u, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise BadInput(
+            f"u is a command, a function of time that gives one, or an array of them, got {u!r:.40}."
+        ) from None
     if values.ndim == 0:
         values = np.full(t.size, float(values))
     values = values[:, None] if values.ndim == 1 else values

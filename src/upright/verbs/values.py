@@ -77,9 +77,15 @@ def si(value: float | str, unit: str) -> float:
         from upright.units import parse
 
         return parse(value, unit)
-    if not math.isfinite(value):
-        raise BadInput(f"a finite number was needed, in the SI unit of {unit or '1'}, got {value}.")
-    return float(value)
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise BadInput(
+            f"a number was needed, in the SI unit of {unit or '1'}, or a text with its unit, got {value!r:.40}."
+        ) from None
+    if not math.isfinite(number):
+        raise BadInput(f"a finite number was needed, in the SI unit of {unit or '1'}, got {number}.")
+    return number
 
 
 def si_if_given(value: float | str | None, unit: str) -> float | None:

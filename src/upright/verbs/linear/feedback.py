@@ -334,7 +334,7 @@ def margins(model: Any, K: Any = None) -> Margins:
         return as_it_runs(model, K)
     period = model.dt or 0.0
     if K is not None:
-        gains = np.atleast_2d(np.asarray(K, dtype=np.float64))
+        gains = _row_of_gains(K)
         if model.B.shape[1] != 1 or gains.shape != (1, model.A.shape[0]):
             raise BadInput(
                 f"margins are for one input, with K of shape (1, {model.A.shape[0]}), got {model.B.shape[1]} inputs "
@@ -376,9 +376,9 @@ def prefilter(model: Any, K: Any, output: int | str = 0) -> float:
     if isinstance(output, str) and output not in names:
         raise BadInput(f"this model has no output '{output}'; {nearest(output, names)}")
     i = names.index(output) if isinstance(output, str) else output
-    if not 0 <= i < len(names):
+    if not isinstance(i, int | np.integer) or not 0 <= i < len(names):
         raise BadInput(f"output is a number from 0 to {len(names) - 1} or one of {', '.join(names)}, got {output}.")
-    k = np.atleast_2d(np.asarray(K, dtype=np.float64))
+    k = _row_of_gains(K)
     if k.shape != (1, model.A.shape[0]) or model.B.shape[1] != 1:
         raise BadInput(
             f"a prefilter is for one input and K of shape (1, {model.A.shape[0]}), got {model.B.shape[1]} inputs and "
@@ -392,6 +392,15 @@ def _complex(poles: Any) -> NDArray[np.complex128]:
         return np.atleast_1d(np.asarray(poles, dtype=np.complex128))
     except (TypeError, ValueError):
         raise BadInput(f'poles are complex numbers, or a text such as "-4+-2j, -17, -3"; got {poles!r:.60}.') from None
+
+
+def _row_of_gains(K: Any) -> Array:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", np.exceptions.ComplexWarning)
+            return np.atleast_2d(np.asarray(K, dtype=np.float64))
+    except (TypeError, ValueError, np.exceptions.ComplexWarning):
+        raise BadInput(f"K holds the gains of u = -K x, real numbers, one for each state, got {K!r:.40}.") from None
 
 
 def _weights(given: Any, size: int, name: str, of: str) -> Array:

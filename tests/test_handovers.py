@@ -1,0 +1,234 @@
+"""What one verb answers, the next one takes: every form of a rig, a model and a log gives the same, or a sentence."""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+
+import control
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import upright as up
+
+NUMBERS = {"m_p": 0.135, "l_cg": 0.19, "r": 0.16, "J_d": 0.011, "J_p": 6e-4, "b_1": 6e-3, "b_2": 2e-4}
+RIG = up.Furuta(**NUMBERS)
+POLES = "-4+-2j, -17, -3"
+DRIVE = {"limit": 2.0, "period": "2 ms", "counts": 4096}
+
+
+def measured(record: up.Record) -> up.Record:
+    """What a program at the rig would log of a simulated motion: no speeds, encoders of 16,000 counts."""
+    keep = [name for name in record.names if not name.endswith("_dot")]
+    step = math.tau / 16_000
+    signals = {n: np.round(record[n] / step) * step if n in ("psi", "theta") else record[n] for n in keep}
+    return record.replace(signals=signals, units={n: record.units[n] for n in keep})
+
+
+def driven(rate: float) -> up.Record:
+    t = np.arange(0, 6, 2e-3)
+    command = 0.1 * np.sin(math.tau * (0.3 * t + rate * t**2))
+    return measured(up.simulate(RIG, start={"theta": "30 deg"}, seconds=6, u=command, dt="2 ms"))
+
+
+@pytest.fixture(scope="module")
+def log() -> up.Record:
+    return driven(0.15)
+
+
+@pytest.fixture(scope="module")
+def fit(log):
+    known = {n: v for n, v in NUMBERS.items() if n not in ("J_p", "b_2")}
+    return up.identify(log, up.Furuta, known=known, ask=["J_p", "b_2"])
+
+
+@pytest.fixture(scope="module")
+def design(fit):
+    return up.design(fit, poles=POLES, **DRIVE)
+
+
+@pytest.fixture(scope="module")
+def forms(fit, tmp_path_factory):
+    """The same rig in every form that a verb of rigs takes."""
+    path = fit.save(tmp_path_factory.mktemp("fit") / "fit.json")
+    return {"fit": fit, "path": path, "text": str(path), "folder": path.parent, "plant": fit.plant, "study": fit.study}
+
+
+RIGS = ("fit", "path", "text", "folder", "plant")
+
+
+@pytest.mark.parametrize("form", RIGS)
+def test_a_design_is_the_same_whatever_the_rig_came_in(form, forms, design):
+    again = up.design(forms[form], poles=POLES, **DRIVE)
+    np.testing.assert_allclose(again.K, design.K, rtol=1e-9)
+
+
+def test_a_design_places_what_it_was_asked_on_the_fitted_plant(fit, design):
+    model = fit.plant.linear("inverted")
+    found = np.linalg.eigvals(model.A - model.B @ design.K)
+    np.testing.assert_allclose(
+        np.sort_complex(found), np.sort_complex(np.array([-4 + 2j, -4 - 2j, -17, -3])), rtol=1e-6
+    )
+
+
+@pytest.mark.parametrize("form", RIGS)
+def test_a_chance_is_the_same_whatever_the_rig_came_in(form, forms, design):
+    if form == "plant":  # nothing is drawn where nothing was identified
+        with pytest.raises(up.BadInput):
+            up.chance(forms[form], design.K[0])
+        return
+    one, other = (up.chance(f, design.K[0], **DRIVE).numbers for f in (forms["fit"], forms[form]))
+    assert one == other
+
+
+@pytest.mark.parametrize("form", ["fit", "path", "plant"])
+def test_mujoco_gets_the_fitted_rig_whatever_it_came_in(form, forms, tmp_path):
+    mujoco = pytest.importorskip("mujoco")
+    answer = up.export(forms[form], to="mjcf", out=tmp_path)
+    model = mujoco.MjModel.from_xml_path(str(answer.files[0]))
+    assert model.nq == 2
+
+
+@pytest.mark.parametrize("form", ["fit", "path"])
+@pytest.mark.parametrize("given", ["record", "frame", "file", "study"])
+def test_a_held_out_log_is_predicted_whatever_it_came_in(form, given, forms, tmp_path):
+    """The fit is of the true plant, so that another motion is explained but for the encoders' rounding."""
+    other = driven(0.05)
+    if given == "frame":
+        other = other.to_pandas()
+    elif given == "file":
+        frame = other.to_pandas()
+        other = tmp_path / "other.csv"
+        frame.to_csv(other)
+    elif given == "study":
+        other = forms["study"]
+    scores = up.predict(forms[form], other).value
+    assert min(p for run in scores.values() for p in run.fit_percent.values()) > 99
+
+
+def test_the_fit_predicts_as_the_verb_does(fit):
+    assert fit.predict(driven(0.05)).value.runs["log"].fit_percent == pytest.approx(
+        up.predict(fit, driven(0.05)).value["log"].fit_percent
+    )
+
+
+def test_a_law_goes_from_the_fit_to_a_run_and_to_a_program_without_a_file(fit, design, tmp_path):
+    run = up.simulate(fit, design.law, start={"theta": "3 deg"}, seconds="4 s")
+    assert run["theta"][-1] == pytest.approx(math.pi, abs=1e-3)
+    program = up.export(design, to="python", out=tmp_path)
+    assert program.files
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", ["fit", "plant"])
+def test_a_rig_in_memory_is_regulated_and_swung_up(form, forms, tmp_path):
+    held = up.regulate(forms[form], poles=POLES, draws=20, seconds=2, out=tmp_path / "r", **DRIVE)
+    assert "SIMULATED" in repr(held).splitlines()[0]
+    swung = up.swing_up(forms["fit"], travel=6, seconds=6, out=tmp_path / "s", **DRIVE)
+    assert swung.numbers
+
+
+def test_a_shaft_in_memory_is_tracked(tmp_path):
+    shaft = up.chain(2, "torsional")(J_1=0.0108, J_2=0.0103, k_12=1.37, c_1=0.007, c_2=0.001)
+    done = up.track(shaft, limit=0.5, period="0.884 ms", counts=16_000, sets=1, out=tmp_path)
+    assert done.numbers["verdict"].startswith(("Do not rely", "Set")) or done.numbers["verdict"]
+
+
+@pytest.mark.parametrize("form", ["fit", "path", "plant", "class", "name"])
+def test_a_log_is_examined_whatever_the_rig_came_in(form, forms, log):
+    rig = {"class": up.Furuta, "name": "furuta", **forms}[form]
+    assert not up.doctor(log, rig=rig).value.wrong
+
+
+def test_the_study_of_a_fit_climbs_its_ladder(fit):
+    assert up.ladder(fit.study).value.steps
+
+
+def test_a_number_of_a_fit_is_asked_by_its_name(fit):
+    assert fit["J_p"].value == pytest.approx(NUMBERS["J_p"], rel=1e-3)
+    assert fit["m_p"].value == NUMBERS["m_p"]
+    with pytest.raises(up.BadInput, match="did you mean 'J_p'"):
+        fit["J_q"]
+
+
+MODELS = {
+    "state space": lambda m: m,
+    "control": lambda m: m.to_control(),
+    "matrices": lambda m: tuple(m),
+    "pair": lambda m: (m.A, m.B),
+}
+VERBS = {
+    "place": lambda m: up.place(m, [-4 + 2j, -4 - 2j, -17, -3]).K,
+    "lqr": lambda m: up.lqr(m, [1, 0, 10, 0], 1.0).K,
+    "hold": lambda m: up.hold(m, "2 ms").A,
+    "margins": lambda m: up.margins(m, up.lqr(m, [1, 0, 10, 0], 1.0)).delay,
+    "dlqr": lambda m: up.dlqr(up.hold(m, 2e-3), [1, 0, 10, 0], 1.0).K,
+    "prefilter": lambda m: up.prefilter(m, up.lqr(m, [1, 0, 10, 0], 1.0)),
+    "design": lambda m: up.design(m, poles=POLES, period="2 ms", limit=2, start={}, speed="observer").K,
+}
+
+
+@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("form", MODELS)
+def test_a_linear_model_gives_the_same_whatever_its_form(verb, form):
+    model = RIG.linear("inverted")
+    np.testing.assert_allclose(VERBS[verb](MODELS[form](model)), VERBS[verb](model), rtol=1e-6)
+
+
+def test_a_transfer_function_is_held_as_python_control_does():
+    transfer = control.tf([2], [1, 0.3, 4])
+    ours, theirs = up.hold(transfer, 1e-2), control.c2d(transfer, 1e-2)
+    omega = np.array([0.5, 2.0, 20.0])
+    np.testing.assert_allclose(ours.response(omega)[:, 0, 0], theirs(np.exp(1j * omega * 1e-2)), rtol=1e-9)
+
+
+def test_gains_that_do_not_hold_the_plant_are_told():
+    with pytest.raises(up.BadInput, match="grows without bound"):
+        up.simulate(RIG, 40 * np.ones((1, 4)), at="inverted", start={"theta": 0.1}, seconds=60)
+
+
+ANYTHING = st.one_of(
+    st.none(), st.booleans(), st.integers(-3, 3), st.floats(allow_nan=True), st.text(max_size=6), st.just([]),
+    st.just({}), st.just(object()), st.just(up.Furuta), st.just(RIG), st.just(np.zeros((2, 3))), st.just(np.zeros(0)),
+    st.just((np.eye(2), np.ones(2))), st.just(RIG.linear("inverted")), st.just([[1, "a"]]), st.just({"theta": "5 kg"}),
+    st.just({"psi": None}), st.just(control.tf([1], [1, 1])),
+)  # fmt: skip
+CALLS = {
+    "place": lambda a, b: up.place(a, b),
+    "lqr": lambda a, b: up.lqr(a, b, 1.0),
+    "lqr's R": lambda a, b: up.lqr(RIG.linear("inverted"), [1, 0, 1, 0], b),
+    "dlqr": lambda a, b: up.dlqr(a, b, 1.0),
+    "hold": lambda a, b: up.hold(a, b),
+    "margins": lambda a, b: up.margins(a, b),
+    "prefilter": lambda a, b: up.prefilter(a, b),
+    "observer": lambda a, b: up.observer(a, b),
+    "simulate": lambda a, b: up.simulate(a, b, seconds=0.01),
+    "start": lambda a, b: up.simulate(RIG, start=a, seconds=b if isinstance(b, str | None.__class__) else 0.01),
+    "u": lambda a, b: up.simulate(RIG, u=a, seconds=0.01, at=b if isinstance(b, str) else None),
+    "plant": lambda a, b: up.Furuta(**{**NUMBERS, "m_p": a}),
+    "design": lambda a, b: up.design(a, poles=b if isinstance(b, str) and b else POLES),
+    "chance": lambda a, b: up.chance(a, b),
+    "regulate": lambda a, b: up.regulate(a if a is not None else 3, draws=2),
+    "track": lambda a, b: up.track(a if a is not None else 3),
+    "doctor": lambda a, b: up.doctor(a, rig=b),
+    "predict": lambda a, b: up.predict(a, b),
+    "ladder": lambda a, b: up.ladder(a),
+    "survey": lambda a, b: up.survey(a),
+    "export": lambda a, b: up.export(a, to="mjcf"),
+    "show": lambda a, b: up.show(a),
+}
+
+
+@pytest.mark.parametrize("verb", CALLS)
+def test_whatever_a_verb_is_given_it_answers_or_says_in_a_sentence(verb, tmp_path_factory, monkeypatch):
+    monkeypatch.chdir(tmp_path_factory.mktemp("anything"))
+
+    @settings(max_examples=25, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+    @given(ANYTHING, ANYTHING)
+    def check(a, b):
+        with suppress(up.UprightError, FileNotFoundError):  # the command line makes a sentence of the second
+            CALLS[verb](a, b)
+
+    check()
