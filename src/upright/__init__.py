@@ -35,6 +35,9 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from upright import shown
+from upright._version import __version__
+
 if TYPE_CHECKING:
     from upright.errors import BadInput, ImpossiblePhysics, NotIdentifiable, UprightError
     from upright.laws import Law, Rule
@@ -66,7 +69,7 @@ if TYPE_CHECKING:
     from upright.verbs.motion import simulate
     from upright.verbs.rig import rig_check, rig_doctor, run
 
-__version__ = "0.1.0"
+shown.look_with(lambda: import_module("upright.views"))
 
 _HOMES = {
     "errors": ("BadInput", "ImpossiblePhysics", "NotIdentifiable", "UprightError"),

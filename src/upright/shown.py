@@ -2,29 +2,38 @@
 
 from __future__ import annotations
 
-from importlib import import_module
+from collections.abc import Callable
 from typing import Any
 
 
 class Shown:
     """A value that can be looked at: short as text, as a table in a notebook, as a picture.
 
-    What it looks like is not said here, since a value knows no report and no figure, but in `upright.views`, which
-    is found by name when the value is first shown.
+    What it looks like is not said here, since a value knows no report and no figure; the front door says who does
+    (`look_with`), and that is asked when a value is first shown.
     """
 
     __slots__ = ()
 
     def __repr__(self) -> str:
-        return _views().text(self)
+        return views().text(self)
 
     def _repr_html_(self) -> str:
-        return _views().html(self)
+        return views().html(self)
 
     def plot(self, *names: str) -> Any:
         """A `matplotlib.figure.Figure` of it; `names` are the columns of a record to draw."""
-        return _views().plot(self, *names)
+        return views().plot(self, *names)
 
 
-def _views() -> Any:
-    return import_module("upright.views")
+_views: list[Callable[[], Any]] = []
+
+
+def look_with(views: Callable[[], Any]) -> None:
+    """Say which module knows how values look; it is imported when the first one is shown."""
+    _views[:] = [views]
+
+
+def views() -> Any:
+    """That module."""
+    return _views[0]()

@@ -202,7 +202,7 @@ app = typer.Typer(
 
 def _version(asked: bool) -> None:
     if asked:
-        from upright import __version__
+        from upright._version import __version__
 
         typer.echo(f"upright {__version__}")
         raise typer.Exit

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from upright import __version__
+from upright._version import __version__
 from upright.control.trial import ServoRig
 from upright.errors import BadInput, UprightError
 from upright.experiments.abreast import run_abreast

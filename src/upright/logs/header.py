@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
-from upright import __version__
+from upright._version import __version__
 from upright.errors import BadInput
 from upright.files import plain_values
 

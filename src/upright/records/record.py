@@ -24,7 +24,7 @@ from upright.errors import BadInput, nearest
 from upright.files import LARGEST as LARGEST_FILE
 from upright.files import read_text, regular, whole_file
 from upright.records.columns import stated_unit, take_time
-from upright.shown import Shown
+from upright.shown import Shown, views
 
 Array = NDArray[np.float64]
 PathLike = str | os.PathLike[str]
@@ -196,9 +196,7 @@ class Record(Shown):
 
     def animate(self, *, speed: float = 1.0, frames: int = 25) -> Any:
         """Moving drawing of a rig whose coordinates are columns; see `upright.views.animation.animate`."""
-        from importlib import import_module
-
-        return import_module("upright.views.animation").animate(self, speed=speed, frames=frames)
+        return views().animate(self, speed=speed, frames=frames)
 
     def replace(self, **changes: Any) -> Record:
         """Record with some fields changed, checked again."""

@@ -16,7 +16,7 @@ _ID = re.compile(r'\b(id="|url\(#|href="#)')
 
 def html(page: Chapter | Book) -> str:
     """A chapter, or a whole report, as a page that can be mailed, printed and read in ten years; texts are escaped."""
-    from upright import __version__
+    from upright._version import __version__
 
     return _rendered("page.html", page=page, version=__version__)
 

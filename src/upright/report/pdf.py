@@ -36,7 +36,7 @@ def write_pdf(path: Path, page: Chapter | Book) -> Path:
     import matplotlib
     import typst
 
-    from upright import __version__
+    from upright._version import __version__
 
     files: dict[str, bytes] = {}
 

@@ -101,7 +101,7 @@ def _fields(of: object, names: str) -> dict[str, Any]:
 
 def provenance(study: Study) -> dict[str, Any]:
     """Which program, study and logs a result came from."""
-    from upright import __version__
+    from upright._version import __version__
 
     return {
         "upright": __version__,

@@ -132,6 +132,13 @@ def _poles(poles: Any) -> str:
     return ", ".join(shown)
 
 
+def animate(record: Record, *, speed: float, frames: int) -> Any:
+    """The rig as it moved; see `Record.animate`."""
+    from upright.views.animation import animate as drawn
+
+    return drawn(record, speed=speed, frames=frames)
+
+
 @styled
 def draw_record(record: Record, *names: str, buckets: int = 800) -> Any:
     """One panel per column over time; without names the measured ones and what drives, as far as they are known."""

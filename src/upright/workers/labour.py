@@ -163,6 +163,6 @@ def _client(address: str) -> Any:
 
 
 def _version() -> str:
-    from upright import __version__
+    from upright._version import __version__
 
     return f"upright {__version__} on Python {sys.version_info[0]}.{sys.version_info[1]}"

@@ -13,7 +13,7 @@ import zipfile
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-from upright import __version__
+from upright._version import __version__
 from upright.errors import BadInput
 from upright.exports.controller import plain
 from upright.exports.fmu.source import source
