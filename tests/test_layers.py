@@ -79,7 +79,7 @@ BLIND = {
     "questionnaire": {"records", "readers", "physics", "simulation", "identification", "study", "control"},
 }
 # How a page is written is one thing, what it says another.
-BLIND["report"] = FLOOR.keys() - {"basis", "errors", "files", "progress", "quantities", "units"}
+BLIND["report"] = FLOOR.keys() - {"_version", "basis", "errors", "files", "progress", "quantities", "units"}
 # A heavy library has one door, opened when it is first needed: a room, or files of a name.
 DOORS = {
     "sympy": "physics",
