@@ -59,7 +59,8 @@ def draft(record: Record, seen: Inspection, log: Path, study: Path, *, plant: st
     head = TomlTable()
     head.line(f"# Study of {log.name}, drafted by `upright init`. Check it, then: upright identify THIS_FILE -o OUT")
     head.line("# A number in quotes wears its unit; { guess = ... } asks for it; a plain text or number is known.")
-    head.line("# Lines marked MEASURE hold placeholders. All keys: `upright identify --keys`.")
+    head.line("# Lines marked MEASURE hold placeholders, which are assumed: no number that rests on one can be used.")
+    head.line('# Replace them by what you measured, as in m_p = "0.22 kg". All keys: `upright identify --keys`.')
     for doubt in doubts:
         head.line(f"# GUESSED: {doubt}")
     head.key("title", log.stem)
