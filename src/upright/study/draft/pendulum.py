@@ -253,7 +253,9 @@ def _gain(found: Recognised) -> float:
     swing = (c.high - c.low) / 2 * {"counts": 4e-4, "mm": 1e-3, "deg": 0.017}.get(c.guess, 1.0)
     u = max(abs(found.drive.low), abs(found.drive.high)) or 1.0
     u /= DAC_COUNTS_PER_VOLT if in_dac_counts(found.drive) else 1.0
-    return max(INERTIA.get(found.plant, 1.0) * swing * (found.frequency or 6.0) ** 2 / u, 1e-9)
+    w = found.frequency or 6.0
+    inertia = INERTIA.get(found.plant, (G / w**2) ** 2)  # of the 1 kg that is assumed
+    return max(inertia * swing * w**2 / u, 1e-9)
 
 
 def _sensor(seen: Inspection, found: Recognised, plant: type[Plant], name: str) -> TomlTable:
@@ -283,7 +285,7 @@ def _defaults(found: Recognised, plant: type[Plant], balanced: Balanced | None) 
         unknown = [f"offset.{plant.coordinates[-1].name}", "input_offset"]
         table.key("unknown", unknown, "where the counter was zeroed; what leans on the first body")
     else:
-        unknown = ["initial"] if found.drive is not None else ["initial", "offset"]
+        unknown = ["initial"] if found.drive is not None and found.settled else ["initial", "offset"]
         table.key("unknown", unknown, "estimated for each run alone")
     return table
 
