@@ -103,3 +103,11 @@ def test_a_swing_that_hardly_decays_is_kept_from_its_release(drafted):
     theta = 0.4 * np.exp(-2e-3 * t) * np.cos(6.0 * t)  # 10 % in 50 s
     _, study = drafted("pendulum", t=t, theta=theta)
     assert study.runs[0].t[0] < 2 * np.pi / 6.0
+
+
+def test_a_pendulum_that_is_held_upright_is_not_free_before_it_falls(drafted):
+    # upright gravity pulls at no angle, so no hand is felt: 3 s at 3.1 rad, then a simulated fall
+    held = np.full(300, 3.1)
+    theta = np.concatenate([held, swing(3.1, 3000)])
+    _, study = drafted("pendulum", t=np.arange(theta.size) * DT, theta=theta)
+    assert held.size * DT - DT <= study.runs[0].t[0] < held.size * DT + 2 * PERIOD  # it lingers before it falls

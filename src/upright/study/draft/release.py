@@ -26,6 +26,9 @@ WIDTHS = 1 / 12, 1 / 2
 """Shares of a period over which accelerations are smoothed: as few as noise allows. A polynomial of order 4 over half a
 period bends a sine's acceleration by 1 %."""
 
+STILL = 0.02
+"""Share of its largest speed below which a pendulum stands still, rather than turns."""
+
 LEFT = 0.1
 """Share of the motion that a free swing has at least: where less is left, what was taken for a hand was none."""
 
@@ -77,14 +80,18 @@ def free_from(t: Array, theta: Array, w: float, swings: float, hinge: Array | No
     noise = float(np.median(unexplained[late])) / 0.6745
     unexplained[:edge] = unexplained[-edge:] = 0.0  # one-sided polynomials amplify noise tenfold
     other = stretches(unexplained > max(HAND * pull, SURE * noise))
-    hands = [(a, b) for a, b in other if (b - a) * step > LASTS * 2 * math.pi / w and _swings_after(size, b)]
+    least = LASTS * 2 * math.pi / w / step
+    hands = [(a, b) for a, b in other if b - a > least and _swings_after(size, b)]
     speed = np.abs(motion.v)
+    still = [
+        (a, b) for a, b in stretches(speed < STILL * float(speed.max())) if b - a > least
+    ]  # upright no hand is felt
     turning = speed > 0.05 * float(speed.max())
     hands = [(a, b) for a, b in hands if np.count_nonzero(turning[b:]) >= LEFT * np.count_nonzero(turning)]
     let_go = min(hands[-1][1] + edge, grid.size - 1) if hands else 0
     if hinge is not None or grid[let_go] >= swings:
         return float(grid[let_go]) if hands else swings
-    before = [b + edge for _, b in other if grid[b] < swings]
+    before = [b for _, b in still if grid[b] < swings] + [b + edge for _, b in other if grid[b] < swings]
     first = max([let_go, *before])
     energy = 2 * (1 - np.cos(motion.q)) * float(slopes[0]) + motion.v**2
     inside = energy[first + edge : energy.size - edge]
