@@ -186,7 +186,8 @@ def test_the_verdict_names_the_measurement_that_frees_a_number():
     asked = {"l_cg": 0.25, "b_2": 1e-3, "b_2c": 1e-3}
     light = identify(hanging({"m_p": 1.0}, {"J_p": 0.0}, asked), [swing()])
     assert usable(light) == {"l_cg"}
-    assert 'b_2, b_2c rest on m_p (assumed). Measure m_p and give it as known, m_p = "... kg"' in light.verdict
+    assert "b_2, b_2c rest on m_p (assumed)." in light.verdict
+    assert 'Measure m_p and give it as known, m_p = "... kg" under [parameters].' in light.verdict
     weighed = identify(hanging({}, {"J_p": SWING["J_p"], "m_p": SWING["m_p"]}, asked), [swing()])
     assert usable(weighed) == set(asked)
     for name in asked:

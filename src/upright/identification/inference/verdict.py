@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from upright.identification.inference.assumptions import proportional, remedy, resting
+from upright.identification.inference.assumptions import proportional, resting
 from upright.identification.inference.loop import Standing
 from upright.identification.model.fit import Assumption, Estimate, Judgement, RunScore
 from upright.identification.model.rig import Rig
@@ -171,7 +171,7 @@ def _usable(found: Evidence, *, confirmed: bool) -> Judgement:
         moved = resting(a)
         if moved:
             verb = "rests" if len(moved) == 1 else "rest"
-            reasons.append(f"{', '.join(moved)} {verb} on {a.name} (assumed). {remedy(a)}")
+            reasons.append(f"{', '.join(moved)} {verb} on {a.name} (assumed).")
     reasons += _lumped(found.rig)
     guessed = found.rig.guessed and not confirmed
     if guessed:
