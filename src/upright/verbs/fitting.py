@@ -65,18 +65,15 @@ class FitAnswer(Answer["Fit"]):
 
     @property
     def parameters(self) -> Any:
-        """Estimates as a `pandas.DataFrame`: value, stderr, low, high, unit, status, rests_on; a parameter per row."""
+        """Estimates as a `pandas.DataFrame`: value, stderr, low, high, unit, status; a parameter per row."""
         return self.to_pandas()
 
     def to_pandas(self) -> Any:
         """See `parameters`."""
         import pandas as pd
 
-        rows = {
-            name: (e.value, e.stderr, *e.interval, e.unit, e.status, ", ".join(e.rests_on))
-            for name, e in self.value.estimates.items()
-        }
-        columns = ["value", "stderr", "low", "high", "unit", "status", "rests_on"]
+        rows = {name: (e.value, e.stderr, *e.interval, e.unit, e.qualified) for name, e in self.value.estimates.items()}
+        columns = ["value", "stderr", "low", "high", "unit", "status"]
         return pd.DataFrame.from_dict(rows, orient="index", columns=columns)
 
     @property

@@ -32,6 +32,14 @@ class Estimate:
     status: str = "firm"
     rests_on: tuple[str, ...] = ()
 
+    @property
+    def qualified(self) -> str:
+        """Status, and which assumed numbers it is a number of; only beside those may it be firm."""
+        if not self.rests_on:
+            return self.status
+        rests = f"rests on {', '.join(self.rests_on)} (assumed)"
+        return rests if self.status == "firm" else f"{self.status}, {rests}"
+
     @classmethod
     def within(cls, value: float, stderr: float, half: float, unit: str = "") -> Estimate:
         """An estimate with an interval of `half` its width on either side."""

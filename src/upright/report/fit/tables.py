@@ -60,14 +60,6 @@ def _sure(p: Parameter) -> str:
     return number(p.uncertainty, 2) if p.uncertainty else "–" if p.assumed else "exact"
 
 
-def _status(e: Estimate) -> str:
-    """Status of an estimate; one that rests on assumed numbers is firm only beside them."""
-    if not e.rests_on:
-        return e.status
-    rests = f"rests on {', '.join(e.rests_on)} (assumed)"
-    return rests if e.status == "firm" else f"{e.status}, {rests}"
-
-
 def _true(e: Estimate | None, true: float | None) -> tuple[tuple[str], tuple[str]]:
     """The true value and where it lies; nothing where nobody knows it, or nothing was estimated."""
     if true is None:
@@ -107,7 +99,7 @@ def run_table(fit: Fit) -> Table:
 
 def _estimate(name: str, e: Estimate, about: Parameter | None) -> tuple[str, ...]:
     beforehand = ", known beforehand" if about and about.uncertainty else ""
-    return (*measured(e.value, e.stderr), interval(e), unit(e.unit), _status(e), _called(name, about) + beforehand)
+    return (*measured(e.value, e.stderr), interval(e), unit(e.unit), e.qualified, _called(name, about) + beforehand)
 
 
 def _called(name: str, about: Parameter | None) -> str:

@@ -54,8 +54,7 @@ def study_of_record(
     name = _name_of(plant) if plant is not None else ""
     study, plant = _drafted(record, name) if plant is None or name else (_plain(record, plant), plant)
     values = study.setdefault("parameters", {})
-    if ask is None:
-        _weigh(study, plant)
+    _own_force(study, plant, weighs=ask is None)
     _answer(values, study.setdefault("actuator", {}), plant, known or {}, ask)
     if not study["actuator"]:
         del study["actuator"]
@@ -126,13 +125,18 @@ def _plain(record: Record, plant: type[Plant]) -> dict[str, Any]:
     return study
 
 
-def _weigh(study: dict[str, Any], plant: type[Plant]) -> None:
-    """A column that bears the name of the plant's force, and its unit or none, is that force: it weighs the masses."""
-    drive, force = study.get("drive", {}), plant.inputs[0] if plant.inputs else None
-    actuator = study.get("actuator", {})
-    if force is None or drive.get("column") != force.name or "gain" not in actuator:
+def _own_force(study: dict[str, Any], plant: type[Plant], *, weighs: bool) -> None:
+    """A column that bears the name of the plant's force, and its unit or none, is that force, and `weighs` the masses.
+
+    Of its limit and the controller's period nobody said anything.
+    """
+    drive, actuator = study.get("drive", {}), study.get("actuator", {})
+    force = next((i for i in plant.inputs if i.name == drive.get("column")), None)
+    if force is None:
         return
-    if drive.setdefault("unit", force.unit) != force.unit:
+    actuator.pop("limit", None)
+    study["rig"].pop("servo_period", None)
+    if not weighs or "gain" not in actuator or drive.setdefault("unit", force.unit) != force.unit:
         return
     del actuator["gain"]
     for name, value in study["parameters"].items():
