@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from upright.errors import BadInput, nearest
 from upright.identification.checks.conventions import wrong_conventions
 from upright.identification.checks.outliers import refit_without_outliers
-from upright.identification.inference.assumptions import assumptions, sentences
+from upright.identification.inference.assumptions import assumptions, sentences, with_assumptions
 from upright.identification.inference.bands import calibrated
 from upright.identification.inference.black_box import black_box
 from upright.identification.inference.covariance import Identifiability, Optimum, assess, identifiability
@@ -247,7 +247,8 @@ def _conclude(
     unseen = seen.sentences({n: p.unit for n, p in asked.parameters.items()})
     worst = min((p for s in scores.values() if s.role == "fit" for p in s.fit_percent.values()), default=100.0)
     conventions = tuple(log.conventions()) if worst < GOOD else ()
-    assumed = () if found.interrupted else assumptions(best, estimates)
+    assumed = assumptions(best, estimates, evaluate=not found.interrupted)
+    estimates = with_assumptions(estimates, assumed)
     late = None if found.interrupted or little or conventions else lateness(best)
     warnings += [late.sentence] if late else []
     answers = judge(

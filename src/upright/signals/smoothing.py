@@ -124,6 +124,12 @@ def acceleration_width(y: Array, dt: float, quantum: float) -> int:
     return width
 
 
+def white_noise(y: Array) -> float:
+    """Standard deviation of white noise on a signal (N,) that is smooth over some samples, from fourth differences."""
+    differences = np.diff(y, 4)  # variance 70 times that of the noise; what is not noise is rarely its median
+    return float(np.median(np.abs(differences))) / (0.6745 * np.sqrt(70.0)) if differences.size else 0.0
+
+
 def noise_gain(width: int, *, order: int = 4) -> float:
     """Standard deviation of the acceleration in the middle of a window, in units of noise per sample period squared."""
     return 2 * float(np.linalg.norm(_polynomials(width, order)[0][2]))

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, shaken, swing
+from upright.identification import Parameter
 from upright.identification.estimate import identify
 from upright.physics import Furuta, Pendulum
 
@@ -89,3 +91,13 @@ def test_a_mass_that_nothing_shows_stays_a_number_one_can_print() -> None:
     [sought] = shared_unknowns(known(Pendulum, values, {"m_p": 0.2}))
     lower, upper = sought.bounds
     assert abs(upper - lower - 2 * np.log(FAR)) < 1e-9
+
+
+def test_a_fit_whose_every_number_ends_at_a_bound_says_so() -> None:
+    run = noisy(swing({**PENDULUM, "b_2": 0.0, "b_2c": 0.0, "b_2q": 0.0}, seconds=4.0), 1e-4, 3)
+    values = {n: v for n, v in PENDULUM.items() if n not in ("b_2", "b_2c", "b_2q")}
+    b = Parameter(name="b_2", value=5e-3, unit="N m s/rad", estimate=True, lower=1e-3)  # the data have none
+    known = rig(Pendulum, values, {})
+    fit = identify(replace(known, parameters={**known.parameters, "b_2": b}), [run])
+    assert fit.estimates["b_2"].status == "at bound"
+    assert "b_2 reached its lower limit" in fit.verdict

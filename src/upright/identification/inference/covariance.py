@@ -290,11 +290,12 @@ def identifiability(best: Optimum) -> Identifiability:
     S = S * sizes[:, None] * sizes
     w, V = np.linalg.eigh(S) if shared else (np.zeros(0), np.zeros((0, 0)))
     order = np.argsort(w)[::-1]
+    blind = _null(S)
     return Identifiability(
         names=tuple(unknowns[i].name for i in shared),
         singular_values=np.sqrt(np.maximum(w[order], 0.0)),
         directions=V[:, order].T,
-        blind=np.array(_null(S)).reshape(-1, len(shared)),
+        blind=np.array(blind).reshape(len(blind), len(shared)),
         effects=np.sqrt(np.maximum(np.diag(S), 0.0)),
     )
 

@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from upright.identification.inference.assumptions import proportional
+from upright.identification.inference.assumptions import proportional, resting
 from upright.identification.inference.loop import Standing
 from upright.identification.model.fit import Assumption, Estimate, Judgement, RunScore
 from upright.identification.model.rig import Rig
@@ -179,9 +179,10 @@ def _usable(found: Evidence, *, confirmed: bool) -> Judgement:
         elif e.status == "weak":
             reasons.append(f"{n} is known poorly, {low:.2g} to {_shown(high, e)}.")
     for a in found.assumptions:
-        along = proportional(a)
-        if along:
-            reasons.append(f"{', '.join(along)}: only per {a.name}, which is assumed to be {a.value:g} {a.unit}.")
+        moved = resting(a)
+        if moved:
+            verb = "rests" if len(moved) == 1 else "rest"
+            reasons.append(f"{', '.join(moved)} {verb} on {a.name} (assumed).")
     reasons += _lumped(found.rig)
     guessed = found.rig.guessed and not confirmed
     if guessed:
@@ -194,8 +195,8 @@ def _usable(found: Evidence, *, confirmed: bool) -> Judgement:
             f"{', '.join(found.bent)}: outside their intervals once the drive may act late, which explains the runs "
             "better; ask for its delay."
         )
-    resting = {n for a in found.assumptions for n in proportional(a)}
-    free = [n for n in firm if n not in resting and n not in found.bent]
+    moving = {n: a for a in found.assumptions for n in resting(a)}
+    free = [n for n in firm if n not in moving and n not in found.bent]
     if no:
         answer, headline = "no", "Not all of them are determined."
     elif guessed:
@@ -203,7 +204,11 @@ def _usable(found: Evidence, *, confirmed: bool) -> Judgement:
     elif found.bent and not free:
         answer, headline = "no", "None of them before the drive's delay is asked for."
     elif reasons:
-        answer, headline = "in part", f"These numbers can be used: {', '.join(free)}." if free else "Only their ratios."
+        answer, headline = "in part", f"These numbers can be used: {', '.join(free)}."
+        if not free:
+            scaled = {n for a in found.assumptions for n in proportional(a)} >= set(firm)
+            missing = " and ".join(dict.fromkeys(a.name for n, a in moving.items() if n in firm))
+            headline = "Only their ratios." if scaled or not missing else f"None of them before {missing} is measured."
     else:
         answer, headline = "yes", f"All numbers can be used: {', '.join(firm)}." if firm else "Nothing was asked."
     advice = ""

@@ -21,7 +21,8 @@ class Estimate:
     """What the data say about one number.
 
     `status` is "firm", "weak" (interval wider than the value, or two models differ), "unseen" (the data cannot tell),
-    "at bound" or "known".
+    "at bound", "known" or "assumed". `rests_on` names assumed numbers that it would move with: until they are measured
+    it is a number of them, whatever its interval.
     """
 
     value: float
@@ -29,6 +30,15 @@ class Estimate:
     interval: tuple[float, float]
     unit: str = ""
     status: str = "firm"
+    rests_on: tuple[str, ...] = ()
+
+    @property
+    def qualified(self) -> str:
+        """Status, and which assumed numbers it is a number of; only beside those may it be firm."""
+        if not self.rests_on:
+            return self.status
+        rests = f"rests on {', '.join(self.rests_on)} (assumed)"
+        return rests if self.status == "firm" else f"{self.status}, {rests}"
 
     @classmethod
     def within(cls, value: float, stderr: float, half: float, unit: str = "") -> Estimate:
@@ -48,8 +58,10 @@ class Pole:
 class Assumption:
     """A number taken as given without knowing it, and what would follow it.
 
-    `follows` are percent by which each estimate would change per percent of it, `without` the estimates proportional
-    to it, per unit of the command and of the encoders.
+    `follows` are percent by which each estimate would change per percent of its `size`, not a number where that was not
+    evaluated, `without` the estimates proportional to it, per unit of the command and of the encoders. The size is its
+    absolute value; of one assumed to be zero, what changes the runs as much as the most influential estimate does.
+    `redefines` names estimates that it gives another meaning, under which they hold whatever its true value is.
     """
 
     name: str
@@ -57,6 +69,8 @@ class Assumption:
     unit: str
     follows: Mapping[str, float]
     without: Mapping[str, Estimate]
+    size: float = 0.0
+    redefines: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -39,6 +39,7 @@ def chapter(
     study: str = "STUDY.toml",
     folder: str = "OUT",
     crossed: CrossValidation | None = None,
+    windows: Sequence[str] = (),
 ) -> Chapter:
     """What a fit says.
 
@@ -52,7 +53,10 @@ def chapter(
         Study and folder of the results, as the commands that are proposed name them.
     crossed : CrossValidation, optional
         Every run predicted by the others.
+    windows : sequence of str
+        How much of each log counts, in sentences.
     """
+    used = (Points(tuple(windows)),) if windows else ()
     return Chapter(
         title=title,
         verdict=headline(fit),
@@ -62,7 +66,9 @@ def chapter(
         parts=(
             data_part(provenance or {}),
             motion_part(fit),
-            Part(title="Fit of the runs", key="fit", content=(*_scores(fit, crossed), *run_pictures(fit, "fit"))),
+            Part(
+                title="Fit of the runs", key="fit", content=(*used, *_scores(fit, crossed), *run_pictures(fit, "fit"))
+            ),
             *_parameters(fit),
             _residuals(fit),
             _unseen(fit),
