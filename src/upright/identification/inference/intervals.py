@@ -290,6 +290,8 @@ def with_left_out(best: Optimum, asked: Rig, left_out: Sequence[str], log: Searc
     if not math.isfinite(found.normal.cost):
         return {}
     there = assess(richer, found.x)
+    if there.lost:
+        return {}
     quantile = student(best.samples - best.x.size - len(left_out))
     estimates: dict[str, Estimate] = {}
     for i in there.shared:

@@ -47,6 +47,7 @@ class Evidence:
     residuals are autocorrelated over `memory` seconds, the motion takes `period` seconds for one period. `standing`
     says how a rig within the intervals stands upright, if this plant can, `driven` whether a command acted in a run.
     Numbers that are `bent` leave their intervals with a dead time of the drive that would explain the runs better.
+    Runs that are `lost` run away at the numbers or as soon as one is moved.
     """
 
     rig: Rig
@@ -62,6 +63,7 @@ class Evidence:
     standing: Standing | None
     driven: bool = True
     bent: Sequence[str] = ()
+    lost: Sequence[str] = ()
 
 
 def judge(found: Evidence) -> tuple[Judgement, ...]:
@@ -88,9 +90,11 @@ def trusted(answers: Sequence[Judgement]) -> bool:
 
 def _predicts(found: Evidence) -> Judgement:
     against: list[str] = []
+    if found.lost:
+        against.append(_failure(found.lost))
     if found.interrupted:
         against.append("The search was interrupted; this is its best so far.")
-    elif not found.converged:
+    elif not found.converged and not found.lost:
         against.append("The search had not settled when its evaluations ran out.")
     fitted, predicted = (_percents(found.runs, role) for role in ("fit", "predict"))
     poor = [f"{what} {p:.1f} %" for what, p in fitted.items() if p < GOOD]
@@ -141,7 +145,24 @@ def _predicts(found: Evidence) -> Judgement:
     return Judgement(question=PREDICTS, answer=part, headline=headline, reasons=tuple(notes))
 
 
+def _failure(lost: Sequence[str]) -> str:
+    """What happened where a motion runs away, and what to try."""
+    named = ", ".join(f"'{label}'" for label in lost)
+    which = f"run{'s' if len(lost) > 1 else ''} {named}"
+    return (
+        f"The fit failed: at the last numbers of the search, or as soon as one of them changes a little, the simulated "
+        f"motion of {which} grows beyond all bounds, so no uncertainty can be computed. Check the plant and the signs "
+        "and units of drive and sensors, start from guesses nearer to the truth, or fit a shorter window or one that "
+        "is restarted (horizon)."
+    )
+
+
 def _usable(found: Evidence, *, confirmed: bool) -> Judgement:
+    if found.lost:
+        return Judgement(
+            question=USABLE, answer="no",
+            headline="None of them: the fit failed, and they are only where its search stopped.",
+        )  # fmt: skip
     asked = {n: e for n, e in found.estimates.items() if e.status in ("firm", "weak", "at bound", "unseen")}
     firm = [n for n, e in asked.items() if e.status == "firm"]
     reasons: list[str] = list(found.unseen)
@@ -211,6 +232,8 @@ def _lumped(rig: Rig) -> list[str]:
 
 def _loop(found: Evidence) -> Judgement:
     s = found.standing
+    if found.lost:
+        return Judgement(question=LOOP, answer="not tested", headline="Not evaluated: the fit failed.")
     if s is None:
         return Judgement(
             question=LOOP, answer="not asked",

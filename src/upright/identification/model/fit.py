@@ -152,7 +152,8 @@ class Fit:
     fix it; `singular_values` belong to the scaled Jacobian, `directions` (rows) to them, in the order of `names`;
     `poles` are those at every equilibrium of the fitted plant. The `verdict` is what the `answers` say, one after
     another, and the model is `trusted` when none of the first two is "no". `bands` is what it
-    promises of predictions, None when it was interrupted.
+    promises of predictions, None when it was interrupted. It `failed` when the motion runs away at the numbers or just
+    beside them: these are where the search stopped, and no interval is known.
     """
 
     rig: Rig
@@ -178,6 +179,7 @@ class Fit:
     assumptions: tuple[Assumption, ...] = ()
     poles: Mapping[str, tuple[Pole, ...]] = field(default_factory=dict[str, tuple[Pole, ...]])
     bands: Bands | None = None
+    failed: bool = False
 
     def keyed(self) -> dict[str, float]:
         """Every number found, by the key that problems know it by, see `Problem.key`."""
