@@ -256,6 +256,7 @@ def _conclude(asked: Rig, runs: Sequence[Run], problem: Problem, found: Descent,
             period=min(t.period for t in problem.tracks),
             standing=None if brief or seen.hidden else standing(best),
             lost=best.lost,
+            nothing=best.explains_nothing,
             driven=any(np.any(track.u) or track.run.loop is not None for track in problem.tracks),
         )
     )

@@ -72,6 +72,11 @@ class Optimum:
         return student(self.samples - self.x.size)
 
     @property
+    def explains_nothing(self) -> bool:
+        """Whether the runs are missed by more than they vary; residuals are in units of each signal's spread."""
+        return not self.variance < 1.0
+
+    @property
     def shared(self) -> list[int]:
         """Places of the numbers that all runs share."""
         return [i for i, u in enumerate(self.problem.unknowns) if u.shared]

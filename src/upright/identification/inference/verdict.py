@@ -47,7 +47,8 @@ class Evidence:
     residuals are autocorrelated over `memory` seconds, the motion takes `period` seconds for one period. `standing`
     says how a rig within the intervals stands upright, if this plant can, `driven` whether a command acted in a run.
     Numbers that are `bent` leave their intervals with a dead time of the drive that would explain the runs better.
-    Runs that are `lost` run away at the numbers or as soon as one is moved.
+    Runs that are `lost` run away at the numbers or as soon as one is moved; `nothing` says that the runs are missed by
+    more than they vary.
     """
 
     rig: Rig
@@ -64,6 +65,7 @@ class Evidence:
     driven: bool = True
     bent: Sequence[str] = ()
     lost: Sequence[str] = ()
+    nothing: bool = False
 
 
 def judge(found: Evidence) -> tuple[Judgement, ...]:
@@ -167,7 +169,13 @@ def _usable(found: Evidence, *, confirmed: bool) -> Judgement:
     firm = [n for n, e in asked.items() if e.status == "firm"]
     reasons: list[str] = list(found.unseen)
     no = bool(found.unseen)
-    if asked and not firm and not found.unseen:
+    if asked and found.nothing:
+        no = True
+        reasons.append(
+            "The model misses the fitted runs by more than these vary, so none of its numbers is determined, however "
+            "narrow its interval."
+        )
+    elif asked and not firm and not found.unseen:
         no = True
         reasons.append("No number asked is determined well, so others would explain the runs as well.")
     for n, e in asked.items():
@@ -186,7 +194,13 @@ def _usable(found: Evidence, *, confirmed: bool) -> Judgement:
         elif e.status == "weak" and low > 0 and high > VAGUE * low:
             no = no or n.startswith(ESSENTIAL)
             reasons.append(f"{n} lies anywhere from {low:.2g} to {_shown(high, e)}: it is not determined.")
-        elif e.status == "weak":
+        elif e.status == "unseen" and not any(n in sentence for sentence in found.unseen):
+            no = True
+            reasons.append(
+                f"{n} has no interval: its standard error came out as zero, as where a motion depends on it without "
+                "bound. Start nearer to the truth, or fit a shorter window."
+            )
+        elif e.status == "weak" and not found.nothing:
             reasons.append(f"{n} is known poorly, {low:.2g} to {_shown(high, e)}.")
     for a in found.assumptions:
         along = proportional(a)

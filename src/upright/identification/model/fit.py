@@ -15,13 +15,16 @@ from upright.identification.model.rig import Rig
 
 Array = NDArray[np.float64]
 
+EXACT = 1e-12
+"""An interval narrower than this share of its value is rounding's."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Estimate:
     """What the data say about one number.
 
-    `status` is "firm", "weak" (interval wider than the value, or two models differ), "unseen" (the data cannot tell),
-    "at bound" or "known".
+    `status` is "firm", "weak" (interval wider than the value, two models differ, or the model explains less than
+    nothing), "unseen" (the data cannot tell), "at bound" or "known".
     """
 
     value: float
@@ -29,6 +32,12 @@ class Estimate:
     interval: tuple[float, float]
     unit: str = ""
     status: str = "firm"
+
+    @property
+    def zero_wide(self) -> bool:
+        """Whether its interval is narrower than any measurement's, as where a motion depends on it without bound."""
+        low, high = self.interval
+        return high - low <= EXACT * abs(self.value)
 
     @classmethod
     def within(cls, value: float, stderr: float, half: float, unit: str = "") -> Estimate:

@@ -1,0 +1,106 @@
+"""Firm, weak or unseen: what a number is called follows from its interval, and from what the model explains."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.identification.twins import PENDULUM, noisy, rig, swing
+from upright.identification.inference.covariance import Optimum, assess
+from upright.identification.inference.intervals import run_estimates, shared_estimates
+from upright.identification.inference.verdict import Evidence, judge, trusted
+from upright.identification.model.fit import Estimate, RunScore
+from upright.identification.problem.residuals import formulate
+from upright.identification.search.descent import SearchLog, descend_progressively
+from upright.physics import Pendulum
+
+
+@pytest.fixture(scope="module")
+def best() -> Optimum:
+    """A swing whose inertia and viscous friction are asked."""
+    problem = formulate(rig(Pendulum, PENDULUM, {"J_p": 2e-3, "b_2": 2e-3}), [noisy(swing(seconds=4.0), 1e-3, seed=1)])
+    return assess(problem, descend_progressively(problem, problem.start).x)
+
+
+def everything(best: Optimum) -> dict[str, Estimate]:
+    return shared_estimates(best, (), SearchLog(), profiles=False) | run_estimates(best)[0]["swing"]
+
+
+def with_sigma(best: Optimum, sigma: float) -> Optimum:
+    """The same with one standard error for every coordinate."""
+    return replace(best, covariance=sigma**2 * np.eye(best.x.size))
+
+
+def test_a_well_seen_number_is_firm(best: Optimum) -> None:
+    assert {e.status for e in everything(best).values()} == {"firm"}
+
+
+@pytest.mark.parametrize("sigma", [0.0, 1e-16])
+def test_an_interval_without_width_says_nothing(best: Optimum, sigma: float) -> None:
+    """No measurement is exact: 1.6454 +- 1e-18 comes from a motion that hangs on it beyond all bounds."""
+    for name, e in everything(with_sigma(best, sigma)).items():
+        assert (e.status, e.stderr, e.interval) == ("unseen", math.inf, (-math.inf, math.inf)), name
+
+
+def test_an_interval_of_a_few_parts_in_a_billion_is_one(best: Optimum) -> None:
+    assert {e.status for n, e in everything(with_sigma(best, 1e-9)).items()} == {"firm"}
+
+
+def test_no_number_is_firm_where_the_runs_are_missed_by_more_than_they_vary(best: Optimum) -> None:
+    """A mean squared residual of 1, in units of the signal's spread, is what its mean alone misses."""
+    assert {e.status for e in everything(replace(best, variance=0.99)).values()} == {"firm"}
+    assert {e.status for e in everything(replace(best, variance=1.01)).values()} == {"weak"}
+
+
+@pytest.mark.parametrize(("half", "status"), [(0.49, "firm"), (0.51, "weak")])
+def test_a_first_angle_is_weak_when_its_interval_is_wider_than_what_would_matter(
+    best: Optimum, half: float, status: str
+) -> None:
+    """Its interval reaches as far to either side, so it is one size wide at half of one."""
+    (u,) = [u for u in best.problem.unknowns if u.name == "initial.theta"]
+    e = run_estimates(with_sigma(best, half * u.scale / best.quantile))[0]["swing"]["initial.theta"]
+    assert e.interval[1] - e.interval[0] == pytest.approx(2 * half * u.scale)
+    assert e.status == status
+
+
+@pytest.mark.parametrize(("half", "status"), [(0.49, "firm"), (0.51, "weak")])
+def test_an_inertia_is_weak_when_its_interval_is_wider_than_itself(best: Optimum, half: float, status: str) -> None:
+    """J_p is sought as it is, so its interval is twice as wide as it reaches to one side."""
+    size = float(best.values[0])
+    e = shared_estimates(with_sigma(best, half * size / best.quantile), (), SearchLog(), profiles=False)["J_p"]
+    assert (e.value, e.status) == (size, status)
+
+
+def judged(estimates: dict[str, Estimate], *, nothing: bool = False):
+    score = RunScore(
+        role="fit", fit_percent={"theta": -1000.0 if nothing else 99.0}, horizon=None, t=np.zeros(1),
+        y=np.zeros((1, 1)), simulated=np.zeros((1, 1)), measured=("theta",),
+    )  # fmt: skip
+    return judge(
+        Evidence(
+            rig=rig(Pendulum, PENDULUM, {}), runs={"swing": score}, estimates=estimates, unseen=(), conventions=(),
+            assumptions=(), converged=True, interrupted=False, memory=0.0, period=1.0, standing=None, nothing=nothing,
+        )
+    )  # fmt: skip
+
+
+def test_the_verdict_says_why_a_number_without_width_cannot_be_used() -> None:
+    firm = Estimate(value=2e-3, stderr=1e-5, interval=(1.9e-3, 2.1e-3), unit="kg m^2")
+    none = Estimate(value=1.6454, stderr=math.inf, interval=(-math.inf, math.inf), unit="1/s", status="unseen")
+    told = judged({"J_p": firm, "omega": none})
+    assert told[1].answer == "no"
+    assert told[1].reasons[0].startswith("omega has no interval")
+    assert not trusted(told)
+
+
+def test_the_verdict_says_that_a_fit_that_explains_nothing_determines_nothing() -> None:
+    narrow = Estimate(value=2e-3, stderr=1e-5, interval=(1.9e-3, 2.1e-3), unit="kg m^2", status="weak")
+    told = judged({"J_p": narrow}, nothing=True)
+    assert (told[0].answer, told[1].answer) == ("no", "no")
+    assert told[1].reasons == (
+        "The model misses the fitted runs by more than these vary, so none of its numbers is determined, however "
+        "narrow its interval.",
+    )
