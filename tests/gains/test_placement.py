@@ -119,6 +119,28 @@ def characteristic(A, b, K, s):
     return sign * value
 
 
+def test_as_many_equal_poles_as_inputs_keep_directions_of_their_own():
+    """Two inputs leave A - B K + 5 without two of its four ranks; one mixture of them would leave three (Heymann).
+
+    And with a direction for each, the poles move by as much as A and B are off, not by the root of it.
+    """
+    A, B = np.diag([1.0, 2.0, 3.0, 4.0]), np.array([[1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [1.0, -1.0]])
+    found = place(A, B, [-5, -5, -2, -3])
+    values = np.linalg.svd(A - B @ found.K + 5 * np.eye(4), compute_uv=False)
+    assert np.sum(values > 1e-9 * values[0]) == 2
+
+
+def test_distinct_poles_of_several_inputs_are_as_robust_as_scipy_s():
+    """How far the eigenvectors are from orthogonal is what several inputs leave free."""
+    from scipy.signal import place_poles
+
+    rng = np.random.default_rng(3)
+    A, B, asked = rng.normal(size=(5, 5)), rng.normal(size=(5, 2)), -np.arange(1.0, 6)
+    ours, theirs = (np.linalg.cond(np.linalg.eig(A - B @ K)[1]) for K in
+                    (place(A, B, asked).K, place_poles(A, B, asked).gain_matrix))  # fmt: skip
+    assert ours < 1.5 * theirs
+
+
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("states", [8, 12, 15])
 def test_a_dense_model_is_right_or_refused(states, seed):
