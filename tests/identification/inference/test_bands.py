@@ -143,6 +143,8 @@ def test_a_prediction_further_ahead_than_was_fitted_is_said_from_a_tenth_more_on
     (said,) = beyond(there, swing(horizon=1.5), most)
     assert "predicted 1.5 s ahead, 3 times the 0.5 s that were fitted" in said
     assert len(beyond(there, swing(horizon=0.56), most)) == 1
+    (said,) = beyond(there, swing(horizon=(0.3, 1.5), restart="kalman"), most)  # the longest of them
+    assert "3 times" in said
     (said,) = beyond(there, swing(seconds=10.0), most)
     assert "predicted 10 s ahead, 20 times" in said
     assert "horizon" not in reached(there, [swing(horizon=0.5), swing()])  # one of them was followed to its end

@@ -10,12 +10,14 @@ import pytest
 
 from tests.identification.twins import PENDULUM, noisy, rig, swing
 from upright.identification.inference.covariance import Optimum, assess
-from upright.identification.inference.intervals import run_estimates, shared_estimates
+from upright.identification.inference.intervals import beyond_bounds, run_estimates, shared_estimates
 from upright.identification.inference.verdict import Evidence, judge, trusted
 from upright.identification.model.fit import Estimate, RunScore
+from upright.identification.model.rig import Parameter
+from upright.identification.model.runs import Run
 from upright.identification.problem.residuals import formulate
 from upright.identification.search.descent import SearchLog, descend_progressively
-from upright.physics import Pendulum
+from upright.physics import CartPendulum, Pendulum
 
 
 @pytest.fixture(scope="module")
@@ -72,6 +74,54 @@ def test_an_inertia_is_weak_when_its_interval_is_wider_than_itself(best: Optimum
     size = float(best.values[0])
     e = shared_estimates(with_sigma(best, half * size / best.quantile), (), SearchLog(), profiles=False)["J_p"]
     assert (e.value, e.status) == (size, status)
+
+
+@pytest.mark.parametrize(
+    ("at", "interval", "widened"),
+    [(2.5e-3, (2.2e-3, 2.5e-3), (1.9e-3, 2.15e-3)), (1.5e-3, (1.5e-3, 1.8e-3), (1.85e-3, 2.1e-3))],
+)
+def test_a_number_at_its_bound_may_lie_at_the_far_end_of_its_interval_and_others_follow(
+    best: Optimum, at: float, interval: tuple[float, float], widened: tuple[float, float]
+) -> None:
+    """Coupled by 0.5 they go half as far the other way: J_p 0.3e-3 back from its bound, b_2 = 2e-3 0.15e-3 past it."""
+    inertia, *others = best.problem.unknowns
+    bounded = [replace(inertia, lower=1.5e-3, upper=2.5e-3), *others]
+    coupled = np.eye(best.x.size)
+    coupled[0, 1] = coupled[1, 0] = 0.5
+    x = best.x.copy()
+    x[:2] = at, 2e-3
+    held = replace(
+        best, problem=replace(best.problem, unknowns=bounded), x=x, matrix=coupled, pinned=np.arange(x.size) == 0
+    )
+    estimates = {
+        "J_p": Estimate(value=at, stderr=1e-4, interval=interval, status="at bound"),
+        "b_2": Estimate(value=2e-3, stderr=5e-5, interval=(1.9e-3, 2.1e-3)),
+    }
+    assert beyond_bounds(held, estimates)["b_2"] == pytest.approx(widened)
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_what_differs_from_run_to_run_has_the_unit_of_its_kind(stated: bool) -> None:
+    """States and offsets in that of their coordinate, moments in seconds, factors in none, an offset of a command in
+    that of the drive's own offset where that is stated."""
+    t = np.arange(200) * 0.01
+    y = 0.1 * np.column_stack([np.sin(3 * t), np.cos(5 * t)])
+    run = Run(
+        label="run", role="fit", t=t, y=y, u=np.ones((200, 1)), measured=("x", "theta"),
+        unknown=("initial", "offset.x", "offset.theta", "scale.x", "gain", "friction", "input_offset", "input_start"),
+    )  # fmt: skip
+    crane = {"m_c": 0.4, "m_p": 0.3, "l_cg": 0.3, "J_p": 5e-3, "b_2": 5e-3}
+    asked = rig(CartPendulum, crane, {"m_c": 0.4})
+    if stated:
+        offset = Parameter(name="actuator.offset", value=0.0, unit="V")
+        asked = replace(asked, parameters={**asked.parameters, "actuator.offset": offset})
+    problem = formulate(asked, [run])
+    units = {n: e.unit for n, e in run_estimates(assess(problem, problem.start))[0]["run"].items()}
+    assert units == {
+        "initial.x": "m", "initial.x_dot": "m/s", "initial.theta": "rad", "initial.theta_dot": "rad/s",
+        "offset.x": "m", "offset.theta": "rad", "scale.x": "1", "gain": "1", "friction": "1",
+        "input_offset": "V" if stated else "1", "input_start": "s",
+    }  # fmt: skip
 
 
 def judged(estimates: dict[str, Estimate], *, nothing: bool = False):
