@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,8 +12,9 @@ import pytest
 from tests.identification.twins import PENDULUM, noisy, rig, swing
 from upright.identification.inference.covariance import Optimum, assess
 from upright.identification.inference.intervals import beyond_bounds, run_estimates, shared_estimates
+from upright.identification.inference.loop import Standing
 from upright.identification.inference.verdict import Evidence, judge, trusted
-from upright.identification.model.fit import Estimate, RunScore
+from upright.identification.model.fit import Estimate, Judgement, RunScore
 from upright.identification.model.rig import Parameter
 from upright.identification.model.runs import Run
 from upright.identification.problem.residuals import formulate
@@ -124,15 +126,16 @@ def test_what_differs_from_run_to_run_has_the_unit_of_its_kind(stated: bool) -> 
     }  # fmt: skip
 
 
-def judged(estimates: dict[str, Estimate], *, nothing: bool = False):
+def judged(estimates: dict[str, Estimate], *, nothing: bool = False, **evidence: Any) -> tuple[Judgement, ...]:
     score = RunScore(
         role="fit", fit_percent={"theta": -1000.0 if nothing else 99.0}, horizon=None, t=np.zeros(1),
         y=np.zeros((1, 1)), simulated=np.zeros((1, 1)), measured=("theta",),
     )  # fmt: skip
+    none: dict[str, Any] = {"converged": True, "interrupted": False, "memory": 0.0, "period": 1.0, "standing": None}
     return judge(
         Evidence(
             rig=rig(Pendulum, PENDULUM, {}), runs={"swing": score}, estimates=estimates, unseen=(), conventions=(),
-            assumptions=(), converged=True, interrupted=False, memory=0.0, period=1.0, standing=None, nothing=nothing,
+            assumptions=(), nothing=nothing, **{**none, **evidence},
         )
     )  # fmt: skip
 
@@ -154,3 +157,35 @@ def test_the_verdict_says_that_a_fit_that_explains_nothing_determines_nothing() 
         "The model misses the fitted runs by more than these vary, so none of its numbers is determined, however "
         "narrow its interval.",
     )
+
+
+@pytest.mark.parametrize(
+    ("interval", "share", "answer"),
+    [
+        ((9.1, 10.9), 1.0, "yes"),  # 9 % of the growth rate to either side, and all rigs held
+        ((8.9, 11.1), 1.0, "in part"),  # 11 %
+        ((7.1, 12.9), 1.0, "in part"),  # 29 %
+        ((6.9, 13.1), 1.0, "no"),  # 31 %
+        ((9.1, 10.9), 0.98, "in part"),
+        ((9.1, 10.9), 0.91, "in part"),
+        ((9.1, 10.9), 0.89, "no"),
+    ],
+)
+def test_a_loop_can_be_designed_where_the_growth_is_known_to_a_tenth_and_rigs_within_are_held(
+    interval: tuple[float, float], share: float, answer: str
+) -> None:
+    growth = Estimate(value=10.0, stderr=0.5, interval=interval, unit="1/s")
+    told = judged({}, standing=Standing(at="inverted", growth=growth, share=share))[2]
+    assert told.answer == answer
+    assert bool(told.advice) == (answer != "yes")
+    assert f"holds {100 * share:.0f} % of the rigs" in told.headline
+    # of a search that had not settled, or was interrupted, no loop follows
+    for state in ({"converged": False}, {"interrupted": True}):
+        doubtful = judged({}, standing=Standing(at="inverted", growth=growth, share=share), **state)[2]
+        assert doubtful.answer == "no"
+
+
+def test_residuals_that_resemble_themselves_for_a_twentieth_of_a_period_are_told() -> None:
+    for memory, told in ((0.11, True), (0.09, False)):
+        reasons = judged({}, memory=memory, period=2.0)[0].reasons
+        assert any(f"autocorrelated over about {memory} s" in r for r in reasons) == told
