@@ -11,7 +11,12 @@ import pytest
 
 from tests.identification.twins import PENDULUM, noisy, rig, swing
 from upright.identification.inference.covariance import Optimum, assess
-from upright.identification.inference.intervals import beyond_bounds, run_estimates, shared_estimates
+from upright.identification.inference.intervals import (
+    beyond_bounds,
+    run_estimates,
+    shared_estimates,
+    with_model_uncertainty,
+)
 from upright.identification.inference.loop import Standing
 from upright.identification.inference.verdict import Evidence, judge, trusted
 from upright.identification.model.fit import Estimate, Judgement, RunScore
@@ -100,6 +105,16 @@ def test_a_number_at_its_bound_may_lie_at_the_far_end_of_its_interval_and_others
         "b_2": Estimate(value=2e-3, stderr=5e-5, interval=(1.9e-3, 2.1e-3)),
     }
     assert beyond_bounds(held, estimates)["b_2"] == pytest.approx(widened)
+    asked, log = best.problem.rig, SearchLog()
+    for status, told in (
+        ("firm", widened),
+        ("weak", widened),
+        ("known", (1.9e-3, 2.1e-3)),
+        ("unseen", (1.9e-3, 2.1e-3)),
+    ):
+        other = estimates | {"b_2": replace(estimates["b_2"], status=status)}
+        e = with_model_uncertainty(other, held, asked, (), log)["b_2"]
+        assert (e.interval, e.status) == (pytest.approx(told), status)
 
 
 @pytest.mark.parametrize("stated", [True, False])
