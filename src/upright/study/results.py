@@ -47,7 +47,7 @@ def write_fit(fit: Fit, study: Study, path: Path, crossed: CrossValidation | Non
         "substeps": fit.rig.substeps,
         **_fields(fit, "verdict trusted answers method evaluations"),
         "seconds": round(fit.seconds, 4),
-        **_fields(fit, "cost interrupted not_evaluated"),
+        **_fields(fit, "cost interrupted failed not_evaluated"),
         "parameters": {n: {**vars(e), "meaning": meanings.get(n, "")} for n, e in {**known, **fit.estimates}.items()},
         "assumed": [
             {

@@ -11,6 +11,8 @@ import pytest
 from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, shaken, swing
 from upright.identification import Parameter
 from upright.identification.estimate import identify
+from upright.identification.inference.covariance import assess, identifiability
+from upright.identification.problem.residuals import formulate
 from upright.physics import Furuta, Pendulum
 
 
@@ -79,6 +81,13 @@ def test_a_weakly_seen_number_is_called_weak() -> None:
     e = fit.estimates["b_2q"]
     assert e.status in ("weak", "at bound", "unseen")
     assert e.interval[0] <= PENDULUM["b_2q"] <= e.interval[1]
+
+
+def test_where_every_number_is_held_by_a_bound_none_is_left_to_see() -> None:
+    problem = formulate(rig(Pendulum, PENDULUM, {"b_2": 2e-3}), [swing(seconds=2.0)])
+    best = assess(problem, problem.start)
+    seen = identifiability(replace(best, pinned=np.ones(best.x.size, dtype=bool)))
+    assert (seen.names, seen.singular_values.size, seen.hidden) == ((), 0, set())
 
 
 def test_a_mass_that_nothing_shows_stays_a_number_one_can_print() -> None:

@@ -84,6 +84,8 @@ def headline(fit: Fit) -> str:
     """The verdict in a sentence."""
     if fit.interrupted:
         return "Not to be trusted yet: the search was interrupted, and this is its best so far."
+    if fit.failed:
+        return "The fit failed: the simulated motion grows beyond all bounds, so its numbers mean nothing."
     if not fit.trusted:
         return "Not to be trusted yet."
     if fit.answers and fit.answers[0].answer == "not tested":
@@ -302,6 +304,13 @@ def next_steps(fit: Fit, *, study: str = "STUDY.toml", folder: str = "OUT", cros
 
     `crossed` says that every run was predicted by the others already.
     """
+    if fit.failed:
+        yield Step(
+            "Nothing else can be said before the simulated motion stays finite: check the plant and the signs and "
+            "units of drive and sensors, and fit from measured states, a short time ahead.",
+            '[[runs]]\nhorizon = "0.5 s"',
+        )
+        return
     yield from (*_broken(fit), *_blind(fit), *_nuisances(fit), *_friction(fit, study, folder))
     untested = "Every run was fitted, so nothing tests the model yet; "
     if not (crossed or fit.interrupted) and all(s.role == "fit" for s in fit.runs.values()):
