@@ -140,8 +140,10 @@ def test_a_period_is_that_of_the_motion_not_of_drift_nor_of_fast_noise():
     motion = np.sin(2 * np.pi * t)
     assert dominant_period(motion + 5 * t, DT) == pytest.approx(1.0, rel=0.02)
     assert dominant_period(motion + 0.09 * np.sin(2 * np.pi * 40 * t), DT) == pytest.approx(1.0, rel=0.02)
-    # equal powers at 1 and 3 Hz: root mean square frequency sqrt((1 + 9)/2) Hz
-    assert dominant_period(motion + np.sin(2 * np.pi * 3 * t), DT) == pytest.approx(1 / math.sqrt(5), rel=0.02)
+    # powers 1 and 1/4 at 1 and 3 Hz: root mean square frequency sqrt((1 + 9/4)/(5/4)) Hz, in whatever unit
+    two = motion + np.sin(2 * np.pi * 3 * t) / 2
+    assert dominant_period(two, DT) == pytest.approx(1 / math.sqrt(2.6), rel=0.02)
+    assert dominant_period(1e-9 * two, DT) == pytest.approx(dominant_period(two, DT), rel=1e-6)
 
 
 @pytest.mark.parametrize("still", [np.zeros(200), np.full(200, 3.0), np.linspace(0, 1, 200)])

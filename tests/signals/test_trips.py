@@ -1,0 +1,56 @@
+"""Is a command that is cut off at any sample smoothed as if it had been cut off first?"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from upright.signals.smoothing import middle
+from upright.signals.trips import TripRegression
+
+N, WIDTH = 60, 11
+HALF = WIDTH // 2
+
+
+def regression(switched):
+    rows = np.arange(HALF, N - HALF)
+    return TripRegression(
+        rows=rows, target=np.sin(0.3 * rows), base=np.ones((rows.size, 1)), switched=switched, weights=middle(WIDTH)
+    )
+
+
+@pytest.mark.parametrize("m", [0, 1, HALF, HALF + 1, 20, N - HALF - 1, N - HALF, N - 1, N])
+def test_what_acts_before_a_sample_is_what_is_zero_from_there_on(m):
+    """Zeros first, then the moving mean: only rows within half a window of the cut differ from all or nothing."""
+    switched = np.random.default_rng(5).normal(size=(N, 2))
+    cut = np.where((np.arange(N) < m)[:, None], switched, 0.0)
+    expected = np.column_stack([np.convolve(column, middle(WIDTH)[::-1], "valid") for column in cut.T])
+    assert regression(switched).before(m) == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("command", "several"),
+    [
+        ([0, 0, 2, 2, 2, 0, 0], False),
+        ([0, 0, 2, 2, -2, -2, 0], True),
+        ([0, 0, 1, 2, 2, 1, 0], False),  # a step that was resampled passes what it never held
+        ([2, 2, 2, 2, 2, 2, 2], False),
+    ],
+)
+def test_levels_are_what_a_command_holds_besides_zero(command, several):
+    switched = np.zeros((N, 2))
+    switched[: len(command), 0] = command
+    switched[len(command) :, 0] = command[-1]
+    assert regression(switched).levels == several
+
+
+def test_columns_that_are_the_target_leave_nothing_and_others_what_is_orthogonal_to_them():
+    made = regression(np.ones((N, 2)))
+    left, slopes = made.explain(made.target[:, None] / 4)
+    assert left == pytest.approx(0.0, abs=1e-12)
+    assert slopes == pytest.approx([4.0])
+    rest = made.target - made.target.mean()
+    aside = np.cos(np.arange(rest.size))
+    aside -= aside.mean()
+    expected = 1 - (rest @ aside) ** 2 / (rest @ rest) / (aside @ aside)  # 1 - r^2
+    assert made.explain(aside[:, None])[0] == pytest.approx(expected)
