@@ -37,7 +37,7 @@ def test_a_step_tells_its_encoder_when_it_is_right_to_two_parts_in_ten_thousand(
 
 @pytest.mark.parametrize("outside", ["below", "above", "both"])
 def test_a_step_is_found_from_the_middle_of_very_many_levels(outside):
-    """Of 7000 levels the 4000 in the middle are counts; what lies further out may be bent, as a scale is at its ends."""
+    """Of 7000 levels the 4000 in the middle are counts; what lies further out may be bent, as scales are."""
     step = 2 * math.pi / 20000
     levels = step * np.arange(-3500, 3500)
     bent = levels + 0.3 * step * np.sin(np.arange(7000) ** 2)  # off the grid by up to 0.3 of a step

@@ -1,4 +1,4 @@
-"""Is the memory of residuals as long as it is, and do sums of autocovariances count every sample, the outer ones too?"""
+"""Is the memory of residuals as long as it is, and do sums of autocovariances count the outer samples too?"""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_two_scores_count_by_bartletts_weight_of_their_distance(first, apart, we
 
 
 def test_the_span_is_that_of_andrews():
-    """1.1447 (alpha n)^(1/3) with alpha = 4 rho^2/((1 - rho)^2 (1 + rho)^2): rho = 1/2 gives 16/9, and 401 rows 10.2."""
+    """1.1447 (alpha n)^(1/3) with alpha = 4 rho^2/((1 - rho)^2 (1 + rho)^2): rho = 1/2 gives 16/9, 401 rows 10.2."""
     assert automatic_span(HALF) == 11
     alternating = np.resize([1.0, -1.0], (401, 1))  # what turns back is no memory
     assert automatic_span(alternating) == 1
