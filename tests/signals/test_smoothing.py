@@ -74,6 +74,20 @@ def test_weights_are_those_that_savitzky_and_golay_print():
     """Analytical Chemistry 36 (1964), table I: quadratic and cubic, 5 and 7 points."""
     assert middle(5, order=3) == pytest.approx(np.array([-3, 12, 17, 12, -3]) / 35)
     assert middle(7, order=2) == pytest.approx(np.array([-2, 3, 6, 7, 6, 3, -2]) / 21)
+    assert middle(7) == pytest.approx(np.array([5, -30, 75, 131, 75, -30, 5]) / 231)
+
+
+def test_a_window_of_seven_has_the_weights_of_a_quartic():
+    """Tables I, III and V of the same: what a single sample does to its neighbours, earlier ones seeing it ahead."""
+    motion = savitzky_golay(np.eye(40)[20], 1.0, 7)
+    assert motion.q[17:24] == pytest.approx(np.array([5, -30, 75, 131, 75, -30, 5]) / 231, abs=1e-12)
+    assert motion.v[17:24] == pytest.approx(np.array([-22, 67, 58, 0, -58, -67, 22]) / 252, abs=1e-12)
+    assert motion.a[17:24] == pytest.approx(np.array([-13, 67, -19, -70, -19, 67, -13]) / 132, abs=1e-12)
+
+
+@pytest.mark.parametrize(("order", "edge"), [(2, 1), (3, 2), (4, 2)])
+def test_a_window_is_no_narrower_than_its_polynomial_needs(order, edge):
+    assert savitzky_golay(np.zeros(40), 1.0, 1, order=order).edge == edge
 
 
 @pytest.mark.parametrize("width", [5, 9, 33])
@@ -143,6 +157,7 @@ def test_a_period_is_that_of_the_motion_not_of_drift_nor_of_fast_noise():
     # powers 1 and 1/4 at 1 and 3 Hz: root mean square frequency sqrt((1 + 9/4)/(5/4)) Hz, in whatever unit
     two = motion + np.sin(2 * np.pi * 3 * t) / 2
     assert dominant_period(two, DT) == pytest.approx(1 / math.sqrt(2.6), rel=0.02)
+    assert dominant_period(np.sin(2 * np.pi * t / 4), DT) == pytest.approx(4.0, rel=0.05)
     assert dominant_period(1e-9 * two, DT) == pytest.approx(dominant_period(two, DT), rel=1e-6)
 
 
