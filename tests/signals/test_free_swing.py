@@ -80,6 +80,28 @@ def test_stated_errors_are_those_seen_over_repetitions():
     assert (scatter > 0.4).all()
 
 
+def test_errors_are_those_that_noise_makes():
+    """Viscous friction alone has a closed form; twenty draws know a scatter to 16 %, and errors may be too large."""
+    omega, sigma, noise = 20.0, 0.6, 2e-4
+    t = np.arange(0, 1.5, 4e-3)
+    damped = math.sqrt(omega**2 - sigma**2)
+    x = 0.05 * np.exp(-sigma * t) * (np.cos(damped * t) + sigma / damped * np.sin(damped * t))
+    rng = np.random.default_rng(2)
+    off = []
+    for _ in range(20):
+        found = decay(t, x + noise * rng.normal(size=t.size), quantum=noise)
+        off.append(
+            [
+                (found.omega_n - omega) / found.omega_error,
+                (found.sigma - sigma) / found.sigma_error,
+                found.delta / found.delta_error,
+            ]
+        )
+    scatter = np.std(off, axis=0)
+    assert (scatter < 1.5).all()
+    assert (scatter > 0.5).all()
+
+
 def test_two_modes_are_not_taken_for_one_swing():
     t = np.arange(0, 3, 2e-3)
     y = np.exp(-0.3 * t) * (np.cos(20 * t) + 0.9 * np.cos(47 * t))
