@@ -41,6 +41,22 @@ def test_a_rounded_row_bounds_the_gain_by_half_a_step(u, low, high):
     assert (found_low, found_high) == pytest.approx((low, high), abs=5e-6)
 
 
+def test_each_of_two_gains_has_the_interval_of_its_own_rows():
+    """Three rows show the first, three the second, six times as large."""
+    X = np.kron(np.diag([1.0, 6.0]), np.ones((3, 1)))
+    both = Regression(
+        family=Family(), pole=0.0, gains=np.zeros(2), missed=0.0,
+        columns=Columns(terms=(("kp", 0), ("ki", 0)), X=X, slope=np.zeros_like(X)),
+    )  # fmt: skip
+    best, width = sharpen(both, np.array([2.0, 2.0, 2.0, 12.0, 12.0, 12.0]), np.ones(6, dtype=bool), 1.0)
+    assert width(np.array([1.0, 0.0, 0.0])) == pytest.approx(
+        (0.5 + best.gains[0] - 2, 0.5 - best.gains[0] + 2), abs=1e-5
+    )
+    low, high = width(np.array([0.0, 1.0, 0.0]))
+    assert low + high == pytest.approx(1 / 6, abs=1e-5)
+    assert sum(width(np.array([1.0, 1.0, 0.0]))) == pytest.approx(1 + 1 / 6, abs=1e-5)
+
+
 def test_rows_that_are_left_out_bound_nothing():
     best, width = sharpen(proportional(np.ones(3)), np.array([2.0, 2.0, 9.0]), np.array([True, True, False]), 1.0)
     assert best.gains == pytest.approx([2.0], abs=1e-8)
@@ -66,9 +82,11 @@ def test_a_law_that_misses_nothing_is_known_exactly():
 def test_the_nearest_line_misses_three_points_alike():
     """Chebyshev's: a triangle of height 1 is missed by 1/2 at each corner; in other units by as much."""
     X = np.array([[1.0, -1e3], [1.0, 0.0], [1.0, 1e3]])
-    gains, largest = nearest(X, np.array([0.0, 1.0, 0.0]))
-    assert gains == pytest.approx([0.5, 0.0], abs=1e-9)
+    gains, largest = nearest(X, np.array([-3.0, 1.0, 3.0]))  # on a slope of 3 in 1000
+    assert gains == pytest.approx([0.5, 3e-3], abs=1e-9)
     assert largest == pytest.approx(0.5)
+    # the slope alone may go down to where the rounded ends are missed by 1: 3 +- 1 in 1000, the constant free
+    assert range_of(X, np.array([-3.0, 1.0, 3.0]), np.array([0.0, 1.0]), 1.0) == pytest.approx((2e-3, 4e-3))
 
 
 @pytest.mark.parametrize("at", [0, 7, 2501, 4999])

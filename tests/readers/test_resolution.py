@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
 
 from upright.readers.resolution import (
+    Quantum,
     counts_per_rev,
     decimal_step,
     find_quantum,
@@ -54,6 +56,37 @@ def test_the_middle_matters_not_the_ends():
     assert find_quantum(np.where(np.abs(levels) < 1500 * step, bent, levels)).step == 0.0
 
 
+def test_a_step_is_found_although_most_levels_are_far_apart():
+    """Five decimals know the step of a few neighbours to a part in a thousand: too little to count to 16384 with."""
+    count = np.array([0, 1, 2, 3, 4, *(1 << np.arange(3, 15))])
+    step = 2 * math.pi / 2000
+    found = find_quantum(np.round(step * np.concatenate([-count[1:], count]), 5))
+    assert found.counts_per_rev == 2000
+    assert found.step == pytest.approx(step, rel=1e-5 / (16384 * step))
+
+
+def test_decimals_are_the_texts_when_values_come_again_and_again():
+    """180 levels of 4000 samples; of 300 samples that hardly ever repeat nobody knows."""
+    t = 2e-3 * np.arange(4000)
+    found = find_quantum(np.round(0.9 * np.exp(-0.3 * t) * np.cos(5 * t), 2))
+    assert (found.step, found.decimals) == (0.01, True)
+    assert find_quantum(np.round(np.random.default_rng(3).normal(size=300), 6)) == Quantum()
+    assert find_quantum(np.array([0.25, 0.5] * 9)) == Quantum()  # two levels are no grid
+
+
+@pytest.mark.parametrize(
+    ("quantum", "words"),
+    [
+        (Quantum(), ""),
+        (Quantum(step=2 * math.pi / 2000, counts_per_rev=2000), "2 pi/2000 = 0.003142"),
+        (Quantum(step=0.01, decimals=True), "0.01 (decimals)"),
+        (Quantum(step=0.0195312), "0.01953"),
+    ],
+)
+def test_a_step_is_spelt_with_where_it_comes_from(quantum, words):
+    assert str(quantum) == words
+
+
 @pytest.mark.parametrize(
     ("values", "step"),
     [
@@ -83,13 +116,16 @@ def test_a_rounded_clock_is_rebuilt_with_its_period():
     assert np.ptp(np.diff(found)) < 1e-12
     assert found[[0, -1]] == pytest.approx(t[[0, -1]], abs=1e-15)
     assert "Time was rounded to 1 ms; rebuilt from the sample index with a period of 1.12" in sentence
+    (wander,) = re.findall(r"wander up to (\S+) ms", sentence)
+    assert 0.4 < float(wander) < 1.0  # half a millisecond, and what the ends are off
 
 
 def test_rows_that_are_missing_leave_a_gap_of_their_number():
     index = np.delete(np.arange(400.0), [50, 51, 200])
     t = clock(1.1275e-3, 1e-3)[index.astype(int)]
-    found, sentence = rebuild(t, index)
+    found, sentence = rebuild(t, 100 + index)  # wherever the count begins
     assert sentence
+    assert found[[0, -1]] == pytest.approx(t[[0, -1]], abs=1e-12)
     assert np.diff(found) == pytest.approx(np.diff(index) * 1.1275e-3, abs=5e-6)
 
 

@@ -65,7 +65,8 @@ def test_a_spike_comes_back_by_about_as_much_as_it_went(back, seen):
     x = np.cos(3 * t)
     x[1000] += 10
     x[1001:] += 10 - back
-    assert spikes(x).tolist() == ([1000] if seen else [])
+    for unit in (1.0, 1e-6, 1e6):
+        assert spikes(unit * x).tolist() == ([1000] if seen else [])
 
 
 @pytest.mark.parametrize(("width", "seen"), [(1, True), (2, True), (3, False)])
@@ -80,6 +81,65 @@ def test_a_signal_without_its_spikes_runs_straight_between_their_neighbours():
     x = np.array([1.0, 50.0, 3.0, -7.0, 60.0, 6.0, 99.0])
     assert without(x, np.array([1, 3, 4, 6])).tolist() == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 6.0]
     assert without(x, np.array([], dtype=int)).tolist() == x.tolist()
+
+
+@pytest.mark.parametrize(("size", "seen"), [(3.0, False), (5.0, True), (4.5, False)])
+def test_of_two_values_alone_counts_differ_by_whole_ones(size, seen):
+    """A spike stands out by four steps: of counts a step is 1, of anything else all that the two differ by."""
+    x = np.full(400, 7.0)
+    x[200] += size
+    assert spikes(x).tolist() == ([200] if seen else [])
+
+
+def test_a_record_of_less_than_four_surroundings_shows_no_jump():
+    for n, seen in ((23, []), (24, [12])):
+        found = jumps(0.01 * np.arange(n), np.where(np.arange(n) < 12, 0.0, 90.0) + np.arange(n), 1.0)
+        assert found.steps.tolist() == seen
+        assert bool(found) == bool(seen)
+        assert (found.modulus, found.wraps.size, found.spikes.size) == (0.0, 0, 0)
+
+
+def test_anything_that_jumps_is_a_jump():
+    t, clean = (signal[:2000] for signal in swing())
+    assert not jumps(t, clean, 1.0)
+    for change in ("steps", "spikes", "wraps"):
+        x = clean.copy()
+        x[1000 : 1001 if change == "spikes" else None] += 4096 if change == "wraps" else 700
+        found = jumps(t, x, 1.0, (4096,))
+        assert found
+        assert [kind for kind in ("steps", "spikes", "wraps") if getattr(found, kind).size] == [change]
+        assert found.modulus == (4096 if change == "wraps" else 0)
+
+
+def test_noise_at_the_edge_of_a_counter_turns_it_there_and_back():
+    t, clean = (signal[:2000] for signal in swing())
+    x = clean.copy()
+    x[1000] += 4096
+    x[1500:] += 4096
+    found = jumps(t, x, 1.0, (4096,))
+    assert found.wraps.tolist() == [1000, 1001, 1500]
+    assert found.spikes.size == 0
+    assert found.mended(x).tolist() == clean.tolist()
+
+
+@pytest.mark.parametrize("gap", [3, 8])
+def test_what_moves_on_while_samples_are_missing_does_not_jump(gap):
+    """At its fastest it goes 1.5 counts a millisecond."""
+    t, x = (signal[:2000] for signal in swing())
+    fastest = round(np.pi / 2 / 3 / 1e-3)
+    kept = np.r_[:fastest, fastest + gap : 2000]
+    assert not jumps(t[kept], x[kept], 1.0)
+    # a real one beside the gap is still found
+    x[fastest + 40 :] += 700
+    assert jumps(t[kept], x[kept], 1.0).steps.tolist() == [fastest + 40 - gap]
+
+
+@pytest.mark.parametrize(("missing", "spike"), [(999, False), (1001, False), (997, True), (1003, True)])
+def test_an_outlier_beside_a_missing_sample_may_be_motion(missing, spike):
+    t, x = (signal[:2000] for signal in swing())
+    x[1000] += 700
+    found = jumps(np.delete(t, missing), np.delete(x, missing), 1.0)
+    assert found.spikes.tolist() == ([1000 - (missing < 1000)] if spike else [])
 
 
 def test_a_mended_column_is_what_it_was():
