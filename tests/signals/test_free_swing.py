@@ -109,6 +109,16 @@ def test_two_modes_are_not_taken_for_one_swing():
         decay(t, y)
 
 
+def test_four_turns_are_enough_and_three_are_not():
+    t = np.arange(0, 2, 2e-3)
+    x = np.exp(-0.5 * t) * np.cos(10 * t - 1)  # it turns each pi/10 s from near 0.1 s on
+    four = t < 0.1 + 3.6 * math.pi / 10
+    assert decay(t[four], x[four]).omega_d == pytest.approx(10.0, rel=1e-4)
+    three = t < 0.1 + 2.6 * math.pi / 10
+    with pytest.raises(NotIdentifiable, match="at least 4 extremes, and this swing shows 3"):
+        decay(t[three], x[three])
+
+
 def test_too_few_turns_are_said():
     t, y, _ = swing(0.8, 390.0, 12.0, 0.5, x0=0.05)
     with pytest.raises(NotIdentifiable, match="at least 4 extremes"):
