@@ -58,7 +58,7 @@ def savitzky_golay(y: Array, dt: float, width: int, *, order: int = 4, derivativ
     from scipy.ndimage import correlate1d
 
     n = y.size
-    width = max(order + 2, min(width, n))
+    width = min(max(order + 2, width), n)
     width -= 1 - width % 2
     if width <= order:
         order = max(1, width - 1)
