@@ -119,6 +119,35 @@ def test_any_unit_like_text_is_a_finite_value_or_a_sentence(text: str) -> None:
         assert math.isfinite(units.parse("1 " + text))
 
 
+def test_a_number_is_in_the_unit_already_and_a_text_in_its_own() -> None:
+    assert units.in_unit(2.0, "mm") == 2.0
+    assert units.in_unit("2 cm", "mm") == pytest.approx(20.0)
+    assert units.parse_if_given("", "m") is None
+    assert units.parse_if_given("2 cm", "m") == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value", "spread"),
+    [
+        ("135 g +- 0.2 %", "kg", 0.135, 2.7e-4),
+        ("135 g +/- 2 g", "kg", 0.135, 2e-3),
+        ("-20 cm ± 2 mm", "m", -0.2, 2e-3),
+        ("-20 cm ± 1 %", "m", -0.2, 2e-3),
+        ("135 g", "kg", 0.135, 0.0),
+    ],
+)
+def test_an_uncertainty_is_a_length_of_its_own_or_a_share(text: str, unit: str, value: float, spread: float) -> None:
+    assert units.measured(text, unit) == pytest.approx((value, spread))
+
+
+def test_a_wrong_unit_is_answered_with_those_of_the_quantity_first() -> None:
+    """Asked for a stiffness, it does not speak of metres."""
+    with pytest.raises(BadInput, match=r"use 'N/rad'"):
+        units.parse("3 xyz", "N/rad")
+    with pytest.raises(BadInput, match=r"did you mean 'N/m'\?"):
+        units.parse("3 N/mm2", "N/m")
+
+
 def test_pint_waits_until_a_unit_is_read() -> None:
     code = "import sys, upright.units; sys.exit('pint' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

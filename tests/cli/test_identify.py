@@ -86,6 +86,21 @@ def test_a_report_is_written_and_the_terminal_says_what_next(fitted):
         assert words in outcome.stdout
 
 
+def test_a_fit_whose_motion_runs_away_is_written_with_its_reason(bench):
+    """Friction of 1000 N m s/rad stops this bob within 1 ms: steps of 10 ms are too long, as long as it may become."""
+    text = STUDY.replace('m_p = "1 kg"', 'm_p = "1 kg"\nb_2 = "1000 N m s/rad"').replace("5 m", "1 m")
+    (bench / "study.toml").write_text(text, encoding="utf-8")
+    outcome = run("identify", "study.toml", "-o", "out")
+    assert outcome.exit_code == 0, outcome.output
+    assert "The fit failed" in outcome.stdout
+    fit = json.loads((bench / "out" / "fit.json").read_text(encoding="utf-8"))
+    assert (fit["failed"], fit["trusted"]) == (True, False)
+    assert fit["parameters"]["l_cg"]["stderr"] is None
+    assert fit["parameters"]["l_cg"]["status"] == "unseen"
+    assert "grows beyond all bounds" in (bench / "out" / "report.html").read_text(encoding="utf-8")
+    assert run("identify", "study.toml", "-o", "out", "--strict").exit_code == 3
+
+
 def test_a_fitted_model_scores_another_study(fitted):
     outcome = run("predict", "out/fit.json", "study.toml", "--json", "-o", "scores")
     assert outcome.exit_code == 0, outcome.output

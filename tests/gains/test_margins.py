@@ -9,7 +9,7 @@ import pytest
 
 from upright.errors import BadInput
 from upright.gains import margins
-from upright.gains.margins import balanced, gain_bounds, gain_factors, modulus, phases, sampled_continuous
+from upright.gains.margins import balanced, gain_bounds, gain_factors, loop_margins, modulus, phases, sampled_continuous
 from upright.laws import Law
 from upright.systems import StateSpace
 
@@ -144,3 +144,20 @@ def test_margins_of_two_inputs_are_refused():
     law = Law(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((2, 0)), np.array([[-0.1], [0.0]]), period=0.1)
     with pytest.raises(BadInput, match="for one input"):
         margins(plant.to_sampled(0.1), law)
+
+
+@pytest.mark.parametrize("period", [0.0, 0.02])
+def test_what_a_command_shows_at_once_weakens_the_feedback_of_a_loop(period):
+    """L = d + b/(s - a): the loop's pole is a - b/(1 + d), and stays stable down to the factor f of f b = a (1 + f d).
+
+    Sampled, z - p for s - a: the pole is p - b/(1 + d), which leaves the circle at p - f b/(1 + f d) = 1.
+    """
+    a = 0.5
+    pole = 1.0 + a if period else a
+    one = np.ones((1, 1))
+    for b, d in ((0.4, 0.5), (0.8, 1.0)):  # it would hold without d
+        with pytest.raises(BadInput, match="not stable"):
+            loop_margins(pole * one, b * one, one, d, period)
+    b, d = 1.2, 0.5
+    found = loop_margins(pole * one, b * one, one, d, period)
+    assert found.least_gain == pytest.approx(a / (b - a * d), rel=1e-6)

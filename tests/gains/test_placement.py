@@ -13,7 +13,7 @@ import pytest
 
 from upright.errors import BadInput
 from upright.gains import place
-from upright.gains.requests import read_poles
+from upright.gains.requests import read_poles, weak_modes
 from upright.physics import Furuta
 
 OGATA_CHAIN = ([[0, 1, 0], [0, 0, 1], [-1, -5, -6]], [0, 0, 1])
@@ -119,6 +119,28 @@ def characteristic(A, b, K, s):
     return sign * value
 
 
+def test_as_many_equal_poles_as_inputs_keep_directions_of_their_own():
+    """Two inputs leave A - B K + 5 without two of its four ranks; one mixture of them would leave three (Heymann).
+
+    And with a direction for each, the poles move by as much as A and B are off, not by the root of it.
+    """
+    A, B = np.diag([1.0, 2.0, 3.0, 4.0]), np.array([[1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [1.0, -1.0]])
+    found = place(A, B, [-5, -5, -2, -3])
+    values = np.linalg.svd(A - B @ found.K + 5 * np.eye(4), compute_uv=False)
+    assert np.sum(values > 1e-9 * values[0]) == 2
+
+
+def test_distinct_poles_of_several_inputs_are_as_robust_as_scipy_s():
+    """How far the eigenvectors are from orthogonal is what several inputs leave free."""
+    from scipy.signal import place_poles
+
+    rng = np.random.default_rng(3)
+    A, B, asked = rng.normal(size=(5, 5)), rng.normal(size=(5, 2)), -np.arange(1.0, 6)
+    ours, theirs = (np.linalg.cond(np.linalg.eig(A - B @ K)[1]) for K in
+                    (place(A, B, asked).K, place_poles(A, B, asked).gain_matrix))  # fmt: skip
+    assert ours < 1.5 * theirs
+
+
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("states", [8, 12, 15])
 def test_a_dense_model_is_right_or_refused(states, seed):
@@ -170,6 +192,29 @@ def test_more_equal_poles_than_inputs():
     A, B = np.diag([1.0, 1.0, 3.0]), np.array([[2.0, 1.0], [1.0, 2.0], [1.0, 1.0]])
     found = place(A, B, [-1, -1, -1])
     np.testing.assert_allclose(np.poly(A - B @ found.K), [1, 3, 3, 1], rtol=1e-9)
+
+
+@pytest.mark.parametrize("a", [0.0, 100.0, -30.0])
+def test_the_sensitivity_is_the_farthest_move_of_a_root_by_hand(a):
+    """x'' = a x + u, u = -k_1 x - k_2 x', poles -1 and -4: s^2 + k_2 s + k_1 - a, each number 0.1 % off in turn."""
+    found = place([[0, 1], [a, 0]], [0, 1], [-1, -4])
+    k_1, k_2 = 4 + a, 5
+    assert found.K[0] == pytest.approx([k_1, k_2])
+    off = ([1, k_2, 1.001 * (k_1 - a)], [1, k_2, k_1 - 1.001 * a], [1, 1.001 * k_2, 1.001 * k_1 - a])
+    moves = [np.abs(np.sort(np.roots(c)) - [-4, -1]).max() for c in off]
+    assert found.sensitivity == pytest.approx(max(moves), rel=1e-6)
+    assert ("touchy" in found.sentence) == (max(moves) > 0.4)
+
+
+def test_how_well_a_mode_is_reached_does_not_depend_on_the_unit_of_time():
+    """The distance to the nearest model that does not reach it, as a share of [A, B] (Eising 1984)."""
+    A, B = np.array([[1.0, 0.0], [0.0, 3.0]]), np.array([[1.0], [1e-3]])
+    plain, faster = weak_modes(A, B), weak_modes(1e4 * A, 1e4 * B)
+    assert [pole for _, pole in plain] == [3.0, 1.0]
+    # at s = 3 the rows (-2, 0, 1) and (0, 0, 1e-3) remain: what of the second is across the first, over the norm, 3
+    assert plain[0][0] == pytest.approx(1e-3 * math.sqrt(1 - 1 / 5) / 3, rel=1e-5)
+    assert [reach for reach, _ in faster] == pytest.approx([reach for reach, _ in plain])
+    assert weak_modes(np.zeros((1, 1)), np.zeros((1, 1))) == [(0.0, 0.0)]
 
 
 @pytest.mark.parametrize(

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import stats
 from scipy.optimize import curve_fit
+from scipy.special import erfinv
 
 from tests.signals.swings import swing
 from upright.errors import BadInput, NotIdentifiable
 from upright.identification.loadings import Loaded, fit_loadings, swings
 from upright.readers import read
 from upright.records import Record
-from upright.signals.free_swing import decay
+from upright.signals.free_swing import Decay, decay
 
 K, BARE, C, F = 390.0, 0.77, 1.2, 0.2
 
@@ -121,3 +124,91 @@ def test_a_real_cart_repeats_its_frequency_to_the_errors_stated():
     # chi square of five repeats about their mean: 13.3 is its 99 % quantile at four degrees of freedom
     assert np.sum(((omega - mean) / error) ** 2) < 13.3
     assert (error / omega < 5e-3).all()
+
+
+def by_hand(added: float, omega: float, omega_error: float, sigma: float = 0.2, sigma_error: float = 0.01) -> Loaded:
+    """A swing of which the frequency and the decay are given."""
+    none = np.zeros(0)
+    numbers = Decay(
+        t=none, x=none, maximum=none.astype(bool), omega_d=omega, omega_n=omega, sigma=sigma, rho=0.9, centre=0.0,
+        delta=0.0, model=none, omega_error=omega_error, sigma_error=sigma_error, delta_error=0.0,
+    )  # fmt: skip
+    return Loaded(label="", added=added, decay=numbers)
+
+
+def test_two_swings_have_the_errors_of_a_line_through_two_points():
+    """y = (m + a)/k at a = 0 and 3 kg: k = 3/(y_2 - y_1), so dk = k^2/3 times the root of the errors' squares.
+
+    y = 1/4 and 1 s^2: k = 4 N/m, m = 1 kg. An error of 1 % in omega is one of 2 % in y: 0.005 and 0.02 s^2. And
+    m = k y_1: dm = sqrt((y_1 dk/dy_1 + k)^2 0.005^2 + (y_1 dk/dy_2)^2 0.02^2), with dk/dy = +- 16/3.
+    """
+    found = fit_loadings([by_hand(0.0, 2.0, 0.02), by_hand(3.0, 1.0, 0.01)])
+    assert (found.k.value, found.bare.value) == (pytest.approx(4.0), pytest.approx(1.0))
+    assert found.y_error == pytest.approx([0.005, 0.02])
+    dk = 16 / 3 * math.hypot(0.005, 0.02)
+    dm = math.hypot((0.25 * 16 / 3 + 4) * 0.005, 0.25 * 16 / 3 * 0.02)
+    assert found.k.stderr == pytest.approx(dk)
+    assert found.bare.stderr == pytest.approx(dm)
+    # 95 % of a normal distribution lie within its error function's argument sqrt(2) erfinv(0.95)
+    within = math.sqrt(2) * erfinv(0.95)
+    assert found.k.interval == pytest.approx((4 - within * dk, 4 + within * dk), rel=1e-12)
+    assert found.bare.interval == pytest.approx((1 - within * dm, 1 + within * dm), rel=1e-12)
+    assert math.isnan(found.misfit)
+    assert math.isnan(found.repeat)
+    assert found.verdict.startswith("Two loadings fix a line")
+
+
+def test_repeats_scatter_about_the_means_of_their_loadings():
+    """0.99 and 1.01, 1.96, 2 and 2.04 times what they should be: squares 2e-4 + 8e-4, of 1 + 2 degrees of freedom."""
+    y = [(0.0, 0.99), (0.0, 1.01), (1.0, 1.96), (1.0, 2.0), (1.0, 2.04), (2.0, 3.0)]
+    found = fit_loadings([by_hand(a, v**-0.5, 1e-5) for a, v in y])
+    assert found.repeat == pytest.approx(math.sqrt((2e-4 + 8e-4) / 3))
+    # it is larger than the 2e-5 that each swing says of itself, so it is the error of all, of the lone one too
+    assert found.y_error == pytest.approx([found.repeat * v for _, v in y])
+    careful = fit_loadings([by_hand(a, v**-0.5, 0.05 * v**-0.5) for a, v in y])
+    assert careful.y_error == pytest.approx([0.1 * v for _, v in y])  # twice the error of omega, the larger here
+
+
+@pytest.mark.parametrize(("bump", "error"), [(0.02, 1e-3), (0.012, 1e-3), (1e-4, 1e-3)])
+def test_an_interval_is_as_wide_as_the_points_scatter_or_as_is_stated_the_larger(bump, error):
+    """Three points, y = 1 + a but for a bump in the middle, each to 2 `error` y: scipy's line, chi and Student's t."""
+    a, y = np.array([0.0, 1.0, 2.0]), np.array([1.0, 2.0 + bump, 3.0])
+    found = fit_loadings([by_hand(x, v**-0.5, error * v**-0.5) for x, v in zip(a, y, strict=True)])
+    (slope, intercept), spread = curve_fit(
+        lambda a, s, i: i + s * a, a, y, sigma=2 * error * y, absolute_sigma=True, xtol=1e-14, ftol=1e-14
+    )
+    chi = float(np.sum(((y - intercept - slope * a) / (2 * error * y)) ** 2))
+    assert found.misfit == pytest.approx(chi, rel=1e-6)  # one degree of freedom
+    scatter, stated = math.sqrt(chi), math.sqrt(spread[0, 0]) / slope**2
+    assert (scatter > 1) == (bump > 0.01)
+    assert found.k.stderr == pytest.approx(stated * max(1.0, scatter), rel=1e-6)
+    half = max(math.sqrt(2) * erfinv(0.95), stats.t.ppf(0.975, 1) * scatter) * stated
+    assert found.k.interval[1] - found.k.value == pytest.approx(half, rel=1e-6)
+    # points that scatter so once in a hundred times are no accident
+    assert ("is an added inertia wrong" in found.verdict) == (stats.chi2.sf(chi, 1) < 0.01) == (bump == 0.02)
+
+
+def test_friction_is_the_weighted_mean_of_what_the_swings_decay_by():
+    """c = k g, g = 2 sigma/omega^2: 0.1 and 0.06 s, to 0.01 and 0.02 s: weights 4 and 1, mean 0.092 s, chi 3.2.
+
+    One degree of freedom, so its error 0.01/sqrt(1.25) grows by sqrt(3.2), its interval by 12.706 of these.
+    """
+    swung = [
+        by_hand(0.0, 2.0, 0.02, sigma=0.2, sigma_error=0.02),
+        by_hand(3.0, 1.0, 0.01, sigma=0.03, sigma_error=0.01),
+    ]
+    found = fit_loadings(swung)
+    assert found.damping.value == pytest.approx(4 * 0.092)
+    dg = 0.01 / math.sqrt(1.25) * math.sqrt(3.2)
+    assert found.damping.stderr == pytest.approx(math.hypot(4 * dg, 0.092 * found.k.stderr))
+    t = stats.t.ppf(0.975, 1)
+    reach = math.hypot(4 * t * dg, 0.092 * (found.k.interval[1] - 4))
+    assert found.damping.interval == pytest.approx((4 * 0.092 - reach, 4 * 0.092 + reach))
+
+
+def test_a_bare_inertia_that_may_be_nothing_is_said():
+    """y = (0.01 + a)/4, to 20 %: the bare body is lost in the errors of the loaded ones."""
+    swung = [by_hand(a, ((0.01 + a) / 4) ** -0.5, 0.1 * ((0.01 + a) / 4) ** -0.5) for a in (1.0, 2.0, 3.0)]
+    found = fit_loadings(swung)
+    assert found.bare.interval[0] <= 0
+    assert found.verdict.startswith("The bare body's inertia cannot be told from nothing")

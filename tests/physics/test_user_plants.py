@@ -1,5 +1,8 @@
 """Is a wrong plant of the user's own answered in one sentence that says what to do?"""
 
+import math
+
+import numpy as np
 import pytest
 
 from tests.physics.specimens import EXAMPLES
@@ -38,6 +41,16 @@ WHEN_MADE = {
         RIGHT + "    k1: float = quantity('N/m', 'spring')\n",
         "parameter 'k1' is a name that equations use themselves; call it 'k_1'",
     ),
+    "parameter like a name of the kernel": (
+        RIGHT + "    _h: float = quantity('m', 'height')\n",
+        "parameter '_h' starts with '_', as names that equations use themselves do; call it 'h'",
+    ),
+    "coordinate like a keyword": (RIGHT.replace('"x"', '"lambda"', 1), "coordinate 'lambda' is no Python name"),
+    "parameter like a keyword": (
+        RIGHT + "    lambda: float = quantity('m', 'wavelength')\n",
+        r"mine\.py has a syntax error in line 11",
+    ),
+    "coordinate like an argument": (RIGHT.replace('"x"', '"at"', 1), r"coordinate 'at' hides an argument of state"),
     "parameter that hides a method": (
         RIGHT + "    energy: float = quantity('J', 'energy')\n",
         "parameter 'energy' hides what a plant itself calls energy",
@@ -172,3 +185,47 @@ def test_a_constant_angle_and_a_gear_ratio_are_taken_out_of_the_sines(tmp_path):
     plant = find("mine.py:Mine", write(tmp_path, text))(m=2.0, alpha=0.3, n=1.7)
     a = acceleration(plant.derived(), plant.parameters())([0.9], [0.2], [])
     assert a == pytest.approx([(sin(1.2) + 1.7 * sin(1.7 * 0.9)) / 2.0], rel=1e-12)
+
+
+LETTERS = """
+from sympy import cos
+
+from upright.physics import Coordinate, Input, Joint, Plant
+from upright.quantities import quantity
+
+class Mine(Plant):
+    p: float = quantity("kg", "mass", above=0)
+    q: float = quantity("N/m", "spring", above=0)
+    v: float = quantity("N s/m", "damping", at_least=0)
+    self: float = quantity("m", "where the spring is slack")
+    coordinates = (Coordinate("t", "m", "position"),)
+    inputs = (Input("u", "N", "force", on="t"),)
+
+    @staticmethod
+    def energies(p, q, v):
+        return p.p * v[0]**2 / 2, p.q * (q[0] - p.self)**2 / 2, p.v * v[0]**2 / 2
+"""
+
+
+def test_quantities_may_be_called_as_the_arguments_of_the_energies_are(tmp_path):
+    """p t'' = -q (t - self) - v t' + u: matrices, energy, step response and estimates by hand."""
+    from upright.identification import Parameter, Rig, Run, identify
+    from upright.simulation import simulate
+
+    plant = find("mine.py:Mine", write(tmp_path, LETTERS))(p=0.5, q=20.0, v=0.2, self=0.1).replace(self=0.0)
+    linear = plant.linear()
+    assert np.allclose(linear.A, [[0.0, 1.0], [-20 / 0.5, -0.2 / 0.5]], rtol=1e-12)
+    assert np.allclose(linear.B, [[0.0], [1 / 0.5]], rtol=1e-12)
+    assert plant.energy(plant.state(t=0.3, t_dot=2.0)) == pytest.approx(0.5 * 2.0**2 / 2 + 20 * 0.3**2 / 2)
+    assert plant.power_lost(plant.state(t_dot=2.0)) == pytest.approx(0.2 * 2.0**2)
+    t = np.arange(301) * 0.01
+    x = simulate(plant, {}, plant.state(), np.ones((301, 1)), 0.01, samples=301, substeps=4)[:, [0], 0]
+    decay, omega = 0.2, math.sqrt(40 - 0.2**2)
+    step = (1 - np.exp(-decay * t) * (np.cos(omega * t) + decay / omega * np.sin(omega * t))) / 20
+    assert x[:, 0] == pytest.approx(step, abs=1e-8)
+    numbers = plant.parameters()
+    parameters = {n: Parameter(name=n, value=v, unit=type(plant).quantity(n).unit) for n, v in numbers.items()}
+    parameters["p"] = Parameter(name="p", value=0.4, unit="kg", estimate=True)
+    run = Run(label="step", role="fit", t=t, y=step[:, None], u=np.ones((301, 1)), measured=("t",))
+    fit = identify(Rig(plant=type(plant), parameters=parameters, substeps=4), [run])
+    assert fit.estimates["p"].value == pytest.approx(0.5, rel=1e-5)

@@ -48,7 +48,7 @@ def source(data: bytes) -> Source:
         (logs.ros_bag().replace(b",0.050000000", b",", 1), "line 7, column 4 .*this cell is empty"),
         (
             logs.ros_bag().replace(b"1707681595.549459725", b"1E661466613"),
-            "line 3.*expected a time stamp in s",
+            "line 3, column 3 .*stamp.*expected a time stamp in s",
         ),
         (logs.ros_bag()[:-8], "torn"),
     ],

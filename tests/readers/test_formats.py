@@ -94,6 +94,8 @@ def test_a_table_without_names_counts_its_columns() -> None:
         ("t  Encoder 1 Pos\n0  1\n1  2\n", [0, 1], ("Encoder 1 Pos",)),
         ("t_us,x\n0,1\n2000,2\n", [0, 0.002], ("x",)),
         ("0 1d0\n1 2D0\n", [0, 1], ("c1",)),
+        ("t x\n0,0 1,5\n0,5 2,5\n", [0, 0.5], ("x",)),
+        ("# by hand\n0 1 2\n1 2 3\n", [0, 1], ("c1", "c2")),
     ],
 )
 def test_habits_of_other_programs_are_read(text: str, t: list[float], names: tuple[str, ...]) -> None:

@@ -133,6 +133,29 @@ def test_saturation_rests_and_turns_are_seen() -> None:
     assert alone.rests[0][1] == pytest.approx(2, abs=0.26)
 
 
+def test_a_commanded_position_that_is_the_measured_one_is_no_reference() -> None:
+    """Read a sample later on a triangle of 3 counts a sample, it differs by 3 but at turns: its steps do not."""
+    t = 1e-3 * np.arange(600)
+    encoder = 3.0 * np.abs(np.arange(600) % 200 - 100)
+    late = np.concatenate([encoder[:1], encoder[:-1]])
+    seen = inspect(Record(t=t, signals={"Commanded Pos": late, "Encoder 1 Pos": encoder}))
+    assert seen.column("Commanded Pos").lies == (
+        "follows 'Encoder 1 Pos' (steps differ by 0 at the median); no reference, open loop",
+    )
+    reference = np.where(np.arange(600) % 200 < 100, 300.0, 0.0)
+    seen = inspect(Record(t=t, signals={"Commanded Pos": reference, "Encoder 1 Pos": encoder}))
+    assert not any("follows" in lie for lie in seen.column("Commanded Pos").lies)
+
+
+def test_first_samples_that_are_far_outside_the_rest_are_named() -> None:
+    t, theta = swing(300)
+    first, later = theta.copy(), theta.copy()
+    first[1] = later[5] = -80.0
+    seen = inspect(Record(t=t, signals={"first": first, "later": later}))
+    assert any("the first samples are outliers (80 against 0.89" in lie for lie in seen.column("first").lies)
+    assert not any("first samples" in lie for lie in seen.column("later").lies)
+
+
 def test_an_idle_input_is_named() -> None:
     t, theta = swing(300)
     column = inspect(Record(t=t, signals={"theta": theta, "Control Effort": 0 * t})).column("Control Effort")

@@ -80,11 +80,43 @@ def test_stated_errors_are_those_seen_over_repetitions():
     assert (scatter > 0.4).all()
 
 
+def test_errors_are_those_that_noise_makes():
+    """Viscous friction alone has a closed form; twenty draws know a scatter to 16 %, and errors may be too large."""
+    omega, sigma, noise = 20.0, 0.6, 2e-4
+    t = np.arange(0, 1.5, 4e-3)
+    damped = math.sqrt(omega**2 - sigma**2)
+    x = 0.05 * np.exp(-sigma * t) * (np.cos(damped * t) + sigma / damped * np.sin(damped * t))
+    rng = np.random.default_rng(2)
+    off = []
+    for _ in range(20):
+        found = decay(t, x + noise * rng.normal(size=t.size), quantum=noise)
+        off.append(
+            [
+                (found.omega_n - omega) / found.omega_error,
+                (found.sigma - sigma) / found.sigma_error,
+                found.delta / found.delta_error,
+            ]
+        )
+    scatter = np.std(off, axis=0)
+    assert (scatter < 1.5).all()
+    assert (scatter > 0.5).all()
+
+
 def test_two_modes_are_not_taken_for_one_swing():
     t = np.arange(0, 3, 2e-3)
     y = np.exp(-0.3 * t) * (np.cos(20 * t) + 0.9 * np.cos(47 * t))
     with pytest.raises(NotIdentifiable, match="not one decaying swing"):
         decay(t, y)
+
+
+def test_four_turns_are_enough_and_three_are_not():
+    t = np.arange(0, 2, 2e-3)
+    x = np.exp(-0.5 * t) * np.cos(10 * t - 1)  # it turns each pi/10 s from near 0.1 s on
+    four = t < 0.1 + 3.6 * math.pi / 10
+    assert decay(t[four], x[four]).omega_d == pytest.approx(10.0, rel=1e-4)
+    three = t < 0.1 + 2.6 * math.pi / 10
+    with pytest.raises(NotIdentifiable, match="at least 4 extremes, and this swing shows 3"):
+        decay(t[three], x[three])
 
 
 def test_too_few_turns_are_said():

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from upright.errors import BadInput, nearest
 from upright.identification.checks.conventions import wrong_conventions
 from upright.identification.checks.outliers import refit_without_outliers
-from upright.identification.inference.assumptions import assumptions, sentences
+from upright.identification.inference.assumptions import assumptions, sentences, with_assumptions
 from upright.identification.inference.bands import calibrated
 from upright.identification.inference.black_box import black_box
 from upright.identification.inference.covariance import Identifiability, Optimum, assess, identifiability
@@ -120,7 +120,7 @@ def identify(
             log.note("lower, met by an interval", found.normal.cost, problem)
             log.lower = None
             fit = conclude(other_valleys(problem, found, log))
-        if not watch or fit.interrupted:
+        if not watch or fit.interrupted or fit.failed:
             return fit
         return refit_without_outliers(
             fit, rig, runs, lambda kept: identify(rig, kept, method=method, progress=progress, watch=False, near=fit)
@@ -154,6 +154,8 @@ def find_optimum(
             starts = [problem.place(s) for s in closed_form_starts(rig, runs)]
             other = search(problem, starts, log, patient=False) if starts else found
             found = better(found, other)
+    if not math.isfinite(found.normal.cost):  # the motion runs away wherever the search came: nothing to refine
+        return problem, found
     found = settle_weights(problem, other_moments(problem, found, log))
     found = reached_limits(problem, found, log)
     log.unresolved = () if found.interrupted else unresolved(problem, found.x)
@@ -207,17 +209,21 @@ def _skipped(runs: Sequence[Run], *, watch: bool) -> tuple[str, ...]:
 def _conclude(
     asked: Rig, runs: Sequence[Run], problem: Problem, found: Descent, log: SearchLog, *, watch: bool
 ) -> Fit:  # fmt: skip
-    """Everything known about an optimum; of an interrupted search only what takes no time, so no predictions."""
+    """Everything known about an optimum; of an interrupted search only what takes no time, so no predictions.
+
+    Where the motion runs away nothing is known of how sure the numbers are, and nothing is predicted.
+    """
     best = assess(problem, found.x)
     seen = identifiability(best)
     warnings = list(log.warnings)
+    brief = found.interrupted or bool(best.lost)
     little = explains_little(problem, found)
-    if little and not found.interrupted:
+    if little and not brief:
         warnings.append(
             "The search stopped after its first pass, because the model explains less than two thirds of how the "
             "signals vary; intervals come from standard errors. Look at units, signs and the plant first."
         )
-    estimates = shared_estimates(best, seen.hidden, log, profiles=not (found.interrupted or little))
+    estimates = shared_estimates(best, seen.hidden, log, profiles=not (brief or little))
     per_run, groups = run_estimates(best)
     for name, value in log.rivals.items():
         e = widened(estimates[name], (value, value))
@@ -236,19 +242,22 @@ def _conclude(
             else f"{name} was left out: with it the held-out part of the runs is not predicted better."
         )
     estimates = {n: estimates[n] for n in asked.parameters if n in estimates}
-    if not found.interrupted:
+    if not brief:
         estimates = with_model_uncertainty(estimates, best, asked, left_out, log)
-    scored = [run for run in runs if run.role == "fit" or not found.interrupted]
-    bands = None if found.interrupted else calibrated(best)
+    scored = [run for run in runs if run.role == "fit" or not brief]
+    bands = None if brief else calibrated(best)
     scores = _scores(best, scored, estimates, groups, bands, log)
     skipped = _skipped(runs, watch=watch) if found.interrupted else ()
     if skipped:
         warnings.append(f"Not evaluated: interrupted. This concerns {', '.join(skipped)}.")
-    unseen = seen.sentences({n: p.unit for n, p in asked.parameters.items()})
+    elif len(scored) < len(runs):
+        warnings.append("What was held out is not predicted, because the fit failed.")
+    unseen = () if best.lost else seen.sentences({n: p.unit for n, p in asked.parameters.items()})
     worst = min((p for s in scores.values() if s.role == "fit" for p in s.fit_percent.values()), default=100.0)
     conventions = tuple(log.conventions()) if worst < GOOD else ()
-    assumed = () if found.interrupted else assumptions(best, estimates)
-    late = None if found.interrupted or little or conventions else lateness(best)
+    assumed = assumptions(best, estimates, evaluate=not brief)
+    estimates = with_assumptions(estimates, assumed)
+    late = None if brief or little or conventions else lateness(best)
     warnings += [late.sentence] if late else []
     answers = judge(
         Evidence(
@@ -263,7 +272,9 @@ def _conclude(
             memory=best.memory,
             bent=late.bent if late else (),
             period=min(t.period for t in problem.tracks),
-            standing=None if found.interrupted or seen.hidden else standing(best),
+            standing=None if brief or seen.hidden else standing(best),
+            lost=best.lost,
+            nothing=best.explains_nothing,
             driven=any(np.any(track.u) or track.run.loop is not None for track in problem.tracks),
         )
     )
@@ -292,6 +303,7 @@ def _conclude(
         poles={} if seen.hidden else _poles(best),  # a pole may depend on what the data cannot see
         assumptions=assumed,
         bands=bands,
+        failed=bool(best.lost),
     )
 
 
@@ -317,6 +329,8 @@ def _scores(
 def _correlation(best: Optimum, seen: Identifiability) -> Array:
     """Correlation (names, names) of the shared numbers in the order of `seen.names`."""
     places = [i for i in best.shared if best.problem.unknowns[i].name in seen.names]
+    if best.lost:
+        return np.eye(len(places))
     C = best.covariance[np.ix_(places, places)]
     d = np.sqrt(np.maximum(np.diag(C), 0.0))
     s = np.where(d > 0, 1 / np.where(d > 0, d, 1.0), 0.0)

@@ -222,13 +222,13 @@ def _code(expression: str) -> Any:
 def _program(derived: Derived, parts: tuple[str, ...], scalar: bool) -> Program:
     """All expressions of some parts of the equations, compiled together; `scalar` ones know no arrays but are fast."""
     names = (*derived.parameters, *derived.coordinates, *(f"{c}_dot" for c in derived.coordinates), *derived.inputs)
-    lines = [f"    {name} = p.get({name!r}, 0.0)" for name in names]
+    lines = [f"    {name} = _scope.get({name!r}, 0.0)" for name in names]  # no plant's name starts like ours
     lines += [f"    k{i} = {text}" for i, text in enumerate(derived.lumps)]
     for s, c, argument in derived.trig:
         lines += [f"    {s} = sin({argument})", f"    {c} = cos({argument})"]
     lines += [f"    {name} = {text}" for name, text in derived.steps]
     results = ["(" + "".join(f"{text}, " for text in getattr(derived, part)) + ")" for part in parts]
-    text = "\n".join(["def run(p):", *lines, f"    return {', '.join(results)}"])
+    text = "\n".join(["def run(_scope):", *lines, f"    return {', '.join(results)}"])
     scope = _functions(math if scalar and not chooses(text) else np)
     exec(compile(_for_arrays(ast.parse(text)), f"<{derived.name}>", "exec"), scope)  # our own text
     run = scope["run"]

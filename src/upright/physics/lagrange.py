@@ -251,7 +251,9 @@ class _Printer(PythonCodePrinter):
         return super()._print_Pow(expr, rational=rational)
 
     def _print_NumberSymbol(self, expr: Any) -> str:
-        return "pi" if expr is sp.pi else repr(float(expr))
+        return repr(float(expr))
+
+    _print_Exp1 = _print_NumberSymbol  # SymPy's own would call it e, a name that the text does not have
 
 
 _PRINTER = _Printer({"fully_qualified_modules": False})

@@ -136,7 +136,7 @@ class Statement:
         """Values of the parameters by name."""
         return {f.name: float(getattr(self, f.name)) for f in fields(self)}  # type: ignore[arg-type]
 
-    def replace(self, **changes: float) -> Self:
+    def replace(self, /, **changes: float) -> Self:
         """The same plant with other values.
 
         Raises
@@ -149,7 +149,7 @@ class Statement:
                 raise BadInput(f"{type(self).__name__} has no parameter '{name}'; {nearest(name, self.names())}")
         return replace(self, **changes)  # type: ignore[type-var]
 
-    def state(self, at: str | None = None, **values: float) -> NDArray[np.float64]:
+    def state(self, /, at: str | None = None, **values: float) -> NDArray[np.float64]:
         """State vector at a named equilibrium with some states set by name.
 
         Parameters
@@ -220,6 +220,11 @@ def _check_names(cls: type[Any]) -> None:
         for name in names:
             if not name.isidentifier() or iskeyword(name):
                 raise BadInput(f"{cls.__name__}: {kind} '{name}' is no Python name; use letters, digits and '_'.")
+            if name.startswith("_"):
+                raise BadInput(
+                    f"{cls.__name__}: {kind} '{name}' starts with '_', as names that equations use themselves do; "
+                    f"call it '{name.strip('_') or 'z'}'."
+                )
             if name in FUNCTIONS or INTERMEDIATE.fullmatch(name):
                 raise BadInput(
                     f"{cls.__name__}: {kind} '{name}' is a name that equations use themselves; "
@@ -227,6 +232,8 @@ def _check_names(cls: type[Any]) -> None:
                 )
             if name in seen:
                 raise BadInput(f"{cls.__name__}: '{name}' is both {seen[name]} and {kind}; rename one of them.")
+            if kind == "coordinate" and name == "at":
+                raise BadInput(f"{cls.__name__}: coordinate 'at' hides an argument of state(at=...); call it 'at_0'.")
             if kind == "parameter" and hasattr(cls._base, name):
                 raise BadInput(
                     f"{cls.__name__}: parameter '{name}' hides what a plant itself calls {name}; call it '{name}_0'."

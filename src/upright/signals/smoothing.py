@@ -58,7 +58,7 @@ def savitzky_golay(y: Array, dt: float, width: int, *, order: int = 4, derivativ
     from scipy.ndimage import correlate1d
 
     n = y.size
-    width = max(order + 2, min(width, n))
+    width = min(max(order + 2, width), n)
     width -= 1 - width % 2
     if width <= order:
         order = max(1, width - 1)
@@ -122,6 +122,12 @@ def acceleration_width(y: Array, dt: float, quantum: float) -> int:
             break
         width = int(width * 1.3) | 1
     return width
+
+
+def white_noise(y: Array) -> float:
+    """Standard deviation of white noise on a signal (N,) that is smooth over some samples, from fourth differences."""
+    differences = np.diff(y, 4)  # variance 70 times that of the noise; what is not noise is rarely its median
+    return float(np.median(np.abs(differences))) / (0.6745 * np.sqrt(70.0)) if differences.size else 0.0
 
 
 def noise_gain(width: int, *, order: int = 4) -> float:

@@ -133,7 +133,11 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
         (
             Key("value", '"0.23 m"', "a known number"),
             Key("uncertainty", '"2 mm" or "1 %"', "its standard uncertainty"),
-            Key("assumed", "true", "a known number that is a convention: the report says what rests on it"),
+            Key(
+                "assumed",
+                "true",
+                "a number that nobody measured: no estimate that rests on it can be used",
+            ),
             Key("measured", "true", "a known number that somebody measured on this rig, as one with an uncertainty is"),
             Key("guess", '"1.6e-3 kg m^2"', "a number to estimate, and where to start"),
             Key("min", "0", "lower bound of the estimate; the plant's own if left out"),

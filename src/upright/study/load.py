@@ -244,6 +244,7 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
         check_clock(record)
     hash_of = record.provenance.sha256[:12]
     notes: list[str] = [f"{Path(record.provenance.file).name}{f' (sha256 {hash_of})' if hash_of else ''}"]
+    whole = float(record.t[0]), float(record.t[-1])
     if "window" in run:
         start, stop = _window(run, record)
         with run.at("window"):
@@ -309,6 +310,7 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
         loop=loop,
         repeats=run.text_of("repeats", "step 0.5 V") if "repeats" in run else "",
         source="; ".join(notes),
+        record=whole,
     )
 
 

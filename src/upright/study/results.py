@@ -14,6 +14,7 @@ from typing import Any
 from upright.files import plain_values, write_json
 from upright.identification import Estimate, Fit
 from upright.identification.frequency.answer import FrequencyFit
+from upright.identification.inference.assumptions import resting
 from upright.identification.ladder.cross_validation import CrossValidation
 from upright.identification.ladder.growth import Ladder, RungResult
 from upright.identification.ladder.rungs import neutral
@@ -39,7 +40,7 @@ def fit_content(fit: Fit, study: Study, crossed: CrossValidation | None = None) 
             stderr=p.uncertainty,
             interval=(p.value - 1.96 * p.uncertainty, p.value + 1.96 * p.uncertainty),
             unit=p.unit,
-            status="known",
+            status="assumed" if p.assumed else "known",
         )
         for name, p in fit.rig.parameters.items()
     }
@@ -53,14 +54,16 @@ def fit_content(fit: Fit, study: Study, crossed: CrossValidation | None = None) 
         "substeps": fit.rig.substeps,
         **_fields(fit, "verdict trusted answers method evaluations"),
         "seconds": round(fit.seconds, 4),
-        **_fields(fit, "cost interrupted not_evaluated"),
+        **_fields(fit, "cost interrupted failed not_evaluated"),
         "parameters": {n: {**vars(e), "meaning": meanings.get(n, "")} for n, e in {**known, **fit.estimates}.items()},
         "assumed": [
             {
                 "name": a.name,
                 "value": a.value,
                 "unit": a.unit,
+                "size": a.size,
                 "percent_per_percent": {n: round(e, 6) for n, e in a.follows.items()},
+                "rests": resting(a),
                 "without_it": a.without,
             }
             for a in fit.assumptions

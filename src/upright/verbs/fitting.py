@@ -42,7 +42,8 @@ class FitAnswer(Answer["Fit"]):
     def brief(self) -> Chapter:
         """Verdict, estimates and scores; the whole chapter is what `report` writes."""
         from upright.report.fit.tables import parameter_table, score_table
-        from upright.report.page import Part, Picture
+        from upright.report.page import Part, Picture, Points
+        from upright.study.windows import windows
 
         asked = {n: p for n, p in self.value.rig.parameters.items() if p.estimate}
         fit = replace(self.value, rig=replace(self.value.rig, parameters=asked))
@@ -51,7 +52,7 @@ class FitAnswer(Answer["Fit"]):
         )  # fmt: skip
         parts = (
             Part("Parameters", (parameter_table(fit, caption="Estimates"),)),
-            Part("Fit of the runs", (score_table(fit.runs), drawn)),
+            Part("Fit of the runs", (Points(windows(self.study.runs)), score_table(fit.runs), drawn)),
         )
         return replace(self.chapter, parts=parts, steps=())
 
@@ -78,9 +79,7 @@ class FitAnswer(Answer["Fit"]):
         """See `parameters`."""
         import pandas as pd
 
-        rows = {
-            name: (e.value, e.stderr, *e.interval, e.unit, e.status) for name, e in self.value.estimates.items()
-        }  # fmt: skip
+        rows = {name: (e.value, e.stderr, *e.interval, e.unit, e.qualified) for name, e in self.value.estimates.items()}
         columns = ["value", "stderr", "low", "high", "unit", "status"]
         return pd.DataFrame.from_dict(rows, orient="index", columns=columns)
 
@@ -233,6 +232,7 @@ def identify(
     from upright.report.fit.chapter import chapter
     from upright.report.symbols import typed
     from upright.study.results import write_fit
+    from upright.study.windows import windows
     from upright.verbs.pages import folder_if_given, write_page
     from upright.workers import Workers
 
@@ -270,7 +270,7 @@ def identify(
     told = chapter(
         fit, title=asked.title or asked.path.stem.replace("_", " "), provenance=asked.provenance, crossed=crossed,
         study=typed(label) + (f" --data {typed(data)}" if data is not None else ""),
-        folder=typed(folder) if folder is not None else "OUT",
+        folder=typed(folder) if folder is not None else "OUT", windows=windows(asked.runs),
     )  # fmt: skip
     if folder is not None and (report or pdf):
         written += write_page(told, folder / "report.html", pdf)

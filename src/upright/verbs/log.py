@@ -273,7 +273,8 @@ def init(
     if beside is not None:
         record.to_csv(beside)
         files.append(beside)
-    guessed = [line.removeprefix("# ") for line in text.splitlines() if line.startswith("# GUESSED")]
+    told = ("# Fits ", "# GUESSED")
+    guessed = [line.removeprefix("# ") for line in text.splitlines() if line.startswith(told)]
     marked = (line.split(" =")[0] for line in text.splitlines() if "MEASURE" in line and " = " in line)
     measure = list(dict.fromkeys(marked))
     if measure:

@@ -1,14 +1,16 @@
 """What is proportional to an assumed gain scales with it, what is not stays; without it the data speak in volts."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from upright.errors import BadInput
-from upright.identification import Parameter, Rig, Run, identify
+from upright.identification import Fit, Parameter, Rig, Run, identify
 from upright.identification.inference.assumptions import per_length, proportional, untouched
+from upright.identification.inference.verdict import USABLE
 from upright.physics import find
 from upright.simulation import simulate
 from upright.study import load_study
@@ -123,3 +125,83 @@ def test_a_guess_cannot_be_assumed(tmp_path):
     (tmp_path / "s.toml").write_text(text)
     with pytest.raises(BadInput, match="assumed has no meaning"):
         load_study(tmp_path / "s.toml")
+
+
+SWING = {"m_p": 0.2235, "l_cg": 0.2, "J_p": 3e-3, "b_2": 1e-3, "b_2c": 8e-4}
+
+
+def swing(seed: int = 5) -> Run:
+    """A pendulum let go at 1.2 rad, read with 0.3 mrad of noise."""
+    t = np.arange(1501) * 0.01
+    x = simulate(find("pendulum")(**SWING), {}, [1.2, 0.0], None, 0.01, samples=t.size, substeps=2)
+    y = x[:, [0], 0] + 3e-4 * np.random.default_rng(seed).normal(size=(t.size, 1))
+    return Run(label="swing", role="fit", t=t, u=np.zeros((t.size, 1)), y=y, measured=("theta",))
+
+
+def hanging(assumed: dict[str, float], known: dict[str, float], asked: dict[str, float]) -> Rig:
+    pendulum = find("pendulum")
+    numbers = {
+        n: Parameter(name=n, value=v, unit=pendulum.quantity(n).unit, estimate=n in asked, assumed=n in assumed)
+        for n, v in {**assumed, **known, **asked}.items()
+    }
+    return Rig(plant=pendulum, parameters=numbers)
+
+
+def usable(fit: Fit) -> set[str]:
+    """Names that the verdict lists as usable."""
+    (answer,) = (a for a in fit.answers if a.question == USABLE)
+    listed = re.search(r"numbers can be used: (.*)\.", answer.headline)
+    return set(listed[1].split(", ")) if listed else set()
+
+
+def test_what_would_move_with_an_assumed_length_is_not_usable_though_it_is_not_proportional_to_it():
+    # of a swing only w^2 = m g l/(J + m l^2) is seen: J = m l (g/w^2 - l), so dJ/dl l/J = (g/w^2 - 2 l)/(g/w^2 - l)
+    fit = identify(hanging({"l_cg": 0.22}, {"m_p": 0.2235}, {"J_p": 2e-3, "b_2": 1e-3, "b_2c": 1e-3}), [swing()])
+    equal = (SWING["J_p"] + SWING["m_p"] * SWING["l_cg"] ** 2) / (SWING["m_p"] * SWING["l_cg"])  # g/w^2
+    expected = (equal - 2 * 0.22) / (equal - 0.22)
+    assert abs(fit.assumptions[0].follows["J_p"] - expected) < 0.02 * abs(expected)
+    assert fit.estimates["J_p"].status == "firm"
+    assert fit.estimates["J_p"].rests_on == ("l_cg",)
+    assert not usable(fit)
+
+
+def test_what_an_assumed_zero_moves_rests_on_it():
+    # J = 0 makes a simple pendulum of length L = J_A/(m l) of it: friction per m L^2 in the place of friction per J_A
+    fits = [
+        identify(hanging({"J_p": J}, {"m_p": SWING["m_p"]}, {"l_cg": 0.25, "b_2": 1e-3, "b_2c": 1e-3}), [swing()])
+        for J in (0.0, SWING["J_p"])
+    ]
+    simple, whole = (f.estimates for f in fits)
+    equal = (SWING["J_p"] + SWING["m_p"] * SWING["l_cg"] ** 2) / (SWING["m_p"] * SWING["l_cg"])
+    for name in ("b_2", "b_2c"):
+        ratio = simple[name].value / whole[name].value
+        assert abs(ratio - equal / SWING["l_cg"]) < 0.02 * ratio
+        assert simple[name].rests_on == ("J_p",)
+    assert abs(simple["l_cg"].value - equal) < 1e-3 * equal
+    assert usable(fits[0]) == {"l_cg"}  # as the length of the simple pendulum of equal period, which it says
+    assert "equivalent point pendulum" in fits[0].verdict
+
+
+def test_the_verdict_names_the_measurement_that_frees_a_number():
+    asked = {"l_cg": 0.25, "b_2": 1e-3, "b_2c": 1e-3}
+    light = identify(hanging({"m_p": 1.0}, {"J_p": 0.0}, asked), [swing()])
+    assert usable(light) == {"l_cg"}
+    assert "b_2, b_2c rest on m_p (assumed)." in light.verdict
+    assert 'Measure m_p and give it as known, m_p = "... kg" under [parameters].' in light.verdict
+    weighed = identify(hanging({}, {"J_p": SWING["J_p"], "m_p": SWING["m_p"]}, asked), [swing()])
+    assert usable(weighed) == set(asked)
+    for name in asked:
+        e = weighed.estimates[name]
+        assert abs(e.value - SWING[name]) < 4 * e.stderr
+        assert not e.rests_on
+
+
+def test_an_interrupted_fit_calls_nothing_usable_that_may_rest_on_an_assumed_number():
+    def stop(stage: str, share: float) -> None:
+        if share > 0:
+            raise KeyboardInterrupt
+
+    fit = identify(hanging({"m_p": 1.0}, {"J_p": 0.0}, {"l_cg": 0.25, "b_2": 1e-3}), [swing()], progress=stop)
+    assert fit.interrupted
+    assert not usable(fit)
+    assert "was not evaluated" in fit.verdict

@@ -133,6 +133,25 @@ def test_a_faster_and_wider_swing_is_beyond_what_was_fitted() -> None:
     assert beyond(there, low, reached(there, [high])) == ()
 
 
+def test_a_prediction_further_ahead_than_was_fitted_is_said_from_a_tenth_more_on() -> None:
+    """Fitted 0.5 s ahead: 0.54 s are no more than that, 0.56 and 1.5 s are, and so is a free run of 10 s."""
+    there = rig(Pendulum, PENDULUM, {})
+    most = reached(there, [swing(horizon=0.5), swing(horizon=0.3)])
+    assert most["horizon"] == 0.5
+    for horizon in (0.3, 0.5, 0.54):
+        assert beyond(there, swing(horizon=horizon), most) == ()
+    (said,) = beyond(there, swing(horizon=1.5), most)
+    assert "predicted 1.5 s ahead, 3 times the 0.5 s that were fitted" in said
+    assert len(beyond(there, swing(horizon=0.56), most)) == 1
+    (said,) = beyond(there, swing(horizon=(0.3, 1.5), restart="kalman"), most)  # the longest of them
+    assert "3 times" in said
+    (said,) = beyond(there, swing(seconds=10.0), most)
+    assert "predicted 10 s ahead, 20 times" in said
+    assert "horizon" not in reached(there, [swing(horizon=0.5), swing()])  # one of them was followed to its end
+    assert beyond(there, swing(horizon=9.0), reached(there, [swing()])) == ()
+    assert reached(there, []) == {}
+
+
 def test_an_angle_that_comes_round_is_not_beyond() -> None:
     """Ten turns further on gravity pulls as before; how far the arm of a Furuta pendulum stands is not felt at all."""
     there = rig(Pendulum, PENDULUM, {})

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, shaken, swing
+from upright.identification import Parameter
 from upright.identification.estimate import identify
+from upright.identification.inference.covariance import assess, identifiability
+from upright.identification.problem.residuals import formulate
 from upright.physics import Furuta, Pendulum
 
 
@@ -79,6 +83,13 @@ def test_a_weakly_seen_number_is_called_weak() -> None:
     assert e.interval[0] <= PENDULUM["b_2q"] <= e.interval[1]
 
 
+def test_where_every_number_is_held_by_a_bound_none_is_left_to_see() -> None:
+    problem = formulate(rig(Pendulum, PENDULUM, {"b_2": 2e-3}), [swing(seconds=2.0)])
+    best = assess(problem, problem.start)
+    seen = identifiability(replace(best, pinned=np.ones(best.x.size, dtype=bool)))
+    assert (seen.names, seen.singular_values.size, seen.hidden) == ((), 0, set())
+
+
 def test_a_mass_that_nothing_shows_stays_a_number_one_can_print() -> None:
     # without gravity, force or friction the mass of a spinning arm is in no output
     from tests.identification.twins import rig as known
@@ -89,3 +100,13 @@ def test_a_mass_that_nothing_shows_stays_a_number_one_can_print() -> None:
     [sought] = shared_unknowns(known(Pendulum, values, {"m_p": 0.2}))
     lower, upper = sought.bounds
     assert abs(upper - lower - 2 * np.log(FAR)) < 1e-9
+
+
+def test_a_fit_whose_every_number_ends_at_a_bound_says_so() -> None:
+    run = noisy(swing({**PENDULUM, "b_2": 0.0, "b_2c": 0.0, "b_2q": 0.0}, seconds=4.0), 1e-4, 3)
+    values = {n: v for n, v in PENDULUM.items() if n not in ("b_2", "b_2c", "b_2q")}
+    b = Parameter(name="b_2", value=5e-3, unit="N m s/rad", estimate=True, lower=1e-3)  # the data have none
+    known = rig(Pendulum, values, {})
+    fit = identify(replace(known, parameters={**known.parameters, "b_2": b}), [run])
+    assert fit.estimates["b_2"].status == "at bound"
+    assert "b_2 reached its lower limit" in fit.verdict

@@ -12,7 +12,7 @@ from tests.identification.twins import noisy, rig
 from upright.identification.estimate import identify
 from upright.identification.inference.poles import poles
 from upright.identification.model.runs import Run
-from upright.physics import CartPendulum, Pendulum
+from upright.physics import CartPendulum, Pendulum, chain
 from upright.simulation import Held, simulate
 
 SIMPLE = {"m_p": 0.2, "l_cg": 0.25, "J_p": 0.0}
@@ -99,3 +99,17 @@ def test_a_stable_pole_stays_stable_however_uncertain_its_damping() -> None:
     values = {**simple.plant(**SIMPLE).parameters(), **SIMPLE, "b_2": 2e-3, "g": 9.81}
     (pole,) = poles(simple, values, ["b_2"], np.array([[4e-6]]), TWO_SIGMA)["hanging"]
     assert pole.real.interval[0] < pole.real.value < pole.real.interval[1] == 0.0
+
+
+def test_of_three_carts_the_middle_one_held_the_outer_ones_swing_by_themselves() -> None:
+    """m_1 between the ground and the middle on k_1 and k_12, m_3 on k_23: two damped oscillators by hand."""
+    three = chain(3)
+    given = {"m_1": 1.0, "m_2": 2.0, "m_3": 0.5, "k_1": 30.0, "k_12": 20.0, "k_23": 18.0, "c_1": 0.2, "c_3": 0.3}
+    values = three(**given).parameters()
+    found = poles(rig(three, given, {}), values, [], np.zeros((0, 0)), TWO_SIGMA, [frozenset({"x_2"})])
+    ((at, told),) = found.items()
+    assert at.endswith("x_2 held")
+    expected = [
+        (-c / (2 * m), math.sqrt(k / m - (c / (2 * m)) ** 2)) for m, k, c in ((1.0, 50.0, 0.2), (0.5, 18.0, 0.3))
+    ]
+    assert np.allclose([(p.real.value, p.imag.value) for p in told], expected, rtol=1e-9)

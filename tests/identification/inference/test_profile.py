@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from tests.identification.twins import PENDULUM, noisy, rig, swing
 from upright.identification.inference import intervals
 from upright.identification.inference.covariance import Optimum, assess
 from upright.identification.inference.intervals import beside_bound, profile
+from upright.identification.model.fit import Estimate
+from upright.identification.problem.normal_equations import Normal
 from upright.identification.problem.residuals import formulate
+from upright.identification.problem.unknowns import Unknown
 from upright.identification.search.descent import SearchLog, descend_progressively
 from upright.physics import Pendulum
 
@@ -45,3 +51,41 @@ def test_an_end_at_a_wall_stays(best: Optimum, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(best.problem, "unknowns", walled)
     monkeypatch.setattr(intervals, "_ends", lambda *_: (wall, 3 * x))
     assert profile(best, place, plain, best.quantile, SearchLog()) == (wall, 3 * x)
+
+
+class Valley:
+    """A problem of one number whose cost is h(x)^2, first flatter and then steeper than its curvature says."""
+
+    lower, upper = np.array([-np.inf]), np.array([np.inf])
+    evaluations = 0
+
+    def __init__(self, unknowns: list[Unknown]) -> None:
+        self.unknowns = unknowns
+
+    @staticmethod
+    def height(x: float) -> float:
+        return 0.5 * x + 0.05 * math.tanh(10 * x) + 49 * max(abs(x) - 1, 0.0) ** 8 * math.copysign(1.0, x)
+
+    def normal(self, x: np.ndarray) -> Normal:
+        h = self.height(float(x[0]))
+        return Normal(h * h, np.ones((1, 1)), np.array([h]))
+
+    def value(self, x: np.ndarray) -> np.ndarray:
+        return x
+
+
+def test_the_ends_of_a_profile_are_where_the_cost_has_risen_enough() -> None:
+    """One standard error up the cost has risen too little, the secant from there goes far beyond: found in between.
+
+    A height is right to 5 %, and beyond 1.5 it rises by 10 % in every hundredth.
+    """
+    u = Unknown(name="x", runs=(), value=0.0, lower=-math.inf, upper=math.inf, log=False, scale=1.0)
+    one = np.ones((1, 1))
+    best = Optimum(
+        problem=Valley([u]), x=np.zeros(1), covariance=one, sandwich=one, white=np.ones(1), matrix=one, variance=1.0,
+        memory=0.0, samples=1e6, pinned=np.zeros(1, dtype=bool),
+    )  # fmt: skip
+    assert Valley.height(1.0) < 1 < Valley.height(2.0)
+    end = brentq(lambda x: Valley.height(x) - 1, 1.0, 2.0)
+    low, high = profile(best, 0, Estimate(value=0.0, stderr=1.0, interval=(-1.0, 1.0)), 1.0, SearchLog())
+    assert (low, high) == pytest.approx((-end, end), rel=0.02)

@@ -182,6 +182,31 @@ def test_a_prediction_with_true_numbers_errs_as_its_covariance_says() -> None:
     np.testing.assert_allclose(error, np.sqrt(np.diag(P)[[0, 2]]), rtol=0.14)
 
 
+def test_every_horizon_is_scored_by_the_motion_from_the_filtered_states() -> None:
+    """Simulated from them under the logged command and its drift, so many samples on, against what was logged then."""
+    run = balanced(6, seconds=4.0)
+    problem = posed(run, LEVELS)
+    track = problem.tracks[0]
+    told = predict({}, problem.rig, [run])[run.label]
+    at = restart_states(problem.solver(0), track, {**problem.base}, np.zeros((2, 1)), None)[..., 0]
+    drive = {"actuator.gain": VALUES["actuator.gain"], "actuator.offset": at[4]}
+
+    def percents(y: np.ndarray, measured: np.ndarray) -> dict[str, float]:
+        missed, moved = (np.linalg.norm(e, axis=0) for e in (y - measured, measured - measured.mean(axis=0)))
+        return dict(zip(("psi", "theta"), 100 * (1 - missed / moved), strict=True))
+
+    for horizon, steps in ((0.05, 25), (0.2, 100)):
+        motion = simulate(
+            Furuta(**PLANT), drive, at[:4].T, run.u, 2e-3, samples=steps + 1, substeps=problem.rig.substeps,
+            start=track.restarts,
+        )  # fmt: skip
+        assert told.ahead[horizon] == pytest.approx(percents(motion[steps][[0, 2]].T, run.y[track.restarts + steps]))
+        if steps == 25:
+            assert told.fit_percent == told.ahead[0.05]
+            assert told.t == pytest.approx(run.t[track.restarts + 25])
+            assert told.naive == pytest.approx(percents((at[[0, 2]] + 0.05 * at[[1, 3]]).T, run.y[track.restarts + 25]))
+
+
 def test_a_list_of_horizons_needs_the_filter() -> None:
     with pytest.raises(BadInput, match="several horizons"):
         formulate(true_rig(), [balanced(0, seconds=3.0, restart="smooth")])

@@ -59,6 +59,21 @@ def test_settling_solves_a_linear_problem_exactly() -> None:
         assert np.all(d[w][~known] == 0)
 
 
+def test_settling_takes_two_states_that_act_alike_however_strongly() -> None:
+    """``|r + a (d_1 + d_2)|^2 + d_1^2 + d_2^2`` is least at ``d_1 = d_2 = -r/(2 a)`` where a is large."""
+    a = 1e12
+    d, residual, _ = settle(lambda d: (1 + a * d.sum(axis=1, keepdims=True), np.full((1, 1, 2), a)), np.ones((1, 2)))
+    np.testing.assert_allclose(d, [[-0.5 / a, -0.5 / a]], rtol=1e-6)
+    assert abs(residual[0, 0]) < 1e-6
+
+
+def test_a_window_whose_motion_runs_away_stays_where_it_was_measured() -> None:
+    """Slopes of 1e200 have no squares; the window beside it settles at ``-a r/(a^2 + 1)`` as if alone."""
+    slope = np.array([1e200, 2.0])[:, None, None]
+    d, _, _ = settle(lambda d: (1 + slope[:, 0] * d, slope), np.ones((2, 1)))
+    np.testing.assert_allclose(d, [[0.0], [-2 / 5]], rtol=1e-9)
+
+
 def test_projected_jacobian_is_the_derivative_of_the_projected_residual() -> None:
     generator = np.random.default_rng(6)
     A, B, r = generator.normal(size=(2, 30, 2)), generator.normal(size=(2, 30, 3)), generator.normal(size=(2, 30))

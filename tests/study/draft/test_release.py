@@ -63,3 +63,51 @@ def test_a_pendulum_lifted_beside_its_moving_cart_is_released_first(drafted):
     _, study = drafted(t=t, x=x, theta=np.concatenate([hand, theta]))
     release = hand.size * DT
     assert release - 0.05 * PERIOD <= study.runs[0].t[0] < release + PERIOD
+
+
+def released(dt, noise, angle, seconds=50.0, seed=3):
+    """Time and angle of a pendulum let go at the first sample, and the last second at which it still swings."""
+    n = round(seconds / dt) + 1
+    t = np.arange(n) * dt
+    theta = simulate(PENDULUM, {}, [angle, 0.0], None, dt, samples=n, substeps=max(2, round(dt / 5e-3)))[:, 0, 0]
+    swinging = t[np.flatnonzero(np.abs(theta) > 0.05 * angle)[-1]]
+    return t, theta + noise * np.random.default_rng(seed).normal(size=n), float(swinging)
+
+
+@pytest.mark.parametrize("dt", [2e-3, 1e-2, 5e-2])
+@pytest.mark.parametrize("noise", [0.0, 1e-3, 5e-3, 2e-2])
+@pytest.mark.parametrize("angle", [0.5, 1.5])
+def test_noise_is_no_hand(drafted, angle, noise, dt):
+    t, theta, swinging = released(dt, noise, angle)
+    _, study = drafted("pendulum", t=t, theta=theta)
+    assert study.runs[0].t[0] < PERIOD
+    assert study.runs[-1].t[-1] > swinging
+    # w^2 = m g l/(J + m l^2) of small swings, and the length of the simple pendulum: what the search starts from
+    equal = PENDULUM.l_cg + PENDULUM.J_p / (PENDULUM.m_p * PENDULUM.l_cg)
+    assert study.rig.parameters["l_cg"].value == pytest.approx(equal, rel=0.1)
+
+
+@pytest.mark.parametrize("noise", [2e-3, 1e-2, 2e-2])
+@pytest.mark.parametrize(("to", "held_at"), [(1.2, 0.9), (0.5, 0.4), (1.0, 1.0)])
+def test_a_hand_is_found_under_noise(drafted, noise, to, held_at):
+    hand = lifted(to, held_at, 1.5)
+    theta = np.concatenate([hand, swing(held_at)])
+    theta += noise * np.random.default_rng(2).normal(size=theta.size)
+    _, study = drafted("pendulum", t=np.arange(theta.size) * DT, theta=theta)
+    release = hand.size * DT
+    assert release - 0.05 * PERIOD <= study.runs[0].t[0] < release + PERIOD
+
+
+def test_a_swing_that_hardly_decays_is_kept_from_its_release(drafted):
+    t = np.arange(5000) * DT
+    theta = 0.4 * np.exp(-2e-3 * t) * np.cos(6.0 * t)  # 10 % in 50 s
+    _, study = drafted("pendulum", t=t, theta=theta)
+    assert study.runs[0].t[0] < 2 * np.pi / 6.0
+
+
+def test_a_pendulum_that_is_held_upright_is_not_free_before_it_falls(drafted):
+    # upright gravity pulls at no angle, so no hand is felt: 3 s at 3.1 rad, then a simulated fall
+    held = np.full(300, 3.1)
+    theta = np.concatenate([held, swing(3.1, 3000)])
+    _, study = drafted("pendulum", t=np.arange(theta.size) * DT, theta=theta)
+    assert held.size * DT - DT <= study.runs[0].t[0] < held.size * DT + 2 * PERIOD  # it lingers before it falls

@@ -148,7 +148,7 @@ def _fit(
     for name, s in zip(squares.names, sigma.tolist(), strict=True):
         value = squares.way.values[name]
         low, high = value - q * s, value + q * s
-        weak = high - low > abs(value)
+        weak = high - low > abs(value) or Estimate.within(value, s, q * s).zero_wide
         bound = value < 1e-6 * rig.parameters[name].value
         status = "at bound" if bound else "weak" if weak else "firm"
         estimates[name] = Estimate(

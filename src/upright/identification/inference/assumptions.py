@@ -7,6 +7,7 @@ well, and what does not feel it (frequencies, damping ratios, speeds) is firm.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -26,45 +27,71 @@ NEGLIGIBLE = 0.02
 """Percent per percent below which a number does not rest on an assumed one; a whole number is met as closely."""
 
 
-def assumptions(best: Optimum, estimates: Mapping[str, Estimate]) -> tuple[Assumption, ...]:
+REDEFINES = {"J_p": ("l_cg",)}
+"""Estimates that a number assumed to be zero gives another meaning: l_cg is the length of the simple pendulum then."""
+
+
+def assumptions(best: Optimum, estimates: Mapping[str, Estimate], *, evaluate: bool = True) -> tuple[Assumption, ...]:
     """How every estimate would follow each assumed number, and its value without it.
 
     The optimum moves by ``d theta/d g = -(J'J)^-1 J'J_g`` when g does (implicit function theorem); nothing is fitted
-    again.
+    again. Unless that is to be evaluated, or where the model runs away beside the optimum, nobody knows what follows.
     """
-    problem, x, value = best.problem, best.x, best.values
-    names = [n for n, p in problem.rig.parameters.items() if p.assumed and p.value != 0]
-    if not names:
+    problem, value = best.problem, best.values
+    assumed = [p for p in problem.rig.parameters.values() if p.assumed]
+    if not assumed:
         return ()
+    asked = [i for i, u in enumerate(problem.unknowns) if u.shared and u.asked and not best.pinned[i] and value[i] != 0]
+    unknowns = [problem.unknowns[i] for i in asked]
+    moves, sizes = _moves(best, assumed, asked) if evaluate else (None, None)
+    found: list[Assumption] = []
+    for k, p in enumerate(assumed):
+        shifts = [math.nan] * len(asked) if moves is None else moves[:, k].tolist()
+        size = abs(p.value) if sizes is None else float(sizes[k])
+        follows = {u.name: float(m) for u, m in zip(unknowns, shifts, strict=True)}
+        found.append(
+            Assumption(
+                name=p.name, value=p.value, unit=p.unit, follows=follows, size=size,
+                redefines=tuple(n for n in REDEFINES.get(p.name, ()) if p.value == 0 and n in follows),
+                without=_without(p, follows, estimates, problem),
+            )
+        )  # fmt: skip
+    return tuple(found)
+
+
+def _moves(best: Optimum, assumed: Sequence[Parameter], asked: Sequence[int]) -> tuple[Array | None, Array]:
+    """Relative change (asked, assumed) of each estimate per relative change of an assumed number, and their sizes."""
+    problem, x, value = best.problem, best.x, best.values
+    names = {p.name for p in assumed}
     loose = {
-        n: replace(p, uncertainty=abs(p.value)) if n in names else replace(p, uncertainty=0.0, estimate=False)
+        n: replace(p, uncertainty=abs(p.value) or 1.0) if n in names else replace(p, uncertainty=0.0, estimate=False)
         for n, p in problem.rig.parameters.items()
     }
     extra = shared_unknowns(replace(problem.rig, parameters=loose))
     steps = np.array([1e-6 * u.scale for u in extra])
     wider = replace(problem, unknowns=[*problem.unknowns, *extra], steps=np.concatenate([problem.steps, steps]))
     z = np.concatenate([x, [u.coordinate(u.value) for u in extra]])
-    A = wider.settle_steps(z).matrix
+    normal = wider.settle_steps(z)
+    sizes = np.array([abs(p.value) for p in assumed])
+    if not math.isfinite(normal.cost):
+        return None, sizes
+    A = normal.matrix
     free = np.flatnonzero(~best.pinned)
     slopes = np.zeros((x.size, len(extra)))
     slopes[free] = -pseudo_inverse(A[np.ix_(free, free)]) @ A[np.ix_(free, np.arange(x.size, z.size))]
-    found: list[Assumption] = []
-    for k, g in enumerate(extra):
-        per_relative = 1.0 if g.log else g.value  # of the assumed number
-        follows = {
-            u.name: float(slopes[i, k] * per_relative / (1.0 if u.log else value[i]))
-            for i, u in enumerate(problem.unknowns)
-            if u.shared and u.asked and i in free and value[i] != 0
-        }
-        p = problem.rig.parameters[g.name]
-        without = _without(p, follows, estimates, problem)
-        found.append(Assumption(name=p.name, value=p.value, unit=p.unit, follows=follows, without=without))
-    return tuple(found)
+    per_relative = np.array([1.0 if problem.unknowns[i].log else float(value[i]) for i in asked])
+    effects = np.sqrt(np.maximum(np.diag(A), 0.0))
+    most = float(np.max(effects[list(asked)] * np.abs(per_relative), initial=0.0))
+    zero = sizes == 0
+    sizes[zero] = most / np.maximum(effects[x.size :][zero], 1e-300)
+    change = np.array([1.0 if u.log else size * math.copysign(1.0, u.value)
+                       for u, size in zip(extra, sizes, strict=True)])  # fmt: skip
+    return slopes[list(asked)] * change / per_relative[:, None], sizes
 
 
 def proportional(a: Assumption) -> list[str]:
     """Names that grow as the assumed number does."""
-    return [n for n, e in a.follows.items() if abs(e - 1) < NEGLIGIBLE]
+    return [n for n, e in a.follows.items() if abs(e - 1) < NEGLIGIBLE and a.value != 0]
 
 
 def untouched(a: Assumption) -> list[str]:
@@ -72,21 +99,53 @@ def untouched(a: Assumption) -> list[str]:
     return [n for n, e in a.follows.items() if abs(e) < NEGLIGIBLE]
 
 
+def resting(a: Assumption) -> list[str]:
+    """Names that are numbers of the assumed one: they would move with it, or may, and it gives them no new meaning."""
+    free = {*untouched(a), *a.redefines}
+    return [n for n in a.follows if n not in free]
+
+
+def with_assumptions(estimates: Mapping[str, Estimate], found: Sequence[Assumption]) -> dict[str, Estimate]:
+    """The estimates, each with the assumed numbers that it rests on."""
+    return {
+        n: replace(e, rests_on=tuple(a.name for a in found if n in resting(a))) for n, e in estimates.items()
+    }  # fmt: skip
+
+
 def sentences(found: Sequence[Assumption]) -> tuple[str, ...]:
     """What rests on which assumed number, and what would make it known."""
     said: list[str] = []
     for a in found:
-        along, firm = proportional(a), untouched(a)
-        other = [f"{n} by {e:+.2g} %" for n, e in a.follows.items() if n not in along and n not in firm]
-        parts = [f"{a.name} = {a.value:g} {a.unit} is assumed, not known"]
-        if along:
-            parts.append(f"{', '.join(along)} {'is' if len(along) == 1 else 'are'} proportional to it, ratios are firm")
-        if other:
-            parts.append(f"for every percent of it {', '.join(other)} would follow")
-        if firm:
-            parts.append(f"{', '.join(firm)} {'does' if len(firm) == 1 else 'do'} not depend on it")
-        said.append("; ".join(parts) + ".")
+        along, firm, moved = proportional(a), untouched(a), resting(a)
+        unit = "" if a.unit in ("", "1") else f" {a.unit}"
+        parts = [f"{a.name} = {a.value:g}{unit} is assumed, not known"]
+        if any(math.isnan(e) for e in a.follows.values()):
+            parts.append("what rests on it was not evaluated, so every estimate may")
+        else:
+            other = {n: e for n, e in a.follows.items() if n in moved and n not in along}
+            if along:
+                parts.append(
+                    f"{', '.join(along)} {'is' if len(along) == 1 else 'are'} proportional to it, ratios are firm"
+                )
+            if other and a.value != 0:
+                told = ", ".join(f"{n} by {e:+.2g} %" for n, e in other.items())
+                parts.append(f"for every percent of it {told} would follow")
+            elif other:
+                parts.append(f"{', '.join(other)} would move with it")
+            if a.redefines:
+                parts.append(f"{', '.join(a.redefines)} takes what it would explain into its own value")
+            if firm:
+                parts.append(f"{', '.join(firm)} {'does' if len(firm) == 1 else 'do'} not depend on it")
+        said.append("; ".join(parts) + "." + (f" {remedy(a)}" if moved else ""))
     return tuple(said)
+
+
+def remedy(a: Assumption) -> str:
+    """What frees the numbers that rest on an assumed one."""
+    key = a.name.rpartition(".")[2]
+    unit = "" if a.unit in ("", "1") else f" {a.unit}"
+    table = "[actuator]" if a.name.startswith("actuator.") else "[parameters]"
+    return f'Measure {a.name} and give it as known, {key} = "...{unit}" under {table}.'
 
 
 def _without(

@@ -28,7 +28,7 @@ from upright.identification.model.bands import LEVEL, Bands, Spread
 from upright.identification.model.fit import RunScore
 from upright.identification.model.rig import NOISE, Rig
 from upright.identification.model.runs import LEAST_RUN, Run
-from upright.identification.problem.normal_equations import pseudo_inverse
+from upright.identification.problem.normal_equations import finite, pseudo_inverse, slopes
 from upright.identification.problem.residuals import ROUNDING, Problem, formulate
 from upright.identification.problem.tracks import Track
 
@@ -58,15 +58,19 @@ class Sensitivity:
     slope: Array
     age: Array
 
+    @property
+    def finite(self) -> bool:
+        """Whether neither the motion nor one with a number moved runs away."""
+        return finite(self.error) and finite(self.slope)
+
 
 def sensitivity(problem: Problem, index: int, x: Array) -> Sensitivity:
     """How a run is met at coordinates `x`, in the units of its outputs; of several horizons the shortest."""
     track, sought = problem.tracks[index], problem.sought_in(index)
-    m = sought.size
     samples = 1 if track.ahead else track.length
     y = problem.simulate(index, problem.lanes(x, sought, central=True), samples)
     error = y[..., 0] - track.targets(samples)
-    slope = (y[..., 1 : m + 1] - y[..., m + 1 :]) / (2 * problem.steps[sought])
+    slope = slopes(y, problem.steps[sought], central=True)
     if track.ahead:
         weight = float(track.ahead.weight[0])
         ahead = np.full(len(error[0]), track.run.horizons[0])
@@ -78,10 +82,12 @@ def sensitivity(problem: Problem, index: int, x: Array) -> Sensitivity:
     return Sensitivity(error=next(ends), slope=next(ends), age=np.tile(time[1:], track.restarts.size))
 
 
-def calibrated(best: Optimum) -> Bands:
-    """Bands that a fit promises, from blocks of its runs predicted by fits of the others."""
+def calibrated(best: Optimum) -> Bands | None:
+    """Bands that a fit promises, from blocks of its runs predicted by fits of the others; None where one runs away."""
     problem = best.problem
     met = [sensitivity(problem, i, best.x) for i in range(len(problem.tracks))]
+    if best.lost or not all(run.finite for run in met):
+        return None
     blocks = _blocks(best)
     moved = np.array([block.step for block in blocks]).reshape(-1, best.x.size)
     covariance = best.sandwich + _one_more(len(blocks)) * (moved.T @ moved)
@@ -113,7 +119,8 @@ def recalibrated(bands: Bands, left_out: Sequence[RunScore]) -> Bands:
     if not missed:
         return bands
     level = min(1.0, bands.level * (1 + 1 / len(left_out)))
-    widths = float(np.quantile(np.concatenate(missed), level)) * bands.quantile
+    every = np.nan_to_num(np.concatenate(missed), nan=MOST, posinf=MOST)  # a run that runs away is lost
+    widths = float(np.quantile(every, level)) * bands.quantile
     return replace(bands, quantile=float(np.clip(widths, NORMAL, MOST)))
 
 
@@ -281,14 +288,17 @@ def banded(
     if not run.filtered:
         problem.settle_steps(x)
         met = sensitivity(problem, 0, x)
-        slope, age = adapted(problem, 0, met.slope, x), met.age
-        places = [bands.names.index(problem.unknowns[i].name) if problem.unknowns[i].shared else -1
-                  for i in problem.sought_in(0)]  # fmt: skip
-        shared = np.flatnonzero(np.array(places) >= 0)
-        kept = np.array(places)[shared]
-        natural = np.array([1 / problem.value(x)[i] if problem.unknowns[i].log else 1.0 for i in problem.sought_in(0)])
-        C = bands.covariance[np.ix_(kept, kept)]
-        variance = _variance((slope * natural)[..., shared], C)
+        age, variance = met.age, np.full(plain.y.shape, math.inf)
+        if met.finite:
+            slope = adapted(problem, 0, met.slope, x)
+            places = [bands.names.index(problem.unknowns[i].name) if problem.unknowns[i].shared else -1
+                      for i in problem.sought_in(0)]  # fmt: skip
+            shared = np.flatnonzero(np.array(places) >= 0)
+            kept = np.array(places)[shared]
+            value = problem.value(x)
+            natural = np.array([1 / value[i] if problem.unknowns[i].log else 1.0 for i in problem.sought_in(0)])
+            C = bands.covariance[np.ix_(kept, kept)]
+            variance = _variance((slope * natural)[..., shared], C)
     width = _width(track, bands, age, np.nan_to_num(variance, nan=math.inf))
     return replace(
         plain, band={c: bands.quantile * w for c, w in width.items()}, beyond=beyond(rig, run, bands.reached)

@@ -16,6 +16,7 @@ known force or inertia sees only ratios, since masses, forces and frictions scal
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -24,7 +25,7 @@ from numpy.typing import NDArray
 
 from upright.identification.model.rig import NOISE
 from upright.identification.model.runs import LEAST_RUN
-from upright.identification.problem.normal_equations import NULL, pseudo_inverse
+from upright.identification.problem.normal_equations import NULL, finite, pseudo_inverse
 from upright.identification.problem.residuals import Problem
 from upright.signals.memory import automatic_span, long_run, lost_share, memory
 
@@ -39,7 +40,8 @@ class Optimum:
     the residuals' memory alone, in which combinations that the data see well stay as sure as they are; `white` (n,) are
     the variances that uncorrelated residuals would give, `matrix` (n, n) is Gauss-Newton's, prior knowledge included.
     One weighted residual has the `variance`; residuals have forgotten themselves after `memory` seconds
-    (autocorrelation below 1/e), which leaves so many independent `samples`.
+    (autocorrelation below 1/e), which leaves so many independent `samples`. `lost` are the labels of runs whose motion
+    runs away at `x`, or as soon as a number is moved: then nothing is known of how sure the numbers are.
     """
 
     problem: Problem
@@ -52,6 +54,7 @@ class Optimum:
     memory: float
     samples: float
     pinned: NDArray[np.bool_]
+    lost: tuple[str, ...] = ()
 
     @property
     def values(self) -> Array:
@@ -67,6 +70,11 @@ class Optimum:
     def quantile(self) -> float:
         """Standard errors from an estimate to the end of its interval."""
         return student(self.samples - self.x.size)
+
+    @property
+    def explains_nothing(self) -> bool:
+        """Whether the runs are missed by more than they vary; residuals are in units of each signal's spread."""
+        return not self.variance < 1.0
 
     @property
     def shared(self) -> list[int]:
@@ -88,9 +96,11 @@ def assess(problem: Problem, x: Array) -> Optimum:
     hac, from_runs = np.zeros((size, size)), np.zeros((size, size))
     blocks: dict[int, list[tuple[Array, Array]]] = {number: [] for number in BLOCKS}
     cost, count, runs, longest, independent = 0.0, 0, 0, 0.0, 0.0
+    lost: list[str] = []
     for index, track in enumerate(problem.tracks):
         rows = problem.rows(index, x, central=True)
-        if rows is None:
+        if rows is None or not squared(*rows):
+            lost.append(track.run.label)
             continue
         runs += 1
         r, J = rows
@@ -110,6 +120,12 @@ def assess(problem: Problem, x: Array) -> Optimum:
         count += int(np.count_nonzero(track.weights)) * r.size // track.weights.size
         longest = max(longest, memory(r, track.spacing))
         independent += r.shape[0] / span
+    if lost:
+        return Optimum(
+            problem=problem, x=x, covariance=np.diag(np.full(size, np.inf)), sandwich=np.diag(np.full(size, np.inf)),
+            white=np.full(size, np.inf), matrix=np.zeros((size, size)), variance=math.inf, memory=0.0, samples=0.0,
+            pinned=np.zeros(size, dtype=bool), lost=tuple(lost),
+        )  # fmt: skip
     _, prior = problem.prior_rows(x)
     A = A + prior.T @ prior
     lower, upper = x <= problem.lower, x >= problem.upper
@@ -134,6 +150,13 @@ def assess(problem: Problem, x: Array) -> Optimum:
         problem=problem, x=x, covariance=covariance, sandwich=sandwich, white=white, matrix=A, variance=variance,
         memory=longest, samples=independent, pinned=pinned,
     )  # fmt: skip
+
+
+def squared(r: Array, J: Array) -> bool:
+    """Whether residuals (T, outputs), their Jacobian (T, outputs, numbers) and the squares of its scores are finite."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        scores = np.einsum("tk,tkp->tp", r, J)
+        return finite(r * r) and finite(J * J) and finite(np.cumsum(scores, axis=0) ** 2)
 
 
 BLOCKS = (4, 8)
@@ -289,12 +312,12 @@ def identifiability(best: Optimum) -> Identifiability:
         S = S - C @ pseudo_inverse(A[np.ix_(own, own)]) @ C.T
     S = S * sizes[:, None] * sizes
     w, V = np.linalg.eigh(S) if shared else (np.zeros(0), np.zeros((0, 0)))
-    order = np.argsort(w)[::-1]
+    order, blind = np.argsort(w)[::-1], _null(S)
     return Identifiability(
         names=tuple(unknowns[i].name for i in shared),
         singular_values=np.sqrt(np.maximum(w[order], 0.0)),
         directions=V[:, order].T,
-        blind=np.array(_null(S)).reshape(-1, len(shared)),
+        blind=np.array(blind).reshape(len(blind), len(shared)),
         effects=np.sqrt(np.maximum(np.diag(S), 0.0)),
     )
 

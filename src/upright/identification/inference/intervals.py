@@ -51,11 +51,11 @@ def shared_estimates(
     budget = AFFORDED if profiles else 0.0
     for i in best.shared:
         u, plain = best.problem.unknowns[i], beside_bound(best, i)
-        if u.name in hidden:
-            infinite = (-math.inf, math.inf)
-            found[u.name] = replace(plain, stderr=math.inf, interval=infinite, status="unseen")
+        if u.name in hidden or (u.asked and not best.pinned[i] and plain.zero_wide):
+            found[u.name] = _unseen(plain)
             continue
-        status = "firm" if u.asked else "known"
+        firm = "weak" if best.explains_nothing else "firm"
+        status = firm if u.asked else "known"
         interval = plain.interval
         wide = interval[1] - interval[0] > abs(plain.value)
         near = best.pinned[i] or interval[0] <= u.lower < plain.value or interval[1] >= u.upper > plain.value
@@ -64,7 +64,7 @@ def shared_estimates(
                 budget -= profile_work(best)
                 interval = profile(best, i, plain, best.quantile, log)
                 wide = interval[1] - interval[0] > abs(plain.value)
-            status = "at bound" if best.pinned[i] else "weak" if wide else "firm"
+            status = "at bound" if best.pinned[i] else "weak" if wide else firm
         found[u.name] = replace(plain, interval=_within(u, interval), status=status)
     return found
 
@@ -79,15 +79,21 @@ def run_estimates(best: Optimum) -> tuple[dict[str, dict[str, Estimate]], dict[s
             continue
         e = estimate(best, i)
         size = abs(e.value) if u.log else u.scale
-        status = "weak" if e.interval[1] - e.interval[0] > size else "firm"
+        status = "weak" if best.explains_nothing or e.interval[1] - e.interval[0] > size else "firm"
         narrowed = not u.log or u.prior is None or float(best.sigma[i]) <= ALREADY * u.prior[1]
         if best.pinned[i]:
             status = "at bound"
+        elif e.zero_wide:
+            e, status = _unseen(e), "unseen"
         elif not (best.matrix[i, i] > 0 and narrowed):
             status = "unseen"
         home = groups.setdefault(u.group, {}) if u.group else runs[tracks[u.runs[0]].run.label]
         home[u.name] = replace(e, status=status)
     return runs, groups
+
+
+def _unseen(plain: Estimate) -> Estimate:
+    return replace(plain, stderr=math.inf, interval=(-math.inf, math.inf), status="unseen")
 
 
 def estimate(best: Optimum, place: int, quantile: float | None = None) -> Estimate:
@@ -290,6 +296,8 @@ def with_left_out(best: Optimum, asked: Rig, left_out: Sequence[str], log: Searc
     if not math.isfinite(found.normal.cost):
         return {}
     there = assess(richer, found.x)
+    if there.lost:
+        return {}
     quantile = student(best.samples - best.x.size - len(left_out))
     estimates: dict[str, Estimate] = {}
     for i in there.shared:

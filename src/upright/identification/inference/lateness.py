@@ -65,6 +65,8 @@ def lateness(best: Optimum) -> Lateness | None:
     if found.normal.cost > MENDED**2 * here.cost:
         return None
     told = assess(wider, found.x)
+    if told.lost:
+        return None
     delay, error = found.x[-1], told.quantile * told.sigma[-1]
     if not 0 < error < delay:
         return None

@@ -60,12 +60,24 @@ def standing(best: Optimum, *, seed: int = 0) -> Standing | None:
     K = placed(A / growth, B[:, 0] / growth, -np.array(FASTER[: len(A)]))
     if K is None:
         return None
-    root = np.linalg.cholesky(C + 1e-12 * np.diag(np.diag(C)) + 1e-300 * np.eye(len(C)))
-    z = np.random.default_rng(seed).normal(size=(DRAWS, len(names))) @ root.T
+    z = np.random.default_rng(seed).normal(size=(DRAWS, len(names))) @ root(C).T
     dA = np.array([(a - A) / s for (a, _), s in zip(moved, steps, strict=True)])
     dB = np.array([(b - B) / s for (_, b), s in zip(moved, steps, strict=True)])
     loops = A + np.tensordot(z, dA, 1) - (B + np.tensordot(z, dB, 1)) @ K[None, :]
     return Standing(at=at, growth=growing[at], share=float(np.mean(np.linalg.eigvals(loops).real.max(axis=1) < 0)))
+
+
+def root(C: Array) -> Array:
+    """L (n, n) with ``L L' = C``, of a covariance that rounding may have left a little indefinite: L of the nearest."""
+    try:
+        return np.asarray(
+            np.linalg.cholesky(C + 1e-12 * np.diag(np.diag(C)) + 1e-300 * np.eye(len(C))), dtype=np.float64
+        )
+    except np.linalg.LinAlgError:
+        d = np.sqrt(np.maximum(np.diag(C), 0.0))
+        s = np.where(d > 0, 1 / np.where(d > 0, d, 1.0), 0.0)
+        w, V = np.linalg.eigh(C * s[:, None] * s)
+        return np.asarray(d[:, None] * V * np.sqrt(np.maximum(w, 0.0)), dtype=np.float64)
 
 
 def placed(A: Array, b: Array, wanted: Array) -> Array | None:

@@ -33,8 +33,8 @@ def fit_percent(y: ArrayLike, simulated: ArrayLike) -> float:
     A signal that does not move scores 100 when it is met exactly and 0 otherwise.
     """
     y, simulated = np.asarray(y, dtype=np.float64), np.asarray(simulated, dtype=np.float64)
-    moved = float(np.linalg.norm(y - y.mean()))
-    missed = float(np.linalg.norm(y - simulated))
+    with np.errstate(over="ignore", invalid="ignore"):  # a motion that ran away misses by more than a number holds
+        moved, missed = float(np.linalg.norm(y - y.mean())), float(np.linalg.norm(y - simulated))
     if moved == 0:
         return 100.0 if missed == 0 else 0.0
     score = 100 * (1 - missed / moved)
@@ -179,7 +179,10 @@ def _predict(
         with_it, problem, x = _foresee(rig, replace(run, unknown=(*run.unknown, name)), groups, progress)
         left = 100 - min(with_it.fit_percent.values())
         if left <= MENDED * missed:
-            factor = run_estimates(assess(problem, x))[0][run.label][name]
+            best = assess(problem, x)
+            if best.lost:
+                continue
+            factor = run_estimates(best)[0][run.label][name]
             offers.append((left, Offer(name=name, factor=factor, fit_percent=with_it.fit_percent)))
     return replace(plain, offer=min(offers, key=lambda o: o[0])[1]) if offers else plain
 

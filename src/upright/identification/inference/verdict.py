@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from upright.identification.inference.assumptions import proportional
+from upright.identification.inference.assumptions import proportional, resting
 from upright.identification.inference.loop import Standing
 from upright.identification.model.fit import Assumption, Estimate, Judgement, RunScore
 from upright.identification.model.rig import Rig
@@ -49,6 +49,8 @@ class Evidence:
     residuals are autocorrelated over `memory` seconds, the motion takes `period` seconds for one period. `standing`
     says how a rig within the intervals stands upright, if this plant can, `driven` whether a command acted in a run.
     Numbers that are `bent` leave their intervals with a dead time of the drive that would explain the runs better.
+    Runs that are `lost` run away at the numbers or as soon as one is moved; `nothing` says that the runs are missed by
+    more than they vary.
     """
 
     rig: Rig
@@ -64,6 +66,8 @@ class Evidence:
     standing: Standing | None
     driven: bool = True
     bent: Sequence[str] = ()
+    lost: Sequence[str] = ()
+    nothing: bool = False
 
 
 def judge(found: Evidence) -> tuple[Judgement, ...]:
@@ -99,9 +103,11 @@ def trusted(answers: Sequence[Judgement]) -> bool:
 
 def _predicts(found: Evidence) -> Judgement:
     against: list[str] = []
+    if found.lost:
+        against.append(_failure(found.lost))
     if found.interrupted:
         against.append("The search was interrupted; this is its best so far.")
-    elif not found.converged:
+    elif not found.converged and not found.lost:
         against.append("The search had not settled when its evaluations ran out.")
     fitted, predicted = (_percents(found.runs, role) for role in ("fit", "predict"))
     poor = [f"{what} {p:.1f} %" for what, p in fitted.items() if p < GOOD]
@@ -152,12 +158,35 @@ def _predicts(found: Evidence) -> Judgement:
     return Judgement(question=PREDICTS, answer=part, headline=headline, reasons=tuple(notes))
 
 
+def _failure(lost: Sequence[str]) -> str:
+    """What happened where a motion runs away, and what to try."""
+    named = ", ".join(f"'{label}'" for label in lost)
+    which = f"run{'s' if len(lost) > 1 else ''} {named}"
+    return (
+        f"The fit failed: at the last numbers of the search, or as soon as one of them changes a little, the simulated "
+        f"motion of {which} grows beyond all bounds, so no uncertainty can be computed. Check the plant and the signs "
+        "and units of drive and sensors, start from guesses nearer to the truth, or fit a shorter window or one that "
+        "is restarted (horizon)."
+    )
+
+
 def _usable(found: Evidence, *, confirmed: bool) -> Judgement:
+    if found.lost:
+        return Judgement(
+            question=USABLE, answer="no",
+            headline="None of them: the fit failed, and they are only where its search stopped.",
+        )  # fmt: skip
     asked = {n: e for n, e in found.estimates.items() if e.status in ("firm", "weak", "at bound", "unseen")}
     firm = [n for n, e in asked.items() if e.status == "firm"]
     reasons: list[str] = list(found.unseen)
     no = bool(found.unseen)
-    if asked and not firm and not found.unseen:
+    if asked and found.nothing:
+        no = True
+        reasons.append(
+            "The model misses the fitted runs by more than these vary, so none of its numbers is determined, however "
+            "narrow its interval."
+        )
+    elif asked and not firm and not found.unseen:
         no = True
         reasons.append("No number asked is determined well, so others would explain the runs as well.")
     for n, e in asked.items():
@@ -176,12 +205,19 @@ def _usable(found: Evidence, *, confirmed: bool) -> Judgement:
         elif e.status == "weak" and low > 0 and high > VAGUE * low:
             no = no or n.startswith(ESSENTIAL)
             reasons.append(f"{n} lies anywhere from {low:.2g} to {_shown(high, e)}: it is not determined.")
-        elif e.status == "weak":
+        elif e.status == "unseen" and not any(n in sentence for sentence in found.unseen):
+            no = True
+            reasons.append(
+                f"{n} has no interval: its standard error came out as zero, as where a motion depends on it without "
+                "bound. Start nearer to the truth, or fit a shorter window."
+            )
+        elif e.status == "weak" and not found.nothing:
             reasons.append(f"{n} is known poorly, {low:.2g} to {_shown(high, e)}.")
     for a in found.assumptions:
-        along = proportional(a)
-        if along:
-            reasons.append(f"{', '.join(along)}: only per {a.name}, which is assumed to be {a.value:g} {a.unit}.")
+        moved = resting(a)
+        if moved:
+            verb = "rests" if len(moved) == 1 else "rest"
+            reasons.append(f"{', '.join(moved)} {verb} on {a.name} (assumed).")
     reasons += _lumped(found.rig)
     guessed = found.rig.guessed and not confirmed
     if guessed:
@@ -194,8 +230,8 @@ def _usable(found: Evidence, *, confirmed: bool) -> Judgement:
             f"{', '.join(found.bent)}: outside their intervals once the drive may act late, which explains the runs "
             "better; ask for its delay."
         )
-    resting = {n for a in found.assumptions for n in proportional(a)}
-    free = [n for n in firm if n not in resting and n not in found.bent]
+    moving = {n: a for a in found.assumptions for n in resting(a)}
+    free = [n for n in firm if n not in moving and n not in found.bent]
     if no:
         answer, headline = "no", "Not all of them are determined."
     elif guessed:
@@ -203,7 +239,11 @@ def _usable(found: Evidence, *, confirmed: bool) -> Judgement:
     elif found.bent and not free:
         answer, headline = "no", "None of them before the drive's delay is asked for."
     elif reasons:
-        answer, headline = "in part", f"These numbers can be used: {', '.join(free)}." if free else "Only their ratios."
+        answer, headline = "in part", f"These numbers can be used: {', '.join(free)}."
+        if not free:
+            scaled = {n for a in found.assumptions for n in proportional(a)} >= set(firm)
+            missing = " and ".join(dict.fromkeys(a.name for n, a in moving.items() if n in firm))
+            headline = "Only their ratios." if scaled or not missing else f"None of them before {missing} is measured."
     else:
         answer, headline = "yes", f"All numbers can be used: {', '.join(firm)}." if firm else "Nothing was asked."
     advice = ""
@@ -222,6 +262,8 @@ def _lumped(rig: Rig) -> list[str]:
 
 def _loop(found: Evidence) -> Judgement:
     s = found.standing
+    if found.lost:
+        return Judgement(question=LOOP, answer="not tested", headline="Not evaluated: the fit failed.")
     if s is None and found.unseen:
         return Judgement(
             question=LOOP, answer="not tested",

@@ -123,7 +123,8 @@ def _predicted(
             groups.setdefault(u.group, {})[u.name] = float(v)
     values = problem.shared_at(end.x)
     held = replace(run, role="predict", unknown=tuple(n for n in run.unknown if n not in typical))
-    bands = calibrated(assess(problem, end.x)) if promise else None
+    best = assess(problem, end.x) if promise else None
+    bands = None if best is None or best.lost else calibrated(best)
     score = predict(values, rig, [held], groups=groups, bands=bands)[run.label]
     return HeldOut(label=run.label, score=score, values=values, blind=tuple(n for n in rig.estimated if n in blind))
 

@@ -15,13 +15,17 @@ from upright.identification.model.rig import Rig
 
 Array = NDArray[np.float64]
 
+EXACT = 1e-12
+"""An interval narrower than this share of its value is rounding's."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Estimate:
     """What the data say about one number.
 
-    `status` is "firm", "weak" (interval wider than the value, or two models differ), "unseen" (the data cannot tell),
-    "at bound" or "known".
+    `status` is "firm", "weak" (interval wider than the value, two models differ, or the model explains less than
+    nothing), "unseen" (the data cannot tell), "at bound", "known" or "assumed". `rests_on` names assumed numbers that
+    it would move with: until they are measured it is a number of them, whatever its interval.
     """
 
     value: float
@@ -29,6 +33,21 @@ class Estimate:
     interval: tuple[float, float]
     unit: str = ""
     status: str = "firm"
+    rests_on: tuple[str, ...] = ()
+
+    @property
+    def qualified(self) -> str:
+        """Status, and which assumed numbers it is a number of; only beside those may it be firm."""
+        if not self.rests_on:
+            return self.status
+        rests = f"rests on {', '.join(self.rests_on)} (assumed)"
+        return rests if self.status == "firm" else f"{self.status}, {rests}"
+
+    @property
+    def zero_wide(self) -> bool:
+        """Whether its interval is narrower than any measurement's, as where a motion depends on it without bound."""
+        low, high = self.interval
+        return high - low <= EXACT * abs(self.value)
 
     @classmethod
     def within(cls, value: float, stderr: float, half: float, unit: str = "") -> Estimate:
@@ -48,8 +67,10 @@ class Pole:
 class Assumption:
     """A number taken as given without knowing it, and what would follow it.
 
-    `follows` are percent by which each estimate would change per percent of it, `without` the estimates proportional
-    to it, per unit of the command and of the encoders.
+    `follows` are percent by which each estimate would change per percent of its `size`, not a number where that was not
+    evaluated, `without` the estimates proportional to it, per unit of the command and of the encoders. The size is its
+    absolute value; of one assumed to be zero, what changes the runs as much as the most influential estimate does.
+    `redefines` names estimates that it gives another meaning, under which they hold whatever its true value is.
     """
 
     name: str
@@ -57,6 +78,8 @@ class Assumption:
     unit: str
     follows: Mapping[str, float]
     without: Mapping[str, Estimate]
+    size: float = 0.0
+    redefines: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,7 +175,9 @@ class Fit:
     fix it; `singular_values` belong to the scaled Jacobian, `directions` (rows) to them, in the order of `names`;
     `poles` are those at every equilibrium of the fitted plant. The `verdict` is what the `answers` say, one after
     another, and the model is `trusted` when none of the first two is "no". `bands` is what it
-    promises of predictions, None when it was interrupted; `not_evaluated` names all that it then does not say.
+    promises of predictions, None when it was interrupted; `not_evaluated` names all that it then does not say. It
+    `failed` when the motion runs away at the numbers or just beside them: these are where the search stopped, and no
+    interval is known.
     """
 
     rig: Rig
@@ -179,6 +204,7 @@ class Fit:
     assumptions: tuple[Assumption, ...] = ()
     poles: Mapping[str, tuple[Pole, ...]] = field(default_factory=dict[str, tuple[Pole, ...]])
     bands: Bands | None = None
+    failed: bool = False
 
     def keyed(self) -> dict[str, float]:
         """Every number found, by the key that problems know it by, see `Problem.key`."""

@@ -82,6 +82,8 @@ class Run:
         The law that closed the loop, when it is simulated too.
     repeats, source : str
         Label of the runs that repeat this one, when their commands do not show it; file, window and hash.
+    record : (float, float), optional
+        First and last time [s] of the record that it is a part of.
     """
 
     label: str
@@ -104,6 +106,7 @@ class Run:
     loop: ClosedLoop | None = None
     repeats: str = ""
     source: str = ""
+    record: tuple[float, float] | None = None
 
     @property
     def horizons(self) -> tuple[float, ...]:

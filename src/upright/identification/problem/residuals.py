@@ -202,6 +202,8 @@ class Problem:
         r, J = np.moveaxis(residual, 1, 0), np.moveaxis(slope, 1, 0)  # windows one after another
         if restart is not None:
             r, J = restart.rows(r.reshape(track.restarts.size, -1), J.reshape(track.restarts.size, -1, m))
+            if not (finite(r) and finite(J)):
+                return None
         return r.reshape(-1, k), J.reshape(-1, k, m)
 
     def residuals(self, index: int, x: Array, horizon: float = math.inf) -> Array:
@@ -262,7 +264,8 @@ class Problem:
             shift[places, :, 1 + np.arange(places.size)] += sizes[:, None]
             y = self.simulate(index, lanes, track.length, shift)
             residual = np.moveaxis(track.errors(y[..., 0]), 1, 0).reshape(len(d), -1)
-            slope = np.moveaxis(track.weighting @ ((y[..., 1:] - y[..., :1]) / sizes), 1, 0)
+            with np.errstate(over="ignore", invalid="ignore"):  # a window that ran away stays where it was measured
+                slope = np.moveaxis(track.weighting @ ((y[..., 1:] - y[..., :1]) / sizes), 1, 0)
             return residual, slope.reshape(*residual.shape, -1)
 
         d, residual, slope = settle(respond, variance)

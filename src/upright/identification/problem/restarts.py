@@ -75,9 +75,10 @@ class Restart:
 
         Variable projection (Golub and Pereyra 1973) with Kaufman's Jacobian: the least of ``|r + A d|^2 + |d/s|^2``.
         """
-        A = self.slope * np.sqrt(self.variance)[:, None, :]
-        follow = -_solve(A, np.matmul(A.transpose(0, 2, 1), jacobian))
-        moved = np.concatenate([jacobian + np.matmul(A, follow), follow], axis=1)
+        with np.errstate(over="ignore", invalid="ignore"):  # from where the motion runs away nothing finite comes
+            A = self.slope * np.sqrt(self.variance)[:, None, :]
+            follow = -_solve(A, np.matmul(A.transpose(0, 2, 1), jacobian))
+            moved = np.concatenate([jacobian + np.matmul(A, follow), follow], axis=1)
         return np.concatenate([residual, self.price], axis=1), moved
 
 
@@ -110,8 +111,9 @@ def settle(respond: Callable[[Array], tuple[Array, Array]], variance: Array) -> 
 
 def _step(residual: Array, slope: Array, d: Array, s: Array) -> Array:
     """Gauss-Newton step (W, S) of the restarts; none where a simulation ran away."""
-    finite = np.isfinite(residual.sum(axis=1)) & np.isfinite(slope.sum(axis=(1, 2)))
-    sound = np.asarray(finite, dtype=bool)
+    with np.errstate(over="ignore", invalid="ignore"):
+        squares = np.sum(residual**2, axis=1) + np.sum((slope * s[:, None, :]) ** 2, axis=(1, 2))
+    sound = np.isfinite(squares)
     A = np.where(sound[:, None, None], slope, 0.0) * s[:, None, :]
     r = np.where(sound[:, None], residual, 0.0)
     gradient = np.matmul(A.transpose(0, 2, 1), r[:, :, None]) + _over(d, s)[:, :, None]
@@ -119,7 +121,16 @@ def _step(residual: Array, slope: Array, d: Array, s: Array) -> Array:
 
 
 def _solve(A: Array, b: Array) -> Array:
-    return np.linalg.solve(np.matmul(A.transpose(0, 2, 1), A) + np.eye(A.shape[2]), b)
+    """Solutions (W, S, m) of ``(A'A + 1) x = b``; NaN for windows in which A has run away."""
+    M = np.matmul(A.transpose(0, 2, 1), A) + np.eye(A.shape[2])
+    ran_away = ~np.isfinite(M).all(axis=(1, 2))
+    M[ran_away] = np.eye(A.shape[2])
+    try:
+        x = np.asarray(np.linalg.solve(M, b), dtype=np.float64)
+    except np.linalg.LinAlgError:  # where A is so large that rounding takes the 1
+        x = np.asarray(np.linalg.pinv(M, hermitian=True) @ b, dtype=np.float64)
+    x[ran_away] = np.nan
+    return x
 
 
 def _over(d: Array, s: Array) -> Array:

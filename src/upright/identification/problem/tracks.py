@@ -193,7 +193,8 @@ class Track:
     def errors(self, y: Array) -> Array:
         """Weighted errors (samples, W, outputs) of simulated outputs, of a free run from the first that counts on."""
         skip = min(self.first, len(y) - 1)
-        e = (y[skip:] - self.targets(len(y))[skip:]) @ self.weighting.T
+        with np.errstate(over="ignore", invalid="ignore"):  # a motion that ran away is told by its NaN
+            e = (y[skip:] - self.targets(len(y))[skip:]) @ self.weighting.T
         return e if self.kept is None else e * self.kept[skip : len(y), None, None]
 
     def targets(self, samples: int) -> Array:

@@ -145,7 +145,7 @@ Of the twist of two disks 79, 79 and 74 percent were explained after one, two an
 def settle_weights(problem: Problem, found: Descent) -> Descent:
     """Weigh prior knowledge, and outputs that move alike, by the residuals found, and settle again."""
     for k in range(3):
-        if found.interrupted:
+        if found.interrupted or not math.isfinite(found.normal.cost):  # nothing to weigh by
             break
         changed = k < REWEIGHED and problem.weigh_components(found.x)
         if not (_weigh_priors(problem, found) or changed):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -39,6 +39,7 @@ def chapter(
     study: str = "STUDY.toml",
     folder: str = "OUT",
     crossed: CrossValidation | None = None,
+    windows: Sequence[str] = (),
 ) -> Chapter:
     """What a fit says.
 
@@ -52,7 +53,10 @@ def chapter(
         Study and folder of the results, as the commands that are proposed name them.
     crossed : CrossValidation, optional
         Every run predicted by the others.
+    windows : sequence of str
+        How much of each log counts, in sentences.
     """
+    used = (Points(tuple(windows)),) if windows else ()
     return Chapter(
         title=title,
         verdict=headline(fit),
@@ -62,7 +66,9 @@ def chapter(
         parts=(
             data_part(provenance or {}),
             motion_part(fit),
-            Part(title="Fit of the runs", key="fit", content=(*_scores(fit, crossed), *run_pictures(fit, "fit"))),
+            Part(
+                title="Fit of the runs", key="fit", content=(*used, *_scores(fit, crossed), *run_pictures(fit, "fit"))
+            ),
             *_parameters(fit),
             _residuals(fit),
             _unseen(fit),
@@ -78,6 +84,8 @@ def headline(fit: Fit) -> str:
     """The verdict in a sentence."""
     if fit.interrupted:
         return "Not to be trusted yet: the search was interrupted, and this is its best so far."
+    if fit.failed:
+        return "The fit failed: the simulated motion grows beyond all bounds, so its numbers mean nothing."
     if not fit.trusted:
         return "Not to be trusted yet."
     if fit.answers and fit.answers[0].answer == "not tested":
@@ -296,6 +304,13 @@ def next_steps(fit: Fit, *, study: str = "STUDY.toml", folder: str = "OUT", cros
 
     `crossed` says that every run was predicted by the others already.
     """
+    if fit.failed:
+        yield Step(
+            "Nothing else can be said before the simulated motion stays finite: check the plant and the signs and "
+            "units of drive and sensors, and fit from measured states, a short time ahead.",
+            '[[runs]]\nhorizon = "0.5 s"',
+        )
+        return
     yield from (*_broken(fit), *_blind(fit), *_nuisances(fit), *_friction(fit, study, folder))
     untested = "Every run was fitted, so nothing tests the model yet; "
     if not (crossed or fit.interrupted) and all(s.role == "fit" for s in fit.runs.values()):

@@ -36,10 +36,11 @@ def parameter_table(
     about = fit.rig.parameters
     told = {n: _estimate(n, e, about.get(n)) for n, e in fit.estimates.items() if e.status != "known"}
     told |= {
-        n: (number(p.value), number(p.uncertainty, 2) if p.uncertainty else "exact", "", unit(p.unit), "given",
-            _called(n, p))
+        n: (number(p.value), _sure(p), "", unit(p.unit), "assumed" if p.assumed else "given", _called(n, p))
         for n, p in about.items()
-        if not p.estimate and n not in told and p.value != (ACTUATOR[n].default if n in ACTUATOR else 0.0)
+        if not p.estimate
+        and n not in told
+        and (p.assumed or p.value != (ACTUATOR[n].default if n in ACTUATOR else 0.0))
     }  # fmt: skip
     rows: list[tuple[str, ...]] = []
     for name, (value, error, around, *rest) in told.items():
@@ -52,6 +53,11 @@ def parameter_table(
     return Table(
         caption=caption, headings=headings, rows=tuple(rows), numbers=numbers, badge=headings.index("status")
     )  # fmt: skip
+
+
+def _sure(p: Parameter) -> str:
+    """How sure a number is that was given."""
+    return number(p.uncertainty, 2) if p.uncertainty else "–" if p.assumed else "exact"
 
 
 def _true(e: Estimate | None, true: float | None) -> tuple[tuple[str], tuple[str]]:
@@ -93,7 +99,7 @@ def run_table(fit: Fit) -> Table:
 
 def _estimate(name: str, e: Estimate, about: Parameter | None) -> tuple[str, ...]:
     beforehand = ", known beforehand" if about and about.uncertainty else ""
-    return (*measured(e.value, e.stderr), interval(e), unit(e.unit), e.status, _called(name, about) + beforehand)
+    return (*measured(e.value, e.stderr), interval(e), unit(e.unit), e.qualified, _called(name, about) + beforehand)
 
 
 def _called(name: str, about: Parameter | None) -> str:

@@ -22,6 +22,7 @@ from upright.study.draft.chain_log import ChainLog
 from upright.study.draft.plausible import implausible
 from upright.study.draft.recognise import Recognised, swing_frequency
 from upright.study.draft.tables import (
+    assumed,
     command_unit,
     drive_table,
     no_drive_table,
@@ -153,16 +154,16 @@ def _parameters(log: ChainLog, plant: type[Plant], start: ChainStarts) -> TomlTa
         body = int(tail[-1]) - 1 if (tail := name.rstrip("cqs"))[-1].isdigit() else -1
         inertia = name[:2] in ("m_", "J_")
         if inertia and stuck[body]:
-            table.key(name, number(value or 1.0, what.unit), f"{what.meaning}; held, so it does not matter")
+            table.key(name, assumed(value or 1.0, what.unit), f"{what.meaning}; held, so it does not matter")
         elif inertia and not scaled:
             scaled = True
-            assumed = {"value": number(value or 1.0, what.unit), "assumed": True}
-            table.key(name, assumed, f"{what.meaning}; MEASURE: a free swing sees only ratios")
+            why = "MEASURE: a free swing sees only ratios"
+            table.key(name, assumed(value or 1.0, what.unit), f"{what.meaning}; {why}")
         elif carts and name == "k_12" and driven and len(stuck) == 2 and stuck[1]:
             why = "MEASURE: with body 2 held, only k_1 + k_12 is seen"
-            table.key(name, number(start.numbers["k_1"] / 2, what.unit), f"{what.meaning}; {why}")
+            table.key(name, assumed(start.numbers["k_1"] / 2, what.unit), f"{what.meaning}; {why}")
         elif carts and name == "k_1" and stuck[0] and len(stuck) > 1:
-            table.key(name, number(0, what.unit), f"{what.meaning}; pulls at the hand")
+            table.key(name, assumed(0, what.unit), f"{what.meaning}; pulls at the hand")
         elif name.startswith("delta_") and not driven and not stuck[body]:
             # a free swing ends in small reversals, which tell how far a body moves before its friction is whole
             coordinate = plant.coordinates[body].name
@@ -187,7 +188,7 @@ def _drive(log: ChainLog, plant: type[Plant], start: ChainStarts) -> list[TomlTa
     damping = per(force.unit, f"{_unit(plant, force.on)}/s")
     actuator = TomlTable("[actuator]")
     why = f"{force.meaning} per command: nobody measured it, so masses, springs and friction are per that"
-    actuator.key("gain", {"value": f"1 {per(force.unit, unit)}", "assumed": True}, why)
+    actuator.key("gain", assumed(1, per(force.unit, unit)), why)
     braked = {"guess": number(start.braked, damping), "min": 0}
     actuator.key("damping", braked, "of the drive while commanded", off=not start.braked)
     if start.braked:

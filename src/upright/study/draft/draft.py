@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import tomllib
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -21,6 +23,7 @@ from upright.study.draft.pendulum import pendulum_tables
 from upright.study.draft.recognise import Recognised, recognise
 from upright.study.draft.suits import COUNTED, plants_that_suit
 from upright.study.text import TomlTable, study_text
+from upright.study.windows import window_sentence
 
 CHAINS = ("rectilinear", "torsional")
 
@@ -59,11 +62,19 @@ def draft(record: Record, seen: Inspection, log: Path, study: Path, *, plant: st
     head = TomlTable()
     head.line(f"# Study of {log.name}, drafted by `upright init`. Check it, then: upright identify THIS_FILE -o OUT")
     head.line("# A number in quotes wears its unit; { guess = ... } asks for it; a plain text or number is known.")
-    head.line("# Lines marked MEASURE hold placeholders. All keys: `upright identify --keys`.")
+    head.line("# Lines marked MEASURE hold placeholders, which are assumed: no number that rests on one can be used.")
+    head.line('# Replace them by what you measured, as in m_p = "0.22 kg". All keys: `upright identify --keys`.')
+    head.line(f"# {window_of(tables, record)}")
     for doubt in doubts:
         head.line(f"# GUESSED: {doubt}")
     head.key("title", log.stem)
     return study_text([head, *tables])
+
+
+def window_of(tables: Sequence[TomlTable], record: Record) -> str:
+    """How much of the record the runs of a draft are, in a sentence."""
+    runs = [tomllib.loads(str(table))["runs"][0] for table in tables if table.lines[:1] == ["[[runs]]"]]
+    return window_sentence([(r["role"], *r["window"]) for r in runs], float(record.t[0]), float(record.t[-1]))
 
 
 def alike(record: Record, seen: Inspection, found: Recognised) -> list[str]:

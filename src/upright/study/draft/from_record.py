@@ -52,14 +52,9 @@ def study_of_record(
     """
     record = _renamed(record, columns or {}, units or {})
     name = _name_of(plant) if plant is not None else ""
-    own = plant is not None and not name
-    study: dict[str, Any] = _plain(record, plant) if own else _drafted(record, name)  # type: ignore[arg-type]
+    study, plant = _drafted(record, name) if plant is None or name else (_plain(record, plant), plant)
     values = study.setdefault("parameters", {})
-    if plant is None:
-        from upright.physics import find
-
-        plant = find(study["rig"]["plant"])
-    _drive(study, record, plant)
+    _own_force(study, plant, weighs=ask is None)
     _answer(values, study.setdefault("actuator", {}), plant, known or {}, ask)
     if not study["actuator"]:
         del study["actuator"]
@@ -98,9 +93,16 @@ def _name_of(plant: type[Plant]) -> str:
     return ""
 
 
-def _drafted(record: Record, name: str) -> dict[str, Any]:
-    text = draft(record, inspect(record), Path(LOG), Path("study.toml"), plant=name)
-    return tomllib.loads(text)
+def _drafted(record: Record, name: str) -> tuple[dict[str, Any], type[Plant]]:
+    """Draft and plant. A drive that the record names, but not as one, is stated before its window is chosen."""
+    from upright.physics import find
+
+    study = tomllib.loads(draft(record, inspect(record), Path(LOG), Path("study.toml"), plant=name))
+    plant = find(study["rig"]["plant"])
+    named = [i.name for i in plant.inputs if i.name in record.signals and record[i.name].any()]
+    if "drive" in study or record.inputs or not named:
+        return study, plant
+    return _drafted(record.replace(inputs=(named[0],)), name)
 
 
 def _plain(record: Record, plant: type[Plant]) -> dict[str, Any]:
@@ -123,13 +125,23 @@ def _plain(record: Record, plant: type[Plant]) -> dict[str, Any]:
     return study
 
 
-def _drive(study: dict[str, Any], record: Record, plant: type[Plant]) -> None:
-    """Name what drove the rig when the record says so and the draft did not see it."""
-    said = [n for n in (*record.inputs, *(i.name for i in plant.inputs)) if n in record.signals and record[n].any()]
-    if "drive" in study or not said or not plant.inputs:
+def _own_force(study: dict[str, Any], plant: type[Plant], *, weighs: bool) -> None:
+    """A column that bears the name of the plant's force, and its unit or none, is that force, and `weighs` the masses.
+
+    Of its limit and the controller's period nobody said anything.
+    """
+    drive, actuator = study.get("drive", {}), study.get("actuator", {})
+    force = next((i for i in plant.inputs if i.name == drive.get("column")), None)
+    if force is None:
         return
-    study["drive"] = {"column": said[0], "unit": record.units[said[0]] or plant.inputs[0].unit}
-    study.get("defaults", {}).pop("held", None)
+    actuator.pop("limit", None)
+    study["rig"].pop("servo_period", None)
+    if not weighs or "gain" not in actuator or drive.setdefault("unit", force.unit) != force.unit:
+        return
+    del actuator["gain"]
+    for name, value in study["parameters"].items():
+        if isinstance(value, dict) and value.get("assumed") and plant.quantity(name).unit == "kg":
+            study["parameters"][name] = {"guess": value["value"]}
 
 
 def _answer(

@@ -1,4 +1,6 @@
-"""Draft of a study of pendulums and of plants of the user's own: which numbers are taken as known, which are asked.
+"""Draft of a study of pendulums and of plants of the user's own: which numbers are assumed, which are asked.
+
+Nothing is known that nobody measured: a placeholder is assumed, so that the fit says what rests on it.
 
 A pendulum that stands falls away from where it is, one that hangs falls back: the sign of its acceleration per angle
 tells, once what its hinge throws at it is taken into account. One that a loop keeps upright is predicted over short
@@ -21,6 +23,7 @@ from upright.study.draft.described import counts_of
 from upright.study.draft.plausible import implausible
 from upright.study.draft.recognise import Recognised, in_dac_counts
 from upright.study.draft.tables import (
+    assumed,
     command_unit,
     drive_table,
     no_drive_table,
@@ -49,7 +52,7 @@ MASS = 0.1
 """Of a pendulum that nobody weighed [kg]."""
 
 SCALE = "MEASURE: sets the scale of all forces"
-SIMPLE = "with 0, l_cg is the length of the simple pendulum of equal period"
+SIMPLE = "MEASURE it or l_cg: with 0, l_cg is the length of the simple pendulum of equal period"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,9 +88,9 @@ class Balanced:
 
 @dataclass(frozen=True, kw_only=True)
 class PendulumStarts:
-    """Numbers of a plant in SI: `known` with the reason, `asked` from a guess on, `uncertain` with how much [%]."""
+    """Numbers of a plant in SI: `assumed` with the reason, `asked` from a guess on, `uncertain` with how much [%]."""
 
-    known: Mapping[str, tuple[float, str]]
+    assumed: Mapping[str, tuple[float, str]]
     asked: Mapping[str, float]
     uncertain: Mapping[str, tuple[float, str]] = field(default_factory=dict[str, tuple[float, str]])
 
@@ -101,7 +104,7 @@ def pendulum_tables(
     if balanced:
         found = recognised_upright(found, balanced)
     starts = starts_upright(balanced, found.plant) if balanced else starts_hanging(found, plant)
-    told = implausible(plant, {**{n: v for n, (v, _) in starts.known.items()}, **starts.asked}, scaled_by="")
+    told = implausible(plant, {**{n: v for n, (v, _) in starts.assumed.items()}, **starts.asked}, scaled_by="")
     found = replace(found, doubts=(*found.doubts, *told))
     tables = [_rig(record, found, plant), _parameters(plant, starts), *_drive(found, plant, balanced)]
     tables += [_sensor(seen, found, plant, name) for name in found.columns]
@@ -154,12 +157,12 @@ def recognised_upright(found: Recognised, balanced: Balanced) -> Recognised:
 
 def starts_upright(balanced: Balanced, plant: str) -> PendulumStarts:
     """Numbers of a balanced pendulum on a cart or an arm."""
-    known = {"m_p": (MASS, SCALE), "J_p": (0.0, SIMPLE)}
+    given = {"m_p": (MASS, SCALE), "J_p": (0.0, SIMPLE)}
     inertia = balanced.inertia(plant)
     asked = {"l_cg": balanced.length, "b_1": 2 * inertia, "b_1c": 0.02 * balanced.gain(plant)}
     if plant == "cart-pendulum":
-        return PendulumStarts(known=known | {"m_c": (inertia, "MEASURE")}, asked=asked)
-    return PendulumStarts(known=known, asked=asked | {"J_d": inertia / 2, "k_psi": 2 * inertia},
+        return PendulumStarts(assumed=given | {"m_c": (inertia, "MEASURE")}, asked=asked)
+    return PendulumStarts(assumed=given, asked=asked | {"J_d": inertia / 2, "k_psi": 2 * inertia},
                   uncertain={"r": (balanced.arm(), "30 %")})  # fmt: skip
 
 
@@ -167,32 +170,32 @@ def starts_hanging(found: Recognised, plant: type[Plant]) -> PendulumStarts:
     """Numbers of a pendulum that swings about where it hangs; any other plant has sizes that swing as slowly."""
     w = found.frequency or 6.0
     length = G / w**2
-    known = {"m_p": (1.0, f"{SCALE}; a swing alone sees only ratios"), "J_p": (0.0, SIMPLE)}
+    given = {"m_p": (1.0, f"{SCALE}; a swing alone sees only ratios"), "J_p": (0.0, SIMPLE)}
     if found.plant == "pendulum":
         friction = {"b_2": 0.002 * w * length**2, "b_2c": 0.002 * G * length, "b_2q": 0.002 * length**2}
-        return PendulumStarts(known=known, asked={"l_cg": length, **friction})
+        return PendulumStarts(assumed=given, asked={"l_cg": length, **friction})
     if found.plant in ("cart-pendulum", "furuta"):
-        known["m_p"] = (MASS, known["m_p"][1])
+        given["m_p"] = (MASS, given["m_p"][1])
         asked = {"l_cg": length, "b_2": 0.002 * w * MASS * length**2, "b_2c": 0.001 * G * MASS * length}
         driven = found.drive is not None and plant.coordinates[0].name in found.columns
         if found.plant == "cart-pendulum":
-            known["m_c"] = (1.0, "MEASURE")
+            given["m_c"] = (1.0, "MEASURE")
         else:
-            known["r"] = (0.1, "MEASURE")
+            given["r"] = (0.1, "MEASURE")
             if driven:
                 asked["J_d"] = 1e-3
             else:
-                known["J_d"] = (1e-3, "MEASURE; not seen while the arm is held or locked")
+                given["J_d"] = (1e-3, "MEASURE; not seen while the arm is held or locked")
         if driven:
             asked |= {"b_1": INERTIA[found.plant] * 1.0, "b_1c": INERTIA[found.plant] * 0.1}
-        return PendulumStarts(known=known, asked=asked)
+        return PendulumStarts(assumed=given, asked=asked)
     required = [f.name for f in fields(plant) if f.default is MISSING]  # type: ignore[arg-type]
     sizes = {"m": length, "kg m^2": length**2, "N m/rad": (w * length) ** 2}
     viscous = {"N m s/rad": 0.002 * w * length**2, "N s/m": 0.002 * w}
     rubbed = {n: viscous[unit] for n in plant.names() if (unit := plant.quantity(n).unit) in viscous}
     rubbed |= {j.coulomb: 0.002 * G * length for j in plant.joints if j.coulomb}
     return PendulumStarts(
-        known=dict.fromkeys(required[:1], (1.0, "MEASURE")),
+        assumed=dict.fromkeys(required[:1], (1.0, "MEASURE")),
         asked={n: sizes.get(plant.quantity(n).unit, 1.0) for n in required[1:]} | rubbed,
     )
 
@@ -213,9 +216,9 @@ def _parameters(plant: type[Plant], starts: PendulumStarts) -> TomlTable:
     left: list[str] = []
     for name in plant.names():
         what = plant.quantity(name)
-        if name in starts.known:
-            value, why = starts.known[name]
-            table.key(name, number(value, what.unit, 4), f"{what.meaning}; {why}")
+        if name in starts.assumed:
+            value, why = starts.assumed[name]
+            table.key(name, assumed(value, what.unit, 4), f"{what.meaning}; {why}")
         elif name in starts.uncertain:
             value, percent = starts.uncertain[name]
             table.key(name, {"value": number(value, what.unit), "uncertainty": percent}, f"{what.meaning}; MEASURE")
@@ -250,7 +253,9 @@ def _gain(found: Recognised) -> float:
     swing = (c.high - c.low) / 2 * {"counts": 4e-4, "mm": 1e-3, "deg": 0.017}.get(c.guess, 1.0)
     u = max(abs(found.drive.low), abs(found.drive.high)) or 1.0
     u /= DAC_COUNTS_PER_VOLT if in_dac_counts(found.drive) else 1.0
-    return max(INERTIA.get(found.plant, 1.0) * swing * (found.frequency or 6.0) ** 2 / u, 1e-9)
+    w = found.frequency or 6.0
+    inertia = INERTIA.get(found.plant, (G / w**2) ** 2)  # of the 1 kg that is assumed
+    return max(inertia * swing * w**2 / u, 1e-9)
 
 
 def _sensor(seen: Inspection, found: Recognised, plant: type[Plant], name: str) -> TomlTable:
@@ -280,7 +285,7 @@ def _defaults(found: Recognised, plant: type[Plant], balanced: Balanced | None) 
         unknown = [f"offset.{plant.coordinates[-1].name}", "input_offset"]
         table.key("unknown", unknown, "where the counter was zeroed; what leans on the first body")
     else:
-        unknown = ["initial"] if found.drive is not None else ["initial", "offset"]
+        unknown = ["initial"] if found.drive is not None and found.settled else ["initial", "offset"]
         table.key("unknown", unknown, "estimated for each run alone")
     return table
 

@@ -12,8 +12,8 @@ from upright.errors import BadInput
 from upright.physics import Plant, find
 from upright.readers.inspection import Column, Inspection, effort_unit
 from upright.records import Array, Record
-from upright.signals.smoothing import savitzky_golay
-from upright.study.draft.release import release_of
+from upright.signals.smoothing import savitzky_golay, white_noise
+from upright.study.draft.release import free_from
 
 RATE = re.compile(r"velocity|speed|rate|_dot\b|omega|\bqd|accel", re.IGNORECASE)
 _EFFORT = re.compile(r"effort|volt|current|torque|force|plant_input|cmd|duty|^(u|v|i)$", re.IGNORECASE)
@@ -45,6 +45,8 @@ class Recognised:
         Where something happens [s].
     frequency : float
         Of the slowest swing of the last coordinate [rad/s]; 0 when it does not swing.
+    settled : bool
+        Whether the last coordinate's zero was read where it lies still.
     doubts : tuple of str
         Sentences about what was guessed.
     """
@@ -57,6 +59,7 @@ class Recognised:
     mirrored: bool
     window: tuple[float, float]
     frequency: float
+    settled: bool
     doubts: tuple[str, ...]
 
 
@@ -93,9 +96,9 @@ def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
     if drive is None and turned and list(columns)[-1] == "theta":
         angle = turned * (last - centre)
         small = swing_frequency(record.t[inside], angle[inside])
-        let_go = release_of(record.t, angle, small, driven if pushed else None)
-        if window[0] < let_go < window[1]:
-            window = let_go, window[1]
+        start = free_from(record.t, angle, small, window[0], driven if pushed else None)
+        if start < window[1]:
+            window = start, window[1]
             inside = (record.t >= window[0]) & (record.t <= window[1])
     mirrored = False
     if pushed and all(c.guess == "rad" or name == "x" for name, c in columns.items()):
@@ -110,6 +113,7 @@ def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
         mirrored=mirrored,
         window=window,
         frequency=swing_frequency(record.t[inside], last[inside] - centre),
+        settled=bool(seen.rests) or (drive is not None and _starts_still(last, record[drive.name])),
         doubts=tuple(doubts),
     )
 
@@ -117,7 +121,8 @@ def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
 def position_columns(record: Record, seen: Inspection) -> list[Column]:
     """Columns that measure a place and move, without speeds, drives, clocks and liars."""
     kinds = ("rad", "m", "counts", "deg", "mm", "")
-    found = [c for c in seen.columns if not (c.drive or c.constant or _lies(c, seen)) and c.guess in kinds]
+    places = [c for c in seen.columns if not c.drive and c.name not in record.inputs and c.guess in kinds]
+    found = [c for c in places if not (c.constant or _lies(c, seen))]
     found = [c for c in found if not RATE.search(c.name) and not _is_speed(record, c.name, [o.name for o in found])]
     found = [_in_degrees(record, _as_angle(record, c, seen)) for c in found]
     found = [c for c in found if c.guess] or found
@@ -176,8 +181,8 @@ def in_dac_counts(c: Column) -> bool:
 def drive_column(record: Record, seen: Inspection) -> Column | None:
     """What commands the rig.
 
-    That is the column in converter counts, else one called like an effort, else one that looks so; where such a column
-    is not the input that the record states, it is that input.
+    That is the column in converter counts, else one called like an effort, else one that looks so; where the record
+    states an input, it is that.
     """
     dac = next((c for c in seen.columns if in_dac_counts(c)), None)
     if dac is not None:
@@ -187,10 +192,10 @@ def drive_column(record: Record, seen: Inspection) -> Column | None:
     candidates = [c for c in candidates if not REFERENCE.search(c.name)]
     effort = [c for c in candidates if _EFFORT.search(c.name) or effort_unit(c.name)]
     found = (effort or candidates or [None])[0]
-    if found is None or not record.inputs or found.name in record.inputs:
+    stated = [seen.column(name) for name in record.inputs]
+    if not stated or (found is not None and found.name in record.inputs):
         return found
-    stated = seen.column(record.inputs[0])
-    return found if stated.constant else stated
+    return found if stated[0].constant else stated[0]
 
 
 def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
@@ -256,7 +261,7 @@ def zero_reading(
         first = int(np.argmax(u != u[0]))
         before = x[max(0, first - 50) : first]
         angle = c.guess in ("rad", "deg")
-        if u[0] == 0 and first >= 5 and not (hangs and _moves(x[:first], x)):
+        if u[0] == 0 and first >= 5 and not (hangs and not _starts_still(x, u)):
             return float(np.median(before))
         return rest_level(x, seen, record.t) if angle else float(x[np.searchsorted(record.t, window[0])])
     return rest_level(x, seen, record.t)
@@ -266,9 +271,10 @@ STILL = 0.05
 """Share of how much a signal varies that it may vary by where it rests."""
 
 
-def _moves(before: Array, x: Array) -> bool:
-    """Whether a signal already moves before the first command, so that its place there is no zero."""
-    return float(np.ptp(before)) > STILL * float(np.ptp(x))
+def _starts_still(x: Array, u: Array) -> bool:
+    """Whether a signal lies still before the first command; where it moves its place is no zero."""
+    first = int(np.argmax(u != u[0]))
+    return u[0] == 0 and first >= 5 and float(np.ptp(x[:first])) <= STILL * float(np.ptp(x))
 
 
 def rest_level(x: Array, seen: Inspection, t: Array) -> float:
@@ -357,7 +363,10 @@ TOLD = 0.9
 
 def swing_frequency(t: Array, x: Array) -> float:
     """Angular frequency [rad/s] of the last swings about zero, where they are small; 0 without three crossings."""
-    far = np.flatnonzero(np.abs(x) > 0.3 * np.std(x))  # hysteresis: noise about zero is no swing
+    if x.size < 2:
+        return 0.0
+    noisy = min(5 * white_noise(x), 0.5 * float(np.abs(x).max()))
+    far = np.flatnonzero(np.abs(x) > max(0.3 * float(np.std(x)), noisy))  # hysteresis: noise about zero is no swing
     if far.size < 2:
         return 0.0
     turns = np.flatnonzero(np.diff(np.signbit(x[far])))

@@ -9,7 +9,7 @@ from upright.physics.statement import Coordinate
 from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Column
 from upright.records import Record
 from upright.study.draft.recognise import in_dac_counts
-from upright.study.text import TomlTable
+from upright.study.text import TomlTable, Value, number
 
 ROLES = {"fit": "fitted", "predict": "scored, never seen by the estimator"}
 
@@ -22,6 +22,11 @@ def rig_table(name: str, plant: type[Plant], record: Record, period: float = 0.0
     if period:
         table.key("period", f"{period * 1e3:.6g} ms", f"the log has a sample every {record.period * 1e3:.4g} ms")
     return table
+
+
+def assumed(value: float, unit: str, digits: int = 3) -> dict[str, Value]:
+    """A number that nobody measured: what rests on it is no fact."""
+    return {"value": number(value, unit, digits), "assumed": True}
 
 
 def parameters_left_at_zero(table: TomlTable, plant: type[Plant], names: Iterable[str]) -> None:
@@ -73,7 +78,7 @@ def sensor_table(
     if c.guess:
         table.key("unit", c.guess, "" if c.unit else "guessed; the log does not say")
     if c.guess == "counts":
-        count = {"value": counts[0], "assumed": True}
+        count: dict[str, Value] = {"value": counts[0], "assumed": True}
         table.key("counts_per_rev" if turns else "counts_per_m", count, f"MEASURE: {counts[1]}")
     elif c.quantum.counts_per_rev and turns:
         table.key("counts_per_rev", {"value": c.quantum.counts_per_rev, "measured": True}, "from the column's steps")

@@ -1,0 +1,75 @@
+"""Is it said how much of a log counts? Shares by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import upright as up
+from upright.report.page import Points
+from upright.study.windows import window_sentence, windows
+from upright.verbs import log as verbs
+
+
+@pytest.mark.parametrize(
+    ("parts", "sentence"),
+    [
+        ([("fit", 0.3, 49.8)], "Fits 0.3 to 49.8 s, 99 % of the record."),
+        ([("fit", 5, 20), ("predict", 20, 30)], "Fits 5 to 20 s and predicts 20 to 30 s, 50 % of the record."),
+        (
+            [("fit", 10, 30), ("fit", 0, 20)],
+            "Fits 0 to 20, 10 to 30 s, 60 % of the record.",
+        ),  # what overlaps counts once
+        ([("fit", 49.8, 50)], "Fits 49.8 to 50 s, 0.4 % of the record."),
+    ],
+)
+def test_windows_are_told_with_their_share_of_the_record(parts, sentence):
+    assert window_sentence(parts, 0.0, 50.0) == sentence
+
+
+def crane_like(t):
+    return {"x": 0.1 * np.sin(t), "theta": 0.3 * np.cos(6 * t), "v": np.sin(2 * t)}
+
+
+STUDY = """
+[rig]
+plant = "pendulum"
+[parameters]
+m_p = 1.0
+l_cg = { guess = "0.3 m" }
+[sensors.theta]
+column = "theta"
+unit = "rad"
+[[runs]]
+label = "a"
+file = "log.csv"
+window = [10.0, 20.0]
+[[runs]]
+label = "b"
+file = "log.csv"
+window = [20.0, 30.0]
+role = "predict"
+"""
+
+
+def test_a_study_tells_them_of_its_runs(study):
+    t = np.arange(4001) * 0.01
+    asked = study(STUDY, t=t, **crane_like(t))
+    assert windows(asked.runs) == ("Fits 10 to 20 s and predicts 20 to 30 s, 50 % of the record.",)
+
+
+def test_init_and_identify_print_them(tmp_path):
+    t = np.arange(1001) * 0.01
+    theta = 0.3 * np.exp(-0.05 * t) * np.cos(6 * t)
+    still = np.full(1000, 0.3)  # a hand holds it for half of the record
+    log = pd.DataFrame({"t": np.arange(2001) * 0.01, "theta": np.r_[still, theta]})
+    draft = verbs.init(log, plant="pendulum")
+    (sentence,) = (line for line in draft.value.splitlines() if line.startswith("# Fits"))
+    assert sentence.endswith("50 % of the record.")
+    printed = [s for p in draft.chapter.parts for b in p.content if isinstance(b, Points) for s in b.sentences]
+    assert sentence.removeprefix("# ") in printed
+    fit = up.identify(log, up.Pendulum)
+    for chapter in (fit.chapter, fit.brief()):
+        told = [s for p in chapter.parts for b in p.content if isinstance(b, Points) for s in b.sentences]
+        assert any(s.startswith("Fits 1") and s.endswith("50 % of the record.") for s in told)
