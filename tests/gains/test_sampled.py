@@ -48,12 +48,12 @@ DOUBLE_INTEGRATOR = linear([[0, 1], [0, 0]], [[0], [1]], [[1, 0]])
 def test_states_are_read_off_outputs_that_show_them_in_other_units(delay):
     """Position in turns and the sum of both: two equations for two states; commands on their way are no states."""
     C = np.array([[1 / (2 * math.pi), 0.0], [1.0, 1.0]])
-    model = hold(linear([[0, 1], [0, 0]], [[0], [1]], C), 0.01, delay)
+    model = linear([[0, 1], [0, 0]], [[0], [1]], C).to_sampled(0.01, delay)
     found = read_off(model)
     np.testing.assert_allclose(found.D @ C @ [0.3, -2.0], [0.3, -2.0], rtol=1e-12)
     assert found.D.shape == (2, 2)
     with pytest.raises(BadInput, match="do not tell every state"):
-        read_off(hold(DOUBLE_INTEGRATOR, 0.01, delay))
+        read_off(DOUBLE_INTEGRATOR.to_sampled(0.01, delay))
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.3, 1.0, 2.6])
