@@ -19,7 +19,7 @@ from pathlib import Path
 from queue import SimpleQueue
 
 from benchmarks.measure import Line, Target
-from benchmarks.mutants.covering import SOURCE, covering
+from benchmarks.mutants.covering import SOURCE, map_of
 from benchmarks.mutants.places import Change, compiles, places
 from benchmarks.mutants.trial import Bench, Outcome
 
@@ -86,7 +86,7 @@ def run(
     kept = folder or (cache or ROOT / "build") / "mutants"
     harmless = judged(verdicts)
     changes = drawn(ROOT, min(sample, 10) if quick else sample, seed, within)
-    covered = covering(ROOT, kept, workers, progress)
+    covered = map_of(ROOT, kept, workers, progress)
     done: list[Outcome] = []
     stop = threading.Event()
     with tempfile.TemporaryDirectory(prefix="upright-mutants-", ignore_cleanup_errors=True) as name:

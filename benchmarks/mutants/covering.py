@@ -1,9 +1,9 @@
 """Which tests run which lines of the package, and how long they take: the quick suite once under `coverage`.
 
-The map is kept in a folder by the text of the tree. For another tree the newest map is brought up to date: test files
-that changed run again, and lines of the source move with their text. Lines that run when a module is imported belong
-to no test; neither does the text of kernels, which is compiled. For them the tests of the whole function stand in, else
-those of the module, else those of its room.
+The map is kept in a folder by the text of the tree. For another tree the map that is most like it is brought up to
+date: test files that changed run again, and lines of the source move with their text. Lines that run when a module is
+imported belong to no test; neither does the text of kernels, which is compiled. For them the tests of the whole
+function stand in, else those of the module, else those of its room.
 """
 
 from __future__ import annotations
@@ -26,6 +26,8 @@ from benchmarks.mutants import watch
 SOURCE = "src/upright"
 KEPT = 250
 """Tests kept for a line, the nearest and cheapest."""
+MAPS = 8
+"""Maps kept of other trees."""
 START = 0.02
 """Seconds that the shortest test costs all the same."""
 
@@ -86,7 +88,7 @@ def _around(text: str, line: int) -> list[range]:
     return [range(span.start + 1, span.stop) for span in sorted(found, key=len)]
 
 
-def covering(root: Path, folder: Path, workers: int, progress: Callable[[str], None]) -> Covering:
+def map_of(root: Path, folder: Path, workers: int, progress: Callable[[str], None]) -> Covering:
     """The map of a tree, made or brought up to date where there is none."""
     files = {p: _digest(root / p) for p in _listed(root, "tests", "benchmarks")}
     sources = {p: (root / p).read_text(encoding="utf-8") for p in _listed(root, SOURCE)}
@@ -96,11 +98,13 @@ def covering(root: Path, folder: Path, workers: int, progress: Callable[[str], N
         return _read(kept)
     folder.mkdir(parents=True, exist_ok=True)
     maps = sorted(folder.glob("covering-*.json"), key=lambda path: path.stat().st_mtime)
+    for path in maps[:-MAPS]:
+        path.unlink(missing_ok=True)
     tests = [p for p in files if Path(p).name.startswith("test_")]
     if maps:
-        old = _read(maps[-1])
+        old = max((_read(path) for path in maps[-MAPS:]), key=lambda m: sum(m.files.get(p) == files[p] for p in tests))
         changed = [p for p in tests if old.files.get(p) != files[p]]
-        progress(f"{maps[-1]} brought up to date: {len(changed)} of {len(tests)} files of tests run again")
+        progress(f"a map of {folder} brought up to date: {len(changed)} of {len(tests)} files of tests run again")
     else:
         old, changed = None, tests
         progress(f"quick tests under coverage, once; kept in {folder}")

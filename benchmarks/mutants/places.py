@@ -111,6 +111,8 @@ class _Finder:
         """The places of a node and of all below it that is computed with."""
         if isinstance(node, (ast.JoinedStr, ast.Raise, ast.Assert, ast.Import, ast.ImportFrom)):
             return
+        if isinstance(node, ast.Call) and ast.unparse(node.func).endswith(("default_rng", "SeedSequence")):
+            return  # another seed is as good
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
             self.returned.append(ast.unparse(node.returns) if node.returns else "")
             for part in [*node.args.defaults, *filter(None, node.args.kw_defaults), *node.body]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import faulthandler
 import json
 import os
+import signal
 import time
 from collections.abc import Generator
 from pathlib import Path
@@ -20,7 +21,9 @@ REPORT, LINES, WANTED, SECONDS = "MUTANTS_REPORT", "MUTANTS_LINES", "MUTANTS_WAN
 MEMORY = 8 * 2**30
 """Bytes that a changed program may ask for: a loop without an end fills the memory before its time is over."""
 HANG, SLOWER = 30.0, 20.0
-"""A test hangs after so many seconds and so many times its usual time: code may be compiled, others use the machine."""
+"""A test hangs after so many seconds of CPU and so many times its usual time: its code may have to be compiled."""
+STANDS = 5.0
+"""How many times as long by the clock on the wall: it may stand still, and others use the machine."""
 
 
 class Outcomes:
@@ -38,10 +41,29 @@ class Outcomes:
         self.say(begun=nodeid)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        self.seconds[report.nodeid] = self.seconds.get(report.nodeid, 0.0) + report.duration
+        spent = dict(report.user_properties).get(SPENT, report.duration)
+        self.seconds[report.nodeid] = self.seconds.get(report.nodeid, 0.0) + float(str(spent))
         if report.outcome == "failed" or report.when == "teardown":
             outcome = "failed" if report.outcome == "failed" else "ran"
             self.say(test=report.nodeid, outcome=outcome, seconds=self.seconds[report.nodeid])
+
+
+SPENT = "seconds of CPU"
+
+
+class Cost:
+    """Seconds of CPU of each phase of a test, its children's too: a neighbour cannot stretch them."""
+
+    def __init__(self) -> None:
+        self.before = sum(os.times()[:4])
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_makereport(self) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+        report = yield
+        now = sum(os.times()[:4])
+        report.user_properties.append((SPENT, now - self.before))
+        self.before = now
+        return report
 
 
 class Lines:
@@ -74,7 +96,7 @@ class Wanted:
 
     def __init__(self, path: str, seconds: float) -> None:
         self.usual: dict[str, float] = json.loads(Path(path).read_text(encoding="utf-8"))
-        self.until = time.monotonic() + seconds
+        self.until = time.process_time() + seconds
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
         rank = {test: i for i, test in enumerate(self.usual)}
@@ -82,13 +104,16 @@ class Wanted:
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, Any, Any]:
-        if time.monotonic() > self.until:
+        if time.process_time() > self.until:
             item.session.shouldstop = "time is over"
-        faulthandler.dump_traceback_later(HANG + SLOWER * self.usual[item.nodeid], exit=True)
+        limit = HANG + SLOWER * self.usual[item.nodeid]
+        faulthandler.dump_traceback_later(STANDS * limit, exit=True)
+        _end_after(limit)
         try:
             return (yield)
         finally:
             faulthandler.cancel_dump_traceback_later()
+            _end_after(0)
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -98,6 +123,7 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(Outcomes(path))
     if folder := asked(LINES):
         config.pluginmanager.register(Lines(folder, str(config.rootpath / "src" / "upright")))
+    config.pluginmanager.register(Cost())
     if path := asked(WANTED):
         _limit_memory()
         config.pluginmanager.register(Wanted(path, float(asked(SECONDS) or "inf")))
@@ -109,3 +135,9 @@ def _limit_memory() -> None:
     except ImportError:  # Windows
         return
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+
+
+def _end_after(seconds: float) -> None:
+    """End this process after so many seconds of CPU, whatever it computes then; never for 0."""
+    if hasattr(signal, "setitimer"):  # not on Windows
+        signal.setitimer(signal.ITIMER_PROF, seconds)
