@@ -10,6 +10,8 @@ import importlib
 import json
 import platform
 import sys
+import time
+import traceback
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -88,7 +90,7 @@ def versions() -> dict[str, str]:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the benchmarks named; 1 when a target was missed."""
+    """Run the benchmarks named; 1 when one of them failed with an error, else 3 when a target was missed."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument(
         "names",
@@ -97,7 +99,7 @@ def main(arguments: list[str] | None = None) -> int:
         help=f"which ones, of {', '.join(NAMES)}; default: all but {', '.join(APART)}",
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every figure to a file too")
-    parser.add_argument("--quick", action="store_true", help="fewer rounds and smaller shares, under two minutes")
+    parser.add_argument("--quick", action="store_true", help="fewer rounds and smaller shares, three to four minutes")
     parser.add_argument("--full", action="store_true", help="run what is otherwise estimated from its parts")
     pages = ", ".join(PUBLISHED)
     parser.add_argument("--markdown", type=Path, metavar="FILE", help=f"write the page of one of {pages}")
@@ -140,7 +142,7 @@ def main(arguments: list[str] | None = None) -> int:
     console = Console(width=None if sys.stdout.isatty() else 200)
     told = Console(stderr=True)
     results: dict[str, Any] = {"versions": versions(), "lines": []}
-    missed = 0
+    missed, failed = 0, []
     options: dict[str, dict[str, Any]] = {
         "fit": {"full": asked.full},
         "starts": {"starts": asked.starts},
@@ -153,16 +155,28 @@ def main(arguments: list[str] | None = None) -> int:
         extra = options.get(name, {})
         extra |= {"markdown": asked.markdown} if name in PUBLISHED else {}
         extra |= shared if name in SHARED else {}
-        module = importlib.import_module(f"benchmarks.{name}")
-        lines: list[Line] = module.run(
-            quick=asked.quick, progress=lambda text, name=name: told.print(f"[dim]{name}: {text}[/]"), **extra
-        )
+        begin = time.perf_counter()
+        try:
+            module = importlib.import_module(f"benchmarks.{name}")
+            lines: list[Line] = module.run(
+                quick=asked.quick,
+                progress=lambda text, name=name: told.print(f"[dim]{name}: {escape(text)}[/]"),
+                **extra,
+            )
+        except Exception:
+            told.print(f"[red]{name} failed[/]")
+            traceback.print_exc()
+            failed.append(name)
+            continue
         console.print(table(name, (module.__doc__ or "").splitlines()[0], lines))
         results["lines"] += [{"benchmark": name} | asdict(line) | {"reached": line.reached} for line in lines]
         missed += sum(line.reached is False for line in lines)
+        told.print(f"[dim]{name}: {time.perf_counter() - begin:.0f} s[/]")
     if asked.json:
         asked.json.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
-    return 1 if missed else 0
+    if failed:
+        told.print(f"[red]ended with an error: {', '.join(failed)}[/]")
+    return 1 if failed else 3 if missed else 0
 
 
 if __name__ == "__main__":
