@@ -15,6 +15,24 @@ static uint8_t terms_in[OUTPUTS];
 static float memory[MEMORIES];
 static bool begun;
 
+/* Whether one count of a reading moves the command by less than all that it may be, at once or through the memories,
+ * which are at zero before or begun by that count. With n memories a count reaches the command within n samples or
+ * never: A^n is a sum of lower powers (Cayley and Hamilton), so that C A^k B is zero for every k if it is for k < n. */
+static bool moderate(const law_t *law, uint8_t reading, bool begins, int16_t most) {
+    float z[MEMORIES], out[OUTPUTS];
+    for (uint8_t i = 0; i < MEMORIES; i++) z[i] = begins ? law->begin[i][reading] : 0;
+    for (uint8_t k = 0; k <= MEMORIES; k++) {
+        for (uint8_t row = 0; row < OUTPUTS; row++) {
+            out[row] = k ? 0 : law->matrix[row][MEMORIES + reading];
+            for (uint8_t i = 0; i < MEMORIES; i++)
+                if (law->matrix[row][i] != 0) out[row] += law->matrix[row][i] * z[i];
+        }
+        if (!(fabsf(out[COMMAND_ROW]) < most)) return false; /* nor what is no number */
+        memcpy(z, out, sizeof z);
+    }
+    return true;
+}
+
 bool law_take(law_t *law, const uint8_t body[LAW_BYTES], int16_t most) {
     law_t offered;
     float *numbers[] = {&offered.matrix[0][0], offered.target, offered.initial, &offered.begin[0][0]};
@@ -29,7 +47,7 @@ bool law_take(law_t *law, const uint8_t body[LAW_BYTES], int16_t most) {
     offered.every = body[3];
     if (offered.every == 0 || offered.limit <= 0) return false;
     for (uint8_t i = 0; i < READINGS; i++)
-        if (!(fabsf(offered.matrix[COMMAND_ROW][MEMORIES + i]) < most)) return false;
+        if (!moderate(&offered, i, false, most) || !moderate(&offered, i, true, most)) return false;
 
     *law = offered;
     uint8_t count = 0;

@@ -34,7 +34,7 @@ typedef struct {
 #define LAW_BYTES (4 * (OUTPUTS * INPUTS + READINGS + MEMORIES + MEMORIES * READINGS) + 4)
 
 /* Reads what came over the wire; false, and nothing taken over, when a number is not one or is absurd: a gain by which
- * one count more or less moves the command by all that it may be. */
+ * one count more or less moves the command by all that it may be, at once or through the memories. */
 bool law_take(law_t *law, const uint8_t body[LAW_BYTES], int16_t most);
 void law_give(const law_t *law, uint8_t body[LAW_BYTES]);
 

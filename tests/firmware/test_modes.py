@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.boards import COUNTS, STEP, rig_on
+from tests.rigs.test_law import PATHS
 from upright.errors import RigStopped
 from upright.laws import Law
 from upright.rigs.line import TerminalLine
@@ -363,6 +364,22 @@ def test_gains_by_which_one_count_is_everything_are_refused(host):
         rig.arm()
         with pytest.raises(RigStopped, match="gains and units"):
             rig.start(Mode.MCU, law(beyond))
+
+
+@pytest.mark.parametrize("path", PATHS)
+def test_a_count_that_is_everything_is_refused_whatever_way_it_takes(host, path):
+    """By 1 % to either side of the limit; float32 rounds by a hundred-thousandth of that."""
+    board, rig = running(host)
+    for share in (0.99, 1.01):
+        rig.stop()
+        rig.arm()
+        law = PATHS[path](share * WIDE.command * COUNTS)
+        if share < 1:
+            rig.start(Mode.MCU, law)
+        else:
+            with pytest.raises(RigStopped, match="its gains are absurd"):
+                rig.start(Mode.MCU, law)
+    assert dead(board)
 
 
 def test_a_law_that_runs_away_stops_the_rig_before_its_number_overflows(host):

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from upright.errors import BadInput
 from upright.laws import Law, Rule, at_work
+from upright.rigs.onboard import MEMORIES
 from upright.rigs.protocol import Capabilities, Limits
 
 
@@ -87,14 +88,34 @@ class RunningLaw:
 def absurdity(law: Law | Rule, about: Capabilities, limits: Limits) -> str:
     """Why no rig may be given these gains, as a clause; empty when it may.
 
-    Gains with which one count more or less moves the command by all that it may be amplify nothing but rounding.
+    Gains with which one count more or less moves the command by all that it may be, at once or through the law's
+    memories, amplify nothing but rounding. The firmware computes the same.
     """
     if isinstance(law, Rule):
         return ""
-    for name, d, per in zip(about.coordinates, law.D[0], about.counts, strict=False):
-        if not abs(d / per) < limits.command:
-            return (
-                f"its gain on {name} is absurd: one count changes the command by {abs(d / per):.3g} "
-                f"{about.command_unit}, and {limits.command:g} {about.command_unit} is all that it may be"
-            )
+    for k, response in enumerate(_impulse(law, len(about.coordinates))):
+        for name, u, per in zip(about.coordinates, response, about.counts, strict=True):
+            if not abs(u / per) < limits.command:
+                later = f" {k} sample{'s' * (k > 1)} later" if k else ""
+                return (
+                    f"its gain on {name} is absurd: one count changes the command by {abs(u / per):.3g} "
+                    f"{about.command_unit}{later}, and {limits.command:g} {about.command_unit} is all that it may be"
+                )
     return ""
+
+
+def _impulse(law: Law, readings: int) -> Iterator[list[float]]:
+    """Largest command, sample by sample, after 1 in one sample of each reading, from memories at zero or begun by it.
+
+    With n memories it reaches the command within n samples or never: A^n is a sum of lower powers (Cayley and
+    Hamilton), so that C A^k B is zero for every k if it is for k < n. At least as many as the firmware looks at.
+    """
+    n = len(law.A)
+    A, B, C, D = (m.reshape(m.shape[:2]) for m in (law.A, law.B, law.C, law.D))
+    begin = np.zeros((n, readings)) if law.begin is None else np.asarray(law.begin, dtype=np.float64)
+    z = np.hstack([np.zeros((n, readings)), begin.reshape(begin.shape[:2])[:, :readings]])
+    with np.errstate(over="ignore", invalid="ignore"):  # what is no number is refused
+        for k in range(max(MEMORIES, n) + 1):
+            first = float(k == 0)
+            u, z = C @ z + first * np.tile(D[:, :readings], 2), A @ z + first * np.tile(B[:, :readings], 2)
+            yield np.abs(u[0].reshape(2, readings)).max(axis=0).tolist()
