@@ -12,7 +12,9 @@ from tests.rigs.test_supervisor import DUTY, LAW, MODEL, RIG, Scene
 from upright.errors import RigStopped
 from upright.experiments.makes import make_rig
 from upright.experiments.worn import worn
+from upright.rigs import Fault
 from upright.rigs.driven import DrivenScale, StillDrive
+from upright.rigs.law import RunningLaw
 
 PROMPT = replace(RIG, delay=0.0, lag=0.0)
 FAST = 15.0
@@ -70,6 +72,26 @@ def test_the_arm_is_stopped_well_within_its_travel(seed, share):
         scene.run(4.0, then=lambda p: p.encoders.scaled(0, share))
     # with nobody beside it the loop lets it go 1.5 rad (wrong way round) to 10 rad (dead)
     assert abs(scene.port.x[0] - scene.beside.target[0]) < 0.7
+
+
+@pytest.mark.parametrize(("share", "what"), [(0.0, "dead"), (-1.0, "wrong way round")])
+def test_what_command_and_pendulum_both_say_stops_the_rig_in_that_tick(share, what):
+    """Before anything else has noticed; asked of the same samples beside the supervisor."""
+    scene = Scene().started(tilt=0.05)
+    law, scale = RunningLaw(scene.beside.law, RIG.period), DrivenScale(RIG, "inverted")
+    tick, said = scene.rig.exchange(0.0), ""
+    for k in range(2000):
+        if k == 340:
+            scene.port.encoders.scaled(0, share)
+        readings = scene.beside.readings(tick)
+        away = [q - t for q, t in zip(readings, scene.beside.target, strict=True)]
+        if said := scale.sees(away, law.step(readings)):
+            break
+        tick = scene.rig.exchange(scene.beside.step(tick))
+    assert said == what
+    with pytest.raises(RigStopped, match=r"psi|Psi"):
+        scene.beside.step(tick)
+    assert scene.beside.faults == (Fault.ENCODER if what == "dead" else Fault.MODEL)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

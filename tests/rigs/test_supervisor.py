@@ -14,7 +14,8 @@ from upright.gains import feedback, filtered, hold, place
 from upright.laws import Rule, state_feedback
 from upright.rigs import Board, Fault, Limits, Mode, TwinPort
 from upright.rigs.driven import StillDrive
-from upright.rigs.supervisor import Duty, Supervisor
+from upright.rigs.supervisor import PLAIN, PULSES, Duty, Supervisor
+from upright.simulation import simulate
 
 RIG = make_rig("furuta")
 MODEL = RIG.linear("inverted")
@@ -99,6 +100,29 @@ def test_a_broken_encoder_fails_the_check(broken, said):
     with pytest.raises(RigStopped, match=said):
         scene.beside.check()
     assert Fault.STOP in scene.rig.sample.faults
+
+
+def moved_by(rig, pulse, seconds=0.15):
+    """Counts that a pulse moves each coordinate by, until it has lasted and for as long after it."""
+    ticks = round(seconds / rig.period)
+    u = np.append(0.0, np.repeat([pulse, 0.0], ticks))
+    x = simulate(rig.plant, rig.drive, rig.plant.state("hanging"), u, rig.period, samples=2 * ticks + 2)[:, 0::2, 0]
+    return np.abs(x).max(axis=0) * rig.counts
+
+
+@pytest.mark.parametrize(("fineness", "share"), [(1.0, 0.02), (0.1, 0.05), (0.005, 0.4)])
+def test_the_pulse_is_the_least_that_shows_plainly_or_the_largest_where_none_does(fineness, share):
+    """The motion under each share of the largest command is simulated in one piece."""
+    rig = replace(RIG, counts=tuple(fineness * n for n in RIG.counts))
+    plain = [s for s in PULSES if moved_by(rig, s * RIG.limit).min() >= PLAIN]
+    assert min(plain, default=max(PULSES)) == share
+    scene = Scene(replace(DUTY, model=rig, limits=replace(LIMITS, travel=(math.inf,) * 2, speed=(math.inf,) * 2)), rig)
+    puts = []
+    write = scene.port.write
+    scene.port.write = lambda u: (puts.append(u), write(u))
+    scene.beside.prepare()
+    scene.beside.check()
+    assert max(puts) == pytest.approx(share * RIG.limit, abs=RIG.converter)
 
 
 def test_without_limits_nothing_is_armed():
