@@ -281,9 +281,13 @@ def test_rounding_of_coarse_encoders_is_not_taken_for_a_lie(make, far, seed):
     gains = design.place(linear.A, linear.B, [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220])
     law = design.feedback(design.filtered(sampled, 0.5), gains.K)
     truth, watch = coarse(worn(make_rig(make, seed), seed)), Watch(model)
-    _, alarm = guarded(watch, truth, law, start=[far, 0.0, 0.02, 0.0], seconds=2.0)
+    run, alarm = guarded(watch, truth, law, start=[far, 0.0, 0.02, 0.0], seconds=2.0)
     assert alarm.sample[0] == -1
+    assert np.any(run.u[-200:] != 0.0)  # the drive stays on
     swapped = replace(truth, scales=(1.0, -1.0))
-    _, alarm = guarded(watch, swapped, law, start=[far, 0.0, 0.02, 0.0], seconds=2.0)
+    run, alarm = guarded(watch, swapped, law, start=[far, 0.0, 0.02, 0.0], seconds=2.0)
+    spoke = int(alarm.sample[0])
+    assert np.all(run.u[spoke + 1 :] == 0.0)  # off for good, one sample after the alarm
+    assert abs(run.u[spoke]) == model.limit  # and not before: the wrong sign pushes with all there is
     assert alarm.what[0].name == "theta"
     assert 0 <= alarm.sample[0] * model.period < 0.1

@@ -111,6 +111,9 @@ def test_a_richer_model_that_was_led_astray_is_fitted_from_the_end_of_the_poorer
     ends: list[tuple[Problem, np.ndarray, float]] = []
 
     def astray(problem: Problem, candidates: Sequence[np.ndarray], log: SearchLog, *, patient: bool = True) -> Descent:
+        assert patient is (
+            not ends
+        )  # more attempts than one for the first model, which has no poorer one to start from
         found = search(problem, candidates, log, patient=patient)
         if len(ends) == 2:
             none = {"b_2c": 0.0, "b_2q": 0.0}
@@ -159,3 +162,16 @@ def test_a_richer_model_that_explains_more_and_predicts_less_is_a_rival_where_it
     assert apart == set(log.rivals) == names
     assert log.rivals == pytest.approx({n: other[n] for n in names}, rel=0.01)
     assert ["explained better with b_2q (" in w for w in log.warnings] == [True] * bool(names)
+
+
+def test_what_a_richer_model_gains_by_chance_is_no_rival() -> None:
+    """Under 0.03 rad of noise viscous friction, Coulomb friction and drag are told apart by nothing but luck."""
+    run, log = noisy(swing(PENDULUM | VISCOUS, angle=1.0, seconds=5.0), 0.03, seed=0), SearchLog()
+    chosen, (start,) = choose_friction(asked(**VISCOUS), [run], log)
+    assert chosen.estimated == ("J_p", "b_2")
+    poorer, richer = formulate(chosen, [run]), formulate(asked(**VISCOUS), [run])
+    end = descend_progressively(richer, richer.start)
+    # two numbers that mean nothing lower the cost by 5.99 variances of a residual in one case of 20 (chi squared)
+    assert 0 < poorer.cost(start) - end.normal.cost < 5.99 * end.normal.cost / run.t.size
+    assert richer.shared_at(end.x)["b_2"] < 0.5 * poorer.shared_at(start)["b_2"]
+    assert (log.rivals, log.warnings) == ({}, [])
