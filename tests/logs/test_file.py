@@ -18,7 +18,7 @@ import upright as up
 from tests.logs.runs import HEADER, row, written, wrong
 from upright.errors import BadInput
 from upright.logs import LogHeader, follow, recover
-from upright.logs.layout import RunFile
+from upright.logs.layout import RunFile, checked, holds
 from upright.logs.whole import log_of
 
 NUMBER = st.floats(allow_nan=False, allow_infinity=False)
@@ -55,6 +55,28 @@ def test_a_header_comes_back_as_it_was():
     old = {k: v for k, v in json.loads(texts["log"]["json"]).items() if k != "references"}
     assert LogHeader.of_metadata(texts | {"log": {"json": json.dumps(old)}}) == header
     assert header.fault_names(3) == ("WATCHDOG", "fault 2")
+
+
+@pytest.mark.parametrize("period", [0.0, -1e-3, 3600.0, float("nan"), float("inf")])
+def test_a_log_needs_a_period_between_none_and_an_hour(period):
+    replace(HEADER, period=3599.0)
+    with pytest.raises(BadInput, match="a log needs the period of its rows"):
+        replace(HEADER, period=period)
+
+
+def test_counts_ticks_modes_and_faults_are_whole_and_nothing_else_is():
+    assert [c.name for c in HEADER.columns if c.whole] == ["tick", "psi_counts", "theta_counts", "mode", "faults"]
+    assert HEADER.fault_names(0) == ()
+    assert HEADER.fault_names(6) == ("OVERTRAVEL", "OVERSPEED")
+    assert HEADER.fault_names(1 | 4 | 16) == ("fault 1", "OVERSPEED", "fault 16")
+
+
+def test_metadata_holds_in_whatever_order_it_is_read_and_not_when_a_letter_differs():
+    kept = checked({"b": "two", "a": "one"})
+    assert holds(dict(sorted(kept.items())))
+    assert holds(dict(sorted(kept.items(), reverse=True)))
+    assert not holds({**kept, "a": "One"})
+    assert not holds({"a": "one", "b": "two"})
 
 
 def test_mcap_itself_reads_rows_units_and_metadata():
