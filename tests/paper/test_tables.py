@@ -101,6 +101,23 @@ def test_a_diagonal_q_makes_table_1_on_a_rig_of_that_frequency():
     np.testing.assert_allclose(np.sort_complex(poles), np.sort_complex(np.array(printed.TABLE_1[0])), atol=2e-4)
 
 
+@pytest.mark.parametrize(
+    ("printed_misses", "right_misses", "shown"),
+    [
+        ((0.1, 2.0), (0.0, 1e-12), True),
+        ((0.0, 2.0), (0.0, 1e-12), False),  # what is printed holds on one of the rigs
+        ((0.1, 2.0), (0.0, 0.3), False),  # what is said to be right fails on one
+    ],
+)
+def test_an_erratum_is_shown_when_print_fails_on_every_rig_and_its_correction_on_none(
+    printed_misses, right_misses, shown
+):
+    erratum = tables.Erratum(
+        number=1, where="", printed="", right="", against="", printed_misses=printed_misses, right_misses=right_misses
+    )
+    assert erratum.shown is shown
+
+
 def test_each_erratum_is_shown_on_every_rig():
     assert [e.number for e in done().errata] == [1, 2, 3, 4, 5]
     assert all(e.shown for e in done().errata)
