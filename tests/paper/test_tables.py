@@ -33,6 +33,14 @@ def test_the_package_knows_the_tables_as_printed():
     assert printed.STUDENTS == tables.STUDENTS
 
 
+def test_gains_by_eq_2_are_asked_for_the_first_set_of_table_1_and_miss_it():
+    """The poles that were asked for are the print's; a gain for another model does not place them, on either side."""
+    np.testing.assert_array_equal(np.sort_complex(done().asked), np.sort_complex(np.array(printed.TABLE_1[0])))
+    assert np.abs(done().missed - done().asked).max() > 0.1
+    # the second of the unstable poles is the derived model's
+    assert done().unstable[1] == pytest.approx(max(NOMINAL.linear("inverted").poles().real))
+
+
 def test_all_32_poles_come_again_below_the_print_s_rounding():
     assert sum(p.size for t in done().tables for p in t.printed) == 32
     for table in done().tables:
