@@ -1,4 +1,7 @@
-"""How fast is it, beside what? `python -m benchmarks [NAMES] [--json FILE] [--quick] [--full]`."""
+"""How fast is it, beside what? `python -m benchmarks [NAMES] [--json FILE] [--quick] [--full]`.
+
+`python -m benchmarks mutants --sample 150 --seed N` asks which changes of the code the quick tests notice.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,8 @@ import importlib
 import json
 import platform
 import sys
+import time
+import traceback
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -24,7 +29,10 @@ NAMES = (
     "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "frequency", "swing_up", "tracking", "lab",
     "doctor", "rigs", "misfit", "verdicts", "regulation", "real", "agree", "bands", "starts", "startup",
     "workers", "long", "gpu", "crash", "safety", "minute", "soak", "jitter", "gym", "at_hand",
+    "mutants",
 )  # fmt: skip
+APART = ("mutants",)
+"""Those that run when they are named, and never among all: what is asked there is not how fast."""
 PUBLISHED = (
     "real", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "workers", "crash", "safety", "soak",
     "jitter", "gym",
@@ -82,20 +90,48 @@ def versions() -> dict[str, str]:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the benchmarks named; 1 when a target was missed."""
+    """Run the benchmarks named; 1 when one of them failed with an error, else 3 when a target was missed."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument("names", nargs="*", metavar="NAMES", help=f"which ones, of {', '.join(NAMES)}; default: all")
+    parser.add_argument(
+        "names",
+        nargs="*",
+        metavar="NAMES",
+        help=f"which ones, of {', '.join(NAMES)}; default: all but {', '.join(APART)}",
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every figure to a file too")
-    parser.add_argument("--quick", action="store_true", help="fewer rounds and smaller shares, under two minutes")
+    parser.add_argument("--quick", action="store_true", help="fewer rounds and smaller shares, three to four minutes")
     parser.add_argument("--full", action="store_true", help="run what is otherwise estimated from its parts")
     pages = ", ".join(PUBLISHED)
     parser.add_argument("--markdown", type=Path, metavar="FILE", help=f"write the page of one of {pages}")
     parser.add_argument("--starts", type=int, default=300, metavar="N", help="random starts of each study in `starts`")
-    parser.add_argument("--workers", type=int, default=1, metavar="N", help=f"processes for {', '.join(SHARED)}")
+    parser.add_argument(
+        "--workers", type=int, metavar="N", help=f"processes for {', '.join(SHARED)}; default 1; for mutants 2"
+    )
     parser.add_argument("--cluster", default="", metavar="ADDRESS", help="Dask scheduler for them, tcp://host:8786")
+    changes = parser.add_argument_group("mutants")
+    changes.add_argument("--sample", type=int, default=150, metavar="N", help="changes of the code; default 150")
+    changes.add_argument("--seed", type=int, default=0, metavar="N", help="which ones; default 0")
+    changes.add_argument(
+        "--within",
+        default="",
+        metavar="PATH",
+        help="only changes of a room, a file or a line: identification/ladder, gains/lqr.py:141",
+    )
+    changes.add_argument(
+        "--map",
+        type=Path,
+        metavar="FOLDER",
+        help="where it is kept which tests cover which lines; default: mutants in UPRIGHT_CACHE",
+    )
+    changes.add_argument(
+        "--judged",
+        type=Path,
+        metavar="FILE",
+        help="changes that make no difference, each `file:line before -> after  # reason`",
+    )
     asked = parser.parse_args(arguments)
     try:
-        shared = {"workers": Workers(number=asked.workers, cluster=asked.cluster)}
+        shared = {"workers": Workers(number=asked.workers or 1, cluster=asked.cluster)}
     except BadInput as error:
         parser.error(str(error))
     if asked.markdown and (len(asked.names) != 1 or asked.names[0] not in PUBLISHED):
@@ -106,21 +142,41 @@ def main(arguments: list[str] | None = None) -> int:
     console = Console(width=None if sys.stdout.isatty() else 200)
     told = Console(stderr=True)
     results: dict[str, Any] = {"versions": versions(), "lines": []}
-    missed = 0
-    for name in asked.names or NAMES:
-        extra: dict[str, Any] = {"fit": {"full": asked.full}, "starts": {"starts": asked.starts}}.get(name, {})
+    missed, failed = 0, []
+    options: dict[str, dict[str, Any]] = {
+        "fit": {"full": asked.full},
+        "starts": {"starts": asked.starts},
+        "mutants": {
+            "sample": asked.sample, "seed": asked.seed, "within": asked.within, "folder": asked.map,
+            "verdicts": asked.judged, "workers": asked.workers or 2,
+        },
+    }  # fmt: skip
+    for name in asked.names or [name for name in NAMES if name not in APART]:
+        extra = options.get(name, {})
         extra |= {"markdown": asked.markdown} if name in PUBLISHED else {}
         extra |= shared if name in SHARED else {}
-        module = importlib.import_module(f"benchmarks.{name}")
-        lines: list[Line] = module.run(
-            quick=asked.quick, progress=lambda text, name=name: told.print(f"[dim]{name}: {text}[/]"), **extra
-        )
+        begin = time.perf_counter()
+        try:
+            module = importlib.import_module(f"benchmarks.{name}")
+            lines: list[Line] = module.run(
+                quick=asked.quick,
+                progress=lambda text, name=name: told.print(f"[dim]{name}: {escape(text)}[/]"),
+                **extra,
+            )
+        except Exception:
+            told.print(f"[red]{name} failed[/]")
+            traceback.print_exc()
+            failed.append(name)
+            continue
         console.print(table(name, (module.__doc__ or "").splitlines()[0], lines))
         results["lines"] += [{"benchmark": name} | asdict(line) | {"reached": line.reached} for line in lines]
         missed += sum(line.reached is False for line in lines)
+        told.print(f"[dim]{name}: {time.perf_counter() - begin:.0f} s[/]")
     if asked.json:
         asked.json.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
-    return 1 if missed else 0
+    if failed:
+        told.print(f"[red]ended with an error: {', '.join(failed)}[/]")
+    return 1 if failed else 3 if missed else 0
 
 
 if __name__ == "__main__":

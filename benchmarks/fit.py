@@ -124,7 +124,7 @@ def run(*, quick: bool, full: bool, progress: Callable[[str], None]) -> list[Lin
             name="simplex over scalar C", run=simplex_in_c, error=relative_error, note="tanh friction"
         ),
     }
-    lines = compare(builders, rounds=3 if quick else 21, progress=progress)
+    lines = compare(builders, rounds=1 if quick else 21, progress=progress)
     if full:
         slow = with_solve_ivp()
         return lines + compare(

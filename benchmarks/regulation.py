@@ -211,9 +211,9 @@ class Calibration:
     z_of_all: float
 
     @property
-    def skill(self) -> float:
-        """Share of the uncertainty that the chances take away."""
-        return 1 - self.brier / self.uncertainty
+    def skill(self) -> float | None:
+        """Share of the uncertainty that the chances take away; None where all outcomes were the same: there is none."""
+        return 1 - self.brier / self.uncertainty if self.uncertainty else None
 
 
 def calibration(chances: Array, came: NDArray[np.bool_]) -> Calibration:
@@ -250,11 +250,15 @@ def run(
         told, each = of_each(partial(_twin, swept, flawed), twins, workers)
         kept = [t for t in told if t is not None]
         chances, came = np.array([t.chance for t in kept]), np.array([t.held for t in kept])
+        if not kept:
+            lines.append(Line(contender=what, seconds=each, note=f"none of {count} identifications succeeded"))
+            continue
         found = calibration(chances, came)
+        skill = "not defined, all ended alike" if found.skill is None else f"{found.skill:.2f}"
         lines.append(
             Line(
                 contender=what, seconds=each, error=found.brier,
-                note=f"Brier {found.brier:.3f}, {found.expected:.3f} if calibrated; skill {found.skill:.2f}; "
+                note=f"Brier {found.brier:.3f}, {found.expected:.3f} if calibrated; skill {skill}; "
                 f"Spiegelhalter z {found.z:+.2f}; {100 * came.mean():.0f} % of {len(kept)} held, "
                 f"told {100 * chances.mean():.0f} %",
             )
@@ -306,13 +310,14 @@ def reliability_figure(chances: Array, came: NDArray[np.bool_], *, bins: int = 1
 def table(what: str, found: Calibration, chances: Array, came: NDArray[np.bool_], strayed: int) -> list[str]:
     """Two tables of one kind of twins."""
     place = np.clip((chances * BINS + 1e-9).astype(int), 0, BINS - 1)
+    skill = "not defined, all ended alike" if found.skill is None else f"{100 * found.skill:.1f} %"
     lost = f"; for {strayed} more the identification said that it had failed" if strayed else ""
     out = [
         "", f"## {chances.size} twins {what}{lost}", "", "| | |", "|---|---|",
         f"| Brier score | {found.brier:.4f} |", f"| the same if the chances are right | {found.expected:.4f} |",
         f"| reliability (0 is best) | {found.reliability:.4f} |", f"| resolution | {found.resolution:.4f} |",
         f"| uncertainty: the score of always telling {100 * came.mean():.1f} % | {found.uncertainty:.4f} |",
-        f"| skill over that | {100 * found.skill:.1f} % |",
+        f"| skill over that | {skill} |",
         f"| Spiegelhalter's z (within ±1.96 for 95 % of right chances) | {found.z:+.2f} |",
         f"| z of how many held, of {chances.sum():.1f} told (within ±1.96 likewise) | {found.z_of_all:+.2f} |",
         "", "| chance told | twins | mean told | came true |", "|---|---|---|---|",

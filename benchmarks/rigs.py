@@ -153,7 +153,7 @@ def run(
     *, quick: bool, progress: Callable[[str], None], markdown: Path | None = None, workers: Workers = HERE
 ) -> list[Line]:
     """Share of intervals that hold the truth by plant and kind of number."""
-    each = 8 if quick else 40
+    each = 2 if quick else 40
     done: dict[str, tuple[list[Outcome], Spread]] = {}
     for place, make in enumerate(MAKES):
         progress(f"{each} rigs like {make.plant}")

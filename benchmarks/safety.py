@@ -250,7 +250,7 @@ def left_alone(*, quick: bool, progress: Callable[[str], None]) -> tuple[list[Li
     """Loops in which nothing is broken, as lines of the benchmark and of the page."""
     lines: list[Line] = []
     body = ["", "## Nothing broken", "", *str(sound.__doc__).splitlines()[2:], "", *SOUND_HEAD]
-    for make in sound.MAKES:
+    for make in sound.MAKES[: 1 if quick else None]:
         for kind in sound.KINDS:
             progress(f"nothing broken: {make}, {kind}")
             found = sound.all_of(make, kind, sound.QUICK if quick else sound.SEEDS)
@@ -276,7 +276,7 @@ SOUND_HEAD = (
 
 
 def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None = None) -> list[Line]:
-    """Break everything in turn, on every column that can run here."""
+    """Break everything in turn, on every column that can run here; `quick`, every eighth thing."""
     lines: list[Line] = []
     body: list[str] = []
     late: list[str] = []
@@ -287,7 +287,7 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
             body.append(f"Left out: {reason}.")
             continue
         body += HEAD
-        for hazard in hazards:
+        for hazard in hazards[:: 8 if quick and markdown is None else 1]:
             progress(f"{column.name}: {hazard.what}")
             try:
                 found = hazard.tell(column)

@@ -26,7 +26,7 @@ from upright.rigs.driven import DrivenScale, StillDrive
 from upright.rigs.supervisor import Duty, Supervisor
 
 MAKES = ("furuta", "linear")
-SEEDS, QUICK = range(1, 31), range(1, 3)
+SEEDS, QUICK = range(1, 31), range(1, 2)
 SECONDS = 4.0
 FREE = Limits(travel=(math.inf,) * 2, speed=(math.inf,) * 2, start=(math.inf,) * 2, command=5.0, saturation=1e9)
 FAR = {"furuta": 0.4, "linear": 0.05}

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from upright.closed_loop.intervals import averaged, nearest, range_of, sharpen
-from upright.closed_loop.regression import Columns, Family, Regression
+from upright.closed_loop.intervals import averaged, nearest, numbers, range_of, sharpen
+from upright.closed_loop.regression import Columns, Family, Regression, Signals
 
 
 def proportional(x, gain=0.0):
@@ -105,3 +105,58 @@ def test_a_sum_of_gains_is_known_where_neither_is():
     low, high = range_of(X, np.full(9, 4.0), np.array([1.0, 1.0]), 0.25)
     assert (low, high) == pytest.approx((3.75, 4.25))
     assert np.diff(range_of(X, np.full(9, 4.0), np.array([1.0, 0.0]), 0.25))[0] > 1e6
+
+
+def told(smoothing, terms, gains, pole=0.0, *, on="error", names=("a",)):
+    """Every number, and how it changes with each gain and the pole, as its interval is asked for."""
+    asked = []
+
+    def width(v):
+        asked.append(v)
+        return 1.0, 3.0
+
+    one = np.zeros(4)
+    columns = Columns(terms=terms, X=np.zeros((4, len(terms))), slope=np.zeros((4, len(terms))))
+    family = Family(on=on, smoothing=smoothing)
+    best = Regression(family=family, pole=pole, columns=columns, gains=np.array(gains), missed=0.0)
+    signals = Signals(
+        names=names, pairs=((one, None),) * len(names), feedforward=(("f", one),), period=0.01, every=1, moving=one
+    )
+    return numbers(best, signals, width), asked
+
+
+def slopes(value, at, h=1e-6):
+    """Central differences."""
+    return [(value(at + h * e) - value(at - h * e)) / (2 * h) for e in np.eye(len(at))]
+
+
+def test_numbers_change_with_gains_as_their_differences_say():
+    """kd is both taps together, the second tap its share; a filter's time constant is T a/(1 - a) for its pole a."""
+    terms = (("kp", 0), ("kd", 0), ("kd2", 0), ("ff", 0), ("1", 0))
+    at = np.array([2.0, 0.3, 0.1, 0.7, 5.0, 0.0])
+    found, asked = told("two taps", terms, at[:-1])
+    of = {"kp": lambda x: x[0], "kd": lambda x: x[1] + x[2], "second tap": lambda x: x[2] / (x[1] + x[2]),
+          "factor f": lambda x: x[3]}  # fmt: skip
+    assert list(found) == list(of)
+    for (name, value), v in zip(of.items(), asked, strict=True):
+        assert found[name].value == pytest.approx(value(at))
+        assert v == pytest.approx(slopes(value, at), abs=1e-8)
+        # one below and three above are four, of two times 1.96 standard errors
+        assert found[name].interval == pytest.approx((value(at) - 1, value(at) + 3))
+        assert found[name].stderr == pytest.approx(4 / 3.92)
+    at = np.array([2.0, 0.3, 0.1, 0.7, 0.8])
+    found, asked = told("filter", (("kp", 0), ("ki", 0), ("kd", 0), ("ff", 0)), at[:-1], 0.8)
+    assert list(found) == ["kp", "ki", "kd", "tau", "factor f"]
+    assert found["tau"].value == pytest.approx(0.04)
+    assert asked[3] == pytest.approx(slopes(lambda x: 0.01 * x[4] / (1 - x[4]), at), abs=1e-8)
+    assert found["tau"].meaning == "low pass of the difference [s], corner 3.979 Hz"  # 1/(2 pi 0.04 s)
+    assert told("filter", (("kd", 0), ("ff", 0)), [1.0, 0.0])[0]["tau"].meaning == "low pass of the difference [s]"
+
+
+def test_numbers_of_two_channels_bear_the_names_of_their_signals():
+    terms = (("kp", 0), ("kd", 0), ("kd2", 0), ("ki", 1), ("ff", 0))
+    found, _ = told("two taps", terms, [2.0, 0.3, 0.1, 4.0, 0.0], on="measurement", names=("a", "b"))
+    assert list(found) == ["kp a", "kd a", "second tap a", "ki b", "factor f"]
+    assert found["kd a"].meaning == "on the rate of a [s]"
+    assert found["kp a"].meaning == "on the error of a"
+    assert found["ki b"].meaning == "on the sum of the error of b [1/s]"

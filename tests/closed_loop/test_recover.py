@@ -40,8 +40,17 @@ def test_every_structure_is_found_exactly(structure: str, program: dict) -> None
             assert found.gains[name].value == pytest.approx(program[name], rel=1e-7)
         else:
             assert name not in found.gains
+    read = "y" if program.get("on") == "measurement" else "the error of y"
+    meanings = {
+        "kp": "on the error of y", "ki": "on the sum of the error of y [1/s]", "kd": f"on the rate of {read} [s]",
+    }  # fmt: skip
+    assert {n: g.meaning for n, g in found.gains.items() if n in meanings} == {
+        n: m for n, m in meanings.items() if program.get(n)
+    }
     if program.get("tau"):
         assert found.gains["tau"].value == pytest.approx(program["tau"], rel=1e-6)
+        corner = 1 / (2 * np.pi * program["tau"])  # of a low pass of the first order
+        assert found.gains["tau"].meaning.endswith(f"corner {corner:.4g} Hz")
     if program.get("second"):
         assert found.gains["second tap"].value == pytest.approx(program["second"], rel=1e-6)
 

@@ -19,6 +19,15 @@ def test_murphy_s_parts_make_up_the_brier_score():
     assert found.skill == pytest.approx((found.resolution - found.reliability) / found.uncertainty)
 
 
+@pytest.mark.parametrize("came", [True, False])
+def test_chances_of_twins_that_all_end_alike_have_no_skill_to_speak_of(came):
+    """The uncertainty of the outcomes is zero, and skill is a share of it; the Brier score is still a number."""
+    found = calibration(np.array([0.8, 0.6]), np.array([came, came]))
+    assert found.uncertainty == 0.0
+    assert found.skill is None
+    assert found.brier == pytest.approx((0.04 + 0.16) / 2 if came else (0.64 + 0.36) / 2)
+
+
 def test_spiegelhalter_s_z_is_standard_normal_for_right_chances_and_not_for_bold_ones():
     rng = np.random.default_rng(6)
     z: list[float] = []

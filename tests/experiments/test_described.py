@@ -235,7 +235,7 @@ def test_a_rig_of_one_s_own_runs_on_one_that_its_fit_allows(tmp_path):
 
 
 def test_without_a_covariance_nothing_can_be_drawn(study, tmp_path):
-    with pytest.raises(BadInput, match="this fit has none; leave --seed out"):
+    with pytest.raises(BadInput, match="this fit has none; give no seed"):
         run(study(), tmp_path, seed=1)
 
 

@@ -72,6 +72,19 @@ def test_a_rule_is_called_with_time_and_its_own_memory():
     np.testing.assert_array_equal(u, rule.follow(READINGS[:, 0], 1e-3)[0])
 
 
+def follower(t, y, r, z, p):
+    return (r[0] - y[0],), ()
+
+
+def test_references_begin_with_the_first_sample_and_the_last_is_held():
+    """Of a rule and of a linear law alike: r = 1, 2, 4 and 4 from then on."""
+    r = [[1.0], [2.0], [4.0]]
+    linear = Law(np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((1, 0)), [[-1.0, 1.0]], references=r)
+    for law in (Rule(function=follower, references=r), linear):
+        step = at_work(law)
+        assert [step(1e-3 * k, (0.5,))[0] for k in range(5)] == [0.5, 1.5, 3.5, 3.5, 3.5]
+
+
 def test_a_rule_is_limited_and_rounded():
     step = at_work(Rule(function=hop, initial=[0.0], parameters=[2.03], limit=2.0, command_quantum=0.25))
     assert step(0.0, (1.0,)) == (-2.0,)

@@ -18,7 +18,7 @@ import upright as up
 from tests.logs.runs import HEADER, row, written, wrong
 from upright.errors import BadInput
 from upright.logs import LogHeader, follow, recover
-from upright.logs.layout import RunFile
+from upright.logs.layout import RunFile, checked, holds, row_schema
 from upright.logs.whole import log_of
 
 NUMBER = st.floats(allow_nan=False, allow_infinity=False)
@@ -55,6 +55,28 @@ def test_a_header_comes_back_as_it_was():
     old = {k: v for k, v in json.loads(texts["log"]["json"]).items() if k != "references"}
     assert LogHeader.of_metadata(texts | {"log": {"json": json.dumps(old)}}) == header
     assert header.fault_names(3) == ("WATCHDOG", "fault 2")
+
+
+@pytest.mark.parametrize("period", [0.0, -1e-3, 3600.0, float("nan"), float("inf")])
+def test_a_log_needs_a_period_between_none_and_an_hour(period):
+    replace(HEADER, period=3599.0)
+    with pytest.raises(BadInput, match="a log needs the period of its rows"):
+        replace(HEADER, period=period)
+
+
+def test_counts_ticks_modes_and_faults_are_whole_and_nothing_else_is():
+    assert [c.name for c in HEADER.columns if c.whole] == ["tick", "psi_counts", "theta_counts", "mode", "faults"]
+    assert HEADER.fault_names(0) == ()
+    assert HEADER.fault_names(6) == ("OVERTRAVEL", "OVERSPEED")
+    assert HEADER.fault_names(1 | 4 | 16) == ("fault 1", "OVERSPEED", "fault 16")
+
+
+def test_metadata_holds_in_whatever_order_it_is_read_and_not_when_a_letter_differs():
+    kept = checked({"b": "two", "a": "one"})
+    assert holds(dict(sorted(kept.items())))
+    assert holds(dict(sorted(kept.items(), reverse=True)))
+    assert not holds({**kept, "a": "One"})
+    assert not holds({"a": "one", "b": "two"})
 
 
 def test_mcap_itself_reads_rows_units_and_metadata():
@@ -176,6 +198,34 @@ def test_what_is_recovered_is_whole_to_mcap_itself(tmp_path):
     assert found.lost_bytes == torn.stat().st_size - found.log.readable
     with pytest.raises(BadInput, match="would be overwritten"):
         recover(torn, torn)
+
+
+def test_events_keep_their_places_among_the_rows_that_are_recovered(tmp_path):
+    """Before the first row, between two and behind the last; what was dropped stays said."""
+    stream = io.BytesIO()
+    file = RunFile(stream, HEADER)
+    for k in range(6):
+        if k in (0, 3):
+            file.event(k * 1e-3, "note", f"before row {k}", dropped=k)
+        file.row(row(k))
+    file.event(6e-3, "stop", "behind them all")
+    file.finish()
+    path = tmp_path / "run.mcap"
+    path.write_bytes(stream.getvalue())
+    recover(path, tmp_path / "whole.mcap")
+    events = log_of((tmp_path / "whole.mcap").read_bytes(), "whole.mcap").events
+    assert [(e.row, e.text, e.dropped) for e in events] == [
+        (0, "before row 0", 0), (3, "before row 3", 3), (6, "behind them all", 0),
+    ]  # fmt: skip
+
+
+def test_viewers_are_told_what_the_numbers_of_modes_and_faults_mean():
+    fields = json.loads(row_schema(HEADER))["properties"]
+    assert fields["mode"]["description"] == "one of 0 IDLE, 2 HOST, 4 FAULT"
+    assert fields["faults"]["description"] == "sum of 2 OVERTRAVEL, 4 OVERSPEED"
+    assert "description" not in fields["psi"]
+    assert "description" not in json.loads(row_schema(replace(HEADER, modes={})))["properties"]["mode"]
+    assert [fields[name]["type"] for name in ("psi", "psi_counts", "mode")] == ["number", "integer", "integer"]
 
 
 def test_the_tail_of_a_growing_log_is_every_row_once(tmp_path):

@@ -33,6 +33,14 @@ def test_the_package_knows_the_tables_as_printed():
     assert printed.STUDENTS == tables.STUDENTS
 
 
+def test_gains_by_eq_2_are_asked_for_the_first_set_of_table_1_and_miss_it():
+    """The poles that were asked for are the print's; a gain for another model does not place them, on either side."""
+    np.testing.assert_array_equal(np.sort_complex(done().asked), np.sort_complex(np.array(printed.TABLE_1[0])))
+    assert np.abs(done().missed - done().asked).max() > 0.1
+    # the second of the unstable poles is the derived model's
+    assert done().unstable[1] == pytest.approx(max(NOMINAL.linear("inverted").poles().real))
+
+
 def test_all_32_poles_come_again_below_the_print_s_rounding():
     assert sum(p.size for t in done().tables for p in t.printed) == 32
     for table in done().tables:
@@ -99,6 +107,23 @@ def test_a_diagonal_q_makes_table_1_on_a_rig_of_that_frequency():
     gains = np.array([model.B[1, 0], model.B[1, 0], model.B[3, 0], model.B[3, 0]]) ** 2
     poles = np.linalg.eigvals(model.A - model.B @ lqr(model.A, model.B, done().weights[w_h] / gains, 1.0))
     np.testing.assert_allclose(np.sort_complex(poles), np.sort_complex(np.array(printed.TABLE_1[0])), atol=2e-4)
+
+
+@pytest.mark.parametrize(
+    ("printed_misses", "right_misses", "shown"),
+    [
+        ((0.1, 2.0), (0.0, 1e-12), True),
+        ((0.0, 2.0), (0.0, 1e-12), False),  # what is printed holds on one of the rigs
+        ((0.1, 2.0), (0.0, 0.3), False),  # what is said to be right fails on one
+    ],
+)
+def test_an_erratum_is_shown_when_print_fails_on_every_rig_and_its_correction_on_none(
+    printed_misses, right_misses, shown
+):
+    erratum = tables.Erratum(
+        number=1, where="", printed="", right="", against="", printed_misses=printed_misses, right_misses=right_misses
+    )
+    assert erratum.shown is shown
 
 
 def test_each_erratum_is_shown_on_every_rig():

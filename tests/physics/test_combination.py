@@ -16,6 +16,7 @@ NAMES = ("x", "theta_1", "theta_2")
         ("-(x - 3*theta_1)/2", {"x": -0.5, "theta_1": 1.5}),
         ("x*2 + 0.3*theta_2 - x", {"x": 1.0, "theta_2": 0.3}),
         ("0*x + theta_1 + 2 - 2", {"theta_1": 1.0}),
+        ("+x - +theta_1", {"x": 1.0, "theta_1": -1.0}),
     ],
 )
 def test_factors_are_those_of_the_sum(text, factors):

@@ -171,6 +171,12 @@ def test_a_file_that_cannot_be_used_is_named(name, sentence):
         find(name, EXAMPLES)
 
 
+@pytest.mark.parametrize("name", ["Plant", "Joint", "quantity", "HALF"])
+def test_what_a_file_imports_or_defines_besides_is_no_plant_of_its(name, tmp_path):
+    with pytest.raises(BadInput, match=f"has no plant '{name}'"):
+        find(f"mine.py:{name}", write(tmp_path, RIGHT + "\nHALF = 0.5\n"))
+
+
 def test_a_constant_angle_and_a_gear_ratio_are_taken_out_of_the_sines(tmp_path):
     """cos(x + alpha) by the addition theorem, cos(n x) with its ratio as a lump: both against plain evaluation."""
     from math import sin

@@ -130,6 +130,7 @@ class IdentifiedRig:
     def described(
         self, given: Mapping[str, Entry | None] | None = None, *, vendor: str = "",
         needs: Collection[str] = ("limit", "servo_period", "counts"), who: str = "a simulation",
+        form: str = "--{} {}",
     ) -> RigDescription:  # fmt: skip
         """What is known of drive, encoders and servo: what a call gives, what the fit says, the data sheet named.
 
@@ -143,6 +144,8 @@ class IdentifiedRig:
             What may not be missing; ``"counts"`` is those of every encoder.
         who : str
             Verb that asks.
+        form : str
+            How its caller gives a number by name: an option, an argument ``"{}={}"``; empty where only files say it.
 
         Raises
         ------
@@ -153,12 +156,11 @@ class IdentifiedRig:
         said = replace(self.description, vendor=chosen).given(given or {})
         if chosen:
             said = said.over(sheet(chosen, self.plant, self.unit))
-        dash, equals = ("", "=") if who == "chance" else ("--", " ")  # which has no command line
-        counts = {f"counts.{c.name}": f"{dash}counts{equals}4096" for c in self.plant.coordinates}
+        counts = {f"counts.{c.name}": form.format("counts", 4096) for c in self.plant.coordinates}
         options = {"limit": "10", "servo_period": '"2 ms"', "travel": "0.2"}
-        options = {n: f"{dash}{n.removeprefix('servo_')}{equals}{value}" for n, value in options.items()}
+        options = {n: form.format(n.removeprefix("servo_"), value) for n, value in options.items()}
         wanted = {n: w for n, w in options.items() if n in needs} | (counts if "counts" in needs else {})
-        said.demand(wanted, who)
+        said.demand(wanted, who, sheet=form.format("vendor", "NAME") or 'vendor = "NAME" in RIG.toml')
         if "delay" not in said.entries and "servo_period" in said.entries:
             late = Entry(value=said.entries["servo_period"].value, unit="s", source="assumed: one servo period")
             said = said.given({"delay": late})
@@ -200,7 +202,7 @@ class IdentifiedRig:
             return make_rig(make.key, seed)
         if not self.draws:
             raise BadInput(
-                "a rig to run on is drawn from the fit's covariance, and this fit has none; leave --seed out, or "
+                "a rig to run on is drawn from the fit's covariance, and this fit has none; give no seed, or "
                 "identify the rig from its logs (upright identify)."
             )
         plant, gain = self.draws[int(np.random.default_rng([seed, 59]).integers(len(self.draws)))]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time as clock
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -193,10 +194,9 @@ def carry_out(
     except RigStopped as stop:
         end["stopped"] = str(stop)
     except KeyboardInterrupt:
-        beside.rig.estop()
-        beside.faults |= Fault.STOP
-        hear(0.0, "fault", "stopped by Ctrl-C or a signal")
         end["stopped"] = "Stopped by Ctrl-C or a signal."
+        with suppress(RigStopped):
+            beside.give_up(Fault.STOP, end["stopped"])
     finally:
         if not finished:
             beside.rig.estop()

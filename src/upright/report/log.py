@@ -94,20 +94,26 @@ def _remarks(column: Column) -> list[str]:
 def draw_columns(record: Record, seen: Inspection) -> Figure:
     """One panel per column over time [s]; spans at rest are grey, gaps are marked.
 
-    Left out are columns that do not move, time and sample index; drives come last.
+    Left out are columns that do not move, time and sample index; drives come last. Where nothing moves, the constant
+    columns are drawn, so that no axis is empty.
     """
-    moving = [c for c in seen.columns if not c.constant and not any("the time" in s or "index" in s for s in c.lies)]
-    columns = sorted(moving, key=lambda c: c.drive)[:MOST_PANELS]
-    drawing = figure(1.1 + 1.15 * max(len(columns), 1))
-    panels: list[Any] = drawing.subplots(max(len(columns), 1), 1, sharex=True, squeeze=False)[:, 0].tolist()
-    for i, (axes, column) in enumerate(zip(panels, columns, strict=False)):
+    signals = [c for c in seen.columns if not any("the time" in s or "index" in s for s in c.lies)] or [*seen.columns]
+    moving = [c for c in signals if not c.constant]
+    columns = sorted(moving or signals, key=lambda c: c.drive)[:MOST_PANELS]
+    drawing = figure(1.1 + 1.15 * len(columns))
+    panels: list[Any] = drawing.subplots(len(columns), 1, sharex=True, squeeze=False)[:, 0].tolist()
+    for i, (axes, column) in enumerate(zip(panels, columns, strict=True)):
         colour, _ = CYCLE[i % len(CYCLE)]
-        for start, stop in seen.rests:
+        for start, stop in seen.rests if moving else ():
             axes.axvspan(start, stop, color="#f0f0f0", linewidth=0)
         for gap in seen.time.gaps[:20]:
             axes.axvline(gap.start, color=GREY, linewidth=0.6, linestyle=":")
         t, y = decimated(record.t, record[column.name], buckets=800)
         axes.plot(t, y, color=colour, linewidth=1.0, drawstyle="steps-post" if column.stepwise else "default")
+        if column.constant:
+            reach = max(abs(column.low), 1.0)  # the line in the middle, and a scale that can be read
+            axes.set_ylim(column.low - reach, column.low + reach)
+            axes.text(0.01, 0.9, f"constant {column.low:g}", transform=axes.transAxes, fontsize=8, color=GREY, va="top")
         unit = column.unit or (f"{column.guess}?" if column.guess else "")
         name = column.name if len(column.name) <= 30 else "…" + column.name[-29:]
         name = f"{name}\n[{unit}]" if unit else name  # shown as the log spells it
@@ -116,7 +122,6 @@ def draw_columns(record: Record, seen: Inspection) -> Figure:
             axes.set_title(column.lies[0], fontsize=8, color=GREY, parse_math=False)
     hide_inner_times(panels)
     drawing.align_ylabels(panels)
-    drawing.suptitle(
-        f"{Path(seen.file).name}, {seen.time.samples} samples, grey: at rest", fontsize=10, parse_math=False
-    )
+    state = "grey: at rest" if moving else "nothing moves"
+    drawing.suptitle(f"{Path(seen.file).name}, {seen.time.samples} samples, {state}", fontsize=10, parse_math=False)
     return drawing

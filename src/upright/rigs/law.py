@@ -36,7 +36,7 @@ def for_rig(law: Law | Rule, about: Capabilities, limits: Limits, target: Sequen
     if law.period and not math.isclose(law.period, about.period, rel_tol=1e-3):
         raise BadInput(
             f"this law is made for a period of {1e3 * law.period:.6g} ms, and {name} ticks every "
-            f'{1e3 * about.period:.6g} ms; design for that: --period "{1e3 * about.period:.6g} ms".'
+            f'{1e3 * about.period:.6g} ms; design for that: upright design FIT --period "{1e3 * about.period:.6g} ms".'
         )
     return replace(law, **changes, **({} if target is None else {"target": np.array(target, dtype=np.float64)}))
 

@@ -73,15 +73,17 @@ class RigDescription:
         """Value of an entry, or the default, which has to mean that there is none of it."""
         return self.entries[name].value if name in self.entries else default
 
-    def demand(self, wanted: Mapping[str, str], who: str) -> None:
+    def demand(self, wanted: Mapping[str, str], who: str, *, sheet: str) -> None:
         """Ask for entries that are not there.
 
         Parameters
         ----------
         wanted : mapping of str to str
-            Names of entries, and how the command line says each: ``{"limit": "--limit 10"}``; "" where it has no way.
+            Names of entries, and how the caller gives each: ``{"limit": "--limit 10"}``; "" where it has no way.
         who : str
             Verb that needs them.
+        sheet : str
+            How the caller names a data sheet: ``"--vendor NAME"``.
 
         Raises
         ------
@@ -94,8 +96,9 @@ class RigDescription:
         vendors = " or ".join(f'"{v}"' for v in VENDORS)
         asked = "; ".join(f"{meaning_of(n)} ({' or '.join(w for w in (wanted[n], place_of(n)) if w)})" for n in missing)
         raise BadInput(
-            f"{who} needs what neither the study nor its fit says: {asked}. Say so on the command line, or in the study"
-            f" and identify again; --vendor takes a data sheet by name ({vendors}) where the rig is one of those."
+            f"{who} needs what neither the study nor its fit says: {asked}. "
+            f"{'Give it as shown, or write it' if any(wanted.values()) else 'Write it'} into the study and identify "
+            f"again; {sheet} takes a data sheet by name ({vendors}) where the rig is one of those."
         )
 
     def unlike(self, other: RigDescription) -> tuple[str, ...]:

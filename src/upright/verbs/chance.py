@@ -86,7 +86,7 @@ def chance(
         raise BadInput(f"counts needs {len(names)} numbers, one for each coordinate, got {len(each)}.")
     listed = dict(zip(names, each, strict=False))
     given = rig_options(known.plant, known.unit, limit=limit, period=period, counts=listed)
-    said = known.described(given, vendor=vendor, who="chance")
+    said = known.described(given, vendor=vendor, who="chance", form="{}={}")
     rig, make = known.rig(said), known.made_by(said.vendor)
     usual = make.start if make else START
     model = rig.linear("inverted")

@@ -20,7 +20,7 @@ from upright.laws import as_values
 from upright.logs import read_log
 from upright.logs.replay import replay
 from upright.realtime.session import QUIET, RunOrder, carry_out
-from upright.report.run import chapter
+from upright.report.run import chapter, draw_run
 from upright.rigs import Fault
 
 RIG = make_rig("furuta")
@@ -141,6 +141,40 @@ def test_a_run_that_ended_well_leaves_no_fault_in_the_rig(folder, tmp_path):
     order = RunOrder(make=lambda: stage, law=as_values(law), seconds=0.1, log=tmp_path / "run.mcap", check=False)
     assert not carry_out(order, law=law).stopped
     assert stage.supervisor.rig.sample.faults == Fault(0)
+
+
+def test_ctrl_c_stops_a_run_at_the_time_it_has_reached(folder, tmp_path):
+    """Pressed when 0.5 s of the loop are over, which a twin shows at every 100th of its ticks of 0.884 ms."""
+    began: list[float] = []
+
+    def watch(state):
+        began.append(state.time)
+        if state.time - began[0] >= 0.5:
+            raise KeyboardInterrupt
+        return ""
+
+    wish = RunRequest(rig=folder / "RIG.toml", excite="free", seconds=2.0, check=False)
+    done = run_rig(wish, tmp_path, watch=watch)
+    t, kind, _ = done.end.events[-1]
+    assert kind == "fault"
+    assert t == pytest.approx(began[-1], abs=1.5 * RIG.period)
+    assert t == pytest.approx(done.log.columns["t"][-1], abs=1.5 * RIG.period)
+    assert done.log.events[-1].t == t
+    assert done.end.faults & Fault.STOP
+    assert "0.5" in done.verdict or "0.6" in done.verdict
+
+
+def test_a_run_in_which_nothing_moves_is_drawn_with_no_empty_axis(folder, tmp_path):
+    """Twin and command rest: every column is a constant, drawn inside its axis, which says so."""
+    wish = RunRequest(rig=folder / "RIG.toml", excite="free", seconds=0.2, check=False)
+    drawing = draw_run(run_rig(wish, tmp_path).log)
+    names = [axes.get_ylabel().split("\n")[0] for axes in drawing.axes]
+    assert {"psi", "theta", "u"} <= set(names)
+    for axes, name in zip(drawing.axes, names, strict=True):
+        (line,) = axes.get_lines()
+        low, high = axes.get_ylim()
+        assert low < min(line.get_ydata()) == max(line.get_ydata()) < high, name
+        assert any("constant" in text.get_text() for text in axes.texts)
 
 
 def test_a_loop_waits_for_a_driven_body_that_is_off_its_start_window(folder, tmp_path):

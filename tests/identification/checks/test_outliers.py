@@ -10,7 +10,15 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from tests.identification.twins import PENDULUM, noisy, rig, swing
-from upright.identification.checks.outliers import BUMPED, SELF_EXCITED, SPIKES, TOUCHED, outliers, without_outliers
+from upright.identification.checks.outliers import (
+    BUMPED,
+    SELF_EXCITED,
+    SPIKES,
+    TOUCHED,
+    outliers,
+    refit_without_outliers,
+    without_outliers,
+)
 from upright.identification.estimate import identify
 from upright.identification.model.runs import Run
 from upright.physics import Pendulum, find
@@ -156,3 +164,30 @@ def test_a_fast_motion_is_no_spike():
     assert spikes(steps).size == 0
     x[100] += 2.0
     assert spikes(x).tolist() == [100]
+
+
+@pytest.mark.parametrize("interrupted", [False, True])
+def test_reasons_are_those_of_the_last_fit_that_was_finished(interrupted):
+    """A fit that was broken off is no model to judge by: what the first one found strange stays so."""
+    question, runs = rig(Pendulum, PENDULUM, GUESSES), swings(3)
+    runs[2] = noisy(pushed(runs[2], 5.03, 1.5), 1e-3, 99)
+    first = identify(question, runs, watch=False)
+    second = identify(question, without_outliers(runs, outliers(first, question, runs)), watch=False)
+    # broken off where friction was still far too large, which misses other stretches
+    b_2 = second.estimates["b_2"]
+    wrong = {**second.estimates, "b_2": replace(b_2, value=3 * b_2.value)}
+    broken = replace(second, estimates=wrong, interrupted=True)
+    last = broken if interrupted else second
+    calls = []
+
+    def again(kept):
+        calls.append(kept)
+        return last
+
+    fit = refit_without_outliers(first, question, runs, again)
+    by_first, by_last = ([o.sentence for o in outliers(f, question, runs)] for f in (first, last))
+    assert by_first != by_last
+    told = [w.removeprefix("Outlier: ") for w in fit.warnings if w.startswith("Outlier: ")]
+    assert told == (by_first if interrupted else by_last)
+    assert len(calls) == 1 or not interrupted
+    assert fit.interrupted is interrupted

@@ -88,6 +88,17 @@ def test_the_model_of_the_filter_is_the_linear_plant_integrated_over_a_sample() 
     np.testing.assert_allclose(Q[0], expected, rtol=1e-8, atol=1e-12 * np.abs(expected).max())
 
 
+def test_back_emf_of_the_drive_damps_its_own_joint_as_friction_there_does() -> None:
+    run = balanced(0, seconds=1.5)
+    slope = 3e-4
+    drive, joint = (
+        posed(run, LEVELS, **changes) for changes in ({"actuator.slope": slope}, {"b_1": VALUES["b_1"] + slope})
+    )
+    for Phi, expected in zip(*(discrete_model(p.solver(0), p.tracks[0], {**p.base}, 1) for p in (drive, joint)),
+                             strict=True):  # fmt: skip
+        np.testing.assert_allclose(Phi, expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
+
+
 def test_the_gain_settles_at_the_solution_of_the_riccati_equation() -> None:
     problem = posed(balanced(0, seconds=3.0), LEVELS)
     track = problem.tracks[0]

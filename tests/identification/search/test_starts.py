@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, shaken, swing
+from upright.closed_loop.structures import ClosedLoop, pid
 from upright.identification.model.rig import base_values
-from upright.identification.search.starts import friction_from_energy, observe, regress, turning_points
+from upright.identification.search.starts import friction_from_energy, observe, regress, samples_of, turning_points
 from upright.physics import Furuta, Pendulum
 from upright.signals.smoothing import dominant_period, savitzky_golay
 
@@ -56,6 +59,28 @@ def test_smoothing_polynomials_are_exact_for_polynomials() -> None:
     assert motion.q == pytest.approx(t**4 - 2 * t**2, abs=1e-10)
     assert motion.v == pytest.approx(4 * t**3 - 4 * t, abs=1e-8)
     assert motion.a == pytest.approx(12 * t**2 - 4, abs=1e-5)
+
+
+@pytest.mark.parametrize(("runs", "samples"), [(1, 4500), (3, 1800), (10, 1500)])
+def test_long_runs_share_six_thousand_samples_and_keep_fifteen_hundred_each(runs: int, samples: int) -> None:
+    """Of 9000 samples every second is taken, one in ceil(9000/2000) = 5 of three runs, one in 6 of ten."""
+    run = swing(seconds=9000 * 2e-3 - 2e-3, dt=2e-3)
+    assert run.t.size == 9000
+    found = samples_of(rig(Pendulum, PENDULUM, {"J_p": 2e-3}), [run] * runs)
+    assert [(s.q.shape[1], s.dt) for s in found] == [(samples, pytest.approx(2e-3 * 9000 / samples))] * runs
+
+
+def test_a_law_runs_at_its_own_rate_through_a_run_that_was_thinned() -> None:
+    """An integrator of five samples a row sums -theta dt, whether every row or every third is looked at."""
+    run = swing(angle=0.5, seconds=6.0)
+    law = pid(ki=2.0, period=2e-3, measured="theta")
+    closed = replace(run, loop=ClosedLoop(law=law, every=5))
+    asked = rig(Pendulum, PENDULUM, {"J_p": 2e-3})
+    (sample,) = samples_of(asked, [closed], most=250)
+    assert sample.q.shape[1] == 201
+    sums = -2.0 * np.concatenate([[0.0], np.cumsum((run.y[1:, 0] + run.y[:-1, 0]) / 2 * 0.01)])[::3]
+    # rectangles of 2 ms under 0.5 rad, and what smoothing over a fiftieth of a second takes off the turns
+    assert np.abs(sample.u[0] - sums)[10:-10].max() < 0.01 * np.ptp(sums)
 
 
 def test_nothing_heavy_is_imported_to_fit() -> None:

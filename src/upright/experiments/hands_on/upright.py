@@ -81,7 +81,7 @@ def run_upright(
     """
     held = rig.described_by(fit, folder / "rig.toml")
     known = read_identified(fit, seed=seed)
-    said = known.described(vendor=rig.file.vendor, who="a run on a rig")
+    said = known.described(vendor=rig.file.vendor, who="a run on a rig", form="")
     wish = RegulationRequest(poles=sets(rig, known), tilt=TILT, push=0.0, seconds=SECONDS)
     return run_regulation(
         known, None, seed, folder, progress, stopped, wish, typed(fit), said=said, tried=_Trier(rig=held, folder=folder)

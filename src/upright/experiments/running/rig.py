@@ -39,7 +39,7 @@ def described(file: RigFile) -> tuple[ServoRig, ServoRig]:
         make = make_named(file.make, option="make")
         return make_rig(make.key), make_rig(make.key, file.seed)
     known = read_identified(file.known, seed=file.seed)
-    said = known.described(vendor=file.vendor, who="a run on a rig")
+    said = known.described(vendor=file.vendor, who="a run on a rig", form="")
     model = known.rig(said)
     truth = model
     if file.kind == "twin" and file.make:

@@ -178,7 +178,10 @@ def run_rig(
         basis &= designed
         if wish.reference:
             if not isinstance(law, Law) or not law.reference_names or not np.any(law.D[:, law.readings :]):
-                raise BadInput(f"the law of {wish.law} follows no reference; design it with --track COORDINATE.")
+                raise BadInput(
+                    f"the law of {wish.law} follows no reference; design one that does: upright design FIT --track "
+                    "COORDINATE."
+                )
             unit = model.plant.coordinates[0].unit
             law = replace(law, references=np.array(signal(wish.reference, unit, model.period, wish.seconds)))
     else:

@@ -16,6 +16,9 @@ from upright.identification.search.starts import regress, samples_of
 CLEAR = 0.5
 """Another convention is named when it leaves less than this share of the variance that the declared one leaves."""
 
+CLOSER = 0.98
+"""Of two that explain nearly the same the one tried first stays; a mirror image of a free rig explains the same."""
+
 
 def wrong_conventions(rig: Rig, runs: Sequence[Run]) -> tuple[str, ...]:
     """Sentences on signs and zeros that would explain the accelerations far better than the declared ones."""
@@ -35,8 +38,7 @@ def wrong_conventions(rig: Rig, runs: Sequence[Run]) -> tuple[str, ...]:
             if not driven and not turns and all(s < 0 for s in signs):
                 continue
             left = _unexplained(rig, runs, flips, turns)
-            fewer = sum(s < 0 for s in flips.values()) + len(turns)
-            if left < best * (0.98 if fewer else 1.0):
+            if left < CLOSER * best:
                 best, found = left, (flips, turns)
     if best > CLEAR * min(declared, 1.0):  # what explains next to nothing is no better convention
         return ()

@@ -1,0 +1,148 @@
+"""Do the quick tests notice when one place of the code is changed? Random changes, room by room.
+
+Operators, comparisons, constants, guards, indices and signs: each change is one place, drawn from all of them, and the
+tests that cover it run until one fails, the nearest and cheapest first, 60 s of them. A test that hangs has noticed.
+Intervals are Wilson's of 95 %. What no test noticed is listed; a change that a person judged to make no difference is
+left out of the share when a file names it: its lines are `file:line before -> after  # reason`, as they are listed.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import random
+import tempfile
+import threading
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+from queue import SimpleQueue
+
+from benchmarks.measure import Line, Target
+from benchmarks.mutants.covering import SOURCE, map_of
+from benchmarks.mutants.places import Change, compiles, places
+from benchmarks.mutants.trial import Bench, Outcome
+
+ROOT = Path(__file__).parents[2]
+UNNOTICED = 0.10
+"""Share of changes that may go unnoticed."""
+DEEPER = "identification"
+"""Room whose own rooms are counted one by one."""
+
+
+def drawn(root: Path, sample: int, seed: int, within: str = "") -> list[Change]:
+    """Changes of different places, each a program that compiles, the same for the same seed and source."""
+    chance = random.Random(seed)
+    sources = {p.relative_to(root).as_posix(): p.read_bytes() for p in sorted((root / SOURCE).rglob("*.py"))}
+    file = f"{SOURCE}/{within}".partition(":")[0]
+    everywhere = [
+        (path, place)
+        for path, source in sources.items()
+        if "/generated/" not in path and path.startswith(file)
+        for place in places(source)
+        if f"{path}:{place.line}:".startswith(f"{SOURCE}/{within}{':' if ':' in within else ''}")
+    ]
+    chance.shuffle(everywhere)
+    found: list[Change] = []
+    for path, place in everywhere:
+        change = Change(path=path, place=place, text=chance.choice(place.instead))
+        if len(found) < sample and compiles(change.applied(sources[path])):
+            found.append(change)
+    return found
+
+
+def room(path: str) -> str:
+    """First folder of a file below the package, the second too in identification."""
+    parts = Path(path).relative_to(SOURCE).parts[:-1]
+    return "/".join(parts[: 2 if parts[:1] == (DEEPER,) else 1]) or "upright"
+
+
+def interval(hits: int, of: int) -> tuple[float, float]:
+    """Wilson's interval of a share, 95 %."""
+    if not of:
+        return 0.0, 1.0
+    z, p = 1.959964, hits / of
+    middle, half = p + z * z / (2 * of), z * math.sqrt(p * (1 - p) / of + z * z / (4 * of * of))
+    return (middle - half) / (1 + z * z / of), (middle + half) / (1 + z * z / of)
+
+
+def said(change: Change, shown: str) -> str:
+    """A change as it is listed, and as a judge writes it down."""
+    return f"{change.path.removeprefix(SOURCE + '/')}:{change.place.line} {shown}"
+
+
+def judged(file: Path | None) -> set[str]:
+    """Changes that make no difference, by a file: everything before `  # ` in each line."""
+    lines = file.read_text(encoding="utf-8").splitlines() if file else []
+    return {" ".join(line.rpartition("  # ")[0].split()) for line in lines if "  # " in line}
+
+
+def run(
+    *, quick: bool, progress: Callable[[str], None], sample: int = 150, seed: int = 0, within: str = "",
+    folder: Path | None = None, verdicts: Path | None = None, workers: int = 2,
+) -> list[Line]:  # fmt: skip
+    """A line for each room, one for all, and one for each change that went unnoticed."""
+    cache = Path(os.environ["UPRIGHT_CACHE"]) if os.environ.get("UPRIGHT_CACHE") else None
+    kept = folder or (cache or ROOT / "build") / "mutants"
+    harmless = judged(verdicts)
+    changes = drawn(ROOT, min(sample, 10) if quick else sample, seed, within)
+    covered = map_of(ROOT, kept, workers, progress)
+    done: list[Outcome] = []
+    stop = threading.Event()
+    with tempfile.TemporaryDirectory(prefix="upright-mutants-", ignore_cleanup_errors=True) as name:
+        benches = [Bench(ROOT, Path(name) / str(i), cache) for i in range(workers)]
+        idle: SimpleQueue[Bench] = SimpleQueue()
+        for bench in benches:
+            idle.put(bench)
+
+        def work(change: Change) -> Outcome | None:
+            bench = idle.get()
+            try:
+                outcome = None if stop.is_set() else bench.outcome(change, covered)
+                return None if stop.is_set() else outcome
+            finally:
+                idle.put(bench)
+
+        with ThreadPoolExecutor(workers) as pool:
+            try:
+                for future in as_completed([pool.submit(work, change) for change in changes]):
+                    if (outcome := future.result()) is not None:
+                        done.append(outcome)
+                        what = said(outcome.change, outcome.shown)
+                        heard = f"noticed by {outcome.by}" if outcome.noticed else f"NOT noticed, {outcome.ran} tests"
+                        progress(f"{len(done)} of {len(changes)}: {what}: {heard}")
+            except KeyboardInterrupt:
+                progress("interrupted; what is finished is counted")
+                stop.set()
+                for bench in benches:
+                    bench.end()
+    return table(done, harmless)
+
+
+def table(done: Sequence[Outcome], harmless: Iterable[str] = ()) -> list[Line]:
+    """Shares of rooms and of all, then what was not noticed."""
+    left_out = set(harmless)
+    counted = [o for o in done if " ".join(said(o.change, o.shown).split()) not in left_out]
+    lines = [_share(name, [o for o in counted if room(o.change.path) == name])
+             for name in sorted({room(o.change.path) for o in counted})]  # fmt: skip
+    judged_out = len(done) - len(counted)
+    lines.append(
+        _share("all", counted, asked=True, note=f"; {judged_out} judged to make no difference" * bool(judged_out))
+    )
+    missed = sorted((o for o in counted if not o.noticed), key=lambda o: (o.change.path, o.change.place.line))
+    return lines + [
+        Line(contender=f"{o.change.path.removeprefix(SOURCE + '/')}:{o.change.place.line}",
+             note=f"{o.shown} ({o.ran} tests ran, {o.covering} cover it)")
+        for o in missed
+    ]  # fmt: skip
+
+
+def _share(name: str, outcomes: Sequence[Outcome], *, asked: bool = False, note: str = "") -> Line:
+    noticed, of = sum(o.noticed for o in outcomes), len(outcomes)
+    low, high = interval(noticed, of)
+    missed = 1 - noticed / of if of else 0.0
+    return Line(
+        contender=f"{name}: share not noticed", ratio=(missed, 1 - high, 1 - low) if of else None,
+        target=Target(most=UNNOTICED) if asked else None,
+        note=f"{noticed} of {of} noticed, {100 * (1 - missed):.0f} % ({100 * low:.0f} to {100 * high:.0f}){note}",
+    )  # fmt: skip

@@ -1,0 +1,213 @@
+"""Which tests run which lines of the package, and how long they take: the quick suite once under `coverage`.
+
+The map is kept in a folder by the text of the tree. For another tree the map that is most like it is brought up to
+date: test files that changed run again, and lines of the source move with their text. Lines that run when a module is
+imported belong to no test; neither does the text of kernels, which is compiled. For them the tests of the whole
+function stand in, else those of the module, else those of its room.
+"""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import hashlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from benchmarks.mutants import watch
+
+SOURCE = "src/upright"
+KEPT = 250
+"""Tests kept for a line, the nearest and cheapest."""
+MAPS = 8
+"""Maps kept of other trees."""
+START = 0.02
+"""Seconds that the shortest test costs all the same."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Covering:
+    """Seconds of every test that passed; text of every source file, and for its lines the numbers of their tests."""
+
+    seconds: dict[str, float]
+    tests: list[str]
+    files: dict[str, str]
+    sources: dict[str, str]
+    lines: dict[str, dict[int, list[int]]]
+
+    def of(self, path: str, first: int, last: int, text: str) -> list[str]:
+        """Tests that run one of some lines of a file; where there are none, those that stand in for them."""
+        own = self.lines.get(path, {})
+        spans = [range(first, last + 1), *_around(text, first), range(1, text.count("\n") + 2)]
+        for span in spans:
+            if found := {test for line in span for test in own.get(line, ())}:
+                return self._nearest(path, found)
+        for folder in (Path(path).parent, Path(path).parents[1]):
+            beside = [lines for other, lines in self.lines.items() if Path(other).parent == folder]
+            if found := {test for lines in beside for tests in lines.values() for test in tests}:
+                return self._nearest(path, found)
+        return []
+
+    def _nearest(self, path: str, found: Iterable[int]) -> list[str]:
+        return sorted((self.tests[i] for i in found), key=lambda test: cost(path, test, self.seconds[test]))
+
+    def beside(self, path: str, chosen: Iterable[str]) -> list[str]:
+        """Other tests of the same files, cheapest first: what a test computes once and keeps serves them as well."""
+        chosen = list(chosen)
+        files = {test.partition("::")[0] for test in chosen}
+        others = [t for t in self.seconds if t.partition("::")[0] in files and t not in set(chosen)]
+        return sorted(others, key=lambda test: cost(path, test, self.seconds[test]))
+
+
+def cost(path: str, test: str, seconds: float) -> float:
+    """Seconds of a test, fewer for one that stands nearer to a file: tests mirror the source."""
+    source, mirrored = Path(path).with_suffix("").parts[2:], Path(test.partition("::")[0]).parts[1:]
+    common = 0
+    for a, b in zip(source, mirrored, strict=False):
+        if a != b and b != f"test_{a}.py":
+            break
+        common += 1
+    return (seconds + START) / 4**common
+
+
+def _around(text: str, line: int) -> list[range]:
+    """Lines of the functions around a line, the innermost first."""
+    found = [
+        range(node.lineno, (node.end_lineno or node.lineno) + 1)
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))
+        and node.lineno <= line <= (node.end_lineno or node.lineno)
+    ]
+    return [range(span.start + 1, span.stop) for span in sorted(found, key=len)]
+
+
+def map_of(root: Path, folder: Path, workers: int, progress: Callable[[str], None]) -> Covering:
+    """The map of a tree, made or brought up to date where there is none."""
+    files = {p: _digest(root / p) for p in _listed(root, "tests", "benchmarks")}
+    sources = {p: (root / p).read_text(encoding="utf-8") for p in _listed(root, SOURCE)}
+    key = hashlib.sha256(json.dumps([files, sources], sort_keys=True).encode()).hexdigest()[:16]
+    kept = folder / f"covering-{key}.json"
+    if kept.exists():
+        return _read(kept)
+    folder.mkdir(parents=True, exist_ok=True)
+    maps = sorted(folder.glob("covering-*.json"), key=lambda path: path.stat().st_mtime)
+    for path in maps[:-MAPS]:
+        path.unlink(missing_ok=True)
+    tests = [p for p in files if Path(p).name.startswith("test_")]
+    if maps:
+        old = max((_read(path) for path in maps[-MAPS:]), key=lambda m: sum(m.files.get(p) == files[p] for p in tests))
+        changed = [p for p in tests if old.files.get(p) != files[p]]
+        progress(f"a map of {folder} brought up to date: {len(changed)} of {len(tests)} files of tests run again")
+    else:
+        old, changed = None, tests
+        progress(f"quick tests under coverage, once; kept in {folder}")
+    new = Covering(seconds={}, tests=[], files={}, sources={}, lines={})
+    if changed:
+        with tempfile.TemporaryDirectory(prefix="upright-covering-") as name:
+            run_tests(root, Path(name), changed if old else [], workers)
+            new = gather(root, Path(name))
+    whole = joined(moved(old, sources, set(files) - set(changed)), new) if old else new
+    whole = Covering(seconds=whole.seconds, tests=whole.tests, files=files, sources=sources, lines=whole.lines)
+    _write(kept, whole)
+    return whole
+
+
+def run_tests(root: Path, folder: Path, tests: Iterable[str], workers: int) -> None:
+    """Run quick tests with their lines and outcomes written to a folder."""
+    environment = dict(os.environ) | {watch.REPORT: str(folder / "report.jsonl"), watch.LINES: str(folder / "lines")}
+    (folder / "lines").mkdir()
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "benchmarks.mutants.watch"]
+    with open(folder / "log", "w", encoding="utf-8") as log:
+        subprocess.run(
+            [*command, "-n", str(workers), *tests], cwd=root, check=False, stdout=log, stderr=subprocess.STDOUT,
+            env=environment | {"PYTHONPATH": str(root / "src")},
+        )  # fmt: skip
+
+
+def gather(root: Path, folder: Path) -> Covering:
+    """What a run of tests has written: tests that passed, and the lines of each."""
+    import coverage
+
+    seconds: dict[str, float] = {}
+    failed: set[str] = set()
+    for line in (folder / "report.jsonl").read_text(encoding="utf-8").splitlines():
+        said = json.loads(line)
+        if "test" in said:
+            seconds[said["test"]] = round(said["seconds"], 4)
+            failed |= {said["test"]} if said["outcome"] == "failed" else set()
+    seconds = {test: s for test, s in seconds.items() if test not in failed}
+    tests = list(seconds)
+    number = {test: i for i, test in enumerate(tests)}
+    lines: dict[str, dict[int, list[int]]] = {}
+    for part in sorted((folder / "lines").iterdir()):
+        data = coverage.CoverageData(basename=str(part))
+        data.read()
+        for file in data.measured_files():
+            path = Path(file).relative_to(root).as_posix()
+            own = lines.setdefault(path, {})
+            for line, contexts in data.contexts_by_lineno(file).items():
+                own.setdefault(line, []).extend(number[c] for c in contexts if c in number)
+    for path, own in lines.items():
+        for line, found in own.items():
+            own[line] = sorted(set(found), key=lambda i, path=path: cost(path, tests[i], seconds[tests[i]]))[:KEPT]
+    return Covering(seconds=seconds, tests=tests, files={}, sources={}, lines=lines)
+
+
+def moved(old: Covering, sources: Mapping[str, str], same: set[str]) -> Covering:
+    """A map for changed sources: lines that still stand in them, and tests of files that are the same."""
+    keep = {i for i, test in enumerate(old.tests) if test.partition("::")[0] in same}
+    lines: dict[str, dict[int, list[int]]] = {}
+    for path, text in sources.items():
+        before = old.lines.get(path, {})
+        if (was := old.sources.get(path)) is None:
+            continue
+        a, b = was.splitlines(), text.splitlines()
+        blocks = (
+            [(0, 0, len(a))] if a == b else difflib.SequenceMatcher(None, a, b, autojunk=False).get_matching_blocks()
+        )
+        lines[path] = {
+            to + i + 1: [test for test in before[at + i + 1] if test in keep]
+            for at, to, size in blocks
+            for i in range(size)
+            if at + i + 1 in before
+        }
+    seconds = {test: old.seconds[test] for i, test in enumerate(old.tests) if i in keep}
+    return Covering(seconds=seconds, tests=old.tests, files={}, sources={}, lines=lines)
+
+
+def joined(old: Covering, new: Covering) -> Covering:
+    """Two maps of different tests as one."""
+    tests = [*old.tests, *new.tests]
+    lines = {path: dict(own) for path, own in old.lines.items()}
+    for path, own in new.lines.items():
+        mine = lines.setdefault(path, {})
+        for line, found in own.items():
+            mine[line] = [*(i + len(old.tests) for i in found), *mine.get(line, [])]
+    return Covering(seconds=old.seconds | new.seconds, tests=tests, files={}, sources={}, lines=lines)
+
+
+def _listed(root: Path, *folders: str) -> list[str]:
+    return sorted(p.relative_to(root).as_posix() for folder in folders for p in (root / folder).rglob("*.py"))
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+
+
+def _write(path: Path, found: Covering) -> None:
+    aside = path.with_suffix(f".{os.getpid()}")
+    aside.write_text(json.dumps(vars(found)), encoding="utf-8")
+    os.replace(aside, path)
+
+
+def _read(path: Path) -> Covering:
+    fields: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    lines = {file: {int(line): found for line, found in own.items()} for file, own in fields["lines"].items()}
+    return Covering(**(fields | {"lines": lines}))

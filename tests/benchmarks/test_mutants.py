@@ -1,0 +1,200 @@
+"""Does `python -m benchmarks mutants` change one place at a time, and does it see whether tests notice?"""
+
+import ast
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from benchmarks.mutants import drawn, interval, judged, room, said, table
+from benchmarks.mutants.covering import Covering, joined, moved
+from benchmarks.mutants.places import Change, compiles, places
+from benchmarks.mutants.trial import Bench, Outcome
+
+ROOT = Path(__file__).parents[2]
+
+
+def changed(source: str) -> set[str]:
+    """Every text that one change makes of a source."""
+    text = source.encode()
+    return {
+        Change(path="x.py", place=place, text=new).applied(text).decode()
+        for place in places(text)
+        for new in place.instead
+    }
+
+
+@pytest.mark.parametrize(
+    ("source", "some"),
+    [
+        ("a < b", {"a <= b", "a > b"}),
+        ("(a) == (b)  # a == b", {"(a) != (b)  # a == b"}),
+        ("a is not b", {"a is b"}),
+        ("a not   in b", {"a in b"}),
+        ("a or b or c", {"a and b or c", "a or b and c"}),
+        ("x = a * b", {"x = a / b"}),
+        ("x += a", {"x -= a"}),
+        ("x = -a", {"x = +a"}),
+        ("x = not a", {"x = bool(a)"}),
+        ("x = 3", {"x = 4", "x = 2"}),
+        ("x = 0", {"x = 1"}),
+        ("x = 0.5", {"x = 1.0", "x = 0.25"}),
+        ("x = True", {"x = False"}),
+        ("if a:\n    b()", {"if not (a):\n    b()", "if True:\n    b()", "if False:\n    b()"}),
+        ("x = a[i:]", {"x = a[(i) + 1:]", "x = a[(i) - 1:]"}),
+        ("for i in range(n): pass", {"for i in range((n) + 1): pass", "for i in range((n) - 1): pass"}),
+        ("x = min(a, b)", {"x = max(a, b)"}),
+        ("def f() -> float:\n    return a", {"def f() -> float:\n    return -(a)"}),
+        ("def f() -> bool:\n    return a", {"def f() -> bool:\n    return not (a)"}),
+        ("θ = 'ψ'; x = a < b  # ψ", {"θ = 'ψ'; x = a <= b  # ψ", "θ = 'ψ'; x = a > b  # ψ"}),
+    ],
+)
+def test_one_place_changes_and_the_rest_is_untouched(source, some):
+    assert changed(source) == some
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        '"""3 < 4"""', "x: Literal[3]", "def f(a: 'b < 3') -> Annotated[int, 3]: ...",
+        "@dataclass(frozen=True)\nclass A: ...", "raise E(f'{a < 3}')", "x = f'{a:3} of {b + 1}'", "assert a < 3",
+        "rng = np.random.default_rng([seed, 31])", "if TYPE_CHECKING:\n    x = 3",
+    ],
+)  # fmt: skip
+def test_what_is_not_computed_with_is_left_alone(source):
+    assert changed(source) == set()
+
+
+def test_changes_of_a_room_are_programs_of_another_meaning():
+    """60 of them: each differs in one stretch of its file and in its syntax tree."""
+    for change in drawn(ROOT, 60, seed=5, within="signals"):
+        source = (ROOT / change.path).read_bytes()
+        after = change.applied(source)
+        assert compiles(after)
+        assert ast.dump(ast.parse(after)) != ast.dump(ast.parse(source))
+        assert after[: change.place.start] == source[: change.place.start]
+        assert source.endswith(after[change.place.start + len(change.text) :])
+
+
+def test_a_seed_draws_the_same_changes_again():
+    first, second = (drawn(ROOT, 20, seed=9, within="gains") for _ in range(2))
+    assert first == second
+    assert {room(change.path) for change in first} == {"gains"}
+    assert first != drawn(ROOT, 20, seed=10, within="gains")
+
+
+def test_wilsons_interval_is_that_of_the_score():
+    """Its ends are the shares p for which the hits are 1.96 standard deviations of p away."""
+    for hits, of in ((120, 155), (1, 5), (0, 7), (7, 7)):
+        for p in interval(hits, of):
+            assert of * (hits / of - p) ** 2 == pytest.approx(1.959964**2 * p * (1 - p), abs=1e-9)
+
+
+HALF = "def half(x):\n    return x / 2\n\n\ndef spare(x):\n    return x / 4\n"
+TESTS = """
+import pkg
+
+def test_half():
+    assert pkg.half(3) == 1.5
+
+def test_nothing():
+    pkg.spare(8)
+
+def test_broken():
+    assert pkg.spare(8) == 3
+"""
+
+
+@pytest.fixture
+def tree(tmp_path):
+    """A repository with a package of two functions, one of them tested, and a test that fails in any case."""
+    root = tmp_path / "root"
+    for name, text in {
+        "src/pkg.py": HALF, "tests/test_pkg.py": TESTS, "benchmarks/__init__.py": "", "pyproject.toml": "",
+        "benchmarks/mutants/__init__.py": "",
+        "benchmarks/mutants/watch.py": (ROOT / "benchmarks/mutants/watch.py").read_text(encoding="utf-8"),
+    }.items():  # fmt: skip
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        (root / name).write_text(text, encoding="utf-8")
+    subprocess.run(["git", "init", "-q"], cwd=root, check=True)
+    return root
+
+
+def covering_of(root, **tests):
+    names = [f"tests/test_pkg.py::{name}" for name in tests]
+    lines = {line: [i] for i, line in enumerate(tests.values())}
+    return Covering(
+        seconds=dict.fromkeys(names, 0.01), tests=names, files={}, sources={"src/pkg.py": HALF},
+        lines={"src/pkg.py": lines},
+    )  # fmt: skip
+
+
+def test_a_change_is_noticed_by_a_test_that_passes_without_it(tree, tmp_path):
+    """The test of the function that changed; not one that only runs it, and not one that fails in any case."""
+    bench = Bench(tree, tmp_path / "bench", None)
+    half, spare = (
+        Change(path="src/pkg.py", place=place, text=b"*") for place in places(HALF.encode()) if b"*" in place.instead
+    )
+    first = bench.outcome(half, covering_of(tree, test_half=2))
+    assert (first.noticed, first.by) == (True, "tests/test_pkg.py::test_half")
+    second = bench.outcome(spare, covering_of(tree, test_nothing=5, test_broken=6))
+    assert (second.noticed, second.ran) == (False, 2)
+    assert (bench.tree / "src/pkg.py").read_text(encoding="utf-8") == HALF
+    assert second.shown == "return x / 4 -> return x * 4"
+
+
+def test_a_change_that_never_ends_is_noticed(tree, tmp_path):
+    watch = tree / "benchmarks/mutants/watch.py"
+    text = watch.read_text(encoding="utf-8")
+    assert "HANG, SLOWER = 30.0" in text
+    watch.write_text(text.replace("HANG, SLOWER = 30.0", "HANG, SLOWER = 0.5"), encoding="utf-8")
+    (tree / "src/pkg.py").write_text(
+        "def half(x):\n    while 0 > x:\n        pass\n    return x / 2\n", encoding="utf-8"
+    )
+    place = next(p for p in places((tree / "src/pkg.py").read_bytes()) if b"<" in p.instead)
+    change = Change(path="src/pkg.py", place=place, text=b"<")
+    outcome = Bench(tree, tmp_path / "bench", None).outcome(change, covering_of(tree, test_half=2))
+    assert (outcome.noticed, outcome.by) == (True, "tests/test_pkg.py::test_half hangs or ends the process")
+
+
+def test_lines_keep_their_tests_when_they_move():
+    tests = ["tests/test_a.py::x", "tests/test_b.py::y"]
+    old = Covering(
+        seconds=dict.fromkeys(tests, 1.0), tests=tests,
+        files={}, sources={"src/upright/p.py": "a\nb\n"}, lines={"src/upright/p.py": {1: [0], 2: [0, 1]}},
+    )  # fmt: skip
+    text = "new\na\nother\nb\n"
+    new = moved(old, {"src/upright/p.py": text}, {"tests/test_b.py"})
+    assert new.lines["src/upright/p.py"] == {2: [], 4: [1]}
+    again = Covering(
+        seconds={"tests/test_a.py::z": 1.0}, tests=["tests/test_a.py::z"], files={}, sources={},
+        lines={"src/upright/p.py": {2: [0]}},
+    )  # fmt: skip
+    both = joined(new, again)
+    assert both.of("src/upright/p.py", 2, 2, text) == ["tests/test_a.py::z"]
+    assert both.of("src/upright/p.py", 4, 4, text) == ["tests/test_b.py::y"]
+    # a line that no test runs: those of the whole module stand in
+    assert set(both.of("src/upright/p.py", 1, 1, text)) == {"tests/test_a.py::z", "tests/test_b.py::y"}
+
+
+def test_a_change_judged_to_make_no_difference_is_left_out_of_the_share(tmp_path):
+    changes = drawn(ROOT, 4, seed=1, within="gains")
+    outcomes = [
+        Outcome(
+            change=change,
+            shown=change.shown((ROOT / change.path).read_bytes()),
+            noticed=i > 1,
+            by="",
+            ran=3,
+            covering=3,
+        )
+        for i, change in enumerate(changes)
+    ]
+    every = {line.contender: line for line in table(outcomes)}
+    assert every["all: share not noticed"].ratio[0] == 0.5
+    assert len(every) == 2 + 2  # room, all, two changes that were not noticed
+    file = tmp_path / "judged.txt"
+    file.write_text(f"{said(outcomes[0].change, outcomes[0].shown)}  # a warning's wording\n", encoding="utf-8")
+    judged_out = {line.contender: line for line in table(outcomes, judged(file))}
+    assert judged_out["all: share not noticed"].ratio[0] == pytest.approx(1 / 3)
+    assert "1 judged" in judged_out["all: share not noticed"].note

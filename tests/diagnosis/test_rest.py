@@ -1,0 +1,95 @@
+"""Rest positions that differ, bodies that creep and swings that grow are told by how much."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from upright.diagnosis import Finding, examine, read_known
+from upright.records import Provenance, Record
+
+DT = 0.01
+STEP = 1e-5
+
+
+def told(kind: str, rig: str = "", **columns: np.ndarray) -> list[Finding]:
+    t = np.arange(len(next(iter(columns.values())))) * DT
+    units = {n: "V" if n == "u" else "m" for n in columns}
+    log = {n: x if n == "u" else np.round(x / STEP) * STEP for n, x in columns.items()}
+    record = Record(t=t, signals=log, units=units, provenance=Provenance(file="log.csv", reader="table"))
+    return [f for f in examine(record, read_known(rig) if rig else None).findings if f.kind == kind]
+
+
+def settling(levels: list[float], seconds: float = 6.0, first: float = 1.0) -> np.ndarray:
+    """A cart that settles at one level after another, by decaying swings: at rest after about 4 s."""
+    t = np.arange(round(seconds / DT)) * DT
+    x, before = [np.full(round(first / DT), levels[0])], levels[0]
+    for level in levels[1:]:
+        x.append(level + (before - level) * np.exp(-2 * t) * np.cos(9 * t))
+        before = level
+    return np.concatenate(x)
+
+
+def pushed(levels: list[float], volts: list[float]) -> dict[str, np.ndarray]:
+    u = np.repeat(volts, [100] + [600] * (len(levels) - 1))
+    return {"x_1": settling(levels), "u": u}
+
+
+def test_rests_of_a_driven_cart_are_compared_where_its_drive_is_off() -> None:
+    """It begins at 0 and, pushed to 30 mm and let go, stops at 2 mm: dry friction holds it there."""
+    (finding,) = told("drift", "rectilinear-1", **pushed([0.0, 0.03, 0.002], [0.0, 1.0, 0.0]))
+    assert finding.evidence["apart [m]"] == pytest.approx(2e-3, abs=1e-4)
+    x = pushed([0.0, 0.03, 0.002], [0.0, 1.0, 0.0])["x_1"]
+    assert finding.evidence["of the range [%]"] == pytest.approx(100 * 2e-3 / np.ptp(x), rel=0.05)
+    assert finding.key == 'unknown = ["initial", "offset.x_1"]'
+    assert len(finding.spans) == 2
+    # 3 % of the range is no drift
+    assert told("drift", "rectilinear-1", **pushed([0.0, 0.03, 0.0008], [0.0, 1.0, 0.0])) == []
+
+
+def test_a_hand_that_holds_before_the_release_is_no_rest_of_a_free_cart() -> None:
+    assert told("drift", "rectilinear-1", x_1=settling([0.03, 0.0])) == []
+    assert told("drift", "rectilinear-1", x_1=settling([0.03, 0.0, 0.0])) == []
+    (finding,) = told("drift", "rectilinear-1", x_1=settling([0.03, 0.0, 0.002], first=2.0))
+    assert finding.evidence["apart [m]"] == pytest.approx(2e-3, abs=1e-4)
+
+
+def test_disks_without_a_spring_to_ground_rest_anywhere() -> None:
+    levels = pushed([0.0, 0.03, 0.002], [0.0, 1.0, 0.0])
+    assert told("drift", "torsional-1", theta_1=levels["x_1"], u=levels["u"]) == []
+
+
+def grown(rate: float, volts: float = 1.0, period: float = 0.5) -> dict[str, np.ndarray]:
+    t = np.arange(800) * DT
+    x = np.where(t < 1, 0.0, np.exp(rate * (t - 1)) * np.sin(2 * np.pi * (t - 1) / period))
+    return {"x_1": 1e-3 * x, "u": np.where(t < 1, 0.0, volts)}
+
+
+def test_a_swing_that_grows_under_a_constant_effort_is_told() -> None:
+    """7 s hold 28 half swings of 0.25 s; from the first seven to the last seven they grow by 21 half swings' worth."""
+    (finding,) = told("self-excited", "rectilinear-1", **grown(0.2))
+    assert finding.evidence["half swings [1]"] == pytest.approx(27, abs=2)
+    assert finding.evidence["growth [1]"] == pytest.approx(np.exp(0.2 * 0.25 * 20.5), rel=0.1)
+    assert finding.key == 'role = "predict"'
+    assert finding.spans[0] == pytest.approx((1.0, 7.99), abs=0.02)
+
+
+@pytest.mark.parametrize(
+    "case", [{"rate": -0.2}, {"rate": 0.2, "volts": 0.0}, {"rate": 0.0}, {"rate": 0.2, "period": 2.5}]
+)
+def test_a_swing_that_dies_or_is_driven_by_nothing_or_is_short_is_not(case: dict[str, float]) -> None:
+    """2.5 s a swing are five half swings, too few to tell."""
+    assert told("self-excited", "rectilinear-1", **grown(**case)) == []
+
+
+@pytest.mark.parametrize(("share", "creeps"), [(0.0, False), (0.1, True), (0.19, True), (0.21, False)])
+def test_a_body_that_moves_a_little_beside_its_like_was_held_and_creeps(share: float, creeps: bool) -> None:
+    t = np.arange(1500) * DT
+    x = 0.02 * np.exp(-0.1 * t) * np.cos(9 * t)
+    found = told("creep", "rectilinear-2", x_1=x, x_2=share * x)
+    assert bool(found) is creeps
+    for finding in found:
+        assert finding.columns == ("x_2",)
+        assert finding.key == 'held = ["x_2"]'
+        assert finding.evidence["range [m]"] == pytest.approx(share * finding.evidence["beside [m]"], rel=1e-2)
+        assert f"{100 * share:.2g} % of the motion" in finding.sentence

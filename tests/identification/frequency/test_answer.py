@@ -1,0 +1,91 @@
+"""What is drawn between the frequencies, and what the verdict says, of a response explained."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tests.identification.frequency.test_frequency import FURUTA, GUESS, asked, smooth
+from upright.identification.frequency.answer import FrequencyFit, curves, digits, explain, key_value, verdict
+from upright.identification.frequency.balance import Balance
+from upright.identification.frequency.response import FrequencyResponse
+from upright.identification.model.fit import Estimate
+from upright.physics import Furuta
+
+
+@cache
+def answer() -> FrequencyFit:
+    return explain(asked(**{n: GUESS[n] for n in ("J_d", "b_1")}), "hanging", smooth())
+
+
+def test_curves_between_the_frequencies_are_those_of_the_transfer_function() -> None:
+    (w, squares), (same, simplex) = curves(answer())
+    assert np.array_equal(w, same)
+    assert w[[0, -1]] == pytest.approx([2.0, 40.0])
+    expected = smooth(omega=w).response
+    assert squares == pytest.approx(expected, rel=1e-3)
+    assert simplex == pytest.approx(expected, rel=0.05)
+
+
+def test_only_least_squares_knows_dry_friction_between_the_frequencies() -> None:
+    """Sizes along a power of the frequency and phases along its logarithm lie on straight lines, so nothing is lost."""
+    found = answer()
+    values = {**found.squares.way.values, "b_1c": 1e-3, "b_2c": 1e-3}
+
+    def friction(w: np.ndarray) -> np.ndarray:
+        return np.column_stack([3 / w, 0.2 * w**0.5]) * np.exp(1j * np.log(w / 2))[:, None]
+
+    used = replace(found.used, dry=friction(found.used.omega))
+    rough = replace(
+        found, used=used, squares=replace(found.squares, way=replace(found.squares.way, values=values)),
+        simplex=replace(found.simplex, values={**values, "J_d": 0.01}),
+    )  # fmt: skip
+    (w, squares), (_, simplex) = curves(rough)
+    there = FrequencyResponse(
+        omega=w, response=smooth(omega=w).response, outputs=used.outputs, drive=np.full(w.size, 1e-9), dry=friction(w),
+    )  # fmt: skip
+    assert squares == pytest.approx(Balance(plant=Furuta, at="hanging", data=there).response(values)[0], rel=1e-6)
+    free = smooth(replace(FURUTA, J_d=0.01, b_1=values["b_1"]), omega=w).response
+    assert simplex == pytest.approx(free, rel=1e-6)
+    assert np.abs(squares / simplex - 1).max() > 0.1  # otherwise there would be nothing to tell apart
+
+
+def test_the_pole_that_matters_is_the_one_by_which_it_falls() -> None:
+    at, what, _ = answer().key
+    assert (at, what) == ("inverted", "unstable pole")
+    truth = float(FURUTA.linear("inverted").poles()[0].real)
+    assert key_value(answer().key).value == pytest.approx(truth, rel=1e-3)
+    assert answer().simplex_pole == pytest.approx(truth, rel=0.02)
+    assert answer().fit.trusted
+
+
+@pytest.mark.parametrize(
+    ("value", "width", "expected"),
+    # digits up to the decade of the width, and two more; 3 at least, 8 at most
+    [(5.0, 0.1, 4), (5.0, 1e-4, 7), (5.0, 5.0, 3), (5.0, 1e-12, 8), (5.0, 0.0, 4), (0.0, 1.0, 4), (5.0, math.inf, 4)],
+)
+def test_digits_follow_from_the_interval(value: float, width: float, expected: int) -> None:
+    number = Estimate(
+        value=value, stderr=0.0, interval=(value - width / 2, value + width / 2), unit="1/s", status="firm"
+    )
+    assert digits(number) == expected
+
+
+def test_a_verdict_trusts_no_response_that_is_not_explained() -> None:
+    found = answer()
+    wide = replace(found.key[2].real, interval=(0.9 * found.key[2].real.value, 1.1 * found.key[2].real.value))
+    for change, key, said in (
+        ({"misfit": 9.1}, found.key, "leaves 3.0 times the errors stated unexplained"),
+        ({"surprise": {"m_p": -4.1, "J_d": 1.0}}, found.key, "contradicts what is known of m_p"),
+        ({"starts": 5, "reached": 2}, found.key, "Only 2 of 5 starts"),
+        ({}, (*found.key[:2], replace(found.key[2], real=wide)), "That is 10 % either way"),
+    ):
+        text, trusted = verdict(replace(found.squares, **change), key)
+        assert said in text
+        assert not trusted
+    for change in ({"misfit": 8.9}, {"surprise": {"J_d": -3.9}}, {"starts": 4, "reached": 2}):
+        assert verdict(replace(found.squares, **change), found.key)[1]
