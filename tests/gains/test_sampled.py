@@ -38,7 +38,7 @@ CTMS = CartPendulum(m_c=0.5, m_p=0.2, b_1=0.1, l_cg=0.3, J_p=0.006, g=9.8).linea
 def linear(A, B, C):
     A, B, C = (np.atleast_2d(np.array(m, dtype=float)) for m in (A, B, C))
     names = tuple(f"x{i}" for i in range(A.shape[0]))
-    return StateSpace(A, B, C, states=names, inputs=("u",), outputs=("y",))
+    return StateSpace(A, B, C, states=names, inputs=("u",))
 
 
 DOUBLE_INTEGRATOR = linear([[0, 1], [0, 0]], [[0], [1]], [[1, 0]])

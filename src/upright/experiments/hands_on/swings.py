@@ -15,7 +15,7 @@ from upright.identification.estimate import identify
 from upright.identification.model.fit import Fit
 from upright.progress import Progress, part
 from upright.readers import read
-from upright.study.draft.release import release_of
+from upright.study.draft.release import free_from
 from upright.study.load import Study, load_study
 from upright.study.results import write_fit
 
@@ -79,7 +79,7 @@ def _window(rig: RigAtHand, log: Path) -> tuple[float, float]:
             "lifted in time; run the experiment again."
         )
     swings = max(abs(p.imag) for p in rig.model.linear(rig.resting).poles())
-    begin = release_of(record.t, theta, swings, record[pivot])
+    begin = free_from(record.t, theta, swings, float(record.t[0]), record[pivot])
     return begin, float(record.t[-1])
 
 
