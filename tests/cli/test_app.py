@@ -47,6 +47,14 @@ def test_help_lists_every_command_with_its_line():
         assert line.split(":")[0][:20] in listing
 
 
+@pytest.mark.parametrize("words", [[], ["log"]])
+def test_without_a_command_the_commands_are_listed(words):
+    outcome = CliRunner().invoke(app, words)
+    assert outcome.exit_code == 2
+    assert outcome.stderr == CliRunner().invoke(app, [*words, "--help"]).stdout
+    assert "log replay" in outcome.stderr
+
+
 def test_version_is_the_package_version():
     assert CliRunner().invoke(app, ["--version"]).stdout.strip() == f"upright {__version__}"
 

@@ -93,12 +93,14 @@ class Commands(TyperGroup):
             return None
         seconds = [w.split()[1] for w in (*DECLARED, *others) if w.startswith(f"{words} ")]
         return Commands(
-            name=words, help=f"{', '.join(seconds)}: see below.", no_args_is_help=True, rich_markup_mode="rich",
-            context_settings=SETTINGS,
+            name=words, help=f"{', '.join(seconds)}: see below.", rich_markup_mode="rich", context_settings=SETTINGS
         )  # fmt: skip
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Take `--no-code` wherever it stands; it is an option of all commands."""
+        """Take `--no-code` wherever it stands; it is an option of all commands. Without a word, list them."""
+        if not args and not ctx.resilient_parsing:  # Typer shows nothing where rich has no part in the help
+            typer.echo(ctx.get_help(), err=True)
+            ctx.exit(USER_ERROR)
         moved = [NO_CODE] if NO_CODE in args else []
         return super().parse_args(ctx, moved + [word for word in args if word != NO_CODE])
 
@@ -141,7 +143,6 @@ def _loaded(words: str, point: Any) -> Command:
 app = typer.Typer(
     name="upright",
     cls=Commands,
-    no_args_is_help=True,
     add_completion=True,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
