@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 
@@ -12,6 +13,7 @@ import pytest
 
 import upright as up
 from upright.cli import COMMANDS
+from upright.files import plain_values
 
 TRUTH = {"m_p": 0.2235, "l_cg": 0.2, "J_p": 2e-3, "b_2": 2e-4, "b_2c": 4e-4}
 FURUTA = {"m_p": 0.135, "l_cg": 0.19, "r": 0.16, "J_d": 0.011, "J_p": 6e-4}
@@ -72,6 +74,7 @@ def test_a_fit_goes_to_a_file_that_the_commands_read(fit, tmp_path):
     from upright.study.fitted import read_fit
 
     assert read_fit(fit.save(tmp_path / "fit.json")).values["l_cg"] == fit.parameters.value["l_cg"]
+    assert json.loads((tmp_path / "fit.json").read_text(encoding="utf-8")) == plain_values(fit.numbers)
     page = fit.report(tmp_path / "fit.html").read_text(encoding="utf-8")
     assert fit.answers[0].headline in page
     with pytest.raises(up.BadInput, match=r"ending in \.html or \.pdf"):

@@ -15,7 +15,6 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field, is_dataclass
 from functools import wraps
 from pathlib import Path
-from secrets import token_hex
 from typing import Any, ParamSpec, TypeVar
 
 from upright.errors import BadInput
@@ -174,7 +173,7 @@ def _aside(path: Path) -> tuple[Path, int | None]:
     mode = None
     with suppress(OSError):  # there is none yet
         mode = stat.S_IMODE(path.stat().st_mode) & 0o777 if os.name == "posix" else None
-    half = path.with_name(f".{path.name[:32]}.{token_hex(8)}.part")
+    half = path.with_name(f".{path.name[:32]}.{os.urandom(8).hex()}.part")
     os.close(os.open(half, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666 if mode is None else mode | stat.S_IWUSR))
     return half, mode
 

@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-from types import ModuleType
 
 import pytest
 from typer.testing import CliRunner
@@ -15,16 +14,14 @@ HEAVY = ("numpy", "scipy", "sympy", "llvmlite", "matplotlib", "pandas", "pint", 
 
 @pytest.fixture
 def show_that_raises(monkeypatch):
-    """A command `show` which raises what it is given, run; gives back exit code and stderr."""
+    """A command `show` whose reader raises what it is given, run; gives back exit code and stderr."""
 
     def run(error: BaseException):
-        def show() -> None:
+        def read(*_, **__) -> None:
             raise error
 
-        stand_in = ModuleType("upright.cli.log.show")
-        stand_in.show = show
-        monkeypatch.setitem(sys.modules, "upright.cli.log.show", stand_in)
-        outcome = CliRunner().invoke(app, ["show"])
+        monkeypatch.setattr("upright.readers.read", read)
+        outcome = CliRunner().invoke(app, ["show", "log.csv"])
         return outcome.exit_code, outcome.stderr
 
     return run
@@ -48,6 +45,14 @@ def test_help_lists_every_command_with_its_line():
     for name, line in COMMANDS.items():
         assert name in listing
         assert line.split(":")[0][:20] in listing
+
+
+@pytest.mark.parametrize("words", [[], ["log"]])
+def test_without_a_command_the_commands_are_listed(words):
+    outcome = CliRunner().invoke(app, words)
+    assert outcome.exit_code == 2
+    assert outcome.stderr == CliRunner().invoke(app, [*words, "--help"]).stdout
+    assert "log replay" in outcome.stderr
 
 
 def test_version_is_the_package_version():
@@ -90,15 +95,12 @@ def test_what_goes_wrong_is_one_sentence_and_an_exit_code(show_that_raises, erro
 
 def test_upright_debug_shows_where_it_happened(show_that_raises, monkeypatch):
     monkeypatch.setenv("UPRIGHT_DEBUG", "1")
-    runner_result = CliRunner()
-    stand_in = ModuleType("upright.cli.log.show")
 
-    def show() -> None:
+    def read(*_, **__) -> None:
         raise BadInput("needed a log")
 
-    stand_in.show = show
-    monkeypatch.setitem(sys.modules, "upright.cli.log.show", stand_in)
-    assert isinstance(runner_result.invoke(app, ["show"]).exception, BadInput)
+    monkeypatch.setattr("upright.readers.read", read)
+    assert isinstance(CliRunner().invoke(app, ["show", "log.csv"]).exception, BadInput)
 
 
 def test_python_minus_m_upright_is_the_same_program():

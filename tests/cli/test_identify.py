@@ -141,7 +141,7 @@ def test_an_interrupted_fit_says_everywhere_what_it_did_not_evaluate(bench, monk
     """Terminal, fit.json and page; two.csv was held out and is not predicted."""
     from contextlib import contextmanager
 
-    from upright.cli.model import identify
+    from upright.cli import terminal
 
     @contextmanager
     def impatient(**_):
@@ -150,7 +150,7 @@ def test_an_interrupted_fit_says_everywhere_what_it_did_not_evaluate(bench, monk
 
         yield stop
 
-    monkeypatch.setattr(identify, "progress_bar", impatient)
+    monkeypatch.setattr(terminal, "progress_bar", impatient)
     (bench / "study.toml").write_text(STUDY + STUDY[STUDY.index("[[runs]]") :].replace('"one"', '"third"', 1)
                                       .replace('"two"', '"fourth"', 1), encoding="utf-8")  # fmt: skip
     outcome = run("identify", "study.toml", "-o", "out", "--hold-out", "each")

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from tests.rigs.test_twin import LAW
 from upright.cli import app
-from upright.cli.control.run import effort, lines
+from upright.cli.watch import effort, lines
 from upright.laws import as_values
 from upright.realtime.session import RunState
 from upright.rigs import Fault, Mode

@@ -28,6 +28,11 @@ def test_every_option_of_a_command_is_one_of_its_verb(name):
     assert "Parameters\n" in (asked.__doc__ or "")
 
 
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_every_argument_and_option_of_a_command_is_explained(name):
+    assert [p.name for p in command(name).params if not p.help] == []
+
+
 @pytest.mark.parametrize(
     ("typed", "offered"), [("upright swi", {"swing-up"}), ("upright doctor --r", {"--rig", "--reader"})]
 )

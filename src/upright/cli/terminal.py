@@ -2,33 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Any
 
 import typer
 
 from upright.progress import Progress, silent
-from upright.verbs.pages import can_be_pdf, folder
-
-if TYPE_CHECKING:
-    from upright.report.page import Chapter
-
-
-Out = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for all files.", callback=folder)]
-Data = Annotated[
-    Path | None, typer.Option(metavar="DIR", help="Folder the runs' files are in; the study's own if left out.")
-]
-AsJson = Annotated[bool, typer.Option("--json", help="Print the numbers as JSON instead of tables.")]
-Pdf = Annotated[bool, typer.Option("--pdf", help="Write the page as PDF too (pdf extra).", callback=can_be_pdf)]
-Processes = Annotated[
-    int, typer.Option("--workers", metavar="N", help="Processes of this machine that share the work.")
-]
-Cluster = Annotated[
-    str, typer.Option("--cluster", metavar="ADDRESS", help="Dask scheduler, tcp://host:8786 (cluster extra).")
-]
-"""Options that several commands have."""
+from upright.verbs.answer import Answer
 
 
 def console(*, error: bool = False) -> Any:
@@ -75,14 +56,28 @@ def step_lines(*, quiet: bool = False) -> Generator[Progress]:
     yield progress
 
 
-def tell(chapter: Chapter, files: Sequence[Path] = (), numbers: Any = None) -> None:
-    """Print a chapter, the files that were written, and what next; or, where they are given, its `numbers` as JSON."""
-    if numbers is not None:
-        print_json(numbers)
-        return
-    from upright.report.terminal import print_chapter
+def tell(answer: Any, *, as_json: bool = False) -> None:
+    """Print what a verb answered, chapter or book, piece by piece where there are many; or its numbers as JSON."""
+    if isinstance(answer, Iterator):
+        many: list[Any] = []
+        for piece in answer:
+            many.append(piece.numbers) if as_json else tell(piece)
+        if as_json:
+            print_json(many)
+    elif not isinstance(answer, Answer):
+        typer.echo(answer)
+    elif as_json:
+        print_json(answer.numbers)
+    elif hasattr(answer, "book"):
+        from upright.report.terminal import print_book
 
-    print_chapter(console(), chapter, files)
+        print_book(console(), answer.book, answer.files)
+        for sentence in answer.hints:
+            typer.echo(sentence)
+    else:
+        from upright.report.terminal import print_chapter
+
+        print_chapter(console(), answer.chapter, answer.files)
 
 
 def print_json(content: Any) -> None:

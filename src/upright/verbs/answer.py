@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from upright.errors import BadInput, nearest
-from upright.report.html import fragment, write_html
-from upright.report.page import Chapter, Picture
+
+if TYPE_CHECKING:
+    from upright.report.page import Chapter, Picture
 
 V = TypeVar("V")
 
@@ -35,6 +36,8 @@ class Answer(Generic[V]):
         return text(self.brief(), self.files)
 
     def _repr_html_(self) -> str:
+        from upright.report.html import fragment
+
         return fragment(self.brief())
 
     def brief(self) -> Chapter:
@@ -79,6 +82,8 @@ class Answer(Generic[V]):
         return draw()
 
     def _drawings(self) -> dict[str, Picture]:
+        from upright.report.page import Picture
+
         return {b.name: b for p in self.chapter.parts for b in p.content if isinstance(b, Picture)}
 
     def report(self, path: str | Path) -> Path:
@@ -92,6 +97,8 @@ class Answer(Generic[V]):
             return write_pdf(path, self.chapter)
         if path.suffix != ".html":
             raise BadInput(f"a report is a file ending in .html or .pdf, got '{path}'.")
+        from upright.report.html import write_html
+
         return write_html(path, self.chapter)
 
 

@@ -13,6 +13,7 @@ from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
 from upright.progress import Progress, part, silent
 from upright.verbs.answer import Answer
+from upright.verbs.command import command
 from upright.verbs.handover import called, rig_of
 from upright.verbs.linear.matrices import linear_model, read_matrices
 from upright.verbs.pages import folder_if_given, page_folder, write_page
@@ -31,8 +32,28 @@ if TYPE_CHECKING:
     from upright.verbs.values import Log
 
 _poles = poles  # the verbs have options of this name
+_FIT = "fit.json or its folder; "
+_COUNTS = 'Encoder counts per turn or metre, "4096" or "x=20000, theta=4096"; the study\'s when omitted.'
 
 
+@command(
+    "Control",
+    metavars={
+        "source": "STUDY_OR_FIT", "matrices": "FILE", "at": "NAME", "lqr": "LIST", "effort_weight": "R",
+        "start": "LIST", "delay": "SAMPLES", "speed": "WAY", "lag": "TIME", "track": "COORDINATE",
+    },
+    helps={
+        "source": "fit.json, its folder, or a study (TOML).",
+        "matrices": "Plain matrices instead: TOML with A and B; C, D, dt, names, units if any.",
+        "start": 'Deviation to come back from, as in "theta=5 deg, psi_dot=0.2 rad/s".',
+        "counts": _COUNTS,
+    },
+    defaults={"out": "."},
+    more="""
+    upright design out/fit.json --at inverted --poles "-4.15+-1.63j, -16.9, -3.2"
+    upright design --matrices model.toml --poles "-4, -5" --period "2 ms"
+    """,
+)  # fmt: skip
 @keeps_its_inputs
 def design(
     source: Any = None, *, matrices: str | os.PathLike[str] | None = None, at: str = "",
@@ -42,10 +63,11 @@ def design(
     counts: float | str | Mapping[str, float] = "", vendor: str = "", track: str = "", sampled: bool = False,
     seed: int = 0, out: str | os.PathLike[str] | None = None, pdf: bool = False,
 ) -> Answer[Designed]:  # fmt: skip
-    """Gains that hold a rig, and what they are worth in the loop that a computer runs.
+    """Find the gains that hold a rig, and what they are worth in the loop a computer runs.
 
-    Poles are placed by Ackermann's formula on the model about an equilibrium, or chosen by least cost; period, delay
-    and differenced encoders are then put in.
+    The numbers are those identified (hanging, for instance); the model is the one about another equilibrium, upright.
+    Poles are placed by Ackermann's formula, or chosen by least cost; period, delay and differenced encoders are then
+    put in.
 
     Parameters
     ----------
@@ -206,6 +228,24 @@ def _start(rig: IdentifiedRig | StateSpace, given: str | Mapping[str, float | st
     return tuple(values.values())
 
 
+@command(
+    "Control",
+    names={"which": "--set"},
+    metavars={"source": "[FIT]", "rig": "MAKE", "which": "N", "tilt": "ANGLE", "push": "SPEED"},
+    helps={
+        "source": _FIT + "a twin is identified without it.",
+        "which": "Pole set of Table 1, 1 to 4, or all.",
+        "poles": 'Poles [1/s] of your own: "-4.15+-1.63j, -16, -3".',
+        "tilt": 'From upright when let go, as in "12 deg".',
+        "push": 'Speed of the pendulum then, outwards: "1.5 rad/s".',
+        "counts": _COUNTS,
+    },
+    ranges={"draws": (1, None)},
+    more="""
+    upright regulate --rig furuta --seed 3
+    upright regulate out/fit.json --seed 3 --set 2 --tilt "20 deg"
+    """,
+)
 @keeps_its_inputs
 def regulate(
     source: Any = None, *, rig: str = "", seed: int | None = None, which: int | str = "",
@@ -215,10 +255,11 @@ def regulate(
     out: str | os.PathLike[str] = "upright-regulate", pdf: bool = False, workers: int = 1, cluster: str = "",
     progress: Progress = silent,
 ) -> Answer[Regulation]:  # fmt: skip
-    """What each pole set will come to on an identified rig that stands upright, and what it came to.
+    """Hold an identified rig upright; say beforehand what each pole set will come to.
 
     Gains are placed on the numbers identified while the rig hung. What will come is simulated with limit, counts, delay
-    and dry friction, on rigs as the fit's covariance allows; the laws then run on a twin.
+    and dry friction, on rigs as the fit's covariance allows; the laws then run on a twin, and both are put side by
+    side.
 
     Parameters
     ----------
@@ -301,7 +342,9 @@ def regulate(
     told = chapter(done)
     if source is not None:
         told = replace(told, warnings=(*told.warnings, *known.doubts(said, truth)))
-    return Answer(done, told, write_page(told, at / "report.html", pdf))
+    files = write_page(told, at / "report.html", pdf)
+    numbers = {**told.numbers, "verdict": told.verdict, "report": str(files[0])}
+    return Answer(done, replace(told, numbers=numbers), files)
 
 
 def _vendor(known: IdentifiedRig, rig: str, vendor: str, source: str) -> str:
@@ -332,6 +375,25 @@ def _wish(
     )  # fmt: skip
 
 
+@command(
+    "Control",
+    metavars={"source": "[FIT]", "lie": "NAME=FACTOR", "check": "LOG"},
+    helps={
+        "source": _FIT + "the law is designed from it, else from the data sheet.",
+        "lie": 'An encoder shows a multiple of what is true: "theta=2".',
+        "counts": _COUNTS,
+    },
+    ranges={"seconds": (1.0, 120.0)},
+    wrong=lambda done: not done.value.sound,  # whatever its model is worth
+    more="""
+    upright swing-up --rig linear --seed 3
+
+    With your own rig: drive it from rest, hanging, until it swings to 60 degrees or
+    more, let it coast, and have its encoders checked (columns u, theta, psi or x).
+
+    upright swing-up out/fit.json --check swings.csv
+    """,
+)
 @keeps_its_inputs
 def swing_up(
     source: Any = None, *, rig: str = "", seed: int = 1, seconds: float = 12.0,
@@ -339,7 +401,10 @@ def swing_up(
     vendor: str = "", lie: str | Mapping[str, float] = "", check: Log | None = None,
     out: str | os.PathLike[str] = "swing-up", pdf: bool = False,
 ) -> Answer[SwingUpRun | Scales]:  # fmt: skip
-    """A hanging pendulum swung up within the drive's limit and travel, and caught; its encoders are asked first.
+    """Swing a hanging pendulum up by its own drive and catch it, once its encoders are trusted.
+
+    The drive's limit and travel are kept. The law is designed from a fit, or from the make's data sheet, and meets a
+    twin with numbers of its own. Logs can be shown, identified and predicted as any other.
 
     Parameters
     ----------
@@ -447,6 +512,22 @@ def _lying(rig: ServoRig, lie: str | Mapping[str, float]) -> ServoRig:
     return replace(rig, scales=tuple(factors.values())) if said else rig
 
 
+@command(
+    "Control",
+    names={"sets": "--set"},
+    metavars={"source": "[FIT]", "sets": "LIST", "step": "SIZE"},
+    helps={
+        "source": "fit.json, its folder, or a study; a twin without it.",
+        "sets": "Sets of Table 2, as in 1,4.",
+        "poles": 'Poles [1/s] of your own: "-10+-20j, -25+-10j".',
+        "step": 'Size of the step, as in "5 mm" or "10 deg".',
+        "counts": _COUNTS,
+    },
+    more="""
+    upright track --rig torsional --seed 3 -o out
+    upright track out/fit.json --set 4 --step "6 mm"
+    """,
+)
 @keeps_its_inputs
 def track(
     source: Any = None, *, rig: str = "rectilinear", seed: int = 0,
@@ -454,7 +535,11 @@ def track(
     limit: float | None = None, period: float | str = "", counts: Counts = "", vendor: str = "",
     out: str | os.PathLike[str] = "track", pdf: bool = False, progress: Progress = silent,
 ) -> Answer[Tracking]:  # fmt: skip
-    """The far inertia of a flexible shaft made to follow a step, by state feedback and by PD (experiment 3).
+    """Make the far inertia of a flexible shaft follow a step, by state feedback and by PD.
+
+    This is experiment 3: identifies a twin from a few pulses, places the poles of Table 2, sizes the step by effort,
+    twist and travel, predicts its figures and runs it; PD control stands beside. With a fit of your own rig the figures
+    are predicted on the fitted numbers.
 
     Parameters
     ----------

@@ -10,12 +10,13 @@ from collections.abc import Callable, Generator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from upright.errors import BadInput
 from upright.files import keeps_its_inputs
 from upright.progress import Progress, silent
 from upright.verbs.answer import Answer
+from upright.verbs.command import command
 from upright.verbs.pages import folder_if_given, write_page
 from upright.verbs.values import texts
 
@@ -40,18 +41,50 @@ class Laboratory:
     session: Session
     book: Book
     interrupted: bool
+    hints: tuple[str, ...] = ()
 
 
+def _nobody_needed(typed: dict[str, Any]) -> dict[str, Any]:
+    """A twin asks nobody for anything, and its runs are not watched."""
+    return typed if typed["rig"].endswith(".toml") else {**typed, "ask": None, "watching": None}
+
+
+@command(
+    "Course",
+    names={"experiment": "--experiment -e", "rig": "--rig"},
+    metavars={"experiment": "1|1a|1b|2|2b|3|4", "rig": "KIND|RIG.toml"},
+    helps={
+        "experiment": "Only this one, and what it stands on.",
+        "rig": "linear, furuta, rectilinear or torsional, else the paper's; or a rig at hand.",
+        "worn": "Rigs with physics that no model has, such as stiction, ripple and play.",
+    },
+    ranges={"seed": (None, None)},
+    given=_nobody_needed,
+    resumes=True,  # goes on in the folder that it reads
+    more="""
+    1a weighs the rig with known added masses, 1b fits its frequency response hanging, 2 holds it upright with gains
+    from that fit, 2b swings it up and catches it, 3 tracks through a flexible shaft, 4 lets the pendulum swing freely.
+
+    With a RIG.toml they are made on the rig itself; you are asked for what no drive can do.
+
+    upright lab
+    upright lab --rig linear --seed 3
+    upright lab --rig furuta --worn
+    upright lab --experiment 1b --experiment 2 -o out
+    upright lab --rig RIG.toml
+    """,
+)
 def lab(
     *, experiment: Sequence[str] | str = (), rig: str = "", seed: int = 0, out: str | os.PathLike[str] | None = None,
     fresh: bool = False, workers: int = 1, worn: bool = False, progress: Progress = silent,
     ask: Callable[[str], bool] | None = None,
     watching: Callable[[], AbstractContextManager[Callable[[RunState], str]]] | None = None,
 ) -> Answer[Laboratory]:  # fmt: skip
-    """The experiments of the paper on simulated rigs, or on one at hand: identify, flip, design, hold, swing, report.
+    """Run the experiments of the paper on simulated rigs, and report what they say.
 
-    Every log, study and fit is written to the folder for the other verbs, and one report.html tells it all (report.pdf
-    with the pdf extra). Ctrl-C keeps and reports what is there; the same call goes on from there.
+    Or on one at hand: identify, flip, design, hold, swing, report. Every log, study and fit is written to the folder
+    for the other verbs, and one report.html tells it all (report.pdf with the pdf extra). Ctrl-C keeps and reports what
+    is there; the same call goes on from there.
 
     Parameters
     ----------
@@ -134,7 +167,17 @@ def lab(
         sound=sound == len(session.results), parts=book.cover, warnings=book.notes, steps=book.steps,
         numbers=laboratory.summary(session, report, pdf), finished=not session.interrupted,
     )  # fmt: skip
-    done = Laboratory(session=session, book=book, interrupted=session.interrupted or pressed.times > 0)
+    took = {
+        t.experiment.key: f"{t.rig}{', as kept from an earlier run' if t.state == 'kept' else ''}; {t.seconds:.1f} s"
+        for t in session.results
+    }
+    hints = ["Each chapter of the report ends with the commands that repeat its steps."]
+    if pdf is None:
+        hints.append("PDF: pip install 'upright[pdf]' and run the same again; nothing is computed twice.")
+    done = Laboratory(
+        session=session, book=replace(book, chapters=tuple(replace(c, about=took[c.key]) for c in book.chapters)),
+        interrupted=session.interrupted or pressed.times > 0, hints=tuple(hints),
+    )  # fmt: skip
     return Answer(done, told, [report] if pdf is None else [report, pdf])
 
 
@@ -193,15 +236,19 @@ def _ctrl_c() -> Generator[_Pressed]:
         signal.signal(signal.SIGINT, before)
 
 
+@command("Course", defaults={"out": "."}, more="upright reproduce -o out")
 def reproduce(
     *, seed: int = 0, out: str | os.PathLike[str] | None = None, pdf: bool = False
 ) -> Answer[Reproduced]:  # fmt: skip
-    """Tables 1 and 2 of the paper again, from a handful of numbers, and each of its misprints.
+    """Regenerate the pole tables of the paper from a few numbers, and show its misprints.
+
+    The printed poles lie on a locus of least cost: plant and weights are recovered from them, and all poles follow
+    again, to less than the print's rounding.
 
     Parameters
     ----------
     seed : int
-        Of the rigs on which formulas are tried.
+        Seed of the rigs on which formulas are tried.
     out : path, optional
         Folder for reproduce.html.
     pdf : bool
@@ -222,12 +269,25 @@ def reproduce(
     return Answer(done, told, [] if at is None else write_page(told, at / "reproduce.html", pdf))
 
 
+@command(
+    "Course",
+    metavars={"file": "FILE", "n": "N", "scale": "LOW-HIGH"},
+    ranges={"n": (2, None)},
+    defaults={"out": "survey"},
+    more="""
+    upright survey ratings.csv -o out
+    upright survey means.csv --n 53
+    """,
+)
 @keeps_its_inputs
 def survey(
     file: str | os.PathLike[str] | DataFrame, *, n: int | None = None, scale: str | tuple[int, int] = "1-4",
     out: str | os.PathLike[str] | None = None, pdf: bool = False,
 ) -> Answer[Ratings | Means | Shares]:  # fmt: skip
-    """What ratings before and after a course say, and agreement with statements; printed summaries are checked.
+    """Evaluate ratings before and after a course; check printed means and percentages.
+
+    One row per person ('feedback pre', 'feedback post', ...), one row per answer (id, item, time, rating), or what was
+    printed: means (concept, pre, post) and percentages, with the number of answers.
 
     Parameters
     ----------

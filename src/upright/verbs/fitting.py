@@ -11,6 +11,8 @@ from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
 from upright.progress import Progress, silent
 from upright.verbs.answer import Answer
+from upright.verbs.command import Flag, command
+from upright.verbs.study import folder_beside, read_study
 from upright.verbs.values import open_log
 
 if TYPE_CHECKING:
@@ -55,6 +57,11 @@ class FitAnswer(Answer["Fit"]):
             Part("Fit of the runs", (Points(windows(self.study.runs)), score_table(fit.runs), drawn)),
         )
         return replace(self.chapter, parts=parts, steps=())
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C ended the fit, or the fits of the others."""
+        return self.value.interrupted or (self.crossed is not None and self.crossed.interrupted)
 
     @property
     def fit(self) -> Fit:
@@ -184,6 +191,73 @@ def prediction(runs: Mapping[str, RunScore], plant: type[Plant], bands: Bands | 
     return Prediction(PredictedRuns(runs=runs, plant=plant), chapter)
 
 
+def _read_first(typed: dict[str, Any]) -> dict[str, Any]:
+    """What was typed, with the study read: a command takes no log, and has its folder beside the study."""
+    folder = typed["out"] if typed["out"] is not None else folder_beside(typed["study"], "fit")
+    return {**typed, "study": read_study(typed["study"], folder, typed["data"]), "out": folder}
+
+
+def _keys() -> str:
+    from upright.study.keys import reference
+
+    return reference()
+
+
+@command(
+    "Model",
+    metavars={"study": "STUDY.toml", "out": "OUT", "hold_out": "LABEL", "method": "METHOD"},
+    helps={
+        "study": "Rig and runs; `upright init LOG` writes one.",
+        "out": "Folder for results; STUDY-fit if left out.",
+        "hold_out": "Predict this run instead of fitting it; 'each': all in turn.",
+    },
+    hidden=("plant", "known", "ask", "columns", "units", "window"),
+    flags={
+        "keys": Flag(help="Print every key a study may have.", prints=_keys),
+        "strict": Flag(help="Exit with 3 when the verdict is not to trust it."),
+    },
+    given=_read_first,
+    wrong=lambda answer, keys, strict: strict and not answer.fit.trusted,
+    more="""
+    A study names a rig and the runs that speak about it:
+
+        [rig]
+        plant = "pendulum"      # cart-pendulum, furuta, torsional-2, my.py:MyRig
+        [parameters]
+        m_p  = "0.107 kg"                                     # known
+        l_cg = { value = "0.23 m", uncertainty = "2 mm" }     # known about
+        J_p  = { guess = "1.6e-3 kg m^2", min = 0 }           # to estimate
+        b_2c = { guess = "1e-4 N m" }
+        [sensors.theta]
+        column = "theta"        # as `upright show LOG` lists them
+        unit = "counts"
+        counts_per_rev = 14400
+        sign = -1
+        [[runs]]
+        file = "swing.csv"
+        window = [1.0, 30.0]
+        [[runs]]
+        file = "swing.csv"
+        label = "tail"
+        window = [30.0, 60.0]
+        role = "predict"        # scored, never fitted
+
+    A driven rig adds, for instance,
+        [drive]
+        column = "v"            # or expression = "2.5*(0.2 - z)"
+        unit = "V"
+        [actuator]
+        gain = { guess = "2 N/V" }
+
+    All keys: `upright identify --keys`, or docs/study.md.
+    Writes OUT/fit.json and OUT/report.html (and OUT/report.pdf with --pdf).
+    Ctrl-C keeps the best so far and writes it.
+    --hold-out each predicts every run from a fit of the others as well; --workers
+    shares those fits among processes.
+    Exit code: 0 a fit was written (3 with --strict when its verdict is not to
+    trust it), 2 the study or a log is wrong, 130 stopped by Ctrl-C.
+    """,
+)
 @keeps_its_inputs
 def identify(
     study: Any, plant: Any = None, *, known: Mapping[str, float | str] | None = None,
@@ -193,7 +267,7 @@ def identify(
     out: str | Path | None = None, report: bool = True, pdf: bool = False, workers: int = 1, cluster: str = "",
     progress: Progress = silent,
 ) -> FitAnswer:  # fmt: skip
-    """Fit a rig's parameters to its logs.
+    """Fit a rig's parameters to its logs as a study file says; write estimates and report.
 
     Parameters
     ----------
@@ -204,14 +278,17 @@ def identify(
         For a log: what is given, what to estimate (as names, or names with guesses), which column is which coordinate,
         in which unit, and the part to fit [s]; see `upright.study.draft.from_record.study_of_record`.
     data : path, optional
-        Folder that a study's files are in.
+        Folder the runs' files are in; the study's own when omitted.
     hold_out : sequence of str
         Runs to predict instead of fitting; "each": all in turn.
-    method : {"auto", "simplex", "least-squares"}
+    method : str
+        How to search: auto, simplex, least-squares.
     out : path, optional
         Folder for fit.json and report.html.
-    report, pdf : bool
-        Whether a page, and a PDF, go there.
+    report : bool
+        Write report.html as well.
+    pdf : bool
+        Write the page as PDF too.
     workers, cluster
         Who computes the refits of ``hold_out="each"``: processes of this machine, or the address of a Dask scheduler.
     progress : callable, optional
@@ -231,7 +308,7 @@ def identify(
     from upright.identification.ladder.cross_validation import cross_validate
     from upright.report.fit.chapter import chapter
     from upright.report.symbols import typed
-    from upright.study.results import write_fit
+    from upright.study.results import fit_content, write_fit
     from upright.study.windows import windows
     from upright.verbs.pages import folder_if_given, write_page
     from upright.workers import Workers
@@ -274,14 +351,13 @@ def identify(
     )  # fmt: skip
     if folder is not None and (report or pdf):
         written += write_page(told, folder / "report.html", pdf)
-    return FitAnswer(fit, told, written, asked, crossed)
+    return FitAnswer(fit, replace(told, numbers=fit_content(fit, asked, crossed)), written, asked, crossed)
 
 
 def asked_study(given: Any, plant: Any = None, *, data: str | Path | None = None, **options: Any) -> Study:
     """The study that was handed in, or the one that a log and what is known of it make."""
     from upright.physics import Plant, find
     from upright.study.load import Study
-    from upright.verbs.study import read_study
 
     of_log = {name: value for name, value in options.items() if value is not None}
     is_study = isinstance(given, Study) or (isinstance(given, str | Path) and _is_study(Path(given)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from upright.errors import BadInput
 from upright.files import check_output, keeps_its_inputs, regular, replace_file
 from upright.verbs.answer import Answer
+from upright.verbs.command import command
 from upright.verbs.pages import can_be_pdf, folder, folder_if_given, write_page
 from upright.verbs.values import open_log, texts
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from upright.diagnosis.case import KnownRig
     from upright.readers import Inspection
     from upright.records import Record
+    from upright.report.page import Step
     from upright.verbs.values import Log
 
 
@@ -91,6 +93,38 @@ def show(log: Log, *, out: str | os.PathLike[str] | None = None, plot: bool = Fa
     return Answer(seen, replace(chapter(record, seen), steps=(onward,), numbers=numbers), files)
 
 
+@command("Log", name="show", defaults={"out": "."}, more="upright show swing.csv")
+def show_logs(
+    logs: Sequence[str | os.PathLike[str]], *, out: str | os.PathLike[str] = "", plot: bool = True
+) -> Iterator[Answer[Inspection]]:
+    """Print and draw what a log holds: columns, sample rate, quanta, gaps, lying columns.
+
+    Readable are ECP exports, tab-separated and comma-separated text with or without names, MATLAB version 5, CSV
+    exports of ROS bags and upright's own logs of runs (MCAP); the format is recognised from the content.
+
+    Parameters
+    ----------
+    logs : sequence of paths
+        Logs as their programs wrote them.
+    out : path
+        Folder for all files.
+    plot : bool
+        Draw the columns to show-LOG.svg.
+
+    Yields
+    ------
+    Answer
+        Of `show`, log by log; the last says what to do next.
+    """
+    at, figures = folder(out), list[Path]()
+    steps: tuple[Step, ...] = ()
+    for k, log in enumerate(logs, start=1):
+        seen = show(log, out=picture_path(Path(log), at, figures) if plot else None)
+        figures += seen.files
+        steps = steps or seen.chapter.steps
+        yield Answer(seen.value, replace(seen.chapter, steps=steps if k == len(logs) else ()), seen.files)
+
+
 def picture_path(log: Path, out: Path, taken: Sequence[Path] = ()) -> Path:
     """Where the columns of a log are drawn, beside the pictures of other logs that may be called the same."""
     stem = f"show-{_stem(log)}"
@@ -104,16 +138,38 @@ def _stem(log: Path) -> str:
     return re.sub(r"[^\w.-]+", "_", log.stem)
 
 
+@command(
+    "Log",
+    names={"html": "-o --html"},
+    metavars={"rig": "RIG", "html": "FILE"},
+    helps={"rig": "Plant (furuta, torsional-2, ...), study (TOML) or fit.json of the rig."},
+    wrong=lambda found: bool(found.value.wrong),
+    more="""
+        upright doctor run.csv
+        upright doctor run.csv --rig furuta
+        upright doctor run.csv --rig study.toml -o run-doctor.html
+
+    A plant's name tells signs; a study with known inertias, or the fit.json of
+    `upright identify`, tells scales too.
+    Exit code: 0 nothing looks wrong, 3 something does, 2 the log or the rig
+    cannot be read.
+    """,
+)
 @keeps_its_inputs
 def doctor(
     log: Log, *, rig: Any = "", html: str | os.PathLike[str] | None = None, pdf: bool = False,
     reader: str = "",
 ) -> Answer[Diagnosis]:  # fmt: skip
-    """What looks wrong with a log, on which evidence, and what to do.
+    """Say in plain sentences what looks wrong with a log, on which evidence, and what to do.
+
+    Looks for dead, frozen, wrapping and spiking sensors, lost counts, gaps, jitter, doubled rows, resets of the clock,
+    efforts that are none or at their limit, motion before the command, creeping bodies; knowing the rig, also for
+    signs, scales and silent trips.
 
     Parameters
     ----------
     log : path, Record or pandas.DataFrame
+        Log as its program wrote it.
     rig : str, path, fit or plant, optional
         Name of the plant, study (TOML) or fit.json of the rig, or what `identify` answered; with it signs, and with
         known inertias scales, are examined too.
@@ -211,15 +267,36 @@ def _plain_diagnosis(diagnosis: Diagnosis, html: Path | None) -> dict[str, Any]:
     }
 
 
+@command(
+    "Log",
+    metavars={"out": "STUDY.toml", "plant": "NAME"},
+    helps={
+        "out": "Study to write, or a folder for LOG.toml.",
+        "plant": "Plant, when the columns do not tell: pendulum, furuta, torsional-2, ...",
+    },
+    defaults={"out": "."},
+    more="""
+        upright show swing.csv
+        upright init swing.csv -o swing.toml
+        upright identify swing.toml -o swing-fit
+
+    Lines marked MEASURE hold placeholders: weigh, measure, or look them up.
+    """,
+)
 @keeps_its_inputs
 def init(
     log: Log, *, out: str | os.PathLike[str] | None = None, plant: str = "", reader: str = "", force: bool = False
 ) -> Answer[str]:
-    """Draft of a study of a log, commented and filled in with what could be recognised.
+    """Write a commented study file from a log, filled in with what could be recognised.
+
+    It guesses the plant, which columns measure and which one drives, units, encoder counts, rest levels, the sign of
+    the drive, the window in which something happens, and where to start each parameter. For a pendulum let go from some
+    angle nothing has to be added.
 
     Parameters
     ----------
     log : path, Record or pandas.DataFrame
+        Log of a rig: CSV, MATLAB, ECP export, ROS bag as CSV.
     out : path, optional
         Study to write, or a folder for LOG.toml; the draft is only answered when omitted. A log that is no file is
         written beside the study, as CSV, for the study to name.
@@ -290,13 +367,20 @@ def init(
     )
 
 
+@command(
+    "Log",
+    metavars=dict.fromkeys(("measured", "reference", "feedforward"), "COLUMN") | {"every": "N"},
+    ranges={"every": (1, None)},
+    defaults={"out": "."},
+    more="upright law run.csv --command u --measured theta --reference target",
+)
 @keeps_its_inputs
 def law(
     log: Log, *, command: str = "", measured: Sequence[str] | str = (), reference: Sequence[str] | str = (),
     feedforward: Sequence[str] | str = (), every: int | None = None, out: str | os.PathLike[str] | None = None,
     pdf: bool = False,
 ) -> Answer[Recovery]:  # fmt: skip
-    """Control law of a closed-loop log: structure, gains, limit, and what it leaves unexplained.
+    """Recover the control law from a closed-loop log: structure, gains, limit, what is left.
 
     P, PI, PD and PID are tried on error and measurement, with plain, two-tap and low-passed differences; the simplest
     that predicts rows held out wins.
@@ -304,14 +388,15 @@ def law(
     Parameters
     ----------
     log : path, Record or pandas.DataFrame
+        Log as its program wrote it.
     command : str
         Column that the law put out.
     measured : str or sequence of str
-        Columns that it read.
+        Column that it read; once for each.
     reference : str or sequence of str, optional
-        What the measured columns followed, in the same order.
+        What a measured column followed, in the same order.
     feedforward : str or sequence of str, optional
-        Columns that were added to the law's output.
+        Column that was added to the law's output.
     every : int, optional
         Samples of the servo per row, when it is known.
     out : path, optional

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from upright.errors import BadInput
 from upright.files import PathLike, check_output, keeps_its_inputs
 from upright.verbs.answer import Answer
+from upright.verbs.command import command
 from upright.verbs.pages import folder
 
 if TYPE_CHECKING:
@@ -24,9 +25,16 @@ if TYPE_CHECKING:
 _CONVERTED = (".csv", ".parquet", ".mat")
 
 
+@command(
+    name="log show",
+    helps={"plot": "Draw the columns to show-LOG.svg."},
+    defaults={"out": "."},
+    given=lambda typed: {**typed, "out": typed["out"] if typed["plot"] else None},
+    more="upright log show run.mcap --plot",
+)
 @keeps_its_inputs
 def log_show(log: PathLike, *, out: PathLike | None = None, plot: bool = False) -> Answer[RunLog]:
-    """What ran, for how long, under which law, and what happened: the log of a run.
+    """Print what a run's log holds: rig, law, duration, rate, modes, faults, events, what is missing.
 
     Parameters
     ----------
@@ -61,8 +69,32 @@ def log_show(log: PathLike, *, out: PathLike | None = None, plot: bool = False) 
     return Answer(found, chapter(found), files)
 
 
+def _rows_told(chunks: Iterator[Fresh]) -> Iterator[str]:
+    """Events and the last row of every chunk, with the units of its columns."""
+    rows = 0
+    for fresh in chunks:
+        yield from (f"{event.t:10.3f} s  {event.kind}: {event.text}" for event in fresh.events)
+        if new := fresh.columns["t"].size:
+            rows += new
+            last = {name: column[-1].item() for name, column in fresh.columns.items()}
+            shown = [c for c in fresh.header.columns if c.unit not in ("s", "1", "counts")]
+            values = "  ".join(f"{c.name} {last[c.name]:.5g} {c.unit}" for c in shown)
+            mode = fresh.header.modes.get(last["mode"], f"mode {last['mode']}")
+            state = " ".join((mode, *fresh.header.fault_names(last["faults"])))
+            yield f"{last['t']:10.3f} s  {values}  {state}  ({rows} rows)"
+
+
+@command(
+    name="log tail",
+    metavars={"patience": "SECONDS"},
+    ranges={"patience": (0.0, None)},
+    told=_rows_told,
+    more="upright log tail run.mcap",
+)
 def log_tail(log: PathLike, *, patience: float = 0.0) -> Iterator[Fresh]:
-    """Rows of a log as they reach its file, from the first on, until its writer ends it.
+    """Print the last row of every chunk as it reaches a log that is being written, and every event.
+
+    Begins with the first chunk, and ends when the run ends its log, or with Ctrl-C.
 
     Parameters
     ----------
@@ -96,14 +128,17 @@ def log_tail(log: PathLike, *, patience: float = 0.0) -> Iterator[Fresh]:
         last = time.monotonic()
 
 
+@command(name="log recover", metavars={"out": "FILE"}, more="upright log recover run.mcap -o whole.mcap")
 @keeps_its_inputs
 def log_recover(log: PathLike, *, out: PathLike | None = None) -> Answer[Salvaged]:
-    """Rows of a torn or damaged log, up to its first error, as a whole file.
+    """Write the rows of a torn log, up to its first error, to a whole file.
+
+    Every row that is kept was checked; how many were kept and lost is said. The log itself stays as it is.
 
     Parameters
     ----------
     log : path
-        Log of a run (MCAP); it stays as it is.
+        Log of a run (MCAP), torn or damaged.
     out : path, optional
         File to write; LOG-recovered.mcap here when omitted.
 
@@ -125,9 +160,12 @@ def log_recover(log: PathLike, *, out: PathLike | None = None) -> Answer[Salvage
     return Answer(found, recovered(found), [at])
 
 
+@command(name="log convert", metavars={"out": "FILE"}, more="upright log convert run.mcap -o run.parquet")
 @keeps_its_inputs
 def log_convert(log: PathLike, *, out: PathLike | None = None) -> Answer[Record]:
-    """Log of a run as a table for other programs.
+    """Write a run's log as CSV, Parquet or MATLAB file.
+
+    Units and provenance go with it.
 
     Parameters
     ----------
@@ -163,8 +201,20 @@ def log_convert(log: PathLike, *, out: PathLike | None = None) -> Answer[Record]
     return Answer(record, told, [at])
 
 
+@command(
+    name="log replay",
+    wrong=lambda again: not again.value.identical,
+    more="""
+    upright log replay run.mcap
+
+    Exit code: 0 every command is the logged one, 3 one differs, 2 the log cannot
+    be replayed.
+    """,
+)
 def log_replay(log: PathLike) -> Answer[Replay]:
-    """Whether the logged law gives the logged commands again, to the last bit, from the logged measurements.
+    """Pass the logged measurements through the logged law; say whether its commands are the same.
+
+    The same to the last bit.
 
     Parameters
     ----------

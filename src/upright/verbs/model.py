@@ -13,6 +13,7 @@ from upright.errors import BadInput, nearest
 from upright.files import check_output, keeps_its_inputs
 from upright.progress import Progress, silent
 from upright.verbs.answer import Answer
+from upright.verbs.command import command
 from upright.verbs.pages import folder, folder_if_given, page_folder, pdf_has_folder, write_page
 from upright.verbs.study import folder_beside, read_study
 from upright.verbs.values import open_log, pairs, paths, si, texts
@@ -29,15 +30,34 @@ if TYPE_CHECKING:
 KINDS = ("sines", "multisine", "sweep")
 
 
+@command(
+    "Model",
+    metavars={"model": "OUT/fit.json", "study": "STUDY.toml", "out": "OUT"},
+    helps={
+        "model": "Model that `upright identify` wrote.",
+        "study": "Runs to score, a study whose guesses are not used, or a log.",
+    },
+    wrong=lambda scored: not scored.chapter.sound,
+    more="""
+    The study is written as for `upright identify`; [parameters] and [actuator]
+    may be left out, since every number comes from the fit.
+
+    upright predict swing-fit/fit.json other_day.toml
+
+    Exit code: 0 predicted as well as the fit promises, 3 worse, 2 the model, the
+    study or a log is wrong.
+    """,
+)
 @keeps_its_inputs
 def predict(
     model: Any, study: Any, *, data: str | os.PathLike[str] | None = None,
     out: str | os.PathLike[str] | None = None, pdf: bool = False,
 ) -> Answer[dict[str, RunScore]]:  # fmt: skip
-    """How well a model that was fitted before explains other runs.
+    """Score other runs with a model that was fitted before.
 
     Every run is scored, whatever its role. What a run lists under ``unknown`` (its initial state, unless it says
-    otherwise) is estimated for that run alone; nothing else is.
+    otherwise) is estimated for that run alone; nothing else is. Around each prediction lies a band that should hold 90
+    % of the samples, as the fit promises; a run that goes beyond what was fitted is named, and by how much.
 
     Parameters
     ----------
@@ -150,13 +170,46 @@ def _runs_to_predict(
     return replace(study, rig=replace(study.rig, parameters=drive)), path.name
 
 
+@command(
+    "Model",
+    metavars={"study": "STUDY.toml", "out": "OUT"},
+    helps={
+        "study": "Rig, runs and everything one might ask.",
+        "out": "Folder for results; STUDY-ladder if left out.",
+    },
+    given=lambda typed: {**typed, "out": typed["out"] or folder_beside(typed["study"], "ladder")},
+    more="""
+    Rungs of your own, in the study:
+
+        [[ladder]]
+        name = "Coulomb friction"
+        adds = ["b_1c", "b_2c"]      # held at zero below this rung
+        [[ladder]]
+        name = "torque that falls with speed"
+        adds = ["actuator.knee", "actuator.fade"]
+        [[ladder]]
+        name = "friction of each run"
+        unknown = ["friction"]
+
+    Writes OUT/ladder.json, OUT/ladder.html and OUT/study.toml, the study of the
+    chosen model. Ctrl-C keeps the rungs so far.
+    Exit code: 0 a ladder was written, 2 the study or a log is wrong, 130
+    stopped by Ctrl-C.
+    """,
+)
 @keeps_its_inputs
 def ladder(
     study: str | os.PathLike[str] | Study, *, out: str | os.PathLike[str] | None = None,
     data: str | os.PathLike[str] | None = None, report: bool = True, pdf: bool = False, workers: int = 1,
     cluster: str = "", progress: Progress = silent,
 ) -> Answer[Ladder]:  # fmt: skip
-    """How rich a model the runs deserve: it grows only while it predicts better what it has not seen.
+    """Grow a model only while it predicts better what it has not seen.
+
+    Give guesses of everything the rig might have. Rung after rung is fitted: viscous friction, Coulomb friction, drag,
+    stiction, presliding, then the drive's terms, then friction that differs from run to run. Each run is predicted from
+    a fit of the others (of a single run, the last third), and a rung is kept only if that prediction improves by more
+    than it scatters. Where runs repeat one another, how well one predicts the other is the ceiling: a model that
+    reaches it has nothing left to explain.
 
     Parameters
     ----------
@@ -167,7 +220,7 @@ def ladder(
     data : path, optional
         Folder the runs' files are in; the study's own when omitted.
     report : bool
-        Write ladder.html too.
+        Write ladder.html as well.
     pdf : bool
         Write the page as PDF too.
     workers, cluster
@@ -228,6 +281,29 @@ def ladder(
     return Answer(climbed, replace(told, numbers=numbers), files)
 
 
+@command(
+    "Model",
+    names={"low": "--from", "high": "--to"},
+    metavars={
+        "sources": "[LOG...]", "rig": "KIND", "ask": "HOW", "kind": "HOW", "signal": "NAME=COLUMN", "counts": "NAME=N",
+        "known": "NAME=VALUE", "hold": "TIME", "low": "W", "high": "W",
+    },
+    helps={
+        "signal": "Column of a coordinate, as in theta=enc2.",
+        "counts": "Counts per rad or m; negative if reversed.",
+        "known": 'As in "m_p=135 g +- 0.2 %"; fixes the scale.',
+        "low": "Least frequency, in rad/s.",
+        "high": "Greatest frequency, in rad/s.",
+    },
+    given=lambda typed: {**typed, "progress": silent} if typed["sources"] else typed,
+    more="""
+    A log without --rig gives the response alone; fit.json goes to upright design.
+
+    upright frequency --rig furuta --seed 3 -o out
+    upright frequency sweep.csv --rig linear --known "m_p=135 g +- 0.2 %" -o out
+    upright frequency one.txt two.txt --command v --signal theta=theta
+    """,
+)  # fmt: skip
 @keeps_its_inputs
 def frequency(
     sources: Sequence[str | os.PathLike[str]] | str | os.PathLike[str] = (), *, rig: str = "", seed: int = 0,
@@ -237,7 +313,10 @@ def frequency(
     low: float | None = None, high: float | None = None, data: str | os.PathLike[str] | None = None,
     out: str | os.PathLike[str] = "frequency", pdf: bool = False, progress: Progress = silent,
 ) -> Answer[FrequencyRun | LoggedResponse]:  # fmt: skip
-    """Frequency response, measured on a twin or read from logs, and the rig fitted to it (experiment 1b).
+    """Measure a frequency response, or read one from logs, and fit the rig to it.
+
+    Fits by the paper's simplex on squared dB and by least squares with phase, weights and dry friction, side by side
+    (experiment 1b).
 
     Parameters
     ----------
@@ -327,7 +406,8 @@ def frequency(
         files += [at / "sweep.csv", at / "fit.json"]
         told = simulated(chapter(found))
     files += write_page(told, at / "report.html", pdf)
-    return Answer(found, told, files)
+    numbers = {"verdict": told.verdict, "sound": told.sound, **told.numbers, "files": [str(f) for f in files]}
+    return Answer(found, replace(told, numbers=numbers), files)
 
 
 def _band(low: float | None, high: float | None) -> tuple[float, float] | None:
@@ -369,16 +449,26 @@ def _known(name: str, value: float | str | tuple[float, float], make: str) -> tu
     return measured(value, "s" if name in ("actuator.delay", "actuator.lag") else "")
 
 
+@command(
+    "Model",
+    metavars={"added": "INERTIA", "signal": "COLUMN", "twin": "KIND"},
+    helps={"added": "What was added, log by log: '1.5 kg', '4e-3 kg m^2', or '2 at 6.5 cm' (500 g each)."},
+    defaults={"out": "loadings"},
+    more="""
+    upright loadings --twin rectilinear -o out
+    upright loadings bare.csv one.csv two.csv --added "0 kg" --added "0.5 kg" --added "1 kg" --signal x --command u
+    """,
+)
 @keeps_its_inputs
 def loadings(
     logs: Sequence[Log] | Log = (), *, added: Sequence[str] | str = (), signal: str = "", command: str = "",
     tolerance: float | str = "0 %", free: bool = False, twin: str = "", seed: int = 0,
     out: str | os.PathLike[str] | None = None, pdf: bool = False,
 ) -> Answer[Loadings]:  # fmt: skip
-    """Stiffness and bare inertia from step responses with known added masses (experiment 1a).
+    """Find stiffness and bare inertia from step responses with known added masses.
 
-    Each swing gives a damped period, and its extremes viscous and dry friction; 1/omega_n^2 over the added inertia is a
-    line whose slope is 1/k.
+    This is experiment 1a. Each swing gives a damped period, and its extremes viscous and dry friction; 1/omega_n^2 over
+    the added inertia is a line whose slope is 1/k.
 
     Parameters
     ----------
@@ -435,19 +525,28 @@ def loadings(
         found, told = weigh_logs(
             records, texts(added), signal=signal, command=command, tolerance=si(tolerance, "1"), free=free
         )
-    return Answer(found, told, [] if at is None else write_page(told, at / "report.html", pdf))
+    files = [] if at is None else write_page(told, at / "report.html", pdf)
+    numbers = {**told.numbers, "report": str(files[0]) if files else ""}
+    return Answer(found, replace(told, numbers=numbers), files)
 
 
+@command(
+    "Model",
+    metavars={"rig": "KIND", "radius": "LENGTH", "out": "FILE"},
+    helps={"radius": "Bolt circle of a disk, once for each; 2 to 9 cm."},
+    ranges={"runs": (2, 16), "levels": (2, 5)},
+    more='upright plan-inertias --rig torsional --error "0.3 %" --radius "4 cm" --radius "9 cm"',
+)
 @keeps_its_inputs
 def plan_inertias(
     *, rig: str = "rectilinear", bare: float | str = "", error: float | str = "0.2 %", tolerance: float | str = "0.2 %",
     runs: int = 10, levels: int = 3, radius: Sequence[float | str] | float | str = (), target: float | str = "",
     out: str | os.PathLike[str] | None = None,
 ) -> Answer[dict[int, tuple[Plan, Plan]]]:  # fmt: skip
-    """Which added masses give the tightest stiffness for the fewest runs of experiment 1a.
+    """Say which masses, where and how often, give the tightest stiffness for the fewest runs.
 
-    Carts take 0, 0.5, 1, 1.5 or 2 kg; disks take none, two or four masses of 500 g on any bolt circle. Every design is
-    compared on the line 1/omega_n^2 = (m_0 + a)/k.
+    The runs are those of experiment 1a. Carts take 0, 0.5, 1, 1.5 or 2 kg; disks take none, two or four masses of 500 g
+    on any bolt circle, so that they stay balanced. Every design is compared on the line 1/omega_n^2 = (m_0 + a)/k.
 
     Parameters
     ----------

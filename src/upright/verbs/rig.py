@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
 from upright.verbs.answer import Answer
+from upright.verbs.command import command
 from upright.verbs.pages import folder_if_given, page_folder, write_page
 from upright.verbs.values import si_if_given
 
@@ -103,6 +104,28 @@ def _counts(counts: Counts, names: list[str]) -> dict[str, float]:
     return per
 
 
+@command(
+    "Control",
+    names={"rig": "--rig"},
+    metavars={
+        "rig": "RIG.toml", "law": "GAIN.json", "excite": "SIGNAL", "reference": "SIGNAL", "duration": "SECONDS",
+        "tilt": "ANGLE",
+    },
+    helps={
+        "rig": "What the rig is, and how far it may go.",
+        "law": "Law to run: design.json of upright design.",
+        "reference": 'That the law follows: "square 0.3 8".',
+        "duration": "How long.",
+    },
+    wrong=lambda done: not done.value.sound,  # whether it ran, whatever its model is worth
+    more="""
+    Space, q, Esc or Ctrl-C stop it: zero first.
+    This is software, not a rated safety function: keep a stop in hardware within reach.
+
+    upright run --rig RIG.toml --law design/design.json --duration 30
+    upright run --rig RIG.toml --excite "sweep 0.5 0.5 8" --duration 60
+    """,
+)  # fmt: skip
 @keeps_its_inputs
 def run(
     rig: str | os.PathLike[str], *, law: str | os.PathLike[str] | None = None, excite: str = "", reference: str = "",
@@ -110,9 +133,11 @@ def run(
     out: str | os.PathLike[str] = "upright-run", pdf: bool = False,
     observe: Callable[[RunState], str] = lambda _: "",
 ) -> Answer[RigRun]:  # fmt: skip
-    """Run a law, or a signal, on the rig of a RIG.toml; supervised, logged, judged.
+    """Run a law, or a signal, on a rig: supervised, watched, logged, judged.
 
-    A rig of hardware runs by the clock on the wall in a process of its own; twins and replays in virtual time.
+    The encoders are zeroed where the rig hangs, a small pulse is compared with the model, then you bring it where it is
+    to be held. A rig of hardware runs by the clock on the wall in a process of its own; twins and replays in virtual
+    time.
 
     Parameters
     ----------
@@ -132,9 +157,9 @@ def run(
     tilt : float or str, optional
         Of the last coordinate when the hand of a twin lets go [rad or m].
     check : bool
-        Whether a small pulse is compared with the model first.
+        Compare a small pulse with the model first.
     watch : bool
-        Whether a bank of Kalman filters looks for lying encoders beside the loop.
+        Look for lying encoders beside the loop, by a bank of Kalman filters.
     out : path
         Folder for the log and the page.
     pdf : bool
@@ -167,19 +192,34 @@ def run(
     return Answer(done, told, [*([done.log_path] if done.log is not None else []), *page])
 
 
+@command(
+    name="rig check",
+    metavars={"rate": "HZ"},
+    defaults={"out": "rig-check"},
+    wrong=lambda done: not done.chapter.sound,
+    more="""
+    Measure with everything running that will run beside the loop.
+
+    upright rig check --seconds 60
+    """,
+)
 def rig_check(
     *, seconds: float = 60.0, rate: float = 1000.0, fifo: bool = True, out: str | os.PathLike[str] | None = None
 ) -> Answer[Jitter]:
-    """How late this machine wakes a loop with law and supervision of a run, and whether it holds a rate.
+    """Measure how late this machine wakes a loop, and say whether it holds a rate.
+
+    The loop has the law and the supervision of a run.
 
     Parameters
     ----------
-    seconds, rate : float
-        How long, and how often [s, Hz].
+    seconds : float
+        How long to measure.
+    rate : float
+        Ticks per second.
     fifo : bool
-        Whether to ask for real-time priority.
+        Ask for real-time priority.
     out : path, optional
-        Folder for jitter.svg.
+        Folder for jitter.svg, the histogram.
 
     Returns
     -------
@@ -207,12 +247,32 @@ def rig_check(
     return Answer(found, jitter_chapter(found), files)
 
 
+def _asked_of_hardware(typed: dict[str, Any]) -> dict[str, Any]:
+    from upright.rigs.rigfile import read_rig_file
+
+    return typed if read_rig_file(typed["rig"]).hardware else {**typed, "hand": None}
+
+
+@command(
+    name="rig doctor",
+    metavars={"rig": "RIG.toml"},
+    helps={"rig": "What the rig is, and how far it may go."},
+    given=_asked_of_hardware,
+    wrong=lambda done: not done.chapter.sound,
+    more="""
+    Let the rig hang freely, with nobody in its way: the pulse moves it.
+
+    upright rig doctor RIG.toml
+    """,
+)
 @keeps_its_inputs
 def rig_doctor(
     rig: str | os.PathLike[str], *, clear: bool = False, pulse: bool = True,
     hand: Callable[[str], bool] | None = None,
 ) -> Answer[Checkup]:  # fmt: skip
-    """Whether a rig is wired as it is described: link, limits read back, encoders by hand, a small pulse.
+    """Look at a rig before any loop: link, limits, encoders by hand, a small pulse.
+
+    Limits are read back; each encoder is moved by hand.
 
     Parameters
     ----------
@@ -221,7 +281,7 @@ def rig_doctor(
     clear : bool
         Forget faults that are latched.
     pulse : bool
-        Give the small pulse.
+        Give a small pulse and compare its answer with the model's.
     hand : callable, optional
         Asked to move a coordinate by hand, with a sentence; answers whether that was done.
 

@@ -8,6 +8,7 @@ from typing import Any
 from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
 from upright.verbs.answer import Answer
+from upright.verbs.command import command
 from upright.verbs.export.law import controller, write_law
 from upright.verbs.export.rig import FORMS
 from upright.verbs.pages import folder
@@ -16,15 +17,30 @@ LAWS = ("c", "arduino", "python", "matlab", "simulink")
 """Forms of a law, `exports.targets.TARGETS`."""
 
 
+@command(
+    "Control",
+    names={"single": "--float"},
+    metavars={"source": "GAINS_OR_FIT", "to": "FORM"},
+    helps={
+        "source": "design.json or fit.json, or its folder.",
+        "to": "A law as c, arduino, python, matlab or simulink; a rig as gymnasium, mjcf, fmu.",
+        "single": "Single precision instead of double.",
+    },
+    more="""
+    upright export out/design.json --to c
+    upright export out --to arduino --float
+    upright export out/fit.json --to gymnasium
+    """,
+)
 @keeps_its_inputs
 def export(
     source: Any, *, to: str, out: str | os.PathLike[str] = "upright-export", single: bool = False,
     limit: float | None = None,
 ) -> Answer[tuple[str, ...]]:  # fmt: skip
-    """A designed law as a program for the computer that closes the loop, or an identified rig for other simulators.
+    """Write a designed law as a program that tests itself, or an identified rig for other simulators.
 
-    A program repeats the commands of upright's own kernel bit for bit in double precision, and carries a replay by
-    which it tests itself.
+    A law's program has sampling, differences or observer, limit and rounding in it. It repeats the commands of
+    upright's own kernel bit for bit in double precision, and carries a replay by which it tests itself.
 
     Parameters
     ----------

@@ -1,17 +1,17 @@
-"""What comes of this law on that rig? Watched while it runs, stopped by a key."""
+"""What does a person at a terminal see of a command at work, and how do they answer it?"""
 
 from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Generator
-from contextlib import contextmanager
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Callable, Generator, Set
+from contextlib import ExitStack, contextmanager
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from upright.cli.terminal import AsJson, Out, Pdf, console, tell
+from upright.cli import terminal
 
 if TYPE_CHECKING:
     from upright.realtime.session import RunState
@@ -20,50 +20,39 @@ STOPS = (" ", "q", "\x1b", "\r", "\n")
 _BAR = 20
 
 
-def run(
-    rig: Annotated[Path, typer.Option("--rig", metavar="RIG.toml", help="What the rig is, and how far it may go.")],
-    law: Annotated[
-        Path | None, typer.Option("--law", metavar="GAIN.json", help="Law to run: design.json of upright design.")
-    ] = None,
-    excite: Annotated[
-        str, typer.Option(metavar="SIGNAL", help='Instead of a law: "free", "step 0.5", "sweep 0.5 0.5 10".')
-    ] = "",
-    reference: Annotated[str, typer.Option(metavar="SIGNAL", help='That the law follows: "square 0.3 8".')] = "",
-    duration: Annotated[float, typer.Option(metavar="SECONDS", help="How long.")] = 30.0,
-    mode: Annotated[str, typer.Option(help="Who closes the loop: host, or mcu (the rig's own controller).")] = "host",
-    tilt: Annotated[str, typer.Option(metavar="ANGLE", help="How a twin's pendulum leans when it is let go.")] = "",
-    check: Annotated[bool, typer.Option(help="Compare a small pulse with the model first.")] = True,
-    watch: Annotated[bool, typer.Option(help="Look for lying encoders beside the loop.")] = True,
-    out: Out = Path("upright-run"),
-    pdf: Pdf = False,
-    as_json: AsJson = False,
-) -> None:
-    r"""Run a law, or a signal, on a rig: supervised, watched, logged, judged.
+@contextmanager
+def services(wanted: Set[str], *, quiet: bool) -> Generator[dict[str, Any]]:
+    """What a verb calls back, by the names of its parameters: bars, views, questions."""
+    at_hand = "ask" in wanted  # a bar would be torn by what is asked and shown in between
+    makers: dict[str, Callable[[ExitStack], Any]] = {
+        "progress": lambda stack: stack.enter_context(
+            (terminal.step_lines if at_hand else terminal.progress_bar)(quiet=quiet)
+        ),
+        "observe": lambda stack: stack.enter_context(view(quiet=quiet)),
+        "watching": lambda _: partial(view, quiet=quiet),
+        "ask": lambda _: _asking("Ready?"),
+        "hand": lambda _: _asking("Done?"),
+    }
+    with ExitStack() as stack:
+        yield {name: make(stack) for name, make in makers.items() if name in wanted}
 
-    The encoders are zeroed where the rig hangs, a small pulse is compared with the model,
-    then you bring it where it is to be held. Space, q, Esc or Ctrl-C stop it: zero first.
-    This is software, not a rated safety function: keep a stop in hardware within reach.
 
-    \b
-    upright run --rig RIG.toml --law design/design.json --duration 30
-    upright run --rig RIG.toml --excite "sweep 0.5 0.5 8" --duration 60
-    """
-    from upright.verbs import rig as verbs
+def _asking(question: str) -> Callable[[str], bool] | None:
+    """Asks the person for something, in a sentence; None where nobody sits there."""
 
-    with view(quiet=as_json) as observe:
-        done = verbs.run(
-            rig, law=law, excite=excite, reference=reference, duration=duration, mode=mode, tilt=tilt, check=check,
-            watch=watch, out=out, pdf=pdf, observe=observe,
-        )  # fmt: skip
-    tell(done.chapter, done.files, done.numbers if as_json else None)
-    if not done.value.sound:  # whether it ran, whatever its model is worth
-        raise typer.Exit(3)
+    def ask(sentence: str) -> bool:
+        try:
+            return typer.confirm(f"{sentence} {question}", default=True, err=True)
+        except typer.Abort:
+            raise KeyboardInterrupt from None
+
+    return ask if sys.stdin.isatty() else None
 
 
 @contextmanager
 def view(*, quiet: bool) -> Generator[Callable[[RunState], str]]:
     """State of the run on stderr, and whether a key was pressed; neither when nobody watches."""
-    screen = console(error=True)
+    screen = terminal.console(error=True)
     if quiet or not screen.is_terminal:
         yield lambda _: ""
         return

@@ -1,1 +1,0 @@
-"""A loop: gains, and what becomes of them at the rig."""

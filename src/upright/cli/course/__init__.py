@@ -1,1 +1,0 @@
-"""A course: the experiments on twins, the paper's tables, the survey."""

@@ -1,1 +1,0 @@
-"""A log: look at it, doubt it, draft its study, find its law."""

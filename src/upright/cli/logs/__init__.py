@@ -1,1 +1,0 @@
-"""The log of a run: `upright log show`, `tail`, `recover`, `convert`, `replay`."""

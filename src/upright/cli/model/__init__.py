@@ -1,1 +1,0 @@
-"""A model: identify it, test it, grow it."""

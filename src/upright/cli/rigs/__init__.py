@@ -1,1 +1,0 @@
-"""Commands of two words that begin with rig."""
