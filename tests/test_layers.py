@@ -14,7 +14,7 @@ BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 # Rooms from the ground up: each imports from those above its own line only. Rooms on one line do not see each other.
 FLOORS = """
 basis errors progress shown
-files
+declared files
 trust workers
 quantities
 units
