@@ -102,3 +102,43 @@ def test_what_this_package_has_keeps_its_name(installed, tmp_path):
     installed("bold", READER.replace('"its"', '"table"'), readers="table = bold:READER")
     (tmp_path / "log.csv").write_text("t,theta\n0,1\n1,2\n2,3\n")
     assert up.read(tmp_path / "log.csv", reader="table")["theta"][2] == 3
+
+
+FORMS = """
+    from upright.exports.targets import LawTarget, RigTarget
+    from upright.report.page import Chapter
+
+    def of_law(made, test, single):
+        return {"law.txt": f"{made.law.period!r} {made.law.D.tolist()!r}"}
+
+    def of_rig(asked):
+        rows = "".join(f"{n}={v!r}\\n" for n, v in asked.rig.plant.parameters().items())
+        return {"rig.its": rows.encode()}, Chapter(title="ITS", verdict=f"{asked.called} is written for ITS.")
+
+    LAW = LawTarget(name="its", title="ITS", write=of_law, test="its {folder}", onward="Run it.")
+    RIG = RigTarget(name="its-rig", write=of_rig)
+"""
+PENDULUM = up.Pendulum(m_p=0.2, l_cg=0.15, J_p=0.001)
+
+
+def test_a_law_and_a_rig_are_exported_in_its_forms(installed, tmp_path):
+    installed("its_forms", FORMS, exports="its = its_forms:LAW\nits-rig = its_forms:RIG")
+    law = up.Law(*(np.zeros(shape) for shape in ((0, 0), (0, 2), (1, 0))), np.array([[3.0, 0.5]]), period=0.01)
+    done = up.export(law, to="its", out=tmp_path)
+    assert (tmp_path / "law.txt").read_text() == "0.01 [[3.0, 0.5]]"
+    assert done.value == (str(tmp_path / "law.txt"),)
+    done = up.export(PENDULUM, to="its-rig", out=tmp_path)
+    lines = (tmp_path / "rig.its").read_text().split()
+    assert {"m_p=0.2", "l_cg=0.15", "J_p=0.001"} <= set(lines)
+    assert done.numbers["to"] == "its-rig"
+    with pytest.raises(up.BadInput, match="limit is that of the fit"):
+        up.export(PENDULUM, to="its-rig", out=tmp_path, limit=1.0)
+    with pytest.raises(up.BadInput, match=r"one of .*its-rig.*did you mean 'its'"):
+        up.export(PENDULUM, to="itz", out=tmp_path)
+
+
+def test_forms_of_this_package_are_written_beside_one_that_does_not_load(installed, tmp_path):
+    installed("unfit", "import nowhere_at_all", exports="its = unfit:LAW")
+    assert up.export(PENDULUM, to="mjcf", out=tmp_path).value == (str(tmp_path / "rig.xml"),)
+    with pytest.raises(up.BadInput, match=r"package unfit does not load .ModuleNotFoundError"):
+        up.export(PENDULUM, to="its", out=tmp_path)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from importlib import import_module
 from pkgutil import iter_modules
@@ -21,6 +22,24 @@ if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
 T = TypeVar("T")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Declaration:
+    """What a thing says of itself first.
+
+    Attributes
+    ----------
+    name : str
+    order : int
+        Its place in lists, the smallest first.
+    """
+
+    name: str
+    order: int = 50
+
+
+D = TypeVar("D", bound=Declaration)
 
 
 class Declared(Mapping[str, T]):
@@ -127,17 +146,15 @@ def _entry_points(group: str, path: tuple[str, ...]) -> dict[str, EntryPoint]:
     return {entry.name: entry for entry in reversed(tuple(entry_points(group=group)))}
 
 
-def in_rooms(kind: type[T], *rooms: str) -> Callable[[], dict[str, T]]:
-    """What gathers the objects of a type that stand in the modules of packages, each under its `name`."""
+def declared_in(kind: type[D], *rooms: str) -> Callable[[], dict[str, D]]:
+    """What gathers the declarations of a kind that stand in the modules of packages, in their order."""
 
-    def gather() -> dict[str, T]:
-        found: dict[str, T] = {}
+    def gather() -> dict[str, D]:
+        found: list[D] = []
         for room in rooms:
-            for module in sorted(m.name for m in iter_modules(import_module(room).__path__)):
-                for value in vars(import_module(f"{room}.{module}")).values():
-                    if isinstance(value, kind):
-                        name: Any = getattr(value, "name")  # noqa: B009
-                        found[str(name)] = value
-        return found
+            for module in iter_modules(import_module(room).__path__):
+                inside = vars(import_module(f"{room}.{module.name}")).values()
+                found += (value for value in inside if isinstance(value, kind))
+        return {one.name: one for one in sorted(found, key=lambda one: (one.order, one.name))}
 
     return gather

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from upright.declared import Declared, in_rooms
+from upright.declared import Declaration, Declared, declared_in
 from upright.readers.source import Source
 from upright.records import Record
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reader:
+class Reader(Declaration):
     """Reader of one format; an object of a module of this room, or the entry point of a package.
 
     Attributes
@@ -29,14 +29,13 @@ class Reader:
         own stand below 30, texts that are recognised by their words above, a table of anything at 100.
     """
 
-    name: str
     files: str
     recognises: Callable[[Source], bool]
     read: Callable[[Source], Record]
-    order: int = 25
+    order: int = 25  # before the texts
 
 
 READERS = Declared(
-    "reader", "upright.readers", in_rooms(Reader, "upright.readers"), lambda value: isinstance(value, Reader)
+    "reader", "upright.readers", declared_in(Reader, "upright.readers"), lambda value: isinstance(value, Reader)
 )
 """Every reader by name."""

@@ -16,7 +16,9 @@ def export(
     to: Annotated[
         str,
         typer.Option(
-            metavar="FORM", help="A law as c, arduino, python, matlab or simulink; a rig as gymnasium, mjcf, fmu."
+            metavar="FORM",
+            help="A law as c, arduino, python, matlab or simulink; a rig as gymnasium, mjcf, fmu; "
+            "or as a form that a package adds.",
         ),
     ],
     out: Annotated[
