@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 import upright as up
+from upright.experiments.makes import make_rig
+from upright.experiments.running.rig import usual_limits
+from upright.rigs.rigfile import read_rig_file
 
 HEAD = "Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n"
 
@@ -142,3 +145,93 @@ def test_forms_of_this_package_are_written_beside_one_that_does_not_load(install
     assert up.export(PENDULUM, to="mjcf", out=tmp_path).value == (str(tmp_path / "rig.xml"),)
     with pytest.raises(up.BadInput, match=r"package unfit does not load .ModuleNotFoundError"):
         up.export(PENDULUM, to="its", out=tmp_path)
+
+
+DRIVER = """
+    from upright.basis import SIMULATED
+    from upright.rigs import Board
+    from upright.rigs.driver import Driver
+
+    class Winch:
+        \"\"\"A board whose first encoder counts 1 per volt and tick; its own clock is virtual.\"\"\"
+
+        def __init__(self, to):
+            about, rest = to.capabilities()
+            self.about, self.per = about, rest.pop("per_volt", 1.0)
+            self.counts, self.command, self.ticks = 0.0, 0.0, 0
+
+        def open(self):
+            from dataclasses import replace
+            return replace(self.about, virtual=True, hardware=PERFORMED == "")
+
+        def write(self, command):
+            self.command = command
+
+        def enable(self, on):
+            self.command = 0.0
+
+        def advance(self):
+            self.ticks += 1
+            self.counts += self.per * self.command
+            return self.ticks * self.about.period
+
+        def read(self):
+            return round(self.counts), 0
+
+        def zero(self):
+            self.counts = 0.0
+
+        def close(self):
+            pass
+
+    PERFORMED = SIMULATED
+    DRIVER = Driver(name="winch", open=lambda to: Board(Winch(to)), performed=PERFORMED)
+"""
+
+
+def test_a_rig_of_its_kind_is_run(installed, tmp_path):
+    installed("its_driver", DRIVER, rigs="winch = its_driver:DRIVER")
+    rig = tmp_path / "RIG.toml"
+    rig.write_text('kind = "winch"\nmake = "furuta"\n[board]\nper_volt = 2.0\n', encoding="utf-8")
+    run = up.run(rig, excite="step 0.5", duration=0.2, check=False, watch=False, out=tmp_path)
+    counts = run.value.log.record()["psi"] * make_rig("furuta").counts[0]
+    assert np.median(np.diff(counts)) == pytest.approx(1.0)  # 2 counts per V and tick, at 0.5 V
+    assert run.chapter.first_line.startswith("SIMULATED")
+
+
+def test_hardware_of_its_kind_does_not_move_without_limits(installed, tmp_path):
+    installed("its_hardware", DRIVER.replace("= SIMULATED", '= ""'), rigs="winch = its_hardware:DRIVER")
+    (tmp_path / "study.toml").write_text('[rig]\nplant = "torsional-1"\n', encoding="utf-8")
+    rig = tmp_path / "RIG.toml"
+    rig.write_text('kind = "winch"\nstudy = "study.toml"\n', encoding="utf-8")
+    assert read_rig_file(rig).hardware
+    assert read_rig_file(rig).limits({"theta_1": "rad"}, "V", usual_limits(make_rig("furuta"))) is None
+
+
+def test_what_board_says_and_the_driver_does_not_know_is_refused(installed, tmp_path):
+    installed(
+        "strict",
+        """
+        from upright.rigs.driver import Driver
+
+        def opened(to):
+            return dict(**to.board, lamp=3)
+
+        DRIVER = Driver(name="lamp", open=opened, performed="SIMULATED: no rig was driven.")
+        """,
+        rigs="lamp = strict:DRIVER",
+    )
+    rig = tmp_path / "RIG.toml"
+    rig.write_text('kind = "lamp"\nmake = "furuta"\n[board]\nlamp = 2\n', encoding="utf-8")
+    with pytest.raises(up.BadInput, match=r'\[board\] does not fit kind = "lamp"'):
+        up.run(rig, excite="free", duration=0.1, out=tmp_path)
+
+
+def test_a_driver_that_does_not_load_is_refused_at_its_line_and_the_others_open(installed, tmp_path):
+    installed("unplugged", "raise OSError('no such device')", rigs="winch = unplugged:DRIVER")
+    rig = tmp_path / "RIG.toml"
+    rig.write_text('make = "furuta"\nkind = "winch"\n', encoding="utf-8")
+    with pytest.raises(up.BadInput, match=r"RIG\.toml, line 2.*package unplugged does not load .OSError"):
+        up.run(rig, excite="free", duration=0.1, out=tmp_path)
+    rig.write_text('make = "furuta"\nkind = "twin"\n', encoding="utf-8")
+    assert up.run(rig, excite="free", duration=0.1, out=tmp_path).value.end.stopped == ""

@@ -17,8 +17,7 @@ def export(
         str,
         typer.Option(
             metavar="FORM",
-            help="A law as c, arduino, python, matlab or simulink; a rig as gymnasium, mjcf, fmu; "
-            "or as a form that a package adds.",
+            help="Such as c or arduino of a law, gymnasium or fmu of a rig; any other word lists them all.",
         ),
     ],
     out: Annotated[

@@ -28,8 +28,8 @@ def export(
     source : path, answer of `design` or `identify`, Law, Rule or plant
         Of a law design.json or its folder; of a rig what `identify` answered, fit.json or its folder, or a plant.
     to : str
-        One of `upright.exports.targets.TARGETS`. A law as ``"c"``, ``"arduino"``, ``"python"``, ``"matlab"`` (GNU
-        Octave too) or ``"simulink"``; a rig as ``"gymnasium"``, an environment whose every episode has another rig
+        One of `upright.exports.targets.TARGETS`: of a law ``"c"``, ``"arduino"``, ``"python"``, ``"matlab"`` (GNU
+        Octave too) or ``"simulink"``; of a rig ``"gymnasium"``, an environment whose every episode has another rig
         that the fit allows, ``"mjcf"``, a model of MuJoCo, or ``"fmu"``, a unit for co-simulation (FMI 3.0).
     out : path
         Folder for the files.
