@@ -8,6 +8,7 @@ import pytest
 import upright as up
 from upright.experiments.makes import make_rig
 from upright.experiments.running.rig import usual_limits
+from upright.physics import find
 from upright.rigs.rigfile import read_rig_file
 
 HEAD = "Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n"
@@ -235,3 +236,92 @@ def test_a_driver_that_does_not_load_is_refused_at_its_line_and_the_others_open(
         up.run(rig, excite="free", duration=0.1, out=tmp_path)
     rig.write_text('make = "furuta"\nkind = "twin"\n', encoding="utf-8")
     assert up.run(rig, excite="free", duration=0.1, out=tmp_path).value.end.stopped == ""
+
+
+PLANT = """
+    import numpy as np
+    from upright.physics import Coordinate, Input, Plant
+    from upright.quantities import quantity
+
+    class Boat(Plant):
+        \"\"\"A boat that rolls: a righting moment, and friction.\"\"\"
+
+        J: float = quantity("kg m^2", "inertia", above=0)
+        k: float = quantity("N m/rad", "righting moment", above=0)
+        b: float = quantity("N m s/rad", "viscous friction", default=0.0, at_least=0)
+
+        coordinates = (Coordinate("roll", "rad", "angle of the mast"),)
+        inputs = (Input("T", "N m", "moment", on="roll"),)
+        equilibria = {"rest": {"roll": 0.0}}
+
+        @staticmethod
+        def energies(p, q, v):
+            return p.J * v[0] ** 2 / 2, p.k * q[0] ** 2 / 2, p.b * v[0] ** 2 / 2
+
+        @staticmethod
+        def drawing(q):
+            mast = np.stack([np.zeros((q["roll"].size, 2)), np.zeros((q["roll"].size, 2))], 1)
+            mast[:, 0, 1], mast[:, 1, 1] = 4 * np.sin(q["roll"]), 4 * np.cos(q["roll"])
+            return [mast]
+"""
+
+
+@pytest.fixture
+def boat(installed):
+    """Its plant, with numbers whose roll is known: w^2 = k/J = 4, damping ratio b/(2 sqrt(k J)) = 0.05."""
+    installed("yard", PLANT, plants="boat = yard:Boat")
+    return find("boat")(J=2.0, k=8.0, b=0.4)
+
+
+def test_its_plant_is_simulated_by_name_as_by_hand(boat):
+    run = up.simulate(boat, start={"roll": 0.3}, seconds=5)
+    w, zeta = 2.0, 0.05
+    fast = w * np.sqrt(1 - zeta**2)
+    by_hand = 0.3 * np.exp(-zeta * w * run.t) * (np.cos(fast * run.t) + zeta * w / fast * np.sin(fast * run.t))
+    np.testing.assert_allclose(run["roll"], by_hand, atol=1e-9)
+
+
+def test_its_plant_is_identified_by_name_by_class_and_by_its_columns(boat, tmp_path):
+    run = up.simulate(boat, start={"roll": 0.3}, seconds=10)
+    log = up.Record(t=run.t, signals={"roll": run["roll"]}, units={"roll": "rad"})
+    for plant in ("boat", type(boat), None):
+        fit = up.identify(log, plant, known={"J": 2.0})
+        assert fit["k"].value == pytest.approx(8.0, rel=1e-4)
+        assert fit["b"].value == pytest.approx(0.4, rel=1e-3)
+    assert fit.study.plant == "boat"
+    again = up.predict(fit.save(tmp_path / "fit.json"), log)  # read back by the plant's name
+    assert again.value is not None
+
+
+def test_a_study_names_its_plant(boat, tmp_path):
+    run = up.simulate(boat, start={"roll": 0.3}, seconds=10)
+    np.savetxt(tmp_path / "log.csv", np.column_stack([run.t, run["roll"]]), "%.9g", ",", header="t,roll", comments="")
+    study = '[rig]\nplant = "boat"\n[parameters]\nJ = 2\nk = { guess = 5 }\nb = { guess = 0.1 }\n'
+    study += '[sensors.roll]\nunit = "rad"\n[defaults]\nunknown = ["initial"]\n[[runs]]\nfile = "log.csv"\n'
+    (tmp_path / "study.toml").write_text(study, encoding="utf-8")
+    assert up.identify(tmp_path / "study.toml")["k"].value == pytest.approx(8.0, rel=1e-4)
+
+
+def test_columns_of_the_built_in_plants_are_recognised_as_before(installed):
+    installed("mimic", PLANT.replace("roll", "theta"), plants="boat = mimic:Boat")
+    run = up.simulate(up.Pendulum(m_p=0.2, l_cg=0.15, J_p=0.001, b_2=1e-3), start={"theta": 0.3}, seconds=5)
+    log = up.Record(t=run.t, signals={"theta": run["theta"]}, units={"theta": "rad"})
+    assert up.identify(log, known={"m_p": 0.2}).study.plant == "pendulum"
+
+
+def test_its_plant_draws_itself(boat):
+    run = up.simulate(boat, start={"roll": 0.3}, seconds=1)
+    assert len(list(run.animate().new_frame_seq())) == 25  # by name, nobody could draw a column called roll
+    unknown = up.Record(t=run.t, signals={"roll": run["roll"]})
+    with pytest.raises(up.BadInput, match="columns called theta"):
+        unknown.animate()
+    assert len(list(unknown.animate(plant=boat).new_frame_seq())) == 25
+
+
+def test_a_plant_that_does_not_load_is_named_and_the_others_are_found(installed):
+    installed("sunk", "import nowhere_at_all", plants="boat = sunk:Boat")
+    with pytest.raises(up.BadInput, match=r"package sunk does not load .ModuleNotFoundError"):
+        find("boat")
+    assert find("furuta") is up.Furuta
+    with pytest.raises(up.BadInput, match="did you mean 'boat'"):
+        find("bout")
