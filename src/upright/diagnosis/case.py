@@ -14,7 +14,7 @@ import numpy as np
 from upright.diagnosis.findings import Curve, Panel
 from upright.errors import BadInput
 from upright.identification import Parameter
-from upright.physics import BUILT_IN, Plant, find
+from upright.physics import Plant, find, name_of
 from upright.readers.inspection import Column, Inspection
 from upright.records import Array, Record
 from upright.study.draft.recognise import RATE, drive_column, recognise
@@ -267,7 +267,7 @@ def case_of(record: Record, inspection: Inspection, known: KnownRig | None) -> C
 
 def _recognised(record: Record, inspection: Inspection, known: KnownRig | None) -> Case:
     """Columns found by name and kind; a plant that needs angles gets none from counts of an unknown encoder."""
-    named = next((n for n, p in BUILT_IN.items() if known is not None and p is known.plant), "")
+    named = "" if known is None else name_of(known.plant)
     try:
         found = recognise(record, inspection, named)
     except BadInput:

@@ -13,7 +13,7 @@ from upright.basis import DESCRIBED, Basis
 from upright.control.trial import GAIN, ServoRig, driven
 from upright.errors import BadInput, ImpossiblePhysics
 from upright.experiments.makes import MAKES, Make, make_of, make_rig, sheet
-from upright.physics import BUILT_IN, Plant, find
+from upright.physics import Plant, find, name_of
 from upright.physics.actuator import ACTUATOR
 from upright.records import Array
 from upright.records.record import of_twin
@@ -329,8 +329,7 @@ def rig_of_study(study: Study) -> IdentifiedRig:
 
 def rig_of_plant(plant: Plant) -> IdentifiedRig:
     """A plant with the numbers that somebody gave, its command being its force."""
-    name = next((n for n, kind in BUILT_IN.items() if kind is type(plant)), type(plant).__name__)
-    return _with_drive(plant, name, {}, _force(type(plant)))
+    return _with_drive(plant, name_of(type(plant)) or type(plant).__name__, {}, _force(type(plant)))
 
 
 def _from_study(path: Path) -> IdentifiedRig:

@@ -17,7 +17,7 @@ import numpy as np
 
 from upright.control.trial import ServoRig
 from upright.errors import BadInput, nearest
-from upright.physics import BUILT_IN, CartPendulum, Furuta, Plant, added_inertia, added_mass, chain
+from upright.physics import CartPendulum, Furuta, Plant, added_inertia, added_mass, chain, name_of
 from upright.records.record import of_twin
 from upright.study.description import VENDORS, Entry, RigDescription, driven_unit
 
@@ -240,7 +240,7 @@ class Make:
     @property
     def plant_name(self) -> str:
         """As studies call the plant."""
-        return next(name for name, plant in BUILT_IN.items() if plant is type(self.plant))
+        return name_of(type(self.plant))
 
     @property
     def gain_unit(self) -> str:

@@ -148,11 +148,6 @@ def of_design(content: Any, source: str) -> SampledController:
     BadInput
         When it is no design, was written before laws could be exported, or its loop falls.
     """
-    if isinstance(content, Mapping) and {"plant", "parameters"} <= content.keys():
-        raise BadInput(
-            f"{source} is a fit, and a law is what `upright design {source} --poles ... -o FOLDER` makes of it; the "
-            "rig itself goes --to gymnasium, mjcf or fmu."
-        )
     if not isinstance(content, Mapping) or not {"law", "K", "period"} <= content.keys():
         raise BadInput(f"{source} is no design.json; it needs the keys law, K and period: {AGAIN}.")
     missing = [key for key in ("readings", "begin", "converter", "command", "margins") if key not in content]

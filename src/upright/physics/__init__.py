@@ -7,6 +7,7 @@ import sys
 import traceback
 from pathlib import Path
 
+from upright.declared import Declared
 from upright.errors import BadInput, UprightError, nearest
 from upright.files import OWN_FILE, regular
 from upright.physics.equations import Derived, DryJoint
@@ -18,6 +19,7 @@ from upright.physics.statement import Coordinate, Input, Joint
 
 __all__ = [
     "BUILT_IN",
+    "PLANTS",
     "CartPendulum",
     "Coordinate",
     "Derived",
@@ -34,6 +36,7 @@ __all__ = [
     "added_mass",
     "chain",
     "find",
+    "name_of",
 ]
 
 BUILT_IN: dict[str, type[Plant]] = {
@@ -45,6 +48,10 @@ BUILT_IN: dict[str, type[Plant]] = {
     "flexible-link": FlexibleLink,
     **{f"{kind}-{n}": chain(n, kind) for kind in ("rectilinear", "torsional") for n in (1, 2, 3)},
 }
+PLANTS = Declared(
+    "plant", "upright.plants", lambda: BUILT_IN, lambda value: isinstance(value, type) and issubclass(value, Plant)
+)
+"""Every plant that has a name: the built-in ones, then those of entry points."""
 _ALIASES = {
     "pendubot": "double-pendulum",
     "chain": "rectilinear-2",
@@ -60,7 +67,7 @@ def find(name: str, folder: Path | None = None) -> type[Plant]:
     ----------
     name : str
         ``"furuta"``, ``"cart-pendulum"``, ``"pendulum"``, ``"chain"`` (two carts), ``"torsional-3"``, ...,
-        or ``"my_plant.py:DoublePendulum"``: a class in a file of the user's own.
+        or ``"my_plant.py:DoublePendulum"``: a class in a file of the user's own; or one that a package adds.
     folder : Path, optional
         Where a relative file is looked for; the current folder when omitted.
 
@@ -80,7 +87,16 @@ def find(name: str, folder: Path | None = None) -> type[Plant]:
     kind, _, bodies = key.replace("chain", "rectilinear").partition("-")
     if kind in ("rectilinear", "torsional") and bodies.isdigit():
         return chain(int(bodies), kind)
-    raise BadInput(f"no plant is called '{name[:60]}'; {nearest(name, [*BUILT_IN, 'chain', 'my_plant.py:ClassName'])}")
+    if name in PLANTS:
+        return PLANTS[name]
+    raise BadInput(f"no plant is called '{name[:60]}'; {nearest(name, [*PLANTS, 'chain', 'my_plant.py:ClassName'])}")
+
+
+def name_of(plant: type[Plant]) -> str:
+    """Name by which `find` gives a plant; empty for one in a file of the user's own."""
+    bodies = len(plant.coordinates)
+    chains = {f"{kind}-{bodies}": chain(bodies, kind) for kind in ("rectilinear", "torsional") if bodies <= 9}
+    return next((name for name, kind in {**PLANTS.sound(), **chains}.items() if kind is plant), "")
 
 
 def _from_file(path: Path, class_name: str) -> type[Plant]:

@@ -134,6 +134,14 @@ class Plant(Shown, Statement, abstract=True):
         """Power [W] that viscous friction takes, shape (...); dry friction is not included."""
         return evaluate(self.derived().power_lost, self._scope(np.asarray(x, dtype=np.float64)))
 
+    @staticmethod
+    def drawing(q: Mapping[str, Matrix]) -> list[Matrix]:
+        """Lines of a moving drawing seen from the side, each of shape (moments, 2, points).
+
+        `q` has coordinates by name, shape (moments,). Without lines it is drawn by what its coordinates are called.
+        """
+        return []
+
     def _scope(self, x: NDArray[np.float64]) -> dict[str, Any]:
         states = {name: x[..., i] for i, name in enumerate(self.state_names())}
         return {**self.parameters(), **states}

@@ -5,23 +5,13 @@
 
 from __future__ import annotations
 
-from upright.errors import BadInput, nearest
-from upright.readers import delimited, ecp, matlab, rosbag, run
+import warnings
+
+from upright.errors import BadInput
 from upright.readers.inspection import Inspection, inspect_record
+from upright.readers.reader import READERS, Reader
 from upright.readers.source import Source, load
 from upright.records import PathLike, Record
-from upright.records.record import CSV_MARK
-
-READERS = {
-    "ecp": ecp.read,
-    "table": delimited.read,
-    "ros-bag": rosbag.read,
-    "matlab": matlab.read,
-    "mcap": run.read,
-    "upright": delimited.read_written,
-}
-
-_HEAD = 1 << 20  # characters in which the line of names ends
 
 __all__ = ["READERS", "inspect", "read", "recognise"]
 
@@ -46,32 +36,31 @@ def read(path: PathLike, *, reader: str | None = None) -> Record:
 
 def read_source(source: Source, *, reader: str | None = None) -> Record:
     """Record of content already in memory; see `read`."""
-    name = reader or recognise(source)
-    if name not in READERS:
-        raise BadInput(f"There is no reader '{name}': {nearest(name, READERS)}")
+    found = READERS.named(reader or recognise(source))
     try:
-        return READERS[name](source)
+        return found.read(source)
     except BadInput as error:
-        if source.file in str(error):
-            raise
-        raise BadInput(f"'{source.file}': {error}") from None  # the record refused what the reader found
+        where = "" if source.file in str(error) else f"'{source.file}': "  # the record refused what the reader found
+        raise BadInput(" ".join((f"{where}{error}", *(() if reader else READERS.unsound())))) from None
 
 
 def recognise(source: Source) -> str:
-    """Name of the reader for this content."""
-    if run.recognise(source.data):
-        return "mcap"
-    if matlab.recognise(source.data, source.file):
-        return "matlab"
-    text = source.text
-    if text.startswith(CSV_MARK):
-        return "upright"
-    if ecp.recognise(text):
-        return "ecp"
-    names = tuple(name.strip() for name in text[:_HEAD].lstrip().split("\n", 1)[0].split(","))
-    if rosbag.recognise(names) and not delimited.begins_with_number(text):
-        return "ros-bag"
-    return "table"
+    """Name of the reader for this content, the first in the readers' `order` that recognises it."""
+    readers = sorted(READERS.sound().items(), key=lambda item: item[1].order)
+    return next(name for name, reader in readers if _recognises(name, reader, source))
+
+
+def _recognises(name: str, reader: Reader, source: Source) -> bool:
+    """Whether a reader does; one of another package that stops does not, and the others are asked."""
+    try:
+        return reader.recognises(source)
+    except Exception as error:
+        if name in READERS.own:
+            raise
+        if not isinstance(error, BadInput):
+            why = f"{type(error).__name__}: {error}"
+            warnings.warn(f"the reader '{name}' stops at '{source.file}': {why}", stacklevel=2)
+        return False
 
 
 def inspect(what: Record | PathLike) -> Inspection:

@@ -11,6 +11,7 @@ import re
 
 import numpy as np
 
+from upright.readers.reader import READERS, Reader
 from upright.readers.resolution import exact_seconds, is_epoch, is_index, rebuild
 from upright.readers.source import Source, TextTable
 from upright.records import Array, Record
@@ -35,7 +36,7 @@ def layout(source: Source, text: str | None = None) -> TextTable:
     if first < 0:
         raise source.bad(
             "expected rows of numbers under at most one line of names, got none;"
-            " readable are ECP exports, CSV, tab-separated text and MATLAB version 5",
+            f" readable are {', '.join(reader.files for reader in READERS.sound().values())}",
             line=1,
         )
     above = [i for i in range(first) if lines[i].strip()]
@@ -202,3 +203,10 @@ def _torn(found: TextTable, rows: int) -> str:
             name=found.names[-1],
         )
     return "The last row has no line end; if the log was cut short, its last number may be cut as well."
+
+
+TABLE = Reader(name="table", files="CSV and tab-separated text", recognises=lambda source: True, read=read, order=100)
+WRITTEN = Reader(
+    name="upright", files="records as text", recognises=lambda source: source.text.startswith(CSV_MARK),
+    read=read_written, order=30,
+)  # fmt: skip

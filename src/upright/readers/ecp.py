@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import re
 
+from upright.readers.reader import Reader
 from upright.readers.resolution import rebuild
 from upright.readers.source import Source, TextTable
 from upright.records import Record
 
 
-def recognise(text: str) -> bool:
+def recognise(source: Source) -> bool:
     """Whether text begins like an ECP export: names, then a bracket within the first lines."""
-    head = text[:4000].split("\n")
+    head = source.text[:4000].split("\n")
     names = next((line for line in head if line.strip()), "")
     bracket = any(line.lstrip().startswith("[") for line in head[:12])
     return bracket or bool(re.match(r" *Sample {2,}Time( |$)", names))
@@ -69,3 +70,6 @@ def _unwrapped(source: Source, lines: list[str], first: int, last: int) -> str:
             raise source.bad(sentence, line=i + 1, column=len(lines[i]) or 1)
         rows.append(row[(i == first) : -1] if row else "")
     return "\n".join(rows)
+
+
+READER = Reader(name="ecp", files="ECP exports", recognises=recognise, read=read, order=40)

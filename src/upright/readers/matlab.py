@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from upright.errors import BadInput
+from upright.readers.reader import Reader
 from upright.readers.resolution import rebuild
 from upright.readers.source import Source
 from upright.records import Array, Record
@@ -56,9 +57,10 @@ class Unreadable:
     kind: str
 
 
-def recognise(data: bytes, file: str) -> bool:
+def recognise(source: Source) -> bool:
     """Whether content is a MATLAB file of any version, or claims to be one by its suffix."""
-    return data[:6] == b"MATLAB" or _is_hdf5(data) or (file.casefold().endswith(".mat") and b"\0" in data[:128])
+    data, claimed = source.data, source.file.casefold().endswith(".mat")
+    return data[:6] == b"MATLAB" or _is_hdf5(data) or (claimed and b"\0" in data[:128])
 
 
 def _is_hdf5(data: bytes) -> bool:
@@ -432,3 +434,6 @@ def _shape(value: Any) -> str:
     if isinstance(value, Unreadable):
         return value.kind
     return f"{len(value)} cells" if isinstance(value, list) else "structure" if isinstance(value, dict) else "text"
+
+
+READER = Reader(name="matlab", files="MATLAB version 5", recognises=recognise, read=read, order=20)

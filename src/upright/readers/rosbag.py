@@ -12,12 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.readers.delimited import begins_with_number
+from upright.readers.reader import Reader
 from upright.readers.resolution import exact_seconds
 from upright.readers.source import Source, cell
 from upright.records import LARGEST, Array, Record
 
 RECEIVED = "__time"
 STAMP = "/header/stamp"
+_HEAD = 1 << 20  # characters in which the line of names ends
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,9 +32,11 @@ class Topic:
     rows: NDArray[np.intp]  # where it wrote
 
 
-def recognise(names: tuple[str, ...]) -> bool:
-    """Whether names look like a bag's: a receive time, or slashes and a stamp."""
-    return RECEIVED in names or any(name.endswith(STAMP) for name in names)
+def recognise(source: Source) -> bool:
+    """Whether names above the rows look like a bag's: a receive time, or slashes and a stamp."""
+    names = [name.strip() for name in source.text[:_HEAD].lstrip().split("\n", 1)[0].split(",")]
+    bag = RECEIVED in names or any(name.endswith(STAMP) for name in names)
+    return bag and not begins_with_number(source.text)
 
 
 def read(source: Source) -> Record:
@@ -192,3 +197,6 @@ def _moves_before(t: Array, signals: dict[str, Array], units: dict[str, str], he
                 f" {t[commanded[0]]:.4g} s: an earlier command was not recorded; use a window after the first."
             )
     return notes
+
+
+READER = Reader(name="ros-bag", files="ROS bags as CSV", recognises=recognise, read=read, order=60)

@@ -194,9 +194,9 @@ class Record(Shown):
             provenance=replace(self.provenance, window=(float(start), float(stop))),
         )
 
-    def animate(self, *, speed: float = 1.0, frames: int = 25) -> Any:
+    def animate(self, *, plant: Any = None, speed: float = 1.0, frames: int = 25) -> Any:
         """Moving drawing of a rig whose coordinates are columns; see `upright.views.animation.animate`."""
-        return views().animate(self, speed=speed, frames=frames)
+        return views().animate(self, plant=plant, speed=speed, frames=frames)
 
     def replace(self, **changes: Any) -> Record:
         """Record with some fields changed, checked again."""

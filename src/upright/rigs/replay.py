@@ -11,8 +11,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.basis import REPLAYED
 from upright.errors import BadInput, RigStopped
+from upright.readers import read
 from upright.records import Record
+from upright.rigs.board import Board
+from upright.rigs.driver import Connection, Driver
 from upright.rigs.protocol import Capabilities, Mode
 
 
@@ -94,3 +98,12 @@ class ReplayPort:
 
     def close(self) -> None:
         """Nothing is held open."""
+
+
+def _open(to: Connection) -> Board:
+    assert to.record is not None  # since the driver needs it
+    step = to.model.converter or 2.0 * to.model.limit / (1 << 23)
+    return Board(ReplayPort(read(to.record), to.model.counts, 2.0 * to.model.limit, step, to.coordinates))
+
+
+DRIVER = Driver(name="replay", order=20, open=_open, needs={"record": "run.csv"}, performed=REPLAYED)

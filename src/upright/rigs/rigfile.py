@@ -31,13 +31,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from upright.basis import REPLAYED, SIMULATED
 from upright.files import replace_file
+from upright.rigs.driver import DRIVERS
 from upright.rigs.protocol import Limits
 from upright.study.text import Section, StudyText, toml
 
-KINDS = ("twin", "replay", "serial", "quanser", "nidaqmx")
-HARDWARE = ("serial", "quanser", "nidaqmx")
 KEYS = (
     "kind", "name", "fit", "study", "make", "seed", "vendor", "port", "record", "at", "zero", "limits", "board",
     "loadings",
@@ -55,11 +53,13 @@ class RigFile:
     path : Path
         The file itself.
     kind : str
-        One of `KINDS`.
+        One of `driver.DRIVERS`.
     name : str
         As its owner calls it; may be empty.
     known : Path or None
         fit.json or study that describes it.
+    performed : str
+        That no rig is driven, where that is so.
     make : str
         Key of the make whose twin it is, with `seed`; beside a description, which is then what is known of it.
     vendor : str
@@ -82,6 +82,7 @@ class RigFile:
     name: str = ""
     known: Path | None = None
     make: str = ""
+    performed: str = ""
     seed: int = 0
     vendor: str = ""
     port: str = ""
@@ -95,12 +96,7 @@ class RigFile:
     @property
     def hardware(self) -> bool:
         """Whether something can really move."""
-        return self.kind in HARDWARE
-
-    @property
-    def performed(self) -> str:
-        """That no rig is driven, where that is so."""
-        return {"twin": SIMULATED, "replay": REPLAYED}.get(self.kind, "")
+        return not self.performed
 
     def limits(self, units: Mapping[str, str], command_unit: str, default: Limits | None = None) -> Limits | None:
         """How far the rig may go; the default where the file says nothing, None where hardware has no limits.
@@ -180,8 +176,10 @@ def read_rig_file(path: Path) -> RigFile:
     root = _root(path)
     root.check(KEYS)
     if "kind" not in root:
-        raise root.error("kind", f'a rig needs kind, one of {", ".join(KINDS)}, such as kind = "twin"')
-    kind = root.choice("kind", KINDS, "twin")
+        raise root.error("kind", f'a rig needs kind, one of {", ".join(DRIVERS)}, such as kind = "twin"')
+    kind = root.choice("kind", tuple(DRIVERS), "twin")
+    with root.at("kind"):
+        driver = DRIVERS[kind]
     texts = {k: root.text_of(k, e) for k, e in _EXAMPLES.items() if k in root}
     if "fit" in texts and "study" in texts:
         raise root.error("study", "a rig is described by a fit or by a study; leave one out")
@@ -189,13 +187,13 @@ def read_rig_file(path: Path) -> RigFile:
     place = path.parent
     if known is not None and not (place / known).exists():
         raise root.error("fit" if "fit" in texts else "study", f"{place / known} does not exist")
-    if known is None and not ("make" in texts and kind in ("twin", "replay")):
-        other = ' or make = "furuta"' if kind in ("twin", "replay") else ""
+    if known is None and not ("make" in texts and driver.performed):
+        other = ' or make = "furuta"' if driver.performed else ""
         raise root.error("kind", f'a rig needs what describes it: fit = "out/fit.json" or study = "study.toml"{other}')
-    for key, kinds in {"port": ("serial",), "record": ("replay",)}.items():
-        if kind in kinds and key not in texts:
-            raise root.error("kind", f'kind = "{kind}" needs {key} = "{_EXAMPLES[key]}"')
-        if kind not in kinds and key in texts:
+    for key in ("port", "record"):
+        if key in driver.needs and key not in texts:
+            raise root.error("kind", f'kind = "{kind}" needs {key} = "{driver.needs[key]}"')
+        if key not in driver.needs and key in texts:
             raise root.error(key, f'kind = "{kind}" has no {key}; leave it out')
     seed = root.values.get("seed", 0)
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
@@ -206,7 +204,8 @@ def read_rig_file(path: Path) -> RigFile:
     if not 0 <= tolerance < 1:
         raise loadings.error("tolerance", 'tolerance is a share of a piece from 0 to below 1, such as "0.2 %"')
     return RigFile(
-        path=path, kind=kind, name=texts.get("name", ""), known=None if known is None else place / known,
+        path=path, kind=kind, performed=driver.performed, name=texts.get("name", ""),
+        known=None if known is None else place / known,
         make=texts.get("make", ""), seed=seed, vendor=texts.get("vendor", ""), port=texts.get("port", ""),
         record=place / texts["record"] if "record" in texts else None, at=texts.get("at", "inverted"),
         zero=texts.get("zero", "hanging"), board=board, tolerance=tolerance,

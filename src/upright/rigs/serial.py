@@ -11,6 +11,7 @@ from upright.errors import BadInput, RigStopped
 from upright.laws import Law
 from upright.rigs import wire
 from upright.rigs.board import told
+from upright.rigs.driver import Connection, Driver
 from upright.rigs.line import Line, open_line
 from upright.rigs.onboard import onboard, ticks
 from upright.rigs.protocol import LONGEST_PULSE, NO_FAULT, Capabilities, Fault, Limits, Mode, SelfTest, Tick
@@ -388,3 +389,14 @@ class SerialRig:
 def _down(value: float) -> int:
     """Whole number below, but for rounding of the last digits."""
     return math.floor(min(value + 1e-9 * max(1.0, value), 2.0**40))
+
+
+def _open(to: Connection) -> SerialRig:
+    about, rest = to.capabilities()
+    return SerialRig(
+        to.port, coordinates=about.coordinates, counts=about.counts, command_unit=about.command_unit,
+        full_scale=about.full_scale, **rest,
+    )  # fmt: skip
+
+
+DRIVER = Driver(name="serial", order=30, open=_open, needs={"port": "/dev/ttyACM0"})

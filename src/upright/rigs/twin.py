@@ -12,8 +12,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from upright.basis import SIMULATED
 from upright.control.trial import SUBSTEPS, ServoRig
 from upright.records import Array
+from upright.rigs.board import Board
+from upright.rigs.driver import Connection, Driver
 from upright.rigs.protocol import Capabilities, Mode
 from upright.simulation import choose
 from upright.simulation.simulator import Simulator
@@ -160,3 +163,10 @@ class TwinPort:
         """A tap adds to the speeds of the coordinates [rad/s or m/s]."""
         self.x = self.x.copy()
         self.x[1::2] += np.asarray(speeds, dtype=np.float64)
+
+
+def _open(to: Connection) -> Board:
+    return Board(TwinPort(to.truth, to.zero if to.zero in to.model.plant.equilibria else ""))
+
+
+DRIVER = Driver(name="twin", order=10, open=_open, performed=SIMULATED)

@@ -21,7 +21,7 @@ from upright.files import read_text
 from upright.identification.model.bands import Bands, Spread
 from upright.identification.model.fit import Judgement
 from upright.identification.model.rig import SUBSTEPS
-from upright.physics import BUILT_IN, find
+from upright.physics import PLANTS, find
 from upright.physics.actuator import ACTUATOR
 from upright.study.description import Entry, RigDescription, check_vendor
 
@@ -278,7 +278,7 @@ def _check_physics(plant: str, values: Mapping[str, float]) -> None:
     for name in kind.names():
         if name in values:
             kind.quantity(name).check(name, values[name])
-    if plant in BUILT_IN and all(name in values for name in kind.names()):
+    if plant in PLANTS and all(name in values for name in kind.names()):
         kind(**{name: values[name] for name in kind.names()})
 
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from upright.identification.model.runs import FOR_GROUPS, PER_RUN
 from upright.physics.actuator import ACTUATOR
+from upright.readers.reader import READERS
 
 
 class Key(NamedTuple):
@@ -83,7 +84,7 @@ _SHARED = (
     Key("score_from", '"30 s"', "seconds after the window's start before which nothing is scored"),
     Key("loop", "table", "law that closed the loop, simulated with the plant"),
     Key("period", '"2 ms"', "sample period to resample to; the log's own if left out"),
-    Key("reader", '"table"', "reader of the file (ecp, table, ros-bag, matlab, upright), when it is not recognised"),
+    Key("reader", '"table"', f"reader of the file ({', '.join(READERS.own)}), when it is not recognised"),
     Key("time", '"stamp"', "column that holds the time [s], when the reader took another one"),
 )
 

@@ -33,7 +33,8 @@ def read(file: Log, *, reader: str = "") -> Record:
     Parameters
     ----------
     file : path, Record or pandas.DataFrame
-        CSV, tab-separated text, MATLAB, ECP export, ROS bag as CSV, log of a run (MCAP); recognised from the content.
+        Whatever one of `upright.readers.READERS` reads, such as CSV, MATLAB or the log of a run (MCAP); recognised from
+        the content.
     reader : str, optional
         Reader of the log, when it is not recognised.
 

@@ -132,11 +132,11 @@ def _poles(poles: Any) -> str:
     return ", ".join(shown)
 
 
-def animate(record: Record, *, speed: float, frames: int) -> Any:
+def animate(record: Record, *, plant: Any, speed: float, frames: int) -> Any:
     """The rig as it moved; see `Record.animate`."""
     from upright.views.animation import animate as drawn
 
-    return drawn(record, speed=speed, frames=frames)
+    return drawn(record, plant=plant, speed=speed, frames=frames)
 
 
 @styled

@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import BadInput
+from upright.physics import PLANTS
 from upright.records import Record
 from upright.report.drawing import BLUE, GREY, VERMILLION, figure
 
 Array = NDArray[np.float64]
 
 
-def animate(record: Record, *, speed: float = 1.0, frames: int = 25) -> Any:
+def animate(record: Record, *, plant: Any = None, speed: float = 1.0, frames: int = 25) -> Any:
     """Moving drawing of a record whose columns bear the names of coordinates; a notebook plays it.
 
     Parameters
@@ -22,6 +23,8 @@ def animate(record: Record, *, speed: float = 1.0, frames: int = 25) -> Any:
     record : Record
         With ``theta`` [rad], and ``x`` [m] or ``psi`` [rad] where the pendulum stands on a cart or an arm; or with
         ``x_1, x_2, ...`` [m] or ``theta_1, theta_2, ...`` [rad].
+    plant : Plant or its class, optional
+        Whose `drawing` is drawn; that of the record's own rig when omitted.
     speed : float
         Times faster than the motion was.
     frames : int
@@ -46,7 +49,10 @@ def animate(record: Record, *, speed: float = 1.0, frames: int = 25) -> Any:
             raise BadInput(f"animate draws angles in rad, and '{name}' is in {record.units[name]}; convert it first.")
     moments = np.arange(record.t[0], record.t[-1], speed / frames)
     q = {name: np.interp(moments, record.t, values) for name, values in record.signals.items()}
-    lines = _pendulum(q) if "theta" in q else _bodies(q)
+    kinds = (kind for kind in PLANTS.sound().values() if kind.__name__ == record.provenance.rig)
+    kind = plant or next(kinds, None)
+    own = kind.drawing(q) if kind else []
+    lines = own or (_pendulum(q) if "theta" in q else _bodies(q))
     if not lines:
         raise BadInput(
             "animate draws columns called theta, x, psi, or x_1, x_2, ..., and the record has "
@@ -57,7 +63,7 @@ def animate(record: Record, *, speed: float = 1.0, frames: int = 25) -> Any:
     axes.set_aspect("equal")
     reach = max(float(np.abs(line).max()) for line in lines) * 1.15
     axes.set_xlim(-reach, reach)
-    axes.set_ylim(-1.3, 1.3)
+    axes.set_ylim(*((-reach, reach) if own else (-1.3, 1.3)))
     axes.axhline(0.0, color=GREY, linewidth=0.8)
     axes.set_yticks([])
     drawn = [axes.plot([], [], color=c, marker="o", linewidth=2)[0] for c, _ in zip((BLUE, VERMILLION) * 8, lines)]  # noqa: B905

@@ -259,7 +259,7 @@ def _next_steps(done: Designed, source: str, folder: str) -> list[Step]:
         )  # fmt: skip
     if done.chosen.margins is not None:
         steps.append(
-            Step("Take the law to the computer that closes the loop: c, arduino, python, matlab or simulink.",
+            Step("Take the law to the computer that closes the loop, in C or another form: upright export --help.",
                  f"upright export {folder}/design.json --to c")
         )  # fmt: skip
     steps.append(

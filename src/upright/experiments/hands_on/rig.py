@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from upright.basis import REPLAYED
 from upright.control.trial import ServoRig, Trial
 from upright.errors import BadInput, RigStopped
 from upright.experiments.identified import read_identified
@@ -206,7 +207,7 @@ def rig_at_hand(
     """
     library()
     file = read_rig_file(path)
-    if file.kind == "replay":
+    if file.performed == REPLAYED:
         raise BadInput(
             f'{path}: a replay answers nothing that is asked of it; experiments need a rig or kind = "twin".'
         )

@@ -7,30 +7,27 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from upright.basis import DESCRIBED, Basis, of_plain
+from upright.basis import DESCRIBED, SIMULATED, Basis, of_plain
 from upright.control.trial import ServoRig
 from upright.errors import BadInput, nearest
 from upright.experiments.identified import read_identified
 from upright.experiments.makes import make_named, make_rig
 from upright.files import read_text
 from upright.laws import Law, Rule, of_values
-from upright.readers import read
 from upright.realtime.session import Stage
 from upright.records import Array
-from upright.rigs import Board, Capabilities, Limits, LiveRig, Mode, ReplayPort, TwinPort
+from upright.rigs import Board, Limits, LiveRig, TwinPort
+from upright.rigs.driver import DRIVERS, Connection
 from upright.rigs.rigfile import RigFile, read_rig_file
 from upright.rigs.supervisor import Duty, Supervisor
 
 LEAN, NEAR = math.radians(30), math.radians(10)
 """How far a pendulum may lean in a run and at its start, where RIG.toml does not say."""
-FULL_SCALE = 10.0
-"""Of converters of vendors' boards, where [board] does not say [V]."""
 
 
 def described(file: RigFile) -> tuple[ServoRig, ServoRig]:
@@ -42,9 +39,9 @@ def described(file: RigFile) -> tuple[ServoRig, ServoRig]:
     said = known.described(vendor=file.vendor, who="a run on a rig", form="")
     model = known.rig(said)
     truth = model
-    if file.kind == "twin" and file.make:
+    if file.performed == SIMULATED and file.make:
         truth = make_rig(make_named(file.make, option="make").key, file.seed)
-    elif file.kind == "twin" and file.seed:
+    elif file.performed == SIMULATED and file.seed:
         truth = known.twin(model, said, file.seed)
     return (replace(model, name=file.name), truth) if file.name else (model, truth)
 
@@ -57,30 +54,16 @@ def live_rig(file: RigFile, model: ServoRig, truth: ServoRig) -> LiveRig:
     BadInput
         When what it takes is not installed, or RIG.toml leaves out what it needs.
     """
-    names = tuple(c.name for c in model.plant.coordinates)
-    if file.kind == "twin":
-        return Board(TwinPort(truth, file.zero if file.zero in model.plant.equilibria else ""))
-    if file.kind == "replay":
-        assert file.record is not None  # as `read_rig_file` made sure
-        step = model.converter or 2.0 * model.limit / (1 << 23)
-        return Board(ReplayPort(read(file.record), model.counts, 2.0 * model.limit, step, names))
-    given = dict(file.board)
-    full_scale = float(given.pop("full_scale", FULL_SCALE))
-    if file.kind == "serial":
-        rig = import_module("upright.rigs.serial").SerialRig
-        return rig(file.port, coordinates=names, counts=model.counts, command_unit=model.unit, full_scale=full_scale,
-                   **given)  # fmt: skip
-    about = Capabilities(
-        name=file.name or file.kind, coordinates=names, counts=model.counts, command_unit=model.unit,
-        full_scale=full_scale, steps=int(given.pop("steps", 1 << 15)), period=model.period,
-        modes=frozenset({Mode.HOST}),
+    to = Connection(
+        kind=file.kind, name=file.name, port=file.port, record=file.record, zero=file.zero, board=file.board,
+        model=model, truth=truth,
     )  # fmt: skip
-    module = import_module(f"upright.rigs.vendor.{file.kind}")
-    port = {"quanser": "QuanserPort", "nidaqmx": "NidaqmxPort"}[file.kind]
     try:
-        return Board(getattr(module, port)(about, **given))
+        return DRIVERS[file.kind].open(to)
     except TypeError as error:
-        raise BadInput(f"{file.path}: [board] does not fit {port} ({error}); see help(upright.rigs.vendor).") from None
+        if not file.board:
+            raise
+        raise BadInput(f'{file.path}: [board] does not fit kind = "{file.kind}" ({error}).') from None
 
 
 def usual_limits(rig: ServoRig) -> Limits:

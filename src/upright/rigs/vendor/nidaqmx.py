@@ -14,6 +14,8 @@ from time import monotonic
 from typing import Any
 
 from upright.errors import BadInput
+from upright.rigs.board import Board
+from upright.rigs.driver import Connection, Driver
 from upright.rigs.protocol import Capabilities, Mode
 
 _BITS = 32  # of the counters, which count on from 0 to 2^32 - 1
@@ -110,3 +112,11 @@ class NidaqmxPort:
         for task in self._tasks:
             task.close()
         self._tasks, self._encoders = [], []
+
+
+def _open(to: Connection) -> Board:
+    about, rest = to.capabilities()
+    return Board(NidaqmxPort(about, **rest))
+
+
+DRIVER = Driver(name="nidaqmx", order=50, open=_open)

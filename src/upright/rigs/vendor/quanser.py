@@ -15,6 +15,8 @@ from time import monotonic
 from typing import Any
 
 from upright.errors import BadInput
+from upright.rigs.board import Board
+from upright.rigs.driver import Connection, Driver
 from upright.rigs.protocol import Capabilities, Mode
 
 
@@ -98,3 +100,11 @@ class QuanserPort:
             self._card.watchdog_stop()
             self._card.close()
             self._card = None
+
+
+def _open(to: Connection) -> Board:
+    about, rest = to.capabilities()
+    return Board(QuanserPort(about, **rest))
+
+
+DRIVER = Driver(name="quanser", order=40, open=_open)

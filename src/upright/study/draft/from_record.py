@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from upright.errors import BadInput, nearest
-from upright.physics import BUILT_IN, Plant
+from upright.physics import Plant, name_of
 from upright.physics.actuator import ACTUATOR
 from upright.readers import inspect
 from upright.records import Record
@@ -51,7 +51,7 @@ def study_of_record(
         When a name fits neither the plant nor the record, or nothing can be recognised.
     """
     record = _renamed(record, columns or {}, units or {})
-    name = _name_of(plant) if plant is not None else ""
+    name = name_of(plant) if plant is not None else ""
     study, plant = _drafted(record, name) if plant is None or name else (_plain(record, plant), plant)
     values = study.setdefault("parameters", {})
     _own_force(study, plant, weighs=ask is None)
@@ -81,16 +81,6 @@ def _renamed(record: Record, columns: Mapping[str, str], units: Mapping[str, str
         stated[name] = unit
     roles = {role: tuple(back.get(n, n) for n in getattr(record, role)) for role in ("inputs", "outputs")}
     return record.replace(signals=signals, units=stated, **roles)
-
-
-def _name_of(plant: type[Plant]) -> str:
-    """Name by which a draft knows a plant; empty for a plant of the user's own."""
-    from upright.physics import find
-
-    for name in (*BUILT_IN, *(f"{kind}-{n}" for kind in ("rectilinear", "torsional") for n in (1, 2, 3, 4))):
-        if find(name) is plant:
-            return name
-    return ""
 
 
 def _drafted(record: Record, name: str) -> tuple[dict[str, Any], type[Plant]]:

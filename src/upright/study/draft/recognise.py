@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from upright.errors import BadInput
-from upright.physics import Plant, find
+from upright.physics import PLANTS, Plant, find
 from upright.readers.inspection import Column, Inspection, effort_unit
 from upright.records import Array, Record
 from upright.signals.smoothing import savitzky_golay, white_noise
@@ -200,6 +200,9 @@ def drive_column(record: Record, seen: Inspection) -> Column | None:
 
 def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
     """Plant whose coordinates look like these columns, and how sure that is."""
+    named = _by_coordinates({c.name for c in places})
+    if named:
+        return named, f"The columns are called as the coordinates of a {named}."
     lengths = [c for c in places if c.guess in ("m", "mm")]
     counts = [c for c in places if c.guess in ("counts", "")]
     angles = [c for c in places if c.guess in ("rad", "deg")]
@@ -226,6 +229,12 @@ def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
         return f"rectilinear-{min(len(lengths), 3)}", "Positions were taken for carts on springs."
     doubt = "One angle was taken for a pendulum on a fixed pivot." if drive is not None else ""
     return "pendulum", doubt
+
+
+def _by_coordinates(names: set[str]) -> str:
+    """Plant of a package, the only one at all whose coordinates have just these names; empty where there is none."""
+    fitting = [n for n, plant in PLANTS.sound().items() if {c.name for c in plant.coordinates} == names]
+    return fitting[0] if len(fitting) == 1 and fitting[0] not in PLANTS.own else ""
 
 
 def _assign(plant: type[Plant], places: list[Column]) -> tuple[dict[str, Column], list[str]]:

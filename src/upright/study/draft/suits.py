@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from upright.physics import BUILT_IN, Plant
+from upright.physics import PLANTS, Plant
 from upright.readers.inspection import Inspection
 from upright.records import Record
 from upright.study.draft.chain_log import chain_kind
@@ -15,7 +15,7 @@ MOST_BODIES = 3
 
 
 def plants_that_suit(record: Record, seen: Inspection) -> tuple[str, ...]:
-    """Built-in plants whose coordinates a log's moving columns can measure, the likeliest first; none when none can."""
+    """Plants whose coordinates a log's moving columns can measure, the likeliest first; none when none can."""
     places = position_columns(record, seen)
     if not places:
         return ()
@@ -35,5 +35,5 @@ def plants_that_suit(record: Record, seen: Inspection) -> tuple[str, ...]:
         sliding = len(plant.coordinates) - turning
         return len(plant.coordinates) == len(units) and turning >= angles and sliding >= lengths
 
-    others = [name for name, plant in BUILT_IN.items() if name != likely and suits(plant)]
+    others = [name for name, plant in PLANTS.sound().items() if name != likely and suits(plant)]
     return (likely, *others)

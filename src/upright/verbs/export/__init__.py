@@ -10,11 +10,8 @@ from upright.files import keeps_its_inputs
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
 from upright.verbs.export.law import controller, write_law
-from upright.verbs.export.rig import FORMS
+from upright.verbs.export.rig import write_rig
 from upright.verbs.pages import folder
-
-LAWS = ("c", "arduino", "python", "matlab", "simulink")
-"""Forms of a law, `exports.targets.TARGETS`."""
 
 
 @command(
@@ -47,9 +44,9 @@ def export(
     source : path, answer of `design` or `identify`, Law, Rule or plant
         Of a law design.json or its folder; of a rig what `identify` answered, fit.json or its folder, or a plant.
     to : str
-        A law as ``"c"``, ``"arduino"``, ``"python"``, ``"matlab"`` (GNU Octave too) or ``"simulink"``; a rig as
-        ``"gymnasium"``, an environment whose every episode has another rig that the fit allows, ``"mjcf"``, a
-        model of MuJoCo, or ``"fmu"``, a unit for co-simulation (FMI 3.0).
+        One of `upright.exports.targets.TARGETS`: of a law ``"c"``, ``"arduino"``, ``"python"``, ``"matlab"`` (GNU
+        Octave too) or ``"simulink"``; of a rig ``"gymnasium"``, an environment whose every episode has another rig
+        that the fit allows, ``"mjcf"``, a model of MuJoCo, or ``"fmu"``, a unit for co-simulation (FMI 3.0).
     out : path
         Folder for the files.
     single : bool
@@ -68,13 +65,17 @@ def export(
     BadInput
         When there is no such form, or what was given cannot be written in it.
     """
-    if to not in (*LAWS, *FORMS):
-        raise BadInput(f"--to is one of {', '.join((*LAWS, *FORMS))}, got '{to}'; {nearest(to, (*LAWS, *FORMS))}")
-    if to in LAWS:
+    from upright.exports.targets import TARGETS, LawTarget, RigTarget
+
+    if to not in TARGETS:
+        raise BadInput(f"--to is one of {', '.join(TARGETS)}, got '{to}'; {nearest(to, TARGETS)}")
+    target = TARGETS[to]
+    if isinstance(target, LawTarget):
         if limit is not None:
             raise BadInput("the limit of a law is the one that it was designed with; give --limit to upright design.")
         made, name = controller(source)
-        return write_law(made, name, to, folder(out), single)
+        return write_law(made, name, target, folder(out), single)
     if single:
         raise BadInput("--float is of laws; a rig is simulated in double precision.")
-    return FORMS[to](source, folder(out), limit)
+    assert isinstance(target, RigTarget)  # there are no others
+    return write_rig(source, target, folder(out), limit)

@@ -14,13 +14,13 @@ from upright.verbs.answer import Answer
 
 if TYPE_CHECKING:
     from upright.exports.controller import SampledController
-
-_OF_RULES = ("c", "arduino", "python")
+    from upright.exports.targets import LawTarget
 
 
 def controller(source: Any) -> tuple[SampledController, str]:
     """The law to be written, and what it is called by."""
     from upright.exports.controller import of_design, of_law
+    from upright.exports.targets import TARGETS, RigTarget
 
     if isinstance(source, Answer) and "law" in (source.numbers or {}):
         from upright.files import plain_values
@@ -36,24 +36,30 @@ def controller(source: Any) -> tuple[SampledController, str]:
         content = json.loads(read_text(path))
     except (UnicodeDecodeError, ValueError, RecursionError):
         raise BadInput(f"{path} is no design.json; `upright design ... -o FOLDER` writes one.") from None
+    if isinstance(content, dict) and {"plant", "parameters"} <= content.keys():
+        *forms, last = (t.name for t in TARGETS.own.values() if isinstance(t, RigTarget))
+        raise BadInput(
+            f"{path} is a fit, and a law is what `upright design {path} --poles ... -o FOLDER` makes of it; the rig "
+            f"itself goes --to {', '.join(forms)} or {last}."
+        )
     return of_design(content, str(path)), str(path)
 
 
-def write_law(made: SampledController, name: str, to: str, at: Path, single: bool) -> Answer[tuple[str, ...]]:
+def write_law(made: SampledController, name: str, target: LawTarget, at: Path, single: bool) -> Answer[tuple[str, ...]]:
     """The law in one form, its files in a folder."""
-    from upright.exports.targets import TARGETS
+    from upright.exports.targets import TARGETS, LawTarget
     from upright.exports.vector import self_test
     from upright.laws import Rule
     from upright.report.page import Chapter, Part, Points, Step, resting_on
     from upright.report.symbols import number, typed
 
-    function = isinstance(made.law, Rule)
-    if function and (single or to not in _OF_RULES):
+    if isinstance(made.law, Rule) and (single or not target.rules):
+        of_rules = (t.name for t in TARGETS.own.values() if isinstance(t, LawTarget) and t.rules)
         raise BadInput(
-            f"a rule goes --to {', '.join(_OF_RULES)} in double precision, since nobody knows what it makes of a "
-            f"rounding; got {'--float' if single else to}."
+            f"a rule goes --to {', '.join(of_rules)} in double precision, since nobody knows what it makes of a "
+            f"rounding; got {'--float' if single else target.name}."
         )
-    target, test = TARGETS[to], self_test(made)
+    test = self_test(made)
     texts = target.write(made, test, single)
     files = [replace_file(at / file, text.encode()) for file, text in texts.items()]
     unit, step = made.command_unit, float(made.converter.max(initial=0.0))
@@ -67,12 +73,8 @@ def write_law(made: SampledController, name: str, to: str, at: Path, single: boo
         if test.single > step * 1.001:
             than = f"more than the converter's step of {number(step, 2)} {unit}" if step else "which no converter hides"
             warnings.append(f"Single precision may move a command by {miss}, {than}; a slower period moves it less.")
-    elif to == "arduino" and function:
-        warnings.append(
-            "On boards whose double has 32 bits (Uno, Mega, Nano) the self-test may fail, and nothing runs."
-        )
-    elif to == "arduino":
-        warnings.append(f"On boards whose double has 32 bits commands may miss by {miss}.")
+    else:
+        warnings += filter(None, [target.warn(made, miss)])
     told = Chapter(
         title=f"{made.title} for {target.name}", verdict=f"{name} is written for {target.name}; {exact}.",
         parts=(Part("What it takes and gives", (Points(tuple(made.facts)),)),), warnings=tuple(warnings),
@@ -80,7 +82,7 @@ def write_law(made: SampledController, name: str, to: str, at: Path, single: boo
             Step("Let it test itself where it will run.", target.test.format(folder=typed(at))), Step(target.onward)
         ),
         numbers={
-            "to": to, "files": [str(f) for f in files], "period": made.law.period, "limit": made.law.limit,
+            "to": target.name, "files": [str(f) for f in files], "period": made.law.period, "limit": made.law.limit,
             "samples": len(test.readings), "single_precision_misses": test.single,
         },
     )  # fmt: skip

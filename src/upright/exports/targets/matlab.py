@@ -6,16 +6,17 @@ import numpy as np
 
 from upright.exports.arithmetic import Language, statements
 from upright.exports.controller import SampledController
+from upright.exports.targets import LawTarget
 from upright.exports.vector import ReplayVector
 from upright.laws.linear import Array
 
 
-def files(made: SampledController, test: ReplayVector, *, single: bool) -> dict[str, str]:
+def files(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
     """Texts by file name."""
     return {"law_step.m": step(made, single=single), "law_selftest.m": replay(test, single=single)}
 
 
-def block(made: SampledController, test: ReplayVector, *, single: bool) -> dict[str, str]:
+def block(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
     """Texts by file name for Simulink: the same function, a level-2 S-function that calls it, what makes its block."""
     return {**files(made, test, single=single), "law_sfun.m": _s_function(made, single=single), "law_block.m": _BLOCK}
 
@@ -155,3 +156,14 @@ new_system('law_model');
 add_block('simulink/User-Defined Functions/Level-2 MATLAB S-Function', 'law_model/law', 'FunctionName', 'law_sfun');
 open_system('law_model');
 """
+
+MATLAB = LawTarget(
+    name="matlab", order=25, title="MATLAB and GNU Octave", write=files,
+    test="octave-cli --path {folder} --eval law_selftest",
+    onward="[u, s] = law_step(s, y) at every sample, with s = [] before the first.",
+)  # fmt: skip
+SIMULINK = LawTarget(
+    name="simulink", order=30, title="Simulink", write=block,
+    test=MATLAB.test,
+    onward="In MATLAB, run law_block: it makes a model with the law as a block at its own sample time.",
+)  # fmt: skip

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from upright.exports import c
 from upright.exports.controller import SampledController, identifiers
+from upright.exports.targets import LawTarget, c
 from upright.exports.vector import ReplayVector
+from upright.laws import Rule
 
 
-def files(made: SampledController, test: ReplayVector, *, single: bool) -> dict[str, str]:
+def files(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
     """Texts by file name, in the folder ``law`` that the sketch has to be called after."""
     texts = c.files(made, test, single=single)
     del texts["law_selftest.c"]
@@ -66,3 +67,20 @@ void loop() {{
   put_out(u);
 }}
 """
+
+
+def _narrow(made: SampledController, miss: str) -> str:
+    """That some boards have no double precision."""
+    where = "On boards whose double has 32 bits"
+    if isinstance(made.law, Rule):
+        return f"{where} (Uno, Mega, Nano) the self-test may fail, and nothing runs."
+    return f"{where} commands may miss by {miss}."
+
+
+TARGET = LawTarget(
+    name="arduino", order=15, title="an Arduino sketch", write=files,
+    rules=True, warn=_narrow,
+    test="arduino-cli compile --upload -b arduino:avr:uno -p PORT {folder}/law && arduino-cli monitor -p PORT "
+    "-c baudrate=115200",
+    onward="Fill in counts_of and put_out in law.ino; until then it reads zeros and puts nothing out.",
+)  # fmt: skip

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from upright.errors import BadInput
 from upright.exports import rule
 from upright.exports.arithmetic import Language, check_inputs, put_out, statements
 from upright.exports.controller import SampledController
+from upright.exports.targets import LawTarget
 from upright.exports.vector import ReplayVector
 from upright.laws import Rule
 
@@ -19,8 +21,10 @@ _LANGUAGE = Language(
 )  # fmt: skip
 
 
-def files(made: SampledController, test: ReplayVector) -> dict[str, str]:
+def files(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
     """Text by file name."""
+    if single:
+        raise BadInput("Python's numbers are doubles; leave --float out, or take --to c.")
     about = "\n".join(made.facts)
     if isinstance(made.law, Rule):
         needs = "from math import floor, frexp, inf, isfinite, nan, pi, sqrt\n\n"
@@ -103,3 +107,9 @@ if __name__ == "__main__":
     print("law: every sample is the expected one")
 '''
     }
+
+
+TARGET = LawTarget(
+    name="python", order=20, title="Python", write=files, rules=True,
+    test="python {folder}/law.py", onward="law = Law(); u = law.step(y) at every sample.",
+)  # fmt: skip

@@ -7,6 +7,7 @@ import numpy as np
 from upright.exports import rule
 from upright.exports.arithmetic import Language, check_inputs, put_out, statements
 from upright.exports.controller import SampledController, identifiers
+from upright.exports.targets import LawTarget
 from upright.exports.vector import ReplayVector
 from upright.laws import Rule
 from upright.laws.linear import Array
@@ -23,7 +24,7 @@ _EXACT = """\
 """
 
 
-def files(made: SampledController, test: ReplayVector, *, single: bool) -> dict[str, str]:
+def files(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
     """Texts by file name."""
     return {
         "law.h": header(made, single=single),
@@ -293,3 +294,10 @@ def _in(unit: str) -> str:
 def _table(name: str, rows: Array, single: bool) -> str:
     body = "".join(f"        {{{', '.join(number(x, single) for x in row)}}},\n" for row in np.asarray(rows).tolist())
     return f"    static const law_real {name}[{len(rows)}][{rows.shape[1]}] = {{\n{body}    }};\n"
+
+
+TARGET = LawTarget(
+    name="c", order=10, title="C99", write=files, rules=True,
+    test="cd {folder} && cc -std=c99 -O2 law.c law_selftest.c -lm && ./a.out",
+    onward="Call law_start once and law_step at every sample.",
+)  # fmt: skip

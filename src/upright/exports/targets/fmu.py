@@ -1,0 +1,37 @@
+"""An identified rig for co-simulation, as a unit of FMI 3.0."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from upright.exports.fmu import build, unit_of
+from upright.exports.targets import RigExport, RigTarget
+from upright.report.page import Chapter, Part, Points, Step
+from upright.report.symbols import typed
+
+
+def write(asked: RigExport) -> tuple[Mapping[str, bytes], Chapter]:
+    """The unit, with a library where a C compiler is found."""
+    unit, file = unit_of(asked.rig), asked.folder / "rig.fmu"
+    content, where = build(unit)
+    warnings = unit.told if where else (*unit.told, "No C compiler was found, so the unit has its sources alone.")
+    taken, given = (", ".join(f"{v.name} [{v.unit or '1'}]" for v in group) for group in (unit.inputs, unit.states))
+    told = Chapter(
+        title=f"{asked.rig.name} for co-simulation", warnings=warnings,
+        verdict=f"{asked.called} is a unit of FMI 3.0" + (f" with a library for {where}." if where else "."),
+        parts=(Part("What it takes and gives", (Points((
+            f"Inputs: {taken or 'none'}; outputs: {given}.",
+            f"Parameters, to be set before the first step: {', '.join(v.name for v in unit.parameters)}; where it "
+            f"begins: {', '.join(v.name for v in unit.starts)}.",
+            "Steps of whole milliseconds; an input is held for a step.",
+        )),)),),
+        steps=(
+            Step("Check and run it.", f"pip install fmpy && fmpy validate {typed(file)} && fmpy simulate {typed(file)} "
+                 f"--start-values {unit.states[-2].name}_start 0.5 --show-plot"),
+        ),
+        numbers={"platform": where},
+    )  # fmt: skip
+    return {file.name: content}, told
+
+
+TARGET = RigTarget(name="fmu", order=45, write=write)
