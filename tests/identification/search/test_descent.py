@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -171,3 +172,19 @@ def test_prior_knowledge_is_weighed_by_the_noise_of_the_residuals() -> None:
     settle_weights(problem, descend_progressively(problem, problem.start))
     # of 1000 residuals, to the fifth of a logarithm that counts as no change
     assert problem.noise == pytest.approx(2e-3 / np.std(run.y), rel=0.25)
+
+
+def test_a_horizon_doubles_and_the_last_third_of_a_run_is_no_stage_of_its_own() -> None:
+    """Of 10 s, from 1 s on at least 2, 4 and then 8 s, which is more than seven tenths: the whole run at once."""
+    problem = formulate(rig(Pendulum, PENDULUM, {"J_p": 2.4e-3, "b_2": 1.8e-3}), [noisy(swing(), 2e-3, 5)])
+    log = SearchLog()
+    descend_progressively(problem, problem.start, log, horizon=1.0)
+    stages = [name for name, *_ in log.history]
+    assert stages[0] == "first 1 s"
+    assert stages[-1] == "whole runs"
+    seconds = [float(name.split()[1]) for name in stages[:-1]]
+    assert all(b >= 2 * a for a, b in itertools.pairwise(seconds))
+    assert max(seconds) <= 7.0
+    log = SearchLog()
+    descend_progressively(problem, problem.start, log, horizon=4.0)
+    assert [name for name, *_ in log.history] == ["first 4 s", "whole runs"]
