@@ -172,6 +172,9 @@ def test_mistakes_are_answered_with_what_is_there() -> None:
         found_in(still)
     with pytest.raises(NotIdentifiable, match="at least 60"):
         found_in(record.window(0, 40 * T))
+    # a spline through more than a million samples is no answer: 300 rows of 3334
+    with pytest.raises(BadInput, match="300 rows of 3334 samples each are 1e"):
+        found_in(record, every=3334)
 
 
 @pytest.mark.parametrize(("every", "said"), [(1, ""), (2, "second"), (3, "third"), (5, "5th")])
