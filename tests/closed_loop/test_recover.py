@@ -172,3 +172,19 @@ def test_mistakes_are_answered_with_what_is_there() -> None:
         found_in(still)
     with pytest.raises(NotIdentifiable, match="at least 60"):
         found_in(record.window(0, 40 * T))
+    # a spline through more than a million samples is no answer: 300 rows of 3334
+    with pytest.raises(BadInput, match="300 rows of 3334 samples each are 1e"):
+        found_in(record, every=3334)
+
+
+@pytest.mark.parametrize(("every", "said"), [(1, ""), (2, "second"), (3, "third"), (5, "5th")])
+def test_what_a_law_misses_is_told_in_percent_of_the_command(every: int, said: str) -> None:
+    """Missed by a tenth of the command's deviation, to and fro, it explains 90 %; by half of it, next to nothing."""
+    found = found_in(closed_loop(Pid(kp=4.0)))
+    rough = np.where(np.arange(found.recorded.size) % 2, 1.0, -1.0) * np.std(found.recorded[3:])
+    partial = replace(found, reproduced=found.recorded + 0.1 * rough, every=every)
+    assert partial.quality == "partial"
+    assert "The law explains 90.0 % of the command" in partial.sentence
+    assert ("every" in partial.sentence) is (every > 1)
+    assert said in partial.sentence
+    assert replace(partial, reproduced=found.recorded + rough).quality == "poor"

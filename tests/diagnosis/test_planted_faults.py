@@ -106,6 +106,15 @@ def test_an_effort_that_did_not_act_is_replaced_left_out_or_cut(plant, fault, ke
 
 
 @pytest.mark.parametrize("plant", RIGS)
+def test_a_reference_in_the_place_of_the_effort_is_known_by_what_follows_it(plant):
+    doctored, (finding,) = planted(plant, "effort is the reference")
+    x, u = doctored.record[doctored.known.plant.coordinates[0].name], doctored.record["u"]
+    alike = 100 * float(np.corrcoef(x, u)[0, 1])
+    assert finding.evidence["correlation with the motion [%]"] == pytest.approx(alike)
+    assert f"follows it ({alike:.0f} % correlation), as it would a reference" in finding.sentence
+
+
+@pytest.mark.parametrize("plant", RIGS)
 def test_an_effort_that_repeats_a_position_does_so_by_its_factor(plant):
     doctored, (finding,) = planted(plant, "effort is the position")
     x, u = doctored.record[doctored.known.plant.coordinates[0].name], doctored.record["u"]

@@ -15,7 +15,9 @@ from upright.identification.frequency.balance import Balance
 from upright.identification.frequency.detection import by_period, detect, settled
 from upright.identification.frequency.fitting import least_squares, simplex_dB
 from upright.identification.frequency.response import FrequencyResponse, describing
+from upright.identification.frequency.spectra import response_of
 from upright.physics import CartPendulum, DoublePendulum, DoublePendulumAbsolute, Furuta, chain
+from upright.records import Provenance, Record
 from upright.simulation import simulate
 
 FURUTA = Furuta(m_p=0.135, l_cg=0.184, r=0.15, J_d=7.2e-3, J_p=6e-4, J_a=2e-5, b_1=2e-3, b_2=4e-5)
@@ -93,6 +95,30 @@ def test_a_transient_is_waited_for_as_long_as_it_lasts():
         assert 0.5 * abs(rho) ** end < 1.1e-3
         assert 0.5 * abs(rho) ** (end - 25) > 1e-3
     assert settled((1 + 0.5 * 0.999**k)[:, None], tolerance=1e-3) is None
+
+
+def test_a_transient_is_settled_once_a_whole_window_is() -> None:
+    """Five periods are looked at at once: of six with one that is off the last five are whole, of five no window is."""
+    assert settled(np.array([2, 1, 1, 1, 1], dtype=complex)[:, None]) is None
+    assert settled(np.array([2, 1, 1, 1, 1, 1], dtype=complex)[:, None]) == 6
+    assert settled(np.ones((5, 1), dtype=complex)) == 5
+    assert settled(np.ones((4, 1), dtype=complex)) is None
+
+
+def test_dry_friction_under_a_multisine_is_that_of_its_large_line_and_half_for_a_faint_one() -> None:
+    """Of a sine of speed V the sign of the speed is 4/(pi V) per speed; of a faint one beside it 2/(pi V)."""
+    length, dt = 400, 1e-3
+    k = np.arange(6 * length)
+    big, faint = 5, 7
+    u = np.cos(2 * math.pi * big * k / length) + 0.08 * np.cos(2 * math.pi * faint * k / length)
+    record = Record(t=k * dt, signals={"u": u, "y": 0.3 * u}, provenance=Provenance(file="log.csv", reader="table"))
+    found = response_of([record], command="u", outputs=["y"], kind="multisine")
+    omega = 2 * math.pi * np.array([big, faint]) / (length * dt)
+    assert found.omega == pytest.approx(omega)
+    assert found.response[:, 0] == pytest.approx([0.3, 0.3])
+    V = 0.3 * omega[0]
+    # but for the square of the ratio of their speeds, (0.08 7/5)^2 = 1.3 %
+    assert found.dry[:, 0] == pytest.approx([4 / (math.pi * V), 2 / (math.pi * V)], rel=0.02)
 
 
 def test_periods_are_told_apart():

@@ -125,11 +125,3 @@ def test_runs_said_to_repeat_one_another_measure_the_same_at_the_same_pace() -> 
     # after 400 samples a clock that is 1 % fast is four samples ahead
     assert not same(one, replace(one, t=1.01 * one.t))
     assert same(one, replace(one, t=1.002 * one.t))
-
-
-def test_samples_inside_a_band_are_counted_where_they_are_scored() -> None:
-    """Of 600 scored samples those of 1.5 lie outside a band of 1, a third of them; those before do not count."""
-    missed = np.where(np.arange(N) < 600, 9.0, np.where(np.arange(N) % 3 == 0, 1.5, 1.0))
-    score = replace(scored(missed, score_from=6.0), band={"q_0": np.ones(N)})
-    assert score.inside == {"q_0": pytest.approx(100 * 2 / 3)}
-    assert scored(missed).inside == {}

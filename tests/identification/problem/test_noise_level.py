@@ -1,4 +1,4 @@
-"""The unit of prior knowledge: a residual's deviation times the root of its memory, alike for one window and many."""
+"""Residuals of a run: which samples make them, their sum of squares, and what one of them is worth."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from tests.identification.twins import PENDULUM, rig, swing
+from tests.identification.twins import PENDULUM, noisy, rig, swing
 from upright.identification.problem.residuals import Problem, formulate, noise_level
+from upright.identification.problem.tracks import prepare
 from upright.physics import Pendulum
 
 DT, SIGMA = 5e-3, 0.01
@@ -50,3 +51,28 @@ def test_samples_that_a_fit_left_out_do_not_count() -> None:
     kept = np.arange(4000) % 20 >= 10
     problem.tracks = [replace(problem.tracks[0], kept=kept)]
     assert noise_level(problem, problem.start) == pytest.approx(SIGMA / spread, rel=0.1)
+
+
+@pytest.mark.parametrize("horizon", [None, 1.0])
+@pytest.mark.parametrize("known", [True, False])
+def test_the_cost_alone_is_that_of_its_model(horizon: float | None, known: bool) -> None:
+    """Both are the sum of squares, of the same restarts, with and without derivatives."""
+    more = {"unknown": (), "initial": {"theta": 1.5, "theta_dot": 0.0}} if known else {}
+    run = noisy(swing(horizon=horizon, **more), 2e-3, 5)
+    problem = formulate(rig(Pendulum, PENDULUM, {"J_p": 2.4e-3, "b_2": 1.8e-3}), [run])
+    assert problem.cost(problem.start) == pytest.approx(problem.normal(problem.start).cost, rel=1e-9)
+
+
+def test_only_a_free_run_without_a_command_is_thinned() -> None:
+    """A small swing of 2 pi sqrt(J/(m g l)) = 1.158 s takes 120 steps a period: every ninth sample of a millisecond."""
+    run = swing(PENDULUM | {"b_2c": 0.0, "b_2q": 0.0}, angle=0.1, dt=1e-3)
+    question = rig(Pendulum, PENDULUM, {"J_p": 2.4e-3})
+    track = prepare(question, run, thin=True)
+    assert (track.dt, track.length, len(track.y)) == (pytest.approx(9e-3), 1112, 1112)  # 10000 // 9 + 1
+    assert prepare(question, run, thin=False).dt == pytest.approx(1e-3)
+    assert prepare(question, replace(run, horizon=1.0), thin=True).dt == pytest.approx(1e-3)
+    driven = replace(run, u=np.sin(run.t)[:, None])
+    assert prepare(question, driven, thin=True).dt == pytest.approx(1e-3)
+    # a constant command is none that changes, and 200 samples stay
+    assert prepare(question, replace(run, u=run.u + 1.0), thin=True).dt == pytest.approx(9e-3)
+    assert prepare(question, run.samples(slice(1000)), thin=True).dt == pytest.approx(5e-3)

@@ -171,3 +171,24 @@ def test_prior_knowledge_is_weighed_by_the_noise_of_the_residuals() -> None:
     settle_weights(problem, descend_progressively(problem, problem.start))
     # of 1000 residuals, to the fifth of a logarithm that counts as no change
     assert problem.noise == pytest.approx(2e-3 / np.std(run.y), rel=0.25)
+
+
+def test_a_horizon_doubles_and_the_last_third_of_a_run_is_no_stage_of_its_own() -> None:
+    """Where the run turns into its mirror image at 4.2 s, no model follows further: 2, 4, then 8 of 10 s, so all of it.
+
+    More than seven tenths are no stage of their own. A run that is followed to its end is taken whole at once.
+    """
+    run = noisy(swing(), 2e-3, 5)
+    turned = replace(run, y=np.where(run.t[:, None] < 4.2, run.y, -run.y))
+    for data, expected in (
+        (turned, ["first 2 s", "first 4 s", "whole runs"]),
+        (run, ["first 2 s", "whole runs"]),
+    ):
+        problem = formulate(rig(Pendulum, PENDULUM, {"J_p": 2.1e-3, "b_2": 1.8e-3}), [data])
+        log = SearchLog()
+        descend_progressively(problem, problem.start, log, horizon=2.0)
+        stages = [name for name, *_ in log.history]
+        assert stages[0] == "first 2 s"
+        assert [float(name.split()[1]) > 7 for name in stages[:-1]] == [False] * (len(stages) - 1)
+        assert stages[-1] == expected[-1]
+        assert len(stages) == len(expected)

@@ -47,6 +47,19 @@ def test_accelerations_give_the_furuta_from_any_guess(factor: float) -> None:
         assert found.values[n] == pytest.approx(FURUTA[n], rel=0.06)
 
 
+@pytest.mark.parametrize("factor", [0.5, 1.0, 3.0])
+def test_masses_that_only_scale_together_stay_where_the_guess_put_them(factor: float) -> None:
+    """A free swing tells J/m, b/m: with both twice as large it swings the same."""
+    truth = {**PENDULUM, "b_2c": 0.0, "b_2q": 0.0}
+    asked = rig(Pendulum, truth, {n: factor * truth[n] for n in ("m_p", "J_p", "b_2")})
+    sample = observe(asked, noisy(swing(truth, angle=0.8), 1e-5, seed=3))
+    assert sample is not None
+    found = regress(asked, [sample])
+    assert found.unexplained < 0.01
+    for n in ("m_p", "J_p", "b_2"):
+        assert found.values[n] == pytest.approx(factor * truth[n], rel=0.1)
+
+
 def test_dominant_period_of_a_sine_is_its_period() -> None:
     t = np.arange(0, 10, 0.01)
     # a Hann window over ten periods widens the line by one tenth

@@ -9,6 +9,7 @@ import pytest
 from upright.errors import BadInput
 from upright.identification.estimate import identify
 from upright.readers import inspect, read
+from upright.study.draft.chain_log import follows
 from upright.study.draft.draft import draft
 from upright.study.load import load_study
 
@@ -195,3 +196,13 @@ def test_real_logs_are_explained_by_their_drafts(log, tmp_path):
     assert all(list(run.held) == held for run in study.runs)
     fit = identify(study.rig, study.runs)
     assert min(v for s in fit.runs.values() for v in s.fit_percent.values()) > least
+
+
+@pytest.mark.parametrize("up", [1.0, -1.0])
+def test_a_body_follows_the_first_sample_of_a_pulse(up):
+    """The command is on for a single sample; the body goes its way only later."""
+    t = np.arange(400) * 0.01
+    u = np.where(np.arange(400) == 101, 1.0, 0.0)
+    x = up * np.where(t > 1.05, 1 - np.exp(-3 * (t - 1.05)), 0.0)
+    assert follows(t, u, x, 100) is (up > 0)
+    assert follows(t, u - 5.0, x, 100) is (up > 0)  # what counts is the change
