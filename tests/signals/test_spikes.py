@@ -134,6 +134,17 @@ def test_what_moves_on_while_samples_are_missing_does_not_jump(gap):
     assert jumps(t[kept], x[kept], 1.0).steps.tolist() == [fastest + 40 - gap]
 
 
+def test_a_jump_is_found_although_every_third_sample_comes_late():
+    """At 1.5 counts a millisecond steps of time of 1, 1 and 4 ms make 1.5, 1.5 and 6 counts; the jump is one of 60."""
+    t = np.cumsum(np.tile([1e-3, 1e-3, 4e-3], 300))
+    x = 1500.0 * t
+    assert not jumps(t, x, 1.0)
+    x[450:] += 60
+    found = jumps(t, x, 1.0)
+    assert found.steps.tolist() == [450]
+    assert found.step_sizes == pytest.approx([60], abs=1e-6)
+
+
 @pytest.mark.parametrize(("missing", "spike"), [(999, False), (1001, False), (997, True), (1003, True)])
 def test_an_outlier_beside_a_missing_sample_may_be_motion(missing, spike):
     t, x = (signal[:2000] for signal in swing())
