@@ -121,6 +121,16 @@ def test_hanging_still_is_worth_nothing_and_standing_still_one(fit):
     assert not fallen.any()
 
 
+def test_a_full_command_costs_a_hundredth_of_the_reward_and_half_of_one_a_quarter_of_that(fit):
+    """The cost goes with the command's square, beside (1 + cos)/2 of the angle that is observed after the step."""
+    lanes = Episodes(read_identified(fit), 5, task="swing_up")
+    lanes.reset(np.ones(5, dtype=bool), np.random.default_rng(0))
+    reward, _ = lanes.step(np.array([[0.0], [0.5], [-0.5], [1.0], [-1.0]]))
+    height = (1 + lanes.observation[:, lanes.names.index("cos theta")]) / 2
+    # the cosine is observed in single precision, 6e-8
+    np.testing.assert_allclose(height - reward, [0.0, 0.0025, 0.0025, 0.01, 0.01], rtol=0, atol=2e-7)
+
+
 def test_the_exported_module_registers_single_and_vector(fit, tmp_path):
     done = export(fit, to="gymnasium", out=tmp_path)
     runpy.run_path(done.value[0])

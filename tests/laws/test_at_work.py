@@ -106,6 +106,18 @@ def test_a_reading_that_is_no_number_leaves_no_command_until_the_law_begins_anew
     assert at_work(law)(0.0, good) == before
 
 
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("place", [0, 1])
+def test_one_reading_of_several_that_is_no_number_stops_a_rule(place, bad):
+    """The rule computes with the first reading alone and would give a finite command all the same."""
+    step = at_work(Rule(function=hop, initial=[0.0], parameters=[2.0]))
+    assert step(0.0, (1.0, 0.5)) == (-2.0,)
+    readings = [1.0, 0.5]
+    readings[place] = bad
+    assert np.isnan(step(1e-3, readings)).all()
+    assert np.isnan(step(2e-3, (1.0, 0.5))).all()
+
+
 def test_a_command_that_overflows_is_none_and_raises_nothing():
     """5e307 is a double, and so many steps of 0.01 are not."""
     law = Law(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), [[1.0]], limit=2.0, command_quantum=0.01)

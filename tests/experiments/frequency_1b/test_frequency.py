@@ -13,9 +13,9 @@ import pytest
 from upright.errors import NotIdentifiable
 from upright.experiments.frequency_1b.chapter import chapter, true_key
 from upright.experiments.frequency_1b.run import run_frequency
-from upright.experiments.frequency_1b.sweeps import SHARE
+from upright.experiments.frequency_1b.sweeps import SHARE, broadband
 from upright.experiments.identified import read_identified
-from upright.experiments.makes import make_rig
+from upright.experiments.makes import MAKES, make_rig
 from upright.identification.frequency.answer import key_value
 from upright.identification.frequency.spectra import chirp, multisine, odd_lines, repetition, response_of, sines_in
 from upright.readers import read
@@ -95,6 +95,16 @@ def test_what_asks_nothing_is_refused():
         response_of([still], command="u", outputs=["y"])
     with pytest.raises(NotIdentifiable, match="three periods"):
         response_of([log(np.sin(np.arange(1000) * 1e-3))], command="u", outputs=["y"], kind="sines")
+
+
+def test_a_broadband_command_is_whole_steps_of_the_converter_where_there_is_one():
+    """Steps of 1/16 V, which floating point holds exactly; a drive without a converter takes any number."""
+    rig, make = make_rig("linear"), MAKES["linear"]
+    stepped, smooth = (broadband(replace(rig, converter=c), make, "multisine").log["u"] for c in (1 / 16, 0.0))
+    np.testing.assert_array_equal(16 * stepped % 1, 0.0)
+    assert np.ptp(stepped) > 1.0
+    assert np.isfinite(smooth).all()
+    assert np.mean(16 * smooth % 1 == 0) < 0.01
 
 
 @pytest.fixture(scope="module")

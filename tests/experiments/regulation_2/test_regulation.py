@@ -75,6 +75,31 @@ def test_without_a_rig_nothing_is_run(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.fixture(scope="module")
+def predicted(tmp_path_factory):
+    """Set 2 on an exactly known model, let go at pi/20 with 0.25 rad/s; nothing is run."""
+    poles = {"set 2": RegulationRequest().poles["set 2"]}
+    wish = RegulationRequest(poles=poles, draws=4, seconds=1.0, tilt=math.pi / 20, push=0.25)
+    known = fit_of(make_rig("linear"), spread=0.0)
+    return run_regulation(known, None, 0, tmp_path_factory.mktemp("regulation"), wish=wish)
+
+
+def test_a_way_to_the_velocities_that_holds_the_rig_has_margins(predicted):
+    """The loop runs with a gain factor of 1 and no added delay: where it holds, both lie within the margins."""
+    held = [way for way in predicted.ways if way.score.held]
+    assert held
+    for way in held:
+        assert way.margins is not None, way.name
+        assert way.margins.least_gain < 1 < way.margins.most_gain
+        assert way.margins.delay > 0
+
+
+def test_the_chapter_names_the_tilt_and_the_push_of_the_start(predicted):
+    """pi/20 is a twentieth of 180 degrees; 0.25 rad/s read as an angle would be 14."""
+    said = " ".join(c for c in regulation_page.chapter(predicted).parts[0].content if isinstance(c, str))
+    assert "let go 9° from upright, moving away at 0.25 rad/s" in said
+
+
 def test_what_the_fit_leaves_out_is_taken_as_said():
     said = make_rig("furuta")
     plain = fit_of(said.changed(b_1c=0.0, b_2c=0.0), spread=0.0)

@@ -184,6 +184,40 @@ def test_a_cart_with_dry_friction_answers_as_den_hartog_says():
     assert abs(answers[0.0] - data.response[0, 0]) > 0.05 * abs(data.response[0, 0])
 
 
+def test_a_large_swing_with_overtones_is_explained_by_the_equations_of_motion():
+    """Eqs. (A1) and (A2) solved backwards: a swing with a third harmonic, the cart's motion and the force it takes.
+
+    Without dry friction the hinge's equation gives the cart's acceleration, and the cart's equation the force.
+    """
+    m_c, m_p, l_cg, J_p, b_1, b_2, g = 0.5, 0.2, 0.3, 0.006, 0.4, 0.003, 9.81
+    omega, count = 9.0, 4096
+    t = 2 * np.pi / omega * np.arange(count) / count
+    parts = {1: 0.5, 3: 0.1 * np.exp(0.7j)}
+    theta, theta_dot, theta_ddot = (
+        sum((a * (1j * k * omega) ** n * np.exp(1j * k * omega * t) for k, a in parts.items())).real for n in (0, 1, 2)
+    )
+    turning = (J_p + m_p * l_cg**2) * theta_ddot + b_2 * theta_dot + m_p * g * l_cg * np.sin(theta)
+    x_ddot = -turning / (m_p * l_cg * np.cos(theta))
+    orders = np.arange(1, 16)
+
+    def harmonics(signal):
+        return 2 / count * np.fft.fft(signal)[orders]
+
+    x = harmonics(x_ddot) / (1j * orders * omega) ** 2
+    x_dot = sum((1j * k * omega * a * np.exp(1j * k * omega * t) for k, a in zip(orders, x, strict=True))).real
+    push = (m_c + m_p) * x_ddot + b_1 * x_dot
+    push += m_p * l_cg * (np.cos(theta) * theta_ddot - np.sin(theta) * theta_dot**2)
+    force = harmonics(push)[0]
+    lines = np.column_stack([x, harmonics(theta)])
+    data = FrequencyResponse(
+        omega=np.array([omega]), response=lines[:1] / force, outputs=("x", "theta"), units=("m", "rad", "N"),
+        drive=np.array([force]), overtones=lines[1:].T[None],
+    )  # fmt: skip
+    plant = CartPendulum(m_c=m_c, m_p=m_p, l_cg=l_cg, J_p=J_p, b_1=b_1, b_2=b_2, g=g)
+    found = Balance(plant=CartPendulum, at="hanging", data=data).response(plant.parameters())[0]
+    np.testing.assert_allclose(found, data.response, rtol=1e-7)
+
+
 def test_both_ways_recover_a_smooth_rig_from_bad_guesses():
     """The response comes from the paper's transfer functions, corrected; errata 4 and 5."""
     data = smooth()

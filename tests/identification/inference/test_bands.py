@@ -9,6 +9,7 @@ import pytest
 
 from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, shaken, swing
 from upright.identification.estimate import identify, predict
+from upright.identification.inference.bands import recalibrated
 from upright.identification.inference.promise import promise
 from upright.identification.inference.reach import beyond, reached
 from upright.identification.ladder.cross_validation import cross_validate
@@ -113,6 +114,16 @@ def test_runs_left_out_in_turn_calibrate_the_band() -> None:
     assert np.mean(np.concatenate(widest) <= crossed.bands.quantile) >= 0.9
 
 
+@pytest.mark.parametrize(("runs", "widths"), [(1, 4.0), (9, 4.0), (18, 3.8), (90, 3.64)])
+def test_the_fewer_runs_are_left_out_the_more_of_them_the_band_holds(runs: int, widths: float) -> None:
+    """An error that grows from 0 to 4 widths: the band of level p is 4 p, and p = min(1, 0.9 (n + 1)/n).
+
+    For n = 18 that is 0.95, for n = 90 it is 0.91 (split conformal prediction). One of 101 samples is 0.04 wide.
+    """
+    bands = recalibrated(Bands(quantile=1.0, spreads={}, level=0.9), [scored(1.0, 0.25)] * runs)
+    assert bands.quantile == pytest.approx(widths, abs=1e-9)
+
+
 def test_a_command_twice_as_large_is_beyond_what_was_fitted() -> None:
     there, (one, _) = driven(4)
     most = reached(there, [one])
@@ -178,6 +189,14 @@ def test_the_promise_is_kept_when_enough_lies_inside() -> None:
     assert "80 %" in kept.sentence
     late = replace(scored(1.0, 0.4), score_from=0.5)
     assert late.inside == {"theta": 0.0}
+
+
+def test_a_prediction_that_no_band_measures_is_not_kept() -> None:
+    """At a fit of 50 % with no band of its signal nothing was compared, which is no success."""
+    untested = promise({"r": scored(1.0, 0.0)}, Bands(quantile=1.0, spreads={}))
+    assert not untested.kept
+    assert "Nothing tells" in untested.sentence
+    assert "theta of r" in untested.sentence
 
 
 def test_without_bands_the_fitted_runs_are_the_measure() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from upright.identification.estimate import identify, predict
 from upright.identification.inference.covariance import Optimum, assess
 from upright.identification.inference.loop import standing
 from upright.identification.inference.verdict import Evidence, judge, trusted
-from upright.identification.model.fit import Estimate, Judgement, RunScore
+from upright.identification.model.fit import Assumption, Estimate, Judgement, RunScore
 from upright.identification.model.rig import Rig
 from upright.identification.model.runs import Run
 from upright.identification.problem.residuals import formulate
@@ -126,6 +127,13 @@ def test_nothing_held_out_is_not_tested() -> None:
     assert identify(question, [runs[0], wrong]).answers[0].answer == "no"
 
 
+def test_a_range_goes_from_the_least_to_the_greatest_percent() -> None:
+    """Whatever the order of the runs; runs that are explained alike are given one number."""
+    runs = {name: _score("fit", percent, None) for name, percent in (("a", 93.0), ("b", 98.5), ("c", 91.2))}
+    assert "It explains 91.2 to 98.5 % of the fitted runs." in _judged(runs)[0].headline
+    assert "It explains 93.0 % of the fitted runs." in _judged({"a": runs["a"]})[0].headline
+
+
 def test_horizons_are_compared_with_their_like() -> None:
     """At 0.05 s everything is predicted; that 2 s ahead is harder is no sign of a bad model."""
     near, far = (_score(role, 100 - missed, h) for role, missed, h in (("fit", 1.0, 0.05), ("predict", 22.0, 2.0)))
@@ -159,6 +167,19 @@ def test_friction_at_zero_is_said_to_have_no_evidence() -> None:
     assert told.reasons == (
         "b_2c reached its lower limit, 0: these data give no evidence for it (at most 0.0003 N m).",
     )
+
+
+@pytest.mark.parametrize(
+    ("friction", "headline"),
+    [(1.0, "Only their ratios."), (0.5, "None of them before actuator.gain is measured.")],
+)
+def test_numbers_that_all_scale_with_an_assumed_gain_are_known_as_ratios(friction: float, headline: str) -> None:
+    """In J w' + b w = g u, J and b both double with g, so J/b is known; where b does not, J/b changes with g too."""
+    firm = Estimate(value=2e-3, stderr=1e-5, interval=(1.9e-3, 2.1e-3), unit="kg m^2")
+    gain = Assumption(name="actuator.gain", value=1.0, unit="N m/V", follows={"J_p": 1.0, "b_2": friction}, without={})
+    runs = {"a": _score("fit", 99.0, None)}
+    usable = _judged(runs, {"J_p": firm, "b_2": firm}, assumptions=[gain])[1]
+    assert (usable.answer, usable.headline) == ("in part", headline)
 
 
 def test_a_guessed_plant_is_a_guess_until_a_prediction_confirms_it() -> None:
@@ -225,12 +246,14 @@ def _score(role: str, percent: float, horizon: float | None) -> RunScore:
     )  # fmt: skip
 
 
-def _judged(runs: dict[str, RunScore], estimates: dict[str, Estimate] | None = None) -> tuple[Judgement, ...]:
+def _judged(
+    runs: dict[str, RunScore], estimates: dict[str, Estimate] | None = None, assumptions: Sequence[Assumption] = ()
+) -> tuple[Judgement, ...]:
     return judge(
         Evidence(
             rig=rig(Pendulum, PENDULUM, dict.fromkeys(estimates or {}, 1e-3)), runs=runs, estimates=estimates or {},
-            unseen=(), conventions=(), assumptions=(), converged=True, interrupted=False, memory=0.0, period=1.0,
-            standing=None,
+            unseen=(), conventions=(), assumptions=assumptions, converged=True, interrupted=False, memory=0.0,
+            period=1.0, standing=None,
         )
     )  # fmt: skip
 
