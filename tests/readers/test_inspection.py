@@ -147,6 +147,14 @@ def test_a_commanded_position_that_is_the_measured_one_is_no_reference() -> None
     assert not any("follows" in lie for lie in seen.column("Commanded Pos").lies)
 
 
+def test_a_commanded_position_a_sixth_of_a_turn_ahead_of_the_encoder_does_not_follow_it() -> None:
+    """Over whole turns two waves correlate by the cosine of what they are apart: 1/2 here, however large they are."""
+    angle = 2 * math.pi * np.arange(600) / 200
+    encoder, command = 300 * np.cos(angle), 300 * np.cos(angle + math.pi / 3)
+    lies = inspect(Record(t=1e-3 * np.arange(600), signals={"Commanded Pos": command, "Encoder 1 Pos": encoder}))
+    assert not any("follows" in lie for lie in lies.column("Commanded Pos").lies)
+
+
 def test_first_samples_that_are_far_outside_the_rest_are_named() -> None:
     t, theta = swing(300)
     first, later = theta.copy(), theta.copy()

@@ -12,7 +12,7 @@ import upright as up
 from upright.errors import BadInput, RigStopped
 from upright.experiments.at_hand import experiments_for
 from upright.experiments.hands_on.loaded import PROBE, _bolted, run_loaded
-from upright.experiments.hands_on.rig import rig_at_hand
+from upright.experiments.hands_on.rig import RigAtHand, rig_at_hand
 from upright.experiments.hands_on.studies import write_study
 
 STUDY = """
@@ -66,6 +66,28 @@ def test_a_cart_is_weighed_within_its_travel_whatever_was_guessed(tmp_path, gues
         # on one side and at most f/k more or less on the other, in the probe that told how large as well
         swing = np.ptp(log["x_1"]) / 4
         assert wanted - 1.5 * held < swing < wanted * probe / (probe - 1.5 * held)
+
+
+def test_a_step_never_exceeds_its_share_of_the_limit(tmp_path, monkeypatch):
+    """A quarter of 60 mm takes 300 N/m 15 mm / (0.5 N/V) = 9 V; 80 % of the limit of 5 V are 4 V."""
+    made(tmp_path)
+    (tmp_path / "study.toml").write_text(STUDY.replace("5 N/V", "0.5 N/V"), encoding="utf-8")
+    levels: list[float] = []
+
+    def put_out(self, samples, folder, stem, **_hand):
+        """A cart that hardly moves, so that what the probe shows asks for as much as there is."""
+        levels.append(max(samples))
+        log = tmp_path / f"{stem}.csv"
+        log.write_text("t,x_1\n0,0\n0.001,1e-6\n0.002,0\n", encoding="utf-8")
+        return log
+
+    monkeypatch.setattr(RigAtHand, "put_out", put_out)
+    rig = replace(rig_at_hand(tmp_path / "RIG.toml"), ask=lambda _sentence: len(levels) < 2)
+    with pytest.raises(RigStopped, match="asked for and not done"):
+        run_loaded(rig, tmp_path / "1a", lambda _step, _share: None)
+    probe, level = levels
+    assert probe == pytest.approx(PROBE * 4.0)
+    assert level == pytest.approx(4.0)
 
 
 def test_pieces_add_up_and_err_by_their_tolerance(tmp_path):

@@ -15,6 +15,7 @@ from upright.identification.checks.outliers import (
     SELF_EXCITED,
     SPIKES,
     TOUCHED,
+    half_swings,
     outliers,
     refit_without_outliers,
     without_outliers,
@@ -154,6 +155,20 @@ def test_what_a_stretch_is_missed_by_is_a_number_that_means_something():
     times = re.search(r"missed (more than )?([\d.]+) times", told.evidence)
     assert times is not None
     assert 4 <= float(times[2]) < 100
+
+
+@pytest.mark.parametrize(("samples", "left"), [(150, 0), (149, 4), (237, 4), (293, 4)])
+def test_a_short_run_is_judged_to_its_end_even_where_an_eighth_of_it_is_half_a_sample_off(samples, left):
+    """An eighth of 149 intervals of 10 ms rounds to 19, and the stretch added at the end ends where the run does.
+
+    An eighth of 148, 236 and 292 is 18.5, 29.5 and 36.5: 8 times 18, 29 and 36 leave 4 intervals at most. In binary the end
+    alone may round the other way, so that only one stretch fits into it and none is added.
+    """
+    run = swing(angle=0.9).samples(slice(samples))
+    halves = half_swings(rig(Pendulum, PENDULUM, {}), run, {})
+    assert halves is not None
+    assert halves.start[0] == 0
+    assert -1e-9 < run.t[-1] - halves.stop[-1] < left * 0.01 + 1e-9
 
 
 def test_a_fast_motion_is_no_spike():

@@ -85,6 +85,15 @@ def test_dry_friction_of_a_sine_is_its_describing_function():
     assert tone.still[0] == pytest.approx(2 * math.asin(0.05) / math.pi, abs=1e-3)
 
 
+def test_a_body_that_stands_still_has_no_friction_and_divides_by_no_speed():
+    t = np.arange(400) * 0.01
+    tone = detect(t, np.column_stack([np.zeros(400), 0.3 * np.cos(2 * math.pi * t)]), 2 * math.pi)
+    with np.errstate(all="raise"):
+        still, moving = tone.dry
+    assert still == 0
+    assert moving == pytest.approx(4 / (math.pi * 2 * math.pi * 0.3), rel=1e-3)  # 4 / (pi V), beside it
+
+
 def test_a_transient_is_waited_for_as_long_as_it_lasts():
     """Lines of successive periods approach theirs as rho^k: the wait ends when rho^k is below the tolerance."""
     k = np.arange(200)

@@ -45,6 +45,16 @@ def test_counts_that_run_away_are_disks_without_springs_to_ground(drafted):
     assert "more than a cart can travel" in text
 
 
+def test_the_range_of_a_command_in_dac_counts_is_said_in_counts_and_of_one_in_volts_in_volts(drafted):
+    """409 counts of ECP's converter are 0.5 V; the comment beside the column says what the column itself holds."""
+    one, two = spun_up()
+    said = {"target_value": (VOLTS, "0 to 409 DAC counts"), "u_volt": (VOLTS / DAC / 2, "0 to 0.5 V")}
+    for name, (values, comment) in said.items():
+        text, _ = drafted(t=T, **{name: values, "enc1": one, "enc2": two})
+        (column,) = (line for line in text.splitlines() if line.startswith(f'column = "{name}"'))
+        assert column.split("#")[1].strip() == comment
+
+
 def test_an_assumed_gain_fixes_the_scale_and_starts_are_of_the_right_size(drafted):
     one, two = spun_up()
     _, study = drafted(t=T, target_value=VOLTS, enc1=one, enc2=two)
