@@ -81,8 +81,9 @@ def _option(command: Command, parameter: inspect.Parameter, texts: Mapping[str, 
     if parameter.kind is not parameter.KEYWORD_ONLY and not named:
         about = typer.Argument(**said)
     else:
-        option = f"--{name.replace('_', '-')}"
-        switch = f"{option}/--no{option[1:]}" if default is True else option
+        word = name.replace("_", "-")
+        words = (word, f"no-{word}") if default is True else (word,)
+        switch = "/".join(f"--{w}" for w in words)
         about = typer.Option(*(named or [switch]), **said)
     kind = kind | None if default is None else kind
     return parameter.replace(kind=parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, about])

@@ -161,8 +161,8 @@ def test_what_a_stretch_is_missed_by_is_a_number_that_means_something():
 def test_a_short_run_is_judged_to_its_end_even_where_an_eighth_of_it_is_half_a_sample_off(samples, left):
     """An eighth of 149 intervals of 10 ms rounds to 19, and the stretch added at the end ends where the run does.
 
-    An eighth of 148, 236 and 292 is 18.5, 29.5 and 36.5: 8 times 18, 29 and 36 leave 4 intervals at most. In binary the end
-    alone may round the other way, so that only one stretch fits into it and none is added.
+    An eighth of 148, 236 and 292 is 18.5, 29.5 and 36.5: 8 times 18, 29 and 36 leave 4 intervals at most. In binary the
+    end alone may round the other way, so that only one stretch fits into it and none is added.
     """
     run = swing(angle=0.9).samples(slice(samples))
     halves = half_swings(rig(Pendulum, PENDULUM, {}), run, {})
