@@ -104,6 +104,9 @@ def test_what_mujoco_has_not_is_said(tmp_path):
     for words in ("quadratic drag of theta", "break-away", "dead time"):
         assert any(words in line for line in told), words
         assert words in text
+    assert not any("brakes" in line for line in told)
+    braking = identified(tmp_path, plant, damping={"value": 0.01, "unit": "N m s/rad", "source": "known"})
+    assert any("brakes whether it is commanded" in line for line in model(braking)[1])
 
 
 def test_the_command_writes_a_model_that_mujoco_loads(tmp_path):

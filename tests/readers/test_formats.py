@@ -123,6 +123,21 @@ def test_a_bag_keeps_nanoseconds_and_holds_its_commands() -> None:
     np.testing.assert_array_equal(record["/effort_control/data.0"], expected)
 
 
+def test_a_bag_says_that_the_first_of_its_joints_moved_before_the_first_command() -> None:
+    """Joint 1 leaves its place at 24 ms, joint 2 at 110 ms, and the first command was recorded at 100 ms."""
+    lines = [
+        "__time,/effort_control/data.0,/joint_states/header/stamp,/joint_states/a/position,/joint_states/b/position"
+    ]
+    for i in range(60):
+        stamp = 1.7e9 + 0.002 * i
+        one, two = 0.1 * max(0, i - 11), 0.1 * max(0, i - 54)
+        lines.append(f"{stamp + 0.0004:.6f},,{stamp:.9f},{one:.9f},{two:.9f}")
+        if i >= 49:
+            lines.append(f"{stamp + 0.0009:.6f},2.0,,,")
+    notes = read_source(source(("\n".join(lines) + "\n").encode())).provenance.notes
+    assert any(note.startswith("The rig moves at 0.024 s, before the first command") for note in notes)
+
+
 @pytest.mark.parametrize("compressed", [True, False])
 def test_our_matlab_parser_agrees_with_scipy(compressed: bool) -> None:
     from scipy.io import savemat

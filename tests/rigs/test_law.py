@@ -8,7 +8,7 @@ import pytest
 from upright.experiments.makes import make_rig
 from upright.laws import Law
 from upright.rigs import Capabilities, Limits
-from upright.rigs.law import absurdity
+from upright.rigs.law import RunningLaw, absurdity
 from upright.rigs.onboard import MEMORIES
 
 PER, LIMIT = 2000.0, 5.0
@@ -82,3 +82,16 @@ def test_a_number_that_overflows_on_its_way_is_refused():
     A = np.array([[0.0, 0.0], [1e200, 0.0]])
     law = Law(A, np.array([[1e200, 0.0], [0.0, 0.0]]), np.array([[0.0, 1.0]]), np.zeros((1, 2)))
     assert "its gain on psi is absurd" in absurdity(law, ABOUT, FREE)
+
+
+def test_a_law_without_a_reference_follows_zero_and_another_one_what_it_is_given():
+    plain = RunningLaw(at_once(1e-3), 1e-3)
+    plain.step([0.1, 0.0])
+    assert plain.followed == 0.0
+    led = Law(
+        np.zeros((0, 0)), np.zeros((0, 3)), np.zeros((1, 0)), np.array([[0.0, 0.0, 2.0]]),
+        reference_names=("reference",),
+    )  # fmt: skip
+    running = RunningLaw(led, 1e-3)
+    assert running.step([0.0, 0.0], reference=0.3) == 0.6
+    assert running.followed == 0.3

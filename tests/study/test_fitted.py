@@ -102,3 +102,16 @@ def test_what_is_wrong_with_a_fit_is_said(tmp_path, place, value, says):
     (tmp_path / "fit.json").write_text(json.dumps(changed(FIT, place, value)), encoding="utf-8")
     with pytest.raises(BadInput, match=says):
         read_fit(tmp_path / "fit.json")
+
+
+@pytest.mark.parametrize(("between", "possible"), [(0.9e-6, True), (1.5e-6, False)])
+def test_a_covariance_is_judged_by_its_correlations_whatever_its_units(tmp_path, between, possible):
+    """Standard deviations of 1e-6 and 1: a covariance of 0.9e-6 is a correlation of 0.9, one of 1.5e-6 is none."""
+    bands = {"names": ["J_p", "actuator.gain"], "covariance": [[1e-12, between], [between, 1.0]]}
+    path = tmp_path / "fit.json"
+    path.write_text(json.dumps({**FIT, "bands": {**FIT["bands"], **bands}}), encoding="utf-8")
+    if possible:
+        assert read_fit(path).bands.covariance[0, 1] == between
+    else:
+        with pytest.raises(BadInput, match="that of some numbers"):
+            read_fit(path)
