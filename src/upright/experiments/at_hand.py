@@ -112,7 +112,7 @@ def _tracking(at: ExperimentInput) -> tuple[Chapter, bool]:
 
 
 def _performed(at: ExperimentInput, chapter: Chapter, basis: Basis) -> Chapter:
-    """The chapter, which says so where the rig at hand is none: a twin, or a replay."""
+    """The chapter, which says so where no hardware is driven: a twin, or a replay."""
     performed = _at(at).file.performed
     return resting_on(chapter, basis, performed) if performed else chapter
 

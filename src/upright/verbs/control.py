@@ -15,7 +15,7 @@ from upright.progress import Progress, part, silent
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
 from upright.verbs.handover import called, rig_of
-from upright.verbs.linear.matrices import linear_model, read_matrices
+from upright.verbs.linear.matrices import is_linear, linear_model, read_matrices
 from upright.verbs.pages import folder_if_given, page_folder, write_page
 from upright.verbs.rig import Counts, as_typed, rig_options
 from upright.verbs.values import open_log, poles, si, si_if_given
@@ -66,7 +66,7 @@ def design(
     """Find the gains that hold a rig, and what they are worth in the loop a computer runs.
 
     The numbers are those identified (hanging, for instance); the model is the one about another equilibrium, upright.
-    Poles are placed by Ackermann's formula, or chosen by least cost; period, delay and differenced encoders are then
+    Poles are placed by Ackermann's formula, or chosen by LQR; period, delay and differenced encoders are then
     put in.
 
     Parameters
@@ -143,7 +143,7 @@ def design(
         at="", poles=asked, weights=weights, R=effort_weight, delay=delay, lag=si_if_given(lag, "s"), memory=memory,
         track=track, sampled=sampled,
     )  # fmt: skip
-    if matrices is not None or _is_linear(source):
+    if matrices is not None or is_linear(source):
         if at or counts or vendor:
             raise BadInput("--at, --counts and --vendor are of a rig, and plain matrices are none; leave them out.")
         rig = read_matrices(matrices) if matrices is not None else linear_model(source)
@@ -174,11 +174,6 @@ def design(
             *write_page(told, folder_at / "design.html", pdf),
         ]
     return Answer(done, told, files)
-
-
-def _is_linear(source: Any) -> bool:
-    """Whether it is a linear model in one of its forms, rather than a rig."""
-    return isinstance(source, tuple) or any(hasattr(source, name) for name in ("A", "num", "frdata"))
 
 
 def _sampling(model: StateSpace, period: float | str) -> float:

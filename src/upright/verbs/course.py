@@ -55,7 +55,7 @@ def _nobody_needed(typed: dict[str, Any]) -> dict[str, Any]:
     metavars={"experiment": "1|1a|1b|2|2b|3|4", "rig": "KIND|RIG.toml"},
     helps={
         "experiment": "Only this one, and what it stands on.",
-        "rig": "linear, furuta, rectilinear or torsional, else the paper's; or a rig at hand.",
+        "rig": "linear, furuta, rectilinear or torsional, else the paper's; or RIG.toml.",
         "worn": "Rigs with physics that no model has, such as stiction, ripple and play.",
     },
     ranges={"seed": (None, None)},
@@ -82,7 +82,7 @@ def lab(
 ) -> Answer[Laboratory]:  # fmt: skip
     """Run the experiments of the paper on simulated rigs, and report what they say.
 
-    Or on one at hand: identify, flip, design, hold, swing, report. Every log, study and fit is written to the folder
+    Or on hardware: identify, flip, design, hold, swing, report. Every log, study and fit is written to the folder
     for the other verbs, and one report.html tells it all (report.pdf with the pdf extra). Ctrl-C keeps and reports what
     is there; the same call goes on from there.
 
@@ -242,7 +242,7 @@ def reproduce(
 ) -> Answer[Reproduced]:  # fmt: skip
     """Regenerate the pole tables of the paper from a few numbers, and show its misprints.
 
-    The printed poles lie on a locus of least cost: plant and weights are recovered from them, and all poles follow
+    The printed poles lie on an LQR locus: plant and weights are recovered from them, and all poles follow
     again, to less than the print's rounding.
 
     Parameters

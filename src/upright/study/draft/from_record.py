@@ -118,7 +118,7 @@ def _plain(record: Record, plant: type[Plant]) -> dict[str, Any]:
 def _own_force(study: dict[str, Any], plant: type[Plant], *, weighs: bool) -> None:
     """A column that bears the name of the plant's force, and its unit or none, is that force, and `weighs` the masses.
 
-    Of its limit and the controller's period nobody said anything.
+    Its limit and the controller's period are not specified.
     """
     drive, actuator = study.get("drive", {}), study.get("actuator", {})
     force = next((i for i in plant.inputs if i.name == drive.get("column")), None)

@@ -16,6 +16,11 @@ if TYPE_CHECKING:
 KEYS = ("A", "B", "C", "D", "dt", "states", "inputs", "outputs", "units")
 
 
+def is_linear(source: Any) -> bool:
+    """Whether it is a linear model in one of its forms, rather than a rig."""
+    return isinstance(source, tuple) or any(hasattr(source, name) for name in ("A", "num", "frdata"))
+
+
 def linear_model(model: Any) -> StateSpace:
     """Model of a `control.StateSpace` or TransferFunction, a plant's ``linear(...)``, what `hold` gives, or arrays.
 
@@ -26,11 +31,6 @@ def linear_model(model: Any) -> StateSpace:
     """
     from upright.systems import StateSpace
 
-    if not isinstance(model, tuple) and not any(hasattr(model, name) for name in ("A", "num")):
-        raise BadInput(
-            "design takes a fit.json, its folder or a study, or a linear model: a control.StateSpace, "
-            f'plant.linear("inverted"), or arrays (A, B, C, D); got {type(model).__name__}.'
-        )
     found = StateSpace.of(model)
     return found if found.name else replace(found, name="a linear model")
 
