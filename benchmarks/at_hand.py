@@ -15,7 +15,7 @@ from pathlib import Path
 from benchmarks.measure import Line, Target, of_each
 from upright.experiments.hands_on.hanging import run_hanging
 from upright.experiments.hands_on.rig import rig_at_hand
-from upright.experiments.makes import MAKES
+from upright.rig.makes import MAKES
 from upright.workers import HERE, Workers
 
 SEEDS, QUICK = (0, 2, 5), (2,)

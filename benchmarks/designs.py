@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from upright.experiments.makes import NOMINAL
 from upright.gains import feedback, kalman, place, shaken
 from upright.laws import Law, state_feedback
+from upright.rig.makes import NOMINAL
 from upright.rigs.protocol import Limits
 
 GAIN = 0.65

@@ -19,8 +19,8 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     """Errors of the pole by least squares and by the paper's simplex, and how often intervals hold."""
     from upright.experiments.frequency_1b.chapter import true_key
     from upright.experiments.frequency_1b.run import run_frequency
-    from upright.experiments.makes import PENDULUMS
     from upright.identification.frequency.answer import key_value
+    from upright.rig.makes import PENDULUMS
 
     lines: list[Line] = []
     seeds = range(1, 3 if quick else 51)

@@ -25,9 +25,9 @@ STEPS = 1e6
 
 def drawn(dry: float) -> Any:
     """A rig of the size of a laboratory's, its numbers known to a percent, with so much of its dry friction."""
-    from upright.experiments.identified import IdentifiedRig
     from upright.physics import Furuta
-    from upright.study.description import Entry, RigDescription
+    from upright.rig import Rig
+    from upright.rig.hardware import Entry, Hardware
 
     plant = Furuta(m_p=0.135, l_cg=0.19, r=0.16, J_d=0.011, J_p=6e-4, b_1=6e-4, b_2=1e-4, b_1c=2e-3 * dry,
                    b_2c=1e-4 * dry)  # fmt: skip
@@ -39,9 +39,7 @@ def drawn(dry: float) -> Any:
         for row in rows.tolist()
     )
     limit = {"limit": Entry(value=5.0, unit="V", source="known")}
-    return IdentifiedRig(
-        plant=plant, name="furuta", gain=0.05, unit="V", draws=draws, description=RigDescription(entries=limit)
-    )
+    return Rig(plant=plant, name="furuta", gain=0.05, unit="V", draws=draws, hardware=Hardware(entries=limit))
 
 
 def ours(lanes: int, task: str, dry: float = 1.0) -> Callable[[], Contender]:

@@ -15,8 +15,8 @@ from benchmarks.measure import Line, of_each
 
 def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     """Median errors and how often the intervals hold, per kind of rig and quantity."""
-    from upright.experiments.makes import OSCILLATORS
     from upright.experiments.weighing_1a.run import drawn_twin, measure_body
+    from upright.rig.makes import OSCILLATORS
 
     lines: list[Line] = []
     seeds = range(1, 6 if quick else 101)

@@ -33,7 +33,7 @@ from upright.report.drawing import BLACK, BLUE, GREY, SKY, figure, save, styled
 from upright.workers import HERE, Workers
 
 if TYPE_CHECKING:
-    from upright.control import ServoRig
+    from upright.rig import Rig
 
 IMAGE = Path("docs/images/regulation_reliability.png")
 Array = NDArray[np.float64]
@@ -54,9 +54,9 @@ class Told:
     held: bool
 
 
-def identify(truth: ServoRig, seed: int) -> tuple[ServoRig, tuple[str, ...], Array] | None:
+def identify(truth: Rig, seed: int) -> tuple[Rig, tuple[str, ...], Array] | None:
     """Best numbers and their covariance, in logarithms, from a log of the hanging rig; None when the search strays."""
-    from upright.experiments.makes import make_of, make_rig
+    from upright.rig.makes import make_of, make_rig
     from upright.simulation import simulate
 
     rng = np.random.default_rng([seed, 61])
@@ -67,7 +67,7 @@ def identify(truth: ServoRig, seed: int) -> tuple[ServoRig, tuple[str, ...], Arr
     u = size * np.sign(np.sin(2 * np.pi * np.arange(rows * EVERY) * truth.period / 0.35))
     x0 = np.zeros(4)
 
-    def shown(rig: ServoRig, parameters: Mapping[str, Array], count: int) -> Array:
+    def shown(rig: Rig, parameters: Mapping[str, Array], count: int) -> Array:
         x = simulate(rig.plant, {**rig.drive, **parameters}, x0, u, rig.period, samples=count, every=EVERY)
         return x[:, 0::2]
 
@@ -77,7 +77,7 @@ def identify(truth: ServoRig, seed: int) -> tuple[ServoRig, tuple[str, ...], Arr
     log = np.round(shown(truth, {}, rows)[:, :, 0] / step) * step + rng.normal(size=(rows, 2)) * spread
     error = np.hypot(spread, step / math.sqrt(12))
     model = make_rig(make.key)
-    model = replace(model, period=truth.period, delay=truth.delay, lag=truth.lag, limit=truth.limit)
+    model = model.replace(period=truth.period, delay=truth.delay, lag=truth.lag, limit=truth.limit)
     known = {n: getattr(truth.plant, n) for n in ("m_p", "l_cg", "r") if n in truth.plant.names()}  # from the bench
     model = model.changed(**known)
     start = {n: model.gain if n == GAIN else getattr(model.plant, n) for n in names}
@@ -111,7 +111,7 @@ def identify(truth: ServoRig, seed: int) -> tuple[ServoRig, tuple[str, ...], Arr
 
 
 def drawn(
-    rig: ServoRig, names: tuple[str, ...], covariance: Array, rng: np.random.Generator, lanes: int
+    rig: Rig, names: tuple[str, ...], covariance: Array, rng: np.random.Generator, lanes: int
 ) -> dict[str, Array]:  # fmt: skip
     """Parameters of rigs that an identification allows, in logarithms Gaussian."""
     moves = rng.multivariate_normal(np.zeros(len(names)), covariance, size=lanes)
@@ -119,16 +119,16 @@ def drawn(
     return {n: value[n] * np.exp(moves[:, i]) for i, n in enumerate(names)}
 
 
-def setting(make: str, seed: int) -> tuple[ServoRig, np.random.Generator]:
+def setting(make: str, seed: int) -> tuple[Rig, np.random.Generator]:
     """The true rig, with its drive of this seed, and what is drawn besides."""
-    from upright.experiments.makes import MAKES, make_rig
+    from upright.rig.makes import MAKES, make_rig
 
     rng = np.random.default_rng([seed, 60])
     truth = make_rig(make, seed)
     off = {n: getattr(truth.plant, n) * math.exp(rng.normal(0, OFF)) for n in MAKES[make].sought}
     truth = truth.changed(**off)
     limit, delay = rng.uniform(2.0, 5.0), truth.delay + rng.choice([0.0, 1e-3, 2e-3, 3e-3])
-    return replace(truth, limit=float(limit), delay=float(delay)), rng
+    return truth.replace(limit=float(limit), delay=float(delay)), rng
 
 
 def hands(start: Array, rng: np.random.Generator, lanes: int) -> Array:
@@ -144,11 +144,13 @@ def one(make: str, seed: int, *, swept: Path | None = None, flawed: bool = False
     from upright.control.score import outcomes
     from upright.experiments.designing.run import SPEEDS, velocities
     from upright.experiments.frequency_1b.run import run_frequency
-    from upright.experiments.identified import of_the_day, read_identified
-    from upright.experiments.makes import make_rig
     from upright.experiments.regulation_2.run import SETS
     from upright.experiments.worn import worn
     from upright.gains.requests import read_poles
+    from upright.rig.completion import completed
+    from upright.rig.makes import make_rig
+    from upright.rig.variation import allowed, of_the_day
+    from upright.study.stored_rig import read_stored_rig
 
     truth, rng = setting(make, seed)
     if swept is None:
@@ -161,9 +163,9 @@ def one(make: str, seed: int, *, swept: Path | None = None, flawed: bool = False
         limit, truth = truth.limit, make_rig(make, seed)
         truth = worn(truth, seed) if flawed else truth
         run_frequency(truth, seed, swept)
-        known = read_identified(swept / "fit.json", seed=seed, draws=LANES)
-        truth, rig = replace(truth, limit=limit), replace(known.rig(), limit=limit)
-        others = known.allowed(rig, LANES, seed)
+        known = read_stored_rig(swept / "fit.json", seed=seed, draws=LANES)
+        truth, rig = truth.replace(limit=limit), completed(known).replace(limit=limit)
+        others = allowed(rig, LANES, seed)
     model = rig.linear("inverted")
     sampled = model.to_sampled(rig.period, rig.delay / rig.period)
     poles = read_poles(SETS[f"set {rng.integers(1, 5)}"])

@@ -45,7 +45,7 @@ from benchmarks.hazards.story import (
     turning_to,
 )
 from benchmarks.measure import Line, Target, Unavailable, page
-from upright.experiments.makes import make_rig
+from upright.rig.makes import make_rig
 from upright.rigs import Fault, Limits, Mode
 
 TICKS = 2

@@ -37,10 +37,10 @@ from benchmarks.designs import GAIN, LIMITS, PARAMETERS, inverted
 from benchmarks.measure import Line, of_each
 from benchmarks.rigs import publish
 from upright.errors import RigStopped
-from upright.experiments.makes import make_rig
 from upright.gains import feedback, filtered, place
 from upright.laws import Law
 from upright.logs import LogHeader, LogWriter, read_log
+from upright.rig.makes import make_rig
 from upright.rigs import Board, Limits, Mode, TwinPort, wire
 from upright.rigs.law import RunningLaw
 from upright.rigs.serial import SerialRig

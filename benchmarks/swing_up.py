@@ -22,7 +22,7 @@ LIES = tuple((place, factor) for factor in (-1.0, 0.5, 2.0, 4.0, 1.1, 0.9) for p
 
 def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     """Shares, times, efforts; then detections and false alarms, hanging and in the running loop."""
-    from upright.experiments.makes import PENDULUMS
+    from upright.rig.makes import PENDULUMS
 
     lines: list[Line] = []
     for make in PENDULUMS:
@@ -41,7 +41,7 @@ def _up(make: str, count: int, scatter: float) -> Line:
     """Twins whose numbers lie `scatter` times as far from the model's as a make's do."""
     from upright.control import design_swing_up
     from upright.control.swing_up import UPRIGHT
-    from upright.experiments.makes import make_rig
+    from upright.rig.makes import make_rig
     from upright.simulation import simulate
 
     model, rigs = make_rig(make), [make_rig(make, seed) for seed in range(1, count + 1)]
@@ -80,7 +80,7 @@ def _sensors(make: str, count: int) -> list[Line]:
     from upright.control.score import FALLEN
     from upright.control.sensors import Suspicion, Watch, probe, put_out, scales
     from upright.control.trial import readings
-    from upright.experiments.makes import make_rig
+    from upright.rig.makes import make_rig
 
     model = make_rig(make)
     names = [c.name for c in model.plant.coordinates]

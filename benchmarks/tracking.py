@@ -18,8 +18,8 @@ from benchmarks.measure import Line, Spread, of_each
 
 def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     """Spread of the step figures per kind of rig and law, and how many stay within effort, travel and twist."""
-    from upright.experiments.makes import SHAFTS, make_rig
     from upright.experiments.tracking_3.run import attempt, run_tracking
+    from upright.rig.makes import SHAFTS, make_rig
 
     lines: list[Line] = []
     seeds = range(1, 5 if quick else 101)

@@ -15,10 +15,11 @@ import numpy as np
 from upright.control import design_swing_up
 from upright.control.swing_up import swing_up
 from upright.experiments.frequency_1b.run import run_frequency
-from upright.experiments.identified import read_identified
-from upright.experiments.makes import make_rig
 from upright.experiments.regulation_2.run import run_regulation
 from upright.report.drawing import CYCLE, figure, save, styled
+from upright.rig.completion import completed
+from upright.rig.makes import make_rig
+from upright.study.stored_rig import read_stored_rig
 
 seed = int(sys.argv[1]) if sys.argv[1:] else 0
 rig = make_rig("furuta", seed)
@@ -26,7 +27,7 @@ rig = make_rig("furuta", seed)
 # Hanging, the rig is swept with sines; gains and verdicts come from that fit alone, the rig is asked only afterwards.
 with TemporaryDirectory() as folder:
     print(run_frequency("furuta", seed, Path(folder)).answer.fit.verdict)
-    identified = read_identified(Path(folder) / "fit.json", seed=seed)
+    identified = completed(read_stored_rig(Path(folder) / "fit.json", seed=seed))
     done = run_regulation(identified, rig, seed, Path(folder))
 
 for a in done.attempts:
@@ -36,7 +37,7 @@ for a in done.attempts:
     print(f"  said beforehand: {a.before.word} ({share:.0f} %), came: {a.word}, {a.score.effort_peak:.1f} V at most")
 print(f"To recommend: {done.best.name}.")
 
-ascent = swing_up(rig, design_swing_up(identified.rig()), seconds=6)
+ascent = swing_up(rig, design_swing_up(identified), seconds=6)
 print(f"From hanging: {ascent.swings} half swings, upright from {ascent.up:.2f} s on, {ascent.peak:.1f} V at most.")
 
 

@@ -38,6 +38,7 @@ identification.inference
 identification.checks identification.frequency identification.loadings
 identification.ladder
 identification
+rig
 study
 study.draft
 control
@@ -45,12 +46,11 @@ rigs
 realtime
 report
 report.fit
-report.ladder report.law report.log
+report.ladder report.law report.log report.rig
 report.run
 diagnosis questionnaire
 paper
-experiments.abreast experiments.makes
-experiments.identified
+experiments.abreast
 experiments.designing experiments.weighing_1a experiments.running
 experiments.frequency_1b
 experiments.regulation_2
@@ -73,6 +73,7 @@ BLIND = {
     "simulation.kernel": {"units", "signals", "records", "readers"},
     "simulation": {"units", "signals", "records", "readers"},
     "gains": {"signals", "records", "readers", "simulation", "simulation.kernel"},
+    "rig": {"readers", "identification"},
     "control": {"readers", "identification", "study"},
     "rigs": {"identification"},
     "realtime": {"identification", "study", "readers"},

@@ -9,8 +9,8 @@ from typer.testing import CliRunner
 from upright.cli import app
 from upright.diagnosis.case import read_known
 from upright.errors import BadInput
-from upright.experiments.identified import read_identified
 from upright.study.load import load_study
+from upright.study.stored_rig import read_stored_rig
 from upright.trust import no_code
 
 PLANT = """
@@ -109,7 +109,7 @@ def test_where_nothing_can_be_remembered_it_is_said_again(elsewhere, capsys, mon
 
 READERS = {
     "study": lambda here: load_study(here / "study.toml"),
-    "fit": lambda here: read_identified(here / "fit.json"),
+    "fit": lambda here: read_stored_rig(here / "fit.json"),
     "folder of a fit": lambda here: read_known(str(here)),
     "rig of the doctor": lambda here: read_known(str(here / "study.toml"), "log.csv"),
 }

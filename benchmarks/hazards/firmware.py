@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import tempfile
 import threading
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ import numpy as np
 
 from benchmarks.boards import STEP, Board, build, plant, rig_on
 from benchmarks.hazards import twin
-from upright.control.trial import ServoRig
+from upright.rig import Rig
 from upright.rigs import Fault
 from upright.rigs.line import TerminalLine
 from upright.rigs.wire import Kind, pack, unpack
@@ -49,10 +48,10 @@ def no_avr() -> str:
     return unable("avr", "avr-gcc") or unable("simrig", "cc simavr")
 
 
-def simple(rig: ServoRig) -> ServoRig:
+def simple(rig: Rig) -> Rig:
     """As far as the board's pendulum has it."""
     free = dict.fromkeys(("b_1c", "b_2c"), 0.0)
-    return replace(rig, plant=rig.plant.replace(**free), period=PERIOD, delay=0.0, lag=0.0)
+    return rig.replace(plant=rig.plant.replace(**free), period=PERIOD, delay=0.0, lag=0.0)
 
 
 KNOWN, TRUTH = simple(twin.KNOWN), simple(twin.TRUTH)

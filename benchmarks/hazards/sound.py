@@ -15,12 +15,12 @@ import numpy as np
 
 from benchmarks.hazards.story import POLES
 from upright.control.sensors import Watch
-from upright.control.trial import ServoRig
-from upright.experiments.makes import make_rig
 from upright.experiments.worn import worn
 from upright.gains import feedback, filtered, place
 from upright.laws import Law
 from upright.records import Array
+from upright.rig import Rig
+from upright.rig.makes import make_rig
 from upright.rigs import Board, Limits, TwinPort
 from upright.rigs.driven import DrivenScale, StillDrive
 from upright.rigs.supervisor import Duty, Supervisor
@@ -87,7 +87,7 @@ class Left:
     scale: int
 
 
-def _law(known: ServoRig) -> Law:
+def _law(known: Rig) -> Law:
     model = known.linear("inverted")
     sampled = model.to_sampled(known.period, known.delay / known.period)
     K = place(model.A, model.B, POLES).K
@@ -107,7 +107,7 @@ def all_of(make: str, kind: str, seeds: range) -> Left:
     )  # fmt: skip
 
 
-def ran(known: ServoRig, law: Law, make: str, kind: str, seed: int) -> tuple[Array, Array, bool, bool]:
+def ran(known: Rig, law: Law, make: str, kind: str, seed: int) -> tuple[Array, Array, bool, bool]:
     """Deviations and commands of a run, and whether the body was said to show no count, or to lie about its motion."""
     disturbed = KINDS[kind](make, np.random.default_rng([seed, 83]), known.period)
     port = TwinPort(worn(make_rig(make, seed), seed))

@@ -10,10 +10,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from upright.control.trial import ServoRig
 from upright.errors import RigStopped, UprightError
 from upright.gains import feedback, filtered, place
 from upright.laws import Law, Rule, state_feedback
+from upright.rig import Rig
 from upright.rigs import Fault, Limits, LiveRig, Mode, Tick
 from upright.rigs.supervisor import Duty, Supervisor
 
@@ -75,7 +75,7 @@ class Column:
     """
 
     name: str
-    known: ServoRig
+    known: Rig
     make: Callable[..., HazardRig]
     loop: Mode = Mode.HOST
     unable: Callable[[], str] = lambda: ""

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from upright.experiments.makes import make_rig
+from upright.rig.makes import make_rig
 from upright.rigs import Board, Fault, TwinPort
 
 KNOWN, TRUTH = make_rig("furuta"), make_rig("furuta", 3)

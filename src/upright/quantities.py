@@ -82,3 +82,8 @@ def figures(value: float, stderr: float) -> int:
     if not (math.isfinite(stderr) and math.isfinite(value)) or stderr <= 0 or value == 0:
         return 4
     return min(max(math.floor(math.log10(abs(value))) - math.floor(math.log10(stderr)) + 2, 2), 8)
+
+
+def with_unit(value: float, unit: str = "", digits: int = 3) -> str:
+    """A number with its unit, ``0.35 m``; a pure number ("" or "1") has none."""
+    return f"{value:.{digits}g}" + (f" {unit}" if unit not in ("", "1") else "")

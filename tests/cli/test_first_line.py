@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from tests.gains.furuta import STUDY
 from upright.cli import app
-from upright.experiments.makes import make_rig
+from upright.rig.makes import make_rig
 
 NO = {
     "question": "Does it predict?",

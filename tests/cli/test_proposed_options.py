@@ -16,8 +16,8 @@ from typer.testing import CliRunner
 import upright
 from tests.rigs.test_twin import LAW
 from upright.cli import COMMANDS, NESTED, app
-from upright.experiments.makes import make_rig
 from upright.laws import as_values
+from upright.rig.makes import make_rig
 
 SOURCE = Path(upright.__file__).parent
 RUNNER = CliRunner()

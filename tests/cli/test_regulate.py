@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from upright.cli import app
-from upright.experiments.makes import make_rig
+from upright.rig.makes import make_rig
 
 
 def regulate(*arguments: object):

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from upright.control import trial
-from upright.control.encoders import Mounting
 from upright.control.trial import readings
-from upright.experiments.makes import make_rig
 from upright.gains import feedback, filtered, place
+from upright.rig.makes import make_rig
+from upright.rig.mounting import Mounting
 
 RIG = make_rig("furuta")
 TURN = (2 * math.pi, 2 * math.pi)

@@ -13,15 +13,15 @@ from upright.control import Scores, score, trial
 from upright.control.preflight import Task, largest, preflight, words
 from upright.control.score import outcomes
 from upright.errors import BadInput
-from upright.experiments.makes import make_rig
 from upright.gains.requests import read_poles
 from upright.paper.reproduce import TABLE_1
+from upright.rig.makes import make_rig
 
 RIG = make_rig("furuta")
 MODEL = RIG.linear("inverted")
 SAMPLED = MODEL.to_sampled(RIG.period, RIG.delay / RIG.period)
 # the same compiled terms as on the true rig, with next to nothing in them
-IDEAL = replace(RIG.changed(b_1c=1e-15, b_2c=1e-15), lag=0.0, converter=0.0, counts=(1e14, 1e14), travel=math.inf)
+IDEAL = RIG.changed(b_1c=1e-15, b_2c=1e-15).replace(lag=0.0, converter=0.0, counts=(1e14, 1e14), travel=math.inf)
 
 
 def law(which):
@@ -33,7 +33,7 @@ def law(which):
 @pytest.mark.parametrize("direction", [[0, 0, 1, 0], [0, 0, 0, 1]])
 def test_a_law_on_the_unstable_mode_recovers_what_the_limit_can(direction):
     """The coordinate z of that mode, z' = p z + b u, runs away beyond b U/p whatever u does; u = -k z reaches it."""
-    rig = replace(IDEAL, limit=0.01)  # so small that the rig is linear
+    rig = IDEAL.replace(limit=0.01)  # so small that the rig is linear
     values, left = np.linalg.eig(MODEL.A.T)
     mode = int(np.argmax(values.real))
     p, w = values[mode].real, left[:, mode].real
@@ -54,7 +54,7 @@ def test_twice_the_start_with_twice_the_friction_and_limit_is_twice_the_motion()
     start = np.array([0.0, 0.0, 2e-4, 0.0])
     found = [
         outcomes(
-            replace(IDEAL, limit=8e-4 * k), law(0), at="inverted", starts=[k * start], seconds=6.0,
+            IDEAL.replace(limit=8e-4 * k), law(0), at="inverted", starts=[k * start], seconds=6.0,
             parameters={"b_1c": k * 5e-5, "b_2c": k * 1e-6},
         )
         for k in (1, 2)
@@ -91,7 +91,7 @@ def test_a_loop_too_slow_for_its_pole_falls_beforehand():
     late = MODEL.to_sampled(RIG.period, (RIG.delay + 0.04) / RIG.period)
     task = Task(start=(0, 0, 0.05, 0), seconds=3.0)
     found = preflight(
-        replace(RIG, delay=RIG.delay + 0.04), MODEL, late, law(3), task, parameters={}, lanes=16, seed=0
+        RIG.replace(delay=RIG.delay + 0.04), MODEL, late, law(3), task, parameters={}, lanes=16, seed=0
     )  # fmt: skip
     assert found.margins is None
     assert found.chance == 0.0
@@ -113,7 +113,7 @@ def test_every_end_of_a_run_has_its_word():
 @pytest.mark.parametrize("force_limit", [math.inf, 1.5])
 def test_one_run_and_many_of_its_start_say_the_same(force_limit):
     """Sample by sample: starts from easy to lost, each on a rig with a gain and a friction of its own."""
-    rig = replace(RIG, limit=4.0, more={"actuator.force_limit": force_limit})
+    rig = RIG.replace(limit=4.0, more={"actuator.force_limit": force_limit})
     angles = np.linspace(0.02, 0.9, 12)
     starts = np.zeros((angles.size, 4))
     starts[:, 2] = angles

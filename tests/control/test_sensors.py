@@ -14,17 +14,18 @@ from scipy.linalg import solve_discrete_are
 from scipy.special import ellipk
 
 from upright import gains as design
-from upright.control import ServoRig, design_swing_up, trial
+from upright.control import design_swing_up, trial
 from upright.control.score import FALLEN
 from upright.control.sensors import ODDS, UNKNOWN, Suspicion, Watch, lifted, probe, put_out, scales
 from upright.control.sensors import watched as guarded
 from upright.control.trial import readings
-from upright.experiments.makes import make_rig
 from upright.experiments.swing_up_2b.run import scales_of_log
 from upright.experiments.worn import worn
 from upright.physics import Furuta
 from upright.readers import read
 from upright.records import Record
+from upright.rig import Rig
+from upright.rig.makes import make_rig
 
 MAKES = ("furuta", "linear")
 
@@ -53,8 +54,8 @@ def test_what_an_encoder_shows_over_what_is_true_is_found_hanging(make, shown):
 
 
 ODD = {
-    "offset of the command": lambda r: replace(r, offset=0.02),
-    "a lazy amplifier": lambda r: replace(r, lag=0.01),
+    "offset of the command": lambda r: r.replace(offset=0.02),
+    "a lazy amplifier": lambda r: r.replace(lag=0.01),
     "twice the dry friction": lambda r: r.changed(b_1c=2 * r.plant.b_1c),
     "a stronger drive": lambda r: replace(r, gain=1.06 * r.gain),
     "a longer rod": lambda r: r.changed(l_cg=1.05 * r.plant.l_cg),
@@ -234,9 +235,7 @@ def test_a_real_encoder_that_counts_the_other_way_is_found(volts):
         m_p=9.801e-3, l_cg=96.608e-3, r=93.525e-3, J_d=1.35e-4, J_p=1.476e-5, b_1=1.37e-2, b_2=1.96e-5, b_1c=5.9e-3,
         tilt_x=0.051, tilt_y=0.022,
     )  # fmt: skip
-    rig = ServoRig(
-        name="furuta_diy", plant=plant, gain=0.0526, lag=9e-3, limit=12.0, counts=(4000.0, 4000.0), period=2e-3
-    )
+    rig = Rig.known(plant, name="furuta_diy", gain=0.0526, lag=9e-3, limit=12.0, counts=(4000.0, 4000.0), period=2e-3)
     folder = Path(os.environ["UPRIGHT_REAL_DATA"]) / "furuta_diy_odrive"
     log = read(folder / f"hardware_sin_response_{volts}V_1s.csv")
     t = np.arange(log.t[0], log.t[-1], log.period)
@@ -273,7 +272,7 @@ def test_rounding_of_coarse_encoders_is_not_taken_for_a_lie(make, far, seed):
     """2,000 counts a turn at 1.1 kHz: the same rounding for six samples is no evidence six times over."""
 
     def coarse(rig):
-        return replace(rig, counts=tuple(c / 8 for c in rig.counts))
+        return rig.replace(counts=tuple(c / 8 for c in rig.counts))
 
     model = coarse(make_rig(make))
     linear = model.linear("inverted")

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from upright.control import design_swing_up
 from upright.control.swing_up import AWAY, FADE, HOLDING, PARAMETERS, TRIPPED, body, swing_and_hold, swing_up
 from upright.errors import BadInput
-from upright.experiments.makes import make_rig
+from upright.rig.makes import make_rig
 
 MAKES = ("furuta", "linear")
 
@@ -114,7 +114,7 @@ def test_every_rig_of_the_make_gets_up_and_stays(law):
 @pytest.mark.parametrize("make", MAKES)
 def test_scipy_finds_the_same_first_swings(make):
     """The commands of the law, held, through the equations of motion typed by hand."""
-    rig = replace(frictionless(make), delay=0.0, lag=0.0, converter=0.0)
+    rig = frictionless(make).replace(delay=0.0, lag=0.0, converter=0.0)
     run = swing_up(rig, replace(designed(make), body=body(rig)), seconds=0.8).trial
     rates, T = crane(rig), rig.period
     x = run.x[0]

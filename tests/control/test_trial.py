@@ -11,10 +11,10 @@ import pytest
 from upright.control import Trial, score, trial
 from upright.control.trial import readings
 from upright.errors import BadInput
-from upright.experiments.makes import make_rig
 from upright.gains import feedback, filtered, place
 from upright.gains.loop import closed
 from upright.records import Record
+from upright.rig.makes import make_rig
 
 RIG = make_rig("furuta")
 MODEL = RIG.linear("inverted")
@@ -23,8 +23,8 @@ SET_1 = [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220]
 GAINS = place(MODEL.A, MODEL.B, SET_1).K
 LAW = feedback(filtered(SAMPLED, 0.5), GAINS)
 # the same compiled terms as on the true rig, with next to nothing in them
-IDEAL = replace(
-    RIG.changed(b_1c=1e-15, b_2c=1e-15), lag=0.0, converter=0.0, counts=(1e14, 1e14)
+IDEAL = RIG.changed(b_1c=1e-15, b_2c=1e-15).replace(
+    lag=0.0, converter=0.0, counts=(1e14, 1e14)
 )  # fmt: skip
 
 

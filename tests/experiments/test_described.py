@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from upright.control import ServoRig, trial
-from upright.control.trial import full_command
+from upright.control import trial
 from upright.errors import BadInput
-from upright.experiments.identified import read_identified
-from upright.experiments.makes import CONVERTER, MAKES, PER_METRE, SERVO, VENDORS, described_make, make_rig, sheet
 from upright.laws import state_feedback
 from upright.physics import CartPendulum, Furuta
+from upright.rig import Rig
+from upright.rig.drive import full_command
+from upright.rig.makes import CONVERTER, MAKES, PER_METRE, SERVO, VENDORS, hardware_of_make, make_rig, sheet
 from upright.simulation import simulate
+from upright.study.stored_rig import read_stored_rig
 from upright.verbs.control import design, regulate, swing_up
 
 POLES = "-4+-2j, -16, -3"
@@ -68,8 +68,8 @@ def run(source, tmp_path, **options):
 def test_the_loop_that_is_told_is_that_of_the_study_s_rig(study, tmp_path):
     """The run told beforehand against one put together by hand of the study's numbers: the command meets 10 V."""
     told = run(study(), tmp_path, tilt="19 deg").value
-    own = ServoRig(
-        name="", plant=CartPendulum(m_c=0.9, m_p=0.12, l_cg=0.2, J_p=1.5e-3, b_1=0.8, b_2=1e-4), gain=1.5, limit=10.0,
+    own = Rig.known(
+        CartPendulum(m_c=0.9, m_p=0.12, l_cg=0.2, J_p=1.5e-3, b_1=0.8, b_2=1e-4), gain=1.5, limit=10.0,
         counts=(20_000, 4096 / math.tau), period=2e-3, delay=2e-3, lag=4e-3, travel=0.3,
     )  # fmt: skip
     attempt = told.attempts[0]
@@ -164,7 +164,7 @@ def test_a_drooping_drive_meets_its_force_where_the_equation_says():
 
 def test_back_emf_is_in_the_linear_model(study):
     """A small motion under a small command, simulated with the drive's slope, moves as the linear model says."""
-    known = read_identified(study(('lag = "4 ms"', 'slope = "3 N s/m"')))
+    known = read_stored_rig(study(('lag = "4 ms"', 'slope = "3 N s/m"')))
     model, plant = known.linear("hanging"), known.plant
     u, dt, n = 1e-3, 1e-3, 1000
     drive = {"actuator.gain": known.gain, **known.more}
@@ -208,7 +208,7 @@ def fit_of(seed: int, folder: Path) -> Path:
     entries["actuator.gain"] = {"value": rig.gain, "stderr": 0.01 * rig.gain, "unit": "N/V", "status": "firm"}
     content = {
         "format": 1, "plant": "cart-pendulum", "verdict": "", "trusted": True, "parameters": entries,
-        "estimated": ["actuator.gain"], "correlation": [[1.0]], "rig": described_make(rig).plain(),
+        "estimated": ["actuator.gain"], "correlation": [[1.0]], "rig": hardware_of_make(rig).plain(),
     }  # fmt: skip
     (folder / "fit.json").write_text(json.dumps(content), encoding="utf-8")
     return folder / "fit.json"
@@ -243,7 +243,7 @@ def test_a_prediction_with_the_fit_of_another_rig_says_so(study, tmp_path):
     from upright.verbs.model import predict
 
     t = np.arange(400) * 0.01
-    plant = read_identified(study()).plant
+    plant = read_stored_rig(study()).plant
     x = simulate(plant, {}, plant.state("hanging", theta=0.3), None, 0.01, samples=400)[:, ::2, 0]
     np.savetxt(tmp_path / "log.csv", np.column_stack([t, x]), "%.9f", ",", header="t,x,theta", comments="")
     runs = '[[runs]]\nfile = "log.csv"\ndrive = 0\n'
@@ -274,9 +274,9 @@ def test_a_swing_up_asks_for_the_travel(tmp_path):
 
 def test_a_drive_that_trips_at_a_speed_ends_the_run():
     """An arm of 0.01 kg m^2 pushed by 0.01 N m from rest turns by 1 rad/s faster every second."""
-    rig = replace(make_rig("furuta"), speed_limit=0.5, counts=(1e9, 1e9), converter=0.0)
+    rig = make_rig("furuta").replace(speed_limit=0.5, counts=(1e9, 1e9), converter=0.0)
     bare = Furuta(m_p=1e-6, l_cg=0.1, r=0.1, J_d=0.01, J_p=1e-9)
-    rig = replace(rig, plant=bare, gain=0.01, limit=1.0, lag=0.0, delay=0.0)
+    rig = rig.replace(plant=bare, gain=0.01, limit=1.0, lag=0.0, delay=0.0)
     law = state_feedback(np.array([[0.0, 0.0, 1e6, 0.0]]), rig.period, target=np.zeros(2), limit=1.0)
     went = trial(rig, law, at="inverted", start=[0.0, 0.0, -1e-2, 0.0], seconds=1.0)
     from upright.control import score

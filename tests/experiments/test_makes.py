@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from upright.errors import BadInput
-from upright.experiments.makes import MAKES, BrassPendulum, make_rig
+from upright.rig.makes import MAKES, BrassPendulum, make_rig
 
 
 @pytest.mark.parametrize("make", ["linear", "furuta"])

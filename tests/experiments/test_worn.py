@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from upright.experiments.makes import PENDULUMS, make_of, make_rig
 from upright.experiments.worn import worn
 from upright.physics.equations import mass_and_force
+from upright.rig.makes import PENDULUMS, make_of, make_rig
 from upright.simulation import simulate
 
 

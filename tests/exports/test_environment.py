@@ -10,10 +10,10 @@ import pytest
 
 from tests.exports.rigs import fit_file
 from upright.errors import BadInput
-from upright.experiments.identified import read_identified
 from upright.exports.episodes import Episodes
 from upright.physics import CartPendulum, Furuta, Pendulum, find
 from upright.simulation import simulate
+from upright.study.stored_rig import read_stored_rig
 from upright.verbs.export import export
 
 gymnasium = pytest.importorskip("gymnasium", reason="gymnasium is not installed")
@@ -40,7 +40,7 @@ def test_gymnasium_s_own_checker_finds_nothing(fit, task):
 
 def test_a_step_is_the_motion_of_the_rig_that_was_drawn(fit):
     """A lane under its own commands is that rig simulated alone, drawn friction and gain included."""
-    lanes = Episodes(read_identified(fit, draws=50), 40)
+    lanes = Episodes(read_stored_rig(fit, draws=50), 40)
     lanes.reset(np.ones(40, dtype=bool), np.random.default_rng(3))
     x0, params = lanes.x.copy(), lanes.params.copy()
     actions = np.random.default_rng(4).uniform(-1, 1, (6, 40, 1))
@@ -59,11 +59,11 @@ def test_a_drive_that_is_late_remembers_its_commands_from_step_to_step(fit):
     """Dead time and lag longer than a step: the same motion as in one run."""
     from dataclasses import replace
 
-    from upright.study.description import Entry
+    from upright.rig.hardware import Entry
 
-    known = read_identified(fit, draws=1)
+    known = read_stored_rig(fit, draws=1)
     late = {n: Entry(value=v, unit="s", source="known") for n, v in (("delay", 0.031), ("lag", 0.012))}
-    lanes = Episodes(replace(known, draws=(), description=known.description.given(late)), 2)
+    lanes = Episodes(replace(known, draws=(), hardware=known.hardware.given(late)), 2)
     lanes.reset(np.ones(2, dtype=bool), np.random.default_rng(3))
     x0, actions = lanes.x.copy(), np.random.default_rng(4).uniform(-1, 1, (8, 2, 1))
     for action in actions:
@@ -76,7 +76,7 @@ def test_a_drive_that_is_late_remembers_its_commands_from_step_to_step(fit):
 
 
 def test_draws_scatter_as_the_fit_says(fit):
-    lanes = Episodes(read_identified(fit, draws=2000), 4000)
+    lanes = Episodes(read_stored_rig(fit, draws=2000), 4000)
     lanes.reset(np.ones(4000, dtype=bool), np.random.default_rng(1))
     masses = lanes.params[lanes.simulator.names.index("m_p")]
     # of 2000 normal draws the deviation's own error is 1/sqrt(4000), 1.6 %; four of them
@@ -112,7 +112,7 @@ def test_the_same_seed_gives_the_same_rigs_and_motions(fit):
 
 
 def test_hanging_still_is_worth_nothing_and_standing_still_one(fit):
-    lanes = Episodes(read_identified(fit), 2, task="swing_up")
+    lanes = Episodes(read_stored_rig(fit), 2, task="swing_up")
     lanes.reset(np.ones(2, dtype=bool), np.random.default_rng(0))
     lanes.x[:] = 0.0
     lanes.x[2, 1] = np.pi
@@ -123,7 +123,7 @@ def test_hanging_still_is_worth_nothing_and_standing_still_one(fit):
 
 def test_a_full_command_costs_a_hundredth_of_the_reward_and_half_of_one_a_quarter_of_that(fit):
     """The cost goes with the command's square, beside (1 + cos)/2 of the angle that is observed after the step."""
-    lanes = Episodes(read_identified(fit), 5, task="swing_up")
+    lanes = Episodes(read_stored_rig(fit), 5, task="swing_up")
     lanes.reset(np.ones(5, dtype=bool), np.random.default_rng(0))
     reward, _ = lanes.step(np.array([[0.0], [0.5], [-0.5], [1.0], [-1.0]]))
     height = (1 + lanes.observation[:, lanes.names.index("cos theta")]) / 2

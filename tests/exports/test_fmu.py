@@ -15,11 +15,12 @@ from tests.physics import bumpers
 from tests.physics.bumpers import BUMPERS
 from tests.physics.specimens import SPECIMENS
 from upright.errors import BadInput
-from upright.experiments.identified import read_identified
 from upright.exports.fmu import build, unit_of
 from upright.exports.fmu.translation import translated
 from upright.physics import BUILT_IN, CartPendulum, Furuta, chain
+from upright.rig import Hardware
 from upright.simulation import simulate
+from upright.study.stored_rig import read_stored_rig
 from upright.verbs.export import export
 
 fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed")
@@ -35,7 +36,7 @@ DRIVE = {"actuator.gain": 0.5, "actuator.delay": 4.3e-3, "actuator.lag": 0.012, 
 
 def identified(folder, plant, **more):
     name = next((n for n, kind in BUILT_IN.items() if kind is type(plant)), "rectilinear-4")
-    return read_identified(fit_file(folder, plant, name=name, **more))
+    return read_stored_rig(fit_file(folder, plant, name=name, **more))
 
 
 def running(path, x0, names):
@@ -107,7 +108,7 @@ def test_every_plant_moves_as_here(name, tmp_path):
 def test_elementary_functions_and_kinks_are_those_of_the_kernel(gap, tmp_path):
     """With the bumpers where the cart rests it has no linear model, and steps as the stiffer side asks."""
     plant = BUMPERS.replace(gap=gap)
-    rig = read_identified(fit_file(tmp_path, plant, name=f"{bumpers.__file__}:Bumpers", unit="N"))
+    rig = read_stored_rig(fit_file(tmp_path, plant, name=f"{bumpers.__file__}:Bumpers", unit="N"))
     (tmp_path / "rig.fmu").write_bytes(build(unit_of(rig))[0])
     x0, commands = [0.02, 0.0, 0.4, 0.0], 3.0 * np.sin(np.arange(30) * 0.3)
     ours = here(plant, {"actuator.gain": 0.5, "actuator.limit": 5.0}, x0, commands, 0.02)
@@ -176,4 +177,4 @@ def test_what_a_unit_does_not_remember_is_said_or_refused(tmp_path):
     slow = identified(tmp_path, soft, **entry)
     with pytest.raises(BadInput, match="relaxation"):
         unit_of(slow)
-    assert unit_of(replace(slow, description=replace(slow.description, entries={}))).told
+    assert unit_of(replace(slow, hardware=Hardware())).told

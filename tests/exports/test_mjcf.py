@@ -10,10 +10,10 @@ import pytest
 from tests.exports.rigs import fit_file
 from tests.physics.specimens import SPECIMENS
 from upright.errors import BadInput
-from upright.experiments.identified import read_identified
 from upright.exports.mjcf import model
 from upright.physics import BUILT_IN, DoublePendulumAbsolute, Pendulum
 from upright.simulation import simulate
+from upright.study.stored_rig import read_stored_rig
 from upright.verbs.export import export
 
 mujoco = pytest.importorskip("mujoco")
@@ -24,7 +24,7 @@ QUICK = {"pendulum", "cart-pendulum", "furuta out of level", "double-pendulum", 
 def identified(folder, plant, **more):
     kinds = {kind: name for name, kind in BUILT_IN.items()}
     name = kinds.get(type(plant), "rectilinear-4")
-    return read_identified(fit_file(folder, plant, name=name, **more))
+    return read_stored_rig(fit_file(folder, plant, name=name, **more))
 
 
 def moved(text: str, x0, u: float, seconds: float):
@@ -97,8 +97,8 @@ def test_absolute_angles_become_joints_of_bodies(tmp_path):
 def test_what_mujoco_has_not_is_said(tmp_path):
     plant = Pendulum(m_p=0.2, l_cg=0.25, b_2q=1e-4, b_2s=2e-3)
     rig = identified(tmp_path, plant)
-    late = replace(rig, description=replace(rig.description, entries=identified(
-        tmp_path, plant, delay={"value": 0.01, "unit": "s", "source": "known"}).description.entries))  # fmt: skip
+    late = replace(rig, hardware=replace(rig.hardware, entries=identified(
+        tmp_path, plant, delay={"value": 0.01, "unit": "s", "source": "known"}).hardware.entries))  # fmt: skip
     text, told = model(late)
     assert mujoco.MjModel.from_xml_string(text).nv == 1  # a point mass too
     for words in ("quadratic drag of theta", "break-away", "dead time"):

@@ -14,12 +14,12 @@ import pytest
 import upright as up
 from upright.control import design_swing_up
 from upright.errors import BadInput
-from upright.experiments.makes import make_rig
 from upright.exports.controller import of_law
 from upright.exports.targets import TARGETS
 from upright.exports.vector import self_test
 from upright.laws import Rule
 from upright.laws.values import as_values, of_values
+from upright.rig.makes import make_rig
 
 PASSED = "law: every sample is the expected one"
 COMPILER = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not on this machine")

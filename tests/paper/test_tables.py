@@ -12,12 +12,12 @@ from typer.testing import CliRunner
 from tests.paper import printed
 from tests.paper.test_errata import possible
 from upright.cli import app
-from upright.experiments.makes import NOMINAL
 from upright.gains import lqr
 from upright.gains.factorization import effort_ratios, recover_locus
 from upright.paper import reproduce as tables
 from upright.paper.reproduce import printed_inverted, reproduce
 from upright.physics import Furuta, chain
+from upright.rig.makes import NOMINAL
 
 
 @cache

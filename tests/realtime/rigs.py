@@ -9,9 +9,9 @@ import struct
 from dataclasses import replace
 from pathlib import Path
 
-from upright.experiments.makes import make_rig
 from upright.gains import feedback, filtered, place
 from upright.realtime.session import Stage
+from upright.rig.makes import make_rig
 from upright.rigs import Board, Limits, TwinPort
 from upright.rigs.supervisor import Duty, Supervisor
 

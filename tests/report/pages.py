@@ -64,21 +64,21 @@ def design_page(**wish):
     def page(folder: Path) -> Chapter:
         from upright.experiments.designing.chapter import chapter
         from upright.experiments.designing.run import DesignRequest, design_for
-        from upright.experiments.identified import IdentifiedRig
         from upright.physics import Furuta
+        from upright.rig import Rig
 
         plant = Furuta(m_p=0.135, l_cg=0.19, r=0.16, J_d=0.011, J_p=6e-4, b_1=6e-4)
         others = tuple((plant.replace(m_p=m), 0.5) for m in (0.134, 0.136))
-        rig = IdentifiedRig(plant=plant, name="furuta", gain=0.5, unit="V", delay=0.0, lag=0.0, draws=others)
+        rig = Rig(plant=plant, name="furuta", gain=0.5, unit="V", draws=others)
         return chapter(design_for(rig, DesignRequest(at="inverted", limit=1.0, quantum=(4e-4, 4e-4), **wish)))
 
     return page
 
 
 def paper_page(folder: Path) -> Chapter:
-    from upright.experiments.makes import NOMINAL
     from upright.paper.chapter import chapter
     from upright.paper.reproduce import reproduce
+    from upright.rig.makes import NOMINAL
 
     return chapter(reproduce(NOMINAL, seed=1))
 
@@ -140,9 +140,9 @@ def measured_response_page(folder: Path) -> Chapter:
 
 
 def loadings_page(folder: Path) -> Chapter:
-    from upright.experiments.makes import make_rig
     from upright.experiments.weighing_1a.chapter import chapter
     from upright.experiments.weighing_1a.run import run_weighing
+    from upright.rig.makes import make_rig
 
     return chapter(run_weighing(make_rig("rectilinear", 2), 2, folder))
 
@@ -164,18 +164,20 @@ def own_frequency_page(folder: Path) -> Chapter:
 
 
 def regulation_page(folder: Path) -> Chapter:
-    from upright.experiments.makes import make_rig
     from upright.experiments.regulation_2.chapter import chapter
     from upright.experiments.regulation_2.run import RegulationRequest, identify_make, run_regulation
+    from upright.rig.completion import completed
+    from upright.rig.makes import make_rig
 
     wish = RegulationRequest(draws=16, seconds=2.0)
-    return chapter(run_regulation(identify_make("linear", 1, folder), make_rig("linear", 1), 1, folder, wish=wish))
+    known = completed(identify_make("linear", 1, folder))
+    return chapter(run_regulation(known, make_rig("linear", 1), 1, folder, wish=wish))
 
 
 def swing_up_page(folder: Path) -> Chapter:
-    from upright.experiments.makes import make_rig
     from upright.experiments.swing_up_2b.chapter import chapter
     from upright.experiments.swing_up_2b.run import run_swing_up
+    from upright.rig.makes import make_rig
 
     return chapter(run_swing_up(make_rig("furuta"), make_rig("furuta", 3), folder))
 
@@ -190,7 +192,7 @@ def tracking_page(folder: Path) -> Chapter:
 def free_swing_page(folder: Path) -> Chapter:
     from upright.experiments.free_swing_4.chapter import chapter
     from upright.experiments.free_swing_4.run import run_free_swing
-    from upright.experiments.makes import make_rig
+    from upright.rig.makes import make_rig
 
     return chapter(run_free_swing(make_rig("furuta", 1), 1, folder))
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.rigs.conformance import Conformance, Specimen
-from upright.experiments.makes import make_rig
 from upright.records import Record
+from upright.rig.makes import make_rig
 from upright.rigs import Board, ReplayPort, TwinPort
 
 FURUTA, SHAFT, CART = (make_rig(key) for key in ("furuta", "torsional", "linear"))

@@ -10,13 +10,13 @@ import pytest
 
 from tests.rigs.test_supervisor import DUTY, LAW, MODEL, RIG, Scene
 from upright.errors import RigStopped
-from upright.experiments.makes import make_rig
 from upright.experiments.worn import worn
+from upright.rig.makes import make_rig
 from upright.rigs import Fault
 from upright.rigs.driven import DrivenScale, StillDrive
 from upright.rigs.law import RunningLaw
 
-PROMPT = replace(RIG, delay=0.0, lag=0.0)
+PROMPT = RIG.replace(delay=0.0, lag=0.0)
 FAST = 15.0
 """rad/s, of the pendulum's swing."""
 

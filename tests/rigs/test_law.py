@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from upright.experiments.makes import make_rig
 from upright.laws import Law
+from upright.rig.makes import make_rig
 from upright.rigs import Capabilities, Limits
 from upright.rigs.law import RunningLaw, absurdity
 from upright.rigs.onboard import MEMORIES

@@ -9,8 +9,8 @@ from itertools import pairwise
 import pytest
 
 from upright.errors import BadInput, RigStopped
-from upright.experiments.makes import make_rig
 from upright.experiments.running.rig import signal, stage_of, usual_limits
+from upright.rig.makes import make_rig
 from upright.rigs import Capabilities, Limits
 from upright.rigs.rigfile import read_rig_file
 from upright.rigs.supervisor import Duty, Supervisor

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from upright.errors import BadInput, RigStopped
-from upright.experiments.makes import make_rig
 from upright.gains import feedback, filtered, place
 from upright.laws import Rule, state_feedback
+from upright.rig.makes import make_rig
 from upright.rigs import Board, Fault, Limits, Mode, TwinPort
 from upright.rigs.driven import StillDrive
 from upright.rigs.supervisor import PLAIN, PULSES, Duty, Supervisor
@@ -113,7 +113,7 @@ def moved_by(rig, pulse, seconds=0.15):
 @pytest.mark.parametrize(("fineness", "share"), [(1.0, 0.02), (0.1, 0.05), (0.005, 0.4)])
 def test_the_pulse_is_the_least_that_shows_plainly_or_the_largest_where_none_does(fineness, share):
     """The motion under each share of the largest command is simulated in one piece."""
-    rig = replace(RIG, counts=tuple(fineness * n for n in RIG.counts))
+    rig = RIG.replace(counts=tuple(fineness * n for n in RIG.counts))
     plain = [s for s in PULSES if moved_by(rig, s * RIG.limit).min() >= PLAIN]
     assert min(plain, default=max(PULSES)) == share
     scene = Scene(replace(DUTY, model=rig, limits=replace(LIMITS, travel=(math.inf,) * 2, speed=(math.inf,) * 2)), rig)

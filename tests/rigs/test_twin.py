@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from upright.control.trial import SUBSTEPS, at_work, trial
-from upright.experiments.makes import make_rig
 from upright.gains import feedback, filtered, place
+from upright.rig.makes import make_rig
 from upright.rigs import Board, Limits, Mode, TwinPort
 from upright.rigs.law import RunningLaw
 from upright.simulation import simulate
@@ -62,9 +62,9 @@ def test_a_twin_under_the_hosts_law_moves_as_the_compiled_loop(compiled):
 
 SLOW_TO_FORGET = {
     "presliding": replace(RIG, plant=RIG.plant.replace(delta_1=0.02, delta_2=0.05, b_2c=2e-4)),
-    "relaxation": replace(RIG, more={"actuator.damping": 0.02, "actuator.relaxation": 0.05}),
-    "relaxation beyond a knee": replace(
-        RIG, more={"actuator.damping": 0.02, "actuator.relaxation": 0.05, "actuator.knee": 0.5, "actuator.fade": 0.1}
+    "relaxation": RIG.replace(more={"actuator.damping": 0.02, "actuator.relaxation": 0.05}),
+    "relaxation beyond a knee": RIG.replace(
+        more={"actuator.damping": 0.02, "actuator.relaxation": 0.05, "actuator.knee": 0.5, "actuator.fade": 0.1}
     ),
 }
 

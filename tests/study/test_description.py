@@ -62,7 +62,7 @@ def study(tmp_path):
 
 
 def test_every_entry_tells_its_value_and_its_source(study):
-    said = load_study(study()).description
+    said = load_study(study()).hardware
     assert (said.name, said.vendor) == ("bench 3", "")
     told = {n: (e.value, e.unit, e.source) for n, e in said.entries.items()}
     assert told["servo_period"] == (pytest.approx(0.002), "s", "known")
@@ -128,9 +128,9 @@ def test_a_fit_hands_on_the_drive_the_encoders_and_the_servo(cart, tmp_path):
     study = load_study(cart())
     fit = identify(study.rig, study.runs)
     write_fit(fit, study, tmp_path / "fit.json")
-    back = read_fit(tmp_path / "fit.json").description
+    back = read_fit(tmp_path / "fit.json").hardware
     assert back.vendor == "ECP 210"
-    assert set(back.entries) == set(study.description.entries)
+    assert set(back.entries) == set(study.hardware.entries)
     said = {n: (e.value, e.unit, e.source) for n, e in back.entries.items()}
     assert said["limit"] == (10.0, "V", "measured")
     assert said["force_limit"] == (30.0, "N", "known")
@@ -149,7 +149,7 @@ def test_a_fit_of_older_form_tells_its_drive_from_its_parameters(cart, tmp_path)
     content = json.loads((tmp_path / "fit.json").read_text(encoding="utf-8"))
     del content["rig"]
     (tmp_path / "fit.json").write_text(json.dumps(content), encoding="utf-8")
-    said = read_fit(tmp_path / "fit.json").description
+    said = read_fit(tmp_path / "fit.json").hardware
     assert {n: e.source for n, e in said.entries.items()} == {
         "gain": "identified", "limit": "known", "force_limit": "known",
         "lag": "identified",  # known about: it may have moved, and such a file says no more
@@ -200,7 +200,7 @@ def test_the_example_of_the_page_describes_a_rig(tmp_path, log):
     rest = CART.partition("[parameters]")[2].partition("[actuator]")[0]
     text = f'{example}unit = "rad"\n[drive]\ncolumn = "u"\nunit = "V"\n[parameters]{rest}[[runs]]\nfile = "log.csv"\n'
     (tmp_path / "study.toml").write_text(text, encoding="utf-8")
-    said = load_study(tmp_path / "study.toml").description
+    said = load_study(tmp_path / "study.toml").hardware
     assert {n: e.source for n, e in said.entries.items()} == {
         "gain": "identified", "limit": "measured", "force_limit": "known", "lag": "assumed", "converter": "known",
         "servo_period": "known", "travel": "known", "speed_limit": "measured", "counts.theta": "measured",
@@ -222,7 +222,7 @@ def test_a_drafted_study_leads_from_a_log_to_a_rig_without_anybody_else_s_number
     text = draft(record, inspect(record), tmp_path / "log.csv", path)
     path.write_text(text, encoding="utf-8")
     assert "ECP" not in text
-    said = load_study(path).description
+    said = load_study(path).hardware
     told = {n: (e.value, e.source) for n, e in said.entries.items()}
     assert told["limit"] == (10.0, "measured")
     assert told["servo_period"] == (pytest.approx(dt), "assumed")

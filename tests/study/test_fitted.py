@@ -8,9 +8,9 @@ import pytest
 from tests.study.mutations import at, changed, paths, wrong
 from upright.diagnosis.case import read_known
 from upright.errors import BadInput, UprightError
-from upright.experiments.identified import read_identified
 from upright.physics import CartPendulum
 from upright.study.fitted import read_fit
+from upright.study.stored_rig import read_stored_rig
 
 
 def number(value, unit, stderr=0.0):
@@ -45,7 +45,7 @@ MUTATIONS = [(p, what, value) for p in paths(FIT) for what, value in wrong(at(FI
 def use(path):
     """What every reader of a fit.json makes of it: its numbers, a linear model, and rigs drawn from its covariance."""
     fitted = read_fit(path)
-    rig = read_identified(path, draws=5)
+    rig = read_stored_rig(path, draws=5)
     known = read_known(str(path))
     models = [rig.linear("inverted"), *rig.spread("inverted")]
     return fitted, rig, known, models

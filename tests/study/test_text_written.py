@@ -5,7 +5,8 @@ import tomllib
 
 import pytest
 
-from upright.study.text import TomlTable, number, study_text, toml
+from upright.quantities import with_unit
+from upright.study.text import TomlTable, study_text, toml
 
 
 @pytest.mark.parametrize(
@@ -19,8 +20,8 @@ def test_a_value_reads_back(value):
 
 def test_a_number_keeps_as_many_digits_as_asked():
     assert tomllib.loads(f"pi = {toml(math.pi, 10)}")["pi"] == pytest.approx(math.pi, rel=1e-9)
-    assert number(math.pi, "rad") == "3.14 rad"
-    assert number(0.2) == number(0.2, "1") == "0.2"
+    assert with_unit(math.pi, "rad") == "3.14 rad"
+    assert with_unit(0.2) == with_unit(0.2, "1") == "0.2"
 
 
 def test_tables_keep_their_keys_and_comments_say_nothing_to_a_program():

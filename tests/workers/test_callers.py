@@ -10,10 +10,10 @@ from tests.identification.ladder.test_crossval import QUESTION, RUNS
 from upright import gains as design
 from upright.cli import app
 from upright.control.score import outcomes
-from upright.experiments.makes import make_rig
 from upright.gains.requests import read_poles
 from upright.identification.ladder.cross_validation import leave_one_out
 from upright.paper.reproduce import TABLE_1
+from upright.rig.makes import make_rig
 from upright.workers import Workers
 
 

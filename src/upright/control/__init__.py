@@ -2,6 +2,7 @@
 
 from upright.control.score import Score, Scores, score
 from upright.control.swing_up import SwingUp, design_swing_up
-from upright.control.trial import ServoRig, Trial, trial
+from upright.control.trial import Trial, trial
+from upright.rig import Rig
 
-__all__ = ["Score", "Scores", "ServoRig", "SwingUp", "Trial", "design_swing_up", "score", "trial"]
+__all__ = ["Rig", "Score", "Scores", "SwingUp", "Trial", "design_swing_up", "score", "trial"]

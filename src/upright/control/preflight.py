@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upright.control.score import Score, Scores, outcomes, score
-from upright.control.trial import ServoRig, Trial, trial
+from upright.control.trial import Trial, trial
 from upright.errors import BadInput
 from upright.gains import Margins, margins
 from upright.gains.loop import closed, command_noise
@@ -22,6 +22,7 @@ from upright.gains.requests import poles_of
 from upright.laws import Law
 from upright.progress import Progress, silent
 from upright.records import Array
+from upright.rig import Rig
 from upright.systems import StateSpace
 from upright.workers import HERE, Workers
 
@@ -98,7 +99,7 @@ class Preflight:
 
 
 def preflight(
-    rig: ServoRig,
+    rig: Rig,
     model: StateSpace,
     sampled: StateSpace,
     law: Law,
@@ -114,7 +115,7 @@ def preflight(
 
     Parameters
     ----------
-    rig : ServoRig
+    rig : Rig
         As identified.
     model, sampled : StateSpace
         Its linear model about the equilibrium, and the same as the law was designed on; margins and noise count the
@@ -179,14 +180,14 @@ def word(found: Score) -> str:
     return words(Scores(**{n: np.asarray(v)[..., None] for n, v in vars(found).items()}))[0]
 
 
-def largest(rig: ServoRig, law: Law, at: str, direction: ArrayLike, *, most: float, seconds: float = 3.0) -> float:
+def largest(rig: Rig, law: Law, at: str, direction: ArrayLike, *, most: float, seconds: float = 3.0) -> float:
     """How far along a direction of the states the rig may start and still be held; `most` when nothing less fails.
 
     Sixty-four starts side by side find the first that fails, three times, each between the neighbours of the last.
 
     Parameters
     ----------
-    rig : ServoRig
+    rig : Rig
     law : Law
     at : str
     direction : array, shape (states,)

@@ -15,11 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upright.control.trial import SUBSTEPS, ServoRig, Trial, at_work, saturation
+from upright.control.trial import SUBSTEPS, Trial, at_work
 from upright.errors import BadInput
 from upright.laws import Law
 from upright.progress import Progress, silent
 from upright.records import Array
+from upright.rig import Rig
+from upright.rig.drive import saturation
 from upright.simulation import simulate
 from upright.workers import HERE, Workers, cut, spread
 
@@ -109,14 +111,14 @@ def score(run: Trial, *, watched: str = "", fallen: float = FALLEN, band: float 
 
 
 def scores(
-    rig: ServoRig, t: Array, away: Array, u: Array, *, full: ArrayLike | None = None, watched: str = "",
+    rig: Rig, t: Array, away: Array, u: Array, *, full: ArrayLike | None = None, watched: str = "",
     fallen: float = FALLEN, band: float = BAND,
 ) -> Scores:  # fmt: skip
     """Figures of runs side by side.
 
     Parameters
     ----------
-    rig : ServoRig
+    rig : Rig
         For its saturation, its travel and the names of its coordinates.
     t : array, shape (N,)
         Evenly spaced [s].
@@ -174,7 +176,7 @@ ROWS = 8192
 
 
 def outcomes(
-    rig: ServoRig,
+    rig: Rig,
     law: Law,
     *,
     at: str,
@@ -188,7 +190,7 @@ def outcomes(
 
     Parameters
     ----------
-    rig : ServoRig
+    rig : Rig
     law : Law
     at : str
         Equilibrium to hold.
@@ -220,7 +222,7 @@ def outcomes(
 
 
 def _outcomes(
-    rig: ServoRig, law: Law, at: str, seconds: float, block: tuple[Array, Mapping[str, Array]], _progress: Progress
+    rig: Rig, law: Law, at: str, seconds: float, block: tuple[Array, Mapping[str, Array]], _progress: Progress
 ) -> Scores:
     """Figures of one block: starts (lanes, states) and the parameters of its lanes."""
     starts, given = block

@@ -19,17 +19,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.control.bank import TEXT
 from upright.control.swing_up import SwingUp
-from upright.control.trial import SUBSTEPS, ServoRig, Trial, logged, trial
+from upright.control.trial import SUBSTEPS, Trial, logged, trial
 from upright.gains import shaken
 from upright.laws import Law
 from upright.records import Array, Record
+from upright.rig import Rig
 from upright.simulation import simulate
 from upright.simulation.lowering.routine import Routine
 
@@ -111,7 +112,7 @@ def sentence(name: str, value: float, error: float, explained: float) -> str:
     return f"The encoder of {name} {what}: {remedy} before the loop is closed."
 
 
-def probe(model: ServoRig, law: SwingUp) -> Array:
+def probe(model: Rig, law: SwingUp) -> Array:
     """Commands, shape (N,), that swing the model to `SWING`, as far as that takes no longer than `PUMP`; then none."""
     x0 = model.plant.state("hanging")
     rule = law.rule(model, x0)
@@ -127,7 +128,7 @@ def probe(model: ServoRig, law: SwingUp) -> Array:
         pumped = round(0.85 * pumped)
 
 
-def put_out(rig: ServoRig, command: Array) -> Record:
+def put_out(rig: Rig, command: Array) -> Record:
     """What the encoders of a hanging rig show under commands put out blindly."""
     x = simulate(
         rig.plant, rig.drive, rig.plant.state("hanging"), command, rig.period, samples=command.size + 1,
@@ -137,7 +138,7 @@ def put_out(rig: ServoRig, command: Array) -> Record:
     return logged(rig, np.arange(u.size, dtype=np.float64) * rig.period, x, u)
 
 
-def scales(model: ServoRig, log: Record, known: Mapping[str, float] | None = None) -> Scales:
+def scales(model: Rig, log: Record, known: Mapping[str, float] | None = None) -> Scales:
     """Scales of the encoders from a log of a hanging rig under known commands.
 
     The model's numbers move within what is known of them (least squares with that as a prior), since an error of theirs
@@ -145,14 +146,14 @@ def scales(model: ServoRig, log: Record, known: Mapping[str, float] | None = Non
 
     Parameters
     ----------
-    model : ServoRig
+    model : Rig
     log : Record
         Readings by coordinate [m or rad] and ``u``, from rest, evenly sampled.
     known : mapping of str to float, optional
         Relative standard error of a parameter, or of ``"gain"``; `KNOWN` where omitted.
     """
     names = tuple(c.name for c in model.plant.coordinates)
-    model = replace(model, period=log.period)
+    model = model.replace(period=log.period)
     every = max(1, round(_SEEN / model.period))
     shown = np.column_stack([log[n] for n in names])[::every]
     told = _known(model, known or {})
@@ -197,7 +198,7 @@ def scales(model: ServoRig, log: Record, known: Mapping[str, float] | None = Non
     )  # fmt: skip
 
 
-def _known(model: ServoRig, known: Mapping[str, float]) -> dict[str, float]:
+def _known(model: Rig, known: Mapping[str, float]) -> dict[str, float]:
     """Relative standard errors of the numbers that may move."""
     out = {"gain": known.get("gain", GAIN_KNOWN)} | ({"lag": LAG_KNOWN} if model.lag else {})
     for name, value in model.plant.parameters().items():
@@ -213,7 +214,7 @@ def _projected(shown: Array, motion: Array, drift: Array) -> tuple[Array, Array]
     return np.array([first[0], *rest], dtype=np.float64), np.asarray(first[1:], dtype=np.float64)
 
 
-def _motion(model: ServoRig, command: Array, every: int, names: Sequence[str], logs: Array) -> Array:
+def _motion(model: Rig, command: Array, every: int, names: Sequence[str], logs: Array) -> Array:
     """Coordinates of the model, shape (N, coordinates, lanes), for logarithms of factors, shape (lanes, names)."""
     values = model.plant.parameters() | {"gain": model.gain, "lag": model.lag}
     lanes = max(2, len(logs))  # two, so that one kernel serves all
@@ -228,7 +229,7 @@ def _motion(model: ServoRig, command: Array, every: int, names: Sequence[str], l
     return x[:, 0::2, : len(logs)]
 
 
-def lifted(rig: ServoRig, shown: float) -> str:
+def lifted(rig: Rig, shown: float) -> str:
     """What a hand that lifted the pendulum upright learns from its reading [rad]; "" when it is half a turn.
 
     The encoder was zeroed where the pendulum hangs. A sign cannot be told, since half a turn either way is upright.
@@ -306,7 +307,7 @@ class Alarm:
 
 
 def watched(
-    watch: Watch, rig: ServoRig, law: Law, *, start: ArrayLike, seconds: float, rest: ArrayLike | None = None
+    watch: Watch, rig: Rig, law: Law, *, start: ArrayLike, seconds: float, rest: ArrayLike | None = None
 ) -> tuple[Trial, Alarm]:
     """Run a law on a rig beside a watch that switches the drive off, one sample after it has spoken.
 
@@ -315,7 +316,7 @@ def watched(
     Parameters
     ----------
     watch : Watch
-    rig : ServoRig
+    rig : Rig
         As it truly is.
     law : Law
     start, seconds, rest
@@ -332,7 +333,7 @@ def watched(
     return (free if k < 0 else run((k + 1) * rig.period)), alarm
 
 
-def sticking(model: ServoRig) -> float:
+def sticking(model: Rig) -> float:
     """Command that dry friction of what the drive moves takes, as far as the model knows of it."""
     on = model.plant.inputs[0].on
     names = [n for j in model.plant.joints if j.on == on for n in (j.coulomb, j.stiction) if n]
@@ -344,7 +345,7 @@ class Watch:
 
     def __init__(
         self,
-        model: ServoRig,
+        model: Rig,
         at: str = "inverted",
         *,
         odds: float = ODDS,

@@ -22,12 +22,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from upright.control.trial import SUBSTEPS, ServoRig, Trial, readings, trial
+from upright.control.trial import SUBSTEPS, Trial, readings, trial
 from upright.errors import BadInput
 from upright.gains import filtered, place_sampled
 from upright.gains.requests import poles_of
 from upright.laws import Rule
 from upright.records import Array
+from upright.rig import Rig
 from upright.simulation import simulate
 
 SWINGING, HOLDING, TRIPPED = 0.0, 1.0, 2.0
@@ -140,7 +141,7 @@ class Body:
         return np.asarray(-self.kappa * np.cos(angle) * speed * np.asarray(a, dtype=np.float64))
 
 
-def body(rig: ServoRig) -> Body:
+def body(rig: Rig) -> Body:
     """Numbers of a rig's pendulum: mass, stiffness and damping matrix hanging, and the mass at a right angle.
 
     Raises
@@ -206,12 +207,12 @@ class SwingUp:
     gain: float
     limit: float
 
-    def rule(self, rig: ServoRig, start: ArrayLike, *, holding: bool = False) -> Rule:
+    def rule(self, rig: Rig, start: ArrayLike, *, holding: bool = False) -> Rule:
         """The law with the encoders and the converter of a rig.
 
         Parameters
         ----------
-        rig : ServoRig
+        rig : Rig
             As it truly is.
         start : array, shape (states,) or (lanes, states)
             Where it is when the law is switched on, as a person sees it who writes zeros where it hangs.
@@ -239,12 +240,12 @@ class SwingUp:
         )  # fmt: skip
 
 
-def design_swing_up(model: ServoRig, *, travel: float | None = None, memory: float = 0.8) -> SwingUp:
+def design_swing_up(model: Rig, *, travel: float | None = None, memory: float = 0.8) -> SwingUp:
     """Swing-up and catch for a rig's model.
 
     Parameters
     ----------
-    model : ServoRig
+    model : Rig
         As it is known; its numbers need not be those of the rig that the law will meet.
     travel : float, optional
         How far the driven body may go from the middle [m or rad]; what the rig says when omitted.
@@ -281,7 +282,7 @@ def design_swing_up(model: ServoRig, *, travel: float | None = None, memory: flo
     return replace(law, size=0.8 * sure * _share(law, model))
 
 
-def _share(law: SwingUp, model: ServoRig, *, rays: int = 40, seconds: float = 2.5) -> float:
+def _share(law: SwingUp, model: Rig, *, rays: int = 40, seconds: float = 2.5) -> float:
     """Share of the sure ellipsoid, in steps of a sixteenth of its radius, from all of whose surface the model rests.
 
     As many points of each surface are tried as there are `rays`, all of them where the law would catch.
@@ -391,7 +392,7 @@ class Ascent:
 
 
 def swing_up(
-    rig: ServoRig,
+    rig: Rig,
     law: SwingUp,
     *,
     seconds: float = 10.0,
@@ -402,7 +403,7 @@ def swing_up(
 
     Parameters
     ----------
-    rig : ServoRig
+    rig : Rig
         As it truly is.
     law : SwingUp
     seconds : float

@@ -7,169 +7,17 @@ one. The rig is nonlinear and has dry friction.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from upright.basis import DESCRIBED, Basis
-from upright.control.encoders import Mounting
 from upright.errors import BadInput
 from upright.laws import Law, Rule
-from upright.physics import Plant
 from upright.records import Array, Record
 from upright.records.record import of_twin
+from upright.rig import Rig
 from upright.simulation import simulate
-from upright.systems import StateSpace
-
-GAIN = "actuator.gain"
-
-
-@dataclass(frozen=True, kw_only=True)
-class ServoRig:
-    """A plant with one input as a servo sees it.
-
-    Attributes
-    ----------
-    name : str
-        As a reader of the report knows it.
-    plant : Plant
-    gain : float
-        Force per unit of command.
-    limit : float
-        Largest command, in its unit.
-    converter : float
-        Smallest step of the command.
-    delay : float
-        From a sample of the encoders to its command at work, computation included [s].
-    lag : float
-        Time constant of the drive [s].
-    offset : float
-        Command that the drive adds by itself.
-    unit : str
-        Of the command.
-    counts : tuple of float
-        Encoder counts per m or rad, one for each coordinate.
-    scales : tuple of float
-        What the encoders show over what is true; 1 where the counts per unit are as said.
-    mounting : Mounting, optional
-        What else the encoders show: play and shafts off centre. Logs have both; a loop, which stays about one point,
-        has the error and the slope that a shaft off centre has there.
-    period : float
-        Servo period [s].
-    travel : float
-        How far the driven coordinate may go either way before a stop or a cable ends it [m or rad].
-    speed_limit : float
-        Speed of the driven coordinate at which the drive trips [m/s or rad/s].
-    twist : float
-        How far the last coordinate may go from the first before the shaft between them trips the rig [m or rad].
-    more : mapping of str to float
-        What else the drive does: numbers of `physics.actuator.ACTUATOR`, such as ``"actuator.force_limit"``.
-    sources : mapping of str to str
-        What limit, counts and so on rest on, in a word or two by name; empty for a twin.
-    seed : int
-        Which rig of the make; 0 is the one as designed.
-    basis : Basis
-        Where its numbers come from, and how far they can be trusted.
-    """
-
-    name: str
-    plant: Plant
-    gain: float
-    limit: float
-    counts: tuple[float, ...]
-    period: float
-    converter: float = 0.0
-    delay: float = 0.0
-    lag: float = 0.0
-    offset: float = 0.0
-    unit: str = "V"
-    scales: tuple[float, ...] = ()
-    mounting: Mounting | None = None
-    travel: float = math.inf
-    speed_limit: float = math.inf
-    twist: float = math.inf
-    more: Mapping[str, float] = field(default_factory=dict[str, float])
-    sources: Mapping[str, str] = field(default_factory=dict[str, str])
-    seed: int = 0
-    basis: Basis = DESCRIBED
-
-    def __post_init__(self) -> None:
-        n = len(self.plant.coordinates)
-        if len(self.plant.inputs) != 1:
-            raise BadInput(f"a rig is driven by one input; {self.name} has {len(self.plant.inputs)}.")
-        if len(self.counts) != n or any(not c > 0 for c in self.counts):
-            raise BadInput(f"a rig with {n} coordinates needs {n} positive numbers of counts, got {self.counts}.")
-        if self.scales and len(self.scales) != n:
-            raise BadInput(f"a rig with {n} coordinates needs {n} scales of its encoders, got {self.scales}.")
-        for name in ("limit", "period"):
-            if not (getattr(self, name) > 0 and math.isfinite(getattr(self, name))):
-                raise BadInput(f"the {name} of a rig must be positive and finite, got {getattr(self, name):g}.")
-
-    @property
-    def drive(self) -> Mapping[str, float]:
-        """The actuator by the names of `upright.simulation.simulate`."""
-        return {
-            **self.more,
-            "actuator.gain": self.gain,
-            "actuator.limit": self.limit,
-            "actuator.delay": self.delay,
-            "actuator.lag": self.lag,
-            "actuator.offset": self.offset,
-        }
-
-    @property
-    def saturation(self) -> float:
-        """Smallest command at which the drive gives all that it can, at rest: that of its command or of its force."""
-        return saturation(self.drive)
-
-    @property
-    def quantum(self) -> Array:
-        """Resolution of each encoder [m or rad], shape (coordinates,)."""
-        return 1.0 / np.array(self.counts)
-
-    @property
-    def shown(self) -> Array:
-        """What each encoder shows over what is true, shape (coordinates,)."""
-        return np.array(self.scales) if self.scales else np.ones(len(self.counts))
-
-    def linear(self, at: str) -> StateSpace:
-        """Model about an equilibrium, from the command to the coordinates; dry friction, lag and counts left out."""
-        return driven(self.plant, {**self.more, GAIN: self.gain}, at)
-
-    def changed(self, **parameters: float) -> ServoRig:
-        """The same rig with other parameters of its plant."""
-        return replace(self, plant=self.plant.replace(**parameters))
-
-
-def driven(plant: Plant, drive: Mapping[str, float], at: str, *, side: float = 0.0) -> StateSpace:
-    """Model about an equilibrium from the command to the coordinates, with what the drive takes for speed.
-
-    The drive gives gain u less its slope and its braking, times the speed of what it drives; that braking is at work
-    while a loop runs.
-    """
-    model = plant.linear(at, side=side)
-    A, names = model.A, plant.state_names()
-    taken = sum(drive.get(f"actuator.{n}", 0.0) for n in ("slope", "damping", "standby"))
-    if taken:
-        A = A.copy()
-        for i, force in enumerate(plant.inputs):
-            A[:, names.index(force.on) + 1] -= taken * model.B[:, i]
-    return replace(model, A=A, B=model.B * drive[GAIN])
-
-
-def full_command(drive: Mapping[str, float]) -> float:
-    """Command at which the force of a drive at rest meets its limit; infinite for a drive without one."""
-    force, gain = drive.get("actuator.force_limit", math.inf), abs(drive[GAIN])
-    left = gain - force * drive.get("actuator.droop", 0.0) if math.isfinite(force) else 0.0
-    return force / left if left > 0 else math.inf
-
-
-def saturation(drive: Mapping[str, float]) -> float:
-    """Smallest command at which a drive gives all that it can, at rest: that of its command or of its force."""
-    return min(drive["actuator.limit"], full_command(drive))
-
 
 SUBSTEPS = 2
 """Runge-Kutta steps per servo period: of 0.4 ms, where the fastest motion of these rigs takes some 10 ms."""
@@ -181,7 +29,7 @@ class Trial:
 
     Attributes
     ----------
-    rig : ServoRig
+    rig : Rig
     at : str
         Equilibrium that was to be held.
     t : array, shape (N,)
@@ -196,7 +44,7 @@ class Trial:
         What a program at the rig could log: readings by coordinate [m or rad], ``u``, and ``reference`` if any.
     """
 
-    rig: ServoRig
+    rig: Rig
     at: str
     t: Array
     x: Array
@@ -212,7 +60,7 @@ class Trial:
 
 
 def trial(
-    rig: ServoRig,
+    rig: Rig,
     law: Law | Rule,
     *,
     at: str,
@@ -227,7 +75,7 @@ def trial(
 
     Parameters
     ----------
-    rig : ServoRig
+    rig : Rig
         As it truly is.
     law : Law or Rule
         A law on deviations from rest, whose own encoder and converter steps and delay are replaced by the rig's; or a
@@ -274,19 +122,19 @@ def trial(
     return Trial(rig=rig, at=at, t=t, x=x, u=u, rest=held, record=logged(rig, t, x, u, reference))
 
 
-def readings(rig: ServoRig, q: ArrayLike) -> Array:
+def readings(rig: Rig, q: ArrayLike) -> Array:
     """What the encoders show [m or rad] of motions, shape (N, ..., coordinates)."""
     step = rig.quantum / rig.shown  # a count is what its true length is; the program multiplies by the said one
     felt = np.asarray(q, dtype=np.float64) if rig.mounting is None else rig.mounting.felt(q)
     return np.floor(felt / step + 0.5) * rig.quantum
 
 
-def at_work(rig: ServoRig, law: Law, rest: ArrayLike, reference: ArrayLike | None = None) -> Law:
+def at_work(rig: Rig, law: Law, rest: ArrayLike, reference: ArrayLike | None = None) -> Law:
     """The law with the rig's encoders and converter about it.
 
     Parameters
     ----------
-    rig : ServoRig
+    rig : Rig
     law : Law
     rest : array, shape (coordinates,)
         What it takes for the readings at the equilibrium.
@@ -304,7 +152,7 @@ def at_work(rig: ServoRig, law: Law, rest: ArrayLike, reference: ArrayLike | Non
     )  # fmt: skip
 
 
-def logged(rig: ServoRig, t: Array, x: Array, u: Array, reference: ArrayLike | None = None) -> Record:
+def logged(rig: Rig, t: Array, x: Array, u: Array, reference: ArrayLike | None = None) -> Record:
     """What a program at the rig could log of states x, shape (N, states), and commands u, shape (N,)."""
     log = twin_log(rig, t, readings(rig, x[:, 0::2]), u)
     signals = {name: log[name] for name in (*log.outputs, "u")}
@@ -314,7 +162,7 @@ def logged(rig: ServoRig, t: Array, x: Array, u: Array, reference: ArrayLike | N
     return log.replace(signals=signals)
 
 
-def twin_log(rig: ServoRig, t: Array, y: Array, u: Array | None = None, *, unit: str = "") -> Record:
+def twin_log(rig: Rig, t: Array, y: Array, u: Array | None = None, *, unit: str = "") -> Record:
     """Log of a twin: commands u, (N,), if any, and readings y, (N, coordinates), in SI or a `unit` of all."""
     of = {c.name: unit or c.unit for c in rig.plant.coordinates}
     signals = {name: y[:, i] for i, name in enumerate(of)}

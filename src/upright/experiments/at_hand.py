@@ -11,10 +11,10 @@ from upright.experiments.hands_on.loaded import kind_of, run_loaded
 from upright.experiments.hands_on.rig import RigAtHand
 from upright.experiments.hands_on.studies import can_identify
 from upright.experiments.laboratory import Experiment, ExperimentInput
-from upright.experiments.makes import MAKES, SHAFTS
 from upright.physics import Plant
+from upright.quantities import with_unit
 from upright.report.page import Chapter, resting_on
-from upright.study.text import number
+from upright.rig.makes import MAKES, SHAFTS
 
 
 def experiments_for(rig: RigAtHand, name: str) -> tuple[Experiment, ...]:
@@ -133,4 +133,4 @@ def _found(at: ExperimentInput, key: str, body: str) -> dict[str, dict[str, Any]
     if not told or not told.get("stderr"):
         return {}
     unit = told["unit"]
-    return {body: {"value": number(told["value"], unit, 10), "uncertainty": number(told["stderr"], unit, 4)}}
+    return {body: {"value": with_unit(told["value"], unit, 10), "uncertainty": with_unit(told["stderr"], unit, 4)}}

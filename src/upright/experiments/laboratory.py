@@ -16,17 +16,17 @@ from typing import Any
 import numpy as np
 
 from upright._version import __version__
-from upright.control.trial import ServoRig
 from upright.errors import BadInput, UprightError
 from upright.experiments.abreast import run_abreast
 from upright.experiments.hands_on.rig import RigAtHand
-from upright.experiments.makes import MAKES, PENDULUMS, SHAFTS, make_rig
 from upright.experiments.weighing_1a.run import Known
 from upright.experiments.worn import worn as worn_twin
 from upright.files import read_text, write_json
 from upright.progress import Progress, silent
 from upright.report.page import Book, Chapter, Step, as_plain, from_plain
 from upright.report.symbols import typed
+from upright.rig import Rig
+from upright.rig.makes import MAKES, PENDULUMS, SHAFTS, make_rig
 from upright.workers import HERE, Workers
 
 CHAPTER_FILE = "chapter.json"
@@ -41,7 +41,7 @@ class ExperimentInput:
     """
 
     make: str
-    rig: ServoRig
+    rig: Rig
     seed: int
     folder: Path
     earlier: Mapping[str, Chapter]
@@ -115,23 +115,25 @@ def _frequency(at: ExperimentInput) -> tuple[Chapter, bool]:
 
 
 def _regulation(at: ExperimentInput) -> tuple[Chapter, bool]:
-    from upright.experiments.identified import read_identified
     from upright.experiments.regulation_2.chapter import chapter
     from upright.experiments.regulation_2.run import run_regulation
+    from upright.rig.completion import completed
+    from upright.study.stored_rig import read_stored_rig
 
-    known = read_identified(at.fit, seed=at.seed)
+    known = completed(read_stored_rig(at.fit, seed=at.seed), who="regulate")
     done = run_regulation(known, at.rig, at.seed, at.folder, at.progress, at.stopped, source=typed(at.fit))
     return chapter(done), not done.interrupted
 
 
 def _swing_up(at: ExperimentInput) -> tuple[Chapter, bool]:
-    from upright.experiments.identified import read_identified
     from upright.experiments.swing_up_2b.chapter import chapter
     from upright.experiments.swing_up_2b.run import known_of, run_swing_up
+    from upright.rig.completion import completed
+    from upright.study.stored_rig import read_stored_rig
 
-    known = read_identified(at.fit, seed=at.seed)
+    known = read_stored_rig(at.fit, seed=at.seed)
     done = run_swing_up(
-        known.rig(), at.rig, at.folder, at.progress, at.stopped, known=known_of(known), source=typed(at.fit)
+        completed(known), at.rig, at.folder, at.progress, at.stopped, known=known_of(known), source=typed(at.fit)
     )
     return chapter(done), not at.stopped()
 
@@ -222,7 +224,7 @@ class Session:
     interrupted: bool = False
     seconds: float = 0.0
 
-    def rig(self, make: str) -> ServoRig:
+    def rig(self, make: str) -> Rig:
         """The twin that is run on, or what is known of the rig at hand."""
         if self.hands is not None:
             return self.hands.model

@@ -9,14 +9,13 @@ degrees or 50 um) and encoders off centre (up to 0.1 degrees of their shaft).
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
-from upright.control.encoders import Mounting
-from upright.control.trial import ServoRig
 from upright.physics import CartPendulum, Furuta, Plant
 from upright.physics.worn import WornCartPendulum, WornFuruta
+from upright.rig import Rig
+from upright.rig.mounting import Mounting
 
 TURN = {"rad": 2 * math.pi, "m": 0.0706}
 """Motion per turn of an encoder's shaft, by unit of the coordinate."""
@@ -29,12 +28,12 @@ RIPPLE, RIPPLES = 0.2, (6, 24)
 TILT, LATE, OFF_CENTRE = math.radians(0.3), 2e-3, math.radians(0.1)
 
 
-def worn(rig: ServoRig, seed: int) -> ServoRig:
+def worn(rig: Rig, seed: int) -> Rig:
     """The rig of a make with flaws of its own, its name and numbers as they were.
 
     Parameters
     ----------
-    rig : ServoRig
+    rig : Rig
     seed : int
         Of the flaws.
     """
@@ -47,10 +46,10 @@ def worn(rig: ServoRig, seed: int) -> ServoRig:
         phase=tuple(rng.uniform(0, 2 * math.pi, size).tolist()), turn=tuple(TURN[u] for u in units),
     )  # fmt: skip
     late = rig.delay + rng.uniform(0, LATE)
-    return replace(rig, plant=_worn_plant(rig, rng), delay=float(late), mounting=mounting)
+    return rig.replace(plant=_worn_plant(rig, rng), delay=float(late), mounting=mounting)
 
 
-def _worn_plant(rig: ServoRig, rng: np.random.Generator) -> Plant:
+def _worn_plant(rig: Rig, rng: np.random.Generator) -> Plant:
     plant = rig.plant
     values = plant.parameters()
     units = {c.name: c.unit for c in plant.coordinates}

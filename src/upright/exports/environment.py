@@ -13,8 +13,9 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from upright.experiments.identified import IdentifiedRig, read_identified
 from upright.exports.episodes import DRAWS, Episodes
+from upright.rig import Rig
+from upright.study.stored_rig import read_stored_rig
 
 Floats = NDArray[np.float32]
 
@@ -24,7 +25,7 @@ class RigVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
 
     Parameters
     ----------
-    fit : path or IdentifiedRig
+    fit : path or Rig
         fit.json or its folder.
     num_envs : int
     max_episode_steps : int
@@ -38,7 +39,7 @@ class RigVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
     metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}
 
     def __init__(
-        self, fit: str | os.PathLike[str] | IdentifiedRig, num_envs: int = 1, *, max_episode_steps: int = 500,
+        self, fit: str | os.PathLike[str] | Rig, num_envs: int = 1, *, max_episode_steps: int = 500,
         draws_seed: int = 0, **options: Any,
     ) -> None:  # fmt: skip
         self.num_envs, self.max_episode_steps = num_envs, max_episode_steps
@@ -74,7 +75,7 @@ class RigEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
     metadata: dict[str, Any] = {"render_modes": []}
 
     def __init__(
-        self, fit: str | os.PathLike[str] | IdentifiedRig, *, draws_seed: int = 0, **options: Any
+        self, fit: str | os.PathLike[str] | Rig, *, draws_seed: int = 0, **options: Any
     ) -> None:  # fmt: skip
         self.episodes = Episodes(_rig(fit, draws_seed), 1, **options)
         self.observation_space, self.action_space = _spaces(self.episodes)
@@ -94,8 +95,8 @@ class RigEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         return self.episodes.observation[0], float(reward[0]), bool(terminated[0]), False, {}
 
 
-def _rig(fit: str | os.PathLike[str] | IdentifiedRig, seed: int) -> IdentifiedRig:
-    return fit if isinstance(fit, IdentifiedRig) else read_identified(Path(fit), seed=seed, draws=DRAWS)
+def _rig(fit: str | os.PathLike[str] | Rig, seed: int) -> Rig:
+    return fit if isinstance(fit, Rig) else read_stored_rig(Path(fit), seed=seed, draws=DRAWS)
 
 
 def _spaces(lanes: Episodes) -> tuple[Box, Box]:

@@ -12,11 +12,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.control.trial import GAIN, full_command
 from upright.errors import BadInput, nearest
-from upright.experiments.identified import IdentifiedRig
 from upright.exports.steps import substeps
 from upright.laws.linear import Array
+from upright.rig import Rig
+from upright.rig.drive import GAIN, full_command
 from upright.simulation import Simulator, choose
 
 TASKS = ("balance", "swing_up")
@@ -35,7 +35,7 @@ class Episodes:
 
     Parameters
     ----------
-    rig : IdentifiedRig
+    rig : Rig
         Whose draws are the rigs that its fit allows; a rig without draws is the same at every reset.
     lanes : int
     task : {"balance", "swing_up"}
@@ -57,7 +57,7 @@ class Episodes:
     """
 
     def __init__(
-        self, rig: IdentifiedRig, lanes: int, *, task: str = "balance", at: str = "", period: float = 0.02,
+        self, rig: Rig, lanes: int, *, task: str = "balance", at: str = "", period: float = 0.02,
         limit: float | None = None, travel: float | None = None, threads: int = 1,
     ) -> None:  # fmt: skip
         if task not in TASKS:
@@ -66,7 +66,7 @@ class Episodes:
             raise BadInput(f"a command is held for 1e-4 to 1 s, got {period:g} s; 0.02 is usual.")
         if lanes < 1:
             raise BadInput(f"an environment has at least one lane, got {lanes}.")
-        points, said = rig.plant.equilibria, rig.description
+        points, said = rig.plant.equilibria, rig.hardware
         at = at or list(points)[-1]
         if at not in points:
             raise BadInput(f"'{rig.name}' has no equilibrium '{at}'; {nearest(at, points)}")
@@ -106,7 +106,7 @@ class Episodes:
         """The rig as identified; joints that deflect before they slide do so at once, as nothing remembers it."""
         rig, presliding = self.rig, {j.presliding for j in self.rig.plant.joints}
         values = {n: 0.0 if n in presliding else v for n, v in rig.plant.parameters().items()}
-        drive = {f"actuator.{n}": rig.description.value(n, 0.0) for n in ("delay", "lag", "offset")}
+        drive = {f"actuator.{n}": rig.hardware.value(n, 0.0) for n in ("delay", "lag", "offset")}
         return {**values, **rig.more, **drive, GAIN: rig.gain, "actuator.limit": self.limit}
 
     @cached_property

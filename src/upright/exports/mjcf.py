@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from upright.errors import BadInput
-from upright.experiments.identified import IdentifiedRig
 from upright.physics import CartPendulum, DoublePendulum, DoublePendulumAbsolute, FlexibleLink, Furuta, Pendulum
 from upright.physics.oscillators import chain
+from upright.rig import Rig
 
 LEAST = 1e-12
 """Inertia of what has none [kg m^2], which MuJoCo does not take."""
@@ -19,7 +19,7 @@ _DRIVE = {
 }  # fmt: skip
 
 
-def model(rig: IdentifiedRig, *, timestep: float = 1e-3) -> tuple[str, tuple[str, ...]]:
+def model(rig: Rig, *, timestep: float = 1e-3) -> tuple[str, tuple[str, ...]]:
     """Text of the model, and in sentences what MuJoCo does not have or has otherwise.
 
     Viscous friction and springs are exact. Coulomb friction is MuJoCo's ``frictionloss``, a soft constraint: it slides
@@ -54,7 +54,7 @@ def model(rig: IdentifiedRig, *, timestep: float = 1e-3) -> tuple[str, tuple[str
     )
 
 
-def _first_line(rig: IdentifiedRig) -> list[str]:
+def _first_line(rig: Rig) -> list[str]:
     """How far the numbers can be trusted, as it can stand in a comment."""
     return [line.replace("--", "- -") for line in [rig.basis.first_line()] if line]
 
@@ -112,10 +112,10 @@ def _chained(p: Any, v: Mapping[str, float], name: str) -> tuple[str, str, tuple
     return bodies, f"  <tendon>\n{tendons}  </tendon>\n" if tendons else "", (0.0, 0.0, 0.0)
 
 
-def _actuator(rig: IdentifiedRig) -> str:
+def _actuator(rig: Rig) -> str:
     """The drive: its gain, limits, lag, and what it loses with speed."""
     out: list[str] = []
-    drive, said = rig.more, rig.description
+    drive, said = rig.more, rig.hardware
     lost = sum(drive.get(f"actuator.{n}", 0.0) for n in ("slope", "damping", "standby"))
     limit, most = said.value("limit", math.inf), drive.get("actuator.force_limit", math.inf)
     for force in rig.plant.inputs:
@@ -129,7 +129,7 @@ def _actuator(rig: IdentifiedRig) -> str:
     return "\n".join(out)
 
 
-def _left_out(rig: IdentifiedRig) -> list[str]:
+def _left_out(rig: Rig) -> list[str]:
     """What MuJoCo does otherwise."""
     v, out = rig.plant.parameters(), list[str]()
     if any(v.get(j.coulomb, 0.0) for j in rig.plant.joints):
@@ -139,7 +139,7 @@ def _left_out(rig: IdentifiedRig) -> list[str]:
         of = [j.on for j in rig.plant.joints if v.get(getattr(j, name), 0.0)]
         if of:
             out.append(f"Left out: {words} of {', '.join(of)}.")
-    said = rig.description
+    said = rig.hardware
     for name, words in _DRIVE.items():
         idle = math.inf if name == "knee" else 0.0
         if said.value(name, idle) != idle:

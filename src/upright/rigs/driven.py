@@ -14,7 +14,7 @@ from collections import deque
 from collections.abc import Sequence
 
 from upright.control.sensors import sticking
-from upright.control.trial import ServoRig
+from upright.rig import Rig
 
 HELD_BY, UNSEEN = 2.0, 100
 """A driven body is held at most by so many times the dry friction that the model knows of; it cannot have moved by so
@@ -40,7 +40,7 @@ WAIT = 0.02
 class StillDrive:
     """Whether the driven body shows not a single count although what acts on it must have moved it."""
 
-    def __init__(self, model: ServoRig, at: str) -> None:
+    def __init__(self, model: Rig, at: str) -> None:
         linear = model.linear(at)
         names = [c.name for c in model.plant.coordinates]
         self.name = model.plant.inputs[0].on
@@ -93,7 +93,7 @@ class DrivenScale:
     For a pendulum that is held upright on what is driven.
     """
 
-    def __init__(self, model: ServoRig, at: str) -> None:
+    def __init__(self, model: Rig, at: str) -> None:
         linear, T = model.linear(at), model.period
         self.name = model.plant.coordinates[0].name
         (self._drive, toppling), A = linear.B[1::2, 0].tolist(), linear.A

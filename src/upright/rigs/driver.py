@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from upright.control.trial import ServoRig
 from upright.declared import Declaration, Declared, declared_in
+from upright.rig import Rig
 from upright.rigs.protocol import Capabilities, LiveRig, Mode
 
 FULL_SCALE = 10.0
@@ -29,13 +29,13 @@ class Connection:
         Equilibrium at which the encoders are zeroed.
     board : mapping of str to any
         What [board] says; all that the other keys of RIG.toml do not.
-    model, truth : ServoRig
+    model, truth : Rig
         The rig as it is known, and what a simulated one of it truly is.
     """
 
     kind: str
-    model: ServoRig
-    truth: ServoRig
+    model: Rig
+    truth: Rig
     name: str = ""
     port: str = ""
     record: Path | None = None

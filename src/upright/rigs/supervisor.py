@@ -19,10 +19,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from upright.control.sensors import Watch
-from upright.control.trial import ServoRig
 from upright.errors import BadInput, RigStopped
 from upright.gains.loop import closed
 from upright.laws import Law, Rule
+from upright.rig import Rig
 from upright.rigs.board import Board, told
 from upright.rigs.driven import DrivenScale, StillDrive
 from upright.rigs.law import RunningLaw, absurdity, for_rig
@@ -55,7 +55,7 @@ class Duty:
     ----------
     limits : Limits or None
         How far it may go; without them nothing is armed.
-    model : ServoRig or None
+    model : Rig or None
         As identified; what is compared with a model is left out without one.
     at, zero : str
         Equilibrium that is held, and the one at which its encoders are zeroed, of the model's plant.
@@ -68,7 +68,7 @@ class Duty:
     """
 
     limits: Limits | None
-    model: ServoRig | None = None
+    model: Rig | None = None
     at: str = ""
     zero: str = ""
     lean: float = math.inf
@@ -435,7 +435,7 @@ class Supervisor:
         return f"{math.degrees(abs(value)):.3g} degrees" if unit == "rad" else f"{1e3 * abs(value):.3g} mm"
 
 
-def _free_with(model: ServoRig, at: str, i: int) -> list[float]:
+def _free_with(model: Rig, at: str, i: int) -> list[float]:
     """How all coordinates go along when one is displaced and nothing pulls back, as on a shaft without a spring to
     ground; zeros where something does.
     """

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upright.basis import SIMULATED
-from upright.control.trial import SUBSTEPS, ServoRig
+from upright.control.trial import SUBSTEPS
 from upright.records import Array
+from upright.rig import Rig
 from upright.rigs.board import Board
 from upright.rigs.driver import Connection, Driver
 from upright.rigs.protocol import Capabilities, Mode
@@ -73,7 +74,7 @@ class TwinPort:
 
     Parameters
     ----------
-    rig : ServoRig
+    rig : Rig
         As it truly is.
     at : str, optional
         Equilibrium; the first of the plant when empty.
@@ -81,7 +82,7 @@ class TwinPort:
         Of the converter [command unit]; twice the drive's limit when omitted.
     """
 
-    def __init__(self, rig: ServoRig, at: str = "", full_scale: float | None = None) -> None:
+    def __init__(self, rig: Rig, at: str = "", full_scale: float | None = None) -> None:
         self.rig = rig
         drive = {n: v for n, v in rig.drive.items() if n not in ("actuator.start", "actuator.end")}
         values = {**rig.plant.parameters(), **drive}

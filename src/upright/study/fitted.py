@@ -23,7 +23,7 @@ from upright.identification.model.fit import Judgement
 from upright.identification.model.rig import SUBSTEPS
 from upright.physics import PLANTS, find
 from upright.physics.actuator import ACTUATOR
-from upright.study.description import Entry, RigDescription, check_vendor
+from upright.rig.hardware import Entry, Hardware, check_vendor
 
 FORMAT = 1
 LARGEST = 1e12
@@ -44,7 +44,7 @@ class FittedModel:
     verdict: str
     trusted: bool
     groups: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
-    description: RigDescription = field(default_factory=RigDescription)
+    hardware: Hardware = field(default_factory=Hardware)
     bands: Bands | None = None
     basis: Basis = SILENT
     content: Mapping[str, Any] = field(default_factory=dict[str, Any])
@@ -128,7 +128,7 @@ def fitted_model(content: dict[str, Any]) -> FittedModel:
     }
     return FittedModel(
         plant=plant, values=values, substeps=substeps, verdict=verdict, trusted=trusted, groups=groups, content=content,
-        basis=_basis(content, verdict, trusted=trusted), description=_description(content, values),
+        basis=_basis(content, verdict, trusted=trusted), hardware=_hardware(content, values),
         bands=None if content.get("bands") is None else _bands(content["bands"]),
     )  # fmt: skip
 
@@ -164,7 +164,7 @@ def _answer(entry: Any) -> Judgement:
     return Judgement(question=question, answer=answer, headline=headline, reasons=tuple(reasons))
 
 
-def _description(content: Mapping[str, Any], values: Mapping[str, float]) -> RigDescription:
+def _hardware(content: Mapping[str, Any], values: Mapping[str, float]) -> Hardware:
     """What the file says of drive, encoders and servo; an older one has its drive among the parameters alone."""
     said = _table(content.get("rig", {}), "rig")
     entries = _drive(content, values)
@@ -182,7 +182,7 @@ def _description(content: Mapping[str, Any], values: Mapping[str, float]) -> Rig
             raise BadInput(f"{place}.value is {value:g}, and parameters.{drive} is {values[drive]:g}")
         entries[name] = Entry(value=value, unit=unit, source=source)
     name, vendor = (_text(said.get(key, ""), f"rig.{key}") for key in ("name", "vendor"))
-    return RigDescription(name=name, vendor=check_vendor(vendor), entries=entries)
+    return Hardware(name=name, vendor=check_vendor(vendor), entries=entries)
 
 
 def _drive(content: Mapping[str, Any], values: Mapping[str, float]) -> dict[str, Entry]:

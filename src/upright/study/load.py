@@ -23,9 +23,10 @@ from upright.identification.problem.simulated import with_noise
 from upright.physics import Plant
 from upright.physics.actuator import ACTUATOR
 from upright.records import Array, Record
+from upright.rig import Hardware
 from upright.study.clock import check_clock
 from upright.study.coordinates import Sensors
-from upright.study.description import RigDescription, read_description
+from upright.study.description import read_hardware
 from upright.study.keys import names
 from upright.study.loop import Scene, read_loop, state_units
 from upright.study.rig import known_values, read_plant, read_rig
@@ -53,7 +54,7 @@ class Study:
         Of the study's text.
     ladder : tuple of Rung
         Rungs that the study declares.
-    description : RigDescription
+    hardware : Hardware
         Drive, encoders, servo and travel, as far as the study says.
     """
 
@@ -65,7 +66,7 @@ class Study:
     source: str = ""
     sha256: str = ""
     ladder: tuple[Rung, ...] = ()
-    description: RigDescription = field(default_factory=RigDescription)
+    hardware: Hardware = field(default_factory=Hardware)
 
     @property
     def provenance(self) -> dict[str, object]:
@@ -129,7 +130,7 @@ def load_study(
     folder = Path(data) if data is not None else path.parent
     logs = {(name, "", ""): record for name, record in (records or {}).items()}
     runs = read_runs(study, plant, lambda run: _log(run, folder, logs))
-    description = read_description(study, plant, rig, [log.provenance.rig for log in logs.values()])
+    hardware = read_hardware(study, plant, rig, [log.provenance.rig for log in logs.values()])
     rig = with_noise(rig, runs)
     if fixed is not None:
         levels = {n: p for n, p in rig.parameters.items() if n.startswith(NOISE)}
@@ -143,7 +144,7 @@ def load_study(
         title=study.text_of("title", "My rig") if "title" in study else "",
         source=study.text_of("source", "https://...") if "source" in study else "",
         ladder=read_ladder(study, plant),
-        description=description,
+        hardware=hardware,
         sha256=hashlib.sha256(words.text.encode()).hexdigest(),
     )
 

@@ -19,7 +19,7 @@ from upright.identification.ladder.cross_validation import CrossValidation
 from upright.identification.ladder.growth import Ladder, RungResult
 from upright.identification.ladder.rungs import neutral
 from upright.physics.actuator import ACTUATOR
-from upright.study.description import RigDescription
+from upright.rig.hardware import Hardware
 from upright.study.fitted import FORMAT
 from upright.study.load import Study
 from upright.study.text import StudyText
@@ -50,7 +50,7 @@ def fit_content(fit: Fit, study: Study, crossed: CrossValidation | None = None) 
         "format": FORMAT,
         "title": study.title,
         "plant": study.plant,
-        "rig": _estimated(study.description, fit.estimates).plain(),
+        "rig": _estimated(study.hardware, fit.estimates).plain(),
         "substeps": fit.rig.substeps,
         **_fields(fit, "verdict trusted answers method evaluations"),
         "seconds": round(fit.seconds, 4),
@@ -91,7 +91,7 @@ def fit_content(fit: Fit, study: Study, crossed: CrossValidation | None = None) 
     return plain_values(content)
 
 
-def _estimated(said: RigDescription, found: Mapping[str, Estimate]) -> RigDescription:
+def _estimated(said: Hardware, found: Mapping[str, Estimate]) -> Hardware:
     """The description with the drive's numbers as they were estimated."""
     asked = {n: e for n, e in said.entries.items() if f"actuator.{n}" in found}
     return said.given({n: replace(e, value=found[f"actuator.{n}"].value) for n, e in asked.items()})
@@ -116,14 +116,14 @@ def provenance(study: Study) -> dict[str, Any]:
 
 
 def write_response_fit(
-    answer: FrequencyFit, folder: Path, plant: str, title: str, source: str = "", said: RigDescription | None = None
+    answer: FrequencyFit, folder: Path, plant: str, title: str, source: str = "", said: Hardware | None = None
 ) -> None:
     """Write `frequency.csv` and `fit.json`, which `upright design` reads; `said` is what is known of the rig."""
     folder.mkdir(parents=True, exist_ok=True)
     answer.data.to_csv(folder / "frequency.csv")
     study = Study(
         path=folder / "frequency.csv", plant=plant, rig=answer.rig, runs=(), title=title, source=source,
-        description=said or RigDescription(),
+        hardware=said or Hardware(),
     )  # fmt: skip
     write_fit(answer.fit, study, folder / "fit.json")
 

@@ -342,11 +342,6 @@ def study_text(tables: Iterable[TomlTable]) -> str:
     return "\n".join(str(table) for table in tables)
 
 
-def number(value: float, unit: str = "", digits: int = 3) -> str:
-    """A number that wears its unit, ``0.35 m``; a pure number ("" or "1") wears none."""
-    return f"{value:.{digits}g}" + (f" {unit}" if unit not in ("", "1") else "")
-
-
 def toml(value: Value, digits: int = 6) -> str:
     """A value in TOML: text in quotes on one line, numbers to so many significant digits, lists, inline tables."""
     if isinstance(value, bool):

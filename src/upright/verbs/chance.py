@@ -62,11 +62,14 @@ def chance(
     from upright.basis import SIMULATED
     from upright.control.preflight import WORDS, Task, preflight
     from upright.experiments.designing.run import SPEEDS, velocities
-    from upright.experiments.identified import rig_table
     from upright.experiments.regulation_2.run import HAND, START
     from upright.gains import feedback
     from upright.report.page import Chapter, Part, Table, resting_on
+    from upright.report.rig import rig_table
     from upright.report.symbols import percent
+    from upright.rig.completion import completed, doubts
+    from upright.rig.makes import make_of_vendor
+    from upright.rig.variation import allowed
     from upright.units import parse
     from upright.verbs.handover import rig_of
     from upright.verbs.rig import rig_options
@@ -86,8 +89,8 @@ def chance(
         raise BadInput(f"counts needs {len(names)} numbers, one for each coordinate, got {len(each)}.")
     listed = dict(zip(names, each, strict=False))
     given = rig_options(known.plant, known.unit, limit=limit, period=period, counts=listed)
-    said = known.described(given, vendor=vendor, who="chance", form="{}={}")
-    rig, make = known.rig(said), known.made_by(said.vendor)
+    rig = completed(known, given, vendor=vendor, who="chance", form="{}={}")
+    make = make_of_vendor(rig.hardware.vendor, rig.plant)
     usual = make.start if make else START
     model = rig.linear("inverted")
     K = np.atleast_2d(np.asarray(gains, dtype=np.float64))
@@ -100,7 +103,7 @@ def chance(
         for w, s, unit in zip((tilt, push), usual, ("rad", "rad/s"), strict=True)
     ]
     task = Task(start=(0.0, 0.0, *begin), hand=(0.0, 0.0, *HAND), seconds=seconds)
-    others = known.allowed(rig, draws, seed)
+    others = allowed(rig, draws, seed)
     told = preflight(
         rig, model, sampled, law, task, parameters=others, lanes=draws, seed=seed, workers=shared, progress=progress
     )
@@ -112,12 +115,12 @@ def chance(
         f"It recovers from tilts up to {math.degrees(told.tilt):.2g}° and from taps up to {told.push:.2g} rad/s."
     )  # fmt: skip
     doubt = [] if known.draws else ["The fit has no covariance: only dry friction and the hand vary."]
-    doubt += known.doubts(said)
+    doubt += doubts(known, rig)
     chapter = Chapter(
         title=f"Chance that the gains hold the {rig.name}",
         verdict=f"Held for {seconds:g} s on {share} of {draws} rigs that the fit allows.", detail=limits,
         sound=told.chance > 0.95, warnings=tuple(doubt),
-        parts=(Part("Before the run", (table,)), Part("The rig", (rig_table(said),))),
+        parts=(Part("Before the run", (table,)), Part("The rig", (rig_table(rig),))),
         numbers={"chance": told.chance, "interval": (low, high), "words": dict(told.words), "tilt": told.tilt,
                  "push": told.push, "noise": told.noise, "draws": draws, "seed": seed},
     )  # fmt: skip

@@ -21,13 +21,12 @@ from upright.verbs.rig import Counts, as_typed, rig_options
 from upright.verbs.values import open_log, poles, si, si_if_given
 
 if TYPE_CHECKING:
-    from upright.control import ServoRig
     from upright.control.sensors import Scales
     from upright.experiments.designing.run import Designed
-    from upright.experiments.identified import IdentifiedRig
     from upright.experiments.regulation_2.run import Regulation, RegulationRequest
     from upright.experiments.swing_up_2b.run import SwingUpRun
     from upright.experiments.tracking_3.run import Tracking
+    from upright.rig import Rig
     from upright.systems import StateSpace
     from upright.verbs.values import Log
 
@@ -127,11 +126,11 @@ def design(
     BadInput
         When the call contradicts itself or the rig, or a pole is out of the input's reach.
     """
-    from upright.control.trial import GAIN, full_command
     from upright.experiments.designing.chapter import chapter
-    from upright.experiments.designing.run import SPEEDS, DesignRequest, design_for, quanta
+    from upright.experiments.designing.run import SPEEDS, DesignRequest, design_for
     from upright.files import write_json
     from upright.report.symbols import typed
+    from upright.rig.completion import completed
 
     folder_at = folder_if_given(out, pdf)
     asked, weights = _poles(poles), _numbers(lqr)
@@ -157,11 +156,10 @@ def design(
         if here not in rig.plant.equilibria:
             raise BadInput(f"'{rig.name}' has no equilibrium '{here}'; {nearest(here, rig.plant.equilibria)}")
         given = rig_options(rig.plant, rig.unit, limit=limit, period=period, counts=counts)
-        said = rig.described(given, vendor=vendor, needs=("servo_period", "counts"), who="upright design")
-        most = min(said.value("limit", math.inf), full_command({**rig.more, GAIN: rig.gain}))
+        on = completed(rig, given, vendor=vendor, needs=("servo_period", "counts"), who="upright design")
         wish = replace(
-            wish, at=here, period=said.entries["servo_period"].value, speed=speed, quantum=quanta(rig, said),
-            limit=most if math.isfinite(most) else None, start=_start(rig, start), said=said,
+            wish, at=here, period=on.period, speed=speed, quantum=tuple(on.quantum.tolist()),
+            limit=on.saturation if math.isfinite(on.saturation) else None, start=_start(rig, start), on=on,
         )  # fmt: skip
         name = called(source)
     done = design_for(rig, wish)
@@ -200,7 +198,7 @@ def _numbers(given: str | Iterable[float]) -> tuple[float, ...] | None:
         raise BadInput(f'weights are numbers separated by commas, as in "1,0,1,0", got {given[:60]!r}.') from None
 
 
-def _start(rig: IdentifiedRig | StateSpace, given: str | Mapping[str, float | str]) -> tuple[float, ...]:
+def _start(rig: Rig | StateSpace, given: str | Mapping[str, float | str]) -> tuple[float, ...]:
     """Deviation, state by state in its unit; empty when none was given."""
     from upright.units import scale
 
@@ -313,6 +311,7 @@ def regulate(
     """
     from upright.experiments.regulation_2.chapter import chapter
     from upright.experiments.regulation_2.run import identify_make, run_regulation
+    from upright.rig.completion import completed, doubts, twin_of
     from upright.workers import Workers
 
     shared = Workers(number=workers, cluster=cluster)
@@ -328,27 +327,30 @@ def regulate(
         vendor = _vendor(known, rig, vendor, name)
         name += as_typed(limit=limit, period=period, counts=counts, travel=travel, vendor=vendor)
     given = rig_options(known.plant, known.unit, limit=limit, period=period, counts=counts, travel=travel)
-    said = known.described(given, vendor=vendor, who="upright regulate")
-    truth = None if seed is None else known.twin(known.rig(said), said, seed)
+    on = completed(known, given, vendor=vendor, who="upright regulate")
+    truth = None if seed is None else twin_of(on, seed)
     done = run_regulation(
-        known, truth, seed or 0, at, lambda step, share: progress(step, base + (1 - base) * share), wish=wish,
-        source=name, workers=shared, said=said,
+        on, truth, seed or 0, at, lambda step, share: progress(step, base + (1 - base) * share), wish=wish,
+        source=name, workers=shared,
     )  # fmt: skip
     told = chapter(done)
     if source is not None:
-        told = replace(told, warnings=(*told.warnings, *known.doubts(said, truth)))
+        told = replace(told, warnings=(*told.warnings, *doubts(known, on, truth)))
     files = write_page(told, at / "report.html", pdf)
     numbers = {**told.numbers, "verdict": told.verdict, "report": str(files[0])}
     return Answer(done, replace(told, numbers=numbers), files)
 
 
-def _vendor(known: IdentifiedRig, rig: str, vendor: str, source: str) -> str:
+def _vendor(known: Rig, rig: str, vendor: str, source: str) -> str:
     """Data sheet chosen by the name of a make, ``--rig``, or of the vendor."""
     if not rig:
         return vendor
-    if rig != known.make.key:
-        raise BadInput(f"{source} is of the make '{known.make.key}', not '{rig}'; leave --rig out.")
-    return vendor or known.make.vendor
+    from upright.rig.makes import make_of_rig
+
+    make = make_of_rig(known)
+    if rig != make.key:
+        raise BadInput(f"{source} is of the make '{make.key}', not '{rig}'; leave --rig out.")
+    return vendor or make.vendor
 
 
 def _wish(
@@ -441,17 +443,18 @@ def swing_up(
     BadInput
         When the call contradicts itself or the fit, or the log cannot be used.
     """
-    from upright.experiments.makes import make_rig
     from upright.experiments.swing_up_2b.chapter import chapter, check_chapter
     from upright.experiments.swing_up_2b.run import known_of, run_swing_up, scales_of_log
     from upright.files import write_json
+    from upright.rig.completion import completed, doubts, twin_of
+    from upright.rig.makes import make_rig
 
     at = page_folder(out, pdf)
     if not 1 <= seconds <= 120:
         raise BadInput(f"--seconds needs a time from 1 to 120 s, got {seconds:g}.")
     if travel is not None and not travel > 0:
         raise BadInput(f"--travel must be above 0, got {travel:g}; give it in m or rad.")
-    known, doubts = None, ()
+    known, doubt = None, ()
     if source is None:
         for option, value in (("limit", limit), ("period", period), ("counts", counts), ("vendor", vendor)):
             if value not in (None, ""):
@@ -464,27 +467,26 @@ def swing_up(
             identified.plant, identified.unit, limit=limit, period=period, counts=counts, travel=travel
         )  # fmt: skip
         needs = ("limit", "servo_period", "counts", "travel")
-        said = identified.described(given, vendor=vendor, needs=needs, who="upright swing-up")
-        model = identified.rig(said)
-        truth = model if check is not None else identified.twin(model, said, seed)
-        doubts = identified.doubts(said, None if check is not None else truth)
+        model = completed(identified, given, vendor=vendor, needs=needs, who="upright swing-up")
+        truth = model if check is not None else twin_of(model, seed)
+        doubt = doubts(identified, model, None if check is not None else truth)
     again = as_typed(travel=travel, limit=limit, period=period, counts=counts, vendor=vendor)
     name = "" if source is None else called(source) + again
     if check is not None:
         record, log = open_log(check)
         scales = scales_of_log(model, record, known)
         told = check_chapter(model, scales, log.name, name or "FIT.json")
-        told = replace(told, warnings=(*told.warnings, *doubts))
+        told = replace(told, warnings=(*told.warnings, *doubt))
         return Answer(scales, told, write_page(told, at / "encoders.html", pdf))
     done = run_swing_up(model, _lying(truth, lie), at, known=known, seconds=seconds, travel=travel, source=name)
     told = chapter(done)
-    told = replace(told, warnings=(*told.warnings, *doubts))
+    told = replace(told, warnings=(*told.warnings, *doubt))
     return Answer(
         done, told, [*write_page(told, at / "swing_up.html", pdf), write_json(at / "swing_up.json", told.numbers)]
     )
 
 
-def _lying(rig: ServoRig, lie: str | Mapping[str, float]) -> ServoRig:
+def _lying(rig: Rig, lie: str | Mapping[str, float]) -> Rig:
     """The rig with one encoder that shows a multiple of what is true."""
     if isinstance(lie, str):
         said = [(name.strip(), value.strip()) for name, _, value in [lie.partition("=")] if lie.strip()]
@@ -576,11 +578,12 @@ def track(
     BadInput
         When there is no such rig or set, or poles cannot be placed.
     """
-    from upright.experiments.makes import SHAFTS, make_rig
     from upright.experiments.tracking_3.chapter import chapter
     from upright.experiments.tracking_3.pulses import rig_of_file, shaft_make
     from upright.experiments.tracking_3.run import follow, run_tracking
     from upright.files import write_json
+    from upright.rig.completion import completed, doubts
+    from upright.rig.makes import SHAFTS, make_rig
 
     at = page_folder(out, pdf)
     own = _poles(poles)
@@ -589,27 +592,27 @@ def track(
         raise BadInput(f"--limit must be above 0, got {limit:g}.")
     if source is None and rig not in SHAFTS:
         raise BadInput(f"--rig is {' or '.join(SHAFTS)}, got '{rig}'.")
-    doubts: tuple[str, ...] = ()
+    doubt: tuple[str, ...] = ()
     if source is None:
         on = make_rig(rig, seed)
     else:
         known = rig_of(source, "track")
         shaft_make(known.plant, f"'{known.name}'")
         given = rig_options(known.plant, known.unit, limit=limit, period=period, counts=counts)
-        said = known.described(given, vendor=vendor, who="upright track")
-        on, doubts = rig_of_file(known, said, Path(called(source)).name), known.doubts(said)
+        on = rig_of_file(completed(known, given, vendor=vendor, who="upright track"), Path(called(source)).name)
+        doubt = doubts(known, on)
     size = si_if_given(step, on.plant.coordinates[-1].unit)
     if size is not None and not size > 0:
         raise BadInput(f"--step needs a size above 0, got '{step}'.")
     if source is None:
-        on = replace(on, limit=limit or on.limit)
+        on = on.replace(limit=limit or on.limit)
         done = run_tracking(on, seed, at, progress, which=which, poles=own, step=size)
     else:
         done = follow(on, on, Path(called(source)), None, None, progress, which=which, poles=own, step=size)
     told = chapter(done)
     told = replace(
         told, title=f"Experiment 3: {told.title.lower()}, {done.rig.name}",
-        numbers={**told.numbers, "verdict": told.verdict}, warnings=(*told.warnings, *doubts),
+        numbers={**told.numbers, "verdict": told.verdict}, warnings=(*told.warnings, *doubt),
     )  # fmt: skip
     return Answer(done, told, [write_json(at / "track.json", told.numbers), *write_page(told, at / "track.html", pdf)])
 

@@ -120,7 +120,7 @@ def lab(
     BadInput
         When there is no such experiment or rig.
     """
-    from upright.experiments.makes import make_named
+    from upright.rig.makes import make_named
 
     if seed < 0:
         raise BadInput(f"--seed needs a whole number of at least 0, got {seed}.")
@@ -259,9 +259,9 @@ def reproduce(
     Answer
         Of a `Reproduced`.
     """
-    from upright.experiments.makes import NOMINAL
     from upright.paper.chapter import chapter
     from upright.paper.reproduce import reproduce as again
+    from upright.rig.makes import NOMINAL
 
     at = folder_if_given(out, pdf)
     done = again(NOMINAL, seed)

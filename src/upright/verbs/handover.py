@@ -10,19 +10,19 @@ from upright.errors import BadInput
 from upright.verbs.answer import Answer
 
 if TYPE_CHECKING:
-    from upright.experiments.identified import IdentifiedRig
+    from upright.rig import Rig
     from upright.study.fitted import FittedModel
 
 SAVED = "fit.json"
 """What a command calls a fit that is in memory, once it is saved."""
 
 
-def rig_of(source: Any, verb: str, *, seed: int = 0, draws: int = 200) -> IdentifiedRig:
+def rig_of(source: Any, verb: str, *, seed: int = 0, draws: int = 200) -> Rig:
     """The rig that a source tells of.
 
     Parameters
     ----------
-    source : path, Fit, Study, Plant or IdentifiedRig
+    source : path, Fit, Study, Plant or Rig
         A path is that of a fit.json, of its folder, or of a study.
     verb : str
         Who asks, for the sentence.
@@ -34,20 +34,21 @@ def rig_of(source: Any, verb: str, *, seed: int = 0, draws: int = 200) -> Identi
     BadInput
         When it is none of these, or its file cannot be read.
     """
-    from upright.experiments import identified
     from upright.physics import Plant
+    from upright.rig import Rig
+    from upright.study import stored_rig
     from upright.study.load import Study
     from upright.verbs.fitting import FitAnswer
 
-    if isinstance(source, identified.IdentifiedRig):
+    if isinstance(source, Rig):
         return source
     if isinstance(source, FitAnswer):
-        return identified.rig_of_fit(fitted_of(source, verb), source.value.rig.plant, seed=seed, draws=draws)
+        return stored_rig.rig_of_fit(fitted_of(source, verb), source.value.rig.plant, seed=seed, draws=draws)
     if isinstance(source, Study):
-        return identified.rig_of_study(source)
+        return stored_rig.rig_with_guesses(source.rig, source.plant, source.hardware)
     if isinstance(source, Plant):
-        return identified.rig_of_plant(source)
-    return identified.read_identified(_file(source, verb), seed=seed, draws=draws)
+        return stored_rig.rig_of_plant(source)
+    return stored_rig.read_stored_rig(_file(source, verb), seed=seed, draws=draws)
 
 
 def fitted_of(source: Any, verb: str) -> FittedModel:

@@ -125,7 +125,7 @@ def predict(
         ),
         warnings=(
             *(() if fitted.trusted else (f"The model's own verdict was: {fitted.verdict}",)),
-            *fitted.description.unlike(asked.description), *(s for run in scores.values() for s in run.beyond), *offers,
+            *fitted.hardware.unlike(asked.hardware), *(s for run in scores.values() for s in run.beyond), *offers,
         ),
     )  # fmt: skip
     if out is None:
@@ -362,7 +362,7 @@ def frequency(
     BadInput
         When there is no such rig or way, or a log cannot be used.
     """
-    from upright.experiments.makes import MAKES
+    from upright.rig.makes import MAKES
 
     at = page_folder(out, pdf)
     for value, option in ((ask, "--ask"), (kind or "sines", "--kind")):
@@ -398,8 +398,8 @@ def frequency(
             )
         from upright.experiments.frequency_1b.chapter import chapter
         from upright.experiments.frequency_1b.run import run_frequency
-        from upright.experiments.makes import make_named
         from upright.report.page import simulated
+        from upright.rig.makes import make_named
 
         make_named(rig)
         found = run_frequency(rig, seed, at, progress, kind=ask)
@@ -433,7 +433,7 @@ def _count(name: str, text: float | str) -> float:
 
 def _known(name: str, value: float | str | tuple[float, float], make: str) -> tuple[float, float]:
     """Value and standard uncertainty [SI]."""
-    from upright.experiments.makes import MAKES
+    from upright.rig.makes import MAKES
 
     if make not in MAKES:
         raise BadInput("--known belongs to a fit; name the rig with --rig too.")
@@ -579,10 +579,10 @@ def plan_inertias(
     BadInput
         When there is no such rig or picture, or numbers contradict each other.
     """
-    from upright.experiments.makes import OSCILLATORS
     from upright.experiments.weighing_1a.plan import chapter, choices, choose
     from upright.identification.loadings import plan_loadings
     from upright.report.drawing import picture_format
+    from upright.rig.makes import OSCILLATORS
     from upright.verbs.values import si_if_given
 
     if out is not None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from upright.physics import Plant
     from upright.realtime.jitter import Jitter
     from upright.realtime.session import RunState
-    from upright.study.description import Entry
+    from upright.rig.hardware import Entry
 
 Counts = float | str | Mapping[str, float]
 
@@ -47,7 +47,7 @@ def rig_options(
     BadInput
         When one of them is no such number.
     """
-    from upright.study.description import Entry, driven_unit
+    from upright.rig.hardware import Entry, driven_unit
 
     every = si_if_given(period, "s")
     if limit is not None and not 0 < limit < 1e9:

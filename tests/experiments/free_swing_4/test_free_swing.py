@@ -14,8 +14,8 @@ from upright.experiments.free_swing_4.run import (
     run_free_swing,
     write_questions,
 )
-from upright.experiments.makes import make_rig
 from upright.report.html import write_html
+from upright.rig.makes import make_rig
 
 pytestmark = pytest.mark.slow
 

@@ -11,7 +11,7 @@ from upright.errors import BadInput
 from upright.experiments.free_swing_4 import release as drift
 from upright.experiments.free_swing_4.release import Release, acquire, freed, motion
 from upright.experiments.free_swing_4.run import losses
-from upright.experiments.makes import COUNTS, MAKES, MOTOR_AND_BELT, NOMINAL, SERVO, make_rig
+from upright.rig.makes import COUNTS, MAKES, MOTOR_AND_BELT, NOMINAL, SERVO, make_rig
 
 
 def twin(seed):

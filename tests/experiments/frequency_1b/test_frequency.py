@@ -14,13 +14,13 @@ from upright.errors import NotIdentifiable
 from upright.experiments.frequency_1b.chapter import chapter, true_key
 from upright.experiments.frequency_1b.run import run_frequency
 from upright.experiments.frequency_1b.sweeps import SHARE, broadband
-from upright.experiments.identified import read_identified
-from upright.experiments.makes import MAKES, make_rig
 from upright.identification.frequency.answer import key_value
 from upright.identification.frequency.spectra import chirp, multisine, odd_lines, repetition, response_of, sines_in
 from upright.readers import read
 from upright.records import Record
 from upright.report.page import Picture
+from upright.rig.makes import MAKES, make_rig
+from upright.study.stored_rig import read_stored_rig
 
 TICK = 2e-3
 SYSTEM = control.tf([40.0], [1, 1.6, 64])  # damping ratio 0.1, 8 rad/s
@@ -100,7 +100,7 @@ def test_what_asks_nothing_is_refused():
 def test_a_broadband_command_is_whole_steps_of_the_converter_where_there_is_one():
     """Steps of 1/16 V, which floating point holds exactly; a drive without a converter takes any number."""
     rig, make = make_rig("linear"), MAKES["linear"]
-    stepped, smooth = (broadband(replace(rig, converter=c), make, "multisine").log["u"] for c in (1 / 16, 0.0))
+    stepped, smooth = (broadband(rig.replace(converter=c), make, "multisine").log["u"] for c in (1 / 16, 0.0))
     np.testing.assert_array_equal(16 * stepped % 1, 0.0)
     assert np.ptp(stepped) > 1.0
     assert np.isfinite(smooth).all()
@@ -139,7 +139,7 @@ def test_amplitudes_are_scheduled(furuta):
 
 @pytest.mark.slow
 def test_design_reads_the_fit_with_its_uncertainty(furuta):
-    file = read_identified(furuta.folder)
+    file = read_stored_rig(furuta.folder)
     pole = key_value(furuta.answer.key)
     assert file.linear("inverted").poles()[0].real == pytest.approx(pole.value, rel=1e-9)
     spread = np.std([m.poles()[0].real for m in file.spread("inverted")])

@@ -21,12 +21,12 @@ from upright.experiments.hands_on.rig import rig_at_hand
 from upright.experiments.hands_on.studies import write_study
 from upright.experiments.hands_on.upright import came
 from upright.experiments.hands_on.upwards import run_upwards
-from upright.experiments.makes import MAKES, make_rig
 from upright.experiments.running.run import RunRequest, run_rig
 from upright.gains import feedback, filtered, place
 from upright.laws import as_values, of_values
 from upright.logs import read_log
 from upright.progress import silent
+from upright.rig.makes import MAKES, make_rig
 from upright.study.load import load_study
 
 OWN = """
@@ -121,8 +121,8 @@ def test_the_study_of_its_logs_says_what_its_owner_says(own, tmp_path):
     assert {n for n, p in asked.items() if p.estimate} == {"J_d", "J_p", "b_1", "b_2", "actuator.gain"}
     assert asked["l_cg"].value == pytest.approx(0.0645)
     assert asked["l_cg"].uncertainty == pytest.approx(5e-4)
-    assert study.description.entries["counts.theta"].value == pytest.approx(2048)
-    assert study.description.entries["travel"].value == 2.0
+    assert study.hardware.entries["counts.theta"].value == pytest.approx(2048)
+    assert study.hardware.entries["travel"].value == 2.0
     assert study.runs[0].y[-1, 1] == pytest.approx(0.2)
 
 

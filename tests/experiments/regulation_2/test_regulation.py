@@ -10,10 +10,12 @@ import pytest
 from upright import gains
 from upright.control.score import outcomes
 from upright.errors import BadInput
-from upright.experiments.identified import IdentifiedRig
-from upright.experiments.makes import described_make, make_rig
 from upright.experiments.regulation_2 import chapter as regulation_page
 from upright.experiments.regulation_2.run import RegulationRequest, identify_make, run_regulation
+from upright.rig import Rig
+from upright.rig.completion import completed
+from upright.rig.makes import hardware_of_make, make_of_rig, make_rig
+from upright.rig.variation import allowed
 
 
 def fit_of(truth, spread=0.01, seed=0, draws=64):
@@ -28,8 +30,13 @@ def fit_of(truth, spread=0.01, seed=0, draws=64):
 
     plant, gain = draw(truth.plant, truth.gain)
     others = tuple(draw(plant, gain) for _ in range(draws))
-    return IdentifiedRig(
-        plant=plant, name="rig", gain=gain, unit="V", draws=others if spread else (), description=described_make(truth)
+    return Rig(
+        plant=plant,
+        name="rig",
+        gain=gain,
+        unit="V",
+        draws=others if spread else (),
+        hardware=hardware_of_make(truth),
     )
 
 
@@ -38,7 +45,7 @@ def fit_of(truth, spread=0.01, seed=0, draws=64):
 def test_two_sets_regulate_and_one_does_not_as_the_paper_saw_and_as_was_told(make, tmp_path):
     """The paper, section 4.2: typically at least two sets regulate, at least one saturates or has too little effort."""
     truth = make_rig(make)
-    done = run_regulation(fit_of(truth), truth, 0, tmp_path, wish=RegulationRequest(draws=64))
+    done = run_regulation(completed(fit_of(truth)), truth, 0, tmp_path, wish=RegulationRequest(draws=64))
     words = [a.word for a in done.attempts]
     assert words.count("regulates") >= 2
     assert {"saturates", "too weak"} & set(words)
@@ -58,7 +65,7 @@ def test_the_log_of_a_run_is_what_the_encoders_show(tmp_path):
 
     truth = make_rig("linear")
     wish = RegulationRequest(poles={"set 2": RegulationRequest().poles["set 2"]}, draws=16, seconds=1.0)
-    done = run_regulation(fit_of(truth), truth, 0, tmp_path, wish=wish)
+    done = run_regulation(completed(fit_of(truth)), truth, 0, tmp_path, wish=wish)
     log = Record.from_csv(tmp_path / "regulation_set_2.csv")
     run = done.attempts[0].after
     counts = log["theta"] * truth.counts[1]
@@ -68,7 +75,7 @@ def test_the_log_of_a_run_is_what_the_encoders_show(tmp_path):
 
 def test_without_a_rig_nothing_is_run(tmp_path):
     wish = RegulationRequest(poles={"set 2": RegulationRequest().poles["set 2"]}, draws=16, seconds=1.0)
-    done = run_regulation(fit_of(make_rig("linear"), spread=0.0), None, 0, tmp_path, wish=wish)
+    done = run_regulation(completed(fit_of(make_rig("linear"), spread=0.0)), None, 0, tmp_path, wish=wish)
     told = regulation_page.chapter(done)
     assert "Nothing was run" in told.verdict
     assert "no uncertainty" in told.detail
@@ -81,7 +88,7 @@ def predicted(tmp_path_factory):
     poles = {"set 2": RegulationRequest().poles["set 2"]}
     wish = RegulationRequest(poles=poles, draws=4, seconds=1.0, tilt=math.pi / 20, push=0.25)
     known = fit_of(make_rig("linear"), spread=0.0)
-    return run_regulation(known, None, 0, tmp_path_factory.mktemp("regulation"), wish=wish)
+    return run_regulation(completed(known), None, 0, tmp_path_factory.mktemp("regulation"), wish=wish)
 
 
 def test_a_way_to_the_velocities_that_holds_the_rig_has_margins(predicted):
@@ -103,11 +110,11 @@ def test_the_chapter_names_the_tilt_and_the_push_of_the_start(predicted):
 def test_what_the_fit_leaves_out_is_taken_as_said():
     said = make_rig("furuta")
     plain = fit_of(said.changed(b_1c=0.0, b_2c=0.0), spread=0.0)
-    rig = plain.rig()
+    rig = completed(plain)
     assert rig.plant.b_1c == said.plant.b_1c
     assert (rig.lag, rig.delay, rig.limit) == (said.lag, said.delay, said.limit)
-    assert plain.make.key == "furuta"
-    drawn = plain.allowed(rig, 4000, seed=1)
+    assert make_of_rig(plain).key == "furuta"
+    drawn = allowed(rig, 4000, seed=1)
     assert set(drawn) == {"b_1c", "b_2c", "b_1s", "b_2s", "v_1s", "v_2s"}
     # 13 % from run to run; of 4000 draws the spread is known to one part in 90, three of which are allowed
     assert np.std(np.log(drawn["b_1c"])) == pytest.approx(0.13, rel=3 / 90)
@@ -116,8 +123,8 @@ def test_what_the_fit_leaves_out_is_taken_as_said():
 def test_friction_close_to_rest_is_drawn_where_the_fit_is_blind_of_it():
     """Uniform up to half of what slides (mean 1/4, variance 1/48), on the day's level; speeds even in logarithm."""
     known = fit_of(make_rig("linear"), spread=0.0)
-    rig = known.rig()
-    drawn = known.allowed(rig, 4000, seed=2)
+    rig = completed(known)
+    drawn = allowed(rig, 4000, seed=2)
     for c, s in (("b_1c", "b_1s"), ("b_2c", "b_2s")):
         excess = drawn[s] / drawn[c] - 1
         assert excess.min() >= 0
@@ -126,7 +133,7 @@ def test_friction_close_to_rest_is_drawn_where_the_fit_is_blind_of_it():
         assert abs(np.corrcoef(excess, drawn[c])[0, 1]) < 3 / math.sqrt(4000)
     assert np.median(drawn["v_1s"]) == pytest.approx(math.sqrt(0.005 * 0.05), rel=0.1)
     told = rig.changed(b_1s=1.2 * rig.plant.b_1c, v_1s=0.01)
-    kept = known.allowed(told, 100, seed=2)
+    kept = allowed(told, 100, seed=2)
     np.testing.assert_allclose(kept["b_1s"] / kept["b_1c"], 1.2)
     assert "v_1s" not in kept
     assert "b_2s" in kept
@@ -135,7 +142,7 @@ def test_friction_close_to_rest_is_drawn_where_the_fit_is_blind_of_it():
 def test_a_cart_whose_friction_is_larger_close_to_rest_hunts():
     """About an unstable point feedback hunts where static friction exceeds that of sliding, and rests where not."""
     known = fit_of(make_rig("linear"), spread=0.0)
-    rig = known.rig()
+    rig = completed(known)
     model = rig.linear("inverted")
     sampled = model.to_sampled(rig.period, rig.delay / rig.period)
     K = gains.place(model.A, model.B, RegulationRequest().poles["set 2"]).K

@@ -11,7 +11,6 @@ import pytest
 
 import upright as up
 from upright.errors import BadInput
-from upright.experiments.makes import make_rig
 from upright.experiments.running.chapter import run_chapter
 from upright.experiments.running.rig import open_loop, stage_of
 from upright.experiments.running.run import RunRequest, run_rig
@@ -21,6 +20,7 @@ from upright.logs import read_log
 from upright.logs.replay import replay
 from upright.realtime.session import QUIET, RunOrder, carry_out
 from upright.report.run import chapter, draw_run
+from upright.rig.makes import make_rig
 from upright.rigs import Fault
 
 RIG = make_rig("furuta")

@@ -7,8 +7,8 @@ import math
 import pytest
 
 from upright.control.sensors import Watch
-from upright.experiments.makes import make_rig
 from upright.experiments.running.tick import supervised
+from upright.rig.makes import make_rig
 from upright.rigs import Mode
 
 

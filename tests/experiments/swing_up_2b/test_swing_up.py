@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from upright.errors import BadInput, NotIdentifiable
-from upright.experiments.identified import IdentifiedRig
-from upright.experiments.makes import make_rig
 from upright.experiments.swing_up_2b.chapter import chapter, check_chapter
 from upright.experiments.swing_up_2b.run import LIES, known_of, run_swing_up, scales_of_log
 from upright.files import plain_values
 from upright.physics import Furuta
 from upright.records import Record
 from upright.report.html import write_html
+from upright.rig import Rig
+from upright.rig.makes import make_rig
 
 pytestmark = pytest.mark.slow
 
@@ -93,7 +93,7 @@ def test_what_a_fit_knows_is_the_spread_of_the_rigs_that_it_allows():
     plant = nominal.plant
     assert isinstance(plant, Furuta)
     others = tuple((plant.replace(m_p=plant.m_p * f, b_1=plant.b_1 * f), nominal.gain * f) for f in (0.98, 1.0, 1.02))
-    file = IdentifiedRig(plant=plant, name="furuta", gain=nominal.gain, unit="V", draws=others)
+    file = Rig(plant=plant, name="furuta", gain=nominal.gain, unit="V", draws=others)
     known = known_of(file)
     spread = 0.02 * math.sqrt(2 / 3)
     assert known["m_p"] == pytest.approx(spread)
@@ -106,6 +106,6 @@ def test_a_friction_that_the_fit_puts_at_its_bound_still_lets_the_encoders_be_sc
     plant = make_rig("furuta").plant
     some = np.random.default_rng(5)
     others = tuple((plant.replace(b_2=abs(some.normal(0, 1.5e-5))), 0.65) for _ in range(50))
-    file = IdentifiedRig(plant=plant.replace(b_2=1e-21), name="furuta", gain=0.65, unit="V", draws=others)
+    file = Rig(plant=plant.replace(b_2=1e-21), name="furuta", gain=0.65, unit="V", draws=others)
     # factors of the model's numbers are exp(z size): a size of 1e16 is no number any more
     assert max(known_of(file).values()) < 5

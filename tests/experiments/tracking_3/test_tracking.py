@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from upright.control import trial
-from upright.experiments.makes import MAKES, SHAFTS, make_rig
 from upright.experiments.tracking_3 import laws as pd
 from upright.experiments.tracking_3.laws import AT, EXTRA, closed_by, paper_sets, tracker, with_sum
 from upright.experiments.tracking_3.pulses import fitted, identify_shaft, pulses
@@ -20,6 +19,7 @@ from upright.gains import place, prefilter
 from upright.gains.loop import swing
 from upright.identification.estimate import identify
 from upright.physics import chain
+from upright.rig.makes import MAKES, SHAFTS, make_rig
 from upright.study.load import load_study
 
 FRICTIONLESS = {"f_1c": 0.0, "f_2c": 0.0}
@@ -41,7 +41,7 @@ def test_the_far_body_ends_at_the_reference_without_friction():
 
 def test_the_sampled_model_with_delay_and_lag_moves_as_the_kernel():
     """Without friction and rounding the loop is linear: two substeps of Runge-Kutta are right to 1e-6 of the start."""
-    rig = replace(make_rig("rectilinear").changed(**FRICTIONLESS), counts=(1e12, 1e12), converter=0.0)
+    rig = make_rig("rectilinear").changed(**FRICTIONLESS).replace(counts=(1e12, 1e12), converter=0.0)
     law = paper_sets(rig, (4,))[0].law
     start = np.array([1e-3, 0.0, -2e-3, 0.02])
     sampled = rig.linear(AT).to_sampled(rig.period, rig.delay / rig.period, rig.lag)
@@ -54,7 +54,7 @@ def test_the_sampled_model_with_delay_and_lag_moves_as_the_kernel():
 def held(rig, law, offset, force):
     """How far the far body creeps when let go at rest, the spring and the drive pulling by shares of friction."""
     p = rig.plant.parameters()
-    fine = replace(rig, counts=(1e12, 1e12), converter=0.0)
+    fine = rig.replace(counts=(1e12, 1e12), converter=0.0)
     d = offset * p["f_2c"] / p["k_12"]  # x_1 - x_2
     # of gain (k_pf (r - x_1) + K_3 d) - k d = force f_1, about x_1 = 0
     u = (force * p["f_1c"] + p["k_12"] * d) / rig.gain
@@ -174,15 +174,15 @@ def test_disks_move_as_carts_do_in_other_units():
 @pytest.mark.parametrize("twist", [0.05, 0.2])
 def test_the_step_keeps_to_the_shaft_of_the_rig_at_hand(twist):
     """The loop is nearly linear, so the step scales with the twist allowed; where less is allowed, the rig trips."""
-    rig = replace(make_rig("torsional"), twist=twist)
+    rig = make_rig("torsional").replace(twist=twist)
     laws = paper_sets(rig, (1, 4))
     chosen = choose(rig, laws)
-    other = choose(replace(rig, twist=2 * twist), laws)
+    other = choose(rig.replace(twist=2 * twist), laws)
     assert other.by_twist == pytest.approx(2 * chosen.by_twist, rel=1e-9)  # from the same run
     done = attempt(rig, laws[1], chosen.size)
     assert done.twist < twist
     assert math.isinf(done.tripped)
-    tight = replace(rig, twist=0.5 * done.twist)
+    tight = rig.replace(twist=0.5 * done.twist)
     assert attempt(tight, laws[1], chosen.size).tripped < 1.0
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from upright.experiments.makes import OSCILLATORS
 from upright.experiments.weighing_1a.run import acquire, drawn_twin, measure_body
 from upright.identification import Parameter, Rig, Run
 from upright.identification.estimate import identify
 from upright.physics import chain
+from upright.rig.makes import OSCILLATORS
 
 KINDS = ("rectilinear", "torsional")
 

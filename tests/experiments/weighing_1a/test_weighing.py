@@ -1,12 +1,10 @@
 """Does experiment 1a say what the rig of the later experiments weighs?"""
 
-from dataclasses import replace
-
 import pytest
 
 from upright.errors import BadInput
-from upright.experiments.makes import MAKES, OSCILLATORS, make_rig
 from upright.experiments.weighing_1a.run import first_body, run_weighing
+from upright.rig.makes import MAKES, OSCILLATORS, make_rig
 
 
 @pytest.mark.parametrize("make", MAKES)
@@ -32,4 +30,4 @@ def test_what_is_handed_on_is_the_rig_s(make, tmp_path):
 def test_a_rig_of_another_kind_is_refused(tmp_path):
     rig = make_rig("rectilinear")
     with pytest.raises(BadInput, match="knows carts, disks and pendulums"):
-        run_weighing(replace(rig, plant=OSCILLATORS["torsional"].plant, counts=(1.0,)), 0, tmp_path)
+        run_weighing(rig.replace(plant=OSCILLATORS["torsional"].plant, counts=(1.0,)), 0, tmp_path)

@@ -126,13 +126,13 @@ def test_what_the_runs_say_nothing_about_is_unseen():
 def test_a_fit_file_keeps_what_groups_share(two_days, tmp_path):
     from types import SimpleNamespace
 
-    from upright.study.description import RigDescription
+    from upright.rig.hardware import Hardware
     from upright.study.fitted import read_fit
     from upright.study.results import write_fit
 
     fit, runs = two_days
     study = SimpleNamespace(
-        title="", plant="pendulum", path=tmp_path, sha256="", source="", runs=runs, description=RigDescription()
+        title="", plant="pendulum", path=tmp_path, sha256="", source="", runs=runs, description=Hardware()
     )
     content = write_fit(fit, study, tmp_path / "fit.json")
     assert content["groups"]["Monday"]["friction"]["status"] == "firm"

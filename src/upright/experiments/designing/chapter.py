@@ -8,15 +8,17 @@ from typing import Any
 import numpy as np
 
 from upright.experiments.designing.run import Designed, VelocityLoop
-from upright.experiments.identified import IdentifiedRig, rig_table
 from upright.gains import spelled_out
 from upright.gains.lqr import locus
 from upright.gains.requests import Roots, written
 from upright.laws import as_values
 from upright.report.drawing import BLACK, BLUE, VERMILLION, Poles, locus_figure, pole_map, swing_figure
 from upright.report.page import Block, Chapter, Part, Picture, Points, Step, Table, resting_on
+from upright.report.rig import rig_table
 from upright.report.symbols import number, percent, plain
 from upright.report.symbols import unit as raised
+from upright.rig import Rig
+from upright.rig.completion import doubts
 from upright.systems import StateSpace, to_s
 
 
@@ -52,7 +54,7 @@ def chapter(done: Designed, *, source: str = "OUT/fit.json", folder: str = ".") 
             Part("Poles", (*sure, *_pole_pictures(done))),
             Part("The loop as it runs", (loop, _way_table(done))),
             Part("Coming back", (_swing_picture(done),)),
-            *((Part("The rig", (rig_table(done.wish.said),)),) if done.wish.said else ()),
+            *((Part("The rig", (rig_table(done.wish.on),)),) if done.wish.on else ()),
         ),
         steps=tuple(_next_steps(done, source, folder)),
         warnings=_doubts(done),
@@ -75,7 +77,7 @@ def _doubts(done: Designed) -> tuple[str, ...]:
     if isinstance(done.rig, StateSpace):
         left = "dry friction, steps of encoders" + ("" if done.wish.limit else ", the largest command of the drive")
         return (f"Plain matrices say nothing of a rig: {left} are in none of these numbers.",)
-    told = done.rig.doubts(done.wish.said) if done.wish.said else ()
+    told = doubts(done.rig, done.wish.on) if done.wish.on else ()
     if done.wish.limit is not None:
         return told
     return (
@@ -178,7 +180,7 @@ def _numbers(done: Designed) -> dict[str, Any]:
         "states": list(done.model.states),
         "command_unit": done.rig.unit,
         "limit": wish.limit,
-        "described": None if wish.said is None else wish.said.plain(),
+        "described": None if wish.on is None else wish.on.hardware.plain(),
         "period": wish.period,
         "delay_samples": done.sampled.delay,
         "delay_from": _delay_from(done),
@@ -203,7 +205,7 @@ def _numbers(done: Designed) -> dict[str, Any]:
         "states_from": done.chosen.name,
         "begin": done.law.begin,
         "command": done.rig.inputs[0] if isinstance(done.rig, StateSpace) else "u",
-        "converter": 0.0 if wish.said is None else wish.said.value("converter", 0.0),
+        "converter": 0.0 if wish.on is None else wish.on.converter,
         "law": spelled_out(done.law) | {"inputs": "readings, readings at rest, reference"},
         "as_run": as_values(done.law),
         "verdict": done.verdict,
@@ -212,7 +214,7 @@ def _numbers(done: Designed) -> dict[str, Any]:
 
 def _readings(done: Designed) -> list[dict[str, Any]]:
     """What the law reads, one by one: encoder's step, sign and zero as described, and the reading at rest."""
-    rig, said = done.rig, done.wish.said
+    rig, on = done.rig, done.wish.on
     rest = dict(zip(rig.outputs, np.ravel(done.law.target).tolist(), strict=True))
     steps = dict(zip(rig.outputs, done.wish.quantum, strict=False))
     return [
@@ -221,7 +223,7 @@ def _readings(done: Designed) -> list[dict[str, Any]]:
             "unit": unit,
             "at_rest": rest[name],
             "step": steps.get(name, 0.0),
-            "sign": 1.0 if said is None else said.value(f"sign.{name}", 1.0),
+            "sign": 1.0 if on is None else on.hardware.value(f"sign.{name}", 1.0),
         }
         for name, unit in zip(rig.outputs, rig.output_units, strict=True)
     ]
@@ -252,7 +254,7 @@ def _next_steps(done: Designed, source: str, folder: str) -> list[Step]:
             Step("Let the drive's limit choose: the cheapest effort that comes back from this start.",
                  f"{base} --lqr {','.join('1' for _ in done.model.states)}{limit}")
         )  # fmt: skip
-    if isinstance(done.rig, IdentifiedRig) and not done.rig.draws:
+    if isinstance(done.rig, Rig) and not done.rig.draws:
         steps.append(
             Step("See what the uncertainty of the numbers does to the poles: design from a fit.json.",
                  "upright identify STUDY.toml -o OUT && upright design OUT/fit.json")

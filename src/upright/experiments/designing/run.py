@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from upright.basis import DESCRIBED, Basis
 from upright.errors import BadInput
 from upright.experiments.designing.estimators import chosen, estimator, estimators
-from upright.experiments.identified import IdentifiedRig
 from upright.gains import (
     Estimator,
     Margins,
@@ -32,7 +31,8 @@ from upright.gains.lqr import least_cost, motion
 from upright.gains.requests import Roots, conjugate_poles, poles_of, written
 from upright.laws import Law
 from upright.records import Array
-from upright.study.description import RigDescription, turn_of
+from upright.rig import Rig
+from upright.rig.completion import completed
 from upright.systems import StateSpace, to_s, to_z
 
 MOST_STATES = 30
@@ -51,8 +51,8 @@ class DesignRequest:
     `lag` is the drive's [s], that of the rig's file when None.
     `poles` [1/s] or `weights` (diagonal of Q, with `R`, or with the limit and `start` from which R follows).
     `speed` is one of `SPEEDS`, or a way that matrices allow, empty for the plainest; `memory` is the filter's. With
-    `sampled`, the gains are those whose sampled loop has the poles asked. `said` is what period, limit and quantum
-    rest on, to be told.
+    `sampled`, the gains are those whose sampled loop has the poles asked. `on` is the rig completed for a run, where
+    it is one.
     """
 
     at: str
@@ -69,7 +69,7 @@ class DesignRequest:
     start: tuple[float, ...] = ()
     track: str = ""
     sampled: bool = False
-    said: RigDescription | None = None
+    on: Rig | None = None
 
     def __post_init__(self) -> None:
         if not 1e-6 <= self.period <= 10.0:
@@ -103,7 +103,7 @@ class Designed:
     `sampled_gains`, whose poles are met in the loop as it runs.
     """
 
-    rig: IdentifiedRig | StateSpace
+    rig: Rig | StateSpace
     wish: DesignRequest
     model: StateSpace
     sampled: StateSpace
@@ -179,12 +179,12 @@ class Designed:
         return f"{head}; the start asked for takes {100 * share:.0f} % of the drive's limit."
 
 
-def design_for(rig: IdentifiedRig | StateSpace, wish: DesignRequest) -> Designed:
+def design_for(rig: Rig | StateSpace, wish: DesignRequest) -> Designed:
     """Gains as wished, and their loop as a computer runs it.
 
     Parameters
     ----------
-    rig : IdentifiedRig or StateSpace
+    rig : Rig or StateSpace
         A plain model knows no encoders and no covariance, and needs no equilibrium.
     wish : DesignRequest
 
@@ -310,10 +310,10 @@ def _way_back(model: StateSpace, K: Array, start: Array) -> tuple[Array, Array, 
 
 
 def _from_encoders(
-    rig: IdentifiedRig, model: StateSpace, sampled: StateSpace, wish: DesignRequest
+    rig: Rig, model: StateSpace, sampled: StateSpace, wish: DesignRequest
 ) -> tuple[str, dict[str, Estimator], tuple[float, ...]]:
     """The way to the velocities that was asked for, all that a rig has, and the steps of its encoders."""
-    quantum = wish.quantum or quanta(rig, rig.described(needs=("counts",), who="upright design"))
+    quantum = wish.quantum or tuple(completed(rig, needs=("counts",), who="upright design").quantum.tolist())
     if wish.limit is None and wish.speed == "kalman":
         raise BadInput(
             "a Kalman filter has to know how hard the rig is pushed, a tenth of what the drive can; give the largest "
@@ -324,16 +324,11 @@ def _from_encoders(
     return wish.speed, {s: velocities(model, sampled, s, wish.memory, limit, quantum) for s in ways}, quantum
 
 
-def _late(rig: IdentifiedRig, wish: DesignRequest) -> float:
+def _late(rig: Rig, wish: DesignRequest) -> float:
     """How late a command acts [samples]; what was identified from a log holds the computer's share already."""
     if wish.delay is not None:
         return wish.delay
     return rig.delay / wish.period or 1.0
-
-
-def quanta(rig: IdentifiedRig, said: RigDescription) -> tuple[float, ...]:
-    """Step of every encoder [m or rad], as described."""
-    return tuple(turn_of(c.unit) / said.entries[f"counts.{c.name}"].value for c in rig.plant.coordinates)
 
 
 def _peak(sampled: StateSpace, law: Law, start: Array, seconds: float) -> float:
@@ -344,7 +339,7 @@ def _peak(sampled: StateSpace, law: Law, start: Array, seconds: float) -> float:
     return float(np.abs(swing(sampled, law, start, samples)[1]).max())
 
 
-def _tilt(rig: IdentifiedRig | StateSpace) -> Array:
+def _tilt(rig: Rig | StateSpace) -> Array:
     """Five degrees, or 5 cm, of the last coordinate; of plain matrices one unit of the first state."""
     if isinstance(rig, StateSpace):
         return np.eye(len(rig.states))[0]
@@ -392,9 +387,7 @@ def _velocity_loop(
     )
 
 
-def _cloud(
-    rig: IdentifiedRig | StateSpace, wish: DesignRequest, nominal: StateSpace, law: Law
-) -> tuple[Roots, float | None]:
+def _cloud(rig: Rig | StateSpace, wish: DesignRequest, nominal: StateSpace, law: Law) -> tuple[Roots, float | None]:
     """Poles [1/s] of the loop with these gains on every rig that the fit allows, and the share that stands."""
     others = [] if isinstance(rig, StateSpace) else rig.spread(wish.at)
     rows = [poles_of(closed(m.to_sampled(wish.period, nominal.delay, nominal.lag), law)) for m in others]

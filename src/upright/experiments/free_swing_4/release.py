@@ -13,11 +13,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from upright.control.trial import ServoRig, twin_log
+from upright.control.trial import twin_log
 from upright.errors import BadInput
-from upright.experiments.makes import MOTOR_AND_BELT, SERVO, make_of
 from upright.physics import CartPendulum, Furuta
 from upright.records import Array, Record
+from upright.rig import Rig
+from upright.rig.makes import MOTOR_AND_BELT, SERVO, make_of
 
 _BELT_OFF = {"b_1": 0.3, "b_1c": 0.1875}  # share of the friction that the disk's own bearings have
 
@@ -30,7 +31,7 @@ class Release:
     push: float = 0.0
 
 
-def freed(rig: ServoRig) -> ServoRig:
+def freed(rig: Rig) -> Rig:
     """A pendulum rig with its drive out of the way: a disk's belt is taken off, a cart pulls its silent motor along."""
     plant = rig.plant
     if isinstance(plant, Furuta):
@@ -41,12 +42,12 @@ def freed(rig: ServoRig) -> ServoRig:
     return replace(rig, plant=plant, name=rig.name.split(",")[0])
 
 
-def carrier(rig: ServoRig) -> str:
+def carrier(rig: Rig) -> str:
     """Coordinate of what carries the pendulum: ``"psi"`` or ``"x"``."""
     return rig.plant.coordinates[0].name
 
 
-def motion(rig: ServoRig, release: Release | None = None, *, seconds: float, every: int = 8) -> tuple[Array, Array]:
+def motion(rig: Rig, release: Release | None = None, *, seconds: float, every: int = 8) -> tuple[Array, Array]:
     """What really happens after a release: time (N,) [s] and states (N, 4) [SI]."""
     from upright.simulation import simulate
 
@@ -58,13 +59,13 @@ def motion(rig: ServoRig, release: Release | None = None, *, seconds: float, eve
 
 
 def acquire(
-    rig: ServoRig, release: Release | None = None, *, seconds: float = 12.0, every: int = 8, shot: int = 0
+    rig: Rig, release: Release | None = None, *, seconds: float = 12.0, every: int = 8, shot: int = 0
 ) -> Record:
     """Log of both encoders after a release.
 
     Parameters
     ----------
-    rig : ServoRig
+    rig : Rig
         As `freed`.
     release : Release, optional
         From horizontal, its carrier at rest, when omitted; no hand holds an angle better than a degree.
@@ -119,7 +120,7 @@ class DriftPath:
     end: float
 
 
-def drift_path(name: str, rig: ServoRig, release: Release | None, *, seconds: float, remedy: bool = False) -> DriftPath:
+def drift_path(name: str, rig: Rig, release: Release | None, *, seconds: float, remedy: bool = False) -> DriftPath:
     """Path of the carrier of one rig after a release."""
     t, x = motion(rig, release, seconds=seconds)
     psi = x[:, 0]
@@ -148,12 +149,12 @@ def momentum(plant: Furuta, x: Array) -> Array:
     return M_11 * psi_dot - plant.m_p * plant.r * plant.l_cg * c * theta_dot
 
 
-def anchored(rig: ServoRig) -> ServoRig:
+def anchored(rig: Rig) -> Rig:
     """The rig with its soft spring to ground."""
     return rig.changed(**{f"k_{carrier(rig)}": make_of(rig.plant).anchor})
 
 
-def drift_paths(rig: ServoRig, *, seconds: float = 24.0) -> tuple[DriftPath, ...]:
+def drift_paths(rig: Rig, *, seconds: float = 24.0) -> tuple[DriftPath, ...]:
     """The same release on the rig as it stands, after a push, out of level, and with the spring in each case.
 
     A rail out of level by so little does not move a cart that sticks.

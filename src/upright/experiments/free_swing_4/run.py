@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from upright.control.trial import ServoRig
 from upright.experiments.free_swing_4.release import (
     TILT,
     DriftPath,
@@ -25,15 +24,17 @@ from upright.experiments.free_swing_4.release import (
     freed,
     motion,
 )
-from upright.experiments.makes import MOTOR_AND_BELT, SERVO, Make, make_of
 from upright.experiments.weighing_1a.run import Known
 from upright.files import replace_file
 from upright.identification.model.fit import Fit
 from upright.physics import Plant
 from upright.progress import Progress, part, silent
+from upright.quantities import with_unit
 from upright.records import Array, Record
+from upright.rig import Rig
+from upright.rig.makes import MOTOR_AND_BELT, SERVO, Make, make_of
 from upright.study.load import Study
-from upright.study.text import TomlTable, counted_sensor, number, study_text, table
+from upright.study.text import TomlTable, counted_sensor, study_text, table
 
 FRICTION = ("b_1", "b_1c", "b_2", "b_2c")
 
@@ -74,7 +75,7 @@ class Recovered:
     inside: bool
 
 
-def logs(rig: ServoRig) -> dict[str, Record]:
+def logs(rig: Rig) -> dict[str, Record]:
     """The releases of the experiment by the name of their file: level, out of level, and anchored by a spring.
 
     A cart does without the last two: a lean too small to see does not move what sticks.
@@ -90,7 +91,7 @@ def logs(rig: ServoRig) -> dict[str, Record]:
     return out
 
 
-def bench(rig: ServoRig, weighed: Known | None = None) -> dict[str, tuple[float, float]]:
+def bench(rig: Rig, weighed: Known | None = None) -> dict[str, tuple[float, float]]:
     """What was measured beforehand: value and standard uncertainty [SI].
 
     The inertia of disk or cart comes from experiment 1a (`weighed`; 1 % without it), the lengths from a ruler and from
@@ -107,7 +108,7 @@ def bench(rig: ServoRig, weighed: Known | None = None) -> dict[str, tuple[float,
     return measured | ({"J_a": (truth["J_a"], 0.0)} if "J_a" in truth else {})
 
 
-def questions(rig: ServoRig, weighed: Known | None = None) -> tuple[Question, ...]:
+def questions(rig: Rig, weighed: Known | None = None) -> tuple[Question, ...]:
     """The fits of the experiment, all from guesses that are 30 % off."""
     rng = np.random.default_rng([rig.seed, 42])
     guess = {n: getattr(rig.plant, n) * rng.choice([0.7, 1.3]) for n in ("m_p", "J_p", *FRICTION)}
@@ -152,13 +153,13 @@ def questions(rig: ServoRig, weighed: Known | None = None) -> tuple[Question, ..
     )
 
 
-def question_text(q: Question, rig: ServoRig) -> str:
+def question_text(q: Question, rig: Rig) -> str:
     """The question as a study file."""
     kind, source = type(rig.plant), f"digital twin of {rig.name}, seed {rig.seed}: simulated, no rig was touched"
 
     def wearing_unit(name: str, value: float) -> float | str:
         unit = kind.quantity(name).unit
-        return value if unit == "1" else number(value, unit, 6)
+        return value if unit == "1" else with_unit(value, unit, 6)
 
     parameters = TomlTable("[parameters]")
     for name, (value, spread) in q.known.items():
@@ -186,7 +187,7 @@ def question_text(q: Question, rig: ServoRig) -> str:
     )
 
 
-def write_questions(rig: ServoRig, folder: Path, weighed: Known | None = None) -> tuple[tuple[Question, Path], ...]:
+def write_questions(rig: Rig, folder: Path, weighed: Known | None = None) -> tuple[tuple[Question, Path], ...]:
     """Write logs and studies; gives back each question with its study file."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, record in logs(rig).items():
@@ -209,7 +210,7 @@ def fit_question(q: Question, study: Path, progress: Progress = silent) -> Quest
     return QuestionFit(question=q, study=loaded, fit=identify(loaded.rig, loaded.runs, method=q.method, progress=tell))
 
 
-def recovered(rig: ServoRig, fit: Fit) -> tuple[Recovered, ...]:
+def recovered(rig: Rig, fit: Fit) -> tuple[Recovered, ...]:
     """The estimates of a fit beside the truth that only a twin can tell."""
     truth = rig.plant.parameters()
     return tuple(
@@ -239,7 +240,7 @@ class EnergyBalance:
 class FreeSwing:
     """What has been found so far; it is filled step by step, so that an interrupted one can be reported."""
 
-    rig: ServoRig
+    rig: Rig
     folder: Path
     weighed: Known | None = None
     answers: dict[str, QuestionFit] = field(default_factory=dict[str, QuestionFit])
@@ -260,7 +261,7 @@ class FreeSwing:
 
 
 def run_free_swing(
-    rig: ServoRig,
+    rig: Rig,
     seed: int,
     folder: Path,
     progress: Progress = silent,
@@ -272,7 +273,7 @@ def run_free_swing(
 
     Parameters
     ----------
-    rig : ServoRig
+    rig : Rig
         Its drive is put out of the way first.
     seed : int
         Of guesses, and of what a hand and a ruler do.

@@ -16,10 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright import units
-from upright.control import ServoRig
 from upright.errors import BadInput, nearest
 from upright.experiments.frequency_1b.sweeps import Sweep, broadband, stepped_sine
-from upright.experiments.makes import Make, described_make, make_named, make_of, make_rig
 from upright.experiments.weighing_1a.run import Known
 from upright.identification import Parameter
 from upright.identification import Rig as Asked
@@ -28,7 +26,9 @@ from upright.identification.frequency.response import FrequencyResponse, is_resp
 from upright.identification.frequency.spectra import response_of
 from upright.progress import Progress, silent
 from upright.records import Record
-from upright.study.description import RigDescription
+from upright.rig import Rig
+from upright.rig.hardware import Hardware
+from upright.rig.makes import Make, hardware_of_make, make_named, make_of, make_rig
 from upright.study.results import write_response_fit
 
 LAG = 1e-3
@@ -41,7 +41,7 @@ class FrequencyRun:
 
     Attributes
     ----------
-    rig : ServoRig
+    rig : Rig
         The twin, which knows the truth.
     make : Make
     sweep : Sweep
@@ -54,7 +54,7 @@ class FrequencyRun:
         Time at the computer [s].
     """
 
-    rig: ServoRig
+    rig: Rig
     make: Make
     sweep: Sweep
     answer: FrequencyFit
@@ -68,7 +68,7 @@ class FrequencyRun:
         return {**self.rig.plant.parameters(), **self.rig.drive}
 
 
-def bench(rig: ServoRig, make: Make) -> dict[str, float]:
+def bench(rig: Rig, make: Make) -> dict[str, float]:
     """What the bench says of the numbers that it tells, each off by its tolerance; exact for the rig as designed."""
     rng = np.random.default_rng([rig.seed, 43])
     true = rig.plant.parameters()
@@ -97,7 +97,7 @@ def asked(make: Make, known: Mapping[str, float], tolerance: Mapping[str, float]
 
 
 def run_frequency(
-    rig: ServoRig | str,
+    rig: Rig | str,
     seed: int,
     folder: Path,
     progress: Progress = silent,
@@ -110,7 +110,7 @@ def run_frequency(
 
     Parameters
     ----------
-    rig : ServoRig or str
+    rig : Rig or str
         A rig of a make, or the make of which `seed` is taken.
     seed : int
     folder : Path
@@ -143,7 +143,7 @@ def run_frequency(
     answer = explain(asked(make, said, tolerance), at, sweep.response, seed=seed, tell=follow, stopped=stopped)
     progress("writing the log and the fit", 0.9)
     title = f"Frequency response of {rig.name}, seed {rig.seed}"
-    write_response_fit(answer, folder, make.plant_name, title, said=described_make(rig))
+    write_response_fit(answer, folder, make.plant_name, title, said=hardware_of_make(rig))
     sweep.log.to_csv(folder / "sweep.csv")
     progress("done", 1.0)
     return FrequencyRun(
@@ -215,7 +215,7 @@ def response_of_logs(
         Told the step at work.
     """
     rest: Asked | None = None
-    plant, said = "", RigDescription()
+    plant, said = "", Hardware()
     if len(sources) == 1 and sources[0].suffix == ".toml":
         rest, plant, records, quantum, said = _study(sources[0], data)
         response = response_of(records, command="u", outputs=records[0].outputs, kind=wish.kind, hold=wish.hold,
@@ -228,7 +228,7 @@ def response_of_logs(
         response = _logs(sources, wish)
     if wish.make and rest is None:
         rest, plant = _designed(wish), make_named(wish.make).plant_name
-        said = RigDescription(vendor=make_named(wish.make).vendor)
+        said = Hardware(vendor=make_named(wish.make).vendor)
     folder.mkdir(parents=True, exist_ok=True)
     names = tuple(s.name for s in sources)
     if rest is None:
@@ -257,7 +257,7 @@ def _designed(wish: LogRequest) -> Asked:
     return replace(rest, parameters={**rest.parameters, **changed})
 
 
-def _study(path: Path, data: Path | None) -> tuple[Asked, str, list[Record], list[float], RigDescription]:
+def _study(path: Path, data: Path | None) -> tuple[Asked, str, list[Record], list[float], Hardware]:
     from upright.study.load import load_study
 
     study = load_study(path, data=data)
@@ -269,7 +269,7 @@ def _study(path: Path, data: Path | None) -> tuple[Asked, str, list[Record], lis
         columns = {"u": run.u[:, 0], **{n: run.y[:, j] for j, n in enumerate(run.measured)}}
         units = {c.name: c.unit for c in study.rig.plant.coordinates if c.name in run.measured}
         records.append(Record(t=run.t, signals=columns, units=units, inputs=("u",), outputs=run.measured))
-    return study.rig, study.plant, records, list(runs[0].quantum or [0.0] * len(runs[0].measured)), study.description
+    return study.rig, study.plant, records, list(runs[0].quantum or [0.0] * len(runs[0].measured)), study.hardware
 
 
 def _logs(sources: Sequence[Path], wish: LogRequest) -> FrequencyResponse:

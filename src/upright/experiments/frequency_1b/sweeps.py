@@ -15,14 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upright.control import ServoRig
 from upright.control.trial import readings, twin_log
 from upright.errors import BadInput
-from upright.experiments.makes import Make, make_rig
 from upright.identification.frequency.detection import Tone, by_period, detect, settled
 from upright.identification.frequency.response import FrequencyResponse
 from upright.identification.frequency.spectra import chirp, from_tones, multisine, odd_lines, response_of
 from upright.records import Array, Record
+from upright.rig import Rig
+from upright.rig.makes import Make, make_rig
 
 EVERY = 4  # servo periods per logged sample
 SHARE = 0.8
@@ -90,7 +90,7 @@ def grid(low: float, high: float, count: int, period: float) -> NDArray[np.int64
     return np.unique(length)[::-1]
 
 
-def sines(rig: ServoRig, lengths: NDArray[np.int64], amplitude: Array, seconds: float) -> tuple[Array, Array]:
+def sines(rig: Rig, lengths: NDArray[np.int64], amplitude: Array, seconds: float) -> tuple[Array, Array]:
     """Commands (N, lanes) and what the encoders show of them (N, coordinates, lanes), logged every `EVERY` periods."""
     from upright.simulation import simulate
 
@@ -112,12 +112,12 @@ def sines(rig: ServoRig, lengths: NDArray[np.int64], amplitude: Array, seconds: 
     return u[::EVERY], readings(rig, x[:, 0::2].swapaxes(1, 2)).swapaxes(1, 2)
 
 
-def stepped_sine(rig: ServoRig, make: Make, *, count: int = 28, seconds: float = 40.0, periods: int = 6) -> Sweep:
+def stepped_sine(rig: Rig, make: Make, *, count: int = 28, seconds: float = 40.0, periods: int = 6) -> Sweep:
     """Sweep a rig over the band of its make, sine after sine.
 
     Parameters
     ----------
-    rig : ServoRig
+    rig : Rig
         The twin.
     make : Make
         The rig as designed: all that is known when the first amplitude is chosen.
@@ -144,7 +144,7 @@ def stepped_sine(rig: ServoRig, make: Make, *, count: int = 28, seconds: float =
     return Sweep(dwells=dwells, response=response, seconds=spent, log=_joined(dwells))
 
 
-def _probed(rig: ServoRig, lengths: NDArray[np.int64], amplitude: Array, goal: Array, seconds: float) -> Array:
+def _probed(rig: Rig, lengths: NDArray[np.int64], amplitude: Array, goal: Array, seconds: float) -> Array:
     """Commands that come closest to the motion asked for, closed in from both sides because friction makes it jump."""
     low, high = np.zeros(lengths.size), np.full(lengths.size, SHARE * rig.limit)
     best, miss = amplitude, np.full(lengths.size, math.inf)
@@ -166,7 +166,7 @@ def _peak(y: Array, length: int, tick: float) -> Array:
     return np.median(lines[-min(4, len(lines)) :], axis=0)
 
 
-def _dwell(rig: ServoRig, omega: float, length: int, u: Array, y: Array, amplitude: float, periods: int) -> Dwell:
+def _dwell(rig: Rig, omega: float, length: int, u: Array, y: Array, amplitude: float, periods: int) -> Dwell:
     tick = rig.period * EVERY
     lines = by_period(y, length, tick)
     rounding = rig.quantum / math.sqrt(12) * math.sqrt(4 / length)
@@ -183,7 +183,7 @@ def _dwell(rig: ServoRig, omega: float, length: int, u: Array, y: Array, amplitu
     )  # fmt: skip
 
 
-def collect(dwells: tuple[Dwell, ...], rig: ServoRig) -> FrequencyResponse:
+def collect(dwells: tuple[Dwell, ...], rig: Rig) -> FrequencyResponse:
     """Response of sines measured one after the other."""
     late = [f"{d.omega:.3g}" for d in dwells if not math.isfinite(d.settle)]
     notes = (f"Not settled at {', '.join(late)} rad/s.",) if late else ()
@@ -193,12 +193,12 @@ def collect(dwells: tuple[Dwell, ...], rig: ServoRig) -> FrequencyResponse:
     )  # fmt: skip
 
 
-def broadband(rig: ServoRig, make: Make, kind: str, *, seed: int = 0) -> Sweep:
+def broadband(rig: Rig, make: Make, kind: str, *, seed: int = 0) -> Sweep:
     """Log and response of a twin asked at all frequencies of its make's band at once, from rest.
 
     Parameters
     ----------
-    rig : ServoRig
+    rig : Rig
     make : Make
         The rig as designed, from which the command is shaped.
     kind : {"multisine", "sweep"}
@@ -251,7 +251,7 @@ def _level(make: Make, omega: ArrayLike) -> Array:
     return np.minimum(make.limit, np.min(np.array(make.reach) / _expected(make, omega), axis=1))
 
 
-def _moved(rig: ServoRig, u: Array) -> Array:
+def _moved(rig: Rig, u: Array) -> Array:
     """What the encoders show (N, coordinates), the command held for a logged sample."""
     from upright.simulation import simulate
 

@@ -9,13 +9,13 @@ from pathlib import Path
 from upright.experiments.frequency_1b.chapter import log_chapter
 from upright.experiments.hands_on.hanging import Hanging
 from upright.experiments.hands_on.loaded import Weighed
-from upright.experiments.makes import OSCILLATORS
 from upright.experiments.weighing_1a.chapter import loading_chapter
 from upright.identification.model.fit import Fit
 from upright.report.fit.chapter import chapter
 from upright.report.fit.tables import finding, plain_estimate
 from upright.report.page import Chapter, Step, Symbol
 from upright.report.symbols import typed, unit
+from upright.rig.makes import OSCILLATORS
 from upright.study.load import Study
 
 

@@ -12,13 +12,13 @@ import numpy as np
 from upright.errors import BadInput
 from upright.experiments.hands_on.hanging import GROWTH, OF_TRAVEL, REACH, SHARE, STILL, travel_of
 from upright.experiments.hands_on.rig import RigAtHand
-from upright.experiments.makes import OSCILLATORS
 from upright.experiments.weighing_1a.from_logs import inertia_of, weigh
 from upright.identification.loadings import Loadings
 from upright.physics import Plant
 from upright.progress import Progress
 from upright.readers import read
 from upright.records import Record
+from upright.rig.makes import OSCILLATORS
 
 SWINGS = 10
 """Periods, by the guesses and with all masses on, for which it swings after each step."""

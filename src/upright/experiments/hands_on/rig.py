@@ -11,10 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from upright.basis import REPLAYED
-from upright.control.trial import ServoRig, Trial
+from upright.control.trial import Trial
 from upright.errors import BadInput, RigStopped
-from upright.experiments.identified import read_identified
-from upright.experiments.makes import MAKES, Make
 from upright.experiments.running.rig import described
 from upright.experiments.running.run import RigRun, RunRequest, run_rig
 from upright.files import read_text, write_json
@@ -22,8 +20,11 @@ from upright.laws import Law, Rule, as_values
 from upright.logs.layout import library
 from upright.realtime.session import RunState
 from upright.records import Array
+from upright.rig import Rig
+from upright.rig.makes import MAKES, Make, make_of_vendor
 from upright.rigs.protocol import Fault
 from upright.rigs.rigfile import RigFile, read_rig_file
+from upright.study.stored_rig import read_stored_rig
 
 Watch = Callable[[RunState], str]
 
@@ -45,7 +46,7 @@ class RigAtHand:
     Attributes
     ----------
     file : RigFile
-    model, truth : ServoRig
+    model, truth : Rig
         As its owner describes it, and what a twin truly is; the same of hardware.
     ask : callable
         Asks a person for something, in a sentence; answers whether it was done.
@@ -54,8 +55,8 @@ class RigAtHand:
     """
 
     file: RigFile
-    model: ServoRig
-    truth: ServoRig
+    model: Rig
+    truth: Rig
     ask: Callable[[str], bool] = nobody
     watching: Callable[[], AbstractContextManager[Watch]] = nobody_watches
 
@@ -64,8 +65,8 @@ class RigAtHand:
         """The make that RIG.toml or the description says it is of; a rig of one's own is of none."""
         if self.file.known is None:
             return MAKES[self.file.make]
-        known = read_identified(self.file.known)
-        return known.made_by(self.file.vendor or known.description.vendor)
+        known = read_stored_rig(self.file.known)
+        return make_of_vendor(self.file.vendor or known.hardware.vendor, known.plant)
 
     @property
     def names(self) -> list[str]:

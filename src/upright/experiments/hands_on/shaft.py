@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from upright.control import ServoRig
 from upright.experiments.hands_on.rig import RigAtHand, trial_of
-from upright.experiments.makes import make_of
 from upright.experiments.tracking_3.laws import AT, Tracker
 from upright.experiments.tracking_3.run import StepTrial, Tracking, asked_of, figured, follow
 from upright.laws import Law
 from upright.progress import Progress
 from upright.records import Array
+from upright.rig import Rig
+from upright.rig.makes import make_of
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -50,7 +50,7 @@ def pushed(law: Law, reference: Array, pushes: Array) -> Law:
     return replace(law, B=B, D=D, references=np.column_stack([reference, pushes]), reference_names=names)
 
 
-def times_as_fast(rig: RigAtHand, model: ServoRig) -> float:
+def times_as_fast(rig: RigAtHand, model: Rig) -> float:
     """Pole sets of Table 2 are for the makers' rigs; those of one's own are as much faster as the shaft swings."""
     if rig.make is not None:
         return 1.0

@@ -12,9 +12,10 @@ from typing import Any
 from upright.errors import BadInput
 from upright.experiments.frequency_1b.run import asked, bench
 from upright.experiments.hands_on.rig import RigAtHand
-from upright.experiments.makes import make_of
 from upright.files import read_text, replace_file
-from upright.study.text import TomlTable, number, study_text, table
+from upright.quantities import with_unit
+from upright.rig.makes import make_of
+from upright.study.text import TomlTable, study_text, table
 
 Tables = dict[str, dict[str, Any]]
 
@@ -93,9 +94,9 @@ def _of_make(rig: RigAtHand) -> Tables:
     values: Tables = {"parameters": {}, "actuator": {}}
     for name, p in start.parameters.items():
         where, _, key = name.rpartition(".")
-        told = number(p.value, p.unit, 10)
+        told = with_unit(p.value, p.unit, 10)
         entry: Any = {"guess": told, "min": 0} if p.estimate else told
         if p.uncertainty:
-            entry = {"value": told, "uncertainty": number(p.uncertainty, p.unit, 4)}
+            entry = {"value": told, "uncertainty": with_unit(p.uncertainty, p.unit, 4)}
         values[where or "parameters"][key] = entry
     return {"rig": {"plant": make.plant_name, "vendor": make.vendor}, **values}

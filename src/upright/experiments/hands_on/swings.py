@@ -10,11 +10,11 @@ from typing import Any
 from upright.errors import NotIdentifiable
 from upright.experiments.hands_on.rig import RigAtHand
 from upright.experiments.hands_on.studies import write_study
-from upright.experiments.makes import MAKES
 from upright.identification.estimate import identify
 from upright.identification.model.fit import Fit
 from upright.progress import Progress, part
 from upright.readers import read
+from upright.rig.makes import MAKES
 from upright.study.draft.release import free_from
 from upright.study.load import Study, load_study
 from upright.study.results import write_fit

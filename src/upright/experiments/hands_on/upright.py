@@ -13,15 +13,17 @@ from pathlib import Path
 from upright.control import score
 from upright.control.preflight import Preflight
 from upright.experiments.hands_on.rig import RigAtHand, trial_of
-from upright.experiments.identified import IdentifiedRig, read_identified
-from upright.experiments.makes import MAKES
 from upright.experiments.regulation_2.run import SETS, Came, Regulation, RegulationRequest, run_regulation
 from upright.experiments.running.run import RigRun
 from upright.gains.requests import Roots, read_poles
 from upright.laws import Law
 from upright.progress import Progress
 from upright.report.symbols import typed
+from upright.rig import Rig
+from upright.rig.completion import completed
+from upright.rig.makes import MAKES
 from upright.rigs.protocol import Fault
+from upright.study.stored_rig import read_stored_rig
 
 TILT = math.radians(4)
 """How far from upright a person lets go, and a twin's hand does."""
@@ -60,7 +62,7 @@ def came(done: RigRun) -> Came:
     return Came(trial=went, score=found, ended=done.end.stopped)
 
 
-def sets(rig: RigAtHand, known: IdentifiedRig) -> Mapping[str, Roots]:
+def sets(rig: RigAtHand, known: Rig) -> Mapping[str, Roots]:
     """Pole sets of Table 1 for a maker's rig; for one of one's own all of them as much faster as it falls faster."""
     printed = {name: read_poles(text) for name, text in SETS.items()}
     if rig.make is not None:
@@ -80,9 +82,8 @@ def run_upright(
         When a run did not begin.
     """
     held = rig.described_by(fit, folder / "rig.toml")
-    known = read_identified(fit, seed=seed)
-    said = known.described(vendor=rig.file.vendor, who="a run on a rig", form="")
+    known = completed(read_stored_rig(fit, seed=seed), vendor=rig.file.vendor, who="a run on a rig", form="")
     wish = RegulationRequest(poles=sets(rig, known), tilt=TILT, push=0.0, seconds=SECONDS)
     return run_regulation(
-        known, None, seed, folder, progress, stopped, wish, typed(fit), said=said, tried=_Trier(rig=held, folder=folder)
+        known, None, seed, folder, progress, stopped, wish, typed(fit), tried=_Trier(rig=held, folder=folder)
     )  # fmt: skip

@@ -10,12 +10,12 @@ from upright.control import SwingUp
 from upright.control.swing_up import Ascent, ascent_of
 from upright.errors import RigStopped
 from upright.experiments.hands_on.rig import RigAtHand, trial_of
-from upright.experiments.identified import read_identified
 from upright.experiments.swing_up_2b.run import SwingUpRun, known_of, run_swing_up
 from upright.progress import Progress
 from upright.readers import read
 from upright.records import Array, Record
 from upright.report.symbols import typed
+from upright.study.stored_rig import read_stored_rig
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -61,6 +61,6 @@ def run_upwards(
     """
     held = rig.described_by(fit, folder / "rig.toml")
     return run_swing_up(
-        held.model, held.model, folder, progress, stopped, known=known_of(read_identified(fit)), lies=False,
+        held.model, held.model, folder, progress, stopped, known=known_of(read_stored_rig(fit)), lies=False,
         source=typed(fit), at_hand=_Hands(rig=held, folder=folder),
     )  # fmt: skip

@@ -6,14 +6,15 @@ import math
 from typing import Any
 
 from upright.basis import SIMULATED
-from upright.control import Score, ServoRig
+from upright.control import Score
 from upright.control.preflight import FELT, WORDS, word
-from upright.experiments.identified import rig_table
 from upright.experiments.regulation_2.figures import chances_figure, runs_figure, ways_figure
 from upright.experiments.regulation_2.run import SETS, Attempt, Regulation, VelocityRun
 from upright.gains.requests import written
 from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Table, resting_on
+from upright.report.rig import rig_table
 from upright.report.symbols import number, plain
+from upright.rig import Rig
 
 SHOWN = 2.5
 """Seconds of the runs that are drawn."""
@@ -110,7 +111,7 @@ def _came(done: Regulation, s: Score) -> str:
     )
 
 
-def _shown(rig: ServoRig, i: int, value: float) -> str:
+def _shown(rig: Rig, i: int, value: float) -> str:
     """A coordinate's deviation in degrees or centimetres."""
     if rig.plant.coordinates[i].unit == "rad":
         return f"{math.degrees(value):.2g}°" if math.degrees(value) < 99.5 else f"{math.degrees(value):.0f}°"
@@ -207,7 +208,7 @@ def _parts(done: Regulation) -> list[Part]:
     )
     parts = [
         Part("Gains", (*given, _gain_table(done))),
-        Part("The rig", (rig_table(done.said),)),
+        Part("The rig", (rig_table(done.rig),)),
         Part(
             "Told before, come after",
             (
@@ -278,7 +279,7 @@ def _numbers(done: Regulation) -> dict[str, Any]:
         "seed": None if done.truth is None else done.truth.seed,
         "start": dict(zip(done.rig.plant.state_names(), done.task.start, strict=True)),
         "limit": done.rig.limit,
-        "described": done.said.plain(),
+        "described": done.rig.hardware.plain(),
         "command_unit": done.rig.unit,
         "recommended": done.best.name,
         "as_told": sum(a.word == a.before.word for a in done.ran) if done.ran else None,

@@ -15,13 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-from upright.control import Score, ServoRig, Trial, score, trial
+from upright.control import Score, Trial, score, trial
 from upright.control.preflight import Preflight, Task, preflight, word
 from upright.errors import BadInput
 from upright.experiments.designing.run import SPEEDS, velocities
 from upright.experiments.frequency_1b.run import run_frequency
-from upright.experiments.identified import IdentifiedRig, read_identified
-from upright.experiments.makes import PENDULUMS
 from upright.gains import Margins, Placement, feedback, margins, place
 from upright.gains.loop import closed, command_noise
 from upright.gains.requests import Roots, poles_of, read_poles
@@ -29,7 +27,10 @@ from upright.laws import Law
 from upright.paper.reproduce import TABLE_1
 from upright.progress import Progress, part, silent
 from upright.records import Array
-from upright.study.description import RigDescription
+from upright.rig import Rig
+from upright.rig.makes import PENDULUMS, make_of_vendor
+from upright.rig.variation import allowed
+from upright.study.stored_rig import read_stored_rig
 from upright.systems import StateSpace
 from upright.workers import HERE, Workers
 
@@ -125,9 +126,9 @@ class Regulation:
 
     Attributes
     ----------
-    rig : ServoRig
+    rig : Rig
         As identified.
-    truth : ServoRig or None
+    truth : Rig or None
         The rig on which the laws ran.
     task : Task
     wish : Wish
@@ -139,15 +140,13 @@ class Regulation:
     source : str
         What `upright regulate` is given to do this again.
     seed : int
-    said : RigDescription
-        Drive, encoders and servo, with what each number rests on.
     interrupted : bool
     seconds : float
         Computing time.
     """
 
-    rig: ServoRig
-    truth: ServoRig | None
+    rig: Rig
+    truth: Rig | None
     task: Task
     wish: RegulationRequest
     attempts: tuple[Attempt, ...]
@@ -155,7 +154,6 @@ class Regulation:
     uncertain: bool
     source: str
     seed: int
-    said: RigDescription = field(default_factory=RigDescription)
     interrupted: bool = False
     seconds: float = 0.0
 
@@ -175,15 +173,15 @@ class Regulation:
         return max(self.attempts, key=lambda a: (round(a.before.words["regulates"], 2), a.before.push))
 
 
-def identify_make(key: str, seed: int, folder: Path, progress: Progress = silent, draws: int = DRAWS) -> IdentifiedRig:
+def identify_make(key: str, seed: int, folder: Path, progress: Progress = silent, draws: int = DRAWS) -> Rig:
     """What experiment 1b makes of a rig of the make; its logs and `fit.json` go into the folder."""
     if key not in PENDULUMS:
         raise BadInput(f"there is nothing to hold upright on the make '{key}'; take one of {', '.join(PENDULUMS)}.")
     run_frequency(key, seed, folder, progress)
-    return read_identified(folder / "fit.json", seed=seed, draws=draws)
+    return read_stored_rig(folder / "fit.json", seed=seed, draws=draws)
 
 
-def _check_upright(known: IdentifiedRig) -> None:
+def _check_upright(known: Rig) -> None:
     plant = known.plant
     if "inverted" not in plant.equilibria or len(plant.coordinates) != 2 or len(plant.inputs) != 1:
         raise BadInput(
@@ -193,17 +191,17 @@ def _check_upright(known: IdentifiedRig) -> None:
 
 
 def run_regulation(
-    known: IdentifiedRig, truth: ServoRig | None, seed: int, folder: Path, progress: Progress = silent,
+    rig: Rig, truth: Rig | None, seed: int, folder: Path, progress: Progress = silent,
     stopped: Callable[[], bool] = lambda: False, wish: RegulationRequest | None = None, source: str = "FIT",
-    workers: Workers = HERE, said: RigDescription | None = None, tried: Try | None = None,
+    workers: Workers = HERE, tried: Try | None = None,
 ) -> Regulation:  # fmt: skip
     """Design for the rig as identified, say what will come, and run on the rig itself.
 
     Parameters
     ----------
-    known : IdentifiedRig
-        What was identified, hanging.
-    truth : ServoRig, optional
+    rig : Rig
+        As identified hanging, completed for a run.
+    truth : Rig, optional
         The rig; without it nothing is run and only what is expected is told.
     seed : int
         Of the hand's errors and of the rigs drawn.
@@ -218,22 +216,19 @@ def run_regulation(
         How a command line would name the fit.
     workers : Workers, optional
         Who simulates the rigs that the fit allows.
-    said : RigDescription, optional
-        Drive, encoders and servo; what the fit says of them when omitted.
     tried : callable, optional
         Runs the laws in the place of `truth`.
     """
     began = time.perf_counter()
     wish = wish or RegulationRequest()
-    _check_upright(known)
-    said = said or known.described(who="regulate")
-    rig, make = known.rig(said), known.made_by(said.vendor)
+    _check_upright(rig)
+    make = make_of_vendor(rig.hardware.vendor, rig.plant)
     usual = make.start if make else START
     model = rig.linear("inverted")
     sampled = model.to_sampled(rig.period, rig.delay / rig.period)
     tilt, push = (w if w is not None else s for w, s in zip((wish.tilt, wish.push), usual, strict=True))
     task = Task(start=(0.0, 0.0, tilt, push), hand=(0.0, 0.0, *HAND), seconds=wish.seconds)
-    others = known.allowed(rig, wish.draws, seed)
+    others = allowed(rig, wish.draws, seed)
     if tried is None and truth is not None:
         tried = partial(_on_twin, truth, task, seed)
     attempts: list[Attempt] = []
@@ -247,8 +242,8 @@ def run_regulation(
             interrupted = True
             break
     done = Regulation(
-        rig=rig, truth=truth, task=task, wish=wish, attempts=tuple(attempts), ways=(), uncertain=bool(known.draws),
-        source=source, seed=seed, said=said, interrupted=interrupted,
+        rig=rig, truth=truth, task=task, wish=wish, attempts=tuple(attempts), ways=(), uncertain=bool(rig.draws),
+        source=source, seed=seed, interrupted=interrupted,
     )  # fmt: skip
     progress("comparing the ways to the velocities", len(wish.poles) / (len(wish.poles) + 1))
     ways = () if interrupted else tuple(_ways(done, model, sampled))
@@ -265,7 +260,7 @@ def actual_start(task: Task, seed: int) -> Array:
 
 
 def _attempt(
-    name: str, poles: Roots, rig: ServoRig, tried: Try | None, model: StateSpace, sampled: StateSpace, task: Task,
+    name: str, poles: Roots, rig: Rig, tried: Try | None, model: StateSpace, sampled: StateSpace, task: Task,
     others: Mapping[str, Array], wish: RegulationRequest, seed: int, workers: Workers, progress: Progress,
 ) -> Attempt:  # fmt: skip
     placed = place(model.A, model.B, poles)
@@ -278,7 +273,7 @@ def _attempt(
     return Attempt(name=name, placement=placed, law=law, before=told, came=came)
 
 
-def _on_twin(truth: ServoRig, task: Task, seed: int, _name: str, law: Law, _told: Preflight) -> Came:
+def _on_twin(truth: Rig, task: Task, seed: int, _name: str, law: Law, _told: Preflight) -> Came:
     went = trial(truth, law, at=task.at, start=actual_start(task, seed), seconds=task.seconds)
     return Came(trial=went, score=score(went))
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from upright.control.trial import ServoRig
 from upright.errors import RigStopped
 from upright.experiments.running.rig import described, stage_of
+from upright.rig import Rig
 from upright.rigs import Board, Fault, LiveRig, TwinPort
 from upright.rigs.board import told
 from upright.rigs.rigfile import read_rig_file
@@ -110,7 +110,7 @@ def check_up(
     return Checkup(name=model.name, findings=tuple(out))
 
 
-def _described(model: ServoRig, period: float, counts: tuple[float, ...]) -> list[CheckupFinding]:
+def _described(model: Rig, period: float, counts: tuple[float, ...]) -> list[CheckupFinding]:
     """Whether the rig is the one that was described."""
     same = math.isclose(period, model.period, rel_tol=1e-3)
     told_of = f"{1e3 * period:.4g} ms, described as {1e3 * model.period:.4g} ms"
@@ -120,7 +120,7 @@ def _described(model: ServoRig, period: float, counts: tuple[float, ...]) -> lis
 
 
 def _by_hand(
-    rig: LiveRig, model: ServoRig, i: int, name: str, hand: Callable[[str], bool] | None
+    rig: LiveRig, model: Rig, i: int, name: str, hand: Callable[[str], bool] | None
 ) -> CheckupFinding:  # fmt: skip
     """One encoder, moved by hand in its positive sense."""
     unit, per = model.plant.coordinates[i].unit, model.counts[i]

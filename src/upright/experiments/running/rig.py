@@ -13,40 +13,40 @@ from typing import Any
 import numpy as np
 
 from upright.basis import DESCRIBED, SIMULATED, Basis, of_plain
-from upright.control.trial import ServoRig
 from upright.errors import BadInput, nearest
-from upright.experiments.identified import read_identified
-from upright.experiments.makes import make_named, make_rig
 from upright.files import read_text
 from upright.laws import Law, Rule, of_values
 from upright.realtime.session import Stage
 from upright.records import Array
+from upright.rig import Rig
+from upright.rig.completion import completed, twin_of
+from upright.rig.makes import make_named, make_rig
 from upright.rigs import Board, Limits, LiveRig, TwinPort
 from upright.rigs.driver import DRIVERS, Connection
 from upright.rigs.rigfile import RigFile, read_rig_file
 from upright.rigs.supervisor import Duty, Supervisor
+from upright.study.stored_rig import read_stored_rig
 
 LEAN, NEAR = math.radians(30), math.radians(10)
 """How far a pendulum may lean in a run and at its start, where RIG.toml does not say."""
 
 
-def described(file: RigFile) -> tuple[ServoRig, ServoRig]:
+def described(file: RigFile) -> tuple[Rig, Rig]:
     """The rig as it is known, and the one that a twin of it truly is."""
     if file.known is None:
         make = make_named(file.make, option="make")
         return make_rig(make.key), make_rig(make.key, file.seed)
-    known = read_identified(file.known, seed=file.seed)
-    said = known.described(vendor=file.vendor, who="a run on a rig", form="")
-    model = known.rig(said)
+    known = read_stored_rig(file.known, seed=file.seed)
+    model = completed(known, vendor=file.vendor, who="a run on a rig", form="")
     truth = model
     if file.performed == SIMULATED and file.make:
         truth = make_rig(make_named(file.make, option="make").key, file.seed)
     elif file.performed == SIMULATED and file.seed:
-        truth = known.twin(model, said, file.seed)
+        truth = twin_of(model, file.seed)
     return (replace(model, name=file.name), truth) if file.name else (model, truth)
 
 
-def live_rig(file: RigFile, model: ServoRig, truth: ServoRig) -> LiveRig:
+def live_rig(file: RigFile, model: Rig, truth: Rig) -> LiveRig:
     """The rig itself; a twin or a replay has its port as `port`.
 
     Raises
@@ -66,7 +66,7 @@ def live_rig(file: RigFile, model: ServoRig, truth: ServoRig) -> LiveRig:
         raise BadInput(f'{file.path}: [board] does not fit kind = "{file.kind}" ({error}).') from None
 
 
-def usual_limits(rig: ServoRig) -> Limits:
+def usual_limits(rig: Rig) -> Limits:
     """Limits of a twin, from what is known of the rig; nothing real may go by these."""
     names = [c.name for c in rig.plant.coordinates]
     free = [math.inf] * len(names)
@@ -142,7 +142,7 @@ def _nothing() -> None:
     """What a person does."""
 
 
-def read_law(path: Path, model: ServoRig, at: str, zero: str) -> tuple[Law | Rule, Basis]:
+def read_law(path: Path, model: Rig, at: str, zero: str) -> tuple[Law | Rule, Basis]:
     """Law of a design.json, or of a file that `upright.laws.as_values` filled, about what is held; and its basis.
 
     Raises

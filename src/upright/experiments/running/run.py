@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from upright.basis import DESCRIBED, MEASURED, Basis
-from upright.control.trial import ServoRig
 from upright.errors import BadInput
 from upright.experiments.running.rig import described, open_loop, read_law, signal, stage_of
 from upright.files import read_text
@@ -22,6 +21,7 @@ from upright.realtime.jitter import TOLERATED
 from upright.realtime.process import run_in_process
 from upright.realtime.session import RunEnd, RunOrder, RunState, carry_out
 from upright.records import Array
+from upright.rig import Rig
 from upright.rigs.protocol import Mode
 from upright.rigs.rigfile import RigFile, read_rig_file
 
@@ -73,7 +73,7 @@ class RigRun:
     ----------
     wish : RunRequest
     file : RigFile
-    model : ServoRig
+    model : Rig
         As it is known.
     end : RunEnd
     log : RunLog or None
@@ -85,7 +85,7 @@ class RigRun:
 
     wish: RunRequest
     file: RigFile
-    model: ServoRig
+    model: Rig
     end: RunEnd
     log: RunLog | None
     log_path: Path
@@ -204,7 +204,7 @@ def run_rig(
     return RigRun(wish=wish, file=file, model=model, end=end, log=log, log_path=path, basis=basis)
 
 
-def _references(law: Law | Rule, model: ServoRig) -> tuple[tuple[str, str], ...]:
+def _references(law: Law | Rule, model: Rig) -> tuple[tuple[str, str], ...]:
     """Names and units for the log of what the law follows; of signals that it came with or was given."""
     if not isinstance(law, Law) or law.references is None:
         return ()

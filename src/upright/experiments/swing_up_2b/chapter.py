@@ -6,15 +6,15 @@ import math
 from typing import Any
 
 from upright.basis import SIMULATED
-from upright.control import ServoRig
 from upright.control.sensors import Scales
 from upright.control.swing_up import Ascent
-from upright.experiments.makes import make_of
 from upright.experiments.swing_up_2b.figures import ascent_figure, check_figure, portrait_figure
 from upright.experiments.swing_up_2b.run import HELD, LIES, TILT, Lie, SwingUpRun
 from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Table, resting_on
 from upright.report.symbols import number, percent
 from upright.report.symbols import unit as raised
+from upright.rig import Rig
+from upright.rig.makes import make_of
 
 QUESTION = (
     "Do the encoders show what is true, and does the drive, within its limit and travel, bring the hanging pendulum "
@@ -39,7 +39,7 @@ def chapter(done: SwingUpRun) -> Chapter:
     return resting_on(told, done.model.basis, SIMULATED if done.simulated else "")
 
 
-def check_chapter(model: ServoRig, check: Scales, log: str, source: str = "FIT.json") -> Chapter:
+def check_chapter(model: Rig, check: Scales, log: str, source: str = "FIT.json") -> Chapter:
     """What a log of a hanging rig says of its encoders, by itself."""
     again = Step("Mend what is said above, log the hanging rig again, and check again.")
     onward = Step("The encoders may be trusted: find the gains that hold the rig.",
@@ -58,7 +58,7 @@ def _scales(check: Scales) -> dict[str, Any]:
     return {n: {"scale": v, "stderr": e, "explained": x, "sound": n not in check.wrong} for n, v, e, x in each}
 
 
-def _sensor_part(model: ServoRig, check: Scales) -> Part:
+def _sensor_part(model: Rig, check: Scales) -> Part:
     """What the hanging rig says of its encoders."""
     rows = tuple(
         (name, number(v, 5), number(2 * e, 2), percent(100 * x), "to be mended" if name in check.wrong else "sound")

@@ -15,16 +15,16 @@ from typing import Protocol
 
 import numpy as np
 
-from upright.control import ServoRig, SwingUp, design_swing_up, trial
+from upright.control import SwingUp, design_swing_up, trial
 from upright.control.score import FALLEN
 from upright.control.sensors import KNOWN, Scales, Suspicion, Watch, probe, put_out, scales
 from upright.control.swing_up import Ascent, swing_up
 from upright.control.trial import readings
 from upright.errors import BadInput, NotIdentifiable, nearest
-from upright.experiments.identified import IdentifiedRig
 from upright.gains import feedback, filtered
 from upright.progress import Progress, silent
 from upright.records import Array, Record
+from upright.rig import Rig
 from upright.units import same_dimension, scale
 
 HELD = 5.0
@@ -79,9 +79,9 @@ class SwingUpRun:
 
     Attributes
     ----------
-    model : ServoRig
+    model : Rig
         As known.
-    truth : ServoRig
+    truth : Rig
     log : Record
         Of the encoders under commands put out blindly.
     check : Scales
@@ -99,8 +99,8 @@ class SwingUpRun:
         Whether a twin stood in for the rig.
     """
 
-    model: ServoRig
-    truth: ServoRig
+    model: Rig
+    truth: Rig
     log: Record
     check: Scales
     law: SwingUp
@@ -146,7 +146,7 @@ class SwingUpRun:
         )
 
 
-def known_of(identified: IdentifiedRig) -> Mapping[str, float]:
+def known_of(identified: Rig) -> Mapping[str, float]:
     """Relative standard errors of a fit's numbers, from the rigs that it allows; friction as it may be on the day."""
     out: dict[str, float] = {}
     for name, value in identified.plant.parameters().items():
@@ -160,12 +160,12 @@ def known_of(identified: IdentifiedRig) -> Mapping[str, float]:
     return out
 
 
-def scales_of_log(model: ServoRig, log: Record, known: Mapping[str, float] | None = None) -> Scales:
+def scales_of_log(model: Rig, log: Record, known: Mapping[str, float] | None = None) -> Scales:
     """Scales of the encoders from a log; see `upright.control.sensors.scales`.
 
     Parameters
     ----------
-    model : ServoRig
+    model : Rig
     log : Record
         Columns named as the coordinates, in any unit or in counts, and the command ``u``, from rest.
     known : mapping of str to float, optional
@@ -216,8 +216,8 @@ class Hands(Protocol):
 
 
 def run_swing_up(
-    model: ServoRig,
-    truth: ServoRig,
+    model: Rig,
+    truth: Rig,
     folder: Path,
     progress: Progress = silent,
     stopped: Callable[[], bool] = lambda: False,
@@ -233,9 +233,9 @@ def run_swing_up(
 
     Parameters
     ----------
-    model : ServoRig
+    model : Rig
         As known: as designed, or as identified.
-    truth : ServoRig
+    truth : Rig
         The rig itself.
     folder : Path
         Takes ``sensors.csv`` and ``swing_up.csv``.
@@ -281,8 +281,8 @@ def run_swing_up(
 
 
 def _lies(
-    model: ServoRig,
-    truth: ServoRig,
+    model: Rig,
+    truth: Rig,
     law: SwingUp,
     command: Array,
     known: Mapping[str, float] | None,

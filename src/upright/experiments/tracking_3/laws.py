@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.control import ServoRig
 from upright.control.score import step_figures
 from upright.control.trial import SUBSTEPS, at_work
 from upright.errors import BadInput
@@ -26,6 +25,7 @@ from upright.gains.requests import Roots, conjugate_poles, poles_of
 from upright.laws import Law
 from upright.paper.reproduce import TABLE_2, poles
 from upright.records import Array
+from upright.rig import Rig
 from upright.simulation import simulate
 from upright.systems import StateSpace, to_s
 
@@ -80,7 +80,7 @@ class Tracker:
         return float(np.min(-self.poles.real / np.abs(self.poles)))
 
 
-def tracker(rig: ServoRig, name: str, K: Array, k_pf: float, *, asked: Roots | None = None) -> Tracker:
+def tracker(rig: Rig, name: str, K: Array, k_pf: float, *, asked: Roots | None = None) -> Tracker:
     """Gains as a law on a rig's encoders, and what it is worth there."""
     law = state_law(rig, K, k_pf)
     return Tracker(
@@ -90,13 +90,13 @@ def tracker(rig: ServoRig, name: str, K: Array, k_pf: float, *, asked: Roots | N
     )  # fmt: skip
 
 
-def state_law(rig: ServoRig, K: Array, k_pf: float) -> Law:
+def state_law(rig: Rig, K: Array, k_pf: float) -> Law:
     """The matrices of gains on differenced encoders."""
     sampled = rig.linear(AT).to_sampled(rig.period, 0.0)
     return feedback(filtered(sampled, MEMORY), K, k_pf)
 
 
-def by_poles(rig: ServoRig, name: str, wanted: Roots) -> Tracker:
+def by_poles(rig: Rig, name: str, wanted: Roots) -> Tracker:
     """State feedback by Ackermann's formula, with the prefilter for unit static gain to the far body."""
     model = rig.linear(AT)
     K = place(model.A, model.B, wanted).K
@@ -113,7 +113,7 @@ def check(which: Sequence[int], own: Roots | None) -> None:
         raise BadInput("nothing to follow with: name a set of Table 2 or poles.")
 
 
-def paper_sets(rig: ServoRig, which: Sequence[int] = (1, 2, 3, 4), faster: float = 1.0) -> tuple[Tracker, ...]:
+def paper_sets(rig: Rig, which: Sequence[int] = (1, 2, 3, 4), faster: float = 1.0) -> tuple[Tracker, ...]:
     """State feedback by the sets of Table 2, or by poles that are so many times as fast."""
     times = "" if faster == 1.0 else f" x{faster:.2g}"
     return tuple(by_poles(rig, f"set {i}{times}", faster * poles(TABLE_2[i - 1])[0]) for i in which)
@@ -124,7 +124,7 @@ def far(model: StateSpace) -> Array:
     return model.C[-1]
 
 
-def play(rig: ServoRig, K: Array, k_pf: float) -> float:
+def play(rig: Rig, K: Array, k_pf: float) -> float:
     """Largest error of the far body at rest that dry friction can hold, two bodies without springs to ground.
 
     The far body stays while ``|k (x_1 - x_2)| <= f_2``, the near one while ``|gain u - k (x_1 - x_2)| <= f_1``; with
@@ -136,7 +136,7 @@ def play(rig: ServoRig, K: Array, k_pf: float) -> float:
     return (f_1 + f_2) / (rig.gain * k_pf) + abs(K[0]) / k_pf * f_2 / p["k_12"]
 
 
-def with_sum(rig: ServoRig, base: Tracker, name: str) -> Tracker:
+def with_sum(rig: Rig, base: Tracker, name: str) -> Tracker:
     """The same poles and one more, EXTRA, for the sum of the error: what friction holds and what pushes is made up for.
 
     With ``k_pf = k_i/|EXTRA|`` the zero of the reference's way in lies on the added pole, so that the step is followed
@@ -160,12 +160,12 @@ def with_sum(rig: ServoRig, base: Tracker, name: str) -> Tracker:
     return replace(plain, law=summed, poles=loop_poles(rig, summed), play=0.0)
 
 
-def closed_by(rig: ServoRig, law: Law) -> Array:
+def closed_by(rig: Rig, law: Law) -> Array:
     """Matrix of the sampled loop of a law on a rig, about rest; dry friction and rounding left out."""
     return closed(rig.linear(AT).to_sampled(rig.period, rig.delay / rig.period, rig.lag), law)
 
 
-def loop_poles(rig: ServoRig, law: Law) -> Roots:
+def loop_poles(rig: Rig, law: Law) -> Roots:
     """Poles [1/s] of that loop, those that die within three samples left out."""
     s = to_s(poles_of(closed_by(rig, law)), rig.period)
     return s[s.real > -SLOW / rig.period]
@@ -175,17 +175,17 @@ DWELL = 2.0
 """How long each is watched [s]."""
 
 
-def near_pd(rig: ServoRig, name: str, kp: float, kd: float) -> Tracker:
+def near_pd(rig: Rig, name: str, kp: float, kd: float) -> Tracker:
     """PD on the driven body's encoder, with the reference of the far one."""
     return tracker(rig, name, _gains(rig, 0, kp, kd), kp)
 
 
-def far_pd(rig: ServoRig, name: str, kp: float, kd: float) -> Tracker:
+def far_pd(rig: Rig, name: str, kp: float, kd: float) -> Tracker:
     """PD on the far body's encoder."""
     return tracker(rig, name, _gains(rig, len(rig.plant.coordinates) - 1, kp, kd), kp)
 
 
-def _gains(rig: ServoRig, body: int, kp: float, kd: float) -> Array:
+def _gains(rig: Rig, body: int, kp: float, kd: float) -> Array:
     K = np.zeros(2 * len(rig.plant.coordinates))
     K[2 * body : 2 * body + 2] = kp, kd
     return K
@@ -201,7 +201,7 @@ class GainSearch:
     settling: Array
 
 
-def tune(rig: ServoRig, step: float, most: float) -> tuple[Tracker, GainSearch]:
+def tune(rig: Rig, step: float, most: float) -> tuple[Tracker, GainSearch]:
     """The PD on the near encoder that brings the far body soonest within 5 % of the reference, and keeps it there.
 
     Every pair of gains of a grid runs on the rig in the kernel, with friction, encoders, converter and limit; then a
@@ -220,7 +220,7 @@ def tune(rig: ServoRig, step: float, most: float) -> tuple[Tracker, GainSearch]:
     return near_pd(rig, "PD, tuned", float(best[0]), float(best[1])), found
 
 
-def tried(rig: ServoRig, pairs: Array, step: float) -> Array:
+def tried(rig: Rig, pairs: Array, step: float) -> Array:
     """Arrival and settling to 5 % of many PD laws at once, shape (pairs, 2)."""
     c = len(rig.plant.coordinates)
     estimator = filtered(rig.linear(AT).to_sampled(rig.period, 0.0), MEMORY)
@@ -249,7 +249,7 @@ def continuous(model: StateSpace) -> tuple[Array, Array, Array]:
     return model.A, P, D
 
 
-def sampled(rig: ServoRig) -> tuple[Array, Array, Array]:
+def sampled(rig: Rig) -> tuple[Array, Array, Array]:
     """The same as it runs: held, late, lagging, with filtered differences."""
     A, P, D = (closed_by(rig, state_law(rig, _gains(rig, 0, *g), 0.0)) for g in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
     return A, P - A, D - A

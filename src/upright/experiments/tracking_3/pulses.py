@@ -12,21 +12,20 @@ from pathlib import Path
 
 import numpy as np
 
-from upright.control import ServoRig
 from upright.control.trial import twin_log
 from upright.errors import BadInput
-from upright.experiments.identified import IdentifiedRig
-from upright.experiments.makes import SHAFTS, Make, make_of
 from upright.experiments.weighing_1a.run import Known
 from upright.files import replace_file
 from upright.identification.model.fit import Fit
 from upright.physics import Plant
 from upright.progress import Progress, part, silent
+from upright.quantities import with_unit
 from upright.records import Record
-from upright.study.description import RigDescription
+from upright.rig import Rig
+from upright.rig.makes import SHAFTS, Make, make_of
 from upright.study.fitted import basis_of
 from upright.study.load import Study
-from upright.study.text import TomlTable, counted_sensor, number, study_text, table
+from upright.study.text import TomlTable, counted_sensor, study_text, table
 
 EVERY = 5
 """Servo periods per logged sample."""
@@ -51,16 +50,16 @@ def shaft_make(plant: Plant, name: str) -> Make:
     return make
 
 
-def rig_of_file(known: IdentifiedRig, said: RigDescription, name: str) -> ServoRig:
-    """The rig that a fit or a study of this `name` tells of, with drive and encoders as they are described."""
+def rig_of_file(known: Rig, name: str) -> Rig:
+    """The completed rig that a fit or a study of this `name` tells of."""
     shaft_make(known.plant, f"'{known.name}'")
     p = known.plant.parameters()
     if p["k_1"] or p["k_2"]:
         raise BadInput("tracking is for bodies without springs to ground, and k_1 or k_2 of this fit is not zero.")
-    return replace(known.rig(said), name=f"the rig of {name}")
+    return replace(known, name=f"the rig of {name}")
 
 
-def pulses(rig: ServoRig, file: str) -> Record:
+def pulses(rig: Rig, file: str) -> Record:
     """Log of what the encoders show, in counts, while the drive pulses [V]."""
     from upright.simulation import simulate
 
@@ -79,7 +78,7 @@ def pulses(rig: ServoRig, file: str) -> Record:
     return twin_log(rig, t, np.floor(x * np.array(rig.counts) + 0.5), u, unit="counts")
 
 
-def shaft_study(rig: ServoRig, seed: int, weighed: Sequence[Known] = ()) -> str:
+def shaft_study(rig: Rig, seed: int, weighed: Sequence[Known] = ()) -> str:
     """Study of the logs, its guesses 30 % off what the make is designed to be.
 
     The inertia that experiment 1a weighed is known as well as it says, and the drive's gain follows; else the gain is
@@ -92,15 +91,15 @@ def shaft_study(rig: ServoRig, seed: int, weighed: Sequence[Known] = ()) -> str:
     for name, value in make.plant.parameters().items():
         unit = make.plant.quantity(name).unit
         if name in known:
-            told, error = number(known[name].value, unit, 6), number(known[name].stderr, unit, 2)
+            told, error = with_unit(known[name].value, unit, 6), with_unit(known[name].stderr, unit, 2)
             parameters.key(name, {"value": told, "uncertainty": error}, "experiment 1a")
         elif value:
-            parameters.key(name, {"guess": number(value * rng.choice([0.7, 1.3]), unit, 4), "min": 0})
+            parameters.key(name, {"guess": with_unit(value * rng.choice([0.7, 1.3]), unit, 4), "min": 0})
     actuator = TomlTable("[actuator]", "the loop's poles do not depend on the gain, masses and springs do")
-    gain = number(make.gain, make.gain_unit, 6)
+    gain = with_unit(make.gain, make.gain_unit, 6)
     actuator.key("gain", {"guess": gain, "min": 0} if known else {"value": gain, "uncertainty": GAIN_ERROR})
-    actuator.key("delay", number(1e3 * rig.delay, "ms", 6))
-    actuator.key("lag", number(1e3 * rig.lag, "ms", 6))
+    actuator.key("delay", with_unit(1e3 * rig.delay, "ms", 6))
+    actuator.key("lag", with_unit(1e3 * rig.lag, "ms", 6))
     defaults = TomlTable("[defaults]")
     defaults.key("initial", dict.fromkeys(rig.plant.state_names()[1::2], 0.0), "at rest")
     defaults.key("unknown", ["initial"])
@@ -126,7 +125,7 @@ def shaft_study(rig: ServoRig, seed: int, weighed: Sequence[Known] = ()) -> str:
 
 
 def identify_shaft(
-    rig: ServoRig, seed: int, folder: Path, progress: Progress = silent, weighed: Sequence[Known] = ()
+    rig: Rig, seed: int, folder: Path, progress: Progress = silent, weighed: Sequence[Known] = ()
 ) -> tuple[Study, Fit]:
     """Pulse a rig, write logs and study, and fit it as `upright identify` would; writes `fit.json` too."""
     from upright.identification.estimate import identify
@@ -144,7 +143,7 @@ def identify_shaft(
     return study, fit
 
 
-def fitted(rig: ServoRig, fit: Fit) -> ServoRig:
+def fitted(rig: Rig, fit: Fit) -> Rig:
     """The rig as the fit sees it: same drive, encoders and period, plant, gain and verdict as estimated."""
     values = {n: p.value for n, p in fit.rig.parameters.items()} | {n: e.value for n, e in fit.estimates.items()}
     plant = rig.plant.replace(**{n: v for n, v in values.items() if n in rig.plant.names()})

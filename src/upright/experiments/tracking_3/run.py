@@ -15,11 +15,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.control import ServoRig, Trial, trial
+from upright.control import Trial, trial
 from upright.control.score import Effort, StepFigures, effort, step_figures
 from upright.errors import BadInput
-from upright.experiments.identified import DAILY
-from upright.experiments.makes import MAKES, make_rig
 from upright.experiments.tracking_3.laws import (
     AT,
     GainSearch,
@@ -37,6 +35,9 @@ from upright.experiments.weighing_1a.run import Known
 from upright.identification.model.fit import Fit
 from upright.progress import Progress, silent
 from upright.records import Array
+from upright.rig import Rig
+from upright.rig.makes import MAKES, make_rig
+from upright.rig.variation import DAILY
 from upright.study.load import Study
 
 RESERVE = 0.95
@@ -112,7 +113,7 @@ class Tracking:
 
     Attributes
     ----------
-    rig, model, true : ServoRig
+    rig, model, true : Rig
         On the day of the trials, as the fit sees it, and when it was measured; all the same where only a fit was given.
     folder : Path
         Holds logs, study and fit; the fit itself where only that was given.
@@ -128,9 +129,9 @@ class Tracking:
         What the tuning tried.
     """
 
-    rig: ServoRig
-    model: ServoRig
-    true: ServoRig
+    rig: Rig
+    model: Rig
+    true: Rig
     folder: Path
     study: Study | None
     fit: Fit | None
@@ -167,7 +168,7 @@ class Tracking:
 
 
 def run_tracking(
-    rig: str | ServoRig, seed: int, folder: Path, progress: Progress = silent,
+    rig: str | Rig, seed: int, folder: Path, progress: Progress = silent,
     stopped: Callable[[], bool] = lambda: False, *, which: Sequence[int] = (1, 2, 3, 4),
     poles: NDArray[np.complex128] | None = None, step: float | None = None, weighed: Sequence[Known] = (),
 ) -> Tracking:  # fmt: skip
@@ -175,7 +176,7 @@ def run_tracking(
 
     Parameters
     ----------
-    rig : str or ServoRig
+    rig : str or Rig
         A make, or a rig with two inertias; the make of a pendulum's rig stands for the rig without it.
     seed : int
         Which rig of the make, and the guesses of the fit.
@@ -216,7 +217,7 @@ def run_tracking(
     )
 
 
-def another_day(rig: ServoRig, seed: int) -> ServoRig:
+def another_day(rig: Rig, seed: int) -> Rig:
     """The same rig when its dry friction has changed as between runs of real rigs."""
     rng = np.random.default_rng([seed, 31])
     dry = {n: rig.plant.parameters()[n] for n in ("f_1c", "f_2c")}
@@ -228,7 +229,7 @@ Try = Callable[[Tracker, StepTrial, float], StepTrial | None]
 
 
 def follow(
-    rig: ServoRig, model: ServoRig, folder: Path, study: Study | None, fit: Fit | None, progress: Progress,
+    rig: Rig, model: Rig, folder: Path, study: Study | None, fit: Fit | None, progress: Progress,
     stopped: Callable[[], bool] = lambda: False, *, which: Sequence[int] = (1, 2, 3, 4),
     poles: NDArray[np.complex128] | None = None, step: float | None = None, faster: float = 1.0,
     tried: Try | None = None,
@@ -271,16 +272,16 @@ def follow(
     return replace(done, stiff=outcome(stiff), far=outcome(far))
 
 
-def stiffest_damped(model: ServoRig, kp: float) -> Tracker:
+def stiffest_damped(model: Rig, kp: float) -> Tracker:
     """PD of the near encoder with this kp, and the kd for which its slowest pole decays fastest."""
     tried = [near_pd(model, "PD, as stiff", kp, kp * rate) for rate in np.geomspace(5e-3, 0.2, 25).tolist()]
     return max(tried, key=lambda law: law.decay)
 
 
-def choose(model: ServoRig, laws: Sequence[Tracker], step: float | None = None) -> Chosen:
+def choose(model: Rig, laws: Sequence[Tracker], step: float | None = None) -> Chosen:
     """The largest step of two digits that keeps every law within effort, twist and travel, by the linear model."""
     most = RESERVE * model.limit / max(abs(law.k_pf) for law in laws)
-    free = replace(model, twist=math.inf, travel=math.inf)  # a trip would cut short what is to be scaled
+    free = model.replace(twist=math.inf, travel=math.inf)  # a trip would cut short what is to be scaled
     unit = [attempt(free, law, 0.5 * most) for law in laws]
     twist = 0.6 * model.twist * 0.5 * most / max(r.twist for r in unit)
     travel = 0.6 * model.travel * 0.5 * most / max(r.travel for r in unit)
@@ -294,7 +295,7 @@ def choose(model: ServoRig, laws: Sequence[Tracker], step: float | None = None) 
     return Chosen(size=size, reason=reason, by_effort=most, by_twist=twist, by_travel=travel)
 
 
-def asked_of(rig: ServoRig, step: float) -> tuple[Array, Array]:
+def asked_of(rig: Rig, step: float) -> tuple[Array, Array]:
     """Reference and push, sample by sample: zero, the step, then a steady push while the reference stays."""
     before, at, end = _ticks(rig)
     reference, pushes = np.zeros(end + 1), np.zeros(end + 1)
@@ -302,12 +303,12 @@ def asked_of(rig: ServoRig, step: float) -> tuple[Array, Array]:
     return reference, pushes
 
 
-def _ticks(rig: ServoRig) -> tuple[int, int, int]:
+def _ticks(rig: Rig) -> tuple[int, int, int]:
     before, at, end = (round(s / rig.period) for s in (BEFORE, BEFORE + DWELL, BEFORE + DWELL + PUSHED))
     return before, at, end
 
 
-def attempt(rig: ServoRig, law: Tracker, step: float) -> StepTrial:
+def attempt(rig: Rig, law: Tracker, step: float) -> StepTrial:
     """A law on a simulated rig."""
     reference, pushes = asked_of(rig, step)
     start = np.zeros(2 * len(rig.plant.coordinates))

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from upright.experiments.makes import OSCILLATORS
 from upright.experiments.weighing_1a.figures import decrement_figure, line_figure, swing_figure
 from upright.experiments.weighing_1a.run import Known, Weighing, truth
 from upright.identification.loadings import Loaded, Loadings
@@ -16,6 +15,7 @@ from upright.records import Record
 from upright.report.fit.tables import interval, plain_estimate
 from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Symbol, Table
 from upright.report.symbols import measured, number, typed, unit
+from upright.rig.makes import OSCILLATORS
 
 QUESTION = (
     "How stiff is the spring, and how heavy is the bare body? A step makes the body swing; known inertias are added "

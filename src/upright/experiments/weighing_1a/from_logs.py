@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from upright.errors import BadInput, NotIdentifiable
-from upright.experiments.makes import MASS_RADIUS, OSCILLATORS, check_radius
 from upright.experiments.weighing_1a.chapter import loading_chapter
 from upright.experiments.weighing_1a.run import drawn_twin, measure_body, truth
 from upright.identification.loadings import Loaded, Loadings, fit_loadings, swings
 from upright.physics.oscillators import added_inertia
 from upright.records import Record
 from upright.report.page import Chapter, Step
+from upright.rig.makes import MASS_RADIUS, OSCILLATORS, check_radius
 from upright.units import parse, same_dimension
 
 _MASSES = re.compile(r"\s*(\d+)\s+at\s+(.+)")

@@ -7,10 +7,10 @@ from itertools import pairwise
 from typing import Any
 
 from upright.errors import BadInput
-from upright.experiments.makes import MASS_RADIUS, check_radius
 from upright.identification.loadings import Loading, Plan
 from upright.physics.oscillators import added_inertia, added_mass
 from upright.report.page import Chapter, Part, Step, Table
+from upright.rig.makes import MASS_RADIUS, check_radius
 
 FLAT = 0.1
 """A run more is worth it while it tightens the stiffness by this share."""

@@ -14,14 +14,14 @@ from pathlib import Path
 
 import numpy as np
 
-from upright.control.trial import ServoRig
 from upright.errors import NotIdentifiable
-from upright.experiments.makes import CONVERTER, OSCILLATORS, SERVO, Make, Oscillator, make_of
 from upright.identification.loadings import Loaded, Loadings, fit_loadings, swings
 from upright.physics import Plant
 from upright.progress import Progress, silent
 from upright.records import Record
 from upright.records.record import of_twin
+from upright.rig import Rig
+from upright.rig.makes import CONVERTER, OSCILLATORS, SERVO, Make, Oscillator, make_of
 
 PIECES = 4  # 500 g masses that come with a rig
 EVERY = 4  # servo periods per logged sample
@@ -131,7 +131,7 @@ class Known:
 class Weighing:
     """Experiment 1a on a rig: the swings with their line, and what they say about the rig as it is used later."""
 
-    rig: ServoRig
+    rig: Rig
     make: Make
     folder: Path
     files: dict[str, str]
@@ -161,7 +161,7 @@ def measure_body(
     return Campaign(on=on, logs=logs, added=added, loadings=found, left_out=tuple(left_out))
 
 
-def first_body(rig: ServoRig) -> LoadedTwin:
+def first_body(rig: Rig) -> LoadedTwin:
     """The first body of a rig on a spring, its masses unbolted.
 
     A pendulum's cart sits between two springs, its disk below a clamped shaft; of two bodies the second is clamped, so
@@ -178,13 +178,13 @@ def first_body(rig: ServoRig) -> LoadedTwin:
     return replace(drawn, truth=drawn.truth.replace(**{design.inertia: true[make.body] - on}, **spring))
 
 
-def _make(rig: ServoRig) -> Make:
+def _make(rig: Rig) -> Make:
     return make_of(
         rig.plant, f"experiment 1a knows carts, disks and pendulums on them, and no {type(rig.plant).__name__}."
     )
 
 
-def run_weighing(rig: ServoRig, seed: int, folder: Path, progress: Progress = silent) -> Weighing:
+def run_weighing(rig: Rig, seed: int, folder: Path, progress: Progress = silent) -> Weighing:
     """Weigh the first body of a rig; its logs are written to `folder`."""
     make = _make(rig)
     done = measure_body(first_body(replace(rig, seed=seed)), progress)

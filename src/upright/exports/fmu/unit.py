@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 
-from upright.control.trial import GAIN
 from upright.errors import BadInput
-from upright.experiments.identified import IdentifiedRig
 from upright.exports.steps import substeps
+from upright.rig import Rig
+from upright.rig.drive import GAIN
 from upright.simulation import Simulator, choose
 
 STEP = 1e-3
@@ -34,7 +34,7 @@ class Variable:
 class Unit:
     """A rig and the kernel that moves it; `told` is what the unit has otherwise than the fit, in sentences."""
 
-    rig: IdentifiedRig
+    rig: Rig
     simulator: Simulator
     values: dict[str, float]
     told: tuple[str, ...]
@@ -93,7 +93,7 @@ class Unit:
         return out
 
 
-def unit_of(rig: IdentifiedRig) -> Unit:
+def unit_of(rig: Rig) -> Unit:
     """The unit of a rig.
 
     Raises
@@ -101,7 +101,7 @@ def unit_of(rig: IdentifiedRig) -> Unit:
     BadInput
         When the drive remembers what a unit does not, or more than it can.
     """
-    said, plant = rig.description, rig.plant
+    said, plant = rig.hardware, rig.plant
     if said.value("relaxation", 0.0):
         raise BadInput(
             "braking that builds up (actuator.relaxation) is remembered from step to step, which the unit does not; "

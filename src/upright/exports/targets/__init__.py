@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from upright.declared import Declaration, Declared, declared_in
-from upright.experiments.identified import IdentifiedRig
 from upright.exports.controller import SampledController
 from upright.exports.vector import ReplayVector
 from upright.report.page import Chapter
+from upright.rig import Rig
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +52,7 @@ class RigExport:
 
     Attributes
     ----------
-    rig : IdentifiedRig
+    rig : Rig
     called : str
         How a command would name what it was read from.
     folder : Path
@@ -63,7 +63,7 @@ class RigExport:
         Largest command that was asked for.
     """
 
-    rig: IdentifiedRig
+    rig: Rig
     called: str
     folder: Path
     kept: Callable[[], Path]

@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from upright.physics import Plant, find
+from upright.quantities import with_unit
 from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Column
 from upright.records import Array, Record
 from upright.signals.smoothing import acceleration_width, savitzky_golay
@@ -32,7 +33,7 @@ from upright.study.draft.tables import (
     sensor_table,
 )
 from upright.study.rig import per
-from upright.study.text import TomlTable, number
+from upright.study.text import TomlTable
 
 SI = {"mm": 1e-3, "deg": float(np.pi / 180)}
 
@@ -169,11 +170,11 @@ def _parameters(log: ChainLog, plant: type[Plant], start: ChainStarts) -> TomlTa
             coordinate = plant.coordinates[body].name
             c = log.recognised.columns[coordinate]
             least = max(3 * (c.quantum.step or 0.0), 1e-4 * (c.high - c.low)) * _factor(log, plant, coordinate)
-            guess = {"guess": number(5 * least, what.unit, 2), "min": number(least, what.unit, 2)}
+            guess = {"guess": with_unit(5 * least, what.unit, 2), "min": with_unit(least, what.unit, 2)}
             table.key(name, guess, what.meaning)
         elif value is not None:
             half = 0.5 if carts and name == "k_1" and len(stuck) == 2 and stuck[1] else 1.0
-            table.key(name, {"guess": number(half * value, what.unit), "min": 0}, what.meaning)
+            table.key(name, {"guess": with_unit(half * value, what.unit), "min": 0}, what.meaning)
         else:
             left.append(name)
     parameters_left_at_zero(table, plant, left)
@@ -189,13 +190,13 @@ def _drive(log: ChainLog, plant: type[Plant], start: ChainStarts) -> list[TomlTa
     actuator = TomlTable("[actuator]")
     why = f"{force.meaning} per command: nobody measured it, so masses, springs and friction are per that"
     actuator.key("gain", assumed(1, per(force.unit, unit)), why)
-    braked = {"guess": number(start.braked, damping), "min": 0}
+    braked = {"guess": with_unit(start.braked, damping), "min": 0}
     actuator.key("damping", braked, "of the drive while commanded", off=not start.braked)
     if start.braked:
         relaxation = {"guess": "30 ms", "min": 0, "max": "2 s"}
         actuator.key("relaxation", relaxation, "time in which that builds up and fades")
     if start.limit:
-        actuator.key("limit", {"guess": number(start.limit, unit), "min": 0}, "the bodies feel no more than that")
+        actuator.key("limit", {"guess": with_unit(start.limit, unit), "min": 0}, "the bodies feel no more than that")
     actuator.key("delay", {"guess": "2 ms", "max": "50 ms"}, off=not log.disks or bool(log.loop))
     return [drive_table(c, unit, scale, reversed_=log.recognised.reversed), actuator]
 

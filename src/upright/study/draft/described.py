@@ -6,10 +6,11 @@ import tomllib
 from collections.abc import Sequence
 
 from upright.physics import find
+from upright.quantities import with_unit
 from upright.readers.inspection import Inspection
 from upright.records import Record
 from upright.study.draft.recognise import Recognised, in_dac_counts
-from upright.study.text import TomlTable, number
+from upright.study.text import TomlTable
 from upright.units import scale
 
 COUNTS = {"rad": (4096, "see the encoder"), "m": (10_000, "see the encoder")}
@@ -59,9 +60,11 @@ def describe(tables: Sequence[TomlTable], record: Record, seen: Inspection, foun
     unit, factor = said.get("unit", ""), abs(said.get("scale", 1.0))
     most = max(abs(found.drive.low), abs(found.drive.high)) * factor
     if not found.drive.stepwise and max(found.drive.low_share, found.drive.high_share) > 0:
-        actuator.key("limit", {"value": number(most, unit, 12), "measured": True}, "the command stays at it")
+        actuator.key("limit", {"value": with_unit(most, unit, 12), "measured": True}, "the command stays at it")
     else:
-        actuator.key("limit", number(most, unit), "MEASURE: largest command that passes; this is the log's", off=True)
+        actuator.key(
+            "limit", with_unit(most, unit), "MEASURE: largest command that passes; this is the log's", off=True
+        )
 
 
 def _went(found: Recognised, body: str, unit: str) -> str:
@@ -69,4 +72,4 @@ def _went(found: Recognised, body: str, unit: str) -> str:
     c = found.columns.get(body)
     if c is None or c.guess not in ("rad", "deg", "m", "mm"):
         return f"... {unit}"
-    return number((c.high - c.low) / 2 * scale(c.guess), unit)
+    return with_unit((c.high - c.low) / 2 * scale(c.guess), unit)

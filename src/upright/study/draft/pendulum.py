@@ -16,6 +16,7 @@ from dataclasses import MISSING, dataclass, field, fields, replace
 import numpy as np
 
 from upright.physics import Plant, find
+from upright.quantities import with_unit
 from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Inspection
 from upright.records import Array, Record
 from upright.signals.smoothing import acceleration_width, savitzky_golay
@@ -33,7 +34,7 @@ from upright.study.draft.tables import (
     sensor_table,
 )
 from upright.study.rig import per
-from upright.study.text import TomlTable, number
+from upright.study.text import TomlTable
 
 G = 9.81
 MANY = 40_000
@@ -221,9 +222,9 @@ def _parameters(plant: type[Plant], starts: PendulumStarts) -> TomlTable:
             table.key(name, assumed(value, what.unit, 4), f"{what.meaning}; {why}")
         elif name in starts.uncertain:
             value, percent = starts.uncertain[name]
-            table.key(name, {"value": number(value, what.unit), "uncertainty": percent}, f"{what.meaning}; MEASURE")
+            table.key(name, {"value": with_unit(value, what.unit), "uncertainty": percent}, f"{what.meaning}; MEASURE")
         elif name in starts.asked:
-            table.key(name, {"guess": number(starts.asked[name], what.unit)}, what.meaning)
+            table.key(name, {"guess": with_unit(starts.asked[name], what.unit)}, what.meaning)
         elif name != "g":
             left.append(name)
     parameters_left_at_zero(table, plant, left)
@@ -238,9 +239,9 @@ def _drive(found: Recognised, plant: type[Plant], balanced: Balanced | None) -> 
     guess = balanced.gain(found.plant) if balanced else _gain(found)
     speed = next(f"{k.unit}/s" for k in plant.coordinates if k.name == force.on)
     actuator = TomlTable("[actuator]")
-    gain = {"guess": number(guess, per(force.unit, unit) if unit else force.unit), "min": 0}
+    gain = {"guess": with_unit(guess, per(force.unit, unit) if unit else force.unit), "min": 0}
     actuator.key("gain", gain, f"{force.meaning} per command; moves {driven} up")
-    actuator.key("slope", {"guess": number(0, per(force.unit, speed))}, "force lost per speed", off=True)
+    actuator.key("slope", {"guess": with_unit(0, per(force.unit, speed))}, "force lost per speed", off=True)
     actuator.key("lag", {"guess": "5 ms", "max": "0.1 s"}, off=True)
     actuator.key("delay", {"guess": "1 ms", "max": "10 ms"}, off=balanced is None)
     return [drive_table(found.drive, unit, scale, reversed_=found.reversed), actuator]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from upright.physics import Plant
-from upright.study.text import number
+from upright.quantities import with_unit
 
 ON_A_BENCH = {"kg": (1e-3, 30.0), "kg m^2": (1e-7, 3.0), "m": (5e-3, 5.0), "N/m": (1e-1, 1e5), "N m/rad": (1e-4, 1e3)}
 """Least and most of a mass, an inertia, a length and a stiffness that stand on a bench, by unit."""
@@ -21,7 +21,7 @@ def implausible(plant: type[Plant], values: Mapping[str, float], *, scaled_by: s
         what, value = plant.quantity(name), abs(values.get(name, 0.0))
         low, high = ON_A_BENCH.get(what.unit, (0.0, float("inf")))
         if value and not low <= value <= high:
-            odd.append(f"{name} = {number(value, what.unit, 2)}")
+            odd.append(f"{name} = {with_unit(value, what.unit, 2)}")
     if not odd:
         return []
     cause = "the unit of a column or of the clock"

@@ -6,10 +6,11 @@ from collections.abc import Iterable
 
 from upright.physics import Plant
 from upright.physics.statement import Coordinate
+from upright.quantities import with_unit
 from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Column
 from upright.records import Record
 from upright.study.draft.recognise import in_dac_counts
-from upright.study.text import TomlTable, Value, number
+from upright.study.text import TomlTable, Value
 
 ROLES = {"fit": "fitted", "predict": "scored, never seen by the estimator"}
 
@@ -26,7 +27,7 @@ def rig_table(name: str, plant: type[Plant], record: Record, period: float = 0.0
 
 def assumed(value: float, unit: str, digits: int = 3) -> dict[str, Value]:
     """A number that nobody measured: what rests on it is no fact."""
-    return {"value": number(value, unit, digits), "assumed": True}
+    return {"value": with_unit(value, unit, digits), "assumed": True}
 
 
 def parameters_left_at_zero(table: TomlTable, plant: type[Plant], names: Iterable[str]) -> None:

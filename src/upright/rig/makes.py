@@ -10,16 +10,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 
-from upright.control.trial import ServoRig
 from upright.errors import BadInput, nearest
 from upright.physics import CartPendulum, Furuta, Plant, added_inertia, added_mass, chain, name_of
 from upright.records.record import of_twin
-from upright.study.description import VENDORS, Entry, RigDescription, driven_unit
+from upright.rig.hardware import VENDORS, Entry, Hardware, driven_unit
+from upright.rig.rig import Rig
 
 COUNTS = 16_000
 """Encoder counts per turn of every joint (ECP 205)."""
@@ -397,10 +397,30 @@ def make_of(plant: Plant, refusal: str = "") -> Make:
     raise BadInput(refusal or f"none of the makes {', '.join(MAKES)} is a {type(plant).__name__}.")
 
 
+def make_of_rig(rig: Rig) -> Make:
+    """The make whose plant a rig has.
+
+    Raises
+    ------
+    BadInput
+        When none of the makes has such a plant.
+    """
+    return make_of(
+        rig.plant,
+        f"none of the makes {', '.join(MAKES)} is a '{rig.name}'; its drive and encoders are not known, so design "
+        "for it (upright design) and simulate with up.simulate.",
+    )
+
+
+def make_of_vendor(vendor: str, plant: Plant) -> Make | None:
+    """Make of a vendor that has this plant, None where he has none, or none was named."""
+    return next((m for m in MAKES.values() if m.vendor == vendor and type(m.plant) is type(plant)), None)
+
+
 def sheet(vendor: str, plant: Plant, unit: str = "V") -> dict[str, Entry]:
     """What a vendor's data sheet says of drive, encoders and servo of a rig with this plant, commanded in `unit`."""
     source = f"data sheet of the {vendor}"
-    make = next((m for m in MAKES.values() if m.vendor == vendor and type(m.plant) is type(plant)), None)
+    make = make_of_vendor(vendor, plant)
     per = {"rad": (float(COUNTS), "1/rev")} | ({"m": (PER_METRE, "1/m")} if vendor == "ECP 210" else {})
     said = {f"counts.{c.name}": per[c.unit] for c in plant.coordinates if c.unit in per}
     said |= {"servo_period": (SERVO, "s"), "delay": (SERVO, "s"), "lag": (LAG, "s")}
@@ -413,12 +433,12 @@ def sheet(vendor: str, plant: Plant, unit: str = "V") -> dict[str, Entry]:
     return {name: Entry(value=value, unit=unit, source=source) for name, (value, unit) in said.items()}
 
 
-def described_make(rig: ServoRig) -> RigDescription:
+def hardware_of_make(rig: Rig) -> Hardware:
     """What a fit of a make's rig says of it: name and vendor; the data sheet is that of the make."""
-    return RigDescription(name=of_twin(rig.name, rig.seed).rig, vendor=make_of(rig.plant).vendor)
+    return Hardware(name=of_twin(rig.name, rig.seed).rig, vendor=make_of(rig.plant).vendor)
 
 
-def make_rig(key: str, seed: int = 0) -> ServoRig:
+def make_rig(key: str, seed: int = 0) -> Rig:
     """A rig of a make.
 
     Inertias differ by two percent, springs by four, friction by a seventh, the drive's gain by two; seed 0 is the rig
@@ -449,20 +469,11 @@ def make_rig(key: str, seed: int = 0) -> ServoRig:
                 changed[name] = value * math.exp(rng.normal(0, spread))
         plant = plant.replace(**changed)
         gain *= math.exp(rng.normal(0, 0.02))
-    return ServoRig(
-        name=make.name,
-        plant=plant,
-        gain=gain,
-        limit=make.limit,
-        converter=CONVERTER,
-        delay=SERVO,
-        lag=LAG,
-        counts=make.counts,
-        period=SERVO,
-        travel=make.travel,
-        twist=make.twist,
-        seed=seed,
-    )
+    known = Rig.known(
+        plant, name=make.name, gain=gain, limit=make.limit, converter=CONVERTER, delay=SERVO, lag=LAG,
+        counts=make.counts, period=SERVO, travel=make.travel, twist=make.twist,
+    )  # fmt: skip
+    return replace(known, seed=seed)
 
 
 def check_radius(radius: float) -> float:

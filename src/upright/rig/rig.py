@@ -1,0 +1,268 @@
+"""A rig as everything speaks of it: plant, drive, sensors, servo, covariance, and where each number comes from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from upright.basis import DESCRIBED, Basis
+from upright.errors import BadInput
+from upright.physics import Plant
+from upright.physics.actuator import ACTUATOR
+from upright.records import Array
+from upright.rig.drive import GAIN, MORE, driven, saturation
+from upright.rig.hardware import Entry, Hardware, counts_unit, driven_unit, meaning_of, place_of, turn_of
+from upright.rig.mounting import Mounting
+from upright.systems import StateSpace
+
+_ENTRIES = {
+    "limit": "limit", "converter": "converter", "delay": "delay", "lag": "lag", "offset": "offset",
+    "period": "servo_period", "travel": "travel", "speed_limit": "speed_limit", "twist": "twist",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rig:
+    """A plant with its numbers, and what is known of the drive, the encoders and the servo about it.
+
+    What nobody gave is missing: `limit`, `period` and `counts` say in a sentence that they are needed, and a delay, a
+    lag, an offset or a converter step that nobody gave is none.
+
+    Attributes
+    ----------
+    plant : Plant
+    name : str
+        As its owner, its make or its plant is called.
+    gain : float
+        Force per unit of command.
+    unit : str
+        Of the command.
+    hardware : Hardware
+        Drive, encoders, servo and travel, each number with its source.
+    draws : tuple of (Plant, float)
+        Plants and gains drawn from a fit's covariance; empty without one.
+    scales : tuple of float
+        What the encoders show over what is true; empty where the counts per unit are as said.
+    mounting : Mounting, optional
+        What else the encoders show: play and shafts off centre. Logs have both; a loop, which stays about one point,
+        has the error and the slope that a shaft off centre has there.
+    seed : int
+        Which rig of its make; 0 is the one as designed.
+    basis : Basis
+        Where its numbers come from, and how far they can be trusted.
+    """
+
+    plant: Plant
+    name: str = ""
+    gain: float = 1.0
+    unit: str = ""
+    hardware: Hardware = field(default_factory=Hardware)
+    draws: tuple[tuple[Plant, float], ...] = ()
+    scales: tuple[float, ...] = ()
+    mounting: Mounting | None = None
+    seed: int = 0
+    basis: Basis = DESCRIBED
+
+    def __post_init__(self) -> None:
+        if self.scales and len(self.scales) != len(self.plant.coordinates):
+            n = len(self.plant.coordinates)
+            raise BadInput(f"a rig with {n} coordinates needs {n} scales of its encoders, got {self.scales}.")
+
+    @classmethod
+    def known(cls, plant: Plant, *, name: str = "", gain: float = 1.0, unit: str = "V", **numbers: Any) -> Rig:
+        """A rig whose numbers are known.
+
+        Parameters
+        ----------
+        plant : Plant
+        name, gain, unit
+            As the attributes.
+        **numbers
+            ``limit``, ``period``, ``counts`` (per m or rad, by coordinate) and the others that `replace` takes.
+        """
+        bare = cls(plant=plant, name=name, gain=gain, unit=unit)
+        return bare.replace(**numbers)
+
+    def replace(self, **changes: Any) -> Rig:
+        """The same rig with something else in it.
+
+        Parameters
+        ----------
+        **changes
+            Attributes; or numbers of the hardware, SI or in the command's unit: ``limit``, ``converter``, ``delay``,
+            ``lag``, ``offset``, ``period``, ``travel``, ``speed_limit``, ``twist``, and ``counts`` per m or rad, one
+            for each coordinate, and ``more``; an infinite number is none.
+
+        Raises
+        ------
+        BadInput
+            When a number is none that a rig can have.
+        """
+        plant: Plant = changes.get("plant", self.plant)
+        place, unit = driven_unit(type(plant)), changes.get("unit", self.unit)
+        units = {
+            "limit": unit, "converter": unit, "offset": unit, "delay": "s", "lag": "s", "period": "s",
+            "travel": place, "speed_limit": f"{place}/s", "twist": place,
+        }  # fmt: skip
+        said: dict[str, Entry] = {}
+        gone: set[str] = set()
+        for name in _ENTRIES.keys() & changes.keys():
+            value = float(changes.pop(name))
+            if name in ("limit", "period") and not value > 0:
+                raise BadInput(f"the {name} of a rig must be positive, got {value:g}.")
+            if math.isfinite(value):
+                said[_ENTRIES[name]] = Entry(value=value, unit=units[name], source="known")
+            else:
+                gone.add(_ENTRIES[name])
+        if "more" in changes:
+            more: Mapping[str, float] = changes.pop("more")
+            gone |= {name.partition(".")[2] for name in self.more}
+            said |= {
+                name.partition(".")[2]: Entry(value=value, unit=ACTUATOR[name].unit, source="known")
+                for name, value in more.items()
+            }
+        if "counts" in changes:
+            said |= _counts(plant, tuple(changes.pop("counts")))
+        hardware: Hardware = changes.pop("hardware", self.hardware)
+        if said or gone:
+            kept = {n: e for n, e in hardware.entries.items() if n not in gone}
+            hardware = replace(hardware, entries=kept | said)
+        return replace(self, hardware=hardware, **changes)
+
+    def changed(self, **parameters: float) -> Rig:
+        """The same rig with other parameters of its plant."""
+        return replace(self, plant=self.plant.replace(**parameters))
+
+    def _number(self, name: str) -> float:
+        if name not in self.hardware.entries:
+            raise BadInput(
+                f"nobody said the {meaning_of(name)} of {self.name or 'the rig'}; {place_of(name)} of a study does."
+            )
+        return self.hardware.entries[name].value
+
+    @property
+    def limit(self) -> float:
+        """Largest command, in its unit."""
+        return self._number("limit")
+
+    @property
+    def period(self) -> float:
+        """Servo period [s]."""
+        return self._number("servo_period")
+
+    @property
+    def counts(self) -> tuple[float, ...]:
+        """Encoder counts per m or rad, one for each coordinate."""
+        return tuple(self._number(f"counts.{c.name}") / turn_of(c.unit) for c in self.plant.coordinates)
+
+    @property
+    def converter(self) -> float:
+        """Smallest step of the command; 0 without one."""
+        return self.hardware.value("converter", 0.0)
+
+    @property
+    def delay(self) -> float:
+        """From a sample of the encoders to its command at work, computation included [s]."""
+        return self.hardware.value("delay", 0.0)
+
+    @property
+    def lag(self) -> float:
+        """Time constant of the drive [s], which the linear model leaves out."""
+        return self.hardware.value("lag", 0.0)
+
+    @property
+    def offset(self) -> float:
+        """Command that the drive adds by itself."""
+        return self.hardware.value("offset", 0.0)
+
+    @property
+    def travel(self) -> float:
+        """How far the driven coordinate may go either way before a stop or a cable ends it [m or rad]."""
+        return self.hardware.value("travel", math.inf)
+
+    @property
+    def speed_limit(self) -> float:
+        """Speed of the driven coordinate at which the drive trips [m/s or rad/s]."""
+        return self.hardware.value("speed_limit", math.inf)
+
+    @property
+    def twist(self) -> float:
+        """How far the last coordinate may go from the first before the shaft between them trips the rig [m or rad]."""
+        return self.hardware.value("twist", math.inf)
+
+    @property
+    def more(self) -> Mapping[str, float]:
+        """What else the drive does: numbers of `physics.actuator.ACTUATOR`, such as ``"actuator.force_limit"``."""
+        return {f"actuator.{n}": e.value for n, e in self.hardware.entries.items() if f"actuator.{n}" in MORE}
+
+    @property
+    def drive(self) -> Mapping[str, float]:
+        """The actuator by the names of `upright.simulation.simulate`."""
+        return {
+            **self.more,
+            GAIN: self.gain,
+            "actuator.limit": self.hardware.value("limit", math.inf),
+            "actuator.delay": self.delay,
+            "actuator.lag": self.lag,
+            "actuator.offset": self.offset,
+        }
+
+    @property
+    def saturation(self) -> float:
+        """Smallest command at which the drive gives all that it can, at rest: that of its command or of its force."""
+        return saturation(self.drive)
+
+    @property
+    def quantum(self) -> Array:
+        """Resolution of each encoder [m or rad], shape (coordinates,)."""
+        return 1.0 / np.array(self.counts)
+
+    @property
+    def shown(self) -> Array:
+        """What each encoder shows over what is true, shape (coordinates,)."""
+        return np.array(self.scales) if self.scales else np.ones(len(self.plant.coordinates))
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Coordinates, each followed by its velocity."""
+        return self.plant.state_names()
+
+    @property
+    def state_units(self) -> list[str]:
+        """Unit of every state."""
+        return [u for c in self.plant.coordinates for u in (c.unit, f"{c.unit}/s")]
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """What is measured: the coordinates."""
+        return tuple(c.name for c in self.plant.coordinates)
+
+    @property
+    def output_units(self) -> list[str]:
+        """Unit of every output."""
+        return [c.unit for c in self.plant.coordinates]
+
+    def linear(self, at: str, *, side: float = 0.0) -> StateSpace:
+        """Model about an equilibrium, from the command to the coordinates; dry friction, lag and counts left out.
+
+        See `Plant.linear`.
+        """
+        return driven(self.plant, {**self.more, GAIN: self.gain}, at, side=side)
+
+    def spread(self, at: str) -> list[StateSpace]:
+        """The same for the draws."""
+        return [driven(plant, {**self.more, GAIN: gain}, at) for plant, gain in self.draws]
+
+
+def _counts(plant: Plant, counts: tuple[float, ...]) -> dict[str, Entry]:
+    n = len(plant.coordinates)
+    if len(counts) != n or any(not c > 0 for c in counts):
+        raise BadInput(f"a rig with {n} coordinates needs {n} positive numbers of counts, got {counts}.")
+    return {
+        f"counts.{c.name}": Entry(value=turn_of(c.unit) * per, unit=counts_unit(c.unit), source="known")
+        for c, per in zip(plant.coordinates, counts, strict=True)
+    }
