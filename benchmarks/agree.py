@@ -206,7 +206,7 @@ def of_part(part: Part) -> Said:
     if part.half is not None:
         runs = [cut(runs[0], part.half)]
     try:
-        fit = identify(study.rig, runs)
+        fit = identify(study.model, runs)
     except BadInput as error:
         return Said(value={}, interval={}, unit={}, silent={}, refused=str(error))
     told = {n: e for n, e in fit.estimates.items() if not n.startswith("noise")}

@@ -57,8 +57,8 @@ def unseen(name: str, data: str) -> list[Seen]:
         (run,) = fitted
         first = run.first_part()
         tail = replace(run, label="tail", role="predict", score_from=float(run.t[first.t.size] - run.t[0]))
-        return seen(name, identify(study.rig, [first, tail]).runs)
-    fit = identify(study.rig, study.runs)
+        return seen(name, identify(study.model, [first, tail]).runs)
+    fit = identify(study.model, study.runs)
     left_out = cross_validate(fit, study.runs).predicted if len(fitted) > 1 else {}
     return [*seen(name, fit.runs), *seen(name, left_out)]
 

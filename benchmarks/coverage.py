@@ -35,7 +35,7 @@ def noise(samples: int, memory: float, generator: np.random.Generator) -> np.nda
 
 def held(seconds: float, memory: float, seed: int) -> list[bool]:
     """Whether the interval of each unknown held the truth."""
-    from upright.identification import Parameter, Rig, Run
+    from upright.identification import GreyBox, Parameter, Run
     from upright.identification.estimate import identify
     from upright.physics import Pendulum
     from upright.simulation import simulate
@@ -45,7 +45,7 @@ def held(seconds: float, memory: float, seed: int) -> list[bool]:
         name: Parameter(name=name, value=GUESS.get(name, value), estimate=name in GUESS)
         for name, value in TRUTH.items()
     }
-    rig = Rig(plant=Pendulum, parameters=parameters)
+    rig = GreyBox(plant=Pendulum, parameters=parameters)
     motion = simulate(Pendulum(**TRUTH), {}, [ANGLE, 0.0], None, PERIOD, samples=n)[:, 0, 0]
     y = motion + LOUD * noise(n, memory, np.random.default_rng(seed))
     run = Run(label="swing", role="fit", t=np.arange(n) * PERIOD, u=np.zeros((n, 1)), y=y[:, None],

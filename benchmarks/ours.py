@@ -64,7 +64,7 @@ def ensemble(
 
 def study() -> tuple[Any, Any]:
     """Rig and run of the synthetic fit: eight unknowns, two encoders."""
-    from upright.identification import Parameter, Rig, Run
+    from upright.identification import GreyBox, Parameter, Run
     from upright.physics import Furuta
     from upright.simulation import simulate
 
@@ -72,7 +72,7 @@ def study() -> tuple[Any, Any]:
     start = problem.RELEASE[list(ORDER)]
     states = simulate(Furuta, true, start, problem.TORQUE, problem.PERIOD, samples=problem.STEPS + 1)[:, ORDER, 0]
     guesses = dict(zip(problem.UNKNOWN, problem.START, strict=False))
-    rig = Rig(
+    rig = GreyBox(
         plant=Furuta,
         parameters={
             name: Parameter(name=name, value=guesses.get(name, value), estimate=name in guesses, lower=0.0)

@@ -66,7 +66,7 @@ def _timed(name: str, data: str) -> tuple[Any, Any, float]:
 
     start = time.perf_counter()
     study = load_study(STUDIES / f"{name}.toml", data=data)
-    fit = identify(study.rig, study.runs)
+    fit = identify(study.model, study.runs)
     return study, fit, time.perf_counter() - start
 
 

@@ -123,12 +123,12 @@ def logged(make: Make, label: str, role: Any, u: np.ndarray, y: np.ndarray) -> A
 
 def asked(make: Make, guesses: dict[str, float], known: dict[str, float] | None = None) -> Any:
     """A rig whose numbers are asked from guesses, besides what is known of its make and more."""
-    from upright.identification import Parameter, Rig
+    from upright.identification import GreyBox, Parameter
     from upright.physics import find
 
     parameters = {n: Parameter(name=n, value=v) for n, v in {**make.known, **(known or {})}.items()}
     parameters |= {n: Parameter(name=n, value=v, estimate=True, lower=0.0) for n, v in guesses.items()}
-    return Rig(plant=find(make.plant), parameters=parameters, substeps=2)
+    return GreyBox(plant=find(make.plant), parameters=parameters, substeps=2)
 
 
 def judged(

@@ -20,7 +20,7 @@ from benchmarks.asked import studies
 from benchmarks.measure import Line, of_each
 from benchmarks.real import STUDIES
 from upright.identification.estimate import find_optimum
-from upright.identification.model.rig import Rig, neutral
+from upright.identification.model.grey_box import GreyBox, neutral
 from upright.identification.problem.residuals import Problem, formulate
 from upright.identification.problem.simulated import with_noise
 from upright.identification.problem.trips import located
@@ -34,11 +34,11 @@ STARTS, QUICK = 300, 2
 
 
 @functools.cache
-def _reference(name: str) -> tuple[Rig, list[Any], Problem, dict[str, float]]:
+def _reference(name: str) -> tuple[GreyBox, list[Any], Problem, dict[str, float]]:
     """A study's rig and runs, the whole problem weighed as by its own fit, and the values of that fit."""
     study = load_study(STUDIES / f"{name}.toml", data=os.environ["UPRIGHT_REAL_DATA"])
-    runs = [located(study.rig, run) for run in study.runs if run.role == "fit"]
-    rig = with_noise(study.rig, runs)
+    runs = [located(study.model, run) for run in study.runs if run.role == "fit"]
+    rig = with_noise(study.model, runs)
     weighed, own = find_optimum(rig, runs, "auto", SearchLog())
     problem = formulate(rig, runs)
     problem.weigh_like(weighed)

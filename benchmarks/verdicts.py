@@ -70,7 +70,7 @@ def answered(case: Case) -> Told:
     """What was said of one rig, and what came."""
     from upright.identification.estimate import identify, predict
     from upright.identification.inference.loop import driven_plant, placed
-    from upright.identification.model.rig import base_values
+    from upright.identification.model.grey_box import base_values
 
     make = case.make
     (u, y), (u2, y2) = case.records
@@ -118,10 +118,10 @@ def rehearsed(name: str) -> Told:
     if not {last.measured[k] for k in last.free} <= {r.measured[k] for r in seen for k in r.free}:
         return []  # a body that no fitted run moves is not promised either
     runs = [*seen, replace(told, role="predict"), replace(last, role="predict", label="what came")]
-    fit = identify(study.rig, runs[:-1])
+    fit = identify(study.model, runs[:-1])
     from upright.identification.estimate import predict
 
-    came = predict(fit, study.rig, runs[-1:])["what came"]
+    came = predict(fit, study.model, runs[-1:])["what came"]
     worst = min(p for told in (came.fit_percent, *came.ahead.values()) for p in told.values())
     return [("Does it predict? (real rigs)", fit.answers[0].answer, worst >= GOOD)]
 

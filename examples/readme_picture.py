@@ -22,12 +22,12 @@ ask.add_argument("--title", help="heading; the study's own when left out")
 asked = ask.parse_args()
 
 study = load_study(asked.study, data=asked.data)
-fit = identify(study.rig, study.runs)
+fit = identify(study.model, study.runs)
 label = asked.run or next(iter(fit.runs))
 score = fit.runs[label]
 what = "fitted" if score.role == "fit" else "predicted, not fitted"
 drawing = fit_figure(
-    score, study.rig.plant, title=f"{asked.title or study.title}, run {label}, {what}", width=7.0, height=1.75
+    score, study.model.plant, title=f"{asked.title or study.title}, run {label}, {what}", width=7.0, height=1.75
 )
 print(fit.verdict)
 print(save(drawing, asked.out))

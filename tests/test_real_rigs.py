@@ -39,7 +39,7 @@ pytestmark = [
 @pytest.mark.parametrize("name", studies())
 def test_a_real_rig_is_explained_and_predicted(name):
     study = load_study(STUDIES / f"{name}.toml", data=DATA)
-    fit = identify(study.rig, study.runs)
+    fit = identify(study.model, study.runs)
     asked = [a for a in ASKED if a.study == name]
     left_out = {}
     if any(a.how == "left out" for a in asked):
@@ -70,7 +70,7 @@ def test_a_run_that_excites_itself_is_named_and_left_out(tmp_path):
     more = f'{text}\n[[runs]]\nlabel = "9:26"\nfile = "{strange.as_posix()}"\n'
     (tmp_path / "more.toml").write_text(more, encoding="utf-8")
     study = load_study(tmp_path / "more.toml", data=DATA)
-    fit, clean = identify(study.rig, study.runs), identify(asked.rig, asked.runs)
+    fit, clean = identify(study.model, study.runs), identify(asked.model, asked.runs)
     (told,) = [w for w in fit.warnings if w.startswith("Outlier")]
     begins = re.match(r"Outlier: 9:26, ([\d.]+) to 10 s: self-excited", told)
     assert begins is not None

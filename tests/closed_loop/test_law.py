@@ -10,7 +10,7 @@ import pytest
 from tests.closed_loop.programs import Pid, T
 from upright.closed_loop import ClosedLoop, Filter, pid
 from upright.errors import BadInput
-from upright.identification import Parameter, Rig, Run
+from upright.identification import GreyBox, Parameter, Run
 from upright.identification.problem.simulated import motions, simulator
 from upright.identification.problem.tracks import prepare
 from upright.laws import Law, state_feedback
@@ -99,7 +99,7 @@ def test_the_compiled_loop_runs_the_law(name: str, every: int) -> None:
         commands.append(u)
         x = motion[:2, :2] @ x + motion[:2, 2] * u
     values = {"m_1": m, "k_1": k, "c_1": c}
-    rig = Rig(
+    rig = GreyBox(
         plant=find("rectilinear-1"), parameters={n: Parameter(name=n, value=v) for n, v in values.items()}, substeps=4
     )
     # the program sees its first sample as no step of the reference, so must the law

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from upright.identification import Parameter, Rig, Run, identify
+from upright.identification import GreyBox, Parameter, Run, identify
 from upright.physics import DoublePendulum, DoublePendulumAbsolute
 from upright.simulation import simulate
 
@@ -31,7 +31,7 @@ def test_a_swing_of_relative_encoders_or_a_camera_tells_the_friction_between_the
         label="swing", role="fit", t=t, u=np.zeros((t.size, 1)), y=y, measured=("theta_1", "theta_2"),
         quantum=(step, step),
     )  # fmt: skip
-    fit = identify(Rig(plant=plant, parameters=numbers), [run])
+    fit = identify(GreyBox(plant=plant, parameters=numbers), [run])
     for name in GUESSES:
         e = fit.estimates[name]
         assert abs(e.value - truth[name]) < 4 * e.stderr  # one miss in 16,000

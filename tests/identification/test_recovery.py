@@ -87,7 +87,7 @@ def test_tail_is_predicted_from_the_beginning_alone() -> None:
     # the noise itself limits the score: 100 (1 - sigma / spread of the tail)
     limit = 100 * (1 - 1e-3 / float(np.std(run.y[600:])))
     assert fit.runs["tail"].fit_percent["theta"] > limit - 2
-    again = predict(fit, fit.rig, [tail])["tail"].fit_percent["theta"]
+    again = predict(fit, fit.model, [tail])["tail"].fit_percent["theta"]
     assert again == pytest.approx(fit.runs["tail"].fit_percent["theta"], abs=1e-6)
 
 

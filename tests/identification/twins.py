@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from upright.identification import Parameter, Rig, Run
+from upright.identification import GreyBox, Parameter, Run
 from upright.physics import Furuta, Pendulum
 from upright.simulation import simulate
 
@@ -18,13 +18,13 @@ FURUTA = {
 }  # fmt: skip
 
 
-def rig(plant: type, values: Mapping[str, float], guesses: Mapping[str, float], **known: float) -> Rig:
+def rig(plant: type, values: Mapping[str, float], guesses: Mapping[str, float], **known: float) -> GreyBox:
     """A rig that knows `values` except those with a guess."""
     names = plant.names()
     unit = {n: plant.quantity(n).unit if n in names else "1" for n in (*values, *guesses, *known)}
     parameters = {n: Parameter(name=n, value=v, unit=unit[n]) for n, v in {**values, **known}.items()}
     parameters |= {n: Parameter(name=n, value=g, unit=unit[n], estimate=True) for n, g in guesses.items()}
-    return Rig(plant=plant, parameters=parameters)
+    return GreyBox(plant=plant, parameters=parameters)
 
 
 def swing(

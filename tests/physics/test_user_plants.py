@@ -215,7 +215,7 @@ class Mine(Plant):
 
 def test_quantities_may_be_called_as_the_arguments_of_the_energies_are(tmp_path):
     """p t'' = -q (t - self) - v t' + u: matrices, energy, step response and estimates by hand."""
-    from upright.identification import Parameter, Rig, Run, identify
+    from upright.identification import GreyBox, Parameter, Run, identify
     from upright.simulation import simulate
 
     plant = find("mine.py:Mine", write(tmp_path, LETTERS))(p=0.5, q=20.0, v=0.2, self=0.1).replace(self=0.0)
@@ -233,5 +233,5 @@ def test_quantities_may_be_called_as_the_arguments_of_the_energies_are(tmp_path)
     parameters = {n: Parameter(name=n, value=v, unit=type(plant).quantity(n).unit) for n, v in numbers.items()}
     parameters["p"] = Parameter(name="p", value=0.4, unit="kg", estimate=True)
     run = Run(label="step", role="fit", t=t, y=step[:, None], u=np.ones((301, 1)), measured=("t",))
-    fit = identify(Rig(plant=type(plant), parameters=parameters, substeps=4), [run])
+    fit = identify(GreyBox(plant=type(plant), parameters=parameters, substeps=4), [run])
     assert fit.estimates["p"].value == pytest.approx(0.5, rel=1e-5)

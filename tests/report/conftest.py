@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from upright.identification import Estimate, Fit, Parameter, Rig, RunScore
+from upright.identification import Estimate, Fit, GreyBox, Parameter, RunScore
 from upright.physics import Furuta
 
 
@@ -56,7 +56,7 @@ def make_fit():
     correlation[0, 1] = correlation[1, 0] = 0.31
     initial = {"theta": Estimate(value=1.5, stderr=0.002, interval=(1.496, 1.504), unit="rad", status="firm")}
     return Fit(
-        rig=Rig(plant=Furuta, parameters=parameters),
+        model=GreyBox(plant=Furuta, parameters=parameters),
         estimates=estimates,
         per_run={"release": initial},
         runs={

@@ -116,7 +116,7 @@ def short_ladder_page(folder: Path) -> Chapter:
                fitted={"release": {"psi": 97.0, "theta": 97.5}}, predicted={"release": {"psi": -3.0, "theta": 1.0}},
                **common)  # fmt: skip
     twice = Repeats(labels=("release", "tail"), percents={"theta": (97.0, 98.0)}, errors={"release": 0.0, "tail": 0.0})
-    ladder = Ladder(steps=(viscous, dry), rig=fit.rig, runs=(), held_out="half of the runs", repeats=(twice,),
+    ladder = Ladder(steps=(viscous, dry), rig=fit.model, runs=(), held_out="half of the runs", repeats=(twice,),
                     stopped="No rung is left.", scores=scores, left_out=("b_1c",))  # fmt: skip
     return chapter(ladder, title="Ladder", provenance={"study": "swing.toml"})
 

@@ -18,8 +18,8 @@ from upright.report.ladder import next_steps
 )
 def test_only_what_was_refused_and_is_still_in_the_study_is_to_be_taken_out(fit, left_out, trimmed, said):
     ladder = Ladder(
-        steps=(), rig=fit.rig, runs=(), held_out="half of the runs", repeats=(), stopped="No rung is left.", scores={},
-        left_out=left_out,
+        steps=(), rig=fit.model, runs=(), held_out="half of the runs", repeats=(), stopped="No rung is left.",
+        scores={}, left_out=left_out,
     )  # fmt: skip
     steps = next_steps(ladder, study="swing.toml", folder="out", data="", trimmed=trimmed)
     taken = [step.sentence for step in steps if "out of the study" in step.sentence]

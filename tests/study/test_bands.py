@@ -14,7 +14,7 @@ def test_bands_come_back_as_they_were_written(tmp_path):
     run = noisy(swing(seconds=4.0), 1e-3, seed=1)
     fit = identify(rig(Pendulum, PENDULUM, {"J_p": 3e-3, "b_2": 1e-3}), [run])
     path = tmp_path / "fit.json"
-    write_fit(fit, Study(path=path, plant="pendulum", rig=fit.rig, runs=(run,), title="", source=""), path)
+    write_fit(fit, Study(path=path, plant="pendulum", model=fit.model, runs=(run,), title="", source=""), path)
     back = read_fit(path).bands
     assert back is not None
     assert fit.bands is not None

@@ -126,7 +126,7 @@ def cart(tmp_path, log):
 
 def test_a_fit_hands_on_the_drive_the_encoders_and_the_servo(cart, tmp_path):
     study = load_study(cart())
-    fit = identify(study.rig, study.runs)
+    fit = identify(study.model, study.runs)
     write_fit(fit, study, tmp_path / "fit.json")
     back = read_fit(tmp_path / "fit.json").hardware
     assert back.vendor == "ECP 210"
@@ -145,7 +145,7 @@ def test_a_fit_hands_on_the_drive_the_encoders_and_the_servo(cart, tmp_path):
 
 def test_a_fit_of_older_form_tells_its_drive_from_its_parameters(cart, tmp_path):
     study = load_study(cart())
-    write_fit(identify(study.rig, study.runs), study, tmp_path / "fit.json")
+    write_fit(identify(study.model, study.runs), study, tmp_path / "fit.json")
     content = json.loads((tmp_path / "fit.json").read_text(encoding="utf-8"))
     del content["rig"]
     (tmp_path / "fit.json").write_text(json.dumps(content), encoding="utf-8")
@@ -185,7 +185,7 @@ def test_what_no_rig_has_is_said_with_its_line(cart, change, words):
 )
 def test_a_changed_description_is_refused(cart, tmp_path, change, words):
     study = load_study(cart())
-    write_fit(identify(study.rig, study.runs), study, tmp_path / "fit.json")
+    write_fit(identify(study.model, study.runs), study, tmp_path / "fit.json")
     content = json.loads((tmp_path / "fit.json").read_text(encoding="utf-8"))
     content["rig"]["entries"] |= change
     (tmp_path / "fit.json").write_text(json.dumps(content), encoding="utf-8")

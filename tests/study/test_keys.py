@@ -33,7 +33,7 @@ def test_the_example_of_the_page_is_a_study(tmp_path):
     (tmp_path / "study.toml").write_text(example.replace(".mat", ".csv"), encoding="utf-8")
     study = load_study(tmp_path / "study.toml")
     assert [run.label for run in study.runs] == ["kP 2.5", "decay"]
-    assert study.rig.estimated == ("J_p", "b_1", "b_2c", "actuator.gain")
+    assert study.model.estimated == ("J_p", "b_1", "b_2c", "actuator.gain")
     np.testing.assert_allclose(study.runs[0].u[:, 0], 2.5 * (0.2 - study.runs[0].y[:, 0]))
 
 

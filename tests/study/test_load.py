@@ -185,6 +185,6 @@ def test_data_may_lie_elsewhere(study, tmp_path):
 
 def test_a_fitted_model_replaces_every_number_and_asks_nothing(study, tmp_path):
     study(RIG + SENSORS + RUN)
-    rig = load_study(tmp_path / "study.toml", fixed={"J_p": 2e-3, "m_c": 0.7, "actuator.gain": 3.0}).rig
+    rig = load_study(tmp_path / "study.toml", fixed={"J_p": 2e-3, "m_c": 0.7, "actuator.gain": 3.0}).model
     assert rig.estimated == ("b_1c",)
     assert [rig.parameters[n].value for n in ("J_p", "m_c", "actuator.gain")] == [2e-3, 0.7, 3.0]

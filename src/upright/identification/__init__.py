@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from upright.identification.estimate import METHODS, fit_percent, identify, predict
     from upright.identification.model.fit import Estimate, Fit, RunScore, to_lmfit
-    from upright.identification.model.rig import Parameter, Rig
+    from upright.identification.model.grey_box import GreyBox, Parameter
     from upright.identification.model.runs import Run
     from upright.identification.search.curve import CurveFit, fit_curve
 
@@ -25,8 +25,8 @@ __all__ = [
     "CurveFit",
     "Estimate",
     "Fit",
+    "GreyBox",
     "Parameter",
-    "Rig",
     "Run",
     "RunScore",
     "fit_curve",
@@ -39,7 +39,7 @@ __all__ = [
 _HOMES = {
     "estimate": ("METHODS", "fit_percent", "identify", "predict"),
     "model.fit": ("Estimate", "Fit", "RunScore", "to_lmfit"),
-    "model.rig": ("Parameter", "Rig"),
+    "model.grey_box": ("GreyBox", "Parameter"),
     "model.runs": ("Run",),
     "search.curve": ("CurveFit", "fit_curve"),
 }

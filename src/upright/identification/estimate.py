@@ -27,7 +27,7 @@ from upright.identification.inference.verdict import GOOD, Evidence, judge, trus
 from upright.identification.ladder.growth import choose_friction
 from upright.identification.model.bands import Bands
 from upright.identification.model.fit import Estimate, Fit, Pole, RunScore
-from upright.identification.model.rig import Rig, neutral
+from upright.identification.model.grey_box import GreyBox, neutral
 from upright.identification.model.runs import Run
 from upright.identification.problem.residuals import Problem, formulate, unreached, unresolved
 from upright.identification.problem.simulated import with_noise
@@ -63,14 +63,14 @@ LOWER = 2
 
 
 def identify(
-    rig: Rig, runs: Sequence[Run], *, method: str = "auto", progress: Progress = silent, watch: bool = True,
+    rig: GreyBox, runs: Sequence[Run], *, method: str = "auto", progress: Progress = silent, watch: bool = True,
     near: Fit | None = None,
 ) -> Fit:  # fmt: skip
     """Estimate a rig's parameters from its runs.
 
     Parameters
     ----------
-    rig : Rig
+    rig : GreyBox
         Plant, what is known and what is asked.
     runs : sequence of Run
         Those with role ``"fit"`` are explained together; those with role ``"predict"`` are only scored, with the
@@ -130,7 +130,7 @@ def identify(
 
 
 def find_optimum(
-    rig: Rig, runs: Sequence[Run], method: str, log: SearchLog, near: Fit | None = None
+    rig: GreyBox, runs: Sequence[Run], method: str, log: SearchLog, near: Fit | None = None
 ) -> tuple[Problem, Descent]:  # fmt: skip
     """The problem whose model was chosen, and where its cost is least."""
     problem = formulate(rig, runs)
@@ -171,7 +171,7 @@ def find_optimum(
     return problem, found
 
 
-def _best_so_far(rig: Rig, runs: Sequence[Run], log: SearchLog) -> tuple[Problem, Array]:
+def _best_so_far(rig: GreyBox, runs: Sequence[Run], log: SearchLog) -> tuple[Problem, Array]:
     """Problem and coordinates of the best so far, which may be of a part of the runs."""
     if log.best is None:
         problem = formulate(rig, runs)
@@ -181,7 +181,7 @@ def _best_so_far(rig: Rig, runs: Sequence[Run], log: SearchLog) -> tuple[Problem
     return problem, problem.place(part.values_at(x))
 
 
-def _check(rig: Rig, runs: Sequence[Run], method: str) -> None:
+def _check(rig: GreyBox, runs: Sequence[Run], method: str) -> None:
     if method not in METHODS:
         raise BadInput(f"the method must be one of {', '.join(METHODS)}, got '{method}'; {nearest(method, METHODS)}")
     if not runs:
@@ -207,7 +207,7 @@ def _skipped(runs: Sequence[Run], *, watch: bool) -> tuple[str, ...]:
 
 
 def _conclude(
-    asked: Rig, runs: Sequence[Run], problem: Problem, found: Descent, log: SearchLog, *, watch: bool
+    asked: GreyBox, runs: Sequence[Run], problem: Problem, found: Descent, log: SearchLog, *, watch: bool
 ) -> Fit:  # fmt: skip
     """Everything known about an optimum; of an interrupted search only what takes no time, so no predictions.
 
@@ -279,7 +279,7 @@ def _conclude(
         )
     )
     return Fit(
-        rig=asked,
+        model=asked,
         estimates=estimates,
         per_run=per_run,
         groups=groups,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from upright.errors import BadInput
-from upright.identification import Rig
+from upright.identification import GreyBox
 from upright.physics import Plant
 from upright.physics.actuator import ACTUATOR
 from upright.rig.hardware import SERVO, VENDORS, Entry, Hardware, check_vendor, counts_unit, driven_unit, turn_of
@@ -14,7 +14,7 @@ from upright.study.text import Section, source_of
 from upright.units import parse
 
 
-def read_hardware(study: Section, plant: type[Plant], rig: Rig, logs: Collection[str] = ()) -> Hardware:
+def read_hardware(study: Section, plant: type[Plant], rig: GreyBox, logs: Collection[str] = ()) -> Hardware:
     """What a study says of its rig besides the plant's numbers.
 
     Parameters
@@ -22,7 +22,7 @@ def read_hardware(study: Section, plant: type[Plant], rig: Rig, logs: Collection
     study : Section
         The whole study.
     plant : type of Plant
-    rig : Rig
+    rig : GreyBox
         As read from the same study.
     logs : collection of str, optional
         What the logs call their rig, which counts where the study gives no name and they agree.

@@ -20,7 +20,7 @@ from upright.errors import BadInput, ImpossiblePhysics
 from upright.files import read_text
 from upright.identification.model.bands import Bands, Spread
 from upright.identification.model.fit import Judgement
-from upright.identification.model.rig import SUBSTEPS
+from upright.identification.model.grey_box import SUBSTEPS
 from upright.physics import PLANTS, find
 from upright.physics.actuator import ACTUATOR
 from upright.rig.hardware import Entry, Hardware, check_vendor

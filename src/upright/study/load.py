@@ -15,15 +15,15 @@ from typing import Any
 import numpy as np
 
 from upright.errors import BadInput, nearest
-from upright.identification import Rig, Run
+from upright.identification import GreyBox, Run
 from upright.identification.ladder.rungs import Rung
-from upright.identification.model.rig import NOISE
+from upright.identification.model.grey_box import NOISE
 from upright.identification.model.runs import FOR_GROUPS, PER_RUN, SPREADS
 from upright.identification.problem.simulated import with_noise
 from upright.physics import Plant
 from upright.physics.actuator import ACTUATOR
 from upright.records import Array, Record
-from upright.rig import Hardware
+from upright.rig import Hardware, Rig
 from upright.study.clock import check_clock
 from upright.study.coordinates import Sensors
 from upright.study.description import read_hardware
@@ -31,6 +31,7 @@ from upright.study.keys import names
 from upright.study.loop import Scene, read_loop, state_units
 from upright.study.rig import known_values, read_plant, read_rig
 from upright.study.sensors import Grid, drive_unit, read_drives, read_sensors
+from upright.study.stored_rig import rig_with_guesses
 from upright.study.text import Section, StudyText, show, si
 
 PathLike = str | os.PathLike[str]
@@ -46,7 +47,7 @@ class Study:
         The study file.
     plant : str
         Plant as the study names it.
-    rig : Rig
+    model : GreyBox
     runs : tuple of Run
     title, source : str
         Heading and origin of the data, for the report; may be empty.
@@ -60,13 +61,18 @@ class Study:
 
     path: Path
     plant: str
-    rig: Rig
+    model: GreyBox
     runs: tuple[Run, ...]
     title: str = ""
     source: str = ""
     sha256: str = ""
     ladder: tuple[Rung, ...] = ()
     hardware: Hardware = field(default_factory=Hardware)
+
+    @property
+    def rig(self) -> Rig:
+        """The rig with the numbers of the study, its guesses counting as numbers."""
+        return rig_with_guesses(self.model, self.plant, self.hardware)
 
     @property
     def provenance(self) -> dict[str, object]:
@@ -139,7 +145,7 @@ def load_study(
     return Study(
         path=path,
         plant=study.section("rig").text_of("plant", "furuta"),
-        rig=rig,
+        model=rig,
         runs=runs,
         title=study.text_of("title", "My rig") if "title" in study else "",
         source=study.text_of("source", "https://...") if "source" in study else "",

@@ -42,16 +42,16 @@ def fit_content(fit: Fit, study: Study, crossed: CrossValidation | None = None) 
             unit=p.unit,
             status="assumed" if p.assumed else "known",
         )
-        for name, p in fit.rig.parameters.items()
+        for name, p in fit.model.parameters.items()
     }
-    meanings = {name: p.meaning for name, p in fit.rig.parameters.items()}
+    meanings = {name: p.meaning for name, p in fit.model.parameters.items()}
     bands = fit.bands if crossed is None else crossed.bands
     content: dict[str, Any] = {
         "format": FORMAT,
         "title": study.title,
         "plant": study.plant,
         "rig": _estimated(study.hardware, fit.estimates).plain(),
-        "substeps": fit.rig.substeps,
+        "substeps": fit.model.substeps,
         **_fields(fit, "verdict trusted answers method evaluations"),
         "seconds": round(fit.seconds, 4),
         **_fields(fit, "cost interrupted failed not_evaluated"),
@@ -122,7 +122,7 @@ def write_response_fit(
     folder.mkdir(parents=True, exist_ok=True)
     answer.data.to_csv(folder / "frequency.csv")
     study = Study(
-        path=folder / "frequency.csv", plant=plant, rig=answer.rig, runs=(), title=title, source=source,
+        path=folder / "frequency.csv", plant=plant, model=answer.rig, runs=(), title=title, source=source,
         hardware=said or Hardware(),
     )  # fmt: skip
     write_fit(answer.fit, study, folder / "fit.json")
@@ -198,7 +198,7 @@ def _line(text: StudyText, name: str) -> int:
 def _nothing(study: Study, names: Collection[str], text: StudyText, number: int) -> list[str]:
     """A line for a parameter that must have a value, though it does nothing."""
     found = next(n for n in names if _line(text, n) == number)
-    plant = study.rig.plant
+    plant = study.model.plant
     if found in ACTUATOR or _has_default(study, found):
         return []
     return [f"{found} = {neutral(plant, found):g}"]
@@ -207,7 +207,7 @@ def _nothing(study: Study, names: Collection[str], text: StudyText, number: int)
 def _has_default(study: Study, name: str) -> bool:
     from dataclasses import MISSING, fields
 
-    return any(f.name == name and f.default is not MISSING for f in fields(study.rig.plant))  # type: ignore[arg-type]
+    return any(f.name == name and f.default is not MISSING for f in fields(study.model.plant))  # type: ignore[arg-type]
 
 
 def _lines_of_ladder(lines: Sequence[str]) -> set[int]:

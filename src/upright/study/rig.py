@@ -8,7 +8,7 @@ from dataclasses import MISSING, fields
 from typing import Any
 
 from upright.errors import BadInput
-from upright.identification.model.rig import SUBSTEPS, Parameter, Rig
+from upright.identification.model.grey_box import SUBSTEPS, GreyBox, Parameter
 from upright.physics import Plant, find
 from upright.physics.actuator import ACTUATOR
 from upright.quantities import Quantity
@@ -30,7 +30,7 @@ def read_plant(study: Section) -> type[Plant]:
         return find(name, study.text.path.parent)
 
 
-def read_rig(study: Section, plant: type[Plant], drive_unit: str, fixed: Mapping[str, float] | None = None) -> Rig:
+def read_rig(study: Section, plant: type[Plant], drive_unit: str, fixed: Mapping[str, float] | None = None) -> GreyBox:
     """Rig of a study.
 
     Parameters
@@ -70,7 +70,7 @@ def read_rig(study: Section, plant: type[Plant], drive_unit: str, fixed: Mapping
         parameters[name] = read(actuator, key, name, what, lambda number=number: number.default)
     rig = study.section("rig")
     substeps = rig.whole("substeps", 1, most=SUBSTEPS)
-    return Rig(plant=plant, parameters=parameters, substeps=substeps, guessed=rig.flag("guessed"))
+    return GreyBox(plant=plant, parameters=parameters, substeps=substeps, guessed=rig.flag("guessed"))
 
 
 def _default(study: Section, plant: type[Plant], name: str) -> float:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from upright.errors import BadInput, ImpossiblePhysics
-from upright.identification import Rig as Identified
+from upright.identification import GreyBox
 from upright.physics import Plant, find, name_of
 from upright.rig import Hardware, Rig
 from upright.rig.drive import GAIN
@@ -35,7 +35,7 @@ def read_stored_rig(path: Path, *, seed: int = 0, draws: int = 200) -> Rig:
     return _from_fit(path, seed, draws) if path.suffix == ".json" else _from_study(path)
 
 
-def rig_with_guesses(model: Identified, name: str, hardware: Hardware) -> Rig:
+def rig_with_guesses(model: GreyBox, name: str, hardware: Hardware) -> Rig:
     """The rig of a study's model, its guesses counting as its numbers."""
     kind = model.plant
     values = {n: p.value for n, p in model.parameters.items()}

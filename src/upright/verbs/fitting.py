@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from upright.identification.model.bands import Bands
     from upright.physics import Plant
     from upright.report.page import Chapter
+    from upright.rig import Rig
     from upright.study.load import Study
 
 METHODS = ("auto", "simplex", "least-squares")
@@ -47,8 +48,8 @@ class FitAnswer(Answer["Fit"]):
         from upright.report.page import Part, Picture, Points
         from upright.study.windows import windows
 
-        asked = {n: p for n, p in self.value.rig.parameters.items() if p.estimate}
-        fit = replace(self.value, rig=replace(self.value.rig, parameters=asked))
+        asked = {n: p for n, p in self.value.model.parameters.items() if p.estimate}
+        fit = replace(self.value, model=replace(self.value.model, parameters=asked))
         drawn = Picture(
             name="fit", draw=lambda: self._drawn(80), caption="Data and model.", description="See the table of scores."
         )  # fmt: skip
@@ -70,7 +71,7 @@ class FitAnswer(Answer["Fit"]):
 
     def __getitem__(self, name: str) -> Any:
         """The `Estimate` of a parameter, or the value of one that was known: ``fit["l_cg"].value``."""
-        rig, found = self.value.rig, self.value.estimates
+        rig, found = self.value.model, self.value.estimates
         if name in found:
             return found[name]
         if name not in rig.parameters:
@@ -91,9 +92,19 @@ class FitAnswer(Answer["Fit"]):
         return pd.DataFrame.from_dict(rows, orient="index", columns=columns)
 
     @property
+    def rig(self) -> Rig:
+        """The rig as identified: plant, drive and sensors with where each number is from, and rigs that the fit allows.
+
+        Every verb takes it, and tells how far the fit can be trusted.
+        """
+        from upright.verbs.handover import rig_of
+
+        return rig_of(self, "rig")
+
+    @property
     def plant(self) -> Plant:
         """The plant with the numbers found and given."""
-        rig, found = self.value.rig, self.value.estimates
+        rig, found = self.value.model, self.value.estimates
         values = {n: found[n].value if n in found else rig.parameters[n].value for n in rig.plant.names()}
         return rig.plant(**values)
 
@@ -107,7 +118,7 @@ class FitAnswer(Answer["Fit"]):
         from upright.report.fit.figures import fit_figure
 
         label, score = next(iter(self.value.runs.items()))
-        return fit_figure(score, self.value.rig.plant, title=label, buckets=buckets)
+        return fit_figure(score, self.value.model.plant, title=label, buckets=buckets)
 
     def save(self, path: str | Path = "fit.json") -> Path:
         """Write the fit for `predict`, `design`, `regulate` and other programs, and give back where."""
@@ -126,7 +137,7 @@ class FitAnswer(Answer["Fit"]):
         from upright.identification.inference.scoring import predict as score
         from upright.study.load import load_study
 
-        rig = self.value.rig
+        rig = self.value.model
         values = {n: p.value for n, p in rig.parameters.items()} | {
             n: e.value for n, e in self.value.estimates.items() if n in rig.parameters
         }
@@ -324,14 +335,14 @@ def identify(
     fitted = sum(run.role == "fit" for run in asked.runs)
     if each and fitted < 2:
         raise BadInput(f"{label}: --hold-out each takes two runs to fit or more, got {fitted}; add a run or a window")
-    if not asked.rig.estimated:
+    if not asked.model.estimated:
         raise BadInput(
             f'{label}: nothing is asked; give a parameter a guess, such as J_p = {{ guess = "1e-3 kg m^2" }}, or score'
             " the runs with a model fitted before: upright predict OUT/fit.json STUDY.toml"
         )
     if not fitted:
         raise BadInput(f'{label}: every run has role = "predict"; at least one needs role = "fit"')
-    fit = estimate(asked.rig, asked.runs, method=method, progress=progress)
+    fit = estimate(asked.model, asked.runs, method=method, progress=progress)
     if each and fit.interrupted:
         said = "Not evaluated: interrupted. No run was predicted by a fit of the others (--hold-out each)."
         fit = replace(fit, warnings=(*fit.warnings, said), not_evaluated=(*fit.not_evaluated, "cross-validation"))

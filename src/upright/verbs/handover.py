@@ -43,9 +43,9 @@ def rig_of(source: Any, verb: str, *, seed: int = 0, draws: int = 200) -> Rig:
     if isinstance(source, Rig):
         return source
     if isinstance(source, FitAnswer):
-        return stored_rig.rig_of_fit(fitted_of(source, verb), source.value.rig.plant, seed=seed, draws=draws)
+        return stored_rig.rig_of_fit(fitted_of(source, verb), source.value.model.plant, seed=seed, draws=draws)
     if isinstance(source, Study):
-        return stored_rig.rig_with_guesses(source.rig, source.plant, source.hardware)
+        return source.rig
     if isinstance(source, Plant):
         return stored_rig.rig_of_plant(source)
     return stored_rig.read_stored_rig(_file(source, verb), seed=seed, draws=draws)

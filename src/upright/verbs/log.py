@@ -231,9 +231,9 @@ def _known(rig: Any, log: str) -> KnownRig | None:
         return KnownRig(name=type(rig).__name__, plant=type(rig), parameters=numbers)
     if isinstance(rig, FitAnswer):
         fit = rig.value
-        values = {n: p.value for n, p in fit.rig.parameters.items()} | {n: e.value for n, e in fit.estimates.items()}
+        values = {n: p.value for n, p in fit.model.parameters.items()} | {n: e.value for n, e in fit.estimates.items()}
         numbers = {n: Parameter(name=n, value=v) for n, v in values.items()}
-        return KnownRig(name=SAVED, plant=fit.rig.plant, parameters=numbers)
+        return KnownRig(name=SAVED, plant=fit.model.plant, parameters=numbers)
     raise BadInput(
         "doctor takes a plant's name, a study (TOML), a fit.json or what up.identify answered as the rig, got "
         f"{type(rig).__name__}."

@@ -96,13 +96,13 @@ def predict(
             raise BadInput(f"{what} {given} does not exist; the call is upright predict OUT/fit.json STUDY.toml")
     fitted, of = fitted_of(model, "predict"), Path(called(model)).name
     asked, on = _runs_to_predict(fitted, model, study, data)
-    missing = [n for n in fitted.values if n not in asked.rig.parameters]
+    missing = [n for n in fitted.values if n not in asked.model.parameters]
     if missing:
         raise BadInput(
             f"{on}: the plant '{asked.plant}' has no parameter {missing[0]}, and {of} is a '{fitted.plant}';"
             " both must be the same plant"
         )
-    rig = replace(asked.rig, substeps=fitted.substeps)
+    rig = replace(asked.model, substeps=fitted.substeps)
     runs = [replace(run, role="predict") for run in asked.runs]
     scores = score(fitted.values, rig, runs, groups=fitted.groups, bands=fitted.bands)
     found = promise(scores, fitted.bands, fitted.scores)
@@ -159,15 +159,15 @@ def _runs_to_predict(
         study = load_study(Path(given), data=None if data is None else Path(data), fixed=fitted.values)
         return study, Path(given).name
     if isinstance(model, FitAnswer):
-        kind = model.value.rig.plant
+        kind = model.value.model.plant
     else:
         kind = find(fitted.plant, Path(model).parent) if isinstance(model, str | os.PathLike) else find(fitted.plant)
     record, path = open_log(given)
     known = {n: v for n, v in fitted.values.items() if n in kind.names()}
     whole = (float(record.t[0]), float(record.t[-1]))
     study = study_of_record(record, kind, known=known, ask=[], window=whole)
-    drive = {n: replace(p, value=fitted.values.get(n, p.value)) for n, p in study.rig.parameters.items()}
-    return replace(study, rig=replace(study.rig, parameters=drive)), path.name
+    drive = {n: replace(p, value=fitted.values.get(n, p.value)) for n, p in study.model.parameters.items()}
+    return replace(study, model=replace(study.model, parameters=drive)), path.name
 
 
 @command(
@@ -259,9 +259,9 @@ def ladder(
     if out is not None:
         for name in ("ladder.json", "study.toml", "ladder.html"):
             check_output(at / name)
-    if not asked.rig.estimated:
+    if not asked.model.estimated:
         raise BadInput(f'{study}: nothing is asked; give a parameter a guess, such as b_2c = {{ guess = "1e-4 N m" }}')
-    climbed = climb(asked.rig, asked.runs, asked.ladder or None, progress=progress, workers=shared)
+    climbed = climb(asked.model, asked.runs, asked.ladder or None, progress=progress, workers=shared)
     if not climbed.steps:
         raise KeyboardInterrupt
     trimmed = study.is_file() and can_be_trimmed(asked, climbed)

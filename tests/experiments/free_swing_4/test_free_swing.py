@@ -114,7 +114,7 @@ def test_the_studies_can_be_identified_again(done):
 
     for question in questions(done.rig):
         study = load_study(done.folder / f"{question.name}.toml")
-        assert set(study.rig.estimated) == set(question.asked)
+        assert set(study.model.estimated) == set(question.asked)
 
 
 def test_an_interrupted_experiment_keeps_and_tells_what_is_there(tmp_path):

@@ -117,7 +117,7 @@ def test_the_study_of_its_logs_says_what_its_owner_says(own, tmp_path):
     rows = "".join(f"{0.002 * k},0,0,{0.02 * k}\n" for k in range(11))
     (tmp_path / "log.csv").write_text(f"t,u_applied,psi,theta\n{rows}", "utf-8")
     study = load_study(tmp_path / "x.toml", text=text + '\n[[runs]]\nfile = "log.csv"\n')
-    asked = study.rig.parameters
+    asked = study.model.parameters
     assert {n for n, p in asked.items() if p.estimate} == {"J_d", "J_p", "b_1", "b_2", "actuator.gain"}
     assert asked["l_cg"].value == pytest.approx(0.0645)
     assert asked["l_cg"].uncertainty == pytest.approx(5e-4)

@@ -222,7 +222,7 @@ def test_the_fit_is_repeated_from_its_files(tmp_path):
     done = run_tracking("torsional", 6, tmp_path, which=(1,), stopped=lambda: True)
     assert done.interrupted
     study = load_study(tmp_path / "shaft.toml")
-    again = identify(study.rig, study.runs)
+    again = identify(study.model, study.runs)
     written = json.loads((tmp_path / "fit.json").read_text(encoding="utf-8"))["parameters"]
     for name, e in again.estimates.items():
         assert written[name]["value"] == pytest.approx(e.value, rel=1e-9)

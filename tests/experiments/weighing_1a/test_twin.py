@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from upright.experiments.weighing_1a.run import acquire, drawn_twin, measure_body
-from upright.identification import Parameter, Rig, Run
+from upright.identification import GreyBox, Parameter, Run
 from upright.identification.estimate import identify
 from upright.physics import chain
 from upright.rig.makes import OSCILLATORS
@@ -86,7 +86,7 @@ def test_least_squares_on_the_whole_motion_agrees(kind):
                 unknown=("initial", "offset", "friction"),
             )
         )
-    fit = identify(Rig(plant=plant, parameters=parameters), runs, method="least-squares")
+    fit = identify(GreyBox(plant=plant, parameters=parameters), runs, method="least-squares")
     for ours, name in ((done.loadings.k, "k_1"), (done.loadings.bare, mass)):
         theirs = fit.estimates[name]
         assert theirs.value == pytest.approx(ours.value, rel=1e-2)

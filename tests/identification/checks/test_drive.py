@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from upright.identification import Parameter, Rig, Run
+from upright.identification import GreyBox, Parameter, Run
 from upright.identification.estimate import identify
 from upright.physics.oscillators import Torsional1
 from upright.simulation import simulate
@@ -31,7 +31,7 @@ def test_a_spin_up_tells_when_the_drive_tripped_and_how_it_brakes() -> None:
     parameters = {n: Parameter(name=n, value=v) for n, v in DISK.items()}
     parameters |= {n: Parameter(name=n, value=v, estimate=True) for n, v in guess.items()}
     run = Run(label="spin-up", role="fit", t=t, u=u, y=y, measured=("theta_1",))
-    fit = identify(Rig(plant=Torsional1, parameters=parameters, substeps=2), [run])
+    fit = identify(GreyBox(plant=Torsional1, parameters=parameters, substeps=2), [run])
     for name in guess:
         e = fit.estimates[name]
         # four standard errors: one miss in 16,000

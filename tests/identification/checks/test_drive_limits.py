@@ -40,5 +40,5 @@ def test_a_force_limit_that_no_run_reaches_is_left_out():
     assert (e.status, e.value) == ("left out", math.inf)
     assert any("no fitted run reaches it" in w for w in fit.warnings)
     for name, truth in {**CART, **SERVO}.items():
-        if name in fit.rig.estimated and name != "actuator.force_limit":
+        if name in fit.model.estimated and name != "actuator.force_limit":
             assert fit.estimates[name].value == pytest.approx(truth, rel=0.01)

@@ -45,7 +45,7 @@ def pushed(run, at: float, speed: float):
 
 def found(fit, runs):
     """Reasons and times by run, of the model that came out."""
-    return [(o.run, o.reason, o.start, o.stop) for o in outliers(fit, fit.rig, runs)]
+    return [(o.run, o.reason, o.start, o.stop) for o in outliers(fit, fit.model, runs)]
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -64,7 +64,7 @@ def test_three_lost_counts_are_named_and_taken_out():
     y[at, 0] += [0.4, -0.3, 0.35]
     clean, runs[1] = runs[1], replace(runs[1], y=y)
     fit = identify(rig(Pendulum, PENDULUM, GUESSES), runs)
-    (told,) = [o for o in outliers(fit, fit.rig, runs) if o.reason == SPIKES]
+    (told,) = [o for o in outliers(fit, fit.model, runs) if o.reason == SPIKES]
     assert (told.run, told.start, told.stop) == ("swing 1", pytest.approx(2.11), pytest.approx(8.03))
     assert all(f"{i * 0.01:.4g} s" in told.evidence for i in at)
     assert any("swing 1" in w and SPIKES in w for w in fit.warnings)
@@ -151,7 +151,7 @@ def test_what_a_stretch_is_missed_by_is_a_number_that_means_something():
     runs = swings(3)
     runs[2] = noisy(pushed(runs[2], 5.03, 1.5), 1e-3, 99)
     fit = identify(rig(Pendulum, PENDULUM, GUESSES), runs)
-    (told,) = outliers(fit, fit.rig, runs)
+    (told,) = outliers(fit, fit.model, runs)
     times = re.search(r"missed (more than )?([\d.]+) times", told.evidence)
     assert times is not None
     assert 4 <= float(times[2]) < 100

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from upright.errors import BadInput, NotIdentifiable
-from upright.identification import Parameter, Rig
+from upright.identification import GreyBox, Parameter
 from upright.identification.frequency.answer import explain
 from upright.identification.frequency.balance import Balance
 from upright.identification.frequency.detection import by_period, detect, settled
@@ -41,10 +41,10 @@ def smooth(plant=FURUTA, gain=0.65, lag=2e-3, omega=OMEGA) -> FrequencyResponse:
     )  # fmt: skip
 
 
-def asked(**sought: float) -> Rig:
+def asked(**sought: float) -> GreyBox:
     """The Furuta rig with guesses for what is sought, the rest known."""
     values = {**FURUTA.parameters(), "actuator.gain": 0.65, "actuator.lag": 2e-3}
-    return Rig(
+    return GreyBox(
         plant=Furuta,
         parameters={
             n: Parameter(name=n, value=sought.get(n, v), estimate=n in sought, lower=0.0) for n, v in values.items()
@@ -248,7 +248,7 @@ def test_the_unstable_pole_does_not_depend_on_the_scale():
     for factor in (1.0, 1.1):
         rest = asked(**GUESS)
         heavy = Parameter(name="m_p", value=factor * FURUTA.m_p)
-        rest = Rig(plant=Furuta, parameters={**rest.parameters, "m_p": heavy})
+        rest = GreyBox(plant=Furuta, parameters={**rest.parameters, "m_p": heavy})
         found = least_squares(rest, "hanging", data, starts=2).way.values
         poles.append(Furuta(**{n: found[n] for n in Furuta.names()}).linear("inverted").poles()[0].real)
     assert found["actuator.gain"] == pytest.approx(1.1 * 0.65, rel=1e-3)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from upright.errors import BadInput
-from upright.identification import Fit, Parameter, Rig, Run, identify
+from upright.identification import Fit, GreyBox, Parameter, Run, identify
 from upright.identification.inference.assumptions import per_length, proportional, untouched
 from upright.identification.inference.verdict import USABLE
 from upright.physics import find
@@ -34,14 +34,14 @@ def steps(gain: float = GAIN, added: float = 0.0, label: str = "step") -> Run:
     )  # fmt: skip
 
 
-def rig(gain: Parameter) -> Rig:
+def rig(gain: Parameter) -> GreyBox:
     """The disk with wrong guesses of everything but the gain."""
     parameters = {
         n: Parameter(name=n, value=1.3 * TRUTH.get(n, 0.0), unit=DISK.quantity(n).unit, estimate=n in TRUTH)
         for n in DISK.names()
         if n in TRUTH
     }
-    return Rig(plant=DISK, parameters=parameters | {"actuator.gain": gain})
+    return GreyBox(plant=DISK, parameters=parameters | {"actuator.gain": gain})
 
 
 def gained(**fields) -> Parameter:
@@ -93,12 +93,12 @@ def test_what_an_assumed_length_does_not_touch_is_named():
         "J_p": Parameter(name="J_p", value=3e-3, unit="kg m^2", estimate=True),
         "b_2": Parameter(name="b_2", value=3e-3, unit="N m s/rad", estimate=True),
     }
-    fit = identify(Rig(plant=pendulum, parameters=numbers), [run])
+    fit = identify(GreyBox(plant=pendulum, parameters=numbers), [run])
     (a,) = fit.assumptions
     assert set(proportional(a)) == {"J_p", "b_2"}
     assert untouched(a) == []
     heavier = replace(numbers["m_p"], value=0.22)
-    other = identify(Rig(plant=pendulum, parameters=numbers | {"m_p": heavier}), [run])
+    other = identify(GreyBox(plant=pendulum, parameters=numbers | {"m_p": heavier}), [run])
     for name in ("J_p", "b_2"):
         assert abs(other.estimates[name].value / fit.estimates[name].value / 1.1 - 1) < 1e-3
 
@@ -138,13 +138,13 @@ def swing(seed: int = 5) -> Run:
     return Run(label="swing", role="fit", t=t, u=np.zeros((t.size, 1)), y=y, measured=("theta",))
 
 
-def hanging(assumed: dict[str, float], known: dict[str, float], asked: dict[str, float]) -> Rig:
+def hanging(assumed: dict[str, float], known: dict[str, float], asked: dict[str, float]) -> GreyBox:
     pendulum = find("pendulum")
     numbers = {
         n: Parameter(name=n, value=v, unit=pendulum.quantity(n).unit, estimate=n in asked, assumed=n in assumed)
         for n, v in {**assumed, **known, **asked}.items()
     }
-    return Rig(plant=pendulum, parameters=numbers)
+    return GreyBox(plant=pendulum, parameters=numbers)
 
 
 def usable(fit: Fit) -> set[str]:

@@ -15,7 +15,7 @@ from upright.identification.inference.reach import beyond, reached
 from upright.identification.ladder.cross_validation import cross_validate
 from upright.identification.model.bands import Bands, Spread
 from upright.identification.model.fit import Fit, RunScore
-from upright.identification.model.rig import Rig
+from upright.identification.model.grey_box import GreyBox
 from upright.identification.model.runs import Run
 from upright.physics import Furuta, Pendulum
 
@@ -25,7 +25,7 @@ def coloured(run: Run, seed: int) -> Run:
     return noisy(run, 0.01 * float(run.y.std()), seed, memory=0.9)
 
 
-def rubbed(seed: int) -> tuple[Rig, list[Run]]:
+def rubbed(seed: int) -> tuple[GreyBox, list[Run]]:
     """A pendulum with drag that its model does not have, let go once to be fitted, and lower to be predicted."""
     generator = np.random.default_rng(seed)
     values = {n: v * 2 ** generator.uniform(-0.5, 0.5) if n.startswith("b") else v for n, v in PENDULUM.items()}
@@ -35,7 +35,7 @@ def rubbed(seed: int) -> tuple[Rig, list[Run]]:
     return rig(Pendulum, known, {"J_p": 3e-3, "b_2": 1e-3, "b_2c": 1e-3}), [one, other]
 
 
-def driven(seed: int) -> tuple[Rig, list[Run]]:
+def driven(seed: int) -> tuple[GreyBox, list[Run]]:
     """A Furuta pendulum whose model is right, shaken as long again for a second run."""
     generator = np.random.default_rng(seed)
     values = FURUTA | {n: FURUTA[n] * 2 ** generator.uniform(-0.5, 0.5) for n in ("J_d", "b_1", "b_2", "b_1c")}

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from upright.identification import Parameter, Rig, Run, identify
+from upright.identification import GreyBox, Parameter, Run, identify
 from upright.identification.inference.verdict import USABLE
 from upright.physics import find
 from upright.simulation import simulate
@@ -23,7 +23,7 @@ def asked(**known):
     numbers["m_1"] = Parameter(name="m_1", value=TRUTH["m_1"], unit="kg")
     numbers["actuator.gain"] = Parameter(name="actuator.gain", value=1.5, unit="N/V", estimate=True, lower=0.0)
     numbers |= {n: Parameter(name=n, value=v, unit="s", estimate=n == "actuator.delay") for n, v in known.items()}
-    return Rig(plant=PLANT, parameters=numbers)
+    return GreyBox(plant=PLANT, parameters=numbers)
 
 
 def run(late=0, friction=0.0):

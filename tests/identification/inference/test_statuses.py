@@ -20,7 +20,7 @@ from upright.identification.inference.intervals import (
 from upright.identification.inference.loop import Standing
 from upright.identification.inference.verdict import Evidence, judge, trusted
 from upright.identification.model.fit import Estimate, Judgement, RunScore
-from upright.identification.model.rig import Parameter
+from upright.identification.model.grey_box import Parameter
 from upright.identification.model.runs import Run
 from upright.identification.problem.residuals import formulate
 from upright.identification.search.descent import SearchLog, descend_progressively

@@ -15,7 +15,7 @@ from upright.identification.inference.covariance import Optimum, assess
 from upright.identification.inference.loop import standing
 from upright.identification.inference.verdict import Evidence, judge, trusted
 from upright.identification.model.fit import Assumption, Estimate, Judgement, RunScore
-from upright.identification.model.rig import Rig
+from upright.identification.model.grey_box import GreyBox
 from upright.identification.model.runs import Run
 from upright.identification.problem.residuals import formulate
 from upright.identification.search.descent import descend_progressively
@@ -258,7 +258,7 @@ def _judged(
     )  # fmt: skip
 
 
-def _optimum(question: Rig, run: Run) -> Optimum:
+def _optimum(question: GreyBox, run: Run) -> Optimum:
     problem = formulate(question, [run])
     return assess(problem, descend_progressively(problem, problem.start).x)
 

@@ -15,7 +15,7 @@ from tests.identification.twins import PENDULUM, noisy, rig, swing
 from upright.identification import Run
 from upright.identification.ladder import growth
 from upright.identification.ladder.growth import choose_friction
-from upright.identification.model.rig import Rig
+from upright.identification.model.grey_box import GreyBox
 from upright.identification.problem.residuals import Problem, formulate
 from upright.identification.search.descent import Descent, SearchLog, descend, descend_progressively, first_horizon
 from upright.identification.search.strategy import closed_form_starts, search
@@ -35,7 +35,7 @@ def swings(seed: int, **truth: float) -> list[Run]:
     ]
 
 
-def asked(*names: str, **truth: float) -> Rig:
+def asked(*names: str, **truth: float) -> GreyBox:
     return rig(Pendulum, PENDULUM | truth, {n: GUESSES[n] for n in names or GUESSES})
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from tests.identification.twins import PENDULUM, noisy, rig, swing
 from upright.errors import BadInput
-from upright.identification import Rig, Run
+from upright.identification import GreyBox, Run
 from upright.identification.ladder.growth import Ladder, climb
 from upright.identification.ladder.rungs import Rung, default_rungs
 from upright.physics import Pendulum, find
@@ -31,7 +31,7 @@ DISK = {
 }
 
 
-def asked(**truth: float) -> Rig:
+def asked(**truth: float) -> GreyBox:
     guesses = {"J_p": 1.4e-3, "b_2": 1.4e-3, "b_2c": 1.4e-3, "b_2q": 7e-4}
     return rig(Pendulum, PENDULUM | truth, guesses)
 
@@ -196,7 +196,7 @@ def test_what_only_the_run_held_out_tells_does_not_predict_it():
 def test_a_real_pendulum_asks_for_dry_friction_and_drag():
     """Throw-away fits of this log gave 73 to 90 % viscous, 85 to 97 % with Coulomb, 98.6 % and more with drag."""
     study = load_study(STUDIES / "aau_pendulum.toml", data=os.environ["UPRIGHT_REAL_DATA"])
-    ladder = climb(study.rig, study.runs)
+    ladder = climb(study.model, study.runs)
     assert chosen(ladder) == ["viscous friction", "Coulomb friction", "quadratic drag"]
     viscous, coulomb, drag = ladder.accepted
     assert 73 < viscous.fit_percent < 90
@@ -210,7 +210,7 @@ def test_a_real_pendulum_asks_for_dry_friction_and_drag():
 def test_two_real_carts_are_predicted_as_well_as_they_repeat_themselves():
     """Repeats of this rig predict one another to 91 to 99 %; throw-away fits predicted 92 % and 91 %."""
     study = load_study(STUDIES / "ecp210_ladder.toml", data=os.environ["UPRIGHT_REAL_DATA"])
-    ladder = climb(study.rig, study.runs, study.ladder)
+    ladder = climb(study.model, study.runs, study.ladder)
     (group,) = ladder.repeats
     assert all(91 < v < 99 for v in group.ceiling.values())
     assert {"Coulomb", "brake by the drive"} <= set(chosen(ladder))

@@ -55,16 +55,16 @@ def test_a_run_of_a_fitted_day_is_predicted_without_choosing_its_friction(two_da
     # noise of 1e-3 rad limits the score: 100 (1 - sigma / spread)
     limit = 100 * (1 - 1e-3 / float(np.std(runs[-1].y)))
     assert told.fit_percent["theta"] > limit - 1
-    again = predict(fit, fit.rig, [runs[-1]])[runs[-1].label]
+    again = predict(fit, fit.model, [runs[-1]])[runs[-1].label]
     assert again.fit_percent["theta"] == pytest.approx(told.fit_percent["theta"], abs=1e-6)
     stranger = replace(runs[-1], shared={"friction": "Sunday"})
-    assert predict(fit, fit.rig, [stranger])[runs[-1].label].adapted == ("initial", "friction")
+    assert predict(fit, fit.model, [stranger])[runs[-1].label].adapted == ("initial", "friction")
 
 
 def test_a_run_of_another_day_is_offered_the_friction_of_that_day(two_days):
     fit, runs = two_days
     alone = replace(runs[-1], shared={})  # friction of the fit: the geometric mean of both days
-    told = predict(fit, fit.rig, [alone])[alone.label]
+    told = predict(fit, fit.model, [alone])[alone.label]
     assert told.offer is not None
     assert told.offer.name == "friction"
     that_day = fit.groups["Tuesday"]["friction"]  # known from the day's other runs
@@ -82,7 +82,7 @@ def test_a_run_of_another_day_is_offered_the_friction_of_that_day(two_days):
 def test_the_wrong_day_predicts_worse(two_days):
     fit, runs = two_days
     right = fit.runs[runs[-1].label].fit_percent["theta"]
-    wrong = predict(fit, fit.rig, [replace(runs[-1], shared={"friction": "Monday"})])[runs[-1].label]
+    wrong = predict(fit, fit.model, [replace(runs[-1], shared={"friction": "Monday"})])[runs[-1].label]
     assert wrong.adapted == ("initial",)
     assert wrong.fit_percent["theta"] < right - 10
 
@@ -138,7 +138,7 @@ def test_a_fit_file_keeps_what_groups_share(two_days, tmp_path):
     assert content["groups"]["Monday"]["friction"]["status"] == "firm"
     assert content["runs"][runs[-1].label]["adapted"] == ["initial"]
     stored = read_fit(tmp_path / "fit.json")
-    again = predict(stored.values, fit.rig, [runs[-1]], groups=stored.groups)[runs[-1].label]
+    again = predict(stored.values, fit.model, [runs[-1]], groups=stored.groups)[runs[-1].label]
     assert again.adapted == ("initial",)
     assert again.fit_percent["theta"] == pytest.approx(fit.runs[runs[-1].label].fit_percent["theta"], abs=1e-6)
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from upright.identification import Parameter, Rig, Run, identify
+from upright.identification import GreyBox, Parameter, Run, identify
 from upright.identification.problem.residuals import formulate
 from upright.physics import find
 from upright.simulation import simulate
@@ -33,7 +33,7 @@ def test_the_shaft_is_found_although_the_friction_is_another():
     parameters = {n: Parameter(name=n, value=1.3 * TRUTH[n], estimate=True, lower=0.0) for n in asked}
     parameters["c_2"] = Parameter(name="c_2", value=0.0)
     run = spin_up()
-    fit = identify(Rig(plant=PLANT, parameters=parameters, substeps=2), [run])
+    fit = identify(GreyBox(plant=PLANT, parameters=parameters, substeps=2), [run])
     score = fit.runs["spin-up"]
     astray = np.abs(score.y - score.simulated).max()
     twist = score.y[:, 0] - score.y[:, 1]
@@ -49,7 +49,7 @@ def test_the_shaft_is_found_although_the_friction_is_another():
 def test_components_are_weighed_by_what_is_missed_of_them_and_the_cost_stays():
     run = spin_up()
     parameters = {n: Parameter(name=n, value=v, estimate=n == "J_1", lower=0.0) for n, v in TRUTH.items()}
-    problem = formulate(Rig(plant=PLANT, parameters=parameters, substeps=2), [run])
+    problem = formulate(GreyBox(plant=PLANT, parameters=parameters, substeps=2), [run])
     x = problem.start
     y = problem.tracks[0].y
     apart = 0.05 * (y[:, :1] - y[:, 1:]) * [1, -1]  # a tenth of the twist, and a hundredth of both angles

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from upright.identification import Parameter, Rig, Run
+from upright.identification import GreyBox, Parameter, Run
 from upright.identification.estimate import identify
 from upright.physics.oscillators import Torsional2
 from upright.simulation import Held, simulate
@@ -34,7 +34,7 @@ def test_a_hand_that_gives_way_quickly_hides_neither_stiffness_nor_damping():
     )  # fmt: skip
     parameters = {n: Parameter(name=n, value=v) for n, v in DISKS.items()}
     parameters |= {n: Parameter(name=n, value=0.7 * DISKS[n], estimate=True) for n in ("k_12", "c_1", "J_1")}
-    fit = identify(Rig(plant=Torsional2, parameters=parameters), [run])
+    fit = identify(GreyBox(plant=Torsional2, parameters=parameters), [run])
     for name in ("k_12", "c_1", "J_1"):
         e = fit.estimates[name]
         assert abs(e.value - DISKS[name]) < 4 * e.stderr + 1e-3 * DISKS[name], name
@@ -53,5 +53,5 @@ def test_a_disk_that_does_not_move_may_be_given_as_measured(level):
     )  # fmt: skip
     parameters = {n: Parameter(name=n, value=v) for n, v in DISKS.items()}
     parameters["k_12"] = Parameter(name="k_12", value=0.35, estimate=True)
-    fit = identify(Rig(plant=Torsional2, parameters=parameters), [run])
+    fit = identify(GreyBox(plant=Torsional2, parameters=parameters), [run])
     assert fit.estimates["k_12"].value == pytest.approx(0.5, rel=1e-3)

@@ -11,10 +11,10 @@ from scipy.linalg import expm, solve_discrete_are
 
 from tests.identification.twins import rig
 from upright.errors import BadInput
-from upright.identification import Rig, Run
+from upright.identification import GreyBox, Run
 from upright.identification.estimate import identify
 from upright.identification.inference.scoring import predict
-from upright.identification.model.rig import NOISE
+from upright.identification.model.grey_box import NOISE
 from upright.identification.problem.residuals import Problem, formulate
 from upright.identification.problem.simulated import discrete_model, gains, restart_states, with_noise
 from upright.laws import state_feedback
@@ -52,7 +52,7 @@ def balanced(seed: int, *, seconds: float = 8.0, push: float = 0.01, friction: f
     )
 
 
-def true_rig(**changes: float) -> Rig:
+def true_rig(**changes: float) -> GreyBox:
     return rig(Furuta, VALUES, {}, **changes)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from upright.identification import Parameter, Rig, Run
+from upright.identification import GreyBox, Parameter, Run
 from upright.identification.estimate import identify, predict
 from upright.identification.problem.trips import find_trips, located
 from upright.physics.oscillators import Torsional2
@@ -32,11 +32,11 @@ def spin_up(*, seconds: float = 6.0, dt: float = 2e-3, volts: float = 0.5, **fie
     return Run(t=t, u=u, y=np.round(y / COUNT) * COUNT, **run)
 
 
-def asked(*names: str, off: float = 1.0) -> Rig:
+def asked(*names: str, off: float = 1.0) -> GreyBox:
     """The two disks with guesses of some numbers, `off` times the truth."""
     parameters = {n: Parameter(name=n, value=v) for n, v in (DISKS | DRIVE).items()}
     parameters |= {n: Parameter(name=n, value=off * parameters[n].value, estimate=True) for n in names}
-    return Rig(plant=Torsional2, parameters=parameters)
+    return GreyBox(plant=Torsional2, parameters=parameters)
 
 
 @pytest.mark.slow
@@ -154,7 +154,7 @@ def test_where_no_trip_is_seen_the_search_begins_at_the_logged_end():
 def test_a_prediction_finds_its_own_trip_and_says_so(tripped):
     fit, _ = tripped
     run = spin_up(actuator={"end": 3.1}, label="other", volts=0.45, unknown=("initial", "input_end"), role="predict")
-    told = predict(fit, fit.rig, [run])["other"]
+    told = predict(fit, fit.model, [run])["other"]
     assert told.adapted == ("initial", "input_end")
     assert min(told.fit_percent.values()) > 99
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from upright.identification import Parameter, Rig, Run, identify
+from upright.identification import GreyBox, Parameter, Run, identify
 from upright.physics import find
 from upright.simulation import simulate
 
@@ -25,7 +25,7 @@ def test_the_end_of_a_push_is_found_from_one_swing_too_early():
     run = Run(label="trip", role="fit", t=t, u=u, y=y, measured=("theta_1", "theta_2"), quantum=(quantum,) * 2,
               unknown=("input_end",), initial=dict.fromkeys(PLANT.state_names(), 0.0))  # fmt: skip
     parameters = {n: Parameter(name=n, value=1.1 * v, estimate=True, lower=0.0) for n, v in TRUTH.items()}
-    fit = identify(Rig(plant=PLANT, parameters=parameters), [run])
+    fit = identify(GreyBox(plant=PLANT, parameters=parameters), [run])
     e = fit.per_run["trip"]["input_end"]
     assert abs(e.value - end) < max(4 * e.stderr, 2e-3)
 
@@ -42,7 +42,7 @@ def test_another_valley_is_reached_from_the_one_beside_it():
     run = Run(label="trip", role="fit", t=t, u=u, y=x[:, ::2, 0], measured=("theta_1", "theta_2"),
               unknown=("input_end",), initial=dict.fromkeys(PLANT.state_names(), 0.0))  # fmt: skip
     parameters = {n: Parameter(name=n, value=v, estimate=n == "c_12", lower=0.0) for n, v in TRUTH.items()}
-    problem = formulate(Rig(plant=PLANT, parameters=parameters), [run])
+    problem = formulate(GreyBox(plant=PLANT, parameters=parameters), [run])
     place = next(i for i, u in enumerate(problem.unknowns) if u.name == "input_end")
     start = problem.start
     start[place] = end - SWING

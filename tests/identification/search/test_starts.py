@@ -9,7 +9,7 @@ import pytest
 
 from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, shaken, swing
 from upright.closed_loop.structures import ClosedLoop, pid
-from upright.identification.model.rig import base_values
+from upright.identification.model.grey_box import base_values
 from upright.identification.search.starts import friction_from_energy, observe, regress, samples_of, turning_points
 from upright.physics import Furuta, Pendulum
 from upright.signals.smoothing import dominant_period, savitzky_golay

@@ -31,7 +31,7 @@ def test_the_page_says_what_a_reader_asks_first(fit, written):
         assert page.prose.index(answer.headline) < page.prose.index("Question")
     for name in fit.estimates:
         assert name in page.prose
-        assert fit.rig.parameters[name].meaning in page.prose
+        assert fit.model.parameters[name].meaning in page.prose
     for needed in ("kg m²", "N m s/rad", "release", "c0ffee", "fitted", "predicted", "93.5 %", "firm", "weak", "∞"):
         assert needed in page.prose
     for sentence in (*fit.unseen, *fit.warnings):

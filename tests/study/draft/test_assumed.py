@@ -35,7 +35,7 @@ def usable(fit) -> set[str]:
 def test_no_friction_of_an_unedited_draft_of_a_swing_can_be_used(drafted):
     log = swing()
     _, study = drafted(t=log["t"].to_numpy(), theta=log["theta"].to_numpy())
-    fit = identify(study.rig, study.runs)
+    fit = identify(study.model, study.runs)
     assert fit.estimates["b_2c"].value > 3 * TRUTH["b_2c"]  # per kilogram, as the draft assumes one
     assert usable(fit) == {"l_cg"}
     assert fit.estimates["l_cg"].value == pytest.approx(TRUTH["l_cg"], rel=1e-3)

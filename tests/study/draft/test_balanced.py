@@ -66,7 +66,7 @@ def test_a_pendulum_that_falls_away_from_where_it_is_kept_stands(drafted, sign):
 def test_the_length_is_that_of_the_pendulum_and_the_arm_that_of_the_arm(drafted):
     psi, theta, u = balanced()
     _, study = drafted(t=T, voltage=u, psi=psi, theta=theta)
-    given = study.rig.parameters
+    given = study.model.parameters
     assert given["l_cg"].value == pytest.approx(LENGTH, rel=0.3)  # from 30 % off, fits converge
     assert given["r"].value == pytest.approx(ARM, rel=0.3)  # the uncertainty that the draft states
     gained = given["actuator.gain"].value / (given["J_d"].value + given["m_p"].value * given["r"].value ** 2)
@@ -94,7 +94,7 @@ def test_a_balanced_qube_is_explained_by_its_draft(tmp_path):
     record = read(path)
     (tmp_path / "study.toml").write_text(draft(record, inspect(record), path, tmp_path / "study.toml"), "utf-8")
     study = load_study(tmp_path / "study.toml")
-    fit = identify(study.rig, study.runs)
+    fit = identify(study.model, study.runs)
     (score,) = fit.runs.values()
     assert score.ahead[0.05]["theta"] > 90
     # the same pendulum by its data sheet: m l_cg^2 + J_p over m l_cg of a rod of 129 mm

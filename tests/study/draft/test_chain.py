@@ -41,7 +41,7 @@ def test_counts_that_run_away_are_disks_without_springs_to_ground(drafted):
     one, two = spun_up()
     text, study = drafted(t=T, target_value=VOLTS, enc1=one, enc2=two)
     assert study.plant == "torsional-2"
-    assert not {"k_1", "k_2"} & set(study.rig.estimated)
+    assert not {"k_1", "k_2"} & set(study.model.estimated)
     assert "more than a cart can travel" in text
 
 
@@ -58,9 +58,9 @@ def test_the_range_of_a_command_in_dac_counts_is_said_in_counts_and_of_one_in_vo
 def test_an_assumed_gain_fixes_the_scale_and_starts_are_of_the_right_size(drafted):
     one, two = spun_up()
     _, study = drafted(t=T, target_value=VOLTS, enc1=one, enc2=two)
-    given = study.rig.parameters
+    given = study.model.parameters
     assert given["actuator.gain"].value == 1.0
-    assert "actuator.gain" not in study.rig.estimated
+    assert "actuator.gain" not in study.model.estimated
     # a factor of two either way is where least squares has no trouble
     for name, truth in {"J_1": 0.009, "J_2": 0.006, "k_12": 2.4}.items():
         assert 0.5 < given[name].value / truth < 2, name
@@ -70,7 +70,7 @@ def test_an_assumed_gain_fixes_the_scale_and_starts_are_of_the_right_size(drafte
 def test_a_draft_explains_its_log_without_a_change(drafted):
     one, two = spun_up()
     _, study = drafted(t=T, target_value=VOLTS, enc1=one, enc2=two)
-    fit = identify(study.rig, study.runs)
+    fit = identify(study.model, study.runs)
     assert min(fit.runs[study.runs[0].label].fit_percent.values()) > 99
     assert fit.estimates["J_1"].value == pytest.approx(0.009, rel=0.02)
     assert fit.estimates["k_12"].value == pytest.approx(2.4, rel=0.02)
@@ -92,7 +92,7 @@ def test_carts_that_return_to_their_springs_are_carts(drafted):
     x = np.round(0.01 * METRE * np.where(T >= ON, 1 - np.exp(-(T - ON)) * np.cos(12 * (T - ON)), 0) * (T < 6))
     _, study = drafted(t=T, target_value=np.where(T < 6, VOLTS, 0.0), enc1=x, enc2=np.round(0.8 * x))
     assert study.plant == "rectilinear-2"
-    assert {"k_1", "k_12"} <= set(study.rig.estimated)
+    assert {"k_1", "k_12"} <= set(study.model.estimated)
 
 
 def test_a_body_that_creeps_beside_one_that_swings_is_held(drafted):
@@ -204,7 +204,7 @@ def test_real_logs_are_explained_by_their_drafts(log, tmp_path):
     study = load_study(tmp_path / "study.toml")
     assert study.plant == plant
     assert all(list(run.held) == held for run in study.runs)
-    fit = identify(study.rig, study.runs)
+    fit = identify(study.model, study.runs)
     assert min(v for s in fit.runs.values() for v in s.fit_percent.values()) > least
 
 

@@ -77,7 +77,7 @@ def test_two_plants_that_explain_a_log_alike_are_both_told(drafted):
 def test_the_plant_that_was_named_is_identified_as_it_is_drafted(drafted):
     # mass and inertias are taken as 1 kg and zero, so lengths are others; poles stay, here known to half a percent
     _, study = drafted("double-pendulum", **log("double-pendulum", LINKS, [0.0] * 4, 0.1, ("theta_1", "theta_2")))
-    fit = identify(study.rig, study.runs)
+    fit = identify(study.model, study.runs)
     assert min(fit.runs["log"].fit_percent.values()) > 99
     truth = find("double-pendulum")(**{**LINKS, "b_1c": 0.0, "b_2c": 0.0}).linear("inverted")
     fastest = max(np.linalg.eigvals(truth.A).real)

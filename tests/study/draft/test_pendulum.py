@@ -27,8 +27,8 @@ ENC1, ENC2 = np.round(4000 * SWING), np.round(3000 * ENVELOPE * np.sin(1.7 * W *
 def test_one_angle_is_a_pendulum_of_the_length_its_period_tells(drafted):
     _, study = drafted(theta=SWING)
     assert study.plant == "pendulum"
-    assert study.rig.parameters["l_cg"].value == pytest.approx(LENGTH, rel=0.01)
-    assert {"l_cg", "b_2", "b_2c"} <= set(study.rig.estimated)
+    assert study.model.parameters["l_cg"].value == pytest.approx(LENGTH, rel=0.01)
+    assert {"l_cg", "b_2", "b_2c"} <= set(study.model.estimated)
 
 
 def test_a_swing_about_half_a_turn_hangs_there(drafted):
@@ -67,7 +67,7 @@ def test_a_cart_and_an_angle_with_volts_are_a_driven_cart_pendulum(drafted):
     assert study.plant == "cart-pendulum"
     assert study.runs[0].measured == ("x", "theta")
     assert 'column = "v"' in text
-    assert "actuator.gain" in study.rig.estimated
+    assert "actuator.gain" in study.model.estimated
     assert "sign = -1   # the first" not in text
 
 
@@ -165,7 +165,7 @@ def test_a_nameless_column_that_only_switches_is_the_command(drafted):
 
 def test_an_angle_that_swings_by_more_than_half_a_turn_is_in_degrees(drafted):
     text, study = drafted(theta=np.degrees(4 * SWING))
-    assert study.rig.parameters["l_cg"].value == pytest.approx(LENGTH, rel=0.1)  # 0.8 rad lengthens it by 4 %
+    assert study.model.parameters["l_cg"].value == pytest.approx(LENGTH, rel=0.1)  # 0.8 rad lengthens it by 4 %
     at = np.interp(study.runs[0].t, T, 4 * SWING)
     np.testing.assert_allclose(study.runs[0].y[:, 0], at, atol=0.02)
     assert "taken for degrees" in text

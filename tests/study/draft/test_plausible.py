@@ -38,15 +38,15 @@ def test_a_spring_to_ground_that_the_log_shows_is_asked_for(drafted):
     # statics: x_2/x_1 = k_12/(k_12 + k_2), here 0.88
     log = carts(k_2=200 * (1 / 0.88 - 1))
     text, study = drafted(**log)
-    assert "k_2" in study.rig.estimated
-    given = study.rig.parameters
+    assert "k_2" in study.model.estimated
+    given = study.model.parameters
     assert given["k_2"].value / given["k_12"].value == pytest.approx(1 / 0.88 - 1, rel=0.02)
     assert "rests at 0.88 of its neighbour's place" in text
 
 
 def test_no_spring_to_ground_is_asked_for_where_both_carts_go_equally_far(drafted):
     text, study = drafted(**carts(k_2=0.0))
-    assert "k_2" not in study.rig.estimated
+    assert "k_2" not in study.model.estimated
     assert "spring to ground was asked" not in text
 
 

@@ -84,7 +84,7 @@ def test_noise_is_no_hand(drafted, angle, noise, dt):
     assert study.runs[-1].t[-1] > swinging
     # w^2 = m g l/(J + m l^2) of small swings, and the length of the simple pendulum: what the search starts from
     equal = PENDULUM.l_cg + PENDULUM.J_p / (PENDULUM.m_p * PENDULUM.l_cg)
-    assert study.rig.parameters["l_cg"].value == pytest.approx(equal, rel=0.1)
+    assert study.model.parameters["l_cg"].value == pytest.approx(equal, rel=0.1)
 
 
 @pytest.mark.parametrize("noise", [2e-3, 1e-2, 2e-2])

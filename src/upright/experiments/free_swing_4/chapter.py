@@ -212,7 +212,7 @@ def _level_part(done: FreeSwing) -> Part:
         pictures.append(
             Picture(
                 name=a.question.name,
-                draw=lambda score=score, a=a, label=label: fit_figure(score, a.fit.rig.plant, title=label),
+                draw=lambda score=score, a=a, label=label: fit_figure(score, a.fit.model.plant, title=label),
                 caption=f"{a.question.title}.", description=f"Fit {fits}.",
             )
         )  # fmt: skip

@@ -207,7 +207,9 @@ def fit_question(q: Question, study: Path, progress: Progress = silent) -> Quest
 
     loaded = load_study(study)
     tell = part(progress, 0.0, 1.0, q.title)
-    return QuestionFit(question=q, study=loaded, fit=identify(loaded.rig, loaded.runs, method=q.method, progress=tell))
+    return QuestionFit(
+        question=q, study=loaded, fit=identify(loaded.model, loaded.runs, method=q.method, progress=tell)
+    )
 
 
 def recovered(rig: Rig, fit: Fit) -> tuple[Recovered, ...]:
@@ -223,7 +225,7 @@ def recovered(rig: Rig, fit: Fit) -> tuple[Recovered, ...]:
             inside=e.interval[0] <= truth[n] <= e.interval[1],
         )
         for n, e in fit.estimates.items()
-        if n in truth and n in fit.rig.parameters and e.status != "known"
+        if n in truth and n in fit.model.parameters and e.status != "known"
     )
 
 
@@ -309,7 +311,7 @@ def run_free_swing(
 def balance(done: FreeSwing) -> EnergyBalance:
     """Where the energy of the first release went, as the fitted model tells it."""
     fit = done.answers["free_swing"].fit
-    values = {n: p.value for n, p in fit.rig.parameters.items() if n in fit.rig.plant.names()}
+    values = {n: p.value for n, p in fit.model.parameters.items() if n in fit.model.plant.names()}
     values |= {n: e.value for n, e in fit.estimates.items() if n in values}
     model = done.rig.plant.replace(**values)
     t, x = motion(replace(done.rig, plant=model), seconds=12.0, every=1)

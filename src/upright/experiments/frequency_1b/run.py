@@ -19,8 +19,7 @@ from upright import units
 from upright.errors import BadInput, nearest
 from upright.experiments.frequency_1b.sweeps import Sweep, broadband, stepped_sine
 from upright.experiments.weighing_1a.run import Known
-from upright.identification import Parameter
-from upright.identification import Rig as Asked
+from upright.identification import GreyBox, Parameter
 from upright.identification.frequency.answer import FrequencyFit, explain
 from upright.identification.frequency.response import FrequencyResponse, is_response
 from upright.identification.frequency.spectra import response_of
@@ -76,7 +75,7 @@ def bench(rig: Rig, make: Make) -> dict[str, float]:
     return {n: true[n] * (1 + s * z) for (n, s), z in zip(make.bench.items(), off, strict=True)}
 
 
-def asked(make: Make, known: Mapping[str, float], tolerance: Mapping[str, float]) -> Asked:
+def asked(make: Make, known: Mapping[str, float], tolerance: Mapping[str, float]) -> GreyBox:
     """What a fit may know about a rig of a make: the design's numbers as guesses, and what is known, how well."""
     design, plant = make_rig(make.key), type(make.plant)
     parameters: dict[str, Parameter] = {}
@@ -93,7 +92,7 @@ def asked(make: Make, known: Mapping[str, float], tolerance: Mapping[str, float]
         ("actuator.lag", LAG, "s", True, "first-order lag"),
     ):
         parameters[name] = Parameter(name=name, value=value, unit=unit, meaning=meaning, estimate=sought, lower=0.0)
-    return Asked(plant=plant, parameters=parameters)
+    return GreyBox(plant=plant, parameters=parameters)
 
 
 def run_frequency(
@@ -214,7 +213,7 @@ def response_of_logs(
     tell : Progress
         Told the step at work.
     """
-    rest: Asked | None = None
+    rest: GreyBox | None = None
     plant, said = "", Hardware()
     if len(sources) == 1 and sources[0].suffix == ".toml":
         rest, plant, records, quantum, said = _study(sources[0], data)
@@ -240,7 +239,7 @@ def response_of_logs(
     return LoggedResponse(sources=names, response=response, answer=answer, folder=folder)
 
 
-def _designed(wish: LogRequest) -> Asked:
+def _designed(wish: LogRequest) -> GreyBox:
     """Numbers of a make: as designed where nothing is said, known within a tolerance where the bench usually tells."""
     make = make_named(wish.make)
     values = make.plant.parameters()
@@ -257,7 +256,7 @@ def _designed(wish: LogRequest) -> Asked:
     return replace(rest, parameters={**rest.parameters, **changed})
 
 
-def _study(path: Path, data: Path | None) -> tuple[Asked, str, list[Record], list[float], Hardware]:
+def _study(path: Path, data: Path | None) -> tuple[GreyBox, str, list[Record], list[float], Hardware]:
     from upright.study.load import load_study
 
     study = load_study(path, data=data)
@@ -267,9 +266,9 @@ def _study(path: Path, data: Path | None) -> tuple[Asked, str, list[Record], lis
     records: list[Record] = []
     for run in runs:
         columns = {"u": run.u[:, 0], **{n: run.y[:, j] for j, n in enumerate(run.measured)}}
-        units = {c.name: c.unit for c in study.rig.plant.coordinates if c.name in run.measured}
+        units = {c.name: c.unit for c in study.model.plant.coordinates if c.name in run.measured}
         records.append(Record(t=run.t, signals=columns, units=units, inputs=("u",), outputs=run.measured))
-    return study.rig, study.plant, records, list(runs[0].quantum or [0.0] * len(runs[0].measured)), study.hardware
+    return study.model, study.plant, records, list(runs[0].quantum or [0.0] * len(runs[0].measured)), study.hardware
 
 
 def _logs(sources: Sequence[Path], wish: LogRequest) -> FrequencyResponse:

@@ -66,7 +66,7 @@ def fit_chapter(study: Study, fit: Fit, folder: Path, truth: Mapping[str, float]
     numbers = {n: {**plain_estimate(e), "unit": e.unit, "status": e.status} for n, e in fit.estimates.items()}
     found = tuple(
         finding(Symbol(f"{n} [{unit(e.unit)}]" if unit(e.unit) else n), e, truth.get(n))
-        for n, e in fit.estimates.items() if e.status != "known" and n in fit.rig.parameters
+        for n, e in fit.estimates.items() if e.status != "known" and n in fit.model.parameters
     )  # fmt: skip
     return replace(
         told, findings=found, numbers={"trusted": fit.trusted, "verdict": fit.verdict, "parameters": numbers}

@@ -151,7 +151,7 @@ def run_hanging(
     except NotIdentifiable:  # friction may leave too few frequencies; the motion says more
         response = None
     study = load_study(path)
-    fit = identify(study.rig, study.runs, progress=part(progress, 0.6, 1.0, "fitting the motion"))
+    fit = identify(study.model, study.runs, progress=part(progress, 0.6, 1.0, "fitting the motion"))
     write_fit(fit, study, folder / "fit.json")
     return Hanging(response=response, study=study, fit=fit)
 

@@ -64,7 +64,7 @@ def run_swings(
     study = load_study(
         write_study(rig, folder / "study.toml", f"Free swings of {rig.model.name}", runs, known=found, drive=False)
     )
-    fit = identify(study.rig, study.runs, progress=part(progress, 0.4, 1.0, "fitting the swings"))
+    fit = identify(study.model, study.runs, progress=part(progress, 0.4, 1.0, "fitting the swings"))
     write_fit(fit, study, folder / "fit.json")
     return study, fit
 

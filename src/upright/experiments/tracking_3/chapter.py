@@ -147,7 +147,7 @@ def _data(done: Tracking) -> list[Part]:
         "servo sample. Other pulses, never fitted, test the model."
     )
     found = f"{fit.verdict} Other pulses are predicted: {scores}."
-    scale = _scale(fit.rig.parameters["actuator.gain"].estimate)
+    scale = _scale(fit.model.parameters["actuator.gain"].estimate)
     return [
         Part("Data", (pulses, *run_pictures(fit, "track"))),
         motion_part(fit),

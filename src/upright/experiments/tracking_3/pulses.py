@@ -138,14 +138,14 @@ def identify_shaft(
     path = folder / STUDY
     replace_file(path, shaft_study(rig, seed, weighed).encode())
     study = load_study(path)
-    fit = identify(study.rig, study.runs, progress=part(progress, 0.0, 1.0, "fitting the shaft"))
+    fit = identify(study.model, study.runs, progress=part(progress, 0.0, 1.0, "fitting the shaft"))
     write_fit(fit, study, folder / FIT)
     return study, fit
 
 
 def fitted(rig: Rig, fit: Fit) -> Rig:
     """The rig as the fit sees it: same drive, encoders and period, plant, gain and verdict as estimated."""
-    values = {n: p.value for n, p in fit.rig.parameters.items()} | {n: e.value for n, e in fit.estimates.items()}
+    values = {n: p.value for n, p in fit.model.parameters.items()} | {n: e.value for n, e in fit.estimates.items()}
     plant = rig.plant.replace(**{n: v for n, v in values.items() if n in rig.plant.names()})
     basis = basis_of(fit.verdict, fit.answers, trusted=fit.trusted)
     return replace(rig, plant=plant, gain=values["actuator.gain"], basis=basis)

@@ -9,7 +9,7 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 
-from upright.identification.model.rig import Rig
+from upright.identification.model.grey_box import GreyBox
 from upright.identification.model.runs import Run
 from upright.identification.search.starts import regress, samples_of
 
@@ -20,7 +20,7 @@ CLOSER = 0.98
 """Of two that explain nearly the same the one tried first stays; a mirror image of a free rig explains the same."""
 
 
-def wrong_conventions(rig: Rig, runs: Sequence[Run]) -> tuple[str, ...]:
+def wrong_conventions(rig: GreyBox, runs: Sequence[Run]) -> tuple[str, ...]:
     """Sentences on signs and zeros that would explain the accelerations far better than the declared ones."""
     declared = _unexplained(rig, runs, {}, {})
     if not 0.1 < declared < math.inf:
@@ -57,6 +57,6 @@ def wrong_conventions(rig: Rig, runs: Sequence[Run]) -> tuple[str, ...]:
     )
 
 
-def _unexplained(rig: Rig, runs: Sequence[Run], flips: Mapping[str, float], turns: Mapping[str, float]) -> float:
+def _unexplained(rig: GreyBox, runs: Sequence[Run], flips: Mapping[str, float], turns: Mapping[str, float]) -> float:
     samples = samples_of(rig, runs, most=2000, flips=flips, turns=turns)
     return regress(rig, samples).unexplained if samples else math.inf

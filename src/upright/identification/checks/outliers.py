@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from upright.identification.inference.scoring import predict
 from upright.identification.model.fit import Fit
-from upright.identification.model.rig import Rig
+from upright.identification.model.grey_box import GreyBox
 from upright.identification.model.runs import Run
 from upright.identification.problem.residuals import formulate
 from upright.signals.smoothing import dominant_period
@@ -92,7 +92,7 @@ class Stretches:
     quantum: Array
 
 
-def outliers(fit: Fit, rig: Rig, runs: Sequence[Run]) -> tuple[Outlier, ...]:
+def outliers(fit: Fit, rig: GreyBox, runs: Sequence[Run]) -> tuple[Outlier, ...]:
     """Stretches of the runs that the fitted model does not explain although it explains the others.
 
     Parameters
@@ -123,7 +123,7 @@ def outliers(fit: Fit, rig: Rig, runs: Sequence[Run]) -> tuple[Outlier, ...]:
     return tuple(sorted(found, key=lambda o: ([r.label for r in runs].index(o.run), o.start)))
 
 
-def half_swings(known: Rig, run: Run, own: Mapping[str, float]) -> Stretches | None:
+def half_swings(known: GreyBox, run: Run, own: Mapping[str, float]) -> Stretches | None:
     """A run restarted every half swing; `own` are its own numbers by name. None when it is too short for that."""
     free = run.free
     duration = float(run.t[-1] - run.t[0])
@@ -142,7 +142,7 @@ def half_swings(known: Rig, run: Run, own: Mapping[str, float]) -> Stretches | N
     return halves
 
 
-def _restarted(known: Rig, run: Run, own: Mapping[str, float], seconds: float, free: Sequence[int]) -> Stretches:
+def _restarted(known: GreyBox, run: Run, own: Mapping[str, float], seconds: float, free: Sequence[int]) -> Stretches:
     """A run restarted every so many seconds, its coordinates `free`."""
     problem = formulate(known, [replace(run, horizon=seconds, restart="smooth", score_from=0.0)], thin=False)
     x = np.array([u.coordinate(own.get(u.name, u.value)) for u in problem.unknowns])
@@ -299,7 +299,7 @@ ASTRAY = 3.0
 STAYS = "Without that stretch the other runs were explained worse, so the fit keeps it."
 
 
-def refit_without_outliers(fit: Fit, rig: Rig, runs: Sequence[Run], again: Callable[[Sequence[Run]], Fit]) -> Fit:
+def refit_without_outliers(fit: Fit, rig: GreyBox, runs: Sequence[Run], again: Callable[[Sequence[Run]], Fit]) -> Fit:
     """The fit, or `again` without what the first one found strange; at most twice, as outliers hide each other.
 
     Reasons are those that the last model gives: the first one was bent by what it had to explain.

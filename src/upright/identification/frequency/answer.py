@@ -16,7 +16,7 @@ from upright.identification.frequency.response import FrequencyResponse
 from upright.identification.inference.covariance import student
 from upright.identification.inference.poles import poles
 from upright.identification.model.fit import Estimate, Fit, Pole
-from upright.identification.model.rig import Rig
+from upright.identification.model.grey_box import GreyBox
 from upright.progress import Progress, silent
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ class FrequencyFit:
     know best, after its equilibrium and what it is, `simplex_pole` the same by the simplex [1/s].
     """
 
-    rig: Rig
+    rig: GreyBox
     at: str
     data: FrequencyResponse
     used: FrequencyResponse
@@ -52,14 +52,14 @@ class FrequencyFit:
 
 
 def explain(
-    rig: Rig, at: str, data: FrequencyResponse, *, seed: int = 0, tell: Progress = silent,
+    rig: GreyBox, at: str, data: FrequencyResponse, *, seed: int = 0, tell: Progress = silent,
     stopped: Callable[[], bool] = lambda: False,
 ) -> FrequencyFit:  # fmt: skip
     """Fit a response in both ways.
 
     Parameters
     ----------
-    rig : Rig
+    rig : GreyBox
         Plant with its numbers: to estimate from a guess, known, or known within an uncertainty, which then counts as
         one measurement more. Masses, forces and the drive's gain scale together: one of them must be known.
     at : str
@@ -102,7 +102,7 @@ def explain(
     )  # fmt: skip
 
 
-def _has_dry(rig: Rig) -> bool:
+def _has_dry(rig: GreyBox) -> bool:
     return any(rig.parameters[j.coulomb].value > 0 for j in rig.plant.joints if j.coulomb in rig.parameters)
 
 
@@ -140,7 +140,7 @@ def digits(number: Estimate) -> int:
 
 
 def _fit(
-    rig: Rig, squares: Squares, found: Mapping[str, tuple[Pole, ...]], key: tuple[str, str, Pole], q: float,
+    rig: GreyBox, squares: Squares, found: Mapping[str, tuple[Pole, ...]], key: tuple[str, str, Pole], q: float,
     left_out: tuple[str, ...],
 ) -> Fit:  # fmt: skip
     sigma = np.sqrt(np.maximum(np.diag(squares.covariance), 0.0))
@@ -157,7 +157,7 @@ def _fit(
     size = np.maximum(sigma, 1e-300)
     told, trusted = verdict(squares, key)
     return Fit(
-        rig=rig, estimates=estimates, per_run={}, runs={}, verdict=told, trusted=trusted,
+        model=rig, estimates=estimates, per_run={}, runs={}, verdict=told, trusted=trusted,
         method="least squares on the complex response", evaluations=squares.way.evaluations,
         seconds=squares.way.seconds, cost=squares.misfit * squares.freedom, names=squares.names,
         correlation=squares.covariance / np.outer(size, size), warnings=left_out, poles=found,

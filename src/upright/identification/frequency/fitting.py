@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from upright.errors import BadInput, NotIdentifiable
 from upright.identification.frequency.balance import Balance
 from upright.identification.frequency.response import FrequencyResponse
-from upright.identification.model.rig import Parameter, Rig
+from upright.identification.model.grey_box import GreyBox, Parameter
 from upright.progress import Progress, silent
 
 Array = NDArray[np.float64]
@@ -128,7 +128,7 @@ class Coordinates:
         return np.maximum(moved, np.where(self.log, -np.inf, 1e-3 * np.abs(self.start)))
 
 
-def coordinates(rig: Rig, *, magnitude: bool = False) -> Coordinates:
+def coordinates(rig: GreyBox, *, magnitude: bool = False) -> Coordinates:
     """Coordinates of a rig's unknowns.
 
     `magnitude` takes those that the magnitude of a linear model shows, all by their logarithm: no dry friction, no
@@ -175,7 +175,7 @@ def usable(data: FrequencyResponse, *, dry: bool = True) -> tuple[NDArray[np.boo
     return ~(noisy | stuck), tuple(told)
 
 
-def simplex_dB(rig: Rig, at: str, data: FrequencyResponse, *, tell: Progress = silent, limit: int = 1500) -> Way:
+def simplex_dB(rig: GreyBox, at: str, data: FrequencyResponse, *, tell: Progress = silent, limit: int = 1500) -> Way:
     """The paper's way: Nelder and Mead on squared dB of the linear model, far output first, then all outputs."""
     from scipy.optimize import minimize
 
@@ -217,7 +217,7 @@ def simplex_dB(rig: Rig, at: str, data: FrequencyResponse, *, tell: Progress = s
 
 
 def least_squares(
-    rig: Rig, at: str, data: FrequencyResponse, *, seed: int = 0, starts: int = 6, tell: Progress = silent,
+    rig: GreyBox, at: str, data: FrequencyResponse, *, seed: int = 0, starts: int = 6, tell: Progress = silent,
 ) -> Squares:  # fmt: skip
     """Complex response, weighed, dry friction at the amplitudes measured; several starts, the best walked to its end.
 

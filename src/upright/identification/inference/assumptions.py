@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from upright.identification.inference.covariance import Optimum
 from upright.identification.model.fit import Assumption, Estimate
-from upright.identification.model.rig import Parameter
+from upright.identification.model.grey_box import Parameter
 from upright.identification.problem.normal_equations import pseudo_inverse
 from upright.identification.problem.residuals import Problem
 from upright.identification.problem.unknowns import shared_unknowns

@@ -26,7 +26,7 @@ from upright.identification.inference.covariance import Optimum, student
 from upright.identification.inference.reach import beyond, reached
 from upright.identification.model.bands import LEVEL, Bands, Spread
 from upright.identification.model.fit import RunScore
-from upright.identification.model.rig import NOISE, Rig
+from upright.identification.model.grey_box import NOISE, GreyBox
 from upright.identification.model.runs import LEAST_RUN, Run
 from upright.identification.problem.normal_equations import finite, pseudo_inverse, slopes
 from upright.identification.problem.residuals import ROUNDING, Problem, formulate
@@ -259,7 +259,7 @@ def _spread(squares: Array, age: Array, horizon: float, least: float) -> Spread:
 
 
 def banded(
-    plain: RunScore, bands: Bands, rig: Rig, run: Run, groups: Mapping[str, Mapping[str, float]],
+    plain: RunScore, bands: Bands, rig: GreyBox, run: Run, groups: Mapping[str, Mapping[str, float]],
     own: Mapping[str, float],
 ) -> RunScore:  # fmt: skip
     """The score of a predicted run with the band of each signal.
@@ -269,7 +269,7 @@ def banded(
     plain : RunScore
         Of the run.
     bands : Bands
-    rig : Rig
+    rig : GreyBox
         With every number known.
     run : Run
     groups : mapping

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model.rig import NOISE
+from upright.identification.model.grey_box import NOISE
 from upright.identification.model.runs import LEAST_RUN
 from upright.identification.problem.normal_equations import NULL, finite, pseudo_inverse
 from upright.identification.problem.residuals import Problem

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from upright.identification.inference.covariance import Optimum, assess, student
 from upright.identification.model.fit import Estimate
-from upright.identification.model.rig import NOISE, Rig
+from upright.identification.model.grey_box import NOISE, GreyBox
 from upright.identification.problem.normal_equations import pseudo_inverse
 from upright.identification.problem.residuals import Problem, formulate
 from upright.identification.problem.unknowns import FAR, Unknown
@@ -122,7 +122,7 @@ def _within(u: Unknown, interval: tuple[float, float]) -> tuple[float, float]:
     return max(interval[0], u.lower), min(interval[1], u.upper)
 
 
-def _unit(rig: Rig, name: str) -> str:
+def _unit(rig: GreyBox, name: str) -> str:
     if name in rig.parameters:
         return rig.parameters[name].unit
     kind, _, which = name.partition(".")
@@ -234,7 +234,7 @@ def _end(
 
 
 def with_model_uncertainty(
-    estimates: Mapping[str, Estimate], best: Optimum, asked: Rig, left_out: Sequence[str], log: SearchLog
+    estimates: Mapping[str, Estimate], best: Optimum, asked: GreyBox, left_out: Sequence[str], log: SearchLog
 ) -> dict[str, Estimate]:
     """Estimates whose intervals hold what a term at its bound, or one left out, would make of them."""
     out = dict(estimates)
@@ -279,7 +279,7 @@ def beyond_bounds(best: Optimum, estimates: Mapping[str, Estimate]) -> Intervals
     return found
 
 
-def with_left_out(best: Optimum, asked: Rig, left_out: Sequence[str], log: SearchLog) -> Intervals:
+def with_left_out(best: Optimum, asked: GreyBox, left_out: Sequence[str], log: SearchLog) -> Intervals:
     """Intervals of all shared numbers in the model that also has what was left out, by name; empty when it will not do.
 
     Starts from where the chosen model ended, with a tenth of the guess of each term left out.

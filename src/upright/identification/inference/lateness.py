@@ -8,7 +8,7 @@ import numpy as np
 
 from upright.identification.inference.covariance import Optimum, assess
 from upright.identification.inference.scoring import score
-from upright.identification.model.rig import Parameter
+from upright.identification.model.grey_box import Parameter
 from upright.identification.problem.normal_equations import pseudo_inverse
 from upright.identification.problem.unknowns import shared_unknowns
 from upright.identification.search.descent import descend

@@ -12,7 +12,7 @@ from upright.errors import UprightError
 from upright.identification.inference.covariance import Optimum
 from upright.identification.inference.poles import poles, shared_values
 from upright.identification.model.fit import Estimate
-from upright.identification.model.rig import Rig
+from upright.identification.model.grey_box import GreyBox
 
 Array = NDArray[np.float64]
 
@@ -94,7 +94,7 @@ def placed(A: Array, b: Array, wanted: Array) -> Array | None:
     return np.linalg.solve(reach.T, np.eye(len(A))[-1]) @ p
 
 
-def driven_plant(rig: Rig, values: dict[str, float], at: str) -> tuple[Array, Array]:
+def driven_plant(rig: GreyBox, values: dict[str, float], at: str) -> tuple[Array, Array]:
     """State matrices with the drive's gain, and its loss per speed as damping."""
     linear = rig.plant(**{n: values[n] for n in rig.plant.names()}).linear(at)
     A, B = linear.A.copy(), linear.B * values.get("actuator.gain", 1.0)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from upright.errors import ImpossiblePhysics, NotIdentifiable
 from upright.identification.inference.covariance import Optimum
 from upright.identification.model.fit import Estimate, Pole
-from upright.identification.model.rig import Rig
+from upright.identification.model.grey_box import GreyBox
 
 Array = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ def shared_values(best: Optimum) -> tuple[dict[str, float], list[str], Array]:
 
 
 def poles(
-    rig: Rig, values: Mapping[str, float], names: list[str], covariance: Array, quantile: float,
+    rig: GreyBox, values: Mapping[str, float], names: list[str], covariance: Array, quantile: float,
     held: Iterable[frozenset[str]] = (frozenset(),),
 ) -> dict[str, tuple[Pole, ...]]:  # fmt: skip
     """Poles [1/s] at each equilibrium, the fastest growing first, friction viscous only and back-EMF included.
@@ -104,7 +104,7 @@ def _of_one_sign(value: float, stderr: float, quantile: float, unit: str) -> Est
     return replace(plain, interval=(ends[0], ends[1]))
 
 
-def _poles(rig: Rig, values: Mapping[str, float], at: str, held: frozenset[str]) -> NDArray[np.complex128]:
+def _poles(rig: GreyBox, values: Mapping[str, float], at: str, held: frozenset[str]) -> NDArray[np.complex128]:
     """Poles with the actuator's loss per speed as damping of the coordinates that it drives, some coordinates held."""
     plant = rig.plant(**{n: values[n] for n in rig.plant.names()})
     linear = plant.linear(at)

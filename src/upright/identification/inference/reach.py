@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model.rig import Rig
+from upright.identification.model.grey_box import GreyBox
 from upright.identification.model.runs import Run
 from upright.identification.problem.unknowns import matters
 from upright.signals.smoothing import dominant_period, savitzky_golay, smoothing_width
@@ -26,7 +26,7 @@ SURE = 99.5
 """Percentile that stands for the largest speed, which a single sample of noise must not be."""
 
 
-def reached(rig: Rig, runs: Sequence[Run]) -> dict[str, float]:
+def reached(rig: GreyBox, runs: Sequence[Run]) -> dict[str, float]:
     """Largest size [SI] of each command, ``command.F``, position, ``theta``, and speed, ``theta_dot``, of some runs.
 
     Where a coordinate's own value is not felt its position does not count, and of an angle that comes round only how
@@ -41,7 +41,7 @@ def reached(rig: Rig, runs: Sequence[Run]) -> dict[str, float]:
     return most
 
 
-def _of(rig: Rig, run: Run) -> dict[str, float]:
+def _of(rig: GreyBox, run: Run) -> dict[str, float]:
     found: dict[str, float] = {}
     for k, source in enumerate(rig.plant.inputs[: run.u.shape[1]]):
         found[f"command.{source.name}"] = float(np.abs(run.u[:, k]).max())
@@ -56,7 +56,7 @@ def _of(rig: Rig, run: Run) -> dict[str, float]:
     return found
 
 
-def beyond(rig: Rig, run: Run, most: Mapping[str, float]) -> tuple[str, ...]:
+def beyond(rig: GreyBox, run: Run, most: Mapping[str, float]) -> tuple[str, ...]:
     """What of a run lies beyond the largest sizes `most` that were fitted, a sentence each."""
     units = {c.name: c.unit for c in rig.plant.coordinates}
     said: list[str] = []
@@ -78,7 +78,7 @@ def beyond(rig: Rig, run: Run, most: Mapping[str, float]) -> tuple[str, ...]:
     return tuple(said)
 
 
-def _called(rig: Rig, name: str, units: Mapping[str, str]) -> tuple[str, str]:
+def _called(rig: GreyBox, name: str, units: Mapping[str, str]) -> tuple[str, str]:
     """What a size is called, and its unit after a blank."""
     source = name.removeprefix("command.")
     if source != name:

@@ -14,7 +14,7 @@ from upright.identification.inference.covariance import assess
 from upright.identification.inference.intervals import run_estimates
 from upright.identification.model.bands import Bands
 from upright.identification.model.fit import Fit, Offer, RunScore
-from upright.identification.model.rig import Rig
+from upright.identification.model.grey_box import GreyBox
 from upright.identification.model.runs import Run
 from upright.identification.problem.residuals import Problem, formulate
 from upright.identification.problem.simulated import with_noise
@@ -98,7 +98,7 @@ def held_speed(track: Track) -> Array:
 
 def predict(
     fitted: Fit | Mapping[str, float],
-    rig: Rig,
+    rig: GreyBox,
     runs: Sequence[Run],
     *,
     groups: Mapping[str, Mapping[str, float]] | None = None,
@@ -111,7 +111,7 @@ def predict(
     ----------
     fitted : Fit or mapping of str to float
         The model, or its parameters by name.
-    rig : Rig
+    rig : GreyBox
         Where parameters that were not fitted come from.
     runs : sequence of Run
         What differs from run to run (initial state, declared offsets and factors) is estimated from the run itself:
@@ -162,7 +162,7 @@ FACTORS = ("friction", "gain")
 
 
 def _predict(
-    rig: Rig, run: Run, groups: Mapping[str, Mapping[str, float]], bands: Bands | None, progress: Progress
+    rig: GreyBox, run: Run, groups: Mapping[str, Mapping[str, float]], bands: Bands | None, progress: Progress
 ) -> RunScore:
     """Score of one run, with its band, and the factor of its own that would mend it where it falls short."""
     run = located(rig, run)
@@ -188,7 +188,7 @@ def _predict(
 
 
 def _foresee(
-    rig: Rig, run: Run, groups: Mapping[str, Mapping[str, float]], progress: Progress
+    rig: GreyBox, run: Run, groups: Mapping[str, Mapping[str, float]], progress: Progress
 ) -> tuple[RunScore, Problem, Array]:
     """Score of one run, and the problem and the coordinates of what was estimated from the run itself."""
     before = replace(run, score_from=0.0)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from upright.identification.inference.assumptions import proportional, resting
 from upright.identification.inference.loop import Standing
 from upright.identification.model.fit import Assumption, Estimate, Judgement, RunScore
-from upright.identification.model.rig import Rig
+from upright.identification.model.grey_box import GreyBox
 from upright.quantities import figures
 
 GOOD = 80.0
@@ -53,7 +53,7 @@ class Evidence:
     more than they vary.
     """
 
-    rig: Rig
+    rig: GreyBox
     runs: Mapping[str, RunScore]
     estimates: Mapping[str, Estimate]
     unseen: Sequence[str]
@@ -252,7 +252,7 @@ def _usable(found: Evidence, *, confirmed: bool) -> Judgement:
     return Judgement(question=USABLE, answer=answer, headline=headline, advice=advice, reasons=tuple(reasons))
 
 
-def _lumped(rig: Rig) -> list[str]:
+def _lumped(rig: GreyBox) -> list[str]:
     """Numbers that stand for something else than their name, because another was set to zero."""
     p = rig.parameters
     if {"l_cg", "J_p"} <= p.keys() and p["l_cg"].estimate and not p["J_p"].estimate and p["J_p"].value == 0:

@@ -19,7 +19,7 @@ from upright.identification.inference.covariance import assess
 from upright.identification.inference.scoring import predict
 from upright.identification.model.bands import Bands
 from upright.identification.model.fit import Fit, RunScore
-from upright.identification.model.rig import Rig
+from upright.identification.model.grey_box import GreyBox
 from upright.identification.model.runs import Run
 from upright.identification.problem.residuals import formulate
 from upright.identification.search.descent import SearchLog, descend_progressively
@@ -58,7 +58,7 @@ class HeldOut:
 
 
 def leave_one_out(
-    rig: Rig,
+    rig: GreyBox,
     runs: Sequence[Run],
     start: Mapping[str, float],
     *,
@@ -73,7 +73,7 @@ def leave_one_out(
 
     Parameters
     ----------
-    rig : Rig
+    rig : GreyBox
         With its unknown parameters.
     runs : sequence of Run
         At least two.
@@ -98,7 +98,7 @@ def leave_one_out(
 
 
 def _predicted(
-    rig: Rig, runs: Sequence[Run], start: Mapping[str, float], noise: float | None, typical: Sequence[str],
+    rig: GreyBox, runs: Sequence[Run], start: Mapping[str, float], noise: float | None, typical: Sequence[str],
     otherwise: Mapping[str, float], promise: bool, k: int, progress: Progress,
 ) -> HeldOut:  # fmt: skip
     """Run number `k` from a fit of the others."""
@@ -163,9 +163,10 @@ def cross_validate(
         )
     left_out = {n: e.value for n, e in fit.estimates.items() if e.status == "left out"}
     parameters = {
-        n: replace(p, value=left_out[n], estimate=False) if n in left_out else p for n, p in fit.rig.parameters.items()
+        n: replace(p, value=left_out[n], estimate=False) if n in left_out else p
+        for n, p in fit.model.parameters.items()
     }
-    rig = replace(fit.rig, parameters=parameters)
+    rig = replace(fit.model, parameters=parameters)
     done = leave_one_out(rig, fitted, fit.keyed(), promise=True, progress=progress, workers=workers)
     found = done.so_far()
     return CrossValidation(

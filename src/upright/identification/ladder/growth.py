@@ -25,7 +25,7 @@ from upright.identification.ladder.decision import Comparison, by_chance, compar
 from upright.identification.ladder.repeats import Repeats, at_ceiling, repeats
 from upright.identification.ladder.rungs import Rung, check, default_rungs, friction_rungs, rig_at, runs_at
 from upright.identification.model.fit import RunScore
-from upright.identification.model.rig import Rig, neutral
+from upright.identification.model.grey_box import GreyBox, neutral
 from upright.identification.model.runs import FITTED_SHARE, LEAST_RUN, Run
 from upright.identification.problem.normal_equations import finite
 from upright.identification.problem.residuals import Problem, formulate, noise_level
@@ -98,7 +98,7 @@ class Ladder:
     """
 
     steps: tuple[RungResult, ...]
-    rig: Rig
+    rig: GreyBox
     runs: tuple[Run, ...]
     held_out: str
     repeats: tuple[Repeats, ...]
@@ -116,7 +116,7 @@ class Ladder:
 
 
 def climb(
-    rig: Rig, runs: Sequence[Run], rungs: Sequence[Rung] | None = None, *, progress: Progress = silent,
+    rig: GreyBox, runs: Sequence[Run], rungs: Sequence[Rung] | None = None, *, progress: Progress = silent,
     workers: Workers = HERE,
 ) -> Ladder:  # fmt: skip
     """Grow a model rung by rung, while what was held out is predicted better by more than chance.
@@ -129,7 +129,7 @@ def climb(
 
     Parameters
     ----------
-    rig : Rig
+    rig : GreyBox
         With everything that the richest model estimates.
     runs : sequence of Run
         Those with role ``"fit"`` decide.
@@ -162,7 +162,7 @@ class _Climb:
     """
 
     def __init__(
-        self, rig: Rig, runs: list[Run], rungs: list[Rung], progress: Progress, workers: Workers
+        self, rig: GreyBox, runs: list[Run], rungs: list[Rung], progress: Progress, workers: Workers
     ) -> None:  # fmt: skip
         self.rig, self.runs, self.rungs, self.progress, self.workers = rig, runs, rungs, progress, workers
         self.log = SearchLog()
@@ -307,14 +307,14 @@ class Candidate:
     residuals, `held_out` the mean squared residual over blocks of the runs that were left out in turn.
     """
 
-    rig: Rig
+    rig: GreyBox
     cost: float
     noise: float
     values: dict[str, float]
     held_out: float
 
 
-def choose_friction(rig: Rig, runs: Sequence[Run], log: SearchLog) -> tuple[Rig, list[Array]]:
+def choose_friction(rig: GreyBox, runs: Sequence[Run], log: SearchLog) -> tuple[GreyBox, list[Array]]:
     """Rig of the friction that predicts best, and coordinates to start the final fit from.
 
     Richer rungs start from where the poorer one ended, or they can end with a larger cost (seen: 1083 against 314).

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from upright.errors import BadInput, nearest
-from upright.identification.model.rig import Rig, neutral
+from upright.identification.model.grey_box import GreyBox, neutral
 from upright.identification.model.runs import Run
 from upright.identification.problem.unknowns import friction_names
 
@@ -40,13 +40,13 @@ class Rung:
     drops: tuple[str, ...] = ()
     unknown: tuple[str, ...] = ()
 
-    def seeds(self, rig: Rig) -> dict[str, float]:
+    def seeds(self, rig: GreyBox) -> dict[str, float]:
         """Values of what it adds: a tenth of the way from where each term does nothing to its guess."""
         found = {n: (neutral(rig.plant, n), rig.parameters[n].value) for n in self.adds}
         return {n: low + 0.1 * (guess - low) if math.isfinite(low) else guess for n, (low, guess) in found.items()}
 
 
-def rig_at(rig: Rig, rungs: Sequence[Rung], kept: Sequence[Rung]) -> Rig:
+def rig_at(rig: GreyBox, rungs: Sequence[Rung], kept: Sequence[Rung]) -> GreyBox:
     """The rig of a place on the ladder: of all that `rungs` add only what the `kept` ones do."""
     added = {n for rung in rungs for n in (*rung.adds, *rung.drops)}
     estimated = {n for n in added if not any(n in rung.adds for rung in rungs)}  # asked from the beginning
@@ -62,7 +62,7 @@ def runs_at(runs: Sequence[Run], kept: Sequence[Rung]) -> list[Run]:
     return [replace(run, unknown=tuple(dict.fromkeys((*run.unknown, *more)))) for run in runs]
 
 
-def friction_rungs(rig: Rig) -> list[Rung]:
+def friction_rungs(rig: GreyBox) -> list[Rung]:
     """Nested friction models within the terms that the rig asks to estimate, poorest first.
 
     A term that must not be zero, since its lower bound is above, is part of them all.
@@ -79,7 +79,7 @@ def friction_rungs(rig: Rig) -> list[Rung]:
     return [Rung(name="viscous friction"), *(Rung(name=name, adds=adds) for name, adds in steps if adds)]
 
 
-def default_rungs(rig: Rig, runs: Sequence[Run]) -> list[Rung]:
+def default_rungs(rig: GreyBox, runs: Sequence[Run]) -> list[Rung]:
     """Every ladder that the rig's questions allow: friction first, then the drive, then friction that differs per run.
 
     The last one needs two runs and some friction.
@@ -97,12 +97,12 @@ def default_rungs(rig: Rig, runs: Sequence[Run]) -> list[Rung]:
     return found
 
 
-def _present(rig: Rig, name: str) -> bool:
+def _present(rig: GreyBox, name: str) -> bool:
     p = rig.parameters.get(name)
     return p is not None and (p.estimate or (p.value != 0 and math.isfinite(p.value)))
 
 
-def check(rig: Rig, rungs: Sequence[Rung]) -> None:
+def check(rig: GreyBox, rungs: Sequence[Rung]) -> None:
     """Refuse rungs that add what nobody asked for, or the same term twice.
 
     Raises

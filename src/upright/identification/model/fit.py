@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.model.bands import Bands
-from upright.identification.model.rig import Rig
+from upright.identification.model.grey_box import GreyBox
 
 Array = NDArray[np.float64]
 
@@ -180,7 +180,7 @@ class Fit:
     interval is known.
     """
 
-    rig: Rig
+    model: GreyBox
     estimates: Mapping[str, Estimate]
     per_run: Mapping[str, Mapping[str, Estimate]]
     groups: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict[str, Mapping[str, Estimate]])
@@ -222,11 +222,11 @@ def to_lmfit(fit: Fit) -> Any:
     from lmfit import Parameters
 
     parameters = Parameters()
-    names = {n: n.replace(".", "_") for n in {**fit.rig.parameters, **fit.estimates}}
+    names = {n: n.replace(".", "_") for n in {**fit.model.parameters, **fit.estimates}}
     for name, key in names.items():
-        e, known = fit.estimates.get(name), fit.rig.parameters.get(name)
+        e, known = fit.estimates.get(name), fit.model.parameters.get(name)
         value = e.value if e is not None else known.value if known is not None else 0.0
-        lower, upper = (-math.inf, math.inf) if known is None else fit.rig.bounds(name)
+        lower, upper = (-math.inf, math.inf) if known is None else fit.model.bounds(name)
         parameters.add(key, value=value, vary=e is not None and e.status != "left out", min=lower, max=upper)
         if e is not None:
             parameters[key].stderr = e.stderr

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model.rig import Rig, base_values, neutral
+from upright.identification.model.grey_box import GreyBox, base_values, neutral
 from upright.identification.model.runs import Run
 from upright.identification.problem.normal_equations import Normal, finite, mixed, products, slopes, squares
 from upright.identification.problem.restarts import PERTURBATION, Restart, settle
@@ -58,7 +58,7 @@ class Problem:
     `steps` (sought,) are the perturbations, `noise` the residual that one sigma of prior knowledge is worth.
     """
 
-    rig: Rig
+    rig: GreyBox
     tracks: list[Track]
     unknowns: list[Unknown]
     steps: Array
@@ -368,7 +368,7 @@ class Problem:
 
 
 def formulate(
-    rig: Rig, runs: Sequence[Run], *, thin: bool = True, given: Mapping[str, Mapping[str, float]] | None = None
+    rig: GreyBox, runs: Sequence[Run], *, thin: bool = True, given: Mapping[str, Mapping[str, float]] | None = None
 ) -> Problem:
     """Set up the problem of explaining `runs`.
 
@@ -388,7 +388,7 @@ def formulate(
     return Problem(rig=rig, tracks=tracks, unknowns=unknowns, steps=np.array([1e-6 * u.scale for u in unknowns]))
 
 
-def resolved(rig: Rig, runs: Sequence[Run], unknowns: Sequence[Unknown]) -> list[Unknown]:
+def resolved(rig: GreyBox, runs: Sequence[Run], unknowns: Sequence[Unknown]) -> list[Unknown]:
     """The numbers sought, presliding lengths no shorter than `ROUNDING` of the finest encoder step that sees them.
 
     The effect of shorter ones on the outputs comes from where the steps of the integration happen to fall: differences
@@ -428,7 +428,7 @@ def unreached(problem: Problem, x: Array) -> tuple[str, ...]:
     return tuple(problem.unknowns[i].name for i in limits if idle(i))
 
 
-def _shortest(rig: Rig, runs: Sequence[Run]) -> dict[str, float]:
+def _shortest(rig: GreyBox, runs: Sequence[Run]) -> dict[str, float]:
     """Least presliding length worth telling, by its name."""
     derived = rig.plant.derived()
     seen = [pair for run in runs for pair in zip(run.measured, run.quantum, strict=False)]

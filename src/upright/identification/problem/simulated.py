@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from upright.closed_loop.structures import ClosedLoop, finer
 from upright.errors import BadInput
-from upright.identification.model.rig import NOISE, Parameter, Rig, base_values
+from upright.identification.model.grey_box import NOISE, GreyBox, Parameter, base_values
 from upright.identification.model.runs import Run
 from upright.identification.problem.tracks import DRIFT, FilterPlan, Track, nearest_equilibrium
 from upright.laws import Law
@@ -33,7 +33,7 @@ from upright.simulation import Held, Simulator, choose
 Array = NDArray[np.float64]
 
 
-def simulator(rig: Rig, track: Track, values: Mapping[str, float | Array], free: Collection[str]) -> Simulator:
+def simulator(rig: GreyBox, track: Track, values: Mapping[str, float | Array], free: Collection[str]) -> Simulator:
     """Solver of one run; terms whose parameters are in `free` stay although they are zero now."""
     derived = rig.plant.derived_for({**values, **dict.fromkeys(free, 1.0)})
     free = [n for n in free if n in derived.parameters or n.startswith("actuator.")]
@@ -309,7 +309,7 @@ def _plan(track: Track) -> FilterPlan:
     return track.ahead
 
 
-def with_noise(rig: Rig, runs: Sequence[Run]) -> Rig:
+def with_noise(rig: GreyBox, runs: Sequence[Run]) -> GreyBox:
     """The rig with the levels of process noise that filters of these runs need, to estimate unless it has them."""
     filtered = [run for run in runs if run.filtered]
     moving = {c for run in filtered for c in run.measured if c not in run.held}

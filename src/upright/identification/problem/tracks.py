@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import BadInput
-from upright.identification.model.rig import Rig
+from upright.identification.model.grey_box import GreyBox
 from upright.identification.model.runs import LEAST_RUN, Run
 from upright.identification.problem.restarts import smoothed_variance
 from upright.signals.smoothing import (
@@ -206,7 +206,7 @@ class Track:
         return self.y[rows]
 
 
-def prepare(rig: Rig, run: Run, *, thin: bool) -> Track:
+def prepare(rig: GreyBox, run: Run, *, thin: bool) -> Track:
     """Make a run ready; `thin` takes every k-th sample of a run without input, as many as its period needs."""
     names = rig.plant.state_names()
     period_s, n = run.period, run.t.size
@@ -287,7 +287,7 @@ def prepare(rig: Rig, run: Run, *, thin: bool) -> Track:
     )
 
 
-def filter_plan(rig: Rig, run: Run, dt: float, start: State, noise: Array) -> tuple[FilterPlan, NDArray[np.int64]]:
+def filter_plan(rig: GreyBox, run: Run, dt: float, start: State, noise: Array) -> tuple[FilterPlan, NDArray[np.int64]]:
     """How a run is predicted, and the samples (W,) from which; `noise` (outputs,) is what smoothing took off it.
 
     Raises
@@ -324,7 +324,7 @@ def filter_plan(rig: Rig, run: Run, dt: float, start: State, noise: Array) -> tu
     return plan, restarts
 
 
-def nearest_equilibrium(rig: Rig, run: Run) -> Array:
+def nearest_equilibrium(rig: GreyBox, run: Run) -> Array:
     """States (states,) of the equilibrium nearest to the record; turns are counted from it."""
     names = rig.plant.state_names()
     units = {c.name: c.unit for c in rig.plant.coordinates}

@@ -8,12 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from upright.identification.model.rig import Rig
+from upright.identification.model.grey_box import GreyBox
 from upright.identification.model.runs import Run
 from upright.signals.trips import CLEAR, Trip, trip_or_misfit
 
 
-def find_trips(rig: Rig, run: Run) -> list[Trip]:
+def find_trips(rig: GreyBox, run: Run) -> list[Trip]:
     """A late begin and an early end of the first input's effect in one run, as far as its motion shows them.
 
     Nothing is said of runs whose driven coordinate was not measured, or whose law is simulated.
@@ -21,7 +21,7 @@ def find_trips(rig: Rig, run: Run) -> list[Trip]:
     return _moments(rig, run)[0]
 
 
-def _moments(rig: Rig, run: Run) -> tuple[list[Trip], bool]:
+def _moments(rig: GreyBox, run: Run) -> tuple[list[Trip], bool]:
     """What `find_trips` says, and whether the command plainly acts until its logged end."""
     found: list[Trip] = []
     plain = False
@@ -56,7 +56,7 @@ def trip_sentence(run: Run, trip: Trip) -> str:
     )
 
 
-def located(rig: Rig, run: Run) -> Run:
+def located(rig: GreyBox, run: Run) -> Run:
     """The run with guesses of when its input really began and ended, for those of the two that are asked.
 
     Where the motion plainly follows the command until its logged end, the guess is what the log says.
@@ -71,7 +71,7 @@ def located(rig: Rig, run: Run) -> Run:
     return replace(run, guesses={**{n: found[n] for n in asked if n in found}, **run.guesses})
 
 
-def unasked_trips(rig: Rig, runs: Sequence[Run]) -> list[str]:
+def unasked_trips(rig: GreyBox, runs: Sequence[Run]) -> list[str]:
     """Sentences on drives that went off or came on where nobody asked when."""
     if any(n in rig.estimated for n in ("actuator.start", "actuator.end")):
         return []

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model.rig import NOISE, Parameter, Rig, base_values
+from upright.identification.model.grey_box import NOISE, GreyBox, Parameter, base_values
 from upright.identification.model.runs import SPREADS, Run
 from upright.identification.problem.tracks import Track
 from upright.physics.actuator import ACTUATOR
@@ -71,12 +71,12 @@ class Unknown:
         return lower, math.log(self.upper) if math.isfinite(self.upper) else math.inf
 
 
-def shared_unknowns(rig: Rig) -> list[Unknown]:
+def shared_unknowns(rig: GreyBox) -> list[Unknown]:
     """Parameters to estimate, and known ones that carry an uncertainty."""
     return [_shared(rig, p) for p in rig.parameters.values() if p.estimate or p.uncertainty > 0]
 
 
-def _shared(rig: Rig, p: Parameter) -> Unknown:
+def _shared(rig: GreyBox, p: Parameter) -> Unknown:
     lower, upper = rig.bounds(p.name)
     positive = False
     if p.name in rig.plant.names():
@@ -109,7 +109,7 @@ _FALLBACK = {"actuator.gain": 1.0, "actuator.lag": 5e-3, "actuator.delay": 5e-3,
 _FALLBACK |= dict.fromkeys(MOMENTS, 0.1)
 
 
-def friction_names(rig: Rig) -> tuple[str, ...]:
+def friction_names(rig: GreyBox) -> tuple[str, ...]:
     """Parameters that a run's friction factor multiplies: viscous terms and every level of dry friction."""
     derived = rig.plant.derived()
     words = {w for text in derived.damping for w in re.findall(r"[A-Za-z_]\w*", text)}
@@ -118,7 +118,7 @@ def friction_names(rig: Rig) -> tuple[str, ...]:
     return tuple(n for n in derived.parameters if n in words)
 
 
-def matters(rig: Rig, coordinate: str, by: float = 1.0) -> bool:
+def matters(rig: GreyBox, coordinate: str, by: float = 1.0) -> bool:
     """Whether a coordinate's own value, not only its changes, is felt: by gravity, a spring or the mass matrix.
 
     A constant error of the sensor cannot be told from the place where the run began otherwise. Of an angle that comes
@@ -151,7 +151,7 @@ INITIAL_SPREAD = (0.02, 0.1)
 """Least sigma of a measured first coordinate and velocity, as a share of how much each varies over the run."""
 
 
-def run_unknowns(rig: Rig, index: int, run: Run, start: State) -> list[Unknown]:
+def run_unknowns(rig: GreyBox, index: int, run: Run, start: State) -> list[Unknown]:
     """What is sought for one run alone; `start` is its measured first state and its uncertainty."""
     found: list[Unknown] = []
     wanted = {*run.unknown, *run.shared}
@@ -228,7 +228,7 @@ class Setting:
 
 
 def setting(
-    rig: Rig, track: Track, values: dict[str, float | Array], own: Mapping[str, Array], friction: tuple[str, ...],
+    rig: GreyBox, track: Track, values: dict[str, float | Array], own: Mapping[str, Array], friction: tuple[str, ...],
     lanes: int,
 ) -> Setting:  # fmt: skip
     """Put a run's own numbers `own` (name to (lanes,)) into the parameters `values` and its first states.

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model.rig import Rig, base_values
+from upright.identification.model.grey_box import GreyBox, base_values
 from upright.identification.model.runs import Run
 from upright.identification.problem.normal_equations import Normal, finite
 from upright.identification.problem.unknowns import Unknown, shared_unknowns
@@ -57,7 +57,7 @@ class Sample:
     period: float
 
 
-def observe(rig: Rig, run: Run, *, flips: Mapping[str, float] | None = None,
+def observe(rig: GreyBox, run: Run, *, flips: Mapping[str, float] | None = None,
             turns: Mapping[str, float] | None = None) -> Sample | None:  # fmt: skip
     """Smoothed motion of a run, None when a coordinate that moves freely was not measured.
 
@@ -92,7 +92,7 @@ def observe(rig: Rig, run: Run, *, flips: Mapping[str, float] | None = None,
 
 
 def samples_of(
-    rig: Rig,
+    rig: GreyBox,
     runs: Sequence[Run],
     *,
     most: int | None = None,
@@ -136,7 +136,7 @@ def model_accelerations(plant: type[Plant], values: Mapping[str, float], sample:
     return np.asarray(np.linalg.solve(M, f[:, :, None])[:, :, 0].T, dtype=np.float64)
 
 
-def disagreement(rig: Rig, values: Mapping[str, float], sample: Sample) -> Array:
+def disagreement(rig: GreyBox, values: Mapping[str, float], sample: Sample) -> Array:
     """Weighted difference (free coordinates, T) between the model's accelerations and the measured ones."""
     a = model_accelerations(rig.plant, {**values, **sample.run.known}, sample)
     smooth = _same_smoothing(a, sample.width)
@@ -161,7 +161,7 @@ class Agreement:
     unexplained: float
 
 
-def regress(rig: Rig, samples: list[Sample]) -> Agreement:
+def regress(rig: GreyBox, samples: list[Sample]) -> Agreement:
     """Least squares on the accelerations over the numbers to estimate."""
     unknowns = [u for u in shared_unknowns(rig) if u.asked]
     base = base_values(rig)
@@ -197,7 +197,7 @@ def _coordinate(u: Unknown, value: float) -> float:
     return math.log(value) if u.log and value > 0 else min(max(value, u.lower), u.upper)
 
 
-def friction_from_energy(rig: Rig, samples: list[Sample], values: Mapping[str, float]) -> dict[str, float]:
+def friction_from_energy(rig: GreyBox, samples: list[Sample], values: Mapping[str, float]) -> dict[str, float]:
     """Friction terms to estimate, from the energy lost between turning points; empty when no run can tell.
 
     Masses and stiffnesses are taken from `values`; what comes back scales with them.

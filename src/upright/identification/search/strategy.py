@@ -18,7 +18,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model.rig import Rig
+from upright.identification.model.grey_box import GreyBox
 from upright.identification.model.runs import Run
 from upright.identification.problem.normal_equations import pseudo_inverse
 from upright.identification.problem.residuals import NOTICED, SAME, Problem, noise_level, unreached
@@ -82,7 +82,7 @@ PATIENCE = 5e8
 """Simulated samples, lanes counted, after which no further attempt begins."""
 
 
-def closed_form_starts(rig: Rig, runs: Sequence[Run]) -> list[dict[str, float]]:
+def closed_form_starts(rig: GreyBox, runs: Sequence[Run]) -> list[dict[str, float]]:
     """Values of the shared numbers from accelerations, then from the energy lost between turning points.
 
     Empty when a moving coordinate was not measured.

@@ -107,9 +107,9 @@ def question(fit: Fit) -> str:
     fitted = sum(s.role == "fit" for s in fit.runs.values())
     predicted = len(fit.runs) - fitted
     runs = f"{fitted} run{'s' if fitted != 1 else ''}"
-    asked = ", ".join(fit.rig.estimated) or "no parameter"
+    asked = ", ".join(fit.model.estimated) or "no parameter"
     held = f", and does the model then predict {predicted} more that it has not seen?" if predicted else "?"
-    return f"Which values of {asked} let the equations of motion of '{fit.rig.plant.__name__}' follow {runs}{held}"
+    return f"Which values of {asked} let the equations of motion of '{fit.model.plant.__name__}' follow {runs}{held}"
 
 
 def data_part(provenance: Mapping[str, object]) -> Part:
@@ -134,7 +134,7 @@ def _origin(provenance: Mapping[str, object], above: str = "") -> list[tuple[str
 
 def motion_part(fit: Fit) -> Part:
     """Equations of motion with the terms that this fit used."""
-    plant, parameters = fit.rig.plant, fit.rig.parameters
+    plant, parameters = fit.model.plant, fit.model.parameters
     zero = {n for n, p in parameters.items() if not p.estimate and p.value == 0}
     for name in set(plant.names()) - parameters.keys():
         q = plant.quantity(name)
@@ -162,7 +162,7 @@ def _scores(fit: Fit, crossed: CrossValidation | None) -> list[Block]:
 
 def run_pictures(fit: Fit, prefix: str) -> list[Picture]:
     """Data against model, run by run, fitted runs first."""
-    return score_pictures(fit.runs, fit.rig.plant, prefix)
+    return score_pictures(fit.runs, fit.model.plant, prefix)
 
 
 def score_pictures(scores: Mapping[str, RunScore], plant: type[Plant], prefix: str) -> list[Picture]:
@@ -406,9 +406,9 @@ def _friction(fit: Fit, study: str, folder: str) -> Iterator[Step]:
                 coloured.append(f"{plain(name)} of '{label}'")
     fixed = {
         name: f"{term} of {joint.on} ({name})"
-        for joint in fit.rig.plant.joints
+        for joint in fit.model.plant.joints
         for term, name in (("Coulomb friction", joint.coulomb), ("quadratic drag", joint.quadratic))
-        if name and name not in fit.rig.estimated
+        if name and name not in fit.model.estimated
     }
     if coloured and fixed:
         others = " and others" if coloured[3:] else ""

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from upright.identification.ladder.cross_validation import CrossValidation
 from upright.identification.model.fit import Estimate, Fit, Pole, RunScore
-from upright.identification.model.rig import Parameter
+from upright.identification.model.grey_box import Parameter
 from upright.physics.actuator import ACTUATOR
 from upright.quantities import figures
 from upright.report.page import KeyNumber, Symbol, Table
@@ -33,7 +33,7 @@ def parameter_table(
         Heading and cells of one column more.
     caption : str
     """
-    about = fit.rig.parameters
+    about = fit.model.parameters
     told = {n: _estimate(n, e, about.get(n)) for n, e in fit.estimates.items() if e.status != "known"}
     told |= {
         n: (number(p.value), _sure(p), "", unit(p.unit), "assumed" if p.assumed else "given", _called(n, p))
@@ -76,7 +76,7 @@ def within(e: Estimate, true: float) -> bool:
 
 def without_table(fit: Fit) -> Table:
     """What rests on assumed numbers, stated without them."""
-    about = fit.rig.parameters
+    about = fit.model.parameters
     return Table(
         caption="What the data give without the assumed gain: per unit of the command, in seconds and counts",
         headings=("symbol", *_ESTIMATE), numbers=(1, 2, 3), badge=5,

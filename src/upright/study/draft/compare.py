@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from upright.errors import BadInput
-from upright.identification.model.rig import Rig
+from upright.identification.model.grey_box import GreyBox
 from upright.identification.search.starts import Sample, regress, samples_of
 from upright.records import Record
 from upright.study.load import load_study
@@ -54,17 +54,17 @@ def explained(record: Record, drafts: Mapping[str, str], log: str) -> dict[str, 
         except BadInput:
             continue
         moving = [c for run in study.runs for c in run.measured if c not in run.held]
-        others = tuple(dict.fromkeys(moving))[1:] if len(study.rig.plant.coordinates) <= MIRRORED else ()
+        others = tuple(dict.fromkeys(moving))[1:] if len(study.model.plant.coordinates) <= MIRRORED else ()
         left = math.inf
         for signs in itertools.product((1.0, -1.0), repeat=len(others)):
-            samples = samples_of(study.rig, study.runs, most=MOST, flips=dict(zip(others, signs, strict=True)))
-            left = min(left, regress(sprung(study.rig, samples[0]), samples).unexplained) if samples else left
+            samples = samples_of(study.model, study.runs, most=MOST, flips=dict(zip(others, signs, strict=True)))
+            left = min(left, regress(sprung(study.model, samples[0]), samples).unexplained) if samples else left
         if math.isfinite(left):
             shares[plant] = max(0.0, 1 - left)
     return dict(sorted(shares.items(), key=lambda item: -item[1]))
 
 
-def sprung(rig: Rig, sample: Sample) -> Rig:
+def sprung(rig: GreyBox, sample: Sample) -> GreyBox:
     """The rig with every spring asked that a draft leaves out until a log shows it; guesses swing as the log does."""
     w = 2 * math.pi / sample.period
     held = {p.unit: p.value for p in rig.parameters.values() if p.unit in SPRUNG.values() and p.value}

@@ -36,7 +36,7 @@ class Parameter:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rig:
+class GreyBox:
     """A plant with what is known and what is asked about its parameters and its actuator.
 
     The plant may be `guessed`: its columns suit it, and nobody said that it is this one.
@@ -60,15 +60,15 @@ class Rig:
         q = self.plant.quantity(name)
         return max(p.lower, q.lower), min(p.upper, q.upper)
 
-    def with_values(self, values: Mapping[str, float]) -> Rig:
+    def with_values(self, values: Mapping[str, float]) -> GreyBox:
         """The rig with every number known: `values` by name, the rest as it stands."""
         return self._known({n: float(values.get(n, p.value)) for n, p in self.parameters.items()})
 
-    def without(self, names: Collection[str]) -> Rig:
+    def without(self, names: Collection[str]) -> GreyBox:
         """The rig with some parameters known to do nothing."""
         return self._known({n: neutral(self.plant, n) for n in self.parameters if n in names})
 
-    def _known(self, values: Mapping[str, float]) -> Rig:
+    def _known(self, values: Mapping[str, float]) -> GreyBox:
         known = {n: replace(self.parameters[n], value=v, estimate=False, uncertainty=0.0) for n, v in values.items()}
         return replace(self, parameters={**self.parameters, **known})
 
@@ -78,7 +78,7 @@ def neutral(plant: type[Plant], name: str) -> float:
     return _defaults(plant).get(name, 0.0)
 
 
-def base_values(rig: Rig) -> dict[str, float]:
+def base_values(rig: GreyBox) -> dict[str, float]:
     """Value of every parameter of plant and actuator, defaults filled in.
 
     Raises
