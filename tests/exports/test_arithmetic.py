@@ -200,3 +200,36 @@ def test_single_precision_misses_a_sum_of_products_by_a_few_roundings_of_their_s
     missed = np.abs(rounded.astype(float) - exact).max()
     assert missed <= test.single
     assert test.single < 10 * 2.0**-24 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("hold", [False, True])
+def test_single_precision_is_bounded_by_errors_that_are_handed_on_from_sample_to_sample(hold):
+    """A memory of one number, z' = a z + b w, u = c z + d w, with its errors followed one by one.
+
+    Sums of three terms (memory, reading, reference) err by five roundings of their sizes, inputs by one more. What is
+    asked within a converter step of the limit may hold a sum or not, so that all that is added to it may be missing.
+    """
+    eps = 2.0**-24
+    a, b, c, d = (1.0 if hold else 0.5), np.array([2.0, -0.75]), 3.0, np.array([1.5, 0.3])
+    law = Law([[a]], [b], [[c]], [d], target=[0.7], initial=[0.9], references=np.zeros((1, 1)), period=0.1,
+              windup="hold" if hold else "free", limit=2.0 if hold else math.inf, command_quantum=0.25 if hold else 0.0,
+              begin=np.array([[-0.4]]))  # fmt: skip
+    made = of_law(law)
+    test, step = self_test(made), (0.25 if hold else 0.0)
+    memory = replace(law, references=test.references).follow(test.readings)[1][:, 0]
+    w = np.column_stack([test.readings[:, 0] - 0.7, test.references[:, 0]])
+    y = np.column_stack([test.readings[:, 0], test.references[:, 0]])
+    rounded = np.float32(y).astype(float) - y - [float(np.float32(0.7)) - 0.7, 0.0]
+    moved_memory = -0.4 * rounded[0, 0]
+    error, worst, asked = 5 * eps * (0.4 * abs(w[0, 0]) + abs(memory[0])), 0.0, c * memory + w @ d
+    for k in range(len(w)):
+        moved = abs(c * moved_memory + rounded[k] @ d)
+        moved_memory = a * moved_memory + rounded[k] @ b
+        size = np.abs(w[k])
+        now = moved + 5 * eps * (c * abs(memory[k]) + size @ np.abs(d)) + eps * (size @ np.abs(d)) + c * error
+        worst = max(worst, now)
+        near = hold and abs(abs(asked[k]) - 2.0) <= now + step
+        error = a * error + 5 * eps * (a * abs(memory[k]) + size @ np.abs(b)) + eps * (size @ np.abs(b))
+        error += abs(a * memory[k] + w[k] @ b - memory[k]) if near else 0.0
+    worst = step * math.ceil(worst / step) if hold else worst
+    assert test.single == pytest.approx(worst + 4 * eps * min(law.limit, np.abs(asked).max()), rel=1e-6)
