@@ -53,8 +53,7 @@ def of_rig(**options):
 @pytest.mark.parametrize(
     ("counts", "quantum"),
     [
-        (4000, (4000, 4000)), ("4000", (4000, 4000)), ("psi=1000, theta=2000", (1000, 2000)),
-        ({"psi": 1000, "theta": 2000}, (1000, 2000)), ("4000, psi=1000", (1000, 4000)),
+        (4000, (4000, 4000)), ({"psi": 1000, "theta": 2000}, (1000, 2000)), ("4000, psi=1000", (1000, 4000)),
     ],
 )  # fmt: skip
 def test_counts_are_per_turn_of_all_or_of_each(counts, quantum):

@@ -7,7 +7,8 @@ from html.parser import HTMLParser
 import pytest
 
 from tests.physics.bumpers import Bumpers
-from upright.physics import BUILT_IN, CartPendulum, DoublePendulumAbsolute, Furuta, Pendulum, find
+from upright.physics import BUILT_IN, CartPendulum, Derived, DoublePendulumAbsolute, Furuta, Pendulum, find
+from upright.physics.equations import DryJoint
 from upright.report.fit.equations import MathWriter, equations
 from upright.report.symbols import symbol
 
@@ -152,3 +153,46 @@ def test_a_joint_between_two_bodies_rubs_on_the_difference_of_their_speeds():
     assert "−b_2csgn(" in two
     assert "−b_1csgn(" in one
     assert "b_1c" not in two
+
+
+class ByHand:
+    """A plant whose equations were typed here: two coordinates, and every kind of intermediate name."""
+
+    @staticmethod
+    def derived(without):
+        return Derived(
+            name="ByHand", coordinates=("x", "y"), inputs=("F",), parameters=("m", "J", "a", "b", "k", "c", "q"),
+            lumps=("m + J",), trig=(("s0", "c0", "a*y"),), steps=(("n0", "a*s0"),), mass=("k0", "b*c0", "J"),
+            force=("F - b*n0 - 0*k", "b/k - sqrt(c0)*x"), stiffness=(), damping=(), gain=(), kinetic="0",
+            potential="0", power_lost="0",
+            joints=(DryJoint(direction=(1.0, 0.0), coulomb="c", quadratic="q"),
+                    DryJoint(direction=(-1.0, 2.0), coulomb="c", quadratic="")),
+        )  # fmt: skip
+
+
+def by_hand(*zero):
+    rows = re.findall(r"<mtr>(.*?)</mtr>", equations(ByHand, zero=zero))
+    return [stripped(re.sub(r"<mover>(.*?)<mo>(.)</mo></mover>", r"\1\2", row)).replace("\u202f", "") for row in rows]
+
+
+def test_intermediate_names_are_put_back_and_what_is_zero_is_worked_out():
+    x, y = by_hand("c", "q")
+    assert x == "(m+J)x¨+bcos(ay)y¨=F−absin(ay)"
+    assert y == "bcos(ay)x¨+Jy¨={b/k}−root{cos(ay)}x"
+    assert by_hand("c", "q", "a") == ["(m+J)x¨+by¨=F", "bx¨+Jy¨={b/k}−x"]  # sin 0 = 0, cos 0 = 1, root of 1 = 1
+    assert by_hand("c", "q", "b") == ["(m+J)x¨=F", "Jy¨=−root{cos(ay)}x"]
+    assert by_hand("c", "q", "m", "a", "b") == ["Jx¨=F", "Jy¨=−x"]
+
+
+def test_dry_friction_acts_along_each_joint_with_its_factor():
+    x, y = by_hand("a", "b")
+    assert x.startswith("(m+J)x¨=F")
+    told = x.removeprefix("(m+J)x¨=F")
+    assert told.count("csgn(") == 2
+    assert "−csgn(x˙)" in told
+    assert "−qx˙|x˙|" in told
+    assert "+csgn(" in told  # against the second joint, which turns by 2 y - x
+    assert y.count("sgn(") == 1
+    assert "−2csgn(" in y.replace("2.0", "2")
+    assert "q" not in y
+    assert "q" not in by_hand("a", "b", "q")[0]
