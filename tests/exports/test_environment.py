@@ -330,3 +330,17 @@ def test_steps_are_as_short_as_the_fastest_mode_needs():
     assert substeps(rig, 0.0416) == 1  # 0.2496 rad
     assert substeps(rig, 0.0418) == 2
     assert substeps(rig, 1.0) == 24
+
+
+def test_a_new_episode_knows_nothing_of_the_commands_of_the_last(fit):
+    """A drive that is 50 ms late: what was commanded before the reset never arrives, in that lane alone."""
+    lanes = Episodes(furuta_rig(fit, limit=5.0, delay=0.05), 2)
+    rest = np.array([0.0, 0.0, np.pi, 0.0])
+    lanes.x[:] = rest[:, None]
+    lanes.step(np.ones((2, 1)))
+    lanes.reset(np.array([True, False]), np.random.default_rng(0))
+    lanes.x[:] = rest[:, None]
+    for _ in range(4):
+        lanes.step(np.zeros((2, 1)))
+    assert np.abs(lanes.x[0]).tolist()[0] < 1e-12
+    assert lanes.x[0, 1] > 1e-4

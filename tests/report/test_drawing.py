@@ -206,6 +206,8 @@ def test_a_map_of_poles_holds_its_first_two_kinds_and_counts_what_lies_outside()
         "rigs that the fit allows": [(-1, 2)], "open": [(-3, 0), (2, 0)], "asked": [(-10, -4), (-10, 4)],
         "fast": [(-14, 0), (-12.9, 0), (-5, -6), (-5, 6), (2.7, 0), (3, 1)],
     }  # fmt: skip
+    # on the edge is inside
+    assert pole_map([*kinds[:2], poles("edge", -13.0, 2.6)]).axes[0].get_xlabel() == "real part [1/s]"
     (stable,) = axes.patches
     assert (stable.get_x(), stable.get_x() + stable.get_width()) == pytest.approx((-13.0, 0.0))
     fills = {line.get_label(): line.get_markerfacecolor() for line in axes.lines}

@@ -102,6 +102,7 @@ def test_the_command_is_drawn_whole_close_up_and_as_what_is_left():
     assert (step.get_y(), step.get_y() + step.get_height()) == (-0.25, 0.25)
     assert [a.get_ylabel() for a in drawing.axes] == ["u [V]", "u [V]", "residual [V]"]
     assert left.get_xlabel() == "time [s]"
+    assert not any(a.yaxis.label.get_parse_math() for a in drawing.axes)
     assert not draw_law(RECORD, replace(FOUND, quantum=0.0)).axes[2].patches
     assert whole.get_title(loc="left") == f"P of r - y; explains {FOUND.explained:.4g} %"
 

@@ -136,6 +136,7 @@ def test_columns_are_drawn_over_time_with_rests_and_gaps_drives_last():
     assert [a.lines[-1].get_drawstyle() for a in drawing.axes] == ["default", "default", "steps-post"]
     assert [a.get_title(loc="left") for a in drawing.axes] == ["", "It follows theta.", ""]
     assert [a.get_xlabel() for a in drawing.axes] == ["", "", "time [s]"]
+    assert not any(a.yaxis.label.get_parse_math() for a in drawing.axes)  # a dollar in a name is a dollar
     assert drawing.get_suptitle() == "swing.csv, 41 samples, grey: at rest"
 
 

@@ -194,6 +194,7 @@ def test_commands_are_drawn_logged_and_replayed_above_their_difference():
         "logged": [[10.25, 10.5, 11.25], [-2, -3, -16]],
         "replayed": [[10.25, 10.5, 11.25], [-2, -2.5, -17]],
     }
+    assert not above.yaxis.label.get_parse_math()
     assert np.array(below.lines[0].get_data()).tolist() == [[10.25, 10.5, 11.25], [0, 0.5, -1]]
     assert (above.get_ylabel(), below.get_ylabel(), below.get_xlabel()) == ("u [V]", "difference", "time [s]")
 

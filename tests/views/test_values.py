@@ -59,6 +59,7 @@ def test_a_record_draws_what_is_measured_and_what_drives_over_time():
     np.testing.assert_array_equal(panels["V [V]"], (T, COLUMNS["V"]))
     assert [a.get_xlabel() for a in figure.axes] == ["", "time [s]"]
     assert len({a.lines[0].get_color() for a in figure.axes}) == 2
+    assert not any(a.yaxis.label.get_parse_math() for a in figure.axes)
 
 
 def test_columns_that_are_asked_for_are_drawn_even_where_they_never_change():
