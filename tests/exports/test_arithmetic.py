@@ -11,8 +11,9 @@ import pytest
 from upright.errors import BadInput
 from upright.exports.arithmetic import Language, put_out, statements
 from upright.exports.controller import SampledController, identifiers, of_design, of_law, plain
+from upright.exports.targets import TARGETS
 from upright.exports.vector import self_test
-from upright.laws import Law
+from upright.laws import Law, Rule
 
 TOY = Language(
     number=lambda x: f"{x:g}", reading=lambda i: f"y{i}", reference=lambda i: f"r{i}", memory=lambda i: f"z{i}",
@@ -233,3 +234,46 @@ def test_single_precision_is_bounded_by_errors_that_are_handed_on_from_sample_to
         error += abs(a * memory[k] + w[k] @ b - memory[k]) if near else 0.0
     worst = step * math.ceil(worst / step) if hold else worst
     assert test.single == pytest.approx(worst + 4 * eps * min(law.limit, np.abs(asked).max()), rel=1e-6)
+
+
+def in_c(made, single=False):
+    return TARGETS["c"].write(made, self_test(made), single)
+
+
+def test_a_header_names_every_signal_and_the_step_of_each_encoder_that_has_one():
+    """A reversed encoder counts the other way: its step has the sign of its wiring."""
+    made = replace(MADE, law=replace(LAW, quantum=[0.001, 0.0]), signs=(-1.0, 1.0), reading_units=("m", "rad"))
+    text = in_c(made)["law.h"]
+    assert "#define LAW_STEP_X -0.001 /* reading per count of the encoder [m] */\n" in text
+    assert "LAW_STEP_THETA" not in text
+    for line in ("typedef double law_real;", "#define LAW_PERIOD 0.01 ", "#define LAW_READINGS 2\n",
+                 "#define LAW_REFERENCES 1\n", "#define LAW_COMMANDS 1\n", "law_real z[2];", "int running;",
+                 "One sample: y[0] is x [m]; y[1] is theta [rad]; r[0] is goal; u[0] is u [V]."):  # fmt: skip
+        assert line in text, line
+    bare = Law(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), [[-3.0]], period=0.1)
+    assert "law_real z[1];" in in_c(of_law(bare))["law.h"]  # C has no arrays of nothing
+
+
+@pytest.mark.parametrize("single", [False, True])
+def test_a_law_in_double_precision_calls_nothing_in_single(single):
+    texts = in_c(MADE, single)
+    assert ("floorf(" in texts["law.c"]) == ("fabsf(" in texts["law.c"]) == single
+    assert ("floor(" in texts["law.c"]) == ("fabs(" in texts["law.c"]) == (not single)
+    assert ("FLT_MANT_DIG" in texts["law.c"], "DBL_MANT_DIG" in texts["law.c"]) == (single, not single)
+    assert ("-4.0f * w0" in texts["law.c"]) == single
+    assert f"typedef {'float' if single else 'double'} law_real;" in texts["law.h"]
+    assert f"allowed = ({'0' if single else 'LAW_EXACT'}) ? 0 : LAW_SINGLE_MISSES;" in texts["law_selftest.h"]
+    assert "static const law_real given[48][2]" in texts["law_selftest.h"]
+    assert "static const law_real expected[48][1]" in texts["law_selftest.h"]
+
+
+def test_numbers_of_a_rule_are_kept_in_double_precision():
+    def push(t, y, r, z, p):
+        return (p[0] * y[0],), (y[0],)
+
+    made = of_law(Rule(function=push, initial=[0.1], parameters=[0.3], measured=("x",), period=0.01))
+    text = in_c(made)["law.c"]
+    assert "static double parameters[] = {0.3};" in text
+    assert "static const double initial[] = {0.1};" in text
+    assert "found[2];" in text
+    assert "s->z[i] = found[1 + i];" in text
