@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 import upright as up
@@ -142,3 +143,16 @@ def test_what_lies_just_beyond_is_refused_before_the_work_begins(call, said, tmp
 def test_a_plan_of_few_runs_is_made_at_the_ends_of_its_bounds():
     assert list(up.plan_inertias(runs=2, levels=2, error=1e-3, tolerance=0.0).value) == [2]
     assert list(up.plan_inertias(runs=4, levels=3).value) == [3, 4]
+
+
+def test_a_ladder_looks_at_the_folder_that_it_is_to_write_to_before_it_climbs(tmp_path):
+    """Where a folder bears the name of its file, neither a study's file nor a study in memory is climbed."""
+    from upright.study.load import load_study
+
+    t = np.arange(500) * 0.01
+    up.init(up.Record(t=t, signals={"theta": np.exp(-0.2 * t) * np.cos(7 * t)}, units={"theta": "rad"}), out="s.toml")
+    (tmp_path / "mine" / "ladder.json").mkdir(parents=True)
+    for study in ("s.toml", load_study(tmp_path / "s.toml")):
+        with pytest.raises(BadInput, match=r"mine/ladder\.json' is a folder"):
+            up.ladder(study, out="mine")
+    assert not list((tmp_path / "mine" / "ladder.json").iterdir())
