@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import runpy
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from tests.exports.rigs import fit_file
 from upright.errors import BadInput
 from upright.exports.episodes import Episodes
+from upright.exports.steps import substeps
 from upright.physics import CartPendulum, Furuta, Pendulum, find
 from upright.simulation import simulate
 from upright.study.stored_rig import read_stored_rig
@@ -57,8 +59,6 @@ def test_a_step_is_the_motion_of_the_rig_that_was_drawn(fit):
 
 def test_a_drive_that_is_late_remembers_its_commands_from_step_to_step(fit):
     """Dead time and lag longer than a step: the same motion as in one run."""
-    from dataclasses import replace
-
     from upright.rig.hardware import Entry
 
     known = read_stored_rig(fit, draws=1)
@@ -182,3 +182,165 @@ def test_a_rig_without_a_limit_is_asked_for_one(tmp_path):
     with pytest.raises(BadInput, match="largest command"):
         export(path, to="gymnasium", out=tmp_path)
     assert export(path, to="gymnasium", out=tmp_path, limit=2.0).numbers["draws"] == 0
+
+
+def furuta_rig(fit, **entries):
+    from upright.study.description import Entry
+
+    known = read_identified(fit)
+    given = {n: Entry(value=v, unit="", source="known") for n, v in entries.items()}
+    return replace(known, draws=(), description=replace(known.description, entries=given))
+
+
+def test_an_observation_is_deviations_then_speeds_and_of_what_turns_over_sine_and_cosine(fit):
+    lanes = Episodes(read_identified(fit), 2)
+    assert lanes.names == ["psi", "sin theta", "cos theta", "psi_dot", "theta_dot"]
+    lanes.x[:] = [[0.3, -0.1], [4.0, 5.0], [np.pi + 0.2, np.pi - 0.4], [6.0, 7.0]]
+    expected = [[0.3, np.sin(0.2), np.cos(0.2), 4, 6], [-0.1, np.sin(-0.4), np.cos(0.4), 5, 7]]
+    np.testing.assert_allclose(lanes.observation, expected, atol=1e-6)
+    assert Episodes(read_identified(fit), 1, at="hanging").target.tolist() == [0, 0]
+    assert lanes.target.tolist() == [0, pytest.approx(np.pi)]
+
+
+@pytest.mark.parametrize(("task", "theta"), [("balance", np.pi), ("swing_up", 0.0)])
+def test_an_episode_begins_within_a_twentieth_of_where_its_task_does(fit, task, theta):
+    lanes = Episodes(read_identified(fit), 400, task=task)
+    lanes.reset(np.ones(400, dtype=bool), np.random.default_rng(2))
+    off = lanes.x - np.array([0.0, 0.0, theta, 0.0])[:, None]
+    assert np.abs(off).max() <= 0.05
+    assert (off.min(axis=1) < -0.045).all()
+    assert (off.max(axis=1) > 0.045).all()
+    assert not lanes.done.any()
+
+
+def test_only_those_that_are_asked_begin_anew(fit):
+    lanes = Episodes(read_identified(fit, draws=4), 3)
+    lanes.reset(np.ones(3, dtype=bool), np.random.default_rng(2))
+    lanes.step(np.zeros((3, 1)))
+    before, steps = lanes.x.copy(), lanes.steps.copy()
+    lanes.reset(np.array([False, True, False]), np.random.default_rng(5))
+    assert (lanes.x[:, [0, 2]] == before[:, [0, 2]]).all()
+    assert (lanes.x[:, 1] != before[:, 1]).all()
+    assert (steps.tolist(), lanes.steps.tolist()) == ([1, 1, 1], [1, 0, 1])
+    lanes.reset(np.zeros(3, dtype=bool), np.random.default_rng(5))
+    assert lanes.steps.tolist() == [1, 0, 1]
+
+
+def test_a_command_is_cut_at_its_limit_and_both_signs_push_their_own_way(fit):
+    lanes = Episodes(furuta_rig(fit, limit=5.0), 4, at="hanging")
+    lanes.x[:] = 0.0
+    lanes.step(np.array([[1.0], [3.0], [-1.0], [-2.0]]))
+    np.testing.assert_array_equal(lanes.x[:, 0], lanes.x[:, 1])
+    np.testing.assert_array_equal(lanes.x[:, 2], lanes.x[:, 3])
+    np.testing.assert_allclose(lanes.x[:, 0], -lanes.x[:, 2], atol=1e-15)
+    assert lanes.x[1, 0] > 0
+
+
+@pytest.mark.parametrize(
+    ("entries", "options", "limit"),
+    [
+        ({"limit": 5.0}, {}, 5.0), ({"limit": 5.0}, {"limit": 7.0}, 7.0),
+        ({"limit": 5.0, "force_limit": 1.0}, {}, 2.0),  # half a N m for each volt
+    ],
+)  # fmt: skip
+def test_full_command_is_what_is_asked_or_what_the_drive_can(fit, entries, options, limit):
+    lanes = Episodes(furuta_rig(fit, **entries), 1, **options)
+    assert lanes.limit == pytest.approx(limit)
+
+
+def test_an_arm_ends_at_its_travel_and_a_pendulum_at_twelve_degrees_on_either_side(fit):
+    lanes = Episodes(furuta_rig(fit, limit=5.0), 6, travel=0.5, period=1e-4)
+    lanes.x[:] = np.array([0.0, 0.0, np.pi, 0.0])[:, None]
+    lanes.x[0, :3] = [0.49, 0.51, -0.51]
+    lanes.x[2, 3:] = np.pi + np.radians([11.9, 12.1, -12.1])
+    reward, fallen = lanes.step(np.zeros((6, 1)))
+    assert fallen.tolist() == [False, True, True, False, True, True]
+    assert reward.tolist() == [1.0] * 6
+    free = Episodes(furuta_rig(fit, limit=5.0), 2, task="swing_up", period=1e-4)
+    free.x[:] = np.array([[9.0, -9.0], [0.0, 0.0], [1.0, 2.0], [0.0, 0.0]])
+    assert not free.step(np.zeros((2, 1)))[1].any()  # nobody said how far the arm may go
+    said = Episodes(furuta_rig(fit, limit=5.0, travel=0.5), 2, task="swing_up", period=1e-4)
+    said.x[:] = np.array([[0.49, -0.51], [0.0, 0.0], [1.0, 2.0], [0.0, 0.0]])
+    assert said.step(np.zeros((2, 1)))[1].tolist() == [False, True]
+
+
+def test_a_motion_that_left_all_numbers_ends_where_it_was(fit):
+    lanes = Episodes(furuta_rig(fit, limit=5.0), 2)
+    lanes.x[:] = np.array([0.0, 0.0, np.pi, 0.0])[:, None]
+    lanes.x[1, 1] = np.inf
+    _, fallen = lanes.step(np.zeros((2, 1)))
+    assert fallen.tolist() == [False, True]
+    assert lanes.x[1, 1] == np.inf
+    assert np.isfinite(lanes.x[:, 0]).all()
+
+
+@pytest.mark.parametrize(("period", "taken"), [(1e-4, True), (1.0, True), (0.9e-4, False), (1.01, False)])
+def test_a_command_is_held_for_a_tenth_of_a_millisecond_to_a_second(fit, period, taken):
+    rig = furuta_rig(fit, limit=5.0)
+    if taken:
+        assert Episodes(rig, 1, period=period).period == period
+    else:
+        with pytest.raises(BadInput, match="1e-4 to 1 s"):
+            Episodes(rig, 1, period=period)
+
+
+@pytest.mark.parametrize(
+    ("lanes", "options", "words"),
+    [
+        (0, {}, "at least one lane, got 0"), (1, {"travel": 0.0}, "travel of an environment lies above 0"),
+        (1, {"limit": 1e9}, r"limit of an environment lies above 0 and below 1e9, got 1e\+09"),
+    ],
+)  # fmt: skip
+def test_numbers_out_of_reach_are_refused(fit, lanes, options, words):
+    with pytest.raises(BadInput, match=words):
+        Episodes(furuta_rig(fit, limit=5.0), lanes, **options)
+
+
+def test_braking_that_builds_up_is_refused_and_what_does_not_is_taken(fit):
+    with pytest.raises(BadInput, match=r"actuator\.relaxation"):
+        Episodes(furuta_rig(fit, limit=5.0, relaxation=0.1), 1)
+    assert Episodes(furuta_rig(fit, limit=5.0, relaxation=0.0), 1)
+
+
+def test_an_episode_is_cut_after_five_hundred_steps_unless_another_number_is_asked(fit):
+    rig = furuta_rig(fit, limit=5.0)
+    assert RigVectorEnv(rig).max_episode_steps == 500
+    assert RigVectorEnv(rig).num_envs == 1
+    env = RigVectorEnv(rig, 2, max_episode_steps=2, at="hanging")
+    env.reset(seed=1)
+    cut = [env.step(np.zeros((2, 1)))[3].tolist() for _ in range(4)]
+    assert cut == [[False] * 2, [True] * 2, [False] * 2, [False] * 2]  # the third begins anew
+
+
+def test_actions_and_observations_have_a_number_for_each_input_and_signal(fit):
+    env = RigEnv(furuta_rig(fit, limit=5.0))
+    assert (env.action_space.low.tolist(), env.action_space.high.tolist()) == ([-1.0], [1.0])
+    assert env.observation_space.shape == (5,)
+    assert RigVectorEnv(furuta_rig(fit, limit=5.0), 3).action_space.shape == (3, 1)
+    seen, about = env.reset(seed=3)
+    assert (seen.shape, about) == ((5,), {})
+    assert env.step(np.zeros(1))[1:] == (1.0, False, False, {})
+
+
+def test_steps_are_as_short_as_the_fastest_mode_needs():
+    """A quarter of a radian of it: w = sqrt(m g l/(J + m l^2)) of a pendulum without friction, hanging or not."""
+    plant = Pendulum(m_p=0.2, l_cg=0.25, J_p=0.0, g=9.0)  # w = sqrt(g/l) = 6 rad/s
+    rig = type("rig", (), {"plant": plant, "linear": lambda self, at, side: plant.linear(at, side=side)})()
+    assert substeps(rig, 0.02) == 1
+    assert substeps(rig, 0.0416) == 1  # 0.2496 rad
+    assert substeps(rig, 0.0418) == 2
+    assert substeps(rig, 1.0) == 24
+
+
+def test_a_new_episode_knows_nothing_of_the_commands_of_the_last(fit):
+    """A drive that is 50 ms late: what was commanded before the reset never arrives, in that lane alone."""
+    lanes = Episodes(furuta_rig(fit, limit=5.0, delay=0.05), 2)
+    rest = np.array([0.0, 0.0, np.pi, 0.0])
+    lanes.x[:] = rest[:, None]
+    lanes.step(np.ones((2, 1)))
+    lanes.reset(np.array([True, False]), np.random.default_rng(0))
+    lanes.x[:] = rest[:, None]
+    for _ in range(4):
+        lanes.step(np.zeros((2, 1)))
+    assert np.abs(lanes.x[0]).tolist()[0] < 1e-12
+    assert lanes.x[0, 1] > 1e-4

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import xml.etree.ElementTree as ET
 import zipfile
 from dataclasses import replace
 from types import SimpleNamespace
@@ -16,6 +17,7 @@ from tests.physics.bumpers import BUMPERS
 from tests.physics.specimens import SPECIMENS
 from upright.errors import BadInput
 from upright.exports.fmu import build, unit_of
+from upright.exports.fmu.archive import description
 from upright.exports.fmu.translation import translated
 from upright.physics import BUILT_IN, CartPendulum, Furuta, chain
 from upright.rig import Hardware
@@ -178,3 +180,52 @@ def test_what_a_unit_does_not_remember_is_said_or_refused(tmp_path):
     with pytest.raises(BadInput, match="relaxation"):
         unit_of(slow)
     assert unit_of(replace(slow, hardware=Hardware())).told
+
+
+def test_a_tool_is_told_every_variable_with_its_unit_meaning_and_number(tmp_path):
+    plant = CartPendulum(m_c=0.5, m_p=0.2, l_cg=0.3, J_p=6e-3, b_1=0.4)
+    offset = {"value": 0.25, "unit": "V", "source": "known"}
+    unit = unit_of(identified(tmp_path, plant, unit="N", offset=offset))
+    root = ET.fromstring(description(unit, "{token}"))
+    about = {v.attrib["name"]: v.attrib for v in root.find("ModelVariables")}
+    names = [v.attrib["name"] for v in root.find("ModelVariables")]
+    states = ["x", "x_dot", "theta", "theta_dot"]
+    assert names[:6] == ["time", "u", *states]
+    assert names[6:10] == [f"{n}_start" for n in states]
+    assert [int(about[n]["valueReference"]) for n in names] == list(range(len(names)))
+    assert (about["u"]["unit"], about["u"]["causality"], about["u"]["start"]) == ("V", "input", "0.0")
+    assert [about[n]["unit"] for n in states] == ["m", "m/s", "rad", "rad/s"]
+    assert {about[n]["causality"] for n in states} == {"output"}
+    given = {n: float(about[n]["start"]) for n in names[10:]}
+    assert {n: given[n] for n in ("m_c", "m_p", "l_cg", "J_p", "b_1")} == {
+        "m_c": 0.5, "m_p": 0.2, "l_cg": 0.3, "J_p": 6e-3, "b_1": 0.4,
+    }  # fmt: skip
+    assert "b_2" not in given  # zero, so that the kernel was chosen without it
+    assert (given["actuator_gain"], about["actuator_gain"]["unit"]) == (0.5, "N/V")
+    assert (given["actuator_offset"], about["actuator_offset"]["unit"]) == (0.25, "V")
+    numbers = [about[n]["valueReference"] for n in states]
+    structure = root.find("ModelStructure")
+    for kind in ("Output", "InitialUnknown"):
+        assert [e.attrib["valueReference"] for e in structure.findall(kind)] == numbers
+    assert root.find("CoSimulation").attrib["fixedInternalStepSize"] == "0.001"
+    assert root.find("DefaultExperiment").attrib["stepSize"] == "0.01"
+    assert root.attrib["instantiationToken"] == "{token}"
+    declared = {u.attrib["name"] for u in root.find("UnitDefinitions")}
+    assert {"s", "V", "m", "rad/s", "N/V", "kg"} <= declared
+    # rows of the kernel: states and starts by number, parameters where it keeps them
+    assert [v.row for v in (*unit.states, *unit.starts)] == [0, 1, 2, 3] * 2
+    assert all(unit.simulator.names[v.row].replace(".", "_") == v.name for v in unit.parameters)
+
+
+@pytest.mark.parametrize(
+    ("delay", "lag", "kept"), [(0.0, 0.0, 3), (4.2e-3, 0.0, 8), (0.0, 0.01, 403), (99.0, 0.0, 99_003)]
+)
+def test_a_unit_remembers_the_delay_and_forty_time_constants(delay, lag, kept, tmp_path):
+    entries = {n: {"value": v, "unit": "s", "source": "known"} for n, v in (("delay", delay), ("lag", lag))}
+    assert unit_of(identified(tmp_path, SMOOTH["pendulum"], **entries)).remembered == kept
+
+
+def test_a_drive_as_late_as_a_minute_and_more_is_refused(tmp_path):
+    entries = {"delay": {"value": 100.0, "unit": "s", "source": "known"}}
+    with pytest.raises(BadInput, match="remember 100003 commands, and 100000 is the most; are they in seconds"):
+        unit_of(identified(tmp_path, SMOOTH["pendulum"], **entries))

@@ -104,6 +104,7 @@ def replay(log: RunLog, law: Law | Rule | None = None) -> Replay:
             first=begin, t=t[begin:known], readings=readings[begin:known], references=_asked(law, log, begin, known)
         )
         for begin, known, _ in stretches
+        if known > begin  # rows were dropped before its first one
     ]
     given = (_in_a_process if of_log and isinstance(law, Rule) else _commands)(law, asked, log.file)
     there = logged[rows]

@@ -17,7 +17,7 @@ _LETTERS = (
 )
 GREEK = {name: chr(code) for code, name in enumerate(_LETTERS.split(), start=0x3B1)}
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_SYMBOL = re.compile(r"[A-Za-z]+(_[A-Za-z0-9]+)*[0-9]*\Z")
+_SYMBOL = re.compile(r"[A-Za-z]+[0-9]*(_[A-Za-z0-9]+)*\Z")
 
 
 def parts(name: str) -> tuple[str, str, str]:

@@ -11,7 +11,18 @@ import numpy as np
 from upright.errors import BadInput, nearest
 from upright.physics import Plant
 from upright.records import Record
-from upright.report.drawing import BLUE, CYCLE, VERMILLION, decimated, figure, hide_inner_times, roots, s_plane, styled
+from upright.report.drawing import (
+    BLUE,
+    CYCLE,
+    GREY,
+    VERMILLION,
+    decimated,
+    figure,
+    hide_inner_times,
+    roots,
+    s_plane,
+    styled,
+)
 from upright.report.html import fragment
 from upright.report.page import Chapter, Part, Picture, Symbol, Table
 from upright.report.symbols import number, unit
@@ -167,9 +178,16 @@ def draw_poles(value: Any) -> Any:
         drawn = {"poles": value.poles() if isinstance(value, StateSpace) else value.poles}
     drawing = figure(2.6)
     axes = drawing.subplots()
-    most = max(float(p.real.max()) for p in drawn.values())
-    s_plane(axes, unstable=max(0.0, 1.2 * most))
-    axes.set_ylabel("imaginary part [1/s]")
+    if (isinstance(value, StateSpace) and value.dt) or (isinstance(value, Gains) and value.period):
+        turn = np.linspace(0.0, 2 * np.pi, 181)
+        axes.plot(np.cos(turn), np.sin(turn), color=GREY, linewidth=0.8)  # inside it motions decay
+        axes.set_aspect("equal")
+        axes.set_xlabel("real part of z")
+        axes.set_ylabel("imaginary part of z")
+    else:
+        most = max(float(p.real.max()) for p in drawn.values())
+        s_plane(axes, unstable=max(0.0, 1.2 * most))
+        axes.set_ylabel("imaginary part [1/s]")
     for (name, poles), (mark, colour) in zip(
         drawn.items(), (("x", BLUE), ("o", VERMILLION), ("s", BLUE)), strict=False
     ):

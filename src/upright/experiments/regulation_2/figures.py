@@ -31,7 +31,7 @@ COLOURS: Mapping[str, tuple[str, str]] = {
 def runs_figure(attempts: Sequence[Attempt], seconds: float) -> Figure:
     """Deviations and command over the first seconds, one column per pole set; a cross where a run was lost."""
     first = attempts[0].before.run
-    coordinates = first.model.plant.coordinates
+    coordinates = first.rig.plant.coordinates
     order = [*range(len(coordinates))][::-1]  # the pendulum on top
     drawing = figure(1.45 * (len(order) + 1) + 0.7)
     axes: Any = drawing.subplots(len(order) + 1, len(attempts), sharex=True, sharey="row", squeeze=False)
@@ -57,7 +57,7 @@ def runs_figure(attempts: Sequence[Attempt], seconds: float) -> Figure:
     for row, i in enumerate(order):
         turned = coordinates[i].unit == "rad"
         axes[row, 0].set_ylabel(axis(mathtext(coordinates[i].name), "deg" if turned else "cm"))
-        if coordinates[i].name == first.model.plant.inputs[0].on and math.isfinite(first.rig.travel):
+        if coordinates[i].name == first.rig.plant.inputs[0].on and math.isfinite(first.rig.travel):
             _ends(axes[row], first.rig.travel * (180 / math.pi if turned else 100.0))
     axes[-1, 0].set_ylabel(axis("command", first.rig.unit))
     axes[-1, 0].text(

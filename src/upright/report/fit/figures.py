@@ -103,7 +103,7 @@ def _signal(upper: Axes, lower: Axes, score: RunScore, j: int, unit: str, bucket
     lower.axhline(0, color=GREY, linewidth=0.6)
     lower.plot(*decimated(t, left, buckets), color=VERMILLION, linewidth=0.7)
     lower.set_ylabel("residual", fontsize=8)
-    lower.yaxis.set_major_locator(MaxNLocator(nbins=3, symmetric=True))
+    lower.yaxis.set_major_locator(MaxNLocator(nbins=3, symmetric=True, steps=[1, 2, 5, 10]))  # one figure says each
     lower.yaxis.set_major_formatter(FuncFormatter(lambda value, _: number(float(f"{value:.3g}"), 1)))
     if score.score_from > 0:
         for panel, label in ((upper, "not scored"), (lower, None)):
@@ -194,7 +194,7 @@ def interval_figure(estimates: Mapping[str, Estimate], *, truth: Mapping[str, fl
         colour = BLUE if firm else VERMILLION
         lo, hi = max(low, -reach), min(high, reach)
         ax.plot([100 * lo, 100 * hi], [row, row], color=colour, linewidth=2, linestyle="-" if firm else (0, (3, 1)))
-        ax.plot(100 * (e.value / centre - 1), row, marker="o" if firm else "s", color=colour, markersize=4.5)
+        ax.plot(100 * (e.value - centre) / abs(centre), row, marker="o" if firm else "s", color=colour, markersize=4.5)
         for end, limit, mark in ((low, -reach, "<"), (high, reach, ">")):
             if not abs(end) <= reach:
                 ax.plot(100 * limit, row, marker=mark, color=colour, markersize=6, clip_on=False)
