@@ -22,6 +22,7 @@ from upright.identification.problem.residuals import Problem, formulate
 from upright.identification.problem.simulated import with_noise
 from upright.identification.search.descent import descend
 from upright.physics import find
+from upright.signals.memory import automatic_span, long_run, lost_share, memory
 
 CART = find("rectilinear-1")
 DT, N, MASS, GAIN = 0.01, 400, 2.0, 3.0
@@ -277,3 +278,46 @@ def test_bands_of_runs_left_out_are_neither_narrower_than_normal_nor_wider_than_
     assert recalibrated(PROMISE, [far]).quantile == quantile
     bare = replace(told, band={})
     assert recalibrated(PROMISE, [bare]) is PROMISE
+
+
+@pytest.mark.parametrize("runs", [1, 3])
+def test_the_sandwich_is_that_of_the_textbook(runs: int) -> None:
+    """Newey and West's sum of the scores for each run, between inverses; White's and the variance beside it."""
+    best = fitted(runs)
+    problem, size = best.problem, 1 + 2 * runs
+    _, P = problem.prior_rows(best.x)
+    A, meat, cost, independent, longest = P.T @ P, np.zeros((size, size)), 0.0, 0.0, 0.0
+    for i, track in enumerate(problem.tracks):
+        J = np.zeros((N, size))
+        J[:, [0, 1 + 2 * i, 2 + 2 * i]] = track.weights[0] * columns(i)
+        r = J @ best.x - track.weights[0] * track.run.y[:, 0]
+        scores = J * r[:, None]
+        own = scores[:, [0, 1 + 2 * i, 2 + 2 * i]]
+        span = automatic_span(own)
+        meat += long_run(scores, span) / (1 - lost_share(own, span))
+        A += J.T @ J
+        cost, independent, longest = cost + r @ r, independent + N / span, max(longest, memory(r[:, None], DT))
+    inverse = np.linalg.inv(A)
+    meat *= independent / max(independent - size, independent / 2)
+    expected = inverse @ (meat + P.T @ P * problem.noise**2) @ inverse
+    assert np.allclose(best.sandwich, expected, rtol=1e-3, atol=1e-6 * np.abs(expected).max())
+    assert best.variance == pytest.approx(cost / (runs * N - size), rel=1e-6)
+    assert best.white == pytest.approx(np.diag(inverse) * best.variance, rel=1e-4)
+    assert best.samples == pytest.approx(independent)
+    assert best.memory == pytest.approx(longest)
+    assert np.allclose(best.matrix, A, rtol=1e-4, atol=1e-4 * np.abs(A).max())
+    assert not best.pinned.any()
+    assert np.all(np.diag(best.covariance) >= np.diag(best.sandwich) * (1 - 1e-12))
+    if runs > 1:
+        assert best.covariance[0, 0] >= spread_of_runs(best, inverse)
+
+
+def spread_of_runs(best: Optimum, inverse: np.ndarray) -> float:
+    """Variance of the gain by how far each run's gradient pulls it."""
+    runs = len(best.problem.tracks)
+    pulls = []
+    for i, track in enumerate(best.problem.tracks):
+        J = np.zeros((N, len(best.x)))
+        J[:, [0, 1 + 2 * i, 2 + 2 * i]] = track.weights[0] * columns(i)
+        pulls.append(inverse @ J.T @ (J @ best.x - track.weights[0] * track.run.y[:, 0]))
+    return float(np.sum(np.array(pulls)[:, 0] ** 2)) * runs / (runs - 1)
