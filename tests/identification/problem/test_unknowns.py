@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 
 from tests.identification.twins import FURUTA, PENDULUM, rig
+from upright.closed_loop.structures import ClosedLoop
 from upright.errors import BadInput
 from upright.identification import Parameter, Rig, Run
 from upright.identification.problem.residuals import Problem, formulate, unreached, unresolved
 from upright.identification.problem.simulated import with_noise
 from upright.identification.problem.tracks import nearest_equilibrium, prepare
 from upright.identification.problem.unknowns import Unknown, friction_names, matters, shared_unknowns
+from upright.laws import state_feedback
 from upright.physics import CartPendulum, Furuta, Pendulum, find
 
 CART = find("rectilinear-1")
@@ -152,6 +154,16 @@ def test_a_drive_acts_within_its_command(
         assert (x.value, x.lower, x.upper) == pytest.approx(told)
         assert (x.scale, x.log) == (0.1, False)
     assert set(own(swung(unknown=("input_start",)))) == set()  # nothing is commanded
+
+
+def test_a_zero_that_nothing_feels_is_sought_where_a_law_reads_it() -> None:
+    """A cart without a spring may stand anywhere, but for the law that pulls it to where its sensor reads zero."""
+    numbers = {n: Parameter(name=n, value=v) for n, v in {"m_1": 2.0, "k_1": 0.0}.items()}
+    free = Rig(plant=CART, parameters=numbers)
+    run = swung(unknown=("offset",))
+    assert formulate(free, [run]).unknowns == []
+    loop = ClosedLoop(law=state_feedback([-6.0, -1.8], DT, measured=("x_1",)))
+    assert [u.name for u in formulate(free, [replace(run, loop=loop)]).unknowns] == ["offset.x_1"]
 
 
 def test_own_numbers_act_where_they_belong() -> None:
