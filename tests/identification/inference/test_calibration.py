@@ -264,6 +264,7 @@ def test_a_filtered_run_is_met_at_its_shortest_horizon() -> None:
     told, met = score(problem, 0, problem.start), sensitivity(problem, 0, problem.start)
     assert met.error == pytest.approx(told.simulated - told.y, abs=1e-9)
     assert met.age == pytest.approx(np.full(len(told.t), 0.1))
+    assert (told.horizon, set(told.ahead)) == (0.1, {0.1, 0.3})
     ahead = problem.simulate(0, problem.start[:, None] + np.array([[1e-3, -1e-3], [0, 0], [0, 0]]), 1)[0, :, 0]
     assert met.slope[:, 0, 0] == pytest.approx((ahead[:, 0] - ahead[:, 1]) / 2e-3, rel=1e-3, abs=1e-9)
 
