@@ -89,3 +89,37 @@ def test_the_ends_of_a_profile_are_where_the_cost_has_risen_enough() -> None:
     end = brentq(lambda x: Valley.height(x) - 1, 1.0, 2.0)
     low, high = profile(best, 0, Estimate(value=0.0, stderr=1.0, interval=(-1.0, 1.0)), 1.0, SearchLog())
     assert (low, high) == pytest.approx((-end, end), rel=0.02)
+
+
+class Flat(Valley):
+    """A cost that levels off at a height of so much of the rise that is asked."""
+
+    def __init__(self, unknowns: list[Unknown], level: float, lower: float = -math.inf) -> None:
+        super().__init__(unknowns)
+        self.level, self.lower = level, np.array([lower])
+
+    def normal(self, x: np.ndarray) -> Normal:
+        h, slope = self.level * math.tanh(float(x[0])), self.level / math.cosh(min(abs(float(x[0])), 300.0)) ** 2
+        return Normal(h * h, np.array([[slope**2]]), np.array([h * slope]))
+
+
+@pytest.mark.parametrize(
+    ("level", "lower", "low", "high"),
+    [
+        (0.2, -math.inf, -7.0, 8.0),  # hardly rises: what the standard error says
+        (3.0, -math.inf, -math.atanh(1 / 3), math.atanh(1 / 3)),
+        (3.0, -0.1, -0.1, math.atanh(1 / 3)),  # a wall comes first
+        (0.2, -0.1, -0.1, 8.0),
+    ],
+)
+def test_where_the_cost_never_rises_enough_the_standard_error_or_a_wall_ends_the_interval(
+    level: float, lower: float, low: float, high: float
+) -> None:
+    u = Unknown(name="x", runs=(), value=0.0, lower=lower, upper=math.inf, log=False, scale=1.0)
+    one = np.ones((1, 1))
+    best = Optimum(
+        problem=Flat([u], level, lower), x=np.zeros(1), covariance=one, sandwich=one, white=np.ones(1), matrix=one,
+        variance=1.0, memory=0.0, samples=1e6, pinned=np.zeros(1, dtype=bool),
+    )  # fmt: skip
+    found = profile(best, 0, Estimate(value=0.0, stderr=1.0, interval=(-7.0, 8.0)), 1.0, SearchLog())
+    assert found == (pytest.approx(low, rel=0.05), pytest.approx(high, rel=0.05))

@@ -35,3 +35,14 @@ def test_where_both_run_away_nothing_is_made_up() -> None:
         found = slopes(lanes(ahead=1e200, behind=-1e200), STEPS, central=True)
         assert found[:, 0] == pytest.approx([3.0, 6.0])
         assert not np.isfinite(found[:, 1] ** 2).all()
+
+
+def test_one_sample_of_one_output_that_runs_away_leaves_that_number_to_its_other_side() -> None:
+    """Outputs (samples, windows, outputs, lanes): the slope by b is one-sided everywhere, that by a stays central."""
+    many = np.stack([[lanes(), 3 * lanes()], [5 * lanes(), 7 * lanes()]])  # (2, 2, 2, 5)
+    sizes = np.array([1, 2, 3, 6, 5, 10, 7, 14], dtype=float).reshape(2, 2, 2)
+    whole = slopes(many, STEPS, central=True)
+    assert whole == pytest.approx(sizes[..., None] * np.array([3.0, 8.0]))
+    many[1, 0, 1, 2] = np.inf  # b moved ahead
+    found = slopes(many, STEPS, central=True)
+    assert found == pytest.approx(sizes[..., None] * np.array([3.0, 7.5]))

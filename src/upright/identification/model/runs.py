@@ -137,10 +137,9 @@ class Run:
 
     def first_part(self, share: float = FITTED_SHARE) -> Run:
         """The beginning of the run; a short run whole."""
-        n = int(self.t.size * share)
-        if n < LEAST_RUN * share:
+        if self.t.size < LEAST_RUN:
             return self
-        return self.samples(slice(n))
+        return self.samples(slice(int(self.t.size * share)))
 
     def samples(self, part: slice) -> Run:
         """Some of the samples; a law that closed the loop stays as it was."""
