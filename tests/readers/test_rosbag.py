@@ -101,7 +101,7 @@ STAMP = "line 4, column 2 (/j/header/stamp): "
         ((HEAD, *ROWS[:2], "101.5,,2,,", *ROWS[3:]), STAMP + "expected a value, the message has others"),
         ((HEAD, *ROWS[:2], "101.5,101.0,,,", *ROWS[3:]), "line 4, column 3 (/j/a): expected a value"),
         ((HEAD, *ROWS[:2], ",101.0,2,,", *ROWS[3:]), "line 4, column 1 (__time): expected a receive time on every row"),
-        ((HEAD, *ROWS[:2], "101.5,99.0,2,,", *ROWS[3:]), STAMP + "time must increase from message to message, got -1 s"),
+        ((HEAD, *ROWS[:2], "101.5,99.0,2,,", *ROWS[3:]), STAMP + "time must increase from message to message"),
         ((HEAD, *ROWS[:2], "101.5,100.0,2,,", *ROWS[3:]), STAMP + "time must increase"),
         ((HEAD, *ROWS[:5], "100.55,,,9,"), "line 7, column 1 (__time): time must increase"),
         ((HEAD, *ROWS[:2], "101.5,101.0,2,", *ROWS[3:]), "line 4: expected 5 cells, got 4; mend the row"),
