@@ -156,6 +156,7 @@ def test_agreement_is_that_of_the_two_first_answers():
         "it helped", "10", "1 strongly agree, 6 agree, 2 neutral, 1 disagree", "70 %",
         f"{100 * low:.3g} to {100 * high:.3g} %",
     )  # fmt: skip
+    assert table(page, "Agreement").numbers == (1, 3, 4)
     assert picture(page, "agreement").description == (
         "it helped: 10 % strongly agree, 60 % agree, 20 % neutral, 10 % disagree, 0 % strongly disagree"
     )
