@@ -16,8 +16,8 @@ from upright.records.columns import stated_unit, take_time, time_scale
     [
         ("t", 1), ("Time", 1), (" TIMESTAMP ", 1), ("tout", 1), ("__time", 1), ("seconds", 1), ("time_s", 1),
         ("time [ms]", 1e-3), ("Time (s)", 1), ("t [ us ]", 1e-6), ("t(\u00b5s)", 1e-6), ("t_\u03bcs", 1e-6),
-        ("t [ns]", 1e-9), ("time [min]", 0),
-        ("t_us", 1e-6), ("time_ms", 1e-3), ("timestamp_ns", 1e-9), ("t_sec", 1), ("t_x", 0), ("theta", 0), ("theta_s", 0),
+        ("t [ns]", 1e-9), ("time [min]", 0), ("t_us", 1e-6), ("time_ms", 1e-3),
+        ("timestamp_ns", 1e-9), ("t_sec", 1), ("t_x", 0), ("theta", 0), ("theta_s", 0),
         ("", 0), ("x [ms]", 0), ("t" + " " * 199, 1),
     ],
 )  # fmt: skip
