@@ -211,6 +211,13 @@ def test_a_body_follows_the_command_that_comes_before_its_motion(u, x, at, up):
     assert follows(0.01 * np.arange(8), np.array(u, dtype=float), np.array(x, dtype=float), at) is up
 
 
+def test_a_motion_more_than_two_seconds_after_a_command_tells_nothing():
+    u = np.r_[np.zeros(4), np.ones(46)]
+    for k, up in ((15, False), (16, True)):
+        x = np.where(np.arange(50) >= 4 + k, -1.0, 0.0)
+        assert follows(0.125 * np.arange(50), u, x, 4) is up
+
+
 def chain(*, named: bool = False, plant: str = "", path: str = "", notes: tuple[str, ...] = (), rests=None, **signals):
     record = log(**signals)
     record = Record(t=record.t, signals=record.signals, provenance=Provenance(notes=notes))
