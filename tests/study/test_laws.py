@@ -145,3 +145,15 @@ def test_units_of_gains_and_states_follow_from_the_coordinates():
     }  # fmt: skip
     assert [gain_unit("V", "m", time) for time in ("", "s", "/s")] == ["V/m", "V/(m s)", "V s/m"]
     assert gain_unit("", "m", "s") == ""
+
+
+def test_a_law_that_explains_the_command_poorly_is_refused_with_what_to_write(monkeypatch):
+    from types import SimpleNamespace
+
+    from upright.study import loop as module
+
+    monkeypatch.setattr(
+        module, "recover", lambda *_, **__: SimpleNamespace(quality="poor", sentence="It explains 3 %.")
+    )
+    said = refusal('kind = "recover"\nreference = "r"')
+    assert "line 19: no law could be recovered from 'v': It explains 3 %. Write the law as kind = \"pid\"" in said
