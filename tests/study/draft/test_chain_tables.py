@@ -84,6 +84,24 @@ def test_a_free_swing_tells_ratios_to_an_inertia_of_one():
     assert not found.trips
 
 
+def test_a_drive_that_brakes_while_it_is_on_is_told_from_friction():
+    """A cart of 2 kg on 500 N/m, damped by 3 N s/m, and by 8 N s/m more while it is commanded."""
+    u = np.where(T % 1.0 < 0.5, 6.0, 0.0)
+    steps = []
+    for c in (3.0, 11.0):
+        A = np.array([[0, 1, 0], [-250, -c / 2, 0.5], [0, 0, 0]])
+        steps.append(expm(A * DT))
+    x, y = np.zeros(2), np.zeros(T.size)
+    for k in range(T.size):
+        y[k] = x[0]
+        step = steps[int(u[k] != 0)]
+        x = step[:2, :2] @ x + step[:2, 2] * u[k]
+    found = starts(T, u, [y], [True], disks=False, quanta=[1e-7], loop=False)
+    assert found.braked == pytest.approx(8.0, rel=0.25)
+    assert found.numbers["c_1"] == pytest.approx(3.0, rel=0.3)
+    assert starts(T, u, [y], [True], disks=False, quanta=[1e-7], loop=True).braked == 0.0
+
+
 def test_a_last_body_that_rests_behind_its_neighbour_is_tied_to_ground():
     """k_12 (x_1 - x_2) = k_2 x_2 with 200 and 50 N/m: four fifths of the way."""
     K = np.array([[500.0, -200], [-200, 250]])
