@@ -159,3 +159,119 @@ def test_the_command_writes_page_and_numbers(tmp_path):
     assert "http" not in page.replace("http://www.w3.org", "")
     told = CliRunner().invoke(app, ["reproduce", "-o", str(tmp_path)], terminal_width=200).stdout
     assert "What next" in told
+
+
+def page(what=None):
+    from upright.paper.chapter import chapter
+
+    return chapter(what or done())
+
+
+def blocks(kind, of=None):
+    return [b for part in (of or page()).parts for b in part.content if isinstance(b, kind)]
+
+
+def test_each_set_is_printed_beside_what_comes_again_and_how_far_it_is_off():
+    from upright.report.page import Table
+
+    for made, paper, told in zip(done().tables, (printed.TABLE_1, printed.TABLE_2), blocks(Table), strict=False):
+        assert told.caption == f"{made.name} [1/s]"
+        for i, (row, poles, again, errors) in enumerate(zip(told.rows, paper, made.again, made.errors, strict=True)):
+            cell = dict(zip(told.headings, row, strict=True))
+            assert cell["set"] == str(i + 1)
+            for name, values in (("printed", poles), ("regenerated", again)):
+                first = max(values, key=lambda p: (abs(p.imag), p.real))
+                assert cell[name].startswith(f"{first.real:.6g}"[:6]), name
+            off = np.abs(np.sort_complex(again) - np.sort_complex(np.array(poles))).max()
+            assert float(cell["largest difference"]) == pytest.approx(off, rel=0.06)
+            roundings = max(np.abs(errors.real).max(), np.abs(errors.imag).max())
+            assert float(cell["in roundings"]) == pytest.approx(roundings, abs=0.0051)
+        assert made.worst == max(np.abs(part).max() for e in made.errors for part in (e.real, e.imag))
+
+
+def test_a_pole_is_off_by_its_difference_over_half_its_last_digit():
+    text = "-4.1484+-1.6341j, -16.8545, -3.2220"
+    values, halves = tables.poles(text)
+    np.testing.assert_array_equal(values, [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.222])
+    np.testing.assert_allclose(halves, [5e-5 + 5e-5j, 5e-5 + 5e-5j, 5e-5 + 1j, 5e-5 + 1j])
+    np.testing.assert_allclose(tables.poles("-35.1, -26")[1], [0.05 + 1j, 0.5 + 1j])
+    first = done().tables[0]
+    np.testing.assert_allclose(first.errors[0].real, (first.again[0] - first.printed[0]).real / 5e-5, rtol=1e-9)
+
+
+def test_errata_stand_in_a_row_with_the_least_and_the_largest_miss_in_percent():
+    from dataclasses import replace
+
+    from upright.report.page import Table
+
+    first = replace(done().errata[0], printed_misses=(0.25, 3.5), right_misses=(0.0, 4e-12))
+    second = replace(done().errata[1], printed_misses=(0.0, 0.5), right_misses=(0.012, 0.034))
+    what = replace(done(), errata=(first, second))
+    rows = blocks(Table, page(what))[2].rows
+    assert rows[0] == (
+        "1", first.where, first.printed, first.right, first.against, "25 to 350 %", "at most 4e-12",
+    )  # fmt: skip
+    assert rows[1][5:] == ("0 to 50 %", "1.2 to 3.4 %")
+    assert rows[2] == (
+        "6", "Tables 3, 4", "n = 53", "n = 48 or 52", "whole answers (GRIM)", "10 of 26 impossible",
+        "1 and 1 impossible",
+    )  # fmt: skip
+    assert not page(what).sound
+    assert page().sound
+    assert what.verdict.endswith("; 2 of 6 errata are shown.")  # the second holds on one rig; the sixth is counted
+    assert done().verdict == (
+        "All 32 poles of Tables 1 and 2 come again, none farther off than the print's rounding;"
+        " 6 of 6 errata are shown."
+    )
+    worse = replace(done(), tables=(replace(done().tables[0], errors=(np.array([1.25 + 0j]),) * 4), done().tables[1]))
+    assert "the worst 1.25 roundings off" in worse.verdict
+    assert not page(worse).sound
+
+
+def test_the_page_tells_the_recovered_plants_and_the_poles_that_were_missed():
+    from upright.report.page import Points
+
+    one, two, three = (b.sentences for b in blocks(Points))
+    locus, second = done().tables[0].locus, done().tables[1].locus
+    assert f"(s² − {-locus.a[2]:.4f}), undamped, unstable pole {np.sqrt(-locus.a[2]):.4f} rad/s" in one[0]
+    assert f"{locus.N[1]:.2f} w² − {-locus.N[2]:.0f} w" in one[0]
+    factors = done().tables[0].ratios
+    assert f"by the factor {factors[0]:.4f} and {factors[1]:.4f}" in one[1]
+    rates = sorted(done().weights)
+    middle = rates[len(rates) // 2]
+    assert f"swings at {rates[0]:.2f} to {rates[-1]:.2f} rad/s; at {middle:.2f} its entries" in one[2]
+    assert one[2].endswith(f"{done().weights[middle][3]:.0f}.")
+    flexible = max(np.roots(second.a), key=lambda s: s.imag)
+    ratio = -flexible.real / abs(flexible)
+    assert f"{second.a[1]:.3f} s² + {second.a[2]:.2f} s + {second.a[3]:.1f}); flexible mode" in two[0]
+    assert f"flexible mode {abs(flexible):.2f} rad/s, damping ratio {ratio:.3f}." in two[0]
+    wrong, right = done().unstable
+    assert f"unstable pole would be {wrong:.3f} instead of {right:.3f} 1/s" in three[0]
+
+
+def test_a_bar_for_every_number_of_answers_and_the_printed_one_stands_out():
+    from matplotlib.colors import to_hex
+
+    from upright.paper.chapter import answers_figure
+
+    (axes,) = answers_figure({47: 5, 48: 1, 53: 10}, 53).axes
+    bars = axes.patches
+    assert [(round(b.get_x() + b.get_width() / 2), b.get_height()) for b in bars] == [(47, 5), (48, 1), (53, 10)]
+    assert [to_hex(b.get_facecolor()).upper() for b in bars] == ["#6B6B6B", "#0072B2", "#D55E00"]
+    assert axes.texts[-1].get_text() == "as printed"
+    assert axes.texts[-1].get_position()[0] == 53
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("number of students who answered", "impossible means")
+    assert list(axes.get_xticks()) == [47, 48, 53]
+
+
+def test_weights_make_the_recovered_polynomial_again():
+    """N(w) = (q_1 - q_2 w)(w - w_h^2)^2 + (q_3 - q_4 w) w^2, multiplied out by numpy; none is negative."""
+    N = done().tables[0].locus.N
+    rates = sorted(done().weights)
+    assert rates[-1] <= np.sqrt(-done().tables[0].locus.a[2]) * (1 + 1e-9)
+    for w_h in (rates[0], rates[-1]):
+        q = done().weights[w_h]
+        assert q.min() >= 0
+        square = np.polymul([1, -(w_h**2)], [1, -(w_h**2)])
+        made = np.polyadd(np.polymul([-q[1], q[0]], square), np.polymul([-q[3], q[2]], [1, 0, 0]))
+        np.testing.assert_allclose(made, N, rtol=1e-8)

@@ -56,11 +56,12 @@ def test_the_middle_matters_not_the_ends():
     assert find_quantum(np.where(np.abs(levels) < 1500 * step, bent, levels)).step == 0.0
 
 
-def test_a_step_is_found_although_most_levels_are_far_apart():
+@pytest.mark.parametrize("middle", [0.0, 3.0])
+def test_a_step_is_found_although_most_levels_are_far_apart(middle):
     """Five decimals know the step of a few neighbours to a part in a thousand: too little to count to 16384 with."""
     count = np.array([0, 1, 2, 3, 4, *(1 << np.arange(3, 15))])
     step = 2 * math.pi / 2000
-    found = find_quantum(np.round(step * np.concatenate([-count[1:], count]), 5))
+    found = find_quantum(np.round(middle + step * np.concatenate([-count[1:], count]), 5))
     assert found.counts_per_rev == 2000
     assert found.step == pytest.approx(step, rel=1e-5 / (16384 * step))
 

@@ -390,13 +390,13 @@ def bounds_figure(rows: Sequence[tuple[str, Bound]]) -> Figure:
     """Range of the paired t that the printed means allow, beside the value it has to pass."""
     drawing = figure(0.9 + 0.34 * len(rows), margins=(2.9, 0.2, 0.3, 0.5))
     axes = drawing.subplots()
-    most = max([b.t[1] for _, b in rows if math.isfinite(b.t[1])], default=10.0) * 1.05
+    critical = rows[0][1].critical
+    most = 1.05 * max([2 * critical, *(abs(t) for _, b in rows for t in b.t if math.isfinite(t))])
     for i, (_, b) in enumerate(rows):
-        low, high = max(b.t[0], -most), min(b.t[1], most)
+        low, high = (min(max(t, -most), most) for t in b.t)
         colour = BLUE if b.verdict == "significant" else ORANGE
         axes.plot([low, high], [i, i], color=colour, linewidth=5, solid_capstyle="butt")
         axes.plot([low], [i], "|", color="black", markersize=9)
-    critical = rows[0][1].critical
     axes.axvline(critical, color=VERMILLION, linestyle="--", label=f"5 % level, {critical:.2f}")
     axes.axvline(-critical, color=VERMILLION, linestyle="--")
     axes.set_yticks(range(len(rows)), [_short(name, 40) for name, _ in rows])

@@ -12,7 +12,8 @@ from upright.errors import BadInput, nearest
 
 TIME_NAMES = ("t", "time", "t_received", "timestamp", "__time", "tout", "time_s", "t_s", "seconds", "sec")
 _LONGEST = 200  # characters of a name that is looked into
-_UNIT_SUFFIX = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+# the names are case-folded, which makes the micro sign a Greek letter
+_UNIT_SUFFIX = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "\u03bcs": 1e-6, "ns": 1e-9}
 
 
 def time_scale(name: str) -> float:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from tests.identification.twins import PENDULUM, swing
 from upright.errors import BadInput
-from upright.physics import Pendulum
+from upright.physics import Furuta, Pendulum
 from upright.records import Provenance, Record
 from upright.study.draft.from_record import study_of_record
 
@@ -46,3 +47,82 @@ def test_a_window_is_the_only_run_and_is_fitted() -> None:
     (run,) = study.runs
     assert run.role == "fit"
     assert run.t[-1] - run.t[0] == pytest.approx(2.0, abs=0.011)
+
+
+T = np.arange(800) * 0.01
+SWING = 0.4 * np.exp(-0.1 * T) * np.cos(6 * T)
+PLAIN = Record(t=T, signals={"theta": SWING}, units={"theta": "rad"}, provenance=Provenance(file="runs/swing 3.csv"))
+KNOWN = {"m_p": 0.2, "l_cg": 0.3}
+
+
+def test_a_placeholder_is_the_first_guess_of_what_is_asked_beyond_the_draft() -> None:
+    study = study_of_record(PLAIN, Pendulum, known={"l_cg": 0.3}, ask=["m_p"])
+    assert study.rig.estimated == ("m_p",)
+    assert study.rig.parameters["m_p"].value == 1.0
+    assert (study.title, study.plant) == ("swing 3", "pendulum")
+    assert study_of_record(PLAIN.replace(provenance=Provenance()), Pendulum, known=KNOWN).title == "log"
+
+
+def test_what_the_draft_asks_is_asked_where_nobody_says_otherwise() -> None:
+    study = study_of_record(PLAIN, Pendulum, known={"b_2": 1e-3})
+    assert "l_cg" in study.rig.estimated
+    assert "b_2" not in study.rig.estimated
+    assert study.rig.parameters["b_2"].value == 1e-3
+    assert study.rig.parameters["l_cg"].value == pytest.approx(9.81 / 36, rel=0.02)
+    given = study_of_record(PLAIN, Pendulum, known=KNOWN, ask={"b_2": "3e-3 N m s/rad"})
+    assert given.rig.estimated == ("b_2",)
+    assert given.rig.parameters["b_2"].value == 3e-3
+    assert study_of_record(PLAIN, Pendulum, known=KNOWN, ask=["b_2"]).rig.parameters["b_2"].value > 0
+
+
+@pytest.mark.parametrize(
+    ("how", "sentence"),
+    [
+        ({"known": {"zeta": 1}}, "Pendulum has no number 'zeta'"),
+        ({"known": KNOWN, "ask": ["zeta"]}, "Pendulum has no number 'zeta'"),
+        ({"known": {"m_p": 1}, "ask": ["b_2"]}, 'needs l_cg, neither known nor asked; measure and pass known={"l_cg"'),
+        ({"known": KNOWN, "ask": ["b_2s"]}, 'b_2s is asked and no guess of it can be read from the log; pass ask={'),
+        ({"known": KNOWN, "ask": ["actuator.delay"]}, "actuator.delay is asked and no guess"),
+        ({"columns": {"theta": "angle"}}, "no column 'angle'"),
+        ({"units": {"phi": "rad"}}, "units names columns, got 'phi'"),
+    ],
+)  # fmt: skip
+def test_what_fits_neither_plant_nor_record_is_a_sentence(how, sentence) -> None:
+    with pytest.raises(BadInput) as caught:
+        study_of_record(PLAIN, Pendulum, **how)
+    assert sentence in str(caught.value)
+
+
+def test_columns_and_units_may_be_said() -> None:
+    record = Record(t=T, signals={"a": np.degrees(SWING)}, outputs=("a",))
+    for units in ({"theta": "deg"}, {"a": "deg"}):
+        study = study_of_record(record, Pendulum, known=KNOWN, columns={"theta": "a"}, units=units)
+        y = study.runs[0].y[:, 0]
+        inside = np.interp(study.runs[0].t, T, SWING)
+        assert np.ptp(y - inside) < 1e-6  # but for where its zero was read
+
+
+def test_of_two_joints_one_lends_the_other_its_friction() -> None:
+    """A driven arm is asked for b_1; an undriven one is not, and the pendulum's friction is of its size."""
+    arm = 0.1 * np.sin(3 * T) * np.exp(-0.2 * T)
+    record = Record(t=T, signals={"psi": arm, "theta": SWING}, units={"psi": "rad", "theta": "rad"})
+    known = {"m_p": 0.1, "l_cg": 0.25, "r": 0.1, "J_d": 1e-3, "b_2": 7e-4}
+    study = study_of_record(record, Furuta, known=known, ask=["b_1"])
+    assert study.rig.parameters["b_1"].value == 7e-4
+
+
+class Own(Pendulum):
+    """A plant that no draft knows."""
+
+
+def test_a_plant_of_ones_own_takes_columns_of_its_coordinates_names() -> None:
+    study = study_of_record(PLAIN, Own, known=KNOWN, ask={"b_2": 1e-3})
+    assert study.rig.estimated == ("b_2",)
+    np.testing.assert_allclose(study.runs[0].y[:, 0], SWING)
+    assert study.runs[0].unknown == ("initial",)
+    bare = Record(t=T, signals={"theta": SWING})
+    np.testing.assert_allclose(study_of_record(bare, Own, known=KNOWN).runs[0].y[:, 0], SWING)
+    with pytest.raises(
+        BadInput, match=r'Own moves in theta, .* columns phi; say which is which: columns=\{"theta": "phi"\}'
+    ):
+        study_of_record(Record(t=T, signals={"phi": SWING}), Own, known=KNOWN)

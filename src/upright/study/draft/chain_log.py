@@ -38,7 +38,7 @@ STEADY = 0.25
 
 _NAMES_DISKS = re.compile(r"tors|dis[ck]|shaft|(?<!\d)205", re.IGNORECASE)
 _NAMES_CARTS = re.compile(r"rectilinear|(?<!\d)210", re.IGNORECASE)
-_GAINS_ZERO = re.compile(r"P_gain = 0\b(?!\.).*I_gain = 0\b(?!\.).*D_gain = 0\b(?!\.)")
+_GAINS_ZERO = re.compile(r"P_gain = 0\b(?!\.\d).*I_gain = 0\b(?!\.\d).*D_gain = 0\b(?!\.\d)")
 
 
 @dataclass(frozen=True, kw_only=True)
