@@ -162,7 +162,7 @@ def gather(root: Path, folder: Path) -> Covering:
 
 def moved(old: Covering, sources: Mapping[str, str], same: set[str]) -> Covering:
     """A map for changed sources: lines that still stand in them, and tests of files that are the same."""
-    keep = {i for i, test in enumerate(old.tests) if test.partition("::")[0] in same}
+    keep = {i for i, test in enumerate(old.tests) if test.partition("::")[0] in same and test in old.seconds}
     lines: dict[str, dict[int, list[int]]] = {}
     for path, text in sources.items():
         before = old.lines.get(path, {})

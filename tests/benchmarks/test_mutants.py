@@ -173,6 +173,8 @@ def test_lines_keep_their_tests_when_they_move():
     both = joined(new, again)
     assert both.of("src/upright/p.py", 2, 2, text) == ["tests/test_a.py::z"]
     assert both.of("src/upright/p.py", 4, 4, text) == ["tests/test_b.py::y"]
+    # brought up to date once more, where a test of before has gone and its file is the same
+    assert moved(both, {"src/upright/p.py": text}, {"tests/test_a.py"}).seconds == again.seconds
     # a line that no test runs: those of the whole module stand in
     assert set(both.of("src/upright/p.py", 1, 1, text)) == {"tests/test_a.py::z", "tests/test_b.py::y"}
 
