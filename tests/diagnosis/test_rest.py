@@ -144,6 +144,7 @@ def test_rests_of_a_speed_beside_a_reference_or_too_short_are_none() -> None:
     assert len(spans) >= 2
     assert with_rests((0.0, 0.9), (8.0, 9.0))
     assert not with_rests((0.0, 0.19), (8.0, 9.0))
+    assert not with_rests((0.0, 0.9), (8.0, 8.19))
     assert not with_rests((0.0, 0.9))
     # while the drive acts a rest is where it pushes to
     assert not with_rests((0.0, 0.9), (2.0, 2.5))
