@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -136,14 +137,19 @@ def test_a_right_or_nearly_right_record_is_not_doubted():
         assert against_numbers(known(m), ForceBalance(m, values(), 5.0)) == []
 
 
+@cache
+def real():
+    """The balance of the motion as it is."""
+    return ForceBalance(motion(), values(), 5.0)
+
+
 class Said:
     """A balance that has been computed."""
 
     def __init__(self, now, *others, gain=5.0):
         self.now, self.found, self.motion, self.gain = now, list(others), motion(), gain
         self.names, self.driven, self.used = ["x_1", "x_2"], 0, True
-        real = ForceBalance(self.motion, values(), 5.0)
-        self.friction, self.needed = real.friction, real.needed
+        self.friction, self.needed = real().friction, real().needed
 
     def declared(self):
         return self.now

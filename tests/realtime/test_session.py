@@ -66,10 +66,22 @@ def test_every_tick_is_shown_and_logged_as_it_was(tmp_path):
     assert [event.kind for event in log.events][-3:] == ["self-test", "start", "stop"]
 
 
-def test_a_run_lasts_to_the_tick_that_ends_its_seconds_and_at_least_one(tmp_path):
-    """Ten whole periods are ten ticks, and no eleventh by rounding."""
-    for seconds, ticks in ((10 * RIG.period, 10), (10.01 * RIG.period, 11), (0.0, 1)):
-        assert run_of(tmp_path, stage=anywhere, seconds=seconds)[0].ticks == ticks
+class Late(Virtual):
+    """A clock by which every tick is two late."""
+
+    def wait(self):
+        self.late += 2
+        return 0.0
+
+
+def test_a_run_lasts_to_the_tick_that_ends_its_seconds_and_at_least_one_by_the_clock_given(tmp_path):
+    """Ten whole periods are ten ticks, and no eleventh by rounding; what may start anywhere is not waited for."""
+    for seconds, ticks in ((10 * RIG.period, 10), (0.0, 1)):
+        end, shown, _ = run_of(
+            tmp_path, stage=anywhere, seconds=seconds, pace=lambda about: (Late(), f"slow at {about.period:g} s")
+        )
+        assert {s.phase for s in shown} == {"running"}
+        assert (end.ticks, end.late, end.warning) == (ticks, 2 * ticks, f"slow at {RIG.period:g} s")
         (tmp_path / "run.mcap").unlink()
 
 
@@ -97,16 +109,6 @@ def test_samples_that_a_pacing_rig_lost_are_late_ticks(tmp_path):
     assert shown[-1].late == TICKS
 
 
-def test_the_clock_of_a_run_and_its_warning_are_those_given(tmp_path):
-    class Late(Virtual):
-        def wait(self):
-            self.late += 2
-            return 0.0
-
-    end, *_ = run_of(tmp_path, pace=lambda about: (Late(), f"slow at {about.period:g} s"))
-    assert (end.late, end.warning) == (2 * TICKS, f"slow at {RIG.period:g} s")
-
-
 def test_a_rig_that_nobody_brings_to_its_start_is_given_up_after_the_patience(tmp_path, monkeypatch):
     monkeypatch.setattr("upright.realtime.session.PATIENCE", 0.5)
     end, shown, log = run_of(tmp_path, stage=lambda: replace(staged(TwinPort(RIG)), bring=lambda: None, advice="lift"))
@@ -116,12 +118,6 @@ def test_a_rig_that_nobody_brings_to_its_start_is_given_up_after_the_patience(tm
     assert PATIENCE == 120.0
     assert {s.phase for s in shown} == {"lift"}
     assert shown[-1].time - shown[0].time == pytest.approx(0.5, abs=0.01)
-
-
-def test_a_rig_that_may_start_anywhere_is_not_waited_for(tmp_path):
-    end, shown, _ = run_of(tmp_path, stage=anywhere)
-    assert end.ticks == TICKS
-    assert {s.phase for s in shown} == {"running"}
 
 
 def test_a_wish_while_waiting_and_one_at_a_tick_end_a_run_with_its_word(tmp_path):
