@@ -17,6 +17,7 @@ from upright.control.swing_up import (
     HOLDING,
     PARAMETERS,
     SWINGING,
+    TRAVEL,
     TRIPPED,
     Ascent,
     Body,
@@ -343,6 +344,7 @@ def test_a_design_takes_limit_and_travel_from_the_rig_and_its_feedback_is_of_lea
     rig = make_rig("linear")
     law = design_swing_up(replace(rig, travel=0.15, more={"actuator.force_limit": 0.8 * rig.limit * rig.gain}))
     assert law.travel == 0.15
+    assert TRAVEL["rad"] == math.tau  # one turn of a cable, where no rig says
     assert law.limit == pytest.approx(0.8 * rig.limit)
     assert (law.period, law.gain) == (rig.period, rig.gain)
     # Bryson: a quarter of the travel, half a radian and half the limit cost alike

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from tests.realtime.rigs import LAW, RIG, staged
+from upright.errors import BadInput
 from upright.laws import as_values
 from upright.logs import read_log
 from upright.realtime.pace import Virtual
-from upright.realtime.session import PATIENCE, RunOrder, carry_out
+from upright.realtime.session import PATIENCE, RunOrder, RunState, carry_out, refused
 from upright.rigs import Board, Fault, Mode, TwinPort
 from upright.rigs.supervisor import Supervisor
 
@@ -127,3 +128,44 @@ def test_a_wish_while_waiting_and_one_at_a_tick_end_a_run_with_its_word(tmp_path
     order = RunOrder(make=anywhere, law=as_values(LAW), seconds=1.0, log=tmp_path / "run.mcap", check=False)
     end = carry_out(order, law=LAW, show=running.append, stopped=lambda: "Enough now." if len(running) == 7 else "")
     assert (end.stopped, end.ticks, end.rows, end.faults) == ("Enough now.", 7, 7, Fault.STOP)
+
+
+class Repeating(Board):
+    """A board whose every second answer is the sample before."""
+
+    def __init__(self, port):
+        super().__init__(port)
+        self.asked, self.begun = 0, False
+
+    def start(self, mode, law=None):
+        super().start(mode, law)
+        self.begun = True
+
+    def exchange(self, command):
+        self.asked += self.begun
+        return self.sample if self.asked % 2 == 1 and self.asked > 1 else super().exchange(command)
+
+
+def test_a_sample_that_comes_again_is_answered_but_not_logged_again(tmp_path):
+    port = TwinPort(RIG)
+
+    def stage():
+        whole = staged(port)
+        duty = replace(whole.supervisor.duty, near=math.inf, watch=False)
+        return replace(whole, supervisor=Supervisor(Repeating(port), duty))
+
+    end, _, log = run_of(tmp_path, stage=stage)
+    assert end.ticks == TICKS
+    ticks = np.asarray(log.columns["tick"])
+    assert end.rows == ticks.size < TICKS
+    assert np.all(np.diff(ticks) == 1)
+
+
+def test_a_run_that_has_not_begun_has_done_nothing():
+    assert RunState(phase="waiting") == RunState(
+        phase="waiting", time=0.0, tick=0, late=0, mode=Mode.IDLE, faults=Fault(0), command=0.0, applied=0.0,
+        readings=(),
+    )  # fmt: skip
+    end = refused(BadInput("no rig here."))
+    assert (end.ticks, end.late, end.rows, end.dropped, end.seconds) == (0, 0, 0, 0, 0.0)
+    assert end.stopped == "no rig here."
