@@ -11,8 +11,9 @@ import pytest
 from benchmarks.doctored import batch
 from tests.diagnosis.cases import case
 from upright.diagnosis import KnownRig
-from upright.diagnosis.case import COUNTERS, Place, case_of, tells_speed, tells_time, unit_of
-from upright.physics import CartPendulum, Furuta, find
+from upright.diagnosis.case import COUNTERS, Place, case_of, read_known, tells_speed, tells_time, unit_of
+from upright.errors import BadInput
+from upright.physics import CartPendulum, Furuta, Pendulum, find
 from upright.readers.inspection import inspect_record
 from upright.records import Provenance, Record
 
@@ -162,3 +163,67 @@ def test_friction_is_what_only_dissipates():
     known = KnownRig(name="", plant=CartPendulum)
     assert {"b_1", "b_2", "b_1c", "b_2c"} <= known.friction
     assert not {"m_p", "l_cg", "g", "m_c"} & known.friction
+
+
+STUDY = """
+[rig]
+plant = "rectilinear-2"
+[parameters]
+m_1 = "2 kg"
+m_2 = "1.5 kg"
+k_12 = "400 N/m"
+[drive]
+column = "volts"
+unit = "V"
+[actuator]
+gain = "5 N/V"
+[sensors.x_1]
+column = "a"
+unit = "mm"
+[sensors.x_2]
+column = "b"
+unit = "mm"
+sign = -1
+[[runs]]
+file = "logs/one.csv"
+locked = ["x_2"]
+[[runs]]
+file = "logs/two.csv"
+loop = { kind = "recover", command = "volts" }
+"""
+
+
+def test_a_study_is_read_for_the_run_that_the_log_is(tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text(STUDY, encoding="utf-8")
+    one, other = read_known(str(path), "elsewhere/one.csv"), read_known(str(path), "three.csv")
+    assert (one.plant, one.locked, one.name) == (find("rectilinear-2"), ("x_2",), str(path))
+    assert other.locked == ()
+    assert one.sensors["x_1"].column == "a"
+    assert other.sensors["x_2"].sign == -1.0
+    assert one.drive.what.strip("`") == "volts"
+    assert (one.parameters["m_2"].value, one.parameters["actuator.gain"].value) == (1.5, 5.0)
+    # what a loop puts out is not a command of its own
+    assert read_known(str(path), "two.csv").drive is None
+
+
+def test_a_rig_is_known_by_its_plant_s_name_and_by_nothing_else():
+    assert read_known("furuta") == KnownRig(name="furuta", plant=Furuta)
+    with pytest.raises(BadInput, match="it may be a plant's name, a study"):
+        read_known("no-such-rig")
+
+
+def test_counters_turn_at_a_turn_and_at_16_and_32_bits():
+    assert (math.tau, 360.0, 2.0**16, 2.0**32) == COUNTERS
+
+
+def test_an_angle_that_is_guessed_to_be_in_degrees_is_read_in_radians():
+    t = np.arange(1200) * 0.01
+    swing = np.where(t < 2, 0.0, 40 * np.exp(-0.6 * (t - 2)) * np.sin(5 * (t - 2)))
+    record = Record(t=t, signals={"theta": swing}, units={"theta": "deg"}, provenance=Provenance(file="a.csv"))
+    inspection = inspect_record(record)
+    inspection = replace(inspection, columns=tuple(replace(c, guess="deg") for c in inspection.columns))
+    (place,) = case_of(record, inspection, KnownRig(name="", plant=Pendulum)).places.values()
+    # from where it rests, which the end of the swing leaves open by a tenth of a degree or so
+    assert np.ptp(place.y) == pytest.approx(math.radians(np.ptp(swing)))
+    assert place.y[0] == pytest.approx(0.0, abs=0.01)
