@@ -290,3 +290,17 @@ def test_a_loop_takes_the_best_place_that_the_kernel_gives(monkeypatch, fifo, al
         number = {"x86_64": 314, "aarch64": 274}[machine]
         assert libc.asked[2] == ("slice", number, 0, 48, 0, os.nice(0), 0, 100_000, 0)
     assert ("real-time priority" in found.warning) == (priority != "FIFO")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="system calls of Linux")
+def test_processors_are_kept_awake_by_a_latency_of_zero_that_is_never_taken_back(monkeypatch):
+    asked = []
+    for name in ("collect", "freeze", "disable"):
+        monkeypatch.setattr(f"upright.realtime.priority.gc.{name}", lambda: None)
+    monkeypatch.setattr("upright.realtime.priority.ctypes.CDLL", lambda *a, **k: Linux(locks=-1))
+    monkeypatch.setattr("upright.realtime.priority.os.sched_setscheduler", lambda *a: None)
+    monkeypatch.setattr("upright.realtime.priority.os.open", lambda path, flags: asked.append((path, flags)) or 7)
+    monkeypatch.setattr("upright.realtime.priority.os.write", lambda file, data: asked.append((file, data)))
+    found = step_forward()
+    assert (found.priority, found.awake, found.locked, found.warning) == ("FIFO", True, False, "")
+    assert asked == [("/dev/cpu_dma_latency", os.O_WRONLY), (7, bytes(4))]
