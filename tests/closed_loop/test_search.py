@@ -28,6 +28,7 @@ from upright.closed_loop.regression import (
 )
 from upright.closed_loop.search import Search, extremes, held_for, stepped
 from upright.closed_loop.structures import Channel, Filter, finer, joined, memory
+from upright.errors import NotIdentifiable
 
 RNG = np.random.default_rng(7)
 T = 0.01
@@ -94,6 +95,15 @@ def test_families_are_those_that_the_log_can_tell_apart_simplest_first():
     assert [f.extras for f in families] == sorted(f.extras for f in families)
     assert Family(smoothing="filter", delay=1, hold=True).extras == 3
     assert Family().extras == 0
+
+
+def test_a_command_that_is_nearly_always_at_its_limit_shows_no_law():
+    u = np.full(200, 9.0)
+    u[3:42] = RNG.normal(size=39)
+    with pytest.raises(NotIdentifiable, match="at its limit in all but 39 rows"):
+        search(u).search()
+    u[42] = 0.5
+    assert search(u).search().gains.size > 0
 
 
 def test_what_counts_as_missing_no_more_is_a_share_a_step_or_the_arithmetic():
