@@ -62,3 +62,19 @@ def test_a_loop_reads_the_same_as_its_log_close_to_upright(phase):
     rounding = RIG.converter / 2 + abs(K[0, 2]) * (RIG.quantum[1] / 2 + error * tilt**2 / 2)
     assert run.u[0] == pytest.approx(-K[0, 2] * expected, abs=rounding)
     assert run.record["theta"][0] - math.pi == pytest.approx(expected, abs=RIG.quantum[1] / 2)
+
+
+def test_an_off_centre_error_goes_with_the_turn_of_its_own_shaft():
+    """Two turns of the shaft per radian: by hand, and its slope by a difference."""
+    made = Mounting(play=(0.0, 0.0), off_centre=(0.1, 0.0), phase=(0.4, 0.0), turn=(0.5, 1.0))
+    q = np.array([0.3, 0.2])
+    assert made.turned(q) == pytest.approx([0.3 + 0.1 * (math.sin(4 * math.pi * 0.3 + 0.4) - math.sin(0.4)), 0.2])
+    step = 1e-6
+    assert made.slope(q) == pytest.approx((made.turned(q + step) - made.turned(q - step)) / (2 * step), rel=1e-6)
+
+
+def test_play_begins_in_its_middle():
+    made = Mounting(play=(0.2, 0.0), off_centre=(0.0, 0.0), phase=(0.0, 0.0), turn=(1.0, 1.0))
+    q = np.repeat(np.array([0.0, 0.05, 0.1, 0.15, 0.3, 0.2, 0.1, 0.05])[:, None], 2, axis=1)
+    assert made.felt(q)[:, 0] == pytest.approx([0.0, 0.0, 0.0, 0.05, 0.2, 0.2, 0.2, 0.15])
+    assert made.felt(q)[:, 1] == pytest.approx(q[:, 1])

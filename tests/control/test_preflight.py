@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from upright import gains as design
-from upright.control import Scores, score, trial
-from upright.control.preflight import Task, largest, preflight, words
+from upright.control import Score, Scores, score, trial
+from upright.control.preflight import Task, largest, preflight, word, words
 from upright.control.score import outcomes
 from upright.errors import BadInput
 from upright.gains.requests import read_poles
@@ -139,3 +139,74 @@ def test_runs_too_long_for_a_whole_block_say_what_short_ones_say():
 def test_no_direction_is_no_question():
     with pytest.raises(BadInput, match="not zero"):
         largest(RIG, law(0), "inverted", [0, 0, 0, 0], most=1.0)
+
+
+def ends(held):
+    """Figures of runs of which some are held."""
+    held = np.asarray(held)
+    lost, none = np.where(held, math.inf, 0.1), np.zeros(held.size)
+    return Scores(
+        fell=lost, ran_out=np.full(held.size, math.inf), settled=none, peaks=none[None], final=none[None],
+        effort_peak=none, effort_rms=none, saturated=none, at_limit=none,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("edge", [1.2345, 0.0101, 1.9999, 0.0])
+def test_the_largest_start_is_found_to_a_64th_of_a_64th_of_a_64th(edge, monkeypatch):
+    asked = []
+
+    def stub(rig, law, *, at, starts, seconds):
+        asked.append((at, seconds))
+        assert np.all(starts[:, [0, 1, 3]] == 0)
+        return ends(starts[:, 2] / 0.5 <= edge)
+
+    monkeypatch.setattr("upright.control.preflight.outcomes", stub)
+    found = largest(RIG, law(0), "inverted", [0, 0, 0.5, 0], most=2.0, seconds=1.5)
+    assert edge - 2.0 / 64**3 <= found <= edge
+    assert asked == [("inverted", 1.5)] * 3
+    assert largest(RIG, law(0), "inverted", [0, 0, 0.5, 0], most=edge / 2 or 1e-9) == (edge / 2)
+
+
+@pytest.mark.parametrize("most", [0.0, -1.0, math.nan])
+def test_nothing_to_try_is_no_question(most):
+    with pytest.raises(BadInput, match="most must be above 0"):
+        largest(RIG, law(0), "inverted", [0, 0, 1, 0], most=most)
+
+
+def test_a_preflight_asks_for_the_tilt_and_for_a_tap_of_the_last_coordinate_each_alone(monkeypatch):
+    def stub(rig, law, at, direction, *, most, seconds=3.0):
+        return (at, tuple(direction), most)
+
+    monkeypatch.setattr("upright.control.preflight.largest", stub)
+    found = told(RIG, (0.1, 0, 0.05, 0), lanes=2)
+    assert found.tilt == ("inverted", (0, 0, 1, 0), math.pi / 2)
+    assert found.push == ("inverted", (0, 0, 0, 1), 20.0)
+    assert found.run.deviation[0] == pytest.approx([0.1, 0.05])
+    assert found.run.t[-1] == pytest.approx(3.0, abs=RIG.period)
+    assert found.score.held
+    # margins and noise of the loop with the rig's own lag, whatever the law was designed on
+    driven = MODEL.to_sampled(SAMPLED.period, SAMPLED.delay, RIG.lag)
+    assert found.margins == design.margins(driven, law(0))
+    assert sum(found.words.values()) == 1.0
+    assert found.words == {"regulates": 1.0, "saturates": 0.0, "too weak": 0.0, "falls": 0.0}
+
+
+def test_a_hand_errs_by_its_spread_about_the_start():
+    task = Task(start=(1.0, 2.0, 3.0, 4.0), hand=(0.0, 0.1, 0.2, 0.0))
+    found = task.starts(4000, np.random.default_rng(2))
+    assert found.shape == (4000, 4)
+    # five standard errors of a mean and of a standard deviation
+    assert found.mean(axis=0) == pytest.approx([1, 2, 3, 4], abs=5 * 0.2 / math.sqrt(4000))
+    assert found.std(axis=0) == pytest.approx([0, 0.1, 0.2, 0], abs=5 * 0.2 / math.sqrt(8000))
+    assert np.all(Task(start=(1.0, 2.0, 3.0, 4.0)).starts(3, np.random.default_rng(2)) == [1, 2, 3, 4])
+
+
+def test_five_milliseconds_at_the_limit_are_not_yet_saturation_and_the_last_word_is_the_commonest():
+    inf = np.full(4, math.inf)
+    found = replace(
+        ends([True] * 4), fell=inf, settled=np.ones(4), at_limit=np.array([5e-3, 5.1e-3, 6e-3, 0.0])
+    )  # fmt: skip
+    assert words(found) == ["regulates", "saturates", "saturates", "regulates"]
+    assert word(Score(**{n: v[..., 1] for n, v in vars(found).items()})) == "saturates"
+    both = replace(ends([False]), ran_out=np.array([0.1]))
+    assert words(both) == ["too weak"]  # fallen and out of travel at once

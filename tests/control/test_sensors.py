@@ -16,7 +16,18 @@ from scipy.special import ellipk
 from upright import gains as design
 from upright.control import design_swing_up, trial
 from upright.control.score import FALLEN
-from upright.control.sensors import ODDS, UNKNOWN, Suspicion, Watch, lifted, probe, put_out, scales
+from upright.control.sensors import (
+    ODDS,
+    UNKNOWN,
+    Scales,
+    Suspicion,
+    Watch,
+    lifted,
+    probe,
+    put_out,
+    scales,
+    sticking,
+)
 from upright.control.sensors import watched as guarded
 from upright.control.trial import readings
 from upright.experiments.swing_up_2b.run import scales_of_log
@@ -290,3 +301,115 @@ def test_rounding_of_coarse_encoders_is_not_taken_for_a_lie(make, far, seed):
     assert abs(run.u[spoke]) == model.limit  # and not before: the wrong sign pushes with all there is
     assert alarm.what[0].name == "theta"
     assert 0 <= alarm.sample[0] * model.period < 0.1
+
+
+def weighed(value, error, explained):
+    return Scales(
+        names=("psi", "theta"), value=np.array(value), error=np.array(error), explained=np.array(explained),
+        t=np.zeros(1), shown=np.zeros((1, 2)), motion=np.zeros((1, 2)),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "explained", "wrong"),
+    [
+        ((1.051, 1.0), (0.0125, 0.0), (1.0, 1.0), ("psi",)),  # beyond 5 % and beyond four standard errors
+        ((1.049, 1.0), (0.001, 0.0), (1.0, 1.0), ()),  # so little is borne
+        ((1.06, 1.0), (0.016, 0.0), (1.0, 1.0), ()),  # that is not sure
+        ((0.9, 0.9), (0.01, 0.01), (1.0, 1.0), ("psi", "theta")),
+        ((1.0, 1.0), (0.01, 0.01), (0.8, 0.79), ("theta",)),
+    ],
+)
+def test_an_encoder_is_wrong_beyond_five_percent_if_that_is_sure_or_if_the_model_does_not_explain_it(
+    value, error, explained, wrong
+):
+    found = weighed(value, error, explained)
+    assert found.wrong == wrong
+    assert found.sound == (not wrong)
+
+
+def test_a_verdict_on_encoders_names_scale_error_and_remedy():
+    good = weighed((1.00123, 0.99), (0.0004, 0.003), (1.0, 1.0)).verdict
+    assert good == "The encoders show what is true (psi 1.0012 ± 0.0008, theta 0.9900 ± 0.006 of it, 95 %)."
+    for value, words in (
+        (2.0, "The encoder of theta shows 2 (± 0.02) times what is true: multiply its counts per unit by 2 before"),
+        (-1.04, "The encoder of theta counts the wrong way round: swap its two channels before"),
+        (-1.06, "theta counts the wrong way round, 1.06 (± 0.02) times what is true: multiply its counts per unit by "
+                "-1.06 before"),
+    ):  # fmt: skip
+        verdict = weighed((1.0, value), (0.01, 0.01), (1.0, 1.0)).verdict
+        assert words in verdict
+        assert "psi" not in verdict
+    bad = weighed((2.0, 2.0), (0.01, 0.01), (1.0, 0.654)).verdict
+    assert "encoder of psi shows 2 " in bad
+    assert "The motion of theta is not that of the model (65 % explained)" in bad
+
+
+@pytest.mark.parametrize(("degrees", "fine"), [(189, True), (-171, True), (169, False), (191, False), (-190.5, False)])
+def test_half_a_turn_by_hand_may_be_ten_degrees_off_either_way(degrees, fine):
+    words = lifted(make_rig("furuta"), math.radians(degrees))
+    assert (words == "") == fine
+    if not fine:
+        assert f"shows {degrees:.0f} degrees for half a turn, {abs(degrees) / 180:.3g} times" in words
+
+
+def test_a_suspicion_says_the_sensor_and_its_factor():
+    assert str(Suspicion()) == "all sensors sound"
+    assert str(Suspicion(name="theta", factor=-1.0)) == "theta shown the wrong way round"
+    assert str(Suspicion(name="psi", factor=0.5)) == "psi shown 0.5 times what is true"
+
+
+def test_a_bank_suspects_each_sensor_of_each_factor():
+    watch, _ = loop("linear")
+    assert {(s.name, s.factor) for s in watch.suspicions} == {
+        ("", 1.0), *((n, f) for n in ("x", "theta") for f in (-1.0, 0.25, 0.5, 2.0, 4.0))
+    }  # fmt: skip
+    assert not watch.suspicions[0].name  # against which all others are weighed
+
+
+def test_dry_friction_of_the_driven_body_takes_its_share_of_the_command():
+    rig = replace(make_rig("furuta").changed(b_1c=0.3, b_2c=0.5), gain=-2.0)
+    assert sticking(rig) == pytest.approx(0.15)  # that of the pendulum's hinge is not the drive's
+    bare = make_rig("furuta").changed(b_1c=0.0, b_2c=0.5)
+    assert sticking(bare) == 0.0
+
+
+def test_a_blind_command_is_logged_with_its_end_and_nothing_after_it():
+    rig = make_rig("linear")
+    log = put_out(rig, np.array([1.0, -2.0, 0.5]))
+    assert log["u"].tolist() == [1.0, -2.0, 0.5, 0.0]
+    assert log.t == pytest.approx(np.arange(4) * rig.period)
+    assert (log.t[0], log["theta"][0], log["x"][0]) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("make", MAKES)
+def test_a_probe_swings_the_model_to_a_hundred_degrees_and_coasts_four_seconds(make):
+    rig, blind = make_rig(make), command(make)
+    coast = round(4.0 / rig.period)
+    assert np.all(blind[-coast:] == 0.0)
+    assert blind[-coast - 1] != 0.0
+    assert blind.size - coast <= 2.5 / rig.period + 1
+    log = put_out(rig, blind)
+    swing = np.degrees(np.abs(log["theta"]))
+    assert 80 < swing.max() < 110  # the drive's lag and the friction of the last quarter swing
+    assert np.abs(log[log.outputs[0]]).max() < 0.9 * design_swing_up(rig).travel
+
+
+def test_scales_are_given_with_what_they_explain_and_the_residuals_of_that():
+    """Of readings twice what is true: the motion returned is the model's times the scale, sample by sample."""
+    rig = replace(make_rig("linear"), scales=(1.0, 2.0))
+    log = put_out(rig, command("linear"))
+    found = scales(make_rig("linear"), log)
+    every = round(7e-3 / rig.period)
+    assert found.t == pytest.approx(log.t[::every])
+    assert found.shown[:, 1] == pytest.approx(log["theta"][::every])
+    assert found.names == ("x", "theta")
+    lost = 1 - np.mean((found.shown - found.motion) ** 2, axis=0) / np.var(found.shown, axis=0)
+    assert found.explained == pytest.approx(lost)
+    assert found.explained.min() > 0.999
+    assert found.value == pytest.approx([1.0, 2.0], rel=2e-3)
+    # what is known better makes surer: every number of the model to a tenth of the usual
+    sure = dict.fromkeys((*rig.plant.names(), "gain"), 0.002)
+    better = scales(make_rig("linear"), log, sure)
+    assert np.all(better.error < 0.5 * found.error)
+    assert np.all(better.error > 0)

@@ -91,3 +91,86 @@ def test_commands_within_half_a_step_of_the_limit_count_as_saturated():
     assert given.peak == 5.0
     assert given.share == 1.0
     assert given.saturated == 0.5
+
+
+def test_a_ramp_passes_its_levels_by_straight_lines_and_settles_where_it_enters_the_band():
+    """Sampled coarsely, from 10 to 30 mm in 10 s, from t = 5 s on: levels between samples, by hand."""
+    t = 5.0 + np.arange(40.0)
+    y = 10.0 + np.minimum(2.0 * np.arange(40.0), 20.0)
+    found = step_figures(t, y, before=10.0, reference=30.0)
+    assert found.change == 20.0
+    assert found.rise == pytest.approx(8.0)
+    assert found.peak_time == 10.0
+    assert found.overshoot == 0.0
+    assert (found.settling_2, found.settling_5) == pytest.approx((9.8, 9.5))
+    assert found.arrival == pytest.approx(9.5)
+    assert (found.error, found.resolution) == (0.0, 0.0)
+    # asked to go to 29 mm: it rests 1 mm above, 5.3 % of the step, and so never arrives
+    off = step_figures(t, y, before=10.0, reference=29.0)
+    assert (off.error, off.arrival) == (-1.0, math.inf)
+    within = step_figures(t, y, before=10.0, reference=29.1)
+    assert within.error == pytest.approx(-0.9)
+    assert 9.0 < within.arrival < 10.0  # 4.7 % of it above: it came within 5 % between two samples
+
+
+def test_a_rest_is_the_median_of_the_last_tenth_and_must_be_seen_that_long():
+    y = np.ones(40)
+    y[:10] = 0.0
+    y[36] = 7.0  # a bump in the last tenth: four samples
+    assert step_figures(T[:40], y, before=0.0, reference=1.0).change == 1.0
+    late = np.zeros(40)
+    late[36:] = 1.0  # the last tenth alone is rest
+    assert step_figures(np.arange(40.0), late, before=0.0, reference=1.0).settling_5 == pytest.approx(35.95)
+    later = np.ones(40)
+    later[:36], later[36] = 0.0, 0.5
+    assert step_figures(np.arange(40.0), later, before=0.0, reference=1.0).settling_5 == math.inf
+
+
+def test_what_the_encoder_does_not_resolve_is_no_overshoot_and_no_settling():
+    y = np.ones(100)
+    y[:10], y[20:30], y[40] = 0.0, 1.04, 1.03
+    t = np.arange(100.0)
+    fine = step_figures(t, y, before=0.0, reference=1.0, quantum=0.03)
+    assert fine.overshoot == pytest.approx(0.04)
+    assert fine.settling_2 == pytest.approx(29 + 1 / 4)  # a band of 3 %, left at 1.04 for 1.0
+    coarse = step_figures(t, y, before=0.0, reference=1.0, quantum=0.041)
+    assert coarse.overshoot == 0.0
+    assert coarse.settling_2 == pytest.approx(9.959)
+    assert step_figures(t, y, before=0.0, reference=1.0, quantum=0.1).settling_5 == pytest.approx(9.9)
+
+
+def test_a_record_that_begins_at_its_rest_has_settled_and_risen_at_once():
+    found = step_figures(np.arange(30.0), np.full(30, 2.0), before=0.0, reference=2.0)
+    assert (found.rise, found.settling_2, found.settling_5, found.arrival, found.peak_time) == (0, 0, 0, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("t", "y", "before", "reference", "words"),
+    [
+        (np.arange(19.0), np.ones(19), 0.0, 1.0, "20 or more"),
+        (np.arange(21.0), np.ones(20), 0.0, 1.0, "20 or more"),
+        (np.ones((20, 1)), np.ones((20, 1)), 0.0, 1.0, "20 or more"),
+        (np.arange(20.0), np.ones(20), 1.0, 1.0, "goes somewhere else"),
+    ],
+)
+def test_a_step_of_too_few_samples_or_to_nowhere_is_refused(t, y, before, reference, words):
+    with pytest.raises(BadInput, match=words):
+        step_figures(t, y, before=before, reference=reference)
+
+
+def test_a_change_of_one_encoder_step_is_none():
+    with pytest.raises(BadInput, match="nothing stepped"):
+        step_figures(np.arange(20.0), np.full(20, -0.5), before=0.0, reference=1.0, quantum=0.5)
+    assert step_figures(np.arange(20.0), np.full(20, -0.5), before=0.0, reference=-1.0, quantum=0.49).change == -0.5
+
+
+@pytest.mark.parametrize(("u", "limit"), [([], 1.0), ([1.0], 0.0)])
+def test_an_effort_without_commands_or_limit_is_refused(u, limit):
+    with pytest.raises(BadInput, match="limit above 0"):
+        effort(u, limit)
+
+
+def test_a_command_half_a_step_below_the_limit_is_at_it():
+    assert effort([1.0, 0.0, 0.0, 0.0], limit=1.25, step=0.5).saturated == 0.25
+    assert effort([1.0, 0.0, 0.0, 0.0], limit=1.25, step=0.4).saturated == 0.0
+    assert effort([1.0], limit=1.25).share == 0.8

@@ -10,9 +10,24 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from upright.control import design_swing_up
-from upright.control.swing_up import AWAY, FADE, HOLDING, PARAMETERS, TRIPPED, body, swing_and_hold, swing_up
+from upright.control import Trial, design_swing_up
+from upright.control.swing_up import (
+    AWAY,
+    FADE,
+    HOLDING,
+    PARAMETERS,
+    SWINGING,
+    TRAVEL,
+    TRIPPED,
+    Ascent,
+    Body,
+    ascent_of,
+    body,
+    swing_and_hold,
+    swing_up,
+)
 from upright.errors import BadInput
+from upright.records import Record
 from upright.rig.makes import make_rig
 
 MAKES = ("furuta", "linear")
@@ -180,3 +195,223 @@ def test_only_a_pendulum_on_a_driven_body_is_swung_up():
         design_swing_up(make_rig("torsional"))
     with pytest.raises(BadInput, match="allow more"):
         design_swing_up(make_rig("linear"), travel=1e-3)
+
+
+def oracle(t, y, z, p):
+    """The pump and the feedback as the docstrings of `swing_and_hold` and `Body` state them, in matrices."""
+    n = dict(zip(PARAMETERS, p, strict=True))
+    q, theta = y[0] * n["scale_q"], y[1] * n["scale_theta"]
+    v, w = (n["memory"] * z[2 + i] + (1 - n["memory"]) * (x - z[i]) / n["period"] for i, x in enumerate((q, theta)))
+
+    def upright(angle):
+        return math.remainder(angle - math.pi, math.tau)
+
+    phi, before = upright(theta), upright(z[1])
+    x = np.array([q, v, phi, w])
+    P = np.array([[n[f"p{min(i, j)}{max(i, j)}"] for j in range(4)] for i in range(4)])
+    hold = float(np.clip(-np.array([n[f"k{i}"] for i in range(4)]) @ x, -n["limit"], n["limit"]))
+    missing = n["weight"] * (1 + z[6] + math.cos(theta)) - n["J"] * w**2 / 2
+    aim, event = z[6], z[7]
+    if t - event > n["pause"] and math.cos(theta) < 0 and missing < 5 * n["learn"] * n["weight"]:
+        if w * z[3] < 0:
+            aim, event = min(aim + n["learn"], 10 * n["learn"]), t
+        elif phi * before < 0:
+            aim, event = max(aim - n["learn"], -10 * n["learn"]), t
+    along = -np.sign(n["kappa"] * math.cos(theta) * w) or 1.0
+    a = float(np.clip(n["sharp"] * missing / n["weight"], -1, 1)) * n["reach"] * along - n["centre"] * q - n["damp"] * v
+    s, c = math.sin(theta), math.cos(theta)
+    # unknown: the pendulum's acceleration and the force, of the two equations of `Body`
+    _, force = np.linalg.solve(
+        [[n["kappa"] * c, -1.0], [n["J"], 0.0]],
+        [-(n["M"] + n["spin"] * s**2) * a + n["kappa"] * s * w**2 - 2 * n["spin"] * s * c * w * v - n["viscous"] * v,
+         -n["kappa"] * c * a - n["weight"] * s + n["spin"] * s * c * v**2],
+    )  # fmt: skip
+    swing = float(np.clip((force + (n["dry"] if a > 0 else -n["dry"])) / n["gain"], -n["limit"], n["limit"]))
+    mode, bump = z[4], z[5] * n["fade"]
+    if mode == SWINGING:
+        u = swing
+        if x @ P @ x <= n["size"] and abs(phi) <= n["near"] and abs(v) <= n["fast"]:
+            mode, bump, aim = HOLDING, swing - hold, 0.0
+    elif abs(phi) > n["away"]:
+        mode, bump, u = SWINGING, 0.0, swing
+    else:
+        u = hold + bump
+    if abs(q) > n["allowed"] or z[4] == TRIPPED:
+        mode, u = TRIPPED, 0.0
+    return float(np.clip(u, -n["limit"], n["limit"])), (q, theta, v, w, mode, bump, aim, event)
+
+
+def test_one_sample_of_the_law_is_what_its_equations_say():
+    """Numbers without anything in common, so that none stands in for another; states about every one of its edges."""
+    rng, seen = np.random.default_rng(8), []
+    for case in range(900):
+        numbers = dict(zip(PARAMETERS, rng.uniform(0.3, 1.7, len(PARAMETERS)), strict=True))
+        numbers |= {
+            "period": 0.1, "memory": rng.uniform(0, 0.9), "learn": 0.1, "kappa": rng.choice([-0.7, 0.8]),
+            "limit": rng.choice([2.0, 50.0]), "size": rng.uniform(0.1, 3.0), "near": 0.5, "away": 0.7,
+            "allowed": rng.choice([0.6, 3.0]), "scale_theta": rng.uniform(0.9, 1.1), "gain": rng.choice([-1.2, 1.3]),
+            "sharp": 4.0, "pause": 0.4,
+        }  # fmt: skip
+        p = [numbers[n] for n in PARAMETERS]
+        about = rng.choice([0.0, math.pi, -math.pi, 3 * math.pi])
+        theta = (about + rng.normal() * 0.5) / numbers["scale_theta"]
+        w = rng.normal() * 2
+        z = (
+            rng.normal() * 0.4, theta * numbers["scale_theta"] - 0.1 * w, rng.normal() * 0.5, rng.normal() * 2,
+            rng.choice([SWINGING, HOLDING, TRIPPED], p=[0.6, 0.35, 0.05]), rng.normal() * 0.3,
+            rng.choice([0.0, 0.05, 0.95, 1.0, -0.95]), 0.0,
+        )  # fmt: skip
+        t, y = rng.uniform(0, 0.8), (rng.normal() * 0.4, theta)
+        (u,), after = swing_and_hold(t, y, (), z, p)
+        expected, state = oracle(t, y, z, p)
+        assert u == pytest.approx(expected, rel=1e-9, abs=1e-9), case
+        assert after == pytest.approx(state, rel=1e-9, abs=1e-9), case
+        seen.append((z[4], after[4], after[6] - z[6] if after[4] == SWINGING else 0.0))
+    # every change of what it does came about, and it learnt up and down
+    pairs = {(a, b) for a, b, _ in seen}
+    assert pairs == {(SWINGING, SWINGING), (SWINGING, HOLDING), (SWINGING, TRIPPED), (HOLDING, SWINGING),
+                     (HOLDING, HOLDING), (HOLDING, TRIPPED), (TRIPPED, TRIPPED)}  # fmt: skip
+    assert {round(learnt, 3) for *_, learnt in seen} >= {0.0, 0.1, 0.05, -0.1, -0.05}
+
+
+@pytest.mark.parametrize(("theta", "wanted"), [(math.pi + 0.5, 1.0), (math.pi + 0.5 + 1e-9, 0.0)])
+def test_the_catch_reaches_to_its_bounds_and_the_hold_to_its_own(theta, wanted):
+    numbers = dict.fromkeys(PARAMETERS, 0.0) | {"scale_q": 1.0, "scale_theta": 1.0, "period": 1.0, "memory": 1.0}
+    numbers |= {"J": 1.0, "weight": 1.0, "gain": 1.0, "limit": 1.0, "away": 0.7}
+    numbers |= {"allowed": 0.3}
+    near = (math.pi + 0.5) - math.pi
+    p = [(numbers | {"near": near})[n] for n in PARAMETERS]
+    assert swing_and_hold(0.0, (0.0, theta), (), (0.0,) * 8, p)[1][4] == wanted
+    # the travel's end itself is still within
+    assert swing_and_hold(0.0, (0.3, 0.0), (), (0.0,) * 8, p)[1][4] == SWINGING
+    assert swing_and_hold(0.0, (0.3 + 1e-9, 0.0), (), (0.0,) * 8, p)[1][4] == TRIPPED
+
+
+def test_a_body_is_eq_3_with_the_rig_s_numbers():
+    cart = make_rig("linear")
+    p = cart.plant
+    made = body(cart)
+    J_A = p.J_p + p.m_p * p.l_cg**2
+    assert pytest.approx(p.m_c + p.m_p) == made.M
+    assert made.spin == pytest.approx(0.0, abs=1e-12)
+    assert (made.kappa, made.J) == pytest.approx((p.m_p * p.l_cg, J_A))
+    assert made.weight == pytest.approx(p.m_p * p.g * p.l_cg)
+    assert (made.viscous, made.dry) == pytest.approx((p.b_1, p.b_1c))
+    arm = make_rig("furuta")
+    p = arm.plant
+    made = body(arm)
+    J_A = p.J_p + p.m_p * p.l_cg**2
+    assert pytest.approx(p.J_d + p.m_p * p.r**2 + p.J_a) == made.M
+    assert made.spin == pytest.approx(J_A - p.J_a)
+    assert (made.kappa, made.J) == pytest.approx((-p.m_p * p.r * p.l_cg, J_A))
+    assert made.weight == pytest.approx(p.m_p * p.g * p.l_cg)
+    assert (made.viscous, made.dry) == pytest.approx((p.b_1, p.b_1c))
+    assert made.omega == pytest.approx(math.sqrt(p.m_p * p.g * p.l_cg / J_A))
+
+
+def test_energy_and_power_of_a_swing_are_those_of_a_pendulum_on_a_moved_pivot():
+    made = Body(M=1.0, spin=0.0, kappa=0.3, J=0.5, weight=2.0, viscous=0.0, dry=0.0)
+    assert made.energy(math.pi / 2, 3.0) == pytest.approx(0.25 * 9 - 2.0)
+    assert made.power(math.pi / 3, 2.0, 5.0) == pytest.approx(-0.3 * 0.5 * 2.0 * 5.0)
+
+
+def test_the_law_begins_where_the_encoders_stand():
+    rig = replace(make_rig("furuta"), scales=(1.0, -2.0), counts=(100.0, 1000.0), converter=0.25)
+    law = designed("furuta")
+    still, held = law.rule(rig, [0.5, 0.1, 0.3, 0.2]), law.rule(rig, [0.5, 0.1, 0.3, 0.2], holding=True)
+    # zeros where it hangs, in what is shown; switched on while it swings, speeds are not known, and no event was
+    assert np.asarray(still.initial).ravel() == pytest.approx([0.5, -0.6, 0.0, 0.0, SWINGING, 0.0, 0.0, -1.0])
+    assert np.asarray(held.initial).ravel() == pytest.approx([0.5, -0.6, 0.1, 0.2, HOLDING, 0.0, 0.0, -1.0])
+    assert np.asarray(still.quantum) == pytest.approx([0.01, 0.0005])
+    assert (still.command_quantum, still.measured, still.period) == (0.25, ("psi", "theta"), law.period)
+    lanes = law.rule(rig, [[0.5, 0.1, 0.3, 0.2], [-0.25, 0.0, 0.1, 0.0]], holding=True)
+    assert np.asarray(lanes.initial)[:, 1] == pytest.approx([-0.25, -0.2, 0.0, 0.0, HOLDING, 0.0, 0.0, -1.0])
+    numbers = dict(zip(PARAMETERS, np.asarray(still.parameters), strict=True))
+    of_law = ("period", "memory", "gain", "limit", "reach", "sharp", "centre", "damp", "size", "fast")
+    assert {n: numbers[n] for n in of_law} == {n: getattr(law, n) for n in of_law}
+    of_body = ("M", "spin", "kappa", "J", "weight", "viscous", "dry")
+    assert {n: numbers[n] for n in of_body} == {n: getattr(law.body, n) for n in of_body}
+    assert [numbers[f"k{i}"] for i in range(4)] == law.K.tolist()
+    assert {f"p{i}{j}": numbers[f"p{i}{j}"] for i in range(4) for j in range(i, 4)} == {
+        f"p{i}{j}": law.P[i, j] for i in range(4) for j in range(i, 4)
+    }
+    assert (numbers["scale_q"], numbers["scale_theta"], numbers["allowed"]) == (1.0, -2.0, law.travel)
+    # a handover's step has fallen to 1/e after its time constant
+    assert numbers["fade"] ** (FADE / law.period) == pytest.approx(1 / math.e)
+
+
+def test_a_design_takes_limit_and_travel_from_the_rig_and_its_feedback_is_of_least_cost():
+    rig = make_rig("linear")
+    law = design_swing_up(replace(rig, travel=0.15, more={"actuator.force_limit": 0.8 * rig.limit * rig.gain}))
+    assert law.travel == 0.15
+    assert TRAVEL["rad"] == math.tau  # one turn of a cable, where no rig says
+    assert law.limit == pytest.approx(0.8 * rig.limit)
+    assert (law.period, law.gain) == (rig.period, rig.gain)
+    # Bryson: a quarter of the travel, half a radian and half the limit cost alike
+    model = rig.linear("inverted")
+    Q, r = np.diag([(4 / law.travel) ** 2, 0, 1 / 0.5**2, 0]), 1 / (law.limit / 2) ** 2
+    left = model.A.T @ law.P + law.P @ model.A - law.P @ model.B @ model.B.T @ law.P / r + Q
+    assert np.abs(left).max() < 1e-6 * np.abs(Q).max()
+
+
+def ascent(theta, mode, w=None, u=None, rig=None):
+    """A run of a second a sample, as logged."""
+    rig = rig or make_rig("linear")
+    n = len(theta)
+    t, x = np.arange(n, dtype=float), np.zeros((n, 4))
+    x[:, 0] = -0.02 * np.arange(n)
+    run = Trial(
+        rig=rig, at="inverted", t=t, x=x, u=np.zeros(n) if u is None else np.array(u), rest=np.zeros(2),
+        record=Record(t=t, signals={"u": t}),
+    )  # fmt: skip
+    speeds = np.column_stack([np.full(n, 9.0), np.zeros(n) if w is None else w])
+    return Ascent(
+        trial=run, law=designed("linear"), mode=np.array(mode, dtype=float), angle=np.array(theta), speeds=speeds,
+        energy=np.zeros(n),
+    )  # fmt: skip
+
+
+def test_the_times_of_an_ascent_are_read_off_its_log():
+    ten = math.radians(10)
+    run = ascent([3.0, 2.0, ten, -1.0, ten, -ten, 0.0], [0, 0, 1, 0, 1, 1, 1], u=[0.0, 1.0, -3.0, 2.0, 0.0, 0.0, 0.0])
+    assert run.up == 4.0  # ten degrees themselves are up
+    assert run.handovers == (2.0, 4.0)
+    assert run.falls == (3.0,)
+    assert run.tripped == math.inf
+    assert run.peak == 3.0
+    assert run.travel == pytest.approx(0.12)
+    assert ascent([0.0, 0.1], [1, 1]).up == 0.0
+    assert ascent([0.0, 0.1, 2.0], [1, 1, 1]).up == math.inf
+    assert ascent([0.0, 0.1, 2.0, 2.0], [0, 1, 2, 2]).tripped == 2.0
+
+
+def test_half_swings_are_counted_to_the_first_handover():
+    w = [0.0, 1.0, 0.2, 1.0, -1.0, -0.1, -2.0, 1.0, -1.0]
+    assert ascent([0.0] * 9, [0] * 9, w).swings == 4
+    assert ascent([0.0] * 9, [0] * 7 + [1] * 2, w).swings == 2
+    assert ascent([0.0] * 9, [0] * 9, np.full(9, 0.2)).swings == 0
+
+
+def test_saturation_of_an_ascent_is_that_of_the_drive_s_force():
+    rig = make_rig("linear")
+    weak = replace(rig, more={"actuator.force_limit": 0.5 * rig.limit * rig.gain})
+    u = 0.5 * rig.limit * np.array([1.0, -1.0, 0.99, 0.0, 1.5])
+    assert ascent([0.0] * 5, [0] * 5, u=u, rig=weak).saturated == pytest.approx(3 / 5)
+
+
+def test_what_a_run_of_a_swing_up_shows_is_what_the_law_knew_after_each_sample():
+    """A pendulum turned by hand at 2 rad/s, its encoder the wrong way round, and no filter."""
+    rig = replace(make_rig("linear"), scales=(1.0, -1.0), converter=0.0)
+    law = replace(designed("linear"), memory=0.0)
+    t = np.arange(5) * rig.period
+    theta = 0.1 + 2.0 * t
+    record = Record(
+        t=t, signals={"x": 0.5 * t, "theta": -theta, "u": 0 * t}, units={"x": "m", "theta": "rad", "u": "V"},
+        inputs=("u",), outputs=("x", "theta"),
+    )  # fmt: skip
+    run = Trial(rig=rig, at="inverted", t=t, x=np.zeros((5, 4)), u=0 * t, rest=np.zeros(2), record=record)
+    found = ascent_of(run, law, law.rule(rig, [0.0, 0.0, 0.1, 0.0]))
+    assert found.angle == pytest.approx(np.mod(-theta, math.tau) - math.pi)
+    assert found.mode == pytest.approx(np.zeros(5))
+    assert found.energy[1:] == pytest.approx(law.body.energy(theta[1:], np.full(4, 2.0)), rel=1e-3)
+    assert found.speeds[1:] == pytest.approx(np.tile([0.5, -2.0], (4, 1)))

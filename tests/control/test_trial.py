@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 from upright.control import Trial, score, trial
-from upright.control.trial import readings
+from upright.control.score import scores
+from upright.control.trial import at_work, logged, readings, twin_log
 from upright.errors import BadInput
 from upright.gains import feedback, filtered, place
 from upright.gains.loop import closed
 from upright.records import Record
+from upright.rig.drive import full_command, saturation
 from upright.rig.makes import make_rig
 
 RIG = make_rig("furuta")
@@ -120,3 +122,152 @@ def test_a_fall_is_told_with_its_time():
 def test_what_cannot_be_is_said(call, words):
     with pytest.raises(BadInput, match=words):
         call()
+
+
+def lanes_of(theta, *, psi=None, u=None, rig=RIG, dt=0.5, **how):
+    """Figures of deviations by hand, shape (N, lanes)."""
+    theta = np.asarray(theta, dtype=float)
+    away = np.stack([np.zeros_like(theta) if psi is None else np.asarray(psi, dtype=float), theta], axis=1)
+    t = np.arange(len(theta)) * dt
+    return scores(rig, t, away, np.zeros_like(theta) if u is None else np.asarray(u, dtype=float), **how)
+
+
+def test_figures_of_runs_side_by_side_are_those_of_each():
+    theta = np.array([[0.5, 0.1, 0.02], [0.3, 0.3, 0.02], [1.0, 0.1, -0.02], [1.1, 0.1, 0.01], [9.0, 0.0, 0.0],
+                      [9.0, -0.1, 0.0]])  # fmt: skip
+    psi = np.array([[0.1, -2.0, 0.0], [0.1, 0.5, 0.3], [0.1, 0.5, 0.1], [-0.4, 0.2, 0.1], [7.0, 0.6, 0.3],
+                    [9.0, 0.2, 0.2]])  # fmt: skip
+    u = np.array([[3.0, 1.0, -5.0], [4.0, -1.0, 0.0], [0.0, 1.0, 4.9], [-5.0, 1.0, 0.0], [5.0, 1.0, 0.0],
+                  [5.0, 3.0, 5.0]])  # fmt: skip
+    rig = replace(RIG, travel=2.0, limit=5.0)
+    found = lanes_of(theta, psi=psi, u=u, rig=rig, fallen=1.0, band=0.1)
+    # a bound itself is still within: 1 rad has not fallen, 2 rad of travel are there, a band's edge is settled
+    assert found.fell.tolist() == [1.5, math.inf, math.inf]
+    assert found.ran_out.tolist() == [2.0, math.inf, math.inf]
+    assert found.settled.tolist() == [math.inf, 1.0, 0.0]
+    assert found.held.tolist() == [False, True, True]
+    # to the loss, with its sample
+    assert found.peaks.tolist() == [[0.4, 2.0, 0.3], [1.1, 0.3, 0.02]]
+    # half of what the last third, two samples of six, swings
+    assert found.final == pytest.approx(np.array([[1.0, 0.2, 0.05], [0.0, 0.05, 0.0]]))
+    assert found.effort_peak.tolist() == [5.0, 3.0, 5.0]
+    assert found.effort_rms == pytest.approx(np.sqrt([50 / 4, 14 / 6, (50 + 4.9**2) / 6]))
+    assert found.saturated == pytest.approx([1 / 4, 0.0, 2 / 6])
+    assert found.at_limit == pytest.approx([0.5, 0.0, 1.0])
+    own = lanes_of(theta, psi=psi, u=u, rig=rig, fallen=1.0, band=0.1, full=[4.0, 1.0, 6.0])
+    assert own.at_limit == pytest.approx([1.0, 3.0, 0.0])
+
+
+def test_a_run_that_leaves_its_band_at_the_end_has_not_settled_and_one_that_comes_last_has():
+    found = lanes_of(np.array([[0.0, 1.0], [0.0, 1.0], [1.0, 0.0]]), band=0.5)
+    assert found.settled.tolist() == [math.inf, 1.0]
+
+
+def test_a_watched_coordinate_falls_and_settles_instead_of_the_last():
+    found = lanes_of(np.full((4, 1), 9.0), psi=[[0.3], [0.1], [0.0], [0.0]], watched="psi", fallen=1.0, band=0.2)
+    assert found.fell[0] == math.inf
+    assert found.settled[0] == 0.5
+
+
+def test_a_driven_body_faster_than_its_limit_has_run_out():
+    psi = np.array([[0.0], [0.0], [1.0], [2.5], [4.5]])  # central differences 0, 1, 2.5, 3.5, 4 rad/s
+    rig = replace(RIG, speed_limit=2.5, travel=100.0)
+    assert lanes_of(np.zeros((5, 1)), psi=psi, rig=rig).ran_out[0] == 1.5
+    early = lanes_of(np.zeros((5, 1)), psi=psi, rig=replace(rig, travel=0.5))
+    assert early.ran_out[0] == 1.0  # whichever comes first
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"counts": (100.0,)}, "2 positive numbers of counts"),
+        ({"counts": (100.0, 0.0)}, "2 positive numbers of counts"),
+        ({"counts": (math.nan, 10.0)}, "2 positive numbers of counts"),
+        ({"scales": (1.0,)}, "2 scales"),
+        ({"limit": 0.0}, "limit of a rig must be positive and finite, got 0"),
+        ({"limit": math.inf}, "limit of a rig must be positive"),
+        ({"period": -1.0}, "period of a rig must be positive and finite, got -1"),
+    ],
+)
+def test_a_rig_that_cannot_be_is_refused(changed, words):
+    with pytest.raises(BadInput, match=words):
+        replace(RIG, **changed)
+
+
+def test_a_drive_s_braking_goes_with_the_speed_of_what_it_drives():
+    """Gain u less (slope + damping + standby) psi': the columns of psi' change by that along B."""
+    more = {"actuator.slope": 0.02, "actuator.damping": 0.03, "actuator.standby": 0.05}
+    bare, braked = RIG.linear("inverted"), replace(RIG, more=more).linear("inverted")
+    force = bare.B[:, 0] / RIG.gain
+    expected = bare.A.copy()
+    expected[:, 1] -= 0.1 * force
+    assert pytest.approx(expected) == braked.A
+    assert bare.A[1, 1] != braked.A[1, 1]
+    assert pytest.approx(bare.B) == braked.B
+    assert pytest.approx(RIG.plant.linear("inverted").B * RIG.gain) == bare.B
+
+
+@pytest.mark.parametrize(
+    ("force", "droop", "gain", "full"),
+    [
+        (math.inf, 0.0, 2.0, math.inf),
+        (3.0, 0.0, 2.0, 1.5),
+        (3.0, 0.0, -2.0, 1.5),
+        (3.0, 0.5, 2.0, 6.0),  # gain u - droop u force, as far as that is above none
+        (4.0, 0.5, 2.0, math.inf),
+        (5.0, 0.5, 2.0, math.inf),
+    ],
+)
+def test_a_force_limit_is_met_at_its_command(force, droop, gain, full):
+    drive = {
+        "actuator.gain": gain, "actuator.limit": 4.0, "actuator.force_limit": force, "actuator.droop": droop,
+    }  # fmt: skip
+    assert full_command(drive) == full
+    assert saturation(drive) == min(4.0, full)
+
+
+def test_a_log_has_readings_command_and_the_reference_that_is_held():
+    t, x = np.arange(4) * 0.1, np.arange(16.0).reshape(4, 4)
+    rig = replace(RIG, counts=(10.0, 4.0), unit="A", scales=(1.0, 2.0))
+    log = logged(rig, t, x + 0.06, np.array([1.0, 2.0, 3.0, 4.0]), [7.0, 8.0])
+    assert log["psi"] == pytest.approx([0.1, 4.1, 8.1, 12.1])
+    assert log["theta"] == pytest.approx([4.0, 12.0, 20.0, 28.0])  # of 56.24 half radians, 112 counts of them
+    assert log["reference"].tolist() == [7.0, 8.0, 8.0, 8.0]
+    assert log["u"].tolist() == [1.0, 2.0, 3.0, 4.0]
+    assert {n: log.units[n] for n in ("u", "psi", "theta")} == {"u": "A", "psi": "rad", "theta": "rad"}
+    assert (log.inputs, log.outputs) == (("u",), ("psi", "theta"))
+
+
+def test_a_twin_s_log_may_be_in_another_unit_and_without_a_command():
+    y = np.array([[1.0, 2.0], [3.0, 4.0]])
+    log = twin_log(RIG, np.arange(2.0), y, unit="deg")
+    assert log["theta"].tolist() == [2.0, 4.0]
+    assert (log.units["psi"], log.units["theta"], log.inputs) == ("deg", "deg", ())
+    assert "u" not in log.signals
+
+
+def test_a_drive_switched_off_commands_nothing_from_that_sample_on():
+    off = 20 * RIG.period
+    run = trial(RIG, LAW, at="inverted", start=tilt(0.05), seconds=0.04, off=off)
+    alone = trial(RIG, LAW, at="inverted", start=tilt(0.05), seconds=0.04)
+    assert run.u[:20] == pytest.approx(alone.u[:20])
+    assert np.all(run.u[20:] == 0.0)
+    assert np.all(alone.u[15:25] != 0.0)
+    assert run.t.size == round(0.04 / RIG.period) + 1
+
+
+def test_pushes_shorter_than_the_run_end_and_longer_ones_are_cut():
+    short = trial(RIG, replace_law(LAW), at="hanging", start=tilt(0.0), seconds=9 * RIG.period, pushes=[0.5, 0.5])
+    step = RIG.converter
+    assert short.u == pytest.approx(np.array([0.5, 0.5, *np.zeros(8)]), abs=step)
+    long = trial(RIG, replace_law(LAW), at="hanging", start=tilt(0.0), seconds=9 * RIG.period, pushes=np.full(50, 0.5))
+    assert long.u == pytest.approx(np.full(10, 0.5), abs=step)
+
+
+def test_a_law_at_work_takes_rest_and_reference_of_the_rig():
+    rig = replace(RIG, scales=(1.0, -0.5), converter=0.25)
+    made = at_work(rig, LAW, [0.1, 3.0])
+    assert (made.delay, made.command_quantum) == (0.0, 0.25)
+    assert np.asarray(made.quantum) == pytest.approx(rig.quantum * [1.0, 2.0])
+    assert made.references is LAW.references
+    assert np.asarray(at_work(rig, LAW, [0.1, 3.0], [1.0, 2.0]).references).tolist() == [1.0, 2.0]

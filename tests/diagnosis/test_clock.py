@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from tests.diagnosis.cases import case
 from upright.diagnosis import Finding, examine
+from upright.diagnosis.clock import examine_clock, read_mended, steps_panel
 from upright.records import Provenance, Record
 
 DT, N = 0.01, 1000
@@ -70,3 +74,112 @@ def test_stamps_rounded_coarsely_are_told_as_rounding_and_not_as_jitter():
     (finding,) = about_time(t)
     assert finding.kind == "clock"
     assert finding.evidence["rounding [ms]"] == pytest.approx(10.0)
+
+
+def clock(time=None, *, t=T, notes=(), **signals):
+    """Findings about a time base of which the inspection says so much."""
+    made = case(x=np.sin(5 * t), t=t, notes=notes) if not signals else case(t=t, notes=notes, **signals)
+    inspection = replace(made.inspection, time=replace(made.inspection.time, **(time or {})))
+    return examine_clock(replace(made, inspection=inspection))
+
+
+@pytest.mark.parametrize(
+    ("rounding", "jitter", "found"),
+    [(1.1e-3, 6e-4, True), (0.9e-3, 6e-4, False), (1.1e-3, 4e-4, False)],
+)
+def test_rounding_is_coarse_from_a_tenth_of_the_period_if_the_stamps_wander(rounding, jitter, found):
+    findings = clock({"rounding": rounding, "jitter": jitter, "period": 0.01, "rebuilt": False})
+    assert bool([f for f in findings if f.kind == "clock"]) == found
+    for f in findings:
+        if f.kind == "clock":
+            assert f.sentence == (
+                "The time stamps are rounded to 1.1 ms, which is coarse beside the period of 10 ms, and do not follow"
+                " a uniform clock."
+            )
+            assert f.evidence == pytest.approx({"rounding [ms]": 1.1, "period [ms]": 10.0})
+
+
+def test_a_clock_that_was_rebuilt_is_a_note_with_how_far_it_wandered():
+    said = "Time was rounded to 1 ms; rebuilt from the sample index: stamps wander up to 0.52 ms"
+    (finding,) = clock({"rounding": 1e-3, "rebuilt": True, "period": 0.01, "jitter": 0.0}, notes=(said,))
+    assert finding.severity == "note"
+    assert "rounded to 1 ms and wander up to 0.52 ms from a uniform clock of 10 ms" in finding.sentence
+    assert finding.evidence == pytest.approx({"rounding [ms]": 1.0, "wander [ms]": 0.52})
+
+
+@pytest.mark.parametrize(
+    ("jitter", "rounding", "found"),
+    [(4.9e-4, 0.0, False), (5.1e-4, 0.0, True), (6e-4, 6e-4, False), (6.1e-4, 6e-4, True)],
+)
+def test_jitter_within_a_coarse_rounding_is_that_rounding(jitter, rounding, found):
+    findings = clock({"jitter": jitter, "rounding": rounding, "period": 0.01, "rebuilt": False})
+    jitters = [f for f in findings if f.kind == "jitter"]
+    assert bool(jitters) == found
+    for f in jitters:
+        assert f"by more than {1e3 * jitter:.3g} ms ({1e4 * jitter:.0f} %)" in f.sentence
+        assert f.key == 'period = "10 ms"'
+        assert not f.spoils
+
+
+def doubled(rows, n=1000):
+    x = np.sin(5 * np.arange(n) * DT)
+    for row in rows:
+        x[row] = x[row - 1]
+    return x
+
+
+def test_rows_that_repeat_while_the_rig_moves_are_counted_from_three_on():
+    fast = [60, 250, 440]  # where the sine passes zero, near enough
+    y = 2 * doubled(fast)
+    (finding,) = [f for f in clock(x=doubled(fast), y=y) if f.kind == "doubled"]
+    assert finding.evidence == pytest.approx({"doubled rows [1]": 3, "share [%]": 0.3})
+    assert finding.sentence.startswith("3 rows repeat the row before in every measured column")
+    assert "(the first at 0.6 s)" in finding.sentence
+    assert finding.columns == ("x", "y")
+    assert not finding.spoils
+    (panel,) = finding.panels
+    (curve,) = panel.curves
+    assert curve.t.size == 31
+    assert finding.marks == (pytest.approx(curve.t[15]),)
+    assert round(curve.t[15] / DT) in fast
+    assert [f for f in clock(x=doubled(fast[:2])) if f.kind == "doubled"] == []
+    # a row that only one of them repeats was not written twice
+    assert [f for f in clock(x=doubled(fast), y=np.sin(5 * T)) if f.kind == "doubled"] == []
+
+
+@pytest.mark.parametrize(("every", "spoilt"), [(31, True), (37, False)])
+def test_more_than_three_doubled_rows_in_a_hundred_spoil_a_record(every, spoilt):
+    t = np.arange(1000) * DT
+    x = 5 * t + 0.1 * t**2
+    rows = np.arange(20, 980, every)
+    x[rows] = x[rows - 1]
+    (finding,) = [f for f in clock(x=x) if f.kind == "doubled"]
+    assert finding.spoils == spoilt
+    assert finding.evidence["doubled rows [1]"] == rows.size
+
+
+def test_a_clock_that_starts_again_is_cut_at_its_reset_and_the_longest_piece_is_read(tmp_path):
+    t = 0.01012347 * np.concatenate([np.arange(40), np.arange(60)])
+    x = np.arange(100.0)
+    t[70] = t[69]
+    log = tmp_path / "log.csv"
+    log.write_text("t [s],x [m]\n" + "".join(f"{a:.8f},{b:.6f}\n" for a, b in zip(t, x, strict=True)), "utf-8")
+    record, (reset, repeat) = read_mended(log)
+    rows = [k for k in range(40, 100) if k != 70]
+    assert record.t == pytest.approx(t[rows])
+    assert record["x [m]"] == pytest.approx(x[rows])
+    assert reset.evidence == pytest.approx({"resets [1]": 1, "back by [s]": t[39]})
+    assert reset.sentence == (
+        "The clock starts again 1 time: row 41 is at 0 s after 0.394815 s. Only rows 41 to 100 are looked at below."
+    )
+    assert repeat.evidence == pytest.approx({"repeated instants [1]": 1, "equal rows [1]": 0})
+    assert repeat.advice == "Which row holds? The first was kept below."
+    assert "(first at 0.293581 s)" in repeat.sentence
+    curve = reset.panels[0].curves[0]
+    assert (curve.t[41], curve.y[41]) == pytest.approx((41.0, t[41]))
+
+
+def test_steps_are_drawn_in_milliseconds_where_they_end():
+    (curve,) = steps_panel(np.array([0.0, 0.01, 0.03])).curves
+    assert curve.t.tolist() == [0.01, 0.03]
+    assert curve.y == pytest.approx([10.0, 20.0])

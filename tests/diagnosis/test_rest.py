@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from tests.diagnosis.cases import case
 from upright.diagnosis import Finding, examine, read_known
+from upright.diagnosis.rest import examine_rest
 from upright.records import Provenance, Record
 
 DT = 0.01
@@ -93,3 +97,103 @@ def test_a_body_that_moves_a_little_beside_its_like_was_held_and_creeps(share: f
         assert finding.key == 'held = ["x_2"]'
         assert finding.evidence["range [m]"] == pytest.approx(share * finding.evidence["beside [m]"], rel=1e-2)
         assert f"{100 * share:.2g} % of the motion" in finding.sentence
+
+
+T = np.arange(1500) * DT
+
+
+def rests(level: float, t0: float = 1.0, share: float = 1.0) -> np.ndarray:
+    """At zero for a while, a swing of 30 mm, and rest at a level."""
+    return np.where(
+        t0 > T, 0.0, share * 0.03 * np.exp(-2 * (T - t0)) * np.sin(9 * (T - t0)) + np.where(T > 5, level, 0)
+    )
+
+
+def driven_rest(level: float, **more: object) -> list[Finding]:
+    made = case(x=np.round(rests(level) / STEP) * STEP, u=np.where((T > 1) & (T < 5), 1.0, 0.0), drive="u")
+    return [f for f in examine_rest(replace(made, **more)) if f.kind == "drift"]
+
+
+def test_a_drift_is_told_from_three_percent_and_five_steps_on() -> None:
+    span = float(np.ptp(rests(0.0)))
+    (finding,) = driven_rest(0.035 * span)
+    assert finding.evidence["apart [m]"] == pytest.approx(0.035 * span, rel=0.03)
+    assert finding.evidence["of the range [%]"] == pytest.approx(3.5, rel=0.03)
+    assert "comes to rest" in finding.sentence
+    assert "(3.5 % of its range)" in finding.sentence
+    assert driven_rest(0.025 * span) == []
+    # the sign does not matter
+    assert driven_rest(-0.035 * span)[0].evidence["apart [m]"] == pytest.approx(0.035 * span, rel=0.03)
+
+
+def test_rests_of_a_speed_beside_a_reference_or_too_short_are_none() -> None:
+    span = float(np.ptp(rests(0.0)))
+    u = np.where((T > 1) & (T < 5), 1.0, 0.0)
+    made = case(x=rests(0.1 * span), u=u, drive="u")
+    assert [f.kind for f in examine_rest(made) if f.kind == "drift"]
+    speed = case(x=rests(0.1 * span), u=u, drive="u", units={"x": "m/s"})
+    assert not [f for f in examine_rest(speed) if f.kind == "drift"]
+    lies = case(x=rests(0.1 * span), u=u, drive="u", columns={"u": {"lies": ("the reference",)}})
+    assert not [f for f in examine_rest(lies) if f.kind == "drift"]
+    spans = made.inspection.rests
+
+    def with_rests(*found: tuple[float, float]) -> list[Finding]:
+        other = replace(made, inspection=replace(made.inspection, rests=found))
+        return [f for f in examine_rest(other) if f.kind == "drift"]
+
+    assert len(spans) >= 2
+    assert with_rests((0.0, 0.9), (8.0, 9.0))
+    assert not with_rests((0.0, 0.19), (8.0, 9.0))
+    assert not with_rests((0.0, 0.9), (8.0, 8.19))
+    assert not with_rests((0.0, 0.9))
+    # while the drive acts a rest is where it pushes to
+    assert not with_rests((0.0, 0.9), (2.0, 2.5))
+    assert with_rests((0.0, 0.9), (5.5, 6.0), (8.0, 9.0))[0].spans == ((0.0, 0.9), (5.5, 6.0), (8.0, 9.0))
+
+
+def test_the_growth_of_a_swing_is_that_of_its_last_quarter_over_its_first() -> None:
+    """Amplitudes of a geometric series: the median of the last quarter of n half swings over that of the first."""
+    for period, rate, told_ in ((0.5, 0.3, True), (0.5, 0.004, False), (2.2, 0.3, False)):
+        t = np.arange(800) * DT
+        x = 1e-3 * np.exp(rate * t) * np.sin(2 * np.pi * t / period)
+        made = case(x=x, u=np.full(800, 1.5), drive="u")
+        made = replace(made, u=np.where(t < 0.5, 0.0, 1.5))
+        found = [f for f in examine_rest(made) if f.kind == "self-excited"]
+        assert bool(found) == told_
+        for finding in found:
+            n = finding.evidence["half swings [1]"]
+            quarter = n // 2 // 2
+            assert finding.evidence["growth [1]"] == pytest.approx(np.exp(rate * period / 2 * (n - quarter)), rel=0.03)
+            start, stop = finding.spans[0]
+            assert (start, stop) == pytest.approx((0.5, 7.99))
+            assert "from 0.5 to 7.99 s while the effort stays at 1.5" in finding.sentence
+            assert (
+                f"the amplitude grows {finding.evidence['growth [1]']:.3g} times over {n:.0f} half" in finding.sentence
+            )
+            (envelope,) = finding.panels[-1].curves
+            assert finding.panels[-1].label == "amplitude [m]"
+            # half swings: from one extreme to the next, at the instant between
+            expected = 1e-3 * np.exp(rate * envelope.t) * np.cosh(rate * period / 4)
+            assert envelope.y == pytest.approx(expected, rel=0.02)
+            assert np.diff(envelope.t) == pytest.approx(period / 2, abs=0.021)
+
+
+def test_every_body_that_is_free_must_grow() -> None:
+    t = np.arange(800) * DT
+    growing = 1e-3 * np.exp(0.3 * t) * np.sin(4 * np.pi * t)
+    steady = 5e-3 * np.sin(4 * np.pi * t)
+    u = np.where(t < 0.5, 0.0, 1.5)
+    assert [f.kind for f in examine_rest(case(x=growing, y=0.5 * growing, u=u, drive="u"))] == ["self-excited"]
+    assert examine_rest(case(x=growing, y=steady, u=u, drive="u")) == []
+    # one that is held says nothing
+    held = case(x=growing, y=0.1 * steady, u=u, drive="u")
+    assert [f.kind for f in examine_rest(held) if f.kind == "self-excited"] == ["self-excited"]
+
+
+@pytest.mark.parametrize(("steps", "creeps"), [(4.9, False), (5.1, True)])
+def test_a_body_creeps_from_five_steps_of_its_sensor_on(steps: float, creeps: bool) -> None:
+    x = np.exp(-0.1 * T) * np.cos(9 * T)
+    q = {"quantum": replace(case(x=x).inspection.columns[0].quantum, step=0.01)}
+    y = steps * 0.01 * (np.arange(1500) / 1499)
+    made = case(x=x, y=y, columns={"y": q})
+    assert bool([f for f in examine_rest(made) if f.kind == "creep"]) == creeps

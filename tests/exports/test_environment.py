@@ -185,26 +185,26 @@ def test_a_rig_without_a_limit_is_asked_for_one(tmp_path):
 
 
 def furuta_rig(fit, **entries):
-    from upright.study.description import Entry
+    from upright.rig.hardware import Entry
 
-    known = read_identified(fit)
+    known = read_stored_rig(fit)
     given = {n: Entry(value=v, unit="", source="known") for n, v in entries.items()}
-    return replace(known, draws=(), description=replace(known.description, entries=given))
+    return replace(known, draws=(), hardware=replace(known.hardware, entries=given))
 
 
 def test_an_observation_is_deviations_then_speeds_and_of_what_turns_over_sine_and_cosine(fit):
-    lanes = Episodes(read_identified(fit), 2)
+    lanes = Episodes(read_stored_rig(fit), 2)
     assert lanes.names == ["psi", "sin theta", "cos theta", "psi_dot", "theta_dot"]
     lanes.x[:] = [[0.3, -0.1], [4.0, 5.0], [np.pi + 0.2, np.pi - 0.4], [6.0, 7.0]]
     expected = [[0.3, np.sin(0.2), np.cos(0.2), 4, 6], [-0.1, np.sin(-0.4), np.cos(0.4), 5, 7]]
     np.testing.assert_allclose(lanes.observation, expected, atol=1e-6)
-    assert Episodes(read_identified(fit), 1, at="hanging").target.tolist() == [0, 0]
+    assert Episodes(read_stored_rig(fit), 1, at="hanging").target.tolist() == [0, 0]
     assert lanes.target.tolist() == [0, pytest.approx(np.pi)]
 
 
 @pytest.mark.parametrize(("task", "theta"), [("balance", np.pi), ("swing_up", 0.0)])
 def test_an_episode_begins_within_a_twentieth_of_where_its_task_does(fit, task, theta):
-    lanes = Episodes(read_identified(fit), 400, task=task)
+    lanes = Episodes(read_stored_rig(fit), 400, task=task)
     lanes.reset(np.ones(400, dtype=bool), np.random.default_rng(2))
     off = lanes.x - np.array([0.0, 0.0, theta, 0.0])[:, None]
     assert np.abs(off).max() <= 0.05
@@ -214,7 +214,7 @@ def test_an_episode_begins_within_a_twentieth_of_where_its_task_does(fit, task, 
 
 
 def test_only_those_that_are_asked_begin_anew(fit):
-    lanes = Episodes(read_identified(fit, draws=4), 3)
+    lanes = Episodes(read_stored_rig(fit, draws=4), 3)
     lanes.reset(np.ones(3, dtype=bool), np.random.default_rng(2))
     lanes.step(np.zeros((3, 1)))
     before, steps = lanes.x.copy(), lanes.steps.copy()

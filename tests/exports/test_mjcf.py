@@ -13,9 +13,9 @@ from tests.physics.specimens import SPECIMENS
 from upright.errors import BadInput
 from upright.exports.mjcf import model
 from upright.physics import BUILT_IN, DoublePendulumAbsolute, Furuta, Pendulum, chain
+from upright.rig.hardware import Entry
 from upright.simulation import simulate
 from upright.study.stored_rig import read_stored_rig
-from upright.study.description import Entry
 from upright.verbs.export import export
 
 mujoco = pytest.importorskip("mujoco")
@@ -202,7 +202,7 @@ def test_carts_stand_beside_and_disks_below_each_other_joined_to_ground_and_neig
     letter = "m" if kind == "rectilinear" else "J"
     values = {f"{letter}_{i}": 0.1 * i for i in (1, 2)} | {"k_1": 3.0, "k_12": 5.0, "c_1": 0.1, "c_2": 0.2, "c_12": 0.7}
     plant = chain(2, kind)(**values, f_1c=0.01, f_2c=0.02, a_2=0.05)
-    root, _ = parsed(read_identified(fit_file(tmp_path, plant, name=f"{kind}-2")))
+    root, _ = parsed(read_stored_rig(fit_file(tmp_path, plant, name=f"{kind}-2")))
     first, second = root.findall(".//body")
     places = [numbers(b.attrib["pos"]) for b in (first, second)]
     beside = [[0, 0.3, 0], [0, 0.6, 0]]
@@ -238,7 +238,7 @@ def test_nine_bodies_in_a_row_are_known_and_one_alone_has_no_spring_between(tmp_
 def described(rig, **values):
     """The rig with more said of its drive."""
     entries = {n: Entry(value=v, unit="", source="known") for n, v in values.items()}
-    return replace(rig, description=replace(rig.description, entries=entries))
+    return replace(rig, hardware=replace(rig.hardware, entries=entries))
 
 
 def test_the_drive_has_its_gain_limits_lag_and_what_it_loses_with_speed(tmp_path):
@@ -250,7 +250,7 @@ def test_the_drive_has_its_gain_limits_lag_and_what_it_loses_with_speed(tmp_path
     assert (drive["dyntype"], numbers(drive["dynprm"])) == ("filter", [0.02])
     assert (drive["ctrllimited"], numbers(drive["ctrlrange"])) == ("true", [-5, 5])
     assert (drive["forcelimited"], numbers(drive["forcerange"])) == ("true", [-0.25, 0.25])
-    plain, _ = parsed(described(replace(rig, lag=0.0)))
+    plain, _ = parsed(described(rig.replace(lag=0.0)))
     assert not {"dyntype", "ctrlrange", "forcerange"} & plain.find(".//actuator/general").attrib.keys()
     assert numbers(plain.find(".//actuator/general").attrib["biasprm"]) == [0, 0, 0]
 

@@ -53,7 +53,7 @@ def grown(fit):
     scores = {"one": replace(fit.runs["tail"], fit_percent={"psi": 70.0, "theta": 50.0})}
     scores["two"] = replace(fit.runs["tail"], fit_percent={"psi": 80.0, "theta": 40.0})
     return Ladder(
-        steps=STEPS, rig=fit.rig, runs=(), held_out="half of the runs", repeats=(TWICE,), stopped="No rung is left.",
+        steps=STEPS, rig=fit.model, runs=(), held_out="half of the runs", repeats=(TWICE,), stopped="No rung is left.",
         scores=scores, left_out=(),
     )  # fmt: skip
 

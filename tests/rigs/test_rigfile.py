@@ -147,3 +147,58 @@ def test_limits_have_to_be_there_before_anything_is_armed():
         Supervisor(Board(TwinPort(make_rig("furuta"))), Duty(limits=None)).prepare()
     with pytest.raises(BadInput):
         Limits(travel=(0.0,), speed=(1.0,), start=(1.0,), command=1.0)
+
+
+def test_every_key_of_a_rig_is_read(written, tmp_path):
+    file = written(
+        'kind = "twin"\nname = "bench 3"\nmake = "furuta"\nseed = 4\nvendor = "ECP 205"\nat = "hanging"\n'
+        'zero = "inverted"\n[loadings]\nadded = ["1 g", "2 g"]\ntolerance = "0.2 %"\n[board]\ndevice = "Dev1"\n'
+    )
+    assert (file.name, file.make, file.seed, file.vendor) == ("bench 3", "furuta", 4, "ECP 205")
+    assert (file.at, file.zero, file.added, file.tolerance) == ("hanging", "inverted", ("1 g", "2 g"), 0.002)
+    assert file.board == {"device": "Dev1"}
+    assert not file.hardware
+    plain = written('kind = "twin"\nmake = "furuta"\n')
+    assert (plain.at, plain.zero, plain.seed, plain.tolerance, plain.added) == ("inverted", "hanging", 0, 0.0, ())
+    default = Limits(travel=(1.0, 2.0), speed=(3.0, 4.0), start=(5.0, 6.0), command=7.0)
+    assert plain.limits(UNITS, "V", default) is default
+    replay = written('kind = "replay"\nstudy = "study.toml"\nrecord = "run.csv"\n')
+    assert replay.record == tmp_path / "run.csv"
+    assert replay.known == tmp_path / "study.toml"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('kind = "twin"\nmake = "furuta"\nseed = -1\n', "seed is a whole number from 0 on, got -1"),
+        ('kind = "twin"\nmake = "furuta"\nseed = true\n', "seed is a whole number from 0 on, got True"),
+        ('kind = "twin"\nmake = "furuta"\nseed = 1.5\n', "seed is a whole number"),
+        ('kind = "twin"\nmake = "furuta"\n[loadings]\ntolerance = 1\n', "from 0 to below 1"),
+        ('kind = "twin"\nmake = "furuta"\n[loadings]\ntolerance = -0.1\n', "from 0 to below 1"),
+    ],
+)
+def test_a_seed_or_a_tolerance_that_is_none_is_refused(written, text, said):
+    with pytest.raises(BadInput, match=said):
+        written(text)
+
+
+def test_a_twin_s_file_fills_in_what_it_leaves_out_coordinate_by_coordinate(written):
+    default = Limits(
+        travel=(1.0, 2.0), speed=(3.0, 4.0), start=(5.0, 6.0), command=7.0, watchdog=0.3, saturation=0.9, twist=1.1
+    )
+    held = written('kind = "twin"\nmake = "furuta"\n[limits.theta]\nspeed = 9\n').limits(UNITS, "V", default)
+    assert (held.travel, held.speed, held.start) == ((1.0, 2.0), (3.0, 9.0), (5.0, 6.0))
+    assert (held.command, held.watchdog, held.saturation, held.twist) == (7.0, 0.3, 0.9, 1.1)
+    hardware = written(WHOLE).limits(UNITS, "V", default)
+    assert hardware.travel[1] == math.inf  # of hardware nothing is filled in
+    assert hardware.saturation == 2.0
+
+
+def test_a_rig_with_a_fit_is_the_same_but_for_its_description(written, tmp_path):
+    file = written('kind = "serial"\nport = "/dev/ttyACM0"\nstudy = "study.toml"\nseed = 3\n')
+    (tmp_path / "out").mkdir()
+    (tmp_path / "fit.json").write_text("", encoding="utf-8")
+    file.with_fit(tmp_path / "fit.json", tmp_path / "out" / "RIG.toml")
+    again = read_rig_file(tmp_path / "out" / "RIG.toml")
+    assert again.known.resolve() == (tmp_path / "fit.json").resolve()
+    assert (again.kind, again.port, again.seed) == ("serial", "/dev/ttyACM0", 3)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
+import struct
 import tracemalloc
 import zlib
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -11,17 +14,23 @@ from hypothesis import strategies as st
 
 from upright.errors import BadInput
 from upright.rigs import Fault, Mode
+from upright.rigs.protocol import LONGEST_PULSE
 from upright.rigs.wire import (
     LONGEST,
+    PROTOCOL,
+    Kind,
+    Packet,
     Parser,
     Result,
     cobs,
     exchange,
     from_cobs,
+    hello,
     limits,
     pack,
     sample,
     self_test,
+    snapshot,
     status,
     unpack,
 )
@@ -182,3 +191,41 @@ def test_limits_come_back_as_they_went():
 def test_what_no_frame_can_hold_is_refused():
     with pytest.raises(BadInput, match="248 bytes"):
         pack(1, 1, bytes(LONGEST - 1))
+
+
+HEADER = (Path(__file__).parents[2] / "firmware" / "rig.h").read_text(encoding="utf-8")
+
+
+def enumerated(name):
+    """Numbers of an enum of the firmware's header, as a compiler gives them."""
+    text = re.search(rf"enum {name} \{{(.*?)\}};", HEADER, re.DOTALL)[1]
+    out, following = {}, 0
+    for entry in filter(None, (part.strip() for part in text.split(","))):
+        word, _, value = entry.partition("=")
+        out[word.strip()] = following = int(value, 0) if value else following
+        following += 1
+    return out
+
+
+def test_modes_faults_requests_and_results_have_the_numbers_of_the_firmware():
+    assert enumerated("mode") == {m.name: m.value for m in Mode}
+    assert enumerated("result") == {r.name: r.value for r in Result}
+    assert enumerated("request") == {k.name: k.value for k in Kind} | {"REPLY": 0x80}
+    faults = {word.removeprefix("F_"): number for word, number in enumerated("fault").items()}
+    ours = {f.name: f.value for f in Fault}
+    assert faults == {name: ours[name] for name in faults}
+    # one bit each, those of the host alone too
+    assert sorted(ours.values()) == [1 << k for k in range(len(ours))]
+    assert Packet(Kind.ARM + 0x80, 0, b"").answers(Kind.ARM)
+    assert not Packet(Kind.ARM, 0, b"").answers(Kind.ARM)
+    assert f"#define PROTOCOL {PROTOCOL}\n" in HEADER
+    assert f"#define LONGEST_PULSE {round(1e6 * LONGEST_PULSE)} " in HEADER
+
+
+def test_a_greeting_and_a_snapshot_are_read_field_by_field():
+    greeting = hello(bytes([1, 1, 2, 8, 3]) + (1000).to_bytes(2, "little") + (32767).to_bytes(2, "little") + b"bench")
+    assert greeting == (1, True, 2, 8, 3, 1000, 32767, "bench")
+    body = struct.pack("<BHI", 2, 64, 70_000) + struct.pack("<Hiih", 10, 1, -2, -3) + struct.pack(
+        "<iihHH", 4, -5, -6, 7, 8
+    )  # fmt: skip
+    assert snapshot(body) == (Mode.HOST, Fault.ENCODER, 70_000, (10, (1, -2), -3), (4, -5), -6, 7, 8)

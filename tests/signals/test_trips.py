@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 from upright.signals.smoothing import middle
-from upright.signals.trips import TripRegression, goes_dead
+from upright.signals.trips import TripRegression, find_trip, goes_dead, trip_or_misfit
 
 N, WIDTH = 60, 11
 HALF = WIDTH // 2
@@ -79,3 +81,101 @@ def test_what_has_hardly_moved_before_tells_nothing_of_its_drive():
     assert not goes_dead(t, u, y, 20)
     assert not goes_dead(t, u, np.zeros_like(y), 1000)
     assert not goes_dead(t, u, y, t.size)
+
+
+def spun(begin, end, *, dt=0.01, until=1000, drag=0.4):
+    """A body of unit mass and damping that is pushed by one from `begin` to `end` [s]; in closed form."""
+    t = dt * np.arange(until)
+
+    def answer(s):  # to a step at zero: drag y' = 1 - exp(-drag s)
+        s = np.maximum(s, 0.0)
+        return (s - (1 - np.exp(-drag * s)) / drag) / drag
+
+    return t, answer(t - begin) - answer(t - end)
+
+
+def speed(t, begin, end, drag=0.4):
+    def answer(s):
+        return (1 - np.exp(-drag * np.maximum(s, 0.0))) / drag
+
+    return answer(t - begin) - answer(t - end)
+
+
+def test_a_drive_that_went_off_early_is_found_with_the_acceleration_on_both_sides():
+    t, y = spun(1.0, 4.0)
+    u = np.where((t >= 1) & (t < 7), 1.0, 0.0)
+    trip = find_trip(t, u, y, quantum=1e-7)
+    assert not trip.late
+    assert trip.at == pytest.approx(4.0, abs=0.02)
+    assert trip.logged == pytest.approx(7.0, abs=0.011)
+    # half way to the nearer end of the command, 1 s and 7 s: over 1.5 s; slopes of a line through the speed
+    assert trip.before == pytest.approx(np.polyfit(t[250:400], speed(t, 1, 4)[250:400], 1)[0], rel=0.02)
+    assert trip.after == pytest.approx(np.polyfit(t[400:550], speed(t, 1, 4)[400:550], 1)[0], rel=0.02)
+    assert trip.before > 0 > trip.after
+    assert trip.unexplained < 0.01
+    assert trip.otherwise > 2 * trip.unexplained
+    assert 0 < trip.error < 0.1
+    found, left = trip_or_misfit(t, u, y, (), quantum=1e-7, late=False)
+    assert (found.at, left) == (trip.at, trip.otherwise)
+
+
+def test_a_drive_that_came_on_late_is_found_and_one_that_did_what_it_was_told_is_none():
+    t, y = spun(3.0, 7.0)
+    u = np.where((t >= 1) & (t < 7), 1.0, 0.0)
+    trip = find_trip(t, u, y, quantum=1e-7, late=True)
+    assert trip.late
+    assert trip.at == pytest.approx(3.0, abs=0.02)
+    assert trip.logged == pytest.approx(1.0, abs=0.011)
+    assert trip.before == pytest.approx(0.0, abs=0.02)
+    assert trip.after == pytest.approx(np.polyfit(t[300:400], speed(t, 3, 7)[300:400], 1)[0], rel=0.05)
+    t, y = spun(1.0, 7.0)
+    for late in (False, True):
+        found, left = trip_or_misfit(t, u, y, (), quantum=1e-7, late=late)
+        assert found is None
+        assert left < 0.01  # of what is logged nothing is left
+
+
+def test_a_record_too_short_or_without_a_command_says_nothing():
+    t, y = spun(1.0, 4.0)
+    u = np.where((t >= 1) & (t < 7), 1.0, 0.0)
+    nobody = (None, math.inf)
+    assert trip_or_misfit(t, 0 * u, y, (), quantum=0.0, late=False) == nobody
+    assert trip_or_misfit(t, np.where(np.arange(t.size) < 9, 1.0, 0.0), y, (), quantum=0.0, late=False) == nobody
+    assert trip_or_misfit(t[:99], u[:99] + 1, y[:99], (), quantum=0.0, late=False) == nobody
+    assert trip_or_misfit(t, u, 0 * y, (), quantum=0.0, late=False) == nobody
+
+
+def combs(u, truth, *, unit=1.0, late=False):
+    """A regression whose target is the command until a sample, or from there on."""
+    switched = np.column_stack([u, np.zeros(u.size)])
+    rows = np.arange(u.size)[HALF:-HALF]
+    acting = np.where((np.arange(u.size) < truth) != late, u, 0.0) * unit
+    target = np.convolve(acting, middle(WIDTH)[::-1], "valid")
+    return TripRegression(
+        rows=rows, target=target, base=np.ones((rows.size, 1)), switched=switched, weights=middle(WIDTH)
+    )
+
+
+@pytest.mark.parametrize("truth", [137, 501, 998, 1760])
+def test_the_sample_at_which_a_command_ended_is_found_by_three_combs(truth):
+    n = 2000
+    made = combs(np.where(np.arange(n) > 100, 1.0, 0.0), truth)
+    at, costs = made.search(101, n - 20)
+    assert at == truth
+    assert costs[at] == pytest.approx(0.0, abs=1e-9)
+    assert costs[at] == min(costs.values())
+    assert len(costs) < 200
+    assert all(101 <= m < n - 20 for m in costs)
+    at, _ = combs(np.sin(0.01 * np.arange(n)), truth, late=True).search(101, n - 20, late=True, forward=False)
+    assert at == truth
+
+
+def test_a_command_that_would_push_backwards_is_no_trip():
+    n, truth = 400, 200
+    u = np.where((np.arange(n) > 50) & (np.arange(n) < 350), 1.0, 0.0)
+    forth, back = combs(u, truth), combs(u, truth, unit=-1.0)
+    assert forth.misfit(truth, late=False, forward=True) == pytest.approx(0.0, abs=1e-9)
+    assert back.misfit(truth, late=False, forward=False) == pytest.approx(0.0, abs=1e-9)
+    assert back.misfit(truth, late=False, forward=True) == 1.0
+    assert combs(-u, truth).misfit(truth, late=False, forward=True) == pytest.approx(0.0, abs=1e-9)
+    assert combs(-u, truth, unit=-1.0).misfit(truth, late=False, forward=True) == 1.0

@@ -5,19 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from upright.study.model import read_rig
 
 from upright.errors import BadInput
 from upright.physics import find
 from upright.study.description import (
     Entry,
-    RigDescription,
+    Hardware,
     check_vendor,
     driven_unit,
     meaning_of,
     place_of,
     read_description,
 )
-from upright.study.rig import read_rig
 from upright.study.text import StudyText
 
 
@@ -25,7 +25,7 @@ def entry(value: float, unit: str = "V", source: str = "known") -> Entry:
     return Entry(value=value, unit=unit, source=source)
 
 
-RIG = RigDescription(name="bench 3", vendor="", entries={"limit": entry(10.0), "travel": entry(0.3, "m", "measured")})
+RIG = Hardware(name="bench 3", vendor="", entries={"limit": entry(10.0), "travel": entry(0.3, "m", "measured")})
 
 
 def test_entries_are_laid_over_each_other():
@@ -75,22 +75,22 @@ def test_what_is_missing_is_asked_for_with_every_way_to_say_it():
     ],
 )
 def test_a_fit_of_another_rig_is_told_by_what_nobody_guessed(name, mine, others, differs):
-    said = RigDescription(entries={name: mine}).unlike(RigDescription(entries={name: others}))
+    said = Hardware(entries={name: mine}).unlike(Hardware(entries={name: others}))
     assert len(said) == differs
     if differs:
         assert said[0].startswith(f"Is it the same rig? Its {meaning_of(name)}: ")
         assert f"{mine.value:.5g}" in said[0].partition(" in the fit")[0]
         assert f"{others.value:.5g}" in said[0].partition(" in the fit, ")[2]
-    assert RigDescription(entries={name: mine}).unlike(RigDescription()) == ()
+    assert Hardware(entries={name: mine}).unlike(Hardware()) == ()
 
 
 def test_names_and_vendors_tell_rigs_apart_where_both_have_one():
-    one, two = RigDescription(name="a", vendor="ECP 205"), RigDescription(name="b", vendor="ECP 210")
+    one, two = Hardware(name="a", vendor="ECP 205"), Hardware(name="b", vendor="ECP 210")
     assert one.unlike(two) == (
         "The fit is of another rig (a) than the study (b).",
         "The fit is of another rig (vendor ECP 205) than the study (vendor ECP 210).",
     )
-    assert one.unlike(RigDescription()) == one.unlike(one) == RigDescription().unlike(two) == ()
+    assert one.unlike(Hardware()) == one.unlike(one) == Hardware().unlike(two) == ()
 
 
 @pytest.mark.parametrize(
@@ -108,7 +108,7 @@ def test_an_entry_says_what_it_is_and_where_a_study_says_it(name, meaning, place
     assert (meaning_of(name), place_of(name)) == (meaning, place)
 
 
-def described(text: str, logs=()) -> RigDescription:
+def described(text: str, logs=()) -> Hardware:
     plant = find("cart-pendulum")
     root = StudyText(Path("s.toml"), text).root()
     return read_description(root, plant, read_rig(root, plant, "V", {"m_c": 1, "m_p": 1, "l_cg": 1}), logs)

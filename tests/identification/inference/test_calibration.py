@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from upright.identification import Parameter, Rig, Run
+from upright.identification import GreyBox, Parameter, Run
 from upright.identification.inference.bands import calibrated, recalibrated, sensitivity
 from upright.identification.inference.covariance import Optimum, assess
 from upright.identification.inference.scoring import predict, score
@@ -28,14 +28,14 @@ CART = find("rectilinear-1")
 DT, N, MASS, GAIN = 0.01, 400, 2.0, 3.0
 
 
-def cart(*, estimate: bool = True) -> Rig:
+def cart(*, estimate: bool = True) -> GreyBox:
     """The mass is known, the gain asked."""
     numbers = [
         Parameter(name="m_1", value=MASS, unit="kg"),
         Parameter(name="k_1", value=0.0, unit="N/m"),
         Parameter(name="actuator.gain", value=GAIN, unit="N/V", estimate=estimate),
     ]
-    return Rig(plant=CART, parameters={p.name: p for p in numbers})
+    return GreyBox(plant=CART, parameters={p.name: p for p in numbers})
 
 
 def command(index: int) -> np.ndarray:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from upright.identification import Parameter, Rig, Run
+from upright.identification import GreyBox, Parameter, Run
 from upright.identification.inference.covariance import Optimum, assess
 from upright.identification.inference.lateness import lateness
 from upright.identification.problem.residuals import formulate
@@ -32,7 +32,7 @@ def fitted(late: float, sway: float = 0.0, **known: float) -> Optimum:
     numbers |= {n: Parameter(name=n, value=v) for n, v in known.items()}
     run = Run(label="steps", role="fit", t=t, u=u[:, None], y=y, measured=("x_1",), unknown=(),
               initial={"x_1": 0.0, "x_1_dot": 0.0})  # fmt: skip
-    problem = formulate(Rig(plant=CART, parameters=numbers), [run])
+    problem = formulate(GreyBox(plant=CART, parameters=numbers), [run])
     problem.settle_steps(problem.start)
     return assess(problem, descend(problem.normal, problem.start, problem.lower, problem.upper).x)
 

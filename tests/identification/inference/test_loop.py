@@ -11,7 +11,7 @@ from scipy import stats
 from scipy.signal import place_poles
 
 from tests.identification.twins import FURUTA, rig, swing
-from upright.identification import Parameter, Rig
+from upright.identification import GreyBox, Parameter
 from upright.identification.inference.covariance import Optimum, assess
 from upright.identification.inference.loop import driven_plant, placed, root, standing
 from upright.identification.inference.poles import poles
@@ -22,7 +22,7 @@ POINT = {"m_p": 0.2, "l_cg": 0.25, "J_p": 0.0, "b_2": 0.0, "b_2c": 0.0, "b_2q": 
 OMEGA = math.sqrt(9.81 / POINT["l_cg"])
 
 
-def uncertain(name: str, relative: float, asked: Rig) -> Optimum:
+def uncertain(name: str, relative: float, asked: GreyBox) -> Optimum:
     """An optimum of which one shared number alone is uncertain, by a share of its value."""
     problem = formulate(asked, [swing(POINT, seconds=2.0, angle=0.5)])
     best = assess(problem, problem.start)
@@ -33,7 +33,7 @@ def uncertain(name: str, relative: float, asked: Rig) -> Optimum:
     return replace(best, covariance=np.diag(sigma**2))
 
 
-def driven(gain: float = 0.5) -> Rig:
+def driven(gain: float = 0.5) -> GreyBox:
     asked = rig(Pendulum, POINT, {})
     drive = Parameter(name="actuator.gain", value=gain, unit="N m/V", estimate=True)
     return replace(asked, parameters={**asked.parameters, "actuator.gain": drive})

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from upright.identification import Parameter, Rig, Run
+from upright.identification import GreyBox, Parameter, Run
 from upright.identification.inference.assumptions import assumptions, remedy, resting, sentences, with_assumptions
 from upright.identification.inference.covariance import Identifiability, Optimum, assess, identifiability, student
 from upright.identification.inference.intervals import (
@@ -54,14 +54,14 @@ def driven(**about: Any) -> Run:
     )
 
 
-def cart(*asked: str, assumed: str = "", **other: float) -> Rig:
+def cart(*asked: str, assumed: str = "", **other: float) -> GreyBox:
     values = {**TRUTH, **other}
     numbers = [Parameter(name=n, value=v, unit=UNITS[n], estimate=n in asked, assumed=n == assumed)
                for n, v in values.items()]  # fmt: skip
-    return Rig(plant=CART, parameters={p.name: p for p in numbers})
+    return GreyBox(plant=CART, parameters={p.name: p for p in numbers})
 
 
-def fitted(rig: Rig, *runs: Run) -> Optimum:
+def fitted(rig: GreyBox, *runs: Run) -> Optimum:
     problem = formulate(rig, runs or [driven()])
     problem.settle_steps(problem.start)
     return assess(problem, descend(problem.normal, problem.start, problem.lower, problem.upper).x)

@@ -13,7 +13,7 @@ from tests.identification.twins import PENDULUM, noisy, rig, swing
 from upright.errors import BadInput
 from upright.identification.model.bands import Bands, Spread
 from upright.identification.model.fit import Estimate
-from upright.identification.model.rig import Parameter, Rig, base_values, neutral
+from upright.identification.model.grey_box import Parameter, base_values, neutral
 from upright.identification.model.runs import Run
 from upright.identification.problem.residuals import Problem, formulate
 from upright.physics import Pendulum
@@ -185,5 +185,5 @@ def test_a_parameter_is_no_guess_unless_it_is_said() -> None:
         -math.inf,
         math.inf,
     )
-    assert not Rig(plant=Pendulum, parameters={}).guessed
-    assert Rig(plant=Pendulum, parameters={}).substeps == 1
+    assert not GreyBox(plant=Pendulum, parameters={}).guessed
+    assert GreyBox(plant=Pendulum, parameters={}).substeps == 1

@@ -12,7 +12,7 @@ import pytest
 from tests.identification.twins import FURUTA, PENDULUM, rig
 from upright.closed_loop.structures import ClosedLoop
 from upright.errors import BadInput
-from upright.identification import Parameter, Rig, Run
+from upright.identification import GreyBox, Parameter, Run
 from upright.identification.problem.residuals import Problem, formulate, unreached, unresolved
 from upright.identification.problem.simulated import with_noise
 from upright.identification.problem.tracks import nearest_equilibrium, prepare
@@ -35,7 +35,7 @@ def sought(name: str, **fields: Any) -> Unknown:
     """One parameter of a cart's rig, as it is sought."""
     p = Parameter(**{"name": name, "value": 4.0, "estimate": True, **fields})
     numbers = {n: Parameter(name=n, value=v) for n, v in VALUES.items()} | {name: p}
-    (found,) = shared_unknowns(Rig(plant=CART, parameters=numbers))
+    (found,) = shared_unknowns(GreyBox(plant=CART, parameters=numbers))
     return found
 
 
@@ -80,7 +80,7 @@ def test_what_is_known_within_a_tolerance_is_sought_but_not_asked() -> None:
     none = sought("c_1", estimate=False, uncertainty=0.2, value=0.0)
     assert (none.prior, none.scale) == ((0.0, 0.2), 0.2)
     known = {n: Parameter(name=n, value=v) for n, v in VALUES.items()}
-    assert shared_unknowns(Rig(plant=CART, parameters=known)) == []
+    assert shared_unknowns(GreyBox(plant=CART, parameters=known)) == []
 
 
 def test_an_open_bound_has_no_logarithm() -> None:
@@ -91,7 +91,7 @@ def test_an_open_bound_has_no_logarithm() -> None:
 def posed(run: Run, *asked: str) -> Problem:
     numbers = {n: Parameter(name=n, value=v, estimate=n in asked) for n, v in VALUES.items()}
     numbers |= {n: Parameter(name=n, value=v) for n, v in (("actuator.gain", 3.0), ("actuator.offset", 0.2))}
-    return formulate(Rig(plant=CART, parameters=numbers), [run], thin=False)
+    return formulate(GreyBox(plant=CART, parameters=numbers), [run], thin=False)
 
 
 def own(run: Run) -> dict[str, Unknown]:
@@ -159,7 +159,7 @@ def test_a_drive_acts_within_its_command(
 def test_a_zero_that_nothing_feels_is_sought_where_a_law_reads_it() -> None:
     """A cart without a spring may stand anywhere, but for the law that pulls it to where its sensor reads zero."""
     numbers = {n: Parameter(name=n, value=v) for n, v in {"m_1": 2.0, "k_1": 0.0}.items()}
-    free = Rig(plant=CART, parameters=numbers)
+    free = GreyBox(plant=CART, parameters=numbers)
     run = swung(unknown=("offset",))
     assert formulate(free, [run]).unknowns == []
     loop = ClosedLoop(law=state_feedback([-6.0, -1.8], DT, measured=("x_1",)))
@@ -173,7 +173,7 @@ def test_own_numbers_act_where_they_belong() -> None:
     run = swung(u=np.ones((N, 1)), unknown=("initial", *names), initial={"x_1_dot": 0.1})
     numbers = {n: Parameter(name=n, value=v) for n, v in {"m_1": 2.0, "k_1": 0.0, "actuator.gain": 3.0}.items()}
     numbers["actuator.offset"] = Parameter(name="actuator.offset", value=0.2)
-    problem = formulate(Rig(plant=CART, parameters=numbers), [run], thin=False)
+    problem = formulate(GreyBox(plant=CART, parameters=numbers), [run], thin=False)
     chosen = {"initial.x_1": 0.4, "gain": 1.5, "scale.x_1": 1.1, "offset.x_1": -0.05, "input_offset": 0.3}
     x = problem.place({f"run: {n}": v for n, v in chosen.items()})
     assert problem.values_at(x) == pytest.approx({f"run: {n}": v for n, v in chosen.items()})
@@ -187,7 +187,7 @@ def test_what_the_sensors_are_off_by_is_taken_off_the_state_where_it_restarts() 
     t = DT * np.arange(N)
     run = swung(y=(0.2 + 0.1 * t)[:, None], unknown=("scale.x_1", "offset.x_1"), horizon=1.0)
     numbers = {n: Parameter(name=n, value=v) for n, v in {"m_1": 2.0, "k_1": 0.0}.items()}
-    problem = formulate(Rig(plant=CART, parameters=numbers), [run], thin=False)
+    problem = formulate(GreyBox(plant=CART, parameters=numbers), [run], thin=False)
     x = problem.place({"run: scale.x_1": 1.1, "run: offset.x_1": -0.05})
     y = problem.simulate(0, x[:, None], problem.tracks[0].length)[:, :, 0, 0]
     starts = problem.tracks[0].restarts
@@ -235,7 +235,7 @@ def test_a_presliding_length_is_no_shorter_than_the_rounding_that_sees_it(
 ) -> None:
     numbers = {n: Parameter(name=n, value=v) for n, v in VALUES.items()}
     numbers["delta_1"] = Parameter(name="delta_1", value=1e-4, unit="m", estimate=True, lower=0.0)
-    problem = formulate(Rig(plant=CART, parameters=numbers), [swung(quantum=quantum, unknown=())])
+    problem = formulate(GreyBox(plant=CART, parameters=numbers), [swung(quantum=quantum, unknown=())])
     (u,) = problem.unknowns
     assert (u.lower, u.value) == (pytest.approx(lower, abs=1e-8), pytest.approx(max(lower, 1e-4)))
     if quantum:
@@ -250,11 +250,11 @@ def test_a_limit_that_no_run_reaches_leaves_the_cost_as_it_is() -> None:
         numbers["actuator.gain"] = Parameter(name="actuator.gain", value=3.0)
         numbers["actuator.force_limit"] = Parameter(name="actuator.force_limit", value=limit, estimate=True)
         run = swung(u=np.sin(3 * DT * np.arange(N))[:, None], unknown=())
-        free = formulate(Rig(plant=CART, parameters={**numbers, "actuator.force_limit": replace(
+        free = formulate(GreyBox(plant=CART, parameters={**numbers, "actuator.force_limit": replace(
             numbers["actuator.force_limit"], estimate=False)}), [run], thin=False)  # fmt: skip
         y = free.simulate(0, np.zeros((0, 1)), N)[:, 0, :, 0]
         problem = formulate(
-            Rig(plant=CART, parameters=numbers), [replace(run, y=y + 1e-3 * np.cos(DT * np.arange(N))[:, None])]
+            GreyBox(plant=CART, parameters=numbers), [replace(run, y=y + 1e-3 * np.cos(DT * np.arange(N))[:, None])]
         )
         assert unreached(problem, problem.start) == idle
 

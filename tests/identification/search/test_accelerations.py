@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from tests.identification.twins import FURUTA, rig, shaken
-from upright.identification import Parameter, Rig, Run
-from upright.identification.model.rig import base_values
+from upright.identification import GreyBox, Parameter, Run
+from upright.identification.model.grey_box import base_values
 from upright.identification.search.starts import (
     Sample,
     disagreement,
@@ -31,9 +31,9 @@ VALUES = {"m_1": 2.0, "k_1": 50.0, "c_1": 1.5, "f_1c": 0.4, "f_1q": 0.3}
 T = DT * np.arange(N)
 
 
-def cart(*asked: str, gain: float = 3.0, **other: float) -> Rig:
+def cart(*asked: str, gain: float = 3.0, **other: float) -> GreyBox:
     numbers = {n: Parameter(name=n, value=v, estimate=n in asked) for n, v in {**VALUES, **other}.items()}
-    return Rig(plant=CART, parameters=numbers | {"actuator.gain": Parameter(name="actuator.gain", value=gain)})
+    return GreyBox(plant=CART, parameters=numbers | {"actuator.gain": Parameter(name="actuator.gain", value=gain)})
 
 
 def driven(**about: Any) -> Run:

@@ -47,7 +47,7 @@ def two(changed, fit):
         "actuator.delay": Parameter(name="actuator.delay", value=0.5, unit="s"),
     }
     known = replace(MASS, status="known")
-    return changed(rig=replace(fit.rig, parameters=parameters), estimates={"J_d": MASS, "r": known})
+    return changed(rig=replace(fit.model, parameters=parameters), estimates={"J_d": MASS, "r": known})
 
 
 def test_parameters_stand_with_error_interval_unit_and_how_they_are_known(two):
@@ -262,7 +262,7 @@ def test_pictures_of_what_is_unseen_are_those_that_the_fit_can_fill(fit, changed
 
 
 def test_a_picture_of_a_run_says_how_it_was_followed(fit):
-    plant = fit.rig.plant
+    plant = fit.model.plant
     runs = {
         "tail": score("predict", horizon=0.5, score_from=0.25, band={"theta": np.full(5, 0.1)}),
         "ahead": score("predict", horizon=0.5, ahead={0.5: {"theta": 1.0}}), "whole": score(),
@@ -281,11 +281,11 @@ def test_a_picture_of_a_run_says_how_it_was_followed(fit):
 
 def test_equations_leave_out_what_this_fit_has_at_zero_and_keep_what_it_estimates(fit):
     """k_psi is nobody's here and may be zero; b_1 is estimated, even from a guess of zero."""
-    parameters = dict(fit.rig.parameters)
+    parameters = dict(fit.model.parameters)
     parameters["b_1"] = replace(parameters["b_1"], value=0.0)
     parameters["b_2"] = Parameter(name="b_2", value=0.0, unit="N m s/rad")
     del parameters["l_cg"]  # cannot be zero, whoever says it
-    markup = motion_part(replace(fit, rig=replace(fit.rig, parameters=parameters))).content[1].markup
+    markup = motion_part(replace(fit, rig=replace(fit.model, parameters=parameters))).content[1].markup
     assert "<mtext>cg</mtext>" in markup
     assert "tilt" not in markup
     assert "<mtext>psi</mtext>" not in markup

@@ -10,7 +10,7 @@ import pytest
 
 from tests.study.draft.test_recognise import OTHER, SWING, T, log
 from tests.study.draft.test_tables import shown
-from upright.identification.model.rig import Parameter, Rig
+from upright.identification.model.grey_box import GreyBox, Parameter
 from upright.identification.search.starts import Sample
 from upright.physics import find
 from upright.readers import inspect
@@ -120,7 +120,7 @@ def test_springs_that_a_draft_leaves_out_are_asked_with_the_swing_of_the_log():
     }
 
     def asked(**changes: Parameter) -> Parameter:
-        rig = Rig(plant=plant, parameters=numbers | changes)
+        rig = GreyBox(plant=plant, parameters=numbers | changes)
         empty = np.zeros((1, 3))
         sample = Sample(
             run=None, dt=0.1, q=empty, v=empty, a=empty, u=empty, free=(0,), fades=np.zeros(1), width=5, edge=2,

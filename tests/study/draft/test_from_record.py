@@ -57,18 +57,18 @@ KNOWN = {"m_p": 0.2, "l_cg": 0.3}
 
 def test_a_placeholder_is_the_first_guess_of_what_is_asked_beyond_the_draft() -> None:
     study = study_of_record(PLAIN, Pendulum, known={"l_cg": 0.3}, ask=["m_p"])
-    assert study.rig.estimated == ("m_p",)
-    assert study.rig.parameters["m_p"].value == 1.0
+    assert study.model.estimated == ("m_p",)
+    assert study.model.parameters["m_p"].value == 1.0
     assert (study.title, study.plant) == ("swing 3", "pendulum")
     assert study_of_record(PLAIN.replace(provenance=Provenance()), Pendulum, known=KNOWN).title == "log"
 
 
 def test_what_the_draft_asks_is_asked_where_nobody_says_otherwise() -> None:
     study = study_of_record(PLAIN, Pendulum, known={"b_2": 1e-3})
-    assert "l_cg" in study.rig.estimated
-    assert "b_2" not in study.rig.estimated
-    assert study.rig.parameters["b_2"].value == 1e-3
-    assert study.rig.parameters["l_cg"].value == pytest.approx(9.81 / 36, rel=0.02)
+    assert "l_cg" in study.model.estimated
+    assert "b_2" not in study.model.estimated
+    assert study.model.parameters["b_2"].value == 1e-3
+    assert study.model.parameters["l_cg"].value == pytest.approx(9.81 / 36, rel=0.02)
     given = study_of_record(PLAIN, Pendulum, known=KNOWN, ask={"b_2": "3e-3 N m s/rad"})
     assert given.rig.estimated == ("b_2",)
     assert given.rig.parameters["b_2"].value == 3e-3
@@ -108,7 +108,7 @@ def test_of_two_joints_one_lends_the_other_its_friction() -> None:
     record = Record(t=T, signals={"psi": arm, "theta": SWING}, units={"psi": "rad", "theta": "rad"})
     known = {"m_p": 0.1, "l_cg": 0.25, "r": 0.1, "J_d": 1e-3, "b_2": 7e-4}
     study = study_of_record(record, Furuta, known=known, ask=["b_1"])
-    assert study.rig.parameters["b_1"].value == 7e-4
+    assert study.model.parameters["b_1"].value == 7e-4
 
 
 class Own(Pendulum):
@@ -117,7 +117,7 @@ class Own(Pendulum):
 
 def test_a_plant_of_ones_own_takes_columns_of_its_coordinates_names() -> None:
     study = study_of_record(PLAIN, Own, known=KNOWN, ask={"b_2": 1e-3})
-    assert study.rig.estimated == ("b_2",)
+    assert study.model.estimated == ("b_2",)
     np.testing.assert_allclose(study.runs[0].y[:, 0], SWING)
     assert study.runs[0].unknown == ("initial",)
     bare = Record(t=T, signals={"theta": SWING})
