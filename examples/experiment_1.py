@@ -12,11 +12,11 @@ from tempfile import TemporaryDirectory
 
 from upright.experiments.frequency_1b.figures import bode_figure
 from upright.experiments.frequency_1b.run import run_frequency
-from upright.experiments.makes import make_rig
 from upright.experiments.weighing_1a.figures import line_figure
 from upright.experiments.weighing_1a.run import run_weighing
 from upright.identification.frequency.answer import curves
 from upright.report.drawing import save
+from upright.rig.makes import make_rig
 
 seed = int(sys.argv[1]) if sys.argv[1:] else 0
 rig = make_rig("furuta", seed)

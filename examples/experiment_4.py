@@ -12,10 +12,10 @@ from tempfile import TemporaryDirectory
 
 from upright.experiments.free_swing_4.release import drift_paths, freed
 from upright.experiments.free_swing_4.run import fit_question, recovered, write_questions
-from upright.experiments.makes import make_rig
 from upright.physics import Furuta
 from upright.report.drawing import save
 from upright.report.fit.figures import fit_figure
+from upright.rig.makes import make_rig
 
 # A rig of the make with its drive belt off, so that the disk turns freely.
 rig = freed(make_rig("furuta", seed=int(sys.argv[1]) if sys.argv[1:] else 0))

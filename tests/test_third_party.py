@@ -116,7 +116,7 @@ FORMS = """
         return {"law.txt": f"{made.law.period!r} {made.law.D.tolist()!r}"}
 
     def of_rig(asked):
-        rows = "".join(f"{n}={v!r}\\n" for n, v in asked.model.plant.parameters().items())
+        rows = "".join(f"{n}={v!r}\\n" for n, v in asked.rig.plant.parameters().items())
         return {"rig.its": rows.encode()}, Chapter(title="ITS", verdict=f"{asked.called} is written for ITS.")
 
     LAW = LawTarget(name="its", title="ITS", write=of_law, test="its {folder}", onward="Run it.")

@@ -316,7 +316,7 @@ def test_energy_and_power_of_a_swing_are_those_of_a_pendulum_on_a_moved_pivot():
 
 
 def test_the_law_begins_where_the_encoders_stand():
-    rig = replace(make_rig("furuta"), scales=(1.0, -2.0), counts=(100.0, 1000.0), converter=0.25)
+    rig = make_rig("furuta").replace(scales=(1.0, -2.0), counts=(100.0, 1000.0), converter=0.25)
     law = designed("furuta")
     still, held = law.rule(rig, [0.5, 0.1, 0.3, 0.2]), law.rule(rig, [0.5, 0.1, 0.3, 0.2], holding=True)
     # zeros where it hangs, in what is shown; switched on while it swings, speeds are not known, and no event was
@@ -342,7 +342,7 @@ def test_the_law_begins_where_the_encoders_stand():
 
 def test_a_design_takes_limit_and_travel_from_the_rig_and_its_feedback_is_of_least_cost():
     rig = make_rig("linear")
-    law = design_swing_up(replace(rig, travel=0.15, more={"actuator.force_limit": 0.8 * rig.limit * rig.gain}))
+    law = design_swing_up(rig.replace(travel=0.15, more={"actuator.force_limit": 0.8 * rig.limit * rig.gain}))
     assert law.travel == 0.15
     assert TRAVEL["rad"] == math.tau  # one turn of a cable, where no rig says
     assert law.limit == pytest.approx(0.8 * rig.limit)
@@ -394,14 +394,14 @@ def test_half_swings_are_counted_to_the_first_handover():
 
 def test_saturation_of_an_ascent_is_that_of_the_drive_s_force():
     rig = make_rig("linear")
-    weak = replace(rig, more={"actuator.force_limit": 0.5 * rig.limit * rig.gain})
+    weak = rig.replace(more={"actuator.force_limit": 0.5 * rig.limit * rig.gain})
     u = 0.5 * rig.limit * np.array([1.0, -1.0, 0.99, 0.0, 1.5])
     assert ascent([0.0] * 5, [0] * 5, u=u, rig=weak).saturated == pytest.approx(3 / 5)
 
 
 def test_what_a_run_of_a_swing_up_shows_is_what_the_law_knew_after_each_sample():
     """A pendulum turned by hand at 2 rad/s, its encoder the wrong way round, and no filter."""
-    rig = replace(make_rig("linear"), scales=(1.0, -1.0), converter=0.0)
+    rig = make_rig("linear").replace(scales=(1.0, -1.0), converter=0.0)
     law = replace(designed("linear"), memory=0.0)
     t = np.arange(5) * rig.period
     theta = 0.1 + 2.0 * t

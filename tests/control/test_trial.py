@@ -139,7 +139,7 @@ def test_figures_of_runs_side_by_side_are_those_of_each():
                     [9.0, 0.2, 0.2]])  # fmt: skip
     u = np.array([[3.0, 1.0, -5.0], [4.0, -1.0, 0.0], [0.0, 1.0, 4.9], [-5.0, 1.0, 0.0], [5.0, 1.0, 0.0],
                   [5.0, 3.0, 5.0]])  # fmt: skip
-    rig = replace(RIG, travel=2.0, limit=5.0)
+    rig = RIG.replace(travel=2.0, limit=5.0)
     found = lanes_of(theta, psi=psi, u=u, rig=rig, fallen=1.0, band=0.1)
     # a bound itself is still within: 1 rad has not fallen, 2 rad of travel are there, a band's edge is settled
     assert found.fell.tolist() == [1.5, math.inf, math.inf]
@@ -171,9 +171,9 @@ def test_a_watched_coordinate_falls_and_settles_instead_of_the_last():
 
 def test_a_driven_body_faster_than_its_limit_has_run_out():
     psi = np.array([[0.0], [0.0], [1.0], [2.5], [4.5]])  # central differences 0, 1, 2.5, 3.5, 4 rad/s
-    rig = replace(RIG, speed_limit=2.5, travel=100.0)
+    rig = RIG.replace(speed_limit=2.5, travel=100.0)
     assert lanes_of(np.zeros((5, 1)), psi=psi, rig=rig).ran_out[0] == 1.5
-    early = lanes_of(np.zeros((5, 1)), psi=psi, rig=replace(rig, travel=0.5))
+    early = lanes_of(np.zeros((5, 1)), psi=psi, rig=rig.replace(travel=0.5))
     assert early.ran_out[0] == 1.0  # whichever comes first
 
 
@@ -191,13 +191,13 @@ def test_a_driven_body_faster_than_its_limit_has_run_out():
 )
 def test_a_rig_that_cannot_be_is_refused(changed, words):
     with pytest.raises(BadInput, match=words):
-        replace(RIG, **changed)
+        RIG.replace(**changed)
 
 
 def test_a_drive_s_braking_goes_with_the_speed_of_what_it_drives():
     """Gain u less (slope + damping + standby) psi': the columns of psi' change by that along B."""
     more = {"actuator.slope": 0.02, "actuator.damping": 0.03, "actuator.standby": 0.05}
-    bare, braked = RIG.linear("inverted"), replace(RIG, more=more).linear("inverted")
+    bare, braked = RIG.linear("inverted"), RIG.replace(more=more).linear("inverted")
     force = bare.B[:, 0] / RIG.gain
     expected = bare.A.copy()
     expected[:, 1] -= 0.1 * force
@@ -228,7 +228,7 @@ def test_a_force_limit_is_met_at_its_command(force, droop, gain, full):
 
 def test_a_log_has_readings_command_and_the_reference_that_is_held():
     t, x = np.arange(4) * 0.1, np.arange(16.0).reshape(4, 4)
-    rig = replace(RIG, counts=(10.0, 4.0), unit="A", scales=(1.0, 2.0))
+    rig = RIG.replace(counts=(10.0, 4.0), unit="A", scales=(1.0, 2.0))
     log = logged(rig, t, x + 0.06, np.array([1.0, 2.0, 3.0, 4.0]), [7.0, 8.0])
     assert log["psi"] == pytest.approx([0.1, 4.1, 8.1, 12.1])
     assert log["theta"] == pytest.approx([4.0, 12.0, 20.0, 28.0])  # of 56.24 half radians, 112 counts of them
@@ -265,7 +265,7 @@ def test_pushes_shorter_than_the_run_end_and_longer_ones_are_cut():
 
 
 def test_a_law_at_work_takes_rest_and_reference_of_the_rig():
-    rig = replace(RIG, scales=(1.0, -0.5), converter=0.25)
+    rig = RIG.replace(scales=(1.0, -0.5), converter=0.25)
     made = at_work(rig, LAW, [0.1, 3.0])
     assert (made.delay, made.command_quantum) == (0.0, 0.25)
     assert np.asarray(made.quantum) == pytest.approx(rig.quantum * [1.0, 2.0])

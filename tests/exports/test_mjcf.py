@@ -242,8 +242,8 @@ def described(rig, **values):
 
 
 def test_the_drive_has_its_gain_limits_lag_and_what_it_loses_with_speed(tmp_path):
-    rig = replace(identified(tmp_path, RIGS["pendulum"]), lag=0.02)
-    root, _ = parsed(described(rig, limit=5.0, force_limit=0.25, slope=1e-3, damping=2e-3, standby=4e-3))
+    rig = identified(tmp_path, RIGS["pendulum"])
+    root, _ = parsed(described(rig, lag=0.02, limit=5.0, force_limit=0.25, slope=1e-3, damping=2e-3, standby=4e-3))
     drive = root.find(".//actuator/general").attrib
     assert (drive["joint"], numbers(drive["gainprm"]), drive["biastype"]) == ("theta", [0.5], "affine")
     assert numbers(drive["biasprm"]) == pytest.approx([0, 0, -7e-3])

@@ -131,9 +131,9 @@ def test_relative_encoders_identify_a_plant_in_absolute_angles(study, swing, noi
     t = 5e-3 * np.arange(len(swing))
     by_camera = study(LINKS + "[sensors.theta_2]\n", t=t, theta_1=first + a, theta_2=second + c)
     by_encoders = study(LINKS + RELATIVE, t=t, theta_1=first + a, enc2=second - first + b)
-    fits = [identify(s.rig, s.runs) for s in (by_camera, by_encoders)]
-    assert by_encoders.rig.plant is DoublePendulumAbsolute
-    for name in by_camera.rig.estimated:
+    fits = [identify(s.model, s.runs) for s in (by_camera, by_encoders)]
+    assert by_encoders.model.plant is DoublePendulumAbsolute
+    for name in by_camera.model.estimated:
         camera, encoders = (fit.estimates[name] for fit in fits)
         if noise:  # the two share the noise of the first angle alone: at most as far apart as their errors together
             assert abs(camera.value - encoders.value) < 4 * math.hypot(camera.stderr, encoders.stderr)

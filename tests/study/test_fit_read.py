@@ -96,12 +96,12 @@ def test_units_groups_and_scores_are_read_under_their_names():
 
 
 def test_the_drive_of_an_older_fit_is_told_by_what_differs_from_none():
-    entries = model().description.entries
+    entries = model().hardware.entries
     assert set(entries) == {"gain", "delay"}
     assert (entries["gain"].value, entries["gain"].unit, entries["gain"].source) == (4.0, "N/V", "identified")
     assert entries["delay"].source == "known"
     stated = FIT["parameters"] | {"actuator.delay": {"value": 2e-3, "stderr": 1e-4, "unit": "s"}}
-    assert model(parameters=stated).description.entries["delay"].source == "measured"
+    assert model(parameters=stated).hardware.entries["delay"].source == "measured"
 
 
 def test_bands_arrive_with_their_spreads_and_what_was_reached():

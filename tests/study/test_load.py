@@ -11,7 +11,7 @@ from upright.study.load import load_study
 
 
 def test_parameters_arrive_in_si_whatever_their_unit(study):
-    p = study(RIG + SENSORS + RUN).rig.parameters
+    p = study(RIG + SENSORS + RUN).model.parameters
     assert p["m_p"].value == pytest.approx(0.107)
     assert (p["l_cg"].value, p["l_cg"].uncertainty) == pytest.approx((0.23, 0.002))
     assert p["J_p"].value == 1.6e-3
@@ -21,12 +21,12 @@ def test_parameters_arrive_in_si_whatever_their_unit(study):
 
 
 def test_only_guesses_are_asked(study):
-    assert study(RIG + SENSORS + RUN).rig.estimated == ("J_p", "b_1c")
+    assert study(RIG + SENSORS + RUN).model.estimated == ("J_p", "b_1c")
 
 
 def test_an_uncertainty_in_percent_is_of_the_value(study):
     text = RIG.replace('"2 mm"', '"5 %"')
-    assert study(text + SENSORS + RUN).rig.parameters["l_cg"].uncertainty == pytest.approx(0.05 * 0.23)
+    assert study(text + SENSORS + RUN).model.parameters["l_cg"].uncertainty == pytest.approx(0.05 * 0.23)
 
 
 @pytest.mark.parametrize(
@@ -41,12 +41,12 @@ def test_an_uncertainty_in_percent_is_of_the_value(study):
     ],
 )
 def test_the_gain_is_force_per_unit_of_the_command(study, drive, gain, value, unit):
-    p = study(f"{RIG}[actuator]\ngain = {gain}\n{drive}\n{SENSORS}{RUN}").rig.parameters["actuator.gain"]
+    p = study(f"{RIG}[actuator]\ngain = {gain}\n{drive}\n{SENSORS}{RUN}").model.parameters["actuator.gain"]
     assert (p.value, p.unit) == (pytest.approx(value), unit)
 
 
 def test_actuator_numbers_left_out_pass_the_command_as_it_is(study):
-    p = study(RIG + SENSORS + RUN).rig.parameters
+    p = study(RIG + SENSORS + RUN).model.parameters
     names = ("gain", "offset", "limit", "lag", "delay", "slope")
     assert [p[f"actuator.{n}"].value for n in names] == [1.0, 0.0, math.inf, 0.0, 0.0, 0.0]
 
@@ -55,14 +55,14 @@ def test_the_slope_is_force_per_speed_and_times_are_seconds(study):
     p = study(
         RIG + '[actuator]\nslope = "2 N s/m"\nlag = "20 ms"\ndelay = { guess = "1 ms", max = "5 ms" }\n' + SENSORS + RUN
     )
-    assert p.rig.parameters["actuator.slope"].value == 2
-    assert p.rig.parameters["actuator.lag"].value == pytest.approx(0.02)
-    assert p.rig.parameters["actuator.delay"].estimate
+    assert p.model.parameters["actuator.slope"].value == 2
+    assert p.model.parameters["actuator.lag"].value == pytest.approx(0.02)
+    assert p.model.parameters["actuator.delay"].estimate
 
 
 def test_a_drive_that_trips_and_fades_is_read_with_its_units(study):
     text = 'end = { guess = "2500 ms" }\nstandby = "2 N s/m"\nknee = "300 mm/s"\nfade = { guess = "1 N s/m" }\n'
-    p = study(f"{RIG}[actuator]\n{text}start = -inf\n{SENSORS}{RUN}").rig.parameters
+    p = study(f"{RIG}[actuator]\n{text}start = -inf\n{SENSORS}{RUN}").model.parameters
     assert p["actuator.end"].value == pytest.approx(2.5)
     assert p["actuator.end"].estimate
     assert (p["actuator.standby"].unit, p["actuator.standby"].value) == ("N s/m", 2.0)
@@ -172,7 +172,7 @@ def test_a_user_plant_is_found_beside_the_study(study, tmp_path):
         encoding="utf-8",
     )
     run = study('[rig]\nplant = "my_plant.py:Mass"\n[parameters]\nm = { guess = 1 }\n[sensors.x]\n' + RUN)
-    assert run.rig.plant.__name__ == "Mass"
+    assert run.model.plant.__name__ == "Mass"
     assert one(run).u.shape == (T.size, 0)
 
 

@@ -6,10 +6,10 @@ import math
 from pathlib import Path
 
 import pytest
-from upright.study.model import actuator_unit, known_values, per, read_rig
 
 from upright.errors import BadInput
 from upright.physics import find
+from upright.study.rig import actuator_unit, known_values, per, read_rig
 from upright.study.text import StudyText
 
 PLANT = find("cart-pendulum")

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from upright.errors import BadInput
-from upright.study.text import Section, StudyText, TomlTable, counted_sensor, number, show, si, source_of, toml
+from upright.quantities import with_unit
+from upright.study.text import Section, StudyText, TomlTable, counted_sensor, show, si, source_of, toml
 
 TEXT = """title = "x"
 [a]
@@ -176,6 +177,6 @@ def test_a_line_of_a_table_has_its_comment_behind_it_and_no_strange_characters()
     table.line("x\x07y")
     assert str(table) == "[a]   # why\nk = 0.123457   # so\n# off = true\nx y\n"
     assert toml([1, 0.5, "a\x7f", {"b": (2,)}], 3) == '[1, 0.5, "a\\u007f", { b = [2] }]'
-    assert (number(0.12345, "m"), number(2.0, "1"), number(2.0), number(0.12345, "m", 1)) == (
+    assert (with_unit(0.12345, "m"), with_unit(2.0, "1"), with_unit(2.0), with_unit(0.12345, "m", 1)) == (
         "0.123 m", "2", "2", "0.1 m",
     )  # fmt: skip

@@ -112,8 +112,8 @@ class Rig:
         gone: set[str] = set()
         for name in _ENTRIES.keys() & changes.keys():
             value = float(changes.pop(name))
-            if name in ("limit", "period") and not value > 0:
-                raise BadInput(f"the {name} of a rig must be positive, got {value:g}.")
+            if name in ("limit", "period") and not 0 < value < math.inf:
+                raise BadInput(f"the {name} of a rig must be positive and finite, got {value:g}.")
             if math.isfinite(value):
                 said[_ENTRIES[name]] = Entry(value=value, unit=units[name], source="known")
             else:

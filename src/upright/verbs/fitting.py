@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from upright.physics import Plant
     from upright.report.page import Chapter
     from upright.rig import Rig
+    from upright.study.fitted import FittedModel
     from upright.study.load import Study
 
 METHODS = ("auto", "simplex", "least-squares")
@@ -97,9 +98,17 @@ class FitAnswer(Answer["Fit"]):
 
         Every verb takes it, and tells how far the fit can be trusted.
         """
-        from upright.verbs.handover import rig_of
+        from upright.study.stored_rig import rig_of_fit
 
-        return rig_of(self, "rig")
+        return rig_of_fit(self.fitted, self.value.model.plant)
+
+    @property
+    def fitted(self) -> FittedModel:
+        """What `save` writes, as it is read again."""
+        from upright.study.fitted import fitted_model
+        from upright.study.results import fit_content
+
+        return fitted_model(fit_content(self.value, self.study, self.crossed))
 
     @property
     def plant(self) -> Plant:

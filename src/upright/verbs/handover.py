@@ -59,14 +59,13 @@ def fitted_of(source: Any, verb: str) -> FittedModel:
     BadInput
         When it is none of these.
     """
-    from upright.study.fitted import FittedModel, fitted_model, read_fit
-    from upright.study.results import fit_content
+    from upright.study.fitted import FittedModel, read_fit
     from upright.verbs.fitting import FitAnswer
 
     if isinstance(source, FittedModel):
         return source
     if isinstance(source, FitAnswer):
-        return fitted_model(fit_content(source.value, source.study, source.crossed))
+        return source.fitted
     path = _file(source, verb)
     return read_fit(path / SAVED if path.is_dir() else path)
 

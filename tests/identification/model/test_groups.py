@@ -132,7 +132,7 @@ def test_a_fit_file_keeps_what_groups_share(two_days, tmp_path):
 
     fit, runs = two_days
     study = SimpleNamespace(
-        title="", plant="pendulum", path=tmp_path, sha256="", source="", runs=runs, description=Hardware()
+        title="", plant="pendulum", path=tmp_path, sha256="", source="", runs=runs, hardware=Hardware()
     )
     content = write_fit(fit, study, tmp_path / "fit.json")
     assert content["groups"]["Monday"]["friction"]["status"] == "firm"

@@ -13,7 +13,7 @@ from tests.identification.twins import PENDULUM, noisy, rig, swing
 from upright.errors import BadInput
 from upright.identification.model.bands import Bands, Spread
 from upright.identification.model.fit import Estimate
-from upright.identification.model.grey_box import Parameter, base_values, neutral
+from upright.identification.model.grey_box import GreyBox, Parameter, base_values, neutral
 from upright.identification.model.runs import Run
 from upright.identification.problem.residuals import Problem, formulate
 from upright.physics import Pendulum

@@ -47,7 +47,7 @@ def two(changed, fit):
         "actuator.delay": Parameter(name="actuator.delay", value=0.5, unit="s"),
     }
     known = replace(MASS, status="known")
-    return changed(rig=replace(fit.model, parameters=parameters), estimates={"J_d": MASS, "r": known})
+    return changed(model=replace(fit.model, parameters=parameters), estimates={"J_d": MASS, "r": known})
 
 
 def test_parameters_stand_with_error_interval_unit_and_how_they_are_known(two):
@@ -68,8 +68,8 @@ def test_parameters_stand_with_error_interval_unit_and_how_they_are_known(two):
 def test_the_drive_s_gain_is_listed_where_it_is_not_the_usual_one(two):
     """One N m per unit of command is what a drive has of which nothing is said."""
     assert "actuator.gain" not in [row[0] for row in parameter_table(two).rows]
-    given = two.rig.parameters | {"actuator.gain": Parameter(name="actuator.gain", value=2.0, unit="N m/V")}
-    table = parameter_table(replace(two, rig=replace(two.rig, parameters=given)))
+    given = two.model.parameters | {"actuator.gain": Parameter(name="actuator.gain", value=2.0, unit="N m/V")}
+    table = parameter_table(replace(two, model=replace(two.model, parameters=given)))
     assert "actuator.gain" in [row[0] for row in table.rows]
 
 
@@ -285,7 +285,7 @@ def test_equations_leave_out_what_this_fit_has_at_zero_and_keep_what_it_estimate
     parameters["b_1"] = replace(parameters["b_1"], value=0.0)
     parameters["b_2"] = Parameter(name="b_2", value=0.0, unit="N m s/rad")
     del parameters["l_cg"]  # cannot be zero, whoever says it
-    markup = motion_part(replace(fit, rig=replace(fit.model, parameters=parameters))).content[1].markup
+    markup = motion_part(replace(fit, model=replace(fit.model, parameters=parameters))).content[1].markup
     assert "<mtext>cg</mtext>" in markup
     assert "tilt" not in markup
     assert "<mtext>psi</mtext>" not in markup

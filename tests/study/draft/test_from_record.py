@@ -70,9 +70,9 @@ def test_what_the_draft_asks_is_asked_where_nobody_says_otherwise() -> None:
     assert study.model.parameters["b_2"].value == 1e-3
     assert study.model.parameters["l_cg"].value == pytest.approx(9.81 / 36, rel=0.02)
     given = study_of_record(PLAIN, Pendulum, known=KNOWN, ask={"b_2": "3e-3 N m s/rad"})
-    assert given.rig.estimated == ("b_2",)
-    assert given.rig.parameters["b_2"].value == 3e-3
-    assert study_of_record(PLAIN, Pendulum, known=KNOWN, ask=["b_2"]).rig.parameters["b_2"].value > 0
+    assert given.model.estimated == ("b_2",)
+    assert given.model.parameters["b_2"].value == 3e-3
+    assert study_of_record(PLAIN, Pendulum, known=KNOWN, ask=["b_2"]).model.parameters["b_2"].value > 0
 
 
 @pytest.mark.parametrize(

@@ -5,19 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from upright.study.model import read_rig
 
 from upright.errors import BadInput
 from upright.physics import find
-from upright.study.description import (
-    Entry,
-    Hardware,
-    check_vendor,
-    driven_unit,
-    meaning_of,
-    place_of,
-    read_description,
-)
+from upright.rig.hardware import Entry, Hardware, check_vendor, driven_unit, meaning_of, place_of
+from upright.study.description import read_hardware
+from upright.study.rig import read_rig
 from upright.study.text import StudyText
 
 
@@ -111,7 +104,7 @@ def test_an_entry_says_what_it_is_and_where_a_study_says_it(name, meaning, place
 def described(text: str, logs=()) -> Hardware:
     plant = find("cart-pendulum")
     root = StudyText(Path("s.toml"), text).root()
-    return read_description(root, plant, read_rig(root, plant, "V", {"m_c": 1, "m_p": 1, "l_cg": 1}), logs)
+    return read_hardware(root, plant, read_rig(root, plant, "V", {"m_c": 1, "m_p": 1, "l_cg": 1}), logs)
 
 
 def test_a_study_describes_drive_servo_and_encoders():
