@@ -20,6 +20,7 @@ Log         read, show, doctor, init, law; Record
 Runs        run, rig_doctor, rig_check; log_show, log_tail, log_recover, log_convert, log_replay
 Model       identify, predict, ladder, frequency, loadings, plan_inertias
 Plants      Pendulum, CartPendulum, Furuta, DoublePendulum, DoublePendulumAbsolute, FlexibleLink, chain
+Rig         Rig: a plant with drive, encoders and servo, and where each number comes from; every verb takes it
 Control     StateSpace, place, lqr, dlqr, prefilter, hold, observer, margins, simulate, chance, design, export,
             regulate, swing_up, track; Law, Rule
 Course      lab, reproduce, survey
@@ -56,6 +57,7 @@ if TYPE_CHECKING:
     )
     from upright.quantities import quantity
     from upright.records import Record
+    from upright.rig import Rig
     from upright.systems import StateSpace
     from upright.verbs.chance import chance
     from upright.verbs.control import design, regulate, swing_up, track
@@ -89,6 +91,7 @@ _HOMES = {
     ),
     "quantities": ("quantity",),
     "records": ("Record",),
+    "rig": ("Rig",),
     "verbs.chance": ("chance",),
     "verbs.control": ("design", "regulate", "swing_up", "track"),
     "verbs.course": ("lab", "reproduce", "survey"),
@@ -106,7 +109,7 @@ _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "BadInput", "CartPendulum", "Coordinate", "DoublePendulum", "DoublePendulumAbsolute", "FlexibleLink", "Furuta",
-    "ImpossiblePhysics", "Input", "Joint", "Law", "NotIdentifiable", "Pendulum", "Plant", "Record", "Rule",
+    "ImpossiblePhysics", "Input", "Joint", "Law", "NotIdentifiable", "Pendulum", "Plant", "Record", "Rig", "Rule",
     "StateSpace",
     "UprightError", "__version__", "chain", "chance", "design", "dlqr", "doctor", "export", "frequency", "hold",
     "identify", "init", "lab", "ladder", "law", "loadings", "log_convert", "log_recover", "log_replay", "log_show",

@@ -246,7 +246,7 @@ def test_a_real_encoder_that_counts_the_other_way_is_found(volts):
         m_p=9.801e-3, l_cg=96.608e-3, r=93.525e-3, J_d=1.35e-4, J_p=1.476e-5, b_1=1.37e-2, b_2=1.96e-5, b_1c=5.9e-3,
         tilt_x=0.051, tilt_y=0.022,
     )  # fmt: skip
-    rig = Rig.known(plant, name="furuta_diy", gain=0.0526, lag=9e-3, limit=12.0, counts=(4000.0, 4000.0), period=2e-3)
+    rig = Rig.known(plant, name="furuta_diy", gain=0.0526, lag=9e-3, limit=12.0, counts=4000 * math.tau, period=2e-3)
     folder = Path(os.environ["UPRIGHT_REAL_DATA"]) / "furuta_diy_odrive"
     log = read(folder / f"hardware_sin_response_{volts}V_1s.csv")
     t = np.arange(log.t[0], log.t[-1], log.period)

@@ -63,7 +63,7 @@ def test_an_encoder_shows_its_scale_times_the_truth_to_a_count():
 
 def test_readings_are_whole_counts():
     q = np.array([[0.1, 3.0], [-0.2, math.pi]])
-    counts = readings(RIG, q) * np.array(RIG.counts)
+    counts = readings(RIG, q) * np.array(RIG.per_unit)
     np.testing.assert_allclose(counts, np.round(q * 16_000 / math.tau), atol=1e-9)
 
 
@@ -228,7 +228,7 @@ def test_a_force_limit_is_met_at_its_command(force, droop, gain, full):
 
 def test_a_log_has_readings_command_and_the_reference_that_is_held():
     t, x = np.arange(4) * 0.1, np.arange(16.0).reshape(4, 4)
-    rig = RIG.replace(counts=(10.0, 4.0), unit="A", scales=(1.0, 2.0))
+    rig = RIG.replace(counts=(10 * math.tau, 4 * math.tau), unit="A", scales=(1.0, 2.0))
     log = logged(rig, t, x + 0.06, np.array([1.0, 2.0, 3.0, 4.0]), [7.0, 8.0])
     assert log["psi"] == pytest.approx([0.1, 4.1, 8.1, 12.1])
     assert log["theta"] == pytest.approx([4.0, 12.0, 20.0, 28.0])  # of 56.24 half radians, 112 counts of them

@@ -70,7 +70,7 @@ def test_the_loop_that_is_told_is_that_of_the_study_s_rig(study, tmp_path):
     told = run(study(), tmp_path, tilt="19 deg").value
     own = Rig.known(
         CartPendulum(m_c=0.9, m_p=0.12, l_cg=0.2, J_p=1.5e-3, b_1=0.8, b_2=1e-4), gain=1.5, limit=10.0,
-        counts=(20_000, 4096 / math.tau), period=2e-3, delay=2e-3, lag=4e-3, travel=0.3,
+        counts=(20_000, 4096), period=2e-3, delay=2e-3, lag=4e-3, travel=0.3,
     )  # fmt: skip
     attempt = told.attempts[0]
     direct = trial(own, attempt.law, at="inverted", start=told.task.start, seconds=1.0)
@@ -92,7 +92,7 @@ def test_options_come_before_the_study(study, tmp_path):
     done = run(study(), tmp_path, limit=6.0, period="1 ms", counts={"theta": 2000}, travel=0.1)
     rig = done.value.rig
     assert (rig.limit, rig.period, rig.travel) == (6.0, 1e-3, 0.1)
-    np.testing.assert_allclose(rig.counts, (20_000, 2000 / math.tau))
+    np.testing.assert_allclose(rig.per_unit, (20_000, 2000 / math.tau))
     told = {row[0]: row[1:] for row in next(p for p in done.chapter.parts if p.title == "The rig").content[0].rows}
     assert told["largest command that passes"] == ("6 V", "--limit")
     assert told["encoder counts of x"] == ("20000 1/m", "known")
@@ -182,7 +182,7 @@ def test_a_data_sheet_is_taken_by_name_and_told(tmp_path):
     done = run(tmp_path / "rig.toml", tmp_path, vendor="ECP 210")
     rig = done.value.rig
     assert (rig.limit, rig.period, rig.travel) == (5.0, SERVO, 0.2)
-    np.testing.assert_allclose(rig.counts, (20_000, 4096 / math.tau))  # which the study says
+    np.testing.assert_allclose(rig.per_unit, (20_000, 4096 / math.tau))  # which the study says
     told = " ".join(done.chapter.warnings)
     assert "data sheet of the ECP 210" in told
     assert "largest command" in told

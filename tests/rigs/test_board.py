@@ -366,7 +366,7 @@ def test_an_arm_that_must_have_moved_a_hundred_counts_is_missed():
     held = 2.0 * rig.plant.b_1c / rig.gain
     u = 3 * held
     acceleration = abs(linear.B[1, 0]) * (u - held)
-    expected = math.sqrt(2 * 100 / rig.counts[0] / acceleration) / rig.period
+    expected = math.sqrt(2 * 100 / rig.per_unit[0] / acceleration) / rig.period
     for command in (u, -u):
         still = StillDrive(rig, "inverted")
         ticks = next(k for k in range(1, 5000) if still.sees(0.5, [0.0, 0.0], command))

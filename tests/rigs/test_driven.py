@@ -35,7 +35,7 @@ def swinging(lean=0.03, seconds=1.0):
 
 
 def rounded(angles):
-    return np.round(angles * RIG.counts[0]) / RIG.counts[0]
+    return np.round(angles * RIG.per_unit[0]) / RIG.per_unit[0]
 
 
 def told(shown, theta, command):

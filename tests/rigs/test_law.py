@@ -67,9 +67,9 @@ def test_a_law_of_the_host_may_have_more_memories_than_a_board_and_is_looked_at_
 def test_one_count_through_a_memory_of_a_rig_is_390_volts():
     """B = 1e6, C = 1, D = 0 behind an encoder of 16,000 counts per turn: 1e6 * 2 pi/16000 V."""
     rig = make_rig("furuta")
-    assert rig.counts[0] == pytest.approx(16000 / (2 * np.pi))
+    assert rig.per_unit[0] == pytest.approx(16000 / (2 * np.pi))
     about = Capabilities(
-        name="rig", coordinates=("psi", "theta"), counts=rig.counts, command_unit="V", full_scale=10.0, steps=32768,
+        name="rig", coordinates=("psi", "theta"), counts=rig.per_unit, command_unit="V", full_scale=10.0, steps=32768,
         period=rig.period,
     )  # fmt: skip
     law = Law(np.zeros((1, 1)), np.array([[1e6, 0.0]]), np.ones((1, 1)), np.zeros((1, 2)))

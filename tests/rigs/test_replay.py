@@ -18,7 +18,7 @@ WIDE = Limits(travel=(np.inf,) * 2, speed=(np.inf,) * 2, start=(np.inf,) * 2, co
 
 
 def angles(counts):
-    return [n / per for n, per in zip(counts, RIG.counts, strict=True)]
+    return [n / per for n, per in zip(counts, RIG.per_unit, strict=True)]
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def logged():
 
 
 def played(record, law):
-    board = Board(ReplayPort(record, RIG.counts, 2 * RIG.limit, RIG.converter))
+    board = Board(ReplayPort(record, RIG.per_unit, 2 * RIG.limit, RIG.converter))
     board.open()
     board.clear_fault()
     board.configure(WIDE)

@@ -68,7 +68,7 @@ def test_a_sound_rig_passes_its_check_and_is_held():
     scene.beside.start()
     scene.port.let_go()
     ticks = scene.run(1.2)
-    assert abs(ticks[-1].counts[1] / RIG.counts[1] - math.pi) < 0.01
+    assert abs(ticks[-1].counts[1] / RIG.per_unit[1] - math.pi) < 0.01
     scene.beside.finish()
     assert scene.rig.sample.mode == Mode.IDLE
     assert [kind for kind, _, _ in scene.told] == ["self-test", "start", "stop"]
@@ -107,7 +107,7 @@ def moved_by(rig, pulse, seconds=0.15):
     ticks = round(seconds / rig.period)
     u = np.append(0.0, np.repeat([pulse, 0.0], ticks))
     x = simulate(rig.plant, rig.drive, rig.plant.state("hanging"), u, rig.period, samples=2 * ticks + 2)[:, 0::2, 0]
-    return np.abs(x).max(axis=0) * rig.counts
+    return np.abs(x).max(axis=0) * rig.per_unit
 
 
 @pytest.mark.parametrize(("fineness", "share"), [(1.0, 0.02), (0.1, 0.05), (0.005, 0.4)])
@@ -267,7 +267,7 @@ def test_its_own_loop_is_watched_too():
     scene = Scene().started(mode=Mode.MCU)
     ticks = scene.run(1.0)
     assert ticks[-1].mode == Mode.MCU
-    assert abs(ticks[-1].counts[1] / RIG.counts[1] - math.pi) < 0.02
+    assert abs(ticks[-1].counts[1] / RIG.per_unit[1] - math.pi) < 0.02
     assert np.ptp([t.applied for t in ticks]) > 0
     again = Scene().started(tilt=0.1, mode=Mode.MCU)
     with pytest.raises(RigStopped):
@@ -290,7 +290,7 @@ def test_a_reference_is_followed_alike_by_the_host_s_loop_and_by_the_rig_s_own()
     host, own = ([(t.counts, t.applied) for t in ticks] for ticks in runs)
     assert host == own
     # friction holds the arm off by at most the torque that it takes over the gain
-    assert runs[1][-1].counts[0] / RIG.counts[0] == pytest.approx(0.3, abs=RIG.plant.b_1c / (RIG.gain * K[0, 0]))
+    assert runs[1][-1].counts[0] / RIG.per_unit[0] == pytest.approx(0.3, abs=RIG.plant.b_1c / (RIG.gain * K[0, 0]))
 
 
 class EverySecond:
@@ -327,10 +327,10 @@ def test_a_command_that_has_just_jumped_has_not_yet_moved_the_arm_that_friction_
     for command in [0.0] * 226 + [5.0] * 4:
         way, speed = way + speed * RIG.period, speed + MODEL.B[1, 0] * command * RIG.period
         assert not still.sees(0.1, [0.0, 0.0], command)
-    assert way * RIG.counts[0] < 10
+    assert way * RIG.per_unit[0] < 10
     for _ in range(100):
         if still.sees(0.1, [0.0, 0.0], 5.0):
             break
         way, speed = way + speed * RIG.period, speed + MODEL.B[1, 0] * 5.0 * RIG.period
     # free of friction it had gone `UNSEEN` counts by then, and not much more: friction takes 0.5 % of 5 V
-    assert way * RIG.counts[0] == pytest.approx(100, rel=0.2)
+    assert way * RIG.per_unit[0] == pytest.approx(100, rel=0.2)

@@ -49,14 +49,14 @@ def test_a_twin_under_the_hosts_law_moves_as_the_compiled_loop(compiled):
     running = RunningLaw(law, RIG.period)
     counts, put, states = [board.sample.counts], [], [port.x]
     for _ in range(TICKS):
-        tick = board.exchange(running.step([n / per for n, per in zip(counts[-1], RIG.counts, strict=True)]))
+        tick = board.exchange(running.step([n / per for n, per in zip(counts[-1], RIG.per_unit, strict=True)]))
         counts.append(tick.counts)
         put.append(tick.applied)
         states.append(port.x)
     # sums taken in another order differ in their last bit, which may tip a command to the next step of 0.3 mV
     np.testing.assert_allclose(put, run.u[:TICKS], atol=1.01 * RIG.converter)
     assert np.all(np.abs(np.array(states) - run.x) < 1e-4 * np.ptp(run.x, axis=0))
-    shown = np.column_stack([run.record["psi"], run.record["theta"]]) * np.array(RIG.counts)
+    shown = np.column_stack([run.record["psi"], run.record["theta"]]) * np.array(RIG.per_unit)
     assert np.abs(np.array(counts) - shown).max() <= 1.0 + 1e-6
 
 
@@ -119,7 +119,7 @@ def test_its_own_loop_gives_the_same_commands_as_the_hosts(compiled):
     _, other = started(Mode.HOST)
     running, counts = RunningLaw(law, RIG.period), other.sample.counts
     for _ in range(TICKS):
-        said = running.step([n / per for n, per in zip(counts, RIG.counts, strict=True)], 0.0)
+        said = running.step([n / per for n, per in zip(counts, RIG.per_unit, strict=True)], 0.0)
         theirs, ours = other.exchange(said), board.exchange(0.0)
         assert (ours.counts, ours.applied) == (theirs.counts, theirs.applied)
         counts = theirs.counts
@@ -149,6 +149,6 @@ def test_a_broken_encoder_shows_what_it_should(fault, shown):
     port.read()
     fault(port.encoders)
     for counts in (3, 127, 128, 900, -300):
-        port.hold("hanging", [counts / RIG.counts[0], 0.0, 0.0, 0.0])
+        port.hold("hanging", [counts / RIG.per_unit[0], 0.0, 0.0, 0.0])
         assert abs(port.read()[0] - shown(counts)) <= 1
         assert port.read()[1] == 0

@@ -18,7 +18,7 @@ import numpy as np
 from upright.errors import BadInput, nearest
 from upright.physics import CartPendulum, Furuta, Plant, added_inertia, added_mass, chain, name_of
 from upright.records.record import of_twin
-from upright.rig.hardware import VENDORS, Entry, Hardware, driven_unit
+from upright.rig.hardware import VENDORS, Entry, Hardware, driven_unit, turn_of
 from upright.rig.rig import Rig
 
 COUNTS = 16_000
@@ -469,9 +469,10 @@ def make_rig(key: str, seed: int = 0) -> Rig:
                 changed[name] = value * math.exp(rng.normal(0, spread))
         plant = plant.replace(**changed)
         gain *= math.exp(rng.normal(0, 0.02))
+    counts = [turn_of(c.unit) * n for c, n in zip(plant.coordinates, make.counts, strict=True)]
     known = Rig.known(
         plant, name=make.name, gain=gain, limit=make.limit, converter=CONVERTER, delay=SERVO, lag=LAG,
-        counts=make.counts, period=SERVO, travel=make.travel, twist=make.twist,
+        counts=counts, period=SERVO, travel=make.travel, twist=make.twist,
     )  # fmt: skip
     return replace(known, seed=seed)
 

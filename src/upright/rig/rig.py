@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
 
 from upright.basis import DESCRIBED, Basis
-from upright.errors import BadInput
+from upright.errors import BadInput, nearest
 from upright.physics import Plant
 from upright.physics.actuator import ACTUATOR
 from upright.records import Array
@@ -18,6 +18,7 @@ from upright.rig.drive import GAIN, MORE, driven, saturation
 from upright.rig.hardware import Entry, Hardware, counts_unit, driven_unit, meaning_of, place_of, turn_of
 from upright.rig.mounting import Mounting
 from upright.systems import StateSpace
+from upright.units import in_unit
 
 _ENTRIES = {
     "limit": "limit", "converter": "converter", "delay": "delay", "lag": "lag", "offset": "offset",
@@ -73,19 +74,38 @@ class Rig:
             raise BadInput(f"a rig with {n} coordinates needs {n} scales of its encoders, got {self.scales}.")
 
     @classmethod
-    def known(cls, plant: Plant, *, name: str = "", gain: float = 1.0, unit: str = "V", **numbers: Any) -> Rig:
+    def known(
+        cls, plant: Plant, *, name: str = "", gain: float | str = 1.0, unit: str = "V", **numbers: Any
+    ) -> Rig:  # fmt: skip
         """A rig whose numbers are known.
 
         Parameters
         ----------
         plant : Plant
-        name, gain, unit
-            As the attributes.
+        name : str, optional
+        gain : float or str
+            Force per unit of command: ``0.65`` or ``"0.65 N m/V"``.
+        unit : str
+            Of the command.
         **numbers
-            ``limit``, ``period``, ``counts`` (per m or rad, by coordinate) and the others that `replace` takes.
+            ``limit``, ``period``, ``counts`` and the others that `replace` takes.
+
+        Raises
+        ------
+        BadInput
+            When a number is none that a rig can have.
+
+        Examples
+        --------
+        >>> import upright as up
+        >>> arm = up.Furuta(m_p=0.135, l_cg=0.19, r=0.16, J_d=0.011, J_p=6e-4)
+        >>> rig = up.Rig.known(arm, gain="0.65 N m/V", limit="10 V", period="2 ms", counts=4096, travel="120 deg")
+        >>> rig.limit, rig.period, round(rig.travel, 4)
+        (10.0, 0.002, 2.0944)
         """
-        bare = cls(plant=plant, name=name, gain=gain, unit=unit)
-        return bare.replace(**numbers)
+        force = plant.inputs[0].unit if plant.inputs else ""
+        strength = in_unit(gain, f"({force})/({unit})") if isinstance(gain, str) else gain
+        return cls(plant=plant, name=name, gain=strength, unit=unit).replace(**numbers)
 
     def replace(self, **changes: Any) -> Rig:
         """The same rig with something else in it.
@@ -93,15 +113,21 @@ class Rig:
         Parameters
         ----------
         **changes
-            Attributes; or numbers of the hardware, SI or in the command's unit: ``limit``, ``converter``, ``delay``,
-            ``lag``, ``offset``, ``period``, ``travel``, ``speed_limit``, ``twist``, and ``counts`` per m or rad, one
-            for each coordinate, and ``more``; an infinite number is none.
+            Attributes; or numbers of the hardware, with their unit in text (``"2 ms"``) or SI and in the command's
+            unit: ``limit``, ``converter``, ``delay``, ``lag``, ``offset``, ``period``, ``travel``, ``speed_limit``,
+            ``twist``, of which an infinite one is none; ``counts`` of the encoders per turn or metre, one number for
+            all or one for each coordinate; and ``more``.
 
         Raises
         ------
         BadInput
-            When a number is none that a rig can have.
+            When there is no such number, or a rig cannot have it.
         """
+        attributes = {f.name for f in fields(self)}
+        unknown = sorted(changes.keys() - attributes - _ENTRIES.keys() - {"counts", "more"})
+        if unknown:
+            names = [*_ENTRIES, "counts", *attributes]
+            raise BadInput(f"a rig has no '{unknown[0]}'; {nearest(unknown[0], names)}")
         plant: Plant = changes.get("plant", self.plant)
         place, unit = driven_unit(type(plant)), changes.get("unit", self.unit)
         units = {
@@ -111,7 +137,7 @@ class Rig:
         said: dict[str, Entry] = {}
         gone: set[str] = set()
         for name in _ENTRIES.keys() & changes.keys():
-            value = float(changes.pop(name))
+            value = in_unit(changes.pop(name), units[name])
             if name in ("limit", "period") and not 0 < value < math.inf:
                 raise BadInput(f"the {name} of a rig must be positive and finite, got {value:g}.")
             if math.isfinite(value):
@@ -126,7 +152,7 @@ class Rig:
                 for name, value in more.items()
             }
         if "counts" in changes:
-            said |= _counts(plant, tuple(changes.pop("counts")))
+            said |= _counts(plant, changes.pop("counts"))
         hardware: Hardware = changes.pop("hardware", self.hardware)
         if said or gone:
             kept = {n: e for n, e in hardware.entries.items() if n not in gone}
@@ -156,8 +182,14 @@ class Rig:
 
     @property
     def counts(self) -> tuple[float, ...]:
-        """Encoder counts per m or rad, one for each coordinate."""
-        return tuple(self._number(f"counts.{c.name}") / turn_of(c.unit) for c in self.plant.coordinates)
+        """Encoder counts per turn or metre, one for each coordinate."""
+        return tuple(self._number(f"counts.{c.name}") for c in self.plant.coordinates)
+
+    @property
+    def per_unit(self) -> tuple[float, ...]:
+        """Encoder counts per rad or m, one for each coordinate."""
+        units = (c.unit for c in self.plant.coordinates)
+        return tuple(n / turn_of(unit) for n, unit in zip(self.counts, units, strict=True))
 
     @property
     def converter(self) -> float:
@@ -219,7 +251,7 @@ class Rig:
     @property
     def quantum(self) -> Array:
         """Resolution of each encoder [m or rad], shape (coordinates,)."""
-        return 1.0 / np.array(self.counts)
+        return 1.0 / np.array(self.per_unit)
 
     @property
     def shown(self) -> Array:
@@ -258,11 +290,12 @@ class Rig:
         return [driven(plant, {**self.more, GAIN: gain}, at) for plant, gain in self.draws]
 
 
-def _counts(plant: Plant, counts: tuple[float, ...]) -> dict[str, Entry]:
+def _counts(plant: Plant, counts: float | Sequence[float]) -> dict[str, Entry]:
     n = len(plant.coordinates)
-    if len(counts) != n or any(not c > 0 for c in counts):
-        raise BadInput(f"a rig with {n} coordinates needs {n} positive numbers of counts, got {counts}.")
+    each = (counts,) * n if isinstance(counts, int | float) else tuple(counts)
+    if len(each) != n or any(not c > 0 for c in each):
+        raise BadInput(f"a rig with {n} coordinates needs {n} positive numbers of counts, got {each}.")
     return {
-        f"counts.{c.name}": Entry(value=turn_of(c.unit) * per, unit=counts_unit(c.unit), source="known")
-        for c, per in zip(plant.coordinates, counts, strict=True)
+        f"counts.{c.name}": Entry(value=float(per), unit=counts_unit(c.unit), source="known")
+        for c, per in zip(plant.coordinates, each, strict=True)
     }

@@ -50,7 +50,7 @@ class StillDrive:
         self._drive, self._period = float(linear.B[row, 0]), model.period
         known = HELD_BY * sticking(model)
         self._held = abs(self._drive) * (known or DRY * model.limit)
-        self._least = UNSEEN / model.counts[self.which]
+        self._least = UNSEEN / model.per_unit[self.which]
         self._shown, self._speed, self._way = math.nan, 0.0, 0.0
 
     def sees(self, reading: float, away: Sequence[float], command: float) -> bool:
@@ -103,7 +103,7 @@ class DrivenScale:
         self._commands = deque([0.0] * late, maxlen=late)
         self._shown, self._driven, self._leaned, self._falls = (_Fast(T) for _ in range(4))
         least = max(LEAST_SHARE * model.limit, LEAST_DRY * sticking(model)) * abs(self._drive) / CORNER**2
-        self._needed = max(least, LEAST_COUNTS / model.counts[0]) ** 2 * MEMORY / T
+        self._needed = max(least, LEAST_COUNTS / model.per_unit[0]) ** 2 * MEMORY / T
         self._kept, self._period = math.exp(-T / MEMORY), T
         self._both, self._size, self._still, self._reading = 0.0, 0.0, 0.0, math.nan
 

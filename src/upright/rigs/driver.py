@@ -51,7 +51,7 @@ class Connection:
         """Those of a board with this rig at it, and what else [board] says."""
         rest = dict(self.board)
         about = Capabilities(
-            name=self.name or self.kind, coordinates=self.coordinates, counts=self.model.counts,
+            name=self.name or self.kind, coordinates=self.coordinates, counts=self.model.per_unit,
             command_unit=self.model.unit, full_scale=float(rest.pop("full_scale", FULL_SCALE)),
             steps=int(rest.pop("steps", 1 << 15)), period=self.model.period, modes=frozenset({Mode.HOST}),
         )  # fmt: skip

@@ -103,7 +103,7 @@ class ReplayPort:
 def _open(to: Connection) -> Board:
     assert to.record is not None  # since the driver needs it
     step = to.model.converter or 2.0 * to.model.limit / (1 << 23)
-    return Board(ReplayPort(read(to.record), to.model.counts, 2.0 * to.model.limit, step, to.coordinates))
+    return Board(ReplayPort(read(to.record), to.model.per_unit, 2.0 * to.model.limit, step, to.coordinates))
 
 
 DRIVER = Driver(name="replay", order=20, open=_open, needs={"record": "run.csv"}, performed=REPLAYED)

@@ -78,7 +78,7 @@ class Duty:
     @property
     def watched(self) -> bool:
         """Whether a bank of filters can say something of it."""
-        return self.watch and self.model is not None and self.at == "inverted" and len(self.model.counts) == 2
+        return self.watch and self.model is not None and self.at == "inverted" and len(self.model.per_unit) == 2
 
 
 @dataclass(eq=False)

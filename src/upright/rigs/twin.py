@@ -95,12 +95,12 @@ class TwinPort:
         self._commands = np.zeros((reach + 1, 1))
         self._start = np.array([reach], dtype=np.int64)
         self._full_scale = full_scale or 2.0 * rig.limit
-        self._per = np.array(rig.counts) * rig.shown
+        self._per = np.array(rig.per_unit) * rig.shown
         self.x: Array = np.array(self.rig.plant.state(at or next(iter(rig.plant.equilibria))), dtype=np.float64)
         self._carried = np.zeros(self._stepper.carried)
         self._felt = self.x[0::2].copy()
-        self._origin = (0,) * len(rig.counts)
-        self.encoders = BrokenEncoders(len(rig.counts))
+        self._origin = (0,) * len(rig.per_unit)
+        self.encoders = BrokenEncoders(len(rig.per_unit))
         self._held, self._enabled, self._command, self._periods = False, False, 0.0, 0
 
     def open(self) -> Capabilities:
@@ -109,7 +109,7 @@ class TwinPort:
         # a converter without steps still puts out whole numbers: 24 bits are finer than any drive follows
         steps = round(self._full_scale / rig.converter) if rig.converter else 1 << 23
         return Capabilities(
-            name=f"the twin of {rig.name}", coordinates=tuple(c.name for c in rig.plant.coordinates), counts=rig.counts,
+            name=f"the twin of {rig.name}", coordinates=rig.outputs, counts=rig.per_unit,
             command_unit=rig.unit, full_scale=steps * rig.converter if rig.converter else self._full_scale, steps=steps,
             period=rig.period, modes=frozenset({Mode.HOST, Mode.MCU}), virtual=True, hardware=False,
         )  # fmt: skip

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from upright.identification.ladder.cross_validation import CrossValidation
     from upright.identification.model.bands import Bands
     from upright.physics import Plant
+    from upright.records import Record
     from upright.report.page import Chapter
     from upright.rig import Rig
     from upright.study.fitted import FittedModel
@@ -91,6 +92,22 @@ class FitAnswer(Answer["Fit"]):
         rows = {name: (e.value, e.stderr, *e.interval, e.unit, e.qualified) for name, e in self.value.estimates.items()}
         columns = ["value", "stderr", "low", "high", "unit", "status"]
         return pd.DataFrame.from_dict(rows, orient="index", columns=columns)
+
+    @property
+    def residuals(self) -> Mapping[str, Record]:
+        """Measured less simulated signals of every run, by its label, as records."""
+        from upright.records import Record
+        from upright.records.record import Provenance
+
+        unit = {c.name: c.unit for c in self.value.model.plant.coordinates}
+        return {
+            label: Record(
+                t=run.t, signals={s: run.y[:, k] - run.simulated[:, k] for k, s in enumerate(run.measured)},
+                units={s: unit[s] for s in run.measured if s in unit}, outputs=run.measured,
+                provenance=Provenance(reader="fit", notes=(f"Residuals of {label}: measured less simulated.",)),
+            )
+            for label, run in self.value.runs.items()
+        }  # fmt: skip
 
     @property
     def rig(self) -> Rig:

@@ -68,7 +68,7 @@ def test_the_log_of_a_run_is_what_the_encoders_show(tmp_path):
     done = run_regulation(completed(fit_of(truth)), truth, 0, tmp_path, wish=wish)
     log = Record.from_csv(tmp_path / "regulation_set_2.csv")
     run = done.attempts[0].after
-    counts = log["theta"] * truth.counts[1]
+    counts = log["theta"] * truth.per_unit[1]
     np.testing.assert_allclose(counts, np.round(counts), atol=1e-6)
     assert np.abs(log["theta"] - run.x[:, 2]).max() <= truth.quantum[1] / 2 * (1 + 1e-9)
 

@@ -84,7 +84,9 @@ def acquire(
     release = release or Release()
     meant = Release(angle=release.angle + rng.normal(0, 0.01), push=release.push)
     t, x = motion(rig, meant, seconds=seconds, every=every)
-    return twin_log(rig, t, np.round(x[:, 0::2] * np.array(rig.counts)), unit="counts")  # zeroed where both joints rest
+    return twin_log(
+        rig, t, np.round(x[:, 0::2] * np.array(rig.per_unit)), unit="counts"
+    )  # zeroed where both joints rest
 
 
 TILT = math.radians(0.25)

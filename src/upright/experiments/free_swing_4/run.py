@@ -177,7 +177,7 @@ def question_text(q: Question, rig: Rig) -> str:
             table("", title=q.title, source=source),
             table("[rig]", plant=make_of(rig.plant).plant_name, vendor=make_of(rig.plant).vendor),
             parameters,
-            *(counted_sensor(c.name, c.unit, n) for c, n in zip(rig.plant.coordinates, rig.counts, strict=True)),
+            *(counted_sensor(c.name, c.unit, n) for c, n in zip(rig.plant.coordinates, rig.per_unit, strict=True)),
             *(
                 table("[[runs]]", label=file.removesuffix(".csv").replace("_", " "), file=file, role=role)
                 for role, file in (("fit", q.fitted), ("predict", q.predicted))

@@ -56,7 +56,7 @@ def write_study(
     if drive:
         tables += [table("[actuator]", digits=10, **_late(rig, said.get("actuator", {}))),
                    table("[drive]", column="u_applied", unit=rig.model.unit)]  # fmt: skip
-    for c, per in zip(rig.model.plant.coordinates, rig.model.counts, strict=True):
+    for c, per in zip(rig.model.plant.coordinates, rig.model.per_unit, strict=True):
         counts = {"counts_per_rev": per * 2 * math.pi} if c.unit == "rad" else {"counts_per_m": per}
         tables.append(table(f"[sensors.{c.name}]", digits=10, column=c.name, unit=c.unit, **counts))
     tables += [table("[defaults]", unknown=["initial"]), *(table("[[runs]]", digits=10, **run) for run in runs)]

@@ -115,7 +115,7 @@ def _described(model: Rig, period: float, counts: tuple[float, ...]) -> list[Che
     same = math.isclose(period, model.period, rel_tol=1e-3)
     told_of = f"{1e3 * period:.4g} ms, described as {1e3 * model.period:.4g} ms"
     out = [CheckupFinding(what="servo period", found=told_of, good=same)]
-    alike = np.allclose(np.abs(counts), model.counts, rtol=1e-6)
+    alike = np.allclose(np.abs(counts), model.per_unit, rtol=1e-6)
     return [*out, CheckupFinding(what="counts", found=", ".join(f"{c:.6g}" for c in counts), good=bool(alike))]
 
 
@@ -123,7 +123,7 @@ def _by_hand(
     rig: LiveRig, model: Rig, i: int, name: str, hand: Callable[[str], bool] | None
 ) -> CheckupFinding:  # fmt: skip
     """One encoder, moved by hand in its positive sense."""
-    unit, per = model.plant.coordinates[i].unit, model.counts[i]
+    unit, per = model.plant.coordinates[i].unit, model.per_unit[i]
     size = MOVED if unit == "rad" else MOVED / 10
     before = rig.exchange(0.0)
     if before.faults:
@@ -133,7 +133,7 @@ def _by_hand(
         if not hand(f"Move {name} by hand in its positive sense by some {'degrees' if unit == 'rad' else 'mm'}."):
             return CheckupFinding(what=what, found="not moved", good=None)
     elif isinstance(rig, Board) and isinstance(rig.port, TwinPort):
-        away = np.zeros(2 * len(model.counts))
+        away = np.zeros(2 * len(model.per_unit))
         away[2 * i] = 2 * size
         rig.port.hold(next(iter(model.plant.equilibria)), away)
     else:

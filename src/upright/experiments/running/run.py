@@ -101,7 +101,7 @@ class RigRun:
     def away(self) -> Array:
         """Deviations from what was held, shape (N, coordinates)."""
         if self.log is None:
-            return np.zeros((0, len(self.model.counts)))
+            return np.zeros((0, len(self.model.per_unit)))
         return np.column_stack([self.log.columns[c.name] for c in self.model.plant.coordinates]) - self.end.target
 
     @property
@@ -114,7 +114,7 @@ class RigRun:
     @property
     def count(self) -> tuple[float, ...]:
         """One count of each encoder [rad or m]; a deviation below that is not a number that anybody read."""
-        return tuple(1.0 / abs(n) for n in self.model.counts)
+        return tuple(1.0 / abs(n) for n in self.model.per_unit)
 
     @property
     def complete(self) -> bool:
@@ -186,7 +186,7 @@ def run_rig(
             law = replace(law, references=np.array(signal(wish.reference, unit, model.period, wish.seconds)))
     else:
         samples = wish.samples or signal(wish.excite, model.unit, model.period, wish.seconds)
-        law = open_loop(samples, len(model.counts), model.period)
+        law = open_loop(samples, len(model.per_unit), model.period)
     references = _references(law, model) if wish.law is not None else ()
     folder.mkdir(parents=True, exist_ok=True)
     path = fresh(folder, wish.stem, ".mcap")

@@ -119,7 +119,7 @@ def _steps(done: Tracking) -> tuple[Step, ...]:
     if done.fit is None:
         return (own,)
     model = done.rig.plant.coordinates
-    counts = "" if model[0].unit == "rad" else f" --counts {done.rig.counts[0]:.6g}"
+    counts = "" if model[0].unit == "rad" else f" --counts {done.rig.per_unit[0]:.6g}"
     return (
         Step(
             "Repeat the fit from its files.",

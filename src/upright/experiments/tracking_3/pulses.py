@@ -75,7 +75,7 @@ def pulses(rig: Rig, file: str) -> Record:
         rig.plant, rig.drive, rig.plant.state(), np.repeat(u, EVERY), rig.period, samples=u.size, every=EVERY
     )[:, ::2, 0]  # fmt: skip
     t = np.arange(u.size, dtype=np.float64) * dt
-    return twin_log(rig, t, np.floor(x * np.array(rig.counts) + 0.5), u, unit="counts")
+    return twin_log(rig, t, np.floor(x * np.array(rig.per_unit) + 0.5), u, unit="counts")
 
 
 def shaft_study(rig: Rig, seed: int, weighed: Sequence[Known] = ()) -> str:
@@ -114,7 +114,7 @@ def shaft_study(rig: Rig, seed: int, weighed: Sequence[Known] = ()) -> str:
             parameters,
             actuator,
             table("[drive]", column="u", unit=rig.unit),
-            *(counted_sensor(c.name, c.unit, n) for c, n in zip(rig.plant.coordinates, rig.counts, strict=True)),
+            *(counted_sensor(c.name, c.unit, n) for c, n in zip(rig.plant.coordinates, rig.per_unit, strict=True)),
             *(
                 table("[[runs]]", label=file.removesuffix(".csv"), file=file, role=role)
                 for role, file in zip(("fit", "predict"), _PULSES, strict=True)
