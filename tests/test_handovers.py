@@ -53,10 +53,10 @@ def design(fit):
 def forms(fit, tmp_path_factory):
     """The same rig in every form that a verb of rigs takes."""
     path = fit.save(tmp_path_factory.mktemp("fit") / "fit.json")
-    return {"fit": fit, "path": path, "text": str(path), "folder": path.parent, "plant": fit.plant, "study": fit.study}
+    return {"fit": fit, "path": path, "text": str(path), "folder": path.parent, "plant": fit.plant, "study": fit.study, "rig": fit.rig}
 
 
-RIGS = ("fit", "path", "text", "folder", "plant")
+RIGS = ("fit", "path", "text", "folder", "plant", "rig")
 
 
 @pytest.mark.parametrize("form", RIGS)
@@ -83,7 +83,7 @@ def test_a_chance_is_the_same_whatever_the_rig_came_in(form, forms, design):
     assert one == other
 
 
-@pytest.mark.parametrize("form", ["fit", "path", "plant"])
+@pytest.mark.parametrize("form", ["fit", "path", "plant", "rig"])
 def test_mujoco_gets_the_fitted_rig_whatever_it_came_in(form, forms, tmp_path):
     mujoco = pytest.importorskip("mujoco")
     answer = up.export(forms[form], to="mjcf", out=tmp_path)

@@ -11,12 +11,13 @@ import numpy as np
 
 from upright.basis import DESCRIBED, Basis
 from upright.errors import BadInput, nearest
-from upright.physics import Plant
+from upright.physics import Plant, name_of
 from upright.physics.actuator import ACTUATOR
 from upright.records import Array
 from upright.rig.drive import GAIN, MORE, driven, saturation
 from upright.rig.hardware import Entry, Hardware, counts_unit, driven_unit, meaning_of, place_of, turn_of
 from upright.rig.mounting import Mounting
+from upright.shown import Shown
 from upright.systems import StateSpace
 from upright.units import in_unit
 
@@ -26,8 +27,8 @@ _ENTRIES = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True, kw_only=True)
-class Rig:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Rig(Shown):
     """A plant with its numbers, and what is known of the drive, the encoders and the servo about it.
 
     What nobody gave is missing: `limit`, `period` and `counts` say in a sentence that they are needed, and a delay, a
@@ -105,7 +106,8 @@ class Rig:
         """
         force = plant.inputs[0].unit if plant.inputs else ""
         strength = in_unit(gain, f"({force})/({unit})") if isinstance(gain, str) else gain
-        return cls(plant=plant, name=name, gain=strength, unit=unit).replace(**numbers)
+        called = name or name_of(type(plant)) or type(plant).__name__
+        return cls(plant=plant, name=called, gain=strength, unit=unit).replace(**numbers)
 
     def replace(self, **changes: Any) -> Rig:
         """The same rig with something else in it.

@@ -16,7 +16,12 @@ from upright.verbs.answer import Answer
 from upright.verbs.command import command
 from upright.verbs.handover import called, rig_of
 from upright.verbs.linear.matrices import is_linear, linear_model, read_matrices
-from upright.verbs.pages import folder_if_given, page_folder, write_page
+from upright.verbs.pages import (
+    folder_if_given,
+    page_folder,
+    write_page,
+    written_where_named,
+)
 from upright.verbs.rig import Counts, as_typed, rig_options
 from upright.verbs.values import open_log, poles, si, si_if_given
 
@@ -223,6 +228,7 @@ def _start(rig: Rig | StateSpace, given: str | Mapping[str, float | str]) -> tup
 
 @command(
     "Control",
+    defaults={"out": "upright-regulate"},
     names={"which": "--set"},
     metavars={"source": "[FIT]", "rig": "MAKE", "which": "N", "tilt": "ANGLE", "push": "SPEED"},
     helps={
@@ -239,13 +245,14 @@ def _start(rig: Rig | StateSpace, given: str | Mapping[str, float | str]) -> tup
     upright regulate out/fit.json --seed 3 --set 2 --tilt "20 deg"
     """,
 )
+@written_where_named
 @keeps_its_inputs
 def regulate(
     source: Any = None, *, rig: str = "", seed: int | None = None, which: int | str = "",
     poles: str | Iterable[complex] = "", speed: str = "filtered", memory: float = 0.5, tilt: float | str = "",
     push: float | str = "", seconds: float = 6.0, draws: int = 200, limit: float | None = None,
     period: float | str = "", counts: Counts = "", travel: float | None = None, vendor: str = "",
-    out: str | os.PathLike[str] = "upright-regulate", pdf: bool = False, workers: int = 1, cluster: str = "",
+    out: str | os.PathLike[str] | None = None, pdf: bool = False, workers: int = 1, cluster: str = "",
     progress: Progress = silent,
 ) -> Answer[Regulation]:  # fmt: skip
     """Hold an identified rig upright; say beforehand what each pole set will come to.
@@ -290,8 +297,8 @@ def regulate(
         How far the driven body may go either way [m or rad].
     vendor : str, optional
         Whose data sheet says what neither the call nor the study does: "ECP 205" or "ECP 210".
-    out : path
-        Folder for all files.
+    out : path, optional
+        Folder for all files; in Python none is written without one.
     pdf : bool
         Write the page as PDF too.
     workers, cluster
@@ -374,6 +381,7 @@ def _wish(
 
 @command(
     "Control",
+    defaults={"out": "swing-up"},
     metavars={"source": "[FIT]", "lie": "NAME=FACTOR", "check": "LOG"},
     helps={
         "source": _FIT + "the law is designed from it, else from the data sheet.",
@@ -391,12 +399,13 @@ def _wish(
     upright swing-up out/fit.json --check swings.csv
     """,
 )
+@written_where_named
 @keeps_its_inputs
 def swing_up(
     source: Any = None, *, rig: str = "", seed: int = 1, seconds: float = 12.0,
     travel: float | None = None, limit: float | None = None, period: float | str = "", counts: Counts = "",
     vendor: str = "", lie: str | Mapping[str, float] = "", check: Log | None = None,
-    out: str | os.PathLike[str] = "swing-up", pdf: bool = False,
+    out: str | os.PathLike[str] | None = None, pdf: bool = False,
 ) -> Answer[SwingUpRun | Scales]:  # fmt: skip
     """Swing a hanging pendulum up by its own drive and catch it, once its encoders are trusted.
 
@@ -428,8 +437,8 @@ def swing_up(
         An encoder shows a multiple of what is true: ``{"theta": 2}``.
     check : path, Record or pandas.DataFrame, optional
         Only say what this log of a hanging, driven rig tells of its encoders.
-    out : path
-        Folder for all files.
+    out : path, optional
+        Folder for all files; in Python none is written without one.
     pdf : bool
         Write the page as PDF too.
 
@@ -468,8 +477,11 @@ def swing_up(
         )  # fmt: skip
         needs = ("limit", "servo_period", "counts", "travel")
         model = completed(identified, given, vendor=vendor, needs=needs, who="upright swing-up")
-        truth = model if check is not None else twin_of(model, seed)
-        doubt = doubts(identified, model, None if check is not None else truth)
+        described = check is not None or not (model.draws or model.hardware.vendor)
+        truth = model if described else twin_of(model, seed)
+        doubt = doubts(identified, model, None if described else truth)
+        if described and check is None:
+            doubt = (*doubt, "Nothing says what else the rig may be, so the law meets the numbers it was made from.")
     again = as_typed(travel=travel, limit=limit, period=period, counts=counts, vendor=vendor)
     name = "" if source is None else called(source) + again
     if check is not None:
@@ -511,6 +523,7 @@ def _lying(rig: Rig, lie: str | Mapping[str, float]) -> Rig:
 
 @command(
     "Control",
+    defaults={"out": "track"},
     names={"sets": "--set"},
     metavars={"source": "[FIT]", "sets": "LIST", "step": "SIZE"},
     helps={
@@ -525,12 +538,13 @@ def _lying(rig: Rig, lie: str | Mapping[str, float]) -> Rig:
     upright track out/fit.json --set 4 --step "6 mm"
     """,
 )
+@written_where_named
 @keeps_its_inputs
 def track(
     source: Any = None, *, rig: str = "rectilinear", seed: int = 0,
     sets: str | int | Sequence[int] = "", poles: str | Iterable[complex] = "", step: float | str = "",
     limit: float | None = None, period: float | str = "", counts: Counts = "", vendor: str = "",
-    out: str | os.PathLike[str] = "track", pdf: bool = False, progress: Progress = silent,
+    out: str | os.PathLike[str] | None = None, pdf: bool = False, progress: Progress = silent,
 ) -> Answer[Tracking]:  # fmt: skip
     """Make the far inertia of a flexible shaft follow a step, by state feedback and by PD.
 
@@ -561,8 +575,8 @@ def track(
         Encoder counts of a rig of your own, per turn or metre; the study's when omitted.
     vendor : str, optional
         Whose data sheet says what neither the call nor the study does: "ECP 205" or "ECP 210".
-    out : path
-        Folder for all files.
+    out : path, optional
+        Folder for all files; in Python none is written without one.
     pdf : bool
         Write the page as PDF too.
     progress : callable, optional

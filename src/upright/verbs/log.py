@@ -171,7 +171,7 @@ def doctor(
     ----------
     log : path, Record or pandas.DataFrame
         Log as its program wrote it.
-    rig : str, path, fit or plant, optional
+    rig : str, path, fit, rig or plant, optional
         Name of the plant, study (TOML) or fit.json of the rig, or what `identify` answered; with it signs, and with
         known inertias scales, are examined too.
     html : path, optional
@@ -219,6 +219,7 @@ def _known(rig: Any, log: str) -> KnownRig | None:
     from upright.diagnosis.case import KnownRig, read_known
     from upright.identification import Parameter
     from upright.physics import Plant
+    from upright.rig import Rig
     from upright.verbs.fitting import FitAnswer
     from upright.verbs.handover import SAVED
 
@@ -229,13 +230,16 @@ def _known(rig: Any, log: str) -> KnownRig | None:
     if isinstance(rig, Plant):
         numbers = {n: Parameter(name=n, value=v) for n, v in rig.parameters().items()}
         return KnownRig(name=type(rig).__name__, plant=type(rig), parameters=numbers)
+    if isinstance(rig, Rig):
+        numbers = {n: Parameter(name=n, value=v) for n, v in {**rig.plant.parameters(), **rig.drive}.items()}
+        return KnownRig(name=rig.name, plant=type(rig.plant), parameters=numbers)
     if isinstance(rig, FitAnswer):
         fit = rig.value
         values = {n: p.value for n, p in fit.model.parameters.items()} | {n: e.value for n, e in fit.estimates.items()}
         numbers = {n: Parameter(name=n, value=v) for n, v in values.items()}
         return KnownRig(name=SAVED, plant=fit.model.plant, parameters=numbers)
     raise BadInput(
-        "doctor takes a plant's name, a study (TOML), a fit.json or what up.identify answered as the rig, got "
+        "doctor takes a plant's name, a study (TOML), a fit.json, a rig or what up.identify answered as the rig, got "
         f"{type(rig).__name__}."
     )
 

@@ -14,7 +14,7 @@ from upright.files import check_output, keeps_its_inputs
 from upright.progress import Progress, silent
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
-from upright.verbs.pages import folder, folder_if_given, page_folder, pdf_has_folder, write_page
+from upright.verbs.pages import folder, folder_if_given, page_folder, pdf_has_folder, write_page, written_where_named
 from upright.verbs.study import folder_beside, read_study
 from upright.verbs.values import open_log, pairs, paths, si, texts
 
@@ -283,6 +283,7 @@ def ladder(
 
 @command(
     "Model",
+    defaults={"out": "frequency"},
     names={"low": "--from", "high": "--to"},
     metavars={
         "sources": "[LOG...]", "rig": "KIND", "ask": "HOW", "kind": "HOW", "signal": "NAME=COLUMN", "counts": "NAME=N",
@@ -304,6 +305,7 @@ def ladder(
     upright frequency one.txt two.txt --command v --signal theta=theta
     """,
 )  # fmt: skip
+@written_where_named
 @keeps_its_inputs
 def frequency(
     sources: Sequence[str | os.PathLike[str]] | str | os.PathLike[str] = (), *, rig: str = "", seed: int = 0,
@@ -311,7 +313,7 @@ def frequency(
     counts: Mapping[str, float | str] | Sequence[str] = (),
     known: Mapping[str, float | str | tuple[float, float]] | Sequence[str] = (), hold: float | str = "",
     low: float | None = None, high: float | None = None, data: str | os.PathLike[str] | None = None,
-    out: str | os.PathLike[str] = "frequency", pdf: bool = False, progress: Progress = silent,
+    out: str | os.PathLike[str] | None = None, pdf: bool = False, progress: Progress = silent,
 ) -> Answer[FrequencyRun | LoggedResponse]:  # fmt: skip
     """Measure a frequency response, or read one from logs, and fit the rig to it.
 
@@ -345,8 +347,8 @@ def frequency(
         Least and greatest frequency [rad/s].
     data : path, optional
         Folder the runs' files are in; the study's own when omitted.
-    out : path
-        Folder for all files.
+    out : path, optional
+        Folder for all files; in Python none is written without one.
     pdf : bool
         Write the page as PDF too.
     progress : callable, optional

@@ -3,13 +3,39 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from dataclasses import replace
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from upright.errors import BadInput
+from upright.verbs.answer import Answer
 
 if TYPE_CHECKING:
     from upright.report.page import Chapter
+
+V = TypeVar("V", bound=Callable[..., Any])
+
+
+def written_where_named(verb: V) -> V:
+    """Let a verb that writes its results leave no file unless `out` names a folder.
+
+    Without one it works in a folder that is gone when it answers; commands that read its files again are not proposed.
+    """
+
+    @wraps(verb)
+    def answered(*arguments: Any, out: str | os.PathLike[str] | None = None, pdf: bool = False, **more: Any) -> Any:
+        if out is not None:
+            return verb(*arguments, out=out, pdf=pdf, **more)
+        pdf_has_folder(out, pdf)
+        with TemporaryDirectory(prefix="upright-") as name:
+            answer = verb(*arguments, out=name, pdf=False, **more)
+        numbers = {n: v for n, v in answer.numbers.items() if n not in ("report", "files")}
+        return Answer(answer.value, replace(answer.chapter, steps=(), numbers=numbers))
+
+    return answered  # type: ignore[return-value]
 
 
 def folder(path: str | os.PathLike[str]) -> Path:
@@ -26,7 +52,7 @@ def folder(path: str | os.PathLike[str]) -> Path:
     return path
 
 
-def page_folder(out: str | os.PathLike[str], pdf: bool) -> Path:
+def page_folder(out: str | os.PathLike[str] | None, pdf: bool) -> Path:
     """The folder for results; says before the work begins that a PDF cannot be made.
 
     Raises
@@ -35,7 +61,7 @@ def page_folder(out: str | os.PathLike[str], pdf: bool) -> Path:
         When it is a file, or a PDF is asked for and there is no program to make it.
     """
     can_be_pdf(pdf)
-    return folder(out)
+    return folder(out or "")
 
 
 def folder_if_given(out: str | os.PathLike[str] | None, pdf: bool = False) -> Path | None:

@@ -25,7 +25,9 @@ from upright.report.drawing import (
 )
 from upright.report.html import fragment
 from upright.report.page import Chapter, Part, Picture, Symbol, Table
+from upright.report.rig import rig_table
 from upright.report.symbols import number, unit
+from upright.rig import Rig
 from upright.systems import StateSpace
 from upright.verbs.answer import text as chapter_text
 from upright.verbs.linear.feedback import Gains
@@ -59,7 +61,9 @@ def plot(value: Any, *names: str) -> Any:
     BadInput
         When a name is no column.
     """
-    return draw_record(value, *names) if isinstance(value, Record) else draw_poles(value)
+    if isinstance(value, Record):
+        return draw_record(value, *names)
+    return draw_poles(value)
 
 
 @summary.register
@@ -100,6 +104,18 @@ def _(plant: Plant) -> Chapter:
     return Chapter(
         title=type(plant).__name__, parts=(Part("", (table,)),),
         verdict=f"Moves in {moves}; driven by {driven}; equilibria: {', '.join(plant.equilibria)}.",
+    )  # fmt: skip
+
+
+@summary.register
+def _(rig: Rig) -> Chapter:
+    plant = summary(rig.plant)
+    per = f"{rig.plant.inputs[0].unit}/{rig.unit}" if rig.plant.inputs and rig.unit else ""
+    allowed = f"; {len(rig.draws)} rigs drawn from its covariance" if rig.draws else ""
+    return Chapter(
+        title=rig.name or type(rig.plant).__name__, parts=(*plant.parts, Part("", (rig_table(rig),))),
+        verdict=f"{type(rig.plant).__name__} behind a drive of {number(rig.gain)} {unit(per)}".rstrip() + f"{allowed}.",
+        detail=rig.basis.sentence,
     )  # fmt: skip
 
 
@@ -172,8 +188,9 @@ def draw_record(record: Record, *names: str, buckets: int = 800) -> Any:
 @styled
 def draw_poles(value: Any) -> Any:
     """Poles of a linear model, of a loop, or of a plant at each of its equilibria."""
-    if isinstance(value, Plant):
-        drawn = {f"about {at}": value.linear(at).poles() for at in value.equilibria}
+    if isinstance(value, Plant | Rig):
+        points = value.equilibria if isinstance(value, Plant) else value.plant.equilibria
+        drawn = {f"about {at}": value.linear(at).poles() for at in points}
     else:
         drawn = {"poles": value.poles() if isinstance(value, StateSpace) else value.poles}
     drawing = figure(2.6)
