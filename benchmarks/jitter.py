@@ -21,8 +21,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.measure import Line, Target, page, spread
-from upright.experiments.running.tick import supervised
 from upright.realtime.jitter import TOLERATED, Jitter, measure
+from upright.running.tick import supervised
 
 SECONDS, QUICK = 60.0, 5.0
 WORK = 1e-4

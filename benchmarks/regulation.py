@@ -142,7 +142,7 @@ def one(make: str, seed: int, *, swept: Path | None = None, flawed: bool = False
     """One twin from identification to outcome; `swept` is a folder for one identified as in experiment 1b."""
     from upright import gains
     from upright.control.score import outcomes
-    from upright.experiments.designing.run import SPEEDS, velocities
+    from upright.designing.run import SPEEDS, velocities
     from upright.experiments.frequency_1b.run import run_frequency
     from upright.experiments.regulation_2.run import SETS
     from upright.experiments.worn import worn

@@ -53,7 +53,15 @@ def design(fit):
 def forms(fit, tmp_path_factory):
     """The same rig in every form that a verb of rigs takes."""
     path = fit.save(tmp_path_factory.mktemp("fit") / "fit.json")
-    return {"fit": fit, "path": path, "text": str(path), "folder": path.parent, "plant": fit.plant, "study": fit.study, "rig": fit.rig}
+    return {
+        "fit": fit,
+        "path": path,
+        "text": str(path),
+        "folder": path.parent,
+        "plant": fit.plant,
+        "study": fit.study,
+        "rig": fit.rig,
+    }
 
 
 RIGS = ("fit", "path", "text", "folder", "plant", "rig")

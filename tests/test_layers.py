@@ -48,10 +48,11 @@ report
 report.fit
 report.ladder report.law report.log report.rig
 report.run
-diagnosis questionnaire
+diagnosis questionnaire designing
 paper
+running
 experiments.abreast
-experiments.designing experiments.weighing_1a experiments.running
+experiments.weighing_1a
 experiments.frequency_1b
 experiments.regulation_2
 experiments.swing_up_2b experiments.tracking_3 experiments.free_swing_4

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import upright as up
-from upright.experiments.running.rig import usual_limits
 from upright.physics import find
 from upright.rig.makes import make_rig
 from upright.rigs.rigfile import read_rig_file
+from upright.running.rig import usual_limits
 
 HEAD = "Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n"
 

@@ -39,8 +39,8 @@ def full_disk(column: Column) -> Happened:
 
 def power_loss(_column: Column) -> Happened:
     """The file of a log ends anywhere; what is read is compared with what was written, row by row."""
-    from upright.experiments.running.run import RunRequest, run_rig
     from upright.logs import read_log
+    from upright.running.run import RunRequest, run_rig
 
     rng, left = np.random.default_rng(11), []
     with tempfile.TemporaryDirectory() as name:

@@ -29,8 +29,8 @@ OTHERS = {
 }  # fmt: skip
 """Options of arduino-cli, Octave, MuJoCo, FMPy, git and Dask."""
 SHOWN_BY = {
-    "rigs": "run", "realtime": "run", "experiments/running/run.py": "run", "experiments/running/rig.py": "run",
-    "experiments/designing": "design", "experiments/regulation_2": "regulate", "experiments/swing_up_2b": "swing-up",
+    "rigs": "run", "realtime": "run", "running/run.py": "run", "running/rig.py": "run",
+    "designing": "design", "experiments/regulation_2": "regulate", "experiments/swing_up_2b": "swing-up",
     "experiments/tracking_3": "track", "experiments/frequency_1b": "frequency", "study/draft": "init",
     "closed_loop": "law", "diagnosis": "doctor", "questionnaire": "survey", "identification/ladder": "ladder",
 }  # fmt: skip

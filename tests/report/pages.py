@@ -62,8 +62,8 @@ def survey_page(name: str, answers: int | None = None):
 
 def design_page(**wish):
     def page(folder: Path) -> Chapter:
-        from upright.experiments.designing.chapter import chapter
-        from upright.experiments.designing.run import DesignRequest, design_for
+        from upright.designing.chapter import chapter
+        from upright.designing.run import DesignRequest, design_for
         from upright.physics import Furuta
         from upright.rig import Rig
 

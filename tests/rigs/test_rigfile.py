@@ -9,13 +9,13 @@ from itertools import pairwise
 import pytest
 
 from upright.errors import BadInput, RigStopped
-from upright.experiments.running.rig import signal, stage_of, usual_limits
 from upright.rig.makes import make_rig
 from upright.rigs import Capabilities, Limits
 from upright.rigs.rigfile import read_rig_file
 from upright.rigs.supervisor import Duty, Supervisor
 from upright.rigs.vendor.nidaqmx import NidaqmxPort
 from upright.rigs.vendor.quanser import QuanserPort
+from upright.running.rig import signal, stage_of, usual_limits
 
 UNITS = {"psi": "rad", "theta": "rad"}
 WHOLE = """

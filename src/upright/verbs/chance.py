@@ -61,7 +61,7 @@ def chance(
     """
     from upright.basis import SIMULATED
     from upright.control.preflight import WORDS, Task, preflight
-    from upright.experiments.designing.run import SPEEDS, velocities
+    from upright.designing.run import SPEEDS, velocities
     from upright.experiments.regulation_2.run import HAND, START
     from upright.gains import feedback
     from upright.report.page import Chapter, Part, Table, resting_on

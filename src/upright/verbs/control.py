@@ -27,7 +27,7 @@ from upright.verbs.values import open_log, poles, si, si_if_given
 
 if TYPE_CHECKING:
     from upright.control.sensors import Scales
-    from upright.experiments.designing.run import Designed
+    from upright.designing.run import Designed
     from upright.experiments.regulation_2.run import Regulation, RegulationRequest
     from upright.experiments.swing_up_2b.run import SwingUpRun
     from upright.experiments.tracking_3.run import Tracking
@@ -131,8 +131,8 @@ def design(
     BadInput
         When the call contradicts itself or the rig, or a pole is out of the input's reach.
     """
-    from upright.experiments.designing.chapter import chapter
-    from upright.experiments.designing.run import SPEEDS, DesignRequest, design_for
+    from upright.designing.chapter import chapter
+    from upright.designing.run import SPEEDS, DesignRequest, design_for
     from upright.files import write_json
     from upright.report.symbols import typed
     from upright.rig.completion import completed

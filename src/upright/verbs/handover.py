@@ -93,6 +93,6 @@ def _file(source: Any, verb: str) -> Path:
     if isinstance(source, type):
         raise BadInput(f"{verb} needs numbers: {source.__name__}(...), or what up.identify answered.")
     raise BadInput(
-        f"{verb} takes what up.identify answered, a fit.json or its folder, a study, a rig or a plant with its numbers, "
+        f"{verb} takes what up.identify answered, a fit.json or its folder, a study, a rig or a plant with numbers, "
         f"got {type(source).__name__}."
     )

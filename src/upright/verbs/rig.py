@@ -15,12 +15,12 @@ from upright.verbs.pages import folder_if_given, page_folder, write_page
 from upright.verbs.values import si_if_given
 
 if TYPE_CHECKING:
-    from upright.experiments.running.doctor import Checkup
-    from upright.experiments.running.run import RigRun
     from upright.physics import Plant
     from upright.realtime.jitter import Jitter
     from upright.realtime.session import RunState
     from upright.rig.hardware import Entry
+    from upright.running.doctor import Checkup
+    from upright.running.run import RigRun
 
 Counts = float | str | Mapping[str, float]
 
@@ -177,8 +177,8 @@ def run(
     BadInput
         When files contradict each other.
     """
-    from upright.experiments.running.chapter import run_chapter
-    from upright.experiments.running.run import RunRequest, run_rig
+    from upright.running.chapter import run_chapter
+    from upright.running.run import RunRequest, run_rig
 
     folder = page_folder(out, pdf)
     leaning = si_if_given(tilt, "rad") or 0.0
@@ -231,11 +231,11 @@ def rig_check(
     BadInput
         When that is no loop.
     """
-    from upright.experiments.running.chapter import jitter_chapter
-    from upright.experiments.running.figures import jitter_figure
-    from upright.experiments.running.tick import supervised
     from upright.realtime.jitter import measure
     from upright.report.drawing import save
+    from upright.running.chapter import jitter_chapter
+    from upright.running.figures import jitter_figure
+    from upright.running.tick import supervised
 
     folder = folder_if_given(out)
     found = measure(seconds, rate, fifo=fifo, make=supervised)
@@ -295,9 +295,9 @@ def rig_doctor(
     BadInput
         When RIG.toml cannot be used.
     """
-    from upright.experiments.running.chapter import checkup_chapter
-    from upright.experiments.running.doctor import check_up
     from upright.report.symbols import typed
+    from upright.running.chapter import checkup_chapter
+    from upright.running.doctor import check_up
 
     found = check_up(Path(rig), hand=hand, clear=clear, pulse=pulse)
     return Answer(found, checkup_chapter(found, typed(Path(rig))))

@@ -21,12 +21,12 @@ from upright.experiments.hands_on.rig import rig_at_hand
 from upright.experiments.hands_on.studies import write_study
 from upright.experiments.hands_on.upright import came
 from upright.experiments.hands_on.upwards import run_upwards
-from upright.experiments.running.run import RunRequest, run_rig
 from upright.gains import feedback, filtered, place
 from upright.laws import as_values, of_values
 from upright.logs import read_log
 from upright.progress import silent
 from upright.rig.makes import MAKES, make_rig
+from upright.running.run import RunRequest, run_rig
 from upright.study.load import load_study
 
 OWN = """

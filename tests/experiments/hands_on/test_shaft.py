@@ -9,13 +9,13 @@ import pytest
 
 from upright.experiments.hands_on.rig import rig_at_hand, trial_of
 from upright.experiments.hands_on.shaft import pushed
-from upright.experiments.running.run import RunRequest, run_rig
 from upright.experiments.tracking_3.laws import AT, paper_sets
 from upright.experiments.tracking_3.run import asked_of, attempt, figured
 from upright.files import write_json
 from upright.laws import as_values
 from upright.rig.makes import make_rig
 from upright.rigs.supervisor import _free_with
+from upright.running.run import RunRequest, run_rig
 
 
 @pytest.mark.parametrize(

@@ -20,13 +20,13 @@ from upright.errors import BadInput, NotIdentifiable
 from upright.experiments.frequency_1b.run import LoggedResponse, LogRequest, response_of_logs
 from upright.experiments.hands_on.rig import RigAtHand
 from upright.experiments.hands_on.studies import write_study
-from upright.experiments.running.rig import usual_limits
 from upright.identification.estimate import identify
 from upright.identification.frequency.spectra import multisine, odd_lines
 from upright.identification.model.fit import Fit
 from upright.progress import Progress, part
 from upright.readers import read
 from upright.records import Array
+from upright.running.rig import usual_limits
 from upright.study.load import Study, load_study
 from upright.study.results import write_fit
 

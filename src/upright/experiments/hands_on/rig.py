@@ -13,8 +13,6 @@ import numpy as np
 from upright.basis import REPLAYED
 from upright.control.trial import Trial
 from upright.errors import BadInput, RigStopped
-from upright.experiments.running.rig import described
-from upright.experiments.running.run import RigRun, RunRequest, run_rig
 from upright.files import read_text, write_json
 from upright.laws import Law, Rule, as_values
 from upright.logs.layout import library
@@ -24,6 +22,8 @@ from upright.rig import Rig
 from upright.rig.makes import MAKES, Make, make_of_vendor
 from upright.rigs.protocol import Fault
 from upright.rigs.rigfile import RigFile, read_rig_file
+from upright.running.rig import described
+from upright.running.run import RigRun, RunRequest, run_rig
 from upright.study.stored_rig import read_stored_rig
 
 Watch = Callable[[RunState], str]

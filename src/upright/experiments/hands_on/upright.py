@@ -14,7 +14,6 @@ from upright.control import score
 from upright.control.preflight import Preflight
 from upright.experiments.hands_on.rig import RigAtHand, trial_of
 from upright.experiments.regulation_2.run import SETS, Came, Regulation, RegulationRequest, run_regulation
-from upright.experiments.running.run import RigRun
 from upright.gains.requests import Roots, read_poles
 from upright.laws import Law
 from upright.progress import Progress
@@ -23,6 +22,7 @@ from upright.rig import Rig
 from upright.rig.completion import completed
 from upright.rig.makes import MAKES
 from upright.rigs.protocol import Fault
+from upright.running.run import RigRun
 from upright.study.stored_rig import read_stored_rig
 
 TILT = math.radians(4)

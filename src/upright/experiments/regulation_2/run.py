@@ -17,8 +17,8 @@ import numpy as np
 
 from upright.control import Score, Trial, score, trial
 from upright.control.preflight import Preflight, Task, preflight, word
+from upright.designing.run import SPEEDS, velocities
 from upright.errors import BadInput
-from upright.experiments.designing.run import SPEEDS, velocities
 from upright.experiments.frequency_1b.run import run_frequency
 from upright.gains import Margins, Placement, feedback, margins, place
 from upright.gains.loop import closed, command_noise

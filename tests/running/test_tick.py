@@ -7,9 +7,9 @@ import math
 import pytest
 
 from upright.control.sensors import Watch
-from upright.experiments.running.tick import supervised
 from upright.rig.makes import make_rig
 from upright.rigs import Mode
+from upright.running.tick import supervised
 
 
 def test_the_tick_that_is_timed_holds_a_pendulum_upright_beside_the_bank_of_filters(monkeypatch):

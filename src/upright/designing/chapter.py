@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from upright.experiments.designing.run import Designed, VelocityLoop
+from upright.designing.run import Designed, VelocityLoop
 from upright.gains import spelled_out
 from upright.gains.lqr import locus
 from upright.gains.requests import Roots, written

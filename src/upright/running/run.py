@@ -12,7 +12,6 @@ import numpy as np
 
 from upright.basis import DESCRIBED, MEASURED, Basis
 from upright.errors import BadInput
-from upright.experiments.running.rig import described, open_loop, read_law, signal, stage_of
 from upright.files import read_text
 from upright.laws import Law, Rule, as_values
 from upright.logs import RunLog, read_log
@@ -24,6 +23,7 @@ from upright.records import Array
 from upright.rig import Rig
 from upright.rigs.protocol import Mode
 from upright.rigs.rigfile import RigFile, read_rig_file
+from upright.running.rig import described, open_loop, read_law, signal, stage_of
 
 MODES = {"host": Mode.HOST, "mcu": Mode.MCU}
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upright.basis import DESCRIBED, Basis
+from upright.designing.estimators import chosen, estimator, estimators
 from upright.errors import BadInput
-from upright.experiments.designing.estimators import chosen, estimator, estimators
 from upright.gains import (
     Estimator,
     Margins,

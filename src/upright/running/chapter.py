@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from upright.experiments.running.doctor import Checkup
-from upright.experiments.running.figures import jitter_figure
-from upright.experiments.running.run import RigRun
 from upright.realtime.jitter import Jitter
 from upright.report.page import Chapter, Facts, KeyNumber, Part, Picture, Step, Table, resting_on
 from upright.report.run import draw_run
 from upright.report.symbols import number, typed
 from upright.rigs.board import told
+from upright.running.doctor import Checkup
+from upright.running.figures import jitter_figure
+from upright.running.run import RigRun
 
 NO_SAFETY = "This supervision is software, not a rated safety function: keep a stop in hardware within reach."
 

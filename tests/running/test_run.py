@@ -11,9 +11,6 @@ import pytest
 
 import upright as up
 from upright.errors import BadInput
-from upright.experiments.running.chapter import run_chapter
-from upright.experiments.running.rig import open_loop, stage_of
-from upright.experiments.running.run import RunRequest, run_rig
 from upright.gains import feedback, filtered, place, prefilter
 from upright.laws import as_values
 from upright.logs import read_log
@@ -22,6 +19,9 @@ from upright.realtime.session import QUIET, RunOrder, carry_out
 from upright.report.run import chapter, draw_run
 from upright.rig.makes import make_rig
 from upright.rigs import Fault
+from upright.running.chapter import run_chapter
+from upright.running.rig import open_loop, stage_of
+from upright.running.run import RunRequest, run_rig
 
 RIG = make_rig("furuta")
 LINEAR = RIG.linear("inverted")

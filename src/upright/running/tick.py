@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from upright.experiments.running.rig import LEAN, NEAR, usual_limits
 from upright.gains import feedback, filtered, place
 from upright.gains.requests import read_poles
 from upright.paper.reproduce import TABLE_1
 from upright.rig.makes import make_rig
 from upright.rigs import Board, Mode, Tick, TwinPort
 from upright.rigs.supervisor import Duty, Supervisor
+from upright.running.rig import LEAN, NEAR, usual_limits
 
 _TILT = math.radians(2)
 

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from upright.errors import RigStopped
-from upright.experiments.running.rig import described, stage_of
 from upright.rig import Rig
 from upright.rigs import Board, Fault, LiveRig, TwinPort
 from upright.rigs.board import told
 from upright.rigs.rigfile import read_rig_file
+from upright.running.rig import described, stage_of
 
 MOVED = 0.05
 """How far a hand has to move a coordinate [rad, or 5 mm of a metre]."""
