@@ -129,6 +129,7 @@ def covering_of(root, **tests):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_change_is_noticed_by_a_test_that_passes_without_it(tree, tmp_path):
     """The test of the function that changed; not one that only runs it, and not one that fails in any case."""
     bench = Bench(tree, tmp_path / "bench", None)

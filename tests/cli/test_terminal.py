@@ -44,6 +44,7 @@ def run(folder, *words, cwd=None, shell="", **environment):
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "cp1252", "utf-8"])
+@pytest.mark.slow
 def test_text_comes_out_in_any_encoding(folder, tmp_path, encoding):
     done = run(folder, "show", "log.csv", "-o", str(tmp_path), PYTHONIOENCODING=encoding)
     assert (done.returncode, done.stderr) == (0, b"")
@@ -89,6 +90,7 @@ def made(folder, out, cwd, **environment):
 
 
 @pytest.mark.parametrize("setting", BAD, ids=lambda s: "=".join(next(iter(s.items())))[:30].split("\n")[0])
+@pytest.mark.slow
 def test_pictures_and_pages_depend_on_no_setting(folder, plain, tmp_path, setting):
     """To the byte, and without a word on stderr: nothing about glyphs, backends, fonts or dates."""
     here = tmp_path / "here"

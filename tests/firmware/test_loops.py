@@ -29,6 +29,7 @@ def settled(rows, kicks):
 
 
 @pytest.mark.parametrize("mode", [Mode.MCU, Mode.HOST])
+@pytest.mark.slow
 def test_the_inverted_pendulum_is_held_through_kicks_the_same_each_time(host, mode):
     first, rig = held(host(*UPRIGHT), mode, inverted(), 4.0, KICKS)
     again, _ = held(host(*UPRIGHT), mode, inverted(), 4.0, KICKS)

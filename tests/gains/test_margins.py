@@ -68,6 +68,7 @@ def by_python_control(A, B, C) -> tuple[float, float, float, float]:
 
 
 @pytest.mark.filterwarnings("ignore:stability_margins. Falling back")
+@pytest.mark.slow
 def test_three_hundred_random_loops_have_python_control_s_margins():
     """Where its polynomials are ill conditioned it invents or misses a crossing; the response, searched, decides."""
     apart = 0

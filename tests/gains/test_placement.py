@@ -143,6 +143,7 @@ def test_distinct_poles_of_several_inputs_are_as_robust_as_scipy_s():
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("states", [8, 12, 15])
+@pytest.mark.slow
 def test_a_dense_model_is_right_or_refused(states, seed):
     """Right: det(sI - A + b K), in rational numbers, changes its sign within 1e-5 around every pole asked."""
     rng = np.random.default_rng(seed)

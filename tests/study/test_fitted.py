@@ -59,6 +59,7 @@ def test_the_fit_itself_is_good(tmp_path):
 
 
 @pytest.mark.parametrize("part", range(4))
+@pytest.mark.slow
 def test_a_changed_fit_is_a_possible_rig_or_one_sentence(tmp_path, part):
     """Every key, changed in every way; whatever is accepted is finite, of positive mass, and can be computed with."""
     path = tmp_path / "fit.json"

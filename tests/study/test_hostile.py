@@ -51,6 +51,7 @@ def test_a_landed_study_is_read(name):
 
 
 @pytest.mark.parametrize("part", range(4))
+@pytest.mark.slow
 def test_some_changes_of_every_study_are_a_study_or_a_sentence(part):
     names = list(STUDIES)[part::4]
     tried = {name: mutations(name)[part::EVERY] for name in names}

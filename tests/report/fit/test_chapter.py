@@ -67,6 +67,7 @@ def test_ids_are_unique_although_many_figures_share_the_page(fit, written):
     } <= set(page.ids)
 
 
+@pytest.mark.slow
 def test_the_same_fit_writes_the_same_bytes(fit, written):
     assert written(fit)[0] == written(fit)[0]
 
@@ -81,6 +82,7 @@ def test_names_from_a_log_cannot_become_markup(changed, written, swing):
 
 
 @pytest.mark.parametrize("label", ["Ωμέγα 振り子", "décroissance à vide", "🚀", "\u202egnorw", "a" * 300, ""])
+@pytest.mark.slow
 def test_labels_in_any_script_are_kept(changed, written, label, swing):
     _, page = written(changed(runs={label: swing(n=50)}))
     assert " ".join(label.split()) in page.prose
@@ -126,6 +128,7 @@ def test_a_doubtful_fit_says_so_before_its_verdict(changed, written):
     assert "interrupted" in page.prose
 
 
+@pytest.mark.slow
 def test_long_logs_stay_a_small_page(changed, written, swing):
     runs = {f"run {i}": swing(n=60_000, seed=i) for i in range(6)}
     text, _ = written(changed(runs=runs))
