@@ -90,3 +90,37 @@ def test_a_rig_goes_through_the_verbs_as_an_object():
     )
     assert told.numbers["limit"] == 10.0
     assert told.numbers["period"] == 2e-3
+
+
+def pulse(t):
+    """A command that begins 20 ms after the first sample."""
+    return float(t > 0.0195)
+
+
+STILL = {"seconds": 0.2, "at": "hanging", "dt": 1e-3}
+
+
+def test_a_simulated_rig_is_driven_through_its_drive():
+    """A command times the gain is the plant's own force, at most that of the limit, late by the delay."""
+    drive = up.Rig.known(ARM, gain=0.65, limit=2.0)
+    for volts, force in ((1.0, 0.65), (5.0, 1.3), (-5.0, -1.3)):
+        run, bare = up.simulate(drive, u=volts, **STILL), up.simulate(ARM, u=force, **STILL)
+        assert run["theta"] == pytest.approx(bare["theta"], rel=1e-12)
+        assert run["T"][-1] == pytest.approx(max(-2.0, min(volts, 2.0)))
+        assert run.units["T"] == "V"
+    late, prompt = (up.simulate(r, u=pulse, **STILL) for r in (drive.replace(delay="10 ms"), drive))
+    assert late["psi"][10:] == pytest.approx(prompt["psi"][:-10], abs=1e-12)
+    assert not late["psi"][:30].any()
+
+
+def test_a_law_designed_for_a_rig_holds_it_at_its_own_period():
+    rig = up.Rig.known(ARM, gain="0.65 N m/V", limit="10 V", period="4 ms", delay="4 ms", counts=4096)
+    law = up.design(rig, poles="-4+-2j, -17, -3").law
+    run = up.simulate(rig, law, start={"theta": "3 deg"}, seconds=4)
+    assert run.period == pytest.approx(4e-3)
+    assert run["theta"][-1] == pytest.approx(math.pi, abs=2 * math.tau / 4096)
+    assert np.abs(run["T"]).max() < 10
+
+
+def test_a_free_rig_is_sampled_at_its_servo_period():
+    assert up.simulate(up.Rig.known(ARM, period="5 ms"), seconds=0.1).period == pytest.approx(5e-3)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +15,9 @@ from upright.laws import Law, Rule, state_feedback
 from upright.physics import Plant
 from upright.records import Provenance, Record
 from upright.verbs.linear.feedback import Gains
+
+if TYPE_CHECKING:
+    from upright.rig import Rig
 
 Array = NDArray[np.float64]
 
@@ -28,7 +32,8 @@ def simulate(
 
     Parameters
     ----------
-    plant : Plant, or what has one, such as a fit
+    plant : Plant, Rig or fit
+        Of a rig or a fit its drive, encoders and servo period count as well, where they are known and not given here.
     law : Gains, array of gains, Law or Rule, optional
         Gains act on readings sampled every `dt`, less the equilibrium, and on their differences.
     start : mapping of state to number or text, or array, shape (states,), optional
@@ -38,9 +43,9 @@ def simulate(
     at : str, optional
         Equilibrium; the one that gains or law are for, else the plant's first.
     u : float, callable of time, or array, shape (N,) or (N, inputs), optional
-        Command, in the unit of the input; it is added to the law's.
+        Command, in the unit of the input or of the rig's command; it is added to the law's.
     dt : float or str, optional
-        Between samples [s]; the period that gains or law are for, else 1 ms.
+        Between samples [s]; the period that gains or law are for, else the rig's, else 1 ms.
     limit : float
         Largest command.
     counts : float or mapping of coordinate to float, optional
@@ -64,8 +69,11 @@ def simulate(
     from upright.simulation import simulate as motion
     from upright.verbs.values import si
 
+    rig = _rig(plant)
     plant = _plant(plant)
     point = _point(plant, law, at)
+    if dt is None and rig is not None:
+        dt = getattr(law, "period", None) or rig.hardware.value("servo_period", 0.0) or None
     seconds, dt = si(seconds, "s"), _period(law, None if dt is None else si(dt, "s"))
     names = plant.state_names()
     units = [unit for c in plant.coordinates for unit in (c.unit, f"{c.unit}/s")]
@@ -74,15 +82,23 @@ def simulate(
         raise BadInput(f"simulate needs seconds and dt above 0, got seconds={seconds:g} and dt={dt:g}.")
     samples = round(seconds / dt) + 1
     t = np.arange(samples, dtype=np.float64) * dt
-    drive = {f"actuator.{name}": float(value) for name, value in (actuator or {}).items()}
-    for name in drive:
+    given_drive = {f"actuator.{name}": float(value) for name, value in (actuator or {}).items()}
+    drive = ({} if rig is None else dict(rig.drive)) | given_drive
+    for name in given_drive:
         if name not in ACTUATOR:
             known = [n.partition(".")[2] for n in ACTUATOR]
             short = name.partition(".")[2]
             raise BadInput(f"the drive has no number '{short}'; {nearest(short, known)} (it has {', '.join(known)})")
     if limit < math.inf:
         drive["actuator.limit"] = limit
-    loop = _loop(plant, law, point, dt, memory, limit, _steps(plant, counts))
+    limit = drive.get("actuator.limit", math.inf)
+    if counts is None and rig is not None:
+        stated = {c.name: f"counts.{c.name}" for c in plant.coordinates}
+        counts = {n: rig.hardware.value(key, 0.0) for n, key in stated.items() if key in rig.hardware.entries}
+    steps = _steps(plant, counts)
+    loop = _loop(plant, law, point, dt, memory, limit, steps)
+    if rig is not None and isinstance(loop, Law):  # late and rounded as the rig is, once
+        loop = replace(loop, delay=0.0, quantum=steps, command_quantum=rig.converter)
     given = _command(u, t, len(plant.inputs))
     x = motion(plant, drive, x0, given, dt, samples=samples, substeps=2, loop=loop)[:, :, 0]
     _check_bounded(t, x[:, : len(names)], names)
@@ -93,7 +109,7 @@ def simulate(
         commands[i.name] = np.zeros(samples) if put_out is None else np.clip(put_out[:, j], -limit, limit)
     return Record(
         t=t, signals=signals | commands,
-        units=dict(zip(names, units, strict=True)) | {i.name: i.unit for i in plant.inputs},
+        units=dict(zip(names, units, strict=True)) | {i.name: (rig and rig.unit) or i.unit for i in plant.inputs},
         inputs=tuple(commands), outputs=tuple(c.name for c in plant.coordinates),
         provenance=Provenance(reader="simulation", rig=type(plant).__name__,
                               notes=("This log was simulated; no rig was touched.",)),
@@ -109,6 +125,16 @@ def _check_bounded(t: Array, x: Array, names: Sequence[str]) -> None:
             f"the motion grows without bound: {names[int(np.argmax(wild[k]))]} is beyond 1e15 at {t[k]:.4g} s, so this "
             "loop does not stabilize the plant; change its gains or its start, or simulate fewer seconds."
         )
+
+
+def _rig(given: Any) -> Rig | None:
+    """A rig, or that of a fit; a plant alone has no drive."""
+    from upright.rig import Rig
+    from upright.verbs.fitting import FitAnswer
+
+    if isinstance(given, Rig):
+        return given
+    return given.rig if isinstance(given, FitAnswer) else None
 
 
 def _plant(given: Any) -> Plant:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -155,10 +154,10 @@ def test_disks_move_as_carts_do_in_other_units():
     p = carts.plant.parameters()
     same = {n.replace("m_", "J_"): v * inertia for n, v in p.items() if n[0] in "mkc"}
     dry = {n: v * inertia * angle for n, v in p.items() if n[0] == "f"}
-    disks = replace(
-        carts, plant=chain(2, "torsional")(**same, **dry), gain=carts.gain * inertia * angle,
-        counts=tuple(c / angle for c in carts.counts), travel=math.inf,
+    disks = carts.replace(plant=chain(2, "torsional")(**same, **dry), gain=carts.gain * inertia * angle,
+        counts=[math.tau * n / angle for n in carts.counts], travel=math.inf,
     )  # fmt: skip
+    carts = carts.replace(counts=[angle * n for n in disks.per_unit])  # to the last bit
     for one, other in zip(paper_sets(carts), paper_sets(disks), strict=True):
         np.testing.assert_allclose(other.K * angle, one.K, rtol=1e-9)
         step = 0.9 * carts.limit / one.k_pf
