@@ -60,7 +60,10 @@ if TYPE_CHECKING:
     from upright.rig import Rig
     from upright.systems import StateSpace
     from upright.verbs.chance import chance
-    from upright.verbs.control import design, regulate, swing_up, track
+    from upright.verbs.control.design import design
+    from upright.verbs.control.regulate import regulate
+    from upright.verbs.control.swing_up import swing_up
+    from upright.verbs.control.track import track
     from upright.verbs.course import lab, reproduce, survey
     from upright.verbs.export import export
     from upright.verbs.fitting import identify
@@ -93,7 +96,10 @@ _HOMES = {
     "records": ("Record",),
     "rig": ("Rig",),
     "verbs.chance": ("chance",),
-    "verbs.control": ("design", "regulate", "swing_up", "track"),
+    "verbs.control.design": ("design",),
+    "verbs.control.regulate": ("regulate",),
+    "verbs.control.swing_up": ("swing_up",),
+    "verbs.control.track": ("track",),
     "verbs.course": ("lab", "reproduce", "survey"),
     "verbs.export": ("export",),
     "verbs.rig": ("rig_check", "rig_doctor", "run"),

@@ -18,7 +18,9 @@ from upright.rig.drive import full_command
 from upright.rig.makes import CONVERTER, MAKES, PER_METRE, SERVO, VENDORS, hardware_of_make, make_rig, sheet
 from upright.simulation import simulate
 from upright.study.stored_rig import read_stored_rig
-from upright.verbs.control import design, regulate, swing_up
+from upright.verbs.control.design import design
+from upright.verbs.control.regulate import regulate
+from upright.verbs.control.swing_up import swing_up
 
 POLES = "-4+-2j, -16, -3"
 RIG = """

@@ -10,7 +10,10 @@ import pytest
 from tests.gains.furuta import RIG, STUDY
 from upright.errors import BadInput
 from upright.files import json_text
-from upright.verbs.control import design, regulate, swing_up, track
+from upright.verbs.control.design import design
+from upright.verbs.control.regulate import regulate
+from upright.verbs.control.swing_up import swing_up
+from upright.verbs.control.track import track
 
 POLES = [-4 + 2j, -4 - 2j, -17, -3]
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from importlib import import_module
 from inspect import isfunction
@@ -34,14 +35,22 @@ ELSEWHERE = "upright.commands"
 def _declared() -> dict[str, Command]:
     """Every command of this package by its words; rooms of verbs without one may need NumPy, and are not imported."""
     found: dict[str, Command] = {}
-    for room in iter_modules(verbs.__path__, f"{verbs.__name__}."):
-        origin = getattr(room.module_finder.find_spec(room.name, None), "origin", None)
-        if origin is not None and b"@command(" in Path(origin).read_bytes():
-            for value in vars(import_module(room.name)).values():
-                if isfunction(value) and value.__module__ == room.name and "command" in vars(value):
+    for name, origin in _modules(verbs.__path__, verbs.__name__):
+        if b"@command(" in Path(origin).read_bytes():
+            for value in vars(import_module(name)).values():
+                if isfunction(value) and value.__module__ == name and "command" in vars(value):
                     said = command_of(value)
                     found[said.words] = said
     return found
+
+
+def _modules(folders: Iterable[str], package: str) -> Iterator[tuple[str, str]]:
+    """Name and file of every module of a package and of those inside it, imported or not."""
+    for module in iter_modules(folders, f"{package}."):
+        spec: Any = module.module_finder.find_spec(module.name, None)
+        if spec is not None and spec.origin is not None:
+            yield module.name, spec.origin
+            yield from _modules(spec.submodule_search_locations or (), module.name)
 
 
 DECLARED = _declared()

@@ -1,0 +1,1 @@
+"""Verbs that close a loop: `design`, `regulate`, `swing_up` and `track`."""

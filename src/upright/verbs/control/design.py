@@ -1,0 +1,214 @@
+"""Gains for an identified rig or plain matrices, and the loop they make: `design`."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from upright.errors import BadInput, nearest
+from upright.files import keeps_its_inputs
+from upright.verbs.answer import Answer
+from upright.verbs.command import command
+from upright.verbs.control.options import COUNTS
+from upright.verbs.handover import called, rig_of
+from upright.verbs.linear.matrices import is_linear, linear_model, read_matrices
+from upright.verbs.pages import folder_if_given, write_page
+from upright.verbs.rig import as_typed, rig_options
+from upright.verbs.values import poles, si, si_if_given
+
+if TYPE_CHECKING:
+    from upright.designing.run import Designed
+    from upright.rig import Rig
+    from upright.systems import StateSpace
+
+_poles = poles  # the verbs have options of this name
+
+
+@command(
+    "Control",
+    metavars={
+        "source": "STUDY_ORFIT", "matrices": "FILE", "at": "NAME", "lqr": "LIST", "effort_weight": "R",
+        "start": "LIST", "delay": "SAMPLES", "speed": "WAY", "lag": "TIME", "track": "COORDINATE",
+    },
+    helps={
+        "source": "fit.json, its folder, or a study (TOML).",
+        "matrices": "Plain matrices instead: TOML with A and B; C, D, dt, names, units if any.",
+        "start": 'Deviation to come back from, as in "theta=5 deg, psi_dot=0.2 rad/s".',
+        "counts": COUNTS,
+    },
+    defaults={"out": "."},
+    more="""
+    upright design out/fit.json --at inverted --poles "-4.15+-1.63j, -16.9, -3.2"
+    upright design --matrices model.toml --poles "-4, -5" --period "2 ms"
+    """,
+)  # fmt: skip
+@keeps_its_inputs
+def design(
+    source: Any = None, *, matrices: str | os.PathLike[str] | None = None, at: str = "",
+    poles: str | Iterable[complex] = "", lqr: str | Iterable[float] = "", effort_weight: float | None = None,
+    limit: float | None = None, start: str | Mapping[str, float | str] = "", period: float | str = "",
+    delay: float | None = None, speed: str = "", memory: float = 0.5, lag: float | str = "",
+    counts: float | str | Mapping[str, float] = "", vendor: str = "", track: str = "", sampled: bool = False,
+    seed: int = 0, out: str | os.PathLike[str] | None = None, pdf: bool = False,
+) -> Answer[Designed]:  # fmt: skip
+    """Find the gains that hold a rig, and what they are worth in the loop a computer runs.
+
+    The numbers are those identified (hanging, for instance); the model is the one about another equilibrium, upright.
+    Poles are placed by Ackermann's formula, or chosen by LQR; period, delay and differenced encoders are then
+    put in.
+
+    Parameters
+    ----------
+    source : fit, path, plant or linear model, optional
+        What `identify` answered, a fit.json, its folder, or a study (TOML), or a plant with its numbers; or a
+        `control.StateSpace` or TransferFunction, ``plant.linear("inverted")``, what `hold` gives, or arrays
+        ``(A, B[, C[, D]])``.
+    matrices : path, optional
+        Instead of `source`, a file in TOML with A and B, and C, D, dt [s], names and units where there are any. Of a
+        linear model there are no dry friction, no encoders and no covariance; a sampled one is designed for as it is.
+    at : str, optional
+        Equilibrium; the last that the plant names when omitted.
+    poles : str or sequence of complex
+        Poles [1/s], as in ``"-4.15+-1.63j, -16.9, -3.2"``.
+    lqr : str or sequence of float
+        Weights of the states, as in ``"1,0,1,0"``, instead of poles.
+    effort_weight : float, optional
+        Weight of the effort; the limit decides when omitted.
+    limit : float, optional
+        Largest command, in the command's unit; the study's when omitted.
+    start : str or mapping, optional
+        Deviation to come back from, by state: ``{"theta": "5 deg"}``, ``{"theta": 0.087}`` [SI].
+    period : float or str, optional
+        Between samples [s]; the study's servo period when omitted.
+    delay : float, optional
+        How many samples late a command acts in all; when omitted the fit's delay, or one where it has none. StateSpace
+        matrices hold their own.
+    speed : str
+        Velocities by plain or filtered difference, or kalman; filtered when omitted. Of matrices measured, filtered,
+        plain or observer; the first of these that the outputs allow when omitted.
+    memory : float
+        Of the filtered difference, 0 to 1.
+    lag : float or str, optional
+        Lag of the drive [s]; the fit's when omitted.
+    counts : float, str or mapping, optional
+        Encoder counts per turn or metre, one number or by coordinate; the study's when omitted.
+    vendor : str, optional
+        Whose data sheet says what neither the call nor the study does: "ECP 205" or "ECP 210".
+    track : str, optional
+        Coordinate that follows a reference.
+    sampled : bool
+        Gains whose sampled loop has the poles asked.
+    seed : int
+        Of the rigs drawn from the fit's covariance.
+    out : path, optional
+        Folder for design.json and design.html.
+    pdf : bool
+        Write the page as PDF too.
+
+    Returns
+    -------
+    Answer
+        Of a `Designed`: gains `K`, `poles`, margins.
+
+    Raises
+    ------
+    BadInput
+        When the call contradicts itself or the rig, or a pole is out of the input's reach.
+    """
+    from upright.designing.chapter import chapter
+    from upright.designing.run import SPEEDS, DesignRequest, design_for
+    from upright.files import write_json
+    from upright.report.symbols import typed
+    from upright.rig.completion import completed
+
+    folder_at = folder_if_given(out, pdf)
+    asked, weights = _poles(poles), _numbers(lqr)
+    if (asked is None) == (weights is None):
+        raise BadInput('give either --poles "-4+-2j, -10, -3" or --lqr "1,0,1,0" (weights of the states).')
+    if (source is None) == (matrices is None):
+        raise BadInput("design takes a fit.json, its folder, a study or a linear model, or --matrices FILE; give one.")
+    wish = DesignRequest(
+        at="", poles=asked, weights=weights, R=effort_weight, delay=delay, lag=si_if_given(lag, "s"), memory=memory,
+        track=track, sampled=sampled,
+    )  # fmt: skip
+    if matrices is not None or is_linear(source):
+        if at or counts or vendor:
+            raise BadInput("--at, --counts and --vendor are of a rig, and plain matrices are none; leave them out.")
+        rig = read_matrices(matrices) if matrices is not None else linear_model(source)
+        wish = replace(wish, period=_sampling(rig, period), speed=speed, limit=limit, start=_start(rig, start))
+        name = "--matrices " + (typed(Path(matrices)) if matrices is not None else "FILE")
+    else:
+        if (speed := speed or "filtered") not in SPEEDS:
+            raise BadInput(f"--speed is plain, filtered or kalman, got '{speed}'.")
+        rig = rig_of(source, "design", seed=seed)
+        here = at or list(rig.plant.equilibria)[-1]
+        if here not in rig.plant.equilibria:
+            raise BadInput(f"'{rig.name}' has no equilibrium '{here}'; {nearest(here, rig.plant.equilibria)}")
+        given = rig_options(rig.plant, rig.unit, limit=limit, period=period, counts=counts)
+        on = completed(rig, given, vendor=vendor, needs=("servo_period", "counts"), who="upright design")
+        wish = replace(
+            wish, at=here, period=on.period, speed=speed, quantum=tuple(on.quantum.tolist()),
+            limit=on.saturation if math.isfinite(on.saturation) else None, start=_start(rig, start), on=on,
+        )  # fmt: skip
+        name = called(source)
+    done = design_for(rig, wish)
+    again = as_typed(limit=limit, period=period, counts=counts, vendor=vendor)
+    told = chapter(done, source=name + again, folder=typed(folder_at or Path()))
+    files: list[Path] = []
+    if folder_at is not None:
+        files = [
+            write_json(folder_at / "design.json", told.numbers),
+            *write_page(told, folder_at / "design.html", pdf),
+        ]
+    return Answer(done, told, files)
+
+
+def _sampling(model: StateSpace, period: float | str) -> float:
+    """Period of the loop [s]; that of sampled matrices is theirs."""
+    asked = si_if_given(period, "s")
+    if asked is None and not model.dt:
+        raise BadInput('these matrices are continuous, and a computer closes the loop: say how often, --period "2 ms".')
+    if asked is not None and model.dt and not math.isclose(asked, model.dt, rel_tol=1e-9):
+        raise BadInput(
+            f"these matrices are sampled every {1e3 * model.dt:.6g} ms, and a period of {1e3 * asked:.6g} ms was "
+            "asked for; leave --period out, or give a continuous model."
+        )
+    return model.dt or asked or 0.0
+
+
+def _numbers(given: str | Iterable[float]) -> tuple[float, ...] | None:
+    if not isinstance(given, str):
+        return tuple(float(x) for x in given) or None
+    if not given:
+        return None
+    try:
+        return tuple(float(part) for part in given.split(","))
+    except ValueError:
+        raise BadInput(f'weights are numbers separated by commas, as in "1,0,1,0", got {given[:60]!r}.') from None
+
+
+def _start(rig: Rig | StateSpace, given: str | Mapping[str, float | str]) -> tuple[float, ...]:
+    """Deviation, state by state in its unit; empty when none was given."""
+    from upright.units import scale
+
+    if isinstance(given, str):
+        parts = [part.partition("=") for part in given.split(",")] if given.strip() else []
+        said: dict[str, float | str] = {name.strip(): value for name, _, value in parts}
+    else:
+        said = dict(given)
+    if not said:
+        return ()
+    names = rig.states
+    units = dict(zip(names, rig.state_units, strict=True))
+    values = dict.fromkeys(names, 0.0)
+    for name, value in said.items():
+        if name not in values:
+            raise BadInput(f"--start names states as in \"theta=5 deg\", got '{name}'; {nearest(name, names)}")
+        values[name] = si(value, units[name]) / (scale(units[name]) if isinstance(value, str) else 1.0)
+    if not any(values.values()):
+        raise BadInput("--start must leave the equilibrium; give one state a value that is not 0.")
+    return tuple(values.values())

@@ -1,0 +1,148 @@
+"""A step through a flexible shaft: `track`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from upright.errors import BadInput
+from upright.files import keeps_its_inputs
+from upright.progress import Progress, silent
+from upright.verbs.answer import Answer
+from upright.verbs.command import command
+from upright.verbs.control.options import COUNTS
+from upright.verbs.handover import called, rig_of
+from upright.verbs.pages import page_folder, write_page, written_where_named
+from upright.verbs.rig import Counts, rig_options
+from upright.verbs.values import poles, si_if_given
+
+if TYPE_CHECKING:
+    from upright.experiments.tracking_3.run import Tracking
+
+_poles = poles  # the verbs have options of this name
+
+
+@command(
+    "Control",
+    defaults={"out": "track"},
+    names={"sets": "--set"},
+    metavars={"source": "[FIT]", "sets": "LIST", "step": "SIZE"},
+    helps={
+        "source": "fit.json, its folder, or a study; a twin without it.",
+        "sets": "Sets of Table 2, as in 1,4.",
+        "poles": 'Poles [1/s] of your own: "-10+-20j, -25+-10j".',
+        "step": 'Size of the step, as in "5 mm" or "10 deg".',
+        "counts": COUNTS,
+    },
+    more="""
+    upright track --rig torsional --seed 3 -o out
+    upright track out/fit.json --set 4 --step "6 mm"
+    """,
+)
+@written_where_named
+@keeps_its_inputs
+def track(
+    source: Any = None, *, rig: str = "rectilinear", seed: int = 0,
+    sets: str | int | Sequence[int] = "", poles: str | Iterable[complex] = "", step: float | str = "",
+    limit: float | None = None, period: float | str = "", counts: Counts = "", vendor: str = "",
+    out: str | os.PathLike[str] | None = None, pdf: bool = False, progress: Progress = silent,
+) -> Answer[Tracking]:  # fmt: skip
+    """Make the far inertia of a flexible shaft follow a step, by state feedback and by PD.
+
+    This is experiment 3: identifies a twin from a few pulses, places the poles of Table 2, sizes the step by effort,
+    twist and travel, predicts its figures and runs it; PD control stands beside. With a fit of your own rig the figures
+    are predicted on the fitted numbers.
+
+    Parameters
+    ----------
+    source : fit, path or plant, optional
+        What `identify` answered, fit.json, its folder, or a study, on whose numbers the figures are predicted; a twin
+        when omitted.
+    rig : str
+        Twin to run on: rectilinear (ECP 210) or torsional (ECP 205).
+    seed : int
+        Which twin of the make; 0 is the one as designed.
+    sets : str, int or sequence of int, optional
+        Sets of Table 2, the command line's ``--set``; all when neither they nor poles are given.
+    poles : str or sequence of complex, optional
+        Poles of one's own [1/s].
+    step : float or str, optional
+        Size of the step [m or rad]; chosen by effort, twist and travel when omitted.
+    limit : float, optional
+        Largest command; the make's own, or the study's, when omitted.
+    period : float or str, optional
+        Servo period [s] of a rig of your own; the study's when omitted.
+    counts : float, str or mapping, optional
+        Encoder counts of a rig of your own, per turn or metre; the study's when omitted.
+    vendor : str, optional
+        Whose data sheet says what neither the call nor the study does: "ECP 205" or "ECP 210".
+    out : path, optional
+        Folder for all files; in Python none is written without one.
+    pdf : bool
+        Write the page as PDF too.
+    progress : callable, optional
+        Told the step at work and the share done.
+
+    Returns
+    -------
+    Answer
+        Of a `Tracking`; `interrupted` when Ctrl-C stopped it.
+
+    Raises
+    ------
+    BadInput
+        When there is no such rig or set, or poles cannot be placed.
+    """
+    from upright.experiments.tracking_3.chapter import chapter
+    from upright.experiments.tracking_3.pulses import rig_of_file, shaft_make
+    from upright.experiments.tracking_3.run import follow, run_tracking
+    from upright.files import write_json
+    from upright.rig.completion import completed, doubts
+    from upright.rig.makes import SHAFTS, make_rig
+
+    at = page_folder(out, pdf)
+    own = _poles(poles)
+    which = _sets(sets) or (() if own is not None else (1, 2, 3, 4))
+    if limit is not None and not limit > 0:
+        raise BadInput(f"--limit must be above 0, got {limit:g}.")
+    if source is None and rig not in SHAFTS:
+        raise BadInput(f"--rig is {' or '.join(SHAFTS)}, got '{rig}'.")
+    doubt: tuple[str, ...] = ()
+    if source is None:
+        on = make_rig(rig, seed)
+    else:
+        known = rig_of(source, "track")
+        shaft_make(known.plant, f"'{known.name}'")
+        given = rig_options(known.plant, known.unit, limit=limit, period=period, counts=counts)
+        on = rig_of_file(completed(known, given, vendor=vendor, who="upright track"), Path(called(source)).name)
+        doubt = doubts(known, on)
+    size = si_if_given(step, on.plant.coordinates[-1].unit)
+    if size is not None and not size > 0:
+        raise BadInput(f"--step needs a size above 0, got '{step}'.")
+    if source is None:
+        on = on.replace(limit=limit or on.limit)
+        done = run_tracking(on, seed, at, progress, which=which, poles=own, step=size)
+    else:
+        done = follow(on, on, Path(called(source)), None, None, progress, which=which, poles=own, step=size)
+    told = chapter(done)
+    told = replace(
+        told, title=f"Experiment 3: {told.title.lower()}, {done.rig.name}",
+        numbers={**told.numbers, "verdict": told.verdict}, warnings=(*told.warnings, *doubt),
+    )  # fmt: skip
+    return Answer(done, told, [write_json(at / "track.json", told.numbers), *write_page(told, at / "track.html", pdf)])
+
+
+def _sets(given: str | int | Sequence[int]) -> tuple[int, ...]:
+    if isinstance(given, int):
+        return (given,)
+    if not isinstance(given, str):
+        return tuple(given)
+    try:
+        return tuple(int(part) for part in given.split(",")) if given else ()
+    except ValueError:
+        raise BadInput(
+            f'--set takes numbers of Table 2 separated by commas, as in "1,4", got {given[:40]!r}.'
+        ) from None
