@@ -157,6 +157,22 @@ def test_the_spring_brings_home_what_a_lean_drags_away():
     assert abs(held.slope) < abs(free.slope) / 30
 
 
+@pytest.mark.parametrize(("make", "body", "unit"), [("furuta", "disk", "rad/s"), ("linear", "cart", "m/s")])
+def test_every_release_is_told_with_its_push_and_once_more_with_the_spring(make, body, unit):
+    """A disk is pushed by an angular speed and may lean by a quarter degree; a cart by a speed, and it sticks."""
+    ways = [f"free {body}, level", f"pushed at release, {MAKES[make].push:g} {unit}"]
+    held = ["spring, level", "spring, pushed at release"]
+    if body == "disk":
+        ways.append("out of level by 0.25°")
+        held.append("spring, out of level by 0.25°")
+    paths = drift.drift_paths(freed(make_rig(make)), seconds=2.5)
+    assert [(w.name, w.remedy) for w in paths] == [(n, False) for n in ways] + [(n, True) for n in held]
+    # one servo step after the release: a pushed body moves at its push, one left at rest has hardly begun
+    for w in paths:
+        speed = (w.psi[1] - w.psi[0]) / (w.t[1] - w.t[0])
+        assert abs(speed - ("pushed" in w.name) * MAKES[make].push) < 0.5 * MAKES[make].push
+
+
 def test_a_cart_s_momentum_is_what_its_release_gave_it():
     # no friction: p = (m_c + m_p) x' + m_p l_cg cos(theta) theta' is constant, so the cart drifts at p over the mass
     rig = freed(make_rig("linear")).changed(**FRICTIONLESS)
