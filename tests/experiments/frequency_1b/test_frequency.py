@@ -13,7 +13,7 @@ import pytest
 from upright.errors import NotIdentifiable
 from upright.experiments.frequency_1b.chapter import chapter, true_key
 from upright.experiments.frequency_1b.run import run_frequency
-from upright.experiments.frequency_1b.sweeps import SHARE, broadband
+from upright.experiments.frequency_1b.sweeps import EVERY, SHARE, broadband, collect, grid, stepped_sine
 from upright.identification.frequency.answer import key_value
 from upright.identification.frequency.spectra import chirp, multisine, odd_lines, repetition, response_of, sines_in
 from upright.readers import read
@@ -105,6 +105,36 @@ def test_a_broadband_command_is_whole_steps_of_the_converter_where_there_is_one(
     assert np.ptp(stepped) > 1.0
     assert np.isfinite(smooth).all()
     assert np.mean(16 * smooth % 1 == 0) < 0.01
+
+
+@pytest.fixture(scope="module")
+def hurried():
+    """Three sines of eight seconds each: too short for the two slow ones, which swing on."""
+    return stepped_sine(make_rig("linear"), MAKES["linear"], count=3, seconds=8.0)
+
+
+def test_sines_that_did_not_settle_are_named_by_their_frequency(hurried):
+    """And only they: with none of them late, nothing is said."""
+    rig = make_rig("linear")
+    tick = rig.period * EVERY
+    lengths = grid(*MAKES["linear"].band, 3, tick)
+    asked = [2 * np.pi / (n * tick) for n in lengths]  # a whole number of samples per period
+    assert [d.omega for d in hurried.dwells] == pytest.approx(asked)
+    for late in ((), (1,), (0, 2)):
+        dwells = tuple(replace(d, settle=np.nan if i in late else 1.0) for i, d in enumerate(hurried.dwells))
+        told = f"Not settled at {', '.join(f'{asked[i]:.3g}' for i in late)} rad/s."
+        assert collect(dwells, rig).notes == ((told,) if late else ())
+    assert collect(hurried.dwells, rig).units == ("m", "rad", "V")
+    assert collect(hurried.dwells, rig).hold == rig.period
+
+
+def test_the_time_at_the_rig_is_that_of_its_sines_settled_or_not(hurried):
+    """Each ends within its eight seconds; the log follows them with one sample from a sine to the next."""
+    assert not all(np.isfinite(d.settle) for d in hurried.dwells)
+    assert 8.0 < hurried.seconds <= 3 * 8.0
+    tick = make_rig("linear").period * EVERY
+    assert hurried.log.t[-1] == pytest.approx(hurried.seconds + 2 * tick)
+    assert len(hurried.log) == sum(len(d.record) for d in hurried.dwells)
 
 
 @pytest.fixture(scope="module")
