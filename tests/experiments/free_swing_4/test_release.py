@@ -9,8 +9,10 @@ from scipy.integrate import quad, solve_ivp
 
 from upright.errors import BadInput
 from upright.experiments.free_swing_4 import release as drift
+from upright.experiments.free_swing_4.chapter import chapter
 from upright.experiments.free_swing_4.release import Release, acquire, freed, motion
-from upright.experiments.free_swing_4.run import losses
+from upright.experiments.free_swing_4.run import FreeSwing, losses
+from upright.experiments.weighing_1a.run import Known
 from upright.rig.makes import COUNTS, MAKES, MOTOR_AND_BELT, NOMINAL, SERVO, make_rig
 
 
@@ -171,6 +173,25 @@ def test_every_release_is_told_with_its_push_and_once_more_with_the_spring(make,
     for w in paths:
         speed = (w.psi[1] - w.psi[0]) / (w.t[1] - w.t[0])
         assert abs(speed - ("pushed" in w.name) * MAKES[make].push) < 0.5 * MAKES[make].push
+
+
+@pytest.mark.parametrize(("make", "body"), [("furuta", "disk"), ("linear", "cart")])
+def test_the_chapter_says_how_fast_the_twin_would_fall_and_what_is_known_of_it(make, body, tmp_path):
+    """Four figures of the growing eigenvalue; weighed in experiment 1a, or known to 1 % from the bench."""
+    rig = freed(make_rig(make, 3))
+    pole = np.linalg.eigvals(rig.plant.linear("inverted").A).real.max()
+    done = FreeSwing(rig=rig, folder=tmp_path)
+    told = chapter(done)
+    twin, known = told.parts[0].content
+    assert twin.startswith(f"A digital twin of {rig.name}, seed 3: ")
+    assert f"fall so at {pole:#.4g} rad/s." in twin
+    assert ("drive belt off" if body == "disk" else "motor silent, pulled along by the cart") in twin
+    assert f"the {body}'s inertia to 1 %, the lengths from a ruler" in known
+    assert f"why does the {body} wander" in told.question
+    assert told.verdict == "The experiment was stopped before the first fit."
+    assert not told.sound
+    weighed = replace(done, weighed=Known(name="J_d", value=1e-3, stderr=1e-6))
+    assert f"the {body}'s inertia from experiment 1a, the lengths" in chapter(weighed).parts[0].content[1]
 
 
 def test_a_cart_s_momentum_is_what_its_release_gave_it():
