@@ -194,6 +194,36 @@ def test_the_chapter_says_how_fast_the_twin_would_fall_and_what_is_known_of_it(m
     assert f"the {body}'s inertia from experiment 1a, the lengths" in chapter(weighed).parts[0].content[1]
 
 
+@pytest.mark.parametrize(
+    ("make", "case", "ends", "sentence"),
+    [
+        ("furuta", "out of level by 0.25°", (-math.pi / 3, math.pi / 90),
+         "That lean drags the free disk away by 60°; a soft spring keeps it within 2°."),
+        ("linear", "pushed at release", (0.031, -0.004),
+         "A push of 0.05 m/s at the release leaves the cart 3.1 cm away, where dry friction holds it; a soft spring "
+         "brings it back to 0.4 cm."),
+    ],
+)  # fmt: skip
+def test_the_chapter_says_how_far_a_carrier_went_and_what_the_spring_makes_of_it(make, case, ends, sentence, tmp_path):
+    """Paths by hand: only the case that matters for the body is told, in degrees or cm, whichever side it went."""
+    t = np.linspace(0.0, 3.0, 301)
+
+    def path(name, end, remedy):
+        psi = end * t / t[-1]
+        return drift.DriftPath(name=name, remedy=remedy, t=t, psi=psi, centre=psi, slope=end / t[-1], end=end)
+
+    free, held = ends
+    drifts = (
+        path("level", 9.0, False), path(case, free, False), path("spring, level", 9.0, True),
+        path(f"spring, {case}", held, True),
+    )  # fmt: skip
+    done = FreeSwing(rig=freed(make_rig(make)), folder=tmp_path, drifts=drifts)
+    assert chapter(done).detail == sentence
+    assert chapter(replace(done, interrupted=True)).detail == (
+        f"Interrupted: this is what was there by then. {sentence}"
+    )
+
+
 def test_a_cart_s_momentum_is_what_its_release_gave_it():
     # no friction: p = (m_c + m_p) x' + m_p l_cg cos(theta) theta' is constant, so the cart drifts at p over the mass
     rig = freed(make_rig("linear")).changed(**FRICTIONLESS)
