@@ -1,6 +1,7 @@
 """Does a session keep what is finished, go on where it stopped, and survive an experiment that fails?"""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -152,3 +153,22 @@ def test_worn_rigs_are_other_rigs_and_are_made_again(bench, tmp_path):
     book = laboratory.book(session, laboratory.date(2006, 6, 18))
     assert "They are worn" in dict(book.facts)["Data"]
     assert dict(book.facts)["Again"] == "upright lab --worn"
+
+
+def test_the_cover_names_each_rig_once_with_the_seed_that_makes_it_again(bench, tmp_path):
+    """Experiments 1 and 2 share the disk of the 205, the third takes carts of the 210."""
+    session = laboratory.run_laboratory((), "", 4, tmp_path)
+    cover = laboratory.book(session, laboratory.date(2006, 6, 18))
+    facts = dict(cover.facts)
+    assert facts["Rig"] == "ECP 205 + A51, Furuta pendulum (seed 4); ECP 210, two carts (seed 4)"
+    assert facts["Data"] == laboratory.TWINS
+    assert facts["Experiments"] == "1, 2, 3"
+    assert facts["Made"].startswith("2006-06-18, upright ")
+    assert facts["Again"] == "upright lab --seed 4"
+    assert (cover.title, cover.notes, cover.missing) == (laboratory.TITLE, (), ())
+    empty = replace(session, results=[], interrupted=True)
+    cover = laboratory.book(empty, laboratory.date(2006, 6, 18))
+    assert dict(cover.facts)["Rig"] == "seed 4"
+    assert dict(cover.facts)["Experiments"] == "none"
+    assert "not yet experiments 1, 2, 3." in cover.notes[0]
+    assert cover.missing == (("1", "Small 1"), ("2", "Small 2"), ("3", "Small 3"))

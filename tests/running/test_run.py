@@ -15,7 +15,7 @@ from upright.gains import feedback, filtered, place, prefilter
 from upright.laws import as_values
 from upright.logs import read_log
 from upright.logs.replay import replay
-from upright.realtime.session import QUIET, RunOrder, carry_out
+from upright.realtime.session import QUIET, RunEnd, RunOrder, carry_out
 from upright.report.run import chapter, draw_run
 from upright.rig.makes import make_rig
 from upright.rigs import Fault
@@ -64,6 +64,29 @@ def test_a_rest_within_one_count_is_said_in_counts(folder, tmp_path):
     assert told["theta, rms of the second half"] == "below a count, 3.9·10⁻⁴ rad"
     moved = run_rig(replace(wish, tilt=0.05), tmp_path)
     assert f"theta stayed within {math.degrees(moved.unrest[-1]):.2g} degrees" in moved.verdict
+
+
+def test_a_run_is_told_with_its_tick_its_late_ticks_and_its_log(folder, tmp_path):
+    """3 of 400 ticks late are 0.75 %; a rig that did not answer has no name and no tick, and no log to look at."""
+    wish = RunRequest(rig=folder / "RIG.toml", law=folder / "design.json", seconds=0.2, check=False)
+    done = run_rig(wish, tmp_path)
+    told = run_chapter(replace(done, end=replace(done.end, ticks=400, late=3, rows=399, dropped=1)))
+    facts = dict(told.parts[0].content[0].pairs)
+    assert facts["rig"] == f"{done.end.about.name}, a tick every 0.884 ms"  # the servo of the ECP 205
+    assert facts["ticks"] == "400, 3 late (0.75 %)"
+    assert facts["log"] == f"{done.log_path.name}: 399 rows, 1 dropped"
+    assert [p.title for p in told.parts] == ["The run", "What was logged"]
+    assert told.findings[0].value == "3 of 400"
+    assert [s.command.split()[1:3] for s in told.steps] == [["log", "show"], ["rig", "check"], ["log", "replay"]]
+    silent = run_chapter(replace(done, end=RunEnd(stopped="No rig answered at the port."), log=None))
+    (run,) = silent.parts
+    assert dict(run.content[0].pairs) == {
+        "ticks": "0, 0 late (none)",
+        "log": f"{done.log_path.name}: 0 rows, 0 dropped",
+    }
+    assert silent.verdict.endswith("Stopped before its loop began: No rig answered at the port.")
+    assert not silent.sound
+    assert [s.command.split()[1:3] for s in silent.steps] == [["rig", "doctor"]]
 
 
 def test_a_reference_is_in_the_log_with_its_unit_and_a_law_without_one_has_no_column(folder, tmp_path):

@@ -9,8 +9,10 @@ from scipy.integrate import quad, solve_ivp
 
 from upright.errors import BadInput
 from upright.experiments.free_swing_4 import release as drift
+from upright.experiments.free_swing_4.chapter import chapter
 from upright.experiments.free_swing_4.release import Release, acquire, freed, motion
-from upright.experiments.free_swing_4.run import losses
+from upright.experiments.free_swing_4.run import FreeSwing, losses
+from upright.experiments.weighing_1a.run import Known
 from upright.rig.makes import COUNTS, MAKES, MOTOR_AND_BELT, NOMINAL, SERVO, make_rig
 
 
@@ -155,6 +157,71 @@ def test_the_spring_brings_home_what_a_lean_drags_away():
     home = NOMINAL.m_p * NOMINAL.g * NOMINAL.r * math.sin(drift.TILT) / MAKES["furuta"].anchor
     assert abs(held.end) < 4 * home
     assert abs(held.slope) < abs(free.slope) / 30
+
+
+@pytest.mark.parametrize(("make", "body", "unit"), [("furuta", "disk", "rad/s"), ("linear", "cart", "m/s")])
+def test_every_release_is_told_with_its_push_and_once_more_with_the_spring(make, body, unit):
+    """A disk is pushed by an angular speed and may lean by a quarter degree; a cart by a speed, and it sticks."""
+    ways = [f"free {body}, level", f"pushed at release, {MAKES[make].push:g} {unit}"]
+    held = ["spring, level", "spring, pushed at release"]
+    if body == "disk":
+        ways.append("out of level by 0.25°")
+        held.append("spring, out of level by 0.25°")
+    paths = drift.drift_paths(freed(make_rig(make)), seconds=2.5)
+    assert [(w.name, w.remedy) for w in paths] == [(n, False) for n in ways] + [(n, True) for n in held]
+    # one servo step after the release: a pushed body moves at its push, one left at rest has hardly begun
+    for w in paths:
+        speed = (w.psi[1] - w.psi[0]) / (w.t[1] - w.t[0])
+        assert abs(speed - ("pushed" in w.name) * MAKES[make].push) < 0.5 * MAKES[make].push
+
+
+@pytest.mark.parametrize(("make", "body"), [("furuta", "disk"), ("linear", "cart")])
+def test_the_chapter_says_how_fast_the_twin_would_fall_and_what_is_known_of_it(make, body, tmp_path):
+    """Four figures of the growing eigenvalue; weighed in experiment 1a, or known to 1 % from the bench."""
+    rig = freed(make_rig(make, 3))
+    pole = np.linalg.eigvals(rig.plant.linear("inverted").A).real.max()
+    done = FreeSwing(rig=rig, folder=tmp_path)
+    told = chapter(done)
+    twin, known = told.parts[0].content
+    assert twin.startswith(f"A digital twin of {rig.name}, seed 3: ")
+    assert f"fall so at {pole:#.4g} rad/s." in twin
+    assert ("drive belt off" if body == "disk" else "motor silent, pulled along by the cart") in twin
+    assert f"the {body}'s inertia to 1 %, the lengths from a ruler" in known
+    assert f"why does the {body} wander" in told.question
+    assert told.verdict == "The experiment was stopped before the first fit."
+    assert not told.sound
+    weighed = replace(done, weighed=Known(name="J_d", value=1e-3, stderr=1e-6))
+    assert f"the {body}'s inertia from experiment 1a, the lengths" in chapter(weighed).parts[0].content[1]
+
+
+@pytest.mark.parametrize(
+    ("make", "case", "ends", "sentence"),
+    [
+        ("furuta", "out of level by 0.25°", (-math.pi / 3, math.pi / 90),
+         "That lean drags the free disk away by 60°; a soft spring keeps it within 2°."),
+        ("linear", "pushed at release", (0.031, -0.004),
+         "A push of 0.05 m/s at the release leaves the cart 3.1 cm away, where dry friction holds it; a soft spring "
+         "brings it back to 0.4 cm."),
+    ],
+)  # fmt: skip
+def test_the_chapter_says_how_far_a_carrier_went_and_what_the_spring_makes_of_it(make, case, ends, sentence, tmp_path):
+    """Paths by hand: only the case that matters for the body is told, in degrees or cm, whichever side it went."""
+    t = np.linspace(0.0, 3.0, 301)
+
+    def path(name, end, remedy):
+        psi = end * t / t[-1]
+        return drift.DriftPath(name=name, remedy=remedy, t=t, psi=psi, centre=psi, slope=end / t[-1], end=end)
+
+    free, held = ends
+    drifts = (
+        path("level", 9.0, False), path(case, free, False), path("spring, level", 9.0, True),
+        path(f"spring, {case}", held, True),
+    )  # fmt: skip
+    done = FreeSwing(rig=freed(make_rig(make)), folder=tmp_path, drifts=drifts)
+    assert chapter(done).detail == sentence
+    assert chapter(replace(done, interrupted=True)).detail == (
+        f"Interrupted: this is what was there by then. {sentence}"
+    )
 
 
 def test_a_cart_s_momentum_is_what_its_release_gave_it():

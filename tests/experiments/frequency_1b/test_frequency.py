@@ -12,13 +12,16 @@ import pytest
 
 from upright.errors import NotIdentifiable
 from upright.experiments.frequency_1b.chapter import chapter, true_key
-from upright.experiments.frequency_1b.run import run_frequency
-from upright.experiments.frequency_1b.sweeps import SHARE, broadband
-from upright.identification.frequency.answer import key_value
+from upright.experiments.frequency_1b.figures import bode_figure
+from upright.experiments.frequency_1b.run import FrequencyRun, asked, bench, run_frequency
+from upright.experiments.frequency_1b.sweeps import EVERY, SHARE, broadband, collect, grid, stepped_sine
+from upright.identification.frequency.answer import explain, key_value
+from upright.identification.frequency.response import FrequencyResponse
 from upright.identification.frequency.spectra import chirp, multisine, odd_lines, repetition, response_of, sines_in
+from upright.identification.model.fit import Estimate, Pole
 from upright.readers import read
 from upright.records import Record
-from upright.report.page import Picture
+from upright.report.page import Picture, Symbol
 from upright.rig.makes import MAKES, make_rig
 from upright.study.stored_rig import read_stored_rig
 
@@ -105,6 +108,131 @@ def test_a_broadband_command_is_whole_steps_of_the_converter_where_there_is_one(
     assert np.ptp(stepped) > 1.0
     assert np.isfinite(smooth).all()
     assert np.mean(16 * smooth % 1 == 0) < 0.01
+
+
+@pytest.fixture(scope="module")
+def hurried():
+    """Three sines of eight seconds each: too short for the two slow ones, which swing on."""
+    return stepped_sine(make_rig("linear"), MAKES["linear"], count=3, seconds=8.0)
+
+
+def test_sines_that_did_not_settle_are_named_by_their_frequency(hurried):
+    """And only they: with none of them late, nothing is said."""
+    rig = make_rig("linear")
+    tick = rig.period * EVERY
+    lengths = grid(*MAKES["linear"].band, 3, tick)
+    asked = [2 * np.pi / (n * tick) for n in lengths]  # a whole number of samples per period
+    assert [d.omega for d in hurried.dwells] == pytest.approx(asked)
+    for late in ((), (1,), (0, 2)):
+        dwells = tuple(replace(d, settle=np.nan if i in late else 1.0) for i, d in enumerate(hurried.dwells))
+        told = f"Not settled at {', '.join(f'{asked[i]:.3g}' for i in late)} rad/s."
+        assert collect(dwells, rig).notes == ((told,) if late else ())
+    assert collect(hurried.dwells, rig).units == ("m", "rad", "V")
+    assert collect(hurried.dwells, rig).hold == rig.period
+
+
+def test_the_time_at_the_rig_is_that_of_its_sines_settled_or_not(hurried):
+    """Each ends within its eight seconds; the log follows them with one sample from a sine to the next."""
+    assert not all(np.isfinite(d.settle) for d in hurried.dwells)
+    assert 8.0 < hurried.seconds <= 3 * 8.0
+    tick = make_rig("linear").period * EVERY
+    assert hurried.log.t[-1] == pytest.approx(hurried.seconds + 2 * tick)
+    assert len(hurried.log) == sum(len(d.record) for d in hurried.dwells)
+
+
+@pytest.fixture(scope="module")
+def done(hurried, tmp_path_factory):
+    """The pendulum's own linear model at eight frequencies, explained, as if the hurried sines had told it."""
+    rig, make = make_rig("linear"), MAKES["linear"]
+    model = rig.linear("hanging")
+    omega = np.geomspace(*make.band, 8)
+    answer = np.array([(model.C @ np.linalg.solve(1j * w * np.eye(4) - model.A, model.B))[:, 0] for w in omega])
+    data = FrequencyResponse(
+        omega=omega, response=answer, outputs=("x", "theta"), units=("m", "rad", "V"),
+        variance=1e-6 * np.abs(answer) ** 2, dry=4 / (np.pi * np.abs(answer) * omega[:, None]),
+    )  # fmt: skip
+    explained = explain(asked(make, bench(rig, make), make.bench), "hanging", data)
+    return FrequencyRun(
+        rig=rig, make=make, sweep=hurried, answer=explained, folder=tmp_path_factory.mktemp("told"), kind="sines",
+        seconds=1.0,
+    )  # fmt: skip
+
+
+def found(value: float, error: float, unit: str) -> Estimate:
+    return Estimate(value=value, stderr=error, interval=(value - 2 * error, value + 2 * error), unit=unit)
+
+
+@pytest.mark.parametrize(
+    ("at", "what", "unit", "part"),
+    [("inverted", "unstable pole", "1/s", np.real), ("hanging", "mode", "rad/s", np.imag)],
+)
+def test_the_key_number_is_told_in_its_unit_with_what_nobody_weighs_beside_the_twin_s(done, at, what, unit, part):
+    """A pole by which it falls is a growth in 1/s, one that swings a frequency; either is 1 % above the twin's here."""
+    true = part(np.linalg.eigvals(done.rig.linear(at).A)).max()
+    key = found(1.01 * true, 0.02 * true, unit)
+    nothing = found(0.0, 0.0, unit)
+    pole = Pole(real=key, imag=nothing) if unit == "1/s" else Pole(real=nothing, imag=key)
+    others = {n: e for n, e in done.answer.fit.estimates.items() if n not in ("J_p", "actuator.gain")}
+    weighed = {"J_p": found(6.5e-4, 2e-5, "kg m^2"), "actuator.gain": found(5.4, 0.1, "N/V")}
+
+    def told(estimates):
+        fit = replace(done.answer.fit, estimates=estimates)
+        return chapter(replace(done, answer=replace(done.answer, key=(at, what, pole), fit=fit)))
+
+    full = told(others | weighed)
+    assert f"The twin's own is {true:.4}"[:-1] in full.detail
+    assert ": 1 % off, inside the interval." in full.detail
+    first, inertia, gain = full.findings
+    assert first.what == f"{what}, {at} [{unit}]"
+    assert float(first.value) == pytest.approx(1.01 * true, rel=5e-3)  # three figures
+    assert float(first.truth) == pytest.approx(true, rel=5e-3)
+    assert inertia.what == Symbol("J_p [kg m²]")
+    assert inertia.value.startswith("6.5")
+    assert gain.what == "gain of the drive [N/V]"
+    assert float(gain.value) == pytest.approx(5.4, abs=0.05)
+    assert float(gain.truth) == pytest.approx(done.rig.drive["actuator.gain"], abs=0.05)
+    for without, left in (("J_p", gain), ("actuator.gain", inertia)):
+        kept = {n: e for n, e in weighed.items() if n != without}
+        assert told(others | kept).findings == (first, left)
+
+
+def test_what_was_asked_counts_the_sines_that_did_not_settle(done):
+    """Two that waited 4 and 19 s, one in vain; then all three in vain, which the notes of the response say."""
+    waits = (4.0, np.nan, 19.0)
+
+    def told(waits):
+        dwells = tuple(replace(d, settle=w) for d, w in zip(done.sweep.dwells, waits, strict=True))
+        late = replace(done.answer, data=replace(done.answer.data, notes=("Not settled.",)))
+        return chapter(replace(done, answer=late, sweep=replace(done.sweep, dwells=dwells, seconds=150.0))).parts[0]
+
+    counted, waited = told(waits).content[:2]
+    assert counted.startswith("8 frequencies from 5 to 45 rad/s, one sine after the other, in 2 minutes at the rig.")
+    assert ": 4 to 19 s; 1 had not settled after 40 s" in waited
+    assert told((4.0, 7.0, 19.0)).content[1].endswith(": 4 to 19 s.")
+    assert told((np.nan,) * 3).content[1] == "Not settled."
+
+
+def test_what_the_fits_leave_is_drawn_on_decades_of_both_signs(done):
+    """Linear within 0.1: a tick at zero and, as far as the axis goes, at 0.1, 1, 10 and 100 above and below it."""
+    drawing = bode_figure(done.answer.data, done.answer)
+    lowest = drawing.axes[-4:]
+    assert [axes.get_ylabel() for axes in lowest] == ["magnitude\nleft [%]", "", "phase\nleft [deg]", ""]
+    for axes in lowest:
+        low, high = axes.get_ylim()
+        assert high == -low > 0.1
+        decades = [v for v in (0.1, 1.0, 10.0, 100.0) if v <= high]
+        assert axes.get_yticks().tolist() == [*(-v for v in reversed(decades)), 0.0, *decades]
+        left = np.concatenate([line.get_ydata() for line in axes.get_lines() if len(line.get_ydata()) == 8])
+        assert np.abs(left).max() < high
+    assert lowest[0].get_xlabel() == ""
+    assert lowest[-1].get_xlabel() == "frequency [rad/s]"
+    # the measured over the model's, by the first of the two fits
+    j, answer = 0, done.answer
+    ratio = np.log(answer.used.response[:, j] / answer.simplex.model[:, j])
+    squares = next(line for line in lowest[0].get_lines() if line.get_marker() == "s")
+    np.testing.assert_allclose(squares.get_ydata(), 100 * ratio.real)
+    squares = next(line for line in lowest[2].get_lines() if line.get_marker() == "s")
+    np.testing.assert_allclose(squares.get_ydata(), np.degrees(ratio.imag))
 
 
 @pytest.fixture(scope="module")

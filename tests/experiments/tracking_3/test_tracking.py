@@ -12,7 +12,7 @@ from upright.control import trial
 from upright.experiments.tracking_3 import laws as pd
 from upright.experiments.tracking_3.laws import AT, EXTRA, closed_by, paper_sets, tracker, with_sum
 from upright.experiments.tracking_3.pulses import fitted, identify_shaft, pulses
-from upright.experiments.tracking_3.run import RESERVE, attempt, choose, run_tracking
+from upright.experiments.tracking_3.run import RESERVE, asked_of, attempt, choose, run_tracking
 from upright.experiments.weighing_1a.run import Known
 from upright.gains import place, prefilter
 from upright.gains.loop import swing
@@ -183,6 +183,19 @@ def test_the_step_keeps_to_the_shaft_of_the_rig_at_hand(twist):
     assert math.isinf(done.tripped)
     tight = rig.replace(twist=0.5 * done.twist)
     assert attempt(tight, laws[1], chosen.size).tripped < 1.0
+
+
+@pytest.mark.parametrize("kind", SHAFTS)
+def test_a_step_is_followed_by_a_push_of_a_tenth_of_the_drive_s_limit_against_it(kind):
+    """0.1 s of rest, 2 s of the step alone, 1.5 s of step and push; the rig's own limit, whatever its unit."""
+    rig = make_rig(kind)
+    for limit in (rig.limit, 3 * rig.limit):
+        reference, pushes = asked_of(rig.replace(limit=limit), 0.02)
+        t = np.arange(reference.size) * rig.period
+        assert t[-1] == pytest.approx(3.6, abs=rig.period)
+        half = rig.period / 2  # steps come at the nearest tick
+        np.testing.assert_array_equal(reference, np.where(t < 0.1 - half, 0.0, 0.02))
+        np.testing.assert_allclose(pushes, np.where(t < 2.1 - half, 0.0, -0.1 * limit), rtol=1e-15)
 
 
 def test_pulses_stay_within_travel_and_twist():

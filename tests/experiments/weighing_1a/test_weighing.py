@@ -1,9 +1,13 @@
 """Does experiment 1a say what the rig of the later experiments weighs?"""
 
+import numpy as np
 import pytest
 
 from upright.errors import BadInput
-from upright.experiments.weighing_1a.run import first_body, run_weighing
+from upright.experiments.weighing_1a.chapter import chapter
+from upright.experiments.weighing_1a.from_logs import weigh_logs
+from upright.experiments.weighing_1a.run import Known, Weighing, first_body, measure_body, run_weighing
+from upright.records import Record
 from upright.rig.makes import MAKES, OSCILLATORS, make_rig
 
 
@@ -31,3 +35,44 @@ def test_a_rig_of_another_kind_is_refused(tmp_path):
     rig = make_rig("rectilinear")
     with pytest.raises(BadInput, match="knows carts, disks and pendulums"):
         run_weighing(rig.replace(plant=OSCILLATORS["torsional"].plant, counts=(1.0,)), 0, tmp_path)
+
+
+def test_the_chapter_says_how_far_a_number_is_off_and_whether_its_interval_covers_it(tmp_path):
+    """2 % above the truth within 1.96 errors of 1.1 %, and 3 % below it beyond 1.96 errors of 1.5 %."""
+    rig = make_rig("rectilinear")
+    true = rig.plant.parameters()
+    body = measure_body(first_body(rig), counts=(0, 4), shots=1)
+    known = tuple(
+        Known(name=name, value=off * true[name], stderr=error * true[name])
+        for name, off, error in (("m_1", 1.02, 0.011), ("k_12", 0.97, 0.015))
+    )
+    told = chapter(Weighing(rig=rig, make=MAKES["rectilinear"], folder=tmp_path, files={}, campaign=body, known=known))
+    assert told.detail == (
+        "m_1 lies 2 % from the twin's, inside its 95 % interval. k_12 lies 3 % from the twin's, outside its 95 % "
+        "interval."
+    )
+    for finding, k in zip(told.findings, known, strict=True):
+        low, high = map(float, finding.interval.split(" to "))
+        step = 0.5 * k.stderr  # shown to the digits that its error leaves
+        assert float(finding.value) == pytest.approx(k.value, abs=step)
+        assert float(finding.truth) == pytest.approx(true[k.name], abs=step)
+        assert (low, high) == pytest.approx((k.value - 1.96 * k.stderr, k.value + 1.96 * k.stderr), abs=step)
+        assert told.numbers["handed_on"][k.name]["truth"] == true[k.name]
+
+
+def test_logs_of_one_name_keep_apart_and_weigh_what_their_frequencies_say():
+    """A cart of 0.6 kg at 400 N/m, drawn by its closed form; files of three folders may share a name."""
+    k, bare, damping, t = 400.0, 0.6, 1.2, np.arange(4000) * 1e-3
+
+    def swing(mass):
+        sigma = damping / (2 * mass)
+        x = 0.02 * np.exp(-sigma * t) * np.cos(np.sqrt(k / mass - sigma**2) * t)
+        return Record(t=t, signals={"x": x}, units={"x": "m"}, outputs=("x",))
+
+    logs = [(swing(bare + added), "log.csv") for added in (0.0, 0.5, 1.0)]
+    found, told = weigh_logs(logs, ["0", "500 g", "1 kg"])
+    assert [s.label for s in found.swings] == ["log.csv", "log.csv (2)", "log.csv (3)"]
+    assert [s.added for s in found.swings] == [0.0, 0.5, 1.0]
+    assert (found.k.value, found.bare.value) == pytest.approx((k, bare), rel=1e-3)
+    assert found.damping.value == pytest.approx(damping, rel=1e-2)
+    assert told.steps[1].command == 'upright plan-inertias --rig rectilinear --bare "0.6 kg"'

@@ -54,6 +54,15 @@ def test_only_least_squares_knows_dry_friction_between_the_frequencies() -> None
     assert np.abs(squares / simplex - 1).max() > 0.1  # otherwise there would be nothing to tell apart
 
 
+def test_what_a_response_cannot_see_correlates_with_nothing() -> None:
+    """Without the motion's dry friction two numbers have no say: zero, not 0/0; a number goes with itself by one."""
+    found = explain(asked(J_d=GUESS["J_d"], b_1=GUESS["b_1"], b_1c=1e-3, b_2c=1e-3), "hanging", smooth())
+    size = found.fit.correlation
+    seen = np.array([n in ("J_d", "b_1") for n in found.fit.names])
+    assert np.diag(size)[seen] == pytest.approx(1.0)
+    assert np.array_equal(size[~seen], np.zeros((2, 4)))
+
+
 def test_the_pole_that_matters_is_the_one_by_which_it_falls() -> None:
     at, what, _ = answer().key
     assert (at, what) == ("inverted", "unstable pole")

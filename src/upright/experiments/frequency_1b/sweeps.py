@@ -140,7 +140,7 @@ def stepped_sine(rig: Rig, make: Make, *, count: int = 28, seconds: float = 40.0
         for i, n in enumerate(lengths)
     )
     response = collect(dwells, rig)
-    spent = sum((d.settle if math.isfinite(d.settle) else seconds) + float(np.ptp(d.record.t)) for d in dwells)
+    spent = sum(float(d.record.t[-1]) for d in dwells)
     return Sweep(dwells=dwells, response=response, seconds=spent, log=_joined(dwells))
 
 
