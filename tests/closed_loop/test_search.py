@@ -119,6 +119,12 @@ def test_what_counts_as_missing_no_more_is_a_share_a_step_or_the_arithmetic():
     )  # fmt: skip
 
 
+def test_the_first_three_rows_tell_nothing_of_the_step_of_a_command():
+    u = 0.25 * RNG.integers(-9, 9, size=200)
+    u[:3] = 0.1037, -7.77e-5, 0.013  # what a front end's memory held
+    assert search(u).quantum == pytest.approx(0.25)
+
+
 def regression(terms, gains, *, missed=0.0, pole=0.0, X=None, **family):
     X = np.zeros((8, len(terms))) if X is None else X
     made = Columns(terms=tuple(terms), X=X, slope=np.zeros_like(X))
