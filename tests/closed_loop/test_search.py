@@ -29,6 +29,7 @@ from upright.closed_loop.regression import (
 from upright.closed_loop.search import Search, extremes, held_for, stepped
 from upright.closed_loop.structures import Channel, Filter, finer, joined, memory
 from upright.errors import NotIdentifiable
+from upright.records import Provenance, Record
 
 RNG = np.random.default_rng(7)
 T = 0.01
@@ -117,6 +118,12 @@ def test_what_counts_as_missing_no_more_is_a_share_a_step_or_the_arithmetic():
     assert smooth.bar(0.0) == pytest.approx(
         max(1e-12 * np.abs(smooth.u[3:]).max(), 0.35 * smooth.quantum)
     )  # fmt: skip
+
+
+def test_the_first_three_rows_tell_nothing_of_the_step_of_a_command():
+    u = 0.25 * RNG.integers(-9, 9, size=200)
+    u[:3] = 0.1037, -7.77e-5, 0.013  # what a front end's memory held
+    assert search(u).quantum == pytest.approx(0.25)
 
 
 def regression(terms, gains, *, missed=0.0, pole=0.0, X=None, **family):
@@ -365,3 +372,31 @@ def test_everything_about_a_law_is_in_its_json():
     assert told["tried"] == [{"name": "P", "numbers": 2, "missed": 0.5}]
     assert told["D"] == pytest.approx([-2.0 - 3.0 * T])
     assert json.loads(as_json(recovered(Channel(measured="y", kp=2.0), limit=5.0)))["limit"] is None
+
+
+@pytest.mark.parametrize(
+    ("gains", "depends"),
+    [
+        ({"kp": (2.0, 0.9)}, True),
+        ({"kp": (-2.0, 0.9)}, True),
+        ({"kp": (2.0, 1.1)}, False),  # not told from none by two standard errors
+        ({"kp": (0.0, 0.0)}, False),  # none at all, however surely
+        ({"kp": (0.1, 1.0), "kd y": (5.0, 1.0)}, True),
+        ({"filter": (5.0, 0.1), "kp": (0.1, 1.0)}, False),  # what filters nothing is no law
+    ],
+)
+def test_a_law_has_a_gain_that_is_more_than_two_standard_errors_from_none(monkeypatch, gains, depends):
+    told = {n: Gain(value=v, stderr=s, interval=(v - 2 * s, v + 2 * s), meaning="") for n, (v, s) in gains.items()}
+    monkeypatch.setattr("upright.closed_loop.search.numbers", lambda *_: told)
+    y = RNG.normal(size=200)
+    made = search(-2 * y, y=y)
+    record = Record(
+        t=T * np.arange(200), signals={"u": made.u, "y": y}, units={"u": "V", "y": "rad"},
+        provenance=Provenance(file="log.csv", reader="table"),
+    )  # fmt: skip
+    best = made.search()
+    if depends:
+        assert made.recovery(best, record, "u", np.arange(200)).gains == told
+    else:
+        with pytest.raises(NotIdentifiable, match="'u' does not depend on y: the loop is open"):
+            made.recovery(best, record, "u", np.arange(200))

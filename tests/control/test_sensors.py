@@ -22,6 +22,7 @@ from upright.control.sensors import (
     Scales,
     Suspicion,
     Watch,
+    _motion,
     lifted,
     probe,
     put_out,
@@ -413,3 +414,15 @@ def test_scales_are_given_with_what_they_explain_and_the_residuals_of_that():
     better = scales(make_rig("linear"), log, sure)
     assert np.all(better.error < 0.5 * found.error)
     assert np.all(better.error > 0)
+
+
+@pytest.mark.parametrize("samples", [12, 13, 14])
+def test_a_motion_seen_every_third_sample_has_a_row_for_the_last_that_is_begun(samples):
+    """As many rows as every third reading of the log has, and the same motion as seen at each."""
+    rig = make_rig("furuta")
+    command = 0.3 * np.sin(np.arange(samples))
+    logs = np.array([[0.0], [0.1], [-0.2]])
+    fine, coarse = (_motion(rig, command, n, ("gain",), logs) for n in (1, 3))
+    assert coarse.shape == (len(command[::3]), 2, 3)
+    assert np.abs(np.diff(fine[-1])).min() > 0  # the gain moves it
+    np.testing.assert_allclose(coarse, fine[::3], rtol=1e-12, atol=1e-15)

@@ -66,6 +66,26 @@ def test_a_sensor_that_freezes_in_motion_is_told_from_a_body_that_comes_to_rest(
     assert frozen_from(rest, STEP)[0] == -1
 
 
+def frozen(last: list[int], rest: int, rows: int) -> int:
+    """Of a column that goes up a step a row, ends on these changes in steps and never moves again."""
+    steps = np.r_[np.ones(rows - 1 - len(last) - rest), last, np.zeros(rest)]
+    return frozen_from(STEP * np.r_[0.0, np.cumsum(steps)], STEP)[0]
+
+
+@pytest.mark.parametrize(
+    ("last", "found"), [([1, 1, 1, 1, 3], True), ([3, 1, 1, 1, 1], True), ([1, 1, 1, 1, 1], False)]
+)
+def test_full_motion_is_more_than_a_step_a_row_over_the_last_five_changes(last, found):
+    assert frozen(last, 20, 400) == (379 if found else -1)
+
+
+@pytest.mark.parametrize(("still", "rows"), [(8, 300), (8, 400), (20, 1000), (24, 1200)])
+def test_a_column_is_frozen_from_eight_rows_or_two_percent_on(still, rows):
+    """Rows that read the same, the one at which it stopped among them."""
+    assert frozen([3] * 5, still - 1, rows) == rows - still
+    assert frozen([3] * 5, still - 2, rows) == -1
+
+
 def test_a_row_written_twice_is_found_where_the_body_moves():
     fast = np.flatnonzero(np.abs(np.diff(SWING)) > 0.7 * PACE)
     rows = fast[50:-50:90] + 1

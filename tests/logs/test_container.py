@@ -77,6 +77,14 @@ def test_the_first_bytes_alone_are_no_damage(n):
     assert container.at == (8 if n == 8 else 0)
 
 
+def test_a_record_is_judged_as_soon_as_its_kind_and_length_are_there():
+    wrong = WHOLE[:8] + struct.pack("<BQ", 0x0C, 40)  # metadata before the header
+    assert list(Container().read(wrong[:-1])) == []
+    with pytest.raises(Damaged, match="0x0c and 40 bytes") as found:
+        list(Container().read(wrong))
+    assert found.value.at == 8
+
+
 def test_another_beginning_is_a_damage_at_the_first_byte():
     with pytest.raises(Damaged, match="no MCAP file begins like this") as found:
         list(Container().read(b"\x89MCAP1\r\n"))

@@ -1,9 +1,11 @@
 """Do the plants reduce to what mechanics knows in closed form?"""
 
+import math
 from dataclasses import FrozenInstanceError
 
 import numpy as np
 import pytest
+import sympy as sp
 
 from upright.errors import BadInput, ImpossiblePhysics, NotIdentifiable
 from upright.physics import CartPendulum, Coordinate, Furuta, Pendulum, Plant, added_inertia, chain, find
@@ -159,6 +161,30 @@ def test_a_plant_is_a_value():
 def test_a_wrong_name_is_answered_with_the_right_one(ask, sentence):
     with pytest.raises(BadInput, match=sentence):
         ask()
+
+
+class Shelf(Plant):
+    """A slope with a spring at its lower end, on whichever side that lies."""
+
+    m: float = quantity("kg", "mass", above=0)
+    k: float = quantity("N/m", "spring", above=0)
+    side: float = quantity("1", "where it goes down", at_least=-1, at_most=1)
+
+    coordinates = (Coordinate("x", "m", "to the right"),)
+
+    @staticmethod
+    def energies(p, q, v):
+        down = p.side * q[0]
+        pressed = sp.Max(down - 0.3, 0)
+        return p.m * v[0] ** 2 / 2, -p.m * 9.81 * down + p.k * pressed**2 / 2, 0
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_what_floats_at_its_nominal_place_rests_where_something_holds_it_on_either_side(side):
+    """Half a metre aside the spring is pressed, until it carries the weight: k (x - 0.3) = m g."""
+    found = Shelf(m=0.2, k=40.0, side=side).linear()
+    assert found.point["x"] == pytest.approx(side * (0.3 + 0.2 * 9.81 / 40.0), rel=1e-9)
+    assert found.poles().imag.max() == pytest.approx(math.sqrt(40.0 / 0.2))
 
 
 def test_a_rig_with_nowhere_to_rest_says_so():

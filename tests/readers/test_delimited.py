@@ -118,6 +118,26 @@ def test_the_time_is_named_so_or_the_first_that_increases(text, t, names, notes)
     assert found.provenance.notes == notes
 
 
+@pytest.mark.parametrize(
+    ("cells", "torn"),
+    [
+        ("1.00 2.00 3.00 4.0", True),
+        ("1.00 2.00 3.00 4", True),
+        ("1.00 2.00 3.00 4.00", False),
+        ("1.00 2.00 3.0 4.0", False),  # the last whole row is shorter already: no fixed format
+        ("1.0 2.00 3.00 4.0", False),
+        ("1.00 2.00 3.0", False),  # two rows are no format
+        ("9.0 1.00 2.00 3.00 4.00 5.00 6.00 7.00 8.0", True),  # the last eight rows tell it
+    ],
+)
+def test_a_last_row_is_torn_where_all_before_it_have_other_decimals(cells, torn):
+    text = "t,x\n" + "\n".join(f"{k},{cell}" for k, cell in enumerate(cells.split()))
+    if torn:
+        assert "the last row is torn" in refusal(text)
+    else:
+        assert record(text).provenance.notes == (CUT,)
+
+
 def test_a_rounded_clock_is_rebuilt_from_the_index_beside_it():
     rows = "".join(f"{i},{round(1.1275 * i)},7\n" for i in range(200) if i != 90)
     found = record(f"Sample,t_ms,x\n{rows}")

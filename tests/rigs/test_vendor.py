@@ -25,15 +25,15 @@ class Task:
 
     def __init__(self):
         self.written, self.counter, self.closed = [], 0, False
-        self.channel, self.range = "", ()
+        self.channel, self.range, self.set_up = "", (), {}
         channels = SimpleNamespace(
             add_ci_lin_encoder_chan=self._add, add_ao_voltage_chan=self._add, add_do_chan=self._add
         )
         self.ci_channels = self.ao_channels = self.do_channels = channels
         Task.made.append(self)
 
-    def _add(self, channel, min_val=None, max_val=None, **_):
-        self.channel, self.range = channel, (min_val, max_val)
+    def _add(self, channel, min_val=None, max_val=None, **set_up):
+        self.channel, self.range, self.set_up = channel, (min_val, max_val), set_up
 
     def start(self):
         pass
@@ -68,6 +68,13 @@ def test_a_daqmx_board_is_hardware_without_a_loop_of_its_own_and_opens_at_zero(d
     assert channels["Dev1/ao0"].written == [0.0]
     assert channels["Dev1/ao0"].range == (-10.0, 10.0)
     assert channels["Dev1/port0/line0"].written == [False]
+
+
+def test_a_daqmx_board_counts_every_edge_by_ones_from_zero(daqmx):
+    """As NI-DAQmx names it: quadrature decoding X4 in ticks, one a pulse, whose first reading is 0."""
+    daqmx.open()
+    edges = {"decoding_type": 1, "units": 2, "dist_per_pulse": 1.0, "initial_pos": 0.0}
+    assert [task.set_up for task in Task.made] == [edges, edges, {}, {}]
 
 
 def test_a_daqmx_board_is_let_go_at_zero_and_off(daqmx):

@@ -251,7 +251,7 @@ class Search:
             named = numbers(best, self.signals, covered)
         else:
             named = numbers(best, self.signals, averaged(best, self.u, self.used))
-        if not any(g.value and abs(g.value) > 2 * g.stderr for name, g in named.items() if name[:2] in TERMS):
+        if not any(abs(g.value) > 2 * g.stderr for name, g in named.items() if name[:2] in TERMS):
             raise NotIdentifiable(
                 f"'{command}' does not depend on {', '.join(self.measured)}: the loop is open, or the law reads other"
                 " columns."

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.identification.frequency.test_frequency import FURUTA, GUESS, asked, smooth
-from upright.identification.frequency.answer import FrequencyFit, curves, digits, explain, key_value, verdict
+from upright.identification.frequency.answer import FrequencyFit, _fit, curves, digits, explain, key_value, verdict
 from upright.identification.frequency.balance import Balance
 from upright.identification.frequency.response import FrequencyResponse
 from upright.identification.model.fit import Estimate
@@ -98,3 +98,39 @@ def test_a_verdict_trusts_no_response_that_is_not_explained() -> None:
         assert not trusted
     for change in ({"misfit": 8.9}, {"surprise": {"J_d": -3.9}}, {"starts": 4, "reached": 2}):
         assert verdict(replace(found.squares, **change), found.key)[1]
+
+
+@pytest.mark.parametrize(
+    ("width", "status"),
+    [(0.99, "firm"), (1.01, "weak"), (4.0, "weak"), (1e-11, "firm"), (1e-13, "weak"), (0.0, "weak")],
+)
+def test_an_interval_wider_than_its_value_or_narrower_than_rounding_is_weak(width: float, status: str) -> None:
+    """`width` of the whole interval, of the value; it ends at zero, which no asked number passes."""
+    found, q = answer(), 2.0
+    names, values = found.squares.names, found.squares.way.values
+    sigma = np.array([width * values[n] / (2 * q) for n in names])
+    squares = replace(found.squares, covariance=np.diag(sigma**2))
+    fit = _fit(found.rig, squares, {}, found.key, q, ())
+    for n, s in zip(names, sigma, strict=True):
+        e = fit.estimates[n]
+        assert (e.value, e.stderr, e.status) == (values[n], pytest.approx(s), status)
+        assert e.interval == pytest.approx((max(0.0, values[n] - q * s), values[n] + q * s))
+
+
+def test_a_number_that_ended_below_a_millionth_of_its_guess_is_at_its_bound() -> None:
+    found = answer()
+    way = found.squares.way
+    small = {n: 0.9e-6 * GUESS[n] if n == "b_1" else v for n, v in way.values.items()}
+    squares = replace(found.squares, way=replace(way, values=small), covariance=1e-20 * np.eye(2))
+    fit = _fit(found.rig, squares, {}, found.key, 2.0, ())
+    assert (fit.estimates["b_1"].status, fit.estimates["J_d"].status) == ("at bound", "firm")
+
+
+def test_what_the_response_does_not_depend_on_correlates_with_nothing() -> None:
+    """Its row of the pseudo-inverse is zero; of the other two the correlation is 3 / (2 * 2)."""
+    found = answer()
+    way = replace(found.squares.way, values=found.squares.way.values | {"b_2": 1e-3})
+    C = 1e-12 * np.array([[4.0, 3.0, 0.0], [3.0, 4.0, 0.0], [0.0, 0.0, 0.0]])
+    squares = replace(found.squares, way=way, names=("J_d", "b_1", "b_2"), covariance=C)
+    told = _fit(found.rig, squares, {}, found.key, 2.0, ()).correlation
+    assert told == pytest.approx(np.array([[1.0, 0.75, 0.0], [0.75, 1.0, 0.0], [0.0, 0.0, 0.0]]))

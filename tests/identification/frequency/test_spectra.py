@@ -264,6 +264,21 @@ def test_a_command_repeats_from_twice_on() -> None:
     assert repetition(once) is None
 
 
+@pytest.mark.parametrize("at", [0, 1, 10, 18, 19])
+def test_a_kick_in_each_period_repeats_wherever_in_the_period_it_stands(at: int) -> None:
+    """Both periods are the same, so their correlation is 1: no sample beside them may be counted with them."""
+    assert repetition(np.tile(np.arange(20) == at, 2).astype(float)) == 20
+
+
+def test_what_grows_from_period_to_period_repeats_as_little_as_its_correlation_says() -> None:
+    """A noise of 5 % of the size on either period leaves 1 / (1 + 0.05^2) = 0.9975 < 0.999; one of 1 % does not."""
+    g = np.random.default_rng(4)
+    once = g.normal(size=500)
+    apart = g.normal(size=(2, 500))
+    assert repetition((once + 0.01 * apart).ravel()) == 500
+    assert repetition((once + 0.05 * apart).ravel()) is None
+
+
 @pytest.mark.parametrize(
     ("periods", "per_period", "good"), [(0.85, 40, False), (0.95, 40, True), (9, 3.9, False), (9, 4.1, True)]
 )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import StateSpace, lsim
 
-from upright.identification.inference.black_box import black_box
+from upright.identification.inference.black_box import _sampled, black_box
 from upright.identification.model.runs import Run
 
 DT = 0.01
@@ -56,3 +56,21 @@ def test_runs_that_are_not_alike_are_passed_over() -> None:
     other = oscillator(1, measured=("x2",))
     short = oscillator(3, seconds=0.02)
     assert black_box([other, short], asked, period=1.0) == {}
+
+
+def test_what_drives_is_the_mean_over_the_step_ahead_of_commands_and_of_what_is_held() -> None:
+    """By hand: steps of two samples; past the end the mean counts what is there over the whole step."""
+    y = np.array([[1.0, 10.0, 5.0], [2.0, 20.0, 6.0], [3.0, 40.0, 7.0], [4.0, 80.0, 8.0]])
+    run = Run(label="a", role="fit", t=DT * np.arange(4), u=np.array([[0.0], [2.0], [4.0], [8.0]]), y=y,
+              measured=("x1", "x2", "x3"), held={"x2": y[:, 1], "x3": y[:, 2]})  # fmt: skip
+    found = _sampled(run, 2 * DT)
+    assert found is not None
+    assert found.stride == 2
+    assert found.y.tolist() == y[:, [0]].tolist()
+    assert found.w == pytest.approx(np.array([[1.0, 15.0, 5.5], [3.0, 30.0, 6.5], [6.0, 60.0, 7.5], [4.0, 40.0, 4.0]]))
+
+
+@pytest.mark.parametrize(("step", "fits"), [(2.0, True), (2.015, True), (2.03, False), (2.5, False), (3.0, False)])
+def test_a_run_fits_a_step_of_whole_samples_to_one_percent_that_it_holds_twice(step: float, fits: bool) -> None:
+    run = Run(label="a", role="fit", t=DT * np.arange(5), u=np.zeros((5, 1)), y=np.zeros((5, 1)), measured=("x1",))
+    assert (_sampled(run, step * DT) is not None) is fits

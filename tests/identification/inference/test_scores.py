@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from tests.identification.twins import PENDULUM, noisy, rig, swing
+from upright.identification import predict
 from upright.identification.inference.black_box import black_box
 from upright.identification.inference.scoring import fit_percent
 from upright.identification.model.runs import Run
+from upright.physics import Pendulum
 
 DT = 0.01
 
@@ -106,3 +109,17 @@ def test_several_runs_are_fitted_together_and_others_passed_over() -> None:
     assert black_box([seen, two, slow, held], asked, period=0.2)["x"] == pytest.approx(expected, abs=2.0)
     assert black_box([two, slow, held], asked, period=0.2) == {}
     assert black_box([seen, white], asked, period=0.2)["x"] < expected - 5.0
+
+
+@pytest.mark.parametrize("late", [lambda y: -y, lambda y: y[::-1], lambda y: y + 5.0], ids=["turned", "back", "aside"])
+def test_what_is_scored_tells_nothing_of_the_run_s_own_numbers(late: Any) -> None:
+    """They come from the samples before, so a prediction is the same whatever is read from then on."""
+    run = noisy(swing(seconds=4.0), 1e-3, seed=3)
+    asked = replace(run, role="predict", score_from=2.0, unknown=("initial", "friction"))
+    scored = run.t - run.t[0] >= 2.0 - 1e-9
+    y = run.y.copy()
+    y[scored] = late(y[scored])
+    one, other = (predict({}, rig(Pendulum, PENDULUM, {}), [r])["swing"] for r in (asked, replace(asked, y=y)))
+    assert one.fit_percent["theta"] > 90 > other.fit_percent["theta"]
+    np.testing.assert_array_equal(other.simulated, one.simulated)
+    assert "friction" in one.adapted

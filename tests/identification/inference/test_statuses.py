@@ -83,6 +83,59 @@ def test_an_inertia_is_weak_when_its_interval_is_wider_than_itself(best: Optimum
     assert (e.value, e.status) == (size, status)
 
 
+@pytest.mark.parametrize("size", [0.03, 1.0, 20.0])
+@pytest.mark.parametrize(("share", "status"), [(0.98, "firm"), (1.02, "weak")])
+def test_a_factor_of_a_run_is_weak_when_its_interval_is_wider_than_itself(
+    best: Optimum, size: float, share: float, status: str
+) -> None:
+    """It is sought by its logarithm: size (e^h - e^-h) = 2 size sinh h is as wide as the factor at h = asinh(1/2)."""
+    (i,) = [i for i, u in enumerate(best.problem.unknowns) if u.name == "initial.theta"]
+    factors = [
+        replace(u, name="gain", log=True, value=1.0, lower=0.0, upper=math.inf, scale=1.0, prior=None) if k == i else u
+        for k, u in enumerate(best.problem.unknowns)
+    ]
+    x = best.x.copy()
+    x[i] = math.log(size)
+    factored = replace(best, problem=replace(best.problem, unknowns=factors), x=x, pinned=best.pinned & False)
+    half = math.asinh(share / 2)
+    e = run_estimates(with_sigma(factored, half / best.quantile))[0]["swing"]["gain"]
+    assert e.value == pytest.approx(size)
+    assert e.interval == pytest.approx((size * math.exp(-half), size * math.exp(half)))
+    assert e.status == status
+
+
+@pytest.mark.parametrize(
+    ("half", "upper", "profiled", "status"),
+    [
+        (0.6, math.inf, 0.9, "firm"),  # too wide by its standard error alone
+        (0.6, math.inf, 1.1, "weak"),
+        (0.1, 1.05, 1.1, "weak"),  # it reaches past its bound, so the standard error tells little
+        (0.1, 1.05, 0.3, "firm"),
+        (0.1, math.inf, None, "firm"),  # far from all bounds: not followed
+    ],
+)
+def test_a_profile_that_was_followed_says_whether_a_number_is_weak(
+    best: Optimum, monkeypatch: pytest.MonkeyPatch, half: float, upper: float, profiled: float | None, status: str
+) -> None:
+    """`half` and `upper` of the number, `profiled` the width of the profile's interval of it."""
+    size, followed = float(best.values[0]), []
+
+    def profile(_best: Optimum, place: int, plain: Estimate, *_: object) -> tuple[float, float]:
+        followed.append(place)
+        return plain.value * (1 - (profiled or 9.0) / 2), plain.value * (1 + (profiled or 9.0) / 2)
+
+    monkeypatch.setattr("upright.identification.inference.intervals.profile", profile)
+    inertia, *others = best.problem.unknowns
+    bounded = [replace(inertia, lower=0.0, upper=upper * size), *others]
+    asked = replace(best, problem=replace(best.problem, unknowns=bounded))
+    covariance = 1e-20 * np.eye(best.x.size)
+    covariance[0, 0] = (half * size / best.quantile) ** 2
+    e = shared_estimates(replace(asked, covariance=covariance), (), SearchLog())["J_p"]
+    assert (e.status, 0 in followed) == (status, profiled is not None)
+    reach = half if profiled is None else profiled / 2
+    assert e.interval == pytest.approx((size * (1 - reach), size * min(upper, 1 + reach)))
+
+
 @pytest.mark.parametrize(
     ("at", "interval", "widened"),
     [(2.5e-3, (2.2e-3, 2.5e-3), (1.9e-3, 2.15e-3)), (1.5e-3, (1.5e-3, 1.8e-3), (1.85e-3, 2.1e-3))],

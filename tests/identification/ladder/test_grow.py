@@ -42,6 +42,9 @@ def swings(seed: int, *angles: float, sigma: float = 3e-3, **truth: float) -> li
     return [noisy(replace(run, t=run.t + 3.0), sigma, seed=100 * seed + k) for k, run in enumerate(clean)]
 
 
+PLAIN = swings(0, 1.5, 1.0, 1.2)
+
+
 def chosen(ladder: Ladder) -> list[str]:
     return [s.rung.name for s in ladder.accepted]
 
@@ -135,6 +138,22 @@ def test_friction_of_each_run_is_offered_only_where_there_are_runs_and_friction(
     names = [r.name for r in default_rungs(asked(), swings(0, 1.5, 1.0))]
     assert names == ["viscous friction", "Coulomb friction", "quadratic drag", "friction of each run"]
     assert "friction of each run" not in [r.name for r in default_rungs(asked(), swings(0, 1.5))]
+
+
+@pytest.mark.parametrize(
+    ("asked_of", "offered"),
+    [
+        (({}, {}), True),
+        (({"unknown": ("friction",)}, {}), False),  # said of one run: it was thought of
+        (({}, {"shared": {"friction": "cold"}}), False),
+        (({"unknown": ("gain",)}, {"unknown": ("gain",)}), True),
+        (({}, {"role": "predict"}), False),  # one run alone is fitted
+        (({}, {}, {"role": "predict", "unknown": ("friction",)}), True),
+    ],
+)
+def test_friction_of_each_run_is_offered_where_no_fitted_run_speaks_of_it(asked_of, offered):
+    runs = [replace(run, **about) for run, about in zip(PLAIN, asked_of, strict=False)]
+    assert ("friction of each run" in [r.name for r in default_rungs(asked(), runs)]) is offered
 
 
 def test_an_interrupted_climb_keeps_the_rungs_so_far():

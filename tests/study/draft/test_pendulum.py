@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 
 from upright.errors import BadInput
+from upright.physics import Coordinate, Joint, Plant
+from upright.quantities import quantity
 from upright.readers import inspect, read
 from upright.study.draft.draft import draft
-from upright.study.draft.recognise import moves_against
+from upright.study.draft.pendulum import starts_hanging
+from upright.study.draft.recognise import Recognised, moves_against
 from upright.study.load import load_study
 
 G = 9.81
@@ -238,3 +241,42 @@ def test_an_arm_that_turns_to_and_fro_stays_in_rad_where_its_steps_are_parts_of_
     arm, rod = (np.round(x / step) * step for x in (8 * np.sin(2 * t), 0.5 * np.cos(6 * t)))
     text, _ = drafted("furuta", psi=arm, theta=rod, u=np.cos(2 * t))
     assert tomllib.loads(text)["sensors"]["psi"]["unit"] == "rad"
+
+
+class Spring(Plant):
+    """A weight whose axis has a spring: sizes in every unit that a swing sets."""
+
+    m_p: float = quantity("kg", "mass", above=0)
+    l_cg: float = quantity("m", "to the centre of gravity", above=0)
+    J_p: float = quantity("kg m^2", "moment of inertia", at_least=0)
+    k: float = quantity("N m/rad", "spring", at_least=0)
+    n: float = quantity("1", "share", at_least=0)
+    b: float = quantity("N m s/rad", "viscous friction", default=0.0)
+    d: float = quantity("N s/m", "drag", default=0.0)
+    f: float = quantity("N m", "dry friction", default=0.0)
+    coordinates = (Coordinate("theta", "rad", "angle"),)
+    joints = (Joint(on="theta", coulomb="f"),)
+
+    @staticmethod
+    def energies(p, q, v):
+        T = (p.J_p + p.m_p * p.l_cg**2) * v[0] ** 2 / 2
+        return T, (p.k + p.n * p.m_p * G * p.l_cg) * q[0] ** 2 / 2, (p.b + p.d * p.l_cg**2) * v[0] ** 2 / 2
+
+
+def test_a_plant_of_the_user_s_own_starts_from_sizes_that_swing_as_slowly():
+    """Of 1 kg: w^2 = g / l of the weight, k / J of the spring, and a thousandth of critical damping."""
+    w = 4.0
+    found = Recognised(plant="spring", columns={}, rest={}, drive=None, reversed=False, mirrored=False,
+                       window=(0.0, 9.0), frequency=w, settled=True, doubts=())  # fmt: skip
+    starts = starts_hanging(found, Spring)
+    mass, _ = starts.assumed["m_p"]
+    asked = starts.asked
+    assert mass == 1.0
+    assert G / asked["l_cg"] == pytest.approx(w**2)
+    assert asked["J_p"] == pytest.approx(mass * asked["l_cg"] ** 2)
+    assert asked["k"] / asked["J_p"] == pytest.approx(w**2)
+    assert asked["b"] / (2 * asked["J_p"] * w) == pytest.approx(1e-3)
+    assert asked["d"] / (2 * mass * w) == pytest.approx(1e-3)
+    assert asked["f"] == pytest.approx(2e-3 * mass * G * asked["l_cg"])
+    assert asked["n"] == 1.0
+    assert asked.keys() == {"l_cg", "J_p", "k", "n", "b", "d", "f"}

@@ -154,7 +154,7 @@ def _fit(
         estimates[name] = Estimate(
             value=value, stderr=s, interval=(max(low, 0.0), high), unit=rig.parameters[name].unit, status=status
         )
-    size = np.maximum(sigma, 1e-150)  # whose square is no zero yet
+    size = np.where(sigma > 0, sigma, 1.0)  # what the response does not depend on has no variance
     told, trusted = verdict(squares, key)
     return Fit(
         model=rig, estimates=estimates, per_run={}, runs={}, verdict=told, trusted=trusted,

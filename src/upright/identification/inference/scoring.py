@@ -15,7 +15,7 @@ from upright.identification.inference.intervals import run_estimates
 from upright.identification.model.bands import Bands
 from upright.identification.model.fit import Fit, Offer, RunScore
 from upright.identification.model.grey_box import GreyBox
-from upright.identification.model.runs import Run
+from upright.identification.model.runs import LEAST_RUN, Run
 from upright.identification.problem.residuals import Problem, formulate
 from upright.identification.problem.simulated import with_noise
 from upright.identification.problem.tracks import FilterPlan, Track
@@ -193,7 +193,7 @@ def _foresee(
     """Score of one run, and the problem and the coordinates of what was estimated from the run itself."""
     before = replace(run, score_from=0.0)
     upto = run.score_from if run.score_from > 0 else math.inf
-    if run.score_from > 0 and run.horizon is not None:
+    if run.score_from > 2 * run.period and (run.horizon is not None or run.t.size >= LEAST_RUN):
         before, upto = before.first_part(run.score_from / (run.period * run.t.size)), math.inf
     problem = formulate(rig, [before], given=groups)
     x, log = problem.start, SearchLog(progress=progress)
