@@ -195,7 +195,7 @@ def test_a_rig_of_its_kind_is_run(installed, tmp_path):
     rig = tmp_path / "RIG.toml"
     rig.write_text('kind = "winch"\nmake = "furuta"\n[board]\nper_volt = 2.0\n', encoding="utf-8")
     run = up.run(rig, excite="step 0.5", duration=0.2, check=False, watch=False, out=tmp_path)
-    counts = run.value.log.record()["psi"] * make_rig("furuta").counts[0]
+    counts = run.value.log.record()["psi"] * make_rig("furuta").per_unit[0]
     assert np.median(np.diff(counts)) == pytest.approx(1.0)  # 2 counts per V and tick, at 0.5 V
     assert run.chapter.first_line.startswith("SIMULATED")
 

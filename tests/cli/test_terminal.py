@@ -55,6 +55,7 @@ def test_text_comes_out_in_any_encoding(folder, tmp_path, encoding):
     assert (help_.returncode, help_.stderr) == (0, b"")
 
 
+@pytest.mark.slow
 def test_numbers_for_a_program_are_the_same_in_any_encoding(folder):
     said = [
         json.loads(run(folder, "doctor", "log.csv", "--json", PYTHONIOENCODING=encoding).stdout.decode(encoding))
@@ -106,6 +107,7 @@ def test_pictures_and_pages_depend_on_no_setting(folder, plain, tmp_path, settin
     ("shell", "code"),
     [(" | head -1; exit ${PIPESTATUS[0]}", 0), (" >&-", 0), (" 2>&-", 0), (" >&- 2>&-", 0), (" > /dev/full", 2)],
 )
+@pytest.mark.slow
 def test_a_terminal_that_goes_away_leaves_no_traceback(folder, tmp_path, shell, code):
     done = run(folder, "show", "log.csv", "-o", str(tmp_path), shell=shell)
     assert done.returncode == code

@@ -316,7 +316,7 @@ def test_energy_and_power_of_a_swing_are_those_of_a_pendulum_on_a_moved_pivot():
 
 
 def test_the_law_begins_where_the_encoders_stand():
-    rig = make_rig("furuta").replace(scales=(1.0, -2.0), counts=(100.0, 1000.0), converter=0.25)
+    rig = make_rig("furuta").replace(scales=(1.0, -2.0), counts=(100 * math.tau, 1000 * math.tau), converter=0.25)
     law = designed("furuta")
     still, held = law.rule(rig, [0.5, 0.1, 0.3, 0.2]), law.rule(rig, [0.5, 0.1, 0.3, 0.2], holding=True)
     # zeros where it hangs, in what is shown; switched on while it swings, speeds are not known, and no event was

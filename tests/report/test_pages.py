@@ -114,6 +114,7 @@ def test_every_table_has_headings_and_every_picture_words(chapter):
     assert all(described)
 
 
+@pytest.mark.slow
 def test_paper_holds_the_verdict_and_every_number(chapter, tmp_path):
     pypdf = pytest.importorskip("pypdf")
     pytest.importorskip("typst")

@@ -21,6 +21,6 @@ def test_the_tick_that_is_timed_holds_a_pendulum_upright_beside_the_bank_of_filt
         commands.append(work())
         tick = exchange()
     assert tick.mode == Mode.HOST
-    assert tick.counts[1] / make_rig("furuta").counts[1] == pytest.approx(math.pi, abs=0.01)
+    assert tick.counts[1] / make_rig("furuta").per_unit[1] == pytest.approx(math.pi, abs=0.01)
     assert seen == pytest.approx(commands)
     assert max(commands) > 0.1 > 0 > min(commands)

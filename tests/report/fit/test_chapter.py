@@ -47,6 +47,7 @@ def test_the_page_needs_nothing_from_anywhere(fit, written):
     assert not {"script", "link", "iframe", "object"} & set(page.tags)
 
 
+@pytest.mark.slow
 def test_the_page_can_be_read_aloud(fit, written):
     _, page = written(fit)
     assert ("html", "lang", "en") in page.attributes
@@ -59,6 +60,7 @@ def test_the_page_can_be_read_aloud(fit, written):
     assert page.tags.count("h1") == 1
 
 
+@pytest.mark.slow
 def test_ids_are_unique_although_many_figures_share_the_page(fit, written):
     text, page = written(fit)
     assert len(page.ids) == len(set(page.ids))

@@ -50,6 +50,7 @@ def shares(text):
     ],
     ids=["pendubot", "pendubot taken for disks", "double pendulum", "disks", "driven arm", "free arm"],
 )  # fmt: skip
+@pytest.mark.slow
 def test_the_plant_that_made_a_log_explains_it_best(drafted, plant, columns):
     text, study = drafted(**columns)
     told, said = shares(text)
