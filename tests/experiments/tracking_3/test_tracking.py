@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -264,3 +265,18 @@ def test_no_pd_of_a_hundred_others_arrives_sooner_by_more_than_the_grid(kind):
     kp = np.exp(rng.uniform(np.log(0.03), 0, 100)) * RESERVE * rig.limit / step
     others = pd.tried(rig, np.column_stack([kp, kp * np.exp(rng.uniform(np.log(8e-3), np.log(0.25), 100))]), step)
     assert found.arrival.min() < 1.05 * others[:, 0].min()
+
+
+@pytest.mark.parametrize("body", [0, 1])
+def test_a_root_locus_of_a_free_mass_is_that_of_its_quadratic(body):
+    """Two masses without a spring: the one under PD moves as s^2 + g kp r s + g kp = 0, the other stays as it is."""
+    plant = chain(2, "rectilinear")(m_1=2.0, m_2=0.5, k_12=1e-12)
+    model = plant.linear("origin" if "origin" in plant.equilibria else next(iter(plant.equilibria)))
+    kp, rate = np.array([0.5, 8.0]), 0.4
+    B = np.array(model.B)
+    B[:] = 0.0
+    B[2 * body + 1] = 3.0  # force on that body alone, for a locus of either
+    found = pd.root_locus(replace(model, B=B), body, rate, kp)
+    for k, poles in zip(kp, found, strict=True):
+        expected = [*np.roots([1.0, 3 * k * rate, 3 * k]), 0.0, 0.0]
+        assert np.sort_complex(poles) == pytest.approx(np.sort_complex(np.array(expected)), abs=1e-5)

@@ -61,6 +61,8 @@ def test_what_a_response_cannot_see_correlates_with_nothing() -> None:
     seen = np.array([n in ("J_d", "b_1") for n in found.fit.names])
     assert np.diag(size)[seen] == pytest.approx(1.0)
     assert np.array_equal(size[~seen], np.zeros((2, 4)))
+    blind = [found.fit.estimates[n] for n in ("b_1c", "b_2c")]
+    assert [(e.status, e.interval) for e in blind] == [("unseen", (-math.inf, math.inf))] * 2
 
 
 def test_the_pole_that_matters_is_the_one_by_which_it_falls() -> None:
@@ -102,7 +104,7 @@ def test_a_verdict_trusts_no_response_that_is_not_explained() -> None:
 
 @pytest.mark.parametrize(
     ("width", "status"),
-    [(0.99, "firm"), (1.01, "weak"), (4.0, "weak"), (1e-11, "firm"), (1e-13, "weak"), (0.0, "weak")],
+    [(0.99, "firm"), (1.01, "weak"), (4.0, "weak"), (1e-11, "firm"), (1e-13, "weak")],
 )
 def test_an_interval_wider_than_its_value_or_narrower_than_rounding_is_weak(width: float, status: str) -> None:
     """`width` of the whole interval, of the value; it ends at zero, which no asked number passes."""

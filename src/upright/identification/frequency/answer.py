@@ -146,13 +146,18 @@ def _fit(
     sigma = np.sqrt(np.maximum(np.diag(squares.covariance), 0.0))
     estimates: dict[str, Estimate] = {}
     for name, s in zip(squares.names, sigma.tolist(), strict=True):
-        value = squares.way.values[name]
+        value, unit = squares.way.values[name], rig.parameters[name].unit
+        if s == 0:  # nothing of the response depends on it, so its row of the pseudo-inverse is zero
+            estimates[name] = Estimate(
+                value=value, stderr=math.inf, interval=(-math.inf, math.inf), unit=unit, status="unseen"
+            )
+            continue
         low, high = value - q * s, value + q * s
         weak = high - low > abs(value) or Estimate.within(value, s, q * s).zero_wide
         bound = value < 1e-6 * rig.parameters[name].value
         status = "at bound" if bound else "weak" if weak else "firm"
         estimates[name] = Estimate(
-            value=value, stderr=s, interval=(max(low, 0.0), high), unit=rig.parameters[name].unit, status=status
+            value=value, stderr=s, interval=(max(low, 0.0), high), unit=unit, status=status
         )
     size = np.where(sigma > 0, sigma, 1.0)  # what the response does not depend on has no variance
     told, trusted = verdict(squares, key)
