@@ -80,8 +80,8 @@ def test_a_ladder_says_what_it_chose_and_why(bench):
 def test_the_chosen_study_asks_for_what_was_kept_and_can_be_fitted(bench):
     run("ladder", "study.toml", "-o", "out", "--no-report")
     chosen = load_study(bench / "out" / "study.toml", data=bench)
-    assert chosen.rig.estimated == ("J_p", "b_2", "b_2c")
-    assert chosen.rig.parameters["b_2q"].value == 0
+    assert chosen.model.estimated == ("J_p", "b_2", "b_2c")
+    assert chosen.model.parameters["b_2q"].value == 0
     assert chosen.ladder == ()
     outcome = run("identify", "out/study.toml", "--data", ".", "-o", "fit", "--no-report")
     assert outcome.exit_code == 0, outcome.output
