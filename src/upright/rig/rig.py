@@ -168,7 +168,8 @@ class Rig(Shown):
     def _number(self, name: str) -> float:
         if name not in self.hardware.entries:
             raise BadInput(
-                f"nobody said the {meaning_of(name)} of {self.name or 'the rig'}; {place_of(name)} of a study does."
+                f"{self.name or 'the rig'} lacks a number that is needed, the {meaning_of(name)}; give it to "
+                f"rig.replace, or write {place_of(name)} into its study."
             )
         return self.hardware.entries[name].value
 

@@ -47,7 +47,7 @@ def rig_options(
     BadInput
         When one of them is no such number.
     """
-    from upright.rig.hardware import Entry, driven_unit
+    from upright.rig.hardware import Entry, counts_unit, driven_unit
 
     every = si_if_given(period, "s")
     if limit is not None and not 0 < limit < 1e9:
@@ -61,8 +61,7 @@ def rig_options(
     out = {n: Entry(value=v, unit=u, source=options[n]) for n, v, u in said if v is not None}
     units = {c.name: c.unit for c in plant.coordinates}
     for name, number in _counts(counts, list(units)).items():
-        per = "1/rev" if units[name] == "rad" else f"1/{units[name]}"
-        out[f"counts.{name}"] = Entry(value=number, unit=per, source="--counts")
+        out[f"counts.{name}"] = Entry(value=number, unit=counts_unit(units[name]), source="--counts")
     return out
 
 

@@ -209,5 +209,6 @@ def draw_poles(value: Any) -> Any:
         drawn.items(), (("x", BLUE), ("o", VERMILLION), ("s", BLUE)), strict=False
     ):
         roots(axes, poles, mark, colour, name)
-    axes.legend()
+    if len(drawn) > 1:  # the mark in the legend of one series would look like a pole
+        axes.legend()
     return drawing

@@ -1,4 +1,4 @@
-"""A rig held upright, told beforehand: `regulate`."""
+"""A rig held upright, with a prediction beforehand: `regulate`."""
 
 from __future__ import annotations
 
