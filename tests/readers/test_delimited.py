@@ -172,3 +172,9 @@ def test_a_record_of_ours_comes_back():
     np.testing.assert_array_equal(found.t, [0, 2])
     np.testing.assert_array_equal(found["x"], [1, 5])
     assert found.units == {"x": "V"}
+
+
+def test_decimal_commas_are_seen_below_rows_of_whole_numbers():
+    found = record("t [ms];theta [deg]\n" + "".join(f"{5 * i};0\n" for i in range(300)) + "1500;1,25\n1505,5;-3\n")
+    assert found["theta [deg]"][-2:].tolist() == [1.25, -3.0]
+    assert found.t[-1] == pytest.approx(1.5055)

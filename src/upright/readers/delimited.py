@@ -62,11 +62,13 @@ def layout(source: Source, text: str | None = None) -> TextTable:
                 column=j + 1,
                 name=name,
             )
-    comma = delimiter in (";", "\t", None) and "," in lines[first] and "." not in lines[first]
+    start = sum(len(line) + 1 for line in lines[:first])
+    # of all rows: a rig that rests is logged as 0;0;0
+    comma = delimiter in (";", "\t", None) and text.find(",", start) >= 0 and text.find(".", start) < 0
     return TextTable(
         source=source,
         text=text,
-        start=sum(len(line) + 1 for line in lines[:first]),
+        start=start,
         names=tuple(names),
         delimiter=delimiter,
         first_line=first + 1,
