@@ -105,6 +105,19 @@ def test_what_is_wrong_with_a_fit_is_said(tmp_path, place, value, says):
         read_fit(tmp_path / "fit.json")
 
 
+def test_variances_are_squares_of_what_a_number_may_be(tmp_path):
+    """A number that the data hardly see is uncertain by 1e9 of its unit: its fit is read, and not trusted by itself."""
+    path = tmp_path / "fit.json"
+    bands = {"names": ["J_p"], "covariance": [[1e18]]}
+    path.write_text(json.dumps({**FIT, "bands": {**FIT["bands"], **bands}}), encoding="utf-8")
+    assert read_fit(path).bands.covariance[0, 0] == 1e18
+    path.write_text(
+        json.dumps({**FIT, "bands": {**FIT["bands"], "names": ["J_p"], "covariance": [[1e30]]}}), encoding="utf-8"
+    )
+    with pytest.raises(BadInput, match="of a rig's size"):
+        read_fit(path)
+
+
 @pytest.mark.parametrize(("between", "possible"), [(0.9e-6, True), (1.5e-6, False)])
 def test_a_covariance_is_judged_by_its_correlations_whatever_its_units(tmp_path, between, possible):
     """Standard deviations of 1e-6 and 1: a covariance of 0.9e-6 is a correlation of 0.9, one of 1.5e-6 is none."""

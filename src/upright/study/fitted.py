@@ -208,7 +208,7 @@ def _bands(entry: Any) -> Bands:
     }
     names = [_text(name, "bands.names") for name in _list(table.get("names"), "bands.names")]
     rows = [
-        [_number(v, "bands.covariance") for v in _list(row, "bands.covariance")]
+        [_number(v, "bands.covariance", LARGEST**2) for v in _list(row, "bands.covariance")]
         for row in _list(table.get("covariance"), "bands.covariance")
     ]
     if [len(row) for row in rows] != [len(names)] * len(names):
@@ -309,8 +309,8 @@ def _text(value: Any, place: str) -> str:
     return value
 
 
-def _number(value: Any, place: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST:
+def _number(value: Any, place: str, largest: float = LARGEST) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= largest:
         raise BadInput(f"{place} must be a finite number of a rig's size, got {_shown(value)}")
     return float(value)
 

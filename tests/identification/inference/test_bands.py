@@ -9,7 +9,7 @@ import pytest
 
 from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, shaken, swing
 from upright.identification.estimate import identify, predict
-from upright.identification.inference.bands import recalibrated
+from upright.identification.inference.bands import possible, recalibrated
 from upright.identification.inference.promise import promise
 from upright.identification.inference.reach import beyond, reached
 from upright.identification.ladder.cross_validation import cross_validate
@@ -206,3 +206,14 @@ def test_without_bands_the_fitted_runs_are_the_measure() -> None:
     kept = promise(runs, None, {"one": {"theta": 60.0}})
     assert kept.kept
     assert "no bands" in kept.sentence
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-6])
+def test_a_covariance_that_rounding_left_indefinite_becomes_the_nearest_that_is_one(size: float) -> None:
+    """Of [[1, 1 + e], [1 + e, 1]], eigenvalues 2 + e and -e, the nearest is (1 + e/2) [[1, 1], [1, 1]]."""
+    e, units = 1e-5, np.array([1.0, size])
+    C = np.array([[1.0, 1.0 + 2 * e], [1.0, 1.0]]) * np.outer(units, units)  # asymmetric as well
+    expected = (1 + e / 2) * np.outer(units, units)
+    assert possible(C) == pytest.approx(expected, rel=1e-12)
+    well = np.array([[2.0, 0.5], [0.5, 1.0]])
+    assert np.array_equal(possible(well), well)

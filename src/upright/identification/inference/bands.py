@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.inference.covariance import Optimum, student
+from upright.identification.inference.loop import root
 from upright.identification.inference.reach import beyond, reached
 from upright.identification.model.bands import LEVEL, Bands, Spread
 from upright.identification.model.fit import RunScore
@@ -97,7 +98,7 @@ def calibrated(best: Optimum) -> Bands | None:
         quantile=NORMAL,
         spreads=_spreads(problem.tracks, met),
         names=tuple(problem.unknowns[i].name for i in shared),
-        covariance=covariance[np.ix_(shared, shared)] * np.outer(slope, slope),
+        covariance=possible(covariance[np.ix_(shared, shared)] * np.outer(slope, slope)),
         reached=reached(problem.rig, [track.run for track in problem.tracks]),
     )
     missed = [_missed(problem, met[block.run], block, covariance, best.x, bands) for block in blocks]
@@ -105,6 +106,17 @@ def calibrated(best: Optimum) -> Bands | None:
         return bands
     widths = float(np.quantile(np.concatenate(missed), LEVEL))
     return replace(bands, quantile=float(np.clip(widths, NORMAL, MOST)))
+
+
+def possible(C: Array) -> Array:
+    """The covariance (n, n) that is nearest to one which rounding has left asymmetric, or a little indefinite."""
+    C = (C + C.T) / 2
+    d = np.sqrt(np.maximum(np.diag(C), 0.0))
+    s = np.where(d > 0, 1 / np.where(d > 0, d, 1.0), 0.0)
+    if not C.size or np.linalg.eigvalsh(C * s[:, None] * s)[0] >= 0:
+        return C
+    L = root(C)
+    return L @ L.T
 
 
 def recalibrated(bands: Bands, left_out: Sequence[RunScore]) -> Bands:
