@@ -196,8 +196,8 @@ def met(source: Source, dialect: str) -> Contact:
         drafted = tomllib.loads(study.read_text(encoding="utf-8"))
     assumed = {n for n, v in drafted["parameters"].items() if isinstance(v, dict) and v.get("assumed")}
     usable = {n: e.value for n, e in fit.estimates.items() if fit.trusted and e.status == "firm" and not e.rests_on}
-    same = source.plant == drafted["rig"]["plant"]
-    wrong = tuple(n for n, value in usable.items() if same and _misses(fit.estimates[n], value, source.truth.get(n)))
+    truth = _meant(source.truth, assumed) if source.plant == drafted["rig"]["plant"] else {}
+    wrong = tuple(n for n, value in usable.items() if _misses(fit.estimates[n], value, truth.get(n)))
     first, last = moving(source)
     windows = [r.get("window", (0.0, math.inf)) for r in drafted["runs"]]
     covered = sum(max(0.0, min(b, last) - max(a, first)) for a, b in windows) / max(last - first, 1e-9)
@@ -207,6 +207,13 @@ def met(source: Source, dialect: str) -> Contact:
         placeholders=tuple(sorted(assumed & set(usable))), plant=drafted["rig"]["plant"], kept=min(covered, 1.0),
         seconds=seconds, held=held,
     )  # fmt: skip
+
+
+def _meant(truth: dict[str, float], assumed: set[str]) -> dict[str, float]:
+    """With J_p set to 0, l_cg is J_A/(m_p l_cg), the length of the simple pendulum of equal period, and said to be."""
+    if "J_p" not in assumed or not {"l_cg", "m_p", "J_p"} <= truth.keys():
+        return truth
+    return truth | {"l_cg": truth["l_cg"] + truth["J_p"] / (truth["m_p"] * truth["l_cg"])}
 
 
 def _misses(estimate: Any, value: float, truth: float | None) -> bool:
