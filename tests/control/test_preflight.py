@@ -118,6 +118,9 @@ def test_one_run_and_many_of_its_start_say_the_same(force_limit):
     starts = np.zeros((angles.size, 4))
     starts[:, 2] = angles
     own = {"actuator.gain": rig.gain * np.linspace(0.9, 1.1, angles.size)[::-1], "b_1c": np.linspace(4e-3, 9e-3, 12)}
+    # the last digit is the order in which a processor adds; where the drive gives all it can, nothing holds it from
+    # growing as the rig falls, by exp(p t)
+    grown = np.finfo(float).eps * math.exp(3.0 * MODEL.poles().real.max())
     many = outcomes(rig, law(3), at="inverted", starts=starts, seconds=3.0, parameters=own)
     assert 0 < np.sum(many.at_limit > 5e-3) < angles.size
     assert 0 < np.sum(many.held) < angles.size
@@ -125,8 +128,8 @@ def test_one_run_and_many_of_its_start_say_the_same(force_limit):
         alone = replace(rig.changed(b_1c=own["b_1c"][i]), gain=own["actuator.gain"][i])
         one = score(trial(alone, law(3), at="inverted", start=start, seconds=3.0))
         for name, value in vars(one).items():
-            # of what fell, the last digit of many turns is the order in which a processor adds
-            np.testing.assert_allclose(getattr(many, name)[..., i], value, rtol=1e-9, err_msg=f"{name} of start {i}")
+            both = getattr(many, name)[..., i], value
+            np.testing.assert_allclose(*both, rtol=1e-9, atol=grown, err_msg=f"{name} of start {i}")
 
 
 def test_runs_too_long_for_a_whole_block_say_what_short_ones_say():
