@@ -18,6 +18,8 @@ from upright.quantities import with_unit
 
 VENDORS = ("ECP 205", "ECP 210")
 """Whose data sheets are known; `rig.makes` has them."""
+DRIVE_SIGN = "drive_sign"
+"""Entry of a drive that a positive command turns backwards: -1."""
 SERVO = {"servo_period": "s", "travel": "", "speed_limit": "/s", "twist": ""}
 """Numbers under [rig]; what is "" or "/s" is in the unit of the driven coordinate, or per second of it."""
 
@@ -49,9 +51,9 @@ class Hardware:
     vendor : str
         One of `VENDORS` whose data sheet gives what is left out here; empty for a rig of one's own.
     entries : mapping of str to Entry
-        ``"limit"``, ``"lag"`` and so on as under [actuator]; ``"converter"``; ``"servo_period"``, ``"travel"``,
-        ``"speed_limit"``, ``"twist"``; and by coordinate ``"counts.theta"`` (per turn or metre), ``"sign.theta"`` and
-        ``"offset.theta"``.
+        ``"limit"``, ``"lag"`` and so on as under [actuator]; ``"drive_sign"``; ``"converter"``; ``"servo_period"``,
+        ``"travel"``, ``"speed_limit"``, ``"twist"``; and by coordinate ``"counts.theta"`` (per turn or metre),
+        ``"sign.theta"`` and ``"offset.theta"``.
     """
 
     name: str = ""
@@ -69,6 +71,14 @@ class Hardware:
     def value(self, name: str, default: float) -> float:
         """Value of an entry, or the default, which has to mean that there is none of it."""
         return self.entries[name].value if name in self.entries else default
+
+    def as_commanded(self) -> tuple[float, Hardware]:
+        """Sign of the drive, and the same without it: numbers of commands then hold for those that the log has."""
+        sign = self.value(DRIVE_SIGN, 1.0)
+        entries = {n: e for n, e in self.entries.items() if n != DRIVE_SIGN}
+        if "offset" in entries:
+            entries["offset"] = replace(entries["offset"], value=sign * entries["offset"].value)
+        return sign, replace(self, entries=entries)
 
     def demand(self, wanted: Mapping[str, str], who: str, *, sheet: str) -> None:
         """Ask for entries that are not there.
@@ -124,7 +134,7 @@ def meaning_of(name: str) -> str:
     if f"actuator.{name}" in ACTUATOR:
         return ACTUATOR[f"actuator.{name}"].meaning
     return {
-        "converter": "smallest step of the command", "servo_period": "servo period",
+        DRIVE_SIGN: "sign of the drive", "converter": "smallest step of the command", "servo_period": "servo period",
         "travel": "how far the driven body may go either way", "speed_limit": "speed at which the drive trips",
         "twist": "how far the ends of the shaft may go apart",
         "counts": f"encoder counts of {of}", "sign": f"sign of the encoder of {of}",
@@ -137,6 +147,8 @@ def place_of(name: str) -> str:
     kind, _, of = name.partition(".")
     if of:
         return f"[sensors.{of}] {'counts_per_rev or counts_per_m' if kind == 'counts' else kind}"
+    if kind == DRIVE_SIGN:
+        return "[drive] sign = -1"
     if kind in SERVO:
         return f'[rig] {kind} = "{"2 ms" if kind == "servo_period" else "..."}"'
     return f'[actuator] {kind} = "..."'

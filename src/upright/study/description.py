@@ -8,8 +8,18 @@ from upright.errors import BadInput
 from upright.identification import GreyBox
 from upright.physics import Plant
 from upright.physics.actuator import ACTUATOR
-from upright.rig.hardware import SERVO, VENDORS, Entry, Hardware, check_vendor, counts_unit, driven_unit, turn_of
-from upright.study.sensors import Sensor, read_sensors
+from upright.rig.hardware import (
+    DRIVE_SIGN,
+    SERVO,
+    VENDORS,
+    Entry,
+    Hardware,
+    check_vendor,
+    counts_unit,
+    driven_unit,
+    turn_of,
+)
+from upright.study.sensors import Sensor, drive_sign, read_sensors
 from upright.study.text import Section, source_of
 from upright.units import parse
 
@@ -46,6 +56,8 @@ def read_hardware(study: Section, plant: type[Plant], rig: GreyBox, logs: Collec
             entries[key] = Entry(value=value, unit=unit, source=source)
     for sensor, place in read_sensors(study, Section(study.text, (), {}), plant).values():
         entries |= {} if sensor.of else _encoder(place, sensor)  # counts of a sum are not those of its coordinate
+    if plant.inputs and drive_sign(study, plant.inputs[0].name) < 0:
+        entries[DRIVE_SIGN] = Entry(value=-1.0, unit="1", source="known")
     named = {*logs}.pop() if len({*logs}) == 1 else ""
     return Hardware(name=called or named, vendor=vendor, entries=entries)
 

@@ -23,7 +23,7 @@ from upright.identification.model.fit import Judgement
 from upright.identification.model.grey_box import SUBSTEPS
 from upright.physics import PLANTS, find
 from upright.physics.actuator import ACTUATOR
-from upright.rig.hardware import Entry, Hardware, check_vendor
+from upright.rig.hardware import DRIVE_SIGN, Entry, Hardware, check_vendor
 
 FORMAT = 1
 LARGEST = 1e12
@@ -176,7 +176,8 @@ def _hardware(content: Mapping[str, Any], values: Mapping[str, float]) -> Hardwa
         if table.get("value") is None and drive in ACTUATOR:
             continue  # the drive is without it
         value = _number(table.get("value"), f"{place}.value")
-        if drive not in ACTUATOR and not name.startswith(("sign.", "offset.")) and not value > 0:
+        signed = name == DRIVE_SIGN or name.startswith(("sign.", "offset."))
+        if drive not in ACTUATOR and not signed and not value > 0:
             raise BadInput(f"{place}.value must be above 0, got {value:g}")
         if drive in values and not math.isclose(value, values[drive], rel_tol=1e-9):
             raise BadInput(f"{place}.value is {value:g}, and parameters.{drive} is {values[drive]:g}")

@@ -38,7 +38,7 @@ _DRIVE = (
     Key("expression", '"2.5*(0.2 - z)"', "or arithmetic on columns and the time t; see Expressions"),
     Key("unit", '"V"', "unit of the command; read off the gain's unit if left out"),
     Key("scale", "0.001", "factor on the command"),
-    Key("sign", "-1", "+1 or -1"),
+    Key("sign", "-1", "+1 or -1: -1 when a positive command drives backwards, as the rig's laws then know"),
 )
 _SHARED = (
     Key("window", "[1.0, 9.0]", 'seconds of the log that count; "start" and "end" are allowed'),

@@ -347,6 +347,12 @@ def _drive(own: Section, shared: Section, *, free: bool) -> Drive:
     )
 
 
+def drive_sign(study: Section, name: str) -> float:
+    """Sign of the force, by the plant's coordinate, that a positive value of the first input's column gives."""
+    table = study.section("inputs").section(name).over(study.section("drive"))
+    return read_sign(table) * math.copysign(1.0, table.number("scale", "1", 1.0))
+
+
 def drive_unit(study: Section) -> str:
     """Unit of the first input's command: as stated, or as the actuator's gain implies, or ""."""
     tables = [study.section("drive"), study.section("defaults").values.get("drive")]

@@ -13,6 +13,7 @@ from upright.identification import GreyBox
 from upright.physics import Plant, find, name_of
 from upright.rig import Hardware, Rig
 from upright.rig.drive import GAIN
+from upright.rig.hardware import DRIVE_SIGN
 from upright.study.description import read_hardware
 from upright.study.fitted import FittedModel, read_fit
 from upright.study.rig import read_plant, read_rig
@@ -41,13 +42,13 @@ def rig_with_guesses(model: GreyBox, name: str, hardware: Hardware) -> Rig:
     values = {n: p.value for n, p in model.parameters.items()}
     plant = kind(**{n: values[n] for n in kind.names()})
     gain = model.parameters.get(GAIN)
-    known = _with_gain(plant, name, values, _command_unit("" if gain is None else gain.unit, kind))
-    return replace(known, hardware=hardware)
+    unit = _command_unit("" if gain is None else gain.unit, kind)
+    return _with_drive(plant, name, values, unit, hardware)
 
 
 def rig_of_plant(plant: Plant) -> Rig:
     """A plant with the numbers that somebody gave, its command being its force."""
-    return _with_gain(plant, name_of(type(plant)) or type(plant).__name__, {}, _force(type(plant)))
+    return Rig(plant=plant, name=name_of(type(plant)) or type(plant).__name__, unit=_force(type(plant)))
 
 
 def rig_of_fit(fitted: FittedModel, kind: type[Plant], *, seed: int = 0, draws: int = 200) -> Rig:
@@ -62,9 +63,9 @@ def rig_of_fit(fitted: FittedModel, kind: type[Plant], *, seed: int = 0, draws: 
         plant = kind(**{n: v for n, v in fitted.values.items() if n in kind.names()})
     except TypeError:
         raise BadInput(f"the fit does not hold every parameter of '{fitted.plant}'; identify again.") from None
-    known = _with_gain(plant, fitted.plant, fitted.values, _command_unit(fitted.unit(GAIN), kind))
-    known = replace(known, hardware=fitted.hardware, basis=fitted.basis)
-    return replace(known, draws=tuple(_drawn(fitted, plant, known.gain, seed, draws)))
+    unit = _command_unit(fitted.unit(GAIN), kind)
+    known = replace(_with_drive(plant, fitted.plant, fitted.values, unit, fitted.hardware), basis=fitted.basis)
+    return replace(known, draws=tuple(_drawn(fitted, plant, seed, draws)))
 
 
 def _from_study(path: Path) -> Rig:
@@ -73,8 +74,8 @@ def _from_study(path: Path) -> Rig:
     model = read_rig(study, kind, unit)
     values = {n: p.value for n, p in model.parameters.items()}
     plant = kind(**{n: values[n] for n in kind.names()})
-    known = _with_gain(plant, study.section("rig").text_of("plant", "furuta"), values, unit or _force(kind))
-    return replace(known, hardware=read_hardware(study, kind, model))
+    name = study.section("rig").text_of("plant", "furuta")
+    return _with_drive(plant, name, values, unit or _force(kind), read_hardware(study, kind, model))
 
 
 def _force(kind: type[Plant]) -> str:
@@ -93,11 +94,13 @@ def _command_unit(per: str, kind: type[Plant]) -> str:
     return per.rpartition("/")[2].strip("()") if "/" in per and per != force else force
 
 
-def _with_gain(plant: Plant, name: str, values: Mapping[str, float], unit: str) -> Rig:
-    return Rig(plant=plant, name=name, gain=values.get(GAIN, 1.0), unit=unit)
+def _with_drive(plant: Plant, name: str, values: Mapping[str, float], unit: str, hardware: Hardware) -> Rig:
+    """A rig whose commands are those of its log; a study turns the log's where its drive has a sign."""
+    sign, as_commanded = hardware.as_commanded()
+    return Rig(plant=plant, name=name, gain=sign * values.get(GAIN, 1.0), unit=unit, hardware=as_commanded)
 
 
-def _drawn(fitted: FittedModel, plant: Plant, gain: float, seed: int, draws: int) -> list[tuple[Plant, float]]:
+def _drawn(fitted: FittedModel, plant: Plant, seed: int, draws: int) -> list[tuple[Plant, float]]:
     """Sets of numbers as the fit's standard errors and correlations scatter them; impossible ones are left out."""
     names, covariance = fitted.covariance((*plant.names(), GAIN))
     if not covariance.any():
@@ -106,9 +109,10 @@ def _drawn(fitted: FittedModel, plant: Plant, gain: float, seed: int, draws: int
     rng = np.random.default_rng([seed, 17])
     moves = rng.normal(size=(draws, len(names))) * np.sqrt(np.maximum(size, 0.0)) @ axes.T
     out: list[tuple[Plant, float]] = []
+    gain, sign = fitted.values.get(GAIN, 1.0), fitted.hardware.value(DRIVE_SIGN, 1.0)
     for move in moves.tolist():
         change = dict(zip(names, move, strict=True))
-        moved = gain + change.pop(GAIN, 0.0)
+        moved = sign * (gain + change.pop(GAIN, 0.0))
         try:
             out.append((plant.replace(**{n: getattr(plant, n) + d for n, d in change.items()}), moved))
         except ImpossiblePhysics:
