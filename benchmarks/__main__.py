@@ -34,11 +34,12 @@ NAMES = (
 APART = ("mutants",)
 """Those that run when they are named, and never among all: what is asked there is not how fast."""
 PUBLISHED = (
-    "first", "strangers", "real", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "workers", "crash", "safety", "soak",
-    "jitter", "gym",
+    "first", "strangers", "real", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "workers", "crash",
+    "safety", "soak", "jitter", "gym",
 )  # fmt: skip
 SHARED = (
-    "first", "strangers", "coverage", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "starts", "soak", "at_hand",
+    "first", "strangers", "coverage", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "starts", "soak",
+    "at_hand",
 )  # fmt: skip
 """Those whose table is a page, and those whose work processes may share."""
 
