@@ -224,7 +224,7 @@ def test_a_drafted_study_leads_from_a_log_to_a_rig_without_anybody_else_s_number
     assert "ECP" not in text
     said = load_study(path).hardware
     told = {n: (e.value, e.source) for n, e in said.entries.items()}
-    assert told["limit"] == (10.0, "measured")
+    assert told["limit"] == (10.0, "assumed")
     assert told["servo_period"] == (pytest.approx(dt), "assumed")
     assert told["counts.theta"] == (pytest.approx(4096), "measured")
     assert told["counts.x"] == (pytest.approx(20_000, rel=1e-3), "measured")

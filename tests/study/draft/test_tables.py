@@ -15,7 +15,7 @@ from upright.physics import find
 from upright.physics.statement import Coordinate
 from upright.readers.inspection import Column
 from upright.readers.resolution import Quantum
-from upright.study.draft.described import counts_of, describe
+from upright.study.draft.described import counts_of, describe, is_cut_off
 from upright.study.draft.pendulum import Balanced, balance_of, pendulum_tables, recognised_upright, starts_upright
 from upright.study.draft.recognise import Recognised
 from upright.study.draft.tables import command_unit, drive_table, rig_table, run_tables, sensor_table
@@ -322,21 +322,23 @@ def described(found: Recognised, seen=SEEN) -> tuple[dict[str, Any], dict[str, s
     return read(*tables), comments(*tables), study_text(tables)
 
 
-def test_a_limit_is_measured_where_a_command_that_varies_stays_at_it():
+def test_a_limit_is_that_of_a_command_that_is_cut_off_and_not_of_the_top_of_steps():
+    t = 0.01 * np.arange(2000)
+    sine, steps = np.clip(4 * np.sin(3 * t), -3, 3), np.repeat(np.random.default_rng(1).uniform(-3, 3, 40), 50)
+    assert is_cut_off(sine, 0.3)
+    assert not is_cut_off(steps, 0.025)
+    assert not is_cut_off(2 * np.sin(3 * t), 0.0)
+    assert not is_cut_off(np.sign(np.sin(3 * t)), 0.5)
+
+
+def test_nobody_measured_the_limit_that_a_log_shows():
     columns = {"x": CART, "theta": PENDULUM}
-    pinned = col("u", "V", drive=True, low=-3.0, high=2.0, low_share=0.1)
-    study, _, text = described(shown("cart-pendulum", columns, drive=pinned))
-    assert study["actuator"]["limit"] == {"value": "3 V", "measured": True}
+    study, told, text = described(shown("cart-pendulum", columns, drive=U))
+    assert "limit" not in study["actuator"]
+    assert '# limit = "3 V"' in text
+    assert told["limit"].startswith("MEASURE")
     assert study["rig"]["servo_period"] == {"value": "10 ms", "assumed": True}
     assert '# travel = "0.2 m"' in text
-    top = col("u", "V", drive=True, low=-1.0, high=2.5, high_share=0.1)
-    assert described(shown("cart-pendulum", columns, drive=top))[0]["actuator"]["limit"]["value"] == "2.5 V"
-    steps = col("u", "V", drive=True, low=-3.0, high=2.0, low_share=0.1, stepwise=True)
-    for drive in (steps, U):
-        study, told, text = described(shown("cart-pendulum", columns, drive=drive))
-        assert "limit" not in study["actuator"]
-        assert '# limit = "3 V"' in text
-        assert told["limit"].startswith("MEASURE")
     assert "travel" not in described(shown("cart-pendulum", columns))[2]
 
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Sequence
 
+import numpy as np
+
 from upright.physics import find
 from upright.quantities import with_unit
 from upright.readers.inspection import Inspection
-from upright.records import Record
+from upright.records import Array, Record
 from upright.study.draft.recognise import Recognised, in_dac_counts
 from upright.study.text import TomlTable
 from upright.units import scale
@@ -32,8 +34,8 @@ def counts_of(seen: Inspection, unit: str) -> tuple[int, str]:
 def describe(tables: Sequence[TomlTable], record: Record, seen: Inspection, found: Recognised) -> None:
     """Add to [rig] and [actuator] what `upright design`, `regulate` and `swing-up` need to know.
 
-    A limit counts as measured where a command that varies stays at its extreme; what the log only hints at is
-    commented out, so that nobody's guess passes for a rig's number.
+    A limit is assumed where a command is cut off; what the log only hints at is commented out, so that nobody's guess
+    passes for a rig's number.
     """
     if found.drive is None:
         return
@@ -59,12 +61,20 @@ def describe(tables: Sequence[TomlTable], record: Record, seen: Inspection, foun
     said = tomllib.loads(str(drive))["drive"]
     unit, factor = said.get("unit", ""), abs(said.get("scale", 1.0))
     most = max(abs(found.drive.low), abs(found.drive.high)) * factor
-    if not found.drive.stepwise and max(found.drive.low_share, found.drive.high_share) > 0:
-        actuator.key("limit", {"value": with_unit(most, unit, 12), "measured": True}, "the command stays at it")
+    if is_cut_off(record[found.drive.name], max(found.drive.low_share, found.drive.high_share)):
+        limit = {"value": with_unit(most, unit, 12), "assumed": True}
+        actuator.key("limit", limit, "the command is cut off there; MEASURE")
     else:
         actuator.key(
             "limit", with_unit(most, unit), "MEASURE: largest command that passes; this is the log's", off=True
         )
+
+
+def is_cut_off(command: Array, share: float) -> bool:
+    """Whether a command that stays at its extreme for a `share` of the time varies elsewhere: no top of steps does."""
+    moved = np.diff(command) != 0
+    between = (np.abs(command) < np.abs(command).max())[1:] & (command[1:] != 0)
+    return share > 0 and between.any() and float(np.mean(moved[between])) > 0.5
 
 
 def _went(found: Recognised, body: str, unit: str) -> str:
