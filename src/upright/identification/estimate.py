@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from upright.errors import BadInput, nearest
 from upright.identification.checks.conventions import wrong_conventions
 from upright.identification.checks.outliers import refit_without_outliers
+from upright.identification.checks.structure import with_proposal
 from upright.identification.inference.assumptions import assumptions, sentences, with_assumptions
 from upright.identification.inference.bands import calibrated
 from upright.identification.inference.black_box import black_box
@@ -122,9 +123,10 @@ def identify(
             fit = conclude(other_valleys(problem, found, log))
         if not watch or fit.interrupted or fit.failed:
             return fit
-        return refit_without_outliers(
+        fit = refit_without_outliers(
             fit, rig, runs, lambda kept: identify(rig, kept, method=method, progress=progress, watch=False, near=fit)
         )
+        return fit if log.conventions() else with_proposal(fit, fitted)
     except KeyboardInterrupt:  # intervals and predictions may take long too; without them an answer is near
         return conclude(replace(found, interrupted=True))
 

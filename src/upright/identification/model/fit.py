@@ -177,7 +177,7 @@ class Fit:
     another, and the model is `trusted` when none of the first two is "no". `bands` is what it
     promises of predictions, None when it was interrupted; `not_evaluated` names all that it then does not say. It
     `failed` when the motion runs away at the numbers or just beside them: these are where the search stopped, and no
-    interval is known.
+    interval is known. `proposed` are numbers that the model leaves out and that would explain the runs far better.
     """
 
     model: GreyBox
@@ -205,6 +205,7 @@ class Fit:
     poles: Mapping[str, tuple[Pole, ...]] = field(default_factory=dict[str, tuple[Pole, ...]])
     bands: Bands | None = None
     failed: bool = False
+    proposed: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def keyed(self) -> dict[str, float]:
         """Every number found, by the key that problems know it by, see `Problem.key`."""
