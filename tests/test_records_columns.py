@@ -8,7 +8,7 @@ import pytest
 
 from upright.errors import BadInput
 from upright.records import Record
-from upright.records.columns import stated_unit, take_time, time_scale
+from upright.records.columns import bare_name, stated_unit, take_time, time_scale
 
 
 @pytest.mark.parametrize(
@@ -118,3 +118,14 @@ def test_a_description_of_columns_that_were_dropped_leaves_them_out():
     for text in ("{", "3", '{"provenance": 3}', '{"provenance": {"window": ["a"]}}'):
         with pytest.raises(BadInput, match="must be the JSON this package wrote, got"):
             Record.rebuild([0, 1], {"x": [1, 2]}, text)
+
+
+@pytest.mark.parametrize(
+    ("name", "bare"),
+    [
+        ("theta [deg]", "theta"), ("theta (counts)", "theta"), ("theta_rad", "theta"), ("x_1", "x_1"), ("x_mm", "x"),
+        ("u [V]", "u"), ("_m", "_m"), ("psi", "psi"), ("f(x) [m]", "f(x)"),
+    ],
+)  # fmt: skip
+def test_a_name_without_its_unit(name, bare):
+    assert bare_name(name) == bare

@@ -39,6 +39,12 @@ def stated_unit(name: str) -> str:
     return match[1] if known(match[1]) else ""
 
 
+def bare_name(name: str) -> str:
+    """A name without its unit: ``theta`` of ``theta [deg]``, ``theta (counts)`` and ``theta_rad``."""
+    bare = re.sub(r"\s*[\[(][^\[\]()]*[\])]\s*$", "", name[:_LONGEST]).strip()
+    return re.sub(r"(?<=\w)_(rad|deg|rev|m|cm|mm|counts?)$", "", bare)
+
+
 def take_time(frame: Any, name: str | None = None) -> tuple[NDArray[np.float64], Any]:
     """Time [s] of a data frame, and the frame without it.
 

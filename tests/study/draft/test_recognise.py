@@ -131,6 +131,27 @@ def test_what_moves_by_less_than_a_hundredth_of_its_kind_is_locked(share, moves)
     assert names == (["phi", "theta", "x"] if moves else ["phi", "x"])
 
 
+def test_counts_of_a_cart_and_of_a_pendulum_are_not_compared_where_their_columns_are_named():
+    """An encoder on a rail may count 250 times as much as one on a hinge, and the pendulum moves nonetheless."""
+    few = np.round(100 * OTHER / np.ptp(OTHER))
+    signals = {"x [counts]": np.round(30_000 * SWING / np.ptp(SWING)), "theta [counts]": few}
+    record = log(**signals)
+    record = record.replace(units=dict.fromkeys(record.names, "counts"))
+    assert [c.name for c in position_columns(record, inspect(record))] == ["x [counts]", "theta [counts]"]
+    found = recognise(record, inspect(record))
+    assert found.plant == "cart-pendulum"
+    assert {n: c.name for n, c in found.columns.items()} == {"x": "x [counts]", "theta": "theta [counts]"}
+
+
+@pytest.mark.parametrize("form", ["{}", "{} [counts]", "{}_counts", "{} (counts)"])
+def test_columns_called_as_the_coordinates_of_a_rig_are_believed(form):
+    record = log(**{form.format("theta"): np.round(4000 * SWING), form.format("psi"): np.round(4000 * OTHER)})
+    record = record.replace(units=dict.fromkeys(record.names, "counts"))
+    found = recognise(record, inspect(record))
+    assert (found.plant, list(found.columns)) == ("furuta", ["psi", "theta"])
+    assert found.columns["psi"].name == form.format("psi")
+
+
 def test_a_column_without_a_unit_counts_only_where_none_has_one():
     assert positions(log(c1=SWING, c2=OTHER)) == [("c1", ""), ("c2", "")]
     assert positions(log(c1=SWING, theta=OTHER)) == [("theta", "rad")]

@@ -12,6 +12,7 @@ from upright.errors import BadInput
 from upright.physics import PLANTS, Plant, find
 from upright.readers.inspection import Column, Inspection, effort_unit
 from upright.records import Array, Record
+from upright.records.columns import bare_name
 from upright.signals.smoothing import savitzky_golay, white_noise
 from upright.study.draft.release import free_from
 
@@ -20,6 +21,8 @@ _EFFORT = re.compile(r"effort|volt|current|torque|force|plant_input|cmd|duty|^(u
 REFERENCE = re.compile(r"target|reference|\bref\b|commanded|set.?point", re.IGNORECASE)
 _ARM = re.compile(r"arm|psi|joint0|base|motor", re.IGNORECASE)
 _CART = re.compile(r"cart|pos|^[xz]\d?$|distance|displacement", re.IGNORECASE)
+_COORDINATES = ("psi", "theta", "x")
+"""Of the rigs that carry a pendulum."""
 _DISK = re.compile(r"disk|disc|theta\s*_?[123]\b", re.IGNORECASE)
 
 
@@ -128,7 +131,12 @@ def position_columns(record: Record, seen: Inspection) -> list[Column]:
     found = [c for c in found if c.guess] or found
     span = {c.name: c.high - c.low for c in found}
     largest = {unit: max(span[c.name] for c in found if c.guess == unit) for unit in {c.guess for c in found}}
-    return [c for c in found if span[c.name] > 0.01 * largest[c.guess]]  # a locked arm still moves by some mrad
+    # a locked arm still moves by some mrad; counts of a cart's encoder and of a pendulum's are not of one size
+    return [
+        c
+        for c in found
+        if span[c.name] > 0.01 * largest[c.guess] or (c.guess == "counts" and bare_name(c.name) in _COORDINATES)
+    ]
 
 
 def _lies(c: Column, seen: Inspection) -> bool:
@@ -200,7 +208,7 @@ def drive_column(record: Record, seen: Inspection) -> Column | None:
 
 def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
     """Plant whose coordinates look like these columns, and how sure that is."""
-    named = _by_coordinates({c.name for c in places})
+    named = _by_coordinates({bare_name(c.name) for c in places})
     if named:
         return named, f"The columns are called as the coordinates of a {named}."
     lengths = [c for c in places if c.guess in ("m", "mm")]
@@ -232,9 +240,9 @@ def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
 
 
 def _by_coordinates(names: set[str]) -> str:
-    """Plant of a package, the only one at all whose coordinates have just these names; empty where there is none."""
+    """The only plant whose coordinates have just these names, two at least of our own; empty where there is none."""
     fitting = [n for n, plant in PLANTS.sound().items() if {c.name for c in plant.coordinates} == names]
-    return fitting[0] if len(fitting) == 1 and fitting[0] not in PLANTS.own else ""
+    return fitting[0] if len(fitting) == 1 and (len(names) > 1 or fitting[0] not in PLANTS.own) else ""
 
 
 def _assign(plant: type[Plant], places: list[Column]) -> tuple[dict[str, Column], list[str]]:
@@ -244,7 +252,7 @@ def _assign(plant: type[Plant], places: list[Column]) -> tuple[dict[str, Column]
         kinds = ("rad", "deg") if coordinate.unit == "rad" else ("m", "mm")
         fitting = [c for c in left if c.guess in kinds] or [c for c in left if c.guess in ("counts", "")]
         pattern = {"psi": _ARM, "x": _CART}.get(coordinate.name)
-        best = next((c for c in fitting if c.name == coordinate.name), None)
+        best = next((c for c in left if bare_name(c.name) == coordinate.name), None)
         best = best or next((c for c in fitting if pattern and pattern.search(c.name)), None)
         best = best or (fitting[0] if fitting else None)
         if best is None:
