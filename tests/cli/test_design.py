@@ -159,7 +159,7 @@ def test_sampled_gains_meet_the_poles_in_the_loop_as_it_runs(study, tmp_path):
     [
         (["--poles", "-1, -2, -3"], "needs 4 poles, got 3"),
         (["--poles", "-1, -2, -3+1j, -4"], "comes without"),
-        ([], "either --poles"),
+        (["--poles", "-1, -2, -3, -4", "--lqr", "1,0,1,0"], "either --poles"),
         (["--poles", POLES, "--at", "upsidedown"], "no equilibrium 'upsidedown'"),
         (["--poles", POLES, "--speed", "guess"], "--speed is plain, filtered or kalman"),
         (["--poles", POLES, "--start", "phi=1 deg"], "--start names states"),

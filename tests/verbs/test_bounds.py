@@ -39,7 +39,7 @@ def test_a_design_of_matrices_takes_period_limit_and_start_as_they_are_typed():
         ({"vendor": "ECP 210"}, "are of a rig"),
         ({"start": "x=0 mm"}, "must leave the equilibrium"), ({"start": "y=1"}, "names states as in"),
         ({"poles": "", "lqr": "1,a"}, "weights are numbers separated by commas"),
-        ({"poles": "", "lqr": []}, "give either --poles"), ({"poles": [], "lqr": ""}, "give either --poles"),
+        ({"poles": "-1, -2", "lqr": "1,1"}, "not both"),
     ],
 )  # fmt: skip
 def test_a_design_of_matrices_that_cannot_be_is_refused(options, said):

@@ -48,7 +48,6 @@ def test_numbers_in_si_say_the_same_as_texts(study, tmp_path):
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        ({}, "give either --poles"),
         ({"poles": POLES, "lqr": "1,0,1,0"}, "give either --poles"),
         ({"poles": POLES[:2]}, "needs 4 poles, got 2"),
         ({"poles": POLES, "at": "invertted"}, "did you mean 'inverted'"),

@@ -24,8 +24,15 @@ from upright.systems import StateSpace, to_s
 
 def chapter(done: Designed, *, source: str = "OUT/fit.json", folder: str = ".") -> Chapter:
     """What a design says; fit or study and the folder of its files are named as they were typed."""
-    wish = "with poles " + written(done.wish.poles) if done.wish.poles is not None else "of least cost"
+    poles = "with poles " if done.wish.proposed is None else "with proposed poles "
+    wish = poles + written(done.wish.poles) if done.wish.poles is not None else "of least cost"
     gains: list[str] = []
+    if done.wish.proposed is not None:
+        gains.append(
+            f"Nobody asked for poles. These are proposed: {done.wish.proposed:g} times as fast as the model "
+            "falls or swings by itself, the quietest of those whose loop keeps nearly the largest distance to -1. Ask "
+            "for others with --poles or --lqr."
+        )
     if done.placement is not None:
         gains.append(f"Farthest pole from where it was asked: {done.placement.miss:.1g} 1/s. {done.placement.sentence}")
     if done.R is not None:

@@ -52,7 +52,7 @@ class DesignRequest:
     `poles` [1/s] or `weights` (diagonal of Q, with `R`, or with the limit and `start` from which R follows).
     `speed` is one of `SPEEDS`, or a way that matrices allow, empty for the plainest; `memory` is the filter's. With
     `sampled`, the gains are those whose sampled loop has the poles asked. `on` is the rig completed for a run, where
-    it is one.
+    it is one. `proposed` is how many times as fast as the model itself proposed poles are; None of poles asked.
     """
 
     at: str
@@ -70,6 +70,7 @@ class DesignRequest:
     track: str = ""
     sampled: bool = False
     on: Rig | None = None
+    proposed: float | None = None
 
     def __post_init__(self) -> None:
         if not 1e-6 <= self.period <= 10.0:

@@ -42,6 +42,7 @@ _poles = poles  # the verbs have options of this name
     },
     defaults={"out": "."},
     more="""
+    upright design out/fit.json
     upright design out/fit.json --at inverted --poles "-4.15+-1.63j, -16.9, -3.2"
     upright design --matrices model.toml --poles "-4, -5" --period "2 ms"
     """,
@@ -58,8 +59,8 @@ def design(
     """Find the gains that hold a rig, and what they are worth in the loop a computer runs.
 
     The numbers are those identified (hanging, for instance); the model is the one about another equilibrium, upright.
-    Poles are placed by Ackermann's formula, or chosen by LQR; period, delay and differenced encoders are then
-    put in.
+    Poles are placed by Ackermann's formula, or chosen by LQR, or proposed where neither is asked for; period, delay and
+    differenced encoders are then put in.
 
     Parameters
     ----------
@@ -73,7 +74,7 @@ def design(
     at : str, optional
         Equilibrium; the last that the plant names when omitted.
     poles : str or sequence of complex
-        Poles [1/s], as in ``"-4.15+-1.63j, -16.9, -3.2"``.
+        Poles [1/s], as in ``"-4.15+-1.63j, -16.9, -3.2"``; proposed when neither these nor weights are given.
     lqr : str or sequence of float
         Weights of the states, as in ``"1,0,1,0"``, instead of poles.
     effort_weight : float, optional
@@ -120,6 +121,7 @@ def design(
         When the call contradicts itself or the rig, or a pole is out of the input's reach.
     """
     from upright.designing.chapter import chapter
+    from upright.designing.proposal import design_unasked
     from upright.designing.run import SPEEDS, DesignRequest, design_for
     from upright.files import write_json
     from upright.report.symbols import typed
@@ -127,8 +129,8 @@ def design(
 
     folder_at = folder_if_given(out, pdf)
     asked, weights = _poles(poles), _numbers(lqr)
-    if (asked is None) == (weights is None):
-        raise BadInput('give either --poles "-4+-2j, -10, -3" or --lqr "1,0,1,0" (weights of the states).')
+    if asked is not None and weights is not None:
+        raise BadInput('give either --poles "-4+-2j, -10, -3" or --lqr "1,0,1,0" (weights of the states), not both.')
     if (source is None) == (matrices is None):
         raise BadInput("design takes a fit.json, its folder, a study or a linear model, or --matrices FILE; give one.")
     wish = DesignRequest(
@@ -155,7 +157,7 @@ def design(
             limit=on.saturation if math.isfinite(on.saturation) else None, start=_start(rig, start), on=on,
         )  # fmt: skip
         name = called(source)
-    done = design_for(rig, wish)
+    done = design_unasked(rig, wish) if asked is None and weights is None else design_for(rig, wish)
     again = as_typed(limit=limit, period=period, counts=counts, vendor=vendor)
     told = chapter(done, source=name + again, folder=typed(folder_at or Path()))
     files: list[Path] = []
