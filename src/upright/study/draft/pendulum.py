@@ -241,7 +241,8 @@ def _drive(found: Recognised, plant: type[Plant], balanced: Balanced | None) -> 
     actuator = TomlTable("[actuator]")
     gain = {"guess": with_unit(guess, per(force.unit, unit) if unit else force.unit), "min": 0}
     actuator.key("gain", gain, f"{force.meaning} per command; moves {driven} up")
-    actuator.key("offset", {"guess": with_unit(0, unit or force.unit)}, "command that the drive adds by itself", off=True)
+    idle = with_unit(0, unit or force.unit)
+    actuator.key("offset", {"guess": idle}, "command that the drive adds by itself", off=True)
     actuator.key("slope", {"guess": with_unit(0, per(force.unit, speed))}, "force lost per speed", off=True)
     actuator.key("lag", {"guess": "5 ms", "max": "0.1 s"}, off=True)
     actuator.key("delay", {"guess": "1 ms", "max": "10 ms"}, off=balanced is None)
