@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -96,11 +96,19 @@ def identify(
     BadInput
         When no run may be fitted, nothing is asked, or a name does not exist.
     """
+    return _identify(rig, runs, method, progress, watch=watch, near=near)
+
+
+def _identify(
+    rig: GreyBox, runs: Sequence[Run], method: str, progress: Progress, *, watch: bool, near: Fit | None,
+    conventions: Callable[[], Sequence[str]] | None = None,
+) -> Fit:  # fmt: skip
+    """As `identify`; a fit without outliers is told what the `conventions` of all samples look like."""
     began = time.perf_counter()
     rig = with_noise(rig, runs)
     fitted = [located(rig, run) for run in runs if run.role == "fit"]
     _check(rig, fitted, method)
-    log = SearchLog(progress=progress, conventions=cache(lambda: wrong_conventions(rig, fitted)))
+    log = SearchLog(progress=progress, conventions=conventions or cache(lambda: wrong_conventions(rig, fitted)))
     log.warnings += unasked_trips(rig, fitted)
     try:
         problem, found = find_optimum(rig, fitted, method, log, near)
@@ -124,8 +132,9 @@ def identify(
         if not watch or fit.interrupted or fit.failed:
             return fit
         fit = refit_without_outliers(
-            fit, rig, runs, lambda kept: identify(rig, kept, method=method, progress=progress, watch=False, near=fit)
-        )
+            fit, rig, runs,
+            lambda kept: _identify(rig, kept, method, progress, watch=False, near=fit, conventions=log.conventions),
+        )  # fmt: skip
         return fit if log.conventions() else with_proposal(fit, fitted)
     except KeyboardInterrupt:  # intervals and predictions may take long too; without them an answer is near
         return conclude(replace(found, interrupted=True))
