@@ -212,7 +212,7 @@ def met(rig: Stranger) -> Ending:
             step = "design"
             design = up.design(fit)
             step = "chance"
-            told = up.chance(fit, design.K, tilt=TILT / 2)
+            told = up.chance(fit, design.K, start={"theta": TILT / 2})
             step = "export"
             up.export(design, to="c", out=folder / "law")
         except UprightError as error:

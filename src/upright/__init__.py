@@ -59,18 +59,21 @@ if TYPE_CHECKING:
     from upright.records import Record
     from upright.rig import Rig
     from upright.systems import StateSpace
-    from upright.verbs.chance import chance
+    from upright.verbs.control.chance import chance
     from upright.verbs.control.design import design
     from upright.verbs.control.regulate import regulate
     from upright.verbs.control.swing_up import swing_up
     from upright.verbs.control.track import track
     from upright.verbs.course import lab, reproduce, survey
     from upright.verbs.export import export
-    from upright.verbs.fitting import identify
     from upright.verbs.linear.feedback import dlqr, hold, lqr, margins, observer, place, prefilter
     from upright.verbs.log import doctor, init, law, read, show
     from upright.verbs.logs import log_convert, log_recover, log_replay, log_show, log_tail
-    from upright.verbs.model import frequency, ladder, loadings, plan_inertias, predict
+    from upright.verbs.model.frequency import frequency
+    from upright.verbs.model.identify import identify
+    from upright.verbs.model.ladder import ladder
+    from upright.verbs.model.loadings import loadings, plan_inertias
+    from upright.verbs.model.predict import predict
     from upright.verbs.motion import simulate
     from upright.verbs.rig import rig_check, rig_doctor, run
 
@@ -95,7 +98,7 @@ _HOMES = {
     "quantities": ("quantity",),
     "records": ("Record",),
     "rig": ("Rig",),
-    "verbs.chance": ("chance",),
+    "verbs.control.chance": ("chance",),
     "verbs.control.design": ("design",),
     "verbs.control.regulate": ("regulate",),
     "verbs.control.swing_up": ("swing_up",),
@@ -107,8 +110,11 @@ _HOMES = {
     "verbs.logs": ("log_convert", "log_recover", "log_replay", "log_show", "log_tail"),
     "systems": ("StateSpace",),
     "verbs.linear.feedback": ("dlqr", "hold", "lqr", "margins", "observer", "place", "prefilter"),
-    "verbs.fitting": ("identify",),
-    "verbs.model": ("frequency", "ladder", "loadings", "plan_inertias", "predict"),
+    "verbs.model.frequency": ("frequency",),
+    "verbs.model.identify": ("identify",),
+    "verbs.model.ladder": ("ladder",),
+    "verbs.model.loadings": ("loadings", "plan_inertias"),
+    "verbs.model.predict": ("predict",),
     "verbs.motion": ("simulate",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}

@@ -46,7 +46,7 @@ def test_a_set_is_told_and_run(fit, tmp_path):
 @pytest.mark.slow
 def test_numbers_for_a_program_are_finite_json(fit, tmp_path):
     outcome = regulate(
-        fit, "--poles", "-5+-2j, -20, -3", "--tilt", "40 deg", "--seconds", 2, "--json", "-o", tmp_path / "out"
+        fit, "--poles", "-5+-2j, -20, -3", "--start", "40 deg", "--seconds", 2, "--json", "-o", tmp_path / "out"
     )  # fmt: skip
     assert outcome.exit_code == 0, outcome.stderr
     said = json.loads(outcome.stdout)
@@ -64,7 +64,7 @@ def test_numbers_for_a_program_are_finite_json(fit, tmp_path):
         (["--set", "1", "--poles", "-1,-2,-3,-4"], "either --set"),
         (["--speed", "fast"], "plain, filtered, kalman"),
         (["--rig", "furuta"], "is of the make 'linear'"),
-        (["--tilt", "3 m"], "3 m"),
+        (["--start", "3 m"], "3 m"),
     ],
 )
 def test_a_bad_call_is_answered_in_a_sentence(fit, arguments, words):

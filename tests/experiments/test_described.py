@@ -69,7 +69,7 @@ def run(source, tmp_path, **options):
 
 def test_the_loop_that_is_told_is_that_of_the_study_s_rig(study, tmp_path):
     """The run told beforehand against one put together by hand of the study's numbers: the command meets 10 V."""
-    told = run(study(), tmp_path, tilt="19 deg").value
+    told = run(study(), tmp_path, start="19 deg").value
     own = Rig.known(
         CartPendulum(m_c=0.9, m_p=0.12, l_cg=0.2, J_p=1.5e-3, b_1=0.8, b_2=1e-4), gain=1.5, limit=10.0,
         counts=(20_000, 4096), period=2e-3, delay=2e-3, lag=4e-3, travel=0.3,
@@ -85,7 +85,7 @@ def test_the_loop_that_is_told_is_that_of_the_study_s_rig(study, tmp_path):
 def test_the_limit_of_the_study_decides_what_holds(study, tmp_path, limit):
     """To turn back from a tilt at rest the cart needs g tan(tilt): 1.76 N at 10 degrees, where 1 V gives 1.5 N."""
     source = study(('limit = { value = "10 V", measured = true }', f'limit = "{limit} V"'))
-    told = run(source, tmp_path, tilt="10 deg").value.attempts[0]
+    told = run(source, tmp_path, start="10 deg").value.attempts[0]
     assert told.before.chance == (1.0 if limit == 10 else 0.0)
     assert np.abs(told.before.run.u).max() <= limit
 
@@ -147,9 +147,9 @@ def test_a_force_limit_is_in_the_loop_that_is_simulated(study, tmp_path):
     """1.5 N/V and 6 N: beyond 4 V the drive gives no more, and the motion is that under a command of at most 4 V."""
     source = study(('lag = "4 ms"', 'force_limit = "6 N"'))
     assert design(source, poles=POLES).numbers["limit"] == pytest.approx(4.0)
-    capped = run(source, tmp_path, tilt="9 deg").value
+    capped = run(source, tmp_path, start="9 deg").value
     other = study(('limit = { value = "10 V", measured = true }', 'limit = "4 V"'), ('lag = "4 ms"', 'lag = "0 s"'))
-    bare = run(other, tmp_path, tilt="9 deg").value
+    bare = run(other, tmp_path, start="9 deg").value
     first, second = (r.attempts[0].before for r in (capped, bare))
     assert np.abs(first.run.u).max() > 4.0
     np.testing.assert_allclose(first.run.x, second.run.x, atol=1e-9)
@@ -242,7 +242,7 @@ def test_without_a_covariance_nothing_can_be_drawn(study, tmp_path):
 
 
 def test_a_prediction_with_the_fit_of_another_rig_says_so(study, tmp_path):
-    from upright.verbs.model import predict
+    from upright import predict
 
     t = np.arange(400) * 0.01
     plant = read_stored_rig(study()).plant

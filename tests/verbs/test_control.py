@@ -68,7 +68,7 @@ def test_a_design_that_cannot_be_had_is_said(study, options, sentence):
     [
         (lambda: regulate(which=1, poles=POLES), "give either --set"),
         (lambda: regulate(which=5), "--set is 1 to 4"),
-        (lambda: regulate(tilt="5 kg"), "rad"),
+        (lambda: regulate(start="5 kg"), "rad"),
         (lambda: swing_up(travel=-1.0), "--travel must be above 0"),
         (lambda: swing_up(seconds=0.5), "from 1 to 120 s"),
         (lambda: swing_up(lie={"phi": 2}), "--lie names a coordinate"),

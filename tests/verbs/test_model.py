@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.signal import cont2discrete, dlsim
 
+from upright import frequency, ladder, loadings, plan_inertias, predict
 from upright.errors import BadInput
 from upright.records import Record
-from upright.verbs.model import frequency, ladder, loadings, plan_inertias, predict
 
 
 def swinging(k: float, m: float, decay: float = 0.4) -> Record:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from inspect import signature
 
 import pytest
@@ -10,6 +11,7 @@ from typer.testing import CliRunner
 
 import upright as up
 from upright.cli import COMMANDS, app
+from upright.verbs.options import shared_parameters
 
 CLI_ONLY = {"as_json", "keys", "strict", "help"}
 
@@ -20,11 +22,19 @@ def command(name: str):
     return group.resolve_command(group.make_context("upright", [name]), [name])[1]
 
 
+def names(verb) -> set[str]:
+    """Names by which a verb can be called, those that it shares with others among them."""
+    out: set[str] = set()
+    for p in signature(verb).parameters.values():
+        out |= shared_parameters(p, verb.__module__)[0].keys() if p.kind is p.VAR_KEYWORD else {p.name}
+    return out
+
+
 @pytest.mark.parametrize("name", sorted(COMMANDS))
 def test_every_option_of_a_command_is_one_of_its_verb(name):
     asked = getattr(up, name.replace("-", "_"))
     options = {p.name for p in command(name).params if p.param_type_name == "option"}
-    assert options - CLI_ONLY <= set(signature(asked).parameters)
+    assert options - CLI_ONLY <= names(asked)
     assert "Parameters\n" in (asked.__doc__ or "")
 
 
@@ -45,3 +55,36 @@ def test_completion_can_be_installed():
     listing = CliRunner().invoke(app, ["--help"], terminal_width=200).stdout
     assert "--install-completion" in listing
     assert "--show-completion" in listing
+
+
+ARM = up.Furuta(m_p=0.1, l_cg=0.2, r=0.2, J_d=5e-3, J_p=1e-3)
+RIG = up.Rig.known(ARM, gain="0.65 N m/V", limit="10 V", period="2 ms", counts=4096)
+K = [[-1.0, -1.5, 20.0, 2.0]]
+
+
+@pytest.mark.parametrize("verb", [up.design, up.regulate, up.swing_up, up.chance])
+def test_an_option_that_no_verb_has_is_answered_with_the_nearest(verb):
+    with pytest.raises(up.BadInput, match=r"no option 'limmit'.*limit"):
+        verb(RIG, *([K] if verb is up.chance else []), limmit=3)
+
+
+def test_numbers_of_a_rig_may_have_any_unit_of_their_kind():
+    plain = up.chance(RIG, K, limit=0.5, period=0.004, travel=2.0, start={"theta": math.pi / 18}, draws=4)
+    named = up.chance(RIG, K, limit="500 mV", period="4 ms", travel=f"{360 / math.pi!r} deg", start="10 deg", draws=4)
+    assert named.words == plain.words
+    assert named.run.u == pytest.approx(plain.run.u, abs=1e-9)
+
+
+def test_a_start_is_of_the_pendulum_unless_it_names_states():
+    assert up.design(RIG, start="3 deg").value.wish.start == pytest.approx((0, 0, math.pi / 60, 0))
+    named = up.design(RIG, start="theta=3 deg, psi_dot=0.5 rad/s").value.wish.start
+    assert named == pytest.approx((0, 0.5, math.pi / 60, 0))
+    with pytest.raises(up.BadInput, match="names states"):
+        up.regulate(RIG, start="phi=3 deg")
+
+
+def test_a_tilt_and_a_push_are_read_for_one_version_more():
+    now = up.chance(RIG, K, start={"theta": 0.1, "theta_dot": 0.4}, draws=4)
+    with pytest.deprecated_call(match="say start="):
+        former = up.chance(RIG, K, tilt=0.1, push=0.4, draws=4)
+    assert former.run.u.tolist() == now.run.u.tolist()

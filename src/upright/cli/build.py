@@ -14,6 +14,7 @@ from upright.cli import terminal
 from upright.cli.watch import services
 from upright.files import keeps_its_inputs
 from upright.verbs.command import Command, Flag, description, parameter_texts
+from upright.verbs.options import shared_parameters
 from upright.verbs.values import pairs
 
 SETTINGS = {"help_option_names": ["-h", "--help"]}
@@ -23,7 +24,7 @@ NAMES = {"out": "-o --out"}
 METAVARS = {
     "cluster": "ADDRESS", "command": "COLUMN", "counts": "LIST", "data": "DIR", "limit": "U", "log": "LOG",
     "logs": "LOG...", "out": "DIR", "period": "TIME", "poles": "LIST", "reader": "NAME", "travel": "M_OR_RAD",
-    "vendor": "NAME", "workers": "N",
+    "speed": "WAY", "vendor": "NAME", "workers": "N",
 }  # fmt: skip
 HELPS = {
     "cluster": "Dask scheduler, tcp://host:8786 (cluster extra).",
@@ -35,9 +36,12 @@ RANGES = {"seed": (0, None)}
 
 def build(command: Command) -> Any:
     """The command as Typer runs it."""
-    verb = inspect.signature(command.verb).parameters
+    verb: Mapping[str, inspect.Parameter] = inspect.signature(command.verb).parameters
     callbacks = {n for n, p in verb.items() if re.search(r"Callable|Progress", _annotation(p))}
     texts = parameter_texts(command.verb)
+    for p in [p for p in verb.values() if p.kind is p.VAR_KEYWORD]:
+        asked, said = shared_parameters(p, command.verb.__module__)
+        verb, texts = {**verb, **asked}, {**said, **texts}
     away = {*callbacks, *command.hidden, *(n for n, p in verb.items() if p.kind in (p.VAR_POSITIONAL, p.VAR_KEYWORD))}
     typed = [_option(command, p, texts) for p in verb.values() if p.name not in away]
     typed += [_flag(name, flag) for name, flag in command.flags.items()]

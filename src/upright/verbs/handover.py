@@ -38,7 +38,7 @@ def rig_of(source: Any, verb: str, *, seed: int = 0, draws: int = 200) -> Rig:
     from upright.rig import Rig
     from upright.study import stored_rig
     from upright.study.load import Study
-    from upright.verbs.fitting import FitAnswer
+    from upright.verbs.model.fit import FitAnswer
 
     if isinstance(source, Rig):
         return source
@@ -60,7 +60,7 @@ def fitted_of(source: Any, verb: str) -> FittedModel:
         When it is none of these.
     """
     from upright.study.fitted import FittedModel, read_fit
-    from upright.verbs.fitting import FitAnswer
+    from upright.verbs.model.fit import FitAnswer
 
     if isinstance(source, FittedModel):
         return source

@@ -220,8 +220,8 @@ def _known(rig: Any, log: str) -> KnownRig | None:
     from upright.identification import Parameter
     from upright.physics import Plant
     from upright.rig import Rig
-    from upright.verbs.fitting import FitAnswer
     from upright.verbs.handover import SAVED
+    from upright.verbs.model.fit import FitAnswer
 
     if isinstance(rig, str | os.PathLike):
         return read_known(str(rig), log) if str(rig) else None

@@ -130,7 +130,7 @@ def _check_bounded(t: Array, x: Array, names: Sequence[str]) -> None:
 def _rig(given: Any) -> Rig | None:
     """A rig, or that of a fit; a plant alone has no drive."""
     from upright.rig import Rig
-    from upright.verbs.fitting import FitAnswer
+    from upright.verbs.model.fit import FitAnswer
 
     if isinstance(given, Rig):
         return given

@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
-from upright.errors import BadInput
+from upright.errors import BadInput, nearest
 
 if TYPE_CHECKING:
     import numpy as np
@@ -91,6 +91,36 @@ def si(value: float | str, unit: str) -> float:
 def si_if_given(value: float | str | None, unit: str) -> float | None:
     """The same for an option that may be left out, as None or an empty text."""
     return None if value is None or value == "" else si(value, unit)
+
+
+Start = str | Mapping[str, float | str]
+"""Deviation by state, `read_start`."""
+
+
+def read_start(given: Start | None, states: Sequence[str], units: Sequence[str]) -> dict[str, float]:
+    """Deviation from an equilibrium by state: ``{"theta": "5 deg"}``, ``"theta=5 deg, theta_dot=1 rad/s"``.
+
+    A value alone is of the last coordinate, whose state comes before the last.
+
+    Raises
+    ------
+    BadInput
+        When there is no such state, or a value is none of its unit.
+    """
+    from upright.units import scale
+
+    if not given:
+        return {}
+    if isinstance(given, str):
+        pieces = [piece.rpartition("=") for piece in given.split(",") if piece.strip()]
+        said: dict[str, float | str] = {(name.strip() or states[-2]): value for name, _, value in pieces}
+    else:
+        said = dict(given)
+    unit = dict(zip(states, units, strict=True))
+    for name in said:
+        if name not in unit:
+            raise BadInput(f"--start names states as in \"theta=5 deg\", got '{name}'; {nearest(name, states)}")
+    return {n: si(v, unit[n]) / (scale(unit[n]) if isinstance(v, str) else 1.0) for n, v in said.items()}
 
 
 def poles(value: str | Iterable[complex] | None) -> NDArray[np.complex128] | None:

@@ -266,7 +266,7 @@ def _steps(done: Regulation) -> list[Step]:
     return [
         *first,
         Step("See how hard a start the recommended set bears.",
-             f'{base} {best} --tilt "25 deg" --push "3 rad/s"'),
+             f'{base} {best} --start "theta=25 deg, theta_dot=3 rad/s"'),
         Step("Let an observer make the velocities.", f"{base} --speed kalman"),
         Step("Try poles of your own.", f'{base} --poles "-5+-3j, -25, -4"'),
     ]  # fmt: skip

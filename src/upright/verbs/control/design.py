@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
-from upright.verbs.control.options import COUNTS
 from upright.verbs.handover import called, rig_of
 from upright.verbs.linear.matrices import is_linear, linear_model, read_matrices
+from upright.verbs.options import DesignOptions, above_zero, as_typed, known_options, rig_entries
 from upright.verbs.pages import folder_if_given, write_page
-from upright.verbs.rig import as_typed, rig_options
-from upright.verbs.values import poles, si, si_if_given
+from upright.verbs.values import Start, poles, read_start, si_if_given
 
 if TYPE_CHECKING:
     from upright.designing.run import Designed
@@ -36,9 +35,9 @@ _poles = poles  # the verbs have options of this name
     },
     helps={
         "source": "fit.json, its folder, or a study (TOML).",
+        "speed": "Velocities: plain, filtered or kalman; of matrices also measured or observer.",
         "matrices": "Plain matrices instead: TOML with A and B; C, D, dt, names, units if any.",
         "start": 'Deviation to come back from, as in "theta=5 deg, psi_dot=0.2 rad/s".',
-        "counts": COUNTS,
     },
     defaults={"out": "."},
     more="""
@@ -51,10 +50,8 @@ _poles = poles  # the verbs have options of this name
 def design(
     source: Any = None, *, matrices: str | os.PathLike[str] | None = None, at: str = "",
     poles: str | Iterable[complex] = "", lqr: str | Iterable[float] = "", effort_weight: float | None = None,
-    limit: float | None = None, start: str | Mapping[str, float | str] = "", period: float | str = "",
-    delay: float | None = None, speed: str = "", memory: float = 0.5, lag: float | str = "",
-    counts: float | str | Mapping[str, float] = "", vendor: str = "", track: str = "", sampled: bool = False,
-    seed: int = 0, out: str | os.PathLike[str] | None = None, pdf: bool = False,
+    start: Start = "", track: str = "", sampled: bool = False, seed: int = 0,
+    out: str | os.PathLike[str] | None = None, pdf: bool = False, **on: Unpack[DesignOptions],
 ) -> Answer[Designed]:  # fmt: skip
     """Find the gains that hold a rig, and what they are worth in the loop a computer runs.
 
@@ -79,26 +76,9 @@ def design(
         Weights of the states, as in ``"1,0,1,0"``, instead of poles.
     effort_weight : float, optional
         Weight of the effort; the limit decides when omitted.
-    limit : float, optional
-        Largest command, in the command's unit; the study's when omitted.
     start : str or mapping, optional
-        Deviation to come back from, by state: ``{"theta": "5 deg"}``, ``{"theta": 0.087}`` [SI].
-    period : float or str, optional
-        Between samples [s]; the study's servo period when omitted.
-    delay : float, optional
-        How many samples late a command acts in all; when omitted the fit's delay, or one where it has none. StateSpace
-        matrices hold their own.
-    speed : str
-        Velocities by plain or filtered difference, or kalman; filtered when omitted. Of matrices measured, filtered,
-        plain or observer; the first of these that the outputs allow when omitted.
-    memory : float
-        Of the filtered difference, 0 to 1.
-    lag : float or str, optional
-        Lag of the drive [s]; the fit's when omitted.
-    counts : float, str or mapping, optional
-        Encoder counts per turn or metre, one number or by coordinate; the study's when omitted.
-    vendor : str, optional
-        Whose data sheet says what neither the call nor the study does: "ECP 205" or "ECP 210".
+        Deviation to come back from, by state: ``{"theta": "5 deg"}``, ``{"theta": 0.087}`` [SI]; a value alone is of
+        the last coordinate.
     track : str, optional
         Coordinate that follows a reference.
     sampled : bool
@@ -109,6 +89,8 @@ def design(
         Folder for design.json and design.html.
     pdf : bool
         Write the page as PDF too.
+    **on
+        Of the rig and its loop: limit, period, counts, vendor, speed, memory, delay, lag; see `DesignOptions`.
 
     Returns
     -------
@@ -127,39 +109,44 @@ def design(
     from upright.report.symbols import typed
     from upright.rig.completion import completed
 
-    folder_at = folder_if_given(out, pdf)
+    folder_at, on = folder_if_given(out, pdf), known_options(DesignOptions, on, "design")
     asked, weights = _poles(poles), _numbers(lqr)
     if asked is not None and weights is not None:
         raise BadInput('give either --poles "-4+-2j, -10, -3" or --lqr "1,0,1,0" (weights of the states), not both.')
     if (source is None) == (matrices is None):
         raise BadInput("design takes a fit.json, its folder, a study or a linear model, or --matrices FILE; give one.")
     wish = DesignRequest(
-        at="", poles=asked, weights=weights, R=effort_weight, delay=delay, lag=si_if_given(lag, "s"), memory=memory,
-        track=track, sampled=sampled,
+        at="", poles=asked, weights=weights, R=effort_weight, delay=on.get("delay"),
+        lag=si_if_given(on.get("lag"), "s"), memory=on.get("memory", 0.5), track=track, sampled=sampled,
     )  # fmt: skip
     if matrices is not None or is_linear(source):
-        if at or counts or vendor:
+        if at or {"counts", "vendor"} & on.keys():
             raise BadInput("--at, --counts and --vendor are of a rig, and plain matrices are none; leave them out.")
         rig = read_matrices(matrices) if matrices is not None else linear_model(source)
-        wish = replace(wish, period=_sampling(rig, period), speed=speed, limit=limit, start=_start(rig, start))
+        wish = replace(
+            wish, period=_sampling(rig, on.get("period")), speed=on.get("speed") or "",
+            limit=above_zero(on, "limit", rig.unit),
+            start=_start(rig, start),
+        )  # fmt: skip
         name = "--matrices " + (typed(Path(matrices)) if matrices is not None else "FILE")
     else:
-        if (speed := speed or "filtered") not in SPEEDS:
+        if (speed := on.get("speed") or "filtered") not in SPEEDS:
             raise BadInput(f"--speed is plain, filtered or kalman, got '{speed}'.")
         rig = rig_of(source, "design", seed=seed)
         here = at or list(rig.plant.equilibria)[-1]
         if here not in rig.plant.equilibria:
             raise BadInput(f"'{rig.name}' has no equilibrium '{here}'; {nearest(here, rig.plant.equilibria)}")
-        given = rig_options(rig.plant, rig.unit, limit=limit, period=period, counts=counts)
-        on = completed(rig, given, vendor=vendor, needs=("servo_period", "counts"), who="upright design")
+        loop = completed(
+            rig, rig_entries(rig.plant, rig.unit, on), vendor=on.get("vendor") or "",
+            needs=("servo_period", "counts"), who="upright design",
+        )  # fmt: skip
         wish = replace(
-            wish, at=here, period=on.period, speed=speed, quantum=tuple(on.quantum.tolist()),
-            limit=on.saturation if math.isfinite(on.saturation) else None, start=_start(rig, start), on=on,
+            wish, at=here, period=loop.period, speed=speed, quantum=tuple(loop.quantum.tolist()),
+            limit=loop.saturation if math.isfinite(loop.saturation) else None, start=_start(rig, start), on=loop,
         )  # fmt: skip
         name = called(source)
     done = design_unasked(rig, wish) if asked is None and weights is None else design_for(rig, wish)
-    again = as_typed(limit=limit, period=period, counts=counts, vendor=vendor)
-    told = chapter(done, source=name + again, folder=typed(folder_at or Path()))
+    told = chapter(done, source=name + as_typed(on), folder=typed(folder_at or Path()))
     files: list[Path] = []
     if folder_at is not None:
         files = [
@@ -169,7 +156,7 @@ def design(
     return Answer(done, told, files)
 
 
-def _sampling(model: StateSpace, period: float | str) -> float:
+def _sampling(model: StateSpace, period: float | str | None) -> float:
     """Period of the loop [s]; that of sampled matrices is theirs."""
     asked = si_if_given(period, "s")
     if asked is None and not model.dt:
@@ -193,24 +180,9 @@ def _numbers(given: str | Iterable[float]) -> tuple[float, ...] | None:
         raise BadInput(f'weights are numbers separated by commas, as in "1,0,1,0", got {given[:60]!r}.') from None
 
 
-def _start(rig: Rig | StateSpace, given: str | Mapping[str, float | str]) -> tuple[float, ...]:
+def _start(rig: Rig | StateSpace, given: Start) -> tuple[float, ...]:
     """Deviation, state by state in its unit; empty when none was given."""
-    from upright.units import scale
-
-    if isinstance(given, str):
-        parts = [part.partition("=") for part in given.split(",")] if given.strip() else []
-        said: dict[str, float | str] = {name.strip(): value for name, _, value in parts}
-    else:
-        said = dict(given)
-    if not said:
-        return ()
-    names = rig.states
-    units = dict(zip(names, rig.state_units, strict=True))
-    values = dict.fromkeys(names, 0.0)
-    for name, value in said.items():
-        if name not in values:
-            raise BadInput(f"--start names states as in \"theta=5 deg\", got '{name}'; {nearest(name, names)}")
-        values[name] = si(value, units[name]) / (scale(units[name]) if isinstance(value, str) else 1.0)
-    if not any(values.values()):
+    said = read_start(given, rig.states, rig.state_units)
+    if said and not any(said.values()):
         raise BadInput("--start must leave the equilibrium; give one state a value that is not 0.")
-    return tuple(values.values())
+    return tuple(said.get(name, 0.0) for name in rig.states) if said else ()

@@ -5,16 +5,15 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
-from upright.verbs.control.options import COUNTS, FIT, vendor_of
 from upright.verbs.handover import called, rig_of
+from upright.verbs.options import FIT, TravelOptions, above_zero, as_typed, known_options, rig_entries, vendor_of
 from upright.verbs.pages import page_folder, write_page, written_where_named
-from upright.verbs.rig import Counts, as_typed, rig_options
 from upright.verbs.values import open_log
 
 if TYPE_CHECKING:
@@ -31,7 +30,6 @@ if TYPE_CHECKING:
     helps={
         "source": FIT + "the law is designed from it, else from the data sheet.",
         "lie": 'An encoder shows a multiple of what is true: "theta=2".',
-        "counts": COUNTS,
     },
     ranges={"seconds": (1.0, 120.0)},
     wrong=lambda done: not done.value.sound,  # whatever its model is worth
@@ -47,10 +45,9 @@ if TYPE_CHECKING:
 @written_where_named
 @keeps_its_inputs
 def swing_up(
-    source: Any = None, *, rig: str = "", seed: int = 1, seconds: float = 12.0,
-    travel: float | None = None, limit: float | None = None, period: float | str = "", counts: Counts = "",
-    vendor: str = "", lie: str | Mapping[str, float] = "", check: Log | None = None,
-    out: str | os.PathLike[str] | None = None, pdf: bool = False,
+    source: Any = None, *, rig: str = "", seed: int = 1, seconds: float = 12.0, lie: str | Mapping[str, float] = "",
+    check: Log | None = None, out: str | os.PathLike[str] | None = None, pdf: bool = False,
+    **on: Unpack[TravelOptions],
 ) -> Answer[SwingUpRun | Scales]:  # fmt: skip
     """Swing a hanging pendulum up by its own drive and catch it, once its encoders are trusted.
 
@@ -68,16 +65,6 @@ def swing_up(
         is named.
     seconds : float
         Time for the way up and for holding, 1 to 120 s.
-    travel : float, optional
-        How far the driven body may go [m or rad]; the study's when omitted, as for the next three.
-    limit : float, optional
-        Largest command, in its unit.
-    period : float or str, optional
-        Servo period [s].
-    counts : float, str or mapping, optional
-        Encoder counts per turn or metre, one number or by coordinate.
-    vendor : str, optional
-        Whose data sheet says what neither the call nor the study does: "ECP 205" or "ECP 210".
     lie : str or mapping, optional
         An encoder shows a multiple of what is true: ``{"theta": 2}``.
     check : path, Record or pandas.DataFrame, optional
@@ -86,6 +73,8 @@ def swing_up(
         Folder for all files; in Python none is written without one.
     pdf : bool
         Write the page as PDF too.
+    **on
+        Of the rig: limit, period, counts, vendor, travel; see `TravelOptions`.
 
     Returns
     -------
@@ -101,40 +90,36 @@ def swing_up(
     from upright.experiments.swing_up_2b.run import known_of, run_swing_up, scales_of_log
     from upright.files import write_json
     from upright.rig.completion import completed, doubts, twin_of
+    from upright.rig.hardware import driven_unit
     from upright.rig.makes import make_rig
 
-    at = page_folder(out, pdf)
+    at, on = page_folder(out, pdf), known_options(TravelOptions, on, "swing_up")
     if not 1 <= seconds <= 120:
         raise BadInput(f"--seconds needs a time from 1 to 120 s, got {seconds:g}.")
-    if travel is not None and not travel > 0:
-        raise BadInput(f"--travel must be above 0, got {travel:g}; give it in m or rad.")
     known, doubt = None, ()
     if source is None:
-        for option, value in (("limit", limit), ("period", period), ("counts", counts), ("vendor", vendor)):
-            if value not in (None, ""):
-                raise BadInput(f"--{option} is for a rig of your own: name its fit.json first.")
+        for option in on.keys() - {"travel"}:
+            raise BadInput(f"--{option} is for a rig of your own: name its fit.json first.")
         model, truth = make_rig(rig or "furuta"), make_rig(rig or "furuta", seed)
     else:
         identified = rig_of(source, "swing_up", seed=seed)
-        known, vendor = known_of(identified), vendor_of(identified, rig, vendor, called(source))
-        given = rig_options(
-            identified.plant, identified.unit, limit=limit, period=period, counts=counts, travel=travel
-        )  # fmt: skip
+        known, on["vendor"] = known_of(identified), vendor_of(identified, rig, on, called(source))
+        given = rig_entries(identified.plant, identified.unit, on)
         needs = ("limit", "servo_period", "counts", "travel")
-        model = completed(identified, given, vendor=vendor, needs=needs, who="upright swing-up")
+        model = completed(identified, given, vendor=on.get("vendor") or "", needs=needs, who="upright swing-up")
         described = check is not None or not (model.draws or model.hardware.vendor)
         truth = model if described else twin_of(model, seed)
         doubt = doubts(identified, model, None if described else truth)
         if described and check is None:
             doubt = (*doubt, "Nothing says what else the rig may be, so the law meets the numbers it was made from.")
-    again = as_typed(travel=travel, limit=limit, period=period, counts=counts, vendor=vendor)
-    name = "" if source is None else called(source) + again
+    name = "" if source is None else called(source) + as_typed(on)
     if check is not None:
         record, log = open_log(check)
         scales = scales_of_log(model, record, known)
         told = check_chapter(model, scales, log.name, name or "FIT.json")
         told = replace(told, warnings=(*told.warnings, *doubt))
         return Answer(scales, told, write_page(told, at / "encoders.html", pdf))
+    travel = above_zero(on, "travel", driven_unit(type(model.plant)))
     done = run_swing_up(model, _lying(truth, lie), at, known=known, seconds=seconds, travel=travel, source=name)
     told = chapter(done)
     told = replace(told, warnings=(*told.warnings, *doubt))

@@ -6,17 +6,16 @@ import os
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 from upright.errors import BadInput
 from upright.files import keeps_its_inputs
 from upright.progress import Progress, silent
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
-from upright.verbs.control.options import COUNTS
 from upright.verbs.handover import called, rig_of
+from upright.verbs.options import RigOptions, above_zero, known_options, rig_entries
 from upright.verbs.pages import page_folder, write_page, written_where_named
-from upright.verbs.rig import Counts, rig_options
 from upright.verbs.values import poles, si_if_given
 
 if TYPE_CHECKING:
@@ -35,7 +34,6 @@ _poles = poles  # the verbs have options of this name
         "sets": "Sets of Table 2, as in 1,4.",
         "poles": 'Poles [1/s] of your own: "-10+-20j, -25+-10j".',
         "step": 'Size of the step, as in "5 mm" or "10 deg".',
-        "counts": COUNTS,
     },
     more="""
     upright track --rig torsional --seed 3 -o out
@@ -47,8 +45,8 @@ _poles = poles  # the verbs have options of this name
 def track(
     source: Any = None, *, rig: str = "rectilinear", seed: int = 0,
     sets: str | int | Sequence[int] = "", poles: str | Iterable[complex] = "", step: float | str = "",
-    limit: float | None = None, period: float | str = "", counts: Counts = "", vendor: str = "",
     out: str | os.PathLike[str] | None = None, pdf: bool = False, progress: Progress = silent,
+    **on: Unpack[RigOptions],
 ) -> Answer[Tracking]:  # fmt: skip
     """Make the far inertia of a flexible shaft follow a step, by state feedback and by PD.
 
@@ -71,20 +69,14 @@ def track(
         Poles of one's own [1/s].
     step : float or str, optional
         Size of the step [m or rad]; chosen by effort, twist and travel when omitted.
-    limit : float, optional
-        Largest command; the make's own, or the study's, when omitted.
-    period : float or str, optional
-        Servo period [s] of a rig of your own; the study's when omitted.
-    counts : float, str or mapping, optional
-        Encoder counts of a rig of your own, per turn or metre; the study's when omitted.
-    vendor : str, optional
-        Whose data sheet says what neither the call nor the study does: "ECP 205" or "ECP 210".
     out : path, optional
         Folder for all files; in Python none is written without one.
     pdf : bool
         Write the page as PDF too.
     progress : callable, optional
         Told the step at work and the share done.
+    **on
+        Of the rig: limit, and of a rig of your own period, counts, vendor; see `RigOptions`.
 
     Returns
     -------
@@ -103,30 +95,28 @@ def track(
     from upright.rig.completion import completed, doubts
     from upright.rig.makes import SHAFTS, make_rig
 
-    at = page_folder(out, pdf)
+    at, asked = page_folder(out, pdf), known_options(RigOptions, on, "track")
     own = _poles(poles)
     which = _sets(sets) or (() if own is not None else (1, 2, 3, 4))
-    if limit is not None and not limit > 0:
-        raise BadInput(f"--limit must be above 0, got {limit:g}.")
     if source is None and rig not in SHAFTS:
         raise BadInput(f"--rig is {' or '.join(SHAFTS)}, got '{rig}'.")
     doubt: tuple[str, ...] = ()
     if source is None:
-        on = make_rig(rig, seed)
+        model = make_rig(rig, seed)
     else:
         known = rig_of(source, "track")
         shaft_make(known.plant, f"'{known.name}'")
-        given = rig_options(known.plant, known.unit, limit=limit, period=period, counts=counts)
-        on = rig_of_file(completed(known, given, vendor=vendor, who="upright track"), Path(called(source)).name)
-        doubt = doubts(known, on)
-    size = si_if_given(step, on.plant.coordinates[-1].unit)
+        given, vendor = rig_entries(known.plant, known.unit, asked), asked.get("vendor") or ""
+        model = rig_of_file(completed(known, given, vendor=vendor, who="upright track"), Path(called(source)).name)
+        doubt = doubts(known, model)
+    size = si_if_given(step, model.plant.coordinates[-1].unit)
     if size is not None and not size > 0:
         raise BadInput(f"--step needs a size above 0, got '{step}'.")
     if source is None:
-        on = on.replace(limit=limit or on.limit)
-        done = run_tracking(on, seed, at, progress, which=which, poles=own, step=size)
+        model = model.replace(limit=above_zero(asked, "limit", model.unit) or model.limit)
+        done = run_tracking(model, seed, at, progress, which=which, poles=own, step=size)
     else:
-        done = follow(on, on, Path(called(source)), None, None, progress, which=which, poles=own, step=size)
+        done = follow(model, model, Path(called(source)), None, None, progress, which=which, poles=own, step=size)
     told = chapter(done)
     told = replace(
         told, title=f"Experiment 3: {told.title.lower()}, {done.rig.name}",

@@ -34,7 +34,7 @@ def write_rig(source: Any, target: RigTarget, at: Path, limit: float | None) -> 
 
 def _kept(source: Any, at: Path) -> Path:
     """The fit.json of a source; of a fit in memory it is written now."""
-    from upright.verbs.fitting import FitAnswer
+    from upright.verbs.model.fit import FitAnswer
 
     if isinstance(source, FitAnswer):
         return source.save(at / SAVED)

@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
 from upright.errors import BadInput
 from upright.progress import Progress, silent
 from upright.verbs.answer import Answer
+from upright.verbs.options import HoldingOptions, known_options, rig_entries
+from upright.verbs.renamed import LET_GO, renamed
+from upright.verbs.values import Start, read_start
 
 if TYPE_CHECKING:
     from upright.control.preflight import Preflight
 
 
+@renamed(LET_GO)
 def chance(
-    fit: Any, gains: Any, *, tilt: Any = None, push: Any = None, seconds: float = 6.0, speed: str = "filtered",
-    memory: float = 0.5, limit: float | None = None, counts: float | Sequence[float] | None = None,
-    period: float | str = "", vendor: str = "", draws: int = 200,
-    seed: int = 0, workers: int = 1, cluster: str = "", progress: Progress = silent,
+    fit: Any, gains: Any, *, start: Start = "", seconds: float = 6.0, draws: int = 200, seed: int = 0,
+    workers: int = 1, cluster: str = "", progress: Progress = silent, **on: Unpack[HoldingOptions],
 ) -> Answer[Preflight]:  # fmt: skip
     """How likely gains are to hold the rig that a fit tells of, before anything moves.
 
@@ -34,18 +35,11 @@ def chance(
     gains : Gains or array, shape (states,)
         On the states about the inverted equilibrium, commands in the unit of the fit's drive; see `design`, or
         multiply ``plant.linear("inverted").B`` by the gain of the drive.
-    tilt, push : number or text, optional
-        Where the pendulum is let go [rad], and how fast [rad/s]; 5 degrees at rest, or the make's own, if left out.
-    seconds, speed, memory, seed
+    start : str or mapping, optional
+        Where the pendulum is let go, and how fast: ``"12 deg"``, ``{"theta": 0.2, "theta_dot": 1.5}`` [SI]; 5 degrees
+        at rest, or the make's own, if left out.
+    seconds, seed
         As in `regulate`.
-    limit : float, optional
-        Largest command, in its unit; the study's if left out.
-    counts : float or sequence of float, optional
-        Encoder counts per turn or metre, of all or coordinate by coordinate; the study's if left out.
-    period : float or str, optional
-        Servo period [s]; the study's if left out.
-    vendor : str, optional
-        Whose data sheet says what neither the call nor the study does: "ECP 205" or "ECP 210".
     draws : int
         Rigs drawn.
     workers, cluster
@@ -53,6 +47,8 @@ def chance(
         extra); the numbers are the same.
     progress : callable, optional
         Told how many are done.
+    **on
+        Of the rig and its loop: limit, period, counts, vendor, travel, speed, memory; see `HoldingOptions`.
 
     Raises
     ------
@@ -70,11 +66,11 @@ def chance(
     from upright.rig.completion import completed, doubts
     from upright.rig.makes import make_of_vendor
     from upright.rig.variation import allowed
-    from upright.units import parse
     from upright.verbs.handover import rig_of
-    from upright.verbs.rig import rig_options
     from upright.workers import Workers
 
+    on = known_options(HoldingOptions, on, "chance")
+    speed, memory = on.get("speed") or "filtered", on.get("memory", 0.5)
     if speed not in SPEEDS:
         raise BadInput(f"velocities come from {', '.join(SPEEDS)}, got '{speed}'.")
     if not 0 < seconds <= 120:
@@ -83,13 +79,8 @@ def chance(
         raise BadInput(f"draws needs a whole number of at least 1, got {draws}.")
     shared = Workers(number=workers, cluster=cluster)
     known = rig_of(fit, "chance", seed=seed, draws=draws)
-    names = [c.name for c in known.plant.coordinates]
-    each = [counts] * len(names) if isinstance(counts, int | float) else list(counts or ())
-    if each and len(each) != len(names):
-        raise BadInput(f"counts needs {len(names)} numbers, one for each coordinate, got {len(each)}.")
-    listed = dict(zip(names, each, strict=False))
-    given = rig_options(known.plant, known.unit, limit=limit, period=period, counts=listed)
-    rig = completed(known, given, vendor=vendor, who="chance", form="{}={}")
+    entries = rig_entries(known.plant, known.unit, on)
+    rig = completed(known, entries, vendor=on.get("vendor") or "", who="chance", form="{}={}")
     make = make_of_vendor(rig.hardware.vendor, rig.plant)
     usual = make.start if make else START
     model = rig.linear("inverted")
@@ -98,11 +89,9 @@ def chance(
         raise BadInput(f"gains for {known.name} need shape {(1, len(model.states))}, got {K.shape}.")
     sampled = model.to_sampled(rig.period, rig.delay / rig.period)
     law = feedback(velocities(model, sampled, speed, memory, rig.limit, rig.quantum), K)
-    begin = [
-        s if w is None else parse(w, unit) if isinstance(w, str) else float(w)
-        for w, s, unit in zip((tilt, push), usual, ("rad", "rad/s"), strict=True)
-    ]
-    task = Task(start=(0.0, 0.0, *begin), hand=(0.0, 0.0, *HAND), seconds=seconds)
+    let_go = dict(zip(("theta", "theta_dot"), usual, strict=True))
+    let_go |= read_start(start, ("theta", "theta_dot"), ("rad", "rad/s"))
+    task = Task(start=(0.0, 0.0, *let_go.values()), hand=(0.0, 0.0, *HAND), seconds=seconds)
     others = allowed(rig, draws, seed)
     told = preflight(
         rig, model, sampled, law, task, parameters=others, lanes=draws, seed=seed, workers=shared, progress=progress

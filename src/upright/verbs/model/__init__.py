@@ -1,0 +1,1 @@
+"""Models of a rig: identified, grown, asked what they predict."""

@@ -1,0 +1,222 @@
+"""A fit as `identify` answers it, and what it says of other runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from upright.errors import BadInput, nearest
+from upright.verbs.answer import Answer
+from upright.verbs.values import open_log
+
+if TYPE_CHECKING:
+    from upright.identification import Fit, RunScore
+    from upright.identification.ladder.cross_validation import CrossValidation
+    from upright.identification.model.bands import Bands
+    from upright.physics import Plant
+    from upright.records import Record
+    from upright.report.page import Chapter
+    from upright.rig import Rig
+    from upright.study.fitted import FittedModel
+    from upright.study.load import Study
+
+
+class FitAnswer(Answer["Fit"]):
+    """A fit, with the study that asked for it.
+
+    Attributes
+    ----------
+    study : Study
+    crossed : CrossValidation or None
+    """
+
+    def __init__(
+        self, fit: Fit, chapter: Chapter, files: Sequence[Path], study: Study, crossed: CrossValidation | None
+    ) -> None:
+        super().__init__(fit, chapter, files)
+        self.study, self.crossed = study, crossed
+
+    def brief(self) -> Chapter:
+        """Verdict, estimates and scores; the whole chapter is what `report` writes."""
+        from upright.report.fit.tables import parameter_table, score_table
+        from upright.report.page import Part, Picture, Points
+        from upright.study.windows import windows
+
+        asked = {n: p for n, p in self.value.model.parameters.items() if p.estimate}
+        fit = replace(self.value, model=replace(self.value.model, parameters=asked))
+        drawn = Picture(
+            name="fit", draw=lambda: self._drawn(80), caption="Data and model.", description="See the table of scores."
+        )  # fmt: skip
+        parts = (
+            Part("Parameters", (parameter_table(fit, caption="Estimates"),)),
+            Part("Fit of the runs", (Points(windows(self.study.runs)), score_table(fit.runs), drawn)),
+        )
+        return replace(self.chapter, parts=parts, steps=())
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C ended the fit, or the fits of the others."""
+        return self.value.interrupted or (self.crossed is not None and self.crossed.interrupted)
+
+    @property
+    def fit(self) -> Fit:
+        """The fit itself."""
+        return self.value
+
+    def __getitem__(self, name: str) -> Any:
+        """The `Estimate` of a parameter, or the value of one that was known: ``fit["l_cg"].value``."""
+        rig, found = self.value.model, self.value.estimates
+        if name in found:
+            return found[name]
+        if name not in rig.parameters:
+            raise BadInput(f"this fit has no parameter '{name}'; {nearest(name, [*found, *rig.parameters])}")
+        return rig.parameters[name]
+
+    @property
+    def parameters(self) -> Any:
+        """Estimates as a `pandas.DataFrame`: value, stderr, low, high, unit, status; a parameter per row."""
+        return self.to_pandas()
+
+    def to_pandas(self) -> Any:
+        """See `parameters`."""
+        import pandas as pd
+
+        rows = {name: (e.value, e.stderr, *e.interval, e.unit, e.qualified) for name, e in self.value.estimates.items()}
+        columns = ["value", "stderr", "low", "high", "unit", "status"]
+        return pd.DataFrame.from_dict(rows, orient="index", columns=columns)
+
+    @property
+    def residuals(self) -> Mapping[str, Record]:
+        """Measured less simulated signals of every run, by its label, as records."""
+        from upright.records import Record
+        from upright.records.record import Provenance
+
+        unit = {c.name: c.unit for c in self.value.model.plant.coordinates}
+        return {
+            label: Record(
+                t=run.t, signals={s: run.y[:, k] - run.simulated[:, k] for k, s in enumerate(run.measured)},
+                units={s: unit[s] for s in run.measured if s in unit}, outputs=run.measured,
+                provenance=Provenance(reader="fit", notes=(f"Residuals of {label}: measured less simulated.",)),
+            )
+            for label, run in self.value.runs.items()
+        }  # fmt: skip
+
+    @property
+    def rig(self) -> Rig:
+        """The rig as identified: plant, drive and sensors with where each number is from, and rigs that the fit allows.
+
+        Every verb takes it, and tells how far the fit can be trusted.
+        """
+        from upright.study.stored_rig import rig_of_fit
+
+        return rig_of_fit(self.fitted, self.value.model.plant)
+
+    @property
+    def fitted(self) -> FittedModel:
+        """What `save` writes, as it is read again."""
+        from upright.study.fitted import fitted_model
+        from upright.study.results import fit_content
+
+        return fitted_model(fit_content(self.value, self.study, self.crossed))
+
+    @property
+    def plant(self) -> Plant:
+        """The plant with the numbers found and given."""
+        rig, found = self.value.model, self.value.estimates
+        values = {n: found[n].value if n in found else rig.parameters[n].value for n in rig.plant.names()}
+        return rig.plant(**values)
+
+    def plot(self, name: str = "") -> Any:
+        """Data against the model for the first run, or the picture called `name`; see `pictures`."""
+        if name:
+            return super().plot(name)
+        return self._drawn(450)
+
+    def _drawn(self, buckets: int) -> Any:
+        from upright.report.fit.figures import fit_figure
+
+        label, score = next(iter(self.value.runs.items()))
+        return fit_figure(score, self.value.model.plant, title=label, buckets=buckets)
+
+    def save(self, path: str | Path = "fit.json") -> Path:
+        """Write the fit for `predict`, `design`, `regulate` and other programs, and give back where."""
+        from upright.study.results import write_fit
+
+        path = Path(path)
+        write_fit(self.value, self.study, path, self.crossed)
+        return path
+
+    def predict(self, other: Any, *, columns: Mapping[str, str] | None = None, units: Mapping[str, str] | None = None,
+                window: tuple[float, float] | None = None) -> Prediction:  # fmt: skip
+        """How well the fit explains another log: a record, a data frame, a log's file, or a study.
+
+        Of the other log only what the study lists under `unknown` is estimated (its initial state); nothing else is.
+        """
+        from upright.identification.inference.scoring import predict as score
+        from upright.study.load import load_study
+
+        rig = self.value.model
+        values = {n: p.value for n, p in rig.parameters.items()} | {
+            n: e.value for n, e in self.value.estimates.items() if n in rig.parameters
+        }
+        if isinstance(other, str | Path) and Path(other).suffix == ".toml":
+            study = load_study(other, fixed=values)
+        else:
+            from upright.study.draft.from_record import study_of_record
+
+            record = open_log(other)[0]
+            given = {n: v for n, v in values.items() if n in rig.plant.names()}
+            study = study_of_record(
+                record, rig.plant, known=given, ask=[], columns=columns, units=units,
+                window=window or (float(record.t[0]), float(record.t[-1])),
+            )  # fmt: skip
+        runs = [replace(run, role="predict") for run in study.runs]
+        fixed = replace(
+            rig, parameters={n: replace(p, value=values[n], estimate=False) for n, p in rig.parameters.items()}
+        )
+        bands = self.value.bands if self.crossed is None else self.crossed.bands
+        return prediction(score(values, fixed, runs, bands=bands), rig.plant, bands)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PredictedRuns:
+    """Scores of runs that were predicted, by their labels."""
+
+    runs: Mapping[str, RunScore]
+    plant: type[Plant]
+
+
+class Prediction(Answer[PredictedRuns]):
+    """Scores of runs that a fit has not seen."""
+
+    def plot(self, name: str = "") -> Any:
+        """Data against the prediction of the first run, or of the run called `name`."""
+        from upright.report.fit.figures import fit_figure
+
+        runs = self.value.runs
+        label = name or next(iter(runs))
+        if label not in runs:
+            raise BadInput(f"no run is called '{label}'; {nearest(label, runs)}")
+        return fit_figure(runs[label], self.value.plant, title=label)
+
+
+def prediction(runs: Mapping[str, RunScore], plant: type[Plant], bands: Bands | None) -> Prediction:
+    """Scores as an answer."""
+    from upright.identification.inference.promise import promise
+    from upright.report.fit.tables import score_table
+    from upright.report.page import Chapter, Part
+
+    worst = min((v for s in runs.values() for v in s.fit_percent.values()), default=float("nan"))
+    found = promise(runs, bands)
+    part = Part("How much of each signal is explained", (score_table(runs),))
+    chapter = Chapter(
+        title="Prediction", verdict=f"The worst signal is explained to {worst:.1f} %. {found.sentence}", parts=(part,),
+        sound=found.kept, warnings=tuple(said for s in runs.values() for said in s.beyond),
+        numbers={
+            label: {"fit_percent": dict(s.fit_percent), "horizon": s.horizon, "inside": s.inside}
+            for label, s in runs.items()
+        },
+    )  # fmt: skip
+    return Prediction(PredictedRuns(runs=runs, plant=plant), chapter)

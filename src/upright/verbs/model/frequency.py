@@ -1,0 +1,193 @@
+"""A frequency response, measured or read from logs, and the rig fitted to it: `frequency`."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from upright.errors import BadInput
+from upright.files import keeps_its_inputs
+from upright.progress import Progress, silent
+from upright.verbs.answer import Answer
+from upright.verbs.command import command
+from upright.verbs.pages import page_folder, write_page, written_where_named
+from upright.verbs.values import pairs, paths, si
+
+if TYPE_CHECKING:
+    from upright.experiments.frequency_1b.run import FrequencyRun, LoggedResponse
+
+KINDS = ("sines", "multisine", "sweep")
+
+
+@command(
+    "Model",
+    defaults={"out": "frequency"},
+    names={"low": "--from", "high": "--to"},
+    metavars={
+        "sources": "[LOG...]", "rig": "KIND", "ask": "HOW", "kind": "HOW", "signal": "NAME=COLUMN", "counts": "NAME=N",
+        "known": "NAME=VALUE", "hold": "TIME", "low": "W", "high": "W",
+    },
+    helps={
+        "signal": "Column of a coordinate, as in theta=enc2.",
+        "counts": "Counts per rad or m; negative if reversed.",
+        "known": 'As in "m_p=135 g +- 0.2 %"; fixes the scale.',
+        "low": "Least frequency, in rad/s.",
+        "high": "Greatest frequency, in rad/s.",
+    },
+    given=lambda typed: {**typed, "progress": silent} if typed["sources"] else typed,
+    more="""
+    A log without --rig gives the response alone; fit.json goes to upright design.
+
+    upright frequency --rig furuta --seed 3 -o out
+    upright frequency sweep.csv --rig linear --known "m_p=135 g +- 0.2 %" -o out
+    upright frequency one.txt two.txt --command v --signal theta=theta
+    """,
+)  # fmt: skip
+@written_where_named
+@keeps_its_inputs
+def frequency(
+    sources: Sequence[str | os.PathLike[str]] | str | os.PathLike[str] = (), *, rig: str = "", seed: int = 0,
+    ask: str = "sines", kind: str = "", command: str = "", signal: Mapping[str, str] | Sequence[str] = (),
+    counts: Mapping[str, float | str] | Sequence[str] = (),
+    known: Mapping[str, float | str | tuple[float, float]] | Sequence[str] = (), hold: float | str = "",
+    low: float | None = None, high: float | None = None, data: str | os.PathLike[str] | None = None,
+    out: str | os.PathLike[str] | None = None, pdf: bool = False, progress: Progress = silent,
+) -> Answer[FrequencyRun | LoggedResponse]:  # fmt: skip
+    """Measure a frequency response, or read one from logs, and fit the rig to it.
+
+    Fits by the paper's simplex on squared dB and by least squares with phase, weights and dry friction, side by side
+    (experiment 1b).
+
+    Parameters
+    ----------
+    sources : path or sequence of paths, optional
+        Logs (repeats together), a frequency.csv, or a study; a twin is asked when omitted.
+    rig : str
+        Twin, or make of the logged rig: furuta, linear, rectilinear, torsional.
+    seed : int
+        Which twin of the make; 0 is the one as designed.
+    ask : str
+        Ask the twin by sines, multisine or sweep.
+    kind : str, optional
+        What a log holds of these, when it is not told rightly.
+    command : str, optional
+        Column that drives.
+    signal : mapping of str to str, optional
+        Column by coordinate, or texts NAME=COLUMN.
+    counts : mapping of str to float, optional
+        Counts per rad or m by coordinate, negative if reversed, or texts NAME=N.
+    known : mapping, optional
+        What is known of the rig by parameter [SI]: a number, a number with its standard uncertainty, or a text such as
+        ``"135 g +- 0.2 %"``; or texts NAME=VALUE.
+    hold : float or str, optional
+        How long a command is held [s]; one sample when omitted.
+    low, high : float, optional
+        Least and greatest frequency [rad/s].
+    data : path, optional
+        Folder the runs' files are in; the study's own when omitted.
+    out : path, optional
+        Folder for all files; in Python none is written without one.
+    pdf : bool
+        Write the page as PDF too.
+    progress : callable, optional
+        Told the step at work and the share done.
+
+    Returns
+    -------
+    Answer
+        Of a `FrequencyRun` on a twin, of a `LoggedResponse` from sources.
+
+    Raises
+    ------
+    BadInput
+        When there is no such rig or way, or a log cannot be used.
+    """
+    from upright.rig.makes import MAKES
+
+    at = page_folder(out, pdf)
+    for value, option in ((ask, "--ask"), (kind or "sines", "--kind")):
+        if value not in KINDS:
+            raise BadInput(f"{option} is one of {', '.join(KINDS)}, got '{value}'.")
+    limits = _band(low, high)
+    files = [at / "frequency.csv"]
+    if logs := [Path(source) for source in paths(sources)]:
+        from upright.experiments.frequency_1b.chapter import log_chapter
+        from upright.experiments.frequency_1b.run import LogRequest, response_of_logs
+        from upright.verbs.values import si_if_given
+
+        said = pairs(signal, "--signal"), pairs(counts, "--counts"), pairs(known, "--known")
+        wish = LogRequest(
+            make=rig, command=command, signals=said[0], kind=kind, seed=seed, hold=si_if_given(hold, "s"),
+            counts={n: _count(n, v) for n, v in said[1].items()},
+            band=limits,
+            known={n: _known(n, v, rig) for n, v in said[2].items()},
+        )  # fmt: skip
+        found = response_of_logs(logs, wish, at, data=None if data is None else Path(data))
+        files += [at / "fit.json"] if found.answer else []
+        told = log_chapter(found)
+    else:
+        said = {"--signal": signal, "--counts": counts, "--known": known, "--command": command, "--hold": hold}
+        said |= {"--kind": kind, "--from": low is not None, "--to": high is not None, "--data": data is not None}
+        for option, value in said.items():
+            if value:
+                raise BadInput(f"{option} belongs to a log, and none was named; name one, or leave the option out.")
+        if not rig:
+            raise BadInput(
+                "frequency needs a log, a frequency.csv or a study to read, or a twin to sweep: --rig "
+                f"{', '.join(MAKES)}."
+            )
+        from upright.experiments.frequency_1b.chapter import chapter
+        from upright.experiments.frequency_1b.run import run_frequency
+        from upright.report.page import simulated
+        from upright.rig.makes import make_named
+
+        make_named(rig)
+        found = run_frequency(rig, seed, at, progress, kind=ask)
+        files += [at / "sweep.csv", at / "fit.json"]
+        told = simulated(chapter(found))
+    files += write_page(told, at / "report.html", pdf)
+    numbers = {"verdict": told.verdict, "sound": told.sound, **told.numbers, "files": [str(f) for f in files]}
+    return Answer(found, replace(told, numbers=numbers), files)
+
+
+def _band(low: float | None, high: float | None) -> tuple[float, float] | None:
+    """Least and greatest frequency [rad/s] of those that were said."""
+    for value, option in ((low, "--from"), (high, "--to")):
+        if value is not None and not 0 < value < math.inf:
+            raise BadInput(f"{option} needs a frequency above 0 rad/s, got {value:g}; leave it out to take all.")
+    band = (low or 0.0, high or math.inf)
+    if not band[0] < band[1]:
+        raise BadInput(f"--from must lie below --to, got {band[0]:g} and {band[1]:g} rad/s; exchange them.")
+    return None if low is None and high is None else band
+
+
+def _count(name: str, text: float | str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if value == 0 or not math.isfinite(value):
+        raise BadInput(f"--counts {name} needs a finite number that is not 0, got '{text}'.")
+    return value
+
+
+def _known(name: str, value: float | str | tuple[float, float], make: str) -> tuple[float, float]:
+    """Value and standard uncertainty [SI]."""
+    from upright.rig.makes import MAKES
+
+    if make not in MAKES:
+        raise BadInput("--known belongs to a fit; name the rig with --rig too.")
+    if isinstance(value, tuple):
+        return si(value[0], ""), si(value[1], "")
+    if not isinstance(value, str):
+        return si(value, ""), 0.0
+    from upright.units import measured
+
+    plant = MAKES[make].plant
+    if name in plant.names():
+        return measured(value, plant.quantity(name).unit)
+    return measured(value, "s" if name in ("actuator.delay", "actuator.lag") else "")

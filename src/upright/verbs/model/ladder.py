@@ -1,0 +1,139 @@
+"""How rich a model may be before it stops predicting better: `ladder`."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from upright.errors import BadInput
+from upright.files import check_output, keeps_its_inputs
+from upright.progress import Progress, silent
+from upright.verbs.answer import Answer
+from upright.verbs.command import command
+from upright.verbs.pages import pdf_has_folder, write_page
+from upright.verbs.study import folder_beside, read_study
+
+if TYPE_CHECKING:
+    from upright.identification.ladder.growth import Ladder
+    from upright.study.load import Study
+
+
+@command(
+    "Model",
+    metavars={"study": "STUDY.toml", "out": "OUT"},
+    helps={
+        "study": "Rig, runs and everything one might ask.",
+        "out": "Folder for results; STUDY-ladder if left out.",
+    },
+    given=lambda typed: {**typed, "out": typed["out"] or folder_beside(typed["study"], "ladder")},
+    more="""
+    Rungs of your own, in the study:
+
+        [[ladder]]
+        name = "Coulomb friction"
+        adds = ["b_1c", "b_2c"]      # held at zero below this rung
+        [[ladder]]
+        name = "torque that falls with speed"
+        adds = ["actuator.knee", "actuator.fade"]
+        [[ladder]]
+        name = "friction of each run"
+        unknown = ["friction"]
+
+    Writes OUT/ladder.json, OUT/ladder.html and OUT/study.toml, the study of the
+    chosen model. Ctrl-C keeps the rungs so far.
+    Exit code: 0 a ladder was written, 2 the study or a log is wrong, 130
+    stopped by Ctrl-C.
+    """,
+)
+@keeps_its_inputs
+def ladder(
+    study: str | os.PathLike[str] | Study, *, out: str | os.PathLike[str] | None = None,
+    data: str | os.PathLike[str] | None = None, report: bool = True, pdf: bool = False, workers: int = 1,
+    cluster: str = "", progress: Progress = silent,
+) -> Answer[Ladder]:  # fmt: skip
+    """Grow a model only while it predicts better what it has not seen.
+
+    Give guesses of everything the rig might have. Rung after rung is fitted: viscous friction, Coulomb friction, drag,
+    stiction, presliding, then the drive's terms, then friction that differs from run to run. Each run is predicted from
+    a fit of the others (of a single run, the last third), and a rung is kept only if that prediction improves by more
+    than it scatters. Where runs repeat one another, how well one predicts the other is the ceiling: a model that
+    reaches it has nothing left to explain.
+
+    Parameters
+    ----------
+    study : path or Study
+        Rig, runs, guesses of everything the rig might have, and rungs of one's own where wanted.
+    out : path, optional
+        Folder for ladder.json, ladder.html and study.toml, the study of the chosen model.
+    data : path, optional
+        Folder the runs' files are in; the study's own when omitted.
+    report : bool
+        Write ladder.html as well.
+    pdf : bool
+        Write the page as PDF too.
+    workers, cluster
+        Who predicts each run from a fit of the others: processes of this machine, or the address of a Dask scheduler.
+    progress : callable, optional
+        Told the step at work and the share done.
+
+    Returns
+    -------
+    Answer
+        Of a `Ladder`; Ctrl-C keeps the rungs so far, and `interrupted` says so.
+
+    Raises
+    ------
+    BadInput
+        When the study or a log is wrong, or nothing is asked.
+    KeyboardInterrupt
+        When Ctrl-C came before the first rung stood.
+    """
+    from upright.files import replace_file, write_json
+    from upright.identification.ladder.growth import climb
+    from upright.report.ladder import chapter, next_steps
+    from upright.report.symbols import typed
+    from upright.study.results import can_be_trimmed, chosen_study, ladder_content
+    from upright.workers import Workers
+
+    shared = Workers(number=workers, cluster=cluster)
+    pdf_has_folder(out, pdf)
+    if isinstance(study, str | os.PathLike):
+        study = Path(study)
+        at = folder_beside(study, "ladder") if out is None else Path(out)
+        asked = read_study(study, at, None if data is None else Path(data))
+    else:
+        asked, study = _study(study, "ladder"), study.path
+        at = folder_beside(study, "ladder") if out is None else Path(out)
+    if out is not None:
+        for name in ("ladder.json", "study.toml", "ladder.html"):
+            check_output(at / name)
+    if not asked.model.estimated:
+        raise BadInput(f'{study}: nothing is asked; give a parameter a guess, such as b_2c = {{ guess = "1e-4 N m" }}')
+    climbed = climb(asked.model, asked.runs, asked.ladder or None, progress=progress, workers=shared)
+    if not climbed.steps:
+        raise KeyboardInterrupt
+    trimmed = study.is_file() and can_be_trimmed(asked, climbed)
+    files: list[Path] = []
+    numbers = ladder_content(climbed, asked)
+    if out is not None:
+        files.append(write_json(at / "ladder.json", numbers))
+        if trimmed:
+            files.append(replace_file(at / "study.toml", chosen_study(asked, climbed).encode()))
+    where = typed(Path(data) if data is not None else study.parent)
+    told = chapter(
+        climbed, title=f"Ladder: {asked.title or asked.path.stem.replace('_', ' ')}", provenance=asked.provenance,
+        steps=next_steps(climbed, study=typed(study), folder=typed(at), data=where, trimmed=trimmed),
+    )  # fmt: skip
+    if out is not None and (report or pdf):
+        files += write_page(told, at / "ladder.html", pdf)
+    return Answer(climbed, replace(told, numbers=numbers), files)
+
+
+def _study(given: Any, verb: str) -> Study:
+    from upright.study.load import Study
+
+    if not isinstance(given, Study):
+        raise BadInput(f"{verb} takes a study: its file (TOML), or the .study of a fit, got {type(given).__name__}.")
+    return given

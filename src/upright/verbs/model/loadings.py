@@ -1,0 +1,193 @@
+"""Stiffness and bare inertia from steps with added masses: `loadings`, and the plan of them: `plan_inertias`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from upright.errors import BadInput, nearest
+from upright.files import keeps_its_inputs
+from upright.verbs.answer import Answer
+from upright.verbs.command import command
+from upright.verbs.pages import folder_if_given, write_page
+from upright.verbs.values import open_log, paths, si, texts
+
+if TYPE_CHECKING:
+    from upright.identification.loadings import Loadings, Plan
+    from upright.verbs.values import Log
+
+
+@command(
+    "Model",
+    metavars={"added": "INERTIA", "signal": "COLUMN", "twin": "KIND"},
+    helps={"added": "What was added, log by log: '1.5 kg', '4e-3 kg m^2', or '2 at 6.5 cm' (500 g each)."},
+    defaults={"out": "loadings"},
+    more="""
+    upright loadings --twin rectilinear -o out
+    upright loadings bare.csv one.csv two.csv --added "0 kg" --added "0.5 kg" --added "1 kg" --signal x --command u
+    """,
+)
+@keeps_its_inputs
+def loadings(
+    logs: Sequence[Log] | Log = (), *, added: Sequence[str] | str = (), signal: str = "", command: str = "",
+    tolerance: float | str = "0 %", free: bool = False, twin: str = "", seed: int = 0,
+    out: str | os.PathLike[str] | None = None, pdf: bool = False,
+) -> Answer[Loadings]:  # fmt: skip
+    """Find stiffness and bare inertia from step responses with known added masses.
+
+    This is experiment 1a. Each swing gives a damped period, and its extremes viscous and dry friction; 1/omega_n^2 over
+    the added inertia is a line whose slope is 1/k.
+
+    Parameters
+    ----------
+    logs : path, Record, pandas.DataFrame, or a list of them
+        One log of steps for each loading; repeats welcome.
+    added : sequence of str
+        What was added, log by log: ``"1.5 kg"``, ``"4e-3 kg m^2"``, or ``"2 at 6.5 cm"`` (500 g each).
+    signal : str, optional
+        Column of the position, in any unit.
+    command : str, optional
+        Column of the command that steps.
+    tolerance : float or str
+        Standard uncertainty of one added piece, as a share.
+    free : bool
+        Count swings at zero command only, with the drive silent.
+    twin : str, optional
+        No logs: step a twin, rectilinear or torsional.
+    seed : int
+        Which twin of the make; 0 is the one as designed.
+    out : path, optional
+        Folder for the page, and for the logs of a twin.
+    pdf : bool
+        Write the page as PDF too.
+
+    Returns
+    -------
+    Answer
+        Of `Loadings`.
+
+    Raises
+    ------
+    BadInput
+        When logs and loadings do not match, or a column is not told.
+    NotIdentifiable
+        When too few swings can be seen.
+    """
+    from upright.experiments.weighing_1a.from_logs import weigh_logs, weigh_twin
+    from upright.report.page import simulated
+
+    at = folder_if_given(out, pdf)
+    given = paths(logs)
+    if twin:
+        if given or added:
+            raise BadInput("--twin steps a simulated rig and takes no logs; leave out either.")
+        found, told = weigh_twin(twin, seed, at)
+        told = simulated(told)
+    else:
+        if not given or len(texts(added)) != len(given):
+            raise BadInput(
+                f"Every log needs its --added, in the same order: {len(given)} logs came with {len(texts(added))};"
+                ' write --added "0 kg" for the bare one, or try --twin rectilinear.'
+            )
+        records = [(record, path.name) for record, path in map(open_log, given)]
+        found, told = weigh_logs(
+            records, texts(added), signal=signal, command=command, tolerance=si(tolerance, "1"), free=free
+        )
+    files = [] if at is None else write_page(told, at / "report.html", pdf)
+    numbers = {**told.numbers, "report": str(files[0]) if files else ""}
+    return Answer(found, replace(told, numbers=numbers), files)
+
+
+@command(
+    "Model",
+    metavars={"rig": "KIND", "radius": "LENGTH", "out": "FILE"},
+    helps={"radius": "Bolt circle of a disk, once for each; 2 to 9 cm."},
+    ranges={"runs": (2, 16), "levels": (2, 5)},
+    more='upright plan-inertias --rig torsional --error "0.3 %" --radius "4 cm" --radius "9 cm"',
+)
+@keeps_its_inputs
+def plan_inertias(
+    *, rig: str = "rectilinear", bare: float | str = "", error: float | str = "0.2 %", tolerance: float | str = "0.2 %",
+    runs: int = 10, levels: int = 3, radius: Sequence[float | str] | float | str = (), target: float | str = "",
+    out: str | os.PathLike[str] | None = None,
+) -> Answer[dict[int, tuple[Plan, Plan]]]:  # fmt: skip
+    """Say which masses, where and how often, give the tightest stiffness for the fewest runs.
+
+    The runs are those of experiment 1a. Carts take 0, 0.5, 1, 1.5 or 2 kg; disks take none, two or four masses of 500 g
+    on any bolt circle, so that they stay balanced. Every design is compared on the line 1/omega_n^2 = (m_0 + a)/k.
+
+    Parameters
+    ----------
+    rig : str
+        rectilinear (carts) or torsional (disks).
+    bare : float or str, optional
+        Bare inertia, roughly [kg or kg m^2]; 0.77 kg or 3e-3 kg m^2 when omitted.
+    error : float or str
+        Standard error of a frequency from one run, as it was measured; a share.
+    tolerance : float or str
+        Standard uncertainty of one added mass or inertia; a share.
+    runs : int
+        Most runs to be planned, 2 to 16.
+    levels : int
+        Different loadings at least, 2 to 5.
+    radius : float, str or a sequence of them, optional
+        Bolt circles of a disk [m]; 2 to 9 cm when omitted.
+    target : float or str, optional
+        Standard error of the stiffness that would do; a share.
+    out : path, optional
+        Picture to draw (SVG, PNG).
+
+    Returns
+    -------
+    Answer
+        Of the best plans by number of runs: for the stiffness, and for stiffness and bare inertia together.
+
+    Raises
+    ------
+    BadInput
+        When there is no such rig or picture, or numbers contradict each other.
+    """
+    from upright.experiments.weighing_1a.plan import chapter, choices, choose
+    from upright.identification.loadings import plan_loadings
+    from upright.report.drawing import picture_format
+    from upright.rig.makes import OSCILLATORS
+    from upright.verbs.values import si_if_given
+
+    if out is not None:
+        picture_format(Path(out))  # before the work begins
+    if rig not in OSCILLATORS:
+        raise BadInput(f"--rig is {' or '.join(OSCILLATORS)}, got '{rig}'; {nearest(rig, OSCILLATORS)}")
+    for value, option, most in ((runs, "--runs", 16), (levels, "--levels", 5)):
+        if not 2 <= value <= most:
+            raise BadInput(f"{option} needs a whole number from 2 to {most}, got {value}.")
+    body = OSCILLATORS[rig]
+    choice = choices(rig, [si(r, "m") for r in paths(radius) if r != ""])
+    given = si_if_given(bare, body.unit)
+    m_0 = body.plant.parameters()[body.inertia] if given is None else given
+    piece = min(w.added for w in choice if w.added > 0)
+    piece = piece / 2 if rig == "torsional" else piece
+    e, g = _share(error, "--error"), _share(tolerance, "--tolerance")
+    if runs < levels:
+        raise BadInput(f"--runs needs at least as many as --levels, got {runs} for {levels}; plan more runs.")
+    plans = {
+        n: plan_loadings(choice, n, bare=m_0, error=e, tolerance=g, piece=piece, levels=levels)
+        for n in range(levels, runs + 1)
+    }
+    wanted = _share(target, "--target") if target != "" else None
+    chosen = choose({n: p[0].k for n, p in plans.items()}, wanted)
+    if out is not None:
+        from upright.experiments.weighing_1a.figures import plan_figure
+        from upright.report.drawing import save
+
+        save(plan_figure(plans, chosen), Path(out))
+    return Answer(plans, chapter(plans, chosen, wanted, body.unit), [] if out is None else [Path(out)])
+
+
+def _share(given: float | str, option: str) -> float:
+    value = si(given, "1")
+    if not 0 <= value < 0.5:
+        raise BadInput(f"{option} needs a share between 0 and 50 %, got '{given}'; write it as '0.2 %'.")
+    return value

@@ -1,0 +1,152 @@
+"""How well a model that was fitted before explains other runs: `predict`."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from upright.errors import BadInput
+from upright.files import keeps_its_inputs
+from upright.verbs.answer import Answer
+from upright.verbs.command import command
+from upright.verbs.pages import folder, pdf_has_folder, write_page
+from upright.verbs.values import open_log
+
+if TYPE_CHECKING:
+    from upright.identification.inference.scoring import RunScore
+    from upright.study.fitted import FittedModel
+    from upright.study.load import Study
+
+
+@command(
+    "Model",
+    metavars={"model": "OUT/fit.json", "study": "STUDY.toml", "out": "OUT"},
+    helps={
+        "model": "Model that `upright identify` wrote.",
+        "study": "Runs to score, a study whose guesses are not used, or a log.",
+    },
+    wrong=lambda scored: not scored.chapter.sound,
+    more="""
+    The study is written as for `upright identify`; [parameters] and [actuator]
+    may be left out, since every number comes from the fit.
+
+    upright predict swing-fit/fit.json other_day.toml
+
+    Exit code: 0 predicted as well as the fit promises, 3 worse, 2 the model, the
+    study or a log is wrong.
+    """,
+)
+@keeps_its_inputs
+def predict(
+    model: Any, study: Any, *, data: str | os.PathLike[str] | None = None,
+    out: str | os.PathLike[str] | None = None, pdf: bool = False,
+) -> Answer[dict[str, RunScore]]:  # fmt: skip
+    """Score other runs with a model that was fitted before.
+
+    Every run is scored, whatever its role. What a run lists under ``unknown`` (its initial state, unless it says
+    otherwise) is estimated for that run alone; nothing else is. Around each prediction lies a band that should hold 90
+    % of the samples, as the fit promises; a run that goes beyond what was fitted is named, and by how much.
+
+    Parameters
+    ----------
+    model : fit or path
+        What `identify` answered, or the fit.json that it wrote, or its folder.
+    study : path, Study, Record or pandas.DataFrame
+        Runs to score: a study, whose guesses are not used, or a log, whose columns are recognised.
+    data : path, optional
+        Folder the runs' files are in; the study's own when omitted.
+    out : path, optional
+        Folder for prediction.json and prediction.html.
+    pdf : bool
+        Write the page as PDF too.
+
+    Returns
+    -------
+    Answer
+        Of the scores by run. Its chapter is `sound` when they are predicted as well as the fit promises.
+
+    Raises
+    ------
+    BadInput
+        When model or study cannot be read, or speak of different plants.
+    """
+    from upright.files import write_json
+    from upright.identification.inference.promise import promise
+    from upright.identification.inference.scoring import predict as score
+    from upright.report.fit.chapter import score_pictures
+    from upright.report.fit.tables import score_table
+    from upright.report.page import Chapter, Part
+    from upright.verbs.handover import called, fitted_of
+
+    pdf_has_folder(out, pdf)
+    for given, what in ((model, "the model"), (study, "the study")):
+        if isinstance(given, str | os.PathLike) and not Path(given).exists():
+            raise BadInput(f"{what} {given} does not exist; the call is upright predict OUT/fit.json STUDY.toml")
+    fitted, of = fitted_of(model, "predict"), Path(called(model)).name
+    asked, on = _runs_to_predict(fitted, model, study, data)
+    missing = [n for n in fitted.values if n not in asked.model.parameters]
+    if missing:
+        raise BadInput(
+            f"{on}: the plant '{asked.plant}' has no parameter {missing[0]}, and {of} is a '{fitted.plant}';"
+            " both must be the same plant"
+        )
+    rig = replace(asked.model, substeps=fitted.substeps)
+    runs = [replace(run, role="predict") for run in asked.runs]
+    scores = score(fitted.values, rig, runs, groups=fitted.groups, bands=fitted.bands)
+    found = promise(scores, fitted.bands, fitted.scores)
+    said = ("role", "fit_percent", "horizon", "adapted", "offer", "inside", "beyond")
+    numbers: dict[str, Any] = {
+        "model": of,
+        "study": on,
+        "verdict": found.sentence,
+        "as_promised": found.kept,
+        "runs": {label: {name: getattr(s, name) for name in said} for label, s in scores.items()},
+    }
+    offers = [s.offer.sentence(label, s.fit_percent) for label, s in scores.items() if s.offer is not None]
+    told = Chapter(
+        title=f"{of} on {on}", verdict=found.sentence, sound=found.kept, numbers=numbers,
+        parts=(
+            Part(
+                "How much of each signal is explained",
+                (score_table(scores), *score_pictures(scores, rig.plant, "prediction")),
+            ),
+        ),
+        warnings=(
+            *(() if fitted.trusted else (f"The model's own verdict was: {fitted.verdict}",)),
+            *fitted.hardware.unlike(asked.hardware), *(s for run in scores.values() for s in run.beyond), *offers,
+        ),
+    )  # fmt: skip
+    if out is None:
+        return Answer(scores, told)
+    at = folder(out)
+    return Answer(
+        scores, told, [write_json(at / "prediction.json", numbers), *write_page(told, at / "prediction.html", pdf)]
+    )
+
+
+def _runs_to_predict(
+    fitted: FittedModel, model: Any, given: Any, data: str | os.PathLike[str] | None
+) -> tuple[Study, str]:  # fmt: skip
+    """Study of the runs to score, and what it is called."""
+    from upright.physics import find
+    from upright.study.draft.from_record import study_of_record
+    from upright.study.load import Study, load_study
+    from upright.verbs.model.fit import FitAnswer
+
+    if isinstance(given, Study):
+        return given, given.path.name
+    if isinstance(given, str | os.PathLike) and Path(given).suffix.lower() in (".toml", ""):
+        study = load_study(Path(given), data=None if data is None else Path(data), fixed=fitted.values)
+        return study, Path(given).name
+    if isinstance(model, FitAnswer):
+        kind = model.value.model.plant
+    else:
+        kind = find(fitted.plant, Path(model).parent) if isinstance(model, str | os.PathLike) else find(fitted.plant)
+    record, path = open_log(given)
+    known = {n: v for n, v in fitted.values.items() if n in kind.names()}
+    whole = (float(record.t[0]), float(record.t[-1]))
+    study = study_of_record(record, kind, known=known, ask=[], window=whole)
+    drive = {n: replace(p, value=fitted.values.get(n, p.value)) for n, p in study.model.parameters.items()}
+    return replace(study, model=replace(study.model, parameters=drive)), path.name

@@ -1,0 +1,229 @@
+"""Options that several verbs share, each said and explained once; a verb takes them as ``**on: Unpack[RigOptions]``.
+
+`cli.build` makes options of the command line of them.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Mapping, Sequence
+from inspect import Parameter
+from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, cast, is_typeddict
+
+from upright.errors import BadInput, nearest
+from upright.verbs.command import parameter_texts
+from upright.verbs.values import si_if_given
+
+if TYPE_CHECKING:
+    from upright.physics import Plant
+    from upright.rig import Rig
+    from upright.rig.hardware import Entry
+
+Counts = float | str | Sequence[float] | Mapping[str, float]
+FIT = "fit.json or its folder; "
+"""How the command line begins to explain a source."""
+Options = TypeVar("Options", bound=Mapping[str, Any])
+
+
+class RigOptions(TypedDict, total=False):
+    """What a rig is that neither its study nor its data sheet says, or says otherwise.
+
+    Parameters
+    ----------
+    limit : float or str, optional
+        Largest command, "5 V" or a number in the command's unit; the study's when omitted.
+    period : float or str, optional
+        Servo period [s]; the study's when omitted.
+    counts : float, str, sequence or mapping, optional
+        Encoder counts per turn or metre, "4096" or "x=20000, theta=4096"; the study's when omitted.
+    vendor : str, optional
+        Whose data sheet says what neither the call nor the study does: "ECP 205" or "ECP 210".
+    """
+
+    limit: float | str | None
+    period: float | str | None
+    counts: Counts | None
+    vendor: str | None
+
+
+class TravelOptions(RigOptions, total=False):
+    """The same of a rig whose driven body may go only so far.
+
+    Parameters
+    ----------
+    travel : float or str, optional
+        How far the driven body may go either way, "30 cm", "120 deg" or a number [m or rad]; the study's when omitted.
+    """
+
+    travel: float | str | None
+
+
+class LoopOptions(RigOptions, total=False):
+    """The same, and how a loop on it comes to its velocities.
+
+    Parameters
+    ----------
+    speed : str, optional
+        Velocities by plain or filtered difference, or kalman; filtered when omitted.
+    memory : float, optional
+        Of the filtered difference, 0 to 1; 0.5 when omitted.
+    """
+
+    speed: str | None
+    memory: float
+
+
+class HoldingOptions(LoopOptions, TravelOptions, total=False):
+    """All of these."""
+
+
+class DesignOptions(LoopOptions, total=False):
+    """What a design asks of a rig besides.
+
+    Parameters
+    ----------
+    delay : float, optional
+        How many samples late a command acts in all; when omitted the fit's delay, or one where it has none. StateSpace
+        matrices hold their own.
+    lag : float or str, optional
+        Lag of the drive [s]; the fit's when omitted.
+    """
+
+    delay: float | None
+    lag: float | str | None
+
+
+def shared_parameters(verb: Parameter, module: str) -> tuple[dict[str, Parameter], dict[str, str]]:
+    """Options that ``**on: Unpack[...]`` of a verb of a module stands for, as parameters, and what is said of each."""
+    named = re.fullmatch(r"(?:\w+\.)?Unpack\[(\w+)\]", str(verb.annotation))
+    kind: Any = getattr(sys.modules[module], named[1], None) if named else None
+    if not is_typeddict(kind):
+        return {}, {}
+    kin = [k for k in vars(sys.modules[kind.__module__]).values() if is_typeddict(k)]  # 3.11 forgets what a kind is of
+    texts = {n: text for k in (*kin, kind) for n, text in parameter_texts(k).items()}
+    annotations: dict[str, Any] = kind.__annotations__
+    asked = {
+        name: Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=getattr(a, "__forward_arg__", a))
+        for name, a in annotations.items()
+    }
+    return asked, texts
+
+
+def known_options(kind: type[Options], given: Mapping[str, Any], verb: str) -> Options:
+    """The options that were given.
+
+    Raises
+    ------
+    BadInput
+        When one is none of this kind.
+    """
+    for name in given:
+        if name not in kind.__annotations__:
+            raise BadInput(f"{verb} has no option '{name}'; {nearest(name, kind.__annotations__)}")
+    return cast("Options", {n: v for n, v in given.items() if v is not None and v != ""})
+
+
+def rig_entries(plant: Plant, unit: str, on: RigOptions) -> dict[str, Entry]:
+    """Entries of a rig that options give; `unit` is that of the command.
+
+    Raises
+    ------
+    BadInput
+        When one of them is no such number.
+    """
+    from upright.rig.hardware import Entry, counts_unit, driven_unit
+
+    place, every = driven_unit(type(plant)), si_if_given(on.get("period"), "s")
+    if every is not None and not 1e-6 <= every <= 10.0:
+        raise BadInput(f"a loop is closed every 1e-6 to 10 s, got a period of {every:g} s.")
+    far = above_zero(on, "travel", place)
+    said = (("limit", above_zero(on, "limit", unit), unit), ("servo_period", every, "s"), ("travel", far, place))
+    options = {"limit": "--limit", "servo_period": "--period", "travel": "--travel"}
+    out = {n: Entry(value=v, unit=u, source=options[n]) for n, v, u in said if v is not None}
+    units = {c.name: c.unit for c in plant.coordinates}
+    for name, number in _counts(on.get("counts"), list(units)).items():
+        out[f"counts.{name}"] = Entry(value=number, unit=counts_unit(units[name]), source="--counts")
+    return out
+
+
+def above_zero(on: Mapping[str, Any], name: str, unit: str) -> float | None:
+    """Number of an option in its unit, of a text with its own unit or without; None where it was not given.
+
+    Raises
+    ------
+    BadInput
+        When it is no such number, or not above 0.
+    """
+    from upright.units import in_unit
+
+    given = on.get(name)
+    if given is None:
+        return None
+    try:
+        value = float(given)
+    except (TypeError, ValueError):
+        value = in_unit(str(given), unit)
+    if not 0 < value < 1e9:
+        raise BadInput(f'--{name} must be above 0 and below 1e9 {unit}, got {given}; as in --{name} "2 {unit}".')
+    return value
+
+
+def as_typed(on: Mapping[str, Any]) -> str:
+    """Options of a rig as a command line says them again, a space before each."""
+    out = ""
+    for name in ("limit", "period", "counts", "travel", "vendor"):
+        value = on.get(name)
+        if isinstance(value, Mapping):
+            value = ", ".join(f"{k}={v}" for k, v in value.items())
+        if value not in (None, ""):
+            out += f" --{name} " + (f"{value:g}" if isinstance(value, int | float) else f'"{value}"')
+    return out
+
+
+def vendor_of(known: Rig, rig: str, on: RigOptions, source: str) -> str:
+    """Data sheet chosen by the name of a make, ``--rig``, or of the vendor; "" where none is."""
+    vendor = on.get("vendor") or ""
+    if not rig:
+        return vendor
+    from upright.rig.makes import make_of_rig
+
+    make = make_of_rig(known)
+    if rig != make.key:
+        raise BadInput(f"{source} is of the make '{make.key}', not '{rig}'; leave --rig out.")
+    return vendor or make.vendor
+
+
+def _counts(counts: Counts | None, names: list[str]) -> dict[str, float]:
+    """Counts by coordinate; a number alone is for all of them."""
+    if (
+        counts is None
+        or (isinstance(counts, Mapping) and not counts)
+        or (isinstance(counts, str) and not counts.strip())
+    ):
+        return {}
+    if isinstance(counts, list | tuple):
+        if len(counts) != len(names):
+            raise BadInput(f"counts needs {len(names)} numbers, one for each coordinate, got {len(counts)}.")
+        counts = dict(zip(names, counts, strict=True))
+    said = str(counts)
+    if isinstance(counts, Mapping):
+        said = ",".join(f"{name}={value}" for name, value in counts.items())
+    per: dict[str, float] = {}
+    for piece in said.split(","):
+        name, equals, value = piece.rpartition("=")
+        name = name.strip()
+        if equals and name not in names:
+            raise BadInput(
+                f"--counts names coordinates as in \"{names[0]}=4096\", got '{name}'; {nearest(name, names)}"
+            )
+        try:
+            number = float(value)
+        except ValueError:
+            number = 0.0
+        if not 0 < number < 1e15:
+            raise BadInput(
+                f"--counts takes numbers above 0, got '{piece.strip()[:40]}'; write 4096 or \"{names[0]}=4096\"."
+            )
+        per |= {name: number} if equals else dict.fromkeys(names, number)
+    return per
