@@ -47,8 +47,8 @@ def test_runs_left_out_are_predicted_the_same():
     ("typed", "said"),
     [
         ("regulate --rig furuta --workers 0", "from 1 to 1024, got 0"),
-        ("regulate --rig furuta --cluster nearby", "tcp://host:8786"),
-        ("regulate --rig furuta --workers 2 --cluster tcp://nearby:8786", "give one"),
+        ("regulate --rig furuta --workers nearby", "tcp://host:8786"),
+        ("regulate --rig furuta --workers 2.5", "tcp://host:8786"),
         ("lab --workers -3", "from 1 to 1024, got -3"),
     ],
 )

@@ -94,7 +94,6 @@ def test_one_item_alone_is_done_here(with_clerk):
         ({"number": 1024}, True), ({"number": 1025}, False), ({"number": 0}, False),
         ({"cluster": "tcp://host:8786"}, True), ({"cluster": "tcp://host"}, False),
         ({"cluster": "http://host:1"}, False),
-        ({"cluster": "tcp://host:8786", "number": 2}, False),
     ],
 )  # fmt: skip
 def test_workers_are_one_to_a_thousand_and_twenty_four_or_a_cluster(how, taken):

@@ -49,7 +49,6 @@ def test_a_block_is_no_part_of_what_the_kernel_steps_at_once():
     [
         ({"number": 0}, "from 1 to"),
         ({"cluster": "nearby"}, "tcp://host:8786"),
-        ({"number": 2, "cluster": "tcp://nearby:8786"}, "give one"),
     ],
 )
 def test_impossible_workers_are_told_so(asked, said):

@@ -22,14 +22,13 @@ INTERRUPTED, WRONG = 130, 3
 # What options of one name have in common, whichever command they are of.
 NAMES = {"out": "-o --out"}
 METAVARS = {
-    "cluster": "ADDRESS", "command": "COLUMN", "counts": "LIST", "data": "DIR", "limit": "U", "log": "LOG",
+    "command": "COLUMN", "counts": "LIST", "data": "DIR", "limit": "U", "log": "LOG",
     "logs": "LOG...", "out": "DIR", "period": "TIME", "poles": "LIST", "reader": "NAME", "travel": "M_OR_RAD",
     "speed": "WAY", "vendor": "NAME", "workers": "N",
 }  # fmt: skip
 HELPS = {
-    "cluster": "Dask scheduler, tcp://host:8786 (cluster extra).",
     "pdf": "Write the page as PDF too (pdf extra).",
-    "workers": "Processes of this machine that share the work.",
+    "workers": "Who shares the work: N processes of this machine, or a Dask scheduler, tcp://host:8786.",
 }
 RANGES = {"seed": (0, None)}
 
@@ -114,6 +113,8 @@ def _repeated(parameter: inspect.Parameter) -> bool:
 def _kind(parameter: inspect.Parameter) -> Any:
     """Type of what is typed; a value with its unit is a text, which the verb reads."""
     text, default = _annotation(parameter), parameter.default
+    if text == "Workforce":
+        return str
     for kind in (bool, int, float):
         if isinstance(default, kind):
             return kind

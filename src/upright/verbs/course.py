@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from upright.questionnaire.sheet import Means, Ratings, Shares
     from upright.realtime.session import RunState
     from upright.report.page import Book
+    from upright.verbs.values import Workforce
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -76,7 +77,7 @@ def _nobody_needed(typed: dict[str, Any]) -> dict[str, Any]:
 )
 def lab(
     *, experiment: Sequence[str] | str = (), rig: str = "", seed: int = 0, out: str | os.PathLike[str] | None = None,
-    fresh: bool = False, workers: int = 1, worn: bool = False, progress: Progress = silent,
+    fresh: bool = False, workers: Workforce = 1, worn: bool = False, progress: Progress = silent,
     ask: Callable[[str], bool] | None = None,
     watching: Callable[[], AbstractContextManager[Callable[[RunState], str]]] | None = None,
 ) -> Answer[Laboratory]:  # fmt: skip
@@ -99,8 +100,9 @@ def lab(
         Folder; upright-lab[-KIND][-SEED][-worn] when omitted.
     fresh : bool
         Make again what the folder holds already.
-    workers : int
-        Processes of this machine that run experiments which need nothing of each other.
+    workers : int, str or executor
+        Who runs experiments that need nothing of each other: processes of this machine, the address of a Dask
+        scheduler, or an executor of `concurrent.futures`.
     worn : bool
         Twins with physics that models leave out, of which fits read as those of real rigs do.
     progress : callable, optional
@@ -144,7 +146,7 @@ def lab(
     from upright.report.symbols import typed
     from upright.workers import Workers
 
-    shared = Workers(number=workers)
+    shared = Workers.of(workers)
     asked = texts(experiment)
     beside = Path() if out is None else at
     hands = _at_hand(rig, beside, ask, watching, worn=worn, workers=workers) if at_hand else None
@@ -183,7 +185,7 @@ def lab(
 
 def _at_hand(
     rig: str, folder: Path, ask: Callable[[str], bool] | None,
-    watching: Callable[[], AbstractContextManager[Callable[[RunState], str]]] | None, *, worn: bool, workers: int,
+    watching: Callable[[], AbstractContextManager[Callable[[RunState], str]]] | None, *, worn: bool, workers: Workforce,
 ) -> RigAtHand:  # fmt: skip
     """The rig of a RIG.toml; what cannot be had of it is said first."""
     from upright.experiments.hands_on.rig import nobody, nobody_watches, rig_at_hand

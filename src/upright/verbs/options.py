@@ -121,7 +121,8 @@ def known_options(kind: type[Options], given: Mapping[str, Any], verb: str) -> O
     for name in given:
         if name not in kind.__annotations__:
             raise BadInput(f"{verb} has no option '{name}'; {nearest(name, kind.__annotations__)}")
-    return cast("Options", {n: v for n, v in given.items() if v is not None and v != ""})
+    empty = {n for n, v in given.items() if v is None or (isinstance(v, str | list | tuple | dict) and not v)}
+    return cast("Options", {n: v for n, v in given.items() if n not in empty})
 
 
 def rig_entries(plant: Plant, unit: str, on: RigOptions) -> dict[str, Entry]:

@@ -18,6 +18,9 @@ LET_GO: Mapping[str, Now] = {
 }
 
 
+CLUSTER: Mapping[str, Now] = {"cluster": ("workers", lambda value: value)}
+
+
 def renamed(former: Mapping[str, Now]) -> Callable[[V], V]:
     """Decorator of a verb; values of one option that are mappings are put together."""
 

@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 from upright.errors import BadInput, nearest
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -38,6 +40,8 @@ class Frame(Protocol):
 
 
 if TYPE_CHECKING:
+    Workforce = int | str | Executor
+    """Who shares work: a number of processes, the address of a Dask scheduler, or an executor."""
     Log = str | os.PathLike[str] | Record | Frame
     """A log: its file, a record, or a data frame."""
 

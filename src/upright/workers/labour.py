@@ -58,6 +58,8 @@ class Pool(ABC):
     name: str
     width: int
     gone = False
+    loss: str
+    """What is said where it is gone."""
     hopeless: tuple[type[BaseException], ...] = ()
     """What is raised when an item has killed its workers too often."""
 
@@ -89,12 +91,45 @@ class Processes(Pool):
         self.executor().shutdown(kill_workers=True)  # type: ignore[call-arg]
 
 
+class Lent(Pool):
+    """Somebody else's executor, of `concurrent.futures` or like it, which stays theirs."""
+
+    def __init__(self, executor: Executor) -> None:
+        self._executor = executor
+        self.width = int(getattr(executor, "_max_workers", 0) or 8)
+        self.name = f"the {type(executor).__name__} of the caller"
+        self.loss = f"{self.name} broke; make another, with fewer workers where memory is short."
+
+    @property
+    def gone(self) -> bool:  # type: ignore[override]
+        """Whether it takes no more work: nobody but its owner can make another."""
+        return bool(getattr(self._executor, "_broken", False))
+
+    def executor(self) -> Executor:
+        """The caller's.
+
+        Raises
+        ------
+        BadInput
+            When it was shut down.
+        """
+        if any(getattr(self._executor, name, False) for name in ("_shutdown", "_shutdown_thread")):
+            raise BadInput(f"{self.name} was shut down; call within its with block.")
+        return self._executor
+
+    def stop(self, running: Iterable[Future[Any]]) -> None:
+        """Take back what waits; what is under way ends by itself."""
+        for future in running:
+            future.cancel()
+
+
 class Cluster(Pool):
     """Workers of a Dask cluster, which have this program installed."""
 
     def __init__(self, address: str) -> None:
         client = _client(address)
         self.name = f"the cluster {address}"
+        self.loss = f"the connection to {self.name} was lost; see whether its scheduler still runs."
         self.hopeless = (import_module("distributed").KilledWorker,)
         self._client = client
         self._executor: Any = client.get_executor(pure=False)
@@ -132,7 +167,7 @@ def _client(address: str) -> Any:
     try:
         distributed = import_module("distributed")
     except ImportError:
-        raise BadInput("--cluster needs the cluster extra: pip install 'upright[cluster]'.") from None
+        raise BadInput("a Dask scheduler needs the cluster extra: pip install 'upright[cluster]'.") from None
     getLogger("distributed.client").setLevel(CRITICAL)  # what it would log is said in sentences
     try:
         client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)

@@ -11,14 +11,15 @@ from __future__ import annotations
 import re
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from operator import index
+from typing import Any, Generic, TypeVar, cast
 
 from upright.errors import BadInput, WorkersLost
 from upright.progress import Progress, part, silent
 from upright.workers.carriage import carried, unpacked
-from upright.workers.labour import Cluster, Pool, Processes, do
+from upright.workers.labour import Cluster, Lent, Pool, Processes, do
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -32,28 +33,44 @@ AHEAD = 2
 
 @dataclass(frozen=True, kw_only=True)
 class Workers:
-    """Who computes: this process, `number` processes of this machine, or the workers of a Dask `cluster`."""
+    """Who computes: this process, `number` processes of this machine, a Dask `cluster`, or an executor that is lent."""
 
     number: int = 1
     cluster: str = ""
+    executor: Executor | None = None
+
+    @classmethod
+    def of(cls, given: int | str | Executor | Workers) -> Workers:
+        """Workers by their number, the address of a Dask scheduler, or as any executor of `concurrent.futures`.
+
+        Raises
+        ------
+        BadInput
+            When it is none of these.
+        """
+        if isinstance(given, Workers):
+            return given
+        if isinstance(given, Executor) or callable(getattr(given, "submit", None)):
+            return cls(executor=cast("Executor", given))
+        try:
+            return cls(number=index(given))  # type: ignore[arg-type]
+        except TypeError:
+            text = str(given).strip()
+        return cls(number=int(text)) if re.fullmatch(r"[+-]?\d+", text) else cls(cluster=text)
 
     def __post_init__(self) -> None:
         if not 1 <= self.number <= MOST:
             raise BadInput(f"--workers takes a whole number from 1 to {MOST}, got {self.number}.")
         if self.cluster and not re.fullmatch(r"(tcp|tls|ws|wss|ucx)://[^\s/]+:\d+", self.cluster):
             raise BadInput(
-                f"--cluster takes the address that `dask scheduler` prints, such as tcp://host:8786, got "
-                f"'{self.cluster:.60}'."
-            )
-        if self.cluster and self.number > 1:
-            raise BadInput(
-                "--workers shares work among processes of this machine, --cluster among those of others; give one."
+                "--workers takes a number of processes of this machine, or the address that `dask scheduler` prints, "
+                f"such as tcp://host:8786, got '{self.cluster:.60}'."
             )
 
     @property
     def alone(self) -> bool:
         """Whether this process does everything itself."""
-        return self.number == 1 and not self.cluster
+        return self.number == 1 and not self.cluster and self.executor is None
 
 
 HERE = Workers()
@@ -120,8 +137,13 @@ def spread(
     """
     if workers.alone or (len(items) < 2 and not workers.cluster):
         return _here(task, items, progress, what)
-    pool = Cluster(workers.cluster) if workers.cluster else Processes(min(workers.number, len(items)))
-    return _there(pool, task, items, progress, what)
+    return _there(_pool(workers, len(items)), task, items, progress, what)
+
+
+def _pool(workers: Workers, items: int) -> Pool:
+    if workers.executor is not None:
+        return Lent(workers.executor)
+    return Cluster(workers.cluster) if workers.cluster else Processes(min(workers.number, items))
 
 
 def _here(task: Callable[[T, Progress], R], items: Sequence[T], progress: Progress, what: str) -> Finished[R]:
@@ -187,7 +209,7 @@ def _give_up(pool: Pool, what: str, begun: Mapping[int, int], error: BaseExcepti
     """Raise when an item was begun too often, or nobody is left to begin it."""
     worst = max(begun, key=lambda i: begun[i])
     if pool.gone:
-        raise WorkersLost(f"the connection to {pool.name} was lost; see whether its scheduler still runs.") from error
+        raise WorkersLost(pool.loss) from error
     if begun[worst] >= TRIES:
         raise WorkersLost(_lost(pool, what, worst, begun[worst])) from error
 

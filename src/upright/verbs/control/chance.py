@@ -11,17 +11,18 @@ from upright.errors import BadInput
 from upright.progress import Progress, silent
 from upright.verbs.answer import Answer
 from upright.verbs.options import HoldingOptions, known_options, rig_entries
-from upright.verbs.renamed import LET_GO, renamed
+from upright.verbs.renamed import CLUSTER, LET_GO, renamed
 from upright.verbs.values import Start, read_start
 
 if TYPE_CHECKING:
     from upright.control.preflight import Preflight
+    from upright.verbs.values import Workforce
 
 
-@renamed(LET_GO)
+@renamed({**LET_GO, **CLUSTER})
 def chance(
     fit: Any, gains: Any, *, start: Start = "", seconds: float = 6.0, draws: int = 200, seed: int = 0,
-    workers: int = 1, cluster: str = "", progress: Progress = silent, **on: Unpack[HoldingOptions],
+    workers: Workforce = 1, progress: Progress = silent, **on: Unpack[HoldingOptions],
 ) -> Answer[Preflight]:  # fmt: skip
     """How likely gains are to hold the rig that a fit tells of, before anything moves.
 
@@ -42,9 +43,8 @@ def chance(
         As in `regulate`.
     draws : int
         Rigs drawn.
-    workers, cluster
-        Processes of this machine that share them, or the address of a Dask scheduler (``tcp://host:8786``, cluster
-        extra); the numbers are the same.
+    workers : int, str or executor
+        Who simulates them, as in `regulate`.
     progress : callable, optional
         Told how many are done.
     **on
@@ -77,7 +77,7 @@ def chance(
         raise BadInput(f"a run takes more than 0 and at most 120 s, got {seconds:g} s.")
     if draws < 1:
         raise BadInput(f"draws needs a whole number of at least 1, got {draws}.")
-    shared = Workers(number=workers, cluster=cluster)
+    shared = Workers.of(workers)
     known = rig_of(fit, "chance", seed=seed, draws=draws)
     entries = rig_entries(known.plant, known.unit, on)
     rig = completed(known, entries, vendor=on.get("vendor") or "", who="chance", form="{}={}")

@@ -15,11 +15,12 @@ from upright.verbs.command import command
 from upright.verbs.handover import called, rig_of
 from upright.verbs.options import FIT, HoldingOptions, as_typed, known_options, rig_entries, vendor_of
 from upright.verbs.pages import page_folder, write_page, written_where_named
-from upright.verbs.renamed import LET_GO, renamed
+from upright.verbs.renamed import CLUSTER, LET_GO, renamed
 from upright.verbs.values import Start, poles, read_start
 
 if TYPE_CHECKING:
     from upright.experiments.regulation_2.run import Regulation, RegulationRequest
+    from upright.verbs.values import Workforce
 
 _poles = poles  # the verbs have options of this name
 
@@ -41,13 +42,13 @@ _poles = poles  # the verbs have options of this name
     upright regulate out/fit.json --seed 3 --set 2 --start "20 deg"
     """,
 )
-@renamed(LET_GO)
+@renamed({**LET_GO, **CLUSTER})
 @written_where_named
 @keeps_its_inputs
 def regulate(
     source: Any = None, *, rig: str = "", seed: int | None = None, which: int | str = "",
     poles: str | Iterable[complex] = "", start: Start = "", seconds: float = 6.0, draws: int = 200,
-    out: str | os.PathLike[str] | None = None, pdf: bool = False, workers: int = 1, cluster: str = "",
+    out: str | os.PathLike[str] | None = None, pdf: bool = False, workers: Workforce = 1,
     progress: Progress = silent, **on: Unpack[HoldingOptions],
 ) -> Answer[Regulation]:  # fmt: skip
     """Hold an identified rig upright; say beforehand what each pole set will come to.
@@ -81,8 +82,9 @@ def regulate(
         Folder for all files; in Python none is written without one.
     pdf : bool
         Write the page as PDF too.
-    workers, cluster
-        Who simulates those rigs: processes of this machine, or the address of a Dask scheduler.
+    workers : int, str or executor
+        Who simulates those rigs: processes of this machine, the address of a Dask scheduler, or an executor of
+        `concurrent.futures`; the numbers are the same.
     progress : callable, optional
         Told the step at work and the share done.
     **on
@@ -103,7 +105,7 @@ def regulate(
     from upright.rig.completion import completed, doubts, twin_of
     from upright.workers import Workers
 
-    shared = Workers(number=workers, cluster=cluster)
+    shared = Workers.of(workers)
     at, on = page_folder(out, pdf), known_options(HoldingOptions, on, "regulate")
     wish = _wish("" if which == "" else str(which), poles, on, start, seconds, draws)
     if source is None:

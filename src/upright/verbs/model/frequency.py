@@ -7,13 +7,14 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypedDict, Unpack
 
 from upright.errors import BadInput
 from upright.files import keeps_its_inputs
 from upright.progress import Progress, silent
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
+from upright.verbs.options import known_options
 from upright.verbs.pages import page_folder, write_page, written_where_named
 from upright.verbs.values import pairs, paths, si
 
@@ -21,6 +22,38 @@ if TYPE_CHECKING:
     from upright.experiments.frequency_1b.run import FrequencyRun, LoggedResponse
 
 KINDS = ("sines", "multisine", "sweep")
+
+
+class ResponseOptions(TypedDict, total=False):
+    """What a log does not say of the response that it holds.
+
+    Parameters
+    ----------
+    kind : str, optional
+        What a log holds of these, when it is not told rightly.
+    command : str, optional
+        Column that drives.
+    signal : mapping of str to str, optional
+        Column by coordinate, or texts NAME=COLUMN.
+    counts : mapping of str to float, optional
+        Counts per rad or m by coordinate, negative if reversed, or texts NAME=N.
+    known : mapping, optional
+        What is known of the rig by parameter [SI]: a number, a number with its standard uncertainty, or a text such as
+        ``"135 g +- 0.2 %"``; or texts NAME=VALUE.
+    hold : float or str, optional
+        How long a command is held [s]; one sample when omitted.
+    low, high : float, optional
+        Least and greatest frequency [rad/s].
+    """
+
+    kind: str
+    command: str
+    signal: Mapping[str, str] | Sequence[str] | None
+    counts: Mapping[str, float | str] | Sequence[str] | None
+    known: Mapping[str, float | str | tuple[float, float]] | Sequence[str] | None
+    hold: float | str | None
+    low: float | None
+    high: float | None
 
 
 @command(
@@ -51,11 +84,8 @@ KINDS = ("sines", "multisine", "sweep")
 @keeps_its_inputs
 def frequency(
     sources: Sequence[str | os.PathLike[str]] | str | os.PathLike[str] = (), *, rig: str = "", seed: int = 0,
-    ask: str = "sines", kind: str = "", command: str = "", signal: Mapping[str, str] | Sequence[str] = (),
-    counts: Mapping[str, float | str] | Sequence[str] = (),
-    known: Mapping[str, float | str | tuple[float, float]] | Sequence[str] = (), hold: float | str = "",
-    low: float | None = None, high: float | None = None, data: str | os.PathLike[str] | None = None,
-    out: str | os.PathLike[str] | None = None, pdf: bool = False, progress: Progress = silent,
+    ask: str = "sines", data: str | os.PathLike[str] | None = None, out: str | os.PathLike[str] | None = None,
+    pdf: bool = False, progress: Progress = silent, **of_log: Unpack[ResponseOptions],
 ) -> Answer[FrequencyRun | LoggedResponse]:  # fmt: skip
     """Measure a frequency response, or read one from logs, and fit the rig to it.
 
@@ -72,21 +102,6 @@ def frequency(
         Which twin of the make; 0 is the one as designed.
     ask : str
         Ask the twin by sines, multisine or sweep.
-    kind : str, optional
-        What a log holds of these, when it is not told rightly.
-    command : str, optional
-        Column that drives.
-    signal : mapping of str to str, optional
-        Column by coordinate, or texts NAME=COLUMN.
-    counts : mapping of str to float, optional
-        Counts per rad or m by coordinate, negative if reversed, or texts NAME=N.
-    known : mapping, optional
-        What is known of the rig by parameter [SI]: a number, a number with its standard uncertainty, or a text such as
-        ``"135 g +- 0.2 %"``; or texts NAME=VALUE.
-    hold : float or str, optional
-        How long a command is held [s]; one sample when omitted.
-    low, high : float, optional
-        Least and greatest frequency [rad/s].
     data : path, optional
         Folder the runs' files are in; the study's own when omitted.
     out : path, optional
@@ -95,6 +110,8 @@ def frequency(
         Write the page as PDF too.
     progress : callable, optional
         Told the step at work and the share done.
+    **of_log
+        Of the logs: kind, command, signal, counts, known, hold, low, high; see `ResponseOptions`.
 
     Returns
     -------
@@ -108,33 +125,31 @@ def frequency(
     """
     from upright.rig.makes import MAKES
 
-    at = page_folder(out, pdf)
+    at, said = page_folder(out, pdf), known_options(ResponseOptions, of_log, "frequency")
+    kind = said.get("kind", "")
     for value, option in ((ask, "--ask"), (kind or "sines", "--kind")):
         if value not in KINDS:
             raise BadInput(f"{option} is one of {', '.join(KINDS)}, got '{value}'.")
-    limits = _band(low, high)
+    limits = _band(said.get("low"), said.get("high"))
     files = [at / "frequency.csv"]
     if logs := [Path(source) for source in paths(sources)]:
         from upright.experiments.frequency_1b.chapter import log_chapter
         from upright.experiments.frequency_1b.run import LogRequest, response_of_logs
         from upright.verbs.values import si_if_given
 
-        said = pairs(signal, "--signal"), pairs(counts, "--counts"), pairs(known, "--known")
         wish = LogRequest(
-            make=rig, command=command, signals=said[0], kind=kind, seed=seed, hold=si_if_given(hold, "s"),
-            counts={n: _count(n, v) for n, v in said[1].items()},
-            band=limits,
-            known={n: _known(n, v, rig) for n, v in said[2].items()},
+            make=rig, command=said.get("command", ""), signals=pairs(said.get("signal"), "--signal"), kind=kind,
+            seed=seed, hold=si_if_given(said.get("hold"), "s"), band=limits,
+            counts={n: _count(n, v) for n, v in pairs(said.get("counts"), "--counts").items()},
+            known={n: _known(n, v, rig) for n, v in pairs(said.get("known"), "--known").items()},
         )  # fmt: skip
         found = response_of_logs(logs, wish, at, data=None if data is None else Path(data))
         files += [at / "fit.json"] if found.answer else []
         told = log_chapter(found)
     else:
-        said = {"--signal": signal, "--counts": counts, "--known": known, "--command": command, "--hold": hold}
-        said |= {"--kind": kind, "--from": low is not None, "--to": high is not None, "--data": data is not None}
-        for option, value in said.items():
-            if value:
-                raise BadInput(f"{option} belongs to a log, and none was named; name one, or leave the option out.")
+        for name in [*said, *(["data"] if data is not None else [])]:
+            option = {"low": "from", "high": "to"}.get(name, name)
+            raise BadInput(f"--{option} belongs to a log, and none was named; name one, or leave the option out.")
         if not rig:
             raise BadInput(
                 "frequency needs a log, a frequency.csv or a study to read, or a twin to sweep: --rig "

@@ -5,21 +5,45 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
 from upright.progress import Progress, silent
 from upright.verbs.command import Flag, command
+from upright.verbs.renamed import CLUSTER, renamed
 from upright.verbs.study import folder_beside, read_study
 from upright.verbs.values import open_log
 
 if TYPE_CHECKING:
     from upright.study.load import Study
+    from upright.verbs.values import Workforce
 
 from upright.verbs.model.fit import FitAnswer
+from upright.verbs.options import known_options
 
 METHODS = ("auto", "simplex", "least-squares")
+
+
+class LogOptions(TypedDict, total=False):
+    """What a log does not say of itself, see `upright.study.draft.from_record.study_of_record`.
+
+    Parameters
+    ----------
+    ask : sequence of names, or mapping of name to guess, optional
+        What to estimate, and nothing else; without it what the draft asks and `known` leaves.
+    columns : mapping of coordinate (or drive) to column, optional
+        Where the columns are called otherwise.
+    units : mapping of coordinate or column to unit, optional
+        Where the log does not say.
+    window : (start, stop), optional
+        Part to fit [s]; the rest is left out.
+    """
+
+    ask: Sequence[str] | Mapping[str, float | str] | None
+    columns: Mapping[str, str] | None
+    units: Mapping[str, str] | None
+    window: tuple[float, float] | None
 
 
 def _read_first(typed: dict[str, Any]) -> dict[str, Any]:
@@ -89,14 +113,13 @@ def _keys() -> str:
     trust it), 2 the study or a log is wrong, 130 stopped by Ctrl-C.
     """,
 )
+@renamed(CLUSTER)
 @keeps_its_inputs
 def identify(
     study: Any, plant: Any = None, *, known: Mapping[str, float | str] | None = None,
-    ask: Sequence[str] | Mapping[str, float | str] | None = None, columns: Mapping[str, str] | None = None,
-    units: Mapping[str, str] | None = None, window: tuple[float, float] | None = None,
     data: str | Path | None = None, hold_out: Sequence[str] | str = (), method: str = "auto",
-    out: str | Path | None = None, report: bool = True, pdf: bool = False, workers: int = 1, cluster: str = "",
-    progress: Progress = silent,
+    out: str | Path | None = None, report: bool = True, pdf: bool = False, workers: Workforce = 1,
+    progress: Progress = silent, **of_log: Unpack[LogOptions],
 ) -> FitAnswer:  # fmt: skip
     """Fit a rig's parameters to its logs as a study file says; write estimates and report.
 
@@ -105,9 +128,8 @@ def identify(
     study : Record, DataFrame, path of a log or of a study (TOML), or Study
     plant : class of a plant or its name, optional
         For a log: ``up.Pendulum``, ``"furuta"``; recognised from the columns when omitted.
-    known, ask, columns, units, window
-        For a log: what is given, what to estimate (as names, or names with guesses), which column is which coordinate,
-        in which unit, and the part to fit [s]; see `upright.study.draft.from_record.study_of_record`.
+    known : mapping, optional
+        For a log: numbers that are given [SI], or with unit and, perhaps, uncertainty: ``{"m_p": "223.5 g"}``.
     data : path, optional
         Folder the runs' files are in; the study's own when omitted.
     hold_out : sequence of str
@@ -120,10 +142,13 @@ def identify(
         Write report.html as well.
     pdf : bool
         Write the page as PDF too.
-    workers, cluster
-        Who computes the refits of ``hold_out="each"``: processes of this machine, or the address of a Dask scheduler.
+    workers : int, str or executor
+        Who computes the refits of ``hold_out="each"``: processes of this machine, the address of a Dask scheduler, or
+        an executor of `concurrent.futures`.
     progress : callable, optional
         Told the step at work and the share done.
+    **of_log
+        For a log: ask, columns, units, window; see `LogOptions`.
 
     Returns
     -------
@@ -144,10 +169,11 @@ def identify(
     from upright.verbs.pages import folder_if_given, write_page
     from upright.workers import Workers
 
-    folder, shared = folder_if_given(out, pdf), Workers(number=workers, cluster=cluster)
+    folder, shared = folder_if_given(out, pdf), Workers.of(workers)
     if method not in METHODS:
         raise BadInput(f"--method must be one of {', '.join(METHODS)}, got '{method}'; {nearest(method, METHODS)}")
-    asked = asked_study(study, plant, known=known, ask=ask, columns=columns, units=units, window=window, data=data)
+    said = known_options(LogOptions, of_log, "identify")
+    asked = asked_study(study, plant, data=data, known=known, **said)
     label = asked.path
     held = [hold_out] if isinstance(hold_out, str) else list(hold_out)
     each = "each" in held and all(run.label != "each" for run in asked.runs)

@@ -13,11 +13,13 @@ from upright.progress import Progress, silent
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
 from upright.verbs.pages import pdf_has_folder, write_page
+from upright.verbs.renamed import CLUSTER, renamed
 from upright.verbs.study import folder_beside, read_study
 
 if TYPE_CHECKING:
     from upright.identification.ladder.growth import Ladder
     from upright.study.load import Study
+    from upright.verbs.values import Workforce
 
 
 @command(
@@ -47,11 +49,12 @@ if TYPE_CHECKING:
     stopped by Ctrl-C.
     """,
 )
+@renamed(CLUSTER)
 @keeps_its_inputs
 def ladder(
     study: str | os.PathLike[str] | Study, *, out: str | os.PathLike[str] | None = None,
-    data: str | os.PathLike[str] | None = None, report: bool = True, pdf: bool = False, workers: int = 1,
-    cluster: str = "", progress: Progress = silent,
+    data: str | os.PathLike[str] | None = None, report: bool = True, pdf: bool = False, workers: Workforce = 1,
+    progress: Progress = silent,
 ) -> Answer[Ladder]:  # fmt: skip
     """Grow a model only while it predicts better what it has not seen.
 
@@ -73,8 +76,9 @@ def ladder(
         Write ladder.html as well.
     pdf : bool
         Write the page as PDF too.
-    workers, cluster
-        Who predicts each run from a fit of the others: processes of this machine, or the address of a Dask scheduler.
+    workers : int, str or executor
+        Who predicts each run from a fit of the others: processes of this machine, the address of a Dask scheduler, or
+        an executor of `concurrent.futures`.
     progress : callable, optional
         Told the step at work and the share done.
 
@@ -97,7 +101,7 @@ def ladder(
     from upright.study.results import can_be_trimmed, chosen_study, ladder_content
     from upright.workers import Workers
 
-    shared = Workers(number=workers, cluster=cluster)
+    shared = Workers.of(workers)
     pdf_has_folder(out, pdf)
     if isinstance(study, str | os.PathLike):
         study = Path(study)
