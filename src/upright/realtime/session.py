@@ -59,6 +59,8 @@ class RunOrder:
         Name and unit of each reference that the law follows, for the log; none where there is nothing to log.
     fifo : bool
         Whether a process of its own asks for FIFO priority.
+    accepted : str
+        Why somebody runs a law whose model is not trusted, for the log.
     """
 
     make: Callable[[], Stage]
@@ -70,6 +72,7 @@ class RunOrder:
     rig_text: str = ""
     references: tuple[tuple[str, str], ...] = ()
     fifo: bool = True
+    accepted: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -170,6 +173,8 @@ def carry_out(
     beside.event, beside.stopped = hear, stopped
     end: dict[str, Any] = {"ticks": 0, "late": 0}
     finished = False
+    if order.accepted:
+        hear(0.0, "accepted", f"The law's model is not trusted, and it runs all the same: {order.accepted}")
     try:
         about = beside.prepare()
         end |= {"about": about, "held": beside.held}

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from upright.basis import DESCRIBED, MEASURED, Basis
+from upright.basis import DESCRIBED, MEASURED, NOT_TRUSTED, Basis
 from upright.errors import BadInput
 from upright.files import read_text
 from upright.laws import Law, Rule, as_values
@@ -36,6 +36,7 @@ class RunRequest:
     `from_rest` begins where the rig rests, however far that is from what is held, as a swing-up does.
     `samples` are what is put out, sample by sample instead of in words; logs are called after the `stem`.
     `bolted` is the inertia that a twin's hands add to its first body before it [kg or kg m^2].
+    `accept` says why a law from a model that is not trusted runs on hardware all the same.
     `own_process` puts a twin or a replay into a process of its own as well, where a rig always is.
     """
 
@@ -52,6 +53,7 @@ class RunRequest:
     check: bool = True
     watch: bool = True
     from_rest: bool = False
+    accept: str = ""
     own_process: bool = False
 
     def __post_init__(self) -> None:
@@ -165,7 +167,8 @@ def run_rig(
     Raises
     ------
     BadInput
-        When files contradict each other.
+        When files contradict each other, or a law from a model that is not trusted is to drive hardware and nobody
+        said why.
     """
     library()  # what a log needs is missed before anything moves
     file = read_rig_file(wish.rig)
@@ -176,6 +179,8 @@ def run_rig(
     if wish.law is not None:
         law, designed = read_law(wish.law, model, at, zero)
         basis &= designed
+        if file.hardware:
+            _check_accepted(wish, basis)
         if wish.reference:
             if not isinstance(law, Law) or not law.reference_names or not np.any(law.D[:, law.readings :]):
                 raise BadInput(
@@ -194,7 +199,7 @@ def run_rig(
         make=partial(stage_of, wish.rig, balance=balance, tilt=wish.tilt, watch=wish.watch,
                      from_rest=wish.from_rest, bolted=wish.bolted), law=as_values(law),
         seconds=wish.seconds, log=path, mode=MODES[wish.mode], check=wish.check, rig_text=read_text(wish.rig),
-        references=references,
+        references=references, accepted=wish.accept.strip() if basis.level == NOT_TRUSTED else "",
     )  # fmt: skip
     if file.hardware or wish.own_process:
         end = run_in_process(order, watch=watch, paced=file.hardware)
@@ -202,6 +207,15 @@ def run_rig(
         end = _inline(order, law, watch)
     log = read_log(path) if path.exists() else None
     return RigRun(wish=wish, file=file, model=model, end=end, log=log, log_path=path, basis=basis)
+
+
+def _check_accepted(wish: RunRequest, basis: Basis) -> None:
+    """Refuse to arm a law from a model that is not trusted, unless somebody says why it runs all the same."""
+    if basis.level == NOT_TRUSTED and not wish.accept.strip():
+        raise BadInput(
+            f"the law of {wish.law} is not armed on hardware, for its model is not trusted: {basis.sentence} Identify "
+            'the rig until it is, or say why it runs all the same, which the log keeps: --accept "REASON".'
+        )
 
 
 def _references(law: Law | Rule, model: Rig) -> tuple[tuple[str, str], ...]:

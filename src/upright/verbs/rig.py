@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     names={"rig": "--rig"},
     metavars={
         "rig": "RIG.toml", "law": "GAIN.json", "excite": "SIGNAL", "reference": "SIGNAL", "duration": "SECONDS",
-        "tilt": "ANGLE",
+        "tilt": "ANGLE", "accept": "REASON",
     },
     helps={
         "rig": "What the rig is, and how far it may go.",
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 def run(
     rig: str | os.PathLike[str], *, law: str | os.PathLike[str] | None = None, excite: str = "", reference: str = "",
     duration: float = 30.0, mode: str = "host", tilt: float | str = "", check: bool = True, watch: bool = True,
-    out: str | os.PathLike[str] = "upright-run", pdf: bool = False,
+    accept: str = "", out: str | os.PathLike[str] = "upright-run", pdf: bool = False,
     observe: Callable[[RunState], str] = lambda _: "",
 ) -> Answer[RigRun]:  # fmt: skip
     """Run a law, or a signal, on a rig: supervised, watched, logged, judged.
@@ -76,6 +76,9 @@ def run(
         Compare a small pulse with the model first.
     watch : bool
         Look for lying encoders beside the loop, by a bank of Kalman filters.
+    accept : str, optional
+        Why a law whose model is not trusted drives hardware all the same; the log keeps it. Without it such a law is
+        not armed.
     out : path
         Folder for the log and the page.
     pdf : bool
@@ -100,7 +103,7 @@ def run(
     leaning = si_if_given(tilt, "rad") or 0.0
     wish = RunRequest(
         rig=Path(rig), law=None if law is None else Path(law), excite=excite, reference=reference, seconds=duration,
-        mode=mode, tilt=leaning, check=check, watch=watch,
+        mode=mode, tilt=leaning, check=check, watch=watch, accept=accept,
     )  # fmt: skip
     done = run_rig(wish, folder, watch=observe)
     told = run_chapter(done)
