@@ -56,9 +56,8 @@ def test_the_gains_hold_the_nonlinear_rig(study, tmp_path):
     assert "The loop stands with margin" in told
     assert "What next" in told
     found = json.loads((tmp_path / "design.json").read_text(encoding="utf-8"))
-    law = Law(
-        **{name: found["law"][name] for name in "ABCD"}, references=np.tile([0.0, math.pi, 0.0], (2, 1)), delay=1.0
-    )
+    matrices = {name: found["law"][name] for name in "ABCD"}
+    law = Law(**matrices, target=[0.0, math.pi], references=np.zeros((2, 1)), delay=1.0)
     x = simulate(RIG, {"actuator.limit": 0.6}, RIG.state("inverted", theta=math.pi + 0.08), None, found["period"],
                  samples=4001, loop=law)[:, :4, 0]  # fmt: skip
     assert np.abs(x[-1] - RIG.state("inverted")).max() < 1e-4

@@ -106,8 +106,8 @@ def bench(tmp_path, monkeypatch):
            "estimated": [], "correlation": [], "rig": {"name": "bench 3"}}  # fmt: skip
     (tmp_path / "fit.json").write_text(json.dumps(fit), encoding="utf-8")
     law = as_values(LAW)
-    (tmp_path / "design.json").write_text(json.dumps({"as_run": law}), encoding="utf-8")
-    (tmp_path / "slow.json").write_text(json.dumps({"as_run": law | {"period": 2e-3}}), encoding="utf-8")
+    (tmp_path / "design.json").write_text(json.dumps({"law": law}), encoding="utf-8")
+    (tmp_path / "slow.json").write_text(json.dumps({"law": law | {"period": 2e-3}}), encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ RUNNER = CliRunner()
 def bench(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "RIG.toml").write_text('kind = "twin"\nmake = "furuta"\nseed = 3\n', encoding="utf-8")
-    (tmp_path / "design.json").write_text(json.dumps({"as_run": as_values(LAW)}), encoding="utf-8")
+    (tmp_path / "design.json").write_text(json.dumps({"law": as_values(LAW)}), encoding="utf-8")
     return tmp_path
 
 

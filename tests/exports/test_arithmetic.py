@@ -127,11 +127,12 @@ def test_a_law_of_python_keeps_its_names_and_loses_what_nothing_depends_on():
 
 DESIGN = {
     "K": [[1.0, 2.0]], "period": 0.02, "at": "inverted", "plant": "furuta", "command": "motor", "command_unit": "V",
-    "readings": [{"name": "psi", "unit": "rad", "at_rest": 0.0, "step": 0.001},
-                 {"name": "theta", "unit": "deg", "at_rest": 3.0, "step": 0.002}],
-    # signals: two readings, what is subtracted at rest of each, a reference
-    "law": {"A": [[0.5]], "B": [[1.0, 2.0, 8.0, 9.0, 3.0]], "C": [[4.0]], "D": [[5.0, 6.0, 8.0, 9.0, 7.0]]},
-    "begin": [[0.25, 0.75]], "converter": 0.125, "limit": 10.0, "margins": {}, "delay_samples": 1.5,
+    "readings": [{"name": "psi", "unit": "rad", "step": 0.001},
+                 {"name": "theta", "unit": "deg", "step": 0.002}],
+    # signals: two readings, a reference
+    "law": {"kind": "linear", "A": [[0.5]], "B": [[1.0, 2.0, 3.0]], "C": [[4.0]], "D": [[5.0, 6.0, 7.0]],
+            "begin": [[0.25, 0.75]], "target": [0.0, 3.0], "reference_names": ["reference"], "period": 0.02},
+    "converter": 0.125, "limit": 10.0, "margins": {}, "delay_samples": 1.5,
     "states_from": "differences", "described": {"entries": {"sign.theta": {"value": -1.0}}},
 }  # fmt: skip
 
@@ -158,12 +159,14 @@ def test_a_design_is_read_signal_by_signal():
     [
         ([], "no design.json; it needs the keys law, K and period"),
         ({"law": {}, "K": []}, "no design.json; it needs the keys law, K and period"),
-        ({k: v for k, v in DESIGN.items() if k not in ("begin", "margins")}, "x lacks begin, margins, as older"),
+        ({k: v for k, v in DESIGN.items() if k not in ("readings", "margins")}, "x lacks readings, margins, as older"),
         (
             DESIGN | {"margins": None, "verdict": "It falls."},
             "the loop of x falls, so its law is not exported: It falls",
         ),
-        (DESIGN | {"law": {"A": [[0.5]]}}, r"x does not hold a law \('B'\)"),
+        (DESIGN | {"law": {"A": [[0.5]]}}, "x lacks the law's kind, as older"),
+        (DESIGN | {"law": {"kind": "linear", "A": [[0.5]]}}, "the values are no law's"),
+        (DESIGN | {"readings": DESIGN["readings"][:1]}, "needs matrices for 1 readings"),
     ],
 )
 def test_what_is_no_design_is_refused_with_what_is_missing(content, said):

@@ -20,7 +20,7 @@ from upright.report.run import chapter, draw_run
 from upright.rig.makes import make_rig
 from upright.rigs import Fault
 from upright.running.chapter import run_chapter
-from upright.running.rig import open_loop, stage_of
+from upright.running.rig import open_loop, read_law, stage_of
 from upright.running.run import RunRequest, run_rig
 
 RIG = make_rig("furuta")
@@ -37,7 +37,7 @@ def folder(tmp_path_factory):
     sampled = model.to_sampled(RIG.period, RIG.delay / RIG.period)
     K = place(model.A, model.B, POLES).K
     law = feedback(filtered(sampled, 0.5), K, prefilter(model.A, model.B, model.C[0], K))
-    (place_of / "design.json").write_text(json.dumps({"as_run": as_values(law)}), encoding="utf-8")
+    (place_of / "design.json").write_text(json.dumps({"law": as_values(law)}), encoding="utf-8")
     return place_of
 
 
@@ -51,6 +51,17 @@ def test_a_law_holds_the_twin_and_its_log_replays_to_the_last_bit(folder, tmp_pa
     again = replay(read_log(done.log_path))
     assert again.rows.size == done.end.ticks
     assert again.identical
+
+
+@pytest.mark.parametrize("key", ["law", "as_run"])
+def test_a_design_of_before_and_of_now_holds_its_law(folder, tmp_path, key):
+    law = json.loads((folder / "design.json").read_text(encoding="utf-8"))["law"]
+    before = {"law": {"A": law["A"], "inputs": "readings, readings at rest, reference"}}
+    (tmp_path / "design.json").write_text(json.dumps(before | {key: law}), encoding="utf-8")
+    read, basis = read_law(tmp_path / "design.json", RIG, "inverted", "hanging")
+    assert as_values(replace(read, target=0.0)) == law
+    assert np.asarray(read.target).tolist() == [0.0, math.pi]
+    assert not basis.trusted
 
 
 def test_a_rest_within_one_count_is_said_in_counts(folder, tmp_path):

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from upright.designing.run import Designed, VelocityLoop
-from upright.gains import spelled_out
 from upright.gains.lqr import locus
 from upright.gains.requests import Roots, written
 from upright.laws import as_values
@@ -210,25 +209,21 @@ def _numbers(done: Designed) -> dict[str, Any]:
         "chance_over_the_fit": done.chance,
         "readings": _readings(done),
         "states_from": done.chosen.name,
-        "begin": done.law.begin,
         "command": done.rig.inputs[0] if isinstance(done.rig, StateSpace) else "u",
         "converter": 0.0 if wish.on is None else wish.on.converter,
-        "law": spelled_out(done.law) | {"inputs": "readings, readings at rest, reference"},
-        "as_run": as_values(done.law),
+        "law": as_values(done.law),
         "verdict": done.verdict,
     }
 
 
 def _readings(done: Designed) -> list[dict[str, Any]]:
-    """What the law reads, one by one: encoder's step, sign and zero as described, and the reading at rest."""
+    """What the law reads, one by one: encoder's step and sign as described."""
     rig, on = done.rig, done.wish.on
-    rest = dict(zip(rig.outputs, np.ravel(done.law.target).tolist(), strict=True))
     steps = dict(zip(rig.outputs, done.wish.quantum, strict=False))
     return [
         {
             "name": name,
             "unit": unit,
-            "at_rest": rest[name],
             "step": steps.get(name, 0.0),
             "sign": 1.0 if on is None else on.hardware.value(f"sign.{name}", 1.0),
         }

@@ -11,7 +11,7 @@ import numpy as np
 
 from upright.basis import DESCRIBED, Basis, of_plain
 from upright.errors import BadInput
-from upright.laws import Law, Rule
+from upright.laws import Law, Rule, of_values
 
 AGAIN = "write it again with `upright design ... -o FOLDER`"
 
@@ -150,7 +150,9 @@ def of_design(content: Any, source: str) -> SampledController:
     """
     if not isinstance(content, Mapping) or not {"law", "K", "period"} <= content.keys():
         raise BadInput(f"{source} is no design.json; it needs the keys law, K and period: {AGAIN}.")
-    missing = [key for key in ("readings", "begin", "converter", "command", "margins") if key not in content]
+    missing = [key for key in ("readings", "converter", "command", "margins") if key not in content]
+    if not isinstance(content["law"], Mapping) or "kind" not in content["law"]:
+        missing.append("the law's kind")
     if missing:
         raise BadInput(f"{source} lacks {', '.join(missing)}, as older versions wrote it; {AGAIN}.")
     if content["margins"] is None:
@@ -165,19 +167,15 @@ def of_design(content: Any, source: str) -> SampledController:
 
 
 def _read(content: Mapping[str, Any]) -> SampledController:
-    told, readings = content["law"], list(content["readings"])
-    A, B, C, D = (np.array(told[name], dtype=np.float64) for name in "ABCD")
-    p, z = len(readings), len(content["law"]["A"])
-    keep = [*range(p), *range(2 * p, D.shape[1])]  # less what is subtracted at rest
-    limit, names = content["limit"], tuple(str(r["name"]) for r in readings)
+    designed, readings, limit = of_values(content["law"]), list(content["readings"]), content["limit"]
+    if not isinstance(designed, Law) or designed.readings != len(readings):
+        raise ValueError(f"it needs matrices for {len(readings)} readings")
+    names, others = tuple(str(r["name"]) for r in readings), designed.D.shape[1] - len(readings)
     described = (content.get("described") or {}).get("entries", {})
-    law = Law(
-        A.reshape(z, z), B.reshape(z, D.shape[1])[:, keep], C.reshape(-1, z), D[:, keep],
-        begin=np.array(content["begin"], dtype=np.float64).reshape(z, p), measured=names,
-        reference_names=tuple("reference" for _ in keep[p:]), period=float(content["period"]),
-        target=np.array([r["at_rest"] for r in readings], dtype=np.float64),
-        limit=math.inf if limit is None else float(limit), command_quantum=float(content["converter"]),
-        quantum=np.array([r["step"] for r in readings], dtype=np.float64),
+    law = replace(
+        designed, measured=names, reference_names=designed.reference_names or ("reference",) * others,
+        period=float(content["period"]), limit=math.inf if limit is None else float(limit),
+        command_quantum=float(content["converter"]), quantum=np.array([r["step"] for r in readings], dtype=np.float64),
     )  # fmt: skip
     at = f" at '{content['at']}'" if content.get("at") else ""
     return SampledController(

@@ -1,6 +1,6 @@
 """Which gain does the rig need, and what is it worth? A linear model goes in, wherever its numbers came from."""
 
-from upright.gains.loop import feedback, margins, place_sampled, spelled_out
+from upright.gains.loop import feedback, margins, place_sampled
 from upright.gains.lqr import dlqr, locus, lqr, weight_for_effort
 from upright.gains.margins import Margins
 from upright.gains.placement import Placement, place, prefilter
@@ -24,6 +24,5 @@ __all__ = [
     "prefilter",
     "read_off",
     "shaken",
-    "spelled_out",
     "weight_for_effort",
 ]

@@ -36,13 +36,6 @@ def feedback(estimator: Estimator, K: ArrayLike, k_pf: float = 0.0) -> Law:
     )  # fmt: skip
 
 
-def spelled_out(law: Law) -> dict[str, Array]:
-    """Matrices of a law with what is its target as signals of its own: readings, readings at rest, references."""
-    p = law.readings
-    B, D = (np.hstack([M[:, :p], -M[:, :p], M[:, p:]]) for M in (law.B, law.D))
-    return {"A": law.A, "B": B, "C": law.C, "D": D}
-
-
 def closed(model: StateSpace, law: Law, gain: float = 1.0) -> Array:
     """Matrix of the loop, the model's states first; `gain` multiplies the command on its way to the plant."""
     without_feedthrough(model, "a loop")

@@ -154,16 +154,22 @@ def read_law(path: Path, model: Rig, at: str, zero: str) -> tuple[Law | Rule, Ba
         content: Any = json.loads(read_text(path))
     except (ValueError, RecursionError):
         raise BadInput(f"{path} is no JSON; name the design.json of `upright design`.") from None
-    values = content.get("as_run", content) if isinstance(content, dict) else None
-    if not isinstance(values, dict) or "kind" not in values:
+    values = law_values(content)
+    if values is None:
         raise BadInput(f"{path} holds no law that can run; design again: upright design FIT -o FOLDER.")
     law = of_values(values)
-    basis = of_plain(content.get("basis"), "this design") if "as_run" in content else DESCRIBED
+    basis = DESCRIBED if values is content else of_plain(content.get("basis"), "this design")
     if isinstance(law, Rule):
         return law, basis
     held, from_zero = model.plant.equilibrium(at), model.plant.equilibrium(zero)
     target = np.array([held[c.name] - from_zero[c.name] for c in model.plant.coordinates])
     return replace(law, target=target), basis
+
+
+def law_values(content: Any) -> dict[str, Any] | None:
+    """Values of the law that a file holds as its `law` (`as_run` before), or is; None where it holds none."""
+    held = [content.get("law"), content.get("as_run"), content] if isinstance(content, dict) else []
+    return next((v for v in held if isinstance(v, dict) and "kind" in v), None)
 
 
 SHAPES = ("free", "step", "square", "sine", "sweep")
