@@ -52,6 +52,7 @@ diagnosis questionnaire designing
 paper
 running
 experiments.abreast
+experiments.stand
 experiments.weighing_1a
 experiments.frequency_1b
 experiments.regulation_2

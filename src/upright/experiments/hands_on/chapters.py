@@ -35,12 +35,12 @@ def hanging_chapter(done: Hanging, folder: Path, truth: Mapping[str, float]) -> 
 
 def loaded_chapter(done: Weighed, folder: Path) -> Chapter:
     """The swings and their line, beside the truth of a twin."""
-    found, body, (column,) = done.loadings, OSCILLATORS[done.kind], done.rig.names
-    true = done.rig.true_values
+    found, body, (column,) = done.loadings, OSCILLATORS[done.kind], done.stand.names
+    true = done.stand.truth
     truth = {"k": true["k_1"], body.bare: true[body.inertia], "c": true["c_1"]} if true else {}
     logs = " ".join(typed(folder / file) for file in done.files.values())
-    added = " ".join(f"--added {typed(a)}" for a in done.rig.file.added)
-    added += f' --tolerance "{100 * done.rig.file.tolerance:g} %"' if done.rig.file.tolerance else ""
+    added = " ".join(f"--added {typed(a)}" for a in done.stand.file.added)
+    added += f' --tolerance "{100 * done.stand.file.tolerance:g} %"' if done.stand.file.tolerance else ""
     told = loading_chapter(
         found, kind=done.kind, title="Stiffness and inertia from added loads", logs=done.logs,
         signals=dict.fromkeys(done.logs, column), left_out=done.left_out, truth=truth or None,

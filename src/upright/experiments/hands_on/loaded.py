@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from upright.errors import BadInput
-from upright.experiments.hands_on.hanging import GROWTH, OF_TRAVEL, REACH, SHARE, STILL, travel_of
-from upright.experiments.hands_on.rig import RigAtHand
+from upright.experiments.hands_on.hanging import GROWTH, OF_TRAVEL, REACH, SHARE, STILL
+from upright.experiments.stand.live import LiveStand
+from upright.experiments.stand.protocol import APPLIED, file_of
 from upright.experiments.weighing_1a.from_logs import inertia_of, weigh
 from upright.identification.loadings import Loadings
 from upright.physics import Plant
 from upright.progress import Progress
-from upright.readers import read
 from upright.records import Record
 from upright.rig.makes import OSCILLATORS
 
@@ -34,7 +34,7 @@ class Weighed:
 
     Attributes
     ----------
-    rig : RigAtHand
+    stand : LiveStand
     kind : {"rectilinear", "torsional"}
     loadings : Loadings
     logs : dict of str to Record
@@ -45,7 +45,7 @@ class Weighed:
         Why some logs did not count.
     """
 
-    rig: RigAtHand
+    stand: LiveStand
     kind: str
     loadings: Loadings
     logs: dict[str, Record]
@@ -59,7 +59,7 @@ def kind_of(plant: Plant) -> str:
     return next((k for k in on_spring if plant.parameters()["k_1"] > 0), "")
 
 
-def run_loaded(rig: RigAtHand, folder: Path, progress: Progress) -> Weighed:
+def run_loaded(stand: LiveStand, folder: Path, progress: Progress) -> Weighed:
     """Ask for one loading after another, and step the rig with each; leaves a log of each in a folder.
 
     Raises
@@ -71,72 +71,71 @@ def run_loaded(rig: RigAtHand, folder: Path, progress: Progress) -> Weighed:
     RigStopped
         When the rig was stopped by a limit, or was not loaded.
     """
-    kind, values = kind_of(rig.model.plant), _added(rig)
-    truly = _bolted(rig, values)
-    seconds = SWINGS * 2 * math.pi / _slowest(rig, max(values))
-    (name,), wanted = rig.names, _wanted(rig)
-    level = PROBE * min(SHARE * rig.model.limit, wanted * _stiffness(rig))
+    kind, values = kind_of(stand.rig.plant), _added(stand)
+    truly = _bolted(stand, values)
+    seconds = SWINGS * 2 * math.pi / _slowest(stand, max(values))
+    (name,), wanted = stand.names, _wanted(stand)
+    level = PROBE * min(SHARE * stand.rig.limit, wanted * _stiffness(stand))
     logs: dict[str, Record] = {}
     files: dict[str, str] = {}
-    runs = list(zip(rig.file.added, truly, strict=True))
+    runs = list(zip(stand.file.added, truly, strict=True))
     runs.insert(0, runs[0])  # the probe
     for i, (text, true) in enumerate(runs):
         progress(f"stepping with {text} added", i / len(runs))
-        rig.requested(
+        stand.ask(
             f"Bolt on what makes {text} in all and nothing else, and let {name} rest on its spring with room to either "
             f"side; steps follow for {len(STEPS) * seconds:.0f} s."
         )
-        signal = _steps(level, seconds, rig.model.period)
-        log = rig.put_out(signal, folder, f"loaded_{i}" if i else "probe", bolted=true)
-        record = read(log)
+        signal = _steps(level, seconds, stand.rig.period)
+        record = stand.run(signal, folder, f"loaded_{i}" if i else "probe", bolted=true)
         if i == 0:
             seen = float(np.ptp(record[name])) / 4  # a step swings to twice where it rests, to either side
-            level = min(SHARE * rig.model.limit, GROWTH / PROBE * level, level * wanted / max(seen, 1e-12))
+            level = min(SHARE * stand.rig.limit, GROWTH / PROBE * level, level * wanted / max(seen, 1e-12))
             continue
         label = text if text not in logs else f"{text}, run {i}"
-        logs[label], files[label] = record, log.name
+        logs[label], files[label] = record, file_of(record)
     found, left_out = weigh(
-        logs, values, dict.fromkeys(logs, name), dict.fromkeys(logs, "u_applied"), tolerance=rig.file.tolerance
+        logs, values, dict.fromkeys(logs, name), dict.fromkeys(logs, APPLIED), tolerance=stand.file.tolerance
     )
-    return Weighed(rig=rig, kind=kind, loadings=found, logs=logs, files=files, left_out=left_out)
+    return Weighed(stand=stand, kind=kind, loadings=found, logs=logs, files=files, left_out=left_out)
 
 
-def _added(rig: RigAtHand) -> list[float]:
+def _added(stand: LiveStand) -> list[float]:
     """Loadings of RIG.toml [kg or kg m^2]."""
-    kind = kind_of(rig.model.plant)
-    said = [inertia_of(text) for text in rig.file.added]
+    kind = kind_of(stand.rig.plant)
+    said = [inertia_of(text) for text in stand.file.added]
     if {k for _, k in said if k} == {kind} and len({a for a, _ in said}) > 1:
         return [a for a, _ in said]
     unit, piece = OSCILLATORS[kind].unit, OSCILLATORS[kind].piece
     raise BadInput(
-        f"{rig.file.path}: experiment 1a needs two or more different loadings in {unit}, such as [loadings] "
-        f'added = ["0 {unit}", "{piece:.3g} {unit}", "{2 * piece:.3g} {unit}"], got {", ".join(rig.file.added)}.'
+        f"{stand.file.path}: experiment 1a needs two or more different loadings in {unit}, such as [loadings] "
+        f'added = ["0 {unit}", "{piece:.3g} {unit}", "{2 * piece:.3g} {unit}"], got {", ".join(stand.file.added)}.'
     )
 
 
-def _bolted(rig: RigAtHand, values: Sequence[float]) -> list[float]:
+def _bolted(stand: LiveStand, values: Sequence[float]) -> list[float]:
     """What a twin's hands truly bolt on: pieces of the smallest loading, each off by its tolerance; of hardware, 0."""
-    if rig.file.hardware:
+    if stand.file.hardware:
         return [0.0] * len(values)
     piece = min(v for v in values if v > 0)
     count = math.ceil(max(values) / piece)
-    off = np.random.default_rng([rig.file.seed, 71]).normal(0.0, rig.file.tolerance, count)
+    off = np.random.default_rng([stand.file.seed, 71]).normal(0.0, stand.file.tolerance, count)
     return np.interp(values, piece * np.arange(count + 1), np.append(0.0, np.cumsum(piece * (1 + off)))).tolist()
 
 
-def _wanted(rig: RigAtHand) -> float:
+def _wanted(stand: LiveStand) -> float:
     """How far a step is to put it [m or rad]; it swings twice as far."""
-    return min(REACH[rig.model.plant.coordinates[0].unit], OF_TRAVEL * travel_of(rig, 0))
+    return min(REACH[stand.rig.plant.coordinates[0].unit], OF_TRAVEL * stand.travel)
 
 
-def _stiffness(rig: RigAtHand) -> float:
+def _stiffness(stand: LiveStand) -> float:
     """Command per displacement, by the guesses."""
-    return rig.model.plant.parameters()["k_1"] / abs(rig.model.gain)
+    return stand.rig.plant.parameters()["k_1"] / abs(stand.rig.gain)
 
 
-def _slowest(rig: RigAtHand, added: float) -> float:
+def _slowest(stand: LiveStand, added: float) -> float:
     """Natural frequency with that added, by the guesses [rad/s]."""
-    p, inertia = rig.model.plant.parameters(), rig.model.plant.names()[0]
+    p, inertia = stand.rig.plant.parameters(), stand.rig.plant.names()[0]
     return math.sqrt(p["k_1"] / (p[inertia] + p["a_1"] + added))
 
 

@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from upright.errors import NotIdentifiable
-from upright.experiments.hands_on.rig import RigAtHand
 from upright.experiments.hands_on.studies import write_study
+from upright.experiments.stand.live import LiveStand
+from upright.experiments.stand.protocol import TestStand, file_of
 from upright.identification.estimate import identify
 from upright.identification.model.fit import Fit
 from upright.progress import Progress, part
-from upright.readers import read
+from upright.records import Record
 from upright.rig.makes import MAKES
 from upright.study.draft.release import free_from
 from upright.study.load import Study, load_study
@@ -28,13 +29,13 @@ CLEAR = math.radians(15)
 
 
 def run_swings(
-    rig: RigAtHand, folder: Path, progress: Progress, found: Mapping[str, Mapping[str, Any]]
+    stand: LiveStand, folder: Path, progress: Progress, found: Mapping[str, Mapping[str, Any]]
 ) -> tuple[Study, Fit]:  # fmt: skip
     """Let it swing and fit; leaves logs, `study.toml` and `fit.json`.
 
     Parameters
     ----------
-    rig : RigAtHand
+    stand : LiveStand
     folder : Path
     progress : callable
     found : mapping
@@ -47,42 +48,41 @@ def run_swings(
     NotIdentifiable
         When no release is seen.
     """
-    names = rig.names
+    names = stand.names
     runs: list[dict[str, Any]] = []
     for i, (role, angle) in enumerate((("fit", HIGH), ("predict", LOW))):
         progress(f"swinging from about {math.degrees(angle):.0f} degrees", 0.2 * i)
-        rig.requested(
+        stand.ask(
             f"Let {names[-1]} hang at rest until the run begins; the drive is silent. Within {HAND:.0f} s from then "
             f"lift {names[-1]} to about {math.degrees(angle):.0f} degrees, hold it and {names[0]} still, let both go "
             "together, and keep away."
         )
-        seconds = SWING + (HAND if rig.file.hardware else 0.0)
-        samples = [0.0] * math.ceil(seconds / rig.model.period)
-        log = rig.put_out(samples, folder, f"release_{math.degrees(angle):.0f}", lifted=angle)
-        begin, end = _window(rig, log)
-        runs.append({"label": log.stem, "file": log.name, "window": [begin, end], "role": role})
+        seconds = SWING + (HAND if stand.file.hardware else 0.0)
+        samples = [0.0] * math.ceil(seconds / stand.rig.period)
+        log = stand.run(samples, folder, f"release_{math.degrees(angle):.0f}", lifted=angle)
+        begin, end = _window(stand, log)
+        runs.append({"label": Path(file_of(log)).stem, "file": file_of(log), "window": [begin, end], "role": role})
     study = load_study(
-        write_study(rig, folder / "study.toml", f"Free swings of {rig.model.name}", runs, known=found, drive=False)
+        write_study(stand, folder / "study.toml", f"Free swings of {stand.rig.name}", runs, known=found, drive=False)
     )
     fit = identify(study.model, study.runs, progress=part(progress, 0.4, 1.0, "fitting the swings"))
     write_fit(fit, study, folder / "fit.json")
     return study, fit
 
 
-def _window(rig: RigAtHand, log: Path) -> tuple[float, float]:
-    record = read(log)
-    pivot, swing = rig.names
-    theta = record[swing]
+def _window(stand: TestStand, log: Record) -> tuple[float, float]:
+    pivot, swing = stand.names
+    theta = log[swing]
     if abs(theta).max() < CLEAR:
         raise NotIdentifiable(
-            f"{swing} went no further than {math.degrees(abs(theta).max()):.2g} degrees in {log.name}: it was not "
+            f"{swing} went no further than {math.degrees(abs(theta).max()):.2g} degrees in {file_of(log)}: it was not "
             "lifted in time; run the experiment again."
         )
-    swings = max(abs(p.imag) for p in rig.model.linear(rig.resting).poles())
-    begin = free_from(record.t, theta, swings, float(record.t[0]), record[pivot])
-    return begin, float(record.t[-1])
+    swings = max(abs(p.imag) for p in stand.rig.linear(stand.resting).poles())
+    begin = free_from(log.t, theta, swings, float(log.t[0]), log[pivot])
+    return begin, float(log.t[-1])
 
 
-def carrier_of(rig: RigAtHand) -> str:
+def carrier_of(stand: LiveStand) -> str:
     """Inertia of the body that carries the pendulum; empty where no make has such a plant."""
-    return next((m.body for m in MAKES.values() if m.pendulum and isinstance(rig.model.plant, type(m.plant))), "")
+    return next((m.body for m in MAKES.values() if m.pendulum and isinstance(stand.rig.plant, type(m.plant))), "")

@@ -97,6 +97,7 @@ def swing_up(
     BadInput
         When the call contradicts itself or the fit, or the log cannot be used.
     """
+    from upright.experiments.stand.twin import TwinStand
     from upright.experiments.swing_up_2b.chapter import chapter, check_chapter
     from upright.experiments.swing_up_2b.run import known_of, run_swing_up, scales_of_log
     from upright.files import write_json
@@ -135,7 +136,8 @@ def swing_up(
         told = check_chapter(model, scales, log.name, name or "FIT.json")
         told = replace(told, warnings=(*told.warnings, *doubt))
         return Answer(scales, told, write_page(told, at / "encoders.html", pdf))
-    done = run_swing_up(model, _lying(truth, lie), at, known=known, seconds=seconds, travel=travel, source=name)
+    stand = TwinStand(rig=_lying(truth, lie))
+    done = run_swing_up(model, stand, at, known=known, seconds=seconds, travel=travel, source=name)
     told = chapter(done)
     told = replace(told, warnings=(*told.warnings, *doubt))
     return Answer(

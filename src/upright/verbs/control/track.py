@@ -126,7 +126,7 @@ def track(
         on = on.replace(limit=limit or on.limit)
         done = run_tracking(on, seed, at, progress, which=which, poles=own, step=size)
     else:
-        done = follow(on, on, Path(called(source)), None, None, progress, which=which, poles=own, step=size)
+        done = follow(on, None, Path(called(source)), None, None, progress, which=which, poles=own, step=size)
     told = chapter(done)
     told = replace(
         told, title=f"Experiment 3: {told.title.lower()}, {done.rig.name}",

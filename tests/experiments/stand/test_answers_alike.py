@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from upright.experiments.hands_on.rig import rig_at_hand, trial_of
-from upright.experiments.hands_on.shaft import pushed
+from upright.experiments.stand.live import live_stand, pushed, run_of
 from upright.experiments.tracking_3.laws import AT, paper_sets
 from upright.experiments.tracking_3.run import asked_of, attempt, figured
 from upright.files import write_json
@@ -41,7 +40,7 @@ def test_a_step_and_the_push_after_it_come_as_simulated(tmp_path):
     path = write_json(tmp_path / "law.json", as_values(pushed(law.law, reference, pushes)))
     seconds = reference.size * rig.period
     done = run_rig(RunRequest(rig=tmp_path / "RIG.toml", law=path, seconds=seconds, check=False), tmp_path)
-    went = trial_of(done, AT)
+    went = run_of(done, AT).trial
     n = simulated.trial.u.size
     np.testing.assert_allclose(
         went.record.t[:n], simulated.trial.record.t, atol=1e-12
@@ -51,4 +50,4 @@ def test_a_step_and_the_push_after_it_come_as_simulated(tmp_path):
     assert found.give == pytest.approx(simulated.give, rel=1e-9)
     assert found.figures.arrival == pytest.approx(simulated.figures.arrival, rel=1e-9)
     assert math.isinf(found.tripped)
-    assert rig_at_hand(tmp_path / "RIG.toml").resting == "rest"
+    assert live_stand(tmp_path / "RIG.toml").resting == "rest"
