@@ -57,7 +57,6 @@ experiments.weighing_1a
 experiments.frequency_1b
 experiments.regulation_2
 experiments.swing_up_2b experiments.tracking_3 experiments.free_swing_4
-experiments.hands_on
 experiments
 exports
 verbs

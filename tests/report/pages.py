@@ -140,11 +140,12 @@ def measured_response_page(folder: Path) -> Chapter:
 
 
 def loadings_page(folder: Path) -> Chapter:
+    from upright.experiments.stand.twin import TwinStand
     from upright.experiments.weighing_1a.chapter import chapter
     from upright.experiments.weighing_1a.run import run_weighing
     from upright.rig.makes import make_rig
 
-    return chapter(run_weighing(make_rig("rectilinear", 2), 2, folder))
+    return chapter(run_weighing(TwinStand(rig=make_rig("rectilinear", 2)), 2, folder))
 
 
 def frequency_page(folder: Path) -> Chapter:

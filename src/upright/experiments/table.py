@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from upright.errors import BadInput
-from upright.experiments.hands_on.loaded import kind_of, run_loaded
-from upright.experiments.stand.live import LiveStand
+from upright.experiments.stand.known import Known
 from upright.experiments.stand.protocol import TestStand
-from upright.experiments.weighing_1a.run import Known
+from upright.experiments.weighing_1a.run import kind_of, run_weighing
 from upright.progress import Progress
-from upright.quantities import with_unit
 from upright.report.page import Chapter
 from upright.report.symbols import typed
 from upright.rig import Rig
@@ -48,14 +45,11 @@ class ExperimentInput:
             raise BadInput("It stands on the fit of experiment 1b, which could not be finished; its chapter says why.")
         return self.folders["1b"] / "fit.json"
 
-    def estimate(self, key: str, body: str) -> dict[str, dict[str, Any]]:
-        """What an earlier experiment says of a body's inertia, as a study has it."""
+    def estimated(self, key: str, name: str) -> tuple[Known, ...]:
+        """What the fit of an earlier experiment says of a parameter, if anything."""
         chapter = self.earlier.get(key)
-        told = chapter.numbers.get("parameters", {}).get(body) if chapter else None
-        if not told or not told.get("stderr"):
-            return {}
-        unit = told["unit"]
-        return {body: {"value": with_unit(told["value"], unit, 10), "uncertainty": with_unit(told["stderr"], unit, 4)}}
+        told = chapter.numbers.get("parameters", {}).get(name) if chapter else None
+        return (Known(name=name, value=told["value"], stderr=told["stderr"]),) if told and told.get("stderr") else ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,7 +79,7 @@ class Experiment:
     part_of: str
     title: str
     makes: tuple[str, ...]
-    on: Callable[[LiveStand], bool]
+    on: Callable[[TestStand], bool]
     needs: tuple[str, ...]
     live_needs: tuple[str, ...]
     seconds: float
@@ -97,30 +91,21 @@ class Experiment:
 
 
 def _weighing(at: ExperimentInput) -> tuple[Chapter, bool]:
-    if isinstance(at.stand, LiveStand):
-        from upright.experiments.hands_on.chapters import loaded_chapter
-
-        return loaded_chapter(run_loaded(at.stand, at.folder, at.progress), at.folder), True
     from upright.experiments.weighing_1a.chapter import chapter
-    from upright.experiments.weighing_1a.run import run_weighing
 
-    return chapter(run_weighing(at.stand.rig, at.seed, at.folder, at.progress)), True
+    return chapter(run_weighing(at.stand, at.seed, at.folder, at.progress)), True
 
 
 def _frequency(at: ExperimentInput) -> tuple[Chapter, bool]:
-    if isinstance(at.stand, LiveStand):
-        from upright.experiments.hands_on.chapters import hanging_chapter
-        from upright.experiments.hands_on.hanging import run_hanging
-
-        plant = at.stand.rig.plant
-        weighed = at.estimate("1a", plant.names()[0]) if kind_of(plant) else {}
-        hung = run_hanging(at.stand, at.folder, at.progress, weighed)
-        return hanging_chapter(hung, at.folder, at.stand.truth), not hung.fit.interrupted
-    from upright.experiments.frequency_1b.chapter import chapter
+    from upright.experiments.frequency_1b.at_once import run_at_once
+    from upright.experiments.frequency_1b.chapter import at_once_chapter, chapter
     from upright.experiments.frequency_1b.run import run_frequency
 
-    done = run_frequency(at.stand.rig, at.seed, at.folder, at.progress, at.stopped, weighed=at.weighed)
-    return chapter(done), True
+    if at.stand.simulated:  # where nobody waits for sines, one after the other
+        done = run_frequency(at.stand.rig, at.seed, at.folder, at.progress, at.stopped, weighed=at.weighed)
+        return chapter(done), True
+    asked = run_at_once(at.stand, at.folder, at.progress, at.weighed)
+    return at_once_chapter(asked, at.folder, at.stand.truth), not asked.fit.interrupted
 
 
 def _identified(at: ExperimentInput, stand: TestStand) -> tuple[Rig, Rig]:
@@ -167,17 +152,16 @@ def _tracking(at: ExperimentInput) -> tuple[Chapter, bool]:
 
 
 def _free_swing(at: ExperimentInput) -> tuple[Chapter, bool]:
-    if isinstance(at.stand, LiveStand):
-        from upright.experiments.hands_on.chapters import fit_chapter
-        from upright.experiments.hands_on.swings import carrier_of, run_swings
-
-        study, fit = run_swings(at.stand, at.folder, at.progress, at.estimate("1b", carrier_of(at.stand)))
-        return fit_chapter(study, fit, at.folder, at.stand.truth), not fit.interrupted
+    from upright.experiments.free_swing_4.by_hand import carrier_of, run_by_hand
     from upright.experiments.free_swing_4.chapter import chapter
     from upright.experiments.free_swing_4.run import run_free_swing
+    from upright.experiments.stand.fits import fit_chapter
     from upright.rig.makes import make_of
     from upright.study.results import write_fit
 
+    if not at.stand.simulated:
+        study, fit = run_by_hand(at.stand, at.folder, at.progress, at.estimated("1b", carrier_of(at.stand)))
+        return fit_chapter(study, fit, at.folder, at.stand.truth), not fit.interrupted
     rig = at.stand.rig
     weighed = next((k for k in at.weighed if k.name == make_of(rig.plant).body), None)
     done = run_free_swing(rig, at.seed, at.folder, at.progress, at.stopped, weighed=weighed)
@@ -187,19 +171,19 @@ def _free_swing(at: ExperimentInput) -> tuple[Chapter, bool]:
     return chapter(done), not done.interrupted
 
 
-def _carries_pendulum(stand: LiveStand) -> bool:
+def _carries_pendulum(stand: TestStand) -> bool:
     plant = stand.rig.plant
     return "inverted" in plant.equilibria and len(plant.coordinates) == 2
 
 
-def _is_shaft(stand: LiveStand) -> bool:
+def _is_shaft(stand: TestStand) -> bool:
     return any(isinstance(stand.rig.plant, type(MAKES[key].plant)) for key in SHAFTS)
 
 
 EXPERIMENTS: tuple[Experiment, ...] = (
     Experiment(
         key="1a", part_of="1", title="Stiffness and inertia from added loads", makes=(*PENDULUMS, *SHAFTS),
-        on=lambda stand: bool(kind_of(stand.rig.plant) and stand.file.added), needs=(), live_needs=(), seconds=1.5,
+        on=lambda stand: bool(kind_of(stand.rig.plant) and stand.added), needs=(), live_needs=(), seconds=1.5,
         tell=_weighing,
     ),
     Experiment(

@@ -15,11 +15,12 @@ import upright as up
 from tests.exports.rigs import fit_file
 from upright.control.swing_up import MODE
 from upright.errors import BadInput
-from upright.experiments.hands_on.hanging import SHARE, _level, asking
-from upright.experiments.hands_on.studies import write_study
+from upright.experiments.frequency_1b.at_once import _level, asking
 from upright.experiments.laboratory import choose
 from upright.experiments.regulation_2.run import scored
 from upright.experiments.stand.live import live_stand, run_of
+from upright.experiments.stand.strength import SHARE
+from upright.experiments.stand.studies import write_study
 from upright.experiments.swing_up_2b.run import run_swing_up
 from upright.gains import feedback, filtered, place
 from upright.laws import as_values, of_values

@@ -95,6 +95,21 @@ class LiveStand:
         return self.file.known if self.file.known and self.file.known.suffix != ".toml" else None
 
     @property
+    def study(self) -> Path | None:
+        """The study that RIG.toml names, if any."""
+        return None if self.fit is not None else self.file.known
+
+    @property
+    def added(self) -> tuple[str, ...]:
+        """Those of RIG.toml."""
+        return self.file.added
+
+    @property
+    def tolerance(self) -> float:
+        """That of RIG.toml."""
+        return self.file.tolerance
+
+    @property
     def travel(self) -> float:
         """The description's, or less where RIG.toml says so."""
         units = {c.name: c.unit for c in self.rig.plant.coordinates}

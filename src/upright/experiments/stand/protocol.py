@@ -68,6 +68,21 @@ class TestStand(Protocol):
         ...
 
     @property
+    def study(self) -> Path | None:
+        """What its owner says of it, from which an identification starts; none of a make's twin."""
+        ...
+
+    @property
+    def added(self) -> tuple[str, ...]:
+        """Known inertias that can be bolted to its first body one after the other, as their owner says them."""
+        ...
+
+    @property
+    def tolerance(self) -> float:
+        """Relative standard uncertainty of a piece of these."""
+        ...
+
+    @property
     def travel(self) -> float:
         """How far the driven coordinate may go [m or rad]."""
         ...
@@ -75,6 +90,11 @@ class TestStand(Protocol):
     @property
     def resting(self) -> str:
         """Equilibrium at which the encoders are zeroed."""
+        ...
+
+    @property
+    def twin(self) -> Rig:
+        """What a twin truly is; of hardware its description."""
         ...
 
     @property

@@ -28,10 +28,19 @@ class TwinStand:
         As it truly is.
     make : Make or None
         That it is one of.
+    added, tolerance : tuple of str, float
+        What may be bolted to its first body, see `TestStand`.
     """
 
     rig: Rig
     make: Make | None = None
+    added: tuple[str, ...] = ()
+    tolerance: float = 0.0
+
+    @property
+    def twin(self) -> Rig:
+        """Itself."""
+        return self.rig
 
     @property
     def names(self) -> list[str]:
@@ -56,6 +65,11 @@ class TwinStand:
     @property
     def fit(self) -> Path | None:
         """None does: it is identified."""
+        return None
+
+    @property
+    def study(self) -> Path | None:
+        """None: the design and the bench say what is known."""
         return None
 
     @property

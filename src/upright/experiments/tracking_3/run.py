@@ -19,6 +19,7 @@ from upright.basis import SIMULATED
 from upright.control import Trial, trial
 from upright.control.score import Effort, StepFigures, effort, step_figures
 from upright.errors import BadInput
+from upright.experiments.stand.known import Known
 from upright.experiments.stand.protocol import TestStand
 from upright.experiments.stand.twin import TwinStand
 from upright.experiments.tracking_3.laws import (
@@ -34,7 +35,6 @@ from upright.experiments.tracking_3.laws import (
     with_sum,
 )
 from upright.experiments.tracking_3.pulses import fitted, identify_shaft
-from upright.experiments.weighing_1a.run import Known
 from upright.identification.model.fit import Fit
 from upright.progress import Progress, silent
 from upright.records import Array

@@ -9,7 +9,7 @@ against the last probe, which they have not seen.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,35 +18,25 @@ import numpy as np
 
 from upright.errors import BadInput, NotIdentifiable
 from upright.experiments.frequency_1b.run import LoggedResponse, LogRequest, response_of_logs
-from upright.experiments.hands_on.studies import write_study
-from upright.experiments.stand.live import LiveStand
+from upright.experiments.stand.fits import fit_study
+from upright.experiments.stand.known import Known
 from upright.experiments.stand.protocol import TestStand, file_of
-from upright.identification.estimate import identify
+from upright.experiments.stand.strength import GROWTH, OF_TRAVEL, REACH, SHARE, STILL
+from upright.experiments.stand.studies import write_study
 from upright.identification.frequency.spectra import multisine, odd_lines
 from upright.identification.model.fit import Fit
 from upright.progress import Progress, part
 from upright.records import Array, Record
-from upright.study.load import Study, load_study
-from upright.study.results import write_fit
+from upright.study.load import Study
 
 BELOW, ABOVE = 0.4, 4.0
 """Ends of the band beside the slowest and the fastest swing of a rig that nobody makes."""
-REACH = {"rad": math.radians(12), "m": 0.02}
-"""Amplitude that is wanted of a coordinate of such a rig."""
-OF_TRAVEL = 0.25
-"""Most amplitude of the driven coordinate, as a share of its travel."""
 LINES, RESOLVED = 20, 4
 """Frequencies, and how many times the period of the multisine holds that of the slowest."""
 PROBES = (0.15, 0.4, 0.8)
 """Commands of the probes, as shares of what the guesses call for; what came of each bounds the next."""
 PROBED, PERIODS = 2, 8
 """Periods of a probe, and of the run."""
-SHARE = 0.8
-"""Of the drive's limit."""
-GROWTH = 3.0
-"""Most by which a run is stronger than the one before."""
-STILL = 0.5
-"""Time at rest before a signal [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,7 +81,7 @@ def asking(stand: TestStand) -> Asking:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Hanging:
+class AtOnce:
     """What the rig answered: its response, if it has one, and a fit of the motion with the study that repeats it."""
 
     response: LoggedResponse | None
@@ -99,12 +89,12 @@ class Hanging:
     fit: Fit
 
 
-def run_hanging(
-    stand: LiveStand, folder: Path, progress: Progress, weighed: Mapping[str, Mapping[str, Any]] | None = None
-) -> Hanging:  # fmt: skip
+def run_at_once(
+    stand: TestStand, folder: Path, progress: Progress, weighed: Sequence[Known] = ()
+) -> AtOnce:  # fmt: skip
     """Ask the rig, and fit what it answered; leaves logs, `study.toml`, `fit.json` and the response in a folder.
 
-    What experiment 1a `weighed` is known of its inertias.
+    What experiment 1a `weighed` is known.
 
     Raises
     ------
@@ -141,10 +131,8 @@ def run_hanging(
         response = response_of_logs([answered], wish, answered.parent, tell=tell)
     except NotIdentifiable:  # friction may leave too few frequencies; the motion says more
         response = None
-    study = load_study(path)
-    fit = identify(study.model, study.runs, progress=part(progress, 0.6, 1.0, "fitting the motion"))
-    write_fit(fit, study, folder / "fit.json")
-    return Hanging(response=response, study=study, fit=fit)
+    study, fit = fit_study(path, part(progress, 0.6, 1.0, "fitting the motion"))
+    return AtOnce(response=response, study=study, fit=fit)
 
 
 def _run(label: str, log: Record, asked: Asking, periods: int) -> dict[str, Any]:

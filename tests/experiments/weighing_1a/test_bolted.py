@@ -10,10 +10,10 @@ import pytest
 
 import upright as up
 from upright.errors import BadInput, RigStopped
-from upright.experiments.hands_on.loaded import PROBE, _bolted, run_loaded
-from upright.experiments.hands_on.studies import write_study
 from upright.experiments.laboratory import choose
 from upright.experiments.stand.live import LiveStand, live_stand
+from upright.experiments.stand.studies import write_study
+from upright.experiments.weighing_1a.run import PROBE, _bolted, step_stand
 from upright.readers import read
 
 STUDY = """
@@ -54,7 +54,7 @@ def test_a_cart_is_weighed_within_its_travel_whatever_was_guessed(tmp_path, gues
     """A guess of a softer spring asks for less; what the probe shows makes up for it."""
     rig = made(tmp_path, LOADINGS.replace("0.2 %", "0 %"))
     told = replace(rig, rig=rig.rig.changed(k_1=guessed))
-    done = run_loaded(told, tmp_path / "1a", lambda _step, _share: None)
+    done = step_stand(told, tmp_path / "1a", lambda _step, _share: None)
     truth = rig.twin.plant.parameters()
     for estimate, true in ((done.loadings.k, truth["k_1"]), (done.loadings.bare, truth["m_1"])):
         assert estimate.interval[0] <= true <= estimate.interval[1]
@@ -85,7 +85,7 @@ def test_a_step_never_exceeds_its_share_of_the_limit(tmp_path, monkeypatch):
     monkeypatch.setattr(LiveStand, "run", run)
     rig = replace(live_stand(tmp_path / "RIG.toml"), person=lambda _sentence: len(levels) < 2)
     with pytest.raises(RigStopped, match="asked for and not done"):
-        run_loaded(rig, tmp_path / "1a", lambda _step, _share: None)
+        step_stand(rig, tmp_path / "1a", lambda _step, _share: None)
     probe, level = levels
     assert probe == pytest.approx(PROBE * 4.0)
     assert level == pytest.approx(4.0)
@@ -116,7 +116,7 @@ def test_a_rig_is_weighed_where_its_file_names_what_is_bolted_on(tmp_path):
 )
 def test_loadings_that_make_no_line_are_told(tmp_path, loadings, complaint):
     with pytest.raises(BadInput, match=complaint):
-        run_loaded(made(tmp_path, loadings), tmp_path / "1a", lambda _step, _share: None)
+        step_stand(made(tmp_path, loadings), tmp_path / "1a", lambda _step, _share: None)
 
 
 @pytest.mark.parametrize(
@@ -140,7 +140,7 @@ def test_a_person_is_asked_for_every_loading_by_the_owners_words(tmp_path):
 
     rig = replace(made(tmp_path), person=person)
     with pytest.raises(RigStopped, match=r"asked for and not done: .*0 kg in all"):
-        run_loaded(rig, tmp_path / "1a", lambda _step, _share: None)
+        step_stand(rig, tmp_path / "1a", lambda _step, _share: None)
 
 
 @pytest.mark.parametrize(("said", "there"), [("", {"guess": "0.001768 s", "min": 0}), ("lag", "0.001768 s")])

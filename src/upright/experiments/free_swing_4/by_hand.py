@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from upright.errors import NotIdentifiable
-from upright.experiments.hands_on.studies import write_study
-from upright.experiments.stand.live import LiveStand
+from upright.experiments.stand.fits import fit_study
+from upright.experiments.stand.known import Known
 from upright.experiments.stand.protocol import TestStand, file_of
-from upright.identification.estimate import identify
+from upright.experiments.stand.studies import write_study
 from upright.identification.model.fit import Fit
 from upright.progress import Progress, part
 from upright.records import Record
 from upright.rig.makes import MAKES
 from upright.study.draft.release import free_from
-from upright.study.load import Study, load_study
-from upright.study.results import write_fit
+from upright.study.load import Study
 
 HIGH, LOW = math.radians(75), math.radians(50)
 """How high the pendulum is lifted, for the run that is fitted and the one that is predicted."""
@@ -28,17 +27,17 @@ CLEAR = math.radians(15)
 """A pendulum that was lifted less was not lifted."""
 
 
-def run_swings(
-    stand: LiveStand, folder: Path, progress: Progress, found: Mapping[str, Mapping[str, Any]]
+def run_by_hand(
+    stand: TestStand, folder: Path, progress: Progress, known: Sequence[Known]
 ) -> tuple[Study, Fit]:  # fmt: skip
     """Let it swing and fit; leaves logs, `study.toml` and `fit.json`.
 
     Parameters
     ----------
-    stand : LiveStand
+    stand : TestStand
     folder : Path
     progress : callable
-    found : mapping
+    known : sequence of Known
         What earlier experiments say of the body that carries the pendulum: nothing else gives a free swing its scale.
 
     Raises
@@ -57,17 +56,14 @@ def run_swings(
             f"lift {names[-1]} to about {math.degrees(angle):.0f} degrees, hold it and {names[0]} still, let both go "
             "together, and keep away."
         )
-        seconds = SWING + (HAND if stand.file.hardware else 0.0)
+        seconds = SWING + (0.0 if stand.performed else HAND)
         samples = [0.0] * math.ceil(seconds / stand.rig.period)
         log = stand.run(samples, folder, f"release_{math.degrees(angle):.0f}", lifted=angle)
         begin, end = _window(stand, log)
         runs.append({"label": Path(file_of(log)).stem, "file": file_of(log), "window": [begin, end], "role": role})
-    study = load_study(
-        write_study(stand, folder / "study.toml", f"Free swings of {stand.rig.name}", runs, known=found, drive=False)
-    )
-    fit = identify(study.model, study.runs, progress=part(progress, 0.4, 1.0, "fitting the swings"))
-    write_fit(fit, study, folder / "fit.json")
-    return study, fit
+    title = f"Free swings of {stand.rig.name}"
+    path = write_study(stand, folder / "study.toml", title, runs, known=known, drive=False)
+    return fit_study(path, part(progress, 0.4, 1.0, "fitting the swings"))
 
 
 def _window(stand: TestStand, log: Record) -> tuple[float, float]:
@@ -83,6 +79,6 @@ def _window(stand: TestStand, log: Record) -> tuple[float, float]:
     return begin, float(log.t[-1])
 
 
-def carrier_of(stand: LiveStand) -> str:
+def carrier_of(stand: TestStand) -> str:
     """Inertia of the body that carries the pendulum; empty where no make has such a plant."""
     return next((m.body for m in MAKES.values() if m.pendulum and isinstance(stand.rig.plant, type(m.plant))), "")
