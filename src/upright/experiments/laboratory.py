@@ -19,7 +19,7 @@ from upright._version import __version__
 from upright.errors import BadInput, UprightError
 from upright.experiments.abreast import run_abreast
 from upright.experiments.stand.live import LiveStand
-from upright.experiments.stand.protocol import TestStand
+from upright.experiments.stand.stand import TestStand
 from upright.experiments.stand.twin import TwinStand
 from upright.experiments.table import EXPERIMENTS, Experiment, ExperimentInput
 from upright.experiments.worn import worn as worn_twin

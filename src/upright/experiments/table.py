@@ -8,7 +8,7 @@ from pathlib import Path
 
 from upright.errors import BadInput
 from upright.experiments.stand.known import Known
-from upright.experiments.stand.protocol import TestStand
+from upright.experiments.stand.stand import TestStand
 from upright.experiments.weighing_1a.run import kind_of, run_weighing
 from upright.progress import Progress
 from upright.report.page import Chapter

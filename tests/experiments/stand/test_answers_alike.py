@@ -9,7 +9,7 @@ import pytest
 
 from upright.basis import SIMULATED
 from upright.experiments.stand.live import live_stand, pushed, run_of
-from upright.experiments.stand.protocol import APPLIED, file_of
+from upright.experiments.stand.stand import APPLIED, file_of
 from upright.experiments.stand.twin import TwinStand
 from upright.experiments.tracking_3.laws import AT, paper_sets
 from upright.experiments.tracking_3.run import asked_of, figured

@@ -10,7 +10,7 @@ from typing import Any
 from upright.errors import NotIdentifiable
 from upright.experiments.stand.fits import fit_study
 from upright.experiments.stand.known import Known
-from upright.experiments.stand.protocol import TestStand, file_of
+from upright.experiments.stand.stand import TestStand, file_of
 from upright.experiments.stand.studies import write_study
 from upright.identification.model.fit import Fit
 from upright.progress import Progress, part

@@ -20,7 +20,7 @@ from upright.errors import BadInput, NotIdentifiable
 from upright.experiments.frequency_1b.run import LoggedResponse, LogRequest, response_of_logs
 from upright.experiments.stand.fits import fit_study
 from upright.experiments.stand.known import Known
-from upright.experiments.stand.protocol import TestStand, file_of
+from upright.experiments.stand.stand import TestStand, file_of
 from upright.experiments.stand.strength import GROWTH, OF_TRAVEL, REACH, SHARE, STILL
 from upright.experiments.stand.studies import write_study
 from upright.identification.frequency.spectra import multisine, odd_lines

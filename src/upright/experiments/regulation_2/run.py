@@ -20,7 +20,7 @@ from upright.control.preflight import Preflight, Task, preflight, word
 from upright.designing.run import SPEEDS, velocities
 from upright.errors import BadInput
 from upright.experiments.frequency_1b.run import run_frequency
-from upright.experiments.stand.protocol import StandRun, TestStand
+from upright.experiments.stand.stand import StandRun, TestStand
 from upright.gains import Margins, Placement, feedback, margins, place
 from upright.gains.loop import closed, command_noise
 from upright.gains.requests import Roots, poles_of, read_poles

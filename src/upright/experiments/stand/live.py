@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,14 +12,13 @@ import numpy as np
 from upright.basis import REPLAYED
 from upright.control.trial import Trial
 from upright.errors import BadInput, RigStopped
-from upright.experiments.stand.protocol import APPLIED, StandRun
+from upright.experiments.stand.stand import APPLIED, StandRun, TestStand
 from upright.files import read_text, write_json
 from upright.laws import Law, Rule, as_values
 from upright.logs.layout import library
 from upright.readers import read
 from upright.realtime.session import RunState
 from upright.records import Array, Record
-from upright.rig import Rig
 from upright.rig.makes import MAKES, Make, make_of_vendor
 from upright.rigs.protocol import Fault
 from upright.rigs.rigfile import RigFile, read_rig_file
@@ -41,92 +40,22 @@ def nobody(_sentence: str) -> bool:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LiveStand:
+class LiveStand(TestStand):
     """A rig behind its protocol as a test stand.
 
     Attributes
     ----------
     file : RigFile
-    rig, twin : Rig
-        As its owner describes it, and what a twin behind the protocol truly is; the same of hardware.
     person : callable
         Asked for something, in a sentence; answers whether it was done.
     watching : callable
         Opens a view for a run: a callable that is shown how it goes, and answers with a sentence to end it.
     """
 
+    simulated = False
     file: RigFile
-    rig: Rig
-    twin: Rig
     person: Callable[[str], bool] = nobody
     watching: Callable[[], AbstractContextManager[Watch]] = nobody_watches
-
-    @property
-    def names(self) -> list[str]:
-        """Coordinates, in the plant's order."""
-        return [c.name for c in self.rig.plant.coordinates]
-
-    @property
-    def make(self) -> Make | None:
-        """The make that RIG.toml or the description says it is of; a rig of one's own is of none."""
-        if self.file.known is None:
-            return MAKES[self.file.make]
-        known = read_stored_rig(self.file.known)
-        return make_of_vendor(self.file.vendor or known.hardware.vendor, known.plant)
-
-    @property
-    def simulated(self) -> bool:
-        """It is driven through the protocol, with its limits, twin or not."""
-        return False
-
-    @property
-    def performed(self) -> str:
-        """That nothing is driven, where it is a twin."""
-        return self.file.performed
-
-    @property
-    def vendor(self) -> str:
-        """As RIG.toml names him."""
-        return self.file.vendor
-
-    @property
-    def fit(self) -> Path | None:
-        """The fit that RIG.toml names; None where it names what an identification may start from."""
-        return self.file.known if self.file.known and self.file.known.suffix != ".toml" else None
-
-    @property
-    def study(self) -> Path | None:
-        """The study that RIG.toml names, if any."""
-        return None if self.fit is not None else self.file.known
-
-    @property
-    def added(self) -> tuple[str, ...]:
-        """Those of RIG.toml."""
-        return self.file.added
-
-    @property
-    def tolerance(self) -> float:
-        """That of RIG.toml."""
-        return self.file.tolerance
-
-    @property
-    def travel(self) -> float:
-        """The description's, or less where RIG.toml says so."""
-        units = {c.name: c.unit for c in self.rig.plant.coordinates}
-        limits = self.file.limits(units, self.rig.unit, usual_limits(self.rig))
-        assert limits is not None  # `live_stand` refuses hardware without
-        return min(self.rig.travel, limits.travel[self.names.index(self.rig.plant.inputs[0].on)])
-
-    @property
-    def resting(self) -> str:
-        """Equilibrium at which the encoders are zeroed."""
-        kinds = self.rig.plant.equilibria
-        return self.file.zero if self.file.zero in kinds else next(iter(kinds))
-
-    @property
-    def truth(self) -> Mapping[str, float]:
-        """Numbers of a twin by name, `actuator.*` included; empty of hardware, whose nobody knows."""
-        return {} if self.file.hardware else {**self.twin.plant.parameters(), **self.twin.drive}
 
     @property
     def text(self) -> str:
@@ -250,14 +179,26 @@ def live_stand(
         raise BadInput(
             f'{path}: a replay answers nothing that is asked of it; experiments need a rig or kind = "twin".'
         )
-    model, truth = described(file)
-    units = {c.name: c.unit for c in model.plant.coordinates}
-    if file.hardware and file.limits(units, model.unit) is None:
+    rig, truth = described(file)
+    units = {c.name: c.unit for c in rig.plant.coordinates}
+    limits = file.limits(units, rig.unit, usual_limits(rig))
+    if limits is None:
         raise BadInput(
             f"{path}: hardware is not driven without limits; write [limits] with command, and "
             f"[limits.{next(iter(units))}] with travel, speed and start."
         )
+    fit = file.known if file.known and file.known.suffix != ".toml" else None
     return LiveStand(
-        file=file, rig=model, twin=replace(truth, name=model.name), person=person if file.hardware else nobody,
-        watching=watching,
+        file=file, rig=rig, true_rig=replace(truth, name=rig.name), make=_make(file), vendor=file.vendor,
+        performed=file.performed, zero=file.zero, room=limits.travel[list(units).index(rig.plant.inputs[0].on)],
+        fit=fit, study=None if fit else file.known, added=file.added, tolerance=file.tolerance,
+        person=person if file.hardware else nobody, watching=watching,
     )  # fmt: skip
+
+
+def _make(file: RigFile) -> Make | None:
+    """The make that RIG.toml or the description says it is of."""
+    if file.known is None:
+        return MAKES[file.make]
+    known = read_stored_rig(file.known)
+    return make_of_vendor(file.vendor or known.hardware.vendor, known.plant)

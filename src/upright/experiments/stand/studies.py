@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from upright.experiments.stand.known import Known, asked, bench
-from upright.experiments.stand.protocol import APPLIED, TestStand
+from upright.experiments.stand.stand import APPLIED, TestStand
 from upright.files import read_text, replace_file
 from upright.quantities import with_unit
 from upright.rig.makes import make_of

@@ -2,90 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from upright.basis import SIMULATED
 from upright.control.trial import SUBSTEPS, logged, trial
-from upright.experiments.stand.protocol import APPLIED, StandRun
+from upright.experiments.stand.stand import APPLIED, StandRun, TestStand
 from upright.laws import Law, Rule
 from upright.records import Array, Record
-from upright.rig import Rig
-from upright.rig.makes import Make
 from upright.simulation import simulate
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class TwinStand:
-    """A twin as a test stand.
+class TwinStand(TestStand):
+    """A twin as a test stand; its `rig` is as it truly is."""
 
-    Attributes
-    ----------
-    rig : Rig
-        As it truly is.
-    make : Make or None
-        That it is one of.
-    added, tolerance : tuple of str, float
-        What may be bolted to its first body, see `TestStand`.
-    """
-
-    rig: Rig
-    make: Make | None = None
-    added: tuple[str, ...] = ()
-    tolerance: float = 0.0
-
-    @property
-    def twin(self) -> Rig:
-        """Itself."""
-        return self.rig
-
-    @property
-    def names(self) -> list[str]:
-        """Coordinates, in the plant's order."""
-        return [c.name for c in self.rig.plant.coordinates]
-
-    @property
-    def simulated(self) -> bool:
-        """It is."""
-        return True
-
-    @property
-    def performed(self) -> str:
-        """That nothing is driven."""
-        return SIMULATED
-
-    @property
-    def vendor(self) -> str:
-        """None is chosen; its fits name their own."""
-        return ""
-
-    @property
-    def fit(self) -> Path | None:
-        """None does: it is identified."""
-        return None
-
-    @property
-    def study(self) -> Path | None:
-        """None: the design and the bench say what is known."""
-        return None
-
-    @property
-    def travel(self) -> float:
-        """The rig's own."""
-        return self.rig.travel
-
-    @property
-    def resting(self) -> str:
-        """The plant's first equilibrium."""
-        return next(iter(self.rig.plant.equilibria))
-
-    @property
-    def truth(self) -> Mapping[str, float]:
-        """Numbers of the twin, those of its drive included."""
-        return {**self.rig.plant.parameters(), **self.rig.drive}
+    simulated = True
 
     def ask(self, sentence: str) -> None:
         """What a person would be asked for is done by the start of the simulation."""

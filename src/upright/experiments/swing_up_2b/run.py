@@ -21,7 +21,7 @@ from upright.control.sensors import KNOWN, Scales, Suspicion, Watch, probe, put_
 from upright.control.swing_up import Ascent, ascent_of
 from upright.control.trial import readings
 from upright.errors import BadInput, NotIdentifiable, RigStopped, nearest
-from upright.experiments.stand.protocol import APPLIED, TestStand
+from upright.experiments.stand.stand import APPLIED, TestStand
 from upright.gains import feedback, filtered
 from upright.progress import Progress, silent
 from upright.records import Array, Record

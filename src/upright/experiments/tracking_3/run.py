@@ -20,7 +20,7 @@ from upright.control import Trial, trial
 from upright.control.score import Effort, StepFigures, effort, step_figures
 from upright.errors import BadInput
 from upright.experiments.stand.known import Known
-from upright.experiments.stand.protocol import TestStand
+from upright.experiments.stand.stand import TestStand
 from upright.experiments.stand.twin import TwinStand
 from upright.experiments.tracking_3.laws import (
     AT,

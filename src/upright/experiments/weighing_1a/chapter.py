@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from upright.experiments.stand.known import Known
-from upright.experiments.stand.protocol import APPLIED
+from upright.experiments.stand.stand import APPLIED
 from upright.experiments.weighing_1a.figures import decrement_figure, line_figure, swing_figure
 from upright.experiments.weighing_1a.run import Weighing
 from upright.identification.loadings import Loaded, Loadings

@@ -20,7 +20,7 @@ import numpy as np
 
 from upright.errors import BadInput
 from upright.experiments.stand.known import Known
-from upright.experiments.stand.protocol import APPLIED, TestStand, file_of
+from upright.experiments.stand.stand import APPLIED, TestStand, file_of
 from upright.experiments.stand.strength import GROWTH, OF_TRAVEL, REACH, SHARE, STILL
 from upright.experiments.weighing_1a.loadings import inertia_of, weigh
 from upright.identification.loadings import Loadings

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import ClassVar
 
+from upright.basis import SIMULATED
 from upright.control.trial import Trial
 from upright.laws import Law, Rule
 from upright.records import Array, Record
@@ -29,79 +32,77 @@ class StandRun:
     overtravel: bool = False
 
 
-class TestStand(Protocol):
-    """A rig on which experiments are made; a twin and hardware answer alike."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TestStand(ABC):
+    """A rig on which experiments are made; a twin and hardware answer alike.
 
-    @property
-    def rig(self) -> Rig:
-        """What is run. Of a twin that is simulated here these are the true numbers, else those of its description."""
-        ...
+    Attributes
+    ----------
+    simulated : bool
+        Whether it is simulated here, where no fall or limit matters; a twin behind the protocol is not.
+    rig : Rig
+        What is run. Of a twin that is simulated here these are the true numbers, else those of its description.
+    true_rig : Rig or None
+        What a twin behind the protocol truly is.
+    make : Make or None
+        None of a rig of one's own.
+    vendor : str
+        Whose data sheet says what a fit of it does not; may be empty.
+    performed : str
+        `basis.SIMULATED` where no rig is driven.
+    zero : str
+        Equilibrium at which the encoders are zeroed; the plant's first where it has no such.
+    room : float
+        How far the driven coordinate may go [m or rad], where that is less than the rig itself says.
+    fit : Path or None
+        What describes it already, so that nothing of it is left to identify.
+    study : Path or None
+        What its owner says of it, from which an identification starts; none of a make's twin.
+    added, tolerance : tuple of str, float
+        Known inertias that can be bolted to its first body one after the other, as their owner says them, and the
+        relative standard uncertainty of a piece.
+    """
+
+    simulated: ClassVar[bool]
+    rig: Rig
+    true_rig: Rig | None = None
+    make: Make | None = None
+    vendor: str = ""
+    performed: str = SIMULATED
+    zero: str = ""
+    room: float = math.inf
+    fit: Path | None = None
+    study: Path | None = None
+    added: tuple[str, ...] = ()
+    tolerance: float = 0.0
 
     @property
     def names(self) -> list[str]:
         """Coordinates, in the plant's order."""
-        ...
-
-    @property
-    def make(self) -> Make | None:
-        """None of a rig of one's own."""
-        ...
-
-    @property
-    def simulated(self) -> bool:
-        """Whether it is simulated here, and no fall or limit matters; a twin behind the protocol is not."""
-        ...
-
-    @property
-    def performed(self) -> str:
-        """`basis.SIMULATED` where no rig is driven."""
-        ...
-
-    @property
-    def vendor(self) -> str:
-        """Whose data sheet says what a fit of it does not; may be empty."""
-        ...
-
-    @property
-    def fit(self) -> Path | None:
-        """What describes it already, so that nothing of it is left to identify."""
-        ...
-
-    @property
-    def study(self) -> Path | None:
-        """What its owner says of it, from which an identification starts; none of a make's twin."""
-        ...
-
-    @property
-    def added(self) -> tuple[str, ...]:
-        """Known inertias that can be bolted to its first body one after the other, as their owner says them."""
-        ...
-
-    @property
-    def tolerance(self) -> float:
-        """Relative standard uncertainty of a piece of these."""
-        ...
-
-    @property
-    def travel(self) -> float:
-        """How far the driven coordinate may go [m or rad]."""
-        ...
+        return [c.name for c in self.rig.plant.coordinates]
 
     @property
     def resting(self) -> str:
         """Equilibrium at which the encoders are zeroed."""
-        ...
+        kinds = self.rig.plant.equilibria
+        return self.zero if self.zero in kinds else next(iter(kinds))
+
+    @property
+    def travel(self) -> float:
+        """How far the driven coordinate may go [m or rad]."""
+        return min(self.rig.travel, self.room)
 
     @property
     def twin(self) -> Rig:
         """What a twin truly is; of hardware its description."""
-        ...
+        return self.rig if self.true_rig is None else self.true_rig
 
     @property
     def truth(self) -> Mapping[str, float]:
         """Numbers of a twin by name, `actuator.*` included; empty of hardware, whose numbers nobody knows."""
-        ...
+        return {**self.twin.plant.parameters(), **self.twin.drive} if self.performed else {}
 
+    @abstractmethod
     def ask(self, sentence: str) -> None:
         """Ask the person beside the rig for something.
 
@@ -110,8 +111,8 @@ class TestStand(Protocol):
         RigStopped
             When it was not done.
         """
-        ...
 
+    @abstractmethod
     def run(
         self, samples: Sequence[float], folder: Path, stem: str, *, lifted: float = 0.0, bolted: float = 0.0
     ) -> Record:  # fmt: skip
@@ -140,8 +141,8 @@ class TestStand(Protocol):
         KeyboardInterrupt
             When somebody stopped it.
         """
-        ...
 
+    @abstractmethod
     def hold(
         self, law: Law | Rule, at: str, folder: Path, stem: str, seconds: float, *, start: Array | None = None,
         reference: Array | None = None, pushes: Array | None = None,
@@ -170,11 +171,10 @@ class TestStand(Protocol):
         KeyboardInterrupt
             When somebody stopped it.
         """
-        ...
 
+    @abstractmethod
     def described_by(self, fit: Path, folder: Path) -> TestStand:
         """The same rig, as a fit describes it to whoever watches its runs; what that takes is written to the folder."""
-        ...
 
 
 def file_of(log: Record) -> str:
