@@ -13,8 +13,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from benchmarks.measure import Line, Target, of_each
-from upright.experiments.hands_on.hanging import run_hanging
-from upright.experiments.hands_on.rig import rig_at_hand
+from upright.experiments.frequency_1b.at_once import run_at_once
+from upright.experiments.stand.live import live_stand
 from upright.rig.makes import MAKES
 from upright.workers import HERE, Workers
 
@@ -29,10 +29,10 @@ def measured(item: tuple[str, int]) -> tuple[str, bool, int, int]:
     with tempfile.TemporaryDirectory(prefix="upright-at-hand-") as name:
         folder = Path(name)
         (folder / "RIG.toml").write_text(f'kind = "twin"\nmake = "{make}"\nseed = {seed}\n', encoding="utf-8")
-        rig = rig_at_hand(folder / "RIG.toml")
-        fit = run_hanging(rig, folder / "1b", lambda _step, _share: None).fit
-    numbers = [*rig.truth.plant.parameters(), "actuator.gain"]
-    firm = [(rig.true_values[n], e) for n, e in fit.estimates.items() if e.status == "firm" and n in numbers]
+        rig = live_stand(folder / "RIG.toml")
+        fit = run_at_once(rig, folder / "1b", lambda _step, _share: None).fit
+    numbers = [*rig.twin.plant.parameters(), "actuator.gain"]
+    firm = [(rig.truth[n], e) for n, e in fit.estimates.items() if e.status == "firm" and n in numbers]
     return make, fit.trusted, sum(e.interval[0] <= t <= e.interval[1] for t, e in firm), len(firm)
 
 

@@ -12,6 +12,7 @@ from tempfile import TemporaryDirectory
 
 from upright.experiments.frequency_1b.figures import bode_figure
 from upright.experiments.frequency_1b.run import run_frequency
+from upright.experiments.stand.twin import TwinStand
 from upright.experiments.weighing_1a.figures import line_figure
 from upright.experiments.weighing_1a.run import run_weighing
 from upright.identification.frequency.answer import curves
@@ -22,7 +23,7 @@ seed = int(sys.argv[1]) if sys.argv[1:] else 0
 rig = make_rig("furuta", seed)
 
 with TemporaryDirectory() as folder:
-    weighed = run_weighing(rig, seed, Path(folder))
+    weighed = run_weighing(TwinStand(rig=rig), seed, Path(folder))
     swept = run_frequency("furuta", seed, Path(folder), weighed=weighed.known)
 
 line = weighed.campaign.loadings

@@ -16,6 +16,7 @@ from upright.control import design_swing_up
 from upright.control.swing_up import swing_up
 from upright.experiments.frequency_1b.run import run_frequency
 from upright.experiments.regulation_2.run import run_regulation
+from upright.experiments.stand.twin import TwinStand
 from upright.report.drawing import CYCLE, figure, save, styled
 from upright.rig.completion import completed
 from upright.rig.makes import make_rig
@@ -28,7 +29,7 @@ rig = make_rig("furuta", seed)
 with TemporaryDirectory() as folder:
     print(run_frequency("furuta", seed, Path(folder)).answer.fit.verdict)
     identified = completed(read_stored_rig(Path(folder) / "fit.json", seed=seed))
-    done = run_regulation(identified, rig, seed, Path(folder))
+    done = run_regulation(identified, TwinStand(rig=rig), seed, Path(folder))
 
 for a in done.attempts:
     gains = ", ".join(f"{k:.3g}" for k in a.placement.K[0])

@@ -52,11 +52,11 @@ diagnosis questionnaire designing
 paper
 running
 experiments.abreast
+experiments.stand
 experiments.weighing_1a
 experiments.frequency_1b
 experiments.regulation_2
 experiments.swing_up_2b experiments.tracking_3 experiments.free_swing_4
-experiments.hands_on
 experiments
 exports
 verbs

@@ -102,8 +102,8 @@ def stopped_by(swallow):
         return told("2"), True
 
     def one(key, tell):
-        return Experiment(key=key, part_of=key, title=f"Number {key}", makes=("furuta",), needs=(), seconds=1,
-                          tell=tell)  # fmt: skip
+        return Experiment(key=key, part_of=key, title=f"Number {key}", makes=("furuta",), needs=(), live_needs=(),
+                          on=lambda _: False, seconds=1, tell=tell)  # fmt: skip
 
     return (one("1", lambda task: (told("1"), True)), one("2", press), one("3", lambda task: (told("3"), True)))
 

@@ -8,7 +8,7 @@ import pytest
 
 from upright.errors import NotIdentifiable
 from upright.experiments import laboratory
-from upright.experiments.laboratory import Experiment
+from upright.experiments.table import Experiment
 from upright.report.page import Chapter, KeyNumber, Part
 from upright.workers import Workers
 
@@ -23,14 +23,17 @@ def bench(monkeypatch):
             ran.append(key)
             if key in trouble:
                 raise trouble[key]
-            told = f"{key} on {task.rig.name}, seed {task.seed}, after {', '.join(task.earlier) or 'nothing'}"
+            told = f"{key} on {task.stand.rig.name}, seed {task.seed}, after {', '.join(task.earlier) or 'nothing'}"
             finding = KeyNumber(what="x", value=str(len(ran)))
             return Chapter(key=key, title=f"Small {key}", question="?", verdict=told, detail="", sound=True,
                            parts=(Part(title="Data"),), findings=(finding,),
                            numbers={"run": len(ran), "bad": float("nan")}), True  # fmt: skip
 
         makes = ("furuta", "linear") if key != "3" else ("rectilinear",)
-        return Experiment(key=key, part_of=key[0], title=f"Small {key}", makes=makes, needs=needs, seconds=1, tell=tell)
+        return Experiment(
+            key=key, part_of=key[0], title=f"Small {key}", makes=makes, on=lambda _: False, needs=needs, live_needs=(),
+            seconds=1, tell=tell,
+        )  # fmt: skip
 
     all_of_them = (small("1"), small("2", ("1",)), small("3", ("1",)))
     monkeypatch.setattr(laboratory, "EXPERIMENTS", all_of_them)
@@ -149,7 +152,7 @@ def test_worn_rigs_are_other_rigs_and_are_made_again(bench, tmp_path):
     laboratory.run_laboratory((), "", 0, tmp_path)
     session = laboratory.run_laboratory((), "", 0, tmp_path, worn=True)
     assert [t.state for t in session.results] == ["done", "done", "done"]
-    assert session.rig("furuta").plant.b_1s > session.rig("furuta").plant.b_1c > 0
+    assert session.stand("furuta").rig.plant.b_1s > session.stand("furuta").rig.plant.b_1c > 0
     book = laboratory.book(session, laboratory.date(2006, 6, 18))
     assert "They are worn" in dict(book.facts)["Data"]
     assert dict(book.facts)["Again"] == "upright lab --worn"

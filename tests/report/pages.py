@@ -140,11 +140,12 @@ def measured_response_page(folder: Path) -> Chapter:
 
 
 def loadings_page(folder: Path) -> Chapter:
+    from upright.experiments.stand.twin import TwinStand
     from upright.experiments.weighing_1a.chapter import chapter
     from upright.experiments.weighing_1a.run import run_weighing
     from upright.rig.makes import make_rig
 
-    return chapter(run_weighing(make_rig("rectilinear", 2), 2, folder))
+    return chapter(run_weighing(TwinStand(rig=make_rig("rectilinear", 2)), 2, folder))
 
 
 def frequency_page(folder: Path) -> Chapter:
@@ -166,20 +167,22 @@ def own_frequency_page(folder: Path) -> Chapter:
 def regulation_page(folder: Path) -> Chapter:
     from upright.experiments.regulation_2.chapter import chapter
     from upright.experiments.regulation_2.run import RegulationRequest, identify_make, run_regulation
+    from upright.experiments.stand.twin import TwinStand
     from upright.rig.completion import completed
     from upright.rig.makes import make_rig
 
     wish = RegulationRequest(draws=16, seconds=2.0)
     known = completed(identify_make("linear", 1, folder))
-    return chapter(run_regulation(known, make_rig("linear", 1), 1, folder, wish=wish))
+    return chapter(run_regulation(known, TwinStand(rig=make_rig("linear", 1)), 1, folder, wish=wish))
 
 
 def swing_up_page(folder: Path) -> Chapter:
+    from upright.experiments.stand.twin import TwinStand
     from upright.experiments.swing_up_2b.chapter import chapter
     from upright.experiments.swing_up_2b.run import run_swing_up
     from upright.rig.makes import make_rig
 
-    return chapter(run_swing_up(make_rig("furuta"), make_rig("furuta", 3), folder))
+    return chapter(run_swing_up(make_rig("furuta"), TwinStand(rig=make_rig("furuta", 3)), folder))
 
 
 def tracking_page(folder: Path) -> Chapter:

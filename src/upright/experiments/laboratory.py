@@ -18,172 +18,20 @@ import numpy as np
 from upright._version import __version__
 from upright.errors import BadInput, UprightError
 from upright.experiments.abreast import run_abreast
-from upright.experiments.hands_on.rig import RigAtHand
-from upright.experiments.weighing_1a.run import Known
+from upright.experiments.stand.live import LiveStand
+from upright.experiments.stand.stand import TestStand
+from upright.experiments.stand.twin import TwinStand
+from upright.experiments.table import EXPERIMENTS, Experiment, ExperimentInput
 from upright.experiments.worn import worn as worn_twin
 from upright.files import read_text, write_json
 from upright.progress import Progress, silent
 from upright.report.page import Book, Chapter, Step, as_plain, from_plain
 from upright.report.symbols import typed
-from upright.rig import Rig
-from upright.rig.makes import MAKES, PENDULUMS, SHAFTS, make_rig
+from upright.rig.makes import MAKES, make_rig
 from upright.workers import HERE, Workers
 
 CHAPTER_FILE = "chapter.json"
 """File of a finished experiment, taken up again as long as nothing it stands on has changed."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ExperimentInput:
-    """What an experiment is given: rig and folder, what finished ones it builds on said and where they wrote.
-
-    `hands` is the rig itself where one is at hand, of which `rig` is the description.
-    """
-
-    make: str
-    rig: Rig
-    seed: int
-    folder: Path
-    earlier: Mapping[str, Chapter]
-    folders: Mapping[str, Path]
-    progress: Progress
-    stopped: Callable[[], bool]
-    hands: RigAtHand | None = None
-
-    @property
-    def weighed(self) -> tuple[Known, ...]:
-        """What experiment 1a hands on, as its chapter tells it."""
-        chapter = self.earlier.get("1a")
-        handed = chapter.numbers.get("handed_on", {}) if chapter else {}
-        return tuple(Known(name=name, value=w["value"], stderr=w["stderr"]) for name, w in handed.items())
-
-    @property
-    def fit(self) -> Path:
-        """The fit of experiment 1b."""
-        if "1b" not in self.earlier:
-            raise BadInput("It stands on the fit of experiment 1b, which could not be finished; its chapter says why.")
-        return self.folders["1b"] / "fit.json"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Experiment:
-    """One experiment of the paper.
-
-    Attributes
-    ----------
-    key : str
-        As it is asked for and as its folder is named.
-    part_of : str
-        Asking for this brings it as well: ``1`` means 1a and 1b.
-    title : str
-    makes : tuple of str
-        Rigs it can be run on; the first is the paper's.
-    needs : tuple of str
-        Experiments whose numbers it takes, where the rig has them.
-    seconds : float
-        How long it takes about, for the progress bar.
-    tell : callable
-        Runs it; the chapter, and whether it is whole.
-    """
-
-    key: str
-    part_of: str
-    title: str
-    makes: tuple[str, ...]
-    needs: tuple[str, ...]
-    seconds: float
-    tell: Callable[[ExperimentInput], tuple[Chapter, bool]]
-
-    def make(self, asked: str) -> str:
-        """Make that it is run on where one is asked for, or none."""
-        return asked if asked in self.makes else self.makes[0]
-
-
-def _weighing(at: ExperimentInput) -> tuple[Chapter, bool]:
-    from upright.experiments.weighing_1a.chapter import chapter
-    from upright.experiments.weighing_1a.run import run_weighing
-
-    return chapter(run_weighing(at.rig, at.seed, at.folder, at.progress)), True
-
-
-def _frequency(at: ExperimentInput) -> tuple[Chapter, bool]:
-    from upright.experiments.frequency_1b.chapter import chapter
-    from upright.experiments.frequency_1b.run import run_frequency
-
-    done = run_frequency(at.rig, at.seed, at.folder, at.progress, at.stopped, weighed=at.weighed)
-    return chapter(done), True
-
-
-def _regulation(at: ExperimentInput) -> tuple[Chapter, bool]:
-    from upright.experiments.regulation_2.chapter import chapter
-    from upright.experiments.regulation_2.run import run_regulation
-    from upright.rig.completion import completed
-    from upright.study.stored_rig import read_stored_rig
-
-    known = completed(read_stored_rig(at.fit, seed=at.seed), who="regulate")
-    done = run_regulation(known, at.rig, at.seed, at.folder, at.progress, at.stopped, source=typed(at.fit))
-    return chapter(done), not done.interrupted
-
-
-def _swing_up(at: ExperimentInput) -> tuple[Chapter, bool]:
-    from upright.experiments.swing_up_2b.chapter import chapter
-    from upright.experiments.swing_up_2b.run import known_of, run_swing_up
-    from upright.rig.completion import completed
-    from upright.study.stored_rig import read_stored_rig
-
-    known = read_stored_rig(at.fit, seed=at.seed)
-    done = run_swing_up(
-        completed(known), at.rig, at.folder, at.progress, at.stopped, known=known_of(known), source=typed(at.fit)
-    )
-    return chapter(done), not at.stopped()
-
-
-def _tracking(at: ExperimentInput) -> tuple[Chapter, bool]:
-    from upright.experiments.tracking_3.chapter import chapter
-    from upright.experiments.tracking_3.run import run_tracking
-
-    done = run_tracking(at.rig, at.seed, at.folder, at.progress, at.stopped, weighed=at.weighed)
-    return chapter(done), not done.interrupted
-
-
-def _free_swing(at: ExperimentInput) -> tuple[Chapter, bool]:
-    from upright.experiments.free_swing_4.chapter import chapter
-    from upright.experiments.free_swing_4.run import run_free_swing
-    from upright.study.results import write_fit
-
-    weighed = next((k for k in at.weighed if k.name == MAKES[at.make].body), None)
-    done = run_free_swing(at.rig, at.seed, at.folder, at.progress, at.stopped, weighed=weighed)
-    if "free_swing" in done.answers:
-        first = done.answers["free_swing"]
-        write_fit(first.fit, first.study, at.folder / "fit.json")
-    return chapter(done), not done.interrupted
-
-
-EXPERIMENTS: tuple[Experiment, ...] = (
-    Experiment(
-        key="1a", part_of="1", title="Stiffness and inertia from added loads", makes=(*PENDULUMS, *SHAFTS), needs=(),
-        seconds=1.5, tell=_weighing,
-    ),
-    Experiment(
-        key="1b", part_of="1", title="Frequency response", makes=(*PENDULUMS, *SHAFTS), needs=("1a",),
-        seconds=5.0, tell=_frequency,
-    ),
-    Experiment(
-        key="2", part_of="2", title="Holding it upright", makes=PENDULUMS, needs=("1b",), seconds=4.0, tell=_regulation,
-    ),
-    Experiment(
-        key="2b", part_of="2", title="Swinging up and catching", makes=PENDULUMS, needs=("1b",), seconds=3.0,
-        tell=_swing_up,
-    ),
-    Experiment(
-        key="3", part_of="3", title="Tracking through a flexible shaft", makes=SHAFTS, needs=("1a",), seconds=5.0,
-        tell=_tracking,
-    ),
-    Experiment(
-        key="4", part_of="4", title="Large free swing", makes=PENDULUMS, needs=("1a",), seconds=9.0, tell=_free_swing,
-    ),
-)  # fmt: skip
-"""In the order in which they are run and told."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -217,19 +65,31 @@ class Session:
     seed: int
     folder: Path
     asked: tuple[Experiment, ...]
-    table: tuple[Experiment, ...]
     worn: bool = False
-    hands: RigAtHand | None = None
+    live: LiveStand | None = None
     results: list[ExperimentResult] = field(default_factory=list[ExperimentResult])
     interrupted: bool = False
     seconds: float = 0.0
 
-    def rig(self, make: str) -> Rig:
-        """The twin that is run on, or what is known of the rig at hand."""
-        if self.hands is not None:
-            return self.hands.model
+    @property
+    def there(self) -> list[Experiment]:
+        """Experiments that the rig can have."""
+        return _there(self.make, self.live)
+
+    def needs(self, e: Experiment) -> list[str]:
+        """Earlier experiments from which it takes numbers."""
+        return _needs(e, self.make, self.live)
+
+    def make_for(self, e: Experiment) -> str:
+        """Make on whose twin an experiment is run, or what the live rig is asked for by."""
+        return self.make if self.live is not None else e.make(self.make)
+
+    def stand(self, make: str) -> TestStand:
+        """The test stand of a make's twin, or the live one."""
+        if self.live is not None:
+            return self.live
         rig = make_rig(make, self.seed)
-        return worn_twin(rig, self.seed) if self.worn else rig
+        return TwinStand(rig=worn_twin(rig, self.seed) if self.worn else rig, make=MAKES[make])
 
     @property
     def missing(self) -> tuple[Experiment, ...]:
@@ -237,9 +97,7 @@ class Session:
         return tuple(e for e in self.asked if e.key not in {t.experiment.key for t in self.results})
 
 
-def choose(
-    asked: Sequence[str], make: str, table: tuple[Experiment, ...] | None = None
-) -> tuple[Experiment, ...]:  # fmt: skip
+def choose(asked: Sequence[str], make: str, live: LiveStand | None = None) -> tuple[Experiment, ...]:
     """The experiments asked for, with those whose numbers they take; all that the rig has when none is named.
 
     Raises
@@ -247,41 +105,47 @@ def choose(
     BadInput
         When there is no such experiment, or not on this rig.
     """
-    table = EXPERIMENTS if table is None else table
-    there = _there(make, table)
+    there = _there(make, live)
+    if live is not None and not there:
+        raise BadInput(
+            f"{live.file.path} names a fit of a rig with neither pendulum nor shaft; identification begins with a "
+            "study: name that."
+        )
     wanted: set[str] = set()
     for name in asked:
-        found = [e for e in table if name in (e.key, e.part_of)]
+        found = [e for e in EXPERIMENTS if name in (e.key, e.part_of)]
         if not found:
-            valid = dict.fromkeys(n for e in table for n in (e.part_of, e.key))
-            if any(name in (e.key, e.part_of) for e in EXPERIMENTS):
-                raise BadInput(
-                    f"experiment {name} cannot be made on {make}, which has experiments "
-                    f"{', '.join(e.key for e in there)}; docs/lab.md says what each asks of a rig."
-                )
+            valid = dict.fromkeys(n for e in EXPERIMENTS for n in (e.part_of, e.key))
             raise BadInput(f"there is no experiment '{name}'; take one of {', '.join(sorted(valid))}.")
         if not any(e in there for e in found):
-            raise BadInput(
-                f"experiment {name} is for --rig {' or '.join(found[0].makes)}; "
-                f"{make} has experiments {', '.join(e.key for e in there)}."
-            )
+            has = f"has experiments {', '.join(e.key for e in there)}"
+            if live is not None:
+                raise BadInput(
+                    f"experiment {name} cannot be made on {make}, which {has}; "
+                    "docs/lab.md says what each asks of a rig."
+                )
+            raise BadInput(f"experiment {name} is for --rig {' or '.join(found[0].makes)}; {make} {has}.")
         wanted |= {e.key for e in found if e in there}
     if not asked:
         wanted = {e.key for e in there}
     for e in reversed(there):  # who builds on another comes after it
         if e.key in wanted:
-            wanted |= set(_needs(e, make, table))
+            wanted |= set(_needs(e, make, live))
     return tuple(e for e in there if e.key in wanted)
 
 
-def _there(make: str, table: tuple[Experiment, ...]) -> list[Experiment]:
+def _there(make: str, live: LiveStand | None) -> list[Experiment]:
     """Experiments that a rig can have; all for the paper's."""
-    return [e for e in table if not make or make in e.makes]
+    if live is not None:
+        return [e for e in EXPERIMENTS if e.on(live)]
+    return [e for e in EXPERIMENTS if not make or make in e.makes]
 
 
-def _needs(e: Experiment, make: str, table: tuple[Experiment, ...]) -> list[str]:
+def _needs(e: Experiment, make: str, live: LiveStand | None) -> list[str]:
     """What it takes numbers from: earlier experiments on the same rig."""
-    return [n.key for n in _there(make, table) if n.key in e.needs and n.make(make) == e.make(make)]
+    if live is not None:
+        return [n.key for n in _there(make, live) if n.key in e.live_needs]
+    return [n.key for n in _there(make, live) if n.key in e.needs and n.make(make) == e.make(make)]
 
 
 def run_laboratory(
@@ -295,8 +159,7 @@ def run_laboratory(
     fresh: bool = False,
     workers: Workers = HERE,
     worn: bool = False,
-    table: tuple[Experiment, ...] | None = None,
-    hands: RigAtHand | None = None,
+    live: LiveStand | None = None,
 ) -> Session:
     """Run experiments on a seeded rig; Ctrl-C stops and keeps what is there.
 
@@ -320,10 +183,8 @@ def run_laboratory(
         Who runs experiments that need nothing of each other; processes of this machine, since they share the folder.
     worn : bool
         Take twins with physics that models leave out; see `upright.experiments.worn`.
-    table : tuple of Experiment, optional
-        What can be run; `EXPERIMENTS` when omitted.
-    hands : RigAtHand, optional
-        The rig itself, where one is at hand; `make` is then what it is asked for by.
+    live : LiveStand, optional
+        The rig itself, where it is no twin that is simulated here; `make` is then what it is asked for by.
 
     Raises
     ------
@@ -331,9 +192,7 @@ def run_laboratory(
         When there is no such experiment, or not on this rig.
     """
     began = time.perf_counter()
-    table = EXPERIMENTS if table is None else table
-    session = Session(make=make, seed=seed, folder=folder, asked=choose(asked, make, table), worn=worn, table=table,
-                      hands=hands)  # fmt: skip
+    session = Session(make=make, seed=seed, folder=folder, asked=choose(asked, make, live), worn=worn, live=live)
     digests = _digests(session)
     whole = sum(e.seconds for e in session.asked)
     behind = 0.0
@@ -362,7 +221,7 @@ def _run_abreast(
     fresh: bool,
 ) -> None:  # fmt: skip
     asked = {e.key: e for e in session.asked}
-    needs = {key: _needs(e, session.make, session.table) for key, e in asked.items()}
+    needs = {key: session.needs(e) for key, e in asked.items()}
     run = partial(_apart, replace(session, asked=()), digests, stopped, fresh)
     found, interrupted = run_abreast({k: e.seconds for k, e in asked.items()}, needs, run, workers, progress)
     session.results += [_brought(key, told) for key, told in found.items()]
@@ -393,14 +252,14 @@ def _digests(session: Session) -> dict[str, str]:
     What was measured on a rig outlasts another version of the program.
     """
     digests: dict[str, str] = {}
-    for e in _there(session.make, session.table):
+    for e in session.there:
         parts = (
-            _program() if session.hands is None else session.hands.text,
+            _program() if session.live is None else session.live.text,
             e.key,
-            e.make(session.make),
+            session.make_for(e),
             str(session.seed),
             "worn" if session.worn else "",
-            *(digests[n] for n in _needs(e, session.make, session.table)),
+            *(digests[n] for n in session.needs(e)),
         )
         digests[e.key] = sha256("\n".join(parts).encode()).hexdigest()
     return digests
@@ -408,9 +267,9 @@ def _digests(session: Session) -> dict[str, str]:
 
 def _with_measured(session: Session, e: Experiment, digest: str) -> str:
     """The digest with the fits that it takes numbers from: a rig that is measured again answers otherwise."""
-    if session.hands is None:
+    if session.live is None:
         return digest
-    fits = [session.folder / n / "fit.json" for n in _needs(e, session.make, session.table)]
+    fits = [session.folder / n / "fit.json" for n in session.needs(e)]
     return sha256(b"".join([digest.encode(), *(f.read_bytes() for f in fits if f.exists())])).hexdigest()
 
 
@@ -437,13 +296,13 @@ def _kept(folder: Path, digest: str) -> Chapter | None:
 def _with_kept(session: Session, digests: Mapping[str, str]) -> list[ExperimentResult]:
     """What was told, and what else is there from an earlier run on the same rig."""
     told = {t.experiment.key: t for t in session.results}
-    for e in _there(session.make, session.table):
+    for e in session.there:
         found = None if e.key in told else _kept(session.folder / e.key, _with_measured(session, e, digests[e.key]))
         if found:
-            make = e.make(session.make)
-            name = session.rig(make).name
+            make = session.make_for(e)
+            name = session.stand(make).rig.name
             told[e.key] = ExperimentResult(experiment=e, make=make, rig=name, chapter=found, state="kept", seconds=0.0)
-    return [told[e.key] for e in _there(session.make, session.table) if e.key in told]
+    return [told[e.key] for e in session.there if e.key in told]
 
 
 def _one(
@@ -451,21 +310,21 @@ def _one(
 ) -> ExperimentResult:
     """One experiment, from an earlier run where that still holds."""
     began = time.perf_counter()
-    make, needs = e.make(session.make), _needs(e, session.make, session.table)
-    rig, folder = session.rig(make), session.folder / e.key
+    make, needs = session.make_for(e), session.needs(e)
+    stand, folder = session.stand(make), session.folder / e.key
     digest = _with_measured(session, e, digest)
     folder.mkdir(parents=True, exist_ok=True)
     progress("starting", 0.0)
     state, chapter = "kept", None if fresh else _kept(folder, digest)
     if chapter is None:
         at = ExperimentInput(
-            make=make, rig=rig, seed=session.seed, folder=folder, progress=progress, stopped=stopped,
+            stand=stand, seed=session.seed, folder=folder, progress=progress, stopped=stopped,
             earlier={
                 t.experiment.key: t.chapter
                 for t in session.results
                 if t.experiment.key in needs and t.state in ("done", "kept")
             },
-            folders={n: session.folder / n for n in needs}, hands=session.hands,
+            folders={n: session.folder / n for n in needs},
         )  # fmt: skip
         try:
             chapter, whole = e.tell(at)
@@ -478,7 +337,7 @@ def _one(
         if state == "done":
             write_json(folder / CHAPTER_FILE, {"made_of": digest, "chapter": as_plain(chapter)})
     return ExperimentResult(
-        experiment=e, make=make, rig=rig.name, chapter=chapter, state=state, seconds=time.perf_counter() - began
+        experiment=e, make=make, rig=stand.rig.name, chapter=chapter, state=state, seconds=time.perf_counter() - began
     )
 
 
@@ -496,8 +355,8 @@ TITLE = "The laboratory: identify it hanging, hold it upright"
 
 def book(session: Session, day: date) -> Book:
     """Everything the session has to say."""
-    hands = session.hands
-    seeded = "" if hands is not None else f" (seed {session.seed})"
+    live = session.live
+    seeded = "" if live is not None else f" (seed {session.seed})"
     rigs = dict.fromkeys(f"{t.rig}{seeded}" for t in session.results)
     notes: list[str] = []
     if session.interrupted:
@@ -509,8 +368,8 @@ def book(session: Session, day: date) -> Book:
     return Book(
         title=TITLE,
         facts=(
-            ("Rig", "; ".join(rigs) or (session.make if hands is not None else f"seed {session.seed}")),
-            ("Data", hands.source if hands is not None else TWINS + (f" {WORN}" if session.worn else "")),
+            ("Rig", "; ".join(rigs) or (session.make if live is not None else f"seed {session.seed}")),
+            ("Data", live.source if live is not None else TWINS + (f" {WORN}" if session.worn else "")),
             ("Experiments", ", ".join(t.experiment.key for t in session.results) or "none"),
             ("Made", f"{day.isoformat()}, upright {__version__}, Python {platform.python_version()}"),
             ("Again", command(session)),
@@ -530,7 +389,7 @@ def command(session: Session, seed: int | None = None) -> str:
     shown = ["upright lab"]
     if session.make:
         shown.append(f"--rig {session.make}")
-    there = _there(session.make, session.table)
+    there = session.there
     told = {e.key for e in session.asked} | {t.experiment.key for t in session.results}
     if len(told) < len(there):
         shown += [f"--experiment {e.key}" for e in there if e.key in told]
@@ -549,7 +408,7 @@ def next_steps(session: Session) -> tuple[Step, ...]:
             Step("Go on where this stopped; what is finished is kept.",
                  f"{command(session)} -o {typed(session.folder)}")
         )  # fmt: skip
-    if session.hands is not None:
+    if session.live is not None:
         held = next((t.chapter.numbers for t in session.results if t.experiment.key == "2"), {})
         if "recommended" in held:
             rig, stem = session.folder / "2" / "rig.toml", held["recommended"].replace(" ", "_")

@@ -23,8 +23,8 @@ from upright.verbs.values import texts
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from upright.experiments.hands_on.rig import RigAtHand
     from upright.experiments.laboratory import Session
+    from upright.experiments.stand.live import LiveStand
     from upright.paper.reproduce import Reproduced
     from upright.questionnaire.sheet import Means, Ratings, Shares
     from upright.realtime.session import RunState
@@ -126,10 +126,10 @@ def lab(
 
     if seed < 0:
         raise BadInput(f"--seed needs a whole number of at least 0, got {seed}.")
-    at_hand = rig.endswith(".toml") or rig.startswith("serial:")
-    if rig and not at_hand:
+    itself = rig.endswith(".toml") or rig.startswith("serial:")
+    if rig and not itself:
         make_named(rig)
-    kind = Path(rig).stem if at_hand else rig
+    kind = Path(rig).stem if itself else rig
     named = "-".join(
         ["upright-lab", *([kind] if kind else []), *([str(seed)] if seed else []), *(["worn"] if worn else [])]
     )
@@ -139,7 +139,6 @@ def lab(
     from datetime import date
 
     from upright.experiments import laboratory
-    from upright.experiments.at_hand import experiments_for
     from upright.report.html import write_html
     from upright.report.page import Chapter
     from upright.report.pdf import available, write_pdf
@@ -149,14 +148,13 @@ def lab(
     shared = Workers.of(workers)
     asked = texts(experiment)
     beside = Path() if out is None else at
-    hands = _at_hand(rig, beside, ask, watching, worn=worn, workers=workers) if at_hand else None
-    rig = rig if hands is None else typed(hands.file.path)
-    table = laboratory.EXPERIMENTS if hands is None else experiments_for(hands, rig)
-    laboratory.choose(asked, rig, table)  # says what is wrong with the call before anything is written
+    live = _live(rig, beside, ask, watching, worn=worn, alone=shared.alone) if itself else None
+    rig = rig if live is None else typed(live.file.path)
+    laboratory.choose(asked, rig, live)  # says what is wrong with the call before anything is written
     with _ctrl_c() as pressed:
         session = laboratory.run_laboratory(
             asked, rig, seed, at, progress, stopped=lambda: pressed.times > 0, fresh=fresh, workers=shared, worn=worn,
-            table=table, hands=hands,
+            live=live,
         )  # fmt: skip
         pressed.patient = True
         progress("writing the report", 1.0)
@@ -183,16 +181,16 @@ def lab(
     return Answer(done, told, [report] if pdf is None else [report, pdf])
 
 
-def _at_hand(
+def _live(
     rig: str, folder: Path, ask: Callable[[str], bool] | None,
-    watching: Callable[[], AbstractContextManager[Callable[[RunState], str]]] | None, *, worn: bool, workers: Workforce,
-) -> RigAtHand:  # fmt: skip
+    watching: Callable[[], AbstractContextManager[Callable[[RunState], str]]] | None, *, worn: bool, alone: bool,
+) -> LiveStand:  # fmt: skip
     """The rig of a RIG.toml; what cannot be had of it is said first."""
-    from upright.experiments.hands_on.rig import nobody, nobody_watches, rig_at_hand
-    from upright.experiments.hands_on.templates import write_templates
+    from upright.experiments.stand.live import live_stand, nobody, nobody_watches
+    from upright.experiments.stand.templates import write_templates
     from upright.report.symbols import typed
 
-    if worn or workers != 1:
+    if worn or not alone:
         raise BadInput("--worn and --workers are for twins of makes; a rig at hand is as it is, and there is one.")
     if rig.startswith("serial:"):
         path = write_templates(folder, rig.removeprefix("serial:"))
@@ -202,12 +200,12 @@ def _at_hand(
         )
     if not Path(rig).exists():
         raise BadInput(f"there is no file '{rig}'; name the RIG.toml of a rig, or a make: linear, furuta, ...")
-    hands = rig_at_hand(Path(rig), ask or nobody, watching or nobody_watches)
-    if hands.file.hardware and ask is None:
+    live = live_stand(Path(rig), ask or nobody, watching or nobody_watches)
+    if live.file.hardware and ask is None:
         raise BadInput(
             "experiments on hardware need a person beside it who is asked: run upright lab in a terminal, or give ask."
         )
-    return hands
+    return live
 
 
 @dataclass

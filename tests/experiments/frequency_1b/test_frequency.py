@@ -13,8 +13,9 @@ import pytest
 from upright.errors import NotIdentifiable
 from upright.experiments.frequency_1b.chapter import chapter, true_key
 from upright.experiments.frequency_1b.figures import bode_figure
-from upright.experiments.frequency_1b.run import FrequencyRun, asked, bench, run_frequency
+from upright.experiments.frequency_1b.run import FrequencyRun, run_frequency
 from upright.experiments.frequency_1b.sweeps import EVERY, SHARE, broadband, collect, grid, stepped_sine
+from upright.experiments.stand.known import asked, bench
 from upright.identification.frequency.answer import explain, key_value
 from upright.identification.frequency.response import FrequencyResponse
 from upright.identification.frequency.spectra import chirp, multisine, odd_lines, repetition, response_of, sines_in

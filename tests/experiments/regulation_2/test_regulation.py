@@ -12,6 +12,7 @@ from upright.control.score import outcomes
 from upright.errors import BadInput
 from upright.experiments.regulation_2 import chapter as regulation_page
 from upright.experiments.regulation_2.run import RegulationRequest, identify_make, run_regulation
+from upright.experiments.stand.twin import TwinStand
 from upright.rig import Rig
 from upright.rig.completion import completed
 from upright.rig.makes import hardware_of_make, make_of_rig, make_rig
@@ -45,7 +46,7 @@ def fit_of(truth, spread=0.01, seed=0, draws=64):
 def test_two_sets_regulate_and_one_does_not_as_the_paper_saw_and_as_was_told(make, tmp_path):
     """The paper, section 4.2: typically at least two sets regulate, at least one saturates or has too little effort."""
     truth = make_rig(make)
-    done = run_regulation(completed(fit_of(truth)), truth, 0, tmp_path, wish=RegulationRequest(draws=64))
+    done = run_regulation(completed(fit_of(truth)), TwinStand(rig=truth), 0, tmp_path, wish=RegulationRequest(draws=64))
     words = [a.word for a in done.attempts]
     assert words.count("regulates") >= 2
     assert {"saturates", "too weak"} & set(words)
@@ -65,7 +66,7 @@ def test_the_log_of_a_run_is_what_the_encoders_show(tmp_path):
 
     truth = make_rig("linear")
     wish = RegulationRequest(poles={"set 2": RegulationRequest().poles["set 2"]}, draws=16, seconds=1.0)
-    done = run_regulation(completed(fit_of(truth)), truth, 0, tmp_path, wish=wish)
+    done = run_regulation(completed(fit_of(truth)), TwinStand(rig=truth), 0, tmp_path, wish=wish)
     log = Record.from_csv(tmp_path / "regulation_set_2.csv")
     run = done.attempts[0].after
     counts = log["theta"] * truth.per_unit[1]

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from upright.errors import BadInput, NotIdentifiable
+from upright.experiments.stand.twin import TwinStand
 from upright.experiments.swing_up_2b.chapter import chapter, check_chapter
 from upright.experiments.swing_up_2b.run import LIES, known_of, run_swing_up, scales_of_log
 from upright.files import plain_values
@@ -24,7 +25,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory):
-    return run_swing_up(make_rig("furuta"), make_rig("furuta", 3), tmp_path_factory.mktemp("up"))
+    return run_swing_up(make_rig("furuta"), TwinStand(rig=make_rig("furuta", 3)), tmp_path_factory.mktemp("up"))
 
 
 def test_it_stands_and_says_so(done, tmp_path):
@@ -59,7 +60,7 @@ def test_every_lie_is_told_before_a_loop_is_closed_or_falls(done):
 
 def test_no_loop_is_closed_on_a_lying_encoder(tmp_path):
     liar = replace(make_rig("furuta", 3), scales=(1.0, 2.0))
-    done = run_swing_up(make_rig("furuta"), liar, tmp_path)
+    done = run_swing_up(make_rig("furuta"), TwinStand(rig=liar), tmp_path)
     assert done.ascent is None
     assert not done.caught
     told = chapter(done)

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from upright.errors import BadInput
+from upright.experiments.stand.known import Known
+from upright.experiments.stand.twin import TwinStand
 from upright.experiments.weighing_1a.chapter import chapter
 from upright.experiments.weighing_1a.from_logs import weigh_logs
-from upright.experiments.weighing_1a.run import Known, Weighing, first_body, measure_body, run_weighing
+from upright.experiments.weighing_1a.run import Weighing, first_body, measure_body, run_weighing
 from upright.records import Record
 from upright.rig.makes import MAKES, OSCILLATORS, make_rig
 
@@ -25,7 +27,7 @@ def test_what_is_handed_on_is_the_rig_s(make, tmp_path):
     for seed in range(1, 7):
         rig = make_rig(make, seed)
         truth = rig.plant.parameters()
-        for k in run_weighing(rig, seed, tmp_path / str(seed)).known:
+        for k in run_weighing(TwinStand(rig=rig), seed, tmp_path / str(seed)).known:
             assert k.value == pytest.approx(truth[k.name], rel=0.01)
             held.append(abs(k.value - truth[k.name]) <= 1.96 * k.stderr)
     assert sum(held) >= len(held) - 2  # of six at 95 %, three or more miss once in 450 times
@@ -34,7 +36,7 @@ def test_what_is_handed_on_is_the_rig_s(make, tmp_path):
 def test_a_rig_of_another_kind_is_refused(tmp_path):
     rig = make_rig("rectilinear")
     with pytest.raises(BadInput, match="knows carts, disks and pendulums"):
-        run_weighing(rig.replace(plant=OSCILLATORS["torsional"].plant, counts=(1.0,)), 0, tmp_path)
+        run_weighing(TwinStand(rig=rig.replace(plant=OSCILLATORS["torsional"].plant, counts=(1.0,))), 0, tmp_path)
 
 
 def test_the_chapter_says_how_far_a_number_is_off_and_whether_its_interval_covers_it(tmp_path):
@@ -46,7 +48,7 @@ def test_the_chapter_says_how_far_a_number_is_off_and_whether_its_interval_cover
         Known(name=name, value=off * true[name], stderr=error * true[name])
         for name, off, error in (("m_1", 1.02, 0.011), ("k_12", 0.97, 0.015))
     )
-    told = chapter(Weighing(rig=rig, make=MAKES["rectilinear"], folder=tmp_path, files={}, campaign=body, known=known))
+    told = chapter(Weighing(rig=rig, make=MAKES["rectilinear"], folder=tmp_path, campaign=body, known=known))
     assert told.detail == (
         "m_1 lies 2 % from the twin's, inside its 95 % interval. k_12 lies 3 % from the twin's, outside its 95 % "
         "interval."

@@ -24,7 +24,7 @@ from upright.experiments.free_swing_4.release import (
     freed,
     motion,
 )
-from upright.experiments.weighing_1a.run import Known
+from upright.experiments.stand.known import Known
 from upright.files import replace_file
 from upright.identification.model.fit import Fit
 from upright.physics import Plant

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from upright.experiments.frequency_1b.at_once import AtOnce
 from upright.experiments.frequency_1b.figures import bode_figure, quality_figure
 from upright.experiments.frequency_1b.run import FrequencyRun, LoggedResponse
+from upright.experiments.stand.fits import fit_chapter
 from upright.identification.frequency.answer import FrequencyFit, curves, digits, key_value
 from upright.identification.frequency.response import FrequencyResponse
 from upright.identification.model.fit import Estimate
@@ -93,6 +97,20 @@ def log_chapter(found: LoggedResponse) -> Chapter:
                  "FrequencyResponse.from_csv('frequency.csv').to_control()"),
         ),
         numbers=response,
+    )  # fmt: skip
+
+
+def at_once_chapter(done: AtOnce, folder: Path, truth: Mapping[str, float]) -> Chapter:
+    """The motion's fit, and the response frequency by frequency before it."""
+    told = fit_chapter(done.study, done.fit, folder, truth)
+    if done.response is None:
+        left = "Dry friction left too few frequencies for a response; the numbers rest on the motion alone."
+        return replace(told, warnings=(*told.warnings, left))
+    asked = log_chapter(done.response)
+    question = "What does the rig answer while it hangs, and which numbers of its equations does that fix?"
+    return replace(
+        told, question=question, parts=(*asked.parts[:2], *told.parts),
+        numbers={**told.numbers, "response": asked.numbers},
     )  # fmt: skip
 
 

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from upright import units
 from upright.errors import BadInput, nearest
 from upright.experiments.frequency_1b.sweeps import Sweep, broadband, stepped_sine
-from upright.experiments.weighing_1a.run import Known
-from upright.identification import GreyBox, Parameter
+from upright.experiments.stand.known import Known, asked, bench
+from upright.identification import GreyBox
 from upright.identification.frequency.answer import FrequencyFit, explain
 from upright.identification.frequency.response import FrequencyResponse, is_response
 from upright.identification.frequency.spectra import response_of
@@ -29,9 +29,6 @@ from upright.rig import Rig
 from upright.rig.hardware import Hardware
 from upright.rig.makes import Make, hardware_of_make, make_named, make_of, make_rig
 from upright.study.results import write_response_fit
-
-LAG = 1e-3
-"""First guess of the drive's time constant [s]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,34 +62,6 @@ class FrequencyRun:
     def truth(self) -> Mapping[str, float]:
         """What only a twin knows, `actuator.*` included."""
         return {**self.rig.plant.parameters(), **self.rig.drive}
-
-
-def bench(rig: Rig, make: Make) -> dict[str, float]:
-    """What the bench says of the numbers that it tells, each off by its tolerance; exact for the rig as designed."""
-    rng = np.random.default_rng([rig.seed, 43])
-    true = rig.plant.parameters()
-    off = rng.normal(size=len(make.bench)) * (rig.seed > 0)
-    return {n: true[n] * (1 + s * z) for (n, s), z in zip(make.bench.items(), off, strict=True)}
-
-
-def asked(make: Make, known: Mapping[str, float], tolerance: Mapping[str, float]) -> GreyBox:
-    """What a fit may know about a rig of a make: the design's numbers as guesses, and what is known, how well."""
-    design, plant = make_rig(make.key), type(make.plant)
-    parameters: dict[str, Parameter] = {}
-    for name, value in make.plant.parameters().items():
-        weighed, what = name in known, plant.quantity(name)
-        parameters[name] = Parameter(
-            name=name, unit=what.unit, meaning=what.meaning, value=known.get(name, value), lower=0.0,
-            estimate=name in make.sought and not weighed,
-            uncertainty=tolerance.get(name, 0.0) * known[name] if weighed else 0.0,
-        )  # fmt: skip
-    for name, value, unit, sought, meaning in (
-        ("actuator.gain", make.gain, make.gain_unit, True, "force per unit of command"),
-        ("actuator.delay", design.delay, "s", False, "dead time"),
-        ("actuator.lag", LAG, "s", True, "first-order lag"),
-    ):
-        parameters[name] = Parameter(name=name, value=value, unit=unit, meaning=meaning, estimate=sought, lower=0.0)
-    return GreyBox(plant=plant, parameters=parameters)
 
 
 def run_frequency(

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from upright.control.trial import readings, twin_log
 from upright.errors import BadInput
+from upright.experiments.stand.strength import SHARE
 from upright.identification.frequency.detection import Tone, by_period, detect, settled
 from upright.identification.frequency.response import FrequencyResponse
 from upright.identification.frequency.spectra import chirp, from_tones, multisine, odd_lines, response_of
@@ -25,8 +26,6 @@ from upright.rig import Rig
 from upright.rig.makes import Make, make_rig
 
 EVERY = 4  # servo periods per logged sample
-SHARE = 0.8
-"""Of the drive's limit."""
 RISE = 4.0
 """A command grows so slowly that it hardly starts the free swing [s], three periods at least."""
 PROBES = 6

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from upright.basis import SIMULATED
 from upright.control import Score
 from upright.control.preflight import FELT, WORDS, word
 from upright.experiments.regulation_2.figures import chances_figure, runs_figure, ways_figure
@@ -42,7 +41,7 @@ def chapter(done: Regulation) -> Chapter:
         ),
         numbers=_numbers(done),
     )  # fmt: skip
-    return resting_on(told, done.rig.basis, SIMULATED if done.simulated else "")
+    return resting_on(told, done.rig.basis, done.performed)
 
 
 def _verdict(done: Regulation) -> str:

@@ -10,16 +10,17 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from upright.basis import SIMULATED
 from upright.control import Score, Trial, score, trial
 from upright.control.preflight import Preflight, Task, preflight, word
 from upright.designing.run import SPEEDS, velocities
 from upright.errors import BadInput
 from upright.experiments.frequency_1b.run import run_frequency
+from upright.experiments.stand.stand import StandRun, TestStand
 from upright.gains import Margins, Placement, feedback, margins, place
 from upright.gains.loop import closed, command_noise
 from upright.gains.requests import Roots, poles_of, read_poles
@@ -28,7 +29,7 @@ from upright.paper.reproduce import TABLE_1
 from upright.progress import Progress, part, silent
 from upright.records import Array
 from upright.rig import Rig
-from upright.rig.makes import PENDULUMS, make_of_vendor
+from upright.rig.makes import MAKES, PENDULUMS, make_of_vendor
 from upright.rig.variation import allowed
 from upright.study.stored_rig import read_stored_rig
 from upright.systems import StateSpace
@@ -38,6 +39,12 @@ START = (math.radians(5), 0.0)
 """Tilt [rad] and speed [rad/s] with which a pendulum is let go where nobody says and no make has its own."""
 HAND = (0.01, 0.1)
 """What a hand gets wrong: half a degree, and 0.1 rad/s."""
+BY_HAND = (math.radians(4), 0.0)
+"""The same where a person brings the pendulum up."""
+SECONDS, SECONDS_BY_HAND = 6.0, 10.0
+"""Length of a run."""
+AT_LEAST = 0.5
+"""Chance of being held below which a set is not run on a live rig: what falls hits something."""
 DRAWS = 200
 SETS = {f"set {i}": text for i, text in enumerate(TABLE_1, start=1)}
 
@@ -51,7 +58,7 @@ class RegulationRequest:
     memory: float = 0.5
     tilt: float | None = None
     push: float | None = None
-    seconds: float = 6.0
+    seconds: float = SECONDS
     draws: int = DRAWS
 
     def __post_init__(self) -> None:
@@ -70,10 +77,6 @@ class Came:
     trial: Trial
     score: Score
     ended: str = ""
-
-
-Try = Callable[[str, Law, Preflight], Came | None]
-"""Runs a law, by its name and with what is expected of it; None where it is not run."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -129,7 +132,7 @@ class Regulation:
     rig : Rig
         As identified.
     truth : Rig or None
-        The rig on which the laws ran.
+        The twin on which the laws ran, where it was one that is simulated here.
     task : Task
     wish : Wish
     attempts : tuple of Attempt
@@ -140,6 +143,8 @@ class Regulation:
     source : str
         What `upright regulate` is given to do this again.
     seed : int
+    performed : str
+        `basis.SIMULATED` where no rig was driven.
     interrupted : bool
     seconds : float
         Computing time.
@@ -154,6 +159,7 @@ class Regulation:
     uncertain: bool
     source: str
     seed: int
+    performed: str = SIMULATED
     interrupted: bool = False
     seconds: float = 0.0
 
@@ -161,11 +167,6 @@ class Regulation:
     def ran(self) -> tuple[Attempt, ...]:
         """The sets that were run."""
         return tuple(a for a in self.attempts if a.came is not None)
-
-    @property
-    def simulated(self) -> bool:
-        """Whether nothing of it came from a rig: the laws ran on a twin, or nothing was run."""
-        return self.truth is not None or not self.ran
 
     @property
     def best(self) -> Attempt:
@@ -190,10 +191,26 @@ def _check_upright(known: Rig) -> None:
         )
 
 
+def request_for(stand: TestStand, known: Rig) -> RegulationRequest:
+    """What is asked of a rig when nobody says.
+
+    The pole sets of Table 1 are for the makers' rigs; for one of one's own all are as much faster as it falls faster.
+    """
+    if stand.simulated:
+        return RegulationRequest()
+    tilt, push = BY_HAND
+    asked = RegulationRequest(tilt=tilt, push=push, seconds=SECONDS_BY_HAND)
+    if stand.make is not None:
+        return asked
+    falls = [float(p.linear("inverted").poles().real.max()) for p in (known.plant, MAKES["furuta"].plant)]
+    faster = falls[0] / falls[1]
+    return replace(asked, poles={f"{name} x{faster:.2g}": faster * p for name, p in asked.poles.items()})
+
+
 def run_regulation(
-    rig: Rig, truth: Rig | None, seed: int, folder: Path, progress: Progress = silent,
+    rig: Rig, stand: TestStand | None, seed: int, folder: Path, progress: Progress = silent,
     stopped: Callable[[], bool] = lambda: False, wish: RegulationRequest | None = None, source: str = "FIT",
-    workers: Workers = HERE, tried: Try | None = None,
+    workers: Workers = HERE,
 ) -> Regulation:  # fmt: skip
     """Design for the rig as identified, say what will come, and run on the rig itself.
 
@@ -201,8 +218,8 @@ def run_regulation(
     ----------
     rig : Rig
         As identified hanging, completed for a run.
-    truth : Rig, optional
-        The rig; without it nothing is run and only what is expected is told.
+    stand : TestStand, optional
+        The rig itself; without it nothing is run and only what is expected is told.
     seed : int
         Of the hand's errors and of the rigs drawn.
     folder : Path
@@ -211,16 +228,20 @@ def run_regulation(
         Told the step at work and the share done.
     stopped : callable, optional
         Asked after every set whether to stop there.
-    wish : Wish, optional
+    wish : RegulationRequest, optional
+        What `request_for` says of the stand when omitted.
     source : str
         How a command line would name the fit.
     workers : Workers, optional
         Who simulates the rigs that the fit allows.
-    tried : callable, optional
-        Runs the laws in the place of `truth`.
+
+    Raises
+    ------
+    RigStopped
+        When a run on a live rig did not begin.
     """
     began = time.perf_counter()
-    wish = wish or RegulationRequest()
+    wish = wish or (RegulationRequest() if stand is None else request_for(stand, rig))
     _check_upright(rig)
     make = make_of_vendor(rig.hardware.vendor, rig.plant)
     usual = make.start if make else START
@@ -229,29 +250,35 @@ def run_regulation(
     tilt, push = (w if w is not None else s for w, s in zip((wish.tilt, wish.push), usual, strict=True))
     task = Task(start=(0.0, 0.0, tilt, push), hand=(0.0, 0.0, *HAND), seconds=wish.seconds)
     others = allowed(rig, wish.draws, seed)
-    if tried is None and truth is not None:
-        tried = partial(_on_twin, truth, task, seed)
     attempts: list[Attempt] = []
     interrupted = False
     for i, (name, poles) in enumerate(wish.poles.items()):
         whole = len(wish.poles) + 1
         tell = part(progress, i / whole, (i + 1) / whole, f"regulating with {name}")
         tell("designing", 0.0)
-        attempts.append(_attempt(name, poles, rig, tried, model, sampled, task, others, wish, seed, workers, tell))
+        foreseen = _foreseen(name, poles, rig, model, sampled, task, others, wish, seed, workers, tell)
+        came = None if stand is None else _came(stand, foreseen, task, seed, folder)
+        attempts.append(replace(foreseen, came=came))
         if stopped():
             interrupted = True
             break
     done = Regulation(
-        rig=rig, truth=truth, task=task, wish=wish, attempts=tuple(attempts), ways=(), uncertain=bool(rig.draws),
-        source=source, seed=seed, interrupted=interrupted,
+        rig=rig, truth=stand.rig if stand is not None and stand.simulated else None, task=task, wish=wish,
+        attempts=tuple(attempts), ways=(), uncertain=bool(rig.draws), source=source, seed=seed,
+        performed=SIMULATED if stand is None or not any(a.came for a in attempts) else stand.performed,
+        interrupted=interrupted,
     )  # fmt: skip
     progress("comparing the ways to the velocities", len(wish.poles) / (len(wish.poles) + 1))
     ways = () if interrupted else tuple(_ways(done, model, sampled))
     for a in done.attempts:
         if a.after is not None:
             folder.mkdir(parents=True, exist_ok=True)
-            a.after.record.to_csv(folder / f"regulation_{a.name.replace(' ', '_')}.csv")
+            a.after.record.to_csv(folder / f"{_stem(a)}.csv")
     return replace(done, ways=ways, seconds=time.perf_counter() - began)
+
+
+def _stem(attempt: Attempt) -> str:
+    return f"regulation_{attempt.name.replace(' ', '_')}"
 
 
 def actual_start(task: Task, seed: int) -> Array:
@@ -259,8 +286,8 @@ def actual_start(task: Task, seed: int) -> Array:
     return task.starts(1, np.random.default_rng([seed, 54]))[0]
 
 
-def _attempt(
-    name: str, poles: Roots, rig: Rig, tried: Try | None, model: StateSpace, sampled: StateSpace, task: Task,
+def _foreseen(
+    name: str, poles: Roots, rig: Rig, model: StateSpace, sampled: StateSpace, task: Task,
     others: Mapping[str, Array], wish: RegulationRequest, seed: int, workers: Workers, progress: Progress,
 ) -> Attempt:  # fmt: skip
     placed = place(model.A, model.B, poles)
@@ -269,13 +296,32 @@ def _attempt(
         rig, model, sampled, law, task, parameters=others, lanes=wish.draws, seed=seed, workers=workers,
         progress=progress,
     )  # fmt: skip
-    came = None if tried is None else tried(name, law, told)
-    return Attempt(name=name, placement=placed, law=law, before=told, came=came)
+    return Attempt(name=name, placement=placed, law=law, before=told, came=None)
 
 
-def _on_twin(truth: Rig, task: Task, seed: int, _name: str, law: Law, _told: Preflight) -> Came:
-    went = trial(truth, law, at=task.at, start=actual_start(task, seed), seconds=task.seconds)
-    return Came(trial=went, score=score(went))
+def _came(stand: TestStand, foreseen: Attempt, task: Task, seed: int, folder: Path) -> Came | None:
+    """The law of an attempt on the rig; None where it is too likely that a live pendulum falls."""
+    chance = foreseen.before.chance
+    if not stand.simulated and chance < AT_LEAST:
+        return None
+    driven, pendulum = stand.names
+    stand.ask(
+        f"Next is {foreseen.name}, expected to hold with a chance of {100 * chance:.0f} %. Let {pendulum} hang at "
+        f"rest; after a small pulse bring it up with {driven} in the middle of its travel, hold both there until the "
+        "loop takes them, and let go."
+    )
+    start = actual_start(task, seed)
+    return scored(stand.hold(foreseen.law, task.at, folder, _stem(foreseen), task.seconds, start=start))
+
+
+def scored(run: StandRun) -> Came:
+    """A run with its figures; one that a supervisor ended before anything could hit was lost there."""
+    found = score(run.trial)
+    if run.ended:
+        end = float(run.trial.t[-1])
+        lost = {"ran_out": end} if run.overtravel else {"fell": end}
+        found = replace(found, settled=math.inf, **lost)
+    return Came(trial=run.trial, score=found, ended=run.ended)
 
 
 def _ways(done: Regulation, model: StateSpace, sampled: StateSpace) -> list[VelocityRun]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from upright.basis import SIMULATED
 from upright.control.sensors import Scales
 from upright.control.swing_up import Ascent
 from upright.experiments.swing_up_2b.figures import ascent_figure, check_figure, portrait_figure
@@ -36,7 +35,7 @@ def chapter(done: SwingUpRun) -> Chapter:
         verdict=done.verdict, detail=f"Law and check were made from {source}; they met a rig with numbers of its own.",
         sound=done.caught, parts=tuple(parts), steps=_steps(done), findings=_findings(done), numbers=_numbers(done),
     )  # fmt: skip
-    return resting_on(told, done.model.basis, SIMULATED if done.simulated else "")
+    return resting_on(told, done.model.basis, done.performed)
 
 
 def check_chapter(model: Rig, check: Scales, log: str, source: str = "FIT.json") -> Chapter:

@@ -11,16 +11,17 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
+from upright.basis import SIMULATED
 from upright.control import SwingUp, design_swing_up, trial
 from upright.control.score import FALLEN
 from upright.control.sensors import KNOWN, Scales, Suspicion, Watch, probe, put_out, scales
-from upright.control.swing_up import Ascent, swing_up
+from upright.control.swing_up import Ascent, ascent_of
 from upright.control.trial import readings
-from upright.errors import BadInput, NotIdentifiable, nearest
+from upright.errors import BadInput, NotIdentifiable, RigStopped, nearest
+from upright.experiments.stand.stand import APPLIED, TestStand
 from upright.gains import feedback, filtered
 from upright.progress import Progress, silent
 from upright.records import Array, Record
@@ -95,8 +96,8 @@ class SwingUpRun:
     folder : Path
     seconds : float
         Computing time.
-    simulated : bool
-        Whether a twin stood in for the rig.
+    performed : str
+        `basis.SIMULATED` where no rig was driven.
     """
 
     model: Rig
@@ -109,7 +110,7 @@ class SwingUpRun:
     source: str
     folder: Path
     seconds: float = 0.0
-    simulated: bool = True
+    performed: str = SIMULATED
 
     @property
     def caught(self) -> bool:
@@ -203,21 +204,9 @@ def scales_of_log(model: Rig, log: Record, known: Mapping[str, float] | None = N
     return found
 
 
-class Hands(Protocol):
-    """Who does on a rig what is otherwise simulated."""
-
-    def coast(self, command: Array, /) -> Record:
-        """Log of a hanging rig under commands put out blindly: readings [m or rad] and ``u``."""
-        ...
-
-    def ascend(self, law: SwingUp, seconds: float, /) -> Ascent:
-        """Swing it up."""
-        ...
-
-
 def run_swing_up(
     model: Rig,
-    truth: Rig,
+    stand: TestStand,
     folder: Path,
     progress: Progress = silent,
     stopped: Callable[[], bool] = lambda: False,
@@ -225,17 +214,15 @@ def run_swing_up(
     known: Mapping[str, float] | None = None,
     seconds: float = SECONDS,
     travel: float | None = None,
-    lies: bool = True,
     source: str = "",
-    at_hand: Hands | None = None,
 ) -> SwingUpRun:
-    """Check the encoders of a hanging rig, swing it up and hold it; then try what lying encoders would have done.
+    """Check the encoders of a hanging rig, swing it up and hold it; then try what lying encoders would do to a twin.
 
     Parameters
     ----------
     model : Rig
         As known: as designed, or as identified.
-    truth : Rig
+    stand : TestStand
         The rig itself.
     folder : Path
         Takes ``sensors.csv`` and ``swing_up.csv``.
@@ -249,35 +236,59 @@ def run_swing_up(
         How long the swing-up may take, holding included.
     travel : float, optional
         How far the driven body may go [m or rad]; what the rig says when omitted.
-    lies : bool
     source : str
         File that the model comes from, as typed.
-    at_hand : Hands, optional
-        The rig itself, in the place of the simulated `truth`.
+
+    Raises
+    ------
+    RigStopped
+        When a live rig was stopped, or did not begin.
     """
     began = time.perf_counter()
     progress("designing swing-up and catch", 0.0)
     law = design_swing_up(model, travel=travel)
     progress("asking the encoders", 0.3)
     command = probe(model, law)
-    log = put_out(truth, command) if at_hand is None else at_hand.coast(command)
+    log = _coasted(stand, command, folder)
     check = scales(model, log, known)
     progress("swinging up", 0.4)
-    ascent = None
-    if check.sound:
-        ascent = swing_up(truth, law, seconds=seconds) if at_hand is None else at_hand.ascend(law, seconds)
+    ascent = _ascended(stand, law, folder, seconds) if check.sound else None
     tried: tuple[Lie, ...] = ()
-    if lies and check.sound and not stopped():
+    if stand.simulated and check.sound and not stopped():
         progress("trying encoders that lie", 0.6)
-        tried = _lies(model, truth, law, command, known)
-    folder.mkdir(parents=True, exist_ok=True)
+        tried = _lies(model, stand.rig, law, command, known)
     log.to_csv(folder / "sensors.csv")
     if ascent is not None:
         ascent.trial.record.to_csv(folder / "swing_up.csv")
     return SwingUpRun(
-        model=model, truth=truth, log=log, check=check, law=law, ascent=ascent, lies=tried,
-        source=source, folder=folder, seconds=time.perf_counter() - began, simulated=at_hand is None,
+        model=model, truth=stand.rig if stand.simulated else model, log=log, check=check, law=law, ascent=ascent,
+        lies=tried,
+        source=source, folder=folder, seconds=time.perf_counter() - began, performed=stand.performed,
     )  # fmt: skip
+
+
+def _coasted(stand: TestStand, command: Array, folder: Path) -> Record:
+    """What the encoders show, from where the rig hangs at rest, under commands put out blindly."""
+    _ask(stand, "the drive swings it, then lets it coast")
+    log = stand.run([*command.tolist(), 0.0], folder, "sensors")
+    names = stand.names
+    signals = {**{n: log[n] - log[n][0] for n in names}, "u": log[APPLIED]}
+    units = {**{n: log.units[n] for n in names}, "u": stand.rig.unit}
+    return log.replace(t=log.t - log.t[0], signals=signals, units=units, inputs=("u",), outputs=tuple(names))
+
+
+def _ascended(stand: TestStand, law: SwingUp, folder: Path, seconds: float) -> Ascent:
+    _ask(stand, "after a small pulse it is swung up, around and caught: keep well away")
+    rule = law.rule(stand.rig, stand.rig.plant.state(stand.resting))
+    run = stand.hold(rule, "inverted", folder, "swing_up", seconds)
+    if run.ended:
+        raise RigStopped(f"The swing-up was stopped {run.trial.t[-1]:.3g} s after its start: {run.ended}")
+    return ascent_of(run.trial, law, rule)
+
+
+def _ask(stand: TestStand, what: str) -> None:
+    driven, pendulum = stand.names
+    stand.ask(f"Let {pendulum} hang at rest, with {driven} in the middle of its travel; {what}.")
 
 
 def _lies(

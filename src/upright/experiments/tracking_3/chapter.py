@@ -51,7 +51,7 @@ def chapter(done: Tracking) -> Chapter:
         verdict=_verdict(done), detail=detail + ended, sound=_sound(done), parts=tuple(parts), steps=_steps(done),
         findings=_findings(done), numbers=_numbers(done),
     )  # fmt: skip
-    return resting_on(told, done.model.basis, SIMULATED if done.simulated or not done.found else "")
+    return resting_on(told, done.model.basis, done.performed if done.found else SIMULATED)
 
 
 def _verdict(done: Tracking) -> str:

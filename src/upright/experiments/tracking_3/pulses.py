@@ -14,7 +14,8 @@ import numpy as np
 
 from upright.control.trial import twin_log
 from upright.errors import BadInput
-from upright.experiments.weighing_1a.run import Known
+from upright.experiments.stand.fits import fit_study
+from upright.experiments.stand.known import Known
 from upright.files import replace_file
 from upright.identification.model.fit import Fit
 from upright.physics import Plant
@@ -128,19 +129,12 @@ def identify_shaft(
     rig: Rig, seed: int, folder: Path, progress: Progress = silent, weighed: Sequence[Known] = ()
 ) -> tuple[Study, Fit]:
     """Pulse a rig, write logs and study, and fit it as `upright identify` would; writes `fit.json` too."""
-    from upright.identification.estimate import identify
-    from upright.study.load import load_study
-    from upright.study.results import write_fit
-
     folder.mkdir(parents=True, exist_ok=True)
     for file in _PULSES:
         pulses(rig, file).to_csv(folder / file)
     path = folder / STUDY
     replace_file(path, shaft_study(rig, seed, weighed).encode())
-    study = load_study(path)
-    fit = identify(study.model, study.runs, progress=part(progress, 0.0, 1.0, "fitting the shaft"))
-    write_fit(fit, study, folder / FIT)
-    return study, fit
+    return fit_study(path, part(progress, 0.0, 1.0, "fitting the shaft"))
 
 
 def fitted(rig: Rig, fit: Fit) -> Rig:

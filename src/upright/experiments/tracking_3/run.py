@@ -15,9 +15,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.basis import SIMULATED
 from upright.control import Trial, trial
 from upright.control.score import Effort, StepFigures, effort, step_figures
 from upright.errors import BadInput
+from upright.experiments.stand.known import Known
+from upright.experiments.stand.stand import TestStand
+from upright.experiments.stand.twin import TwinStand
 from upright.experiments.tracking_3.laws import (
     AT,
     GainSearch,
@@ -31,12 +35,11 @@ from upright.experiments.tracking_3.laws import (
     with_sum,
 )
 from upright.experiments.tracking_3.pulses import fitted, identify_shaft
-from upright.experiments.weighing_1a.run import Known
 from upright.identification.model.fit import Fit
 from upright.progress import Progress, silent
 from upright.records import Array
 from upright.rig import Rig
-from upright.rig.makes import MAKES, make_rig
+from upright.rig.makes import MAKES, make_of, make_rig
 from upright.rig.variation import DAILY
 from upright.study.load import Study
 
@@ -127,6 +130,8 @@ class Tracking:
         PD of the near encoder tuned, the same as stiff as the strongest set, and PD of the far encoder.
     search : GainSearch or None
         What the tuning tried.
+    performed : str
+        `basis.SIMULATED` where no rig was driven.
     """
 
     rig: Rig
@@ -142,6 +147,7 @@ class Tracking:
     stiff: Outcome | None = None
     far: Outcome | None = None
     search: GainSearch | None = None
+    performed: str = SIMULATED
     seconds: float = 0.0
     interrupted: bool = False
 
@@ -172,7 +178,7 @@ def run_tracking(
     stopped: Callable[[], bool] = lambda: False, *, which: Sequence[int] = (1, 2, 3, 4),
     poles: NDArray[np.complex128] | None = None, step: float | None = None, weighed: Sequence[Known] = (),
 ) -> Tracking:  # fmt: skip
-    """Run the experiment on a twin.
+    """Run the experiment on a twin: identify its shaft by pulses, design on the fit, try on another day.
 
     Parameters
     ----------
@@ -201,8 +207,8 @@ def run_tracking(
     progress("pulsing the shaft", 0.0)
     study, fit = identify_shaft(true, seed, folder, lambda what, share: progress(what, 0.05 + 0.25 * share), weighed)
     done = follow(
-        another_day(true, seed),
         fitted(true, fit),
+        TwinStand(rig=another_day(true, seed), make=make_of(true.plant)),
         folder,
         study,
         fit,
@@ -224,38 +230,37 @@ def another_day(rig: Rig, seed: int) -> Rig:
     return rig.changed(**{n: v * math.exp(rng.normal(0, DAILY)) for n, v in dry.items()})
 
 
-Try = Callable[[Tracker, StepTrial, float], StepTrial | None]
-"""Tries a law, of which so much is expected, with a step of that size; None where it is not tried."""
-
-
 def follow(
-    rig: Rig, model: Rig, folder: Path, study: Study | None, fit: Fit | None, progress: Progress,
+    model: Rig, stand: TestStand | None, folder: Path, study: Study | None, fit: Fit | None, progress: Progress,
     stopped: Callable[[], bool] = lambda: False, *, which: Sequence[int] = (1, 2, 3, 4),
-    poles: NDArray[np.complex128] | None = None, step: float | None = None, faster: float = 1.0,
-    tried: Try | None = None,
+    poles: NDArray[np.complex128] | None = None, step: float | None = None,
 ) -> Tracking:  # fmt: skip
-    """Design on the model, try on the rig; see `run_tracking`.
+    """Design on the model and try on the rig; without a rig only what the model foresees is told. See `run_tracking`.
 
-    `faster` is what the poles of Table 2 are multiplied by; `tried` tries laws in the place of a simulated `rig`.
+    Pole sets of Table 2 are for the makers' rigs; those of one's own are as much faster as the shaft swings faster.
+
+    Raises
+    ------
+    RigStopped
+        When a run on a live rig did not begin.
     """
     check(which, poles)
-    laws = list(paper_sets(model, which, faster))
+    laws = list(paper_sets(model, which, 1.0 if stand is None or stand.make is not None else _times_as_fast(model)))
 
     def outcome(law: Tracker) -> Outcome:
         predicted = attempt(model, law, chosen.size)
-        if tried is not None:
-            measured = tried(law, predicted, chosen.size)
-        else:
-            measured = None if rig is model else attempt(rig, law, chosen.size)
+        measured = None if stand is None else _tried(stand, law, predicted, chosen.size, folder)
         return Outcome(law=law, predicted=predicted, measured=measured or predicted)
 
     if poles is not None:
         laws.append(by_poles(model, "own set", poles))
+    rig = model if stand is None else stand.rig
     chosen = choose(model, laws, step)
     progress("stepping", 0.35)
     done = Tracking(
         rig=rig, model=model, true=rig, folder=folder, study=study, fit=fit, step=chosen,
         sets=tuple(outcome(law) for law in laws),
+        performed=SIMULATED if stand is None else stand.performed,
     )  # fmt: skip
     if stopped():
         return replace(done, interrupted=True)
@@ -293,6 +298,27 @@ def choose(model: Rig, laws: Sequence[Tracker], step: float | None = None) -> Ch
     if step is not None:
         size, reason = step, "as asked"
     return Chosen(size=size, reason=reason, by_effort=most, by_twist=twist, by_travel=travel)
+
+
+def _times_as_fast(model: Rig) -> float:
+    swings = [float(p.linear(AT).poles().imag.max()) for p in (model.plant, make_of(model.plant).plant)]
+    return swings[0] / swings[1]
+
+
+def _tried(stand: TestStand, law: Tracker, expected: StepTrial, step: float, folder: Path) -> StepTrial | None:
+    """The law on the rig; None where it is foreseen to leave a live rig's bounds."""
+    safe = math.isinf(expected.tripped) and law.decay > 0 and not expected.effort.saturated
+    if not stand.simulated and not safe:
+        return None
+    stand.ask(
+        f"Next is {law.name}. Let everything rest with {stand.names[0]} in the middle of its "
+        "travel; a small pulse comes first, then the step, then a steady push of the drive."
+    )
+    reference, pushes = asked_of(stand.rig, step)
+    stem = f"tracking_{law.name.replace(' ', '_').replace(',', '')}"
+    seconds = (reference.size - 1) * stand.rig.period
+    run = stand.hold(law.law, AT, folder, stem, seconds, reference=reference, pushes=pushes)
+    return figured(run.trial, step)
 
 
 def asked_of(rig: Rig, step: float) -> tuple[Array, Array]:

@@ -7,15 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from upright.experiments.stand.known import Known
+from upright.experiments.stand.stand import APPLIED
 from upright.experiments.weighing_1a.figures import decrement_figure, line_figure, swing_figure
-from upright.experiments.weighing_1a.run import Known, Weighing, truth
+from upright.experiments.weighing_1a.run import Weighing
 from upright.identification.loadings import Loaded, Loadings
 from upright.quantities import figures
 from upright.records import Record
-from upright.report.fit.tables import interval, plain_estimate
+from upright.report.fit.tables import finding, interval, plain_estimate
 from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Symbol, Table
 from upright.report.symbols import measured, number, typed, unit
-from upright.rig.makes import OSCILLATORS
+from upright.rig.makes import OSCILLATORS, Make
 
 QUESTION = (
     "How stiff is the spring, and how heavy is the bare body? A step makes the body swing; known inertias are added "
@@ -26,14 +28,30 @@ MOST_PANELS = 6
 
 
 def chapter(done: Weighing) -> Chapter:
-    """Experiment 1a on the rig of the later experiments."""
-    on, found = done.campaign.on, done.campaign.loadings
-    true = truth(on)
-    column = next(iter(done.campaign.logs.values())).outputs[0]
-    weighed = loading_chapter(
-        found, kind=on.design.kind, title="Stiffness and inertia from added loads", logs=done.campaign.logs,
-        signals=dict.fromkeys(done.campaign.logs, column), left_out=done.campaign.left_out, truth=true,
+    """Experiment 1a on a rig, beside the truth of a twin."""
+    campaign = done.campaign
+    found, body = campaign.loadings, OSCILLATORS[campaign.kind]
+    told = loading_chapter(
+        found, kind=campaign.kind, title="Stiffness and inertia from added loads", logs=campaign.logs,
+        signals={label: record.outputs[0] for label, record in campaign.logs.items()}, left_out=campaign.left_out,
+        truth=campaign.truth or None, steps=_steps(done),
     )  # fmt: skip
+    if done.make is not None:
+        return _later_chapter(done, done.make, told)
+    named = (("k", found.k, "stiffness"), (body.bare, found.bare, "inertia"), ("c", found.damping, "damping"))
+    findings = tuple(
+        finding(Symbol(f"{n} [{unit(_unit(campaign.kind, what))}]"), e, campaign.truth.get(n)) for n, e, what in named
+    )
+    weighed = {body.inertia: {**plain_estimate(found.bare), "unit": body.unit}}
+    handed_on = {k.name: {"value": k.value, "stderr": k.stderr} for k in done.known}
+    numbers = {**told.numbers, "parameters": weighed, "handed_on": handed_on}
+    return replace(told, key="1a", findings=findings, numbers=numbers)
+
+
+def _later_chapter(done: Weighing, make: Make, weighed: Chapter) -> Chapter:
+    """The chapter of a twin's body, with the rig that is built on it for the later experiments."""
+    campaign = done.campaign
+    found, true = campaign.loadings, campaign.truth
     digits = {k.name: figures(k.value, k.stderr) for k in done.known}
     units = {k.name: unit(type(done.rig.plant).quantity(k.name).unit) for k in done.known}
     handed = Table(
@@ -46,21 +64,20 @@ def chapter(done: Weighing) -> Chapter:
         numbers=(1, 2, 3),
     )  # fmt: skip
     steps = (
-        f"{len(done.campaign.logs)} steps of the command, masses of 500 g added one by one, each loading twice; dry "
+        f"{len(campaign.logs)} steps of the command, masses of 500 g added one by one, each loading twice; dry "
         "friction, encoder counts and converter steps are as on the rig."
     )
-    named = (("k", found.k), (on.design.bare, found.bare), ("c", found.damping))
+    named = (("k", found.k), (OSCILLATORS[campaign.kind].bare, found.bare), ("c", found.damping))
     handed_on = {k.name: {"value": k.value, "stderr": k.stderr, "truth": _truth(done, k)} for k in done.known}
     return replace(
         weighed,
         key="1a",
         detail=" ".join(_sentence(done, k) for k in done.known),
         parts=(
-            Part("The body", (done.make.mounted.bare, steps)),
+            Part("The body", (make.mounted.bare, steps)),
             *weighed.parts,
-            Part("What is handed on", (done.make.mounted.later, handed)),
+            Part("What is handed on", (make.mounted.later, handed)),
         ),
-        steps=_steps(done),
         findings=tuple(
             KeyNumber(
                 what=Symbol(f"{k.name} [{units[k.name]}]"),
@@ -90,17 +107,27 @@ def _sentence(done: Weighing, k: Known) -> str:
 
 
 def _steps(done: Weighing) -> tuple[Step, ...]:
-    kind = done.campaign.on.design.kind
-    first = {label: file for label, file in done.files.items() if label.endswith("run 1")}
-    added = " ".join(f'--added "{done.campaign.added[label]:.6g} {_unit(kind, "inertia")}"' for label in first)
-    files = " ".join(typed(done.folder / file) for file in first.values())
+    campaign, body = done.campaign, OSCILLATORS[done.campaign.kind]
+    if done.make is not None:
+        first = [label for label in campaign.files if label.endswith("run 1")]
+        files = " ".join(typed(done.folder / campaign.files[label]) for label in first)
+        added = " ".join(f'--added "{campaign.added[label]}"' for label in first)
+        return (
+            Step(
+                "Weigh the body again from one log of each loading, as you would your own.",
+                f"upright loadings {files} {added} -o {typed(done.folder / 'again')}",
+            ),
+            Step("See which masses would have told most.", f"upright plan-inertias --rig {campaign.kind}"),
+        )
+    files = " ".join(typed(done.folder / file) for file in campaign.files.values())
+    added = " ".join(f"--added {typed(a)}" for a in campaign.added.values())
+    added += f' --tolerance "{100 * done.tolerance:g} %"' if done.tolerance else ""
+    column = next(iter(campaign.logs.values())).outputs[0]
     return (
-        Step(
-            "Weigh the body again from one log of each loading, as you would your own.",
-            f"upright loadings {files} {added} -o {typed(done.folder / 'again')}",
-        ),
-        Step("See which masses would have told most.", f"upright plan-inertias --rig {kind}"),
-    )
+        Step("Weigh it again from one log of each loading, as you would from logs of your own.",
+             f"upright loadings {files} {added} --signal {column} --command {APPLIED}"),
+        Step(f"Write {body.inertia} into the study of what is built on this body, what is mounted on it added."),
+    )  # fmt: skip
 
 
 def loading_chapter(

@@ -3,19 +3,27 @@
 The rig's pendulum or second body is locked or taken off, its masses are unbolted, and known ones are added one by one.
 What is then mounted for the later experiments has a known inertia, so the body's inertia follows with its uncertainty.
 
+On a live rig, which is one cart or disk, its owner names what is bolted on, a person does it, and a first step shows
+how large the others may be.
+
 The twins of cart and disk stick: dry friction, encoder counts, converter steps and amplifier limits are as on the rigs.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from upright.errors import NotIdentifiable
-from upright.identification.loadings import Loaded, Loadings, fit_loadings, swings
+from upright.errors import BadInput
+from upright.experiments.stand.known import Known
+from upright.experiments.stand.stand import APPLIED, TestStand, file_of
+from upright.experiments.stand.strength import GROWTH, OF_TRAVEL, REACH, SHARE, STILL
+from upright.experiments.weighing_1a.loadings import inertia_of, weigh
+from upright.identification.loadings import Loadings
 from upright.physics import Plant
 from upright.progress import Progress, silent
 from upright.records import Record
@@ -25,6 +33,12 @@ from upright.rig.makes import CONVERTER, OSCILLATORS, SERVO, Make, Oscillator, m
 
 PIECES = 4  # 500 g masses that come with a rig
 EVERY = 4  # servo periods per logged sample
+SWINGS = 10
+"""Periods, by the guesses and with all masses on, for which it swings after each step."""
+STEPS = (1.0, 0.0, -1.0, 0.0)
+"""Commands of a run, one swing each: to either side and back."""
+PROBE = 0.3
+"""Of the step that the guesses call for: what comes of it says how large a step may be."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,66 +113,80 @@ def truth(on: LoadedTwin) -> dict[str, float]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Campaign:
-    """The logs of experiment 1a on one body with what follows from them."""
+    """The logs of experiment 1a on one body with what follows from them.
 
-    on: LoadedTwin
+    Attributes
+    ----------
+    kind : {"rectilinear", "torsional"}
+    logs : dict of str to Record
+        By label.
+    added : dict of str to str
+        What was bolted on, by label.
+    loadings : Loadings
+    left_out : tuple of str
+        Why some logs did not count: friction may leave too few swings.
+    truth : mapping of str to float
+        What only a twin can tell, by the symbols of the report; empty of hardware.
+    files : dict of str to str
+        Names of the logs, by label, where they were written.
+    on : LoadedTwin or None
+        The body itself, where it is simulated.
+    """
+
+    kind: str
     logs: dict[str, Record]
-    added: dict[str, float]
+    added: dict[str, str]
     loadings: Loadings
     left_out: tuple[str, ...]
-    """Why some logs did not count: friction may leave too few swings."""
+    truth: Mapping[str, float]
+    files: Mapping[str, str] = field(default_factory=dict[str, str])
+    on: LoadedTwin | None = None
 
-    def write_logs(self, folder: Path) -> dict[str, str]:
-        """Write every log as CSV; gives back its file by its label."""
+    def written(self, folder: Path) -> Campaign:
+        """The same with every log as CSV in a folder."""
         folder.mkdir(parents=True, exist_ok=True)
         files: dict[str, str] = {}
         for label, record in self.logs.items():
             files[label] = label.replace(" masses, run ", "x500g_run") + ".csv"
             record.to_csv(folder / files[label])
-        return files
-
-
-@dataclass(frozen=True, kw_only=True)
-class Known:
-    """A parameter of the rig that experiment 1a leaves known: value and standard error [SI]."""
-
-    name: str
-    value: float
-    stderr: float
+        return replace(self, files=files)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Weighing:
-    """Experiment 1a on a rig: the swings with their line, and what they say about the rig as it is used later."""
+    """Experiment 1a on a rig: the swings with their line, and what they say about the rig as it is used later.
+
+    `make` says what the later experiments add to the body; None where it is used as it was weighed.
+    """
 
     rig: Rig
-    make: Make
+    make: Make | None
     folder: Path
-    files: dict[str, str]
     campaign: Campaign
     known: tuple[Known, ...]
+    tolerance: float = 0.0
 
 
 def measure_body(
     on: LoadedTwin, progress: Progress = silent, *, counts: tuple[int, ...] = (0, 1, 2, 3, 4), shots: int = 2
 ) -> Campaign:
     """Step a body with every count of masses, `shots` times each, and weigh it."""
+    design = on.design
     logs: dict[str, Record] = {}
-    added: dict[str, float] = {}
-    loaded: list[Loaded] = []
-    left_out: list[str] = []
+    values: list[float] = []
     for i, count in enumerate(counts):
         progress(f"stepping with {count} masses", i / len(counts))
         for shot in range(shots):
-            name, inertia = f"{count} masses, run {shot + 1}", count * on.design.piece
-            record = acquire(on, count, shot=shot)
-            logs[name], added[name] = record, inertia
-            try:
-                loaded += swings(record, added=inertia, label=name, signal=record.outputs[0], command="u", quantum=1.0)
-            except NotIdentifiable as error:
-                left_out.append(str(error))
-    found = fit_loadings(loaded, tolerance=on.design.tolerance, piece=on.design.piece)
-    return Campaign(on=on, logs=logs, added=added, loadings=found, left_out=tuple(left_out))
+            logs[f"{count} masses, run {shot + 1}"] = acquire(on, count, shot=shot)
+            values.append(count * design.piece)
+    signals = {label: record.outputs[0] for label, record in logs.items()}
+    found, left_out = weigh(
+        logs, values, signals, dict.fromkeys(logs, "u"), tolerance=design.tolerance, piece=design.piece
+    )  # fmt: skip
+    added = {label: f"{value:.6g} {design.unit}" for label, value in zip(logs, values, strict=True)}
+    return Campaign(
+        kind=design.kind, logs=logs, added=added, loadings=found, left_out=left_out, truth=truth(on), on=on
+    )  # fmt: skip
 
 
 def first_body(rig: Rig) -> LoadedTwin:
@@ -184,19 +212,131 @@ def _make(rig: Rig) -> Make:
     )
 
 
-def run_weighing(rig: Rig, seed: int, folder: Path, progress: Progress = silent) -> Weighing:
-    """Weigh the first body of a rig; its logs are written to `folder`."""
+def run_weighing(stand: TestStand, seed: int, folder: Path, progress: Progress = silent) -> Weighing:
+    """Weigh the first body of a rig; its logs are written to `folder`.
+
+    A twin's body is freed and stepped whatever is built on it, a live rig must be that body alone.
+
+    Raises
+    ------
+    BadInput
+        When a twin is of no make, or the loadings named for a live rig are of another kind or fewer than two.
+    NotIdentifiable
+        When too few swings can be seen.
+    RigStopped
+        When a live rig was stopped by a limit, or was not loaded.
+    """
+    rig = stand.rig
+    if not stand.simulated:
+        done = step_stand(stand, folder, progress)
+        bare = done.loadings.bare
+        known = (Known(name=OSCILLATORS[done.kind].inertia, value=bare.value, stderr=bare.stderr),)
+        return Weighing(rig=rig, make=None, folder=folder, campaign=done, known=known, tolerance=stand.tolerance)
     make = _make(rig)
-    done = measure_body(first_body(replace(rig, seed=seed)), progress)
+    done = measure_body(first_body(replace(rig, seed=seed)), progress).written(folder)
     found, mounted = done.loadings, make.mounted
     spread = make.oscillator.tolerance * mounted.each * math.sqrt(mounted.pieces)
-    known = [
-        Known(
-            name=make.body,
-            value=found.bare.value + mounted.each * mounted.pieces + mounted.rest,
-            stderr=math.hypot(found.bare.stderr, spread, mounted.rest_error),
+    body = Known(
+        name=make.body,
+        value=found.bare.value + mounted.each * mounted.pieces + mounted.rest,
+        stderr=math.hypot(found.bare.stderr, spread, mounted.rest_error),
+    )
+    spring = "k_12" in rig.plant.names()
+    known = (body, Known(name="k_12", value=found.k.value, stderr=found.k.stderr)) if spring else (body,)
+    return Weighing(rig=rig, make=make, folder=folder, campaign=done, known=known)
+
+
+def kind_of(plant: Plant) -> str:
+    """Whether it is one cart or one disk on a spring, which can be weighed; empty of any other."""
+    on_spring = (k for k, o in OSCILLATORS.items() if isinstance(plant, type(o.plant)))
+    return next((k for k in on_spring if plant.parameters()["k_1"] > 0), "")
+
+
+def step_stand(stand: TestStand, folder: Path, progress: Progress = silent) -> Campaign:
+    """Ask for one loading after another, and step the rig with each; leaves a log of each in a folder.
+
+    Raises
+    ------
+    BadInput
+        When RIG.toml names loadings of another kind, or fewer than two.
+    NotIdentifiable
+        When too few swings can be seen.
+    RigStopped
+        When the rig was stopped by a limit, or was not loaded.
+    """
+    kind, values = kind_of(stand.rig.plant), _added(stand)
+    truly = _bolted(stand, values)
+    seconds = SWINGS * 2 * math.pi / _slowest(stand, max(values))
+    (name,), wanted = stand.names, _wanted(stand)
+    level = PROBE * min(SHARE * stand.rig.limit, wanted * _stiffness(stand))
+    logs: dict[str, Record] = {}
+    files: dict[str, str] = {}
+    runs = list(zip(stand.added, truly, strict=True))
+    runs.insert(0, runs[0])  # the probe
+    for i, (text, true) in enumerate(runs):
+        progress(f"stepping with {text} added", i / len(runs))
+        stand.ask(
+            f"Bolt on what makes {text} in all and nothing else, and let {name} rest on its spring with room to either "
+            f"side; steps follow for {len(STEPS) * seconds:.0f} s."
         )
-    ]
-    if "k_12" in rig.plant.names():
-        known.append(Known(name="k_12", value=found.k.value, stderr=found.k.stderr))
-    return Weighing(rig=rig, make=make, folder=folder, files=done.write_logs(folder), campaign=done, known=tuple(known))
+        signal = _steps(level, seconds, stand.rig.period)
+        record = stand.run(signal, folder, f"loaded_{i}" if i else "probe", bolted=true)
+        if i == 0:
+            seen = float(np.ptp(record[name])) / 4  # a step swings to twice where it rests, to either side
+            level = min(SHARE * stand.rig.limit, GROWTH / PROBE * level, level * wanted / max(seen, 1e-12))
+            continue
+        label = text if text not in logs else f"{text}, run {i}"
+        logs[label], files[label] = record, file_of(record)
+    found, left_out = weigh(
+        logs, values, dict.fromkeys(logs, name), dict.fromkeys(logs, APPLIED), tolerance=stand.tolerance
+    )
+    body, true = OSCILLATORS[kind], stand.truth
+    truth = {"k": true["k_1"], body.bare: true[body.inertia], "c": true["c_1"]} if true else {}
+    return Campaign(
+        kind=kind, logs=logs, added=dict(zip(logs, stand.added, strict=True)), loadings=found, left_out=left_out,
+        truth=truth, files=files,
+    )  # fmt: skip
+
+
+def _added(stand: TestStand) -> list[float]:
+    """Loadings of RIG.toml [kg or kg m^2]."""
+    kind = kind_of(stand.rig.plant)
+    said = [inertia_of(text) for text in stand.added]
+    if {k for _, k in said if k} == {kind} and len({a for a, _ in said}) > 1:
+        return [a for a, _ in said]
+    unit, piece = OSCILLATORS[kind].unit, OSCILLATORS[kind].piece
+    raise BadInput(
+        f"experiment 1a needs two or more different loadings in {unit}, such as, in RIG.toml, [loadings] "
+        f'added = ["0 {unit}", "{piece:.3g} {unit}", "{2 * piece:.3g} {unit}"], got {", ".join(stand.added)}.'
+    )
+
+
+def _bolted(stand: TestStand, values: Sequence[float]) -> list[float]:
+    """What a twin's hands truly bolt on: pieces of the smallest loading, each off by its tolerance; of hardware, 0."""
+    if not stand.performed:
+        return [0.0] * len(values)
+    piece = min(v for v in values if v > 0)
+    count = math.ceil(max(values) / piece)
+    off = np.random.default_rng([stand.twin.seed, 71]).normal(0.0, stand.tolerance, count)
+    return np.interp(values, piece * np.arange(count + 1), np.append(0.0, np.cumsum(piece * (1 + off)))).tolist()
+
+
+def _wanted(stand: TestStand) -> float:
+    """How far a step is to put it [m or rad]; it swings twice as far."""
+    return min(REACH[stand.rig.plant.coordinates[0].unit], OF_TRAVEL * stand.travel)
+
+
+def _stiffness(stand: TestStand) -> float:
+    """Command per displacement, by the guesses."""
+    return stand.rig.plant.parameters()["k_1"] / abs(stand.rig.gain)
+
+
+def _slowest(stand: TestStand, added: float) -> float:
+    """Natural frequency with that added, by the guesses [rad/s]."""
+    p, inertia = stand.rig.plant.parameters(), stand.rig.plant.names()[0]
+    return math.sqrt(p["k_1"] / (p[inertia] + p["a_1"] + added))
+
+
+def _steps(level: float, seconds: float, period: float) -> list[float]:
+    each = math.ceil(seconds / period)
+    return np.concatenate([np.zeros(math.ceil(STILL / period)), np.repeat(level * np.array(STEPS), each)]).tolist()

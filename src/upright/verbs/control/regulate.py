@@ -102,6 +102,7 @@ def regulate(
     """
     from upright.experiments.regulation_2.chapter import chapter
     from upright.experiments.regulation_2.run import identify_make, run_regulation
+    from upright.experiments.stand.twin import TwinStand
     from upright.rig.completion import completed, doubts, twin_of
     from upright.workers import Workers
 
@@ -122,7 +123,8 @@ def regulate(
     )
     truth = None if seed is None else twin_of(model, seed)
     done = run_regulation(
-        model, truth, seed or 0, at, lambda step, share: progress(step, base + (1 - base) * share), wish=wish,
+        model, None if truth is None else TwinStand(rig=truth), seed or 0, at,
+        lambda step, share: progress(step, base + (1 - base) * share), wish=wish,
         source=name, workers=shared,
     )  # fmt: skip
     told = chapter(done)

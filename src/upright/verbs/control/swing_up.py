@@ -86,6 +86,7 @@ def swing_up(
     BadInput
         When the call contradicts itself or the fit, or the log cannot be used.
     """
+    from upright.experiments.stand.twin import TwinStand
     from upright.experiments.swing_up_2b.chapter import chapter, check_chapter
     from upright.experiments.swing_up_2b.run import known_of, run_swing_up, scales_of_log
     from upright.files import write_json
@@ -119,8 +120,8 @@ def swing_up(
         told = check_chapter(model, scales, log.name, name or "FIT.json")
         told = replace(told, warnings=(*told.warnings, *doubt))
         return Answer(scales, told, write_page(told, at / "encoders.html", pdf))
-    travel = above_zero(on, "travel", driven_unit(type(model.plant)))
-    done = run_swing_up(model, _lying(truth, lie), at, known=known, seconds=seconds, travel=travel, source=name)
+    travel, stand = above_zero(on, "travel", driven_unit(type(model.plant))), TwinStand(rig=_lying(truth, lie))
+    done = run_swing_up(model, stand, at, known=known, seconds=seconds, travel=travel, source=name)
     told = chapter(done)
     told = replace(told, warnings=(*told.warnings, *doubt))
     return Answer(

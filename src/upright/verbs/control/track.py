@@ -116,7 +116,7 @@ def track(
         model = model.replace(limit=above_zero(asked, "limit", model.unit) or model.limit)
         done = run_tracking(model, seed, at, progress, which=which, poles=own, step=size)
     else:
-        done = follow(model, model, Path(called(source)), None, None, progress, which=which, poles=own, step=size)
+        done = follow(model, None, Path(called(source)), None, None, progress, which=which, poles=own, step=size)
     told = chapter(done)
     told = replace(
         told, title=f"Experiment 3: {told.title.lower()}, {done.rig.name}",

@@ -9,7 +9,7 @@ against the last probe, which they have not seen.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,36 +18,25 @@ import numpy as np
 
 from upright.errors import BadInput, NotIdentifiable
 from upright.experiments.frequency_1b.run import LoggedResponse, LogRequest, response_of_logs
-from upright.experiments.hands_on.rig import RigAtHand
-from upright.experiments.hands_on.studies import write_study
-from upright.identification.estimate import identify
+from upright.experiments.stand.fits import fit_study
+from upright.experiments.stand.known import Known
+from upright.experiments.stand.stand import TestStand, file_of
+from upright.experiments.stand.strength import GROWTH, OF_TRAVEL, REACH, SHARE, STILL
+from upright.experiments.stand.studies import write_study
 from upright.identification.frequency.spectra import multisine, odd_lines
 from upright.identification.model.fit import Fit
 from upright.progress import Progress, part
-from upright.readers import read
-from upright.records import Array
-from upright.running.rig import usual_limits
-from upright.study.load import Study, load_study
-from upright.study.results import write_fit
+from upright.records import Array, Record
+from upright.study.load import Study
 
 BELOW, ABOVE = 0.4, 4.0
 """Ends of the band beside the slowest and the fastest swing of a rig that nobody makes."""
-REACH = {"rad": math.radians(12), "m": 0.02}
-"""Amplitude that is wanted of a coordinate of such a rig."""
-OF_TRAVEL = 0.25
-"""Most amplitude of the driven coordinate, as a share of its travel."""
 LINES, RESOLVED = 20, 4
 """Frequencies, and how many times the period of the multisine holds that of the slowest."""
 PROBES = (0.15, 0.4, 0.8)
 """Commands of the probes, as shares of what the guesses call for; what came of each bounds the next."""
 PROBED, PERIODS = 2, 8
 """Periods of a probe, and of the run."""
-SHARE = 0.8
-"""Of the drive's limit."""
-GROWTH = 3.0
-"""Most by which a run is stronger than the one before."""
-STILL = 0.5
-"""Time at rest before a signal [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +48,7 @@ class Asking:
     wave: Array
 
 
-def asking(rig: RigAtHand) -> Asking:
+def asking(stand: TestStand) -> Asking:
     """Of the rig as its owner describes it.
 
     Raises
@@ -67,10 +56,10 @@ def asking(rig: RigAtHand) -> Asking:
     BadInput
         When it does not swing where it rests.
     """
-    model, at = rig.model, rig.resting
+    model, at = stand.rig, stand.resting
     linear = model.linear(at)
-    if rig.make is not None:
-        band, reach = rig.make.band, np.array(rig.make.reach)
+    if stand.make is not None:
+        band, reach = stand.make.band, np.array(stand.make.reach)
     else:
         swings = [abs(p) for p in linear.poles() if abs(p.imag) > 1e-3 * abs(p)]
         if not swings:
@@ -80,8 +69,8 @@ def asking(rig: RigAtHand) -> Asking:
             )
         band = (BELOW * min(swings), ABOVE * max(swings))
         reach = np.array([REACH[c.unit] for c in model.plant.coordinates])
-    driven = rig.names.index(model.plant.inputs[0].on)
-    reach[driven] = min(reach[driven], OF_TRAVEL * travel_of(rig, driven))
+    driven = stand.names.index(model.plant.inputs[0].on)
+    reach[driven] = min(reach[driven], OF_TRAVEL * stand.travel)
     length = 64 * math.ceil(RESOLVED * 2 * math.pi / (64 * band[0] * model.period))
     base = 2 * math.pi / (length * model.period)
     lines = odd_lines(*band, LINES, base)
@@ -91,16 +80,8 @@ def asking(rig: RigAtHand) -> Asking:
     return Asking(band=band, reach=reach, wave=wave / np.abs(wave).max())
 
 
-def travel_of(rig: RigAtHand, driven: int) -> float:
-    """How far the driven coordinate may go: the description's, or less where RIG.toml says so."""
-    units = {c.name: c.unit for c in rig.model.plant.coordinates}
-    held = rig.file.limits(units, rig.model.unit, usual_limits(rig.model))
-    assert held is not None  # hardware without limits is no rig at hand
-    return min(rig.model.travel, held.travel[driven])
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Hanging:
+class AtOnce:
     """What the rig answered: its response, if it has one, and a fit of the motion with the study that repeats it."""
 
     response: LoggedResponse | None
@@ -108,84 +89,81 @@ class Hanging:
     fit: Fit
 
 
-def run_hanging(
-    rig: RigAtHand, folder: Path, progress: Progress, weighed: Mapping[str, Mapping[str, Any]] | None = None
-) -> Hanging:  # fmt: skip
+def run_at_once(
+    stand: TestStand, folder: Path, progress: Progress, weighed: Sequence[Known] = ()
+) -> AtOnce:  # fmt: skip
     """Ask the rig, and fit what it answered; leaves logs, `study.toml`, `fit.json` and the response in a folder.
 
-    What experiment 1a `weighed` is known of its inertias.
+    What experiment 1a `weighed` is known.
 
     Raises
     ------
     RigStopped
         When the rig was stopped by a limit, or was not left to rest.
     """
-    asked = asking(rig)
-    names = rig.names
-    rests = f"{names[-1]} hang at rest" if rig.resting == "hanging" else "everything rest"
+    asked = asking(stand)
+    names = stand.names
+    rests = f"{names[-1]} hang at rest" if stand.resting == "hanging" else "everything rest"
     still = f"Let {rests}, with {names[0]} in the middle of its travel and room around it"
     still = f"Take the added masses off. {still}" if weighed else still
-    most = SHARE * rig.model.limit
-    right = _level(rig, asked, most)  # by the guesses
-    level, stronger, probe = PROBES[0] * right, right, Path()
+    most = SHARE * stand.rig.limit
+    right = _level(stand, asked, most)  # by the guesses
+    level, stronger, logs = PROBES[0] * right, right, list[Record]()
     for i, share in enumerate(PROBES):
         progress(f"probing, {i + 1} of {len(PROBES)}", 0.3 * i / len(PROBES))
         level = min(share * stronger, GROWTH * level, most)
-        rig.requested(f"{still}; probe {i + 1} of {len(PROBES)} follows.")
-        probe = rig.put_out(_from_rest(rig, level * asked.wave, PROBED), folder, "probe")
-        stronger = min(level / max(_share(probe, names, asked), 1e-3), most)
+        stand.ask(f"{still}; probe {i + 1} of {len(PROBES)} follows.")
+        logs.append(stand.run(_from_rest(stand, level * asked.wave, PROBED), folder, "probe"))
+        stronger = min(level / max(_share(logs[-1], names, asked), 1e-3), most)
     level = min(stronger, GROWTH * level)
-    seconds = PERIODS * asked.wave.size * rig.model.period
-    rig.requested(f"{still}; all frequencies at once follow for {seconds:.0f} s.")
+    seconds = PERIODS * asked.wave.size * stand.rig.period
+    stand.ask(f"{still}; all frequencies at once follow for {seconds:.0f} s.")
     progress(f"asking all frequencies at once for {seconds:.0f} s", 0.3)
-    log = rig.put_out(_from_rest(rig, level * asked.wave, PERIODS), folder, "multisine")
-    runs = [_run("multisine", log, asked, PERIODS), _run("probe", probe, asked, PROBED) | {"role": "predict"}]
-    path = write_study(rig, folder / "study.toml", f"Hanging: {rig.model.name}", runs, known=weighed)
-    wish = LogRequest(kind="multisine", hold=rig.model.period, band=asked.band, signals={}, counts={}, known={})
-    alone = {**runs[0], "file": f"../{log.name}"}
-    answered = write_study(rig, folder / "response" / "study.toml", f"Response: {rig.model.name}", [alone],
+    log = stand.run(_from_rest(stand, level * asked.wave, PERIODS), folder, "multisine")
+    runs = [_run("multisine", log, asked, PERIODS), _run("probe", logs[-1], asked, PROBED) | {"role": "predict"}]
+    path = write_study(stand, folder / "study.toml", f"Hanging: {stand.rig.name}", runs, known=weighed)
+    wish = LogRequest(kind="multisine", hold=stand.rig.period, band=asked.band, signals={}, counts={}, known={})
+    alone = {**runs[0], "file": f"../{file_of(log)}"}
+    answered = write_study(stand, folder / "response" / "study.toml", f"Response: {stand.rig.name}", [alone],
                            known=weighed)  # fmt: skip
     tell = part(progress, 0.5, 0.6, "fitting the response")
     try:
         response = response_of_logs([answered], wish, answered.parent, tell=tell)
     except NotIdentifiable:  # friction may leave too few frequencies; the motion says more
         response = None
-    study = load_study(path)
-    fit = identify(study.model, study.runs, progress=part(progress, 0.6, 1.0, "fitting the motion"))
-    write_fit(fit, study, folder / "fit.json")
-    return Hanging(response=response, study=study, fit=fit)
+    study, fit = fit_study(path, part(progress, 0.6, 1.0, "fitting the motion"))
+    return AtOnce(response=response, study=study, fit=fit)
 
 
-def _run(label: str, log: Path, asked: Asking, periods: int) -> dict[str, Any]:
+def _run(label: str, log: Record, asked: Asking, periods: int) -> dict[str, Any]:
     """The part of a log in which the command was whole: while it grows, what sticks and slips hardly moves, and a
     simulation that errs there is lost from there on.
     """
-    t = read(log).t
-    return {"label": label, "file": log.name, "window": [float(t[-periods * asked.wave.size]), float(t[-1])]}
+    window = [float(log.t[-periods * asked.wave.size]), float(log.t[-1])]
+    return {"label": label, "file": file_of(log), "window": window}
 
 
-def _from_rest(rig: RigAtHand, wave: Array, periods: int) -> list[float]:
+def _from_rest(stand: TestStand, wave: Array, periods: int) -> list[float]:
     """Samples that begin at rest, since a drive with a lag looks back, and grow over a period before those asked for.
 
     What begins at once gives a free axis a push, on which it drifts out of its travel.
     """
     growing = wave * (1 - np.cos(np.linspace(0.0, math.pi, wave.size))) / 2
-    return np.concatenate([np.zeros(math.ceil(STILL / rig.model.period)), growing, np.tile(wave, periods)]).tolist()
+    return np.concatenate([np.zeros(math.ceil(STILL / stand.rig.period)), growing, np.tile(wave, periods)]).tolist()
 
 
-def _level(rig: RigAtHand, asked: Asking, most: float) -> float:
+def _level(stand: TestStand, asked: Asking, most: float) -> float:
     """Largest command that by the guesses moves no coordinate further than wanted."""
     spectrum = np.fft.rfft(asked.wave)
-    omega = 2 * math.pi * np.arange(spectrum.size) / (asked.wave.size * rig.model.period)
+    omega = 2 * math.pi * np.arange(spectrum.size) / (asked.wave.size * stand.rig.period)
     lines = np.flatnonzero(np.abs(spectrum) > 1e-6 * np.abs(spectrum).max())
     answer = np.zeros((asked.reach.size, spectrum.size), dtype=np.complex128)
-    answer[:, lines] = rig.model.linear(rig.resting).response(omega[lines])[:, :, 0].T * spectrum[lines]
+    answer[:, lines] = stand.rig.linear(stand.resting).response(omega[lines])[:, :, 0].T * spectrum[lines]
     peaks = np.ptp(np.fft.irfft(answer, asked.wave.size, axis=1), axis=1) / 2
     return float(min(most, np.min(asked.reach / np.maximum(peaks, 1e-12))))
 
 
-def _share(log: Path, names: list[str], asked: Asking) -> float:
+def _share(log: Record, names: list[str], asked: Asking) -> float:
     """Largest amplitude over the last period of a probe, beside the one that is wanted."""
-    record = read(log)
-    seen = np.column_stack([record[n] for n in names])[-asked.wave.size :]
+    seen = np.column_stack([log[n] for n in names])[-asked.wave.size :]
     return float(np.max(np.ptp(seen, axis=0) / (2 * asked.reach)))

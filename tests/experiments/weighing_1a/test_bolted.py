@@ -10,10 +10,11 @@ import pytest
 
 import upright as up
 from upright.errors import BadInput, RigStopped
-from upright.experiments.at_hand import experiments_for
-from upright.experiments.hands_on.loaded import PROBE, _bolted, run_loaded
-from upright.experiments.hands_on.rig import RigAtHand, rig_at_hand
-from upright.experiments.hands_on.studies import write_study
+from upright.experiments.laboratory import choose
+from upright.experiments.stand.live import LiveStand, live_stand
+from upright.experiments.stand.studies import write_study
+from upright.experiments.weighing_1a.run import PROBE, _bolted, step_stand
+from upright.readers import read
 
 STUDY = """
 [rig]
@@ -44,7 +45,7 @@ def made(folder, loadings=LOADINGS):
     """A twin of the cart, with what may be bolted to it."""
     (folder / "study.toml").write_text(STUDY, encoding="utf-8")
     (folder / "RIG.toml").write_text(f'kind = "twin"\nstudy = "study.toml"\n{loadings}', encoding="utf-8")
-    return rig_at_hand(folder / "RIG.toml")
+    return live_stand(folder / "RIG.toml")
 
 
 @pytest.mark.slow
@@ -52,9 +53,9 @@ def made(folder, loadings=LOADINGS):
 def test_a_cart_is_weighed_within_its_travel_whatever_was_guessed(tmp_path, guessed):
     """A guess of a softer spring asks for less; what the probe shows makes up for it."""
     rig = made(tmp_path, LOADINGS.replace("0.2 %", "0 %"))
-    told = replace(rig, model=rig.model.changed(k_1=guessed))
-    done = run_loaded(told, tmp_path / "1a", lambda _step, _share: None)
-    truth = rig.truth.plant.parameters()
+    told = replace(rig, rig=rig.rig.changed(k_1=guessed))
+    done = step_stand(told, tmp_path / "1a", lambda _step, _share: None)
+    truth = rig.twin.plant.parameters()
     for estimate, true in ((done.loadings.k, truth["k_1"]), (done.loadings.bare, truth["m_1"])):
         assert estimate.interval[0] <= true <= estimate.interval[1]
         assert estimate.stderr < 0.001 * true
@@ -74,17 +75,17 @@ def test_a_step_never_exceeds_its_share_of_the_limit(tmp_path, monkeypatch):
     (tmp_path / "study.toml").write_text(STUDY.replace("5 N/V", "0.5 N/V"), encoding="utf-8")
     levels: list[float] = []
 
-    def put_out(self, samples, folder, stem, **_hand):
+    def run(self, samples, folder, stem, **_hand):
         """A cart that hardly moves, so that what the probe shows asks for as much as there is."""
         levels.append(max(samples))
         log = tmp_path / f"{stem}.csv"
         log.write_text("t,x_1\n0,0\n0.001,1e-6\n0.002,0\n", encoding="utf-8")
-        return log
+        return read(log)
 
-    monkeypatch.setattr(RigAtHand, "put_out", put_out)
-    rig = replace(rig_at_hand(tmp_path / "RIG.toml"), ask=lambda _sentence: len(levels) < 2)
+    monkeypatch.setattr(LiveStand, "run", run)
+    rig = replace(live_stand(tmp_path / "RIG.toml"), person=lambda _sentence: len(levels) < 2)
     with pytest.raises(RigStopped, match="asked for and not done"):
-        run_loaded(rig, tmp_path / "1a", lambda _step, _share: None)
+        step_stand(rig, tmp_path / "1a", lambda _step, _share: None)
     probe, level = levels
     assert probe == pytest.approx(PROBE * 4.0)
     assert level == pytest.approx(4.0)
@@ -100,8 +101,8 @@ def test_pieces_add_up_and_err_by_their_tolerance(tmp_path):
 
 
 def test_a_rig_is_weighed_where_its_file_names_what_is_bolted_on(tmp_path):
-    assert [e.key for e in experiments_for(made(tmp_path), "RIG.toml")] == ["1a", "1b"]
-    assert [e.key for e in experiments_for(made(tmp_path, ""), "RIG.toml")] == ["1b"]
+    assert [e.key for e in choose((), "RIG.toml", made(tmp_path))] == ["1a", "1b"]
+    assert [e.key for e in choose((), "RIG.toml", made(tmp_path, ""))] == ["1b"]
     with pytest.raises(BadInput, match=r"1a cannot be made on .*, which has experiments 1b;"):
         up.lab(rig=str(tmp_path / "RIG.toml"), experiment="1a", out=tmp_path / "out")
 
@@ -115,7 +116,7 @@ def test_a_rig_is_weighed_where_its_file_names_what_is_bolted_on(tmp_path):
 )
 def test_loadings_that_make_no_line_are_told(tmp_path, loadings, complaint):
     with pytest.raises(BadInput, match=complaint):
-        run_loaded(made(tmp_path, loadings), tmp_path / "1a", lambda _step, _share: None)
+        step_stand(made(tmp_path, loadings), tmp_path / "1a", lambda _step, _share: None)
 
 
 @pytest.mark.parametrize(
@@ -137,9 +138,9 @@ def test_a_person_is_asked_for_every_loading_by_the_owners_words(tmp_path):
         asked.append(sentence)
         return len(asked) < 2
 
-    rig = replace(made(tmp_path), ask=person)
+    rig = replace(made(tmp_path), person=person)
     with pytest.raises(RigStopped, match=r"asked for and not done: .*0 kg in all"):
-        run_loaded(rig, tmp_path / "1a", lambda _step, _share: None)
+        step_stand(rig, tmp_path / "1a", lambda _step, _share: None)
 
 
 @pytest.mark.parametrize(("said", "there"), [("", {"guess": "0.001768 s", "min": 0}), ("lag", "0.001768 s")])
@@ -149,6 +150,6 @@ def test_a_delay_that_nobody_said_is_found_where_nothing_else_is_late(tmp_path, 
     if said:
         study = STUDY.replace("limit =", 'lag = { guess = "1 ms", min = 0 }\nlimit =')
         (tmp_path / "study.toml").write_text(study, encoding="utf-8")
-        rig = rig_at_hand(tmp_path / "RIG.toml")
+        rig = live_stand(tmp_path / "RIG.toml")
     written = write_study(rig, tmp_path / "found.toml", "", [])
     assert tomllib.loads(written.read_text(encoding="utf-8"))["actuator"]["delay"] == there

@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from upright.experiments.hands_on.rig import rig_at_hand
-from upright.experiments.laboratory import Experiment, ExperimentInput, run_laboratory
+from upright.experiments import laboratory
+from upright.experiments.stand.live import live_stand
+from upright.experiments.table import Experiment, ExperimentInput
 from upright.report.page import Chapter
 
 
 @pytest.fixture
-def bench(tmp_path):
+def bench(tmp_path, monkeypatch):
     """Two experiments that count how often they were made; the second takes the fit of the first."""
     (tmp_path / "RIG.toml").write_text('kind = "twin"\nmake = "furuta"\n', encoding="utf-8")
     made: list[str] = []
@@ -25,13 +26,16 @@ def bench(tmp_path):
         return Chapter(title="t", verdict="v"), True
 
     def experiment(key: str, needs: tuple[str, ...]) -> Experiment:
-        return Experiment(key=key, part_of=key, title=key, makes=("RIG.toml",), needs=needs, seconds=1.0, tell=tell)
+        return Experiment(
+            key=key, part_of=key, title=key, makes=("furuta",), on=lambda _: True, needs=(), live_needs=needs,
+            seconds=1.0, tell=tell,
+        )  # fmt: skip
 
-    table = (experiment("1b", ()), experiment("2", ("1b",)))
+    monkeypatch.setattr(laboratory, "EXPERIMENTS", (experiment("1b", ()), experiment("2", ("1b",))))
 
     def run(folder: Path = tmp_path / "out") -> list[str]:
         made.clear()
-        run_laboratory((), "RIG.toml", 0, folder, table=table, hands=rig_at_hand(tmp_path / "RIG.toml"))
+        laboratory.run_laboratory((), "RIG.toml", 0, folder, live=live_stand(tmp_path / "RIG.toml"))
         return list(made)
 
     return tmp_path, run

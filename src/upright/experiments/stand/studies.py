@@ -9,9 +9,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from upright.errors import BadInput
-from upright.experiments.frequency_1b.run import asked, bench
-from upright.experiments.hands_on.rig import RigAtHand
+from upright.experiments.stand.known import Known, asked, bench
+from upright.experiments.stand.stand import APPLIED, TestStand
 from upright.files import read_text, replace_file
 from upright.quantities import with_unit
 from upright.rig.makes import make_of
@@ -20,43 +19,43 @@ from upright.study.text import TomlTable, study_text, table
 Tables = dict[str, dict[str, Any]]
 
 
-def can_identify(rig: RigAtHand) -> bool:
-    """Whether it is said what a fit may start from: in a study, or by the make of a twin."""
-    return rig.file.known is None or rig.file.known.suffix == ".toml"
-
-
 def write_study(
-    rig: RigAtHand, path: Path, title: str, runs: Sequence[Mapping[str, Any]], *,
-    known: Mapping[str, Mapping[str, Any]] | None = None, drive: bool = True,
+    stand: TestStand, path: Path, title: str, runs: Sequence[Mapping[str, Any]], *,
+    known: Sequence[Known] = (), drive: bool = True,
 ) -> Path:  # fmt: skip
     """A study of logs of this rig.
 
     Parameters
     ----------
-    rig : RigAtHand
+    stand : TestStand
     path : Path
     title : str
     runs : sequence of mappings
         As `[[runs]]` has them.
-    known : mapping of str to mapping, optional
-        Numbers that an earlier experiment found, in the place of what the owner wrote: ``value``, ``uncertainty``.
+    known : sequence of Known
+        Numbers that an earlier experiment found, in the place of what the owner wrote.
     drive : bool
         Whether something drove; what stands between command and force is otherwise left as it is guessed.
     """
-    said = _said(rig, path.parent)
-    parameters = said.get("parameters", {}) | dict(known or {})
+    said = _said(stand, path.parent)
+    units = {k.name: stand.rig.plant.quantity(k.name).unit for k in known}
+    found = {
+        k.name: {"value": with_unit(k.value, units[k.name], 10), "uncertainty": with_unit(k.stderr, units[k.name], 4)}
+        for k in known
+    }
+    parameters = said.get("parameters", {}) | found
     written = table("[parameters]")
     for name, value in parameters.items():
         written.key(name, value)
     tables: list[TomlTable] = [
-        table("", title=title, source=f"logs of {rig.model.name}"),
-        table("[rig]", digits=10, **({"servo_period": f"{rig.model.period:.10g} s"} | said["rig"])),
+        table("", title=title, source=f"logs of {stand.rig.name}"),
+        table("[rig]", digits=10, **({"servo_period": f"{stand.rig.period:.10g} s"} | said["rig"])),
         written,
     ]
     if drive:
-        tables += [table("[actuator]", digits=10, **_late(rig, said.get("actuator", {}))),
-                   table("[drive]", column="u_applied", unit=rig.model.unit)]  # fmt: skip
-    for c, per in zip(rig.model.plant.coordinates, rig.model.per_unit, strict=True):
+        tables += [table("[actuator]", digits=10, **_late(stand, said.get("actuator", {}))),
+                   table("[drive]", column=APPLIED, unit=stand.rig.unit)]  # fmt: skip
+    for c, per in zip(stand.rig.plant.coordinates, stand.rig.per_unit, strict=True):
         counts = {"counts_per_rev": per * 2 * math.pi} if c.unit == "rad" else {"counts_per_m": per}
         tables.append(table(f"[sensors.{c.name}]", digits=10, column=c.name, unit=c.unit, **counts))
     tables += [table("[defaults]", unknown=["initial"]), *(table("[[runs]]", digits=10, **run) for run in runs)]
@@ -64,21 +63,19 @@ def write_study(
     return path
 
 
-def _late(rig: RigAtHand, actuator: Mapping[str, Any]) -> dict[str, Any]:
+def _late(stand: TestStand, actuator: Mapping[str, Any]) -> dict[str, Any]:
     """The drive with its delay: a sample where nobody said it, and found where nothing else is late."""
-    if "delay" in actuator or not rig.model.delay:
+    if "delay" in actuator or not stand.rig.delay:
         return dict(actuator)
-    assumed = f"{rig.model.delay:.10g} s"
+    assumed = f"{stand.rig.delay:.10g} s"
     return {**actuator, "delay": assumed if "lag" in actuator else {"guess": assumed, "min": 0}}
 
 
-def _said(rig: RigAtHand, folder: Path) -> Tables:
+def _said(stand: TestStand, folder: Path) -> Tables:
     """Tables of the owner's study, a plant of his own still found from where the new one lies."""
-    source = rig.file.known
+    source = stand.study
     if source is None:
-        return _of_make(rig)
-    if not can_identify(rig):
-        raise BadInput(f"{rig.file.path} names a fit, and what is to be identified begins with a study; name that.")
+        return _of_make(stand)
     tables: Tables = tomllib.loads(read_text(source))
     plant = str(tables["rig"].get("plant", ""))
     if ".py:" in plant:
@@ -87,10 +84,10 @@ def _said(rig: RigAtHand, folder: Path) -> Tables:
     return {k: tables[k] for k in ("rig", "parameters", "actuator") if k in tables}
 
 
-def _of_make(rig: RigAtHand) -> Tables:
+def _of_make(stand: TestStand) -> Tables:
     """What the maker designed, and what the bench says of this twin."""
-    make = make_of(rig.model.plant)
-    start = asked(make, bench(rig.truth, make), make.bench)
+    make = make_of(stand.rig.plant)
+    start = asked(make, bench(stand.twin, make), make.bench)
     values: Tables = {"parameters": {}, "actuator": {}}
     for name, p in start.parameters.items():
         where, _, key = name.rpartition(".")

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from upright.errors import NotIdentifiable
-from upright.experiments.hands_on.rig import RigAtHand
-from upright.experiments.hands_on.studies import write_study
-from upright.identification.estimate import identify
+from upright.experiments.stand.fits import fit_study
+from upright.experiments.stand.known import Known
+from upright.experiments.stand.stand import TestStand, file_of
+from upright.experiments.stand.studies import write_study
 from upright.identification.model.fit import Fit
 from upright.progress import Progress, part
-from upright.readers import read
+from upright.records import Record
 from upright.rig.makes import MAKES
 from upright.study.draft.release import free_from
-from upright.study.load import Study, load_study
-from upright.study.results import write_fit
+from upright.study.load import Study
 
 HIGH, LOW = math.radians(75), math.radians(50)
 """How high the pendulum is lifted, for the run that is fitted and the one that is predicted."""
@@ -27,17 +27,17 @@ CLEAR = math.radians(15)
 """A pendulum that was lifted less was not lifted."""
 
 
-def run_swings(
-    rig: RigAtHand, folder: Path, progress: Progress, found: Mapping[str, Mapping[str, Any]]
+def run_by_hand(
+    stand: TestStand, folder: Path, progress: Progress, known: Sequence[Known]
 ) -> tuple[Study, Fit]:  # fmt: skip
     """Let it swing and fit; leaves logs, `study.toml` and `fit.json`.
 
     Parameters
     ----------
-    rig : RigAtHand
+    stand : TestStand
     folder : Path
     progress : callable
-    found : mapping
+    known : sequence of Known
         What earlier experiments say of the body that carries the pendulum: nothing else gives a free swing its scale.
 
     Raises
@@ -47,42 +47,38 @@ def run_swings(
     NotIdentifiable
         When no release is seen.
     """
-    names = rig.names
+    names = stand.names
     runs: list[dict[str, Any]] = []
     for i, (role, angle) in enumerate((("fit", HIGH), ("predict", LOW))):
         progress(f"swinging from about {math.degrees(angle):.0f} degrees", 0.2 * i)
-        rig.requested(
+        stand.ask(
             f"Let {names[-1]} hang at rest until the run begins; the drive is silent. Within {HAND:.0f} s from then "
             f"lift {names[-1]} to about {math.degrees(angle):.0f} degrees, hold it and {names[0]} still, let both go "
             "together, and keep away."
         )
-        seconds = SWING + (HAND if rig.file.hardware else 0.0)
-        samples = [0.0] * math.ceil(seconds / rig.model.period)
-        log = rig.put_out(samples, folder, f"release_{math.degrees(angle):.0f}", lifted=angle)
-        begin, end = _window(rig, log)
-        runs.append({"label": log.stem, "file": log.name, "window": [begin, end], "role": role})
-    study = load_study(
-        write_study(rig, folder / "study.toml", f"Free swings of {rig.model.name}", runs, known=found, drive=False)
-    )
-    fit = identify(study.model, study.runs, progress=part(progress, 0.4, 1.0, "fitting the swings"))
-    write_fit(fit, study, folder / "fit.json")
-    return study, fit
+        seconds = SWING + (0.0 if stand.performed else HAND)
+        samples = [0.0] * math.ceil(seconds / stand.rig.period)
+        log = stand.run(samples, folder, f"release_{math.degrees(angle):.0f}", lifted=angle)
+        begin, end = _window(stand, log)
+        runs.append({"label": Path(file_of(log)).stem, "file": file_of(log), "window": [begin, end], "role": role})
+    title = f"Free swings of {stand.rig.name}"
+    path = write_study(stand, folder / "study.toml", title, runs, known=known, drive=False)
+    return fit_study(path, part(progress, 0.4, 1.0, "fitting the swings"))
 
 
-def _window(rig: RigAtHand, log: Path) -> tuple[float, float]:
-    record = read(log)
-    pivot, swing = rig.names
-    theta = record[swing]
+def _window(stand: TestStand, log: Record) -> tuple[float, float]:
+    pivot, swing = stand.names
+    theta = log[swing]
     if abs(theta).max() < CLEAR:
         raise NotIdentifiable(
-            f"{swing} went no further than {math.degrees(abs(theta).max()):.2g} degrees in {log.name}: it was not "
+            f"{swing} went no further than {math.degrees(abs(theta).max()):.2g} degrees in {file_of(log)}: it was not "
             "lifted in time; run the experiment again."
         )
-    swings = max(abs(p.imag) for p in rig.model.linear(rig.resting).poles())
-    begin = free_from(record.t, theta, swings, float(record.t[0]), record[pivot])
-    return begin, float(record.t[-1])
+    swings = max(abs(p.imag) for p in stand.rig.linear(stand.resting).poles())
+    begin = free_from(log.t, theta, swings, float(log.t[0]), log[pivot])
+    return begin, float(log.t[-1])
 
 
-def carrier_of(rig: RigAtHand) -> str:
+def carrier_of(stand: TestStand) -> str:
     """Inertia of the body that carries the pendulum; empty where no make has such a plant."""
-    return next((m.body for m in MAKES.values() if m.pendulum and isinstance(rig.model.plant, type(m.plant))), "")
+    return next((m.body for m in MAKES.values() if m.pendulum and isinstance(stand.rig.plant, type(m.plant))), "")

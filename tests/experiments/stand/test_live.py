@@ -15,16 +15,16 @@ import upright as up
 from tests.exports.rigs import fit_file
 from upright.control.swing_up import MODE
 from upright.errors import BadInput
-from upright.experiments.at_hand import experiments_for
-from upright.experiments.hands_on.hanging import SHARE, _level, asking
-from upright.experiments.hands_on.rig import rig_at_hand
-from upright.experiments.hands_on.studies import write_study
-from upright.experiments.hands_on.upright import came
-from upright.experiments.hands_on.upwards import run_upwards
+from upright.experiments.frequency_1b.at_once import _level, asking
+from upright.experiments.laboratory import choose
+from upright.experiments.regulation_2.run import scored
+from upright.experiments.stand.live import live_stand, run_of
+from upright.experiments.stand.strength import SHARE
+from upright.experiments.stand.studies import write_study
+from upright.experiments.swing_up_2b.run import run_swing_up
 from upright.gains import feedback, filtered, place
 from upright.laws import as_values, of_values
 from upright.logs import read_log
-from upright.progress import silent
 from upright.rig.makes import MAKES, make_rig
 from upright.running.run import RunRequest, run_rig
 from upright.study.load import load_study
@@ -79,17 +79,17 @@ def own(tmp_path):
     """A twin of a rig that only its owner's study tells of."""
     (tmp_path / "study.toml").write_text(OWN, encoding="utf-8")
     (tmp_path / "RIG.toml").write_text('kind = "twin"\nstudy = "study.toml"\n', encoding="utf-8")
-    return rig_at_hand(tmp_path / "RIG.toml")
+    return live_stand(tmp_path / "RIG.toml")
 
 
 def made(folder, text='kind = "twin"\nmake = "furuta"\nseed = 3\n'):
     (folder / "RIG.toml").write_text(text, encoding="utf-8")
-    return rig_at_hand(folder / "RIG.toml")
+    return live_stand(folder / "RIG.toml")
 
 
 def test_the_band_holds_the_swing_of_a_rig_that_nobody_makes(own):
     asked = asking(own)
-    p = own.model.plant
+    p = own.rig.plant
     # arm free: the pendulum swings faster than on a fixed hinge, by the inertia that it takes along
     J, arm = p.J_p + p.m_p * p.l_cg**2, p.J_d + p.m_p * p.r**2
     swing = math.sqrt(p.m_p * p.g * p.l_cg / (J - (p.m_p * p.l_cg * p.r) ** 2 / arm))
@@ -101,11 +101,11 @@ def test_the_band_holds_the_swing_of_a_rig_that_nobody_makes(own):
 def test_no_coordinate_is_to_go_further_than_asked(own):
     """By scipy's simulation of the model, after its transient."""
     asked = asking(own)
-    level = _level(own, asked, SHARE * own.model.limit)
+    level = _level(own, asked, SHARE * own.rig.limit)
     u = level * np.tile(asked.wave, 6)
-    model = own.model.linear("hanging")
+    model = own.rig.linear("hanging")
     # the arm drifts freely, which is no answer to the wave: only what repeats is looked at
-    t = np.arange(u.size) * own.model.period
+    t = np.arange(u.size) * own.rig.period
     _, y, _ = lsim((model.A, model.B, model.C, np.zeros((2, 1))), u, t)
     last = y[-asked.wave.size :]
     swings = np.ptp(last - np.linspace(last[0], last[-1], len(last)), axis=0) / 2
@@ -147,22 +147,22 @@ def test_whose_rig_it_is_may_be_said_by_either_file(own, tmp_path):
     assert own.make is None
     said = tmp_path / "study.toml"
     said.write_text(OWN.replace('name = "qube 7"', 'vendor = "ECP 205"'), encoding="utf-8")
-    assert rig_at_hand(tmp_path / "RIG.toml").make is MAKES["furuta"]
+    assert live_stand(tmp_path / "RIG.toml").make is MAKES["furuta"]
     said.write_text(OWN, encoding="utf-8")
     assert made(tmp_path, 'kind = "twin"\nstudy = "study.toml"\nvendor = "ECP 205"\n').make is MAKES["furuta"]
 
 
 def test_a_fit_alone_is_not_identified_again(own, tmp_path):
-    assert [e.key for e in experiments_for(own, "RIG.toml")] == ["1b", "2", "2b", "4"]
+    assert [e.key for e in choose((), "RIG.toml", own)] == ["1b", "2", "2b", "4"]
     counts = {"value": 2048.0, "unit": "1/rev", "source": "known"}
     said = {
         "servo_period": {"value": 2e-3, "unit": "s", "source": "known"},
         "counts.psi": counts,
         "counts.theta": counts,
     }
-    fit_file(tmp_path, own.model.plant, name="furuta", **said)
+    fit_file(tmp_path, own.rig.plant, name="furuta", **said)
     alone = made(tmp_path, 'kind = "twin"\nfit = "fit.json"\n')
-    assert [e.key for e in experiments_for(alone, "RIG.toml")] == ["2", "2b"]
+    assert [e.key for e in choose((), "RIG.toml", alone)] == ["2", "2b"]
 
 
 def test_a_run_that_the_supervisor_ends_was_lost_there(tmp_path):
@@ -175,7 +175,7 @@ def test_a_run_that_the_supervisor_ends_was_lost_there(tmp_path):
     up_law.write_text(json.dumps(as_values(law)), encoding="utf-8")
     made(tmp_path, 'kind = "twin"\nmake = "furuta"\n[limits]\ncommand = "5 V"\n[limits.psi]\ntravel = "3 deg"\n')
     wish = RunRequest(rig=tmp_path / "RIG.toml", law=up_law, seconds=2.0, tilt=0.08, check=False)
-    found = came(run_rig(wish, tmp_path))
+    found = scored(run_of(run_rig(wish, tmp_path), "inverted"))
     assert not found.score.held
     assert found.score.ran_out == pytest.approx(found.trial.t[-1])
     assert math.isinf(found.score.settled)
@@ -193,15 +193,15 @@ def test_a_swing_up_is_told_from_the_middle_wherever_its_pulse_left_the_arm(tmp_
     }
     fit = fit_file(tmp_path, plant, name="furuta", **said)
     rig = made(tmp_path, 'kind = "twin"\nfit = "fit.json"\n')
-    done = run_upwards(rig, fit, tmp_path / "out", silent, lambda: False)
+    done = run_swing_up(rig.rig, rig.described_by(fit, tmp_path / "out"), tmp_path / "out")
     log = read_log(tmp_path / "out" / "swing_up.mcap")
     arm = log.columns["psi"]
     assert abs(arm[0]) > 0.05
     assert done.ascent.travel == pytest.approx(np.abs(arm).max())
     # what it is said to do at each moment is what it did: read as the encoders showed it, the law gives its commands
     readings = np.column_stack([arm, log.columns["theta"]])
-    commands, memory = of_values(dict(log.header.law)).follow(readings, rig.model.period)
-    limit = rig.model.limit
+    commands, memory = of_values(dict(log.header.law)).follow(readings, rig.rig.period)
+    limit = rig.rig.limit
     np.testing.assert_allclose(np.clip(commands[:, 0], -limit, limit), log.columns["u"], atol=0.01)
     assert np.array_equal(done.ascent.mode[:-1], memory[1:, MODE])
 
@@ -222,14 +222,14 @@ def test_nothing_is_tried_where_no_log_can_be_kept(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "mcap", None)
     monkeypatch.setitem(sys.modules, "mcap.writer", None)
     with pytest.raises(BadInput, match=r"pip install 'upright\[rig\]'"):
-        rig_at_hand(tmp_path / "RIG.toml")
+        live_stand(tmp_path / "RIG.toml")
 
 
 def test_what_does_not_swing_is_told_what_else_identifies_it(tmp_path):
     (tmp_path / "study.toml").write_text(LOOSE, encoding="utf-8")
     (tmp_path / "RIG.toml").write_text('kind = "twin"\nstudy = "study.toml"\n', encoding="utf-8")
     with pytest.raises(BadInput, match=r"does not swing.*upright identify"):
-        asking(rig_at_hand(tmp_path / "RIG.toml"))
+        asking(live_stand(tmp_path / "RIG.toml"))
 
 
 def test_a_port_alone_is_not_driven_but_given_a_file_to_fill_in(tmp_path):

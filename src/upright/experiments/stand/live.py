@@ -1,0 +1,204 @@
+"""A test stand behind the protocol of rigs: supervised runs of a RIG.toml, and a person for what no drive can do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from upright.basis import REPLAYED
+from upright.control.trial import Trial
+from upright.errors import BadInput, RigStopped
+from upright.experiments.stand.stand import APPLIED, StandRun, TestStand
+from upright.files import read_text, write_json
+from upright.laws import Law, Rule, as_values
+from upright.logs.layout import library
+from upright.readers import read
+from upright.realtime.session import RunState
+from upright.records import Array, Record
+from upright.rig.makes import MAKES, Make, make_of_vendor
+from upright.rigs.protocol import Fault
+from upright.rigs.rigfile import RigFile, read_rig_file
+from upright.running.rig import described, usual_limits
+from upright.running.run import RigRun, RunRequest, run_rig
+from upright.study.stored_rig import read_stored_rig
+
+Watch = Callable[[RunState], str]
+
+
+def nobody_watches() -> AbstractContextManager[Watch]:
+    """No view."""
+    return nullcontext(lambda _: "")
+
+
+def nobody(_sentence: str) -> bool:
+    """Hands of a twin: what a person would be asked for is done already."""
+    return True
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LiveStand(TestStand):
+    """A rig behind its protocol as a test stand.
+
+    Attributes
+    ----------
+    file : RigFile
+    person : callable
+        Asked for something, in a sentence; answers whether it was done.
+    watching : callable
+        Opens a view for a run: a callable that is shown how it goes, and answers with a sentence to end it.
+    """
+
+    simulated = False
+    file: RigFile
+    person: Callable[[str], bool] = nobody
+    watching: Callable[[], AbstractContextManager[Watch]] = nobody_watches
+
+    @property
+    def text(self) -> str:
+        """What is said of it: RIG.toml, and what describes the rig."""
+        known = self.file.known
+        return read_text(self.file.path) + ("" if known is None else read_text(known))
+
+    @property
+    def source(self) -> str:
+        """Where its data come from, as a sentence."""
+        if self.file.hardware:
+            return f"Measured on {self.rig.name}: {self.file.kind} {self.file.port}".rstrip() + "."
+        return "A digital twin behind the protocol of rigs, run as hardware is; none was touched."
+
+    def ask(self, sentence: str) -> None:
+        """Ask the person beside it; see `TestStand.ask`."""
+        if not self.person(sentence):
+            raise RigStopped(f"This was asked for and not done: {sentence}")
+
+    def run(
+        self, samples: Sequence[float], folder: Path, stem: str, *, lifted: float = 0.0, bolted: float = 0.0
+    ) -> Record:  # fmt: skip
+        """Log of a signal, from rest; see `TestStand.run`."""
+        request = RunRequest(
+            rig=self.file.path, samples=tuple(samples), seconds=len(samples) * self.rig.period, tilt=lifted,
+            bolted=bolted, check=False, watch=False, stem=stem,
+        )  # fmt: skip
+        done = self._run(request, folder)
+        if done.end.stopped:
+            raise RigStopped(done.end.stopped)
+        return read(done.log_path)
+
+    def hold(
+        self, law: Law | Rule, at: str, folder: Path, stem: str, seconds: float, *, start: Array | None = None,
+        reference: Array | None = None, pushes: Array | None = None,
+    ) -> StandRun:  # fmt: skip
+        """A run of a law, with the pulse before it; the filters run beside it where it is brought to what is held.
+
+        What begins at rest elsewhere has no filters beside it, and may lean as it will; see `TestStand.hold`.
+        """
+        if reference is not None or pushes is not None:
+            law = pushed(law, reference, pushes)
+        folder.mkdir(parents=True, exist_ok=True)
+        path = write_json(folder / f"law_{stem}.json", as_values(law))
+        from_rest = start is None and at != self.resting
+        request = RunRequest(
+            rig=self.file.path, law=path, seconds=seconds + self.rig.period, stem=stem,
+            tilt=0.0 if start is None else float(start[-2]), from_rest=from_rest,
+        )  # fmt: skip
+        done = self._run(request, folder)
+        if done.log is None or len(done.log) < 3:
+            raise RigStopped(done.end.stopped)
+        origin = None
+        if from_rest:  # its law counts from where the encoders were zeroed, wherever the pulse has left the rig
+            held, zero = (self.rig.plant.equilibrium(n) for n in (at, self.resting))
+            origin = [held[n] - zero[n] for n in held]
+        return run_of(done, at, origin)
+
+    def _run(self, request: RunRequest, folder: Path) -> RigRun:
+        with self.watching() as watch:
+            done = run_rig(request, folder, watch=watch)
+        if done.end.faults & Fault.STOP:
+            raise KeyboardInterrupt
+        return done
+
+    def described_by(self, fit: Path, folder: Path) -> LiveStand:
+        """The same rig described by a fit; its RIG.toml is written to the folder as ``rig.toml``."""
+        path = folder / "rig.toml"
+        self.file.with_fit(fit, path)
+        return live_stand(path, self.person, self.watching)
+
+
+def pushed(law: Law | Rule, reference: Array | None, pushes: Array | None) -> Law:
+    """A law with its reference, and with what is added to its command before the limit as a second one.
+
+    Raises
+    ------
+    BadInput
+        When it is no linear law that follows a reference.
+    """
+    if not isinstance(law, Law) or reference is None or pushes is None:
+        raise BadInput("what a live rig follows needs a linear law, a reference and pushes; give zeros for none.")
+    B = np.column_stack([law.B, np.zeros(len(law.B))])
+    D = np.column_stack([law.D, np.ones(len(law.D))])
+    names = (*law.reference_names, "push")
+    return replace(law, B=B, D=D, references=np.column_stack([reference, pushes]), reference_names=names)
+
+
+def run_of(done: RigRun, at: str, origin: Sequence[float] | None = None) -> StandRun:
+    """A logged run about an equilibrium, its time from where the loop began: states are the readings and their
+    differences, counted from what was held, or from the readings of an origin.
+    """
+    assert done.log is not None
+    t, away = done.t, done.away
+    if origin is not None:
+        away = away + np.subtract(done.end.target, origin)
+    x = np.empty((t.size, 2 * away.shape[1]))
+    point = np.array(list(done.model.plant.equilibrium(at).values()))
+    x[:, 0::2], x[:, 1::2] = away + point, np.gradient(away, t, axis=0)
+    signals = {c.name: x[:, 2 * i] for i, c in enumerate(done.model.plant.coordinates)}
+    record = done.log.record()
+    shown = record.replace(t=t, signals={n: signals.get(n, v) for n, v in record.signals.items()})
+    trial = Trial(rig=done.model, at=at, t=t, x=x, u=done.log.columns[APPLIED], rest=point, record=shown)
+    return StandRun(trial=trial, ended=done.end.stopped, overtravel=bool(done.end.faults & Fault.OVERTRAVEL))
+
+
+def live_stand(
+    path: Path, person: Callable[[str], bool] = nobody,
+    watching: Callable[[], AbstractContextManager[Watch]] = nobody_watches,
+) -> LiveStand:  # fmt: skip
+    """The rig of a RIG.toml.
+
+    Raises
+    ------
+    BadInput
+        When it is one on which nothing can be tried, or what keeps a log is not installed.
+    """
+    library()
+    file = read_rig_file(path)
+    if file.performed == REPLAYED:
+        raise BadInput(
+            f'{path}: a replay answers nothing that is asked of it; experiments need a rig or kind = "twin".'
+        )
+    rig, truth = described(file)
+    units = {c.name: c.unit for c in rig.plant.coordinates}
+    limits = file.limits(units, rig.unit, usual_limits(rig))
+    if limits is None:
+        raise BadInput(
+            f"{path}: hardware is not driven without limits; write [limits] with command, and "
+            f"[limits.{next(iter(units))}] with travel, speed and start."
+        )
+    fit = file.known if file.known and file.known.suffix != ".toml" else None
+    return LiveStand(
+        file=file, rig=rig, true_rig=replace(truth, name=rig.name), make=_make(file), vendor=file.vendor,
+        performed=file.performed, zero=file.zero, room=limits.travel[list(units).index(rig.plant.inputs[0].on)],
+        fit=fit, study=None if fit else file.known, added=file.added, tolerance=file.tolerance,
+        person=person if file.hardware else nobody, watching=watching,
+    )  # fmt: skip
+
+
+def _make(file: RigFile) -> Make | None:
+    """The make that RIG.toml or the description says it is of."""
+    if file.known is None:
+        return MAKES[file.make]
+    known = read_stored_rig(file.known)
+    return make_of_vendor(file.vendor or known.hardware.vendor, known.plant)

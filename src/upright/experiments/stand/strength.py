@@ -1,0 +1,16 @@
+"""How strongly a rig is asked whose numbers are guesses: well within the drive's limit and the travel, step by step."""
+
+from __future__ import annotations
+
+import math
+
+REACH = {"rad": math.radians(12), "m": 0.02}
+"""Amplitude that is wanted of a coordinate of a rig that nobody makes."""
+OF_TRAVEL = 0.25
+"""Most amplitude of the driven coordinate, as a share of its travel."""
+SHARE = 0.8
+"""Of the drive's limit."""
+GROWTH = 3.0
+"""Most by which a run is stronger than the one before."""
+STILL = 0.5
+"""Time at rest before a signal [s]."""
