@@ -81,8 +81,7 @@ def test_states_are_had_in_the_ways_that_outputs_allow(model, ways):
 
 @pytest.mark.parametrize(
     ("C", "speed", "count"),
-    [([[1.0, 0.0]], "", 2), ([[1.0, 0.0]], "plain", 2), ([[1.0, 0.0]], "observer", 3), (np.eye(2), "", 1),
-     (np.eye(2), "observer", 2)],
+    [([[1.0, 0.0]], "", 2), ([[1.0, 0.0]], "plain", 2), ([[1.0, 0.0]], "observer", 3), (np.eye(2), "", 1)],
 )  # fmt: skip
 def test_beside_the_way_that_was_asked_for_stand_those_without_an_observer(C, speed, count):
     model = StateSpace(A=[[0.0, 1.0], [-3.0, 0.0]], B=[[0.0], [1.0]], C=C)
