@@ -88,6 +88,15 @@ def test_a_hand_is_asked_in_the_coordinate_s_unit_and_may_refuse(tmp_path):
     assert checkup.verdict.endswith("Not looked at: x by hand, theta by hand, a small pulse.")
 
 
+def test_a_stop_that_is_pressed_meanwhile_is_told_instead_of_the_next_channel(tmp_path, wired):
+    rigs = []
+    wired(rigs.append)
+    checkup = check_up(rig_file(tmp_path), hand=lambda _: rigs[0].estop() or False, pulse=False)
+    finding = found(checkup, "theta by hand")
+    assert (finding.found, finding.good) == ("it was stopped by hand", False)
+    assert not checkup.sound
+
+
 @pytest.mark.parametrize(("share", "good"), [(0.11, True), (0.09, False)])
 def test_a_hand_that_moved_a_tenth_of_what_it_should_is_seen(tmp_path, wired, share, good):
     """5 mm of a cart are asked for."""

@@ -15,6 +15,7 @@ from upright.identification.checks.outliers import (
     SELF_EXCITED,
     SPIKES,
     TOUCHED,
+    _spiky,
     half_swings,
     outliers,
     refit_without_outliers,
@@ -72,6 +73,17 @@ def test_three_lost_counts_are_named_and_taken_out():
     other = identify(rig(Pendulum, PENDULUM, GUESSES), [runs[0], clean, runs[2]])
     for n in GUESSES:
         assert fit.estimates[n].value == pytest.approx(other.estimates[n].value, abs=0.05 * other.estimates[n].stderr)
+
+
+@pytest.mark.parametrize(("count", "listed", "more"), [(1, 1, False), (5, 5, False), (6, 5, True), (40, 5, True)])
+def test_of_many_lost_counts_five_are_named_and_all_of_their_span(count, listed, more):
+    (run,) = swings(7, 1)
+    times = [0.25 * (k + 1) for k in range(count)]
+    told = _spiky(run, [(t, "theta") for t in times])
+    assert (told.start, told.stop) == (times[0], times[-1])
+    assert told.evidence.count(" s") == listed
+    assert told.evidence.startswith("theta at 0.25 s")
+    assert told.evidence.endswith("and others") == more
 
 
 def test_a_finger_is_named_with_its_time_and_left_out():
