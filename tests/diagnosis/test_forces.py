@@ -93,7 +93,7 @@ def test_the_factor_on_a_sensor_is_found(factor):
 
 @pytest.mark.parametrize(("coupling", "rel"), [(4e2, 4e-3), (4e4, 1e-4)])
 def test_the_stiffer_the_bodies_are_joined_the_sharper_is_the_factor(coupling, rel):
-    """A factor that is off by d takes the force k_12 d x_1 at least, of which a hundredth of the inertial force may be left."""
+    """Off by d it takes the force k_12 d x_1 at least, of which a hundredth of the inertial force may be left."""
     m = motion()
     u = m.u + (coupling - 400) * (m.q[0] - m.q[1]) / 5.0
     shown = np.array([[1 / 3.7], [1.0]])
