@@ -134,6 +134,7 @@ def test_a_response_is_tabled_in_decibels_degrees_and_percent():
     assert table.numbers == (1, 2, 3, 4, 5)
     columns = list(zip(*table.rows, strict=True))
     assert columns[0] == ("x",) * 3
+    assert columns[5][0] == "0.9876"  # so near 1 three digits would not do
     values = [[float(v.replace("−", "-")) for v in column] for column in columns[1:]]
     response = found.response.response[:, 0]
     for column, expected in zip(values, (
