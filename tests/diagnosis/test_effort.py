@@ -89,15 +89,18 @@ def test_a_drive_cut_off_at_its_limit_is_told_with_the_limit_and_its_share():
     assert not about("saturation", named)  # what was asked for is not the drive
 
 
-def test_a_few_samples_at_the_limit_are_a_note():
+@pytest.mark.parametrize(("peaks", "severity"), [(1, "note"), (4, "note"), (7, "warning")])
+def test_up_to_half_a_percent_of_the_samples_at_the_limit_are_a_note(peaks, severity):
+    """Each peak stays there for 4 of 4000 samples."""
     t = np.arange(4000) * 0.01
     u = np.sin(3 * t)
-    u[1000:1011] = np.linspace(u[1000], 3.0, 11)
-    u[1010:1014], u[1014:1020] = 3.0, np.linspace(2.5, u[1020], 6)
+    for at in 1000 + 400 * np.arange(peaks):
+        u[at : at + 11] = np.linspace(u[at], 3.0, 11)
+        u[at + 10 : at + 14], u[at + 14 : at + 20] = 3.0, np.linspace(2.5, u[at + 20], 6)
     drive = {"u": {"drive": True, "stepwise": False, "constant": False}}
     (finding,) = about("saturation", case(x=np.sin(t), u=u, measured=("x",), drive="u", columns=drive))
-    assert finding.severity == "note"
-    assert finding.evidence["share [%]"] == pytest.approx(0.1)
+    assert finding.severity == severity
+    assert finding.evidence["share [%]"] == pytest.approx(0.1 * peaks)
 
 
 def begun(motion, command, size=1.0):

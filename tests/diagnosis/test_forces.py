@@ -91,6 +91,19 @@ def test_the_factor_on_a_sensor_is_found(factor):
     assert best.unexplained.max() < 0.01
 
 
+@pytest.mark.parametrize(("coupling", "rel"), [(4e2, 4e-3), (4e4, 1e-4)])
+def test_the_stiffer_the_bodies_are_joined_the_sharper_is_the_factor(coupling, rel):
+    """Off by d it takes the force k_12 d x_1 at least, of which a hundredth of the inertial force may be left."""
+    m = motion()
+    u = m.u + (coupling - 400) * (m.q[0] - m.q[1]) / 5.0
+    shown = np.array([[1 / 3.7], [1.0]])
+    wrong = replace(m, q=m.q * shown, v=m.v * shown, a=m.a * shown, u=u, command=u)
+    assert 0.01 * np.std(2.0 * m.a[0]) / np.std(coupling * m.q[0]) < rel
+    found = ForceBalance(wrong, values() | {"k_12": coupling}, 5.0).others()
+    best = next(e for e in found if e.who == "x_1")
+    assert best.factor == pytest.approx(3.7, rel=rel)
+
+
 def known(m):
     """The case of a motion: columns named after the coordinates, the effort in volts."""
     made = case(0.02, x_1=m.q[0], x_2=m.q[1], u=m.u, drive="u")
@@ -338,6 +351,9 @@ def test_gravity_that_pushes_away_tells_of_a_zero_that_is_upright():
     weak = term(("theta", "theta"), "gravity", -1.0, 8.0, share=0.004)
     (finding,) = signs(throw, weak, plant=CartPendulum)
     assert "its zero is upright" in finding.sentence
+    for slope, words in ((0.1, "its zero is upright"), (-0.1, "count against each other")):  # however long the rod
+        (finding,) = signs(throw, replace(weak, slope=slope), plant=CartPendulum)
+        assert words in finding.sentence
     (finding,) = signs(throw, weak, plant=CartPendulum, zeroed=True)
     assert "count against each other" in finding.sentence
     (finding,) = signs(throw, replace(weak, share=0.002), plant=CartPendulum)

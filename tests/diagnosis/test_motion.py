@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from upright.diagnosis.motion import SmoothedMotion, driven_row, quiet_width, terms
+from tests.diagnosis.cases import case
+from upright.diagnosis.motion import SmoothedMotion, driven_row, motion_of, quiet_width, terms
 from upright.physics import CartPendulum, Furuta, Pendulum, Plant, find
 from upright.simulation import simulate
 
@@ -150,3 +151,22 @@ def test_smoothing_reaches_as_far_as_noise_asks_and_no_further(sigma: float) -> 
     else:
         assert 13 < width < 50  # a polynomial over half a period would bend
     assert quiet_width(np.random.default_rng(1).normal(size=n), dt) == pytest.approx(n // 15, abs=2)
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_of_a_record_with_a_gap_the_longest_stretch_is_the_motion(first: bool) -> None:
+    """x = sin(5 t) and its derivatives, whose last reading before the gap is the last that counts."""
+    t = np.arange(1200) * 0.01
+    t = np.delete(t, slice(800, 900) if first else slice(300, 400))
+    made = case(x=0.1 * np.sin(5 * t), u=np.cos(3 * t), drive="u", measured=("x",), t=t)
+    made = replace(made, plant=find("rectilinear-1"), places={"x_1": made.places["q_x"]})
+    found = motion_of(made)
+    assert isinstance(found, SmoothedMotion)
+    begin, end = (0.0, 7.99) if first else (4.0, 11.99)
+    edge = 0.01 * (found.weights.size // 2)
+    assert found.t[[0, -1]] == pytest.approx([begin + edge, end - edge], abs=1.5 * 0.01)
+    assert found.command.size == 800
+    assert found.q[0] == pytest.approx(0.1 * np.sin(5 * found.t), abs=2e-5)
+    assert found.v[0] == pytest.approx(0.5 * np.cos(5 * found.t), abs=2e-3)
+    assert found.a[0] == pytest.approx(-2.5 * np.sin(5 * found.t), abs=0.05)
+    assert found.command == pytest.approx(np.cos(3 * (begin + 0.01 * np.arange(800))), abs=1e-9)

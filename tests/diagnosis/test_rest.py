@@ -126,6 +126,15 @@ def test_a_drift_is_told_from_three_percent_and_five_steps_on() -> None:
     assert driven_rest(-0.035 * span)[0].evidence["apart [m]"] == pytest.approx(0.035 * span, rel=0.03)
 
 
+@pytest.mark.parametrize(("steps", "differs"), [(4, False), (6, True)])
+def test_five_steps_of_a_coarse_encoder_are_no_drift(steps: int, differs: bool) -> None:
+    """Steps of a millimetre, of which 3 % of the range are fewer than two."""
+    x = np.round(rests(steps * 1e-3) / 1e-3) * 1e-3
+    made = case(x=x, u=np.where((T > 1) & (T < 5), 1.0, 0.0), drive="u")
+    assert 0.03 * np.ptp(x) < 2e-3
+    assert [f.kind for f in examine_rest(made)].count("drift") == differs
+
+
 def test_rests_of_a_speed_beside_a_reference_or_too_short_are_none() -> None:
     span = float(np.ptp(rests(0.0)))
     u = np.where((T > 1) & (T < 5), 1.0, 0.0)

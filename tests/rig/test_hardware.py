@@ -8,7 +8,7 @@ import pytest
 
 from upright.errors import BadInput
 from upright.physics import find
-from upright.rig.hardware import Entry, Hardware, check_vendor, driven_unit, meaning_of, place_of
+from upright.rig.hardware import DRIVE_SIGN, Entry, Hardware, check_vendor, driven_unit, meaning_of, place_of
 from upright.study.description import read_hardware
 from upright.study.rig import read_rig
 from upright.study.text import StudyText
@@ -35,6 +35,17 @@ def test_entries_are_laid_over_each_other():
         },
     }
     assert str(entry(0.123456789)) == "0.123457 V (known)"
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_sign_of_a_drive_is_taken_out_once_and_its_offset_with_it(sign):
+    """u' = s u + o is s (u + s o): what a log's command meets."""
+    said = Hardware(entries={DRIVE_SIGN: entry(sign, ""), "offset": entry(0.3), "limit": entry(10.0)})
+    found, plain = said.as_commanded()
+    assert found == sign
+    assert plain.entries == {"offset": entry(sign * 0.3), "limit": entry(10.0)}
+    assert plain.as_commanded() == (1.0, plain)
+    assert RIG.as_commanded() == (1.0, RIG)
 
 
 def test_what_is_missing_is_asked_for_with_every_way_to_say_it():

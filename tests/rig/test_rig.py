@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import upright as up
+from tests.physics.bumpers import Bumpers
 from upright.errors import BadInput
 from upright.rig import Hardware, Rig
 
@@ -19,6 +20,18 @@ def test_numbers_are_taken_in_any_unit_of_their_kind():
     assert (rig.limit, rig.period, rig.lag) == pytest.approx((10.0, 2e-3, 4e-3))
     assert rig.travel == pytest.approx(2 * math.pi / 3)
     assert rig == Rig.known(ARM, gain=rig.gain, limit=10.0, period=2e-3, travel=rig.travel, counts=4096, lag=4e-3)
+
+
+def test_without_a_gain_a_command_is_the_force_itself():
+    rig, plain = Rig.known(ARM), ARM.linear("inverted")
+    assert pytest.approx(plain.B) == rig.linear("inverted").B
+    assert pytest.approx(2 * plain.B) == rig.replace(gain=2.0).linear("inverted").B
+
+
+def test_a_rig_is_called_as_it_was_said_as_its_plant_or_as_its_class():
+    assert Rig.known(ARM, name="bench 3").name == "bench 3"
+    assert Rig.known(ARM).name == "furuta"
+    assert Rig.known(Bumpers(m=1.0, J=1e-3, k=500.0, gap=0.1)).name == "Bumpers"
 
 
 def test_counts_are_per_turn_or_metre_and_steps_in_si():

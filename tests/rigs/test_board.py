@@ -11,7 +11,7 @@ import pytest
 from upright.errors import RigStopped
 from upright.laws import state_feedback
 from upright.records import Record
-from upright.rigs import Board, Capabilities, Fault, Limits, Mode, SelfTest
+from upright.rigs import Board, Capabilities, Fault, Limits, Mode, SelfTest, Tick
 from upright.rigs.driven import StillDrive
 from upright.rigs.replay import ReplayPort
 from upright.rigs.supervisor import Duty, Supervisor, unlike
@@ -206,6 +206,23 @@ def test_its_own_loop_runs_the_law_on_its_readings():
     applied = [board.exchange(0.0).applied for _ in range(4)]
     # the law answers the sample before: 0.1 m, then 0.1 m and -0.5 rad
     assert applied == pytest.approx([0.0, 0.0, -0.2, 0.3])
+
+
+def test_a_board_that_is_opened_has_put_nothing_out_and_waits_to_be_cleared():
+    port = Script([(7, -2)])
+    board = Board(port)
+    board.estop()  # of a board that is not there nothing can be put out
+    assert board.sample == Tick(tick=0, time=0.0, counts=(), applied=0.0, mode=Mode.IDLE, faults=Fault.RESET)
+    with pytest.raises(RigStopped, match="The rig is not open; open it first"):
+        board.exchange(1.0)
+    assert (port.written, port.enabled) == ([], [])
+    assert board.open() == ABOUT
+    assert board.sample == Tick(tick=0, time=0.0, counts=(7, -2), applied=0.0, mode=Mode.FAULT, faults=Fault.RESET)
+    assert board.exchange(1.0).applied == 0.0
+    assert (board.sample.tick, board.sample.time, board.sample.faults) == (1, 0.01, Fault.RESET)
+    board.close()
+    board.close()
+    assert (port.closed, set(port.written), set(port.enabled)) == (2, {0.0}, {False})
 
 
 def test_ticks_and_times_go_on_with_the_port():

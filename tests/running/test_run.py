@@ -15,6 +15,7 @@ from upright.gains import feedback, filtered, place, prefilter
 from upright.laws import as_values
 from upright.logs import read_log
 from upright.logs.replay import replay
+from upright.realtime.jitter import TOLERATED
 from upright.realtime.session import QUIET, RunEnd, RunOrder, carry_out
 from upright.report.run import chapter, draw_run
 from upright.rig.makes import make_rig
@@ -233,6 +234,100 @@ def test_a_loop_waits_for_a_driven_body_that_is_off_its_start_window(folder, tmp
     assert not done.stopped
     assert done.target[0] == pytest.approx(0.1, abs=1e-3)
     assert waited[-1] - waited[0] == pytest.approx(2.0 + QUIET, abs=0.01)
+
+
+def test_a_rig_that_refuses_its_limits_has_no_log(folder, tmp_path):
+    text = 'kind = "twin"\nmake = "furuta"\n[limits]\ncommand = "100 V"\n'
+    (tmp_path / "RIG.toml").write_text(text, encoding="utf-8")
+    done = run_rig(RunRequest(rig=tmp_path / "RIG.toml", excite="free", seconds=0.1), tmp_path)
+    assert done.log is None
+    assert not done.log_path.exists()
+    assert (done.t.size, done.away.shape, done.unrest) == (0, (0, 2), ())
+    assert not done.complete
+    assert not done.sound
+    assert done.verdict.startswith("Stopped before its loop began: ")
+    assert "beyond the converter's" in done.verdict
+
+
+def test_a_run_is_sound_with_a_whole_log_and_few_late_ticks(folder, tmp_path):
+    wish = RunRequest(rig=folder / "RIG.toml", excite="free", seconds=0.1, check=False)
+    done = run_rig(wish, tmp_path)
+    assert done.verdict.startswith(f"The signal was put out for 0.1 s, {done.end.ticks} ticks, none late.")
+
+    def ended(**how):
+        return replace(done, end=replace(done.end, **how))
+
+    assert done.sound
+    assert ended(ticks=1000, late=math.floor(1000 * TOLERATED)).sound
+    assert not ended(ticks=1000, late=math.floor(1000 * TOLERATED) + 1).sound
+    assert "1000 ticks, 1 of them late." in ended(ticks=1000, late=1).verdict
+    missing = ended(dropped=1)
+    assert not missing.complete
+    assert not missing.sound
+    assert missing.verdict.endswith("The log is not whole: rows are missing.")
+    torn = replace(done, log=replace(done.log, complaint="its end is missing"))
+    assert not torn.sound
+    stopped = ended(stopped="The rig stopped.")
+    assert stopped.complete
+    assert not stopped.sound
+    assert stopped.verdict == f"Stopped after {done.t[-1]:.3g} s: The rig stopped."
+
+
+@pytest.mark.parametrize("at", ["hanging", "inverted"])
+def test_the_rest_is_told_from_the_second_half_about_what_was_held_or_what_it_varied_about(folder, tmp_path, at):
+    """Readings that are a constant in each half, and a sine about another one in the second."""
+    wish = RunRequest(rig=folder / "RIG.toml", excite="free", seconds=0.2, check=False)
+    done = run_rig(wish, tmp_path)
+    n = 200
+    swing = np.where(np.arange(n) < n // 2, 7.0, 0.3 + 0.04 * np.sqrt(2) * np.sin(2 * math.pi * np.arange(n) / 20))
+    target = np.array([0.5, {"hanging": 0.0, "inverted": math.pi}[at]])
+    columns = {"t": 3.0 + 0.01 * np.arange(n), "psi": swing + target[0], "theta": swing + target[1]}
+    held = replace(
+        done, log=replace(done.log, columns=columns), end=replace(done.end, target=target),
+        wish=replace(wish, law=folder / "design.json", excite=""),
+    )  # fmt: skip
+    assert held.t[[0, -1]] == pytest.approx([0.0, 1.99])
+    assert held.unrest == pytest.approx([math.hypot(0.3, 0.04)] * 2)
+    assert f"theta stayed within {math.degrees(math.hypot(0.3, 0.04)):.2g} degrees (rms, second half)" in held.verdict
+    followed = replace(held, wish=replace(held.wish, reference="sine 0.1 2.5"))
+    assert followed.unrest == pytest.approx([0.04] * 2)
+    assert "theta varied by 2.3 degrees (rms, second half)" in followed.verdict
+
+
+@pytest.mark.parametrize(
+    ("how", "words"),
+    [
+        ({"seconds": 0.0}, "more than 0 and at most 86400 s, got 0 s"),
+        ({"seconds": -1.0}, "got -1 s"),
+        ({"seconds": 86_401.0}, "got 86401 s"),
+        ({"seconds": math.nan}, "got nan s"),
+        ({"mode": "board"}, "--mode is host or mcu, got 'board'"),
+        ({"reference": "step 0.1"}, "a reference is for a law"),
+        ({"excite": ""}, "one of them"),
+        ({"law": "design.json"}, "one of them"),
+    ],
+)
+def test_a_run_that_cannot_be_asked_is_refused(folder, how, words):
+    asked = {"rig": folder / "RIG.toml", "excite": "free"}
+    assert RunRequest(**asked, seconds=86_400.0, mode="mcu").seconds == 86_400.0
+    assert RunRequest(rig=folder / "RIG.toml", samples=(0.0, 1.0)).law is None
+    with pytest.raises(BadInput, match=words):
+        RunRequest(**(asked | how))
+
+
+def test_a_twin_s_hand_brings_it_where_it_is_held_and_lets_go_with_the_tilt_asked(folder):
+    for how, away in (({}, 0.0), ({"tilt": 0.05}, 0.05), ({"tilt": -0.05}, -0.05)):
+        stage = stage_of(folder / "RIG.toml", **how)
+        stage.supervisor.prepare()
+        stage.bring()
+        psi, theta = stage.supervisor.rig.port.read()
+        per = RIG.per_unit[1]
+        assert (psi, theta) == (0, round((math.pi + away) * per))
+    for how in ({"balance": False}, {"from_rest": True, "tilt": 0.05}):
+        stage = stage_of(folder / "RIG.toml", **how)
+        stage.supervisor.prepare()
+        stage.bring()  # what holds itself is not brought
+        assert stage.supervisor.rig.port.read() == (0, 0)
 
 
 def test_what_contradicts_itself_is_refused(folder, tmp_path):

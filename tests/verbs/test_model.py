@@ -9,6 +9,7 @@ from scipy.signal import cont2discrete, dlsim
 from upright import frequency, ladder, loadings, plan_inertias, predict
 from upright.errors import BadInput
 from upright.records import Record
+from upright.verbs.model.frequency import _known
 
 
 def swinging(k: float, m: float, decay: float = 0.4) -> Record:
@@ -86,3 +87,21 @@ def test_the_line_of_a_frequency_response_comes_back(tmp_path):
     w = response.omega[near]
     assert response.response[near, 0] == pytest.approx(1 / (4 - w**2 + 0.8j * w), rel=0.05)
     assert found.files == (tmp_path / "out" / "frequency.csv", tmp_path / "out" / "report.html")
+
+
+@pytest.mark.parametrize(
+    ("name", "said", "value", "error"),
+    [
+        ("J_d", "72 g m^2 +- 1 %", 0.072, 7.2e-4),  # in the unit of the plant's own
+        ("m_p", "135 g", 0.135, 0.0),
+        ("actuator.delay", "4 ms +- 1 ms", 4e-3, 1e-3),
+        ("actuator.lag", "2 ms", 2e-3, 0.0),
+        ("actuator.gain", "0.65 +- 2 %", 0.65, 0.013),
+        ("J_d", 0.072, 0.072, 0.0),
+        ("J_d", (0.072, 1e-3), 0.072, 1e-3),
+    ],
+)
+def test_what_is_known_of_a_rig_is_taken_in_the_unit_of_its_kind(name, said, value, error):
+    assert _known(name, said, "furuta") == pytest.approx((value, error))
+    with pytest.raises(BadInput, match="name the rig with --rig too"):
+        _known(name, said, "")

@@ -18,9 +18,10 @@ def jitter_figure(found: Jitter) -> Figure:
     """Ticks by how far behind their deadline they were woken, both axes logarithmic; the period is marked."""
     drawing = figure(2.8, margins=(0.75, 0.1, 0.1, 0.5))
     axis = drawing.subplots()
-    behind = 1e6 * np.maximum(found.behind, 1e-7)
-    edges = np.logspace(-1, max(4.0, float(np.ceil(np.log10(behind.max())))), 120)
-    axis.hist(behind, bins=edges.tolist(), color=BLUE)
+    last = float(np.ceil(np.log10(max(1e6 * found.behind.max(), 1e4))))
+    edges = np.logspace(-1, last, 120)
+    # a prompt tick stands in the first bar, by its very edge: a rounding below it would not be drawn
+    axis.hist(np.maximum(1e6 * found.behind, edges[0]), bins=edges.tolist(), color=BLUE)
     axis.set_xscale("log")
     axis.set_yscale("log")
     axis.axvline(1e6 * found.period, color=VERMILLION, linewidth=0.9)

@@ -14,7 +14,7 @@ from upright.errors import NotIdentifiable
 from upright.experiments.frequency_1b.chapter import chapter, true_key
 from upright.experiments.frequency_1b.figures import bode_figure
 from upright.experiments.frequency_1b.run import FrequencyRun, run_frequency
-from upright.experiments.frequency_1b.sweeps import EVERY, SHARE, broadband, collect, grid, stepped_sine
+from upright.experiments.frequency_1b.sweeps import EVERY, SHARE, _probed, broadband, collect, grid, sines, stepped_sine
 from upright.experiments.stand.known import asked, bench
 from upright.identification.frequency.answer import explain, key_value
 from upright.identification.frequency.response import FrequencyResponse
@@ -130,6 +130,44 @@ def test_sines_that_did_not_settle_are_named_by_their_frequency(hurried):
         assert collect(dwells, rig).notes == ((told,) if late else ())
     assert collect(hurried.dwells, rig).units == ("m", "rad", "V")
     assert collect(hurried.dwells, rig).hold == rig.period
+
+
+def test_a_sine_settles_where_its_free_swing_cannot_be_seen_and_is_measured_from_then_on(hurried):
+    """The pendulum swings freely at 8 rad/s and loses e in 7 s: a sine above 40 rad/s hardly wakes that, others do."""
+    slow, middle, fast = hurried.dwells
+    assert not np.isfinite([slow.settle, middle.settle]).any()
+    assert fast.record.t[0] == pytest.approx(fast.settle)
+    for d in hurried.dwells:
+        periods = len(d.record) * d.record.period * d.omega / (2 * np.pi)
+        assert periods == pytest.approx(round(periods), abs=1e-6)
+        assert round(periods) >= 6
+        assert len(d.record) * d.record.period > min(1.0, 6 * 2 * np.pi / d.omega) - d.record.period
+
+
+def test_a_sine_moves_the_rig_as_far_as_it_may_or_as_the_drive_can(hurried):
+    """At 15 rad/s cart or pendulum come to what was asked of them, within what swings on; at 45 the drive ends it."""
+    make = MAKES["linear"]
+    _, middle, fast = hurried.dwells
+    reached = [np.max(np.ptp(d.record.y, axis=0) / 2 / np.array(make.reach)) for d in (middle, fast)]
+    assert 0.75 < reached[0] < 1.33
+    assert middle.amplitude < SHARE * make.limit
+    assert reached[1] < 0.75
+    assert fast.amplitude == pytest.approx(SHARE * make.limit, rel=0.02)
+
+
+@pytest.mark.parametrize("first", [0.2, 5.0])
+def test_probes_come_to_the_motion_asked_for_from_either_side(first):
+    """From a fifth of the command of the rig as designed, and from five times as much."""
+    rig, make = make_rig("linear"), MAKES["linear"]
+    tick = rig.period * EVERY
+    lengths = np.round(2 * np.pi / np.array([12.0, 18.0]) / tick).astype(int)
+    model = np.abs(rig.linear("hanging").response(2 * np.pi / (lengths * tick)))[:, :, 0]
+    goal = np.array([make.reach] * 2)
+    found = _probed(rig, lengths, first * np.min(goal / model, axis=1), goal, 6.0)
+    y = sines(rig, lengths, found, 6.0)[1]
+    last = [y[-3 * n :, :, i] for i, n in enumerate(lengths)]
+    reached = [np.max(np.ptp(part, axis=0) / 2 / np.array(make.reach)) for part in last]
+    assert reached == pytest.approx([1.0, 1.0], rel=0.15)  # what swings on at 8 rad/s, and friction, are some of it
 
 
 def test_the_time_at_the_rig_is_that_of_its_sines_settled_or_not(hurried):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,13 @@ from upright.identification.checks.outliers import (
     SELF_EXCITED,
     SPIKES,
     TOUCHED,
+    UNEXPLAINED,
+    Outlier,
+    Stretches,
+    _spiky,
+    _strange,
+    _usual,
+    explains_worse,
     half_swings,
     outliers,
     refit_without_outliers,
@@ -72,6 +80,17 @@ def test_three_lost_counts_are_named_and_taken_out():
     other = identify(rig(Pendulum, PENDULUM, GUESSES), [runs[0], clean, runs[2]])
     for n in GUESSES:
         assert fit.estimates[n].value == pytest.approx(other.estimates[n].value, abs=0.05 * other.estimates[n].stderr)
+
+
+@pytest.mark.parametrize(("count", "listed", "more"), [(1, 1, False), (5, 5, False), (6, 5, True), (40, 5, True)])
+def test_of_many_lost_counts_five_are_named_and_all_of_their_span(count, listed, more):
+    (run,) = swings(7, 1)
+    times = [0.25 * (k + 1) for k in range(count)]
+    told = _spiky(run, [(t, "theta") for t in times])
+    assert (told.start, told.stop) == (times[0], times[-1])
+    assert told.evidence.count(" s") == listed
+    assert told.evidence.startswith("theta at 0.25 s")
+    assert told.evidence.endswith("and others") == more
 
 
 def test_a_finger_is_named_with_its_time_and_left_out():
@@ -206,3 +225,117 @@ def test_reasons_are_those_of_the_last_fit_that_was_finished(interrupted):
     assert told == (by_first if interrupted else by_last)
     assert len(calls) == 1 or not interrupted
     assert fit.interrupted is interrupted
+
+
+N = 24
+"""Half swings of a second each, of 0.5 rad, that are missed by a hundredth of a radian."""
+
+
+def missed(where, by=0.5, constant=True, moved=0.5, **more):
+    """A run of half swings that is missed by more at some of them."""
+    times = np.arange(N, dtype=float)
+    far = np.full((N, 1), 0.01)
+    far[list(where), 0] = by
+    run = replace(swing(angle=0.5, label="a"), measured=("theta",))
+    return Stretches(run=run, start=times, stop=times + 1, missed=far, moved=np.broadcast_to(moved, (N, 1)),
+                     constant=np.broadcast_to(constant, N), quantum=np.array([1e-4]), **more)  # fmt: skip
+
+
+def told_of(stretches, spread=0.4):
+    return [(o.start, o.stop, o.reason) for o in _strange(stretches, [stretches], {"theta": spread})]
+
+
+@pytest.mark.parametrize(
+    ("where", "reason"),
+    [
+        ([0], TOUCHED.format("start")), ([1], TOUCHED.format("start")), ([2], BUMPED), ([10], BUMPED),
+        ([N - 3], BUMPED), ([N - 2], TOUCHED.format("end")), ([N - 1], TOUCHED.format("end")),
+        ([9, 10, 11], BUMPED), ([9, 10, 12], BUMPED), ([8, 9, 10, 11], UNEXPLAINED),
+    ],
+)  # fmt: skip
+def test_a_push_is_told_from_hands_at_either_end_and_from_what_no_push_explains(where, reason):
+    """Within two half swings of an end it is a hand; four half swings in a row are no single push."""
+    falling = missed(where, moved=0.5 * 0.9 ** np.arange(N)[:, None])
+    assert told_of(falling) == [(where[0], where[-1] + 1, reason)]
+
+
+def test_pushes_that_are_apart_are_told_apart_and_where_the_command_changed_none_is():
+    falling = 0.5 * 0.9 ** np.arange(N)[:, None]
+    assert told_of(missed([5, 12], moved=falling)) == [(5, 6, BUMPED), (12, 13, BUMPED)]
+    constant = np.ones(N, dtype=bool)
+    constant[5] = False
+    assert told_of(missed([5, 12], moved=falling, constant=constant)) == [(12, 13, BUMPED)]
+
+
+def test_a_swing_that_goes_on_for_as_long_feeds_itself():
+    assert told_of(missed(range(5, 10))) == [(5, 10, SELF_EXCITED)]
+    assert told_of(missed(range(5, 10), moved=0.5 * 0.9 ** np.arange(N)[:, None])) == [(5, 10, UNEXPLAINED)]
+
+
+@pytest.mark.parametrize(("by", "far"), [(0.039, False), (0.041, True)])
+def test_four_times_the_usual_is_far(by, far):
+    """Of a signal so small that a twentieth of it is less."""
+    assert bool(told_of(missed([10], by=by, moved=0.5 * 0.9 ** np.arange(N)[:, None]), spread=0.1)) == far
+
+
+@pytest.mark.parametrize(("by", "far"), [(0.049, False), (0.051, True)])
+def test_a_twentieth_of_the_signal_is_far(by, far):
+    assert bool(told_of(missed([10], by=by, moved=0.5 * 0.9 ** np.arange(N)[:, None]), spread=1.0)) == far
+
+
+def test_how_far_is_told_up_to_a_hundredfold():
+    falling = 0.5 * 0.9 ** np.arange(N)[:, None]
+    for by, words in (
+        (0.5, "missed 50 times as much as the other stretches"), (0.99, "missed 99 times as much"),
+        (1.01, "missed more than 99 times as much"), (np.inf, "the simulation runs away there"),
+    ):  # fmt: skip
+        stretches = missed([10], by=by, moved=falling)
+        (told,) = _strange(stretches, [stretches], {"theta": 0.4})
+        assert told.evidence.startswith(words)
+
+
+def test_a_run_is_judged_by_its_own_runs_that_move():
+    """Half swings of less than three hundredths of the signal say nothing of what is usual."""
+    moved = np.full((N, 1), 0.5)
+    moved[: N // 2] = 0.02
+    far = np.where(np.arange(N)[:, None] < N // 2, 1.0, 0.01)
+    one = replace(missed([]), missed=far, moved=moved)
+    assert _usual(one, [one], "theta", 1.0) == pytest.approx(0.01)
+    assert _usual(one, [one], "theta", 0.5) == pytest.approx(1.0)
+    quiet = replace(one, moved=np.full((N, 1), 0.01))
+    assert _usual(one, [quiet], "theta", 1.0) == pytest.approx(0.01)  # where the others do not move, its own
+    assert _usual(quiet, [quiet], "theta", 1.0) == 0.0
+
+
+def scored(**percents):
+    """A fit of runs explained by so many percent, signal by signal."""
+    roles = {"other": "predict"}
+    return SimpleNamespace(runs={
+        label: SimpleNamespace(role=roles.get(label, "fit"), fit_percent=dict(zip("xy", p, strict=True)))
+        for label, p in percents.items()
+    })  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("new", "worse"),
+    [
+        ({"a": (90, 80), "b": (70, 60)}, False), ({"a": (87.1, 77.1), "b": (67.1, 57.1)}, False),
+        ({"a": (86.9, 95), "b": (95, 95)}, True), ({"a": (95, 95), "b": (95, 56.9)}, True),
+        ({"a": (90, 80), "b": (70, 60), "new": (1, 1)}, False), ({"a": (90, 80), "other": (1, 1)}, False),
+    ],
+)  # fmt: skip
+def test_a_fit_went_astray_where_one_signal_of_one_run_is_explained_three_percent_worse(new, worse):
+    old = scored(a=(90, 80), b=(70, 60), other=(50, 50))
+    assert explains_worse(scored(**new), old) is worse
+
+
+def test_spikes_that_nobody_named_stay():
+    (run,) = swings(7, 1)
+    y = run.y.copy()
+    y[[211, 500], 0] += 0.4
+    spiked = replace(run, y=y)
+    named = Outlier(run=spiked.label, start=2.0, stop=5.1, reason=SPIKES, evidence="")
+    assert np.array_equal(without_outliers([spiked], [])[0].y, y)
+    assert np.array_equal(without_outliers([spiked], [replace(named, run="another")])[0].y, y)
+    (clean,) = without_outliers([spiked], [named])
+    assert clean.y[[211, 500], 0] == pytest.approx(run.y[[211, 500], 0], abs=0.02)

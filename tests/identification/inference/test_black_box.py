@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import StateSpace, lsim
 
-from upright.identification.inference.black_box import _sampled, black_box
+from upright.identification.inference.black_box import Paced, _percents, _sampled, black_box
 from upright.identification.model.runs import Run
 
 DT = 0.01
@@ -74,3 +74,35 @@ def test_what_drives_is_the_mean_over_the_step_ahead_of_commands_and_of_what_is_
 def test_a_run_fits_a_step_of_whole_samples_to_one_percent_that_it_holds_twice(step: float, fits: bool) -> None:
     run = Run(label="a", role="fit", t=DT * np.arange(5), u=np.zeros((5, 1)), y=np.zeros((5, 1)), measured=("x1",))
     assert (_sampled(run, step * DT) is not None) is fits
+
+
+def left(measured: np.ndarray, foreseen: np.ndarray) -> float:
+    """Fit percent as it is defined: 100 for all, 0 for the mean's."""
+    return 100 * (1 - np.linalg.norm(measured - foreseen) / np.linalg.norm(measured - measured.mean()))
+
+
+@pytest.mark.parametrize("stride", [1, 2])
+def test_exactly_so_many_steps_ahead_only_the_last_of_them_counts_from_every_origin(stride: int) -> None:
+    """By hand: an equation that says "as now" misses a signal by what changes in three steps, from each origin."""
+    y = np.cumsum(np.arange(12.0))[:, None]
+    still = np.array([[0.0], [1.0], [0.0]])  # of one, y and the command
+    paced = Paced(y=y, w=np.zeros((12, 1)), stride=stride)
+    ahead, every = 3 * stride, np.arange(0, 12 - 3 * stride, stride)
+    found = _percents(still, 1, paced, 3, exactly=True)
+    assert found == {0: pytest.approx(left(y[every + ahead, 0], y[every, 0]))}
+    skipped = every[every + ahead >= 8]
+    found = _percents(still, 1, paced, 3, 8.0, exactly=True)
+    assert found == {0: pytest.approx(left(y[skipped + ahead, 0], y[skipped, 0]))}
+
+
+def test_windows_laid_end_to_end_count_all_their_steps_and_without_them_the_whole_run() -> None:
+    y = np.cumsum(np.arange(12.0))[:, None]
+    still = np.array([[0.0], [1.0], [0.0]])
+    paced = Paced(y=y, w=np.zeros((12, 1)), stride=1)
+    begun = np.repeat([0, 3, 6], 3)  # a fourth window would end behind the run
+    at = np.arange(1, 10)
+    assert _percents(still, 1, paced, 3) == {0: pytest.approx(left(y[at, 0], y[begun, 0]))}
+    assert _percents(still, 1, paced, 3, 5.0) == {0: pytest.approx(left(y[at[4:], 0], y[begun[4:], 0]))}
+    assert _percents(still, 1, paced, None) == {0: pytest.approx(left(y[1:, 0], np.zeros(11)))}
+    assert _percents(still, 1, paced, 3, 12.0) == {}
+    assert _percents(still, 1, paced, 12) == {0: -1000.0}  # no window fits

@@ -61,6 +61,18 @@ def test_a_dead_time_that_nobody_asked_for_is_found_and_its_cost_told():
     assert not told(with_it)
 
 
+def test_a_dead_time_that_spring_damper_and_gain_can_almost_stand_for_is_found_all_the_same():
+    """Under a sine whose size hardly varies, a force that is late is one of another phase, as others would give it."""
+    t = PERIOD * np.arange(2000)
+    u = np.sin(13.0 * t) * (1 + 0.2 * np.sin(0.9 * t))
+    x = simulate(PLANT(**TRUTH), {}, [0.0, 0.0], 2 * np.r_[np.zeros(10), u[:-10]], PERIOD, samples=t.size, substeps=2)
+    y = x[:, :1, 0] + 1e-4 * np.random.default_rng(1).standard_normal((t.size, 1))
+    sine = Run(label="sine", role="fit", t=t, u=u[:, None], y=y, measured=("x_1",))
+    (sentence,) = told(identify(asked(), [sine]))
+    low, high = map(float, re.search(r"late \(([\d.]+) to ([\d.]+)\)", sentence).groups())
+    assert low < 10 * PERIOD * 1e3 < high < 1.2 * 10 * PERIOD * 1e3
+
+
 @pytest.mark.parametrize("other", [run(), run(friction=0.3)], ids=["in time", "dry friction left out"])
 def test_a_drive_that_acts_in_time_is_not_called_late(other):
     assert not told(identify(asked(), [other]))

@@ -9,6 +9,7 @@ import pytest
 from upright.errors import BadInput
 from upright.identification.estimate import identify
 from upright.readers import inspect, read
+from upright.study.draft.chain import _by_first_motion
 from upright.study.draft.chain_log import follows
 from upright.study.draft.draft import draft
 from upright.study.load import load_study
@@ -216,3 +217,21 @@ def test_a_body_follows_the_first_sample_of_a_pulse(up):
     x = up * np.where(t > 1.05, 1 - np.exp(-3 * (t - 1.05)), 0.0)
     assert follows(t, u, x, 100) is (up > 0)
     assert follows(t, u - 5.0, x, 100) is (up > 0)  # what counts is the change
+
+
+@pytest.mark.parametrize("begin", [0, 300])
+@pytest.mark.parametrize(("inertia", "push"), [(2.0, 3.0), (0.01, -0.5)])
+def test_a_first_motion_under_a_constant_push_tells_the_inertia(inertia, push, begin):
+    """x = u t^2/(2 m), from rest wherever the encoder stood, and the log goes on with whatever it likes."""
+    u = np.where(np.arange(T.size) >= begin, push, 0.0)
+    t = np.clip(T - T[begin], 0, None)
+    x = 5.0 + push * t**2 / (2 * inertia)
+    assert _by_first_motion(T, u, x) == pytest.approx(inertia, rel=1e-9)
+    x[T.size // 2 :] = x[T.size // 2]
+    assert _by_first_motion(T, u, x) == pytest.approx(inertia, rel=1e-9)
+
+
+def test_a_body_that_is_thrown_at_once_or_stays_tells_no_inertia():
+    jump = np.where(T[100] < T, 1.0, 0.0)
+    assert _by_first_motion(T, jump, jump) == 1.0
+    assert _by_first_motion(T, jump, np.zeros(T.size)) == 1.0

@@ -54,6 +54,10 @@ ELSEWHERE = ("torsional", "they come to rest elsewhere, where springs would pull
         ("", "c1", OUT, PULSE, False, "", CAME_BACK),
         ("counts", "e1", SHORT, PULSE, False, "", CAME_BACK),
         ("counts", "e1", LONG, PULSE, False, "", ELSEWHERE),
+        # an encoder may have begun to count anywhere
+        ("counts", "e1", OUT - 3000, ON, False, "", CAME_BACK),
+        ("counts", "e1", OUT - 3000, -ON, False, "", ELSEWHERE),
+        ("counts", "e1", 3000 - OUT, ON, True, "", CAME_BACK),
         ("counts", "e1", -LONG, PULSE, False, "", ELSEWHERE),
         ("counts", "e1", DRIFTS, PULSE, False, "", ELSEWHERE),  # the last twentieth drifts by 0.5 %
         ("counts", "e1", np.r_[OUT[:380], 1000 + np.linspace(0, 30, 20)], PULSE, False, "", CAME_BACK),

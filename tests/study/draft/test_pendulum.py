@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.study.draft.test_recognise import col
 from upright.errors import BadInput
 from upright.physics import Coordinate, Joint, Plant
 from upright.quantities import quantity
 from upright.readers import inspect, read
 from upright.study.draft.draft import draft
-from upright.study.draft.pendulum import starts_hanging
+from upright.study.draft.pendulum import _gain, starts_hanging
 from upright.study.draft.recognise import Recognised, moves_against
 from upright.study.load import load_study
 
@@ -184,6 +185,36 @@ def pushed(sign: float, *, moving: bool) -> tuple[np.ndarray, np.ndarray]:
             v += 1e-3 * (0.5 * sign * push - 2.0 * v)
             x += 1e-3 * v
     return u, np.array(out)
+
+
+def guessed_gain(plant, guess="rad", low=-0.3, high=0.3, frequency=5.0, command=None):
+    """Gain that a draft begins with, of a coordinate and a command that go so far."""
+    column, drive = col("q", guess, low=low, high=high), col("u", **(command or {"low": -2.0, "high": 1.5}))
+    return _gain(Recognised(
+        plant=plant, columns={"q": column}, rest={"q": 0.0}, drive=drive, reversed=False, mirrored=False,
+        window=(0.0, 1.0), frequency=frequency, settled=True, doubts=(),
+    ))  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("plant", "inertia"), [("furuta", 2e-3), ("cart-pendulum", 1.1), ("pendulum", (G / 25.0) ** 2)]
+)
+def test_a_gain_begins_where_the_start_inertia_swings_as_far_as_was_seen(plant, inertia):
+    """J A w^2 = k u: of 0.3 rad at 5 rad/s under 2 V at most; a kilogram at g/w^2 has J = (g/w^2)^2."""
+    assert guessed_gain(plant) == pytest.approx(inertia * 0.3 * 25.0 / 2.0)
+    assert guessed_gain(plant, low=-1.3, high=-0.7) == pytest.approx(guessed_gain(plant))
+    assert guessed_gain(plant, low=0.0, high=0.0) == 1e-9
+    # 409 counts of ECP's converter are half a volt
+    dac = {"low": -1636.0, "high": 1227.0, "lies": ("the command in DAC counts",)}
+    assert guessed_gain(plant, command=dac) == pytest.approx(guessed_gain(plant), rel=2e-3)
+    assert guessed_gain(plant, command={"low": 0.0, "high": 0.0}) == pytest.approx(2 * guessed_gain(plant))
+
+
+@pytest.mark.parametrize(("guess", "unit"), [("deg", math.pi / 180), ("mm", 1e-3), ("counts", math.tau / 16_000)])
+def test_a_gain_begins_as_large_in_other_units_of_the_swing(guess, unit):
+    """Counts are those of an encoder of 16,000 a turn; a start is right within a few percent of the unit."""
+    other = guessed_gain("furuta", guess, low=-0.3 / unit, high=0.3 / unit)
+    assert other == pytest.approx(guessed_gain("furuta"), rel=0.05)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

@@ -1,0 +1,130 @@
+"""Does the page of a design say how much its loop stands, in units that can be checked, and what to try?"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+import upright as up
+from upright.basis import MEASURED
+from upright.designing.chapter import chapter
+from upright.designing.run import DesignRequest, design_for
+from upright.gains import Margins
+from upright.report.page import Table
+from upright.report.symbols import number
+from upright.systems import StateSpace
+
+ARM = up.Rig.known(
+    up.Furuta(m_p=0.135, l_cg=0.19, r=0.16, J_d=0.011, J_p=6e-4), gain="0.65 N m/V", limit="10 V", period="2 ms",
+    counts=4096,
+)  # fmt: skip
+CART = up.Rig.known(
+    up.CartPendulum(m_c=0.9, m_p=0.12, l_cg=0.2, J_p=1.5e-3), gain="2 N/V", limit="10 V", period="2 ms",
+    counts=(20_000, 4096),
+)  # fmt: skip
+POLES = (-4.0, -5.0, -16.0, -3.0)
+FINE = Margins(least_gain=0.2, most_gain=5.0, phase=0.7, delay=0.02, modulus=0.6)
+
+
+@pytest.fixture(scope="module")
+def done():
+    """Of a rig whose numbers are trusted, so that the loop alone decides."""
+    rig = replace(ARM, basis=MEASURED)
+    return design_for(rig, DesignRequest(at="inverted", poles=POLES, period=2e-3, limit=10.0))
+
+
+def with_margins(done, margins, **how):
+    return replace(done, chosen=replace(done.chosen, margins=margins), **how)
+
+
+def tables(told):
+    return [block for part in told.parts for block in part.content if isinstance(block, Table)]
+
+
+@pytest.mark.parametrize(
+    ("changes", "chance", "words"),
+    [
+        ({}, None, ""),
+        ({"modulus": 0.41, "least_gain": 0.69, "delay": 2.01e-3}, 0.991, ""),
+        ({"modulus": 0.39}, None, "distance to -1 is only 0.39"),
+        ({"least_gain": 0.71}, None, "a gain 29 % weaker lets it fall"),
+        ({"delay": 1.9e-3}, None, "it bears only 1.9 ms more delay"),
+        ({}, 0.98, "2 % of the rigs that the fit allows fall"),
+        ({"modulus": 0.3, "delay": 1e-3}, None, "distance to -1 is only 0.30; it bears only 1 ms more delay"),
+    ],
+)
+def test_a_loop_stands_with_margin_or_with_what_it_lacks(done, changes, chance, words):
+    """Asked are 0.4 of distance, a third of gain, a period of delay and 99 % of the rigs."""
+    told = with_margins(done, replace(FINE, **changes), chance=chance, peak_sampled=2.5)
+    head = f"The loop stands, with reservations: {words}" if words else "The loop stands with margin"
+    assert told._loop_verdict() == f"{head}; the start asked for takes 25 % of the drive's limit."
+    page = chapter(told)
+    assert page.sound == (not words)
+    offered = any("--sampled" in step.command for step in page.steps)
+    assert offered == ("distance" in words)
+
+
+def test_a_start_beyond_the_limit_saturates_and_its_share_that_does_not_is_told(done):
+    told = with_margins(done, FINE, peak_sampled=25.0)._loop_verdict()
+    assert "needs 25 V, 250 % of the limit: the drive saturates; up to 40 % of that start it does not." in told
+    assert with_margins(done, FINE, peak_sampled=10.0)._loop_verdict().endswith("takes 100 % of the drive's limit.")
+    free = with_margins(done, FINE, wish=replace(done.wish, limit=None))
+    assert free._loop_verdict() == "The loop stands with margin."
+    assert any("whether it saturates is not known" in w for w in chapter(free).warnings)
+    assert not any("saturates" in w for w in chapter(done).warnings)
+
+
+def test_a_loop_that_falls_is_not_sound_and_is_not_taken_anywhere(done):
+    falls = with_margins(done, None, peak_sampled=math.inf)
+    page = chapter(falls)
+    assert chapter(with_margins(done, FINE, peak_sampled=1.0)).sound
+    assert page.verdict.startswith("The sampled loop falls: with a period of 2 ms, 1 samples of delay and the ")
+    assert not page.sound
+    commands = [step.command for step in page.steps]
+    assert any("--sampled" in c for c in commands)
+    assert not any("upright export" in c for c in commands)
+    assert any("upright export" in s.command for s in chapter(with_margins(done, FINE)).steps)
+    assert "takes" not in page.parts[2].content[0]  # no peak of a loop that falls
+
+
+@pytest.mark.parametrize(("rig", "speeds", "units"), [
+    (ARM, "rad/s, rad/s", ["V/rad", "V s/rad", "V/rad", "V s/rad"]),
+    (CART, "m/s, rad/s", ["V/m", "V s/m", "V/rad", "V s/rad"]),
+])  # fmt: skip
+def test_gains_and_noise_stand_in_the_command_s_unit_for_each_state_s(rig, speeds, units):
+    """u = -K x: a gain has the command's unit over its state's."""
+    done = design_for(rig, DesignRequest(at="inverted", poles=POLES, period=2e-3, limit=10.0))
+    gains, _, ways, *_ = tables(chapter(done))
+    assert [row[-1] for row in gains.rows] == units
+    assert [float(row[1].replace("−", "-")) for row in gains.rows] == pytest.approx(done.continuous[0], rel=1e-4)
+    assert ways.headings[1:3] == (f"speed noise [{speeds}]", "command noise [V]")
+    assert [row[0].endswith(" (chosen)") for row in ways.rows] == [w is done.chosen for w in done.ways]
+    for row, way in zip(ways.rows, done.ways, strict=True):
+        assert row[1] == ", ".join(number(v, 2) for v in way.speed_noise)
+        assert float(row[-2]) == pytest.approx(1e3 * way.margins.delay, rel=5e-3)
+        assert float(row[-3]) == pytest.approx(math.degrees(way.margins.phase), rel=5e-3)
+
+
+@pytest.mark.parametrize(("unit", "per"), [("N", "V/N"), ("m/s^2", "V/(m/s²)"), ("N/m", "V/(N/m)"), ("1", "V")])
+def test_a_state_of_any_unit_has_a_gain_per_that(unit, per):
+    """Other units than lengths, angles and speeds come with matrices of one's own."""
+    model = StateSpace(A=[[-1.0]], B=[[1.0]], C=[[1.0]], states=("x",), inputs=("u",), units={"x": unit, "u": "V"})
+    told = chapter(design_for(model, DesignRequest(at="", poles=(-3.0,), period=1e-3, speed="")))
+    assert tables(told)[0].rows[0][-1] == per
+
+
+def test_who_says_how_late_a_command_acts_is_told(done):
+    late = design_for(ARM.replace(delay="3 ms"), done.wish)
+    assert late.sampled.delay == pytest.approx(1.5)
+    for design, words in (
+        (late, "1.5 samples late (as the file says)"), (done, "1 samples late (assumed)"),
+        (design_for(ARM, replace(done.wish, delay=2.0)), "2 samples late (as asked)"),
+    ):  # fmt: skip
+        assert words in chapter(design).parts[2].content[0]
+    plain = StateSpace(A=[[-1.0]], B=[[1.0]], C=[[1.0]])
+    wish = DesignRequest(at="", poles=(-3.0,), period=1e-3, speed="")
+    assert "(assumed)" in chapter(design_for(plain, wish)).parts[2].content[0]
+    held = chapter(design_for(plain.to_sampled(1e-3), wish))
+    assert "0 samples late (besides what the matrices hold)" in held.parts[2].content[0]
