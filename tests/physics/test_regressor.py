@@ -89,3 +89,21 @@ def test_a_motors_constant_is_torque_per_current_and_voltage_per_speed() -> None
     equations = regressor(motor, frozenset(motor.optional))
     (constant,) = (i for i, b in enumerate(equations.base) if "k_t" in b.names)
     np.testing.assert_allclose(equations.columns(q, v, a)[constant], np.array([-v[2], 0 * v[1], v[0]]), atol=1e-10)
+
+
+def test_a_bodys_own_inertia_is_what_its_acceleration_multiplies_alone() -> None:
+    """Of the Furuta's arm the rod's share changes with its angle; of a double pendulum's links both have one."""
+    found = {name: regressor(find(name), frozenset(find(name).optional)) for name in ("furuta", "double-pendulum")}
+    texts = {name: [e.base[e.own(i) or 0].text for i in range(2)] for name, e in found.items()}
+    assert texts == {
+        "furuta": ["J_d + m_p*r*r", "J_p + l_cg*l_cg*m_p"],
+        "double-pendulum": ["J_1 + l_1*l_1*m_2 + l_c1*l_c1*m_1", "J_2 + l_c2*l_c2*m_2"],
+    }
+    assert regressor(Bumpers).own(1) is None
+
+
+def test_what_may_be_left_out_is_told_from_what_is_always_there() -> None:
+    """An anchor or an axial inertia may be none; a centroidal inertia may be none, that about the hinge not."""
+    equations = regressor(Furuta, frozenset(Furuta.optional))
+    assert {b.text for b in equations.base if not b.always} == {"J_a", "k_psi", "b_1", "b_2"}
+    assert {b.text for b in regressor(find("torsional-2")).base if b.always} == {"J_1 + a_1", "J_2 + a_2", "k_12"}

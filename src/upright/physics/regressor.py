@@ -12,7 +12,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from itertools import combinations
 
@@ -38,6 +38,8 @@ class BaseParameter:
         Parameters in it.
     positive : bool
         Whether it is positive whatever the values of its parameters are within their bounds.
+    always : bool
+        Whether it is there although every parameter that may be left out is: an inertia is, a spring to ground is not.
     weights : tuple of float
         How much of it is in each lump of the derived text.
     """
@@ -45,6 +47,7 @@ class BaseParameter:
     text: str
     names: frozenset[str]
     positive: bool
+    always: bool
     weights: tuple[float, ...]
 
 
@@ -81,6 +84,13 @@ class Regressor:
         """What is in ``M a - f`` besides base parameters times columns, (coordinates, ...)."""
         return np.broadcast_to(needed_force(self.derived, self._fixed(known or {}), q, v, a), np.shape(q)).copy()
 
+    def own(self, i: int) -> int | None:
+        """Which base parameter is the inertia of coordinate `i` alone: its column is that acceleration and little else.
+
+        None where every inertia of the coordinate depends on where it is.
+        """
+        return _own(self, i)
+
     def values(self, parameters: Mapping[str, float]) -> Array:
         """Base parameters (n,) of a plant with these parameters."""
         return np.array([float(evaluate(b.text, parameters)) for b in self.base])
@@ -95,6 +105,21 @@ def regressor(plant: type[Plant], zero: frozenset[str] = frozenset()) -> Regress
 
 
 @cache
+def _own(equations: Regressor, i: int) -> int | None:
+    if equations.fixed:
+        return None
+    n = len(equations.derived.coordinates)
+    q, v, a = np.random.default_rng(0).normal(size=(3, n, 50))
+    alone = np.zeros_like(a)
+    alone[i] = 1.0
+    inertia = equations.columns(q, 0 * v, alone)[:, i] - equations.columns(q, 0 * v, 0 * a)[:, i]
+    besides = np.linalg.norm(equations.columns(q, v, a)[:, i] - inertia * a[i], axis=1)
+    here = [j for j, b in enumerate(equations.base)
+            if b.positive and b.always and np.ptp(inertia[j]) < 1e-9 < inertia[j, 0]]  # fmt: skip
+    return min(here, key=lambda j: float(besides[j]), default=None)
+
+
+@cache
 def _regressor(plant: type[Plant], zero: frozenset[str]) -> Regressor:
     derived = plant.derived(without=zero)
     opened = replace(derived, lumps=(), parameters=tuple(f"k{i}" for i in range(len(derived.lumps))))
@@ -103,7 +128,7 @@ def _regressor(plant: type[Plant], zero: frozenset[str]) -> Regressor:
     for i, text in enumerate(derived.lumps):
         if f"k{i}" not in nonlinear:
             for factor, product in _products(ast.parse(text, mode="eval").body):
-                if not zero.intersection(map(ast.unparse, _factors(ast.parse(product, mode="eval").body))):
+                if not zero.intersection(_plain(product)):
                     here = shares.setdefault(product, {})
                     here[i] = here.get(i, 0.0) + factor
     alike: dict[tuple[float, ...], list[tuple[float, str]]] = {}
@@ -127,7 +152,9 @@ def _base(plant: type[Plant], products: list[tuple[float, str]], weights: tuple[
         factor > 0 and re.fullmatch(r"[\w.*/() ]+", product) and not re.search(r"\w\(", product)
         for factor, product in products
     )
+    absent = {f.name for f in fields(plant) if f.default == 0}  # type: ignore[arg-type]
     return BaseParameter(
+        always=any(not absent.intersection(_plain(product)) for _, product in products),
         text=" + ".join(product if factor == 1 else f"{factor!r}*({product})" for factor, product in products),
         names=names,
         positive=positive and all(plant.quantity(name).lower >= 0 for name in names),
@@ -137,6 +164,11 @@ def _base(plant: type[Plant], products: list[tuple[float, str]], weights: tuple[
 
 def _names(product: str) -> frozenset[str]:
     return frozenset(n.id for n in ast.walk(ast.parse(product)) if isinstance(n, ast.Name)) - frozenset(FUNCTIONS)
+
+
+def _plain(product: str) -> list[str]:
+    """Factors of a product, as text: what is zero as one of them takes the product away."""
+    return [ast.unparse(factor) for factor in _factors(ast.parse(product, mode="eval").body)]
 
 
 def _products(node: ast.expr) -> list[tuple[float, str]]:
