@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -75,6 +76,31 @@ def savitzky_golay(y: Array, dt: float, width: int, *, order: int = 4, derivativ
         part[n - half :] = powers[d, half + 1 :] @ (fit @ y[n - width :])
         parts.append(part / dt**d)
     return Motion(q=parts[0], v=parts[1], a=parts[2] if derivatives > 1 else np.zeros(n), edge=half)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SmoothedMotion:
+    """Positions, speeds and accelerations of several coordinates, (coordinates, N) each, through the same smoothing.
+
+    `fades` are speeds below which the sign of a speed is not believed; up to `edge` samples at the ends are unreliable.
+    """
+
+    q: Array
+    v: Array
+    a: Array
+    edge: int
+
+    @property
+    def fades(self) -> Array:
+        """(coordinates,), zero for one that does not move."""
+        return 0.02 * np.std(self.v, axis=1)
+
+
+def smoothed(signals: Sequence[Array], dt: float, width: int, *, order: int = 4) -> SmoothedMotion:
+    """Motion of coordinates (N,) that were sampled together."""
+    motion = [savitzky_golay(y, dt, width, order=order) for y in signals]
+    q, v, a = (np.array([getattr(m, name) for m in motion]) for name in ("q", "v", "a"))
+    return SmoothedMotion(q=q, v=v, a=a, edge=motion[0].edge)
 
 
 def middle(width: int, *, order: int = 4) -> Array:
