@@ -20,7 +20,7 @@ from upright.errors import BadInput
 from upright.physics import Plant
 from upright.physics.regressor import Regressor, regressor
 from upright.records import Array
-from upright.signals.smoothing import dominant_period, middle, noise_gain, savitzky_golay
+from upright.signals.smoothing import dominant_period, middle, noise_gain, savitzky_golay, smoothed
 from upright.signals.stretches import pieces
 from upright.study.sensors import Grid
 
@@ -91,23 +91,19 @@ def motion_of(case: Case) -> SmoothedMotion | str:
     from scipy.ndimage import correlate1d
 
     inner = slice(width // 2, n - width // 2, max(1, -(-n // MOST)))
-    q, v, a = np.zeros((3, len(coordinates), len(range(*inner.indices(n)))))
-    for i, c in enumerate(coordinates):
-        if c in y:
-            smooth = savitzky_golay(y[c], dt, width)
-            q[i], v[i], a[i] = smooth.q[inner], smooth.v[inner], smooth.a[inner]
+    smooth = smoothed([y.get(c, np.zeros(n)) for c in coordinates], dt, width)
     return SmoothedMotion(
         plant=case.plant,
         t=grid.t[inner],
-        q=q,
-        v=v,
-        a=a,
+        q=smooth.q[:, inner],
+        v=smooth.v[:, inner],
+        a=smooth.a[:, inner],
         u=correlate1d(u, middle(width), mode="nearest")[inner],
         samples=np.arange(n)[inner],
         dt=dt,
         command=u,
         weights=middle(width),
-        fades=np.maximum(0.02 * np.std(v, axis=1), 1e-9),
+        fades=np.maximum(0.02 * np.std(smooth.v[:, inner], axis=1), 1e-9),
         rows=tuple(coordinates.index(c) for c in moving),
     )
 

@@ -23,12 +23,20 @@ class State:
 
 @dataclass(frozen=True, kw_only=True)
 class Motion:
-    """Position, speed and acceleration of one coordinate, each (N,), and how far the ends are unreliable."""
+    """Position, speed and acceleration of one coordinate, each (N,), and how far the ends are unreliable.
+
+    Of several coordinates that went through the same smoothing each is (coordinates, N).
+    """
 
     q: Array
     v: Array
     a: Array
     edge: int
+
+    @property
+    def fades(self) -> Array:
+        """Speeds (coordinates,) below which the sign of a speed is not believed; zero of what does not move."""
+        return 0.02 * np.std(self.v, axis=-1)
 
 
 def dominant_period(y: Array, dt: float) -> float:
@@ -78,29 +86,12 @@ def savitzky_golay(y: Array, dt: float, width: int, *, order: int = 4, derivativ
     return Motion(q=parts[0], v=parts[1], a=parts[2] if derivatives > 1 else np.zeros(n), edge=half)
 
 
-@dataclass(frozen=True, kw_only=True)
-class SmoothedMotion:
-    """Positions, speeds and accelerations of several coordinates, (coordinates, N) each, through the same smoothing.
-
-    `fades` are speeds below which the sign of a speed is not believed; up to `edge` samples at the ends are unreliable.
-    """
-
-    q: Array
-    v: Array
-    a: Array
-    edge: int
-
-    @property
-    def fades(self) -> Array:
-        """(coordinates,), zero for one that does not move."""
-        return 0.02 * np.std(self.v, axis=1)
-
-
-def smoothed(signals: Sequence[Array], dt: float, width: int, *, order: int = 4) -> SmoothedMotion:
-    """Motion of coordinates (N,) that were sampled together."""
-    motion = [savitzky_golay(y, dt, width, order=order) for y in signals]
-    q, v, a = (np.array([getattr(m, name) for m in motion]) for name in ("q", "v", "a"))
-    return SmoothedMotion(q=q, v=v, a=a, edge=motion[0].edge)
+def smoothed(signals: Sequence[Array], dt: float, width: int) -> Motion:
+    """Motion of coordinates (N,) that were sampled together, through the same smoothing; exactly none of a constant."""
+    none = np.zeros(len(signals[0]))
+    parts = [savitzky_golay(y, dt, width) if np.ptp(y) else Motion(q=y + none, v=none, a=none, edge=0) for y in signals]
+    q, v, a = (np.array([getattr(part, name) for part in parts]) for name in ("q", "v", "a"))
+    return Motion(q=q, v=v, a=a, edge=max(part.edge for part in parts))
 
 
 def middle(width: int, *, order: int = 4) -> Array:
