@@ -180,3 +180,5 @@ def test_coordinates_smoothed_together_move_as_each_alone_and_a_constant_not_at_
     # a fiftieth of the deviation of 3 cos(3 t) and -7 sin(7 t), an amplitude over the square root of 2
     assert both.fades == pytest.approx([0.06 / np.sqrt(2), 0.0, 0.14 / np.sqrt(2)], rel=0.05)
     assert both.edge == 10
+    cubic = smoothed(signals, 0.01, 21, order=3)
+    assert np.array_equal(cubic.a[0], savitzky_golay(signals[0], 0.01, 21, order=3).a)

@@ -259,7 +259,7 @@ class _Parts:
     all: Array
     odd: dict[int, Array]
     half: Array | None
-    inertial: NDArray[np.bool_]
+    inertial: tuple[bool, ...]
 
     @classmethod
     def of(cls, equations: Regressor, plant: type[Plant], i: int, motion: tuple[Array, Array, Array]) -> _Parts:
@@ -275,7 +275,7 @@ class _Parts:
             odd={j: (whole - columns(*(np.where(own[j][:, None], -x, x) for x in motion))) / 2
                  for j in range(n) if j != i},
             half=columns(q + np.pi * own[i][:, None], v, a) if plant.coordinates[i].unit == "rad" else None,
-            inertial=np.any(whole != columns(q, v, 0 * a), axis=1),
+            inertial=equations.inertial(i),
         )  # fmt: skip
 
     def joins(self, k: int) -> int | None:

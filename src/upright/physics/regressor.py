@@ -91,6 +91,20 @@ class Regressor:
         """
         return _own(self, i)
 
+    def inertial(self, i: int) -> tuple[bool, ...]:
+        """Of which base parameters the column in row `i` depends on an acceleration."""
+        return _inertial(self, i)
+
+    def acting(self, i: int, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
+        """Columns (n, ...) that explain the acceleration of coordinate `i`, friction that is dry and inputs besides.
+
+        Those of its own inertia, of inertias that may be missing and of what is not in its row are left out.
+        """
+        rows, own = -self.columns(q, v, a)[:, i], self.own(i)
+        inertial = self.inertial(i)
+        return rows[[k for k, b in enumerate(self.base)
+                     if k != own and (b.always or not inertial[k]) and np.any(rows[k])]]  # fmt: skip
+
     def values(self, parameters: Mapping[str, float]) -> Array:
         """Base parameters (n,) of a plant with these parameters."""
         return np.array([float(evaluate(b.text, parameters)) for b in self.base])
@@ -102,6 +116,13 @@ class Regressor:
 def regressor(plant: type[Plant], zero: frozenset[str] = frozenset()) -> Regressor:
     """Regressor of a plant, parameters named in `zero` being zero."""
     return _regressor(plant, zero)
+
+
+@cache
+def _inertial(equations: Regressor, i: int) -> tuple[bool, ...]:
+    q, v, a = np.random.default_rng(0).normal(size=(3, len(equations.derived.coordinates), 20))
+    differ = equations.columns(q, v, a)[:, i] != equations.columns(q, v, 0 * a)[:, i]
+    return tuple(np.any(differ, axis=1).tolist())
 
 
 @cache

@@ -86,10 +86,13 @@ def savitzky_golay(y: Array, dt: float, width: int, *, order: int = 4, derivativ
     return Motion(q=parts[0], v=parts[1], a=parts[2] if derivatives > 1 else np.zeros(n), edge=half)
 
 
-def smoothed(signals: Sequence[Array], dt: float, width: int) -> Motion:
+def smoothed(signals: Sequence[Array], dt: float, width: int, *, order: int = 4) -> Motion:
     """Motion of coordinates (N,) that were sampled together, through the same smoothing; exactly none of a constant."""
     none = np.zeros(len(signals[0]))
-    parts = [savitzky_golay(y, dt, width) if np.ptp(y) else Motion(q=y + none, v=none, a=none, edge=0) for y in signals]
+    parts = [
+        savitzky_golay(y, dt, width, order=order) if np.ptp(y) else Motion(q=y + none, v=none, a=none, edge=0)
+        for y in signals
+    ]
     q, v, a = (np.array([getattr(part, name) for part in parts]) for name in ("q", "v", "a"))
     return Motion(q=q, v=v, a=a, edge=max(part.edge for part in parts))
 

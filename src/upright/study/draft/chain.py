@@ -315,8 +315,9 @@ def starts(
         numbers[f"k_{last}"] = numbers[f"k_{last - 1}{last}"] * (1 / grounded - 1)
     trips = False
     if u is not None and not loop and free[0]:
-        others = [y for y, f in zip(bodies[1:], free[1:], strict=True) if f]
-        trips = find_trip(t, u, bodies[0], others, quantum=quanta[0]) is not None
+        whole = regressor(plant)
+        trips = find_trip(t, u, bodies[0], bodies[1:], quantum=quanta[0],
+                          terms=lambda m: list(whole.acting(0, m.q, m.v, m.a))) is not None  # fmt: skip
     return ChainStarts(numbers=numbers, braked=braked, trips=trips, limit=limit, fastest=w, grounded=grounded)
 
 

@@ -31,11 +31,10 @@ def hinge_of(plant: type[Plant], motion: Motion, inside: slice) -> Hinge:
     """Hinge of a cart pendulum or a Furuta pendulum that moves so, its angle zero hanging."""
     equations = regressor(plant, frozenset(plant.optional))
     own, row = equations.own(1), equations.columns(motion.q, motion.v, motion.a)[:, 1, inside]
-    resting = equations.columns(motion.q, motion.v, 0 * motion.a)[:, 1, inside]
+    inertial = equations.inertial(1)
     assert own is not None  # a pendulum's inertia about its hinge is its own
     acting = [k for k, b in enumerate(equations.base) if b.always and k != own and np.any(row[k])]
-    throws = [k for k in acting if not np.array_equal(row[k], resting[k])]
-    pulls = [k for k in acting if k not in throws]
+    throws, pulls = ([k for k in acting if inertial[k] is which] for which in (True, False))
     table = -row[[*throws, *pulls]].T
     (throw, gravity), left = _slopes(table, row[own])
     return Hinge(
