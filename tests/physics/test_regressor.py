@@ -102,6 +102,17 @@ def test_a_bodys_own_inertia_is_what_its_acceleration_multiplies_alone() -> None
     assert regressor(Bumpers).own(1) is None
 
 
+def test_a_column_is_an_inertias_or_a_forces_or_not_in_the_row() -> None:
+    equations = regressor(Furuta, frozenset(Furuta.optional))
+    roles = {b.text: (equations.roles(0)[k], equations.roles(1)[k]) for k, b in enumerate(equations.base)}
+    assert roles["l_cg*m_p*r"] == ("inertia", "inertia")
+    assert roles["k_psi"] == ("force", "")
+    assert roles["g*l_cg*m_p"] == ("", "force")
+    # throw, gravity, viscous friction and the axial inertia's centrifugal force; about the arm that inertia is left out
+    q, v, a = motions(2)
+    assert [len(equations.acting(i, q, v, a)) for i in (0, 1)] == [4, 4]
+
+
 def test_what_may_be_left_out_is_told_from_what_is_always_there() -> None:
     """An anchor or an axial inertia may be none; a centroidal inertia may be none, that about the hinge not."""
     equations = regressor(Furuta, frozenset(Furuta.optional))

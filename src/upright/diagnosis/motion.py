@@ -275,7 +275,7 @@ class _Parts:
             odd={j: (whole - columns(*(np.where(own[j][:, None], -x, x) for x in motion))) / 2
                  for j in range(n) if j != i},
             half=columns(q + np.pi * own[i][:, None], v, a) if plant.coordinates[i].unit == "rad" else None,
-            inertial=equations.inertial(i),
+            inertial=tuple(role == "inertia" for role in equations.roles(i)),
         )  # fmt: skip
 
     def joins(self, k: int) -> int | None:

@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from itertools import combinations
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +24,7 @@ from upright.physics.equations import FUNCTIONS, Derived, chooses, evaluate, nee
 from upright.physics.plant import Plant
 
 Array = NDArray[np.float64]
+Role = Literal["inertia", "force", ""]
 _LUMP = re.compile(r"\bk\d+\b")
 
 
@@ -91,19 +93,18 @@ class Regressor:
         """
         return _own(self, i)
 
-    def inertial(self, i: int) -> tuple[bool, ...]:
-        """Of which base parameters the column in row `i` depends on an acceleration."""
-        return _inertial(self, i)
+    def roles(self, i: int) -> tuple[Role, ...]:
+        """What each base parameter's column is in row `i`: an inertia's, with accelerations, a force's, or none."""
+        return _roles(self, i)
 
     def acting(self, i: int, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
         """Columns (n, ...) that explain the acceleration of coordinate `i`, friction that is dry and inputs besides.
 
-        Those of its own inertia, of inertias that may be missing and of what is not in its row are left out.
+        That of its own inertia is left out, and accelerations with an inertia that may be missing.
         """
-        rows, own = -self.columns(q, v, a)[:, i], self.own(i)
-        inertial = self.inertial(i)
-        return rows[[k for k, b in enumerate(self.base)
-                     if k != own and (b.always or not inertial[k]) and np.any(rows[k])]]  # fmt: skip
+        own, roles = self.own(i), self.roles(i)
+        told = [k for k, b in enumerate(self.base) if k != own and (roles[k] == "force" or (roles[k] and b.always))]
+        return -self.columns(q, v, a)[told, i]
 
     def values(self, parameters: Mapping[str, float]) -> Array:
         """Base parameters (n,) of a plant with these parameters."""
@@ -119,10 +120,12 @@ def regressor(plant: type[Plant], zero: frozenset[str] = frozenset()) -> Regress
 
 
 @cache
-def _inertial(equations: Regressor, i: int) -> tuple[bool, ...]:
+def _roles(equations: Regressor, i: int) -> tuple[Role, ...]:
     q, v, a = np.random.default_rng(0).normal(size=(3, len(equations.derived.coordinates), 20))
-    differ = equations.columns(q, v, a)[:, i] != equations.columns(q, v, 0 * a)[:, i]
-    return tuple(np.any(differ, axis=1).tolist())
+    moving, coasting = (equations.columns(q, v, x)[:, i] for x in (a, 0 * a))
+    return tuple(
+        "inertia" if np.any(x != y) else "force" if np.any(x) else "" for x, y in zip(moving, coasting, strict=True)
+    )
 
 
 @cache

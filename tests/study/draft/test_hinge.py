@@ -41,3 +41,12 @@ def test_throw_and_gravity_are_those_of_the_equation(plant: type[Plant], along: 
 def test_a_pendulum_that_is_looked_at_from_upright_has_its_gravity_the_other_way() -> None:
     x, theta = swung(-3.0, 0.0)
     assert hinge_of(CartPendulum, smoothed([x, theta + np.pi], DT, 21), slice(21, -21)).gravity < 0
+
+
+def test_a_hinge_that_stays_where_it_is_throws_nobody() -> None:
+    """A pendulum of one length and no throw, J_A theta'' = -m g l sin(theta), on a cart that was clamped."""
+    swing = solve_ivp(lambda _, y: [y[1], -40 * np.sin(y[0])], (0, T[-1]), [0.9, 0.0], t_eval=T, rtol=1e-9).y[0]
+    hinge = hinge_of(CartPendulum, smoothed([np.zeros(T.size), swing], DT, 21), slice(21, -21))
+    assert hinge.throw == 0
+    assert hinge.left == pytest.approx(hinge.unthrown)
+    assert hinge.gravity == pytest.approx(40.0, rel=0.01)

@@ -30,11 +30,11 @@ class Hinge:
 def hinge_of(plant: type[Plant], motion: Motion, inside: slice) -> Hinge:
     """Hinge of a cart pendulum or a Furuta pendulum that moves so, its angle zero hanging."""
     equations = regressor(plant, frozenset(plant.optional))
-    own, row = equations.own(1), equations.columns(motion.q, motion.v, motion.a)[:, 1, inside]
-    inertial = equations.inertial(1)
+    own, roles = equations.own(1), equations.roles(1)
     assert own is not None  # a pendulum's inertia about its hinge is its own
-    acting = [k for k, b in enumerate(equations.base) if b.always and k != own and np.any(row[k])]
-    throws, pulls = ([k for k in acting if inertial[k] is which] for which in (True, False))
+    row = equations.columns(motion.q, motion.v, motion.a)[:, 1, inside]
+    throws, pulls = ([k for k, b in enumerate(equations.base) if b.always and k != own and roles[k] == role]
+                     for role in ("inertia", "force"))  # fmt: skip
     table = -row[[*throws, *pulls]].T
     (throw, gravity), left = _slopes(table, row[own])
     return Hinge(
