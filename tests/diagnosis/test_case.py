@@ -53,6 +53,7 @@ def test_bodies_in_counts_or_lengths_are_alike_and_an_angle_is_not():
     assert not case(a=SINE, b=SINE, units={"a": "mm", "b": "rad"}).chained
     assert replace(case(a=SINE, units={"a": "rad"}), plant=find("torsional-1")).chained
     assert not replace(case(a=SINE), plant=CartPendulum).chained
+    assert not any(replace(case(a=SINE), plant=find(name)).chained for name in ("flexible-link", "double-pendulum"))
 
 
 def test_what_is_measured_is_what_is_placed_else_the_outputs_else_what_looks_like_a_place():

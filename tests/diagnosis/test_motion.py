@@ -31,19 +31,30 @@ J_A, MGL, ML = 2e-3 + 0.2 * 0.3**2, 0.2 * 9.81 * 0.3, 0.2 * 0.3
 RIGS = {
     # J_A theta'' = u - m g l sin(theta)
     "pendulum": Rig(
-        Pendulum(**ROD), 0.2, {"theta": 1.0}, {("effort", "theta"): 1 / J_A, ("theta", "theta"): -MGL / J_A}
+        Pendulum(**ROD), 0.2, {"theta": 1.0}, {("effort", "theta"): 1 / J_A, ("theta", "theta"): MGL / J_A}
     ),
     # (m_c + m_p) x'' + m l (cos theta'' - sin theta'^2) = u;  J_A theta'' = -m l cos x'' - m g l sin
     "cart-pendulum": Rig(
         CartPendulum(**ROD, m_c=0.5, b_1=0.3), 3.0, {"theta": 1.0},
-        {("effort", "x"): 1 / 0.7, ("theta", "theta"): -MGL / J_A, ("x", "theta"): -ML / J_A},
+        {("effort", "x"): 1 / 0.7, ("theta", "theta"): MGL / J_A, ("x", "theta"): ML / J_A, ("theta", "x"): ML / 0.7},
     ),
     # (J_d + m r^2 + J_A sin^2) psi'' + 2 J_A sin cos psi' theta' - m r l (cos theta'' - sin theta'^2) = u
     # J_A theta'' = m r l cos psi'' + J_A sin cos psi'^2 - m g l sin
     "furuta": Rig(
         Furuta(**ROD, r=0.2, J_d=0.02, b_1=5e-3), 0.4, {"theta": 1.0},
-        {("effort", "psi"): 1 / (0.02 + 0.2 * 0.2**2), ("theta", "theta"): -MGL / J_A,
-         ("psi", "theta"): 0.2 * ML / J_A},
+        {("effort", "psi"): 1 / (0.02 + 0.2 * 0.2**2), ("theta", "theta"): MGL / J_A,
+         ("psi", "theta"): 0.2 * ML / J_A, ("theta", "psi"): 0.2 * ML / (0.02 + 0.2 * 0.2**2)},
+    ),
+    # (J_1 + m_1 l_c1^2 + m_2 l_1^2) theta_1'' + (J_2 + m_2 l_c2^2) (theta_1'' + theta_2'')
+    #   + m_2 l_1 l_c2 (cos theta_2 (2 theta_1'' + theta_2'') - sin theta_2 (2 theta_1' + theta_2') theta_2')
+    #   + (m_1 l_c1 + m_2 l_1) g sin theta_1 + m_2 l_c2 g sin(theta_1 + theta_2) = u
+    # (J_2 + m_2 l_c2^2) (theta_1'' + theta_2'') + m_2 l_1 l_c2 (cos theta_2 theta_1'' + sin theta_2 theta_1'^2)
+    #   + m_2 l_c2 g sin(theta_1 + theta_2) = 0
+    "double-pendulum": Rig(
+        find("double-pendulum")(m_1=0.3, m_2=0.2, l_1=0.3, l_c1=0.15, l_c2=0.12, J_1=3e-3, J_2=2e-3, b_2=1e-3), 0.3,
+        {"theta_1": 1.0},
+        {("effort", "theta_1"): 1 / 0.02775, ("theta_1", "theta_1"): 9.81 * 0.105 / 0.02775,
+         ("theta_2", "theta_1"): 0.0072 / 0.02775, ("theta_1", "theta_2"): 0.0072 / 4.88e-3},
     ),
     # m_1 x_1'' = u - k_1 x_1 - k_12 (x_1 - x_2);  m_2 x_2'' = -k_12 (x_2 - x_1) - k_2 x_2
     "rectilinear-2": Rig(
@@ -84,7 +95,6 @@ def test_slopes_are_those_of_the_equations_of_motion(name: str) -> None:
     found = {term.who: term for term in terms(moved(RIGS[name]))}
     assert {who: t.slope for who, t in found.items()} == pytest.approx(RIGS[name].slopes, rel=0.01)
     for term in found.values():
-        assert np.sign(term.slope) == term.expected
         assert term.total < 1e-4  # nothing of the acceleration is left
         assert 0.99 < term.share <= 1  # and without the term it is
         # with all other terms taken out acceleration and term lie on the line that a picture shows
@@ -95,10 +105,8 @@ def test_slopes_are_those_of_the_equations_of_motion(name: str) -> None:
 def test_the_driven_row_leaves_the_effort_over_the_inertia(name: str) -> None:
     motion = moved(RIGS[name])
     here = np.arange(motion.t.size) % 3 > 0
-    row = driven_row(motion, here)
-    assert row is not None
-    a, columns = row
-    assert np.array_equal(a, motion.a[0][here])
+    a, columns = driven_row(motion, here)[-1]
+    assert a == pytest.approx(motion.a[0][here], rel=1e-12)
     A = np.column_stack([motion.u[here], columns])
     solution, *_ = np.linalg.lstsq(A, a, rcond=None)
     assert np.std(a - A @ solution) < 0.01 * np.std(a)
@@ -115,14 +123,13 @@ def test_dry_friction_leaves_the_slopes_as_they_are() -> None:
     assert all(t.total < 1e-3 for t in found.values())
 
 
-def test_a_plant_of_ones_own_has_no_terms_and_an_unmoved_body_no_row() -> None:
+def test_an_unmoved_body_has_no_row_and_throws_nobody() -> None:
     motion = moved(RIGS["cart-pendulum"])
-    assert driven_row(replace(motion, rows=(1,)), np.ones(motion.t.size, bool)) is None
+    assert driven_row(replace(motion, rows=(1,)), np.ones(motion.t.size, bool)) == []
     # a cart that was not measured may have been thrown about: what it did is no term
     assert {term.who for term in terms(replace(motion, rows=(1,)))} == {("theta", "theta")}
     still = replace(motion, u=0 * motion.u)
     assert ("effort", "x") not in {term.who for term in terms(still)}
-    assert terms(replace(motion, plant=find("double-pendulum"))) == []
 
 
 def test_a_body_slides_where_it_is_fast_or_speeds_up() -> None:

@@ -61,6 +61,9 @@ def test_a_hand_that_holds_before_the_release_is_no_rest_of_a_free_cart() -> Non
 def test_disks_without_a_spring_to_ground_rest_anywhere() -> None:
     levels = pushed([0.0, 0.03, 0.002], [0.0, 1.0, 0.0])
     assert told("drift", "torsional-1", theta_1=levels["x_1"], u=levels["u"]) == []
+    # an arm without an anchor does too, its pendulum hangs straight down again
+    both = {"psi": levels["x_1"], "theta": 0.9 * levels["x_1"], "u": levels["u"]}
+    assert [f.columns for f in told("drift", "furuta", **both)] == [("theta",)]
 
 
 def grown(rate: float, volts: float = 1.0, period: float = 0.5) -> dict[str, np.ndarray]:

@@ -15,6 +15,7 @@ from upright.signals.smoothing import (
     middle,
     noise_gain,
     savitzky_golay,
+    smoothed,
     smoothing_width,
     spread,
 )
@@ -164,3 +165,20 @@ def test_a_period_is_that_of_the_motion_not_of_drift_nor_of_fast_noise():
 @pytest.mark.parametrize("still", [np.zeros(200), np.full(200, 3.0), np.linspace(0, 1, 200)])
 def test_what_does_not_swing_has_the_whole_record_as_its_period(still):
     assert dominant_period(still, DT) == pytest.approx(2.0)
+
+
+def test_coordinates_smoothed_together_move_as_each_alone_and_a_constant_not_at_all() -> None:
+    t = np.arange(400) * 0.01
+    signals = [np.sin(3 * t), np.full(t.size, 0.4), np.cos(7 * t)]
+    both = smoothed(signals, 0.01, 21)
+    for i, y in ((0, signals[0]), (2, signals[2])):
+        alone = savitzky_golay(y, 0.01, 21)
+        assert all(np.array_equal(getattr(both, name)[i], getattr(alone, name)) for name in ("q", "v", "a"))
+    assert np.array_equal(both.q[1], signals[1])
+    assert not both.v[1].any()
+    assert not both.a[1].any()
+    # a fiftieth of the deviation of 3 cos(3 t) and -7 sin(7 t), an amplitude over the square root of 2
+    assert both.fades == pytest.approx([0.06 / np.sqrt(2), 0.0, 0.14 / np.sqrt(2)], rel=0.05)
+    assert both.edge == 10
+    cubic = smoothed(signals, 0.01, 21, order=3)
+    assert np.array_equal(cubic.a[0], savitzky_golay(signals[0], 0.01, 21, order=3).a)

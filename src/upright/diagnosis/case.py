@@ -119,7 +119,9 @@ class Case:
     def chained(self) -> bool:
         """Whether the bodies are alike, so that one that hardly moves beside another was held."""
         if self.plant is not None:
-            return self.plant.__name__.startswith(("Rectilinear", "Torsional"))
+            derived, n = self.plant.derived(without=frozenset(self.plant.optional)), len(self.plant.coordinates)
+            apart = sum(text != "0" for text in derived.mass) == n  # joined by forces alone
+            return apart and not derived.trig and len({c.unit for c in self.plant.coordinates}) == 1
         return all(unit_of(c) in ("counts", "m", "mm") for c in self.measured)
 
     def moves(self, name: str) -> bool:

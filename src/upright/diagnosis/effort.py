@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from upright.diagnosis.case import Case, unit_of
 from upright.diagnosis.findings import Curve, Finding, Panel
 from upright.diagnosis.forces import ForceBalance
-from upright.diagnosis.motion import SmoothedMotion, driven_row
+from upright.diagnosis.motion import SmoothedMotion, chosen, driven_row
 from upright.diagnosis.sensors import clipped
 from upright.readers.inspection import DAC_COUNTS_PER_VOLT
 from upright.records import Array
@@ -228,24 +228,30 @@ def push_of(motion: SmoothedMotion, balance: ForceBalance | None) -> Push | None
     """What the effort explains; None without an effort on a measured body."""
     if not np.ptp(motion.u) > 0:
         return None
-    driven, here = 0, swift(motion, 0)
-    row = driven_row(motion, here)
-    if np.count_nonzero(here) < 40 or row is None:
+    driven = [c.name for c in motion.plant.coordinates].index(motion.plant.inputs[0].on)
+    here = swift(motion, driven)
+    if np.count_nonzero(here) < 40 or driven not in motion.rows:
         return None
-    target, others = row
     if balance is not None:
-        driven, here = balance.driven, swift(motion, balance.driven)
         k = motion.rows.index(driven)
         tau, _ = balance.needed(np.ones((1, len(balance.names))))
-        target, others = tau[0, k][here], balance.friction[k][here]
+        explained = [(tau[0, k][here], balance.friction[k][here])]
+    else:
+        explained = driven_row(motion, here)
+    if not explained:
+        return None
     u, t, rows = motion.u[here], motion.t[here], motion.samples[here]
     live = np.flatnonzero(np.abs(u) > 0.02 * float(np.abs(u).max()))
     if live.size < 8:
         return None
-    table = TripRegression(
-        rows=rows, target=target, base=others, switched=motion.command[:, None], weights=motion.weights
-    )
-    end, costs = table.search(int(rows[live[0]]), int(rows[live[-1]]) + 1, forward=False)
+    first, last = int(rows[live[0]]), int(rows[live[-1]]) + 1
+    tables = [
+        TripRegression(rows=rows, target=y, base=others, switched=motion.command[:, None], weights=motion.weights)
+        for y, others in explained
+    ]
+    ends = [table.search(first, last, forward=False) for table in tables]
+    best = chosen([min(costs.values()) for _, costs in ends])
+    table, (end, costs) = tables[best], ends[best]
     early = table.before(end)
     late = table.whole - early
     after = 1.0

@@ -296,7 +296,7 @@ def _force_panel(balance: ForceBalance, e: Explanation, title: str, *, like: Exp
 def against_form(case: Case, motion: SmoothedMotion, found: list[Term]) -> list[Finding]:
     """Signs that the form of the equations fixes."""
     clear = [x for x in found if x.share > MATTERS and x.total < 0.6]
-    wrong = [x for x in clear if x.slope * x.expected < 0]
+    wrong = [x for x in clear if x.slope < 0]
     if not wrong:
         return []
     pushed = [x for x in wrong if x.who[0] == "effort"]
@@ -304,7 +304,7 @@ def against_form(case: Case, motion: SmoothedMotion, found: list[Term]) -> list[
     hangs = [x for x in wrong if x.who[0] == x.who[1]]
     thrown = any(x.text == "throw" for x in wrong)
     if thrown and not case.zeroed:  # a zero that is upright turns both signs, and a loop hides gravity's
-        hangs += [x for x in found if x.text == "gravity" and x.slope > 0 and x.share > 0.003]
+        hangs += [x for x in found if x.text == "gravity" and x.slope < 0 and x.share > 0.003]
     if hangs:
         return [_upside_down(case, motion, hangs[0])]
     right_joined = [x for x in clear if x.who[0] not in ("effort", x.who[1]) and x not in wrong]
@@ -358,7 +358,6 @@ def _finding(case: Case, motion: SmoothedMotion, x: Term, who: str, sentence: st
         sentence=sentence,
         evidence={
             f"slope found [{system}]": slope,
-            "slope expected (sign) [1]": x.expected,
             "explains [%]": 100 * x.share,
         },
         advice=f"Take the sign of '{name}' out again." if turned else f"Set the sign of '{name}'.",

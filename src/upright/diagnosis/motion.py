@@ -1,23 +1,26 @@
 """How did the rig move, and which signs does the form of its equations fix, whatever the numbers are?
 
-Positions, speeds, accelerations and effort have all gone through the same smoothing. A positive force accelerates its
-own body forwards; a spring pulls a body towards its neighbour; gravity pulls a pendulum down; a hinge that is
-accelerated throws its pendulum. Accelerations are regressed on these terms with free coefficients, and the signs of
-those that matter are read off.
+Positions, speeds, accelerations and effort have all gone through the same smoothing. A row of the equations of motion,
+divided by the inertia of its own body, is an acceleration; it is regressed on the columns of the plant's base
+parameters, all positive. A slope that comes out negative says that a convention is another: a column that is odd in
+another coordinate (a spring, a hinge that is accelerated) turns its sign with that coordinate's, one that is turned by
+half a turn (gravity) with what is called zero.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upright.diagnosis.case import Case
 from upright.errors import BadInput
-from upright.physics import CartPendulum, Furuta, Pendulum, Plant
+from upright.physics import Plant
+from upright.physics.regressor import Regressor, regressor
 from upright.records import Array
-from upright.signals.smoothing import dominant_period, middle, noise_gain, savitzky_golay
+from upright.signals.smoothing import dominant_period, middle, noise_gain, savitzky_golay, smoothed
 from upright.signals.stretches import pieces
 from upright.study.sensors import Grid
 
@@ -88,23 +91,19 @@ def motion_of(case: Case) -> SmoothedMotion | str:
     from scipy.ndimage import correlate1d
 
     inner = slice(width // 2, n - width // 2, max(1, -(-n // MOST)))
-    q, v, a = np.zeros((3, len(coordinates), len(range(*inner.indices(n)))))
-    for i, c in enumerate(coordinates):
-        if c in y:
-            smooth = savitzky_golay(y[c], dt, width)
-            q[i], v[i], a[i] = smooth.q[inner], smooth.v[inner], smooth.a[inner]
+    smooth = smoothed([y.get(c, np.zeros(n)) for c in coordinates], dt, width)
     return SmoothedMotion(
         plant=case.plant,
         t=grid.t[inner],
-        q=q,
-        v=v,
-        a=a,
+        q=smooth.q[:, inner],
+        v=smooth.v[:, inner],
+        a=smooth.a[:, inner],
         u=correlate1d(u, middle(width), mode="nearest")[inner],
         samples=np.arange(n)[inner],
         dt=dt,
         command=u,
         weights=middle(width),
-        fades=np.maximum(0.02 * np.std(v, axis=1), 1e-9),
+        fades=np.maximum(0.02 * np.std(smooth.v[:, inner], axis=1), 1e-9),
         rows=tuple(coordinates.index(c) for c in moving),
     )
 
@@ -130,20 +129,22 @@ def quiet_width(y: Array, dt: float) -> int:
 
 MATTERS = 0.1
 """Share of what the other terms leave that a term must explain before its sign is believed."""
+PLAIN, FEWER = 0.15, 0.5
+"""Unexplained share up to which a plant's plain form is taken; beyond, one with every spring and dashpot that may be
+missing is, where it leaves less than the second of that. Such a spring explains some of anything that goes far."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Term:
-    """Answer of one term in one equation.
+    """Answer of one term in one equation, whose coefficient is positive in the plant's own convention.
 
-    `who` names what the term joins: ("effort", coordinate) or two coordinates; `expected` is the sign of its
-    coefficient, `slope` what was found, `share` what it explains of what the others leave, `total` what all leave.
-    `target` (N,) and `alone` (N,) are acceleration and term with all others taken out.
+    `who` names what the term joins: ("effort", coordinate) or two coordinates; `slope` is the coefficient that was
+    found, `share` what it explains of what the others leave, `total` what all leave. `target` (N,) and `alone` (N,)
+    are acceleration and term with all others taken out.
     """
 
     who: tuple[str, str]
     text: str
-    expected: float
     slope: float
     share: float
     total: float
@@ -152,109 +153,181 @@ class Term:
     t: Array
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Row:
+    """An acceleration (N,), the columns (N,) that push it, by whom they join and what they are, and any others."""
+
+    target: Array
+    known: dict[tuple[str, str], tuple[str, Array]]
+    free: list[Array]
+
+    def at(self, here: NDArray[np.bool_]) -> Row:
+        """The same at some of the samples."""
+        known = {who: (text, x[here]) for who, (text, x) in self.known.items()}
+        return Row(target=self.target[here], known=known, free=[x[here] for x in self.free])
+
+    @property
+    def columns(self) -> Array:
+        """What is known, then the others, (N, p), each of length one."""
+        columns = [*(x for _, x in self.known.values()), *self.free]
+        return np.column_stack([x / (float(np.linalg.norm(x)) or 1.0) for x in columns])
+
+    @property
+    def left(self) -> float:
+        """Share of the acceleration's square that all columns leave."""
+        A = self.columns
+        rest = self.target - A @ np.linalg.lstsq(A, self.target, rcond=1e-10)[0]
+        return float(rest @ rest) / (float(self.target @ self.target) or 1.0)
+
+
+def chosen(left: Sequence[float]) -> int:
+    """Which of a plain and a whole form to take that leave these shares."""
+    return len(left) - 1 if left[0] > PLAIN and left[-1] < FEWER * left[0] else 0
+
+
 def terms(motion: SmoothedMotion) -> list[Term]:
-    """Terms with a known sign, none for a plant of the user's own, whose form is not known here."""
-    plant, q, v, a = motion.plant, motion.q, motion.v, motion.a
-    names = [c.name for c in plant.coordinates]
-    one = np.ones(motion.t.size)
-    found: list[Term] = []
-    pushed = bool(np.ptp(motion.u) > 0)
-    effort = {("effort", names[0]): ("effort", 1.0, motion.u)} if pushed else {}
-    for i in motion.rows:
-        friction = [one, v[i], np.tanh(v[i] / motion.fades[i])]
-        push = effort if i == 0 else {}
-        here = motion.slides(i)
-        if issubclass(plant, Pendulum):
-            known = {**push, (names[0], names[0]): ("gravity", -1.0, np.sin(q[0]))}
-            found += _row(motion.t, names, here, a[i], known, friction)
-        elif issubclass(plant, CartPendulum | Furuta):
-            rotary = issubclass(plant, Furuta)
-            throw = -1.0 if not rotary else 1.0
-            s, c = np.sin(q[1]), np.cos(q[1])
-            if i == 0:
-                kick = c * a[1] - s * v[1] ** 2
-                others = [s * s * a[0], 2 * s * c * v[0] * v[1]] if rotary else []
-                found += _row(motion.t, names, here, a[0], push, [*friction, kick, *others])
-            else:
-                known = {(names[1], names[1]): ("gravity", -1.0, s)}
-                if 0 in motion.rows:
-                    known[names[0], names[1]] = ("throw", throw, c * a[0])
-                spin = [s * c * v[0] ** 2] if rotary else []
-                found += _row(motion.t, names, here, a[1], known, [*friction, *spin])
-        elif plant.__name__.startswith(("Rectilinear", "Torsional")):
-            known = dict(push)
-            for j in (i - 1, i + 1):
-                if 0 <= j < len(names) and j in motion.rows:
-                    known[names[j], names[i]] = ("spring", 1.0, q[j] if _own(motion, i) else q[j] - q[i])
-            found += _row(motion.t, names, here, a[i], known, [*friction, *_own(motion, i)])
-        else:
-            return []
-    return found
+    """Terms with a known sign."""
+    return [term for i in motion.rows for term in _row_terms(motion, i)]
 
 
-def _row(
-    t: Array,
-    names: list[str],
-    here: NDArray[np.bool_],
-    target: Array,
-    known: dict[tuple[str, str], tuple[str, float, Array]],
-    free: list[Array],
-) -> list[Term]:
-    """Regression of one acceleration where the body slides."""
-    target, free = target[here], [x[here] for x in free]
-    known = {who: (text, sign, x[here]) for who, (text, sign, x) in known.items()}
-    scale = float(np.std(target))
-    columns = [*(entry[2] for entry in known.values()), *free]
-    columns = [c / (float(np.linalg.norm(c)) or 1.0) for c in columns]
-    if scale == 0 or not known:
+def driven_row(motion: SmoothedMotion, here: NDArray[np.bool_]) -> list[tuple[Array, Array]]:
+    """Acceleration (N,) of the driven body and all terms (N, p) of its equation but the effort, at samples `here`.
+
+    In the plain form, then in the whole one; nothing where the body did not move or its equation cannot be written.
+    """
+    plant = motion.plant
+    driven = [c.name for c in plant.coordinates].index(plant.inputs[0].on) if plant.inputs else -1
+    rows = [row.at(here) for row in _forms(replace(motion, u=0 * motion.u), driven)] if driven in motion.rows else []
+    return [(row.target, row.columns) for row in rows]
+
+
+def _row(motion: SmoothedMotion, i: int) -> Row | None:
+    """Equation of one body, in its plain form unless the whole one explains far more; where the body slides."""
+    forms = [row.at(motion.slides(i)) for row in _forms(motion, i)]
+    return forms[chosen([form.left for form in forms])] if forms else None
+
+
+def _forms(motion: SmoothedMotion, i: int) -> list[Row]:
+    """One row of the equations divided by the inertia of its own body, in a plain form and in a whole one.
+
+    In the whole form springs and dashpots that may be missing have a coefficient, and a coupling's own part, its pull
+    back to where the body was, has another than its pull to the neighbour. There is none where no inertia is the
+    body's own, or numbers are needed to write the equation down.
+    """
+    equations = regressor(motion.plant, frozenset(motion.plant.optional))
+    own = equations.own(i)
+    if own is None:
         return []
-    A = np.column_stack(columns)
+    names = [c.name for c in motion.plant.coordinates]
+    parts = _Parts.of(equations, motion.plant, i, (motion.q, motion.v, motion.a))
+    effort: dict[tuple[str, str], tuple[str, Array]] = {}
+    if np.ptp(motion.u) > 0 and motion.plant.inputs[0].on == names[i]:
+        effort["effort", names[i]] = "effort", motion.u
+    rows: list[Row] = []
+    for whole in (False, True):
+        target, known, free = -parts.all[own], dict(effort), _friction(motion, i)
+        for k, b in enumerate(equations.base):
+            free_to_split = whole and not parts.inertial[k]
+            if not b.always and not free_to_split:
+                continue
+            j = parts.joins(k)
+            column = parts.all[k]
+            if k == own:  # an acceleration that is not the body's own, as of the link before, is a term of its own
+                column = parts.odd[j][k] if j is not None else 0 * column
+                target = target + column
+            elif free_to_split and j is not None:
+                column = parts.odd[j][k]
+                free.append(parts.all[k] - column)
+            who = names[i if j is None else j], names[i]
+            turns = parts.turns(k) if j is None else j in motion.rows
+            if b.positive and b.always and turns and who not in known and _size(column):
+                known[who] = "gravity" if j is None else "throw" if parts.inertial[k] else "spring", column
+            else:
+                free.append(column)
+        rows.append(Row(target=target, known=known, free=[x for x in free if _size(x)]))
+    return rows
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Parts:
+    """Columns of one row as accelerations, `all` (base parameters, N), and how they turn with conventions.
+
+    `odd` are their parts that turn with each other coordinate, `half` what they are with the own one half a turn on,
+    None where it is no angle; `inertial` tells which hold an acceleration.
+    """
+
+    all: Array
+    odd: dict[int, Array]
+    half: Array | None
+    inertial: tuple[bool, ...]
+
+    @classmethod
+    def of(cls, equations: Regressor, plant: type[Plant], i: int, motion: tuple[Array, Array, Array]) -> _Parts:
+        def columns(q: Array, v: Array, a: Array) -> Array:
+            return -equations.columns(q, v, a)[:, i]
+
+        q, v, a = motion
+        n = len(q)
+        own = np.arange(n)[:, None] == np.arange(n)  # one row per coordinate
+        whole = columns(q, v, a)
+        return cls(
+            all=whole,
+            odd={j: (whole - columns(*(np.where(own[j][:, None], -x, x) for x in motion))) / 2
+                 for j in range(n) if j != i},
+            half=columns(q + np.pi * own[i][:, None], v, a) if plant.coordinates[i].unit == "rad" else None,
+            inertial=tuple(role == "inertia" for role in equations.roles(i)),
+        )  # fmt: skip
+
+    def joins(self, k: int) -> int | None:
+        """The only other coordinate with which a column turns, wholly or in part."""
+        least = 1e-9 * _size(self.all[k])
+        joined = [j for j, part in self.odd.items() if _size(part[k]) > least]
+        return joined[0] if len(joined) == 1 else None
+
+    def turns(self, k: int) -> bool:
+        """Whether a column turns with what is called zero of the own coordinate, half a turn on."""
+        column = self.all[k]
+        return self.half is not None and bool(np.allclose(self.half[k], -column, rtol=0, atol=1e-9 * _size(column)))
+
+
+def _friction(motion: SmoothedMotion, i: int) -> list[Array]:
+    """A constant, and speed and sign of the speed of each joint that acts on a body, or of the body itself."""
+    directions = [np.array(j.direction([c.name for c in motion.plant.coordinates])) for j in motion.plant.joints]
+    columns = [np.ones(motion.t.size)]
+    for direction in [d for d in directions if d[i]] or [np.arange(len(motion.q)) == i]:
+        speed = direction @ motion.v
+        columns += [speed, np.tanh(speed / float(np.linalg.norm(direction * motion.fades)))]
+    return columns
+
+
+def _size(x: Array) -> float:
+    return float(np.linalg.norm(x))
+
+
+def _row_terms(motion: SmoothedMotion, i: int) -> list[Term]:
+    """Regression of one acceleration where the body slides."""
+    row = _row(motion, i)
+    if row is None or not row.known or not np.std(row.target) > 0:
+        return []
+    target, A = row.target, row.columns
     coefficients, *_ = np.linalg.lstsq(A, target, rcond=1e-10)
     rest = target - A @ coefficients
     total = float(rest @ rest) / float(target @ target)
     out: list[Term] = []
-    for k, (who, (text, expected, column)) in enumerate(known.items()):
-        others = np.delete(A, k, axis=1)
-        Q = np.linalg.qr(others)[0]
+    for k, (who, (text, column)) in enumerate(row.known.items()):
+        Q = np.linalg.qr(np.delete(A, k, axis=1))[0]
         alone, left = (x - Q @ (Q.T @ x) for x in (column, target))
         power = float(left @ left)
-        share = 1 - float(rest @ rest) / power if power > 0 else 0.0
         out.append(
             Term(
                 who=who,
                 text=text,
-                expected=expected,
                 slope=float(coefficients[k]) / (float(np.linalg.norm(column)) or 1.0),
-                share=share,
+                share=1 - float(rest @ rest) / power if power > 0 else 0.0,
                 total=total,
                 target=left,
                 alone=alone,
-                t=t[here],
+                t=motion.t[motion.slides(i)],
             )
         )
     return out
-
-
-def driven_row(motion: SmoothedMotion, here: NDArray[np.bool_]) -> tuple[Array, Array] | None:
-    """Acceleration (N,) of the driven body and all terms (N, p) of its equation but the effort, at samples `here`."""
-    q, v, a = motion.q, motion.v, motion.a
-    if 0 not in motion.rows:
-        return None
-    columns = [np.ones(motion.t.size), v[0], np.tanh(v[0] / motion.fades[0])]
-    if issubclass(motion.plant, Pendulum):
-        columns += [np.sin(q[0])]
-    elif issubclass(motion.plant, CartPendulum | Furuta):
-        s, c = np.sin(q[1]), np.cos(q[1])
-        columns += [c * a[1] - s * v[1] ** 2, s * s * a[0], 2 * s * c * v[0] * v[1]]
-    else:
-        others = [q[i] for i in motion.rows if 0 < i < 2]
-        columns += [q[0], *others] if _own(motion, 0) else [x - q[0] for x in others]
-    return a[0][here], np.column_stack([c / (float(np.linalg.norm(c)) or 1.0) for c in columns])[here]
-
-
-def _own(motion: SmoothedMotion, i: int) -> list[Array]:
-    """A body's own position, for a spring to ground; none when disks turn together, which shows that there is none."""
-    q = motion.q
-    alike = [j for j in (i - 1, i + 1) if j in motion.rows]
-    together = alike and all(np.ptp(q[j] - q[i]) < 0.1 * np.ptp(q[i]) for j in alike)
-    return [] if together and motion.plant.__name__.startswith("Torsional") else [q[i]]

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import MISSING, fields
 
 import numpy as np
 
 from upright.diagnosis.case import HELD, Case, tells_speed, unit_of
 from upright.diagnosis.findings import Curve, Finding, Panel
+from upright.physics.equations import small_motions
 from upright.records import Array
 from upright.signals.stretches import pieces, turning_points
 
@@ -39,14 +41,13 @@ def _creep(case: Case) -> Iterator[Finding]:
 
 
 def _drift(case: Case) -> Iterator[Finding]:
-    """Rest positions that differ from one rest to the next, on a rig that a spring or gravity centres."""
+    """Rest positions that differ from one rest to the next, of what springs or gravity centre."""
     rests = [span for span in case.inspection.rests if span[1] - span[0] > 0.2]
-    centred = case.plant is None or not case.plant.__name__.startswith("Torsional")
-    if len(rests) < 2 or not centred:
+    if len(rests) < 2:
         return
-    t = case.record.t
+    t, free = case.record.t, _turning_free(case)
     for c in case.measured:
-        if tells_speed(c):
+        if tells_speed(c) or case.coordinate(c.name) in free:
             continue
         x = case.record[c.name]
         quiet = [s for s in rests if not case.driven or not np.any(case.u[(t >= s[0]) & (t <= s[1])])]
@@ -70,6 +71,20 @@ def _drift(case: Case) -> Iterator[Finding]:
                 panels=case.over_time(c.name),
                 spans=tuple(quiet),
             )
+
+
+def _turning_free(case: Case) -> frozenset[str]:
+    """Angles that no spring and no gravity pulls back; where no number is known, springs that may be missing are."""
+    plant = case.plant
+    if plant is None:
+        return frozenset()
+    values = {f.name: 1.0 if f.default is MISSING else f.default for f in fields(plant)}  # type: ignore[arg-type]
+    values |= {n: p.value for n, p in case.parameters.items() if n in values}
+    at = next(iter(plant.equilibria.values()))
+    stiffness = small_motions(plant.derived_for(values), {**values, **at})[2]
+    _, s, ways = np.linalg.svd(stiffness)
+    free = np.abs(ways[s <= 1e-9 * s.max()]).max(axis=0, initial=0.0)
+    return frozenset(c.name for c, x in zip(plant.coordinates, free, strict=True) if c.unit == "rad" and x > 1e-6)
 
 
 def _grows(case: Case) -> Iterator[Finding]:

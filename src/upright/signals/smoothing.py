@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -22,12 +23,20 @@ class State:
 
 @dataclass(frozen=True, kw_only=True)
 class Motion:
-    """Position, speed and acceleration of one coordinate, each (N,), and how far the ends are unreliable."""
+    """Position, speed and acceleration of one coordinate, each (N,), and how far the ends are unreliable.
+
+    Of several coordinates that went through the same smoothing each is (coordinates, N).
+    """
 
     q: Array
     v: Array
     a: Array
     edge: int
+
+    @property
+    def fades(self) -> Array:
+        """Speeds (coordinates,) below which the sign of a speed is not believed; zero of what does not move."""
+        return 0.02 * np.std(self.v, axis=-1)
 
 
 def dominant_period(y: Array, dt: float) -> float:
@@ -75,6 +84,17 @@ def savitzky_golay(y: Array, dt: float, width: int, *, order: int = 4, derivativ
         part[n - half :] = powers[d, half + 1 :] @ (fit @ y[n - width :])
         parts.append(part / dt**d)
     return Motion(q=parts[0], v=parts[1], a=parts[2] if derivatives > 1 else np.zeros(n), edge=half)
+
+
+def smoothed(signals: Sequence[Array], dt: float, width: int, *, order: int = 4) -> Motion:
+    """Motion of coordinates (N,) that were sampled together, through the same smoothing; exactly none of a constant."""
+    none = np.zeros(len(signals[0]))
+    parts = [
+        savitzky_golay(y, dt, width, order=order) if np.ptp(y) else Motion(q=y + none, v=none, a=none, edge=0)
+        for y in signals
+    ]
+    q, v, a = (np.array([getattr(part, name) for part in parts]) for name in ("q", "v", "a"))
+    return Motion(q=q, v=v, a=a, edge=max(part.edge for part in parts))
 
 
 def middle(width: int, *, order: int = 4) -> Array:

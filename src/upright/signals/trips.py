@@ -1,23 +1,23 @@
 """When a drive goes off, or comes on late, whatever the logged command says.
 
 An amplifier that trips leaves the logged command where it was, and the body coasts. The acceleration of the driven
-coordinate tells: it is regressed on the command, speeds, the sign of the speed (dry friction) and positions, once with
-the command as logged and once with a command that ends earlier, for every moment at which it may have ended. All
-have gone through the same smoothing, so the moment is sharper than the smoothing is wide. No model is needed; whoever
-has one brings its terms along.
+coordinate tells: it is regressed on the command, the sign of the speed (dry friction) and what else acts on it, once
+with the command as logged and once with a command that ends earlier, for every moment at which it may have ended. All
+have gone through the same smoothing, so the moment is sharper than the smoothing is wide. Without a model speeds and
+positions act; whoever has one brings its terms along.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.signals.smoothing import acceleration_width, middle, savitzky_golay, spread
+from upright.signals.smoothing import Motion, acceleration_width, middle, smoothed, spread
 
 Array = NDArray[np.float64]
 
@@ -185,8 +185,24 @@ class TripRegression:
         return at, costs
 
 
+Terms = Callable[[Motion], Sequence[Array]]
+"""Columns (N,) that act on the first coordinate of a motion, whose positions are as they were read."""
+
+
+def linear(motion: Motion) -> list[Array]:
+    """What acts where nobody knows better: every position and speed."""
+    return [*motion.v, *(motion.q - motion.q[:, :1])]
+
+
 def find_trip(
-    t: Array, u: Array, y: Array, others: Sequence[Array] = (), *, quantum: float = 0.0, late: bool = False
+    t: Array,
+    u: Array,
+    y: Array,
+    others: Sequence[Array] = (),
+    *,
+    quantum: float = 0.0,
+    late: bool = False,
+    terms: Terms = linear,
 ) -> Trip | None:
     """Early end, or late begin, of the effect of a command, None when the motion shows none.
 
@@ -200,12 +216,14 @@ def find_trip(
         Resolution of `y`.
     late : bool
         Ask for a late begin instead of an early end.
+    terms : callable, optional
+        What acts on `y`, from the motion of `y` and `others`.
     """
-    return trip_or_misfit(t, u, y, others, quantum=quantum, late=late)[0]
+    return trip_or_misfit(t, u, y, others, quantum=quantum, late=late, terms=terms)[0]
 
 
 def trip_or_misfit(
-    t: Array, u: Array, y: Array, others: Sequence[Array], *, quantum: float, late: bool
+    t: Array, u: Array, y: Array, others: Sequence[Array], *, quantum: float, late: bool, terms: Terms = linear
 ) -> tuple[Trip | None, float]:
     """What `find_trip` says, and what is left unexplained with the command as logged, infinite if nobody can say."""
     nobody = None, math.inf
@@ -216,7 +234,7 @@ def trip_or_misfit(
     width = acceleration_width(y, dt, quantum)
     if t.size < LEAST * width:
         return nobody
-    speed, table = _linear(u, y, others, dt, width, late=late)
+    speed, table = _regression(u, [y, *others], dt, width, late=late, terms=terms)
     first, last = int(live[0]), int(live[-1]) + 1
     low, high = first + width // 4, last - width // 4
     if table is None or low >= high:
@@ -235,31 +253,28 @@ def trip_or_misfit(
     return trip, logged
 
 
-def _linear(
-    u: Array, y: Array, others: Sequence[Array], dt: float, width: int, *, late: bool, moving: bool = True
+def _regression(
+    u: Array, signals: Sequence[Array], dt: float, width: int, *, late: bool, terms: Terms, moving: bool = True
 ) -> tuple[Array, TripRegression | None]:
-    """Speed (N,) of `y`, and the regression of its acceleration on positions and speeds; None with little motion."""
-    motion = savitzky_golay(y, dt, width, order=3)
-    if not np.ptp(motion.a) > 0:
-        return motion.v, None
+    """Speed (N,) of the first signal, and the regression of its acceleration; None with little motion."""
+    motion = replace(smoothed(signals, dt, width, order=3), q=np.array(signals))
+    speed, acceleration = motion.v[0], motion.a[0]
+    if not np.ptp(acceleration) > 0:
+        return speed, None
     weights = middle(width, order=3)
-    sign = np.tanh(motion.v / (0.02 * spread(motion.v)))
-    columns = [np.ones_like(y), sign, motion.v, y - y[0]]
-    for z in others:
-        other = savitzky_golay(z, dt, width, order=3, derivatives=1)
-        columns += [other.v, z - z[0]]
+    columns = [np.ones(speed.size), np.tanh(speed / (0.02 * spread(speed))), *terms(motion)]
     # damping that is there with the command on goes with it
-    switched = np.stack([u, motion.v * (u != 0)], axis=1)
+    switched = np.stack([u, speed * (u != 0)], axis=1)
     half = width // 2
-    tells = np.abs(motion.v) > STUCK * float(np.abs(motion.v).max())
+    tells = np.abs(speed) > STUCK * float(np.abs(speed).max())
     # a body that sticks hides what pushes it, but under a constant command it cannot set out late
     tells |= not moving or (late and not np.ptp(u[u != 0]))
-    rows = half + np.flatnonzero(tells[half : y.size - half])
+    rows = half + np.flatnonzero(tells[half : speed.size - half])
     rows = rows[:: max(1, rows.size // ROWS)]
     if rows.size < LEAST:
-        return motion.v, None
+        return speed, None
     base = _smoothed(np.stack(columns, axis=1), weights)[rows]
-    return motion.v, TripRegression(rows=rows, target=motion.a[rows], base=base, switched=switched, weights=weights)
+    return speed, TripRegression(rows=rows, target=acceleration[rows], base=base, switched=switched, weights=weights)
 
 
 def _accelerations(speed: Array, dt: float, at: int, *ends: int) -> tuple[float, float]:
@@ -290,7 +305,7 @@ def goes_dead(t: Array, u: Array, y: Array, at: int) -> bool:
     """
     dt = float(t[-1] - t[0]) / (t.size - 1)
     width = max(7, int(0.06 / dt) | 1)
-    speed, table = _linear(u, y, (), dt, width, late=False, moving=False)
+    speed, table = _regression(u, [y], dt, width, late=False, terms=linear, moving=False)
     if table is None:
         return False
     push = table.whole[:, 0]

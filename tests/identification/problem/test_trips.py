@@ -12,6 +12,7 @@ import pytest
 from upright.identification import GreyBox, Parameter, Run
 from upright.identification.estimate import identify, predict
 from upright.identification.problem.trips import find_trips, located
+from upright.physics import Furuta
 from upright.physics.oscillators import Torsional2
 from upright.signals.trips import find_trip
 from upright.simulation import simulate
@@ -64,6 +65,23 @@ def test_a_late_begin_is_seen():
     assert trip.late
     assert trip.logged == pytest.approx(1.0, abs=1e-9)
     assert trip.at == pytest.approx(1.8, abs=5e-3)
+
+
+@pytest.mark.parametrize("end", [None, 2.2, 3.1])
+def test_an_arm_whose_pendulum_swings_far_trips_where_it_does_and_nowhere_else(end):
+    """What the rod does to its arm is no line in its angle and speed: by the arm's equation the trip still shows."""
+    dt, n = 2e-3, 3000
+    t = np.arange(n) * dt
+    arm = {"m_p": 0.1, "l_cg": 0.2, "r": 0.15, "J_d": 3e-3, "J_p": 4e-4, "b_1": 3e-3, "b_2": 2e-4, "b_1c": 1e-3}
+    drive = {"actuator.gain": 0.1} | ({"actuator.end": end} if end else {})
+    u = np.where((t >= 0.5) & (t < 4.5), 2.0 * np.sin(5 * t + 1), 0.0)[:, None]
+    y = simulate(Furuta(**arm), drive, [0.0, 0.0, 1.5, 0.0], u, dt, samples=n)[:, [0, 2], 0]
+    run = Run(label="arm", role="fit", t=t, u=u, y=np.round(y / COUNT) * COUNT, measured=("psi", "theta"),
+              quantum=(COUNT, COUNT))  # fmt: skip
+    known = {n: Parameter(name=n, value=v) for n, v in (dict.fromkeys(Furuta.names(), 0.0) | arm | {"g": 9.81}).items()}
+    found = find_trips(GreyBox(plant=Furuta, parameters=known), run)
+    assert [trip.late for trip in found] == [False] * bool(end)
+    assert all(trip.at == pytest.approx(end, abs=0.02) for trip in found)  # counts over the smoothing, some samples
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ import pytest
 from scipy.linalg import expm
 
 from tests.study.draft.test_recognise import col, log
+from upright.physics import find
 from upright.readers.inspection import Column
 from upright.readers.resolution import Quantum
 from upright.study.draft.chain import ChainStarts, chain_tables, starts
@@ -42,7 +43,7 @@ def test_two_carts_are_found_from_their_driven_motion():
     """Carts of 2 and 1.5 kg on springs of 300 and 200 N/m, damped by 3 and 2 N s/m."""
     K = np.array([[500.0, -200], [-200, 200]])
     bodies = moved([2.0, 1.5], K, [3.0, 2.0], SQUARE, [0, 0])
-    found = starts(T, SQUARE, bodies, [True, True], disks=False, quanta=[1e-6, 1e-6], loop=False)
+    found = starts(T, SQUARE, bodies, [True, True], plant=find("rectilinear-2"), quanta=[1e-6, 1e-6], loop=False)
     expected = {"m_1": 2.0, "m_2": 1.5, "k_1": 300, "k_12": 200, "c_1": 3.0, "c_2": 2.0}
     for name, value in expected.items():
         assert found.numbers[name] == pytest.approx(value, rel=0.15 if name[0] != "c" else 0.5), name
@@ -56,7 +57,7 @@ def test_free_disks_are_found_and_have_no_spring_to_ground():
     K = np.array([[2.4, -2.4], [-2.4, 2.4]])
     u = np.where(T > 0.5, 0.5, 0.0)
     bodies = moved([0.009, 0.006], K, [1e-4, 1e-4], u, [0, 0])
-    found = starts(T, u, bodies, [True, True], disks=True, quanta=[1e-5, 1e-5], loop=False)
+    found = starts(T, u, bodies, [True, True], plant=find("torsional-2"), quanta=[1e-5, 1e-5], loop=False)
     assert found.numbers["J_1"] == pytest.approx(0.009, rel=0.1)
     assert found.numbers["J_2"] == pytest.approx(0.006, rel=0.1)
     assert found.numbers["k_12"] == pytest.approx(2.4, rel=0.1)
@@ -66,7 +67,9 @@ def test_free_disks_are_found_and_have_no_spring_to_ground():
 
 def test_a_cart_beside_one_that_is_held_is_tied_by_both_springs():
     bodies = moved([2.0], np.array([[500.0]]), [3.0], SQUARE, [0])
-    found = starts(T, SQUARE, [*bodies, 0 * T], [True, False], disks=False, quanta=[1e-6, 1e-6], loop=False)
+    found = starts(
+        T, SQUARE, [*bodies, 0 * T], [True, False], plant=find("rectilinear-2"), quanta=[1e-6, 1e-6], loop=False
+    )
     assert found.numbers["k_1"] == pytest.approx(500, rel=0.1)
     assert found.numbers["m_1"] == pytest.approx(2.0, rel=0.1)
     assert found.numbers["m_2"] == found.numbers["m_1"]  # it does not matter
@@ -75,7 +78,7 @@ def test_a_cart_beside_one_that_is_held_is_tied_by_both_springs():
 
 def test_a_free_swing_tells_ratios_to_an_inertia_of_one():
     bodies = moved([2.0], np.array([[500.0]]), [3.0], 0 * T, [0.02])
-    found = starts(T, None, bodies, [True], disks=False, quanta=[1e-7], loop=False)
+    found = starts(T, None, bodies, [True], plant=find("rectilinear-1"), quanta=[1e-7], loop=False)
     assert found.numbers["m_1"] == 1.0
     assert found.numbers["k_1"] == pytest.approx(250, rel=0.05)
     assert found.numbers["c_1"] == pytest.approx(1.5, rel=0.3)
@@ -96,10 +99,10 @@ def test_a_drive_that_brakes_while_it_is_on_is_told_from_friction():
         y[k] = x[0]
         step = steps[int(u[k] != 0)]
         x = step[:2, :2] @ x + step[:2, 2] * u[k]
-    found = starts(T, u, [y], [True], disks=False, quanta=[1e-7], loop=False)
+    found = starts(T, u, [y], [True], plant=find("rectilinear-1"), quanta=[1e-7], loop=False)
     assert found.braked == pytest.approx(8.0, rel=0.25)
     assert found.numbers["c_1"] == pytest.approx(3.0, rel=0.3)
-    assert starts(T, u, [y], [True], disks=False, quanta=[1e-7], loop=True).braked == 0.0
+    assert starts(T, u, [y], [True], plant=find("rectilinear-1"), quanta=[1e-7], loop=True).braked == 0.0
 
 
 def test_a_last_body_that_rests_behind_its_neighbour_is_tied_to_ground():
@@ -107,18 +110,18 @@ def test_a_last_body_that_rests_behind_its_neighbour_is_tied_to_ground():
     K = np.array([[500.0, -200], [-200, 250]])
     u = np.where(T > 0.5, 3.0, 0.0)
     bodies = moved([2.0, 1.5], K, [12.0, 9.0], u, [0, 0])
-    found = starts(T, u, bodies, [True, True], disks=False, quanta=[1e-7, 1e-7], loop=False)
+    found = starts(T, u, bodies, [True, True], plant=find("rectilinear-2"), quanta=[1e-7, 1e-7], loop=False)
     assert found.grounded == pytest.approx(0.8, abs=0.01)
     assert found.numbers["k_2"] == pytest.approx(0.25 * found.numbers["k_12"], rel=0.05)
     for quanta, free in (([1e-3, 1e-3], [True, True]), ([1e-7, 1e-7], [False, True])):
-        again = starts(T, u, bodies, free, disks=False, quanta=quanta, loop=False)
+        again = starts(T, u, bodies, free, plant=find("rectilinear-2"), quanta=quanta, loop=False)
         assert again.grounded == 0.0  # too near to tell by the steps of its sensor, or beside a hand
 
 
 def test_a_command_beyond_reach_is_taken_to_pass_a_tenth_of_it():
     bodies = moved([2.0], np.array([[500.0]]), [3.0], SQUARE, [0])
     for reach, limit in ((2.9, 0.29), (3.0, 0.0), (np.inf, 0.0)):
-        found = starts(T, SQUARE, bodies, [True], disks=False, quanta=[1e-6], loop=True, reach=reach)
+        found = starts(T, SQUARE, bodies, [True], plant=find("rectilinear-1"), quanta=[1e-6], loop=True, reach=reach)
         assert found.limit == pytest.approx(limit)
 
 

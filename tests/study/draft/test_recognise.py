@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from upright.errors import BadInput
+from upright.physics import CartPendulum, Furuta
 from upright.readers import inspect
 from upright.readers.inspection import Column, Inspection
 from upright.readers.resolution import Quantum
@@ -438,13 +439,15 @@ def thrown(c: float, fades: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.nda
 
 @pytest.mark.parametrize("c", [2.0, -2.0, 0.5])
 def test_the_coupling_of_a_thrown_pendulum_is_found(c):
-    assert coupling(*thrown(c)) == pytest.approx(c, rel=0.01)
+    """A cart throws its pendulum against its acceleration, eq. (A1), an arm along with it, fig. 3a."""
+    assert coupling(CartPendulum, *thrown(c)) == pytest.approx(-c, rel=0.01)
+    assert np.sign(coupling(Furuta, *thrown(c))) == np.sign(c)
 
 
 def test_what_is_not_thrown_has_no_coupling():
     t, x, theta = thrown(0.0)
-    assert coupling(t, x, theta) == 0.0
-    assert coupling(t[:35], x[:35], thrown(2.0)[2][:35]) == 0.0  # under four spans of a tenth of a second
+    assert coupling(CartPendulum, t, x, theta) == 0.0
+    assert coupling(CartPendulum, t[:35], x[:35], thrown(2.0)[2][:35]) == 0.0  # under four spans of a tenth of a second
 
 
 def test_an_ordinary_log_is_recognised_as_a_whole():

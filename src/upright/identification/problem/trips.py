@@ -10,7 +10,8 @@ import numpy as np
 
 from upright.identification.model.grey_box import GreyBox
 from upright.identification.model.runs import Run
-from upright.signals.trips import CLEAR, Trip, trip_or_misfit
+from upright.physics.regressor import regressor
+from upright.signals.trips import CLEAR, Terms, Trip, linear, trip_or_misfit
 
 
 def find_trips(rig: GreyBox, run: Run) -> list[Trip]:
@@ -33,14 +34,29 @@ def _moments(rig: GreyBox, run: Run) -> tuple[list[Trip], bool]:
     quantum = dict(zip(run.measured, run.quanta, strict=True))
     signals = {c: run.y[:, k] for k, c in enumerate(run.measured)}
     signals |= {c: v for c, v in run.held.items() if isinstance(v, np.ndarray)}
-    others = [signals[c.name] for c in rig.plant.coordinates if c.name in signals and c.name != on]
+    signals |= {c: np.full(run.t.size, v) for c, v in run.held.items() if not isinstance(v, np.ndarray)}
+    others = {c.name: signals[c.name] for c in rig.plant.coordinates if c.name in signals and c.name != on}
+    terms = _terms(rig, [on, *others])
     gain = rig.parameters["actuator.gain"].value if "actuator.gain" in rig.parameters else 1.0
     for late in (False, True):
         u = cut(run, found).u[:, 0] * math.copysign(1.0, gain)
-        trip, otherwise = trip_or_misfit(run.t, u, signals[on], others, quantum=quantum[on], late=late)
+        trip, otherwise = trip_or_misfit(
+            run.t, u, signals[on], [*others.values()], quantum=quantum[on], late=late, terms=terms
+        )
         found += [trip] if trip is not None else []
         plain = plain or (not late and trip is None and otherwise < CLEAR[1])
     return found, plain
+
+
+def _terms(rig: GreyBox, measured: list[str]) -> Terms:
+    """What acts on the first coordinate by its equation of motion, which needs the motion of all."""
+    coordinates = [c.name for c in rig.plant.coordinates]
+    asked = {n for n, p in rig.parameters.items() if p.value or p.estimate}
+    equations, driven = regressor(rig.plant, frozenset(rig.plant.optional) - asked), coordinates.index(measured[0])
+    if set(coordinates) - set(measured) or equations.own(driven) is None:
+        return linear
+    order = [measured.index(c) for c in coordinates]
+    return lambda motion: list(equations.acting(driven, motion.q[order], motion.v[order], motion.a[order]))
 
 
 def trip_sentence(run: Run, trip: Trip) -> str:

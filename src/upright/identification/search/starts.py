@@ -28,7 +28,7 @@ from upright.physics.plant import Plant
 from upright.signals.smoothing import (
     dominant_period,
     middle,
-    savitzky_golay,
+    smoothed,
     smoothing_width,
     spread,
 )
@@ -72,23 +72,21 @@ def observe(rig: GreyBox, run: Run, *, flips: Mapping[str, float] | None = None,
     signal = {c: run.y[:, k] for k, c in enumerate(run.measured)}
     period = min(dominant_period(signal[coordinates[i]], dt) for i in free)
     width = max(smoothing_width(signal[coordinates[i]], dt, period, quantum[coordinates[i]]) for i in free)
-    q, v, a = np.zeros((3, len(coordinates), n))
-    fades = np.zeros(len(coordinates))
-    edge = 0
-    for i, c in enumerate(coordinates):
+
+    def counted(c: str) -> Array:
         if c in run.held and np.ndim(run.held[c]) == 0:
-            q[i] = float(run.held[c])
-            continue
+            return np.full(n, run.held[c], dtype=np.float64)
         y = np.asarray(run.held[c]) if c in run.held else signal[c]
-        motion = savitzky_golay((flips or {}).get(c, 1.0) * y + (turns or {}).get(c, 0.0), dt, width)
-        q[i], v[i], a[i], edge = motion.q, motion.v, motion.a, motion.edge
-        fades[i] = 0.02 * spread(motion.v)
+        return (flips or {}).get(c, 1.0) * y + (turns or {}).get(c, 0.0)
+
+    motion = smoothed([counted(c) for c in coordinates], dt, width)
     since = run.t - run.t[0]
     acting = (since >= run.guesses.get("input_start", -math.inf)) & (since < run.guesses.get("input_end", math.inf))
     u = np.where(acting, run.u.T, 0.0)
     if run.loop is not None:
-        u = u + run.loop.follow(q.T, coordinates)[0]
-    return Sample(run=run, dt=dt, q=q, v=v, a=a, u=u, free=free, fades=fades, width=width, edge=edge, period=period)
+        u = u + run.loop.follow(motion.q.T, coordinates)[0]
+    return Sample(run=run, dt=dt, q=motion.q, v=motion.v, a=motion.a, u=u, free=free, fades=motion.fades, width=width,
+                  edge=motion.edge, period=period)  # fmt: skip
 
 
 def samples_of(

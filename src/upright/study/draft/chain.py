@@ -1,8 +1,8 @@
 """Draft of a study of carts on springs or disks on a shaft, and where the search for its numbers starts.
 
 Nobody measured how hard the drive pushes: 1 N/V (N m/V) is assumed, and masses, springs and friction follow from the
-motion: each body's acceleration is regressed on what acts on it, all through the same smoothing. With a gain of 1 (or,
-for a free swing, an inertia of 1) the slopes are the numbers of the plant, roughly.
+motion: each body's acceleration is regressed on the columns of its equation, all through the same smoothing. With a
+gain of 1 (or, for a free swing, an inertia of 1) the slopes are the numbers of the plant, roughly.
 """
 
 from __future__ import annotations
@@ -13,10 +13,11 @@ from itertools import pairwise
 import numpy as np
 
 from upright.physics import Plant, find
+from upright.physics.regressor import regressor
 from upright.quantities import with_unit
 from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Column
 from upright.records import Array, Record
-from upright.signals.smoothing import acceleration_width, savitzky_golay
+from upright.signals.smoothing import acceleration_width, savitzky_golay, smoothed
 from upright.signals.stretches import pieces
 from upright.signals.trips import find_trip
 from upright.study.draft.chain_log import ChainLog
@@ -130,7 +131,7 @@ def _starts_of(record: Record, log: ChainLog, plant: type[Plant]) -> ChainStarts
         u,
         [(record[c.name][rows] - log.recognised.rest[n]) * factors[n] for n, c in columns.items()],
         [n not in log.fixed for n in columns],
-        disks=log.disks,
+        plant=plant,
         quanta=[(c.quantum.step or 0.0) * factors[n] for n, c in columns.items()],
         loop=log.reference is not None,
         reach=reach,
@@ -239,7 +240,7 @@ def starts(
     bodies: list[Array],
     free: list[bool],
     *,
-    disks: bool,
+    plant: type[Plant],
     quanta: list[float],
     loop: bool,
     reach: float = np.inf,
@@ -256,8 +257,8 @@ def starts(
         Coordinates, zero at rest [SI].
     free : list of bool
         Which of them nobody holds.
-    disks : bool
-        Whether no spring ties body 1 to ground.
+    plant : type of Plant
+        The chain, as `upright.physics.chain` makes it.
     quanta : list of float
         Resolution of each [SI].
     loop : bool
@@ -268,59 +269,69 @@ def starts(
     dt = float(t[-1] - t[0]) / (t.size - 1)
     k = max((i for i, f in enumerate(free) if f), key=lambda i: float(np.ptp(bodies[i])))
     width = min(acceleration_width(bodies[k], dt, quanta[k]), max(t.size // 12, 9) | 1)
-    motion = [savitzky_golay(y, dt, width) for y in bodies]
+    motion = smoothed(bodies, dt, width)
     command = u if u is not None else np.zeros(t.size)
     limit = PASSES * reach if np.abs(command).max() > reach else 0.0
     command = np.clip(command, -limit, limit) if limit else command
     switches = 0.1 < float(np.mean(command != 0)) < 0.95 and not loop and dt < RESOLVED
     w = _frequency(t, bodies, free)
-    m = "J" if disks else "m"
+    equations = regressor(plant, frozenset(plant.names()) - _sought(plant, free))
+    acting = -equations.columns(motion.q, motion.v, motion.a)
     numbers: dict[str, float] = {}
     inertia, braked = 1.0, 0.0
-    for i, own in enumerate(motion):
-        n = str(i + 1)
+    edge = slice(motion.edge, -motion.edge or None)
+    for i, joint in enumerate(plant.joints):
+        own = equations.own(i)
+        assert own is not None  # a chain's mass matrix is diagonal
         if not free[i]:
-            numbers[f"{m}_{n}"] = inertia
+            numbers[equations.base[own].text] = inertia
             continue
+        v = motion.v[i]
         driven = i == 0 and u is not None
-        fast = np.abs(own.v) > 0.02 * np.abs(own.v).max()
-        columns = {"friction": -np.sign(own.v) * fast, "c": -own.v}
-        if i > 0:
-            columns["k_left"] = motion[i - 1].q - own.q
-        if i + 1 < len(motion) and free[i + 1]:
-            columns["k_right"] = motion[i + 1].q - own.q
-        if i == 0 and (not disks or len(motion) == 1 or not free[1]):
-            columns["k"] = -own.q
+        columns = {b.text: acting[k, i] for k, b in enumerate(equations.base) if k != own and np.any(acting[k, i])}
+        columns[joint.coulomb] = -np.sign(v) * (np.abs(v) > 0.02 * np.abs(v).max())
         if driven:
             columns["u"] = savitzky_golay(command, dt, width).q
             if switches:
-                columns["on"] = -savitzky_golay(np.where(command != 0, own.v, 0.0), dt, width).q
+                columns["on"] = -savitzky_golay(np.where(command != 0, v, 0.0), dt, width).q
         columns["constant"] = np.ones(t.size)
-        edge = slice(own.edge, -own.edge or None)
-        slope, error = _regress({name: c[edge] for name, c in columns.items()}, own.a[edge], width)
+        slope, error = _regress({name: c[edge] for name, c in columns.items()}, -acting[own, i][edge], width)
+        shared = next((n for n in columns if n in numbers and slope[n] > 0), "")
         if driven:
             clear = slope["u"] > 2 * error["u"] and not limit
             inertia = 1 / slope["u"] if clear else _by_first_motion(t, command, bodies[0])
             if switches:  # braking that builds up late looks like none, so it is asked wherever the volts go off
-                braked = inertia * max(slope["on"], 0.2 * abs(slope["c"]), 0.1 * w)
-        if i > 0 and numbers.get(f"k_{i}{n}") and slope["k_left"] > 0:
-            inertia = numbers[f"k_{i}{n}"] / slope["k_left"]
-        numbers[f"{m}_{n}"] = inertia
-        springs = {"k_right": f"k_{n}{i + 2}", "k_left": f"k_{i}{n}", "k": "k_12" if disks else "k_1"}
-        for side, spring in springs.items():
-            if side in slope and not (side == "k_left" and spring in numbers):
-                numbers[spring] = inertia * (slope[side] if slope[side] > 0 else w**2)
-        numbers[f"c_{n}"] = inertia * max(slope["c"], 0.01 * w)
-        numbers[f"f_{n}c"] = inertia * max(slope["friction"], 0.01 * w * float(np.abs(own.v).max()))
+                braked = inertia * max(slope["on"], 0.2 * abs(slope[f"c_{i + 1}"]), 0.1 * w)
+        elif shared:  # a spring pulls both its bodies alike
+            inertia = numbers[shared] / slope[shared]
+        numbers[equations.base[own].text] = inertia
+        least = {f"c_{i + 1}": 0.01 * w, joint.coulomb: 0.01 * w * float(np.abs(v).max())}
+        for name in columns.keys() & frozenset(plant.names()) - numbers.keys():
+            numbers[name] = inertia * (max(slope[name], least[name]) if name in least else
+                                       slope[name] if slope[name] > 0 else w**2)  # fmt: skip
     grounded = _lags_behind(command, bodies, quanta) if len(bodies) > 1 and free[-1] and free[-2] else 0.0
     if grounded:  # k_12 (x_1 - x_2) = k_2 x_2
         last = len(bodies)
         numbers[f"k_{last}"] = numbers[f"k_{last - 1}{last}"] * (1 / grounded - 1)
     trips = False
     if u is not None and not loop and free[0]:
-        others = [y for y, f in zip(bodies[1:], free[1:], strict=True) if f]
-        trips = find_trip(t, u, bodies[0], others, quantum=quanta[0]) is not None
+        whole = regressor(plant)
+        trips = find_trip(t, u, bodies[0], bodies[1:], quantum=quanta[0],
+                          terms=lambda m: list(whole.acting(0, m.q, m.v, m.a))) is not None  # fmt: skip
     return ChainStarts(numbers=numbers, braked=braked, trips=trips, limit=limit, fastest=w, grounded=grounded)
+
+
+def _sought(plant: type[Plant], free: list[bool]) -> frozenset[str]:
+    """Parameters that act on bodies which nobody holds, but springs to ground: of carts, and of a lone disk, the first.
+
+    Where the second cart is held, its spring pulls the first one as one to ground does, and is taken for that.
+    """
+    disks, n = plant.coordinates[0].unit == "rad", len(free)
+    inertias = {f"{'J' if disks else 'm'}_{i + 1}" for i in range(n)}
+    dashpots = {f"c_{i + 1}" for i in range(n) if free[i]}
+    grounded = free[0] and (not disks or n == 1)
+    springs = {f"k_{i + 1}{i + 2}" for i in range(n - 1) if free[i + 1] or (free[i] and not (i == 0 and grounded))}
+    return frozenset(inertias | dashpots | springs | ({"k_1"} if grounded else set()))
 
 
 def _lags_behind(u: Array, bodies: list[Array], quanta: list[float]) -> float:

@@ -18,9 +18,10 @@ import numpy as np
 from upright.physics import Plant, find
 from upright.quantities import with_unit
 from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Inspection
-from upright.records import Array, Record
-from upright.signals.smoothing import acceleration_width, savitzky_golay
+from upright.records import Record
+from upright.signals.smoothing import acceleration_width, savitzky_golay, smoothed
 from upright.study.draft.described import counts_of
+from upright.study.draft.hinge import hinge_of
 from upright.study.draft.plausible import implausible
 from upright.study.draft.recognise import Recognised, in_dac_counts
 from upright.study.draft.tables import (
@@ -61,7 +62,8 @@ class Balanced:
     """A pendulum that a loop keeps upright.
 
     `rate` [rad/s]: square root of its acceleration per angle; `throw`: its acceleration per that of the first
-    coordinate; `pull`: acceleration of the first coordinate per unit of effort; `centre`: reading upright.
+    coordinate, negative where it is counted against the plant's angle; `pull`: acceleration of the first coordinate
+    per unit of effort; `centre`: reading upright.
     """
 
     rate: float
@@ -128,23 +130,22 @@ def balance_of(record: Record, found: Recognised) -> Balanced | None:
     width = max(7, int(min(max(wide, SMOOTHED[0] / dt), SMOOTHED[1] / dt)) | 1)
     if record.t.size < 30 * width:
         return None
-    arm, pendulum = (savitzky_golay(x, dt, width) for x in (first, tilt))
+    motion = smoothed([first, math.pi + tilt], dt, width)
     push = savitzky_golay(u, dt, width).q
     inside = slice(width, -width)
-    (throw, away), left = _regression(pendulum.a, [arm.a, pendulum.q], inside)
-    (pull, *_), _ = _regression(arm.a, [push, pendulum.q, arm.v, np.sign(arm.v), np.ones_like(push)], inside)
-    if away <= 0 or left > 0.9 * _regression(pendulum.a, [arm.a], inside)[1]:
+    hinge = hinge_of(find(found.plant), motion, inside)
+    if hinge.gravity <= 0 or hinge.left > 0.9 * hinge.weightless:
         return None
-    return Balanced(rate=math.sqrt(away), throw=throw, pull=pull, centre=centre)
+    # close to upright all that the pendulum does to the first coordinate goes with its angle
+    speed = motion.v[0]
+    table = np.column_stack([push, motion.q[1], speed, np.sign(speed), np.ones_like(push)])[inside]
+    pull = float(np.linalg.lstsq(table, motion.a[0][inside], rcond=None)[0][0])
+    return Balanced(rate=math.sqrt(hinge.gravity), throw=hinge.throw, pull=pull, centre=centre)
 
 
 def recognised_upright(found: Recognised, balanced: Balanced) -> Recognised:
-    """What was recognised, with signs and the reading of the pendulum's zero, half a turn from upright.
-
-    Hanging, an arm throws its pendulum forward and a cart backward (fig. 3a and eq. (A1)); upright it is the reverse.
-    """
-    throw = balanced.throw * (1 if found.plant == "furuta" else -1)
-    mirrored = throw > 0
+    """What was recognised, with signs and the reading of the pendulum's zero, half a turn from upright."""
+    mirrored = balanced.throw < 0
     last = list(found.columns)[-1]
     scale = _si(found.columns[last].guess)
     zero = (balanced.centre + (math.pi if mirrored else -math.pi)) / scale
@@ -304,10 +305,3 @@ def _runs(found: Recognised, file: str, label: str) -> list[TomlTable]:
 
 def _si(unit: str) -> float:
     return {"deg": math.pi / 180, "mm": 1e-3, "counts": 2 * math.pi / 4096}.get(unit, 1.0)
-
-
-def _regression(a: Array, columns: list[Array], inside: slice) -> tuple[list[float], float]:
-    """Slopes of `a` on columns, and the sum of squares that they leave."""
-    table = np.column_stack(columns)[inside]
-    slopes, *_ = np.linalg.lstsq(table, a[inside], rcond=None)
-    return [float(s) for s in slopes], float(np.sum((a[inside] - table @ slopes) ** 2))

@@ -13,7 +13,8 @@ from upright.physics import PLANTS, Plant, find
 from upright.readers.inspection import Column, Inspection, effort_unit
 from upright.records import Array, Record
 from upright.records.columns import bare_name
-from upright.signals.smoothing import savitzky_golay, white_noise
+from upright.signals.smoothing import savitzky_golay, smoothed, white_noise
+from upright.study.draft.hinge import hinge_of
 from upright.study.draft.release import free_from
 
 RATE = re.compile(r"velocity|speed|rate|_dot\b|omega|\bqd|accel", re.IGNORECASE)
@@ -105,8 +106,7 @@ def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
             inside = (record.t >= window[0]) & (record.t <= window[1])
     mirrored = False
     if pushed and all(c.guess == "rad" or name == "x" for name, c in columns.items()):
-        thrown = coupling(record.t[inside], driven[inside], last[inside] - centre)
-        mirrored = thrown * (1 if plant == "furuta" else -1) < 0
+        mirrored = coupling(find(plant), record.t[inside], driven[inside], last[inside] - centre) < 0
     return Recognised(
         plant=plant,
         columns=columns,
@@ -395,22 +395,17 @@ def swing_frequency(t: Array, x: Array) -> float:
     return math.pi / half if half > 0 else 0.0
 
 
-def coupling(t: Array, x: Array, theta: Array) -> float:
-    """Acceleration of a pendulum per acceleration of its hinge, 0 when the data do not tell.
+def coupling(plant: type[Plant], t: Array, x: Array, theta: Array) -> float:
+    """Acceleration of a hanging pendulum per acceleration of its hinge, 0 when the data do not tell.
 
-    From ``theta'' = c cos(theta) x'' - w^2 sin(theta)`` by linear regression; c is negative on a cart along x, positive
-    on an arm of fig. 3a. Angles are zero hanging, and accelerations slopes of fourth-order polynomials over 0.1 s.
+    Negative where one of both is counted against the plant's convention. Accelerations are slopes of fourth-order
+    polynomials over 0.1 s.
     """
     step = max(float(np.median(np.diff(t))), 2e-3)
     grid = np.arange(t[0], t[-1], step)
     width = max(7, int(0.1 / step) | 1)
     if grid.size < 4 * width:
         return 0.0
-    angle, place = np.interp(grid, t, theta), np.interp(grid, t, x)
-    a, b = (savitzky_golay(v, step, width).a[width:-width] for v in (angle, place))
-    angle = angle[width:-width]
-    both = np.column_stack([np.cos(angle) * b, -np.sin(angle)])
-    slopes, *_ = np.linalg.lstsq(both, a, rcond=None)
-    alone, *_ = np.linalg.lstsq(both[:, 1:], a, rcond=None)
-    left, without = np.sum((a - both @ slopes) ** 2), np.sum((a - both[:, 1:] @ alone) ** 2)
-    return float(slopes[0]) if left < 0.7 * without else 0.0
+    motion = smoothed([np.interp(grid, t, x), np.interp(grid, t, theta)], step, width)
+    hinge = hinge_of(plant, motion, slice(width, -width))
+    return hinge.throw if hinge.left < 0.7 * hinge.unthrown else 0.0
