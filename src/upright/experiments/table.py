@@ -109,12 +109,13 @@ def _frequency(at: ExperimentInput) -> tuple[Chapter, bool]:
 
 
 def _identified(at: ExperimentInput, stand: TestStand) -> tuple[Rig, Rig]:
-    """The rig as it was identified, as the fit has it and completed for a run."""
+    """The rig as it was identified, as the fit has it and completed for a run; a live one called as its owner does."""
     from upright.rig.completion import completed
     from upright.study.stored_rig import read_stored_rig
 
     known = read_stored_rig(at.fit, seed=at.seed)
-    return known, completed(known, vendor=stand.vendor, who="an experiment", form="")
+    model = completed(known, vendor=stand.vendor, who="an experiment", form="")
+    return known, model if stand.simulated else model.replace(name=stand.rig.name)
 
 
 def _regulation(at: ExperimentInput) -> tuple[Chapter, bool]:
@@ -156,15 +157,14 @@ def _free_swing(at: ExperimentInput) -> tuple[Chapter, bool]:
     from upright.experiments.free_swing_4.chapter import chapter
     from upright.experiments.free_swing_4.run import run_free_swing
     from upright.experiments.stand.fits import fit_chapter
-    from upright.rig.makes import make_of
     from upright.study.results import write_fit
 
+    body = carrier_of(at.stand)
     if not at.stand.simulated:
-        study, fit = run_by_hand(at.stand, at.folder, at.progress, at.estimated("1b", carrier_of(at.stand)))
+        study, fit = run_by_hand(at.stand, at.folder, at.progress, at.estimated("1b", body))
         return fit_chapter(study, fit, at.folder, at.stand.truth), not fit.interrupted
-    rig = at.stand.rig
-    weighed = next((k for k in at.weighed if k.name == make_of(rig.plant).body), None)
-    done = run_free_swing(rig, at.seed, at.folder, at.progress, at.stopped, weighed=weighed)
+    weighed = next((k for k in at.weighed if k.name == body), None)
+    done = run_free_swing(at.stand.rig, at.seed, at.folder, at.progress, at.stopped, weighed=weighed)
     if "free_swing" in done.answers:
         first = done.answers["free_swing"]
         write_fit(first.fit, first.study, at.folder / "fit.json")

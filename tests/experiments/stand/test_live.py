@@ -9,17 +9,15 @@ import sys
 
 import numpy as np
 import pytest
-from scipy.signal import lsim
 
 import upright as up
+from tests.experiments.rigs import OWN, made
 from tests.exports.rigs import fit_file
 from upright.control.swing_up import MODE
 from upright.errors import BadInput
-from upright.experiments.frequency_1b.at_once import _level, asking
 from upright.experiments.laboratory import choose
 from upright.experiments.regulation_2.run import scored
 from upright.experiments.stand.live import live_stand, run_of
-from upright.experiments.stand.strength import SHARE
 from upright.experiments.stand.studies import write_study
 from upright.experiments.swing_up_2b.run import run_swing_up
 from upright.gains import feedback, filtered, place
@@ -29,50 +27,6 @@ from upright.rig.makes import MAKES, make_rig
 from upright.running.run import RunRequest, run_rig
 from upright.study.load import load_study
 
-OWN = """
-[rig]
-plant = "furuta"
-name = "qube 7"
-servo_period = "2 ms"
-travel = "2 rad"
-[parameters]
-m_p = { value = "24 g", measured = true }
-l_cg = { value = "64.5 mm", uncertainty = "0.5 mm" }
-r = { value = "85 mm", measured = true }
-J_d = { guess = "8e-5 kg m^2", min = 0 }
-J_p = { guess = "3.3e-5 kg m^2", min = 0 }
-J_a = "0 kg m^2"
-b_1 = { guess = "1.5e-4 N m s/rad", min = 0 }
-b_2 = { guess = "1e-5 N m s/rad", min = 0 }
-[actuator]
-gain = { guess = "0.005 N m/V", min = 0 }
-limit = { value = "10 V", measured = true }
-delay = "2 ms"
-[sensors.psi]
-column = "psi"
-counts_per_rev = { value = 2048, measured = true }
-[sensors.theta]
-column = "theta"
-counts_per_rev = { value = 2048, measured = true }
-"""
-
-LOOSE = """
-[rig]
-plant = "rectilinear-1"
-servo_period = "1 ms"
-travel = "0.1 m"
-[parameters]
-m_1 = { guess = "1 kg", min = 0 }
-k_1 = "0 N/m"
-c_1 = { guess = "1 N s/m", min = 0 }
-[actuator]
-gain = { guess = "2 N/V", min = 0 }
-limit = { value = "5 V", measured = true }
-[sensors.x_1]
-column = "x_1"
-counts_per_m = { value = 20000, measured = true }
-"""
-
 
 @pytest.fixture
 def own(tmp_path):
@@ -80,36 +34,6 @@ def own(tmp_path):
     (tmp_path / "study.toml").write_text(OWN, encoding="utf-8")
     (tmp_path / "RIG.toml").write_text('kind = "twin"\nstudy = "study.toml"\n', encoding="utf-8")
     return live_stand(tmp_path / "RIG.toml")
-
-
-def made(folder, text='kind = "twin"\nmake = "furuta"\nseed = 3\n'):
-    (folder / "RIG.toml").write_text(text, encoding="utf-8")
-    return live_stand(folder / "RIG.toml")
-
-
-def test_the_band_holds_the_swing_of_a_rig_that_nobody_makes(own):
-    asked = asking(own)
-    p = own.rig.plant
-    # arm free: the pendulum swings faster than on a fixed hinge, by the inertia that it takes along
-    J, arm = p.J_p + p.m_p * p.l_cg**2, p.J_d + p.m_p * p.r**2
-    swing = math.sqrt(p.m_p * p.g * p.l_cg / (J - (p.m_p * p.l_cg * p.r) ** 2 / arm))
-    assert asked.band[0] < swing < asked.band[1]
-    assert asked.band[0] == pytest.approx(0.4 * swing, rel=0.01)
-    assert asked.reach[0] <= 0.25 * 2.0
-
-
-def test_no_coordinate_is_to_go_further_than_asked(own):
-    """By scipy's simulation of the model, after its transient."""
-    asked = asking(own)
-    level = _level(own, asked, SHARE * own.rig.limit)
-    u = level * np.tile(asked.wave, 6)
-    model = own.rig.linear("hanging")
-    # the arm drifts freely, which is no answer to the wave: only what repeats is looked at
-    t = np.arange(u.size) * own.rig.period
-    _, y, _ = lsim((model.A, model.B, model.C, np.zeros((2, 1))), u, t)
-    last = y[-asked.wave.size :]
-    swings = np.ptp(last - np.linspace(last[0], last[-1], len(last)), axis=0) / 2
-    assert np.max(swings / asked.reach) == pytest.approx(1.0, abs=0.05)
 
 
 def test_the_study_of_its_logs_says_what_its_owner_says(own, tmp_path):
@@ -133,14 +57,6 @@ def test_a_rig_described_by_a_fit_is_that_rig_still(tmp_path):
     assert 'fit = "../1b/fit.json"' in told
     assert "seed = 3" in told
     assert 'travel = "1 rad"' in told
-
-
-def test_a_limit_of_the_file_bounds_what_is_asked_and_the_rest_is_the_descriptions(tmp_path):
-    assert asking(made(tmp_path)).reach[0] == MAKES["furuta"].reach[0]
-    limited = 'kind = "twin"\nmake = "furuta"\n[limits]\ncommand = "4 V"\n'
-    assert asking(made(tmp_path, limited)).reach[0] == MAKES["furuta"].reach[0]
-    narrow = asking(made(tmp_path, limited + '[limits.psi]\ntravel = "1 rad"\n'))
-    assert narrow.reach[0] == pytest.approx(0.25)
 
 
 def test_whose_rig_it_is_may_be_said_by_either_file(own, tmp_path):
@@ -225,13 +141,6 @@ def test_nothing_is_tried_where_no_log_can_be_kept(tmp_path, monkeypatch):
         live_stand(tmp_path / "RIG.toml")
 
 
-def test_what_does_not_swing_is_told_what_else_identifies_it(tmp_path):
-    (tmp_path / "study.toml").write_text(LOOSE, encoding="utf-8")
-    (tmp_path / "RIG.toml").write_text('kind = "twin"\nstudy = "study.toml"\n', encoding="utf-8")
-    with pytest.raises(BadInput, match=r"does not swing.*upright identify"):
-        asking(live_stand(tmp_path / "RIG.toml"))
-
-
 def test_a_port_alone_is_not_driven_but_given_a_file_to_fill_in(tmp_path):
     with pytest.raises(BadInput, match="fill in"):
         up.lab(rig="serial:/dev/ttyACM7", out=tmp_path / "out")
@@ -255,18 +164,3 @@ def test_a_port_alone_is_not_driven_but_given_a_file_to_fill_in(tmp_path):
 def fill_in(path):
     """Every question answered as its example does."""
     path.write_text(re.sub(r"(?m)^# (?=[\[\w]+ ?[=.])", "", path.read_text("utf-8")), encoding="utf-8")
-
-
-@pytest.mark.slow
-def test_a_twin_with_dry_friction_is_identified_through_the_protocol(tmp_path):
-    rig = made(tmp_path, 'kind = "twin"\nmake = "rectilinear"\nseed = 3\n')
-    done = up.lab(rig=str(rig.file.path), experiment="1b", out=tmp_path / "out")
-    told = done.numbers["experiments"]["1b"]
-    assert told["state"] == "done"
-    truth = make_rig("rectilinear", 3)
-    # not the lag, whose interval of 0.1 us is finer than that the twin steps twice a period and the fit once
-    for name, true in {**truth.plant.parameters(), "actuator.gain": truth.gain}.items():
-        e = told["numbers"]["parameters"].get(name)
-        if e is not None and e["status"] == "firm":
-            assert e["interval"][0] <= true <= e["interval"][1], name
-    assert told["numbers"]["trusted"]

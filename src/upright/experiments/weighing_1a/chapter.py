@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from upright.experiments.stand.known import Known
 from upright.experiments.stand.stand import APPLIED
 from upright.experiments.weighing_1a.figures import decrement_figure, line_figure, swing_figure
-from upright.experiments.weighing_1a.run import Weighing
+from upright.experiments.weighing_1a.run import Campaign, Weighing
 from upright.identification.loadings import Loaded, Loadings
 from upright.quantities import figures
 from upright.records import Record
@@ -111,7 +111,7 @@ def _steps(done: Weighing) -> tuple[Step, ...]:
     if done.make is not None:
         first = [label for label in campaign.files if label.endswith("run 1")]
         files = " ".join(typed(done.folder / campaign.files[label]) for label in first)
-        added = " ".join(f'--added "{campaign.added[label]}"' for label in first)
+        added = added_options(campaign, first)
         return (
             Step(
                 "Weigh the body again from one log of each loading, as you would your own.",
@@ -120,7 +120,7 @@ def _steps(done: Weighing) -> tuple[Step, ...]:
             Step("See which masses would have told most.", f"upright plan-inertias --rig {campaign.kind}"),
         )
     files = " ".join(typed(done.folder / file) for file in campaign.files.values())
-    added = " ".join(f"--added {typed(a)}" for a in campaign.added.values())
+    added = added_options(campaign, campaign.files)
     added += f' --tolerance "{100 * done.tolerance:g} %"' if done.tolerance else ""
     column = next(iter(campaign.logs.values())).outputs[0]
     return (
@@ -128,6 +128,11 @@ def _steps(done: Weighing) -> tuple[Step, ...]:
              f"upright loadings {files} {added} --signal {column} --command {APPLIED}"),
         Step(f"Write {body.inertia} into the study of what is built on this body, what is mounted on it added."),
     )  # fmt: skip
+
+
+def added_options(campaign: Campaign, labels: Iterable[str]) -> str:
+    """Loadings of some logs as the command line takes them."""
+    return " ".join(f'--added "{campaign.added[n]:.6g} {OSCILLATORS[campaign.kind].unit}"' for n in labels)
 
 
 def loading_chapter(

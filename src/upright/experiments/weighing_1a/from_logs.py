@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from upright.errors import BadInput
-from upright.experiments.weighing_1a.chapter import loading_chapter
+from upright.experiments.weighing_1a.chapter import added_options, loading_chapter
 from upright.experiments.weighing_1a.loadings import inertia_of, weigh
 from upright.experiments.weighing_1a.run import drawn_twin, measure_body
 from upright.identification.loadings import Loadings
@@ -77,10 +77,9 @@ def weigh_twin(kind: str, seed: int, folder: Path | None) -> tuple[Loadings, Cha
     column = next(iter(done.logs.values())).outputs[0]
     done = done if folder is None else done.written(folder)
     files = done.files
-    added = " ".join(f'--added "{done.added[label]}"' for label in files)
     steps = [Step("See which masses would have told most.", f"upright plan-inertias --rig {kind}")]
     if files:
-        again = f"upright loadings {' '.join(files.values())} {added}"
+        again = f"upright loadings {' '.join(files.values())} {added_options(done, files)}"
         steps.insert(0, Step("Weigh the rig again from its logs in that folder, as you would your own.", again))
     told = loading_chapter(
         done.loadings, kind=kind, title=f"Experiment 1a on a twin, {kind}, seed {seed}", logs=done.logs,

@@ -120,8 +120,8 @@ class Campaign:
     kind : {"rectilinear", "torsional"}
     logs : dict of str to Record
         By label.
-    added : dict of str to str
-        What was bolted on, by label.
+    added : dict of str to float
+        Inertia that was bolted on, by label [kg or kg m^2].
     loadings : Loadings
     left_out : tuple of str
         Why some logs did not count: friction may leave too few swings.
@@ -135,7 +135,7 @@ class Campaign:
 
     kind: str
     logs: dict[str, Record]
-    added: dict[str, str]
+    added: dict[str, float]
     loadings: Loadings
     left_out: tuple[str, ...]
     truth: Mapping[str, float]
@@ -183,9 +183,9 @@ def measure_body(
     found, left_out = weigh(
         logs, values, signals, dict.fromkeys(logs, "u"), tolerance=design.tolerance, piece=design.piece
     )  # fmt: skip
-    added = {label: f"{value:.6g} {design.unit}" for label, value in zip(logs, values, strict=True)}
     return Campaign(
-        kind=design.kind, logs=logs, added=added, loadings=found, left_out=left_out, truth=truth(on), on=on
+        kind=design.kind, logs=logs, added=dict(zip(logs, values, strict=True)), loadings=found, left_out=left_out,
+        truth=truth(on), on=on,
     )  # fmt: skip
 
 
@@ -293,7 +293,7 @@ def step_stand(stand: TestStand, folder: Path, progress: Progress = silent) -> C
     body, true = OSCILLATORS[kind], stand.truth
     truth = {"k": true["k_1"], body.bare: true[body.inertia], "c": true["c_1"]} if true else {}
     return Campaign(
-        kind=kind, logs=logs, added=dict(zip(logs, stand.added, strict=True)), loadings=found, left_out=left_out,
+        kind=kind, logs=logs, added=dict(zip(logs, values, strict=True)), loadings=found, left_out=left_out,
         truth=truth, files=files,
     )  # fmt: skip
 

@@ -1,0 +1,99 @@
+"""All frequencies at once on a rig that is only guessed: what is asked stays within its travel, and finds the rig."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.signal import lsim
+
+from tests.experiments.rigs import OWN, made
+from upright.errors import BadInput
+from upright.experiments.frequency_1b.at_once import _level, asking, run_at_once
+from upright.experiments.stand.live import live_stand
+from upright.experiments.stand.strength import SHARE
+from upright.experiments.stand.twin import TwinStand
+from upright.progress import silent
+from upright.rig.makes import MAKES, make_rig
+
+LOOSE = """
+[rig]
+plant = "rectilinear-1"
+servo_period = "1 ms"
+travel = "0.1 m"
+[parameters]
+m_1 = { guess = "1 kg", min = 0 }
+k_1 = "0 N/m"
+c_1 = { guess = "1 N s/m", min = 0 }
+[actuator]
+gain = { guess = "2 N/V", min = 0 }
+limit = { value = "5 V", measured = true }
+[sensors.x_1]
+column = "x_1"
+counts_per_m = { value = 20000, measured = true }
+"""
+
+
+@pytest.fixture
+def own(tmp_path):
+    """A twin of a rig that only its owner's study tells of."""
+    (tmp_path / "study.toml").write_text(OWN, encoding="utf-8")
+    (tmp_path / "RIG.toml").write_text('kind = "twin"\nstudy = "study.toml"\n', encoding="utf-8")
+    return live_stand(tmp_path / "RIG.toml")
+
+
+def test_the_band_holds_the_swing_of_a_rig_that_nobody_makes(own):
+    asked = asking(own)
+    p = own.rig.plant
+    # arm free: the pendulum swings faster than on a fixed hinge, by the inertia that it takes along
+    J, arm = p.J_p + p.m_p * p.l_cg**2, p.J_d + p.m_p * p.r**2
+    swing = math.sqrt(p.m_p * p.g * p.l_cg / (J - (p.m_p * p.l_cg * p.r) ** 2 / arm))
+    assert asked.band[0] < swing < asked.band[1]
+    assert asked.band[0] == pytest.approx(0.4 * swing, rel=0.01)
+    assert asked.reach[0] <= 0.25 * 2.0
+
+
+def test_no_coordinate_is_to_go_further_than_asked(own):
+    """By scipy's simulation of the model, after its transient."""
+    asked = asking(own)
+    level = _level(own, asked, SHARE * own.rig.limit)
+    u = level * np.tile(asked.wave, 6)
+    model = own.rig.linear("hanging")
+    # the arm drifts freely, which is no answer to the wave: only what repeats is looked at
+    t = np.arange(u.size) * own.rig.period
+    _, y, _ = lsim((model.A, model.B, model.C, np.zeros((2, 1))), u, t)
+    last = y[-asked.wave.size :]
+    swings = np.ptp(last - np.linspace(last[0], last[-1], len(last)), axis=0) / 2
+    assert np.max(swings / asked.reach) == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_limit_of_the_file_bounds_what_is_asked_and_the_rest_is_the_descriptions(tmp_path):
+    assert asking(made(tmp_path)).reach[0] == MAKES["furuta"].reach[0]
+    limited = 'kind = "twin"\nmake = "furuta"\n[limits]\ncommand = "4 V"\n'
+    assert asking(made(tmp_path, limited)).reach[0] == MAKES["furuta"].reach[0]
+    narrow = asking(made(tmp_path, limited + '[limits.psi]\ntravel = "1 rad"\n'))
+    assert narrow.reach[0] == pytest.approx(0.25)
+
+
+def test_what_does_not_swing_is_told_what_else_identifies_it(tmp_path):
+    (tmp_path / "study.toml").write_text(LOOSE, encoding="utf-8")
+    (tmp_path / "RIG.toml").write_text('kind = "twin"\nstudy = "study.toml"\n', encoding="utf-8")
+    with pytest.raises(BadInput, match=r"does not swing.*upright identify"):
+        asking(live_stand(tmp_path / "RIG.toml"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("live", [True, False])
+def test_a_twin_with_dry_friction_is_identified_on_either_stand(live, tmp_path):
+    truth = make_rig("rectilinear", 3)
+    text = 'kind = "twin"\nmake = "rectilinear"\nseed = 3\n'
+    stand = made(tmp_path, text) if live else TwinStand(rig=truth, make=MAKES["rectilinear"])
+    fit = run_at_once(stand, tmp_path / "1b", silent).fit
+    # not the lag, whose interval of 0.1 us is finer than that the twin steps twice a period and the fit once
+    firm = {n: e for n, e in fit.estimates.items() if e.status == "firm"}
+    for name, true in {**truth.plant.parameters(), "actuator.gain": truth.gain}.items():
+        if name in firm:
+            assert firm[name].interval[0] <= true <= firm[name].interval[1], name
+    assert firm
+    assert fit.trusted
