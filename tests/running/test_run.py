@@ -25,7 +25,7 @@ from upright.rigs.rigfile import read_rig_file
 from upright.running import run as run_module
 from upright.running.chapter import run_chapter
 from upright.running.rig import described, open_loop, stage_of
-from upright.running.run import RunRequest, run_rig
+from upright.running.run import RunRequest, fresh, run_rig
 
 RIG = make_rig("furuta")
 LINEAR = RIG.linear("inverted")
@@ -247,6 +247,16 @@ def test_a_signal_on_a_real_rig_rests_on_no_model_and_a_law_on_that_of_its_desig
     assert run_rig(blind, tmp_path).basis == MEASURED
     assert run_rig(held, tmp_path).basis.level != MEASURED.level
     assert paces == [False, True, True]
+
+
+def test_logs_of_one_folder_are_numbered_from_the_second_on(tmp_path):
+    names = []
+    for _ in range(4):
+        path = fresh(tmp_path, "run", ".mcap")
+        path.write_bytes(b"")
+        names.append(path.name)
+    assert names == ["run.mcap", "run-2.mcap", "run-3.mcap", "run-4.mcap"]
+    assert fresh(tmp_path, "other", ".mcap").name == "other.mcap"
 
 
 def test_a_rig_that_refuses_its_limits_has_no_log(folder, tmp_path):
