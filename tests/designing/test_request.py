@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.linalg import solve_continuous_are
 
 import upright as up
 from upright.designing.estimators import chosen, estimators
@@ -156,3 +157,17 @@ def test_a_law_that_tracks_comes_to_its_reference_and_another_has_none(track):
     assert done.law.target == pytest.approx([0.0, math.pi])
     with pytest.raises(BadInput, match="nothing called 'phi' is measured; --track one of psi, theta"):
         design_for(ARM, DesignRequest(at="inverted", poles=(-4.0, -5.0, -16.0, -3.0), track="phi"))
+
+
+def test_gains_of_samples_meet_the_poles_of_least_cost_in_the_loop_as_it_runs():
+    """Those of the continuous loop by scipy's Riccati equation, among the poles of the sampled one."""
+    model = ARM.linear("inverted")
+    S = solve_continuous_are(model.A, model.B, np.diag([1.0, 0.0, 10.0, 0.0]), [[0.05]])
+    wanted = np.linalg.eigvals(model.A - model.B @ (model.B.T @ S / 0.05))
+    asked = DesignRequest(
+        at="inverted", weights=(1.0, 0.0, 10.0, 0.0), R=0.05, period=2e-3, speed="plain", sampled=True
+    )
+    done = design_for(ARM, asked)
+    for pole in wanted:
+        assert np.abs(done.poles - pole).min() < 1e-5 * abs(pole)
+        assert np.abs(done.wanted - pole).min() < 1e-6 * abs(pole)
