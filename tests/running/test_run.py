@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import upright as up
+from upright.basis import MEASURED
 from upright.errors import BadInput
 from upright.gains import feedback, filtered, place, prefilter
 from upright.laws import as_values
@@ -20,9 +21,11 @@ from upright.realtime.session import QUIET, RunEnd, RunOrder, carry_out
 from upright.report.run import chapter, draw_run
 from upright.rig.makes import make_rig
 from upright.rigs import Fault
+from upright.rigs.rigfile import read_rig_file
+from upright.running import run as run_module
 from upright.running.chapter import run_chapter
-from upright.running.rig import open_loop, read_law, stage_of
-from upright.running.run import RunRequest, run_rig
+from upright.running.rig import described, open_loop, read_law, stage_of
+from upright.running.run import RunRequest, fresh, run_rig
 
 RIG = make_rig("furuta")
 LINEAR = RIG.linear("inverted")
@@ -234,6 +237,37 @@ def test_a_loop_waits_for_a_driven_body_that_is_off_its_start_window(folder, tmp
     assert not done.stopped
     assert done.target[0] == pytest.approx(0.1, abs=1e-3)
     assert waited[-1] - waited[0] == pytest.approx(2.0 + QUIET, abs=0.01)
+
+
+def test_a_signal_on_a_real_rig_rests_on_no_model_and_a_law_on_that_of_its_design(folder, tmp_path, monkeypatch):
+    """As if the twin were a rig: its loop would run in another process, at the pace of the clock on the wall."""
+    paces = []
+
+    def beside(order, *, watch, paced):
+        paces.append(paced)
+        return RunEnd(stopped="It was not run.")
+
+    monkeypatch.setattr(run_module, "run_in_process", beside)
+    blind = RunRequest(rig=folder / "RIG.toml", excite="free", seconds=0.05, check=False)
+    held = replace(blind, excite="", law=folder / "design.json")
+    model = described(read_rig_file(folder / "RIG.toml"))[0].basis
+    assert run_rig(replace(blind, own_process=True), tmp_path).basis == model  # a twin is one
+    assert paces == [False]
+    real = replace(read_rig_file(folder / "RIG.toml"), performed="")
+    monkeypatch.setattr(run_module, "read_rig_file", lambda path: real)
+    assert run_rig(blind, tmp_path).basis == MEASURED
+    assert run_rig(held, tmp_path).basis.level != MEASURED.level
+    assert paces == [False, True, True]
+
+
+def test_logs_of_one_folder_are_numbered_from_the_second_on(tmp_path):
+    names = []
+    for _ in range(4):
+        path = fresh(tmp_path, "run", ".mcap")
+        path.write_bytes(b"")
+        names.append(path.name)
+    assert names == ["run.mcap", "run-2.mcap", "run-3.mcap", "run-4.mcap"]
+    assert fresh(tmp_path, "other", ".mcap").name == "other.mcap"
 
 
 def test_a_rig_that_refuses_its_limits_has_no_log(folder, tmp_path):

@@ -55,6 +55,12 @@ def test_of_signs_that_only_count_together_one_is_named() -> None:
     assert told(wrong_conventions(ARM, [replace(run, y=run.y * [1.0, -1.0])])) == ({"theta"}, set())
 
 
+def test_one_driven_run_tells_the_signs_of_a_free_one_beside_it() -> None:
+    """Both signs are reversed in both runs; the free one obeys its equations all the same."""
+    both = [replace(run, y=-run.y) for run in (moved(0.1, 0.3), moved(0.0, 0.3))]
+    assert told(wrong_conventions(ARM, both)) == ({"psi", "theta"}, set())
+
+
 def test_a_zero_upright_is_named_and_no_sign_with_it() -> None:
     run = noisy(swing(angle=1.2), 1e-4, seed=2)
     assert told(wrong_conventions(ROD, [replace(run, y=run.y + np.pi)])) == (set(), {"theta"})

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -76,6 +78,9 @@ def test_what_is_known_or_assumed_is_no_number_that_is_left_out():
     known = rig(Furuta, {**FURUTA, "k_psi": 0.02}, {"J_d": 0.01})
     assert not any("k_psi" in numbers for numbers in missing_numbers(known, [run]))
     assert "k_psi" in missing_numbers(asked(Furuta, FURUTA, "J_d"), [run])[0]
+    assert missing_numbers(asked(Furuta, FURUTA), [run]) == []  # of numbers that are all known nothing is asked
+    short = replace(run, t=run.t[:5], u=run.u[:5], y=run.y[:5])
+    assert missing_numbers(asked(Furuta, FURUTA, "J_d"), [short]) == []
     reversed_arm = Run(**{**vars(run), "y": run.y * [-1.0, 1.0]})
     fit = identify(asked(Furuta, FURUTA, "J_d", "b_1", "b_1c"), [reversed_arm])
     assert fit.proposed == {}
