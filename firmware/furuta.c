@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "furuta_equations.h"
+
 static const struct {
     const char *name;
     size_t at;
@@ -19,6 +21,7 @@ static const struct {
     {"b_1", offsetof(furuta_t, b_1), true},
     {"b_2", offsetof(furuta_t, b_2), true},
     {"g", offsetof(furuta_t, g), true},
+    {"k_psi", offsetof(furuta_t, k_psi), false},
     {"gain", offsetof(furuta_t, gain), true},
     {"step", offsetof(furuta_t, step), true},
     {"counts_psi", offsetof(furuta_t, counts[0]), true},
@@ -56,16 +59,13 @@ const char *furuta_missing(const furuta_t *rig) {
 }
 
 static void speeds(const furuta_t *p, const double x[4], double T, double x_dot[4]) {
-    double psi_dot = x[1], theta_dot = x[3], s = sin(x[2]), c = cos(x[2]);
-    double J_A = p->J_p + p->m_p * p->l_cg * p->l_cg, k = p->m_p * p->r * p->l_cg;
-    double M11 = p->J_d + p->m_p * p->r * p->r + J_A * s * s + p->J_a * c * c, M12 = -k * c;
-    double f1 = T - 2 * theta_dot * psi_dot * s * c * (J_A - p->J_a) - k * s * theta_dot * theta_dot - p->b_1 * psi_dot;
-    double f2 = -p->m_p * p->g * p->l_cg * s + s * c * psi_dot * psi_dot * (J_A - p->J_a) - p->b_2 * theta_dot;
-    double D = M11 * J_A - M12 * M12;
-    x_dot[0] = psi_dot;
-    x_dot[1] = (J_A * f1 - M12 * f2) / D;
-    x_dot[2] = theta_dot;
-    x_dot[3] = (M11 * f2 - M12 * f1) / D;
+    double M[2][2], f[2];
+    furuta_equations(p, x, T, M, f);
+    double D = M[0][0] * M[1][1] - M[0][1] * M[1][0];
+    x_dot[0] = x[1];
+    x_dot[1] = (M[1][1] * f[0] - M[0][1] * f[1]) / D;
+    x_dot[2] = x[3];
+    x_dot[3] = (M[0][0] * f[1] - M[1][0] * f[0]) / D;
 }
 
 void furuta_move(furuta_t *rig, double torque, double dt) {

@@ -1,11 +1,12 @@
 /* Furuta pendulum on a drive, to test firmware on: eq. (3) of ASEE 2006-1008 with viscous friction, theta = 0 hanging.
- * Every number comes from whoever starts it; none is assumed. */
+ * Every number comes from whoever starts it; none is assumed, but that nothing anchors the arm. */
 #ifndef FURUTA_H
 #define FURUTA_H
 #include <stdbool.h>
 
 typedef struct {
     double m_p, l_cg, r, J_d, J_p, J_a, b_1, b_2, g; /* as in src/upright/physics/pendulums.py */
+    double k_psi;     /* anchors the arm to ground; 0 when nobody says */
     double gain;      /* torque per unit of command */
     double step;      /* command of one step of the converter */
     double counts[2]; /* per rad */
