@@ -153,6 +153,14 @@ def test_columns_called_as_the_coordinates_of_a_rig_are_believed(form):
     assert found.columns["psi"].name == form.format("psi")
 
 
+def test_theta_and_alpha_are_arm_and_pendulum():
+    """As Quanser calls them; a flexible link has coordinates of these names, and is drafted where it is named."""
+    record = log(theta=SWING, alpha=OTHER)
+    record = record.replace(units=dict.fromkeys(record.names, "rad"))
+    assert recognise(record, inspect(record)).plant == "furuta"
+    assert recognise(record, inspect(record), "flexible-link").plant == "flexible-link"
+
+
 def test_a_column_without_a_unit_counts_only_where_none_has_one():
     assert positions(log(c1=SWING, c2=OTHER)) == [("c1", ""), ("c2", "")]
     assert positions(log(c1=SWING, theta=OTHER)) == [("theta", "rad")]

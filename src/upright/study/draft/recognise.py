@@ -240,9 +240,14 @@ def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
 
 
 def _by_coordinates(names: set[str]) -> str:
-    """The only plant whose coordinates have just these names, two at least of our own; empty where there is none."""
+    """The only plant whose coordinates have just these names; empty where there is none.
+
+    Of our own only those that carry a pendulum: theta and alpha are arm and pendulum of Quanser's QUBE as well as hub
+    and link of a flexible one.
+    """
     fitting = [n for n, plant in PLANTS.sound().items() if {c.name for c in plant.coordinates} == names]
-    return fitting[0] if len(fitting) == 1 and (len(names) > 1 or fitting[0] not in PLANTS.own) else ""
+    own = len(names) > 1 and names <= set(_COORDINATES)
+    return fitting[0] if len(fitting) == 1 and (own or fitting[0] not in PLANTS.own) else ""
 
 
 def _assign(plant: type[Plant], places: list[Column]) -> tuple[dict[str, Column], list[str]]:
