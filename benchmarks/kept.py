@@ -1,13 +1,14 @@
 """How much of what moves does the study keep that `init` drafts for a log, and do intervals hold that rest on it?
 
-300 twins, 60 of each of five plants, every number drawn within a factor of 1.6. Each is driven by steps or let go,
-rests for a second before that or moves from the first sample on, rests for a second at the end or moves on to the
-last sample, and its command stands in a column that is called so or has to be found (of one that is let go: a column
-of zeros, or none). Angles have white noise of 0 to 0.02 rad, lengths a hundredth of that in metres, and encoders
-round. What moves is known, since the motion is: a coordinate goes through 2 % of its range, and more than the noise's
-standard deviation, within a quarter of a second. Asked: in 95 of 100 cases the windows of the drafted study keep 90 %
-of it. Every fifth log is then identified as drafted, placeholders replaced by what their owner would have measured;
-of n honest intervals 95 % hold the truth, give or take ``1.96 sqrt(0.95 * 0.05 / n)``.
+300 twins, 60 of each of five plants, every number drawn within a factor of 1.6. Each is driven by steps or let go
+(once, or thrice, with a hand that brings it back), rests for a second before that or moves from the first sample on,
+rests for a second at the end or moves on to the last sample, and its command stands in a column that is called so or
+has to be found (of one that is let go: a column of zeros, or none). Angles have white noise of 0 to 0.02 rad, lengths
+a hundredth of that in metres, and encoders round. What moves is known, since the motion is: a coordinate goes, before
+and after, through 2 % of its range, and more than the noise's standard deviation, within a quarter of a second, and
+no hand is on it. Asked: in 95 of 100 cases the windows of the drafted study keep 90 % of it. Every fifth log is then
+identified as drafted, placeholders replaced by what their owner would have measured; of n honest intervals 95 % hold
+the truth, give or take ``1.96 sqrt(0.95 * 0.05 / n)``.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ from upright.workers import HERE, Workers
 
 DT, REST, MOVED, LONGEST = 5e-3, 1.0, 8.0, 60.0
 """Sample period, rest, motion that is logged, and motion that is waited for until it has died away [s]."""
+HAND, RELEASES = 1.0, (1.0, -0.7, 0.85)
+"""How long a hand takes to bring something back and to hold it [s], and how far, as shares of the first time."""
 KEPT, CASES, MOVES, WITHIN = 0.9, 0.95, 0.02, 0.25
 NOISE = 0.0, 0.0067, 0.0133, 0.02
 EVERY = 5
@@ -53,6 +56,8 @@ class Case:
     after: bool
     named: bool
     noise: float
+    again: bool
+    """Whether a hand brings what is let go back and lets it go again, twice."""
 
     @property
     def name(self) -> str:
@@ -87,7 +92,7 @@ def cases(each: int) -> list[Case]:
     return [
         Case(
             place=place, number=k, driven=bool(k & 1), before=bool(k & 2), after=bool(k & 4), named=bool(k & 8),
-            noise=NOISE[(k // 16) % len(NOISE)],
+            noise=NOISE[(k // 16) % len(NOISE)], again=not k & 1 and bool((k >> 1 ^ k >> 2 ^ k >> 4) & 1),
         )
         for place in range(len(MAKES)) for k in range(each)
     ]  # fmt: skip
@@ -96,39 +101,83 @@ def cases(each: int) -> list[Case]:
 def twin(case: Case) -> Twin:
     """Log and truth of one case."""
     from upright.physics import find
-    from upright.simulation import simulate
 
     make = MAKES[case.place]
     generator = np.random.default_rng(70_000 + 1000 * case.place + case.number)
     plant = find(make.plant)
     numbers, _ = drawn(make, generator)
     gain = GAIN.get(make.plant, 0.1)
-    rest, longest = round(REST / DT), round(LONGEST / DT)
-    u = np.zeros((longest, 1))
-    start: dict[str, float] = {}
-    if case.driven:
-        u[: round(MOVED / DT)] = command(make.force or TORQUE, round(MOVED / DT), generator)
-        u = np.roll(u, -int(np.argmax(u != 0)))  # it begins with the command
-    else:
-        start = LET_GO.get(make.plant, make.start)
-    x0 = [start.get(n, 0.0) for n in plant.state_names()]
-    x = simulate(plant(**numbers, **make.known), {"actuator.gain": gain}, x0, u / gain, DT, samples=longest, substeps=2)
-    clean = x[:, ::2, 0]
-    last = int(np.flatnonzero(moving(clean, case.noise * _scale(make)))[-1])
-    samples = min(last + rest, longest) if case.after else min(round(MOVED / DT), round(0.6 * last))
-    clean, u = clean[:samples], u[:samples]
-    if case.before:
-        clean, u = np.concatenate([np.repeat(clean[:1], rest, 0), clean]), np.concatenate([np.zeros((rest, 1)), u])
     loud = case.noise * _scale(make)
+    clean, u, moves = _driven(case, numbers, gain, loud, generator) if case.driven else _let_go(case, numbers, loud)
+    if case.before:
+        rest = round(REST / DT)
+        clean = np.concatenate([np.repeat(clean[:1], rest, 0), clean])
+        u, moves = np.concatenate([np.zeros(rest), u]), np.concatenate([np.zeros(rest, bool), moves])
     y = np.round((clean + loud * generator.normal(size=clean.shape)) / make.quantum) * make.quantum
     columns = {c.name: (c.unit, y[:, i]) for i, c in enumerate(plant.coordinates)}
     if case.named:
-        columns["u"] = ("V", u[:, 0] / gain)
+        columns["u"] = ("V", u / gain)
     elif case.driven:
-        columns["channel 7"] = ("", u[:, 0] / gain)
+        columns["channel 7"] = ("", u / gain)
     truth = numbers | make.known | {"actuator.gain": gain}
     source = Source(name=case.name, t=np.arange(len(y)) * DT, columns=columns, truth=truth, plant=make.plant)
-    return Twin(source=source, moves=moving(clean, loud))
+    return Twin(source=source, moves=moves)
+
+
+def _moved(make: Make, numbers: dict[str, float], x0: Sequence[float], u: np.ndarray) -> np.ndarray:
+    """Coordinates (N, n) of a twin that begins in a state and feels a force (N,)."""
+    from upright.physics import find
+    from upright.simulation import simulate
+
+    plant = find(make.plant)(**numbers, **make.known)
+    x = simulate(plant, {}, list(x0), u[:, None], DT, samples=len(u), substeps=2)
+    return x[:, ::2, 0]
+
+
+def _driven(
+    case: Case, numbers: dict[str, float], gain: float, loud: np.ndarray, generator: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Coordinates, force and where they move, from the first command on."""
+    make, moved = MAKES[case.place], round(MOVED / DT)
+    u = np.zeros(round(LONGEST / DT))
+    u[:moved] = command(make.force or TORQUE, moved, generator)[:, 0]
+    u = np.roll(u, -int(np.argmax(u != 0)))
+    clean = _moved(make, numbers, [0.0] * 2 * len(make.quantum), u)
+    moves = moving(clean, loud)
+    samples = _end(case, moves)
+    return clean[:samples], u[:samples], moves[:samples]
+
+
+def _let_go(case: Case, numbers: dict[str, float], loud: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Coordinates, no force, and where they move by themselves, from the first release on."""
+    from upright.physics import find
+
+    make = MAKES[case.place]
+    names = [c.name for c in find(make.plant).coordinates]
+    start = LET_GO.get(make.plant, make.start)
+    begun = np.array([start.get(n, 0.0) for n in names])
+    by_hand = np.array([n in start or make.plant in LET_GO for n in names])
+    places, motions = np.zeros((0, len(names))), np.zeros(0, bool)
+    sizes = RELEASES if case.again else RELEASES[:1]
+    for k, size in enumerate(sizes):
+        if k:
+            way = np.minimum(np.arange(round(HAND / DT)) / round(HAND / DT / 2), 1.0)[:, None]
+            to = np.where(by_hand, size * begun, places[-1])
+            places = np.concatenate([places, (1 - way) * places[-1] + way * to])
+            motions = np.concatenate([motions, np.zeros(len(way), bool)])
+        at = np.where(by_hand, size * begun, places[-1] if k else begun)
+        clean = _moved(make, numbers, np.stack([at, 0 * at], axis=1).ravel().tolist(), np.zeros(round(LONGEST / DT)))
+        moves = moving(clean, loud)
+        samples = _end(case, moves) if k + 1 == len(sizes) else int(np.flatnonzero(moves)[-1])
+        places = np.concatenate([places, clean[:samples]])
+        motions = np.concatenate([motions, moves[:samples]])
+    return places, np.zeros(len(places)), motions
+
+
+def _end(case: Case, moves: np.ndarray) -> int:
+    """Sample at which a log ends: at rest, or in motion."""
+    last = int(np.flatnonzero(moves)[-1])
+    return min(last + round(REST / DT), len(moves)) if case.after else min(round(MOVED / DT), round(0.6 * last))
 
 
 def _scale(make: Make) -> np.ndarray:
@@ -139,15 +188,15 @@ def _scale(make: Make) -> np.ndarray:
 
 
 def moving(clean: np.ndarray, loud: np.ndarray) -> np.ndarray:
-    """Samples (N,) about which a coordinate (N, n) goes through more than a share of its range, and than its noise."""
+    """Samples (N,) before and after which a coordinate (N, n) goes through more than a share of its range, and than its
+    noise."""
     width = max(2, round(WITHIN / DT))
     if len(clean) <= width:
         return np.ones(len(clean), bool)
     reach = np.ptp(np.lib.stride_tricks.sliding_window_view(clean, width, axis=0), axis=2)
     seen = (reach > np.maximum(MOVES * np.ptp(clean, axis=0), loud)).any(axis=1)
-    out = np.zeros(len(clean), bool)
-    out[width // 2 : width // 2 + seen.size] = seen
-    return out
+    beyond = np.ones(width - 1, bool)  # nobody sees what was before the first sample and comes after the last
+    return np.concatenate([beyond, seen]) & np.concatenate([seen, beyond])
 
 
 def share_kept(t: np.ndarray, moves: np.ndarray, windows: Sequence[tuple[float, float]]) -> float:
@@ -241,11 +290,11 @@ def _groups(done: Sequence[Kept]) -> dict[str, list[Kept]]:
     out: dict[str, list[Kept]] = {}
     for k in done:
         c = k.case
-        for name in (
-            MAKES[c.place].plant, "driven" if c.driven else "let go", "rests before" if c.before else "moves at once",
-            "rests after" if c.after else "moves to the end", "drive named" if c.named else "drive to be found",
-            f"noise {c.noise:g} rad",
-        ):  # fmt: skip
+        motion = "driven" if c.driven else "let go thrice" if c.again else "let go once"
+        first = "rests before" if c.before else "moves at once"
+        last = "rests after" if c.after else "moves to the end"
+        drive = "drive named" if c.named else "drive to be found"
+        for name in (MAKES[c.place].plant, motion, first, last, drive, f"noise {c.noise:g} rad"):
             out.setdefault(name, []).append(k)
     return out
 
@@ -288,9 +337,8 @@ def _page(done: Sequence[Kept]) -> str:
             continue
         how = ["driven" if c.driven else "let go", "rests before" * c.before, "rests after" * c.after]
         how += ["named" if c.named else "found", f"noise {c.noise:g}"]
+        how += ["thrice"] if c.again else []
         missed += "" if k.trusted or not missed else " (not trusted)"
-        body.append(
-            f"| {c.name} | {', '.join(filter(None, how))} | {k.moved:.1f} | {100 * k.share:.0f} | {k.said.replace('|', '/')}"
-            f" | {missed} |"
-        )
+        told = (c.name, ", ".join(filter(None, how)), f"{k.moved:.1f}", f"{100 * k.share:.0f}", k.said, missed)
+        body.append("| " + " | ".join(x.replace("|", "/") for x in told) + " |")
     return page("kept", "What moves is kept", __doc__, body)
