@@ -33,7 +33,7 @@ DT, REST, MOVED, LONGEST = 5e-3, 1.0, 8.0, 60.0
 """Sample period, rest, motion that is logged, and motion that is waited for until it has died away [s]."""
 HAND, RELEASES = 1.0, (1.0, -0.7, 0.85)
 """How long a hand takes to bring something back and to hold it [s], and how far, as shares of the first time."""
-KEPT, CASES, MOVES, WITHIN = 0.9, 0.95, 0.02, 0.25
+KEPT, CASES, MOVES, WITHIN, PAUSE = 0.9, 0.95, 0.02, 0.25, 1.0
 NOISE = 0.0, 0.0067, 0.0133, 0.02
 EVERY = 5
 """One in so many logs is identified."""
@@ -189,14 +189,17 @@ def _scale(make: Make) -> np.ndarray:
 
 def moving(clean: np.ndarray, loud: np.ndarray) -> np.ndarray:
     """Samples (N,) before and after which a coordinate (N, n) goes through more than a share of its range, and than its
-    noise."""
+    noise; where a slow swing turns is no rest."""
     width = max(2, round(WITHIN / DT))
     if len(clean) <= width:
         return np.ones(len(clean), bool)
     reach = np.ptp(np.lib.stride_tricks.sliding_window_view(clean, width, axis=0), axis=2)
     seen = (reach > np.maximum(MOVES * np.ptp(clean, axis=0), loud)).any(axis=1)
     beyond = np.ones(width - 1, bool)  # nobody sees what was before the first sample and comes after the last
-    return np.concatenate([beyond, seen]) & np.concatenate([seen, beyond])
+    out = np.concatenate([beyond, seen]) & np.concatenate([seen, beyond])
+    for first, last in stretches(out, gap=round(PAUSE / DT)):
+        out[first : last + 1] = True
+    return out
 
 
 def share_kept(t: np.ndarray, moves: np.ndarray, windows: Sequence[tuple[float, float]]) -> float:
@@ -220,6 +223,8 @@ def met(case: Case) -> Kept:
             up.init(log, out=study, plant=made.source.plant)
         except UprightError as error:
             return Kept(case=case, share=0.0, said=str(error).splitlines()[0])
+        except Exception as error:  # what a stranger must never meet
+            return Kept(case=case, share=0.0, said=f"{type(error).__name__}: {error}")
         drafted = tomllib.loads(study.read_text(encoding="utf-8"))
         windows = [tuple(r["window"]) for r in drafted["runs"]]
         said = ", ".join(f"{a:.3g} to {b:.3g} s" for a, b in windows)
