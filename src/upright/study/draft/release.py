@@ -123,6 +123,9 @@ CYCLES = 1.0
 GAUSSIANS = 1 / 20, 1 / 5
 """Standard deviations of what smooths a chain's accelerations, in periods, at least and at most as noise demands."""
 
+MOST = 20_000
+"""Samples of a log of a chain that are looked at; of more, every second or third."""
+
 ROUNDS = 20
 """Of weighted least squares that come to least absolute errors."""
 
@@ -150,7 +153,7 @@ def free_stretches(t: Array, bodies: Sequence[Array]) -> list[tuple[float, float
 
     Springs and friction accelerate a body: its acceleration is linear in its speed, the places of all bodies and the
     sign of its speed. A hand that pulls or holds it does not follow that. All terms go through the same Gaussian, so
-    that they stay in proportion however wide it is, and it is as wide as a third of a period.
+    that they stay in proportion however wide it is; it is as narrow as noise allows.
 
     Parameters
     ----------
@@ -162,8 +165,10 @@ def free_stretches(t: Array, bodies: Sequence[Array]) -> list[tuple[float, float
     Returns
     -------
     list of (float, float)
-        None where the accelerations are not explained.
+        Empty where springs and friction do not explain the accelerations, or nothing swings.
     """
+    every = math.ceil(t.size / MOST)
+    t, bodies = t[::every], [x[::every] for x in bodies]
     dt = float(t[-1] - t[0]) / (t.size - 1)
     widest = max(float(np.ptp(x)) for x in bodies)
     moving = [x for x in bodies if float(np.ptp(x)) > TRAVELS * widest]
@@ -177,7 +182,7 @@ def free_stretches(t: Array, bodies: Sequence[Array]) -> list[tuple[float, float
         if by is None:
             return []
         hand |= by
-    width = max(round(max(period, LASTING) / dt), 3)
+    width = min(max(round(max(period, LASTING) / dt), 3), t.size)
     reach = np.max([_reach(x, width) / float(np.ptp(x)) for x in moving], axis=0)
     edge, least = math.ceil(sigma), CYCLES * period / dt
     out: list[tuple[float, float]] = []
@@ -209,11 +214,9 @@ def _width(x: Array, period: float) -> float:
 
 def _period(x: Array, dt: float) -> float:
     """Period [s] in which a body's acceleration has most of its power."""
-    from scipy.fft import rfft, rfftfreq
-
     shape = np.hanning(x.size)
-    f = rfftfreq(x.size, dt)
-    power = np.abs(rfft((x - np.linspace(x[0], x[-1], x.size)) * shape)) ** 2
+    f = np.fft.rfftfreq(x.size, dt)
+    power = np.abs(np.fft.rfft((x - np.linspace(x[0], x[-1], x.size)) * shape)) ** 2
     power[(f > 1 / (8 * dt)) | (power < SURE**2 * white_noise(x) ** 2 * float(np.sum(shape**2)))] = 0.0
     return float(1 / f[max(int(np.argmax(power * f**4)), 1)])
 
@@ -231,6 +234,8 @@ def _by_hand(x: Array, bodies: Sequence[Array], sigma: float) -> NDArray[np.bool
     pull = float(np.quantile(np.abs(a[edge:-edge]), 0.99))
     large = np.abs(a) > LARGE * pull  # a body that is held still, or pulled slowly, tells nothing of its springs
     large[:edge] = large[-edge:] = False
+    if not large.any():
+        return None
     weight = np.ones_like(a)
     left = np.zeros_like(a)
     for _ in range(ROUNDS):  # least absolute errors, which a hand that jerks or lets go pulls at little
@@ -248,7 +253,8 @@ def _by_hand(x: Array, bodies: Sequence[Array], sigma: float) -> NDArray[np.bool
 
 def _reach(x: Array, width: int) -> Array:
     """What a body (N,), its noise smoothed, goes through within as many samples from each on, (N - width + 1,)."""
-    from scipy.ndimage import gaussian_filter1d
+    from scipy.ndimage import gaussian_filter1d, maximum_filter1d, minimum_filter1d
 
-    windows = np.lib.stride_tricks.sliding_window_view(gaussian_filter1d(x, width / 10, mode="nearest"), width)
-    return np.asarray(np.ptp(windows, axis=1), dtype=np.float64)
+    smooth = gaussian_filter1d(x, width / 10, mode="nearest")
+    centred = np.asarray(maximum_filter1d(smooth, width) - minimum_filter1d(smooth, width), dtype=np.float64)
+    return centred[width // 2 : width // 2 + x.size - width + 1]
