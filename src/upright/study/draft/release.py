@@ -135,8 +135,12 @@ FEWEST = 2.5
 LARGE = 0.2
 """Share of the largest acceleration from which a body of a chain is surely not held."""
 
-DEAD = 0.002
-"""Share of its range that a body still goes through in a period once its swing has died away."""
+DEAD, DIED = 0.002, 0.01
+"""Share of its range by which a body still goes through more in a period than it will, and in all, once its swing has
+died away."""
+
+GOES = 0.5
+"""Share of its widest swing that a body goes through in a period from where a free stretch begins."""
 
 LASTING = 0.25
 """Seconds within which it does, where a period is shorter."""
@@ -168,17 +172,40 @@ def free_stretches(t: Array, bodies: Sequence[Array]) -> list[tuple[float, float
         Empty where springs and friction do not explain the accelerations, or nothing swings.
     """
     every = math.ceil(t.size / MOST)
-    t, bodies = t[::every], [x[::every] for x in bodies]
-    dt = float(t[-1] - t[0]) / (t.size - 1)
+    bodies = [x[::every] for x in bodies]
     widest = max(float(np.ptp(x)) for x in bodies)
-    moving = [x for x in bodies if float(np.ptp(x)) > TRAVELS * widest]
+    return _unheld(t[::every], [x for x in bodies if float(np.ptp(x)) > TRAVELS * widest], bodies)
+
+
+def free_swings(t: Array, theta: Array, hinge: Array | None = None) -> list[tuple[float, float]]:
+    """Stretches (start, stop) [s] in which no hand is on a pendulum, as `free_stretches` tells those of a chain.
+
+    Parameters
+    ----------
+    t : (N,) array
+        Time [s].
+    theta : (N,) array
+        Angle from where it hangs [rad].
+    hinge : (N,) array, optional
+        Coordinate that moves its hinge.
+    """
+    every = math.ceil(t.size / MOST)
+    theta = theta[::every]
+    return _unheld(t[::every], [theta], [np.sin(theta)], hinge[::every] if hinge is not None else None)
+
+
+def _unheld(
+    t: Array, moving: Sequence[Array], pulls: Sequence[Array], hinge: Array | None = None
+) -> list[tuple[float, float]]:
+    """Stretches in which `pulls`, friction and what the `hinge` does accelerate what moves, and nothing else."""
+    dt = float(t[-1] - t[0]) / (t.size - 1)
     period = max(_period(x, dt) for x in moving)
     if t.size < FEWEST * period / dt:
         return []
     sigma = max(_width(x, period / dt) for x in moving)
     hand = np.zeros(t.size, bool)
     for x in moving:
-        by = _by_hand(x, bodies, sigma)
+        by = _by_hand(x, pulls, sigma, hinge)
         if by is None:
             return []
         hand |= by
@@ -191,10 +218,14 @@ def free_stretches(t: Array, bodies: Sequence[Array]) -> list[tuple[float, float
         inside = reach[first : last + 2 - width]
         if last - first < least or not inside.size:
             continue
+        begins = int(np.argmax(inside >= GOES * float(inside.max())))  # no hand is felt at rest, or upright
+        inside = inside[begins:]
         dead = int(np.argmax(inside <= float(inside.min()) + DEAD))  # a hand that pulls slowly is noticed late
-        if inside[: dead + 1].max() >= AT_LEAST * float(reach.max()):
-            more = round(period / dt) if b + 1 == t.size else 0  # no hand follows
-            out.append((float(t[first]), float(t[min(last, first + dead + width + more)])))
+        if b + 1 < t.size or inside.min() < DIED:  # else it swings on to the end of the log, and no hand follows
+            last = min(last, first + begins + dead + width)
+        first += begins
+        if last - first >= least and inside[: dead + 1].max() >= AT_LEAST * float(reach.max()):
+            out.append((float(t[first]), float(t[last])))
     return out
 
 
@@ -221,13 +252,16 @@ def _period(x: Array, dt: float) -> float:
     return float(1 / f[max(int(np.argmax(power * f**4)), 1)])
 
 
-def _by_hand(x: Array, bodies: Sequence[Array], sigma: float) -> NDArray[np.bool_] | None:
+def _by_hand(x: Array, pulls: Sequence[Array], sigma: float, hinge: Array | None) -> NDArray[np.bool_] | None:
     """Samples (N,) at which something else accelerates a body; None where its motion is not explained at all."""
     from scipy.ndimage import gaussian_filter1d
 
     a, v = (gaussian_filter1d(x, sigma, order=k, mode="nearest") for k in (2, 1))
     turns = gaussian_filter1d(np.sign(v) * (np.abs(v) > STILL * float(np.abs(v).max())), sigma, mode="nearest")
-    columns = [v, turns, *(gaussian_filter1d(y - np.median(y), sigma, mode="nearest") for y in bodies), np.ones_like(x)]
+    columns = [v, turns, *(gaussian_filter1d(y - np.median(y), sigma, mode="nearest") for y in pulls), np.ones_like(x)]
+    if hinge is not None:
+        thrown = gaussian_filter1d(hinge, sigma, order=2, mode="nearest")
+        columns.append(np.cos(gaussian_filter1d(x, sigma, mode="nearest")) * thrown)
     table = np.column_stack(columns)
     table /= np.maximum(np.abs(table).max(axis=0), 1e-300)
     edge = round(3 * sigma)
