@@ -219,6 +219,8 @@ def _unheld(
         if last - first < least or not inside.size:
             continue
         begins = int(np.argmax(inside >= GOES * float(inside.max())))  # no hand is felt at rest, or upright
+        if begins:
+            begins = min(begins + min(_leaves(x[first + begins :]) for x in moving), inside.size - 1)
         inside = inside[begins:]
         dead = int(np.argmax(inside <= float(inside.min()) + DEAD))  # a hand that pulls slowly is noticed late
         if b + 1 < t.size or inside.min() < DIED:  # else it swings on to the end of the log, and no hand follows
@@ -227,6 +229,11 @@ def _unheld(
         if last - first >= least and inside[: dead + 1].max() >= AT_LEAST * float(reach.max()):
             out.append((float(t[first]), float(t[last])))
     return out
+
+
+def _leaves(x: Array) -> int:
+    """First sample at which a body is no longer where it began."""
+    return int(np.argmax(np.abs(x - x[0]) > max(STILL * float(np.ptp(x)), SURE * white_noise(x))))
 
 
 def _width(x: Array, period: float) -> float:
