@@ -139,11 +139,14 @@ DEAD, DIED = 0.002, 0.01
 """Share of its range by which a body still goes through more in a period than it will, and in all, once its swing has
 died away."""
 
+HOLDS = 0.5
+"""Share of a period that a hand is on a body of a chain, or on a pendulum that is let go again, at least."""
+
 GOES = 0.5
 """Share of its widest swing that a body goes through in a period from where a free stretch begins."""
 
 LASTING = 0.25
-"""Seconds within which it does, where a period is shorter."""
+"""Seconds within which it does, where a period is shorter, and that a hand lasts, where a period is longer."""
 
 AT_LEAST, TRAVELS = 0.2, 0.2
 """Share of the widest swing that a free stretch has at least, and of the widest travel that a body has that counts."""
@@ -208,7 +211,8 @@ def _unheld(
         by = _by_hand(x, pulls, sigma, hinge)
         if by is None:
             return []
-        hand |= by
+        for a, b in stretches(by, gap=round(period / 2 / dt)):  # a body that sticks for a moment is in no hand
+            hand[a : b + 1] |= b - a > min(HOLDS * period, LASTING) / dt
     width = min(max(round(max(period, LASTING) / dt), 3), t.size)
     reach = np.max([_reach(x, width) / float(np.ptp(x)) for x in moving], axis=0)
     edge, least = math.ceil(sigma), CYCLES * period / dt
@@ -222,7 +226,8 @@ def _unheld(
         if begins:
             begins = min(begins + min(_leaves(x[first + begins :]) for x in moving), inside.size - 1)
         inside = inside[begins:]
-        dead = int(np.argmax(inside <= float(inside.min()) + DEAD))  # a hand that pulls slowly is noticed late
+        least_left = np.flatnonzero(inside <= float(inside.min()) + DEAD)  # a hand that pulls slowly is noticed late
+        dead = int(least_left[0] if inside.min() < DIED else least_left[-1])
         if b + 1 < t.size or inside.min() < DIED:  # else it swings on to the end of the log, and no hand follows
             last = min(last, first + begins + dead + width)
         first += begins
