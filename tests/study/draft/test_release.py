@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from upright.physics import CartPendulum, Pendulum
+from upright.physics import CartPendulum, Pendulum, find
 from upright.simulation import Held, simulate
+from upright.study.draft.release import free_stretches, free_swings
 
 DT = 0.01
 PENDULUM = Pendulum(m_p=0.2, l_cg=0.3, J_p=2e-3, b_2=2e-3, b_2c=1e-3)
@@ -111,3 +112,86 @@ def test_a_pendulum_that_is_held_upright_is_not_free_before_it_falls(drafted):
     theta = np.concatenate([held, swing(3.1, 3000)])
     _, study = drafted("pendulum", t=np.arange(theta.size) * DT, theta=theta)
     assert held.size * DT - DT <= study.runs[0].t[0] < held.size * DT + 2 * PERIOD  # it lingers before it falls
+
+
+AGAIN = (1.0, -0.7, 0.85)
+"""How far a hand brings something back each time, as shares of the first."""
+CHAINS = {
+    "torsional-2": ({"J_1": 2e-3, "J_2": 2e-3, "k_12": 2.0, "c_1": 2e-3, "c_2": 2e-3, "f_1c": 5e-3}, (0.0, 0.5), 1.0),
+    "rectilinear-2": (
+        {"m_1": 1.0, "m_2": 1.0, "k_1": 300.0, "k_12": 400.0, "c_1": 1.0, "c_2": 1.0}, (0.012, 0.02), 0.01,
+    ),
+}  # fmt: skip
+"""Numbers, where they are let go from, and how much 1 rad of noise is, by plant."""
+
+
+def by_hand(plant, places, dt, seconds):
+    """Coordinates (N, n), and each release and the next time that the hand comes [s].
+
+    The hand holds for 1 s; later it moves for 0.5 s and holds for 0.5 s.
+    """
+    away = np.array(places)
+    out, spans = [np.tile(away, (round(1 / dt), 1))], []
+    for k, share in enumerate(AGAIN):
+        if k:
+            way = np.minimum(np.arange(round(1 / dt)) * 2 * dt, 1.0)[:, None]
+            out.append((1 - way) * out[-1][-1] + way * share * away)
+        x0 = np.stack([share * away, 0 * away], axis=1).ravel()
+        begin = sum(len(x) for x in out) * dt
+        out.append(simulate(plant, {}, list(x0), None, dt, samples=round(seconds / dt), substeps=2)[:, ::2, 0])
+        spans.append((begin, begin + seconds))
+    return np.concatenate(out), spans
+
+
+def free_and_whole(found, spans, period, seconds):
+    """Whether each stretch begins at a release, ends before the hand is there, and keeps nine tenths of what is free.
+
+    A hand that begins to move from where a swing has died is no force yet: it is noticed within a fifth of its way, 0.1 s.
+    """
+    assert len(found) == len(spans)
+    for (start, stop), (begin, end) in zip(found, spans, strict=True):
+        assert begin - 0.02 * period <= start <= begin + period / 2
+        assert stop <= end + 0.1
+        assert stop - start >= 0.9 * seconds
+
+
+@pytest.mark.parametrize("noise", [0.0, 5e-3, 2e-2])
+@pytest.mark.parametrize("name", CHAINS)
+def test_each_swing_of_a_chain_is_kept_from_the_hand_to_the_hand(name, noise):
+    numbers, away, per = CHAINS[name]
+    seconds = 2.0
+    x, spans = by_hand(find(name)(**numbers), away, 5e-3, seconds)
+    x += per * noise * np.random.default_rng(5).normal(size=x.shape)
+    # k/J_1 + k/J_2, and what the slower mode of the carts comes to
+    period = 2 * np.pi / (np.sqrt(2.0 / 2e-3 * 2) if name == "torsional-2" else 11.2)
+    free_and_whole(free_stretches(np.arange(len(x)) * 5e-3, list(x.T)), spans, period, seconds)
+
+
+@pytest.mark.parametrize("noise", [0.0, 5e-3, 2e-2])
+def test_each_swing_of_a_pendulum_is_a_run_and_the_last_one_is_predicted(drafted, noise):
+    seconds = 10.0
+    x, spans = by_hand(PENDULUM, (1.2,), DT, seconds)
+    theta = x[:, 0] + noise * np.random.default_rng(6).normal(size=len(x))
+    _, study = drafted("pendulum", t=np.arange(theta.size) * DT, theta=theta)
+    assert [run.role for run in study.runs] == ["fit", "fit", "predict"]
+    free_and_whole([(run.t[0], run.t[-1]) for run in study.runs], spans, PERIOD, seconds)
+
+
+def test_where_nothing_swings_no_stretch_is_free():
+    t = np.arange(2000) * 5e-3
+    pulled = np.clip(np.sin(t), -0.5, 0.7)  # a hand alone: no place and no speed explains what accelerates it
+    jerked = np.cumsum(np.random.default_rng(7).choice([-1.0, 0.0, 1.0], size=t.size))
+    assert free_stretches(t, [jerked]) == []
+    assert free_swings(t, 0.001 * np.random.default_rng(8).normal(size=t.size)) == []
+    assert all(stop - start > 0 for start, stop in free_stretches(t, [pulled]))
+
+
+def test_a_pendulum_let_go_twice_from_upright_is_free_from_where_it_falls():
+    fall = swing(3.1, 1200)
+    down = np.linspace(fall[-1], 3.1, 60)
+    theta = np.concatenate([np.full(200, 3.1), fall, down, np.full(200, 3.1), fall])
+    found = free_swings(np.arange(theta.size) * DT, theta)
+    second = (200 + 1200 + 60 + 200) * DT
+    assert len(found) == 2
+    assert 2.0 - DT <= found[0][0] < 2.0 + 2 * PERIOD  # it lingers before it falls
+    assert second - DT <= found[1][0] < second + 2 * PERIOD

@@ -17,6 +17,7 @@ from upright.signals.stretches import turning_points
 from upright.signals.trips import goes_dead
 from upright.study.draft.described import COUNTS, counts_of
 from upright.study.draft.recognise import REFERENCE, Recognised, in_dac_counts
+from upright.study.draft.release import free_stretches
 
 RUNS_AWAY = 16_000
 """Counts beyond which a body is a disk: a cart of an ECP 210 has 16000 in 7 cm, and less travel than that."""
@@ -115,7 +116,8 @@ def read_chain(record: Record, seen: Inspection, found: Recognised, *, named: bo
         )
     windows, loop = [_driven(record, seen, at, disks=plant.startswith("tors"))], ""
     if drive is None:
-        windows = releases(t, widest(record, columns)) or [found.window]
+        places = [record[c.name] for c in columns]
+        windows = free_stretches(t, places) or releases(t, widest(record, columns)) or [found.window]
     elif reference is not None:
         loop, about_law = _law(record, drive, reference, columns[0], names[0])
         doubts.append(about_law)

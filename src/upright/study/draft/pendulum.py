@@ -295,8 +295,11 @@ def _defaults(found: Recognised, plant: type[Plant], balanced: Balanced | None) 
 
 
 def _runs(found: Recognised, file: str, label: str) -> list[TomlTable]:
-    """One run; a long free swing keeps its tail for prediction."""
+    """One run; a long free swing keeps its tail for prediction, and of several the last one is predicted."""
     start, stop = found.window
+    if found.earlier:
+        runs = [(f"{label} {i + 1}", a, b, "fit") for i, (a, b) in enumerate(found.earlier)]
+        return run_tables(file, [*runs, (f"{label} {len(runs) + 1}", start, stop, "predict")])
     split = start + 0.6 * (stop - start)
     if found.drive is None and found.frequency * (stop - start) / (2 * np.pi) > 12:
         return run_tables(file, [(f"{label} start", start, split, "fit"), (f"{label} tail", split, stop, "predict")])

@@ -15,7 +15,7 @@ from upright.records import Array, Record
 from upright.records.columns import bare_name
 from upright.signals.smoothing import savitzky_golay, smoothed, white_noise
 from upright.study.draft.hinge import hinge_of
-from upright.study.draft.release import free_from
+from upright.study.draft.release import free_from, free_swings
 
 RATE = re.compile(r"velocity|speed|rate|_dot\b|omega|\bqd|accel", re.IGNORECASE)
 _EFFORT = re.compile(r"effort|volt|current|torque|force|plant_input|cmd|duty|^(u|v|i)$", re.IGNORECASE)
@@ -53,6 +53,8 @@ class Recognised:
         Whether the last coordinate's zero was read where it lies still.
     doubts : tuple of str
         Sentences about what was guessed.
+    earlier : tuple of (float, float)
+        Where it swung before, until a hand brought it back [s].
     """
 
     plant: str
@@ -65,6 +67,7 @@ class Recognised:
     frequency: float
     settled: bool
     doubts: tuple[str, ...]
+    earlier: tuple[tuple[float, float], ...] = ()
 
 
 def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
@@ -96,6 +99,7 @@ def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
     rest = {n: zero_reading(record, seen, c, drive, window, hangs=n == "theta") for n, c in columns.items()}
     centre = rest[list(columns)[-1]]
     driven = record[next(iter(columns.values())).name]
+    earlier: tuple[tuple[float, float], ...] = ()
     turned = {"rad": 1.0, "deg": math.pi / 180}.get(columns[list(columns)[-1]].guess, 0.0)
     if drive is None and turned and list(columns)[-1] == "theta":
         angle = turned * (last - centre)
@@ -103,7 +107,10 @@ def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
         start = free_from(record.t, angle, small, window[0], driven if pushed else None)
         if start < window[1]:
             window = start, window[1]
-            inside = (record.t >= window[0]) & (record.t <= window[1])
+        swings = free_swings(record.t, angle, driven if pushed else None)
+        if len(swings) > 1:  # a hand has brought it back
+            window, earlier = swings[-1], tuple(swings[:-1])
+        inside = (record.t >= window[0]) & (record.t <= window[1])
     mirrored = False
     if pushed and all(c.guess == "rad" or name == "x" for name, c in columns.items()):
         mirrored = coupling(find(plant), record.t[inside], driven[inside], last[inside] - centre) < 0
@@ -118,6 +125,7 @@ def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
         frequency=swing_frequency(record.t[inside], last[inside] - centre),
         settled=bool(seen.rests) or (drive is not None and _starts_still(last, record[drive.name])),
         doubts=tuple(doubts),
+        earlier=earlier,
     )
 
 
