@@ -276,15 +276,6 @@ class StepFigures:
     resolution: float
 
 
-@dataclass(frozen=True, kw_only=True)
-class Effort:
-    """What the drive had to give: largest command [its unit], share of the limit, share of the samples at it."""
-
-    peak: float
-    share: float
-    saturated: float
-
-
 TAIL = 0.1
 """Share of the record that counts as rest; a median over it hears neither a bump nor an encoder that flickers."""
 
@@ -338,15 +329,6 @@ def step_figures(t: ArrayLike, y: ArrayLike, *, before: float, reference: float,
         error=reference - rest,
         resolution=resolution,
     )
-
-
-def effort(u: ArrayLike, limit: float, step: float = 0.0) -> Effort:
-    """What the drive gave; `step` is the converter's, within which a command counts as at its limit."""
-    size = np.abs(np.asarray(u, dtype=np.float64))
-    if size.size == 0 or not limit > 0:
-        raise BadInput(f"effort needs commands and a limit above 0, got {size.size} commands and a limit of {limit:g}.")
-    peak = float(size.max())
-    return Effort(peak=peak, share=peak / limit, saturated=float(np.mean(size >= limit - step / 2)))
 
 
 def _passed(t: Array, share: Array, level: float) -> float:

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.control import Trial, trial
-from upright.control.score import Effort, StepFigures, effort, step_figures
+from upright.control.effort import Effort, effort
+from upright.control.score import StepFigures, step_figures
 from upright.errors import BadInput
 from upright.experiments.tracking_3.laws import (
     AT,
