@@ -9,7 +9,7 @@ import pytest
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from upright.control.effort import QUIET_PEAK, QUIET_RMS, cycle, effort, quiet, rest
+from upright.control.effort import QUIET_PEAK, QUIET_RMS, cycle, effort, quiet, rest_effort
 from upright.errors import BadInput
 
 T = np.arange(12_000) * 1e-3
@@ -36,7 +36,7 @@ def test_a_command_half_a_step_below_the_limit_is_at_it():
 
 def test_a_sine_at_rest_has_its_amplitude_over_root_two_and_its_period():
     """4 s of whole periods of 0.4 s; the mean is no noise, and counts for the peak."""
-    found = rest(T, 0.5 + 0.3 * np.sin(2 * np.pi * T / 0.4), limit=2.0)
+    found = rest_effort(T, 0.5 + 0.3 * np.sin(2 * np.pi * T / 0.4), limit=2.0)
     assert found.rms == pytest.approx(0.3 / math.sqrt(2) / 2.0, rel=1e-6)
     assert found.peak == pytest.approx(0.8 / 2.0, rel=1e-6)
     assert found.command.size == pytest.approx(0.3, rel=1e-6)
@@ -45,8 +45,8 @@ def test_a_sine_at_rest_has_its_amplitude_over_root_two_and_its_period():
 
 def test_only_the_last_third_is_rest():
     u = np.where(T < 8.0, 9.0, 0.0)
-    assert rest(T, u, limit=10.0).peak == 0
-    assert rest(T, u[::-1], limit=10.0).peak == pytest.approx(0.9)
+    assert rest_effort(T, u, limit=10.0).peak == 0
+    assert rest_effort(T, u[::-1], limit=10.0).peak == pytest.approx(0.9)
 
 
 def test_a_difference_of_rounded_readings_has_the_variance_of_two_roundings():
@@ -54,7 +54,7 @@ def test_a_difference_of_rounded_readings_has_the_variance_of_two_roundings():
     q, k, n = 0.01, 30.0, 60_000
     y = np.random.default_rng(4).uniform(0, 1, n)
     u = k * np.diff(np.floor(y / q + 0.5) * q - y)
-    found = rest(np.arange(u.size) * 1e-3, u, limit=1.0)
+    found = rest_effort(np.arange(u.size) * 1e-3, u, limit=1.0)
     # correlated by -1/2 with their neighbours: 1.5 times the variance of a variance of independent ones; 5 sigma
     assert found.rms == pytest.approx(k * q / math.sqrt(6), rel=5 * math.sqrt(1.5 / 2 / (n / 3)))
     assert found.peak <= k * q
@@ -90,7 +90,7 @@ def test_a_relay_about_three_lags_cycles_as_the_exact_solution_and_its_describin
     left_out = 0.0231
     assert found.period == pytest.approx(2 * math.pi / math.sqrt(2), rel=left_out / 0.943)
     assert found.size == pytest.approx(4 * d / (6 * math.pi), rel=left_out * (1 + 2 / 0.943))
-    bang = rest(t, -d * np.sign(y), limit=d)
+    bang = rest_effort(t, -d * np.sign(y), limit=d)
     assert (bang.peak, bang.quiet) == (1.0, False)
     assert bang.rms == pytest.approx(1.0, abs=1e-3)  # two whole periods of a square wave, less a sample at 0
 
@@ -114,10 +114,10 @@ def test_the_thresholds_leave_three_deviations_of_a_gaussian_and_half_of_what_th
 
 
 def test_without_a_limit_nothing_is_loud():
-    assert rest(T, 1e3 * np.sin(T), limit=math.inf).quiet
+    assert rest_effort(T, 1e3 * np.sin(T), limit=math.inf).quiet
 
 
 @pytest.mark.parametrize(("u", "limit"), [(np.zeros(1), 1.0), (np.zeros(5), 1.0), (np.zeros(T.size), 0.0)])
 def test_a_rest_without_commands_times_or_limit_is_refused(u, limit):
     with pytest.raises(BadInput, match="limit above 0"):
-        rest(T[:1] if u.size == 1 else T, u, limit)
+        rest_effort(T[:1] if u.size == 1 else T, u, limit)

@@ -10,7 +10,7 @@ import pytest
 
 from upright import gains as design
 from upright.control import Score, Scores, score, trial
-from upright.control.preflight import Task, largest, preflight, word, words
+from upright.control.preflight import WORDS, Task, largest, preflight, word, words
 from upright.control.score import outcomes
 from upright.errors import BadInput
 from upright.gains.requests import read_poles
@@ -80,7 +80,7 @@ def test_the_chance_of_a_hand_that_errs_about_the_edge_is_the_normal_distributio
 def test_what_is_sure_has_chance_one_or_none():
     easy = told(RIG, (0, 0, 0.05, 0))
     assert easy.chance == 1.0
-    assert easy.word == "regulates"
+    assert easy.word == "stabilised"
     beyond = told(RIG, (0, 0, 1.2, 0))
     assert beyond.chance == 0.0
     assert beyond.word == "falls"
@@ -100,14 +100,26 @@ def test_a_loop_too_slow_for_its_pole_falls_beforehand():
 def test_every_end_of_a_run_has_its_word():
     inf = np.inf
     found = Scores(
-        fell=np.array([inf, inf, inf, inf, 0.4, 0.4]),
-        ran_out=np.array([inf, inf, inf, 0.3, 0.3, inf]),
-        settled=np.array([1.0, 1.0, inf, 1.0, inf, inf]),
-        saturated=np.zeros(6), at_limit=np.array([0.0, 0.1, 0.0, 0.0, 0.1, 0.1]),
-        peaks=np.zeros((2, 6)), final=np.zeros((2, 6)), effort_peak=np.zeros(6), effort_rms=np.zeros(6),
+        fell=np.array([inf, inf, inf, inf, 0.4, 0.4, inf, inf]),
+        ran_out=np.array([inf, inf, inf, 0.3, 0.3, inf, inf, inf]),
+        settled=np.array([1.0, 1.0, inf, 1.0, inf, inf, 1.0, 1.0]),
+        saturated=np.zeros(8), at_limit=np.array([0.0, 0.1, 0.0, 0.0, 0.1, 0.1, 0.0, 0.1]),
+        peaks=np.zeros((2, 8)), final=np.zeros((2, 8)), effort_peak=np.zeros(8), effort_rms=np.zeros(8),
+        rest_rms=np.array([0.0, 0.0, 0.0, 0.0, 0.9, 0.9, 0.2, 0.0]),
+        rest_peak=np.array([0.0, 0.0, 0.9, 0.9, 0.9, 0.9, 0.4, 0.85]),
     )  # fmt: skip
-    assert words(found) == ["regulates", "saturates", "too weak", "too weak", "too weak", "falls"]
-    assert found.held.tolist() == [True, True, True, False, False, False]
+    out, busy = "leaves its travel", "stabilised with excessive effort"
+    assert words(found) == [
+        "stabilised",
+        "stabilised with saturation",
+        "does not settle",
+        out,
+        out,
+        "falls",
+        busy,
+        busy,
+    ]
+    assert found.held.tolist() == [True, True, True, False, False, False, True, True]
 
 
 @pytest.mark.parametrize("force_limit", [math.inf, 1.5])
@@ -150,7 +162,7 @@ def ends(held):
     lost, none = np.where(held, math.inf, 0.1), np.zeros(held.size)
     return Scores(
         fell=lost, ran_out=np.full(held.size, math.inf), settled=none, peaks=none[None], final=none[None],
-        effort_peak=none, effort_rms=none, saturated=none, at_limit=none,
+        effort_peak=none, effort_rms=none, saturated=none, at_limit=none, rest_rms=none, rest_peak=none,
     )  # fmt: skip
 
 
@@ -191,7 +203,8 @@ def test_a_preflight_asks_for_the_tilt_and_for_a_tap_of_the_last_coordinate_each
     driven = MODEL.to_sampled(SAMPLED.period, SAMPLED.delay, RIG.lag)
     assert found.margins == design.margins(driven, law(0))
     assert sum(found.words.values()) == 1.0
-    assert found.words == {"regulates": 1.0, "saturates": 0.0, "too weak": 0.0, "falls": 0.0}
+    assert found.words == {word: float(word == "stabilised") for word in WORDS}
+    assert found.quiet_chance == 1.0
 
 
 def test_a_hand_errs_by_its_spread_about_the_start():
@@ -209,7 +222,7 @@ def test_five_milliseconds_at_the_limit_are_not_yet_saturation_and_the_last_word
     found = replace(
         ends([True] * 4), fell=inf, settled=np.ones(4), at_limit=np.array([5e-3, 5.1e-3, 6e-3, 0.0])
     )  # fmt: skip
-    assert words(found) == ["regulates", "saturates", "saturates", "regulates"]
-    assert word(Score(**{n: v[..., 1] for n, v in vars(found).items()})) == "saturates"
+    assert words(found) == ["stabilised", *["stabilised with saturation"] * 2, "stabilised"]
+    assert word(Score(**{n: v[..., 1] for n, v in vars(found).items()})) == "stabilised with saturation"
     both = replace(ends([False]), ran_out=np.array([0.1]))
-    assert words(both) == ["too weak"]  # fallen and out of travel at once
+    assert words(both) == ["leaves its travel"]  # fallen and out of travel at once

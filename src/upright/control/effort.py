@@ -54,7 +54,7 @@ class Cycle:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rest:
+class RestEffort:
     """What holding takes once the motion has died away.
 
     Attributes
@@ -103,7 +103,7 @@ def busyness(u: Array, limit: ArrayLike) -> tuple[Array, Array]:
     return still.std(axis=0) / np.asarray(limit), np.abs(still).max(axis=0) / np.asarray(limit)
 
 
-def rest(t: Array, u: Array, limit: float, *, body: Array | None = None, count: float = 0.0) -> Rest:
+def rest_effort(t: Array, u: Array, limit: float, *, body: Array | None = None, count: float = 0.0) -> RestEffort:
     """What holding took over the last third of a run.
 
     Parameters
@@ -129,7 +129,7 @@ def rest(t: Array, u: Array, limit: float, *, body: Array | None = None, count: 
         )
     rms, peak = busyness(u, limit)
     clock = resting(t)
-    return Rest(
+    return RestEffort(
         rms=float(rms), peak=float(peak), command=cycle(clock, resting(u)),
         body=None if body is None else cycle(clock, resting(body), count),
     )  # fmt: skip
@@ -155,7 +155,7 @@ def cycle(t: Array, x: Array, step: float = 0.0) -> Cycle | None:
     return Cycle(size=swing / 2, period=float(periods.mean()))
 
 
-def shown(found: Rest, limit: float, unit: str) -> str:
+def shown(found: RestEffort, limit: float, unit: str) -> str:
     """The command at rest in words, as what comes after "the command at rest"."""
     told = (
         f"has an rms of {100 * found.rms:.2g} % of the limit and peaks at {found.peak * limit:.2g} of {limit:g} {unit}"
