@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from upright.control import Score, Trial, score, trial
-from upright.control.preflight import Preflight, Task, preflight, word
+from upright.control.preflight import STABILISED, Preflight, Task, preflight, word
 from upright.designing.run import SPEEDS, velocities
 from upright.errors import BadInput
 from upright.experiments.frequency_1b.run import run_frequency
@@ -169,8 +169,17 @@ class Regulation:
 
     @property
     def best(self) -> Attempt:
-        """The set to recommend beforehand: the surest to regulate, of equals the one that bears the hardest tap."""
-        return max(self.attempts, key=lambda a: (round(a.before.words["regulates"], 2), a.before.push))
+        """The set to recommend beforehand: the surest to stabilise without saturation or excessive effort.
+
+        Of equals the one with the quietest command at rest, to a hundredth of the limit; of those the one that
+        recovers from the hardest tap.
+        """
+        return max(self.attempts, key=lambda a: (round(a.before.words[STABILISED], 2), -_loudness(a), a.before.push))
+
+
+def _loudness(a: Attempt) -> float:
+    """Rms of the command at rest as a share of the limit, to a hundredth: the median of the rigs allowed."""
+    return round(float(np.median(a.before.drawn.rest_rms)), 2)
 
 
 def identify_make(key: str, seed: int, folder: Path, progress: Progress = silent, draws: int = DRAWS) -> Rig:
