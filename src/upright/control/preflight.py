@@ -103,6 +103,12 @@ class Preflight:
         return self.words[STABILISED] + self.words[SATURATED]
 
     @property
+    def rest_rms(self) -> float:
+        """Rms of the command at rest, as a share of the limit, that 95 % of the rigs held do not exceed."""
+        held = self.drawn.rest_rms[self.drawn.held]
+        return float(np.quantile(held, 0.95)) if held.size else self.rest.rms
+
+    @property
     def word(self) -> str:
         """What most of them come to."""
         return max(WORDS, key=lambda w: self.words[w])

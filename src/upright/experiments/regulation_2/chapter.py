@@ -8,7 +8,7 @@ from typing import Any
 from upright.basis import SIMULATED
 from upright.control import Score
 from upright.control.effort import QUIET_PEAK, QUIET_RMS, RestEffort, shown
-from upright.control.preflight import FELT, SATURATED, STABILISED, WORDS, word
+from upright.control.preflight import BUSY, FELT, SATURATED, STABILISED, WORDS, word
 from upright.control.score import effort_at_rest
 from upright.experiments.regulation_2.figures import chances_figure, runs_figure, ways_figure
 from upright.experiments.regulation_2.run import SETS, Attempt, Regulation, VelocityRun
@@ -52,15 +52,15 @@ def _verdict(done: Regulation) -> str:
     best = done.best
     share = best.before.words[STABILISED]
     head = (
-        f"Use {best.name}: it stabilises {_of_rigs(done, share)} within the drive's limit, "
-        f"with {_rms(best.before.rest.rms)} of it at rest."
+        f"Use {best.name}: it stabilises {_of_rigs(done, share)} without saturation; on 95 % of them the command at "
+        f"rest has an rms of {_rms(best.before.rest_rms)}."
         if share >= 0.5
-        else f"Do not rely on any of these pole sets with this start. The best, {best.name}, stabilises only "
+        else f"Do not rely on any of these pole sets with this start. The best, {best.name}, stabilises "
         f"{_of_rigs(done, share)} without saturation or excessive effort; most often the result is: {best.before.word}."
     )
     ran = done.ran
     if not ran:
-        return f"{head}{_excess(best.before.rest, done.rig)} Nothing was run: this is what the model says."
+        return f"{head}{_excess(done, best)} Nothing was run: this is what the model says."
     agreed = [a for a in ran if a.word == a.before.word]
     if len(agreed) == len(ran):
         runs = f"All {len(ran)} runs agreed with their predictions." if len(ran) > 1 else "The run agreed with that."
@@ -71,21 +71,29 @@ def _verdict(done: Regulation) -> str:
             if a not in agreed
         )
         runs = f"{len(agreed)} of {len(ran)} runs agreed with their predictions. Not so: {others}."
-    return f"{head} {runs}{_excess(effort_at_rest(best.after or best.before.run), done.rig)}"
+    return f"{head} {runs}{_excess(done, best)}"
 
 
 def _of_rigs(done: Regulation, share: float) -> str:
     rigs, of = done.wish.draws, "sampled from the fit's covariance" if done.uncertain else "sampled"
-    return f"all {rigs} rigs {of}" if share == 1 else f"{round(share * rigs)} of {rigs} rigs {of}"
+    some = round(share * rigs)
+    return f"{'all' if some == rigs else f'{some} of' if some else 'none of'} {rigs} rigs {of}"
 
 
-def _excess(found: RestEffort, rig: Rig) -> str:
+def _excess(done: Regulation, a: Attempt) -> str:
     """What is too much about the command at rest, as a sentence after others; empty where nothing is."""
-    if found.quiet:
+    if a.word == BUSY and a.after is not None:
+        found = effort_at_rest(a.after)
+    elif a.before.word == BUSY:
+        found = a.before.rest
+    else:
+        return ""
+    if found.quiet:  # of the rig as identified, unlike that of most rigs allowed
         return ""
     return (
-        f" The command at rest {shown(found, rig.saturation, rig.unit)}; up to {100 * QUIET_RMS:.0f} % and "
-        f"{100 * QUIET_PEAK:.0f} % of the limit would be quiet. Ask for slower poles, or filter the velocities more."
+        f" The command at rest {shown(found, done.rig.saturation, done.rig.unit)}; quiet is up to "
+        f"{100 * QUIET_RMS:.0f} % rms and a peak of {100 * QUIET_PEAK:.0f} %. Ask for slower poles, or take the "
+        "velocities from a filter (--speed kalman)."
     )
 
 
@@ -118,24 +126,23 @@ def _sentence(done: Regulation, a: Attempt) -> str:
     )
     told = (
         f"{a.name[:1].upper()}{a.name[1:]}: predicted probability of stabilisation {100 * b.chance:.0f} %"
-        f" ({_shares(a)}); {reach}; predicted peak {b.score.effort_peak:.2g} of {rig.limit:g} {rig.unit}, "
-        f"{_rms(b.rest.rms)} of the limit at rest."
+        f" ({_shares(a)}); {reach}; predicted peak {b.score.effort_peak:.2g} of {rig.limit:g} {rig.unit}; rms at rest "
+        f"{_rms(b.rest_rms)}."
     )
     if a.after is None or a.came is None:
         return f"{told} It was not run." if done.ran else told
-    return f"{told} {_came(done, a.came.score, effort_at_rest(a.after))} {a.came.ended}".rstrip()
+    return f"{told} {_came(done.rig, a.came.score, effort_at_rest(a.after))} {a.came.ended}".rstrip()
 
 
 def _rms(share: float) -> str:
-    return f"a command of {100 * share:.2g} % rms"
+    return "less than 0.1 % of the limit" if share < 1e-3 else f"{100 * share:.2g} % of the limit"
 
 
 def _shares(a: Attempt) -> str:
     return ", ".join(f"{w} {100 * a.before.words[w]:.0f} %" for w in WORDS if a.before.words[w] > 0)
 
 
-def _came(done: Regulation, s: Score, rest: RestEffort) -> str:
-    rig = done.rig
+def _came(rig: Rig, s: Score, rest: RestEffort) -> str:
     driven = plain(rig.plant.inputs[0].on)
     if not s.held and s.fell < s.ran_out:
         return f"Measured: it fell after {s.fell:.2g} s."
@@ -150,8 +157,7 @@ def _came(done: Regulation, s: Score, rest: RestEffort) -> str:
         still = f"swings on by {_shown(rig, 0, s.final[0])}{every}"
     return (
         f"Measured: settled in {s.settled:.2g} s with a peak of {s.effort_peak:.2g} {rig.unit}{full}, "
-        f"{100 * s.rest_rms:.2g} % rms at rest; {driven} went {_shown(rig, 0, s.peaks[0])} and {still}."
-        f"{_excess(rest, rig)}"
+        f"rms at rest {_rms(s.rest_rms)}; {driven} went {_shown(rig, 0, s.peaks[0])} and {still}."
     )
 
 
@@ -344,7 +350,7 @@ def _set(a: Attempt) -> dict[str, Any]:
         "K": a.placement.K[0],
         "before": {
             "word": b.word, "words": dict(b.words), "chance": b.chance, "tilt": b.tilt, "push": b.push,
-            "command_noise": b.noise,
+            "command_noise": b.noise, "rest_rms_95": b.rest_rms,
             "margins": b.margins, "rest": _rest(b.rest),
             **_scored(b.score),
         },
