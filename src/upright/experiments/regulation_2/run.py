@@ -171,15 +171,16 @@ class Regulation:
     def best(self) -> Attempt:
         """The set to recommend beforehand: the surest to stabilise without saturation or excessive effort.
 
-        Of equals the one with the quietest command at rest, to a hundredth of the limit; of those the one that
-        recovers from the hardest tap.
+        Then the surest to stabilise with saturation, or at all; of equals the one with the quietest command at rest,
+        to a hundredth of the limit, and of those the one that recovers from the hardest tap.
         """
-        return max(self.attempts, key=lambda a: (round(a.before.words[STABILISED], 2), -_loudness(a), a.before.push))
+        return max(self.attempts, key=_rank)
 
 
-def _loudness(a: Attempt) -> float:
-    """Rms of the command at rest as a share of the limit, to a hundredth."""
-    return round(a.before.rest_rms, 2)
+def _rank(a: Attempt) -> tuple[float, ...]:
+    b = a.before
+    sure = (b.words[STABILISED], b.quiet_chance, b.chance)
+    return (*(round(share, 2) for share in sure), -round(b.rest_rms, 2), b.push)
 
 
 def identify_make(key: str, seed: int, folder: Path, progress: Progress = silent, draws: int = DRAWS) -> Rig:
