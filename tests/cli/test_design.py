@@ -53,7 +53,7 @@ def test_the_gains_hold_the_nonlinear_rig(study, tmp_path):
     outcome = design(study, "--poles", POLES, "--limit", "0.6", "-o", tmp_path)
     assert outcome.exit_code == 0, outcome.stderr
     told = " ".join(outcome.stdout.split())
-    assert "The loop stands with margin" in told
+    assert "Stable with margin" in told
     assert "What next" in told
     found = json.loads((tmp_path / "design.json").read_text(encoding="utf-8"))
     law = Law(
