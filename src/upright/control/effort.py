@@ -155,14 +155,19 @@ def cycle(t: Array, x: Array, step: float = 0.0) -> Cycle | None:
     return Cycle(size=swing / 2, period=float(periods.mean()))
 
 
+def of_limit(share: float) -> str:
+    """A share of the limit in words."""
+    return "less than 0.1 % of the limit" if share < 1e-3 else f"{100 * share:.2g} % of the limit"
+
+
 def shown(found: RestEffort, limit: float, unit: str) -> str:
     """The command at rest in words, as what comes after "the command at rest"."""
-    told = (
-        f"has an rms of {100 * found.rms:.2g} % of the limit and peaks at {found.peak * limit:.2g} of {limit:g} {unit}"
-    )
+    told = f"has an rms of {of_limit(found.rms)} and peaks at {found.peak * limit:.2g} of {limit:g} {unit}"
     if found.command is not None:
         told += f", every {_seconds(found.command.period)}"
-    return told
+    return (
+        told if found.quiet else f"{told} (quiet: up to {100 * QUIET_RMS:.0f} % rms, {QUIET_PEAK * limit:.3g} {unit})"
+    )
 
 
 def _seconds(period: float) -> str:

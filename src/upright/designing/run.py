@@ -105,6 +105,11 @@ class Holding:
     effort: RestEffort
     lost: float
 
+    @property
+    def quiet(self) -> bool:
+        """Whether it is held to the end, by a command that is quiet at rest."""
+        return math.isinf(self.lost) and self.effort.quiet
+
 
 @dataclass(frozen=True, kw_only=True)
 class Designed:

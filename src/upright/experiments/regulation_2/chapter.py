@@ -7,7 +7,7 @@ from typing import Any
 
 from upright.basis import SIMULATED
 from upright.control import Score
-from upright.control.effort import QUIET_PEAK, QUIET_RMS, RestEffort, shown
+from upright.control.effort import RestEffort, of_limit, shown
 from upright.control.preflight import BUSY, FELT, SATURATED, STABILISED, WORDS, word
 from upright.control.score import effort_at_rest
 from upright.experiments.regulation_2.figures import chances_figure, runs_figure, ways_figure
@@ -53,7 +53,7 @@ def _verdict(done: Regulation) -> str:
     share = best.before.words[STABILISED]
     head = (
         f"Use {best.name}: it stabilises {_of_rigs(done, share)} without saturation; on 95 % of them the command at "
-        f"rest has an rms of {_rms(best.before.rest_rms)}."
+        f"rest has an rms of {of_limit(best.before.rest_rms)}."
         if share >= 0.5
         else f"Do not rely on any of these pole sets with this start. The best, {best.name}, stabilises "
         f"{_of_rigs(done, share)} without saturation or excessive effort; most often the result is: {best.before.word}."
@@ -91,8 +91,7 @@ def _excess(done: Regulation, a: Attempt) -> str:
     if found.quiet:  # of the rig as identified, unlike that of most rigs allowed
         return ""
     return (
-        f" The command at rest {shown(found, done.rig.saturation, done.rig.unit)}; quiet is up to "
-        f"{100 * QUIET_RMS:.0f} % rms and a peak of {100 * QUIET_PEAK:.0f} %. Ask for slower poles, or take the "
+        f" The command at rest {shown(found, done.rig.saturation, done.rig.unit)}. Ask for slower poles, or take the "
         "velocities from a filter (--speed kalman)."
     )
 
@@ -127,15 +126,11 @@ def _sentence(done: Regulation, a: Attempt) -> str:
     told = (
         f"{a.name[:1].upper()}{a.name[1:]}: predicted probability of stabilisation {100 * b.chance:.0f} %"
         f" ({_shares(a)}); {reach}; predicted peak {b.score.effort_peak:.2g} of {rig.limit:g} {rig.unit}; rms at rest "
-        f"{_rms(b.rest_rms)}."
+        f"{of_limit(b.rest_rms)}."
     )
     if a.after is None or a.came is None:
         return f"{told} It was not run." if done.ran else told
     return f"{told} {_came(done.rig, a.came.score, effort_at_rest(a.after))} {a.came.ended}".rstrip()
-
-
-def _rms(share: float) -> str:
-    return "less than 0.1 % of the limit" if share < 1e-3 else f"{100 * share:.2g} % of the limit"
 
 
 def _shares(a: Attempt) -> str:
@@ -157,7 +152,7 @@ def _came(rig: Rig, s: Score, rest: RestEffort) -> str:
         still = f"swings on by {_shown(rig, 0, s.final[0])}{every}"
     return (
         f"Measured: settled in {s.settled:.2g} s with a peak of {s.effort_peak:.2g} {rig.unit}{full}, "
-        f"rms at rest {_rms(s.rest_rms)}; {driven} went {_shown(rig, 0, s.peaks[0])} and {still}."
+        f"rms at rest {of_limit(s.rest_rms)}; {driven} went {_shown(rig, 0, s.peaks[0])} and {still}."
     )
 
 

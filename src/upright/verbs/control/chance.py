@@ -120,17 +120,16 @@ def chance(
 
 def _effort(told: Preflight) -> str:
     """What holding takes, as the end of a sentence."""
-    from upright.control.effort import QUIET_PEAK, QUIET_RMS
+    from upright.control.effort import QUIET_PEAK, QUIET_RMS, of_limit
     from upright.report.symbols import percent
 
     if not told.drawn.held.any():
         return "."
-    rms = "less than 0.1 %" if told.rest_rms < 1e-3 else f"{100 * told.rest_rms:.2g} %"
     if told.quiet_chance > 0.95:
-        return f"; on 95 % of those the command at rest has an rms of at most {rms} of the limit."
+        return f"; on 95 % of those the command at rest has an rms of at most {of_limit(told.rest_rms)}."
     return (
-        f". Only {percent(100 * told.quiet_chance)} settle with a command that is quiet at rest: its rms reaches {rms} "
-        f"of the limit ({100 * QUIET_RMS:.0f} % is quiet) and its peak "
+        f". Only {percent(100 * told.quiet_chance)} settle with a command that is quiet at rest: its rms reaches "
+        f"{of_limit(told.rest_rms)} ({100 * QUIET_RMS:.0f} % is quiet) and its peak "
         f"{100 * float(told.drawn.rest_peak[told.drawn.held].max()):.0f} % ({100 * QUIET_PEAK:.0f} %)."
     )
 
