@@ -155,9 +155,9 @@ def cycle(t: Array, x: Array, step: float = 0.0) -> Cycle | None:
     return Cycle(size=swing / 2, period=float(periods.mean()))
 
 
-def of_limit(share: float) -> str:
-    """A share of the limit in words."""
-    return "less than 0.1 % of the limit" if share < 1e-3 else f"{100 * share:.2g} % of the limit"
+def of_limit(share: float, bound: str = "") -> str:
+    """A share of the limit in words, a bound such as "at most " before it."""
+    return "less than 0.1 % of the limit" if share < 1e-3 else f"{bound}{100 * share:.2g} % of the limit"
 
 
 def shown(found: RestEffort, limit: float, unit: str) -> str:

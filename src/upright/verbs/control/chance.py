@@ -126,7 +126,7 @@ def _effort(told: Preflight) -> str:
     if not told.drawn.held.any():
         return "."
     if told.quiet_chance > 0.95:
-        return f"; on 95 % of those the command at rest has an rms of at most {of_limit(told.rest_rms)}."
+        return f"; on 95 % of those the command at rest has an rms of {of_limit(told.rest_rms, 'at most ')}."
     return (
         f". Only {percent(100 * told.quiet_chance)} settle with a command that is quiet at rest: its rms reaches "
         f"{of_limit(told.rest_rms)} ({100 * QUIET_RMS:.0f} % is quiet) and its peak "
