@@ -89,7 +89,7 @@ def test_the_chance_of_standing_is_that_of_a_gain_within_its_margin(tmp_path):
     found = json.loads((tmp_path / "design.json").read_text())
     expected = norm.cdf(0.5 * (1 - found["margins"]["least_gain"]) / 0.35)
     assert found["chance_over_the_fit"] == pytest.approx(expected, abs=0.11)
-    assert "of the rigs that the fit allows fall" in " ".join(outcome.stdout.split())
+    assert "of the rigs sampled from the fit's covariance are unstable" in " ".join(outcome.stdout.split())
 
 
 @pytest.mark.slow

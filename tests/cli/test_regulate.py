@@ -54,7 +54,7 @@ def test_numbers_for_a_program_are_finite_json(fit, tmp_path):
     assert before["chance"] == 0.0  # on a rail of 20 cm no pole set brings 40 degrees back
     assert before["tilt"] < 0.7
     assert said["sets"]["your poles"]["after"] is None
-    assert said["verdict"].startswith("Do not rely on any of these pole sets with this start")
+    assert said["verdict"].startswith("No pole set is recommended for this start")
 
 
 @pytest.mark.parametrize(

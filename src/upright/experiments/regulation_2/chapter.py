@@ -55,7 +55,7 @@ def _verdict(done: Regulation) -> str:
         f"Use {best.name}: it stabilises {_of_rigs(done, share)} without saturation; on 95 % of them the command at "
         f"rest has an rms of {of_limit(best.before.rest_rms, 'at most ')}."
         if share >= 0.5
-        else f"Do not rely on any of these pole sets with this start. The best, {best.name}, stabilises "
+        else f"No pole set is recommended for this start. The best, {best.name}, stabilises "
         f"{_of_rigs(done, share)} without saturation or excessive effort; most often the result is: {best.before.word}."
     )
     ran = done.ran
