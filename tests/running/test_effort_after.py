@@ -64,6 +64,23 @@ def test_a_ripple_beyond_a_tenth_of_the_limit_is_excessive_and_never_green(bench
         assert "upright design" in told.steps[1].command
 
 
+def test_a_run_at_its_limit_for_more_than_five_milliseconds_saturates(bench, tmp_path):
+    """By the log's own commands, on a drive of less and less."""
+    done = ran(bench, tmp_path, 0.0, tilt=0.05, seconds=3.0)
+    u = np.abs(done.log.columns["u_applied"])
+    assert not done.saturates
+    assert done.way_back.share == pytest.approx(u.max() / 5)
+    for limit in (0.99 * u.max(), 0.5 * u.max()):
+        weak = replace(done, end=replace(done.end, held=replace(done.end.held, command=limit)))
+        full = np.sum(u >= limit - RIG.converter / 2)
+        assert weak.way_back.saturated == pytest.approx(full / len(u))
+        assert weak.saturates is bool(full * RIG.period > 5e-3)
+    assert weak.saturates
+    assert "Stabilised with saturation for 3 s" in weak.verdict
+    facts = dict(run_chapter(weak).parts[0].content[0].pairs)
+    assert "V, at the limit for" in facts["largest command"]
+
+
 def test_what_follows_a_moving_reference_or_is_stopped_or_has_no_law_rests_nowhere(bench, tmp_path):
     done = ran(bench, tmp_path, 1.5)
     assert replace(done, end=replace(done.end, stopped="Somebody pressed stop.")).effort is None

@@ -17,6 +17,8 @@ from upright.records import Array
 
 RESTING = 1 / 3
 """Last share of a run that counts as rest."""
+FELT = 5e-3
+"""Time at the limit that counts as saturation [s]; what is shorter passes in the drive's own lag."""
 QUIET_RMS = 0.1
 """Largest rms of a quiet command about its mean, as a share of the limit.
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from upright.control.effort import RestEffort
+from upright.control.effort import FELT, RestEffort
 from upright.control.score import Score, Scores, effort_at_rest, outcomes, score
 from upright.control.trial import Trial, trial
 from upright.errors import BadInput
@@ -30,8 +30,6 @@ from upright.workers import HERE, Workers
 STABILISED, SATURATED, BUSY = "stabilised", "stabilised with saturation", "stabilised with excessive effort"
 WORDS = (STABILISED, SATURATED, BUSY, "does not settle", "leaves its travel", "falls")
 """What a run can come to, the best first; see `words`."""
-FELT = 5e-3
-"""Time at the limit that counts as saturation [s]; what is shorter passes in the drive's own lag."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -34,6 +34,9 @@ def run_chapter(done: RigRun) -> Chapter:
              f"below a count, {number(count, 2)} {c.unit}" if v < count else f"{number(v, 3)} {c.unit}")
             for c, v, count in zip(done.model.plant.coordinates, done.unrest, done.count, strict=True)
         ]  # fmt: skip
+    if (taken := done.way_back) is not None:
+        peak = f"{number(taken.peak, 3)} of {done.limit:g} {done.model.unit}"
+        facts.append(("largest command", f"{peak}, at the limit for {100 * taken.saturated:.2g} % of the ticks"))
     if done.effort is not None:
         facts.append(("command at rest", shown(done.effort, done.limit, done.model.unit)))
     parts = [Part("The run", (Facts(tuple(facts)), *_events(done)))]
@@ -82,7 +85,8 @@ def _numbers(done: RigRun) -> dict[str, Any]:
         "rig": done.model.name, "kind": done.file.kind, "seconds": done.wish.seconds, "ticks": end.ticks,
         "late": end.late, "stopped": end.stopped, "faults": int(end.faults), "fault_words": told(end.faults),
         "rows": end.rows, "dropped": end.dropped, "rms": list(done.unrest), "log": str(done.log_path),
-        "effort": _effort(done.effort), "clock_seconds": end.seconds, "verdict": done.verdict,
+        "way_back": None if done.way_back is None else vars(done.way_back), "effort": _effort(done.effort),
+        "clock_seconds": end.seconds, "verdict": done.verdict,
     }  # fmt: skip
 
 

@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from upright.basis import DESCRIBED, MEASURED, NOT_TRUSTED, Basis
-from upright.control.effort import RestEffort, rest_effort, resting, shown
+from upright.control.effort import FELT, Effort, RestEffort, effort, rest_effort, resting, shown
+from upright.control.preflight import BUSY, SATURATED, STABILISED
 from upright.errors import BadInput
 from upright.files import read_text
 from upright.laws import Law, Rule, as_values
@@ -129,6 +130,25 @@ class RigRun:
         return min(self.model.saturation, math.inf if self.end.held is None else self.end.held.command)
 
     @property
+    def way_back(self) -> Effort | None:
+        """What the drive had to give in all; None where no law ran."""
+        if self.wish.law is None or self.log is None or not len(self.log):
+            return None
+        return effort(self._applied, self.limit, self.model.converter)
+
+    @property
+    def saturates(self) -> bool:
+        """Whether the command was at its limit for longer than the drive's own lag hides."""
+        taken = self.way_back
+        return taken is not None and taken.saturated * self.end.ticks * self.model.period > FELT
+
+    @property
+    def _applied(self) -> Array:
+        """Commands that the converter put out."""
+        assert self.log is not None
+        return self.log.columns[f"{self.log.header.command}_applied"]
+
+    @property
     def effort(self) -> RestEffort | None:
         """What holding took over the last third; None where no law held it to the end, or it followed what moved."""
         log = self.log
@@ -140,8 +160,7 @@ class RigRun:
         if self.wish.from_rest and float(np.abs(resting(self.away)[:, -1]).max()) > ARRIVED:
             return None
         body = [c.name for c in self.model.plant.coordinates].index(self.model.plant.inputs[0].on)
-        applied = columns[f"{log.header.command}_applied"]
-        return rest_effort(self.t, applied, self.limit, body=self.away[:, body], count=self.count[body])
+        return rest_effort(self.t, self._applied, self.limit, body=self.away[:, body], count=self.count[body])
 
     @property
     def quiet(self) -> bool:
@@ -178,8 +197,8 @@ class RigRun:
         size = f"{math.degrees(size):.2g} degrees" if last.unit == "rad" else f"{1e3 * size:.2g} mm"
         size = f"one encoder count, {size}" if self.unrest[-1] < self.count[-1] else size
         what = "varied by" if self.wish.reference else "stayed within"
-        kind = "Stabilised" if self.quiet else "Stabilised with excessive effort"
-        return f"{kind} for {how}{late}; {last.name} {what} {size} (rms, second half){self._rest()}.{log}"
+        kind = STABILISED if self.quiet and not self.saturates else SATURATED if self.quiet else BUSY
+        return f"{kind.capitalize()} for {how}{late}; {last.name} {what} {size} (rms, second half){self._rest()}.{log}"
 
     def _rest(self) -> str:
         if self.effort is None:

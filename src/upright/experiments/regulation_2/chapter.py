@@ -7,8 +7,8 @@ from typing import Any
 
 from upright.basis import SIMULATED
 from upright.control import Score
-from upright.control.effort import RestEffort, of_limit, shown
-from upright.control.preflight import BUSY, FELT, SATURATED, STABILISED, WORDS, word
+from upright.control.effort import FELT, RestEffort, of_limit, shown
+from upright.control.preflight import BUSY, SATURATED, STABILISED, WORDS, word
 from upright.control.score import effort_at_rest
 from upright.experiments.regulation_2.figures import chances_figure, runs_figure, ways_figure
 from upright.experiments.regulation_2.run import SETS, Attempt, Regulation, VelocityRun
