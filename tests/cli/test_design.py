@@ -53,7 +53,7 @@ def test_the_gains_hold_the_nonlinear_rig(study, tmp_path):
     outcome = design(study, "--poles", POLES, "--limit", "0.6", "-o", tmp_path)
     assert outcome.exit_code == 0, outcome.stderr
     told = " ".join(outcome.stdout.split())
-    assert "The loop stands with margin" in told
+    assert "Stable with margin" in told
     assert "What next" in told
     found = json.loads((tmp_path / "design.json").read_text(encoding="utf-8"))
     matrices = {name: found["law"][name] for name in "ABCD"}
@@ -88,7 +88,7 @@ def test_the_chance_of_standing_is_that_of_a_gain_within_its_margin(tmp_path):
     found = json.loads((tmp_path / "design.json").read_text())
     expected = norm.cdf(0.5 * (1 - found["margins"]["least_gain"]) / 0.35)
     assert found["chance_over_the_fit"] == pytest.approx(expected, abs=0.11)
-    assert "of the rigs that the fit allows fall" in " ".join(outcome.stdout.split())
+    assert "of the rigs sampled from the fit's covariance are unstable" in " ".join(outcome.stdout.split())
 
 
 @pytest.mark.slow

@@ -36,8 +36,8 @@ def test_a_set_is_told_and_run(fit, tmp_path):
     outcome = regulate(fit, "--seed", 0, "--set", 3, "--seconds", 2, "-o", tmp_path / "out")
     assert outcome.exit_code == 0, outcome.stderr
     told = " ".join(outcome.stdout.split())
-    assert "came: regulates" in told
-    assert "So it came." in told
+    assert "came: stabilised" in told
+    assert "The run agreed with that." in told
     assert f"upright regulate {fit} --seed 0" in told
     assert (tmp_path / "out" / "regulation_set_3.csv").exists()
     assert "Holding it upright" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
@@ -54,7 +54,7 @@ def test_numbers_for_a_program_are_finite_json(fit, tmp_path):
     assert before["chance"] == 0.0  # on a rail of 20 cm no pole set brings 40 degrees back
     assert before["tilt"] < 0.7
     assert said["sets"]["your poles"]["after"] is None
-    assert said["verdict"].startswith("None is to be trusted with this start")
+    assert said["verdict"].startswith("No pole set is recommended for this start")
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import control
 import numpy as np
 import pytest
 
-from upright.control.score import effort, step_figures
+from upright.control.score import step_figures
 from upright.errors import BadInput
 from upright.physics import chain
 from upright.simulation import simulate
@@ -86,13 +86,6 @@ def test_what_did_not_move_is_refused():
         step_figures(T, np.zeros_like(T), before=0.0, reference=1.0, quantum=1e-3)
 
 
-def test_commands_within_half_a_step_of_the_limit_count_as_saturated():
-    given = effort(np.array([1.0, -5.0, 4.9999, 2.0]), limit=5.0, step=1e-3)
-    assert given.peak == 5.0
-    assert given.share == 1.0
-    assert given.saturated == 0.5
-
-
 def test_a_ramp_passes_its_levels_by_straight_lines_and_settles_where_it_enters_the_band():
     """Sampled coarsely, from 10 to 30 mm in 10 s, from t = 5 s on: levels between samples, by hand."""
     t = 5.0 + np.arange(40.0)
@@ -162,15 +155,3 @@ def test_a_change_of_one_encoder_step_is_none():
     with pytest.raises(BadInput, match="nothing stepped"):
         step_figures(np.arange(20.0), np.full(20, -0.5), before=0.0, reference=1.0, quantum=0.5)
     assert step_figures(np.arange(20.0), np.full(20, -0.5), before=0.0, reference=-1.0, quantum=0.49).change == -0.5
-
-
-@pytest.mark.parametrize(("u", "limit"), [([], 1.0), ([1.0], 0.0)])
-def test_an_effort_without_commands_or_limit_is_refused(u, limit):
-    with pytest.raises(BadInput, match="limit above 0"):
-        effort(u, limit)
-
-
-def test_a_command_half_a_step_below_the_limit_is_at_it():
-    assert effort([1.0, 0.0, 0.0, 0.0], limit=1.25, step=0.5).saturated == 0.25
-    assert effort([1.0, 0.0, 0.0, 0.0], limit=1.25, step=0.4).saturated == 0.0
-    assert effort([1.0], limit=1.25).share == 0.8

@@ -154,6 +154,10 @@ def test_figures_of_runs_side_by_side_are_those_of_each():
     assert found.effort_rms == pytest.approx(np.sqrt([50 / 4, 14 / 6, (50 + 4.9**2) / 6]))
     assert found.saturated == pytest.approx([1 / 4, 0.0, 2 / 6])
     assert found.at_limit == pytest.approx([0.5, 0.0, 1.0])
+    # of the last two commands of six, over 5 V: half their distance, and the larger
+    assert found.rest_rms == pytest.approx([0.0, 0.2, 0.5])
+    assert found.rest_peak == pytest.approx([1.0, 0.6, 1.0])
+    assert found.quiet.tolist() == [False, False, False]
     own = lanes_of(theta, psi=psi, u=u, rig=rig, fallen=1.0, band=0.1, full=[4.0, 1.0, 6.0])
     assert own.at_limit == pytest.approx([1.0, 3.0, 0.0])
 

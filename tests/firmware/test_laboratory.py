@@ -104,10 +104,10 @@ def test_a_rig_behind_a_wire_is_identified_held_swung_up_and_let_swing(host, tmp
     assert not misses(told["1b"], ("J_d", "J_p", "b_1", "b_2", "actuator.gain"))
 
     sets = told["2"]["sets"]
-    expected = {name: s for name, s in sets.items() if s["before"]["words"]["regulates"] >= 0.5}
+    expected = {name: s for name, s in sets.items() if s["before"]["words"]["stabilised"] >= 0.5}
     assert expected
     assert {name: (s["after"]["word"], s["after"]["ended"]) for name, s in expected.items()} == dict.fromkeys(
-        expected, ("regulates", "")
+        expected, ("stabilised", "")
     )
 
     assert told["2b"]["swing_up"]["held"]

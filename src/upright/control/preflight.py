@@ -13,7 +13,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from upright.control.score import Score, Scores, outcomes, score
+from upright.control.effort import FELT, RestEffort
+from upright.control.score import Score, Scores, effort_at_rest, outcomes, score
 from upright.control.trial import Trial, trial
 from upright.errors import BadInput
 from upright.gains import Margins, margins
@@ -26,10 +27,9 @@ from upright.rig import Rig
 from upright.systems import StateSpace
 from upright.workers import HERE, Workers
 
-WORDS = ("regulates", "saturates", "too weak", "falls")
-"""What a run can come to; see `words`."""
-FELT = 5e-3
-"""Time at the limit that counts as saturation [s]; what is shorter passes in the drive's own lag."""
+STABILISED, SATURATED, BUSY = "stabilised", "stabilised with saturation", "stabilised with excessive effort"
+WORDS = (STABILISED, SATURATED, BUSY, "does not settle", "leaves its travel", "falls")
+"""What a run can come to, the best first; see `words`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,6 +70,8 @@ class Preflight:
         Standard deviation of the command from the encoders' counts [its unit]; None as above.
     run, score : Trial, Score
         The run on the model as identified.
+    rest : RestEffort
+        What holding takes at its end.
     tilt, push : float
         Largest tilt [rad] and largest speed from a tap [rad/s] of the last coordinate, each alone, that it recovers.
     drawn : Scores
@@ -82,6 +84,7 @@ class Preflight:
     noise: float | None
     run: Trial
     score: Score
+    rest: RestEffort
     tilt: float
     push: float
     drawn: Scores
@@ -91,6 +94,17 @@ class Preflight:
     def chance(self) -> float:
         """Share of the rigs allowed that are held to the end."""
         return float(np.mean(self.drawn.held))
+
+    @property
+    def quiet_chance(self) -> float:
+        """Share of the rigs allowed that are held to the end and settle by a command that is quiet at rest."""
+        return self.words[STABILISED] + self.words[SATURATED]
+
+    @property
+    def rest_rms(self) -> float:
+        """Rms of the command at rest, as a share of the limit, that 95 % of the rigs held do not exceed."""
+        held = self.drawn.rest_rms[self.drawn.held]
+        return float(np.quantile(held, 0.95)) if held.size else self.rest.rms
 
     @property
     def word(self) -> str:
@@ -149,6 +163,7 @@ def preflight(
         noise=command_noise(driven, law, rig.quantum) if stands else None,
         run=run,
         score=score(run),
+        rest=effort_at_rest(run),
         tilt=largest(rig, law, task.at, tilted, most=np.pi / 2) if stands else 0.0,
         push=largest(rig, law, task.at, tapped, most=20.0) if stands else 0.0,
         drawn=drawn,
@@ -159,19 +174,25 @@ def preflight(
 def words(found: Scores) -> list[str]:
     """What each run came to.
 
-    It *falls*; it is *too weak* when the driven body leaves its travel or dry friction keeps the pendulum from
-    settling; it *saturates* when it holds but meets the limit for longer than `FELT`; else it *regulates*.
+    It *falls*; the driven body *leaves its travel*; it *does not settle* when dry friction or the law keep the
+    pendulum swinging; it is stabilised *with excessive effort* when the command at rest is not quiet (`effort.quiet`),
+    *with saturation* when it is, but the limit was met for longer than `FELT`.
     """
     out: list[str] = []
-    for fell, ran_out, settled, full in zip(
-        found.fell.tolist(), found.ran_out.tolist(), found.settled.tolist(), found.at_limit.tolist(), strict=True
-    ):
+    for fell, ran_out, settled, full, calm in zip(
+        found.fell.tolist(), found.ran_out.tolist(), found.settled.tolist(), found.at_limit.tolist(),
+        found.quiet.tolist(), strict=True,
+    ):  # fmt: skip
         if fell < ran_out:
             out.append("falls")
-        elif np.isfinite(ran_out) or np.isinf(settled):
-            out.append("too weak")
+        elif np.isfinite(ran_out):
+            out.append("leaves its travel")
+        elif np.isinf(settled):
+            out.append("does not settle")
+        elif not calm:
+            out.append(BUSY)
         else:
-            out.append("saturates" if full > FELT else "regulates")
+            out.append(SATURATED if full > FELT else STABILISED)
     return out
 
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from upright.control.effort import RestEffort, busyness, quiet, rest_effort
 from upright.control.trial import SUBSTEPS, Trial, at_work
 from upright.errors import BadInput
 from upright.laws import Law
@@ -54,6 +55,8 @@ class Scores:
         Share of the samples at the limit of command or force, 0 to 1.
     at_limit : array, shape (lanes,)
         Time spent there [s].
+    rest_rms, rest_peak : array, shape (lanes,)
+        Of the command over the last third of the run, as shares of its limit; see `effort.RestEffort`.
     """
 
     fell: Array
@@ -65,11 +68,18 @@ class Scores:
     effort_rms: Array
     saturated: Array
     at_limit: Array
+    rest_rms: Array
+    rest_peak: Array
 
     @property
     def held(self) -> NDArray[np.bool_]:
         """Which runs neither fell nor came to the end of the travel."""
         return np.isinf(self.fell) & np.isinf(self.ran_out)
+
+    @property
+    def quiet(self) -> NDArray[np.bool_]:
+        """In which runs the command at rest left the drive to what it is there for."""
+        return quiet(self.rest_rms, self.rest_peak)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,11 +95,27 @@ class Score:
     effort_rms: float
     saturated: float
     at_limit: float
+    rest_rms: float
+    rest_peak: float
 
     @property
     def held(self) -> bool:
         """Whether it was held to the end, within the travel."""
         return math.isinf(self.fell) and math.isinf(self.ran_out)
+
+    @property
+    def quiet(self) -> bool:
+        """Whether the command at rest left the drive to what it is there for."""
+        return bool(quiet(self.rest_rms, self.rest_peak))
+
+
+def effort_at_rest(run: Trial) -> RestEffort:
+    """What holding took over the last third of a trial, as the encoders and the converter show it."""
+    names = [c.name for c in run.rig.plant.coordinates]
+    moved = run.rig.plant.inputs[0].on
+    return rest_effort(
+        run.t, run.u, run.rig.saturation, body=run.record[moved], count=float(run.rig.quantum[names.index(moved)])
+    )
 
 
 def score(run: Trial, *, watched: str = "", fallen: float = FALLEN, band: float = BAND) -> Score:
@@ -151,6 +177,7 @@ def scores(
     end = away[-max(2, t.size // 3) :]
     level = np.asarray(rig.saturation if full is None else full, dtype=np.float64)
     limited = before & (np.abs(u) >= level * (1 - 1e-9))
+    rest_rms, rest_peak = busyness(u, level)
     return Scores(
         fell=fell,
         ran_out=ran_out,
@@ -161,6 +188,8 @@ def scores(
         effort_rms=np.sqrt(np.sum(np.where(before, u**2, 0.0), axis=0) / before.sum(axis=0)),
         saturated=limited.sum(axis=0) / before.sum(axis=0),
         at_limit=float(t[1] - t[0]) * limited.sum(axis=0),
+        rest_rms=rest_rms,
+        rest_peak=rest_peak,
     )
 
 
@@ -276,15 +305,6 @@ class StepFigures:
     resolution: float
 
 
-@dataclass(frozen=True, kw_only=True)
-class Effort:
-    """What the drive had to give: largest command [its unit], share of the limit, share of the samples at it."""
-
-    peak: float
-    share: float
-    saturated: float
-
-
 TAIL = 0.1
 """Share of the record that counts as rest; a median over it hears neither a bump nor an encoder that flickers."""
 
@@ -338,15 +358,6 @@ def step_figures(t: ArrayLike, y: ArrayLike, *, before: float, reference: float,
         error=reference - rest,
         resolution=resolution,
     )
-
-
-def effort(u: ArrayLike, limit: float, step: float = 0.0) -> Effort:
-    """What the drive gave; `step` is the converter's, within which a command counts as at its limit."""
-    size = np.abs(np.asarray(u, dtype=np.float64))
-    if size.size == 0 or not limit > 0:
-        raise BadInput(f"effort needs commands and a limit above 0, got {size.size} commands and a limit of {limit:g}.")
-    peak = float(size.max())
-    return Effort(peak=peak, share=peak / limit, saturated=float(np.mean(size >= limit - step / 2)))
 
 
 def _passed(t: Array, share: Array, level: float) -> float:

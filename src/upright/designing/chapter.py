@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from upright.designing.run import Designed, VelocityLoop
+from upright.control.effort import shown
+from upright.designing.run import Designed, Holding, VelocityLoop
 from upright.gains.lqr import locus
 from upright.gains.requests import Roots, written
 from upright.laws import as_values
@@ -207,6 +208,7 @@ def _numbers(done: Designed) -> dict[str, Any]:
         "peak_command": done.peak,
         "peak_command_sampled": done.peak_sampled,
         "chance_over_the_fit": done.chance,
+        "at_rest": None if done.holding is None else _at_rest(done.holding),
         "readings": _readings(done),
         "states_from": done.chosen.name,
         "command": done.rig.inputs[0] if isinstance(done.rig, StateSpace) else "u",
@@ -214,6 +216,12 @@ def _numbers(done: Designed) -> dict[str, Any]:
         "law": as_values(done.law),
         "verdict": done.verdict,
     }
+
+
+def _at_rest(held: Holding) -> dict[str, Any]:
+    """Command at rest, as shares of the limit; a limit cycle in SI."""
+    found = held.effort
+    return {"quiet": found.quiet, "rms": found.rms, "peak": found.peak, "cycle": found.command, "lost": held.lost}
 
 
 def _readings(done: Designed) -> list[dict[str, Any]]:
@@ -234,7 +242,13 @@ def _readings(done: Designed) -> list[dict[str, Any]]:
 def _effort(done: Designed) -> str:
     if not math.isfinite(done.peak_sampled):
         return ""
-    return (
+    rest = ""
+    if done.holding is not None and math.isinf(done.holding.lost):
+        rest = (
+            " Simulated with counts and dry friction, the command at rest "
+            f"{shown(done.holding.effort, done.wish.limit or math.inf, done.rig.unit)}."
+        )
+    return rest + (
         f" The start asked for takes {number(done.peak_sampled, 3)} {done.rig.unit} at most, "
         f"{number(done.peak, 3)} {done.rig.unit} by the continuous model."
     )

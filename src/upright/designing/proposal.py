@@ -1,8 +1,8 @@
 """Which poles to begin with, where nobody asked for any?
 
 As fast as the rig falls, or swings where nothing falls, and somewhat slower or faster. Of those that hold as many of
-the rigs that a fit allows, whose start the drive can take, and whose loop keeps nearly the largest distance to -1, the
-one with the quietest command.
+the rigs that a fit allows, whose start the drive can take, whose command is quiet at rest, and whose loop keeps nearly
+the largest distance to -1, the one with the least command noise.
 """
 
 from __future__ import annotations
@@ -50,8 +50,9 @@ def design_unasked(rig: Rig | StateSpace, wish: DesignRequest) -> Designed:
     surest = max(_chance(d) for _, d in tried)
     sure = [(m, d) for m, d in tried if _chance(d) >= surest - 0.01]
     within = [(m, d) for m, d in sure if d.peak_sampled <= limit] or [min(sure, key=lambda one: one[1].peak_sampled)]
-    widest = max(modulus for modulus, _ in within)
-    return min((d for m, d in within if m >= NEARLY * widest), key=_loudness)
+    calm = [(m, d) for m, d in within if d.holding is None or d.holding.quiet] or within
+    widest = max(modulus for modulus, _ in calm)
+    return min((d for m, d in calm if m >= NEARLY * widest), key=_loudness)
 
 
 def own_pace(poles: Roots) -> float:

@@ -9,6 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upright.basis import DESCRIBED, Basis
+from upright.control.effort import QUIET_RMS, RestEffort, shown
+from upright.control.score import effort_at_rest, score
+from upright.control.trial import trial
 from upright.designing.estimators import chosen, estimator, estimators
 from upright.errors import BadInput
 from upright.gains import (
@@ -35,6 +38,8 @@ from upright.rig import Rig
 from upright.rig.completion import completed
 from upright.systems import StateSpace, to_s, to_z
 
+SLOWEST, ROWS = 10.0, 60_000
+"""Time constants of the slowest pole, and most samples, for which the motion to rest is simulated."""
 MOST_STATES = 30
 """States from which 60 digits take longer than anyone waits."""
 
@@ -94,12 +99,26 @@ class VelocityLoop:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Holding:
+    """What holding takes on the nonlinear rig with counts and dry friction; `lost` is when it was lost [s], or inf."""
+
+    effort: RestEffort
+    lost: float
+
+    @property
+    def quiet(self) -> bool:
+        """Whether it is held to the end, by a command that is quiet at rest."""
+        return math.isinf(self.lost) and self.effort.quiet
+
+
+@dataclass(frozen=True, kw_only=True)
 class Designed:
     """Gains and what they are worth.
 
     `model` is sampled where plain matrices are those of samples; all poles are in s [1/s] all the same.
     `peak` is the largest command that the start takes with continuous feedback, `peak_sampled` in the loop as it runs;
     `swing` is that way back: t, outputs, commands.
+    `holding` is simulated; None of plain matrices, without a limit, and where the linear loop falls.
     K are the gains in force: the `continuous` ones of placement or least cost (`placement` is None then), or the
     `sampled_gains`, whose poles are met in the loop as it runs.
     """
@@ -122,6 +141,7 @@ class Designed:
     peak_sampled: float
     swing: tuple[Array, Array, Array]
     chance: float | None
+    holding: Holding | None = None
     cloud: Roots = field(default_factory=lambda: np.zeros(0, dtype=np.complex128))
 
     @property
@@ -155,29 +175,44 @@ class Designed:
                 f"{self.sampled.delay:.3g} samples of delay and the {way.name} the gains do not stabilize. "
                 "Sample faster, ask for slower poles, or design for the sampled loop (--sampled)."
             )
-        m, chance = way.margins, 1.0 if self.chance is None else self.chance
-        thin = [
-            text
-            for text, bad in (
-                (f"distance to -1 is only {m.modulus:.2f}", m.modulus < 0.4),
-                (f"a gain {100 * (1 - m.least_gain):.0f} % weaker lets it fall", m.least_gain > 0.7),
-                (f"it bears only {1e3 * m.delay:.2g} ms more delay", m.delay < self.wish.period),
-                (f"{100 * (1 - chance):.0f} % of the rigs that the fit allows fall", self.chance is not None
-                 and self.chance < 0.99),
-            )
-            if bad
-        ]  # fmt: skip
-        head = "The loop stands, with reservations: " + "; ".join(thin) if thin else "The loop stands with margin"
+        thin = self._reservations(way.margins)
+        head = "Stable, with reservations: " + "; ".join(thin) if thin else "Stable with margin"
         limit = self.wish.limit
         if limit is None:
             return f"{head}."
         share = self.peak_sampled / limit
         if share > 1:
             return (
-                f"{head}. The start asked for needs {self.peak_sampled:.3g} {unit}, {100 * share:.0f} % of the limit: "
-                f"the drive saturates; up to {100 / share:.0f} % of that start it does not."
+                f"{head}. Recovering from this start takes {self.peak_sampled:.3g} {unit}, {100 * share:.0f} % of the "
+                f"limit, and saturates the drive; up to {100 / share:.0f} % of this start it does not."
             )
-        return f"{head}; the start asked for takes {100 * share:.0f} % of the drive's limit."
+        return f"{head}; recovering from this start takes {100 * share:.0f} % of the drive's limit."
+
+    def _reservations(self, m: Margins) -> list[str]:
+        """What is thin about the loop, or too much about its command at rest."""
+        chance, limit = self.chance, self.wish.limit or math.inf
+        rounding = (self.chosen.command_noise or 0.0) / limit
+        out = [
+            text
+            for text, bad in (
+                (f"distance to -1 is only {m.modulus:.2f}", m.modulus < 0.4),
+                (f"a gain {100 * (1 - m.least_gain):.0f} % weaker makes it unstable", m.least_gain > 0.7),
+                (f"it bears only {1e3 * m.delay:.2g} ms more delay", m.delay < self.wish.period),
+                (f"{100 * (1 - (chance or 0)):.0f} % of the rigs sampled from the fit's covariance are unstable with "
+                 "it", chance is not None and chance < 0.99),
+            )
+            if bad
+        ]  # fmt: skip
+        if self.holding is not None and math.isfinite(self.holding.lost):
+            out.append(f"with counts, dry friction and limit the simulated rig is lost after {self.holding.lost:.2g} s")
+        elif self.holding is not None and not self.holding.effort.quiet:
+            out.append(f"the command at rest {shown(self.holding.effort, limit, self.rig.unit)}")
+        elif rounding > QUIET_RMS:
+            out.append(
+                f"the rounding of encoders gives the command an rms of {100 * rounding:.2g} % of the limit "
+                f"({100 * QUIET_RMS:.0f} % is quiet)"
+            )
+        return out
 
 
 def design_for(rig: Rig | StateSpace, wish: DesignRequest) -> Designed:
@@ -230,11 +265,12 @@ def design_for(rig: Rig | StateSpace, wish: DesignRequest) -> Designed:
     t, x, u = _way_back(model, K, start)
     loops = {s: _velocity_loop(model, sampled, e, used, quantum) for s, e in ways.items()}
     cloud, chance = _cloud(rig, wish, sampled, law)
+    peak = _peak(sampled, law, start, float(t[-1]))
     return Designed(
         rig=rig, wish=wish, model=model, sampled=sampled, K=used, continuous=K, placement=placement,
         sampled_gains=gains, R=R, law=law, poles=to_s(poles_of(closed(sampled, law)), sampled.period),
         ways=tuple(loops.values()), chosen=loops[speed], k_pf=k_pf, peak=float(np.abs(u).max()),
-        peak_sampled=_peak(sampled, law, start, float(t[-1])),
+        peak_sampled=peak, holding=_holding(wish, sampled, law, start, peak),
         swing=(t, x @ model.C.T + u @ model.D.T, u), chance=chance, cloud=cloud,
     )  # fmt: skip
 
@@ -338,6 +374,19 @@ def _peak(sampled: StateSpace, law: Law, start: Array, seconds: float) -> float:
         return math.inf
     samples = min(max(round(seconds / sampled.period), 100), 20_000)
     return float(np.abs(swing(sampled, law, start, samples)[1]).max())
+
+
+def _holding(wish: DesignRequest, sampled: StateSpace, law: Law, start: Array, peak: float) -> Holding | None:
+    """What holding takes on the rig, let go near enough for half of the limit to bring it back."""
+    if wish.on is None or wish.limit is None or not 0 < peak < math.inf:
+        return None
+    slowest = -float(to_s(poles_of(closed(sampled, law)), wish.period).real.max())
+    seconds = min(max(SLOWEST / slowest, 6.0), ROWS * wish.period)
+    rig = wish.on.replace(delay=sampled.delay * wish.period, lag=sampled.lag)
+    near = start * min(1.0, 0.5 * wish.limit / peak)
+    run = trial(rig, replace(law, target=0.0), at=wish.at, start=near, seconds=seconds)
+    found = score(run)
+    return Holding(effort=effort_at_rest(run), lost=min(found.fell, found.ran_out))
 
 
 def _tilt(rig: Rig | StateSpace) -> Array:

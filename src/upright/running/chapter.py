@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from upright.control.effort import RestEffort, shown
 from upright.realtime.jitter import Jitter
 from upright.report.page import Chapter, Facts, KeyNumber, Part, Picture, Step, Table, resting_on
 from upright.report.run import draw_run
@@ -33,6 +34,11 @@ def run_chapter(done: RigRun) -> Chapter:
              f"below a count, {number(count, 2)} {c.unit}" if v < count else f"{number(v, 3)} {c.unit}")
             for c, v, count in zip(done.model.plant.coordinates, done.unrest, done.count, strict=True)
         ]  # fmt: skip
+    if (taken := done.way_back) is not None:
+        peak = f"{number(taken.peak, 3)} of {done.limit:g} {done.model.unit}"
+        facts.append(("largest command", f"{peak}, at the limit for {100 * taken.saturated:.2g} % of the ticks"))
+    if done.effort is not None:
+        facts.append(("command at rest", shown(done.effort, done.limit, done.model.unit)))
     parts = [Part("The run", (Facts(tuple(facts)), *_events(done)))]
     if log is not None and len(log) > 2:
         parts.append(Part("What was logged", (
@@ -41,7 +47,8 @@ def run_chapter(done: RigRun) -> Chapter:
         )))  # fmt: skip
     warnings = tuple(filter(None, (end.warning, NO_SAFETY if done.file.hardware else "", end.log_message)))
     chapter = Chapter(
-        title=f"Run on {done.model.name}", verdict=done.verdict, sound=done.sound, parts=tuple(parts),
+        title=f"Run on {done.model.name}", verdict=done.verdict, sound=done.sound and done.quiet,
+        parts=tuple(parts),
         warnings=warnings, steps=_steps(done, rig), numbers=_numbers(done),
         findings=(KeyNumber(what="late ticks", value=f"{end.late} of {end.ticks}"),),
     )  # fmt: skip
@@ -64,6 +71,9 @@ def _steps(done: RigRun, rig: str) -> tuple[Step, ...]:
         out.append(Step("See what rate this machine holds.", "upright rig check"))
     if done.wish.law is None:
         out.append(Step("Identify the rig from this log.", f"upright init {log}"))
+    elif not done.quiet:
+        out.append(Step("Design a law whose command is quieter at rest: slower poles, or velocities from a filter.",
+                        "upright design --help"))  # fmt: skip
     elif not done.end.stopped:
         out.append(Step("Check that the law gave what the log says.", f"upright log replay {log}"))
     return tuple(out)
@@ -75,8 +85,14 @@ def _numbers(done: RigRun) -> dict[str, Any]:
         "rig": done.model.name, "kind": done.file.kind, "seconds": done.wish.seconds, "ticks": end.ticks,
         "late": end.late, "stopped": end.stopped, "faults": int(end.faults), "fault_words": told(end.faults),
         "rows": end.rows, "dropped": end.dropped, "rms": list(done.unrest), "log": str(done.log_path),
+        "way_back": None if done.way_back is None else vars(done.way_back), "effort": _effort(done.effort),
         "clock_seconds": end.seconds, "verdict": done.verdict,
     }  # fmt: skip
+
+
+def _effort(found: RestEffort | None) -> dict[str, Any] | None:
+    """Command at rest, as shares of the limit; limit cycles in SI."""
+    return None if found is None else {"quiet": found.quiet, **vars(found)}
 
 
 def checkup_chapter(found: Checkup, rig: str) -> Chapter:

@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from upright.basis import DESCRIBED, MEASURED, NOT_TRUSTED, Basis
+from upright.control.effort import FELT, Effort, RestEffort, effort, rest_effort, resting, shown
+from upright.control.preflight import BUSY, SATURATED, STABILISED
 from upright.errors import BadInput
 from upright.files import read_text
 from upright.laws import Law, Rule, as_values
@@ -25,6 +27,10 @@ from upright.rigs.protocol import Mode
 from upright.rigs.rigfile import RigFile, read_rig_file
 from upright.running.rig import described, open_loop, read_law, signal, stage_of
 
+LEAST = 100
+"""Fewest rows of which a last third tells anything."""
+ARRIVED = math.radians(10)
+"""How far from upright a run that began hanging may be over its last third, for the rest of it to be one [rad]."""
 MODES = {"host": Mode.HOST, "mcu": Mode.MCU}
 
 
@@ -119,6 +125,49 @@ class RigRun:
         return tuple(1.0 / abs(n) for n in self.model.per_unit)
 
     @property
+    def limit(self) -> float:
+        """Largest command that passes: of the drive, or as the supervisor limits it."""
+        return min(self.model.saturation, math.inf if self.end.held is None else self.end.held.command)
+
+    @property
+    def way_back(self) -> Effort | None:
+        """What the drive had to give in all; None where no law ran."""
+        if self.wish.law is None or self.log is None or not len(self.log):
+            return None
+        return effort(self._applied, self.limit, self.model.converter)
+
+    @property
+    def saturates(self) -> bool:
+        """Whether the command was at its limit for longer than the drive's own lag hides."""
+        taken = self.way_back
+        return taken is not None and taken.saturated * self.end.ticks * self.model.period > FELT
+
+    @property
+    def _applied(self) -> Array:
+        """Commands that the converter put out."""
+        assert self.log is not None
+        return self.log.columns[f"{self.log.header.command}_applied"]
+
+    @property
+    def effort(self) -> RestEffort | None:
+        """What holding took over the last third; None where no law held it to the end, or it followed what moved."""
+        log = self.log
+        if self.wish.law is None or self.end.stopped or log is None or len(log) < LEAST:
+            return None
+        columns = log.columns
+        if any(np.ptp(resting(columns[name])) > 0 for name, _ in log.header.references):
+            return None
+        if self.wish.from_rest and float(np.abs(resting(self.away)[:, -1]).max()) > ARRIVED:
+            return None
+        body = [c.name for c in self.model.plant.coordinates].index(self.model.plant.inputs[0].on)
+        return rest_effort(self.t, self._applied, self.limit, body=self.away[:, body], count=self.count[body])
+
+    @property
+    def quiet(self) -> bool:
+        """Whether the command at rest left the drive to what it is there for, as far as there was a rest."""
+        return self.effort is None or self.effort.quiet
+
+    @property
     def complete(self) -> bool:
         """Whether every row of the loop is in the log."""
         return self.log is not None and not self.log.complaint and not self.end.dropped
@@ -148,7 +197,19 @@ class RigRun:
         size = f"{math.degrees(size):.2g} degrees" if last.unit == "rad" else f"{1e3 * size:.2g} mm"
         size = f"one encoder count, {size}" if self.unrest[-1] < self.count[-1] else size
         what = "varied by" if self.wish.reference else "stayed within"
-        return f"Held for {how}{late}; {last.name} {what} {size} (rms, second half).{log}"
+        kind = STABILISED if self.quiet and not self.saturates else SATURATED if self.quiet else BUSY
+        return f"{kind.capitalize()} for {how}{late}; {last.name} {what} {size} (rms, second half){self._rest()}.{log}"
+
+    def _rest(self) -> str:
+        if self.effort is None:
+            return ""
+        body = self.effort.body
+        told = f"; the command at rest {shown(self.effort, self.limit, self.model.unit)}"
+        if body is None:
+            return told
+        name, unit = self.model.plant.inputs[0].on, self.model.plant.coordinates[0].unit
+        size = f"{math.degrees(body.size):.2g} degrees" if unit == "rad" else f"{1e3 * body.size:.2g} mm"
+        return f"{told}; {name} cycles by {size} every {body.period:.2g} s"
 
 
 def run_rig(

@@ -48,13 +48,13 @@ def test_two_sets_regulate_and_one_does_not_as_the_paper_saw_and_as_was_told(mak
     truth = make_rig(make)
     done = run_regulation(completed(fit_of(truth)), TwinStand(rig=truth), 0, tmp_path, wish=RegulationRequest(draws=64))
     words = [a.word for a in done.attempts]
-    assert words.count("regulates") >= 2
-    assert {"saturates", "too weak"} & set(words)
+    assert words.count("stabilised") >= 2
+    assert {"stabilised with saturation", "does not settle", "leaves its travel"} & set(words)
     assert [a.before.word for a in done.attempts] == words
-    assert done.best.word == "regulates"
+    assert done.best.word == "stabilised"
     chapter = regulation_page.chapter(done)
     assert chapter.numbers["as_told"] == 4
-    assert "came as told" in chapter.verdict
+    assert "All 4 runs agreed with their predictions." in chapter.verdict
     # each set of Table 1 weighs effort half as much as the one before: more command is spent, less travel
     peaks = [a.before.score for a in done.attempts if a.before.score.held]
     assert np.all(np.diff([s.peaks[0] for s in peaks]) < 0)
@@ -79,7 +79,7 @@ def test_without_a_rig_nothing_is_run(tmp_path):
     done = run_regulation(completed(fit_of(make_rig("linear"), spread=0.0)), None, 0, tmp_path, wish=wish)
     told = regulation_page.chapter(done)
     assert "Nothing was run" in told.verdict
-    assert "no uncertainty" in told.detail
+    assert "states no uncertainty" in told.detail
     assert not list(tmp_path.iterdir())
 
 

@@ -6,7 +6,9 @@ import math
 from typing import Any
 
 from upright.control import Score
-from upright.control.preflight import FELT, WORDS, word
+from upright.control.effort import FELT, RestEffort, of_limit, shown
+from upright.control.preflight import BUSY, SATURATED, STABILISED, WORDS, word
+from upright.control.score import effort_at_rest
 from upright.experiments.regulation_2.figures import chances_figure, runs_figure, ways_figure
 from upright.experiments.regulation_2.run import SETS, Attempt, Regulation, VelocityRun
 from upright.gains.requests import written
@@ -28,12 +30,12 @@ def chapter(done: Regulation) -> Chapter:
         "anything moves, from the numbers identified while it hung?",
         verdict=_verdict(done),
         detail=_detail(done),
-        sound=not done.interrupted and done.best.before.words["regulates"] > 0.9,
+        sound=_sound(done),
         parts=tuple(_parts(done)),
         steps=tuple(_steps(done)),
         findings=tuple(
             KeyNumber(
-                what=f"chance that {a.name} holds",
+                what=f"probability that {a.name} stabilises",
                 value=f"{100 * a.before.chance:.0f} %" + (f"; it {a.word}" if a.word and done.truth is None else ""),
                 truth="" if done.truth is None else a.word,
             )
@@ -45,29 +47,69 @@ def chapter(done: Regulation) -> Chapter:
 
 
 def _verdict(done: Regulation) -> str:
-    """Which set to take, and whether things came as told."""
+    """Which set to use, and whether the runs agreed with their predictions."""
     best = done.best
-    share = best.before.words["regulates"]
-    sure = f"{round(share * done.wish.draws)} of {done.wish.draws} rigs that the identification allows regulate with it"
-    head = f"{'Take' if share >= 0.5 else 'None is to be trusted with this start; best is'} {best.name}: {sure}."
+    share = best.before.words[STABILISED]
+    head = (
+        f"Use {best.name}: it stabilises {_of_rigs(done, share)} without saturation; on 95 % of them the command at "
+        f"rest has an rms of {of_limit(best.before.rest_rms, 'at most ')}."
+        if share >= 0.5
+        else f"No pole set is recommended for this start. The best, {best.name}, stabilises "
+        f"{_of_rigs(done, share)} without saturation or excessive effort; most often the result is: {best.before.word}."
+    )
     ran = done.ran
     if not ran:
-        return head + " Nothing was run: this is what the model says."
-    as_told = [a for a in ran if a.word == a.before.word]
-    if len(as_told) == len(ran):
-        return f"{head} All {len(ran)} runs came as told." if len(ran) > 1 else f"{head} So it came."
-    others = ", ".join(f"{a.name} ({a.word}, told {100 * a.before.words[a.word]:.0f} %)" for a in ran
-                       if a not in as_told)  # fmt: skip
-    return f"{head} {len(as_told)} of {len(ran)} runs came as most of those rigs did; not so {others}."
+        return f"{head}{_excess(done, best)} Nothing was run: this is what the model says."
+    agreed = [a for a in ran if a.word == a.before.word]
+    if len(agreed) == len(ran):
+        runs = f"All {len(ran)} runs agreed with their predictions." if len(ran) > 1 else "The run agreed with that."
+    else:
+        others = "; ".join(
+            f"{a.name} came to: {a.word} (predicted probability {100 * a.before.words[a.word]:.0f} %)"
+            for a in ran
+            if a not in agreed
+        )
+        runs = f"{len(agreed)} of {len(ran)} runs agreed with their predictions. Not so: {others}."
+    return f"{head} {runs}{_excess(done, best)}"
+
+
+def _of_rigs(done: Regulation, share: float) -> str:
+    rigs, of = done.wish.draws, "sampled from the fit's covariance" if done.uncertain else "sampled"
+    some = round(share * rigs)
+    return f"{'all' if some == rigs else f'{some} of' if some else 'none of'} {rigs} rigs {of}"
+
+
+def _excess(done: Regulation, a: Attempt) -> str:
+    """What is too much about the command at rest, as a sentence after others; empty where nothing is."""
+    if a.word == BUSY and a.after is not None:
+        found = effort_at_rest(a.after)
+    elif a.before.word == BUSY:
+        found = a.before.rest
+    else:
+        return ""
+    if found.quiet:  # of the rig as identified, unlike that of most rigs allowed
+        return ""
+    return (
+        f" The command at rest {shown(found, done.rig.saturation, done.rig.unit)}. Ask for slower poles, or take the "
+        "velocities from a filter (--speed kalman)."
+    )
+
+
+def _sound(done: Regulation) -> bool:
+    """Whether the set to use is sure and quiet beforehand, and was so where it was run."""
+    best = done.best
+    ran_well = best.score is None or best.word in (STABILISED, SATURATED)
+    return not done.interrupted and ran_well and best.before.words[STABILISED] > 0.9
 
 
 def _detail(done: Regulation) -> str:
     """How far that can be trusted."""
     spread = (
-        f"The {done.wish.draws} rigs were drawn from the fit's covariance, dry friction as it may be on the day, and "
-        "started as a hand does it."
+        f"The {done.wish.draws} rigs are sampled from the fit's covariance, with day-to-day variation of dry friction "
+        "and of the release by hand."
         if done.uncertain
-        else "The fit tells of no uncertainty, so only dry friction and the hand vary: the chances are too sure."
+        else "The fit states no uncertainty, so only dry friction and the release by hand vary: the probabilities are "
+        "too high."
     )
     return spread + (" Stopped by Ctrl-C before every set was run." if done.interrupted else "")
 
@@ -81,32 +123,35 @@ def _sentence(done: Regulation, a: Attempt) -> str:
         else "the sampled loop is not stable"
     )
     told = (
-        f"{a.name[:1].upper()}{a.name[1:]}: told to be held with a chance of {100 * b.chance:.0f} %"
-        f" ({_shares(a)}); {reach}; the command was to peak at {b.score.effort_peak:.2g} of {rig.limit:g} {rig.unit}."
+        f"{a.name[:1].upper()}{a.name[1:]}: predicted probability of stabilisation {100 * b.chance:.0f} %"
+        f" ({_shares(a)}); {reach}; predicted peak {b.score.effort_peak:.2g} of {rig.limit:g} {rig.unit}; rms at rest "
+        f"{of_limit(b.rest_rms)}."
     )
-    if a.came is None:
+    if a.after is None or a.came is None:
         return f"{told} It was not run." if done.ran else told
-    return f"{told} {_came(done, a.came.score)} {a.came.ended}".rstrip()
+    return f"{told} {_came(done.rig, a.came.score, effort_at_rest(a.after))} {a.came.ended}".rstrip()
 
 
 def _shares(a: Attempt) -> str:
     return ", ".join(f"{w} {100 * a.before.words[w]:.0f} %" for w in WORDS if a.before.words[w] > 0)
 
 
-def _came(done: Regulation, s: Score) -> str:
-    rig = done.rig
+def _came(rig: Rig, s: Score, rest: RestEffort) -> str:
     driven = plain(rig.plant.inputs[0].on)
     if not s.held and s.fell < s.ran_out:
-        return f"It fell after {s.fell:.2g} s."
+        return f"Measured: it fell after {s.fell:.2g} s."
     if not s.held:
-        return f"It was too weak: {driven} came to the end of its travel after {s.ran_out:.2g} s."
+        return f"Measured: {driven} came to the end of its travel after {s.ran_out:.2g} s."
     if math.isinf(s.settled):
-        return f"It was too weak: dry friction kept the pendulum swinging by {math.degrees(s.final[-1]):.2g}°."
+        return f"Measured: it did not settle; the pendulum kept swinging by {math.degrees(s.final[-1]):.2g}°."
     full = f", {1e3 * s.at_limit:.0f} ms of it at the limit" if s.at_limit > FELT else ""
-    still = f"swings on by {_shown(rig, 0, s.final[0])}" if s.final[0] > 2 * rig.quantum[0] else "comes to rest"
+    still = "comes to rest"
+    if s.final[0] > 2 * rig.quantum[0]:
+        every = f" every {rest.body.period:.2g} s" if rest.body is not None else ""
+        still = f"swings on by {_shown(rig, 0, s.final[0])}{every}"
     return (
-        f"It settled in {s.settled:.2g} s with a peak of {s.effort_peak:.2g} {rig.unit}{full}; {driven} went "
-        f"{_shown(rig, 0, s.peaks[0])} and {still}."
+        f"Measured: settled in {s.settled:.2g} s with a peak of {s.effort_peak:.2g} {rig.unit}{full}, "
+        f"rms at rest {of_limit(s.rest_rms)}; {driven} went {_shown(rig, 0, s.peaks[0])} and {still}."
     )
 
 
@@ -149,17 +194,18 @@ def _told_table(done: Regulation) -> Table:
         )  # fmt: skip
         if a.score is not None:
             rows.append(
-                ("", f"came: {a.word}", "held" if a.score.held else "lost", "", "", "", *_figures(done, a.score))
+                ("", f"came: {a.word}", "stabilised" if a.score.held else "lost", "", "", "", *_figures(done, a.score))
             )
     driven = done.rig.plant.coordinates[0]
     return Table(
-        caption="Told before (first lines) and come after; tilt and tap are the largest recovered, each alone; noise "
-        "is that of the command from the encoders' counts",
+        caption="Predicted (first lines) and measured; tilt and tap are the largest recovered, each alone; noise is "
+        "that of the command from the encoders' counts; rest is the command over the last third of the run, rms and "
+        "peak as shares of the limit",
         headings=(
             "", "verdict", "chance", "tilt [deg]", "tap [rad/s]", f"noise [{done.rig.unit}]", "settled [s]",
-            f"peak [{done.rig.unit}]", "at limit", f"{plain(driven.name)} peak", f"{plain(driven.name)} rest",
+            f"peak [{done.rig.unit}]", "at limit", "rest", f"{plain(driven.name)} peak", f"{plain(driven.name)} rest",
         ),
-        rows=tuple(rows), numbers=tuple(range(2, 11)),
+        rows=tuple(rows), numbers=tuple(range(2, 12)),
     )  # fmt: skip
 
 
@@ -168,7 +214,8 @@ def _figures(done: Regulation, s: Score) -> tuple[str, ...]:
     still = "still" if s.final[0] <= 2 * done.rig.quantum[0] else f"±{_shown(done.rig, 0, s.final[0])}"
     rest = still if s.held else "–"
     return (
-        settled, number(s.effort_peak, 3), f"{100 * s.saturated:.1f} %", _shown(done.rig, 0, s.peaks[0]), rest,
+        settled, number(s.effort_peak, 3), f"{100 * s.saturated:.1f} %",
+        f"{100 * s.rest_rms:.2g}, {100 * s.rest_peak:.2g} %", _shown(done.rig, 0, s.peaks[0]), rest,
     )  # fmt: skip
 
 
@@ -297,12 +344,18 @@ def _set(a: Attempt) -> dict[str, Any]:
         "K": a.placement.K[0],
         "before": {
             "word": b.word, "words": dict(b.words), "chance": b.chance, "tilt": b.tilt, "push": b.push,
-            "command_noise": b.noise,
-            "margins": b.margins,
+            "command_noise": b.noise, "rest_rms_95": b.rest_rms,
+            "margins": b.margins, "rest": _rest(b.rest),
             **_scored(b.score),
         },
-        "after": None if came is None else {"word": a.word, "ended": came.ended, **_scored(came.score)},
+        "after": None if came is None else {
+            "word": a.word, "ended": came.ended, "rest": _rest(effort_at_rest(came.trial)), **_scored(came.score),
+        },
     }  # fmt: skip
+
+
+def _rest(found: RestEffort) -> dict[str, Any]:
+    return {"quiet": found.quiet, "rms": found.rms, "peak": found.peak, "command": found.command, "body": found.body}
 
 
 def _scored(s: Score) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,9 +20,11 @@ if TYPE_CHECKING:
 
 
 COLOURS: Mapping[str, tuple[str, str]] = {
-    "regulates": (SKY, ""),
-    "saturates": (ORANGE, "///"),
-    "too weak": ("#d9d9d9", "..."),
+    "stabilised": (SKY, ""),
+    "stabilised with saturation": (SKY, "///"),
+    "stabilised with excessive effort": (ORANGE, "///"),
+    "does not settle": (ORANGE, "..."),
+    "leaves its travel": ("#d9d9d9", "..."),
     "falls": (VERMILLION, "xxx"),
 }
 """Fill and hatching of every end of a run, so that grey print tells them apart."""
@@ -52,7 +55,7 @@ def runs_figure(attempts: Sequence[Attempt], seconds: float) -> Figure:
             axes[-1, column].plot(t, u, color=colour, linestyle=line, linewidth=width)
         for side in (-1, 1):
             axes[-1, column].axhline(side * first.rig.limit, color=GREY, linestyle=":", linewidth=1.0)
-        axes[0, column].set_title(a.title)
+        axes[0, column].set_title(fill(a.title, 22))
         axes[-1, column].set_xlabel("time [s]")
     for row, i in enumerate(order):
         turned = coordinates[i].unit == "rad"
@@ -84,7 +87,7 @@ def _ends(row: Any, travel: float) -> None:
 @styled
 def chances_figure(told: Mapping[str, Mapping[str, float]], came: Mapping[str, str]) -> Figure:
     """Share of the rigs allowed that come to each end, one bar per pole set, with what came written beside."""
-    drawing = figure(0.42 * len(told) + 1.1)
+    drawing = figure(0.42 * len(told) + 1.3)
     ax: Any = drawing.subplots()
     names = list(told)
     left = np.zeros(len(names))
@@ -95,12 +98,12 @@ def chances_figure(told: Mapping[str, Mapping[str, float]], came: Mapping[str, s
         left += share
     for i, n in enumerate(names):
         if came.get(n):
-            ax.text(101.5, i, f"came: {came[n]}", va="center", fontsize=8.5)
+            ax.text(101.5, i, fill(f"came: {came[n]}", 20), va="center", fontsize=8.5)
     ax.invert_yaxis()
     ax.set_xlim(0, 100)
     ax.grid(axis="y", visible=False)
     ax.set_xlabel("share of the rigs that the identification allows [%]")
-    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=len(WORDS))
+    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=len(WORDS) // 2)
     return drawing
 
 

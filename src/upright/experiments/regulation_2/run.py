@@ -16,7 +16,7 @@ import numpy as np
 
 from upright.basis import SIMULATED
 from upright.control import Score, Trial, score, trial
-from upright.control.preflight import Preflight, Task, preflight, word
+from upright.control.preflight import STABILISED, Preflight, Task, preflight, word
 from upright.designing.run import SPEEDS, velocities
 from upright.errors import BadInput
 from upright.experiments.frequency_1b.run import run_frequency
@@ -170,8 +170,18 @@ class Regulation:
 
     @property
     def best(self) -> Attempt:
-        """The set to recommend beforehand: the surest to regulate, of equals the one that bears the hardest tap."""
-        return max(self.attempts, key=lambda a: (round(a.before.words["regulates"], 2), a.before.push))
+        """The set to recommend beforehand: the surest to stabilise without saturation or excessive effort.
+
+        Then the surest to stabilise with saturation, or at all; of equals the one with the quietest command at rest,
+        to a hundredth of the limit, and of those the one that recovers from the hardest tap.
+        """
+        return max(self.attempts, key=_rank)
+
+
+def _rank(a: Attempt) -> tuple[float, ...]:
+    b = a.before
+    sure = (b.words[STABILISED], b.quiet_chance, b.chance)
+    return (*(round(share, 2) for share in sure), -round(b.rest_rms, 2), b.push)
 
 
 def identify_make(key: str, seed: int, folder: Path, progress: Progress = silent, draws: int = DRAWS) -> Rig:

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from upright.basis import SIMULATED
 from upright.control import Trial, trial
-from upright.control.score import Effort, StepFigures, effort, step_figures
+from upright.control.effort import Effort, effort
+from upright.control.score import StepFigures, step_figures
 from upright.errors import BadInput
 from upright.experiments.stand.known import Known
 from upright.experiments.stand.stand import TestStand

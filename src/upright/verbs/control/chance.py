@@ -107,13 +107,31 @@ def chance(
     doubt += doubts(known, rig)
     chapter = Chapter(
         title=f"Chance that the gains hold the {rig.name}",
-        verdict=f"Held for {seconds:g} s on {share} of {draws} rigs that the fit allows.", detail=limits,
-        sound=told.chance > 0.95, warnings=tuple(doubt),
+        verdict=f"Stabilised for {seconds:g} s on {share} of {draws} rigs sampled from the fit's covariance"
+        f"{_effort(told)}", detail=limits,
+        sound=told.quiet_chance > 0.95, warnings=tuple(doubt),
         parts=(Part("Before the run", (table,)), Part("The rig", (rig_table(rig),))),
-        numbers={"chance": told.chance, "interval": (low, high), "words": dict(told.words), "tilt": told.tilt,
+        numbers={"chance": told.chance, "interval": (low, high), "words": dict(told.words),
+                 "quiet_chance": told.quiet_chance, "rest_rms_95": told.rest_rms, "tilt": told.tilt,
                  "push": told.push, "noise": told.noise, "draws": draws, "seed": seed},
     )  # fmt: skip
     return Answer(told, resting_on(chapter, known.basis, SIMULATED))
+
+
+def _effort(told: Preflight) -> str:
+    """What holding takes, as the end of a sentence."""
+    from upright.control.effort import QUIET_PEAK, QUIET_RMS, of_limit
+    from upright.report.symbols import percent
+
+    if not told.drawn.held.any():
+        return "."
+    if told.quiet_chance > 0.95:
+        return f"; on 95 % of those the command at rest has an rms of {of_limit(told.rest_rms, 'at most ')}."
+    return (
+        f". Only {percent(100 * told.quiet_chance)} settle with a command that is quiet at rest: its rms reaches "
+        f"{of_limit(told.rest_rms)} ({100 * QUIET_RMS:.0f} % is quiet) and its peak "
+        f"{100 * float(told.drawn.rest_peak[told.drawn.held].max()):.0f} % ({100 * QUIET_PEAK:.0f} %)."
+    )
 
 
 def _wilson(held: int, of: int) -> tuple[float, float]:
