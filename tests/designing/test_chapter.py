@@ -49,17 +49,17 @@ def tables(told):
         ({}, None, ""),
         ({"modulus": 0.41, "least_gain": 0.69, "delay": 2.01e-3}, 0.991, ""),
         ({"modulus": 0.39}, None, "distance to -1 is only 0.39"),
-        ({"least_gain": 0.71}, None, "a gain 29 % weaker lets it fall"),
+        ({"least_gain": 0.71}, None, "a gain 29 % weaker makes it unstable"),
         ({"delay": 1.9e-3}, None, "it bears only 1.9 ms more delay"),
-        ({}, 0.98, "2 % of the rigs that the fit allows fall"),
+        ({}, 0.98, "2 % of the rigs sampled from the fit's covariance are unstable with it"),
         ({"modulus": 0.3, "delay": 1e-3}, None, "distance to -1 is only 0.30; it bears only 1 ms more delay"),
     ],
 )
 def test_a_loop_stands_with_margin_or_with_what_it_lacks(done, changes, chance, words):
     """Asked are 0.4 of distance, a third of gain, a period of delay and 99 % of the rigs."""
     told = with_margins(done, replace(FINE, **changes), chance=chance, peak_sampled=2.5)
-    head = f"The loop stands, with reservations: {words}" if words else "The loop stands with margin"
-    assert told._loop_verdict() == f"{head}; the start asked for takes 25 % of the drive's limit."
+    head = f"Stable, with reservations: {words}" if words else "Stable with margin"
+    assert told._loop_verdict() == f"{head}; recovering from this start takes 25 % of the drive's limit."
     page = chapter(told)
     assert page.sound == (not words)
     offered = any("--sampled" in step.command for step in page.steps)
@@ -68,10 +68,10 @@ def test_a_loop_stands_with_margin_or_with_what_it_lacks(done, changes, chance, 
 
 def test_a_start_beyond_the_limit_saturates_and_its_share_that_does_not_is_told(done):
     told = with_margins(done, FINE, peak_sampled=25.0)._loop_verdict()
-    assert "needs 25 V, 250 % of the limit: the drive saturates; up to 40 % of that start it does not." in told
+    assert "takes 25 V, 250 % of the limit, and saturates the drive; up to 40 % of this start it does not." in told
     assert with_margins(done, FINE, peak_sampled=10.0)._loop_verdict().endswith("takes 100 % of the drive's limit.")
     free = with_margins(done, FINE, wish=replace(done.wish, limit=None))
-    assert free._loop_verdict() == "The loop stands with margin."
+    assert free._loop_verdict() == "Stable with margin."
     assert any("whether it saturates is not known" in w for w in chapter(free).warnings)
     assert not any("saturates" in w for w in chapter(done).warnings)
 

@@ -29,7 +29,7 @@ def run(theta=0.1, x=0.05, volts=3.0, rig=RIG):
     )
 
 
-def attempt(before, after=None, title="set 1: regulates"):
+def attempt(before, after=None, title="set 1: stabilised"):
     return SimpleNamespace(before=SimpleNamespace(run=before), after=after, title=title)
 
 
@@ -53,7 +53,7 @@ def test_deviations_stand_in_degrees_and_centimetres_the_pendulum_above_the_cart
         np.testing.assert_allclose(came.get_ydata(), other, atol=1e-9)
     assert lines(axes[0, 1]) == []  # nothing was run
     assert [ax.get_ylabel().rpartition(" ")[2] for ax in axes[:, 0]] == ["[deg]", "[cm]", "[V]"]
-    assert [ax.get_title(loc="left") for ax in axes[0]] == ["set 1: regulates"] * 2
+    assert [ax.get_title(loc="left") for ax in axes[0]] == ["set 1: stabilised"] * 2
     for ax in axes[2]:
         limits = [line.get_ydata()[0] for line in ax.get_lines() if line.get_linestyle() == ":"]
         assert limits == [-RIG.limit, RIG.limit]
@@ -91,17 +91,18 @@ def test_a_run_is_drawn_until_it_is_lost_and_a_cross_stands_there():
 
 def test_shares_of_every_end_add_up_to_a_hundred_with_what_came_beside():
     told = {
-        "set 1": dict.fromkeys(WORDS, 0.0) | {"regulates": 0.75, "falls": 0.25},
-        "set 2": dict.fromkeys(WORDS, 0.0) | {"regulates": 0.5, "saturates": 0.3, "too weak": 0.2},
+        "set 1": dict.fromkeys(WORDS, 0.0) | {"stabilised": 0.75, "falls": 0.25},
+        "set 2": dict.fromkeys(WORDS, 0.0)
+        | {"stabilised": 0.5, "stabilised with saturation": 0.3, "does not settle": 0.2},
     }
-    drawing = chances_figure(told, {"set 1": "regulates", "set 2": ""})
+    drawing = chances_figure(told, {"set 1": "stabilised", "set 2": ""})
     (ax,) = drawing.axes
     bars = np.array([[(b.get_x(), b.get_width()) for b in part] for part in ax.containers])
     assert [to_hex(part[0].get_facecolor()) for part in ax.containers] == [to_hex(COLOURS[w][0]) for w in WORDS]
     for i, name in enumerate(told):
         assert bars[:, i, 1] == pytest.approx([100 * told[name][w] for w in WORDS])
         assert bars[:, i, 0] == pytest.approx(np.concatenate([[0], np.cumsum(bars[:-1, i, 1])]))
-    assert [(t.get_text(), t.get_position()[1]) for t in ax.texts] == [("came: regulates", 0)]
+    assert [(t.get_text(), t.get_position()[1]) for t in ax.texts] == [("came: stabilised", 0)]
     assert ax.get_xlim() == (0, 100)
     assert ax.yaxis_inverted()  # the first set on top
     taller = chances_figure(told | {f"set {k}": told["set 1"] for k in range(3, 9)}, {})
