@@ -23,7 +23,7 @@ from upright.identification.estimate import find_optimum
 from upright.identification.model.grey_box import GreyBox, neutral
 from upright.identification.problem.residuals import Problem, formulate
 from upright.identification.problem.simulated import with_noise
-from upright.identification.problem.trips import located
+from upright.identification.problem.trips import with_trip_guesses
 from upright.identification.search.descent import SearchLog
 from upright.study.load import load_study
 from upright.workers import HERE, Workers
@@ -37,7 +37,7 @@ STARTS, QUICK = 300, 2
 def _reference(name: str) -> tuple[GreyBox, list[Any], Problem, dict[str, float]]:
     """A study's rig and runs, the whole problem weighed as by its own fit, and the values of that fit."""
     study = load_study(STUDIES / f"{name}.toml", data=os.environ["UPRIGHT_REAL_DATA"])
-    runs = [located(study.model, run) for run in study.runs if run.role == "fit"]
+    runs = [with_trip_guesses(study.model, run) for run in study.runs if run.role == "fit"]
     rig = with_noise(study.model, runs)
     weighed, own = find_optimum(rig, runs, "auto", SearchLog())
     problem = formulate(rig, runs)

@@ -78,7 +78,7 @@ def _sensors(make: str, count: int) -> list[Line]:
     from upright import gains
     from upright.control import design_swing_up, trial
     from upright.control.score import FALLEN
-    from upright.control.sensors import Suspicion, Watch, probe, put_out, scales
+    from upright.control.sensors import Suspicion, Watch, probe, scales, shown_by_encoders
     from upright.control.trial import readings
     from upright.rig.makes import make_rig
 
@@ -103,8 +103,8 @@ def _sensors(make: str, count: int) -> list[Line]:
         liar = replace(twin, scales=tuple(factor if i == place else 1.0 for i in range(2)))
         told.append((names[place], factor))
         begin = time.process_time()
-        false += not scales(model, put_out(twin, command)).sound
-        found = scales(model, put_out(liar, command))
+        false += not scales(model, shown_by_encoders(twin, command)).sound
+        found = scales(model, shown_by_encoders(liar, command))
         hanging += time.process_time() - begin
         wrong += not found.sound
         named += found.wrong == (names[place],)

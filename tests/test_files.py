@@ -11,7 +11,7 @@ import pytest
 from upright.errors import BadInput
 from upright.files import check_output, keeps_its_inputs, read_bytes, read_text, replace_file, whole_file
 from upright.identification.frequency.response import FrequencyResponse, is_response
-from upright.questionnaire.sheet import read as read_sheet
+from upright.questionnaire.sheet import read_sheet as read_sheet
 from upright.readers import read
 from upright.records import Record
 from upright.study.fitted import read_fit

@@ -77,7 +77,7 @@ def test_whatever_is_asked_comes_after_what_it_stands_on():
             if make and make not in e.makes:
                 continue
             for name in (e.key, e.part_of):
-                order = [x.key for x in laboratory.choose([name], make)]
+                order = [x.key for x in laboratory.chosen_experiments([name], make)]
                 assert e.key in order
                 there = {x.key: x for x in EXPERIMENTS}
                 on = make or e.makes[0]

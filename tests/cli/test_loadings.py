@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from upright.cli import app
-from upright.experiments.weighing_1a.run import acquire, drawn_twin
+from upright.experiments.weighing_1a.run import drawn_twin, step_log
 
 pytestmark = pytest.mark.slow
 
@@ -27,7 +27,7 @@ def said(outcome) -> str:
 def logs(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("loads")
     for count in (0, 2, 4):
-        acquire(drawn_twin(2, "torsional"), count).to_csv(folder / f"{count}.csv")
+        step_log(drawn_twin(2, "torsional"), count).to_csv(folder / f"{count}.csv")
     return folder
 
 

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from tests.rigs.test_twin import LAW
 from upright.cli import app
-from upright.cli.watch import effort, lines
+from upright.cli.watch import effort_bar, lines
 from upright.laws import as_values
 from upright.realtime.session import RunState
 from upright.rigs import Fault, Mode
@@ -73,6 +73,6 @@ def test_the_view_shows_state_effort_lateness_and_faults():
     shown = lines(state, 5.0).plain
     for text in ("1.50 s", "HOST", "2 late", "+0.0100", "-0.0200", "-2.500", "faster than its limit", "Esc"):
         assert text in shown
-    assert effort(-2.5, 5.0).count("█") == 10
-    assert effort(-2.5, 5.0).index("█") < effort(-2.5, 5.0).index("|")
+    assert effort_bar(-2.5, 5.0).count("█") == 10
+    assert effort_bar(-2.5, 5.0).index("█") < effort_bar(-2.5, 5.0).index("|")
     assert "bring it" in lines(RunState(phase="bring it upright"), 1.0).plain.lower()

@@ -11,7 +11,7 @@ import pytest
 
 from upright.cli import terminal
 from upright.cli.sentences import sentences
-from upright.cli.watch import effort, lines, view
+from upright.cli.watch import effort_bar, lines, view
 from upright.errors import RigStopped, nearest
 from upright.progress import part
 from upright.realtime.session import RunState
@@ -32,14 +32,14 @@ FULL = "█" * 20
     ],
 )  # fmt: skip
 def test_a_command_is_a_bar_from_the_middle_to_its_own_side(value, largest, bar):
-    assert effort(value, largest) == bar
+    assert effort_bar(value, largest) == bar
 
 
 def test_a_run_shows_its_time_deviations_command_and_what_is_wrong():
     state = RunState(phase="running", time=1.5, tick=150, mode=Mode.HOST, applied=-2.5, readings=(0.25, -1.0))
     text = lines(state, 10.0)
     assert text.plain.splitlines() == [
-        "    1.50 s  HOST  tick 150  0 late", "away   +0.2500    -1.0000", f"command   -2.500 {effort(-2.5, 10.0)}",
+        "    1.50 s  HOST  tick 150  0 late", "away   +0.2500    -1.0000", f"command   -2.500 {effort_bar(-2.5, 10.0)}",
         "space, q or Esc: stop",
     ]  # fmt: skip
     fault = next(iter(Fault))

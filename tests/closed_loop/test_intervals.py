@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from upright.closed_loop.intervals import averaged, nearest, numbers, range_of, sharpen
+from upright.closed_loop.intervals import averaged, gains_with_intervals, least_worst, range_of, sharpen
 from upright.closed_loop.regression import Columns, Family, Regression, Signals
 
 
@@ -82,7 +82,7 @@ def test_a_law_that_misses_nothing_is_known_exactly():
 def test_the_nearest_line_misses_three_points_alike():
     """Chebyshev's: a triangle of height 1 is missed by 1/2 at each corner; in other units by as much."""
     X = np.array([[1.0, -1e3], [1.0, 0.0], [1.0, 1e3]])
-    gains, largest = nearest(X, np.array([-3.0, 1.0, 3.0]))  # on a slope of 3 in 1000
+    gains, largest = least_worst(X, np.array([-3.0, 1.0, 3.0]))  # on a slope of 3 in 1000
     assert gains == pytest.approx([0.5, 3e-3], abs=1e-9)
     assert largest == pytest.approx(0.5)
     # the slope alone may go down to where the rounded ends are missed by 1: 3 +- 1 in 1000, the constant free
@@ -94,7 +94,7 @@ def test_one_row_among_thousands_bounds_a_gain(at):
     """Rows are tried some at a time; whichever tells most has to be among them."""
     u = np.zeros(5000)
     u[at] = 1.0
-    gains, largest = nearest(np.ones((5000, 1)), u)
+    gains, largest = least_worst(np.ones((5000, 1)), u)
     assert (gains[0], largest) == pytest.approx((0.5, 0.5))
     assert range_of(np.ones((5000, 1)), u, np.array([1.0]), 0.7) == pytest.approx((0.3, 0.7))
 
@@ -122,7 +122,7 @@ def told(smoothing, terms, gains, pole=0.0, *, on="error", names=("a",)):
     signals = Signals(
         names=names, pairs=((one, None),) * len(names), feedforward=(("f", one),), period=0.01, every=1, moving=one
     )
-    return numbers(best, signals, width), asked
+    return gains_with_intervals(best, signals, width), asked
 
 
 def slopes(value, at, h=1e-6):

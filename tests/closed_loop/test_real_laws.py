@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.readers.logs import real
-from upright.closed_loop import Recovery, recover
+from upright.closed_loop import Recovery, recover_law
 from upright.readers import read
 
 pytestmark = [pytest.mark.real_data, pytest.mark.slow]
@@ -25,7 +25,7 @@ TAU = 50.0  # rad/s, controller.toml
 def test_the_qube_law_reproduces_to_the_last_digits(name: str, column: str) -> None:
     record = read(real(f"{QUBE}{name}.csv"))
     limited = column == "plant_input"
-    found = recover(
+    found = recover_law(
         record, measured=["theta", "alpha"], references=["target_theta", "target_alpha"], command=column,
         feedforward=["feedforward"] if limited else [],
     )  # fmt: skip
@@ -40,12 +40,12 @@ def test_the_qube_law_reproduces_to_the_last_digits(name: str, column: str) -> N
 
 def ecp205(name: str) -> Recovery:
     record = read(real(f"{ECP205}{name}.mat"))
-    return recover(record, measured=["cart1pos"], references=["target_value"], command="duty_cycle")
+    return recover_law(record, measured=["cart1pos"], references=["target_value"], command="duty_cycle")
 
 
 def ecp210(name: str) -> Recovery:
     record = read(real(f"{ECP210}21-Feb-2025 {name}.mat"))
-    return recover(record, measured=["enc1"], references=["target_v"], command="duty")
+    return recover_law(record, measured=["enc1"], references=["target_v"], command="duty")
 
 
 @pytest.mark.parametrize(
@@ -92,11 +92,11 @@ def test_the_gains_of_the_rectilinear_front_end_are_negative(name: str, ki: floa
 
 def test_an_exported_p_loop_is_exact_and_its_pid_is_refused() -> None:
     columns = {"measured": ["Encoder 1 Pos"], "references": ["Commanded Pos"], "command": "Control Effort"}
-    p = recover(read(real(f"{EXPORT}closed_loop_kp.csv")), **columns)
+    p = recover_law(read(real(f"{EXPORT}closed_loop_kp.csv")), **columns)
     assert p.structure == "P"
     assert p.quality == "rounding"
     # kp 0.5, 1.6 steps of 10 V/16380 per count
     low, high = p.gains["kp"].interval
     assert low < 0.5 * 1.6 * 10 / 16380 < high
-    pid = recover(read(real(f"{EXPORT}closed_loop_pid.csv")), **columns)
+    pid = recover_law(read(real(f"{EXPORT}closed_loop_pid.csv")), **columns)
     assert pid.quality == "poor"

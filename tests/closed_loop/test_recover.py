@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.closed_loop.programs import Pid, T, closed_loop
-from upright.closed_loop import recover
+from upright.closed_loop import recover_law
 from upright.errors import BadInput, NotIdentifiable
 from upright.records import Record
 
@@ -27,7 +27,7 @@ STRUCTURES = {
 
 
 def found_in(record: Record, **asked):
-    return recover(record, measured=["y"], references=["r"], command="u", **asked)
+    return recover_law(record, measured=["y"], references=["r"], command="u", **asked)
 
 
 @pytest.mark.parametrize(("structure", "program"), STRUCTURES.items(), ids=STRUCTURES)
@@ -114,7 +114,7 @@ def test_two_channels_and_a_feedforward_are_told_apart() -> None:
     first, second = Pid(kp=6.0, kd=1.8, tau=0.02), Pid(kp=30.0, kd=2.5, tau=0.02)
     u = np.array([first(x, 0.0) + second(y, 0.0) for x, y in zip(a, b, strict=True)]) + 0.7 * f
     record = Record(t=np.arange(3000) * T, signals={"a": a, "b": b, "f": f, "u": u})
-    found = recover(record, measured=["a", "b"], command="u", feedforward=["f"])
+    found = recover_law(record, measured=["a", "b"], command="u", feedforward=["f"])
     assert found.quality == "exact"
     assert found.structure == "PD of a and b; filtered difference of the error"
     values = {name: gain.value for name, gain in found.gains.items()}
@@ -146,7 +146,7 @@ def test_an_open_loop_is_no_law() -> None:
     wave = iter(np.where(np.arange(4000) % 1000 < 500, 0.2, -0.2))
     record = closed_loop(lambda y, r: float(next(wave)))
     try:
-        found = recover(record, measured=["y"], command="u")
+        found = recover_law(record, measured=["y"], command="u")
     except NotIdentifiable:
         return
     assert found.quality == "poor"
@@ -162,11 +162,11 @@ def test_a_law_with_a_dead_zone_is_not_called_exact() -> None:
 def test_mistakes_are_answered_with_what_is_there() -> None:
     record = closed_loop(Pid(kp=3.0), rows=300)
     with pytest.raises(BadInput, match="no column 'Y'"):
-        recover(record, measured=["Y"], command="u")
+        recover_law(record, measured=["Y"], command="u")
     with pytest.raises(BadInput, match="at least one measured column"):
-        recover(record, measured=[], command="u")
+        recover_law(record, measured=[], command="u")
     with pytest.raises(BadInput, match="1 measured columns take as many references at most, got 2"):
-        recover(record, measured=["y"], references=["r", "r"], command="u")
+        recover_law(record, measured=["y"], references=["r", "r"], command="u")
     still = Record(t=record.t, signals={**record.signals, "u": np.zeros(300)})
     with pytest.raises(NotIdentifiable, match="stays at 0"):
         found_in(still)

@@ -22,12 +22,12 @@ from upright.closed_loop.regression import (
     fit,
     held_out,
     law_of,
-    least_squares,
     refine,
+    scaled_least_squares,
     structure,
 )
 from upright.closed_loop.search import Search, extremes, held_for, stepped
-from upright.closed_loop.structures import Channel, Filter, finer, joined, memory
+from upright.closed_loop.structures import Channel, Filter, finer, joined, memory_before
 from upright.errors import NotIdentifiable
 from upright.records import Provenance, Record
 
@@ -219,7 +219,7 @@ def test_gains_of_columns_of_any_size_are_found_and_a_zero_column_gets_none():
     X = RNG.normal(size=(50, 3)) * [1e-9, 1.0, 1e9]
     X = np.column_stack([X, np.zeros(50)])
     gains = np.array([2e9, -3.0, 4e-9, 0.0])
-    assert least_squares(X, X @ gains) == pytest.approx(gains)
+    assert scaled_least_squares(X, X @ gains) == pytest.approx(gains)
 
 
 def test_what_rows_held_out_miss_is_judged_by_gains_of_the_others():
@@ -292,11 +292,13 @@ def test_the_memory_of_a_law_before_its_first_sample_sees_no_jump():
     b = Channel(measured="b", kd=5.0, ki=8.0)
     first = {"a": 3.0, "r": 10.0, "b": -2.0}
     # the sum of the first, error of a, its low pass, the sum of the second, error of b, its low pass
-    assert memory([a, b], first, constant=6.0, smoothed={"b": 15.0}) == pytest.approx([1.5, 7.0, 0.0, 0.0, 2.0, 3.0])
-    assert memory([Channel(measured="b", kp=1.0)], first, constant=6.0) == pytest.approx([6.0])
-    assert memory([Channel(measured="b", kp=1.0)], first).size == 0
+    assert memory_before([a, b], first, constant=6.0, smoothed={"b": 15.0}) == pytest.approx(
+        [1.5, 7.0, 0.0, 0.0, 2.0, 3.0]
+    )
+    assert memory_before([Channel(measured="b", kp=1.0)], first, constant=6.0) == pytest.approx([6.0])
+    assert memory_before([Channel(measured="b", kp=1.0)], first).size == 0
     on = Channel(measured="a", reference="r", kd=2.0, on="measurement")
-    assert memory([on], first) == pytest.approx([-3.0, 0.0])
+    assert memory_before([on], first) == pytest.approx([-3.0, 0.0])
 
 
 @pytest.mark.parametrize(

@@ -25,8 +25,8 @@ from upright.control.sensors import (
     _motion,
     lifted,
     probe,
-    put_out,
     scales,
+    shown_by_encoders,
     sticking,
 )
 from upright.control.sensors import watched as guarded
@@ -48,7 +48,7 @@ def command(make):
 
 
 def checked(rig, make):
-    return scales(make_rig(make), put_out(rig, command(make)))
+    return scales(make_rig(make), shown_by_encoders(rig, command(make)))
 
 
 @pytest.mark.slow
@@ -84,9 +84,9 @@ def test_an_odd_rig_is_not_a_lying_encoder(make, odd):
 def test_a_short_rail_is_kept_to_and_asked_all_the_same(make, travel):
     model, rig = make_rig(make), replace(make_rig(make, 1), scales=(1.1, 1.0))
     blind = probe(model, design_swing_up(model, travel=travel))
-    log = put_out(model, blind)
+    log = shown_by_encoders(model, blind)
     assert np.abs(log[log.outputs[0]]).max() < travel
-    assert scales(model, put_out(rig, blind)).value == pytest.approx([1.1, 1.0], rel=0.01)
+    assert scales(model, shown_by_encoders(rig, blind)).value == pytest.approx([1.1, 1.0], rel=0.01)
 
 
 def test_a_drive_of_twice_the_strength_is_not_blamed_on_a_scale():
@@ -377,7 +377,7 @@ def test_dry_friction_of_the_driven_body_takes_its_share_of_the_command():
 
 def test_a_blind_command_is_logged_with_its_end_and_nothing_after_it():
     rig = make_rig("linear")
-    log = put_out(rig, np.array([1.0, -2.0, 0.5]))
+    log = shown_by_encoders(rig, np.array([1.0, -2.0, 0.5]))
     assert log["u"].tolist() == [1.0, -2.0, 0.5, 0.0]
     assert log.t == pytest.approx(np.arange(4) * rig.period)
     assert (log.t[0], log["theta"][0], log["x"][0]) == (0.0, 0.0, 0.0)
@@ -390,7 +390,7 @@ def test_a_probe_swings_the_model_to_a_hundred_degrees_and_coasts_four_seconds(m
     assert np.all(blind[-coast:] == 0.0)
     assert blind[-coast - 1] != 0.0
     assert blind.size - coast <= 2.5 / rig.period + 1
-    log = put_out(rig, blind)
+    log = shown_by_encoders(rig, blind)
     swing = np.degrees(np.abs(log["theta"]))
     assert 80 < swing.max() < 110  # the drive's lag and the friction of the last quarter swing
     assert np.abs(log[log.outputs[0]]).max() < 0.9 * design_swing_up(rig).travel
@@ -399,7 +399,7 @@ def test_a_probe_swings_the_model_to_a_hundred_degrees_and_coasts_four_seconds(m
 def test_scales_are_given_with_what_they_explain_and_the_residuals_of_that():
     """Of readings twice what is true: the motion returned is the model's times the scale, sample by sample."""
     rig = replace(make_rig("linear"), scales=(1.0, 2.0))
-    log = put_out(rig, command("linear"))
+    log = shown_by_encoders(rig, command("linear"))
     found = scales(make_rig("linear"), log)
     every = round(7e-3 / rig.period)
     assert found.t == pytest.approx(log.t[::every])

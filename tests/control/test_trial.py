@@ -10,7 +10,7 @@ import pytest
 
 from upright.control import Trial, score, trial
 from upright.control.score import scores
-from upright.control.trial import at_work, logged, readings, twin_log
+from upright.control.trial import law_on_rig, logged, readings, twin_log
 from upright.errors import BadInput
 from upright.gains import feedback, filtered, place
 from upright.gains.loop import closed
@@ -270,8 +270,8 @@ def test_pushes_shorter_than_the_run_end_and_longer_ones_are_cut():
 
 def test_a_law_at_work_takes_rest_and_reference_of_the_rig():
     rig = RIG.replace(scales=(1.0, -0.5), converter=0.25)
-    made = at_work(rig, LAW, [0.1, 3.0])
+    made = law_on_rig(rig, LAW, [0.1, 3.0])
     assert (made.delay, made.command_quantum) == (0.0, 0.25)
     assert np.asarray(made.quantum) == pytest.approx(rig.quantum * [1.0, 2.0])
     assert made.references is LAW.references
-    assert np.asarray(at_work(rig, LAW, [0.1, 3.0], [1.0, 2.0]).references).tolist() == [1.0, 2.0]
+    assert np.asarray(law_on_rig(rig, LAW, [0.1, 3.0], [1.0, 2.0]).references).tolist() == [1.0, 2.0]

@@ -11,7 +11,7 @@ import pytest
 from benchmarks.doctored import batch
 from tests.diagnosis.cases import case
 from upright.diagnosis import KnownRig
-from upright.diagnosis.case import COUNTERS, Place, case_of, read_known, tells_speed, tells_time, unit_of
+from upright.diagnosis.case import COUNTERS, Place, case_of, column_unit, read_known, tells_speed, tells_time
 from upright.errors import BadInput
 from upright.physics import CartPendulum, Furuta, Pendulum, find
 from upright.readers.inspection import inspect_record
@@ -113,7 +113,7 @@ def test_a_column_tells_time_or_speed_by_what_is_known_of_it():
     a, b, c, rate = (made.inspection.column(n) for n in ("a", "b", "c", "x_dot"))
     assert [tells_time(x) for x in (a, b)] == [True, False]
     assert [tells_speed(x) for x in (a, c, rate)] == [False, True, True]
-    assert [unit_of(x) for x in (b, c)] == ["deg", "m/s"]
+    assert [column_unit(x) for x in (b, c)] == ["deg", "m/s"]
 
 
 def test_a_locked_coordinate_is_not_read_and_the_others_are_as_stated():

@@ -100,15 +100,15 @@ def test_one_experiment_again_does_not_cost_the_others_their_place(bench, tmp_pa
     laboratory.run_laboratory((), "", 0, tmp_path)
     again = laboratory.run_laboratory(("2",), "", 0, tmp_path, fresh=True)
     assert [(t.experiment.key, t.state) for t in again.results] == [("1", "done"), ("2", "done"), ("3", "kept")]
-    assert laboratory.command(again) == "upright lab"
+    assert laboratory.typed_again(again) == "upright lab"
     trouble["2"] = KeyboardInterrupt()
     stopped = laboratory.run_laboratory(("2",), "", 0, tmp_path, fresh=True)
     assert stopped.interrupted
     assert [t.experiment.key for t in stopped.results] == ["1", "2", "3"]  # 2 as it was kept: it still holds
     alone = laboratory.run_laboratory(("1",), "", 1, tmp_path)
-    assert laboratory.command(alone) == "upright lab --experiment 1 --seed 1"
-    assert laboratory.command(alone, 7) == "upright lab --experiment 1 --seed 7"  # the same on another rig
-    assert laboratory.command(alone, 0) == "upright lab --experiment 1"
+    assert laboratory.typed_again(alone) == "upright lab --experiment 1 --seed 1"
+    assert laboratory.typed_again(alone, 7) == "upright lab --experiment 1 --seed 7"  # the same on another rig
+    assert laboratory.typed_again(alone, 0) == "upright lab --experiment 1"
     assert ran == ["1", "2", "3", "1", "2", "1", "2", "1"]
 
 

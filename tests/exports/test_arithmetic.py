@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from upright.errors import BadInput
-from upright.exports.arithmetic import Language, put_out, statements
-from upright.exports.controller import SampledController, identifiers, of_design, of_law, plain
+from upright.exports.arithmetic import Language, output_lines, statements
+from upright.exports.controller import SampledController, harmless, identifiers, of_design, of_law
 from upright.exports.targets import TARGETS
 from upright.exports.vector import self_test
 from upright.laws import Law, Rule
@@ -70,14 +70,14 @@ def test_commands_of_a_rule_are_rounded_and_limited():
     two = Law(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((2, 0)), [[1.0], [1.0]], period=0.1, limit=3.0,
               command_quantum=[0.0, 0.25])  # fmt: skip
     made = SampledController(law=two, readings=("x",), commands=("a", "b"))
-    assert put_out(made, TOY) == [
+    assert output_lines(made, TOY) == [
         "stop if bad(c0) or bad(c1 * 4)", "c1 = floor(c1 * 4 + 0.5) * 0.25;", "u0 = clip(c0, 3);", "u1 = clip(c1, 3);",
     ]  # fmt: skip
 
 
 def test_a_program_says_what_its_reader_has_to_know():
     assert replace(MADE, states_from="differences", delay=1.0).facts == [
-        *filter(None, [plain(MADE.basis.first_line())]),
+        *filter(None, [harmless(MADE.basis.first_line())]),
         "Call it every 0.01 s, with readings taken just before, and put the command out at once.",
         "Readings: x [m], theta; at rest 0.0, 1.5.",
         "Commands: u [V]; none beyond 6.0, in steps of 0.5.",
@@ -102,7 +102,7 @@ def test_steps_and_memories_are_counted_for_each_signal():
     [("a\nb\tc", "a b c"), ('*/ "x"', "* / 'x'"), ("/* a", "/ * a"), ("a\\b", "a/b"), ("psi [rad]", "psi [rad]")],
 )
 def test_a_name_can_stand_in_a_comment_of_any_language(text, kept):
-    assert plain(text) == kept
+    assert harmless(text) == kept
 
 
 def test_names_are_spelled_as_programs_can_each_another():

@@ -16,9 +16,9 @@ from tests.physics import bumpers
 from tests.physics.bumpers import BUMPERS
 from tests.physics.specimens import SPECIMENS
 from upright.errors import BadInput
-from upright.exports.fmu import build, unit_of
-from upright.exports.fmu.archive import description
-from upright.exports.fmu.translation import translated
+from upright.exports.fmu import archive, unit_of
+from upright.exports.fmu.archive import model_description
+from upright.exports.fmu.translation import as_c
 from upright.physics import BUILT_IN, CartPendulum, Furuta, chain
 from upright.rig import Hardware
 from upright.simulation import simulate
@@ -81,7 +81,7 @@ def test_stick_slip_delay_and_lag_are_those_of_the_kernel(tmp_path):
     """The same steps and events: rounding alone differs, which 2 s of a pendulum that only swings do not magnify."""
     values = {n: v for n, v in DRIVE.items() if n != "actuator.gain"}
     rig = identified(tmp_path, DRY, values=values)
-    (tmp_path / "rig.fmu").write_bytes(build(unit_of(rig))[0])
+    (tmp_path / "rig.fmu").write_bytes(archive(unit_of(rig))[0])
     x0, step = [0.3, 0.0, 0.02, 0.0], 0.01
     commands = np.where(np.arange(200) % 70 < 20, 0.02, 0.0)
     ours = here(DRY, {**DRIVE, "actuator.limit": 5.0}, x0, commands, step)
@@ -99,7 +99,7 @@ SMOOTH = {n: s.plant for n, s in SPECIMENS.items() if n != "double pendulum"}
 )
 def test_every_plant_moves_as_here(name, tmp_path):
     plant = SMOOTH[name]
-    (tmp_path / "rig.fmu").write_bytes(build(unit_of(identified(tmp_path, plant)))[0])
+    (tmp_path / "rig.fmu").write_bytes(archive(unit_of(identified(tmp_path, plant)))[0])
     x0 = np.random.default_rng(1).uniform(-0.3, 0.3, 2 * len(plant.coordinates)).tolist()
     commands = np.sin(np.arange(50) * 0.3)
     ours = here(plant, {"actuator.gain": 0.5, "actuator.limit": 5.0}, x0, commands, 0.02)
@@ -111,7 +111,7 @@ def test_elementary_functions_and_kinks_are_those_of_the_kernel(gap, tmp_path):
     """With the bumpers where the cart rests it has no linear model, and steps as the stiffer side asks."""
     plant = BUMPERS.replace(gap=gap)
     rig = read_stored_rig(fit_file(tmp_path, plant, name=f"{bumpers.__file__}:Bumpers", unit="N"))
-    (tmp_path / "rig.fmu").write_bytes(build(unit_of(rig))[0])
+    (tmp_path / "rig.fmu").write_bytes(archive(unit_of(rig))[0])
     x0, commands = [0.02, 0.0, 0.4, 0.0], 3.0 * np.sin(np.arange(30) * 0.3)
     ours = here(plant, {"actuator.gain": 0.5, "actuator.limit": 5.0}, x0, commands, 0.02)
     assert np.abs(ours - walked(tmp_path / "rig.fmu", plant, x0, commands, 0.02)).max() < 1e-9
@@ -143,13 +143,13 @@ def test_fmpy_s_validator_finds_nothing_and_its_simulation_agrees(tmp_path):
 def test_what_has_no_counterpart_in_c_is_refused_by_its_text(line):
     """Another program than the kernel's text would be worse than none."""
     with pytest.raises(BadInput, match="does not write as C; --to gymnasium") as refused:
-        translated(f"def run_1(n):\n    {line}\n", "run_1", {}, {})
+        as_c(f"def run_1(n):\n    {line}\n", "run_1", {}, {})
     assert line.partition("n = ")[2].split(" ")[0] in str(refused.value)
 
 
 def test_a_step_of_a_fraction_of_a_millisecond_is_refused(tmp_path):
     plant = SMOOTH["pendulum"]
-    (tmp_path / "rig.fmu").write_bytes(build(unit_of(identified(tmp_path, plant)))[0])
+    (tmp_path / "rig.fmu").write_bytes(archive(unit_of(identified(tmp_path, plant)))[0])
     run = running(tmp_path / "rig.fmu", [0.1, 0.0], plant.state_names())
     with pytest.raises(fmpy.fmi1.FMICallException):
         run.unit.doStep(currentCommunicationPoint=0.0, communicationStepSize=1.5e-3)
@@ -162,14 +162,14 @@ def test_a_step_of_a_fraction_of_a_millisecond_is_refused(tmp_path):
 def test_a_fast_motion_is_stepped_as_finely_as_it_needs(tmp_path):
     """400 rad/s, of which a step of 1 ms is 0.4 rad: the closed form x cos(w t) after 50 ms, to 8e-6 a step."""
     plant = chain(1)(m_1=0.5, k_1=0.5 * 400.0**2)
-    (tmp_path / "rig.fmu").write_bytes(build(unit_of(identified(tmp_path, plant)))[0])
+    (tmp_path / "rig.fmu").write_bytes(archive(unit_of(identified(tmp_path, plant)))[0])
     there = walked(tmp_path / "rig.fmu", plant, [0.01, 0.0], [0.0] * 50, 1e-3)
     assert there[-1, 0] == pytest.approx(0.01 * np.cos(400.0 * 0.05), abs=0.01 * 100 * 8e-6)
 
 
 def test_the_same_rig_gives_the_same_file(tmp_path):
     rig = identified(tmp_path, SMOOTH["pendulum"])
-    assert build(unit_of(rig))[0] == build(unit_of(rig))[0]
+    assert archive(unit_of(rig))[0] == archive(unit_of(rig))[0]
 
 
 def test_what_a_unit_does_not_remember_is_said_or_refused(tmp_path):
@@ -186,7 +186,7 @@ def test_a_tool_is_told_every_variable_with_its_unit_meaning_and_number(tmp_path
     plant = CartPendulum(m_c=0.5, m_p=0.2, l_cg=0.3, J_p=6e-3, b_1=0.4)
     offset = {"value": 0.25, "unit": "V", "source": "known"}
     unit = unit_of(identified(tmp_path, plant, unit="N", offset=offset))
-    root = ET.fromstring(description(unit, "{token}"))
+    root = ET.fromstring(model_description(unit, "{token}"))
     about = {v.attrib["name"]: v.attrib for v in root.find("ModelVariables")}
     names = [v.attrib["name"] for v in root.find("ModelVariables")]
     states = ["x", "x_dot", "theta", "theta_dot"]

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from upright.exports.fmu.translation import helpers, translated
+from upright.exports.fmu.translation import as_c, helpers
 
 
 def body(*lines, arguments="n, X", arrays=None, sizes=None):
     """C of the statements of one function, its head and declarations left out."""
     text = f"def run({arguments}):\n" + "".join(f"    {line}\n" for line in lines)
     arrays = arrays if arrays is not None else {"X": ("double *", (1,))}
-    written = translated(text, "run", arrays, sizes or {}).splitlines()
+    written = as_c(text, "run", arrays, sizes or {}).splitlines()
     return [line.strip() for line in written[2:-1] if not line.strip().startswith(("long ", "double ", "(void)"))]
 
 
@@ -80,9 +80,7 @@ def test_branches_and_loops_close_in_their_order():
 
 
 def test_each_block_stands_four_blanks_further_in():
-    written = translated(
-        "def run(n):\n    if n > 1:\n        while n > 2:\n            n -= 1\n    n = 3\n", "run", {}, {}
-    )
+    written = as_c("def run(n):\n    if n > 1:\n        while n > 2:\n            n -= 1\n    n = 3\n", "run", {}, {})
     assert written.splitlines()[2:] == [
         "    if (n > 1) {", "        while (n > 2) {", "            n = (n - 1);", "        }", "    }",
         "    n = 3;", "}",
@@ -102,7 +100,7 @@ def test_a_function_that_returns_several_writes_them_where_its_caller_reads_them
         "def half(x):\n    return x / 2\n\ndef count(n):\n    return n + 1\n\n"
         "def run(n, X):\n    a, b = pair(X[0], n)\n    X[1] = half(a)\n    m = count(n)\n    X[2] = m\n"
     )
-    written = translated(text, "run", {"X": ("double *", (1,))}, {})
+    written = as_c(text, "run", {"X": ("double *", (1,))}, {})
     heads = [line for line in written.splitlines() if line.startswith("static")]
     # each behind those that it calls, and none that nobody calls
     assert heads == [
@@ -117,11 +115,11 @@ def test_a_function_that_returns_several_writes_them_where_its_caller_reads_them
 
 def test_a_name_that_once_holds_a_fraction_is_double_throughout():
     text = "def run(n):\n    a = 1\n    b = a\n    c = n\n    a = a + 0.5\n"
-    assert "    long c = 0;\n    double a = 0, b = 0;\n" in translated(text, "run", {}, {})
+    assert "    long c = 0;\n    double a = 0, b = 0;\n" in as_c(text, "run", {}, {})
 
 
 def test_what_nobody_reads_is_told_to_the_compiler_and_names_of_c_are_evaded():
-    written = translated("def run(_dt, double, n):\n    _t = double\n", "run", {}, {})
+    written = as_c("def run(_dt, double, n):\n    _t = double\n", "run", {}, {})
     assert "k_run(double dt_, long double_, long n)" in written
     assert "    (void)dt_;\n    (void)n;\n    (void)t_;\n    t_ = double_;\n" in written
     assert "(void)double_" not in written

@@ -14,7 +14,7 @@ from upright.errors import RigStopped
 from upright.laws import Law
 from upright.rigs.line import TerminalLine
 from upright.rigs.protocol import Fault, Limits, Mode
-from upright.rigs.wire import Kind, Parser, Result, exchange, pack, self_test, status
+from upright.rigs.wire import Kind, Parser, Result, exchange, pack, self_test_body, status
 
 WIDE = Limits(travel=(3.0, 4.0), speed=(20.0, 20.0), start=(0.5, 0.5), command=5.0, watchdog=0.02, saturation=0.1)
 PULL = Law(np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((1, 0)), np.array([[1.0, 0.0]]))
@@ -459,7 +459,7 @@ def pulsed(host, ticks, watchdog=0.02):
     rig.configure(replace(WIDE, watchdog=watchdog, saturation=math.inf))
     rig.arm()
     board.do("run 5000")  # a long while armed
-    line.write(pack(Kind.SELF_TEST, 200, self_test(FULL, ticks)))
+    line.write(pack(Kind.SELF_TEST, 200, self_test_body(FULL, ticks)))
     (reply,) = Parser().feed(line.read(1.0))
     read = status(reply.body)
     assert read is not None
@@ -550,7 +550,7 @@ def test_a_run_that_starts_during_a_self_test_starts_at_zero(host):
     rig.clear_fault()
     rig.configure(WIDE)
     rig.arm()
-    line.write(pack(Kind.SELF_TEST, 99, self_test(500, 50)))
+    line.write(pack(Kind.SELF_TEST, 99, self_test_body(500, 50)))
     assert line.read(1.0)
     rig.exchange(0.0)
     assert board.state()[5] == 500

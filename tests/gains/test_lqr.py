@@ -9,7 +9,7 @@ import pytest
 
 from upright.errors import BadInput
 from upright.gains import dlqr, locus, lqr, place, prefilter, weight_for_effort
-from upright.gains.lqr import least_cost, motion, peak_effort
+from upright.gains.lqr import least_cost, linear_motion, peak_effort
 from upright.physics import CartPendulum, Furuta
 
 DOUBLE_INTEGRATOR = ([[0, 1], [0, 0]], [0, 1])
@@ -108,14 +108,14 @@ def test_the_least_effort_of_one_unstable_pole():
     A, B = np.array([[3.0]]), np.array([[1.0]])
     K = lqr(A, B, 1e-9, 1.0)
     assert K[0, 0] == pytest.approx(6.0, rel=1e-8)
-    assert np.abs(motion(A, B, K, [0.2])[2]).max() == pytest.approx(1.2, rel=1e-8)
+    assert np.abs(linear_motion(A, B, K, [0.2])[2]).max() == pytest.approx(1.2, rel=1e-8)
 
 
 @pytest.mark.parametrize(("seconds", "lasts"), [(0.0, 5.0), (2.0, 2.0)])
 def test_the_motion_of_a_critically_damped_body_runs_forwards_from_its_start(seconds, lasts):
     """x'' = u, u = -4 x - 4 x': x = x_0 (1 + 2 t) exp(-2 t), for ten time constants where nothing else is asked."""
     A, B, K = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0]]), np.array([[4.0, 4.0]])
-    t, x, u = motion(A, B, K, [0.3, 0.0], seconds)
+    t, x, u = linear_motion(A, B, K, [0.3, 0.0], seconds)
     assert (t[0], t[-1]) == (0.0, pytest.approx(lasts, rel=1e-6))  # a double pole is good to half the digits
     assert len(t) == 401  # 40 a time constant of the fastest, 400 at least
     assert np.all(np.diff(t) > 0)
@@ -129,7 +129,7 @@ def test_a_motion_under_gains_that_do_not_stabilize_is_refused():
     A, B = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0]])
     for K in ([[0.0, 0.0]], [[1.0, 0.0]], [[1.0, -1.0]]):  # stays, swings on, grows
         with pytest.raises(BadInput, match="do not stabilize"):
-            motion(A, B, np.array(K), [0.3, 0.0])
+            linear_motion(A, B, np.array(K), [0.3, 0.0])
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import pytest
 from tests.logs.runs import HEADER, row, written
 from upright.errors import BadInput
 from upright.logs import LogWriter, recover
-from upright.logs.layout import RunFile, columns_of, event_schema, row_schema, row_writer
+from upright.logs.layout import RunFile, columns_of_schema, event_schema, row_schema, row_writer
 from upright.logs.whole import log_of
 
 
@@ -34,7 +34,7 @@ def test_schemas_say_type_unit_and_meaning_of_every_field():
     assert fields["mode"] == {"type": "integer", "unit": "1", "description": "one of 0 IDLE, 2 HOST, 4 FAULT"}
     assert fields["faults"]["description"] == "sum of 2 OVERTRAVEL, 4 OVERSPEED"
     assert fields["psi"] == {"type": "number", "unit": "rad"}
-    assert columns_of(row_schema(HEADER)) == HEADER.columns
+    assert columns_of_schema(row_schema(HEADER)) == HEADER.columns
     assert json.loads(event_schema())["properties"]["dropped"]["type"] == "integer"
 
 

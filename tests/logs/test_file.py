@@ -18,7 +18,7 @@ import upright as up
 from tests.logs.runs import HEADER, row, written, wrong
 from upright.errors import BadInput
 from upright.logs import LogHeader, follow, recover
-from upright.logs.layout import RunFile, checked, holds, row_schema
+from upright.logs.layout import RunFile, holds, row_schema, with_checksum
 from upright.logs.whole import log_of
 
 NUMBER = st.floats(allow_nan=False, allow_infinity=False)
@@ -72,7 +72,7 @@ def test_counts_ticks_modes_and_faults_are_whole_and_nothing_else_is():
 
 
 def test_metadata_holds_in_whatever_order_it_is_read_and_not_when_a_letter_differs():
-    kept = checked({"b": "two", "a": "one"})
+    kept = with_checksum({"b": "two", "a": "one"})
     assert holds(dict(sorted(kept.items())))
     assert holds(dict(sorted(kept.items(), reverse=True)))
     assert not holds({**kept, "a": "One"})

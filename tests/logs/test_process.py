@@ -13,7 +13,7 @@ import pytest
 from tests.logs.runs import HEADER, row, wrong
 from upright.logs import process, read_log
 from upright.logs.container import Container
-from upright.logs.ring import DONE, FAILED, NUMBER, STATE, WRITTEN, Ring, join, share
+from upright.logs.ring import DONE, FAILED, NUMBER, STATE, WRITTEN, Ring, join, shared_memory
 
 SIZE = Ring.size(len(HEADER.columns), 1024)
 
@@ -21,7 +21,7 @@ SIZE = Ring.size(len(HEADER.columns), 1024)
 @pytest.fixture
 def run(tmp_path, monkeypatch):
     """Runs the process here, on a ring that was filled before and whose loop has gone since."""
-    memory, name, files = share(SIZE)
+    memory, name, files = shared_memory(SIZE)
     ring = Ring(memory, HEADER.columns, 1024)
 
     def go(path=tmp_path / "run.mcap"):
@@ -126,7 +126,7 @@ def test_another_error_of_the_file_is_told_in_its_own_words(run, monkeypatch):
 
 
 def test_memory_is_the_same_on_both_sides(run):
-    memory, name, files = share(64)
+    memory, name, files = shared_memory(64)
     there = join(name, 64)
     memory[:3] = b"abc"
     assert there[:4] == b"abc\0"

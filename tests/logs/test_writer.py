@@ -130,9 +130,9 @@ def test_a_full_disk_ends_the_log_and_not_the_loop(tmp_path):
 
 @pytest.mark.parametrize("sample", [(1.0, 2), "text", None, ("a",) * 10, (0.5,) * 10, 3.0])
 def test_what_is_no_row_is_dropped_with_a_word(tmp_path, sample):
-    from upright.logs.ring import Ring, share
+    from upright.logs.ring import Ring, shared_memory
 
-    memory, _, files = share(Ring.size(10, 16))
+    memory, _, files = shared_memory(Ring.size(10, 16))
     for file in files:
         os.close(file)
     ring = Ring(memory, HEADER.columns, 16)

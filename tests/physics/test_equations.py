@@ -12,7 +12,7 @@ from tests.paper.symbolic import linear
 from tests.physics.specimens import EXAMPLES, SPECIMENS
 from tests.physics.text import acceleration, slope, swing
 from upright.physics import Plant, find, lagrange
-from upright.physics.generate import FOLDER, source, variants
+from upright.physics.generate import FOLDER, module_source, variants
 from upright.physics.lagrange import derive
 from upright.physics.plant import module_name
 
@@ -78,7 +78,7 @@ def test_energy_grows_by_the_work_done_and_falls_by_the_heat(name, rng):
 def test_accelerations_are_those_of_an_unabridged_derivation(name, rng):
     """Lumps, named sines and common steps change nothing: SymPy's own Lagrange equations, evaluated plainly."""
     plant = PLANTS[name]
-    M, f = lagrange.motion(type(plant))
+    M, f = lagrange.mass_and_force(type(plant))
     _, q, v, u = lagrange.symbols(type(plant))
     values = {sp.Symbol(k, real=True): value for k, value in plant.parameters().items()}
     plain = sp.lambdify([q, v, u], [M.subs(values), f.subs(values)])
@@ -94,7 +94,7 @@ def test_accelerations_are_those_of_an_unabridged_derivation(name, rng):
 def test_generated_equations_are_those_of_the_energies(plant, without):
     """If this fails: python -m upright.physics.generate."""
     path = FOLDER / f"{module_name(plant, without)}.py"
-    assert path.read_text(encoding="utf-8") == source(derive(plant, without=without))
+    assert path.read_text(encoding="utf-8") == module_source(derive(plant, without=without))
 
 
 @pytest.mark.slow

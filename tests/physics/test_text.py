@@ -10,8 +10,8 @@ import pytest
 import sympy as sp
 
 from upright.physics import Coordinate, Plant
-from upright.physics.equations import evaluate, small_motions
-from upright.physics.lagrange import text
+from upright.physics.equations import evaluated, small_motions
+from upright.physics.lagrange import python_source
 from upright.quantities import quantity
 
 X = sp.Symbol("x", real=True)
@@ -27,7 +27,7 @@ THIRDS = [sp.Rational(k, 3) for k in (-4, -1, 1, 2, 4, 5, 7, 8, 10, 11)]
     ],
 )  # fmt: skip
 def test_a_number_with_a_name_keeps_its_value(number, value):
-    assert evaluate(text(number), {}) == pytest.approx(value, rel=1e-15)
+    assert evaluated(python_source(number), {}) == pytest.approx(value, rel=1e-15)
 
 
 @pytest.mark.parametrize("base", [X, X + 1])
@@ -36,13 +36,13 @@ def test_a_power_is_the_power(base, power):
     """However it is written: as a product, with a root, or as a power."""
     x = 1.7
     expected = (x if base is X else x + 1) ** float(power)
-    assert evaluate(text(base**power), {"x": x}) == pytest.approx(expected, rel=1e-14)
+    assert evaluated(python_source(base**power), {"x": x}) == pytest.approx(expected, rel=1e-14)
 
 
 @pytest.mark.parametrize("power", POWERS)
 def test_powers_up_to_the_fourth_become_products_and_halves_roots(power):
     plain = 0 < power < 5 or power in (-1, -sp.S.Half)
-    assert ("**" in text(X**power)) == (not plain)
+    assert ("**" in python_source(X**power)) == (not plain)
 
 
 def test_a_spring_of_e_newtons_per_metre_pulls_like_one():
@@ -73,19 +73,19 @@ def test_conditions_hold_where_the_truth_table_says(condition):
     expression = f"(2.0 if {condition} else 5.0)"
     expected = [2.0 if holds else 5.0 for holds in CONDITIONS[condition]]
     arrays = dict(zip("xyz", np.array(TRUTH).T, strict=True))
-    assert evaluate(expression, arrays).tolist() == expected
-    assert [float(evaluate(expression, dict(zip("xyz", row, strict=True)))) for row in TRUTH] == expected
+    assert evaluated(expression, arrays).tolist() == expected
+    assert [float(evaluated(expression, dict(zip("xyz", row, strict=True)))) for row in TRUTH] == expected
 
 
 def test_what_is_not_chosen_need_not_exist():
     """x log x, continued by 0 to where the logarithm is none."""
     with np.errstate(all="raise"):
-        found = evaluate("(x * log(x) if x > 0 else 0.0)", {"x": np.array([-1.0, 0.0, 2.0])})
-        alone = evaluate("(1 / x if x > 0 else 0.0)", {"x": 0.0})
+        found = evaluated("(x * log(x) if x > 0 else 0.0)", {"x": np.array([-1.0, 0.0, 2.0])})
+        alone = evaluated("(1 / x if x > 0 else 0.0)", {"x": 0.0})
     assert found.tolist() == [0.0, 0.0, 2 * math.log(2)]
     assert alone == 0.0
     with np.errstate(all="raise"), pytest.raises(FloatingPointError):  # where there is no choice, it has to
-        evaluate("1 / x", {"x": np.array([0.0])})
+        evaluated("1 / x", {"x": np.array([0.0])})
 
 
 def test_a_wedge_is_steep_only_where_both_conditions_hold():

@@ -16,7 +16,7 @@ from upright.questionnaire.chapter import (
     gain_figure,
 )
 from upright.questionnaire.sheet import Item, Likert, Means, Ratings, Shares
-from upright.questionnaire.statistics import Bound, Fits, compare
+from upright.questionnaire.statistics import Bound, Fits, compare_ratings
 from upright.report.drawing import BLACK, BLUE, GREY, ORANGE, SKY, VERMILLION
 from upright.report.page import Chapter, Picture, Points, Step, Table
 
@@ -188,7 +188,10 @@ def test_bars_of_agreement_lie_end_to_end_and_shares_from_seven_percent_are_writ
 
 
 def test_gains_are_drawn_from_before_to_after_with_their_interval():
-    found = [("loops", compare(PRE, POST)), ("a question of more than thirty letters", compare(EVEN.pre, EVEN.post))]
+    found = [
+        ("loops", compare_ratings(PRE, POST)),
+        ("a question of more than thirty letters", compare_ratings(EVEN.pre, EVEN.post)),
+    ]
     drawing = gain_figure(found, (1, 4))
     left, right = drawing.axes
     assert [tuple(line.get_xdata()) for line in left.lines[:3]] == [

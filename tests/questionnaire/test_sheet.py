@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from upright.errors import BadInput
-from upright.questionnaire.sheet import Likert, Means, Ratings, Shares, cells_of, is_number, read, read_table
+from upright.questionnaire.sheet import Likert, Means, Ratings, Shares, cells_of, is_number, read_sheet, read_table
 
 
 def test_three_headings_of_agreement_make_shares():
@@ -200,6 +200,6 @@ def test_a_printed_number_has_digits_on_both_sides_of_its_point(text, number):
 def test_both_orders_of_utf_16_are_read(tmp_path, encoding):
     path = tmp_path / "a.csv"
     path.write_bytes("\ufeffGröße pre,Größe post\n1,5\n".encode(encoding))
-    found = read(path, scale=(1, 5))
+    found = read_sheet(path, scale=(1, 5))
     assert isinstance(found, Ratings)
     assert found.items[0].name == "Größe"

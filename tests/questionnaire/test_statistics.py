@@ -10,39 +10,48 @@ import pytest
 from scipy import stats
 
 from upright.errors import BadInput
-from upright.questionnaire.statistics import Fits, bound, compare, counts, fitting, holm, signed_ranks, whole_row
+from upright.questionnaire.statistics import (
+    Fits,
+    bound,
+    compare_ratings,
+    counts,
+    fitting,
+    holm,
+    signed_ranks,
+    whole_row,
+)
 
 
 def test_four_people_by_hand():
     """Gains 2, 0, -1, 1: sizes 2, 1, 1 have ranks 3, 1.5, 1.5; of the eight signs three leave 1.5 or less down."""
-    found = compare([1, 2, 2, 3, np.nan], [3, 2, 1, 4, 2])
+    found = compare_ratings([1, 2, 2, 3, np.nan], [3, 2, 1, 4, 2])
     assert (found.n, found.missing, found.pre, found.post, found.gain) == (4, 1, 2.0, 2.5, 0.5)
     assert found.spread == pytest.approx(math.sqrt((1.5**2 + 0.5**2 + 1.5**2 + 0.5**2) / 3))
     assert found.t == pytest.approx(0.5 * 2 / found.spread)
     assert found.effect == pytest.approx(0.5 / found.spread)
     assert (found.signed_rank, found.ranks_effect, found.p_ranks) == (1.5, 0.5, 0.75)
     assert found.normalized == 0.25  # half a point of the two that were left up to 4
-    assert compare([1, 2, 2, 3], [3, 2, 1, 4], top=5).normalized == pytest.approx(0.5 / 3)
-    back = compare([3, 2, 1, 4], [1, 2, 2, 3])
+    assert compare_ratings([1, 2, 2, 3], [3, 2, 1, 4], top=5).normalized == pytest.approx(0.5 / 3)
+    back = compare_ratings([3, 2, 1, 4], [1, 2, 2, 3])
     assert (back.signed_rank, back.ranks_effect, back.t) == (1.5, -0.5, pytest.approx(-found.t))
     assert back.p == pytest.approx(found.p)
 
 
 def test_without_a_gain_or_room_for_one_there_is_none():
-    still = compare([2, 3], [2, 3])
+    still = compare_ratings([2, 3], [2, 3])
     assert (still.p_ranks, still.signed_rank, still.ranks_effect, still.spread) == (1.0, 0.0, 0.0, 0.0)
     assert math.isnan(still.p)
     assert math.isnan(still.effect)
     assert all(map(math.isnan, still.effect_interval))
     assert still.interval == (0.0, 0.0)
-    assert math.isnan(compare([4, 4], [4, 3]).normalized)
-    assert compare([4, 4], [4, 3], top=5).normalized == -0.5
+    assert math.isnan(compare_ratings([4, 4], [4, 3]).normalized)
+    assert compare_ratings([4, 4], [4, 3], top=5).normalized == -0.5
 
 
 def test_two_people_are_enough_and_one_is_not():
-    assert compare([1, 2], [2, 2]).n == 2
+    assert compare_ratings([1, 2], [2, 2]).n == 2
     with pytest.raises(BadInput, match=r"got 1\."):
-        compare([1, np.nan, 2], [1, 2, np.nan])
+        compare_ratings([1, np.nan, 2], [1, 2, np.nan])
 
 
 def test_ranks_are_exact_up_to_two_hundred_gains_and_normal_beyond():

@@ -13,14 +13,14 @@ from scipy import stats
 from tests.paper import printed
 from upright.errors import BadInput
 from upright.questionnaire.chapter import chapter
-from upright.questionnaire.sheet import Item, Likert, Means, Ratings, Shares, read
+from upright.questionnaire.sheet import Item, Likert, Means, Ratings, Shares, read_sheet
 from upright.questionnaire.statistics import (
     bound,
-    compare,
+    can_be_printed,
+    compare_ratings,
     counts,
     fitting,
     holm,
-    possible,
     signed_ranks,
     squares_of_gains,
     whole_row,
@@ -39,7 +39,7 @@ def ratings(seed: int, n: int) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize(("seed", "n"), [(1, 5), (2, 12), (3, 53), (4, 300)])
 def test_paired_t_is_scipys(seed, n):
     pre, post = ratings(seed, n)
-    ours, theirs = compare(pre, post), stats.ttest_rel(post, pre)
+    ours, theirs = compare_ratings(pre, post), stats.ttest_rel(post, pre)
     assert ours.t == pytest.approx(theirs.statistic, rel=1e-12)
     assert ours.p == pytest.approx(theirs.pvalue, rel=1e-9)
     interval = theirs.confidence_interval(0.95)
@@ -59,13 +59,13 @@ def test_wilcoxon_with_ties_is_scipys_over_every_sign(seed, n):
 def test_wilcoxon_of_many_is_scipys_normal_one():
     pre, post = ratings(5, 600)
     theirs = stats.wilcoxon(post - pre, method="asymptotic", correction=False)
-    assert compare(pre, post).p_ranks == pytest.approx(theirs.pvalue, rel=1e-9)
+    assert compare_ratings(pre, post).p_ranks == pytest.approx(theirs.pvalue, rel=1e-9)
 
 
 def test_the_interval_of_an_effect_holds_its_ends():
     """At the ends of the interval, the noncentral t leaves 2.5 % beyond what was seen."""
     pre, post = ratings(2, 20)
-    found = compare(pre, post)
+    found = compare_ratings(pre, post)
     low, high = (e * math.sqrt(found.n) for e in found.effect_interval)
     assert stats.nct.sf(found.t, found.n - 1, low) == pytest.approx(0.025, rel=1e-6)
     assert stats.nct.cdf(found.t, found.n - 1, high) == pytest.approx(0.025, rel=1e-6)
@@ -75,17 +75,17 @@ def test_missing_answers_leave_their_pair_out_only():
     pre, post = ratings(3, 20)
     pre[4] = post[7] = np.nan
     both = np.isfinite(pre) & np.isfinite(post)
-    found = compare(pre, post)
+    found = compare_ratings(pre, post)
     assert (found.n, found.missing) == (18, 2)
     assert found.t == pytest.approx(stats.ttest_rel(post[both], pre[both]).statistic, rel=1e-12)
 
 
 def test_equal_gains_have_no_t():
-    found = compare([1, 2, 3], [2, 3, 4])
+    found = compare_ratings([1, 2, 3], [2, 3, 4])
     assert math.isnan(found.t)
     assert found.ranks_effect == 1.0
     with pytest.raises(BadInput, match="at least 2 people"):
-        compare([1, np.nan], [2, 3])
+        compare_ratings([1, np.nan], [2, 3])
 
 
 def test_holm_is_the_textbooks_example():
@@ -160,23 +160,23 @@ def test_possible_means_are_those_of_all_totals(n):
     for hundredths in range(100, 401):
         text = f"{hundredths / 100:.2f}"
         if text in reachable:
-            assert possible(text, n)
-        elif possible(text, n):  # an exact half that Python's formatting sent the other way
+            assert can_be_printed(text, n)
+        elif can_be_printed(text, n):  # an exact half that Python's formatting sent the other way
             assert any((200 * s) % n == 0 and (200 * s // n) % 2 == 1 for s in counts(text, n))
 
 
 def test_table_3_and_4_of_the_paper_fit_other_numbers_of_answers():
     """Erratum 6."""
-    means = read(EXAMPLES / "table_4.csv")
+    means = read_sheet(EXAMPLES / "table_4.csv")
     assert isinstance(means, Means)
     numbers = [m for row in means.rows for m in row[2:]]
     assert sorted(numbers) == sorted(m for row in printed.TABLE_4 for m in row)
     by_answers = {f.answers: f.possible for f in fitting(numbers, [], 53)}
     assert by_answers[53] == 24 - 8
     assert sorted(n for n, k in by_answers.items() if k == max(by_answers.values())) == [48, 52]
-    shares = read(EXAMPLES / "table_3.csv")
+    shares = read_sheet(EXAMPLES / "table_3.csv")
     assert isinstance(shares, Shares)
-    assert [s for s in shares.rows[0][1] if not possible(s, 53, of=100)] == ["46", "54"]
+    assert [s for s in shares.rows[0][1] if not can_be_printed(s, 53, of=100)] == ["46", "54"]
     assert whole_row(shares.rows[0][1], 52)  # 24 and 28
     assert not whole_row(["50", "52"], 200)  # at least 99 and 103
 
@@ -189,7 +189,7 @@ def test_wide_and_long_tables_say_the_same(tmp_path):
         "id,item,time,rating\na,feedback,pre,1\na,feedback,post,3\nb,feedback,pre,2\nc,feedback,Post,4\nc,feedback,pre,2\n"
     )
     for path in (wide, long):
-        sheet = read(path)
+        sheet = read_sheet(path)
         assert isinstance(sheet, Ratings)
         (item,) = sheet.items
         assert item.name == "feedback"
@@ -201,7 +201,7 @@ def test_wide_and_long_tables_say_the_same(tmp_path):
 def test_encodings_and_declared_delimiters_of_excel_are_read(tmp_path, encoding):
     path = tmp_path / "answers.csv"
     path.write_bytes("sep=;\r\nname;Größe pre;Größe post;helped\r\nx;1;2;Agree\r\ny;2;2;Disagree\r\n".encode(encoding))
-    sheet = read(path)
+    sheet = read_sheet(path)
     assert isinstance(sheet, Ratings)
     assert sheet.items[0].name == "Größe"
     assert dict(zip(sheet.likert[0].options, sheet.likert[0].counts, strict=True))["agree"] == 1
@@ -228,7 +228,7 @@ def test_what_cannot_be_read_is_said_with_its_line(tmp_path, text, sentence):
     path = tmp_path / "answers.csv"
     path.write_text(text)
     with pytest.raises(BadInput, match=sentence):
-        read(path)
+        read_sheet(path)
 
 
 @pytest.mark.parametrize(
@@ -267,7 +267,7 @@ def test_each_printed_change_has_one_verdict_and_its_gain(tmp_path):
     """Five people, critical t 2.78: four up by one point each make t = 0.8 sqrt(5)/0.447 = 4, other pairings less."""
     path = tmp_path / "means.csv"
     path.write_text("concept,pre,post\nsame,4.0,4.0\nmore,2.0,2.8\nall,1.0,4.0\n")
-    told = chapter(read(path), title="Survey", source=path.name, answers=5)
+    told = chapter(read_sheet(path), title="Survey", source=path.name, answers=5)
     found = told.numbers["found"]["bounds"]
     assert [b["verdict"] for b in found.values()] == ["not significant", "open", "significant"]
     assert [b["gain"] for b in found.values()] == [0.0, 0.8, 3.0]

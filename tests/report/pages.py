@@ -43,19 +43,19 @@ def doctor_page(folder: Path) -> Chapter:
 
 
 def law_page(folder: Path) -> Chapter:
-    from upright.closed_loop import recover
+    from upright.closed_loop import recover_law
     from upright.report.law import chapter
 
     record = closed_loop(Pid(kp=4.0, ki=3.0, kd=0.2, second=0.8, on="measurement"), rows=2000, step=0.01)
-    return chapter(record, recover(record, measured=["y"], references=["r"], command="u"), "run.csv")
+    return chapter(record, recover_law(record, measured=["y"], references=["r"], command="u"), "run.csv")
 
 
 def survey_page(name: str, answers: int | None = None):
     def page(folder: Path) -> Chapter:
         from upright.questionnaire.chapter import chapter
-        from upright.questionnaire.sheet import read
+        from upright.questionnaire.sheet import read_sheet
 
-        return chapter(read(EXAMPLES / "survey" / name), title="Survey", source=name, answers=answers)
+        return chapter(read_sheet(EXAMPLES / "survey" / name), title="Survey", source=name, answers=answers)
 
     return page
 
@@ -87,14 +87,14 @@ def ladder_page(folder: Path) -> Chapter:
     from tests.identification.twins import PENDULUM, noisy, rig, swing
     from upright.identification.ladder.growth import climb
     from upright.physics import Pendulum
-    from upright.report.ladder import chapter, next_steps
+    from upright.report.ladder import chapter, ladder_steps
 
     guesses = {"J_p": 1.5e-3, "b_2": 1e-3, "b_2c": 1e-3}
     truth = {"b_2q": 0.0, "b_2c": 4e-3}
     runs = [noisy(swing(PENDULUM | truth, angle=a, label=f"from {a:g}"), 3e-3, seed=k) for k, a in enumerate((1.5, 1))]
     known = {n: v for n, v in (PENDULUM | truth).items() if n not in guesses}
     ladder = climb(rig(Pendulum, known, guesses), runs)
-    steps = next_steps(ladder, study="swing.toml", folder="out", data="", trimmed=True)
+    steps = ladder_steps(ladder, study="swing.toml", folder="out", data="", trimmed=True)
     return chapter(ladder, title="Ladder", provenance={"study": "swing.toml"}, steps=steps)
 
 

@@ -27,7 +27,7 @@ from upright.report.drawing import (
     swing_figure,
 )
 from upright.report.fit.figures import autocorrelation, fit_figure
-from upright.report.symbols import axis, identifier, mathtext, measured, number, percent, plain, typed, unit
+from upright.report.symbols import axis, identifier, mathtext, number, percent, plain, typed, unit, with_error
 
 
 @given(st.integers(2, 20_000), st.integers(0, 100))
@@ -112,8 +112,8 @@ def test_numbers_are_written_as_on_paper(value, text):
 
 
 def test_a_value_shows_two_figures_of_its_error():
-    assert measured(0.123456, 0.00123) == ("0.1235", "1.2·10⁻³")
-    assert measured(1.0, np.inf)[1] == "∞"
+    assert with_error(0.123456, 0.00123) == ("0.1235", "1.2·10⁻³")
+    assert with_error(1.0, np.inf)[1] == "∞"
 
 
 def test_units_and_symbols_are_those_of_the_paper():
@@ -317,4 +317,4 @@ def test_a_path_is_quoted_where_a_shell_would_read_it(path, shown):
 
 
 def test_an_error_of_zero_is_a_dash():
-    assert measured(2.0, 0.0) == ("2.000", "–")
+    assert with_error(2.0, 0.0) == ("2.000", "–")

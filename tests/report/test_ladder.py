@@ -10,7 +10,7 @@ import pytest
 from upright.identification.ladder.growth import Ladder, RungResult
 from upright.identification.ladder.repeats import Repeats
 from upright.identification.ladder.rungs import Rung
-from upright.report.ladder import chapter, ladder_figure, next_steps, rung_table
+from upright.report.ladder import chapter, ladder_figure, ladder_steps, rung_table
 
 
 @pytest.mark.parametrize(
@@ -26,7 +26,7 @@ def test_only_what_was_refused_and_is_still_in_the_study_is_to_be_taken_out(fit,
         steps=(), rig=fit.model, runs=(), held_out="half of the runs", repeats=(), stopped="No rung is left.",
         scores={}, left_out=left_out,
     )  # fmt: skip
-    steps = next_steps(ladder, study="swing.toml", folder="out", data="", trimmed=trimmed)
+    steps = ladder_steps(ladder, study="swing.toml", folder="out", data="", trimmed=trimmed)
     taken = [step.sentence for step in steps if "out of the study" in step.sentence]
     assert len(taken) == said
     assert all("Take b_1c out" in sentence for sentence in taken)
@@ -129,7 +129,7 @@ def test_the_picture_of_a_ladder_shows_every_rung_and_the_ceiling(grown):
 
 def test_what_a_ladder_leaves_to_do_comes_in_order(grown):
     def said(data="", **changes):
-        return list(next_steps(replace(grown, **changes), study="swing.toml", folder="out", data=data, trimmed=False))
+        return list(ladder_steps(replace(grown, **changes), study="swing.toml", folder="out", data=data, trimmed=False))
 
     run = type("run", (), {"unknown": ("gain",)})()
     own, fit, refused = said(runs=(run,))
@@ -140,5 +140,7 @@ def test_what_a_ladder_leaves_to_do_comes_in_order(grown):
     first = said(steps=STEPS[:1], repeats=(), interrupted=True, data="a.csv")
     assert [s.sentence.partition(" ")[0] for s in first] == ["The", "Fit", "Repeat"]
     assert first[1].command == "upright identify swing.toml --data a.csv -o out/fit"
-    trimmed = list(next_steps(replace(grown, steps=STEPS[:1]), study="swing.toml", folder="out", data="", trimmed=True))
+    trimmed = list(
+        ladder_steps(replace(grown, steps=STEPS[:1]), study="swing.toml", folder="out", data="", trimmed=True)
+    )
     assert [s.command for s in trimmed] == ["upright identify out/study.toml -o out/fit"]

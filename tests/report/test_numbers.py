@@ -31,7 +31,7 @@ from tests.report.pages import (
 )
 from tests.report.reader import Page
 from upright.physics import Furuta
-from upright.report.html import html
+from upright.report.html import html_page
 from upright.report.page import Chapter, Picture, Table
 from upright.report.pdf import write_pdf
 from upright.report.terminal import print_chapter
@@ -55,7 +55,7 @@ def read(chapter: Chapter, caption: str, folder: Path) -> dict[str, dict[str, st
     chapter = without_pictures(chapter)
     (heading, *rows), *others = [
         cells
-        for cells, table in zip(Page(html(chapter)).tables, blocks(chapter, Table), strict=True)
+        for cells, table in zip(Page(html_page(chapter)).tables, blocks(chapter, Table), strict=True)
         if caption in table.caption
     ]
     assert others == []
@@ -100,7 +100,7 @@ def test_the_scores_of_a_ladder_are_means_of_its_runs(tmp_path):
 def test_a_response_stands_in_decibels_and_degrees(tmp_path):
     told = measured_response_page(tmp_path)
     read(told, "Response", tmp_path)
-    (_, *rows), *_ = Page(html(without_pictures(told))).tables
+    (_, *rows), *_ = Page(html_page(without_pictures(told))).tables
     for (_, omega, magnitude, phase, error, _), w, h in zip(rows, OMEGA, ANSWER, strict=True):
         assert value(omega[1]) == w
         assert value(magnitude[1]) == pytest.approx(20 * np.log10(abs(h)), abs=6e-3)
@@ -122,7 +122,7 @@ def test_a_survey_stands_as_scipy_has_it(tmp_path):
 
 
 def test_the_doctor_tells_the_size_of_a_jump_in_the_unit_of_the_log(tmp_path):
-    told = Page(html(without_pictures(doctor_page(tmp_path)))).prose
+    told = Page(html_page(without_pictures(doctor_page(tmp_path)))).prose
     (size, unit), *_ = re.findall(r"jump ([\d.]+) (\w+)", told)
     assert float(size) == pytest.approx(0.15, rel=0.01)
     assert unit == "rad"

@@ -33,7 +33,7 @@ from tests.report.pages import (
     tracking_page,
 )
 from tests.report.reader import Page
-from upright.report.html import html
+from upright.report.html import html_page
 from upright.report.page import Chapter, KeyNumber, Picture, Symbol, Table, as_plain, from_plain
 from upright.report.pdf import write_pdf
 from upright.report.terminal import print_book, print_chapter
@@ -86,7 +86,7 @@ def no_computer_s_word_for_nothing(text: str) -> None:
 
 
 def test_a_page_can_be_parsed_heard_and_told_apart(chapter):
-    text = html(chapter)
+    text = html_page(chapter)
     page = Page(text)
     assert page.tags.count("h1") == 1
     assert chapter.title in page.prose
@@ -100,7 +100,7 @@ def test_a_page_can_be_parsed_heard_and_told_apart(chapter):
 
 
 def test_every_table_has_headings_and_every_picture_words(chapter):
-    page = Page(html(chapter))
+    page = Page(html_page(chapter))
     tables, pictures = blocks(chapter, Table), blocks(chapter, Picture)
     assert len(page.tables) == page.tags.count("caption") == len(tables)
     for head, *rows in page.tables:
@@ -131,7 +131,7 @@ def test_paper_holds_the_verdict_and_every_number(chapter, tmp_path):
 def test_the_terminal_says_the_same_numbers(chapter):
     lines = StringIO()
     print_chapter(Console(file=lines, width=300, highlight=False), chapter, [Path("out/report.html")])
-    said, page = lines.getvalue(), squeezed(Page(html(chapter)).prose)
+    said, page = lines.getvalue(), squeezed(Page(html_page(chapter)).prose)
     for table in blocks(chapter, Table, aside=False):
         assert table.caption in said
         for row in table.rows:
@@ -170,7 +170,7 @@ def hostile(content):
 def test_what_a_person_wrote_is_never_taken_for_markup(page, tmp_path):
     pypdf = pytest.importorskip("pypdf")
     told = from_plain(hostile(as_plain(page(tmp_path))))
-    text = html(told)
+    text = html_page(told)
     assert "<script" not in text
     assert Page(text).prose.count(HOSTILE) > 10
     lines = StringIO()
@@ -194,7 +194,7 @@ def test_the_laboratory_tells_every_chapter_on_all_three(tmp_path):
         for e, c in zip(EXPERIMENTS, made, strict=False)
     )
     told = book(session, date(2006, 6, 18))
-    page = Page(html(told))
+    page = Page(html_page(told))
     lines = StringIO()
     print_book(Console(file=lines, width=300, highlight=False), told, [tmp_path / "report.html"])
     paper = "".join(p.extract_text() for p in pypdf.PdfReader(write_pdf(tmp_path / "book.pdf", told)).pages)

@@ -13,7 +13,7 @@ from upright.logs import LogHeader, RunLog
 from upright.logs.replay import Difference, Replay, replay
 from upright.logs.salvage import Salvaged
 from upright.logs.whole import RunEvent
-from upright.report.run import chapter, draw_replay, law_in_words, numbers, recovered, replayed
+from upright.report.run import chapter, draw_replay, law_in_words, log_numbers, recovered_chapter, replayed
 
 LAW = Law(np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((1, 0)), [[-2.0, 0.5]], references=np.zeros((1, 1)), period=0.25)
 HEADER = LogHeader(
@@ -100,14 +100,14 @@ def test_a_log_of_one_row_or_none_is_told_without_steps_and_pictures():
 
 def test_numbers_of_a_run_are_those_of_its_columns():
     event = RunEvent(t=10.5, kind="stop", text="asked", row=3)
-    told = numbers(log(events=[event]))
+    told = log_numbers(log(events=[event]))
     assert (told["rows"], told["seconds"], told["period"], told["bytes"]) == (7, 1.75, 0.25, 900)
     assert told["faults"] == ["WATCHDOG", "OVERSPEED"]
     assert told["columns"]["theta_counts"] == "counts"
     assert told["columns"]["u_applied"] == "V"
     assert told["events"] == [{"t": 10.5, "kind": "stop", "text": "asked", "row": 3, "dropped": 0}]
-    assert numbers(log(rows=1))["seconds"] == 0.0
-    assert numbers(log(rows=2))["seconds"] == 0.25
+    assert log_numbers(log(rows=1))["seconds"] == 0.0
+    assert log_numbers(log(rows=2))["seconds"] == 0.25
 
 
 @pytest.mark.parametrize(
@@ -128,11 +128,11 @@ def test_a_law_is_told_in_a_line(law, said):
 def test_what_was_kept_of_a_torn_log_is_told_with_what_was_lost():
     event = RunEvent(t=10.5, kind="stop", text="asked", row=3)
     torn = Salvaged(log=log(complaint="It ends.", events=[event]), file=Path("new.mcap"), lost_bytes=64, lost_rows=2)
-    page = recovered(torn)
+    page = recovered_chapter(torn)
     assert page.verdict == "7 rows and 1 events kept; 64 bytes behind them (about 2 rows) could not be read."
     assert (page.title, page.steps[0].command) == ("my run.mcap recovered", "upright log show new.mcap")
     assert page.parts[0].content[0].sentences == ("It ends.",)
-    whole = recovered(replace(torn, log=log(), lost_bytes=0, lost_rows=0))
+    whole = recovered_chapter(replace(torn, log=log(), lost_bytes=0, lost_rows=0))
     assert whole.verdict == "7 rows and 0 events kept; nothing that was written is missing."
     assert whole.parts[0].content[0].sentences == ("The log was whole.",)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.rigs.test_twin import LAW, RIG, started
-from upright.control.trial import at_work
+from upright.control.trial import law_on_rig
 from upright.errors import BadInput, RigStopped
 from upright.records import Record
 from upright.rigs import Board, Limits, Mode, ReplayPort
@@ -25,7 +25,7 @@ def angles(counts):
 def logged():
     """Commands of a run on the twin, and its record as it came back from a file."""
     _, board = started(Mode.HOST)
-    running = RunningLaw(at_work(RIG, LAW, REST), RIG.period)
+    running = RunningLaw(law_on_rig(RIG, LAW, REST), RIG.period)
     tick, rows = board.exchange(0.0), []
     for _ in range(TICKS):
         command = running.step(angles(tick.counts))
@@ -57,12 +57,12 @@ def played(record, law):
 def test_the_law_that_was_logged_gives_the_same_bits(logged, tmp_path):
     commands, record = logged
     record.to_csv(tmp_path / "run.csv")
-    assert played(Record.from_csv(tmp_path / "run.csv"), at_work(RIG, LAW, REST)).tobytes() == commands.tobytes()
+    assert played(Record.from_csv(tmp_path / "run.csv"), law_on_rig(RIG, LAW, REST)).tobytes() == commands.tobytes()
 
 
 def test_another_law_is_told_from_it(logged):
     commands, record = logged
-    other = at_work(RIG, LAW, (0.0, np.pi + 1e-9))
+    other = law_on_rig(RIG, LAW, (0.0, np.pi + 1e-9))
     assert played(record, other).tobytes() != commands.tobytes()
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from upright.control.trial import SUBSTEPS, at_work, trial
+from upright.control.trial import SUBSTEPS, law_on_rig, trial
 from upright.gains import feedback, filtered, place
 from upright.rig.makes import make_rig
 from upright.rigs import Board, Limits, Mode, TwinPort
@@ -40,7 +40,7 @@ def started(mode, law=None, away=(0.0, 0.0, 0.05, 0.0)):
 def compiled():
     """The same law on the same rig in the compiled loop, and the law with the rig's encoders about it."""
     run = trial(RIG, LAW, at="inverted", start=[0.0, 0.0, 0.05, 0.0], seconds=TICKS * RIG.period)
-    return run, at_work(RIG, LAW, run.rest)
+    return run, law_on_rig(RIG, LAW, run.rest)
 
 
 def test_a_twin_under_the_hosts_law_moves_as_the_compiled_loop(compiled):

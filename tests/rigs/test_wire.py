@@ -29,7 +29,7 @@ from upright.rigs.wire import (
     limits,
     pack,
     sample,
-    self_test,
+    self_test_body,
     snapshot,
     status,
     unpack,
@@ -173,7 +173,7 @@ def test_a_status_of_another_program_is_none(body):
 
 def test_numbers_go_with_the_least_byte_first_and_ticks_run_over():
     assert exchange(-2, 1.5, 0x12345).hex() == "feff" + "0000c03f" + "4523"  # 1.5 is 3fc00000
-    assert self_test(-300, 150).hex() == "d4fe" + "9600"
+    assert self_test_body(-300, 150).hex() == "d4fe" + "9600"
     assert sample(bytes.fromhex("0a00" + "01000000" + "ffffffff" + "feff")) == (10, (1, -1), -2)
 
 

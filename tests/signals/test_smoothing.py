@@ -15,9 +15,9 @@ from upright.signals.smoothing import (
     middle,
     noise_gain,
     savitzky_golay,
+    scatter,
     smoothed,
     smoothing_width,
-    spread,
 )
 
 DT = 0.01
@@ -145,8 +145,8 @@ def test_a_window_is_an_eighth_of_a_period_or_fifteen_steps_of_motion(period, qu
 
 def test_a_body_at_rest_has_no_steps_to_wait_for():
     assert smoothing_width(np.zeros(100), DT, 1.0, 0.1) == 12
-    assert spread(np.zeros(5)) == 1.0
-    assert spread(np.array([-2.0, 2.0])) == 2.0
+    assert scatter(np.zeros(5)) == 1.0
+    assert scatter(np.array([-2.0, 2.0])) == 2.0
 
 
 def test_a_period_is_that_of_the_motion_not_of_drift_nor_of_fast_noise():

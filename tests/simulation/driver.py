@@ -72,7 +72,7 @@ class Driver:
     def cuModuleLoadData(self, image: bytes) -> tuple[Any, ...]:
         assert image.endswith(b"\0")  # the driver reads on to there
         self.modules += 1
-        return 0, machine.load(image[:-1], "thread")
+        return 0, machine.address_of(image[:-1], "thread")
 
     def cuModuleUnload(self, module: int) -> tuple[Any, ...]:
         self.modules -= 1

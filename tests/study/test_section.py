@@ -8,7 +8,7 @@ import pytest
 
 from upright.errors import BadInput
 from upright.quantities import with_unit
-from upright.study.text import Section, StudyText, TomlTable, counted_sensor, show, si, source_of, toml
+from upright.study.text import Section, StudyText, TomlTable, as_written, counted_sensor, in_si, source_of, toml
 
 TEXT = """title = "x"
 [a]
@@ -126,12 +126,12 @@ def test_a_number_rests_on_what_the_study_says(value, word):
     ],
 )  # fmt: skip
 def test_a_value_is_shown_short(value, shown):
-    assert show(value) == shown
+    assert as_written(value) == shown
 
 
 @pytest.mark.parametrize("value", [1e-60, 1e60, -1e60, 0, "3 m", "2 mm"])
 def test_a_number_of_any_sensible_size_is_one(value):
-    assert isinstance(si(value, "m", "length"), float | int)
+    assert isinstance(in_si(value, "m", "length"), float | int)
 
 
 @pytest.mark.parametrize(
@@ -144,7 +144,7 @@ def test_a_number_of_any_sensible_size_is_one(value):
 )  # fmt: skip
 def test_a_number_beyond_is_refused(value, sentence):
     with pytest.raises(BadInput) as caught:
-        si(value, "m", "length")
+        in_si(value, "m", "length")
     assert sentence in str(caught.value)
 
 

@@ -12,7 +12,7 @@ from upright.errors import BadInput
 from upright.report.page import Chapter, Part, Picture
 from upright.verbs.answer import Answer
 from upright.verbs.linear.matrices import is_linear, linear_model, read_matrices
-from upright.verbs.values import open_log, pairs, paths, poles, si, si_if_given, texts
+from upright.verbs.values import open_log, pairs, paths, read_pole_list, si, si_if_given, texts
 
 
 @pytest.mark.parametrize(
@@ -42,12 +42,12 @@ def test_what_is_left_out_is_none_and_zero_is_not():
 
 
 def test_poles_are_texts_or_numbers():
-    assert sorted(poles("-4+-2j, -10"), key=lambda p: (p.real, p.imag)) == [-10, -4 - 2j, -4 + 2j]
-    assert poles(-3.0).tolist() == [-3]
-    assert poles([[-1, -2]]).tolist() == [-1, -2]
-    assert poles([]) is None
-    assert poles("") is None
-    assert poles(None) is None
+    assert sorted(read_pole_list("-4+-2j, -10"), key=lambda p: (p.real, p.imag)) == [-10, -4 - 2j, -4 + 2j]
+    assert read_pole_list(-3.0).tolist() == [-3]
+    assert read_pole_list([[-1, -2]]).tolist() == [-1, -2]
+    assert read_pole_list([]) is None
+    assert read_pole_list("") is None
+    assert read_pole_list(None) is None
 
 
 @pytest.mark.parametrize(

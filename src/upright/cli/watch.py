@@ -78,7 +78,7 @@ def lines(state: RunState, largest: float) -> Any:
 
     if state.phase != "running":
         return Text.assemble((f"{state.phase[:1].upper()}{state.phase[1:]}", "bold"), "\nspace, q or Esc: stop")
-    bar = effort(state.applied, largest)
+    bar = effort_bar(state.applied, largest)
     away = "  ".join(f"{q:+9.4f}" for q in state.readings)
     late = (f"{state.late} late", "bold red" if state.late else "green")
     out = Text.assemble(
@@ -91,7 +91,7 @@ def lines(state: RunState, largest: float) -> Any:
     return out
 
 
-def effort(value: float, largest: float) -> str:
+def effort_bar(value: float, largest: float) -> str:
     """A bar from the middle to either side."""
     n = min(_BAR, round(_BAR * abs(value) / largest)) if math.isfinite(value) else _BAR
     left, right = ("█" * n if value < 0 else "").rjust(_BAR), ("█" * n if value > 0 else "").ljust(_BAR)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from upright.closed_loop.recovery import Gain, Recovery
-from upright.closed_loop.search import recover
+from upright.closed_loop.search import recover_law
 from upright.closed_loop.structures import Channel, ClosedLoop, Filter, joined, pid
 
-__all__ = ["Channel", "ClosedLoop", "Filter", "Gain", "Recovery", "joined", "pid", "recover"]
+__all__ = ["Channel", "ClosedLoop", "Filter", "Gain", "Recovery", "joined", "pid", "recover_law"]

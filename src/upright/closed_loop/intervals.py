@@ -63,7 +63,7 @@ def sharpen(best: Regression, u: Array, used: Rows, quantum: float) -> tuple[Reg
     Where even the nearest miss by more than that, such as under a clock that jitters, they are given twice the excess.
     """
     X, recorded = best.columns.X[used], u[used]
-    gains, largest = nearest(X, recorded)
+    gains, largest = least_worst(X, recorded)
     within = max(0.5 * quantum, largest + max(largest - 0.5 * quantum, 0.0)) * (1 + 1e-6)
 
     def width(v: Array) -> tuple[float, float]:
@@ -74,7 +74,7 @@ def sharpen(best: Regression, u: Array, used: Rows, quantum: float) -> tuple[Reg
     return replace(best, gains=gains), width
 
 
-def numbers(best: Regression, signals: Signals, width: HalfWidth) -> dict[str, Gain]:
+def gains_with_intervals(best: Regression, signals: Signals, width: HalfWidth) -> dict[str, Gain]:
     """Every number of the law with its interval."""
     gains = best.by_term
     place = {term: k for k, term in enumerate(best.columns.terms)}
@@ -113,7 +113,7 @@ def numbers(best: Regression, signals: Signals, width: HalfWidth) -> dict[str, G
     return out
 
 
-def nearest(X: Array, u: Array) -> tuple[Array, float]:
+def least_worst(X: Array, u: Array) -> tuple[Array, float]:
     """Gains (p,) whose largest residual is least, and that residual."""
     size = _size(X)
     A, p = X / size, X.shape[1]

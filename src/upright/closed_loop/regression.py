@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.closed_loop.structures import Channel, Filter, On, joined, memory
+from upright.closed_loop.structures import Channel, Filter, On, joined, memory_before
 from upright.laws import Law
 
 Array = NDArray[np.float64]
@@ -159,7 +159,7 @@ def held_out(n: int) -> Rows:
     return (np.arange(n) * BLOCKS // n) % 2 == 1
 
 
-def least_squares(X: Array, u: Array) -> Array:
+def scaled_least_squares(X: Array, u: Array) -> Array:
     """Solution of a regression whose columns are of any size; one that is zero everywhere gets no gain."""
     size = np.sqrt(np.sum(X * X, axis=0))
     safe = np.where(size > 0, size, 1.0)
@@ -181,11 +181,11 @@ def fit(signals: Signals, family: Family, u: Array, used: Rows, drop: frozenset[
 
     pole = pole_of(used, None)
     inside = at(pole_of(inner, pole))
-    gains = least_squares(inside.X[inner], u[inner])
+    gains = scaled_least_squares(inside.X[inner], u[inner])
     missed = float(np.sqrt(np.mean((u[outer] - inside.X[outer] @ gains) ** 2))) if outer.any() else math.inf
     made = at(pole)
     return Regression(
-        family=family, pole=pole, columns=made, gains=least_squares(made.X[used], u[used]), missed=missed
+        family=family, pole=pole, columns=made, gains=scaled_least_squares(made.X[used], u[used]), missed=missed
     )  # fmt: skip
 
 
@@ -223,14 +223,14 @@ def refine(at: Callable[[float], Columns], u: Array, rows: Rows, pole: float) ->
     best, loss = pole, math.inf
     for _ in range(12):
         made = at(pole)
-        gains = least_squares(made.X[rows], u[rows])
+        gains = scaled_least_squares(made.X[rows], u[rows])
         missed = u[rows] - made.X[rows] @ gains
         now = float(missed @ missed)
         if now >= loss * (1 - 1e-9):
             break
         best, loss = pole, now
         both = np.column_stack([made.X[rows], made.slope[rows] @ gains])
-        step = float(least_squares(both, u[rows])[-1])
+        step = float(scaled_least_squares(both, u[rows])[-1])
         pole = min(max(pole + step, 0.0), 0.9999)
     return best
 
@@ -269,7 +269,7 @@ def law_of(best: Regression, channels: Sequence[Channel], signals: Signals, limi
         y, r = signals.pairs[signals.names.index(channel.measured)]
         first |= {channel.measured: float(y[0])} | ({channel.reference: float(r[0])} if r is not None else {})
     smoothed = {name: gains.get(("start", i), 0.0) for i, name in enumerate(signals.names)}
-    return replace(law, initial=memory(channels, first, constant=constant, smoothed=smoothed))
+    return replace(law, initial=memory_before(channels, first, constant=constant, smoothed=smoothed))
 
 
 def structure(made: Regression, measured: Sequence[str]) -> str:

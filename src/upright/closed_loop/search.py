@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.closed_loop.intervals import averaged, numbers, sharpen
+from upright.closed_loop.intervals import averaged, gains_with_intervals, sharpen
 from upright.closed_loop.recovery import Recovery, TriedStructure
 from upright.closed_loop.regression import TERMS, Family, Regression, Signals, Term, channels_of, fit, law_of, structure
 from upright.closed_loop.structures import finer
@@ -43,7 +43,7 @@ _LONGEST_HOLD = 50
 _LEAST_CHANGES = 20
 
 
-def recover(
+def recover_law(
     record: Record, *, measured: Sequence[str], command: str, references: Sequence[str] = (),
     feedforward: Sequence[str] = (), every: int | None = None,
 ) -> Recovery:  # fmt: skip
@@ -248,9 +248,9 @@ class Search:
         rounded = self.every == 1 and FLOOR * float(np.abs(self.u).max()) < best.missed < 0.5 * self.quantum
         if rounded:
             best, covered = sharpen(best, self.u, self.used, self.quantum)
-            named = numbers(best, self.signals, covered)
+            named = gains_with_intervals(best, self.signals, covered)
         else:
-            named = numbers(best, self.signals, averaged(best, self.u, self.used))
+            named = gains_with_intervals(best, self.signals, averaged(best, self.u, self.used))
         if not any(abs(g.value) > 2 * g.stderr for name, g in named.items() if name[:2] in TERMS):
             raise NotIdentifiable(
                 f"'{command}' does not depend on {', '.join(self.measured)}: the loop is open, or the law reads other"

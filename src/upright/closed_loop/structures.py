@@ -128,7 +128,7 @@ def joined(channels: Sequence[Channel], *, period: float, bias: float = 0.0, **f
     )  # fmt: skip
 
 
-def memory(
+def memory_before(
     channels: Sequence[Channel],
     first: Mapping[str, float],
     *,

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.control.effort import RestEffort, busyness, quiet, rest_effort
-from upright.control.trial import SUBSTEPS, Trial, at_work
+from upright.control.trial import SUBSTEPS, Trial, law_on_rig
 from upright.errors import BadInput
 from upright.laws import Law
 from upright.progress import Progress, silent
@@ -262,7 +262,7 @@ def _outcomes(
     drives = [{**rig.drive, **{n: float(v[i]) for n, v in given.items()}} for i in range(len(x0))]
     motion = simulate(
         rig.plant, {**rig.drive, **given}, x0, None, rig.period, samples=rows, substeps=SUBSTEPS,
-        loop=at_work(rig, law, point),
+        loop=law_on_rig(rig, law, point),
     )  # fmt: skip
     away = motion[:, 0 : x0.shape[1] : 2] - point[:, None]
     return scores(rig, t, away, motion[:, x0.shape[1]], full=[saturation(drive) for drive in drives])

@@ -92,10 +92,10 @@ class Scales:
         if self.sound:
             figures = ", ".join(f"{n} {v:.4f} ± {2 * e:.1g}" for n, (v, e, _) in rows.items())
             return f"The encoders show what is true ({figures} of it, 95 %)."
-        return " ".join(sentence(n, *rows[n]) for n in self.wrong)
+        return " ".join(encoder_sentence(n, *rows[n]) for n in self.wrong)
 
 
-def sentence(name: str, value: float, error: float, explained: float) -> str:
+def encoder_sentence(name: str, value: float, error: float, explained: float) -> str:
     """What is wrong with one encoder, and how to mend it."""
     if explained < 0.8:
         return (
@@ -123,12 +123,12 @@ def probe(model: Rig, law: SwingUp) -> Array:
     name = model.plant.coordinates[0].name
     while True:  # coasting, the driven body goes on; on the model it stays within the travel
         command = np.concatenate([run.u[:pumped], np.zeros(round(COAST / model.period))])
-        if pumped < 100 or np.abs(put_out(model, command)[name]).max() < 0.9 * law.travel:
+        if pumped < 100 or np.abs(shown_by_encoders(model, command)[name]).max() < 0.9 * law.travel:
             return command
         pumped = round(0.85 * pumped)
 
 
-def put_out(rig: Rig, command: Array) -> Record:
+def shown_by_encoders(rig: Rig, command: Array) -> Record:
     """What the encoders of a hanging rig show under commands put out blindly."""
     x = simulate(
         rig.plant, rig.drive, rig.plant.state("hanging"), command, rig.period, samples=command.size + 1,

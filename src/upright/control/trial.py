@@ -106,7 +106,7 @@ def trial(
     point = np.array(list(rig.plant.equilibrium(at).values()))
     held = point if rest is None else np.asarray(rest, dtype=np.float64)
     x0 = rig.plant.state(at) + np.asarray(start, dtype=np.float64)
-    given = law if isinstance(law, Rule) else at_work(rig, law, held, reference)
+    given = law if isinstance(law, Rule) else law_on_rig(rig, law, held, reference)
     late = None
     if pushes is not None:
         late = np.zeros(count)
@@ -129,7 +129,7 @@ def readings(rig: Rig, q: ArrayLike) -> Array:
     return np.floor(felt / step + 0.5) * rig.quantum
 
 
-def at_work(rig: Rig, law: Law, rest: ArrayLike, reference: ArrayLike | None = None) -> Law:
+def law_on_rig(rig: Rig, law: Law, rest: ArrayLike, reference: ArrayLike | None = None) -> Law:
     """The law with the rig's encoders and converter about it.
 
     Parameters

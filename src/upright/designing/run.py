@@ -30,7 +30,7 @@ from upright.gains import (
     weight_for_effort,
 )
 from upright.gains.loop import closed, command_noise, swing
-from upright.gains.lqr import least_cost, motion
+from upright.gains.lqr import least_cost, linear_motion
 from upright.gains.requests import Roots, conjugate_poles, poles_of, written
 from upright.laws import Law
 from upright.records import Array
@@ -338,7 +338,7 @@ def _placed_samples(model: StateSpace, poles: Roots) -> Placement:
 def _way_back(model: StateSpace, K: Array, start: Array) -> tuple[Array, Array, Array]:
     """Motion of the model under ``u = -K x``: t (N,) [s], x (N, n) and u (N, m)."""
     if model.dt is None:
-        return motion(model.A, model.B, K, start)
+        return linear_motion(model.A, model.B, K, start)
     slowest = float(np.abs(poles_of(model.A - model.B @ K)).max())
     samples = int(np.clip(10 / -math.log(slowest) if 0 < slowest < 1 else 0, 20, 20_000))
     shown = replace(model, C=np.eye(model.A.shape[0]), D=None, outputs=())

@@ -122,7 +122,7 @@ class Case:
             derived, n = self.plant.derived(without=frozenset(self.plant.optional)), len(self.plant.coordinates)
             apart = sum(text != "0" for text in derived.mass) == n  # joined by forces alone
             return apart and not derived.trig and len({c.unit for c in self.plant.coordinates}) == 1
-        return all(unit_of(c) in ("counts", "m", "mm") for c in self.measured)
+        return all(column_unit(c) in ("counts", "m", "mm") for c in self.measured)
 
     def moves(self, name: str) -> bool:
         """Whether a coordinate moves by more than 3 % of the largest motion in the same unit."""
@@ -136,11 +136,11 @@ class Case:
 
     def widest(self, unit: str) -> Column:
         """Measured column in a unit that covers the largest range."""
-        return max((c for c in self.measured if unit_of(c) == unit), key=self.span)
+        return max((c for c in self.measured if column_unit(c) == unit), key=self.span)
 
     def beside(self, c: Column) -> float:
         """Range of a measured column as a share of the largest in the same unit; 0 where nothing moves."""
-        return self.span(c) / (self.span(self.widest(unit_of(c))) or 1.0)
+        return self.span(c) / (self.span(self.widest(column_unit(c))) or 1.0)
 
     def held(self, c: Column) -> bool:
         """Whether a body hardly moves beside another one that is alike."""
@@ -169,7 +169,7 @@ class Case:
         return self._panel(self.inspection.column(column), slice(max(i - 40, 0), i + 40), "points")
 
     def _panel(self, c: Column, rows: slice, style: Literal["line", "steps", "points"]) -> Panel:
-        unit = unit_of(c)
+        unit = column_unit(c)
         curve = Curve(name=c.name, t=self.record.t[rows], y=self.record[c.name][rows], style=style)
         return Panel(label=f"{c.name} [{unit}]" if unit else c.name, curves=(curve,))
 
@@ -181,10 +181,10 @@ def tells_time(c: Column) -> bool:
 
 def tells_speed(c: Column) -> bool:
     """Whether a column is a rate, which a stop changes at once and no count is lost from."""
-    return unit_of(c).endswith("/s") or RATE.search(c.name) is not None
+    return column_unit(c).endswith("/s") or RATE.search(c.name) is not None
 
 
-def unit_of(c: Column) -> str:
+def column_unit(c: Column) -> str:
     """Unit of a column as the log or its look says; empty when neither does."""
     return c.unit or c.guess
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.diagnosis.case import Case, unit_of
+from upright.diagnosis.case import Case, column_unit
 from upright.diagnosis.findings import Curve, Finding, Panel
 from upright.diagnosis.forces import ForceBalance
 from upright.diagnosis.motion import SmoothedMotion, chosen, driven_row
@@ -122,7 +122,7 @@ def _limited(case: Case) -> Iterator[Finding]:
             continue
         ends = " and ".join(f"{v:.5g}" for v in (low, high) if v == v)
         limit = max(abs(v) for v in (low, high) if v == v)
-        unit = unit_of(c)
+        unit = column_unit(c)
         yield Finding(
             kind="saturation",
             columns=(c.name,),

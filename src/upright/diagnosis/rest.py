@@ -7,7 +7,7 @@ from dataclasses import MISSING, fields
 
 import numpy as np
 
-from upright.diagnosis.case import HELD, Case, tells_speed, unit_of
+from upright.diagnosis.case import HELD, Case, column_unit, tells_speed
 from upright.diagnosis.findings import Curve, Finding, Panel
 from upright.physics.equations import small_motions
 from upright.records import Array
@@ -22,7 +22,7 @@ def examine_rest(case: Case) -> list[Finding]:
 def _creep(case: Case) -> Iterator[Finding]:
     """Bodies that hardly move beside the others, yet do not stay where they are."""
     for c in case.measured if case.chained else ():
-        unit, span = unit_of(c), case.span(c)
+        unit, span = column_unit(c), case.span(c)
         largest = case.widest(unit)
         beside = case.span(largest)
         if not 5 * c.quantum.step < span < HELD * beside:
@@ -58,7 +58,7 @@ def _drift(case: Case) -> Iterator[Finding]:
             continue
         off, span = max(levels) - min(levels), float(np.ptp(x))
         if off > max(0.03 * span, 5 * c.quantum.step):
-            unit = unit_of(c)
+            unit = column_unit(c)
             yield Finding(
                 kind="drift",
                 columns=(c.name,),
@@ -100,7 +100,7 @@ def _grows(case: Case) -> Iterator[Finding]:
         growth = [(c.name, *_growth(t[start:stop], case.record[c.name][start:stop])) for c in free]
         if growth and all(cycles >= 8 and rate > 1.15 for _, rate, cycles, *_ in growth):
             name, rate, cycles, at, size = max(growth, key=lambda g: g[1])
-            unit = unit_of(case.inspection.column(name))
+            unit = column_unit(case.inspection.column(name))
             envelope = Curve(name="amplitude", t=at, y=size, style="points")
             yield Finding(
                 kind="self-excited",

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.diagnosis.case import Case, tells_speed, tells_time, unit_of
+from upright.diagnosis.case import Case, column_unit, tells_speed, tells_time
 from upright.diagnosis.findings import Finding
 from upright.readers.inspection import Column
 from upright.records import Array, Record
@@ -65,7 +65,7 @@ def _dead(case: Case) -> Iterator[Finding]:
 
 
 def _jumped(case: Case, c: Column, x: Array, jumped: Jumps) -> Iterator[Finding]:
-    t, unit = case.record.t, unit_of(c) or "1"
+    t, unit = case.record.t, column_unit(c) or "1"
     if jumped.wraps.size:
         yield Finding(
             kind="wrap",

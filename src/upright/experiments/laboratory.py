@@ -97,7 +97,7 @@ class Session:
         return tuple(e for e in self.asked if e.key not in {t.experiment.key for t in self.results})
 
 
-def choose(asked: Sequence[str], make: str, live: LiveStand | None = None) -> tuple[Experiment, ...]:
+def chosen_experiments(asked: Sequence[str], make: str, live: LiveStand | None = None) -> tuple[Experiment, ...]:
     """The experiments asked for, with those whose numbers they take; all that the rig has when none is named.
 
     Raises
@@ -192,7 +192,9 @@ def run_laboratory(
         When there is no such experiment, or not on this rig.
     """
     began = time.perf_counter()
-    session = Session(make=make, seed=seed, folder=folder, asked=choose(asked, make, live), worn=worn, live=live)
+    session = Session(
+        make=make, seed=seed, folder=folder, asked=chosen_experiments(asked, make, live), worn=worn, live=live
+    )
     digests = _digests(session)
     whole = sum(e.seconds for e in session.asked)
     behind = 0.0
@@ -372,7 +374,7 @@ def book(session: Session, day: date) -> Book:
             ("Data", live.source if live is not None else TWINS + (f" {WORN}" if session.worn else "")),
             ("Experiments", ", ".join(t.experiment.key for t in session.results) or "none"),
             ("Made", f"{day.isoformat()}, upright {__version__}, Python {platform.python_version()}"),
-            ("Again", command(session)),
+            ("Again", typed_again(session)),
         ),
         chapters=tuple(
             replace(t.chapter, about=t.rig, finished=t.state in ("done", "kept")) for t in session.results
@@ -383,7 +385,7 @@ def book(session: Session, day: date) -> Book:
     )  # fmt: skip
 
 
-def command(session: Session, seed: int | None = None) -> str:
+def typed_again(session: Session, seed: int | None = None) -> str:
     """What to type for this session, or for the same on another rig."""
     seed = session.seed if seed is None else seed
     shown = ["upright lab"]
@@ -406,7 +408,7 @@ def next_steps(session: Session) -> tuple[Step, ...]:
     if session.interrupted or any(t.state == "failed" for t in session.results):
         steps.append(
             Step("Go on where this stopped; what is finished is kept.",
-                 f"{command(session)} -o {typed(session.folder)}")
+                 f"{typed_again(session)} -o {typed(session.folder)}")
         )  # fmt: skip
     if session.live is not None:
         held = next((t.chapter.numbers for t in session.results if t.experiment.key == "2"), {})
@@ -416,14 +418,14 @@ def next_steps(session: Session) -> tuple[Step, ...]:
             again = f"upright run --rig {typed(rig)} --law {typed(law)} --duration 60"
             steps.append(Step("Run the best law for longer.", again))
         return tuple(steps)
-    steps.append(Step("Take another rig of the same make.", command(session, session.seed + 1)))
+    steps.append(Step("Take another rig of the same make.", typed_again(session, session.seed + 1)))
     other = "linear" if session.make != "linear" else "furuta"
     steps.append(Step("Run the laboratory on another kind of rig.", f"upright lab --rig {other}"))
     steps.append(Step("Start on a log of your own.", "upright init LOG"))
     return tuple(steps)
 
 
-def summary(session: Session, report: Path, pdf: Path | None) -> dict[str, Any]:
+def session_summary(session: Session, report: Path, pdf: Path | None) -> dict[str, Any]:
     """The session as plain values for another program: SI."""
     return {
         "seed": session.seed,

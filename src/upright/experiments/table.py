@@ -142,13 +142,13 @@ def _swing_up(at: ExperimentInput) -> tuple[Chapter, bool]:
 
 def _tracking(at: ExperimentInput) -> tuple[Chapter, bool]:
     from upright.experiments.tracking_3.chapter import chapter
-    from upright.experiments.tracking_3.run import follow, run_tracking
+    from upright.experiments.tracking_3.run import run_tracking, track_on
 
     if at.stand.simulated:
         done = run_tracking(at.stand.rig, at.seed, at.folder, at.progress, at.stopped, weighed=at.weighed)
     else:
         stand = at.stand.described_by(at.fit, at.folder)
-        done = follow(stand.rig, stand, at.folder, None, None, at.progress, at.stopped)
+        done = track_on(stand.rig, stand, at.folder, None, None, at.progress, at.stopped)
     return chapter(done), not done.interrupted
 
 

@@ -133,7 +133,7 @@ def _check_commands(made: SampledController, say: Language) -> list[str]:
     return say.stop(f" {say.either} ".join(map(say.not_finite, values)))
 
 
-def put_out(made: SampledController, say: Language) -> list[str]:
+def output_lines(made: SampledController, say: Language) -> list[str]:
     """What becomes of the commands c0, c1, ... of a rule."""
     rounded = [_rounded(j, step, say) for j, step in enumerate(made.converter.tolist()) if step]
     given = [_given(j, made.law.limit, say) for j in range(len(made.commands))]

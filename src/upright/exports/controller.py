@@ -78,7 +78,7 @@ class SampledController:
         unit = f" [{self.command_unit}]" if self.command_unit else ""
         rest = [f"{v!r}" for v in self.law.arrays()["target"][0].tolist()] if isinstance(self.law, Law) else []
         said = [
-            *filter(None, [plain(self.basis.first_line())]),
+            *filter(None, [harmless(self.basis.first_line())]),
             f"Call it every {self.law.period!r} s, with readings taken just before, and put the command out at once.",
             f"Readings: {', '.join(units)}" + (f"; at rest {', '.join(rest)}." if rest else "."),
             f"Commands: {', '.join(self.commands)}{unit}; "
@@ -126,7 +126,7 @@ def of_law(law: Any) -> SampledController:
         readings = law.measured or tuple(f"y{i}" for i in range(law.readings))
         references, inputs = law.reference_names or references, len(law.C)
     written = SampledController(
-        law=made, readings=tuple(map(plain, readings)), references=tuple(map(plain, references)),
+        law=made, readings=tuple(map(harmless, readings)), references=tuple(map(harmless, references)),
         reading_units=("",) * len(readings), signs=(1.0,) * len(readings),
         commands=("u",) if inputs == 1 else tuple(f"u{j}" for j in range(inputs)), delay=law.delay or None,
     )  # fmt: skip
@@ -179,11 +179,12 @@ def _read(content: Mapping[str, Any]) -> SampledController:
     )  # fmt: skip
     at = f" at '{content['at']}'" if content.get("at") else ""
     return SampledController(
-        law=law, readings=tuple(map(plain, names)), reading_units=tuple(plain(str(r["unit"])) for r in readings),
-        commands=(plain(content["command"]),), references=law.reference_names,
-        command_unit=plain(str(content.get("command_unit") or "")),
+        law=law, readings=tuple(map(harmless, names)), reading_units=tuple(harmless(str(r["unit"])) for r in readings),
+        commands=(harmless(content["command"]),), references=law.reference_names,
+        command_unit=harmless(str(content.get("command_unit") or "")),
         signs=tuple(float(described.get(f"sign.{n}", {}).get("value", 1.0)) for n in names),
-        title=plain(f"{content.get('plant', 'a rig')}{at}"), states_from=plain(str(content.get("states_from", ""))),
+        title=harmless(f"{content.get('plant', 'a rig')}{at}"),
+        states_from=harmless(str(content.get("states_from", ""))),
         delay=content.get("delay_samples"), basis=of_plain(content.get("basis"), "this design"),
     )  # fmt: skip
 
@@ -200,7 +201,7 @@ def _without_idle_references(made: SampledController) -> SampledController:
     )  # fmt: skip
 
 
-def plain(text: str) -> str:
+def harmless(text: str) -> str:
     """A name as it can stand in a comment or a text of any language, ending neither."""
     kept = "".join(c if c.isprintable() else " " for c in text)
     return kept.replace("\\", "/").replace("*/", "* /").replace("/*", "/ *").replace('"', "'")

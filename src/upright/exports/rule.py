@@ -7,14 +7,14 @@ from collections.abc import Mapping
 
 from upright.errors import BadInput
 from upright.exports.controller import SampledController
-from upright.exports.fmu.translation import Kind, helpers, translated
+from upright.exports.fmu.translation import Kind, as_c, helpers
 from upright.laws import Rule
 from upright.laws.rule import text_of
-from upright.simulation.kernel.elementary import called
+from upright.simulation.kernel.elementary import definitions
 from upright.simulation.lowering.instructions import LARGEST_POWER
 
 
-def numbers(made: SampledController) -> tuple[list[float], list[float]]:
+def rule_numbers(made: SampledController) -> tuple[list[float], list[float]]:
     """Its parameters, and what it remembers at first."""
     parameters, initial = (values[:, 0].tolist() for values in made.law.by_lane(1).values())
     return parameters, initial
@@ -29,10 +29,10 @@ def in_c(made: SampledController) -> str:
     function = tree.body[0]
     assert isinstance(function, ast.FunctionDef)  # as `text_of` made sure
     time, *tuples = (a.arg for a in function.args.args)
-    sizes = (len(made.readings), len(made.references), made.memories, len(numbers(made)[0]))
+    sizes = (len(made.readings), len(made.references), made.memories, len(rule_numbers(made)[0]))
     plain = ast.fix_missing_locations(_Plain(dict(zip(tuples, sizes, strict=True))).visit(tree))
     arrays: dict[str, tuple[Kind, tuple[int, ...]]] = dict.fromkeys(tuples, ("double *", (1,)))
-    written = translated(f"{called(text)}\n{ast.unparse(plain)}", "rule", {time: ("double", ()), **arrays}, {})
+    written = as_c(f"{definitions(text)}\n{ast.unparse(plain)}", "rule", {time: ("double", ()), **arrays}, {})
     return helpers(written) + written
 
 
@@ -67,7 +67,7 @@ def in_python(made: SampledController) -> str:
     rule = made.law
     assert isinstance(rule, Rule)  # asked before
     text = text_of(rule.function)
-    tree = _Powers().visit(ast.parse(f"{_OWN}\n{called(text)}\n{text}"))
+    tree = _Powers().visit(ast.parse(f"{_OWN}\n{definitions(text)}\n{text}"))
     for node in tree.body:
         assert isinstance(node, ast.FunctionDef)  # the texts hold nothing else
         node.decorator_list = []

@@ -60,7 +60,7 @@ def self_test(made: SampledController) -> ReplayVector:
     references = size * signal
     full = replace(law, references=references, delay=0.0)
     return ReplayVector(
-        readings=readings, references=references, commands=commanded(full, readings, len(law.C)),
+        readings=readings, references=references, commands=kernel_commands(full, readings, len(law.C)),
         single=_single_precision(made, full, readings),
     )  # fmt: skip
 
@@ -76,7 +76,7 @@ def _of_rule(made: SampledController) -> ReplayVector:
     readings = _on_steps(made, size * shape)
     references = np.repeat(np.where(k < SAMPLES // 2, 0.0, 0.5)[:, None], len(made.references), axis=1)
     full = replace(law, references=references, delay=0.0)
-    commands = commanded(full, readings, len(made.commands))
+    commands = kernel_commands(full, readings, len(made.commands))
     return ReplayVector(readings=readings, references=references, commands=commands, single=0.0)
 
 
@@ -87,7 +87,7 @@ def _on_steps(made: SampledController, readings: Array) -> Array:
     return np.where(step > 0, on_steps, readings)
 
 
-def commanded(law: Law | Rule, readings: Array, inputs: int) -> Array:
+def kernel_commands(law: Law | Rule, readings: Array, inputs: int) -> Array:
     """Commands of the kernel, shape (N, inputs), where every coordinate moves as prescribed."""
     n = readings.shape[1]
     names, forces = tuple(f"y{i}" for i in range(n)), tuple(f"u{j}" for j in range(inputs))

@@ -145,7 +145,7 @@ def locus(A: ArrayLike, B: ArrayLike, Q: ArrayLike, weights: ArrayLike, *, sampl
     return np.array(rows)
 
 
-def motion(A: Array, B: Array, K: Array, start: ArrayLike, seconds: float = 0.0) -> tuple[Array, Array, Array]:
+def linear_motion(A: Array, B: Array, K: Array, start: ArrayLike, seconds: float = 0.0) -> tuple[Array, Array, Array]:
     """Linear motion under ``u = -K x`` from a deviation: t (N,) [s], x (N, n) and u (N, m).
 
     Without `seconds`, ten time constants of the slowest pole.
@@ -168,7 +168,7 @@ def motion(A: Array, B: Array, K: Array, start: ArrayLike, seconds: float = 0.0)
 
 def peak_effort(A: Array, B: Array, K: Array, start: ArrayLike) -> float:
     """Largest command on the way back from a deviation [the input's unit]; the limit itself is not in the model."""
-    return float(np.abs(motion(A, B, K, start)[2]).max())
+    return float(np.abs(linear_motion(A, B, K, start)[2]).max())
 
 
 def weight_for_effort(

@@ -15,7 +15,7 @@ from upright.errors import BadInput, nearest
 from upright.identification.checks.conventions import wrong_conventions
 from upright.identification.checks.outliers import refit_without_outliers
 from upright.identification.checks.structure import with_proposal
-from upright.identification.inference.assumptions import assumptions, sentences, with_assumptions
+from upright.identification.inference.assumptions import assumption_sentences, assumptions, with_assumptions
 from upright.identification.inference.bands import calibrated
 from upright.identification.inference.black_box import black_box
 from upright.identification.inference.covariance import Identifiability, Optimum, assess, identifiability
@@ -23,7 +23,7 @@ from upright.identification.inference.intervals import run_estimates, shared_est
 from upright.identification.inference.lateness import lateness
 from upright.identification.inference.loop import standing
 from upright.identification.inference.poles import poles, shared_values
-from upright.identification.inference.scoring import fit_percent, predict, score
+from upright.identification.inference.scoring import fit_percent, predict, score_run
 from upright.identification.inference.verdict import GOOD, Evidence, judge, trusted
 from upright.identification.ladder.growth import choose_friction
 from upright.identification.model.bands import Bands
@@ -32,7 +32,7 @@ from upright.identification.model.grey_box import GreyBox, neutral
 from upright.identification.model.runs import Run
 from upright.identification.problem.residuals import Problem, formulate, unreached, unresolved
 from upright.identification.problem.simulated import with_noise
-from upright.identification.problem.trips import located, unasked_trips
+from upright.identification.problem.trips import unasked_trips, with_trip_guesses
 from upright.identification.search.descent import Descent, SearchLog, descend, descend_progressively, first_horizon
 from upright.identification.search.strategy import (
     ATTEMPTS,
@@ -106,7 +106,7 @@ def _identify(
     """As `identify`; a fit without outliers is told what the `conventions` of all samples look like."""
     began = time.perf_counter()
     rig = with_noise(rig, runs)
-    fitted = [located(rig, run) for run in runs if run.role == "fit"]
+    fitted = [with_trip_guesses(rig, run) for run in runs if run.role == "fit"]
     _check(rig, fitted, method)
     log = SearchLog(progress=progress, conventions=conventions or cache(lambda: wrong_conventions(rig, fitted)))
     log.warnings += unasked_trips(rig, fitted)
@@ -295,7 +295,7 @@ def _conclude(
         per_run=per_run,
         groups=groups,
         runs=scores,
-        verdict=" ".join([*(a.text() for a in answers), *sentences(assumed)]),
+        verdict=" ".join([*(a.text() for a in answers), *assumption_sentences(assumed)]),
         trusted=trusted(answers),
         answers=answers,
         method="",
@@ -326,7 +326,7 @@ def _scores(
     fitted = [run for run in runs if run.role == "fit"]
     thinned = any(t.y.shape[0] < t.run.t.size for t in problem.tracks)
     whole = formulate(rig, fitted, thin=False) if thinned else problem
-    found = {run.label: score(whole, i, best.x) for i, run in enumerate(fitted)}
+    found = {run.label: score_run(whole, i, best.x) for i, run in enumerate(fitted)}
     values = {n: e.value for n, e in estimates.items()}
     known = {label: {n: e.value for n, e in group.items()} for label, group in groups.items()}
     foreseen = [r for r in runs if r.role != "fit"]

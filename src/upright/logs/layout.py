@@ -81,7 +81,7 @@ def _schema(title: str, fields: Mapping[str, Any]) -> bytes:
     return json.dumps({"title": title, "type": "object", "properties": fields, "required": list(fields)}).encode()
 
 
-def columns_of(schema: bytes) -> tuple[LogColumn, ...]:
+def columns_of_schema(schema: bytes) -> tuple[LogColumn, ...]:
     """Columns as the schema of a row has them."""
     fields: dict[str, Any] = json.loads(schema)["properties"]
     return tuple(LogColumn(name, str(field["unit"]), field["type"] == "integer") for name, field in fields.items())
@@ -104,7 +104,7 @@ def row_writer(columns: Sequence[LogColumn]) -> Callable[[Sequence[float]], byte
     return message
 
 
-def checked(texts: Mapping[str, str]) -> dict[str, str]:
+def with_checksum(texts: Mapping[str, str]) -> dict[str, str]:
     """Texts of a metadata record with their checksum."""
     return {**texts, CHECK: f"{_sum(texts):08x}"}
 
@@ -137,7 +137,7 @@ class RunFile:
         self._file.start(profile=PROFILE, library=f"upright {header.versions.get('upright', '')}".strip())
         metadata = header.as_metadata()
         for name, texts in metadata.items():
-            self._file.add_metadata(name, checked(texts))
+            self._file.add_metadata(name, with_checksum(texts))
         self._channels = [
             self._file.register_channel(
                 topic, "json", self._file.register_schema(name, "jsonschema", schema), metadata["log"]

@@ -125,7 +125,7 @@ class Ring:
         self._memory.close()
 
 
-def share(size: int) -> tuple[mmap.mmap, str, tuple[int, ...]]:
+def shared_memory(size: int) -> tuple[mmap.mmap, str, tuple[int, ...]]:
     """Memory that a child may map too: as `join` needs it there, and the files that the child must inherit.
 
     It has no name that could outlive its processes, however they end. Where there are files that are on no disk
@@ -155,7 +155,7 @@ def _nameless(size: int, folder: str | None) -> int:
 
 
 def join(name: str, size: int) -> mmap.mmap:
-    """The memory that `share` made in another process."""
+    """The memory that `shared_memory` made in another process."""
     if sys.platform == "win32":
         return mmap.mmap(-1, size, tagname=name)
     return mmap.mmap(int(name), size)

@@ -14,7 +14,7 @@ from upright.errors import BadInput
 from upright.files import PathLike, read_bytes
 from upright.logs.container import MAGIC, Container, Damaged, Message, summary_fault
 from upright.logs.header import LogColumn, LogHeader
-from upright.logs.layout import EVENTS, SAMPLES, columns_of
+from upright.logs.layout import EVENTS, SAMPLES, columns_of_schema
 from upright.records import Provenance, Record
 
 Columns = dict[str, NDArray[Any]]
@@ -185,7 +185,7 @@ class Rows:
                     rows.append(message.content)
                 elif message.topic == EVENTS:
                     self.events.append(RunEvent(**json.loads(message.content)))
-            columns = columns_of(container.schemas[SAMPLES])
+            columns = columns_of_schema(container.schemas[SAMPLES])
             part = _columns(columns, json.loads(b"[%s]" % b",".join(rows)))
         except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError) as error:
             raise Damaged(container.at, f"a row or an event does not follow its schema ({error})") from None

@@ -17,7 +17,7 @@ from upright.errors import BadInput
 from upright.files import PathLike, check_output
 from upright.logs import ring as of
 from upright.logs.header import LogHeader
-from upright.logs.ring import Ring, share
+from upright.logs.ring import Ring, shared_memory
 
 _START, _END = 30.0, 30.0  # s that the process may take to begin, and to write what waits
 
@@ -70,7 +70,7 @@ class LogWriter:
         if not 16 <= rows <= 1 << 22:
             raise BadInput(f"the buffer of a log holds 16 to {1 << 22} rows, got {rows}.")
         self._path.parent.mkdir(parents=True, exist_ok=True)
-        memory, name, inherited = share(Ring.size(len(header.columns), rows))
+        memory, name, inherited = shared_memory(Ring.size(len(header.columns), rows))
         self._ring: Ring | None = Ring(memory, header.columns, rows)
         self._columns, self._unfit, self._full = header.columns, 0, 0
         self._last, self._clock = LogStatus(rows=0, dropped=0), threading.Event()

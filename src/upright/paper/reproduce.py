@@ -17,7 +17,7 @@ from upright.gains import place
 from upright.gains.factorization import Locus, effort_ratios, recover_locus
 from upright.gains.requests import matched, poles_of
 from upright.physics import Furuta
-from upright.questionnaire.statistics import possible
+from upright.questionnaire.statistics import can_be_printed
 from upright.records import Array
 
 Roots = NDArray[np.complex128]
@@ -50,7 +50,7 @@ TABLE_4 = (
 STUDENTS = 53
 
 
-def poles(text: str) -> tuple[Roots, Roots]:
+def printed_poles(text: str) -> tuple[Roots, Roots]:
     """Poles of one set [1/s], and half a unit of their last digits, real and imaginary part apart."""
     values: list[complex] = []
     halves: list[complex] = []
@@ -190,8 +190,8 @@ def _rig(rng: np.random.Generator, *, axial: bool) -> Furuta:
 def impossible_means(answers: int) -> int:
     """How many of Table 4's means (24) and Table 3's first percentages (2) cannot come from so many answers (GRIM)."""
     means = [mean for row in TABLE_4 for mean in row]
-    wrong = sum(not possible(mean, answers) for mean in means)
-    return wrong + sum(not possible(share, answers, of=100) for share in TABLE_3_FIRST)
+    wrong = sum(not can_be_printed(mean, answers) for mean in means)
+    return wrong + sum(not can_be_printed(share, answers, of=100) for share in TABLE_3_FIRST)
 
 
 def printed_inverted(p: Furuta) -> tuple[Array, Array]:
@@ -279,7 +279,7 @@ def reproduce(furuta: Furuta, seed: int = 0) -> Reproduced:
 
 
 def _again(name: str, sets: tuple[str, ...], *, free: tuple[int, ...]) -> Regenerated:
-    read = [poles(text) for text in sets]
+    read = [printed_poles(text) for text in sets]
     printed, half = tuple(p for p, _ in read), [h for _, h in read]
     locus = recover_locus(printed, half, free=free)
     again = tuple(matched(p, q) for p, q in zip(printed, locus.sets(len(printed)), strict=True))

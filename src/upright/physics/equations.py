@@ -94,7 +94,7 @@ def chooses(text: str) -> bool:
     return " if " in text
 
 
-def evaluate(expression: str, scope: Scope) -> Array:
+def evaluated(expression: str, scope: Scope) -> Array:
     """Value of one derived expression; names are looked up in `scope`, elementwise on arrays."""
     if chooses(expression):
         scope = _arrays(scope)

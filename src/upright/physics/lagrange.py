@@ -173,7 +173,7 @@ def _steady(e: Any) -> Any:
     return e
 
 
-def motion(cls: type[Statement], *, without: Collection[str] = ()) -> tuple[Any, Any]:
+def mass_and_force(cls: type[Statement], *, without: Collection[str] = ()) -> tuple[Any, Any]:
     """Mass matrix M and force vector f of ``M a = f(q, v, u)``, as SymPy matrices, dry friction left out.
 
     Parameters named in `without` are zero.
@@ -201,7 +201,7 @@ def derive(cls: type[Statement], *, without: frozenset[str] = frozenset()) -> De
         When the energies are not those of a mechanical system in these coordinates.
     """
     p, q, v, u = symbols(cls)
-    M, f = motion(cls, without=without)
+    M, f = mass_and_force(cls, without=without)
     T, V, D = _stated(cls, without)
     _check_jumps(cls, V, M, f)
     n = len(q)
@@ -223,17 +223,17 @@ def derive(cls: type[Statement], *, without: frozenset[str] = frozenset()) -> De
         coordinates=tuple(index),
         inputs=tuple(i.name for i in cls.inputs),
         parameters=cls.names(),
-        lumps=tuple(text(k) for k in lumps),
-        trig=tuple((s.name, c.name, text(a)) for s, c, a in trig),
-        steps=tuple((s.name, text(e)) for s, e in steps),
-        mass=tuple(text(e) for e in list(entries)[:-n]),
-        force=tuple(text(e) for e in list(entries)[-n:]),
-        stiffness=tuple(text(at_rest(e)) for e in -f.jacobian(q)),
-        damping=tuple(text(at_rest(e)) for e in -f.jacobian(v)),
-        gain=tuple(text(e) for e in f.jacobian(u).subs(rest)) if u else (),
-        kinetic=text(sp.expand(momentum_energy) if momentum_energy.is_polynomial(*v) else momentum_energy),
-        potential=text(V),
-        power_lost=text(sum(vi * _steady(sp.diff(D, vi)) for vi in v)),
+        lumps=tuple(python_source(k) for k in lumps),
+        trig=tuple((s.name, c.name, python_source(a)) for s, c, a in trig),
+        steps=tuple((s.name, python_source(e)) for s, e in steps),
+        mass=tuple(python_source(e) for e in list(entries)[:-n]),
+        force=tuple(python_source(e) for e in list(entries)[-n:]),
+        stiffness=tuple(python_source(at_rest(e)) for e in -f.jacobian(q)),
+        damping=tuple(python_source(at_rest(e)) for e in -f.jacobian(v)),
+        gain=tuple(python_source(e) for e in f.jacobian(u).subs(rest)) if u else (),
+        kinetic=python_source(sp.expand(momentum_energy) if momentum_energy.is_polynomial(*v) else momentum_energy),
+        potential=python_source(V),
+        power_lost=python_source(sum(vi * _steady(sp.diff(D, vi)) for vi in v)),
         joints=tuple(DryJoint(direction=j.direction(index), **j.parameters()) for j in cls.joints),
     )
 
@@ -259,7 +259,7 @@ class _Printer(PythonCodePrinter):
 _PRINTER = _Printer({"fully_qualified_modules": False})
 
 
-def text(expression: Any) -> str:
+def python_source(expression: Any) -> str:
     """Python source of an expression, functions unqualified."""
     return str(_PRINTER.doprint(expression))
 

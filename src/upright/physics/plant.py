@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import ImpossiblePhysics, NotIdentifiable
-from upright.physics.equations import Derived, chooses, evaluate, mass_and_force, small_motions
+from upright.physics.equations import Derived, chooses, evaluated, mass_and_force, small_motions
 from upright.physics.statement import Statement
 from upright.shown import Shown
 from upright.systems import StateSpace
@@ -128,11 +128,11 @@ class Plant(Shown, Statement, abstract=True):
         """Kinetic plus potential energy [J] of states `x`, shape (..., states)."""
         d = self.derived()
         scope = self._scope(np.asarray(x, dtype=np.float64))
-        return evaluate(d.kinetic, scope) + evaluate(d.potential, scope)
+        return evaluated(d.kinetic, scope) + evaluated(d.potential, scope)
 
     def power_lost(self, x: ArrayLike) -> NDArray[np.float64]:
         """Power [W] that viscous friction takes, shape (...); dry friction is not included."""
-        return evaluate(self.derived().power_lost, self._scope(np.asarray(x, dtype=np.float64)))
+        return evaluated(self.derived().power_lost, self._scope(np.asarray(x, dtype=np.float64)))
 
     @staticmethod
     def drawing(q: Mapping[str, Matrix]) -> list[Matrix]:

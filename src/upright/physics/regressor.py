@@ -20,7 +20,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upright.physics.equations import FUNCTIONS, Derived, chooses, evaluate, needed_force
+from upright.physics.equations import FUNCTIONS, Derived, chooses, evaluated, needed_force
 from upright.physics.plant import Plant
 
 Array = NDArray[np.float64]
@@ -108,10 +108,10 @@ class Regressor:
 
     def values(self, parameters: Mapping[str, float]) -> Array:
         """Base parameters (n,) of a plant with these parameters."""
-        return np.array([float(evaluate(b.text, parameters)) for b in self.base])
+        return np.array([float(evaluated(b.text, parameters)) for b in self.base])
 
     def _fixed(self, known: Mapping[str, float]) -> dict[str, float]:
-        return {name: float(evaluate(text, known)) for name, text in self.fixed}
+        return {name: float(evaluated(text, known)) for name, text in self.fixed}
 
 
 def regressor(plant: type[Plant], zero: frozenset[str] = frozenset()) -> Regressor:
@@ -211,7 +211,7 @@ def _products(node: ast.expr) -> list[tuple[float, str]]:
         if any(isinstance(n, ast.Name) for n in ast.walk(part)):
             symbols.append(ast.unparse(part))
         else:
-            factor *= float(evaluate(ast.unparse(part), {}))
+            factor *= float(evaluated(ast.unparse(part), {}))
     return [(factor, "*".join(sorted(symbols)) or "1.0")]
 
 

@@ -16,11 +16,11 @@ from upright.questionnaire.statistics import (
     Fits,
     Paired,
     bound,
-    compare,
+    can_be_printed,
+    compare_ratings,
     counts,
     fitting,
     holm,
-    possible,
     whole_row,
 )
 from upright.report.drawing import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILLION, figure, styled
@@ -90,7 +90,7 @@ def chapter(
 def _ratings(sheet: Ratings, scale: tuple[int, int]) -> _Evaluated:
     pairs = {i.name: np.isfinite(i.pre) & np.isfinite(i.post) for i in sheet.items}
     few = [i for i in sheet.items if pairs[i.name].sum() < 2]
-    found = [(i.name, compare(i.pre, i.post, top=scale[1])) for i in sheet.items if i not in few]
+    found = [(i.name, compare_ratings(i.pre, i.post, top=scale[1])) for i in sheet.items if i not in few]
     adjusted = holm([p.p for _, p in found])
     rows = tuple(
         (
@@ -178,7 +178,7 @@ def _means(sheet: Means, n: int, scale: tuple[int, int]) -> _Evaluated:
     found = [(f"{name}, {what.lower()}" if what else name, pre, post, bound(pre, post, n, scale=scale))
              for name, what, pre, post in sheet.rows]  # fmt: skip
     printed = [m for _, pre, post, _ in found for m in (pre, post)]
-    wrong = [m for m in printed if not possible(m, n)]
+    wrong = [m for m in printed if not can_be_printed(m, n)]
     rows = [
         (name, _marked(pre, n), _marked(post, n), number(_gain(pre, post), 3), _span(b.t), b.verdict)
         for name, pre, post, b in found
@@ -243,11 +243,11 @@ def _rest(found: Sequence[tuple[str, str, str, Bound]]) -> str:
 
 def _shares(sheet: Shares, n: int) -> _Evaluated:
     printed = [s for _, shares in sheet.rows for s in shares]
-    wrong = [s for s in printed if not possible(s, n, of=100)]
+    wrong = [s for s in printed if not can_be_printed(s, n, of=100)]
     rows = [
         (
             name,
-            *(f"{s}{'' if possible(s, n, of=100) else ' *'}" for s in shares),
+            *(f"{s}{'' if can_be_printed(s, n, of=100) else ' *'}" for s in shares),
             "yes" if whole_row(shares, n) else "no",
         )
         for name, shares in sheet.rows

@@ -69,7 +69,7 @@ class Shares:
     rows: tuple[tuple[str, tuple[str, ...]], ...]
 
 
-def read(path: Path, *, scale: tuple[int, int] = (1, 4)) -> Ratings | Means | Shares:
+def read_sheet(path: Path, *, scale: tuple[int, int] = (1, 4)) -> Ratings | Means | Shares:
     """Table of a CSV file, as spreadsheets write it: any of ``, ; tab``, any of UTF-8, UTF-16 or Windows' own.
 
     Raises

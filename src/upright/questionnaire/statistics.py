@@ -74,7 +74,7 @@ class Paired:
     normalized: float
 
 
-def compare(pre: ArrayLike, post: ArrayLike, *, top: float = 4.0) -> Paired:
+def compare_ratings(pre: ArrayLike, post: ArrayLike, *, top: float = 4.0) -> Paired:
     """Ratings before (n,) and after (n,) of the same people, NaN where an answer is missing.
 
     Raises
@@ -183,7 +183,7 @@ def counts(printed: str, answers: int, *, of: int = 1) -> range:
     return range(low, high + 1)
 
 
-def possible(printed: str, answers: int, *, of: int = 1) -> bool:
+def can_be_printed(printed: str, answers: int, *, of: int = 1) -> bool:
     """Whether a number can come from that many answers."""
     return len(counts(printed, answers, of=of)) > 0
 
@@ -200,7 +200,7 @@ def fitting(means: Sequence[str], shares: Sequence[str], most: int) -> tuple[Fit
     return tuple(
         Fits(
             answers=n,
-            possible=sum(possible(m, n) for m in means) + sum(possible(s, n, of=100) for s in shares),
+            possible=sum(can_be_printed(m, n) for m in means) + sum(can_be_printed(s, n, of=100) for s in shares),
             printed=printed,
         )
         for n in range(1, most + 1)

@@ -200,7 +200,7 @@ def broken(t: Array, y: Array, every: float | None) -> tuple[Array, Array]:
     return np.insert(t, cuts, t[cuts]), np.insert(y, cuts, np.nan)
 
 
-def limits(ax: Axes, most: float, name: str, at: float) -> None:
+def draw_limits(ax: Axes, most: float, name: str, at: float) -> None:
     """Lines at plus and minus `most`, named where the curves end, `at`."""
     for side in (-1, 1):
         ax.axhline(side * most, color=GREY, linestyle="--", linewidth=0.9)
@@ -287,7 +287,7 @@ def swing_figure(
     axes[-1].plot(t, command, color=VERMILLION)
     axes[-1].set_ylabel(axis("command", unit))
     if limit is not None:
-        limits(axes[-1], limit, "limit", float(t[-1]))
+        draw_limits(axes[-1], limit, "limit", float(t[-1]))
         reach = 1.25 * max(limit, float(np.abs(command).max()))
         axes[-1].set_ylim(-reach, reach)
     hide_inner_times(axes)

@@ -14,7 +14,7 @@ _FRAGMENTS = count(1)  # ids differ between the cells of a notebook
 _ID = re.compile(r'\b(id="|url\(#|href="#)')
 
 
-def html(page: Chapter | Book) -> str:
+def html_page(page: Chapter | Book) -> str:
     """A chapter, or a whole report, as a page that can be mailed, printed and read in ten years; texts are escaped."""
     from upright._version import __version__
 
@@ -47,4 +47,4 @@ def _rendered(template: str, **values: Any) -> str:
 
 def write_html(path: Path, page: Chapter | Book) -> Path:
     """Write a page; one that exists is replaced at once or not at all."""
-    return replace_file(path, html(page).encode("utf-8", errors="replace"))
+    return replace_file(path, html_page(page).encode("utf-8", errors="replace"))

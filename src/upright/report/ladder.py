@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def chapter(ladder: Ladder, *, title: str, provenance: Mapping[str, object], steps: Iterable[Step] = ()) -> Chapter:
-    """What a ladder says; `steps` are those of `next_steps`."""
+    """What a ladder says; `steps` are those of `ladder_steps`."""
     seen = "; ".join(
         f"{s.rung.name}: fitted {percent(s.fit_percent)}, predicted {percent(s.predicted_percent)}"
         for s in ladder.steps
@@ -167,7 +167,7 @@ def _label(step: RungResult) -> str:
     return "\n".join([*lines, f"{step.parameters} + {step.per_run}", "" if step.accepted else "(refused)"]).rstrip()
 
 
-def next_steps(ladder: Ladder, *, study: str, folder: str, data: str, trimmed: bool) -> Iterator[Step]:
+def ladder_steps(ladder: Ladder, *, study: str, folder: str, data: str, trimmed: bool) -> Iterator[Step]:
     """What to do with the ladder."""
     if ladder.interrupted:
         yield Step("The climb was stopped; run it to its end.")

@@ -62,11 +62,11 @@ def chapter(log: RunLog) -> Chapter:
     verdict = f"{n} whole rows. {log.complaint}" if log.complaint else f"The log is whole: {n} rows."
     return Chapter(
         title=Path(log.file).name, verdict=verdict, sound=not log.complaint and not log.dropped, parts=tuple(parts),
-        steps=tuple(steps), numbers=numbers(log),
+        steps=tuple(steps), numbers=log_numbers(log),
     )  # fmt: skip
 
 
-def numbers(log: RunLog) -> dict[str, Any]:
+def log_numbers(log: RunLog) -> dict[str, Any]:
     """The same as plain values."""
     t, header = log.columns["t"], log.header
     return {
@@ -119,7 +119,7 @@ def draw_run(log: RunLog) -> Figure:
     return draw_columns(record, inspect(record))
 
 
-def recovered(found: Salvaged) -> Chapter:
+def recovered_chapter(found: Salvaged) -> Chapter:
     """What was kept of a torn log."""
     log = found.log
     lost = (

@@ -98,7 +98,7 @@ def number(value: float, digits: int = 4) -> str:
     return f"{mantissa}·10{str(int(power)).translate(_SUPERSCRIPT)}".replace("-", "−")
 
 
-def measured(value: float, stderr: float) -> tuple[str, str]:
+def with_error(value: float, stderr: float) -> tuple[str, str]:
     """Value and its standard error, to the two figures of the error that mean something."""
     return number(value, figures(value, stderr)), number(stderr, 2) if stderr > 0 else "–"
 

@@ -159,7 +159,7 @@ class SerialRig:
             raise self._refusal(f"a self-test takes a pulse of up to {LONGEST_PULSE:g} s, got {seconds:g} s")
         length = max(1, _down(seconds / self._tick))
         first = self.exchange(0.0).counts
-        self._ask(Kind.SELF_TEST, wire.self_test(self._steps(pulse), length))
+        self._ask(Kind.SELF_TEST, wire.self_test_body(self._steps(pulse), length))
         farthest, until = [0] * len(first), self._status.tick + 2 * length + 1
         while self._status.tick < until:
             tick = self.exchange(0.0)

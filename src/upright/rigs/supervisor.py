@@ -43,7 +43,7 @@ REST = 0.5
 Event = Callable[[float, str, str], None]
 
 
-def silent(_t: float, _kind: str, _text: str) -> None:
+def unheard(_t: float, _kind: str, _text: str) -> None:
     """Events that nobody asked for."""
 
 
@@ -97,7 +97,7 @@ class Supervisor:
 
     rig: LiveRig
     duty: Duty
-    event: Event = silent
+    event: Event = unheard
     stopped: Callable[[], str] = field(default=lambda: "")
     about: Capabilities = field(init=False)
     held: Limits = field(init=False)

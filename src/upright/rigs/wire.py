@@ -271,6 +271,6 @@ def exchange(command: int, reference: float, answers: int) -> bytes:
     return _EXCHANGE.pack(command, reference, answers & 0xFFFF)
 
 
-def self_test(pulse: int, ticks: int) -> bytes:
+def self_test_body(pulse: int, ticks: int) -> bytes:
     """Body of `Kind.SELF_TEST`: command [steps] for some ticks."""
     return _SELF_TEST.pack(pulse, ticks)

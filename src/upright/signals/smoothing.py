@@ -165,7 +165,7 @@ def smoothing_width(y: Array, dt: float, period: float, quantum: float) -> int:
     return max(7, width)
 
 
-def spread(y: Array) -> float:
+def scatter(y: Array) -> float:
     """Standard deviation of a signal, never zero."""
     s = float(np.std(y))
     return s if s > 0 else 1.0

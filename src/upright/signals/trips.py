@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.signals.smoothing import Motion, acceleration_width, middle, smoothed, spread
+from upright.signals.smoothing import Motion, acceleration_width, middle, scatter, smoothed
 
 Array = NDArray[np.float64]
 
@@ -262,7 +262,7 @@ def _regression(
     if not np.ptp(acceleration) > 0:
         return speed, None
     weights = middle(width, order=3)
-    columns = [np.ones(speed.size), np.tanh(speed / (0.02 * spread(speed))), *terms(motion)]
+    columns = [np.ones(speed.size), np.tanh(speed / (0.02 * scatter(speed))), *terms(motion)]
     # damping that is there with the command on goes with it
     switched = np.stack([u, speed * (u != 0)], axis=1)
     half = width // 2

@@ -309,7 +309,7 @@ class Simulator:
         if threads <= 1 or blocks < 2 * threads:
             step(0, blocks)
         else:
-            share(step, blocks, threads)
+            take_turns(step, blocks, threads)
         return out[:, :, :lanes] if f.record else reduced[:, :lanes]
 
 
@@ -344,7 +344,7 @@ def recorded(shape: tuple[int, int, int], memory: Array | None) -> Array:
     return memory[:size].reshape(shape)
 
 
-def share(step: Callable[[int, int], None], blocks: int, threads: int) -> None:
+def take_turns(step: Callable[[int, int], None], blocks: int, threads: int) -> None:
     """Let threads take turns at pieces of the work; the kernel holds no lock."""
     from concurrent.futures import ThreadPoolExecutor
 

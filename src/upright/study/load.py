@@ -32,7 +32,7 @@ from upright.study.loop import Scene, read_loop, state_units
 from upright.study.rig import known_values, read_plant, read_rig
 from upright.study.sensors import Grid, drive_unit, read_drives, read_sensors
 from upright.study.stored_rig import rig_with_guesses
-from upright.study.text import Section, StudyText, show, si
+from upright.study.text import Section, StudyText, as_written, in_si
 
 PathLike = str | os.PathLike[str]
 
@@ -333,10 +333,12 @@ def _window(run: Section, record: Record) -> tuple[float, float]:
     value: Any = run.values["window"]
     first, last = float(record.t[0]), float(record.t[-1])
     if not isinstance(value, list) or len(value) != 2:
-        raise run.error("window", f"window must be two times in s, such as window = [1.0, 9.0], got {show(value)}")
+        raise run.error(
+            "window", f"window must be two times in s, such as window = [1.0, 9.0], got {as_written(value)}"
+        )
     with run.at("window"):
-        start = first if value[0] == "start" else si(value[0], "s", "window")
-        stop = last if value[1] == "end" else si(value[1], "s", "window")
+        start = first if value[0] == "start" else in_si(value[0], "s", "window")
+        stop = last if value[1] == "end" else in_si(value[1], "s", "window")
         slack = record.period
         if not start < stop:
             raise BadInput(
@@ -409,7 +411,7 @@ def _horizon(run: Section, grid: Grid) -> float | tuple[float, ...] | None:
         return None
     listed: list[Any] = value if isinstance(value, list) else [value]
     with run.at("horizon"):
-        found = [si(v, "s", "horizon") for v in listed]
+        found = [in_si(v, "s", "horizon") for v in listed]
     if len(found) > _HORIZONS:
         raise run.error(
             "horizon", f"horizon lists {len(found)} times, and {_HORIZONS} are the most; take a few of them"

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from upright.closed_loop import Channel, ClosedLoop, Filter, joined, recover
-from upright.closed_loop.structures import memory
+from upright.closed_loop import Channel, ClosedLoop, Filter, joined, recover_law
+from upright.closed_loop.structures import memory_before
 from upright.errors import nearest
 from upright.laws import Law, state_feedback
 from upright.physics import Plant
@@ -19,7 +19,7 @@ from upright.study.coordinates import Sensors
 from upright.study.keys import names
 from upright.study.rig import per
 from upright.study.sensors import Drive, Grid, Sensor, read_sign
-from upright.study.text import Section, show, si
+from upright.study.text import Section, as_written, in_si
 from upright.units import in_unit
 
 
@@ -63,7 +63,7 @@ def read_loop(run: Section, scene: Scene) -> ClosedLoop | None:
     kind = section.values.get("kind", "state")
     if kind not in tuple(KINDS):  # it may be no word at all
         near = nearest(str(kind), KINDS)
-        raise section.error("kind", f"kind must be one of {', '.join(KINDS)}, got {show(kind)}; {near}")
+        raise section.error("kind", f"kind must be one of {', '.join(KINDS)}, got {as_written(kind)}; {near}")
     return KINDS[kind](section, scene)
 
 
@@ -133,7 +133,7 @@ def _pid(section: Section, scene: Scene) -> ClosedLoop:
     ]  # fmt: skip
     start = {n: first_of(scene, n, raw=raw) for n in measured}
     start |= {f"reference {i + 1}": float(r[0]) for i, r in enumerate(references)}
-    law = replace(joined(channels, period=period), initial=memory(channels, start))
+    law = replace(joined(channels, period=period), initial=memory_before(channels, start))
     return _closed_loop(section, limited(section, law), references, scene, every, raw=raw)
 
 
@@ -170,7 +170,7 @@ def _recovered(section: Section, scene: Scene) -> ClosedLoop:
         raise section.error("kind", 'a law is recovered from the column it put out; add command = "duty"')
     columns = columns_of(section, "reference")
     with section.at("kind"):
-        found = recover(
+        found = recover_law(
             scene.record, measured=[scene.sensors[n].column for n in measured], references=columns, command=command,
             feedforward=columns_of(section, "feedforward"),
         )  # fmt: skip
@@ -236,7 +236,9 @@ def filter_of(section: Section, period: float) -> Filter:
     taps: Any = section.values.get("taps", [1, 0])
     two = isinstance(taps, list) and len(taps) == 2 and all(type(v) in (int, float) and abs(v) < 1e6 for v in taps)
     if not two or abs(sum(taps) - 1) > 1e-6:
-        raise section.error("taps", f"taps must be two numbers that sum to 1, such as [0.2, 0.8], got {show(taps)}")
+        raise section.error(
+            "taps", f"taps must be two numbers that sum to 1, such as [0.2, 0.8], got {as_written(taps)}"
+        )
     tau = section.number("tau", "s", 0.0)
     return Filter(pole=Filter.of(tau, period).pole, second=float(taps[1]))
 
@@ -261,7 +263,7 @@ def columns_of(section: Section, key: str) -> tuple[str, ...]:
     """Names of columns under `key`."""
     items = section.entries(key)
     if not all(isinstance(item, str) for item in items):
-        raise section.error(key, f"{key} of a law to recover must name columns, got {show(section.values[key])}")
+        raise section.error(key, f"{key} of a law to recover must name columns, got {as_written(section.values[key])}")
     return tuple(items)
 
 
@@ -273,7 +275,7 @@ def several(section: Section, key: str, units: Sequence[str]) -> list[float]:
     items += [0.0] * (len(units) - len(items))
     with section.at(key):
         return [
-            in_unit(item, unit) if unit and isinstance(item, str) else si(item, "1", key)
+            in_unit(item, unit) if unit and isinstance(item, str) else in_si(item, "1", key)
             for item, unit in zip(items, units, strict=True)
         ]
 
@@ -306,4 +308,4 @@ def reference_of(value: Any, unit: str, section: Section, scene: Scene) -> Array
     with section.at("reference"):
         if isinstance(value, str) and not value[:1].isdigit() and value[:1] not in "+-.":
             return scene.grid.references(expressions.evaluate(value, scene.record.signals, scene.record.t))
-        return np.array([si(value, unit, "reference")])
+        return np.array([in_si(value, unit, "reference")])

@@ -13,7 +13,7 @@ from upright.physics import Plant, find
 from upright.physics.actuator import ACTUATOR
 from upright.quantities import Quantity
 from upright.study.keys import names
-from upright.study.text import SOURCES, Section, show, si
+from upright.study.text import SOURCES, Section, as_written, in_si
 from upright.trust import before_running
 from upright.units import uncertainty
 
@@ -122,7 +122,7 @@ def read_parameter(section: Section, key: str, name: str, what: Quantity) -> Par
     if ("value" in table) == ("guess" in table):
         raise section.error(
             key,
-            f"{name} needs either value (known) or guess (to estimate), got {show(value)};"
+            f"{name} needs either value (known) or guess (to estimate), got {as_written(value)};"
             f' for instance {key} = {{ guess = "1 {what.unit}", min = 0 }}',
         )
     estimate = "guess" in table
@@ -166,7 +166,7 @@ def _number(section: Section, keys: tuple[str, ...], value: Any, what: Quantity)
     with section.text.at((*section.place(keys[0]), *keys[1:])):
         if isinstance(value, float) and not math.isfinite(value):  # `_checked` knows where infinity has a meaning
             return value
-        return si(value, what.unit, keys[0])
+        return in_si(value, what.unit, keys[0])
 
 
 def _checked(section: Section, keys: tuple[str, ...], name: str, value: Any, what: Quantity) -> float:
@@ -182,11 +182,11 @@ def _uncertainty(section: Section, key: str, value: Any, number: float, what: Qu
         try:
             sigma = uncertainty(value, number, what.unit)
         except BadInput:
-            raise section.error(key, f'uncertainty must be like "2 mm" or "1 %", got {show(value)}') from None
+            raise section.error(key, f'uncertainty must be like "2 mm" or "1 %", got {as_written(value)}') from None
     else:
         sigma = _number(section, (key, "uncertainty"), value, what)
     if not 0 <= sigma < math.inf:
-        raise section.error(key, f"the uncertainty of {key} must be zero or more, got {show(value)}")
+        raise section.error(key, f"the uncertainty of {key} must be zero or more, got {as_written(value)}")
     return sigma
 
 

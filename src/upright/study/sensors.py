@@ -16,7 +16,7 @@ from upright.physics.combination import combination
 from upright.records import Array, Record
 from upright.study import expressions
 from upright.study.keys import names
-from upright.study.text import Section, show, si
+from upright.study.text import Section, as_written, in_si
 
 _UNIFORM = 0.02  # samples off the grid by less than this part of a period count as on it
 _ON_GRID = 1e-6  # and by less than this as at the grid's instant
@@ -265,7 +265,7 @@ def read_sign(section: Section) -> float:
     """+1 or -1."""
     sign: Any = section.values.get("sign", 1)
     if isinstance(sign, bool) or sign not in (1, -1):
-        raise section.error("sign", f"sign must be 1 or -1, got {show(sign)}")
+        raise section.error("sign", f"sign must be 1 or -1, got {as_written(sign)}")
     return float(sign)
 
 
@@ -323,7 +323,7 @@ def _as_table(section: Section, key: str) -> Section:
         return section.section(key)
     if not isinstance(value, str):
         with section.at(key):
-            value = repr(si(value, "", key))
+            value = repr(in_si(value, "", key))
     table = Section(section.text, section.place(key), {"expression": value})
     table.places = {"expression": section.place(key)}
     return table

@@ -94,7 +94,7 @@ class Section:
     def __init__(self, text: StudyText, path: KeyPath, values: Any) -> None:
         self.text, self.path = text, path
         if not isinstance(values, dict):
-            raise text.error(path, f"'{self.name}' must be a table of keys, got {show(values)}")
+            raise text.error(path, f"'{self.name}' must be a table of keys, got {as_written(values)}")
         self.values: dict[str, Any] = values
         self.places: dict[str, KeyPath] = {}
 
@@ -140,7 +140,7 @@ class Section:
         """Text under `key`."""
         value = self.values.get(key)
         if not isinstance(value, str) or not value.strip():
-            got = "nothing" if key not in self.values else show(value)
+            got = "nothing" if key not in self.values else as_written(value)
             raise self.error(key, f'[{self.name}] needs {key} as text, such as {key} = "{example}", got {got}')
         return value
 
@@ -151,10 +151,12 @@ class Section:
         value, valid = self.values[key], tuple(valid)
         items = [value] if isinstance(value, str) else value
         if not isinstance(items, list):
-            raise self.error(key, f'{key} must be a list of names, such as {key} = ["{valid[0]}"], got {show(value)}')
+            raise self.error(
+                key, f'{key} must be a list of names, such as {key} = ["{valid[0]}"], got {as_written(value)}'
+            )
         for item in items:
             if item not in valid:
-                raise self.error(key, f"{key} lists {show(item)}; {nearest(str(item), valid)}")
+                raise self.error(key, f"{key} lists {as_written(item)}; {nearest(str(item), valid)}")
         return tuple(dict.fromkeys(items))
 
     def entries(self, key: str) -> list[Any]:
@@ -169,13 +171,13 @@ class Section:
                 raise self.error(key, f"[{self.name}] needs {key}, a number in {unit}")
             return default
         with self.at(key):
-            return si(self.values[key], unit, key)
+            return in_si(self.values[key], unit, key)
 
     def positive(self, key: str, unit: str, default: float) -> float:
         """Number above zero."""
         value = self.number(key, unit, default)
         if not value > 0:
-            raise self.error(key, f"{key} must be above zero, got {show(self.values[key])}")
+            raise self.error(key, f"{key} must be above zero, got {as_written(self.values[key])}")
         return value
 
     def stated(self, key: str, unit: str) -> tuple[float, str]:
@@ -186,14 +188,16 @@ class Section:
             inner.check(("value", *SOURCES))
         number = inner.number("value" if inner is not self else key, unit)
         if not number > 0:
-            raise self.error(key, f"{key} must be above zero, got {show(value)}; leave it out where there is none")
+            raise self.error(
+                key, f"{key} must be above zero, got {as_written(value)}; leave it out where there is none"
+            )
         return number, source_of(value)
 
     def flag(self, key: str) -> bool:
         """True or false, false when left out."""
         value = self.values.get(key, False)
         if not isinstance(value, bool):
-            raise self.error(key, f"{key} must be true or false, got {show(value)}")
+            raise self.error(key, f"{key} must be true or false, got {as_written(value)}")
         return value
 
     def choice(self, key: str, valid: Iterable[str], default: str) -> str:
@@ -201,14 +205,14 @@ class Section:
         value, valid = self.values.get(key, default), tuple(valid)
         if value not in valid:
             words = " or ".join(f'"{v}"' for v in valid)
-            raise self.error(key, f"{key} must be {words}, got {show(value)}; {nearest(str(value), valid)}")
+            raise self.error(key, f"{key} must be {words}, got {as_written(value)}; {nearest(str(value), valid)}")
         return value
 
     def whole(self, key: str, default: int, most: int) -> int:
         """Whole number from 1 to `most`."""
         value = self.values.get(key, default)
         if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
-            raise self.error(key, f"{key} must be a whole number from 1 to {most}, got {show(value)}")
+            raise self.error(key, f"{key} must be a whole number from 1 to {most}, got {as_written(value)}")
         return value
 
 
@@ -220,19 +224,19 @@ def source_of(value: Any) -> str:
     return next((word for word in SOURCES if told.get(word)), "measured" if "uncertainty" in told else "known")
 
 
-def si(value: Any, unit: str, what: str) -> float:
+def in_si(value: Any, unit: str, what: str) -> float:
     """Value in `unit`, one of SI or of the command, of a number or of text such as ``"2 mm"``."""
     if isinstance(value, bool) or not isinstance(value, str | int | float):
-        raise BadInput(f'{what} must be a number or text with a unit, such as "1.5 {unit}", got {show(value)}')
+        raise BadInput(f'{what} must be a number or text with a unit, such as "1.5 {unit}", got {as_written(value)}')
     if not isinstance(value, str) and not abs(value) < 1e300:
-        raise BadInput(f"{what} must be a finite number, got {show(value)}")
+        raise BadInput(f"{what} must be a finite number, got {as_written(value)}")
     number = units.in_unit(value, unit)
     if number and not _LEAST <= abs(number) <= 1 / _LEAST:  # its square, or the inverse of that, would overflow
-        raise BadInput(f"{what} must be 0 or from {_LEAST:g} to {1 / _LEAST:g} in size, got {show(value)}")
+        raise BadInput(f"{what} must be 0 or from {_LEAST:g} to {1 / _LEAST:g} in size, got {as_written(value)}")
     return number
 
 
-def show(value: Any) -> str:
+def as_written(value: Any) -> str:
     """A value as the study wrote it, short."""
     if isinstance(value, str):
         return f'"{value}"' if len(value) < 40 else f'"{value[:37]}..."'

@@ -37,10 +37,10 @@ def held(
     if first_order:
         ramp = _ramp(A, B, period)
         new, D = new - ramp + early @ ramp, D + C @ ramp
-    return remembering(early @ late, {whole: new, whole + 1: early @ old}, C, D, delay)
+    return with_past_commands(early @ late, {whole: new, whole + 1: early @ old}, C, D, delay)
 
 
-def remembering(A: Array, columns: Mapping[int, Array], C: Array, D: Array, delay: float) -> Matrices:
+def with_past_commands(A: Array, columns: Mapping[int, Array], C: Array, D: Array, delay: float) -> Matrices:
     """Matrices at the samples with what commands of so many samples ago do as `columns`, those commands as states."""
     n, m = next(iter(columns.values())).shape
     memories = math.ceil(delay - 1e-12)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput, nearest
 from upright.shown import Shown
-from upright.systems.discretization import Matrices, held, remembering
+from upright.systems.discretization import Matrices, held, with_past_commands
 
 Array = NDArray[np.float64]
 Roots = NDArray[np.complex128]
@@ -240,7 +240,7 @@ class StateSpace(Shown):
             )
         if self.delay or self.lag:
             raise BadInput("this sampled model has a delay or a lag already; sample the continuous one again.")
-        return self._with(remembering(self.A, {int(delay): self.B}, self.C, self.D, delay), (), delay)
+        return self._with(with_past_commands(self.A, {int(delay): self.B}, self.C, self.D, delay), (), delay)
 
     def _with(self, matrices: Matrices, given: Sequence[str], delay: float, **fields: Any) -> StateSpace:
         """The same signals and point about other matrices, with the states that drive and delay add."""

@@ -33,7 +33,7 @@ class Answer(Generic[V]):
         self.value, self.chapter, self.files = value, chapter, tuple(files)
 
     def __repr__(self) -> str:
-        return text(self.brief(), self.files)
+        return as_text(self.brief(), self.files)
 
     def _repr_html_(self) -> str:
         from upright.report.html import fragment
@@ -102,7 +102,7 @@ class Answer(Generic[V]):
         return write_html(path, self.chapter)
 
 
-def text(chapter: Chapter, files: Sequence[Path] = ()) -> str:
+def as_text(chapter: Chapter, files: Sequence[Path] = ()) -> str:
     """A chapter as a terminal shows it."""
     from rich.console import Console
 

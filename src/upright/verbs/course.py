@@ -150,7 +150,7 @@ def lab(
     beside = Path() if out is None else at
     live = _live(rig, beside, ask, watching, worn=worn, alone=shared.alone) if itself else None
     rig = rig if live is None else typed(live.file.path)
-    laboratory.choose(asked, rig, live)  # says what is wrong with the call before anything is written
+    laboratory.chosen_experiments(asked, rig, live)  # says what is wrong with the call before anything is written
     with _ctrl_c() as pressed:
         session = laboratory.run_laboratory(
             asked, rig, seed, at, progress, stopped=lambda: pressed.times > 0, fresh=fresh, workers=shared, worn=worn,
@@ -165,7 +165,7 @@ def lab(
     told = Chapter(
         title=book.title, verdict=f"{sound} of {len(session.results)} verdicts are sound.",
         sound=sound == len(session.results), parts=book.cover, warnings=book.notes, steps=book.steps,
-        numbers=laboratory.summary(session, report, pdf), finished=not session.interrupted,
+        numbers=laboratory.session_summary(session, report, pdf), finished=not session.interrupted,
     )  # fmt: skip
     took = {
         t.experiment.key: f"{t.rig}{', as kept from an earlier run' if t.state == 'kept' else ''}; {t.seconds:.1f} s"
@@ -313,7 +313,7 @@ def survey(
         When the sheet cannot be read, or it is not told on how many answers it rests.
     """
     from upright.questionnaire.chapter import chapter
-    from upright.questionnaire.sheet import Ratings, read, read_table
+    from upright.questionnaire.sheet import Ratings, read_sheet, read_table
     from upright.report.page import Step
     from upright.report.symbols import typed
 
@@ -327,7 +327,7 @@ def survey(
     limits = (int(ends[1]), int(ends[2]))
     if isinstance(file, str | os.PathLike):
         file = Path(file)
-        sheet, name, command = read(file, scale=limits), file.name, f"upright survey {typed(file)}"
+        sheet, name, command = read_sheet(file, scale=limits), file.name, f"upright survey {typed(file)}"
     elif hasattr(file, "to_csv"):
         sheet, name, command = read_table(file.to_csv(index=bool(file.index.name)), "frame", scale=limits), "frame", ""
     else:

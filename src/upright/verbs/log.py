@@ -419,7 +419,7 @@ def law(
     BadInput
         When the log cannot be read, columns are missing, or the log is too short.
     """
-    from upright.closed_loop import recover
+    from upright.closed_loop import recover_law
     from upright.closed_loop.recovery import as_json
     from upright.report.law import chapter, draw_law
     from upright.report.symbols import typed
@@ -433,7 +433,7 @@ def law(
             f"{path.name} holds the columns {', '.join(record.names)}; say which one the law put out (--command) and"
             " which it read (--measured, and --reference if it followed one)."
         )
-    found = recover(
+    found = recover_law(
         record, measured=texts(measured), references=texts(reference), command=command,
         feedforward=texts(feedforward), every=every,
     )  # fmt: skip

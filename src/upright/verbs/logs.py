@@ -153,11 +153,11 @@ def log_recover(log: PathLike, *, out: PathLike | None = None) -> Answer[Salvage
         When nothing of it can be read, or `out` may not be written.
     """
     from upright.logs import recover
-    from upright.report.run import recovered
+    from upright.report.run import recovered_chapter
 
     at = Path(f"{Path(log).stem}-recovered.mcap") if out is None else Path(out)
     found = recover(log, at)
-    return Answer(found, recovered(found), [at])
+    return Answer(found, recovered_chapter(found), [at])
 
 
 @command(name="log convert", metavars={"out": "FILE"}, more="upright log convert run.mcap -o run.parquet")

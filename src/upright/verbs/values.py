@@ -127,7 +127,7 @@ def read_start(given: Start | None, states: Sequence[str], units: Sequence[str])
     return {n: si(v, unit[n]) / (scale(unit[n]) if isinstance(v, str) else 1.0) for n, v in said.items()}
 
 
-def poles(value: str | Iterable[complex] | None) -> NDArray[np.complex128] | None:
+def read_pole_list(value: str | Iterable[complex] | None) -> NDArray[np.complex128] | None:
     """Poles [1/s] of a text such as ``"-4+-2j, -10"`` or of numbers, a pair as two; None where none are given."""
     if value is None or isinstance(value, str):
         from upright.gains.requests import read_poles

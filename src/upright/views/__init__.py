@@ -29,7 +29,7 @@ from upright.report.rig import rig_table
 from upright.report.symbols import number, unit
 from upright.rig import Rig
 from upright.systems import StateSpace
-from upright.verbs.answer import text as chapter_text
+from upright.verbs.answer import as_text as chapter_text
 from upright.verbs.linear.feedback import Gains
 
 MOST_ROWS, MOST_PANELS = 24, 6
@@ -161,7 +161,7 @@ def _poles(poles: Any) -> str:
 
 def animate(record: Record, *, plant: Any, speed: float, frames: int) -> Any:
     """The rig as it moved; see `Record.animate`."""
-    from upright.views.animation import animate as drawn
+    from upright.views.animation import animated as drawn
 
     return drawn(record, plant=plant, speed=speed, frames=frames)
 

@@ -15,7 +15,7 @@ from upright.report.drawing import BLUE, GREY, VERMILLION, figure
 Array = NDArray[np.float64]
 
 
-def animate(record: Record, *, plant: Any = None, speed: float = 1.0, frames: int = 25) -> Any:
+def animated(record: Record, *, plant: Any = None, speed: float = 1.0, frames: int = 25) -> Any:
     """Moving drawing of a record whose columns bear the names of coordinates; a notebook plays it.
 
     Parameters

@@ -10,7 +10,7 @@ from scipy.integrate import quad, solve_ivp
 from upright.errors import BadInput
 from upright.experiments.free_swing_4 import release as drift
 from upright.experiments.free_swing_4.chapter import chapter
-from upright.experiments.free_swing_4.release import Release, acquire, freed, motion
+from upright.experiments.free_swing_4.release import Release, freed, motion, release_log
 from upright.experiments.free_swing_4.run import FreeSwing, losses
 from upright.experiments.weighing_1a.run import Known
 from upright.rig.makes import COUNTS, MAKES, MOTOR_AND_BELT, NOMINAL, SERVO, make_rig
@@ -46,7 +46,7 @@ def test_seeds_are_rigs_of_their_own_that_can_be_had_again():
 
 
 def test_a_log_holds_whole_counts_at_the_servo_s_beat():
-    record = acquire(twin(1), seconds=1.0, every=4)
+    record = release_log(twin(1), seconds=1.0, every=4)
     assert record.period == pytest.approx(4 * SERVO)
     for name in ("psi", "theta"):
         assert record.units[name] == "counts"
@@ -55,7 +55,7 @@ def test_a_log_holds_whole_counts_at_the_servo_s_beat():
 
 
 def test_a_repetition_differs_as_a_hand_differs():
-    first, again, other = (acquire(twin(1), seconds=1.0, shot=s)["theta"] for s in (1, 1, 2))
+    first, again, other = (release_log(twin(1), seconds=1.0, shot=s)["theta"] for s in (1, 1, 2))
     assert np.array_equal(first, again)
     assert not np.array_equal(first, other)
 

@@ -13,7 +13,7 @@ from upright.control import trial
 from upright.experiments.tracking_3 import laws as pd
 from upright.experiments.tracking_3.laws import AT, EXTRA, closed_by, paper_sets, tracker, with_sum
 from upright.experiments.tracking_3.pulses import fitted, identify_shaft, pulses
-from upright.experiments.tracking_3.run import RESERVE, asked_of, attempt, choose, run_tracking
+from upright.experiments.tracking_3.run import RESERVE, asked_of, attempt, choose_step, run_tracking
 from upright.experiments.weighing_1a.run import Known
 from upright.gains import place, prefilter
 from upright.gains.loop import swing
@@ -176,8 +176,8 @@ def test_the_step_keeps_to_the_shaft_of_the_rig_at_hand(twist):
     """The loop is nearly linear, so the step scales with the twist allowed; where less is allowed, the rig trips."""
     rig = make_rig("torsional").replace(twist=twist)
     laws = paper_sets(rig, (1, 4))
-    chosen = choose(rig, laws)
-    other = choose(rig.replace(twist=2 * twist), laws)
+    chosen = choose_step(rig, laws)
+    other = choose_step(rig.replace(twist=2 * twist), laws)
     assert other.by_twist == pytest.approx(2 * chosen.by_twist, rel=1e-9)  # from the same run
     done = attempt(rig, laws[1], chosen.size)
     assert done.twist < twist

@@ -10,7 +10,7 @@ import pytest
 
 import upright as up
 from upright.errors import BadInput, RigStopped
-from upright.experiments.laboratory import choose
+from upright.experiments.laboratory import chosen_experiments
 from upright.experiments.stand.live import LiveStand, live_stand
 from upright.experiments.stand.studies import write_study
 from upright.experiments.weighing_1a.run import PROBE, _bolted, step_stand
@@ -101,8 +101,8 @@ def test_pieces_add_up_and_err_by_their_tolerance(tmp_path):
 
 
 def test_a_rig_is_weighed_where_its_file_names_what_is_bolted_on(tmp_path):
-    assert [e.key for e in choose((), "RIG.toml", made(tmp_path))] == ["1a", "1b"]
-    assert [e.key for e in choose((), "RIG.toml", made(tmp_path, ""))] == ["1b"]
+    assert [e.key for e in chosen_experiments((), "RIG.toml", made(tmp_path))] == ["1a", "1b"]
+    assert [e.key for e in chosen_experiments((), "RIG.toml", made(tmp_path, ""))] == ["1b"]
     with pytest.raises(BadInput, match=r"1a cannot be made on .*, which has experiments 1b;"):
         up.lab(rig=str(tmp_path / "RIG.toml"), experiment="1a", out=tmp_path / "out")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from upright.errors import BadInput
-from upright.experiments.weighing_1a.plan import choices, choose
+from upright.experiments.weighing_1a.plan import choices, fewest_runs
 
 
 def test_a_cart_carries_up_to_four_brass_masses_of_half_a_kilogram():
@@ -40,4 +40,4 @@ def test_a_disk_carries_them_in_pairs_on_its_bolt_circles():
     ],
 )
 def test_runs_are_added_while_they_tighten_the_stiffness_by_a_tenth(k, wanted, runs):
-    assert choose(k, wanted) == runs
+    assert fewest_runs(k, wanted) == runs

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from upright.experiments.weighing_1a.run import acquire, drawn_twin, measure_body
+from upright.experiments.weighing_1a.run import drawn_twin, measure_body, step_log
 from upright.identification import GreyBox, Parameter, Run
 from upright.identification.estimate import identify
 from upright.physics import chain
@@ -33,13 +33,13 @@ def test_twins_are_weighed_within_one_percent(kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_log_is_what_an_encoder_shows(kind):
     on = drawn_twin(3, kind)
-    record = acquire(on, 2, shot=1)
-    again = acquire(on, 2, shot=1)
+    record = step_log(on, 2, shot=1)
+    again = step_log(on, 2, shot=1)
     (name,) = record.outputs
     x = record[name]
     assert np.array_equal(x, np.round(x))
     assert np.array_equal(x, again[name])
-    assert not np.array_equal(x, acquire(on, 2, shot=2)[name])
+    assert not np.array_equal(x, step_log(on, 2, shot=2)[name])
     make = OSCILLATORS[kind]
     assert np.abs(record["u"]).max() <= make.limit
     # at the step's end friction holds the body within f/k of where the spring would have it
@@ -53,7 +53,7 @@ def test_travel_stays_within_the_rigs():
     """Carts of the 210 travel 3 cm; the shaft of the 205 trips at 25 degrees."""
     for kind, most in (("rectilinear", 0.03), ("torsional", np.radians(25))):
         for count in range(5):
-            record = acquire(drawn_twin(0, kind), count)
+            record = step_log(drawn_twin(0, kind), count)
             assert np.abs(record[record.outputs[0]]).max() / OSCILLATORS[kind].counts < most
 
 

@@ -12,7 +12,7 @@ from upright.identification.checks.outliers import (
     SELF_EXCITED,
     SPIKES,
     Outlier,
-    cut,
+    part_of_run,
     without_outliers,
     without_spikes,
 )
@@ -76,11 +76,11 @@ def test_others_and_predicted_runs_stay_whole_and_what_excites_itself_goes() -> 
 
 
 def test_a_part_is_called_by_its_times_and_keeps_a_first_state_of_its_own_alone() -> None:
-    late, early = cut(RUN, 100, 201), cut(RUN, 0, 100)
+    late, early = part_of_run(RUN, 100, 201), part_of_run(RUN, 0, 100)
     assert (late.label, late.source) == ("a, 10 to 20 s", "log.csv; cut to 10 to 20 s")
     assert (late.t[0], late.t.size, dict(late.initial)) == (pytest.approx(10.0), 101, {})
     assert (early.label, dict(early.initial)) == ("a, 0 to 9.9 s", {"x": 1.0})
-    assert cut(RUN, 0, N) is RUN
+    assert part_of_run(RUN, 0, N) is RUN
 
 
 def test_a_sample_that_jumps_away_and_back_is_replaced_and_told_with_its_time() -> None:

@@ -16,7 +16,7 @@ from scipy import stats
 from upright.identification import GreyBox, Parameter, Run
 from upright.identification.inference.bands import calibrated, recalibrated, sensitivity
 from upright.identification.inference.covariance import Optimum, assess
-from upright.identification.inference.scoring import predict, score
+from upright.identification.inference.scoring import predict, score_run
 from upright.identification.model.bands import Bands, Spread
 from upright.identification.problem.residuals import Problem, formulate
 from upright.identification.problem.simulated import with_noise
@@ -160,7 +160,7 @@ def test_the_errors_of_restarted_runs_grow_with_their_age() -> None:
     best = fitted(2, 0.5)
     bands = calibrated(best)
     assert bands is not None
-    told = [score(best.problem, i, best.x) for i in range(2)]
+    told = [score_run(best.problem, i, best.x) for i in range(2)]
     missed = np.concatenate([s.simulated[:, 0] - s.y[:, 0] for s in told]) ** 2
     age = np.concatenate([np.tile(DT * np.arange(1, 51), len(s.t) // 50) for s in told])
     early = age <= 0.25 + 1e-9
@@ -235,7 +235,7 @@ def test_windows_are_laid_end_to_end_and_scored_from_where_it_is_asked() -> None
     run = rolled(1, role="predict", horizon=0.5, score_from=2.0)
     run = replace(run, t=run.t + 5.0)
     problem = formulate(cart(), [run], thin=False)
-    told = score(problem, 0, problem.start)
+    told = score_run(problem, 0, problem.start)
     assert told.t == pytest.approx(5.0 + DT * np.arange(1, 351))
     assert told.y[:, 0] == pytest.approx(run.y[1:351, 0])
     assert (told.horizon, told.score_from, told.role, told.measured) == (0.5, 2.0, "predict", ("x_1",))
@@ -261,7 +261,7 @@ def test_slopes_of_the_outputs_are_in_their_own_unit() -> None:
 def test_a_filtered_run_is_met_at_its_shortest_horizon() -> None:
     run = rolled(0, horizon=(0.1, 0.3), restart="kalman")
     problem = formulate(with_noise(cart(), [run]), [run])
-    told, met = score(problem, 0, problem.start), sensitivity(problem, 0, problem.start)
+    told, met = score_run(problem, 0, problem.start), sensitivity(problem, 0, problem.start)
     assert met.error == pytest.approx(told.simulated - told.y, abs=1e-9)
     assert met.age == pytest.approx(np.full(len(told.t), 0.1))
     assert (told.horizon, set(told.ahead)) == (0.1, {0.1, 0.3})

@@ -13,7 +13,7 @@ from scipy.signal import place_poles
 from tests.identification.twins import FURUTA, rig, swing
 from upright.identification import GreyBox, Parameter
 from upright.identification.inference.covariance import Optimum, assess
-from upright.identification.inference.loop import driven_plant, placed, root, standing
+from upright.identification.inference.loop import driven_plant, matrix_root, placed, standing
 from upright.identification.inference.poles import poles
 from upright.identification.problem.residuals import formulate
 from upright.physics import Furuta, Pendulum, chain
@@ -87,10 +87,10 @@ def test_a_root_of_a_covariance_gives_it_back() -> None:
     chance = np.random.default_rng(3)
     M = chance.normal(size=(3, 3)) * [[1e-6], [1.0], [1e4]]
     C = M @ M.T
-    assert root(C) @ root(C).T == pytest.approx(C, rel=1e-9)
-    assert root(np.zeros((2, 2))) == pytest.approx(0.0, abs=1e-100)
+    assert matrix_root(C) @ matrix_root(C).T == pytest.approx(C, rel=1e-9)
+    assert matrix_root(np.zeros((2, 2))) == pytest.approx(0.0, abs=1e-100)
     # a correlation of 1.5 has the eigenvalues 2.5 and -0.5; of the nearest one the second is 0
-    L = root(np.array([[4.0, 3.0], [3.0, 1.0]]))
+    L = matrix_root(np.array([[4.0, 3.0], [3.0, 1.0]]))
     assert np.allclose(L @ L.T, np.array([[4.0, 2.0], [2.0, 1.0]]) * 1.25)
 
 

@@ -11,7 +11,13 @@ import pytest
 from scipy import stats
 
 from upright.identification import GreyBox, Parameter, Run
-from upright.identification.inference.assumptions import assumptions, remedy, resting, sentences, with_assumptions
+from upright.identification.inference.assumptions import (
+    assumption_sentences,
+    assumptions,
+    remedy,
+    resting,
+    with_assumptions,
+)
 from upright.identification.inference.covariance import Identifiability, Optimum, assess, identifiability, student
 from upright.identification.inference.intervals import (
     beside_bound,
@@ -262,7 +268,7 @@ def assumed(name: str, value: float, unit: str, redefines: tuple[str, ...] = (),
     ],
 )  # fmt: skip
 def test_what_rests_on_an_assumed_number_is_told(a: Assumption, said: str) -> None:
-    assert sentences([a]) == (said,)
+    assert assumption_sentences([a]) == (said,)
     assert (remedy(a) in said) == bool(resting(a))
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from upright.identification import GreyBox, Parameter, Run
 from upright.identification.estimate import identify, predict
-from upright.identification.problem.trips import find_trips, located
+from upright.identification.problem.trips import find_trips, with_trip_guesses
 from upright.physics import Furuta
 from upright.physics.oscillators import Torsional2
 from upright.signals.trips import find_trip
@@ -165,7 +165,7 @@ def test_a_tripping_rig_is_recovered_from_counts(tripped):
 
 
 def test_where_no_trip_is_seen_the_search_begins_at_the_logged_end():
-    run = located(asked(), spin_up(unknown=("input_end",)))
+    run = with_trip_guesses(asked(), spin_up(unknown=("input_end",)))
     assert run.guesses["input_end"] == pytest.approx(4.0, abs=2 * run.period)  # volts until the sample before 4 s
 
 

@@ -22,7 +22,7 @@ from upright.identification.search.starts import (
     samples_of,
 )
 from upright.physics import CartPendulum, Furuta, find
-from upright.signals.smoothing import spread
+from upright.signals.smoothing import scatter
 from upright.simulation import simulate
 
 CART = find("rectilinear-1")
@@ -88,7 +88,7 @@ def test_what_disagrees_is_told_in_the_spread_of_the_measured_acceleration_and_w
     # seven samples a polynomial passes over: jumps of dry friction are rounded, the rest stays
     assert np.median(np.abs(disagreement(cart(), values, exact))) < 1e-3
     off = replace(s, a=a + 0.5)
-    assert np.median(disagreement(cart(), values, off)) == pytest.approx(-0.5 / spread(a[0] + 0.5), rel=1e-2)
+    assert np.median(disagreement(cart(), values, off)) == pytest.approx(-0.5 / scatter(a[0] + 0.5), rel=1e-2)
     assert disagreement(cart(), values, replace(exact, edge=3000)).shape == (1, N // 2)
     heavier = replace(exact, run=replace(s.run, known={"m_1": 4.0}))
     assert np.allclose(disagreement(cart(), {**values, "m_1": 9.0}, heavier),
@@ -102,7 +102,7 @@ def test_smoothed_motion_is_that_of_the_run_with_its_conventions_and_its_drive()
     assert s.q[0] == pytest.approx(run.y[:, 0], abs=1e-3)
     assert np.array_equal(s.u, run.u.T)
     assert (s.free, s.dt) == ((0,), pytest.approx(DT))
-    assert s.fades == pytest.approx([0.02 * spread(s.v[0])])
+    assert s.fades == pytest.approx([0.02 * scatter(s.v[0])])
     turned = observe(asked, run, flips={"x_1": -1.0}, turns={"x_1": 0.3})
     assert turned is not None
     assert turned.q[0] == pytest.approx(0.3 - s.q[0])

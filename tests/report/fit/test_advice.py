@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from upright.identification import Estimate
-from upright.report.fit.chapter import next_steps
+from upright.report.fit.chapter import fit_steps
 
 
 def said(fit, **more):
-    return " ".join(f"{s.sentence} {s.command}" for s in next_steps(fit, **more))
+    return " ".join(f"{s.sentence} {s.command}" for s in fit_steps(fit, **more))
 
 
 def test_a_reversed_sign_is_the_first_suspicion(changed, swing):
     run = swing(n=200)
     off = replace(run, simulated=-run.simulated, fit_percent={"psi": -100.0, "theta": -99.0})
-    first, *_ = next_steps(changed(runs={"release": off}))
+    first, *_ = fit_steps(changed(runs={"release": off}))
     assert "sign" in first.sentence
     assert first.command == "[sensors.psi]\nsign = -1"
 
@@ -53,7 +53,7 @@ def test_a_stopped_search_is_to_be_ended(changed):
 
 
 def test_every_fit_is_to_be_tried_on_a_run_it_has_not_met(fit):
-    *_, last = next_steps(fit, folder="out")
+    *_, last = fit_steps(fit, folder="out")
     assert last.command == "upright predict out/fit.json OTHER.toml"
 
 

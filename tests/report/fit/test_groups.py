@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from upright.identification import Estimate
-from upright.report.fit.chapter import next_steps
+from upright.report.fit.chapter import fit_steps
 from upright.report.fit.tables import run_table, score_table
 
 FACTOR = Estimate(value=1.2, stderr=0.02, interval=(1.16, 1.24), unit="1", status="firm")
@@ -22,13 +22,13 @@ def test_a_prediction_says_what_it_took_from_the_run_itself(changed, fit):
     tail = [row for row in score_table(runs).rows if row[0] == "tail"]
     assert tail
     assert all(row[-1] == "from the first sample; its own initial, gain" for row in tail)
-    said = " ".join(step.sentence for step in next_steps(changed(runs=runs)))
+    said = " ".join(step.sentence for step in fit_steps(changed(runs=runs)))
     assert "'tail' chose its own gain" in said
     plain = {**fit.runs, "tail": replace(fit.runs["tail"], adapted=("initial",))}
-    assert "chose its own" not in " ".join(step.sentence for step in next_steps(changed(runs=plain)))
+    assert "chose its own" not in " ".join(step.sentence for step in fit_steps(changed(runs=plain)))
 
 
 def test_a_factor_that_nothing_shows_is_to_be_left_out(changed):
     idle = replace(FACTOR, status="unseen")
-    said = " ".join(s.sentence for s in next_steps(changed(groups={"28 Jan": {"gain": idle}})))
+    said = " ".join(s.sentence for s in fit_steps(changed(groups={"28 Jan": {"gain": idle}})))
     assert "say nothing about gain of group 28 Jan" in said

@@ -11,7 +11,7 @@ import pytest
 from upright.identification import Estimate, Parameter, RunScore
 from upright.identification.ladder.cross_validation import CrossValidation
 from upright.identification.model.fit import Assumption, Judgement, Offer, Pole
-from upright.report.fit.chapter import chapter, headline, motion_part, next_steps, question, score_pictures
+from upright.report.fit.chapter import chapter, fit_steps, headline, motion_part, question, score_pictures
 from upright.report.fit.tables import (
     cross_table,
     finding,
@@ -295,7 +295,7 @@ def test_equations_leave_out_what_this_fit_has_at_zero_and_keep_what_it_estimate
 
 
 def said(fit, **more):
-    return [f"{s.sentence} {s.command}" for s in next_steps(fit, **more)]
+    return [f"{s.sentence} {s.command}" for s in fit_steps(fit, **more)]
 
 
 def test_a_fit_that_ran_away_has_one_thing_to_do(changed):

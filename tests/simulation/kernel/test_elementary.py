@@ -11,7 +11,7 @@ import pytest
 from tests.simulation.lowering.machine_code import compiled
 from upright.laws.rule import KNOWN
 from upright.physics.equations import FUNCTIONS
-from upright.simulation.kernel.elementary import ALWAYS, NAMES, called
+from upright.simulation.kernel.elementary import ALWAYS, NAMES, definitions
 
 ULP = 3.0
 """Units in the last place; the quotient of a sine and a cosine is the worst."""
@@ -35,7 +35,7 @@ def value(name, lanes, x, y=None):
     out = np.empty_like(given[0])
     names = ["X", "Y"][: len(given)]
     text = f"""{ALWAYS}
-{called(f"{name}(")}
+{definitions(f"{name}(")}
 @entry
 def entered({", ".join(names)}, OUT, n):
     for k in range(n):
@@ -102,7 +102,7 @@ def test_at_the_ends_and_outside(lanes):
 
 
 def test_a_text_brings_what_it_calls_and_no_more():
-    assert called("k0*x - w1*(x + 2)") == ""
-    assert [line.split("(")[0] for line in called("asin(x) + 2").splitlines() if line[:4] == "def "] == [
+    assert definitions("k0*x - w1*(x + 2)") == ""
+    assert [line.split("(")[0] for line in definitions("asin(x) + 2").splitlines() if line[:4] == "def "] == [
         "def atan", "def asin",
     ]  # fmt: skip

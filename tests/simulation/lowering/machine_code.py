@@ -25,7 +25,7 @@ def compiled(text: str, *, lanes: int = 1, name: str = "entered") -> Callable[..
     @cache
     def address(types: tuple[Type, ...]) -> int:
         module = Module(text, lanes).entry(name, types, machine.platform())
-        return machine.load(machine.compiled(module), name)
+        return machine.address_of(machine.compiled(module), name)
 
     def call(*args: object) -> None:
         words = [struct.pack("=d", a) if isinstance(a, float) else struct.pack("=q", a if isinstance(a, int) else id(a))

@@ -66,68 +66,68 @@ def test_processes_that_compile_the_same_kernel_at_once_all_succeed(tmp_path):
 def fresh(monkeypatch, tmp_path):
     """A cache folder of one's own, as in a process that has not looked for one."""
     monkeypatch.setenv("UPRIGHT_CACHE", str(tmp_path))
-    cache.folder.cache_clear()
+    cache.cache_folder.cache_clear()
     yield tmp_path / "code"
-    cache.folder.cache_clear()
+    cache.cache_folder.cache_clear()
 
 
 @pytest.fixture
 def only(fresh):
     """The file that holds the only code kept."""
-    cache.write("name", b"code")
+    cache.keep_code("name", b"code")
     (path,) = fresh.iterdir()
     return path
 
 
 def test_what_was_written_is_read_again(only):
-    assert cache.read("name") == b"code"
+    assert cache.kept_code("name") == b"code"
 
 
 @pytest.mark.parametrize("change", [b"", b"co", bytes(36)])
 def test_a_torn_file_is_not_loaded_and_is_written_again(only, change):
     only.write_bytes(change)
-    assert cache.read("name") is None
-    cache.write("name", b"code")
-    assert cache.read("name") == b"code"
+    assert cache.kept_code("name") is None
+    cache.keep_code("name", b"code")
+    assert cache.kept_code("name") == b"code"
 
 
 def test_code_under_another_name_is_not_loaded(only):
     os.replace(only, only.with_name("other"))
-    assert cache.read("other") is None
+    assert cache.kept_code("other") is None
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="here nobody else can write to a user's profile")
 class TestOthers:
     def test_the_folder_is_for_its_owner_only(self, fresh):
-        assert cache.folder() == fresh
+        assert cache.cache_folder() == fresh
         assert fresh.stat().st_mode & 0o077 == 0
 
     def test_a_folder_that_others_can_write_to_is_closed_to_them(self, fresh):
         fresh.mkdir()
         fresh.chmod(0o777)
-        assert cache.folder() == fresh
+        assert cache.cache_folder() == fresh
         assert fresh.stat().st_mode & 0o022 == 0
 
     def test_a_file_that_others_can_write_to_is_not_loaded(self, only):
         only.chmod(0o666)
-        assert cache.read("name") is None
+        assert cache.kept_code("name") is None
 
     def test_a_file_of_somebody_else_is_not_loaded(self, only, monkeypatch):
         nobody = os.getuid() + 1
         monkeypatch.setattr(os, "getuid", lambda: nobody)
-        assert cache.read("name") is None
+        assert cache.kept_code("name") is None
 
     def test_neither_is_a_folder_of_somebody_else_used(self, fresh, monkeypatch):
         fresh.mkdir()
         nobody = os.getuid() + 1
         monkeypatch.setattr(os, "getuid", lambda: nobody)
         monkeypatch.setattr("platformdirs.user_cache_dir", lambda name: str(fresh.parent))
-        assert cache.folder() is None
+        assert cache.cache_folder() is None
 
     def test_a_link_is_not_followed(self, only):
         os.replace(only, only.with_name("elsewhere"))
         only.symlink_to(only.with_name("elsewhere"))
-        assert cache.read("name") is None
+        assert cache.kept_code("name") is None
 
 
 def test_without_a_folder_to_write_to_motions_are_simulated_all_the_same(monkeypatch, tmp_path, block):
@@ -136,15 +136,15 @@ def test_without_a_folder_to_write_to_motions_are_simulated_all_the_same(monkeyp
     for name in ("UPRIGHT_CACHE", "HOME", "XDG_CACHE_HOME", "LOCALAPPDATA"):
         monkeypatch.setenv(name, str(tmp_path / "file" / "below"))
     monkeypatch.setattr("platformdirs.user_cache_dir", lambda name: str(tmp_path / "file" / "below"))
-    cache.folder.cache_clear()
+    cache.cache_folder.cache_clear()
     try:
-        assert cache.folder() is None
+        assert cache.cache_folder() is None
         layout = Layout(derived=block, flavour=choose(block, {**BLOCK, "F_c": 0.1}))
         assert Kernel(source(layout)).events != 0
         x = simulate(block, BLOCK, [0.0, 1.0], None, 0.5, samples=3)
         assert np.array_equal(x[:, 0, 0], [0.0, 0.5, 1.0])
     finally:
-        cache.folder.cache_clear()
+        cache.cache_folder.cache_clear()
 
 
 def test_a_full_disk_leaves_nothing_behind(fresh, monkeypatch):
@@ -152,9 +152,9 @@ def test_a_full_disk_leaves_nothing_behind(fresh, monkeypatch):
         raise OSError(errno.ENOSPC, "no space left on device")
 
     monkeypatch.setattr(os, "replace", full)
-    cache.write("name", b"code")
+    cache.keep_code("name", b"code")
     assert list(fresh.iterdir()) == []
-    assert cache.read("name") is None
+    assert cache.kept_code("name") is None
 
 
 def test_every_kind_of_array_and_number_gives_the_same_motion(block):

@@ -18,7 +18,7 @@ from upright.readers.resolution import Quantum
 from upright.study.draft.described import counts_of, describe, is_cut_off
 from upright.study.draft.pendulum import Balanced, balance_of, pendulum_tables, recognised_upright, starts_upright
 from upright.study.draft.recognise import Recognised
-from upright.study.draft.tables import command_unit, drive_table, rig_table, run_tables, sensor_table
+from upright.study.draft.tables import command_unit, drive_table, rig_toml, run_tables, sensor_table
 from upright.study.text import TomlTable, study_text
 
 DAC = ("the command in DAC counts (819 per V: 409 = 0.5 V)",)
@@ -104,13 +104,13 @@ def test_runs_have_their_window_and_a_rig_its_coarser_period():
     one, two = read(*run_tables("a.csv", [("up", 1.0, 2.5, "fit"), ("down", 3.0, 4.25, "predict")]))["runs"]
     assert one == {"label": "up", "file": "a.csv", "window": [1.0, 2.5], "role": "fit"}
     assert two == {"label": "down", "file": "a.csv", "window": [3.0, 4.25], "role": "predict"}
-    rig = rig_table("pendulum", find("pendulum"), log(0.002, x=np.arange(5)), 0.008)
+    rig = rig_toml("pendulum", find("pendulum"), log(0.002, x=np.arange(5)), 0.008)
     assert read(rig)["rig"] == {"plant": "pendulum", "period": "8 ms"}
     assert comments(rig) == {
         "plant": "coordinates: theta [rad] angle of the pendulum, 0 hanging",
         "period": "the log has a sample every 2 ms",
     }  # fmt: skip
-    assert read(rig_table("pendulum", find("pendulum"), log(x=np.arange(5))))["rig"] == {"plant": "pendulum"}
+    assert read(rig_toml("pendulum", find("pendulum"), log(x=np.arange(5))))["rig"] == {"plant": "pendulum"}
 
 
 def shown(plant: str, columns: dict[str, Column], **more: Any) -> Recognised:

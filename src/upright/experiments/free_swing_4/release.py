@@ -58,7 +58,7 @@ def motion(rig: Rig, release: Release | None = None, *, seconds: float, every: i
     return np.linspace(0.0, (rows - 1) * every * SERVO, rows), x
 
 
-def acquire(
+def release_log(
     rig: Rig, release: Release | None = None, *, seconds: float = 12.0, every: int = 8, shot: int = 0
 ) -> Record:
     """Log of both encoders after a release.

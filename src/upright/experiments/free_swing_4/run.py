@@ -17,12 +17,12 @@ from upright.experiments.free_swing_4.release import (
     TILT,
     DriftPath,
     Release,
-    acquire,
     anchored,
     carrier,
     drift_paths,
     freed,
     motion,
+    release_log,
 )
 from upright.experiments.stand.known import Known
 from upright.files import replace_file
@@ -81,17 +81,17 @@ def logs(rig: Rig) -> dict[str, Record]:
     A cart does without the last two: a lean too small to see does not move what sticks.
     """
     low = Release(angle=math.radians(-60))
-    out = {"release_90.csv": acquire(rig, shot=1), "release_60.csv": acquire(rig, low, shot=2)}
+    out = {"release_90.csv": release_log(rig, shot=1), "release_60.csv": release_log(rig, low, shot=2)}
     if carrier(rig) == "psi":
         leaning = rig.changed(tilt_y=math.sin(TILT))
-        out["release_90_tilted.csv"] = acquire(leaning, shot=3)
-        out["release_60_tilted.csv"] = acquire(leaning, low, shot=4)
-        out["release_90_spring.csv"] = acquire(anchored(leaning), shot=5)
-        out["release_60_spring.csv"] = acquire(anchored(leaning), low, shot=6)
+        out["release_90_tilted.csv"] = release_log(leaning, shot=3)
+        out["release_60_tilted.csv"] = release_log(leaning, low, shot=4)
+        out["release_90_spring.csv"] = release_log(anchored(leaning), shot=5)
+        out["release_60_spring.csv"] = release_log(anchored(leaning), low, shot=6)
     return out
 
 
-def bench(rig: Rig, weighed: Known | None = None) -> dict[str, tuple[float, float]]:
+def measured_beforehand(rig: Rig, weighed: Known | None = None) -> dict[str, tuple[float, float]]:
     """What was measured beforehand: value and standard uncertainty [SI].
 
     The inertia of disk or cart comes from experiment 1a (`weighed`; 1 % without it), the lengths from a ruler and from
@@ -112,7 +112,7 @@ def questions(rig: Rig, weighed: Known | None = None) -> tuple[Question, ...]:
     """The fits of the experiment, all from guesses that are 30 % off."""
     rng = np.random.default_rng([rig.seed, 42])
     guess = {n: getattr(rig.plant, n) * rng.choice([0.7, 1.3]) for n in ("m_p", "J_p", *FRICTION)}
-    known = bench(rig, weighed)
+    known = measured_beforehand(rig, weighed)
     scale = {"J_d": 1.3, "J_a": 0.7, "m_c": 1.3}
     blind = {n: v for n, v in known.items() if n not in scale}
     tilt = {"tilt_x": (-0.1, 0.1), "tilt_y": (-0.1, 0.1)}

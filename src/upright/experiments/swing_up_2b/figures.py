@@ -17,9 +17,9 @@ from upright.report.drawing import (
     VERMILLION,
     Array,
     decimated,
+    draw_limits,
     figure,
     hide_inner_times,
-    limits,
     styled,
 )
 from upright.report.symbols import axis, mathtext
@@ -70,7 +70,7 @@ def ascent_figure(run: Ascent, *, after: float = 2.5) -> Figure:
 def _limits(ax: Any, limit: float, most: float, name: str, where: float) -> None:
     """Draw a bound where it is near enough to be seen beside the curve, else say how far it is."""
     if limit <= 4 * most:
-        limits(ax, limit, name, where)
+        draw_limits(ax, limit, name, where)
         ax.set_ylim(-1.3 * limit, 1.3 * limit)
     else:
         ax.text(0.995, 0.97, f"{name} ±{limit:.3g}", ha="right", va="top", fontsize=7.5, color=GREY,

@@ -17,7 +17,7 @@ import numpy as np
 from upright.basis import SIMULATED
 from upright.control import SwingUp, design_swing_up, trial
 from upright.control.score import FALLEN
-from upright.control.sensors import KNOWN, Scales, Suspicion, Watch, probe, put_out, scales
+from upright.control.sensors import KNOWN, Scales, Suspicion, Watch, probe, scales, shown_by_encoders
 from upright.control.swing_up import Ascent, ascent_of
 from upright.control.trial import readings
 from upright.errors import BadInput, NotIdentifiable, RigStopped, nearest
@@ -307,7 +307,7 @@ def _lies(
     runs: list[tuple[Array, Array, Array]] = []
     for name, factor in told:
         rig = replace(truth, scales=tuple(factor if n == name else 1.0 for n in names))
-        checks.append(scales(model, put_out(rig, command), known))
+        checks.append(scales(model, shown_by_encoders(rig, command), known))
         rest = readings(rig, list(rig.plant.equilibrium("inverted").values()))  # zeroed by a hand that holds it upright
         went = trial(rig, law_upright, at="inverted", start=[0.0, 0.0, TILT, 0.0], seconds=seconds, rest=rest)
         seen = np.column_stack([went.record[n] for n in names]) - rest

@@ -20,7 +20,7 @@ from upright.experiments.tracking_3.figures import (
 from upright.experiments.tracking_3.laws import AT, best_decay, root_locus, sampled
 from upright.experiments.tracking_3.pulses import FIT, STUDY
 from upright.experiments.tracking_3.run import BEFORE, DWELL, RESERVE, Outcome, StepTrial, Tracking
-from upright.experiments.tracking_3.tables import length, milli, share
+from upright.experiments.tracking_3.tables import length, milli, percentage
 from upright.identification.model.fit import Fit
 from upright.paper.reproduce import TABLE_2
 from upright.report.fit.chapter import motion_part, run_pictures
@@ -61,7 +61,7 @@ def _verdict(done: Tracking) -> str:
     head = f"A step of {length(done, size)} is followed by {who} within effort, travel and twist"
     if bad:
         head = f"A step of {length(done, size)} is too much for {', '.join(map(_beyond, bad))}"
-    got, effort = best.measured.figures, share(best.measured.effort.share, 0)
+    got, effort = best.measured.figures, percentage(best.measured.effort.share, 0)
     if got is None:
         return f"{head}."
     head += f"; {best.law.name} takes {effort} of the drive's limit and {_arrives(got.arrival)}."
@@ -72,8 +72,9 @@ def _verdict(done: Tracking) -> str:
     slow = "does not settle" if stiff is None or swings else f"swings for {stiff.settling_5:.2g} s"
     return (
         f"{head} A tuned PD of the near encoder {_arrives(done.pd.measured.figures.arrival)}, with "
-        f"{share(pd.effort.share, 0)} of the limit, but a push of the drive moves it by {share(pd.give / size, 0)} of "
-        f"the step, {best.law.name} by {share(best.measured.give / size, 0)}; made as stiff, the PD {slow}."
+        f"{percentage(pd.effort.share, 0)} of the limit, but a push of the drive moves it by "
+        f"{percentage(pd.give / size, 0)} of the step, {best.law.name} by "
+        f"{percentage(best.measured.give / size, 0)}; made as stiff, the PD {slow}."
     )
 
 
@@ -81,7 +82,7 @@ def _beyond(o: Outcome) -> str:
     run = o.measured
     if math.isfinite(run.tripped):
         return f"{o.law.name} (leaves travel or twist after {run.tripped:.2g} s)"
-    return f"{o.law.name} (at the drive's limit in {share(run.effort.saturated, 1)} of the samples)"
+    return f"{o.law.name} (at the drive's limit in {percentage(run.effort.saturated, 1)} of the samples)"
 
 
 def _arrives(arrival: float) -> str:
@@ -108,8 +109,8 @@ def _findings(done: Tracking) -> tuple[KeyNumber, ...]:
     f = best.measured.figures
     if f is not None:
         out.append(KeyNumber(what=f"{best.law.name}: arrival within 5 % [s]", value=milli(f.arrival)))
-        out.append(KeyNumber(what=f"{best.law.name}: overshoot", value=share(f.overshoot)))
-    out.append(KeyNumber(what=f"{best.law.name}: effort, of the limit", value=share(best.measured.effort.share)))
+        out.append(KeyNumber(what=f"{best.law.name}: overshoot", value=percentage(f.overshoot)))
+    out.append(KeyNumber(what=f"{best.law.name}: effort, of the limit", value=percentage(best.measured.effort.share)))
     return tuple(out)
 
 
@@ -183,7 +184,7 @@ def _gains(done: Tracking, far: str) -> Part:
             f"The step is {length(done, done.step.size)}, {_sized(done)}. The largest command is the first: speeds are "
             "zero and errors the whole step, so that it is k_pf times the step, whatever the rig.",
             tables.gain_table(done),
-            tables.pole_table(done),
+            tables.shaft_pole_table(done),
             Picture(
                 name="track-poles", draw=lambda: poles_figure(done),
                 caption="Poles asked (rings), of the sampled, late loop on the fitted model (+) and on the rig (x). "
@@ -207,14 +208,14 @@ def _sized(done: Tracking) -> str:
 
 def _loop(done: Tracking, near: str, far: str) -> Part:
     """Step figures and pictures of the sets."""
-    shares = ", ".join(f"{o.law.name} {share(o.measured.effort.share, 0)}" for o in done.sets)
+    shares = ", ".join(f"{o.law.name} {percentage(o.measured.effort.share, 0)}" for o in done.sets)
     best = _strongest(done)
     off = abs(best.measured.effort.peak / best.predicted.effort.peak - 1)
     told = f"Largest command, of the drive's limit: {shares}."
     if done.found:
         told += (
             f" Foreseen for {best.law.name}: "
-            f"{best.predicted.effort.peak:.3g} {done.rig.unit} ({share(best.predicted.effort.share)}); found "
+            f"{best.predicted.effort.peak:.3g} {done.rig.unit} ({percentage(best.predicted.effort.share)}); found "
             + ("the same." if off < 5e-4 else f"{best.measured.effort.peak:.3g} {done.rig.unit}.")
         )
     steps = Picture(
@@ -229,7 +230,7 @@ def _loop(done: Tracking, near: str, far: str) -> Part:
 def _described(done: Tracking) -> str:
     """The picture of the steps, for who cannot see it."""
     return "; ".join(
-        f"{o.law.name}: overshoot {share(o.measured.figures.overshoot)}, settled to 5 % after "
+        f"{o.law.name}: overshoot {percentage(o.measured.figures.overshoot)}, settled to 5 % after "
         f"{milli(o.measured.figures.settling_5)} s"
         for o in done.sets
         if o.measured.figures is not None
@@ -242,9 +243,9 @@ def _friction(done: Tracking, far: str) -> Part:
     if done.summed is not None and done.summed.measured.figures is not None:
         left = abs(done.summed.measured.figures.error) / done.step.size
         cure = (
-            f" The sum of the error, with a fifth pole at −5 1/s, is the cure: it leaves {share(left)} of the step, "
-            "and the push is made up for. Its zero cancels that pole on the reference's way, so that the step itself "
-            "is followed as before."
+            f" The sum of the error, with a fifth pole at −5 1/s, is the cure: it leaves {percentage(left)} of the "
+            "step, and the push is made up for. Its zero cancels that pole on the reference's way, so that the step "
+            "itself is followed as before."
         )
     return Part(
         "What friction leaves",
@@ -277,8 +278,8 @@ def _why(done: Tracking, pd: Outcome, stiff: Outcome, other_end: Outcome, near: 
         "Why state feedback",
         (
             f"PD control of the driven body, kp and kd the best of {tried} pairs tried on the fitted rig under the "
-            f"same limit, brings {far} to the reference about as soon, at {share(pd.measured.effort.share, 0)} of the "
-            "limit. For a step alone it would do.",
+            f"same limit, brings {far} to the reference about as soon, at "
+            f"{percentage(pd.measured.effort.share, 0)} of the limit. For a step alone it would do.",
             "But it has one damper for two modes. Without natural damping no kp and kd let every pole decay faster "
             f"than half the root of k/inertia 1, {number(bound, 3)} 1/s here, and it gets there only at kp·gain = k "
             f"(inertia 1)/(inertia 2), {number(p['k_12'] * inertia / other, 3)} {force}, where {best.law.name} has "
@@ -362,7 +363,7 @@ def _numbers(done: Tracking) -> dict[str, Any]:
                 "poles": o.law.poles, "decay": o.law.decay, "damping": o.law.damping,
                 "static_force_per_error": o.law.stiffness, "error_at_most": o.law.play, "foreseen": run(o.predicted),
                 "found": run(o.measured) if o.tried else None, "within_limits": o.within,
-            } for o in tables.outcomes(done)
+            } for o in tables.tried_laws(done)
         },
         "seconds": done.seconds,
         "interrupted": done.interrupted,

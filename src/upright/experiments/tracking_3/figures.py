@@ -21,8 +21,8 @@ from upright.report.drawing import (
     GREY,
     VERMILLION,
     decimated,
+    draw_limits,
     figure,
-    limits,
     roots,
     s_plane,
     styled,
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 _SHOWN = {"m": (1e3, "mm"), "rad": (180 / math.pi, "deg")}
 
 
-def shown(of: str) -> tuple[float, str]:
+def in_reading_unit(of: str) -> tuple[float, str]:
     """Factor and unit in which lengths or angles of this size are read best."""
     return _SHOWN.get(of, (1.0, of))
 
@@ -50,7 +50,7 @@ def steps_figure(
     With `kick` both positions are shown, and the command only so long [s], for that is where it acts.
     """
     bodies = done.rig.plant.coordinates
-    factor, of = shown(bodies[-1].unit)
+    factor, of = in_reading_unit(bodies[-1].unit)
     step = factor * done.step.size
     picked = [bodies[-1]] if kick is None else [bodies[0], bodies[-1]]
     rows = len(picked) + 1
@@ -96,7 +96,7 @@ def _efforts(ax: Any, done: Tracking, outcomes: Sequence[Outcome], until: float)
     for (colour, style), o in zip(CYCLE, outcomes, strict=False):
         drawn = decimated(*_seen(o, "u", -0.05 * until, until))
         ax.step(*drawn, color=colour, linestyle=style, linewidth=1.0, where="post")
-    limits(ax, done.rig.limit, "limit", until)
+    draw_limits(ax, done.rig.limit, "limit", until)
     ax.set_ylim(-1.3 * done.rig.limit, 1.3 * done.rig.limit)
     ax.set_xlim(-0.06 if until > 1 else -0.05 * until, 1.02 * until)
     ax.set_ylabel(axis("command", done.rig.unit))

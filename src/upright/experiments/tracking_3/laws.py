@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.control.score import step_figures
-from upright.control.trial import SUBSTEPS, at_work
+from upright.control.trial import SUBSTEPS, law_on_rig
 from upright.errors import BadInput
 from upright.gains import feedback, filtered, place, prefilter
 from upright.gains.loop import closed
 from upright.gains.requests import Roots, conjugate_poles, poles_of
 from upright.laws import Law
-from upright.paper.reproduce import TABLE_2, poles
+from upright.paper.reproduce import TABLE_2, printed_poles
 from upright.records import Array
 from upright.rig import Rig
 from upright.simulation import simulate
@@ -103,7 +103,7 @@ def by_poles(rig: Rig, name: str, wanted: Roots) -> Tracker:
     return tracker(rig, name, K, prefilter(model.A, model.B, far(model), K), asked=wanted)
 
 
-def check(which: Sequence[int], own: Roots | None) -> None:
+def check_sets(which: Sequence[int], own: Roots | None) -> None:
     """Refuse sets that Table 2 does not have, and poles that a shaft with two bodies cannot have."""
     if any(not 1 <= i <= len(TABLE_2) for i in which):
         raise BadInput(f"Table 2 has sets 1 to {len(TABLE_2)}, got {', '.join(map(str, which))}.")
@@ -116,7 +116,7 @@ def check(which: Sequence[int], own: Roots | None) -> None:
 def paper_sets(rig: Rig, which: Sequence[int] = (1, 2, 3, 4), faster: float = 1.0) -> tuple[Tracker, ...]:
     """State feedback by the sets of Table 2, or by poles that are so many times as fast."""
     times = "" if faster == 1.0 else f" x{faster:.2g}"
-    return tuple(by_poles(rig, f"set {i}{times}", faster * poles(TABLE_2[i - 1])[0]) for i in which)
+    return tuple(by_poles(rig, f"set {i}{times}", faster * printed_poles(TABLE_2[i - 1])[0]) for i in which)
 
 
 def far(model: StateSpace) -> Array:
@@ -229,7 +229,7 @@ def tried(rig: Rig, pairs: Array, step: float) -> Array:
     many = Law(A, B, C, D, references=np.array([step]))
     count = round(DWELL / rig.period)
     start = rig.plant.state(AT)
-    given = at_work(rig, many, np.zeros(c))
+    given = law_on_rig(rig, many, np.zeros(c))
     x = simulate(
         rig.plant, rig.drive, start, None, rig.period, samples=count, substeps=SUBSTEPS, loop=given
     )[:, 2 * c - 2]  # fmt: skip

@@ -28,7 +28,7 @@ from upright.experiments.tracking_3.laws import (
     GainSearch,
     Tracker,
     by_poles,
-    check,
+    check_sets,
     far_pd,
     near_pd,
     paper_sets,
@@ -202,12 +202,12 @@ def run_tracking(
     weighed : sequence of Known
         What experiment 1a leaves known of the shaft.
     """
-    check(which, poles)
+    check_sets(which, poles)
     began = time.perf_counter()
     true = make_rig(MAKES[rig].shaft if rig in MAKES else rig, seed) if isinstance(rig, str) else rig
     progress("pulsing the shaft", 0.0)
     study, fit = identify_shaft(true, seed, folder, lambda what, share: progress(what, 0.05 + 0.25 * share), weighed)
-    done = follow(
+    done = track_on(
         fitted(true, fit),
         TwinStand(rig=another_day(true, seed), make=make_of(true.plant)),
         folder,
@@ -231,7 +231,7 @@ def another_day(rig: Rig, seed: int) -> Rig:
     return rig.changed(**{n: v * math.exp(rng.normal(0, DAILY)) for n, v in dry.items()})
 
 
-def follow(
+def track_on(
     model: Rig, stand: TestStand | None, folder: Path, study: Study | None, fit: Fit | None, progress: Progress,
     stopped: Callable[[], bool] = lambda: False, *, which: Sequence[int] = (1, 2, 3, 4),
     poles: NDArray[np.complex128] | None = None, step: float | None = None,
@@ -245,7 +245,7 @@ def follow(
     RigStopped
         When a run on a live rig did not begin.
     """
-    check(which, poles)
+    check_sets(which, poles)
     laws = list(paper_sets(model, which, 1.0 if stand is None or stand.make is not None else _times_as_fast(model)))
 
     def outcome(law: Tracker) -> Outcome:
@@ -256,7 +256,7 @@ def follow(
     if poles is not None:
         laws.append(by_poles(model, "own set", poles))
     rig = model if stand is None else stand.rig
-    chosen = choose(model, laws, step)
+    chosen = choose_step(model, laws, step)
     progress("stepping", 0.35)
     done = Tracking(
         rig=rig, model=model, true=rig, folder=folder, study=study, fit=fit, step=chosen,
@@ -284,7 +284,7 @@ def stiffest_damped(model: Rig, kp: float) -> Tracker:
     return max(tried, key=lambda law: law.decay)
 
 
-def choose(model: Rig, laws: Sequence[Tracker], step: float | None = None) -> Chosen:
+def choose_step(model: Rig, laws: Sequence[Tracker], step: float | None = None) -> Chosen:
     """The largest step of two digits that keeps every law within effort, twist and travel, by the linear model."""
     most = RESERVE * model.limit / max(abs(law.k_pf) for law in laws)
     free = model.replace(twist=math.inf, travel=math.inf)  # a trip would cut short what is to be scaled

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from upright.experiments.tracking_3.figures import shown
+from upright.experiments.tracking_3.figures import in_reading_unit
 from upright.experiments.tracking_3.laws import AT
 from upright.experiments.tracking_3.run import Outcome, StepTrial, Tracking
 from upright.gains.requests import written
@@ -13,12 +13,12 @@ from upright.report.symbols import number, plain
 from upright.report.symbols import unit as raised
 
 
-def outcomes(done: Tracking) -> tuple[Outcome, ...]:
+def tried_laws(done: Tracking) -> tuple[Outcome, ...]:
     """All laws that were tried, state feedback first."""
     return (*done.sets, *(o for o in (done.summed, done.pd, done.stiff, done.far) if o is not None))
 
 
-def share(value: float, digits: int = 1) -> str:
+def percentage(value: float, digits: int = 1) -> str:
     """A share as a percentage."""
     if not math.isfinite(value):
         return "–"
@@ -33,7 +33,7 @@ def milli(value: float) -> str:
 
 def length(done: Tracking, value: float, digits: int = 3) -> str:
     """A length or an angle as it is read best."""
-    factor, unit = shown(done.rig.plant.coordinates[-1].unit)
+    factor, unit = in_reading_unit(done.rig.plant.coordinates[-1].unit)
     return f"{number(factor * value, digits)} {unit}"
 
 
@@ -44,7 +44,7 @@ def gain_table(done: Tracking) -> Table:
     rows = tuple(
         (o.law.name, *(number(k, 4) for k in o.law.K), number(o.law.k_pf, 4), number(o.law.stiffness, 4),
          number(o.law.decay, 3), number(o.law.damping, 2))
-        for o in outcomes(done)
+        for o in tried_laws(done)
     )  # fmt: skip
     force = f"{'N m' if of == 'rad' else 'N'}/{of}"
     return Table(
@@ -55,12 +55,12 @@ def gain_table(done: Tracking) -> Table:
     )  # fmt: skip
 
 
-def pole_table(done: Tracking) -> Table:
+def shaft_pole_table(done: Tracking) -> Table:
     """Poles asked, and of the loop as it runs on the fitted rig."""
     rows = [("open loop", "", written(done.model.linear(AT).poles(), 4))]
     rows += [
         (o.law.name, written(o.law.asked, 5) if o.law.asked.size else "–", written(o.law.poles, 4))
-        for o in outcomes(done)
+        for o in tried_laws(done)
     ]
     return Table(
         caption="Poles [1/s]: asked for, and of the loop with held, late commands and filtered differences, "
@@ -72,7 +72,7 @@ def pole_table(done: Tracking) -> Table:
 def step_table(done: Tracking) -> Table:
     """Step figures, foreseen on the fitted model and found on the rig."""
     rows: list[tuple[str, ...]] = []
-    for o in outcomes(done):
+    for o in tried_laws(done):
         both = (("foreseen", o.predicted), ("found", o.measured)) if done.found else (("foreseen", o.predicted),)
         rows += [(o.law.name if what == both[0][0] else "", what, *_figures(run)) for what, run in both]
     return Table(
@@ -85,13 +85,13 @@ def step_table(done: Tracking) -> Table:
 
 
 def _figures(run: StepTrial) -> tuple[str, ...]:
-    effort = (number(run.effort.peak, 3), share(run.effort.share), share(run.effort.saturated, 2))
+    effort = (number(run.effort.peak, 3), percentage(run.effort.share), percentage(run.effort.saturated, 2))
     f = run.figures
     if f is None:
         told = f"trips at {run.tripped:.2f} s" if math.isfinite(run.tripped) else "does not move"
         return (told, *("–",) * 5, *effort)
     return (
-        milli(f.rise), share(f.overshoot), milli(f.peak_time), milli(f.settling_5), milli(f.settling_2),
+        milli(f.rise), percentage(f.overshoot), milli(f.peak_time), milli(f.settling_5), milli(f.settling_2),
         milli(f.arrival), *effort,
     )  # fmt: skip
 
@@ -101,15 +101,15 @@ def friction_table(done: Tracking) -> Table:
     size = done.step.size
     seen = ("foreseen", "found") if done.found else ("foreseen",)
     rows: list[tuple[str, ...]] = []
-    for o in outcomes(done):
+    for o in tried_laws(done):
         runs = (o.predicted, o.measured)[: len(seen)]
         if any(r.figures is None for r in runs):
             continue
         bound, steady = (
             ("0 (sum)", "0 (sum)") if o.law.play == 0
-            else (share(o.law.play / size), share(abs(done.push) / o.law.k_pf / size))
+            else (percentage(o.law.play / size), percentage(abs(done.push) / o.law.k_pf / size))
         )  # fmt: skip
-        left, moved = [_left(r, size) for r in runs], [share(r.give / size) for r in runs]
+        left, moved = [_left(r, size) for r in runs], [percentage(r.give / size) for r in runs]
         rows.append((o.law.name, bound, *left, steady, *moved))
     return Table(
         caption="Left at rest by dry friction, and moved by a steady push of the drive "
@@ -123,4 +123,4 @@ def friction_table(done: Tracking) -> Table:
 def _left(run: StepTrial, size: float) -> str:
     if run.figures is None or not math.isfinite(run.figures.settling_2):
         return "still swings"
-    return share(run.figures.error / size)
+    return percentage(run.figures.error / size)

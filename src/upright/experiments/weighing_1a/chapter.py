@@ -9,14 +9,14 @@ import numpy as np
 
 from upright.experiments.stand.known import Known
 from upright.experiments.stand.stand import APPLIED
-from upright.experiments.weighing_1a.figures import decrement_figure, line_figure, swing_figure
+from upright.experiments.weighing_1a.figures import decrement_figure, extremes_figure, line_figure
 from upright.experiments.weighing_1a.run import Campaign, Weighing
 from upright.identification.loadings import Loaded, Loadings
 from upright.quantities import figures
 from upright.records import Record
 from upright.report.fit.tables import finding, interval, plain_estimate
 from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Symbol, Table
-from upright.report.symbols import measured, number, typed, unit
+from upright.report.symbols import number, typed, unit, with_error
 from upright.rig.makes import OSCILLATORS, Make
 
 QUESTION = (
@@ -58,7 +58,7 @@ def _later_chapter(done: Weighing, make: Make, weighed: Chapter) -> Chapter:
         caption="What the later experiments take from here",
         headings=("symbol", "truth of the twin", "value", "std. error", "unit"),
         rows=tuple(
-            (Symbol(k.name), number(_truth(done, k), digits[k.name]), *measured(k.value, k.stderr), units[k.name])
+            (Symbol(k.name), number(_truth(done, k), digits[k.name]), *with_error(k.value, k.stderr), units[k.name])
             for k in done.known
         ),
         numbers=(1, 2, 3),
@@ -191,7 +191,7 @@ def _found_table(found: Loadings, kind: str, truth: Mapping[str, float]) -> Tabl
     rows = tuple(
         (
             Symbol(name), *((number(truth[name], figures(w.value, w.stderr)),) if truth else ()),
-            *measured(w.value, w.stderr), interval(w), unit(_unit(kind, what)), meaning,
+            *with_error(w.value, w.stderr), interval(w), unit(_unit(kind, what)), meaning,
         )
         for name, meaning, w, what in named
     )  # fmt: skip
@@ -244,7 +244,7 @@ def _swing_pictures(found: Loadings, logs: Mapping[str, Record], signals: Mappin
     if not with_logs:
         return pictures
     swings = Picture(
-        name="swings", draw=lambda: swing_figure(with_logs),
+        name="swings", draw=lambda: extremes_figure(with_logs),
         caption="One swing of each loading. Rings: extremes, from the exact shape about each; crosses: the "
         "recursion of a spring with viscous and dry friction. Grey: where dry friction can hold the body.",
         description=f"{len(with_logs)} decaying swings with their extremes marked.",

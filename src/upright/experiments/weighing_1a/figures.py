@@ -42,7 +42,7 @@ def line_figure(found: Loadings, what: str) -> Figure:
 
 
 @styled
-def swing_figure(swings: Sequence[tuple[Loaded, Record, str]]) -> Figure:
+def extremes_figure(swings: Sequence[tuple[Loaded, Record, str]]) -> Figure:
     """Signal, extremes found, and the recursion's extremes, one panel per log."""
     drawing = figure(0.6 + 1.25 * len(swings))
     panels: list[Any] = drawing.subplots(len(swings), 1, squeeze=False)[:, 0].tolist()

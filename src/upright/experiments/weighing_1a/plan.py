@@ -34,7 +34,7 @@ def choices(rig: str, circles: Sequence[float] = ()) -> list[Loading]:
     return out
 
 
-def choose(k: dict[int, float], wanted: float | None) -> int:
+def fewest_runs(k: dict[int, float], wanted: float | None) -> int:
     """Runs: the fewest that reach what is wanted, else the last that is worth its while."""
     if wanted is not None:
         return next((n for n in sorted(k) if k[n] <= wanted), max(k))

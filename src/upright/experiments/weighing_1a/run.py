@@ -77,7 +77,7 @@ def drawn_twin(seed: int = 0, kind: str = "rectilinear") -> LoadedTwin:
     return LoadedTwin(design=design, truth=truth, pieces=pieces, seed=seed)
 
 
-def acquire(on: LoadedTwin, count: int, *, shot: int = 0, seconds: float = 3.0) -> Record:
+def step_log(on: LoadedTwin, count: int, *, shot: int = 0, seconds: float = 3.0) -> Record:
     """Log of a step of the command and of its end, with `count` masses added; counts and volts.
 
     Friction differs by 13 % from run to run, and the body starts from wherever friction held it.
@@ -106,7 +106,7 @@ def acquire(on: LoadedTwin, count: int, *, shot: int = 0, seconds: float = 3.0) 
     )
 
 
-def truth(on: LoadedTwin) -> dict[str, float]:
+def twin_truth(on: LoadedTwin) -> dict[str, float]:
     """What only a twin can tell, by the symbols of the report."""
     return {"k": on.stiffness, on.design.bare: on.bare, "c": on.truth.parameters()["c_1"]}
 
@@ -177,7 +177,7 @@ def measure_body(
     for i, count in enumerate(counts):
         progress(f"stepping with {count} masses", i / len(counts))
         for shot in range(shots):
-            logs[f"{count} masses, run {shot + 1}"] = acquire(on, count, shot=shot)
+            logs[f"{count} masses, run {shot + 1}"] = step_log(on, count, shot=shot)
             values.append(count * design.piece)
     signals = {label: record.outputs[0] for label, record in logs.items()}
     found, left_out = weigh(
@@ -185,7 +185,7 @@ def measure_body(
     )  # fmt: skip
     return Campaign(
         kind=design.kind, logs=logs, added=dict(zip(logs, values, strict=True)), loadings=found, left_out=left_out,
-        truth=truth(on), on=on,
+        truth=twin_truth(on), on=on,
     )  # fmt: skip
 
 

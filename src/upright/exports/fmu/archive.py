@@ -15,25 +15,25 @@ from xml.sax.saxutils import quoteattr
 
 from upright._version import __version__
 from upright.errors import BadInput
-from upright.exports.controller import plain
-from upright.exports.fmu.source import source
+from upright.exports.controller import harmless
+from upright.exports.fmu.source import fmu_source
 from upright.exports.fmu.unit import STEP, Unit, Variable
 
 NAME = "rig"
 _ENDINGS = {"Linux": ("linux", "so"), "Darwin": ("darwin", "dylib"), "Windows": ("windows", "dll")}
 
 
-def build(unit: Unit) -> tuple[bytes, str]:
+def archive(unit: Unit) -> tuple[bytes, str]:
     """Bytes of the archive, and the platform that its library is for; "" where no C compiler is found."""
-    text = source(unit, "{TOKEN}")
+    text = fmu_source(unit, "{TOKEN}")
     token = "{" + str(uuid.uuid5(uuid.NAMESPACE_URL, hashlib.sha256(text.encode()).hexdigest())) + "}"
     text = text.replace("{TOKEN}", token)
     files = {
-        "modelDescription.xml": description(unit, token).encode(),
+        "modelDescription.xml": model_description(unit, token).encode(),
         f"sources/{NAME}.c": text.encode(),
         "sources/buildDescription.xml": _BUILD.encode(),
     }
-    library = compiled(text)
+    library = compiled_library(text)
     system, ending = _ENDINGS.get(platform.system(), ("", ""))
     where = f"{_machine()}-{system}"
     if library is not None:
@@ -45,7 +45,7 @@ def build(unit: Unit) -> tuple[bytes, str]:
     return held.getvalue(), where if library is not None else ""
 
 
-def compiled(text: str) -> bytes | None:
+def compiled_library(text: str) -> bytes | None:
     """The library, None where there is no C compiler.
 
     Raises
@@ -76,9 +76,9 @@ def _machine() -> str:
     return {"amd64": "x86_64", "arm64": "aarch64"}.get(machine, machine)
 
 
-def description(unit: Unit, token: str) -> str:
+def model_description(unit: Unit, token: str) -> str:
     """Text of ``modelDescription.xml``."""
-    first_line = plain(unit.rig.basis.first_line())
+    first_line = harmless(unit.rig.basis.first_line())
     told = f" description={quoteattr(first_line)}" if first_line else ""
     variables = [
         '    <Float64 name="time" valueReference="0" causality="independent" variability="continuous" unit="s"/>'

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from upright.exports.controller import plain
-from upright.exports.fmu.translation import Kind, helpers, translated
+from upright.exports.controller import harmless
+from upright.exports.fmu.translation import Kind, as_c, helpers
 from upright.exports.fmu.unit import STEP, Unit
 from upright.simulation.kernel.compiled import source as kernel_text
 from upright.simulation.kernel.flavour import lay_out
 from upright.simulation.kernel.lanes import room
 
 
-def source(unit: Unit, token: str) -> str:
+def fmu_source(unit: Unit, token: str) -> str:
     """Text of the C file."""
     simulator = unit.simulator
     layout = lay_out(simulator.derived, simulator.flavour)
@@ -20,12 +20,12 @@ def source(unit: Unit, token: str) -> str:
     arrays |= {"U": ("double *", (inputs, 1)), "OUT": ("double *", (states, 1, 1))}
     arrays |= {"START": ("long *", (1,)), "FL": ("double *", (1,)), "W": ("double *", (1,))}
     sizes = {"W": "W_SIZE", "U": "(PAST + 1)", "HELD": "0", "R": "0"}
-    kernel = translated(kernel_text(layout), "run_1", arrays, sizes)
+    kernel = as_c(kernel_text(layout), "run_1", arrays, sizes)
     rows = simulator.table(unit.values, 1)[:, 0].tolist()
     numbers = ", ".join(repr(v).replace("inf", "HUGE_VAL") for v in rows)
     places = ", ".join(str(p.row) for p in unit.parameters) or "0"
     return f"""\
-/* {plain(unit.rig.name)}, written by upright export: the kernel that simulates the rig there, and FMI 3.0 around it. */
+/* {harmless(unit.rig.name)}, written by upright export: the kernel that simulates the rig, and FMI 3.0 around it. */
 #include <math.h>
 #include <stdbool.h>
 #include <stddef.h>

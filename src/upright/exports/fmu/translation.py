@@ -83,7 +83,7 @@ class _Known:
         return [a.arg for a in self.node.args.args]
 
 
-def translated(text: str, entry: str, arrays: Arrays, sizes: Mapping[str, str]) -> str:
+def as_c(text: str, entry: str, arrays: Arrays, sizes: Mapping[str, str]) -> str:
     """Functions in C that `entry` needs, itself the last.
 
     Parameters

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from upright.exports import rule
-from upright.exports.arithmetic import Language, check_inputs, put_out, statements
+from upright.exports.arithmetic import Language, check_inputs, output_lines, statements
 from upright.exports.controller import SampledController, identifiers
 from upright.exports.targets import LawTarget
 from upright.exports.vector import ReplayVector
@@ -28,8 +28,8 @@ def files(made: SampledController, test: ReplayVector, single: bool) -> dict[str
     """Texts by file name."""
     return {
         "law.h": header(made, single=single),
-        "law.c": source(made, single=single),
-        "law_selftest.h": replay(test, single=single),
+        "law.c": c_source(made, single=single),
+        "law_selftest.h": selftest_header(test, single=single),
         "law_selftest.c": _MAIN,
     }
 
@@ -38,7 +38,8 @@ def header(made: SampledController, *, single: bool) -> str:
     """Text of ``law.h``."""
     names, units = identifiers(made.readings), [_in(unit) for unit in made.reading_units]
     steps = "".join(
-        f"#define LAW_STEP_{name.upper()} {number(sign * step, single)} /* reading per count of the encoder{unit} */\n"
+        f"#define LAW_STEP_{name.upper()} {constant(sign * step, single)} "
+        f"/* reading per count of the encoder{unit} */\n"
         for name, step, unit, sign in zip(names, made.encoder.tolist(), units, made.signs, strict=True)
         if step
     )
@@ -59,7 +60,7 @@ extern "C" {{
 
 typedef {"float" if single else "double"} law_real;
 
-#define LAW_PERIOD {number(made.law.period, single)} /* between two samples [s] */
+#define LAW_PERIOD {constant(made.law.period, single)} /* between two samples [s] */
 #define LAW_READINGS {len(made.readings)}
 #define LAW_REFERENCES {len(made.references)}
 #define LAW_COMMANDS {len(made.commands)}
@@ -83,20 +84,20 @@ void law_step(law_state *s, const law_real *y, const law_real *r, law_real *u);
 """
 
 
-def source(made: SampledController, *, single: bool) -> str:
+def c_source(made: SampledController, *, single: bool) -> str:
     """Text of ``law.c``."""
     f = "f" if single else ""
     say = Language(
-        number=lambda x: number(x, single), reading="y[{}]".format, reference="r[{}]".format, memory="s->z[{}]".format,
-        command="u[{}]".format, let="law_real ", end=";", remark="/* {} */".format, floor=f"floor{f}",
-        absolute=f"fabs{f}", limited=lambda c, most: f"{c} > {most} ? {most} : {c} < -{most} ? -{most} : {c}",
+        number=lambda x: constant(x, single), reading="y[{}]".format, reference="r[{}]".format,
+        memory="s->z[{}]".format, command="u[{}]".format, let="law_real ", end=";", remark="/* {} */".format,
+        floor=f"floor{f}", absolute=f"fabs{f}", limited=lambda c, most: f"{c} > {most} ? {most} : {c} < -{most} ? -{most} : {c}",
         first=lambda lines: ["if (!s->running) {", *(f"    {line}" for line in lines), "}"],
         hold=lambda line: ["if (!beyond)", f"    {line}"], either="||",
         stopped="s->stopped", not_finite="!is_finite({})".format,
         stop=lambda when: [f"if ({when}) {{", "    stop(s, u);", "    return;", "}"],
     )  # fmt: skip
     if isinstance(made.law, Rule):
-        return _of_rule(made, check_inputs(made, say), put_out(made, say), single=single)
+        return _of_rule(made, check_inputs(made, say), output_lines(made, say), single=single)
     body = "\n".join(f"    {line}".replace("law_real beyond", "int beyond") for line in statements(made, say))
     unused = "" if made.references else "    (void)r;\n"
     return f"""\
@@ -154,7 +155,7 @@ static void stop(law_state *s, law_real *u)
 
 def _of_rule(made: SampledController, first: list[str], last: list[str], *, single: bool) -> str:
     inputs, states = len(made.commands), made.memories
-    parameters, initial = (", ".join(number(x, False) for x in values) or "0" for values in rule.numbers(made))
+    parameters, initial = (", ".join(constant(x, False) for x in values) or "0" for values in rule.rule_numbers(made))
     commands = "\n".join(f"    law_real c{j} = found[{j}];" for j in range(inputs))
     checked, body = ("\n".join(f"    {line}" for line in lines) for lines in (first, last))
     copied = "for (i = 0; i < LAW_REFERENCES; i++)\n        asked[i] = r[i];" if made.references else "(void)r;"
@@ -199,7 +200,7 @@ void law_step(law_state *s, const law_real *y, const law_real *r, law_real *u)
 """
 
 
-def replay(test: ReplayVector, *, single: bool) -> str:
+def selftest_header(test: ReplayVector, *, single: bool) -> str:
     """Text of ``law_selftest.h``."""
     count = len(test.readings)
     given = _table("given", test.readings, single)
@@ -219,7 +220,7 @@ def replay(test: ReplayVector, *, single: bool) -> str:
 
 /* Bit for bit in double precision. In single precision, where double means single, and on processors that keep more
    digits than a double has (FLT_EVAL_METHOD), rounding may add up to: */
-#define LAW_SINGLE_MISSES {number(test.single, single)}
+#define LAW_SINGLE_MISSES {constant(test.single, single)}
 #if defined(FLT_EVAL_METHOD) && (FLT_EVAL_METHOD < 0 || FLT_EVAL_METHOD > 1)
 #define LAW_EXACT 0
 #else
@@ -282,7 +283,7 @@ int main(void)
 """
 
 
-def number(x: float, single: bool) -> str:
+def constant(x: float, single: bool) -> str:
     """A constant in C, to its last bit: the shortest decimals that are read as the same number."""
     return f"{float(x)!r}f" if single else repr(float(x))
 
@@ -292,7 +293,7 @@ def _in(unit: str) -> str:
 
 
 def _table(name: str, rows: Array, single: bool) -> str:
-    body = "".join(f"        {{{', '.join(number(x, single) for x in row)}}},\n" for row in np.asarray(rows).tolist())
+    body = "".join(f"        {{{', '.join(constant(x, single) for x in row)}}},\n" for row in np.asarray(rows).tolist())
     return f"    static const law_real {name}[{len(rows)}][{rows.shape[1]}] = {{\n{body}    }};\n"
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from upright.exports.fmu import build, unit_of
+from upright.exports.fmu import archive, unit_of
 from upright.exports.targets import RigExport, RigTarget
 from upright.report.page import Chapter, Part, Points, Step
 from upright.report.symbols import typed
@@ -13,7 +13,7 @@ from upright.report.symbols import typed
 def write(asked: RigExport) -> tuple[Mapping[str, bytes], Chapter]:
     """The unit, with a library where a C compiler is found."""
     unit, file = unit_of(asked.rig), asked.folder / "rig.fmu"
-    content, where = build(unit)
+    content, where = archive(unit)
     warnings = unit.told if where else (*unit.told, "No C compiler was found, so the unit has its sources alone.")
     taken, given = (", ".join(f"{v.name} [{v.unit or '1'}]" for v in group) for group in (unit.inputs, unit.states))
     told = Chapter(

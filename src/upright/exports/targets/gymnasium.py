@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from upright.exports.controller import plain
+from upright.exports.controller import harmless
 from upright.exports.episodes import DRAWS, Episodes
 from upright.exports.targets import RigExport, RigTarget
 from upright.report.page import Chapter, Part, Points, Step
@@ -19,7 +19,7 @@ def module(rig: str, fit: str, limit: float | None, first_line: str = "") -> tup
     `fit` is a path from the module's folder, `first_line` what the module says of it first.
     """
     name = f"upright/{''.join(c for c in rig.rpartition(':')[2] if c.isalnum()) or 'rig'}-v0"
-    head = plain(f"{first_line} ".lstrip())
+    head = harmless(f"{first_line} ".lstrip())
     options = "" if limit is None else f', "limit": {limit!r}'
     return (
         name,

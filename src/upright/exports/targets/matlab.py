@@ -13,15 +13,15 @@ from upright.laws.linear import Array
 
 def files(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
     """Texts by file name."""
-    return {"law_step.m": step(made, single=single), "law_selftest.m": replay(test, single=single)}
+    return {"law_step.m": step_function(made, single=single), "law_selftest.m": selftest_function(test, single=single)}
 
 
-def block(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
+def simulink_block(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
     """Texts by file name for Simulink: the same function, a level-2 S-function that calls it, what makes its block."""
     return {**files(made, test, single=single), "law_sfun.m": _s_function(made, single=single), "law_block.m": _BLOCK}
 
 
-def step(made: SampledController, *, single: bool) -> str:
+def step_function(made: SampledController, *, single: bool) -> str:
     """Text of ``law_step.m``."""
     number = "single" if single else "double"
     say = Language(
@@ -54,7 +54,7 @@ end
 """
 
 
-def replay(test: ReplayVector, *, single: bool) -> str:
+def selftest_function(test: ReplayVector, *, single: bool) -> str:
     """Text of ``law_selftest.m``."""
     with_r, first_r = (", asked(k, :)", ", asked(1, :)") if test.references.shape[1] else ("", "")
     asked = _table("asked", test.references) if with_r else ""
@@ -163,7 +163,7 @@ MATLAB = LawTarget(
     onward="[u, s] = law_step(s, y) at every sample, with s = [] before the first.",
 )  # fmt: skip
 SIMULINK = LawTarget(
-    name="simulink", order=30, title="Simulink", write=block,
+    name="simulink", order=30, title="Simulink", write=simulink_block,
     test=MATLAB.test,
     onward="In MATLAB, run law_block: it makes a model with the law as a block at its own sample time.",
 )  # fmt: skip

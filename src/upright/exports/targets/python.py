@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from upright.errors import BadInput
 from upright.exports import rule
-from upright.exports.arithmetic import Language, check_inputs, put_out, statements
+from upright.exports.arithmetic import Language, check_inputs, output_lines, statements
 from upright.exports.controller import SampledController
 from upright.exports.targets import LawTarget
 from upright.exports.vector import ReplayVector
@@ -29,13 +29,15 @@ def files(made: SampledController, test: ReplayVector, single: bool) -> dict[str
     if isinstance(made.law, Rule):
         needs = "from math import floor, frexp, inf, isfinite, nan, pi, sqrt\n\n"
         before = f"\n\n{rule.in_python(made)}\n"
-        parameters, initial = (tuple(values) for values in rule.numbers(made))
+        parameters, initial = (tuple(values) for values in rule.rule_numbers(made))
         begin = [f"self.z = {initial!r}", "self.samples = 0"]
         inputs = range(len(made.commands))
         lines = [
             *check_inputs(made, _LANGUAGE),
             f"found, self.z = rule(self.samples * PERIOD, tuple(y), tuple(r), self.z, {parameters!r})",
-            *(f"c{j} = found[{j}]" for j in inputs), f"u = [0.0] * {len(made.commands)}", *put_out(made, _LANGUAGE),
+            *(f"c{j} = found[{j}]" for j in inputs),
+            f"u = [0.0] * {len(made.commands)}",
+            *output_lines(made, _LANGUAGE),
             "self.samples += 1",
         ]  # fmt: skip
     else:

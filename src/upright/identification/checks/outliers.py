@@ -135,7 +135,7 @@ def half_swings(known: GreyBox, run: Run, own: Mapping[str, float]) -> Stretches
         return None
     halves = _restarted(known, run, own, seconds, free)
     # what is left at the end is less than a half swing: another that ends there, begun inside the last one
-    tail = _restarted(known, cut(run, run.t.size - 1 - 2 * samples, run.t.size), own, seconds, free)
+    tail = _restarted(known, part_of_run(run, run.t.size - 1 - 2 * samples, run.t.size), own, seconds, free)
     if tail.stop[-1] > halves.stop[-1] + run.period / 2:
         joined = {n: np.concatenate([getattr(halves, n), getattr(tail, n)[-1:]]) for n in PER_STRETCH}
         halves = replace(halves, **joined)
@@ -272,7 +272,7 @@ def _spiky(run: Run, jumped: Sequence[tuple[float, str]]) -> Outlier:
     )  # fmt: skip
 
 
-def cut(run: Run, first: int, last: int) -> Run:
+def part_of_run(run: Run, first: int, last: int) -> Run:
     """Samples `first` to `last` of a run, called so; states known at its first sample are not those of a later one."""
     if (first, last) == (0, run.t.size):
         return run
@@ -386,5 +386,5 @@ def without_outliers(runs: Sequence[Run], found: Sequence[Outlier]) -> list[Run]
             part = np.flatnonzero((run.t > a) & (run.t < b))
             moves = part.size > 0 and np.any(np.ptp(clean.y[part], axis=0) > MOVES * np.ptp(clean.y, axis=0))
             if moves and part.size >= max(LEAST_SAMPLES, run.t.size * WORTH):
-                kept.append(cut(clean, int(part[0]), int(part[-1]) + 1))
+                kept.append(part_of_run(clean, int(part[0]), int(part[-1]) + 1))
     return kept

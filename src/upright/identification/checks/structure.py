@@ -13,8 +13,8 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from upright.identification.inference.assumptions import sentences
-from upright.identification.inference.scoring import score
+from upright.identification.inference.assumptions import assumption_sentences
+from upright.identification.inference.scoring import score_run
 from upright.identification.inference.verdict import GOOD
 from upright.identification.model.fit import Fit
 from upright.identification.model.grey_box import GreyBox, Parameter, neutral
@@ -57,7 +57,7 @@ def with_proposal(fit: Fit, runs: Sequence[Run]) -> Fit:
     told = sentence(found, fit.model, worst)
     first, *others = fit.answers
     answers = (replace(first, reasons=(told, *first.reasons)), *others)
-    verdict = " ".join([*(a.text() for a in answers), *sentences(fit.assumptions)])
+    verdict = " ".join([*(a.text() for a in answers), *assumption_sentences(fit.assumptions)])
     return replace(
         fit, answers=answers, verdict=verdict, warnings=(*fit.warnings, told), proposed=dict(found.values)
     )  # fmt: skip
@@ -145,7 +145,7 @@ def _fitted(rig: GreyBox, names: Sequence[str], runs: Sequence[Run]) -> Proposal
     if not math.isfinite(found.normal.cost):
         return Proposal(values={}, reached=-math.inf)
     values = problem.values_at(found.x)
-    reached = _worst(score(problem, i, found.x).fit_percent for i in range(len(problem.tracks)))
+    reached = _worst(score_run(problem, i, found.x).fit_percent for i in range(len(problem.tracks)))
     return Proposal(values={n: float(values[n]) for n in names}, reached=reached)
 
 

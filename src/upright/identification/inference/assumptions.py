@@ -112,7 +112,7 @@ def with_assumptions(estimates: Mapping[str, Estimate], found: Sequence[Assumpti
     }  # fmt: skip
 
 
-def sentences(found: Sequence[Assumption]) -> tuple[str, ...]:
+def assumption_sentences(found: Sequence[Assumption]) -> tuple[str, ...]:
     """What rests on which assumed number, and what would make it known."""
     said: list[str] = []
     for a in found:

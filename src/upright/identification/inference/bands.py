@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.inference.covariance import Optimum, student
-from upright.identification.inference.loop import root
+from upright.identification.inference.loop import matrix_root
 from upright.identification.inference.reach import beyond, reached
 from upright.identification.model.bands import LEVEL, Bands, Spread
 from upright.identification.model.fit import RunScore
@@ -115,7 +115,7 @@ def possible(C: Array) -> Array:
     s = np.where(d > 0, 1 / np.where(d > 0, d, 1.0), 0.0)
     if not C.size or np.linalg.eigvalsh(C * s[:, None] * s)[0] >= 0:
         return C
-    L = root(C)
+    L = matrix_root(C)
     return L @ L.T
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from upright.identification.inference.covariance import Optimum, assess
-from upright.identification.inference.scoring import score
+from upright.identification.inference.scoring import score_run
 from upright.identification.model.grey_box import Parameter
 from upright.identification.problem.normal_equations import pseudo_inverse
 from upright.identification.problem.unknowns import shared_unknowns
@@ -71,7 +71,11 @@ def lateness(best: Optimum) -> Lateness | None:
     if not 0 < error < delay:
         return None
     before, after = (
-        {(track.run.label, s): p for i, track in enumerate(of.tracks) for s, p in score(of, i, at).fit_percent.items()}
+        {
+            (track.run.label, s): p
+            for i, track in enumerate(of.tracks)
+            for s, p in score_run(of, i, at).fit_percent.items()
+        }
         for of, at in ((problem, x), (wider, found.x))
     )
     run, signal = worst = min(before, key=lambda key: before[key])

@@ -60,14 +60,14 @@ def standing(best: Optimum, *, seed: int = 0) -> Standing | None:
     K = placed(A / growth, B[:, 0] / growth, -np.array(FASTER[: len(A)]))
     if K is None:
         return None
-    z = np.random.default_rng(seed).normal(size=(DRAWS, len(names))) @ root(C).T
+    z = np.random.default_rng(seed).normal(size=(DRAWS, len(names))) @ matrix_root(C).T
     dA = np.array([(a - A) / s for (a, _), s in zip(moved, steps, strict=True)])
     dB = np.array([(b - B) / s for (_, b), s in zip(moved, steps, strict=True)])
     loops = A + np.tensordot(z, dA, 1) - (B + np.tensordot(z, dB, 1)) @ K[None, :]
     return Standing(at=at, growth=growing[at], share=float(np.mean(np.linalg.eigvals(loops).real.max(axis=1) < 0)))
 
 
-def root(C: Array) -> Array:
+def matrix_root(C: Array) -> Array:
     """L (n, n) with ``L L' = C``, of a covariance that rounding may have left a little indefinite: L of the nearest."""
     try:
         return np.asarray(

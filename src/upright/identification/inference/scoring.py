@@ -19,7 +19,7 @@ from upright.identification.model.runs import LEAST_RUN, Run
 from upright.identification.problem.residuals import Problem, formulate
 from upright.identification.problem.simulated import with_noise
 from upright.identification.problem.tracks import FilterPlan, Track
-from upright.identification.problem.trips import located
+from upright.identification.problem.trips import with_trip_guesses
 from upright.identification.search.descent import SearchLog, descend_progressively
 from upright.identification.search.strategy import better, settle_weights
 from upright.progress import Progress, silent
@@ -41,7 +41,7 @@ def fit_percent(y: ArrayLike, simulated: ArrayLike) -> float:
     return max(-1000.0, score) if math.isfinite(score) else -1000.0
 
 
-def score(problem: Problem, index: int, x: Array) -> RunScore:
+def score_run(problem: Problem, index: int, x: Array) -> RunScore:
     """Score of one run for coordinates `x`; windows restarted from measured states are laid end to end."""
     track = problem.tracks[index]
     run = track.run
@@ -165,7 +165,7 @@ def _predict(
     rig: GreyBox, run: Run, groups: Mapping[str, Mapping[str, float]], bands: Bands | None, progress: Progress
 ) -> RunScore:
     """Score of one run, with its band, and the factor of its own that would mend it where it falls short."""
-    run = located(rig, run)
+    run = with_trip_guesses(rig, run)
     plain, problem, x = _foresee(rig, run, groups, progress)
     if bands is not None:
         plain = banded(plain, bands, rig, run, groups, problem.values_at(x))
@@ -209,4 +209,4 @@ def _foresee(
     whole = formulate(rig, [run], thin=False, given=groups)
     sought = [u.name for u in problem.unknowns if u.lower < u.upper]
     adapted = dict.fromkeys("initial" if name.startswith("initial.") else name for name in sought)
-    return replace(score(whole, 0, x), adapted=tuple(adapted)), problem, x
+    return replace(score_run(whole, 0, x), adapted=tuple(adapted)), problem, x

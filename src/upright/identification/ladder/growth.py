@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import BadInput
-from upright.identification.inference.scoring import score
+from upright.identification.inference.scoring import score_run
 from upright.identification.ladder.cross_validation import leave_one_out
 from upright.identification.ladder.decision import Comparison, by_chance, compare, reason, stalled
 from upright.identification.ladder.repeats import Repeats, at_ceiling, repeats
-from upright.identification.ladder.rungs import Rung, check, default_rungs, friction_rungs, rig_at, runs_at
+from upright.identification.ladder.rungs import Rung, check_rungs, default_rungs, friction_rungs, rig_at, runs_at
 from upright.identification.model.fit import RunScore
 from upright.identification.model.grey_box import GreyBox, neutral
 from upright.identification.model.runs import FITTED_SHARE, LEAST_RUN, Run
@@ -147,7 +147,7 @@ def climb(
     """
     seen = [run for run in runs if run.role == "fit"]
     rungs = list(rungs) if rungs else default_rungs(rig, seen)
-    check(rig, rungs)
+    check_rungs(rig, rungs)
     if not seen or (len(seen) == 1 and seen[0].first_part() is seen[0]):
         raise BadInput(
             f"a ladder has to hold something out: two runs with role 'fit', or one of {LEAST_RUN} samples or more"
@@ -226,12 +226,12 @@ class _Climb:
         if found.interrupted:
             raise KeyboardInterrupt
         whole = formulate(rig, shown, thin=False)
-        fitted = {run.label: score(whole, i, found.x) for i, run in enumerate(shown)}
+        fitted = {run.label: score_run(whole, i, found.x) for i, run in enumerate(shown)}
         if len(runs) == 1:
             ahead = replace(
                 runs[0], score_from=max(runs[0].score_from, FITTED_SHARE * float(runs[0].t[-1] - runs[0].t[0]))
             )
-            predicted = {ahead.label: score(formulate(rig, [ahead], thin=False), 0, found.x)}
+            predicted = {ahead.label: score_run(formulate(rig, [ahead], thin=False), 0, found.x)}
         else:
             predicted = self.leave_out(problem, found.x, runs, kept, part(self.progress, middle, stop, rung.name))
         comparison = None

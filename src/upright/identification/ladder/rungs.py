@@ -102,7 +102,7 @@ def _present(rig: GreyBox, name: str) -> bool:
     return p is not None and (p.estimate or (p.value != 0 and math.isfinite(p.value)))
 
 
-def check(rig: GreyBox, rungs: Sequence[Rung]) -> None:
+def check_rungs(rig: GreyBox, rungs: Sequence[Rung]) -> None:
     """Refuse rungs that add what nobody asked for, or the same term twice.
 
     Raises

@@ -40,7 +40,7 @@ def simulator(rig: GreyBox, track: Track, values: Mapping[str, float | Array], f
     loop = track.run.loop
     every = 1 if loop is None else loop.every
     held = {n: finely(h, every) for n, h in track.held.items()}
-    law = None if loop is None else controller(loop, track.run, rig.plant)
+    law = None if loop is None else law_of_loop(loop, track.run, rig.plant)
     stepped = {n: v for n, v in values.items() if not n.startswith(NOISE)}
     flavour = choose(derived, stepped, free=free, held=tuple(held), loop=law)
     return Simulator(derived=derived, flavour=flavour, dt=track.dt / every, substeps=rig.substeps, loop=law, held=held)
@@ -99,7 +99,7 @@ def outputs(
     return y + offsets if scales is None else y * scales + offsets
 
 
-def controller(loop: ClosedLoop, run: Run, plant: type[Plant]) -> Law:
+def law_of_loop(loop: ClosedLoop, run: Run, plant: type[Plant]) -> Law:
     """The law on all coordinates of a plant, in their order, feeding its first input.
 
     Raises

@@ -23,8 +23,8 @@ from upright.signals.smoothing import (
     dominant_period,
     end_errors,
     savitzky_golay,
+    scatter,
     smoothing_width,
-    spread,
 )
 from upright.simulation import Held
 
@@ -235,14 +235,14 @@ def prepare(rig: GreyBox, run: Run, *, thin: bool) -> Track:
         width = smoothing_width(run.y[:, k], period_s, period, run.quanta[k])
         motion = savitzky_golay(run.y[:, k], period_s, width, derivatives=1)
         x[:, column], x[:, column + 1] = motion.q, motion.v
-        sizes[column], sizes[column + 1] = spread(motion.q), spread(motion.v)
+        sizes[column], sizes[column + 1] = scatter(motion.q), scatter(motion.v)
         taken[k] = np.std(run.y[:, k] - motion.q)
         errors[column : column + 2] = end_errors(run.y[:, k], motion.q, period_s, width)
         if c in run.held:
             sizes[column : column + 2] = 1.0
         elif windowed:
             variance[:, column : column + 2] = (
-                smoothed_variance(n, width, period_s, restarts) * spread(run.y[:, k]) ** 2
+                smoothed_variance(n, width, period_s, restarts) * scatter(run.y[:, k]) ** 2
             )
     for name, value in run.initial.items():
         x[0, names.index(name)] = value
@@ -267,7 +267,7 @@ def prepare(rig: GreyBox, run: Run, *, thin: bool) -> Track:
     if run.filtered:
         ahead, restarts = filter_plan(rig, run, dt, start, taken)
         length, variance = len(ahead.samples), np.zeros((restarts.size, len(names)))
-    weights = np.array([0.0 if c in run.held else 1.0 / spread(run.y[:, k]) for k, c in enumerate(run.measured)])
+    weights = np.array([0.0 if c in run.held else 1.0 / scatter(run.y[:, k]) for k, c in enumerate(run.measured)])
     return Track(
         run=run,
         dt=dt,

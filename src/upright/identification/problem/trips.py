@@ -39,7 +39,7 @@ def _moments(rig: GreyBox, run: Run) -> tuple[list[Trip], bool]:
     terms = _terms(rig, [on, *others])
     gain = rig.parameters["actuator.gain"].value if "actuator.gain" in rig.parameters else 1.0
     for late in (False, True):
-        u = cut(run, found).u[:, 0] * math.copysign(1.0, gain)
+        u = silenced(run, found).u[:, 0] * math.copysign(1.0, gain)
         trip, otherwise = trip_or_misfit(
             run.t, u, signals[on], [*others.values()], quantum=quantum[on], late=late, terms=terms
         )
@@ -72,7 +72,7 @@ def trip_sentence(run: Run, trip: Trip) -> str:
     )
 
 
-def located(rig: GreyBox, run: Run) -> Run:
+def with_trip_guesses(rig: GreyBox, run: Run) -> Run:
     """The run with guesses of when its input really began and ended, for those of the two that are asked.
 
     Where the motion plainly follows the command until its logged end, the guess is what the log says.
@@ -99,7 +99,7 @@ def unasked_trips(rig: GreyBox, runs: Sequence[Run]) -> list[str]:
     return said
 
 
-def cut(run: Run, trips: Sequence[Trip]) -> Run:
+def silenced(run: Run, trips: Sequence[Trip]) -> Run:
     """The run with its command put to zero where it did not act."""
     since = run.t - run.t[0]
     off = np.zeros(run.t.size, dtype=bool)

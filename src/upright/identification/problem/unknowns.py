@@ -124,7 +124,7 @@ def matters(rig: GreyBox, coordinate: str, by: float = 1.0) -> bool:
     A constant error of the sensor cannot be told from the place where the run began otherwise. Of an angle that comes
     round a change `by` one turn is not felt.
     """
-    from upright.physics.equations import evaluate
+    from upright.physics.equations import evaluated
 
     derived = rig.plant.derived()
     values = base_values(rig)
@@ -132,9 +132,9 @@ def matters(rig: GreyBox, coordinate: str, by: float = 1.0) -> bool:
     generator = np.random.default_rng(1)
     for c in derived.coordinates:
         scope[c], scope[f"{c}_dot"] = generator.normal(size=2)
-    energies = [float(evaluate(text, scope)) for text in (derived.kinetic, derived.potential)]
+    energies = [float(evaluated(text, scope)) for text in (derived.kinetic, derived.potential)]
     scope[coordinate] += by
-    moved = [float(evaluate(text, scope)) for text in (derived.kinetic, derived.potential)]
+    moved = [float(evaluated(text, scope)) for text in (derived.kinetic, derived.potential)]
     return not np.allclose(energies, moved, rtol=1e-12, atol=1e-12 * max(map(abs, energies)))
 
 

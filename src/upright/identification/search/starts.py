@@ -23,14 +23,14 @@ from upright.identification.problem.normal_equations import Normal, finite
 from upright.identification.problem.unknowns import Unknown, shared_unknowns
 from upright.identification.search.descent import descend
 from upright.physics.actuator import drive_force
-from upright.physics.equations import evaluate, mass_and_force
+from upright.physics.equations import evaluated, mass_and_force
 from upright.physics.plant import Plant
 from upright.signals.smoothing import (
     dominant_period,
     middle,
+    scatter,
     smoothed,
     smoothing_width,
-    spread,
 )
 from upright.signals.stretches import turning_points
 
@@ -141,7 +141,7 @@ def disagreement(rig: GreyBox, values: Mapping[str, float], sample: Sample) -> A
     edge = min(sample.edge, a.shape[1] // 4)
     here = slice(edge, a.shape[1] - edge)
     measured = sample.a[list(sample.free)]
-    return (smooth[:, here] - measured[:, here]) / np.array([[spread(row)] for row in measured])
+    return (smooth[:, here] - measured[:, here]) / np.array([[scatter(row)] for row in measured])
 
 
 def _same_smoothing(a: Array, width: int) -> Array:
@@ -221,7 +221,7 @@ def friction_from_energy(rig: GreyBox, samples: list[Sample], values: Mapping[st
         scope = dict(here)
         for i, c in enumerate(derived.coordinates):
             scope[c], scope[f"{c}_dot"] = s.q[i], s.v[i]  # type: ignore[assignment]
-        energy = np.broadcast_to(evaluate(derived.kinetic, scope) + evaluate(derived.potential, scope), s.q.shape[1:])
+        energy = np.broadcast_to(evaluated(derived.kinetic, scope) + evaluated(derived.potential, scope), s.q.shape[1:])
         drives = [list(derived.coordinates).index(d.on) for d in plant.inputs]
         power = np.einsum("kt,kt->t", drive_force(plant, here, s.u, s.v, s.dt), s.v[drives])
         cuts = _cuts(s)
@@ -229,7 +229,7 @@ def friction_from_energy(rig: GreyBox, samples: list[Sample], values: Mapping[st
             continue
         columns: dict[str, Array] = {}
         for n in viscous:
-            columns[n] = evaluate(derived.power_lost, {**scope, **dict.fromkeys(viscous, 0.0), n: 1.0}) + 0 * power
+            columns[n] = evaluated(derived.power_lost, {**scope, **dict.fromkeys(viscous, 0.0), n: 1.0}) + 0 * power
         for name, direction, order in kinds:
             columns[name] = np.abs(np.array(direction) @ s.v) ** order
         known = sum((here[n] * columns[n] for n in columns if n not in estimated), np.zeros_like(power))

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from upright.identification.inference.assumptions import sentences
+from upright.identification.inference.assumptions import assumption_sentences
 from upright.identification.ladder.cross_validation import CrossValidation
 from upright.identification.model.fit import Fit, RunScore
 from upright.identification.model.runs import SPREADS
@@ -60,7 +60,7 @@ def chapter(
     return Chapter(
         title=title,
         verdict=headline(fit),
-        detail=" ".join([*(a.headline for a in fit.answers), *sentences(fit.assumptions)]) or fit.verdict,
+        detail=" ".join([*(a.headline for a in fit.answers), *assumption_sentences(fit.assumptions)]) or fit.verdict,
         sound=fit.trusted,
         question=question(fit),
         parts=(
@@ -76,7 +76,7 @@ def chapter(
             *_search(fit),
         ),
         warnings=fit.warnings,
-        steps=tuple(next_steps(fit, study=study, folder=folder, crossed=crossed is not None)),
+        steps=tuple(fit_steps(fit, study=study, folder=folder, crossed=crossed is not None)),
     )
 
 
@@ -204,7 +204,7 @@ def _parameters(fit: Fit) -> list[Part]:
     ]
     without, own, poles = without_table(fit), run_table(fit), pole_table(fit)
     if fit.assumptions:
-        told = (Points(tuple(sentences(fit.assumptions))), *((without,) if without.rows else ()))
+        told = (Points(tuple(assumption_sentences(fit.assumptions))), *((without,) if without.rows else ()))
         parts.append(Part(title="What rests on assumed numbers", key="assumed", content=told))
     if own.rows:
         parts.append(Part(title="Runs and groups", key="runs", content=(own,)))
@@ -299,7 +299,7 @@ FOLLOWED = 80.0
 """Fit percent below which a free run counts as lost."""
 
 
-def next_steps(fit: Fit, *, study: str = "STUDY.toml", folder: str = "OUT", crossed: bool = False) -> Iterator[Step]:
+def fit_steps(fit: Fit, *, study: str = "STUDY.toml", folder: str = "OUT", crossed: bool = False) -> Iterator[Step]:
     """Steps in order of weight: what would make the model wrong first, what would make it better last.
 
     `crossed` says that every run was predicted by the others already.

@@ -12,7 +12,7 @@ from upright.identification.model.grey_box import Parameter
 from upright.physics.actuator import ACTUATOR
 from upright.quantities import figures
 from upright.report.page import KeyNumber, Symbol, Table
-from upright.report.symbols import measured, number, percent, plain, unit
+from upright.report.symbols import number, percent, plain, unit, with_error
 
 _ESTIMATE = ("value", "std. error", "95 % interval", "unit", "status", "name and meaning")
 _OF_THE_RIG = "Parameters of the rig; standard errors allow for autocorrelated residuals"
@@ -99,7 +99,7 @@ def run_table(fit: Fit) -> Table:
 
 def _estimate(name: str, e: Estimate, about: Parameter | None) -> tuple[str, ...]:
     beforehand = ", known beforehand" if about and about.uncertainty else ""
-    return (*measured(e.value, e.stderr), interval(e), unit(e.unit), e.qualified, _called(name, about) + beforehand)
+    return (*with_error(e.value, e.stderr), interval(e), unit(e.unit), e.qualified, _called(name, about) + beforehand)
 
 
 def _called(name: str, about: Parameter | None) -> str:
@@ -181,9 +181,9 @@ def pole_table(fit: Fit) -> Table:
     rows: list[tuple[str, ...]] = []
     for at, found in fit.poles.items():
         for pole in found:
-            value, around = measured(pole.real.value, pole.real.stderr)[0], interval(pole.real)
+            value, around = with_error(pole.real.value, pole.real.stderr)[0], interval(pole.real)
             if pole.imag.value > 0:
-                value += f" ± {measured(pole.imag.value, pole.imag.stderr)[0]} i"
+                value += f" ± {with_error(pole.imag.value, pole.imag.stderr)[0]} i"
                 around += f"; ± ({interval(pole.imag)}) i"
             rows.append((at, value, around, _swing(pole)))
     return Table(
@@ -201,4 +201,4 @@ def _swing(pole: Pole) -> str:
     if low <= 0 < e.stderr:
         return f"not determined; below {number(high / turn, 2)} Hz"
     hertz = replace(e, value=e.value / turn, stderr=e.stderr / turn, interval=(low / turn, high / turn))
-    return f"{measured(hertz.value, hertz.stderr)[0]} Hz ({interval(hertz)})"
+    return f"{with_error(hertz.value, hertz.stderr)[0]} Hz ({interval(hertz)})"

@@ -13,11 +13,11 @@ from typing import Any
 from upright.errors import BadInput
 from upright.laws.linear import Law, Structure
 from upright.laws.rule import Rule, Written, line_in
-from upright.simulation.kernel.elementary import ALWAYS, called
+from upright.simulation.kernel.elementary import ALWAYS, definitions
 from upright.simulation.kernel.equations import acceleration, step, terms
 from upright.simulation.kernel.events import events, places
 from upright.simulation.kernel.flavour import Layout
-from upright.simulation.kernel.lanes import ROUNDING, RUN_ARGUMENTS, law, run
+from upright.simulation.kernel.lanes import ROUNDING, RUN_ARGUMENTS, law_text, run_text
 from upright.simulation.lowering import cache as kept
 from upright.simulation.lowering.gpu import threads
 from upright.simulation.lowering.module import Module, Platform
@@ -45,15 +45,15 @@ def source(p: Layout) -> str:
     d = p.derived
     texts = [*d.lumps, *(of for _, _, of in d.trig), *(text for _, text in d.steps), *d.mass, *d.force]
     texts += [p.flavour.loop.text] if isinstance(p.flavour.loop, Written) else []
-    functions = called(*texts)
+    functions = definitions(*texts)
     parts = [f'"""Generated kernel of {d.name}; {p.flavour}"""', ALWAYS, *[functions] * bool(functions)]
     parts += [acceleration(p), step(p)]
     parts += [f"@exact\n{p.flavour.loop.text}\n"] if isinstance(p.flavour.loop, Written) else []
     parts += [ROUNDING] if p.flavour.loop else []
-    parts += [law(p)] if isinstance(p.flavour.loop, Structure) else []
+    parts += [law_text(p)] if isinstance(p.flavour.loop, Structure) else []
     if p.flavour.dry:
         parts += [terms(p, places(p)), events(p)]
-    return "\n\n".join([*parts, run(p, 1), run(p, WIDTH)])
+    return "\n\n".join([*parts, run_text(p, 1), run_text(p, WIDTH)])
 
 
 @cache
@@ -94,7 +94,7 @@ class Kernel:
     def _address(self, name: str) -> int:
         from upright.simulation.lowering import machine
 
-        return machine.load(self._code(name, lambda: machine.compiled(lowered(self.text, name))), name)
+        return machine.address_of(self._code(name, lambda: machine.compiled(lowered(self.text, name))), name)
 
     def _code(self, name: str, compiled: Callable[[], bytes]) -> bytes:
         def noted() -> bytes:

@@ -179,7 +179,7 @@ NAMES = frozenset(_TEXTS) - {"exact_sincos"}
 """Functions that a text may call."""
 
 
-def called(*texts: str) -> str:
+def definitions(*texts: str) -> str:
     """Definitions of what these texts call, each before those that call it."""
     found: list[str] = []
 

@@ -146,7 +146,7 @@ def _feed(w: Writer, back: tuple[tuple[str, str], ...]) -> None:
     w.depth -= 1
 
 
-def command(w: Writer) -> None:
+def open_loop(w: Writer) -> None:
     """Open loop: command, limit, offset and gain."""
     p, f = w.p, w.p.flavour
     if not p.nu:
@@ -266,7 +266,7 @@ def _law_arguments(p: Layout, law: Structure) -> list[str]:
     return [*(f"ff{j}" for j in inputs), *(f"_y{i}" for i in readings), *references, *p.numbers, *rounding, *limits]
 
 
-def law(p: Layout) -> str:
+def law_text(p: Layout) -> str:
     """Text of ``law(...)``: commands, rounded, and what a `Law` remembers next; 0 and 1 of its A and B are left out.
 
     Every operation is rounded by itself and sums run from left to right, so that the law on a rig's own computer can
@@ -309,7 +309,7 @@ def room(p: Layout, width: int, buffer: int) -> int:
     return len(p.rows) * width + late + (places(p)["END"] if p.flavour.dry else 0)
 
 
-def run(p: Layout, width: int) -> str:
+def run_text(p: Layout, width: int) -> str:
     """Text of ``run_{width}``."""
     w = Writer(p, width)
     w.add(
@@ -326,7 +326,7 @@ def run(p: Layout, width: int) -> str:
     w.add("for _k in range(_nsteps + 1):")
     w.depth = 3
     prescribed(w)
-    (controller if p.flavour.loop else command)(w)
+    (controller if p.flavour.loop else open_loop)(w)
     w.depth = 3
     (_record if p.flavour.record else _reduce)(w)
     w.depth = 3

@@ -18,7 +18,7 @@ _CHECK = 32  # bytes of a SHA-256
 
 
 @cache
-def folder() -> Path | None:
+def cache_folder() -> Path | None:
     """Folder of the machine code: below ``UPRIGHT_CACHE``, else in the user's cache; None where neither will do."""
     from platformdirs import user_cache_dir
 
@@ -56,16 +56,16 @@ def key(*parts: str) -> str:
 
 def code(name: str, compiled: Callable[[], bytes]) -> bytes:
     """What was kept under a name; where there is nothing, what is compiled now, which is kept."""
-    found = read(name)
+    found = kept_code(name)
     if found is None:
         found = compiled()
-        write(name, found)
+        keep_code(name, found)
     return found
 
 
-def read(name: str) -> bytes | None:
+def kept_code(name: str) -> bytes | None:
     """What was kept under a name; None when there is nothing, or not what was written."""
-    place = folder()
+    place = cache_folder()
     if place is None:
         return None
     try:
@@ -82,9 +82,9 @@ def read(name: str) -> bytes | None:
     return code if content[:_CHECK] == _check(name, code) else None
 
 
-def write(name: str, code: bytes) -> None:
+def keep_code(name: str, code: bytes) -> None:
     """Keep code under a name, written aside and moved so that none sees half of it; not where there is no room."""
-    place = folder()
+    place = cache_folder()
     if place is None:
         return
     aside = ""

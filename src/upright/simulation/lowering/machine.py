@@ -131,7 +131,7 @@ def _linker() -> Any:
     return llvm.create_lljit_compiler(_target(), use_jit_link=True)
 
 
-def load(code: bytes, name: str) -> int:
+def address_of(code: bytes, name: str) -> int:
     """Address of a function in object code, brought into memory."""
     if _LINKS:
         library = llvm.JITLibraryBuilder().add_object_img(code).add_current_process().export_symbol(name)

@@ -48,7 +48,7 @@ def _address(text: str, name: str, types: tuple[Type, ...]) -> int:
     def compiled() -> bytes:
         return machine.compiled(Module(text, 1).entry(name, types, machine.platform()))
 
-    return machine.load(kept.code(kept.key(kept.lowered_by(), name, repr(types), text), compiled), name)
+    return machine.address_of(kept.code(kept.key(kept.lowered_by(), name, repr(types), text), compiled), name)
 
 
 def _type(x: Given) -> Type:

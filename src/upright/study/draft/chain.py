@@ -29,7 +29,7 @@ from upright.study.draft.tables import (
     drive_table,
     no_drive_table,
     parameters_left_at_zero,
-    rig_table,
+    rig_toml,
     run_tables,
     sensor_table,
 )
@@ -141,7 +141,7 @@ def _starts_of(record: Record, log: ChainLog, plant: type[Plant]) -> ChainStarts
 def _rig(record: Record, log: ChainLog, plant: type[Plant], start: ChainStarts) -> TomlTable:
     every = int(2 * np.pi / start.fastest / 120 / record.period)
     coarse = not log.loop and every > 1
-    return rig_table(log.recognised.plant, plant, record, min(every, 4) * record.period if coarse else 0.0)
+    return rig_toml(log.recognised.plant, plant, record, min(every, 4) * record.period if coarse else 0.0)
 
 
 def _parameters(log: ChainLog, plant: type[Plant], start: ChainStarts) -> TomlTable:

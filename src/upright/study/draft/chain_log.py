@@ -245,11 +245,11 @@ def _driven(record: Record, seen: Inspection, at: int, *, disks: bool) -> tuple[
 
 def _law(record: Record, drive: Column, reference: Column, body: Column, coordinate: str) -> tuple[str, str]:
     """The law that made the command, as a study writes it ("" for none), and the sentence that says so."""
-    from upright.closed_loop import recover
+    from upright.closed_loop import recover_law
     from upright.closed_loop.recovery import loop_written
 
     try:
-        law = recover(record, measured=[body.name], references=[reference.name], command=drive.name)
+        law = recover_law(record, measured=[body.name], references=[reference.name], command=drive.name)
     except UprightError as error:
         return "", f"No law was found in '{drive.name}' ({error}); the command as recorded drives the bodies."
     text = loop_written(law).replace(f"COORDINATE OF {body.name}", coordinate)

@@ -30,7 +30,7 @@ from upright.study.draft.tables import (
     drive_table,
     no_drive_table,
     parameters_left_at_zero,
-    rig_table,
+    rig_toml,
     run_tables,
     sensor_table,
 )
@@ -210,7 +210,7 @@ def _rig(record: Record, found: Recognised, plant: type[Plant]) -> TomlTable:
     period = 0.0
     if (found.window[1] - found.window[0]) / record.period > MANY and found.frequency:
         period = max(1, int(2 * np.pi / found.frequency / 200 / record.period)) * record.period
-    return rig_table(found.plant, plant, record, period)
+    return rig_toml(found.plant, plant, record, period)
 
 
 def _parameters(plant: type[Plant], starts: PendulumStarts) -> TomlTable:

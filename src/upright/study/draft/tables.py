@@ -15,7 +15,7 @@ from upright.study.text import TomlTable, Value
 ROLES = {"fit": "fitted", "predict": "scored, never seen by the estimator"}
 
 
-def rig_table(name: str, plant: type[Plant], record: Record, period: float = 0.0) -> TomlTable:
+def rig_toml(name: str, plant: type[Plant], record: Record, period: float = 0.0) -> TomlTable:
     """Plant and its coordinates, and a `period` [s] coarser than the log's when there is one."""
     table = TomlTable("[rig]")
     coordinates = ", ".join(f"{c.name} [{c.unit}] {c.meaning}" for c in plant.coordinates)

@@ -17,14 +17,14 @@ from upright.verbs.handover import called, rig_of
 from upright.verbs.linear.matrices import is_linear, linear_model, read_matrices
 from upright.verbs.options import DesignOptions, above_zero, as_typed, known_options, rig_entries
 from upright.verbs.pages import folder_if_given, write_page
-from upright.verbs.values import Start, poles, read_start, si_if_given
+from upright.verbs.values import Start, read_pole_list, read_start, si_if_given
 
 if TYPE_CHECKING:
     from upright.designing.run import Designed
     from upright.rig import Rig
     from upright.systems import StateSpace
 
-_poles = poles  # the verbs have options of this name
+_poles = read_pole_list  # the verbs have options of this name
 
 
 @command(

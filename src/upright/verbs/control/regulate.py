@@ -16,13 +16,13 @@ from upright.verbs.handover import called, rig_of
 from upright.verbs.options import FIT, HoldingOptions, as_typed, known_options, rig_entries, vendor_of
 from upright.verbs.pages import page_folder, write_page, written_where_named
 from upright.verbs.renamed import CLUSTER, LET_GO, renamed
-from upright.verbs.values import Start, poles, read_start
+from upright.verbs.values import Start, read_pole_list, read_start
 
 if TYPE_CHECKING:
     from upright.experiments.regulation_2.run import Regulation, RegulationRequest
     from upright.verbs.values import Workforce
 
-_poles = poles  # the verbs have options of this name
+_poles = read_pole_list  # the verbs have options of this name
 
 
 @command(

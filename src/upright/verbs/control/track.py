@@ -16,12 +16,12 @@ from upright.verbs.command import command
 from upright.verbs.handover import called, rig_of
 from upright.verbs.options import RigOptions, above_zero, known_options, rig_entries
 from upright.verbs.pages import page_folder, write_page, written_where_named
-from upright.verbs.values import poles, si_if_given
+from upright.verbs.values import read_pole_list, si_if_given
 
 if TYPE_CHECKING:
     from upright.experiments.tracking_3.run import Tracking
 
-_poles = poles  # the verbs have options of this name
+_poles = read_pole_list  # the verbs have options of this name
 
 
 @command(
@@ -90,7 +90,7 @@ def track(
     """
     from upright.experiments.tracking_3.chapter import chapter
     from upright.experiments.tracking_3.pulses import rig_of_file, shaft_make
-    from upright.experiments.tracking_3.run import follow, run_tracking
+    from upright.experiments.tracking_3.run import run_tracking, track_on
     from upright.files import write_json
     from upright.rig.completion import completed, doubts
     from upright.rig.makes import SHAFTS, make_rig
@@ -116,7 +116,7 @@ def track(
         model = model.replace(limit=above_zero(asked, "limit", model.unit) or model.limit)
         done = run_tracking(model, seed, at, progress, which=which, poles=own, step=size)
     else:
-        done = follow(model, None, Path(called(source)), None, None, progress, which=which, poles=own, step=size)
+        done = track_on(model, None, Path(called(source)), None, None, progress, which=which, poles=own, step=size)
     told = chapter(done)
     told = replace(
         told, title=f"Experiment 3: {told.title.lower()}, {done.rig.name}",

@@ -9,7 +9,7 @@ from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
-from upright.verbs.export.law import controller, write_law
+from upright.verbs.export.law import controller_of, write_law
 from upright.verbs.export.rig import write_rig
 from upright.verbs.pages import folder
 
@@ -73,7 +73,7 @@ def export(
     if isinstance(target, LawTarget):
         if limit is not None:
             raise BadInput("the limit of a law is the one that it was designed with; give --limit to upright design.")
-        made, name = controller(source)
+        made, name = controller_of(source)
         return write_law(made, name, target, folder(out), single)
     if single:
         raise BadInput("--float is of laws; a rig is simulated in double precision.")

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from upright.exports.targets import LawTarget
 
 
-def controller(source: Any) -> tuple[SampledController, str]:
+def controller_of(source: Any) -> tuple[SampledController, str]:
     """The law to be written, and what it is called by."""
     from upright.exports.controller import of_design, of_law
     from upright.exports.targets import TARGETS, RigTarget

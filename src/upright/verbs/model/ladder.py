@@ -96,7 +96,7 @@ def ladder(
     """
     from upright.files import replace_file, write_json
     from upright.identification.ladder.growth import climb
-    from upright.report.ladder import chapter, next_steps
+    from upright.report.ladder import chapter, ladder_steps
     from upright.report.symbols import typed
     from upright.study.results import can_be_trimmed, chosen_study, ladder_content
     from upright.workers import Workers
@@ -128,7 +128,7 @@ def ladder(
     where = typed(Path(data) if data is not None else study.parent)
     told = chapter(
         climbed, title=f"Ladder: {asked.title or asked.path.stem.replace('_', ' ')}", provenance=asked.provenance,
-        steps=next_steps(climbed, study=typed(study), folder=typed(at), data=where, trimmed=trimmed),
+        steps=ladder_steps(climbed, study=typed(study), folder=typed(at), data=where, trimmed=trimmed),
     )  # fmt: skip
     if out is not None and (report or pdf):
         files += write_page(told, at / "ladder.html", pdf)

@@ -150,7 +150,7 @@ def plan_inertias(
     BadInput
         When there is no such rig or picture, or numbers contradict each other.
     """
-    from upright.experiments.weighing_1a.plan import chapter, choices, choose
+    from upright.experiments.weighing_1a.plan import chapter, choices, fewest_runs
     from upright.identification.loadings import plan_loadings
     from upright.report.drawing import picture_format
     from upright.rig.makes import OSCILLATORS
@@ -177,7 +177,7 @@ def plan_inertias(
         for n in range(levels, runs + 1)
     }
     wanted = _share(target, "--target") if target != "" else None
-    chosen = choose({n: p[0].k for n, p in plans.items()}, wanted)
+    chosen = fewest_runs({n: p[0].k for n, p in plans.items()}, wanted)
     if out is not None:
         from upright.experiments.weighing_1a.figures import plan_figure
         from upright.report.drawing import save
