@@ -43,9 +43,9 @@ class _Trier:
         if before.chance < AT_LEAST:
             return None
         self.rig.requested(
-            f"Next is {name}, expected to hold with a chance of {100 * before.chance:.0f} %. Let {self.rig.names[-1]} "
-            f"hang at rest; after a small pulse bring it up with {self.rig.names[0]} in the middle of its travel, hold "
-            "both there until the loop takes them, and let go."
+            f"Next is {name}, predicted probability of stabilisation {100 * before.chance:.0f} %. Let "
+            f"{self.rig.names[-1]} hang at rest; after a small pulse bring it up with {self.rig.names[0]} in the "
+            "middle of its travel, hold both there until the loop takes them, and let go."
         )
         done = self.rig.hold(law, self.folder, f"regulation_{name.replace(' ', '_')}", SECONDS, tilt=TILT)
         return came(done)
