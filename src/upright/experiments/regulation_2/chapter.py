@@ -27,8 +27,8 @@ def chapter(done: Regulation) -> Chapter:
     told = Chapter(
         key="2",
         title="Holding it upright",
-        question="Which of the pole sets hold the rig upright within its drive's limit, and can that be predicted before "
-        "anything moves, from the numbers identified while it hung?",
+        question="Which of the pole sets hold the rig upright within its drive's limit, and can that be predicted "
+        "before anything moves, from the numbers identified while it hung?",
         verdict=_verdict(done),
         detail=_detail(done),
         sound=_sound(done),
