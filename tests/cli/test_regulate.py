@@ -36,7 +36,7 @@ def test_a_set_is_told_and_run(fit, tmp_path):
     outcome = regulate(fit, "--seed", 0, "--set", 3, "--seconds", 2, "-o", tmp_path / "out")
     assert outcome.exit_code == 0, outcome.stderr
     told = " ".join(outcome.stdout.split())
-    assert "came: stabilised" in told
+    assert "measured: stabilised" in told
     assert "The run agreed with that." in told
     assert f"upright regulate {fit} --seed 0" in told
     assert (tmp_path / "out" / "regulation_set_3.csv").exists()

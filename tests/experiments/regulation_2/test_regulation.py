@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from upright import gains
 from upright.control.score import outcomes
 from upright.errors import BadInput
 from upright.experiments.regulation_2 import chapter as regulation_page
-from upright.experiments.regulation_2.run import RegulationRequest, identify_make, run_regulation
+from upright.experiments.regulation_2.run import Regulation, RegulationRequest, identify_make, run_regulation
 from upright.experiments.stand.twin import TwinStand
 from upright.rig import Rig
 from upright.rig.completion import completed
@@ -59,6 +61,56 @@ def test_two_sets_regulate_and_one_does_not_as_the_paper_saw_and_as_was_told(mak
     peaks = [a.before.score for a in done.attempts if a.before.score.held]
     assert np.all(np.diff([s.peaks[0] for s in peaks]) < 0)
     assert np.all(np.diff([s.effort_peak for s in peaks]) > 0)
+
+
+def attempt(stabilised, saturated=0.0, busy=0.0, rest_rms=0.0, push=1.0):
+    """What is predicted of a pole set, by its shares."""
+    words = {
+        "stabilised": stabilised,
+        "stabilised with saturation": saturated,
+        "stabilised with excessive effort": busy,
+    }
+    return SimpleNamespace(before=SimpleNamespace(
+        words=words, quiet_chance=stabilised + saturated, chance=stabilised + saturated + busy, rest_rms=rest_rms,
+        push=push,
+    ))  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("better", "worse"),
+    [
+        (attempt(1.0, rest_rms=0.02, push=5.0), attempt(1.0, rest_rms=0.06, push=9.0)),  # quiet before the harder tap
+        (attempt(1.0, rest_rms=0.022, push=9.0), attempt(1.0, rest_rms=0.018, push=5.0)),  # equally quiet: the tap
+        (attempt(0.9, rest_rms=0.09), attempt(0.8, 0.2, rest_rms=0.0)),  # sure before quiet
+        (attempt(0.0, 0.9, 0.1), attempt(0.0, 0.1, 0.9, push=9.0)),  # saturating rather than busy
+        (attempt(0.0, 0.0, 1.0, rest_rms=0.5), attempt(0.0, rest_rms=0.0, push=9.0)),  # busy rather than lost
+    ],
+)
+def test_of_sets_equally_sure_the_quieter_one_is_used(better, worse):
+    for order in ((better, worse), (worse, better)):
+        done = Regulation(
+            rig=None, truth=None, task=None, wish=None, attempts=order, ways=(), uncertain=True, source="", seed=0
+        )  # fmt: skip
+        assert done.best is better
+
+
+@pytest.mark.slow
+def test_coarse_encoders_make_the_verdict_name_the_command_at_rest(tmp_path):
+    """1,000 counts a turn, differenced: beyond a tenth of the limit by rounding alone, as tests of control say."""
+    truth = make_rig("furuta").replace(counts=(1_000, 1_000))
+    known = completed(fit_of(make_rig("furuta"))).replace(counts=(1_000, 1_000))
+    poles = {"set 2": RegulationRequest().poles["set 2"]}
+    wish = RegulationRequest(poles=poles, draws=32, speed="plain")
+    done = run_regulation(known, truth, 0, tmp_path, wish=wish)
+    told = regulation_page.chapter(done)
+    assert done.best.before.chance == 1.0
+    assert done.best.before.word == "stabilised with excessive effort"
+    assert not told.sound
+    assert "No pole set is recommended" in told.verdict
+    assert "The command at rest has an rms of" in told.verdict
+    calm = run_regulation(known, truth, 0, tmp_path, wish=replace(wish, speed="kalman"))
+    assert calm.best.before.quiet_chance == 1.0
+    assert "The command at rest" not in regulation_page.chapter(calm).verdict
 
 
 def test_the_log_of_a_run_is_what_the_encoders_show(tmp_path):

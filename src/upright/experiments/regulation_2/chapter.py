@@ -26,8 +26,8 @@ def chapter(done: Regulation) -> Chapter:
     told = Chapter(
         key="2",
         title="Holding it upright",
-        question="Which of the pole sets hold the rig upright within its drive's limit, and can that be told before "
-        "anything moves, from the numbers identified while it hung?",
+        question="Which of the pole sets hold the rig upright within its drive's limit, and can that be predicted "
+        "before anything moves, from the numbers identified while it hung?",
         verdict=_verdict(done),
         detail=_detail(done),
         sound=_sound(done),
@@ -65,7 +65,7 @@ def _verdict(done: Regulation) -> str:
         runs = f"All {len(ran)} runs agreed with their predictions." if len(ran) > 1 else "The run agreed with that."
     else:
         others = "; ".join(
-            f"{a.name} came to: {a.word} (predicted probability {100 * a.before.words[a.word]:.0f} %)"
+            f"{a.name}: {a.word} (predicted probability {100 * a.before.words[a.word]:.0f} %)"
             for a in ran
             if a not in agreed
         )
@@ -194,7 +194,15 @@ def _told_table(done: Regulation) -> Table:
         )  # fmt: skip
         if a.score is not None:
             rows.append(
-                ("", f"came: {a.word}", "stabilised" if a.score.held else "lost", "", "", "", *_figures(done, a.score))
+                (
+                    "",
+                    f"measured: {a.word}",
+                    "stabilised" if a.score.held else "lost",
+                    "",
+                    "",
+                    "",
+                    *_figures(done, a.score),
+                )
             )
     driven = done.rig.plant.coordinates[0]
     return Table(
@@ -233,9 +241,9 @@ def _way_table(done: Regulation) -> Table:
 
     unit = done.rig.unit
     return Table(
-        caption=f"Ways to the velocities, all with the gains of {done.best.name}: noise of the command told from "
-        "the counts, its change from sample to sample as it came in the first second, delay borne and distance to −1",
-        headings=("from", f"noise [{unit}]", f"change [{unit}]", "delay [ms]", "distance", "came", "settled [s]",
+        caption=f"Ways to the velocities, all with the gains of {done.best.name}: noise of the command predicted from "
+        "the counts, its change from sample to sample as measured in the first second, delay borne and distance to −1",
+        headings=("from", f"noise [{unit}]", f"change [{unit}]", "delay [ms]", "distance", "measured", "settled [s]",
                   f"peak [{unit}]"),
         rows=tuple(row(w) for w in done.ways), numbers=(1, 2, 3, 4, 6, 7),
     )  # fmt: skip
@@ -244,7 +252,7 @@ def _way_table(done: Regulation) -> Table:
 def _parts(done: Regulation) -> list[Part]:
     tilt, push = math.degrees(done.task.start[2]), done.task.start[3]
     rig = done.rig
-    steps = f"steps of {1e3 * rig.converter:.2g} m{rig.unit}" if rig.converter else "no steps that anybody told"
+    steps = f"steps of {1e3 * rig.converter:.2g} m{rig.unit}" if rig.converter else "steps that nobody stated"
     given = (
         f"{rig.name}, sampled every {1e3 * rig.period:.3g} ms; the command has a limit of {rig.limit:g} {rig.unit}, "
         f"{steps}, and acts {1e3 * rig.delay:.2g} ms late with a lag of "
@@ -256,7 +264,7 @@ def _parts(done: Regulation) -> list[Part]:
         Part("Gains", (*given, _gain_table(done))),
         Part("The rig", (rig_table(done.rig),)),
         Part(
-            "Told before, come after",
+            "Predicted and measured",
             (
                 Points(tuple(_sentence(done, a) for a in done.attempts)),
                 _told_table(done),
@@ -280,7 +288,7 @@ def _chance_picture(done: Regulation) -> Picture:
     told = {a.name: a.before.words for a in done.attempts}
     return Picture(
         name="regulation-chances", draw=lambda: chances_figure(told, {a.name: a.word for a in done.attempts}),
-        caption="What the rigs that the identification allows come to with each pole set, and what the rig did.",
+        caption="Share of the rigs sampled from the fit's covariance by what the run comes to, and what was measured.",
         description="; ".join(
             f"{n}: " + ", ".join(f"{w} {100 * s:.0f} %" for w, s in words.items() if s > 0) for n, words in told.items()
         ),
@@ -292,7 +300,7 @@ def _run_pictures(done: Regulation) -> list[Picture]:
     return [
         Picture(
             name=f"regulation-runs{i // 4}", draw=lambda four=done.attempts[i : i + 4]: runs_figure(four, SHOWN),
-            caption="Deviation from upright and command. Dashed: as told by the identified model; solid: as it came; a "
+            caption="Deviation from upright and command. Dashed: predicted by the identified model; solid: measured; a "
             "cross ends a run that was lost.",
             description="; ".join(a.title for a in done.attempts[i : i + 4]),
         )

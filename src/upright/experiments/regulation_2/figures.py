@@ -39,8 +39,8 @@ def runs_figure(attempts: Sequence[Attempt], seconds: float) -> Figure:
     drawing = figure(1.45 * (len(order) + 1) + 0.7)
     axes: Any = drawing.subplots(len(order) + 1, len(attempts), sharex=True, sharey="row", squeeze=False)
     for column, a in enumerate(attempts):
-        runs = [(a.before.run, "told", ORANGE, "--", 2.0)]
-        runs += [(a.after, "came", BLUE, "-", 1.1)] if a.after is not None else []
+        runs = [(a.before.run, "predicted", ORANGE, "--", 2.0)]
+        runs += [(a.after, "measured", BLUE, "-", 1.1)] if a.after is not None else []
         for run, name, colour, line, width in runs:
             found = score(run)
             lost = min(found.fell, found.ran_out)
@@ -98,11 +98,11 @@ def chances_figure(told: Mapping[str, Mapping[str, float]], came: Mapping[str, s
         left += share
     for i, n in enumerate(names):
         if came.get(n):
-            ax.text(101.5, i, fill(f"came: {came[n]}", 20), va="center", fontsize=8.5)
+            ax.text(101.5, i, fill(f"measured: {came[n]}", 20), va="center", fontsize=8.5)
     ax.invert_yaxis()
     ax.set_xlim(0, 100)
     ax.grid(axis="y", visible=False)
-    ax.set_xlabel("share of the rigs that the identification allows [%]")
+    ax.set_xlabel("share of the sampled rigs [%]")
     ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=len(WORDS) // 2)
     return drawing
 
