@@ -151,7 +151,8 @@ def by_hand(plant, places, dt, seconds):
 def free_and_whole(found, spans, period, seconds):
     """Whether each stretch begins at a release, ends before the hand is there, and keeps nine tenths of what is free.
 
-    A hand that begins to move from where a swing has died is no force yet: it is noticed within a fifth of its way, 0.1 s.
+    A hand that begins to move from where a swing has died is no force yet: it is noticed within a fifth of its way,
+    0.1 s.
     """
     assert len(found) == len(spans)
     for (start, stop), (begin, end) in zip(found, spans, strict=True):

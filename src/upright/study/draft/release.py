@@ -1,4 +1,6 @@
-"""From when on does a pendulum move freely? Then gravity, friction and the hinge alone accelerate it, and no hand."""
+"""When do a pendulum or the bodies of a chain move freely? Then gravity, springs, friction and the hinge alone
+accelerate them, and no hand.
+"""
 
 from __future__ import annotations
 
