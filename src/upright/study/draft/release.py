@@ -1,6 +1,4 @@
-"""When do a pendulum or the bodies of a chain move freely? Then gravity, springs, friction and the hinge alone
-accelerate them, and no hand.
-"""
+"""When do pendulums and chains move freely, accelerated by gravity, springs, friction and hinge alone, and by no hand?"""
 
 from __future__ import annotations
 
