@@ -1,4 +1,4 @@
-"""When do pendulums and chains move freely, accelerated by gravity, springs, friction and hinge alone, and by no hand?"""
+"""When do pendulums and chains move freely, accelerated by gravity, springs, friction and hinge, and by no hand?"""
 
 from __future__ import annotations
 
