@@ -189,6 +189,11 @@ def test_a_swing_that_grows_or_changes_its_period_is_a_hand():
     assert releases(0.005 * np.arange(uneven.size), uneven) == []
 
 
+def test_noise_that_turns_from_sample_to_sample_does_not_swing():
+    x = np.r_[np.full(200, 100.0), 100 * 0.9 ** np.arange(12) * (-1.0) ** np.arange(12), np.zeros(200)]
+    assert releases(0.005 * np.arange(x.size), x) == []
+
+
 @pytest.mark.parametrize(("half", "count"), [(0.1, 1), (0.3, 2)])
 def test_what_lasts_less_than_three_tenths_of_the_longest_swing_is_a_hand_that_shakes(half, count):
     slow, quick = swings(100, 6, 0.5), swings(160, 6, half)

@@ -1,9 +1,14 @@
 """Does the window of a draft begin after the hand has let go, and not later than it must?"""
 
+import os
+import tomllib
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from upright.physics import CartPendulum, Pendulum, find
+from upright.readers import read
 from upright.simulation import Held, simulate
 from upright.study.draft.release import free_stretches, free_swings
 
@@ -196,3 +201,17 @@ def test_a_pendulum_let_go_twice_from_upright_is_free_from_where_it_falls():
     assert len(found) == 2
     assert 2.0 - DT <= found[0][0] < 2.0 + 2 * PERIOD  # it lingers before it falls
     assert second - DT <= found[1][0] < second + 2 * PERIOD
+
+
+@pytest.mark.real_data
+def test_carts_that_somebody_lets_go_by_hand_are_free_from_where_a_person_says_so():
+    """Windows that were chosen by eye in a shipped study, beside those that are drafted for the same logs."""
+    study = Path(__file__).parents[3] / "examples" / "studies" / "ecp210_releases.toml"
+    chosen: dict[str, list[float]] = {}
+    for run in tomllib.loads(study.read_text(encoding="utf-8"))["runs"]:
+        chosen.setdefault(run["file"], []).append(run["window"][0])
+    for file, begins in chosen.items():
+        record = read(Path(os.environ["UPRIGHT_REAL_DATA"]) / file)
+        carts = [record[name] for name in record.names if name.startswith("Encoder")]
+        found = [start for start, _ in free_stretches(record.t, carts)]
+        assert found == pytest.approx(begins, abs=0.1)  # a quarter of a period

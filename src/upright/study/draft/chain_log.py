@@ -34,6 +34,9 @@ STILL = 0.005
 HALVES = 4
 """Half swings that make a free swing: fewer may be a hand."""
 
+SAMPLES = 4
+"""Samples of a half swing, at least: what turns faster is noise."""
+
 STEADY = 0.25
 """Share by which the half periods of one free swing may differ; dry friction leaves them equal."""
 
@@ -316,8 +319,8 @@ def releases(t: Array, x: Array) -> list[tuple[float, float]]:
         j = i
         while j + 1 < size.size and size[j + 1] < 1.02 * size[j] and _steady(length[i : j + 2]):
             j += 1
-        if j - i + 1 >= HALVES:
-            half = float(np.median(length[i : j + 1]))
+        half = float(np.median(length[i : j + 1]))
+        if j - i + 1 >= HALVES and half >= SAMPLES * float(t[-1] - t[0]) / (t.size - 1):
             follows = float(t[at[j + 1]]) if j + 1 < size.size else float(t[-1])
             last = float(t[turns[j + 1]])
             out.append((float(t[at[i]]) + 0.25 * half, min(last + half, follows, float(t[-1]))))

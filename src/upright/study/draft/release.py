@@ -1,4 +1,4 @@
-"""From when on does a pendulum move freely? Then gravity, friction and the hinge alone accelerate it, and no hand."""
+"""When do pendulums and chains move freely, accelerated by gravity, springs, friction and hinge, and by no hand?"""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ DEAD, DIED = 0.002, 0.01
 """Share of its range by which a body still goes through more in a period than it will, and in all, once its swing has
 died away."""
 
-HOLDS = 0.5
+HOLDS = 0.2
 """Share of a period that a hand is on a body of a chain, or on a pendulum that is let go again, at least."""
 
 GOES = 0.5
