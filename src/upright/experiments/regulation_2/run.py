@@ -316,7 +316,7 @@ def _came(stand: TestStand, foreseen: Attempt, task: Task, seed: int, folder: Pa
         return None
     driven, pendulum = stand.names
     stand.ask(
-        f"Next is {foreseen.name}, expected to hold with a chance of {100 * chance:.0f} %. Let {pendulum} hang at "
+        f"Next is {foreseen.name}, predicted probability of stabilisation {100 * chance:.0f} %. Let {pendulum} hang at "
         f"rest; after a small pulse bring it up with {driven} in the middle of its travel, hold both there until the "
         "loop takes them, and let go."
     )

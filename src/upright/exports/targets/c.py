@@ -90,7 +90,8 @@ def c_source(made: SampledController, *, single: bool) -> str:
     say = Language(
         number=lambda x: constant(x, single), reading="y[{}]".format, reference="r[{}]".format,
         memory="s->z[{}]".format, command="u[{}]".format, let="law_real ", end=";", remark="/* {} */".format,
-        floor=f"floor{f}", absolute=f"fabs{f}", limited=lambda c, most: f"{c} > {most} ? {most} : {c} < -{most} ? -{most} : {c}",
+        floor=f"floor{f}", absolute=f"fabs{f}",
+        limited=lambda c, most: f"{c} > {most} ? {most} : {c} < -{most} ? -{most} : {c}",
         first=lambda lines: ["if (!s->running) {", *(f"    {line}" for line in lines), "}"],
         hold=lambda line: ["if (!beyond)", f"    {line}"], either="||",
         stopped="s->stopped", not_finite="!is_finite({})".format,
