@@ -65,6 +65,8 @@ def completed(
 def twin_of(rig: Rig, seed: int) -> Rig:
     """Another rig to run on: one of the vendor's make, or, of a rig of one's own, one that the covariance allows.
 
+    Limit, period, counts and travel that a call gave are its own too.
+
     Raises
     ------
     BadInput
@@ -72,7 +74,9 @@ def twin_of(rig: Rig, seed: int) -> Rig:
     """
     make = make_of_vendor(rig.hardware.vendor, rig.plant)
     if make is not None:
-        return make_rig(make.key, seed)
+        truth = make_rig(make.key, seed)
+        said = {n: e for n, e in rig.hardware.entries.items() if e.source.startswith("--")}
+        return replace(truth, hardware=replace(truth.hardware, entries={**truth.hardware.entries, **said}))
     if not rig.draws:
         raise BadInput(
             "a rig to run on is drawn from the fit's covariance, and this fit has none; give no seed, or "

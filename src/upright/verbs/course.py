@@ -53,7 +53,7 @@ def _nobody_needed(typed: dict[str, Any]) -> dict[str, Any]:
 @command(
     "Course",
     names={"experiment": "--experiment -e", "rig": "--rig"},
-    metavars={"experiment": "1|1a|1b|2|2b|3|4", "rig": "KIND|RIG.toml"},
+    metavars={"experiment": "1|1a|1b|2|2b|3|4", "rig": "KIND|RIG.toml", "accept": "REASON"},
     helps={
         "experiment": "Only this one, and what it stands on.",
         "rig": "linear, furuta, rectilinear or torsional, else the paper's; or RIG.toml.",
@@ -77,7 +77,7 @@ def _nobody_needed(typed: dict[str, Any]) -> dict[str, Any]:
 )
 def lab(
     *, experiment: Sequence[str] | str = (), rig: str = "", seed: int = 0, out: str | os.PathLike[str] | None = None,
-    fresh: bool = False, workers: Workforce = 1, worn: bool = False, progress: Progress = silent,
+    fresh: bool = False, workers: Workforce = 1, worn: bool = False, accept: str = "", progress: Progress = silent,
     ask: Callable[[str], bool] | None = None,
     watching: Callable[[], AbstractContextManager[Callable[[RunState], str]]] | None = None,
 ) -> Answer[Laboratory]:  # fmt: skip
@@ -105,6 +105,9 @@ def lab(
         scheduler, or an executor of `concurrent.futures`.
     worn : bool
         Twins with physics that models leave out, of which fits read as those of real rigs do.
+    accept : str, optional
+        Why laws from a fit that is not trusted drive hardware all the same; the logs keep it. Without it such laws are
+        not armed.
     progress : callable, optional
         Told the step at work and the share done.
     ask : callable, optional
@@ -148,7 +151,7 @@ def lab(
     shared = Workers.of(workers)
     asked = texts(experiment)
     beside = Path() if out is None else at
-    live = _live(rig, beside, ask, watching, worn=worn, alone=shared.alone) if itself else None
+    live = _live(rig, beside, ask, watching, worn=worn, alone=shared.alone, accept=accept) if itself else None
     rig = rig if live is None else typed(live.file.path)
     laboratory.chosen_experiments(asked, rig, live)  # says what is wrong with the call before anything is written
     with _ctrl_c() as pressed:
@@ -184,6 +187,7 @@ def lab(
 def _live(
     rig: str, folder: Path, ask: Callable[[str], bool] | None,
     watching: Callable[[], AbstractContextManager[Callable[[RunState], str]]] | None, *, worn: bool, alone: bool,
+    accept: str,
 ) -> LiveStand:  # fmt: skip
     """The rig of a RIG.toml; what cannot be had of it is said first."""
     from upright.experiments.stand.live import live_stand, nobody, nobody_watches
@@ -200,7 +204,7 @@ def _live(
         )
     if not Path(rig).exists():
         raise BadInput(f"there is no file '{rig}'; name the RIG.toml of a rig, or a make: linear, furuta, ...")
-    live = live_stand(Path(rig), ask or nobody, watching or nobody_watches)
+    live = live_stand(Path(rig), ask or nobody, watching or nobody_watches, accept)
     if live.file.hardware and ask is None:
         raise BadInput(
             "experiments on hardware need a person beside it who is asked: run upright lab in a terminal, or give ask."

@@ -13,6 +13,8 @@ import pytest
 import upright as up
 from tests.experiments.rigs import OWN, made
 from tests.exports.rigs import fit_file
+from tests.running.test_accepted import SERIAL, STUDY
+from upright.basis import NOT_TRUSTED, Basis
 from upright.control.swing_up import MODE
 from upright.errors import BadInput
 from upright.experiments.laboratory import chosen_experiments
@@ -21,9 +23,10 @@ from upright.experiments.stand.live import live_stand, run_of
 from upright.experiments.stand.studies import write_study
 from upright.experiments.swing_up_2b.run import run_swing_up
 from upright.gains import feedback, filtered, place
-from upright.laws import as_values, of_values
+from upright.laws import Law, as_values, of_values
 from upright.logs import read_log
 from upright.rig.makes import MAKES, make_rig
+from upright.running import run as run_module
 from upright.running.run import RunRequest, run_rig
 from upright.study.load import load_study
 
@@ -164,3 +167,23 @@ def test_a_port_alone_is_not_driven_but_given_a_file_to_fill_in(tmp_path):
 def fill_in(path):
     """Every question answered as its example does."""
     path.write_text(re.sub(r"(?m)^# (?=[\[\w]+ ?[=.])", "", path.read_text("utf-8")), encoding="utf-8")
+
+
+UNTRUSTED = Basis(level=NOT_TRUSTED, sentence="The runs are explained to 41 %.")
+
+
+@pytest.mark.parametrize("accept", ["", "the pendulum hangs on a string"])
+def test_a_law_from_a_fit_that_is_not_trusted_is_not_armed_on_hardware_without_a_reason(tmp_path, monkeypatch, accept):
+    """Behind a wire that is not there: with a reason it comes as far as the port."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
+    (tmp_path / "RIG.toml").write_text(SERIAL, encoding="utf-8")
+    described = run_module.described
+    monkeypatch.setattr(
+        run_module, "described", lambda file: tuple(r.replace(basis=UNTRUSTED) for r in described(file))
+    )
+    live = live_stand(tmp_path / "RIG.toml", lambda _sentence: True, accept=accept)
+    law = Law(np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((1, 0)), np.zeros((1, 2)), period=2e-3)
+    said = "port /dev/no_such_board" if accept else "not armed on hardware.*explained to 41 %"
+    with pytest.raises(BadInput, match=said):
+        live.hold(law, "inverted", tmp_path, "held", 1.0, start=np.zeros(4))

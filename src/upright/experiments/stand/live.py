@@ -50,12 +50,15 @@ class LiveStand(TestStand):
         Asked for something, in a sentence; answers whether it was done.
     watching : callable
         Opens a view for a run: a callable that is shown how it goes, and answers with a sentence to end it.
+    accept : str
+        Why laws from a fit that is not trusted drive hardware all the same; without it they are not armed.
     """
 
     simulated = False
     file: RigFile
     person: Callable[[str], bool] = nobody
     watching: Callable[[], AbstractContextManager[Watch]] = nobody_watches
+    accept: str = ""
 
     @property
     def text(self) -> str:
@@ -104,6 +107,7 @@ class LiveStand(TestStand):
         request = RunRequest(
             rig=self.file.path, law=path, seconds=seconds + self.rig.period, stem=stem,
             tilt=0.0 if start is None else float(start[-2]), from_rest=from_rest,
+            accept=self.accept,
         )  # fmt: skip
         done = self._run(request, folder)
         if done.log is None or len(done.log) < 3:
@@ -125,7 +129,7 @@ class LiveStand(TestStand):
         """The same rig described by a fit; its RIG.toml is written to the folder as ``rig.toml``."""
         path = folder / "rig.toml"
         self.file.with_fit(fit, path)
-        return live_stand(path, self.person, self.watching)
+        return live_stand(path, self.person, self.watching, self.accept)
 
 
 def pushed(law: Law | Rule, reference: Array | None, pushes: Array | None) -> Law:
@@ -164,7 +168,7 @@ def run_of(done: RigRun, at: str, origin: Sequence[float] | None = None) -> Stan
 
 def live_stand(
     path: Path, person: Callable[[str], bool] = nobody,
-    watching: Callable[[], AbstractContextManager[Watch]] = nobody_watches,
+    watching: Callable[[], AbstractContextManager[Watch]] = nobody_watches, accept: str = "",
 ) -> LiveStand:  # fmt: skip
     """The rig of a RIG.toml.
 
@@ -192,7 +196,7 @@ def live_stand(
         file=file, rig=rig, true_rig=replace(truth, name=rig.name), make=_make(file), vendor=file.vendor,
         performed=file.performed, zero=file.zero, room=limits.travel[list(units).index(rig.plant.inputs[0].on)],
         fit=fit, study=None if fit else file.known, added=file.added, tolerance=file.tolerance,
-        person=person if file.hardware else nobody, watching=watching,
+        person=person if file.hardware else nobody, watching=watching, accept=accept,
     )  # fmt: skip
 
 
