@@ -75,8 +75,9 @@ def test_a_command_without_a_limit_is_warned_of(tmp_path):
     ("change", "words"),
     [
         ({"margins": None, "verdict": "The sampled loop falls."}, "The sampled loop falls."),
-        ({"begin": ...}, "lacks begin"),
-        ({"law": {"A": "x"}}, "does not hold a law"),
+        ({"readings": ...}, "lacks readings"),
+        ({"law": {"A": "x"}}, "lacks the law's kind"),
+        ({"law": {"kind": "linear", "A": "x"}}, "the values are no law's"),
         ({"law": ...}, "is no design.json"),
     ],
 )

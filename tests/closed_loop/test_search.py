@@ -389,7 +389,7 @@ def test_everything_about_a_law_is_in_its_json():
 )
 def test_a_law_has_a_gain_that_is_more_than_two_standard_errors_from_none(monkeypatch, gains, depends):
     told = {n: Gain(value=v, stderr=s, interval=(v - 2 * s, v + 2 * s), meaning="") for n, (v, s) in gains.items()}
-    monkeypatch.setattr("upright.closed_loop.search.numbers", lambda *_: told)
+    monkeypatch.setattr("upright.closed_loop.search.gains_with_intervals", lambda *_: told)
     y = RNG.normal(size=200)
     made = search(-2 * y, y=y)
     record = Record(

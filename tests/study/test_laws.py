@@ -153,7 +153,7 @@ def test_a_law_that_explains_the_command_poorly_is_refused_with_what_to_write(mo
     from upright.study import loop as module
 
     monkeypatch.setattr(
-        module, "recover", lambda *_, **__: SimpleNamespace(quality="poor", sentence="It explains 3 %.")
+        module, "recover_law", lambda *_, **__: SimpleNamespace(quality="poor", sentence="It explains 3 %.")
     )
     said = refusal('kind = "recover"\nreference = "r"')
     assert "line 19: no law could be recovered from 'v': It explains 3 %. Write the law as kind = \"pid\"" in said

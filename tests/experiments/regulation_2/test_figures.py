@@ -102,7 +102,7 @@ def test_shares_of_every_end_add_up_to_a_hundred_with_what_came_beside():
     for i, name in enumerate(told):
         assert bars[:, i, 1] == pytest.approx([100 * told[name][w] for w in WORDS])
         assert bars[:, i, 0] == pytest.approx(np.concatenate([[0], np.cumsum(bars[:-1, i, 1])]))
-    assert [(t.get_text(), t.get_position()[1]) for t in ax.texts] == [("came: stabilised", 0)]
+    assert [(t.get_text(), t.get_position()[1]) for t in ax.texts] == [("measured: stabilised", 0)]
     assert ax.get_xlim() == (0, 100)
     assert ax.yaxis_inverted()  # the first set on top
     taller = chances_figure(told | {f"set {k}": told["set 1"] for k in range(3, 9)}, {})
