@@ -315,7 +315,12 @@ def test_the_rest_is_told_from_the_second_half_about_what_was_held_or_what_it_va
     n = 200
     swing = np.where(np.arange(n) < n // 2, 7.0, 0.3 + 0.04 * np.sqrt(2) * np.sin(2 * math.pi * np.arange(n) / 20))
     target = np.array([0.5, {"hanging": 0.0, "inverted": math.pi}[at]])
-    columns = {"t": 3.0 + 0.01 * np.arange(n), "psi": swing + target[0], "theta": swing + target[1], "u_applied": np.zeros(n)}
+    columns = {
+        "t": 3.0 + 0.01 * np.arange(n),
+        "psi": swing + target[0],
+        "theta": swing + target[1],
+        "u_applied": np.zeros(n),
+    }
     held = replace(
         done, log=replace(done.log, columns=columns), end=replace(done.end, target=target),
         wish=replace(wish, law=folder / "design.json", excite=""),
