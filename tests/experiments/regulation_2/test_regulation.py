@@ -101,14 +101,14 @@ def test_coarse_encoders_make_the_verdict_name_the_command_at_rest(tmp_path):
     known = completed(fit_of(make_rig("furuta"))).replace(counts=(1_000, 1_000))
     poles = {"set 2": RegulationRequest().poles["set 2"]}
     wish = RegulationRequest(poles=poles, draws=32, speed="plain")
-    done = run_regulation(known, truth, 0, tmp_path, wish=wish)
+    done = run_regulation(known, TwinStand(rig=truth), 0, tmp_path, wish=wish)
     told = regulation_page.chapter(done)
     assert done.best.before.chance == 1.0
     assert done.best.before.word == "stabilised with excessive effort"
     assert not told.sound
     assert "No pole set is recommended" in told.verdict
     assert "The command at rest has an rms of" in told.verdict
-    calm = run_regulation(known, truth, 0, tmp_path, wish=replace(wish, speed="kalman"))
+    calm = run_regulation(known, TwinStand(rig=truth), 0, tmp_path, wish=replace(wish, speed="kalman"))
     assert calm.best.before.quiet_chance == 1.0
     assert "The command at rest" not in regulation_page.chapter(calm).verdict
 
