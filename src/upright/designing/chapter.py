@@ -281,8 +281,7 @@ def _next_steps(done: Designed, source: str, folder: str) -> list[Step]:
                  f"upright export {folder}/design.json --to c")
         )  # fmt: skip
     steps.append(
-        Step(f"Simulate it: upright.laws.Law takes A, B, C and D of law in {folder}/design.json, its "
-             "references being the readings at rest and then the reference.")
+        Step(f"Simulate it: upright.laws.of_values makes the law of what stands as law in {folder}/design.json.")
     )  # fmt: skip
     if not plain_matrices:
         steps.append(Step("Run it on the rig, or on its twin (RIG.toml: docs/rigs.md).",
