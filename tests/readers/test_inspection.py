@@ -183,3 +183,16 @@ def test_any_valid_record_can_be_inspected(rows: list[tuple[float, float, float,
     assert len(seen.columns) == 4
     assert all(math.isfinite(c.low) and math.isfinite(c.quantum.step) and 0 <= c.low_share <= 1 for c in seen.columns)
     assert seen.time.period > 0
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("x_m", "m"), ("pos_mm", "mm"), ("theta_rad", "rad"), ("theta_deg", "deg"), ("pendulum_angle_deg", "deg"),
+        ("x", "m"), ("theta_m", "rad"), ("u_m", ""), ("theta_dot_deg", "rad/s"),
+    ],
+)  # fmt: skip
+def test_a_unit_behind_the_name_of_a_place_is_its_own(name: str, unit: str) -> None:
+    """``theta_m`` is the angle of a motor and no length; what is behind a rate is left as it was."""
+    t, x = swing()
+    assert inspect(Record(t=t, signals={name: 0.3 * x})).column(name).guess == unit

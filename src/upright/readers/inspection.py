@@ -25,6 +25,7 @@ _ANGLE = re.compile(r"theta|phi|psi|alpha|beta|angle|arm|joint.*position|pend", 
 _RATE = re.compile(r"velocity|speed|rate|_dot|omega|qd", re.IGNORECASE)
 _COUNTS = re.compile(r"enc|count|cart\d*pos|\bpos\b", re.IGNORECASE)
 _LENGTH = re.compile(r"^(z|x|pos(ition)?|distance|displacement)\d*$", re.IGNORECASE)
+_PLACE = re.compile(r"(?P<stem>.+)_(?P<unit>rad|deg|m|mm)", re.IGNORECASE)
 _VOLTS = re.compile(r"volt|plant_input|control_output|feedforward|^(u|v)$", re.IGNORECASE)
 _EFFORT = re.compile(r"(?i:u|v|i|f|t|tau)_?\d?(?:\s*[\[(]\s*([^\[\]()]+?)\s*[\])]|_(m?[VA]|Nm?))\s*")
 _DRIVE = re.compile(
@@ -184,6 +185,8 @@ def _guess_unit(name: str, values: Array, step: Quantum) -> str:
     whole = bool((values == np.round(values)).all()) and np.ptp(values) > 0
     if _RATE.search(name):
         return "" if whole else "rad/s" if _ANGLE.search(name) or "joint" in name else ""
+    if (unit := _place_unit(name)) and not step.counts_per_rev:
+        return unit
     if whole and (np.ptp(values) >= 20 or _COUNTS.search(name)):
         return "counts"
     if step.counts_per_rev:
@@ -193,6 +196,15 @@ def _guess_unit(name: str, values: Array, step: Quantum) -> str:
     if _VOLTS.search(name):
         return "V"
     return "m" if _LENGTH.search(name) else ""
+
+
+def _place_unit(name: str) -> str:
+    """Unit behind a place's name, ``theta_deg`` or ``x_mm``; empty where there is none: ``theta_m`` is a motor's."""
+    match = _PLACE.fullmatch(name)
+    if match is None:
+        return ""
+    like = _ANGLE if match["unit"].lower() in ("rad", "deg") else _LENGTH
+    return match["unit"].lower() if like.search(match["stem"]) else ""
 
 
 def effort_unit(name: str) -> str:
