@@ -275,9 +275,9 @@ def _recognised(record: Record, inspection: Inspection, known: KnownRig | None) 
     except BadInput:
         found = None
     column = found.drive if found else drive_column(record, inspection)
-    u: Array = record[column.name].copy() if column is not None else np.zeros(record.t.size)
+    u: Array = record[column.name] if column is not None else np.zeros(record.t.size)
     if column is not None and any(lie.startswith("the first samples are outliers") for lie in column.lies):
-        u[:3] = u[3]
+        u = np.concatenate([np.full(3, u[3]), u[3:]])
     plant = known.plant if known is not None else None
     places: dict[str, Place] = {}
     chain = plant is not None and not any(c.name in ("theta", "psi", "x") for c in plant.coordinates)
