@@ -11,15 +11,15 @@ from pathlib import Path
 from upright.physics import BUILT_IN
 from upright.physics.equations import Derived
 from upright.physics.lagrange import derive
+from upright.physics.nonideal import NonidealCartPendulum, NonidealFuruta
 from upright.physics.plant import Plant, module_name
-from upright.physics.worn import WornCartPendulum, WornFuruta
 
 FOLDER = Path(__file__).parent / "generated"
 
 
 def variants() -> list[tuple[type[Plant], frozenset[str]]]:
     """Every built-in plant and those that twins are made of, whole and with all its optional parameters left out."""
-    plants = (*BUILT_IN.values(), WornCartPendulum, WornFuruta)
+    plants = (*BUILT_IN.values(), NonidealCartPendulum, NonidealFuruta)
     return [(cls, frozenset(w)) for cls in plants for w in ([(), cls.optional] if cls.optional else [()])]
 
 

@@ -4,7 +4,7 @@
 from upright.physics.equations import Derived, DryJoint
 
 DERIVED = Derived(
-    name='WornFuruta',
+    name='NonidealFuruta',
     coordinates=(
         'psi',
         'theta',
