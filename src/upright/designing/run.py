@@ -332,7 +332,7 @@ def _placed_samples(model: StateSpace, poles: Roots) -> Placement:
         )
     found = place((model.A - np.eye(asked.size)) / T, model.B / T, (to_z(asked, T) - 1) / T)
     attained = to_s(1 + T * found.attained, T)
-    return replace(found, asked=asked, attained=attained, miss=float(np.abs(attained - asked).max()))
+    return replace(found, requested=asked, attained=attained, miss=float(np.abs(attained - asked).max()))
 
 
 def _way_back(model: StateSpace, K: Array, start: Array) -> tuple[Array, Array, Array]:
