@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.diagnosis.cases import case
-from upright.diagnosis import KnownRig, examine
+from upright.diagnosis import examine
 from upright.diagnosis.case import Place
 from upright.diagnosis.findings import KINDS, Diagnosis, Finding
 from upright.diagnosis.motion import motion_of
@@ -164,7 +164,7 @@ def record(**signals):
 
 
 def test_what_cannot_be_looked_for_is_said_with_its_reason():
-    cart = KnownRig(name="rectilinear-1", plant=find("rectilinear-1"))
+    cart = find("rectilinear-1")
     alone = examine(record(x_1=SWING))
     assert alone.unchecked["effort"] == "the log has no effort column that could be recognised"
     assert alone.unchecked["sign"] == "nobody said what the rig is; name it with --rig"
@@ -211,7 +211,7 @@ def test_a_record_that_is_spoilt_is_not_asked_for_its_forces():
         t=holed, signals={"x_1": SWING[rows], "u": np.cos(3 * T)[rows]}, units={"x_1": "m", "u": "V"},
         provenance=Provenance(file="log.csv", reader="table"),
     )  # fmt: skip
-    found = examine(log, KnownRig(name="", plant=find("rectilinear-1")))
+    found = examine(log, find("rectilinear-1"))
     assert "gap" in {f.kind for f in found.wrong}
     assert found.unchecked["sign"] == "after the gap found above, mend that first"
 

@@ -21,7 +21,7 @@ def told(kind: str, rig: str = "", **columns: np.ndarray) -> list[Finding]:
     units = {n: "V" if n == "u" else "m" for n in columns}
     log = {n: x if n == "u" else np.round(x / STEP) * STEP for n, x in columns.items()}
     record = Record(t=t, signals=log, units=units, provenance=Provenance(file="log.csv", reader="table"))
-    return [f for f in examine(record, read_known(rig) if rig else None).findings if f.kind == kind]
+    return [f for f in examine(record, *(read_known(rig) if rig else ())).findings if f.kind == kind]
 
 
 def settling(levels: list[float], seconds: float = 6.0, first: float = 1.0) -> np.ndarray:

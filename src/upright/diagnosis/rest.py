@@ -79,7 +79,7 @@ def _turning_free(case: Case) -> frozenset[str]:
     if plant is None:
         return frozenset()
     values = {f.name: 1.0 if f.default is MISSING else f.default for f in fields(plant)}  # type: ignore[arg-type]
-    values |= {n: p.value for n, p in case.parameters.items() if n in values}
+    values |= {} if case.rig is None else case.rig.plant.parameters()
     at = next(iter(plant.equilibria.values()))
     stiffness = small_motions(plant.derived_for(values), {**values, **at})[2]
     _, s, ways = np.linalg.svd(stiffness)

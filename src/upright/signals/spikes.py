@@ -95,12 +95,13 @@ def _returns(x: Array, first: int, last: int) -> bool:
 
 def without(x: Array, at: NDArray[np.int64]) -> Array:
     """A signal (N,) with samples replaced by straight lines between their neighbours."""
+    if not at.size:
+        return x
+    good = np.ones(x.size, dtype=bool)
+    good[at] = False
+    beside = np.flatnonzero(good)
     out = x.copy()
-    if at.size:
-        good = np.ones(x.size, dtype=bool)
-        good[at] = False
-        beside = np.flatnonzero(good)
-        out[at] = np.interp(at, beside, x[beside])
+    out[at] = np.interp(at, beside, x[beside])
     return out
 
 

@@ -54,6 +54,13 @@ class FittedModel:
         entry = self.content["parameters"].get(name)
         return str(entry.get("unit") or "") if isinstance(entry, dict) else ""
 
+    def source(self, name: str) -> str:
+        """Where a parameter comes from: ``"identified"``, ``"assumed"`` or ``"known"``."""
+        entry = self.content["parameters"].get(name)
+        status = entry.get("status") if isinstance(entry, dict) else None
+        asked = name in self.content.get("estimated", ())
+        return "identified" if asked else "assumed" if status == "assumed" else "known"
+
     @property
     def scores(self) -> dict[str, dict[str, float]]:
         """Fit percent by label and signal of the runs that were fitted, as far as the file tells."""

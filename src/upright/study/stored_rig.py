@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from upright.errors import BadInput, ImpossiblePhysics
-from upright.identification import GreyBox
+from upright.identification import GreyBox, Parameter
 from upright.physics import Plant, find, name_of
 from upright.rig import Hardware, Rig
 from upright.rig.drive import GAIN
@@ -43,7 +43,12 @@ def rig_with_guesses(model: GreyBox, name: str, hardware: Hardware) -> Rig:
     plant = kind(**{n: values[n] for n in kind.names()})
     gain = model.parameters.get(GAIN)
     unit = _command_unit("" if gain is None else gain.unit, kind)
-    return _with_drive(plant, name, values, unit, hardware)
+    sources = {n: _source(model.parameters[n]) for n in (*kind.names(), GAIN) if n in model.parameters}
+    return replace(_with_drive(plant, name, values, unit, hardware), sources=sources)
+
+
+def _source(p: Parameter) -> str:
+    return "guessed" if p.estimate else "assumed" if p.assumed else "known"
 
 
 def rig_of_plant(plant: Plant) -> Rig:
@@ -64,8 +69,9 @@ def rig_of_fit(fitted: FittedModel, kind: type[Plant], *, seed: int = 0, draws: 
     except TypeError:
         raise BadInput(f"the fit does not hold every parameter of '{fitted.plant}'; identify again.") from None
     unit = _command_unit(fitted.unit(GAIN), kind)
-    known = replace(_with_drive(plant, fitted.plant, fitted.values, unit, fitted.hardware), basis=fitted.basis)
-    return replace(known, draws=tuple(_drawn(fitted, plant, seed, draws)))
+    known = _with_drive(plant, fitted.plant, fitted.values, unit, fitted.hardware)
+    sources = {n: fitted.source(n) for n in (*kind.names(), GAIN) if n in fitted.values}
+    return replace(known, basis=fitted.basis, sources=sources, draws=tuple(_drawn(fitted, plant, seed, draws)))
 
 
 def _from_study(path: Path) -> Rig:
