@@ -13,7 +13,7 @@ BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 
 # Rooms from the ground up: each imports from those above its own line only. Rooms on one line do not see each other.
 FLOORS = """
-basis _version errors progress shown
+basis _version errors progress renamed shown
 declared files
 trust workers
 quantities

@@ -26,13 +26,13 @@ def test_a_coordinate_moves_by_more_than_three_percent_of_the_widest_in_its_unit
     plant = find("rectilinear-2")
     made = replace(case(x_1=SINE), plant=plant)
     for share, moves in ((0.031, True), (0.029, False)):
-        places = {n: Place(column=n, y=s * SINE, quantum=0.0, unit="m") for n, s in (("x_1", 1.0), ("x_2", share))}
+        places = {n: Place(column=n, y=s * SINE, resolution=0.0, unit="m") for n, s in (("x_1", 1.0), ("x_2", share))}
         with_both = replace(made, places=places)
         assert with_both.moves("x_1")
         assert with_both.moves("x_2") == moves
     # an angle of 0.01 rad is not weighed against a metre
-    other = {"x": Place(column="x", y=SINE, quantum=0.0, unit="m"),
-             "theta": Place(column="theta", y=0.01 * SINE, quantum=0.0, unit="rad")}  # fmt: skip
+    other = {"x": Place(column="x", y=SINE, resolution=0.0, unit="m"),
+             "theta": Place(column="theta", y=0.01 * SINE, resolution=0.0, unit="rad")}  # fmt: skip
     assert replace(made, plant=CartPendulum, places=other).moves("theta")
     assert not replace(made, places={}).moves("x_1")
 
@@ -63,7 +63,7 @@ def test_what_is_measured_is_what_is_placed_else_the_outputs_else_what_looks_lik
     assert [c.name for c in made.measured] == ["a", "b"]
     outputs = replace(made, record=made.record.replace(outputs=("b",)))
     assert [c.name for c in outputs.measured] == ["b"]
-    placed = replace(made, places={"x": Place(column="push", y=SINE, quantum=0.0, unit="m")})
+    placed = replace(made, places={"x": Place(column="push", y=SINE, resolution=0.0, unit="m")})
     assert [c.name for c in placed.measured] == ["push"]
     assert placed.coordinate("push") == "x"
     assert placed.coordinate("a") == "COORDINATE"
@@ -132,12 +132,12 @@ def test_a_locked_coordinate_is_not_read_and_the_others_are_as_stated():
     assert (locked.drive, np.any(locked.u)) == ("", False)
     assert locked.stated.keys() == {"x_1", "x_2"}
     sensor = known.sensors["x_1"]
-    y, quantum, _ = sensor.read(record)
+    y, resolution, _ = sensor.read(record)
     assert both.places["x_1"].y == pytest.approx(y)
     assert both.places["x_1"].unit == "m"
-    step = inspection.column(sensor.column).quantum.step
+    step = inspection.column(sensor.column).resolution.step
     factor = abs(sensor.factor(sensor.column_unit(record, record[sensor.column])))
-    assert both.places["x_1"].quantum == pytest.approx(quantum or step * factor)
+    assert both.places["x_1"].resolution == pytest.approx(resolution or step * factor)
     assert set(both.moduli[sensor.column]) == set(COUNTERS)  # a length makes no turn of its own
 
 

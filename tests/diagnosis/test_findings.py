@@ -140,7 +140,7 @@ def test_a_sensor_at_its_limit_is_told_with_the_share_of_its_samples():
     # a body that was held reached no limit
     made = case(DT, x=x, y=20 * np.sin(T), measured=("x", "y"))
     assert not [f for f in examine_sensors(replace(made, plant=find("rectilinear-2")))[0] if f.columns == ("x",)]
-    coarse = {"x": {"quantum": replace(made.inspection.column("x").quantum, step=3.5 / 49)}}
+    coarse = {"x": {"resolution": replace(made.inspection.column("x").resolution, step=3.5 / 49)}}
     assert not found_in("saturation", x=x, measured=("x",), columns=coarse)[0]
 
 
@@ -220,7 +220,7 @@ def test_a_motion_is_missed_where_a_coordinate_is():
     made = case(DT, x=SWING, measured=("x",))
     assert motion_of(made) == "nobody said what the rig is; name it with --rig"
     plant = find("cart-pendulum")
-    place = {"x": Place(column="x", y=SWING, quantum=STEP, unit="m")}
+    place = {"x": Place(column="x", y=SWING, resolution=STEP, unit="m")}
     assert motion_of(replace(made, plant=plant, places=place)) == "no column measures theta"
     locked = motion_of(replace(made, plant=plant, places=place, locked=("theta",)))
     assert locked.rows == (0,)

@@ -107,7 +107,7 @@ def test_the_stiffer_the_bodies_are_joined_the_sharper_is_the_factor(coupling, r
 def known(m):
     """The case of a motion: columns named after the coordinates, the effort in volts."""
     made = case(0.02, x_1=m.q[0], x_2=m.q[1], u=m.u, drive="u")
-    places = {n: Place(column=n, y=m.q[i], quantum=1e-5, unit="m") for i, n in enumerate(("x_1", "x_2"))}
+    places = {n: Place(column=n, y=m.q[i], resolution=1e-5, unit="m") for i, n in enumerate(("x_1", "x_2"))}
     return replace(made, plant=CART, places=places, rig=Rig(plant=CART(**NUMBERS), gain=7.0))
 
 
@@ -290,7 +290,7 @@ def signs(*found, plant=CART, made=None, **how):
     names = [c.name for c in plant.coordinates]
     made = made or replace(
         case(0.02, **dict.fromkeys(names, T), u=T, drive="u"), plant=plant,
-        places={n: Place(column=n, y=0.5 * np.sin(T), quantum=1e-5, unit=c.unit)
+        places={n: Place(column=n, y=0.5 * np.sin(T), resolution=1e-5, unit=c.unit)
                 for n, c in zip(names, plant.coordinates, strict=True)},
     )  # fmt: skip
     return against_form(replace(made, **how), m, list(found))

@@ -205,7 +205,7 @@ def test_every_body_that_is_free_must_grow() -> None:
 @pytest.mark.parametrize(("steps", "creeps"), [(4.9, False), (5.1, True)])
 def test_a_body_creeps_from_five_steps_of_its_sensor_on(steps: float, creeps: bool) -> None:
     x = np.exp(-0.1 * T) * np.cos(9 * T)
-    q = {"quantum": replace(case(x=x).inspection.columns[0].quantum, step=0.01)}
+    q = {"resolution": replace(case(x=x).inspection.columns[0].resolution, step=0.01)}
     y = steps * 0.01 * (np.arange(1500) / 1499)
     made = case(x=x, y=y, columns={"y": q})
     assert bool([f for f in examine_rest(made) if f.kind == "creep"]) == creeps

@@ -32,14 +32,14 @@ HELD = 0.2
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Place:
-    """A coordinate as it was measured: `y` (N,) and its `quantum` in `unit`, and the column it came from.
+    """A coordinate as it was measured: `y` (N,) and its `resolution` in `unit`, and the column it came from.
 
     The unit is the coordinate's, or counts where nobody said how many make a turn or a metre.
     """
 
     column: str
     y: Array
-    quantum: float
+    resolution: float
     unit: str
 
 
@@ -231,10 +231,12 @@ def case_of(record: Record, inspection: Inspection, rig: Rig | type[Plant] | Non
     for name, sensor in wiring.sensors.items():
         if sensor.column not in record.signals or name in wiring.locked:
             continue
-        y, quantum, _ = sensor.read(record)
+        y, resolution, _ = sensor.read(record)
         factor = sensor.factor(sensor.column_unit(record, record[sensor.column]))
-        step = inspection.column(sensor.column).quantum.step
-        places[name] = Place(column=sensor.column, y=y, quantum=quantum or step * factor, unit=sensor.coordinate.unit)
+        step = inspection.column(sensor.column).resolution.step
+        places[name] = Place(
+            column=sensor.column, y=y, resolution=resolution or step * factor, unit=sensor.coordinate.unit
+        )
         turn = 2 * math.pi / factor if sensor.coordinate.unit == "rad" and factor else 0.0
         moduli[sensor.column] = tuple({m for m in (turn, *COUNTERS) if m})
     u, drive = np.zeros(record.t.size), ""
@@ -271,7 +273,7 @@ def _recognised(record: Record, inspection: Inspection, plant: type[Plant] | Non
             factor = factor or 1.0
             y = factor * (record[c.name] - found.rest[coordinate.name])
             unit = c.guess if c.guess == "counts" else coordinate.unit
-            places[coordinate.name] = Place(column=c.name, y=y, quantum=factor * c.quantum.step, unit=unit)
+            places[coordinate.name] = Place(column=c.name, y=y, resolution=factor * c.resolution.step, unit=unit)
     return Case(
         record=record, inspection=inspection, plant=plant, places=places,
         drive=column.name if column is not None else "", u=u,

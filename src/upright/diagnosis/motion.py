@@ -80,7 +80,7 @@ def motion_of(case: Case) -> SmoothedMotion | str:
     moving = tuple(
         c
         for c in coordinates
-        if c in y and np.ptp(y[c]) > 50 * told * case.places[c].quantum and (told or case.moves(c))
+        if c in y and np.ptp(y[c]) > 50 * told * case.places[c].resolution and (told or case.moves(c))
     )
     if not moving:
         return "nothing moves"

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from upright.physics import BUILT_IN
 from upright.physics.lagrange import derive
+from upright.physics.nonideal import NonidealCartPendulum, NonidealFuruta
 from upright.physics.plant import Plant, stem
 from upright.physics.stored import FOLDER, text_of
-from upright.physics.worn import WornCartPendulum, WornFuruta
 
 
 def variants() -> list[tuple[type[Plant], frozenset[str]]]:
     """Every built-in plant and those that twins are made of, whole and with all its optional parameters left out."""
-    plants = (*BUILT_IN.values(), WornCartPendulum, WornFuruta)
+    plants = (*BUILT_IN.values(), NonidealCartPendulum, NonidealFuruta)
     return [(cls, frozenset(w)) for cls in plants for w in ([(), cls.optional] if cls.optional else [()])]
 
 

@@ -83,9 +83,9 @@ def _rest(plant: Statement, derived: Derived, point: dict[str, float]) -> dict[s
     """Nearest true equilibrium to a nominal one; a coordinate that floats there is also tried from either side."""
     aside = [{**point, name: value + d} for name, value in point.items() for d in (0.5, -0.5)]
     for start in (point, *aside):
-        found = _newton(plant, derived, start)
-        if found is not None:
-            return found
+        rest = _newton(plant, derived, start)
+        if rest is not None:
+            return rest
     raise NotIdentifiable(
         f"{type(plant).__name__} has no equilibrium near {point}; level the rig or anchor the free coordinate."
     )

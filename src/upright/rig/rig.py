@@ -14,6 +14,7 @@ from upright.errors import BadInput, nearest
 from upright.physics import Plant, name_of
 from upright.physics.actuator import ACTUATOR
 from upright.records import Array
+from upright.renamed import former
 from upright.rig.drive import GAIN, MORE, driven, saturation
 from upright.rig.hardware import Entry, Hardware, counts_unit, driven_unit, meaning_of, place_of, turn_of
 from upright.rig.mounting import Mounting
@@ -261,9 +262,11 @@ class Rig(Shown):
         return saturation(self.drive)
 
     @property
-    def quantum(self) -> Array:
+    def resolution(self) -> Array:
         """Resolution of each encoder [m or rad], shape (coordinates,)."""
         return 1.0 / np.array(self.per_unit)
+
+    quantum = former("resolution")
 
     @property
     def shown(self) -> Array:

@@ -303,7 +303,7 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
         u=u,
         y=np.column_stack([readings[n] for n in measured]),
         measured=measured,
-        quantum=tuple(quanta[n] for n in measured),
+        resolution=tuple(quanta[n] for n in measured),
         held={**locked, **{n: readings[n] for n in held_names}},
         known=known_values(run.section("known"), plant),
         unknown=run.names("unknown", (*PER_RUN, *sensor_nuisances(plant)), ("initial",)),
