@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.study.test_fitted import FIT
+from tests.study.test_stored_fit import FIT
 from upright.basis import NOT_TRUSTED, RESERVED, TRUSTED
 from upright.errors import BadInput
 from upright.identification.model.fit import Judgement
