@@ -81,11 +81,15 @@ void port_enable(bool on) {
 }
 
 static void show(uint32_t tick) {
+    static enum mode shown = FAULT;
     enum mode mode = rig_mode();
     if (mode == FAULT) {
         if (!(tick & (BLINK_TICKS - 1))) TOGGLE(LED);
-    } else if (mode == IDLE) LOW(LED);
-    else HIGH(LED);
+    } else if (mode != shown) {
+        if (mode == IDLE) LOW(LED);
+        else HIGH(LED);
+    }
+    shown = mode;
 }
 
 /* The host. */
