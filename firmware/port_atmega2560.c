@@ -161,6 +161,7 @@ ISR(TIMER1_COMPA_vect) {
 static uint8_t cause_at_reset __attribute__((section(".noinit")));
 void before_main(void) __attribute__((naked, used, section(".init3")));
 void before_main(void) {
+    OUTPUT(POWER_STAGE); /* low, as every output is by now */
     cause_at_reset = MCUSR;
     MCUSR = 0;
     wdt_disable();
@@ -176,7 +177,6 @@ void before_main(void) {
 
 int main(void) {
     reset_cause = cause_at_reset;
-    OUTPUT(POWER_STAGE);
     OUTPUT(LED);
     drive_prepare();
     UCSR0A = _BV(U2X0);

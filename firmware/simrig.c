@@ -11,6 +11,7 @@
  * Lines on standard input, each answered: those of mishap.h, and
  *     wrap CHANNEL V  the counter's own number, without that anything moved
  *     illegal         both phases of encoder 1 change at once
+ *     reset           the processor starts anew, as after a dip of its supply; a resistor holds the enable line low
  *     hang            the processor stops in a loop with its interrupts off
  *     run TICKS       time passes without the host
  *     glitch STEPS    the converter puts out something else than it was commanded
@@ -223,6 +224,10 @@ static void obey(const char *line) {
         memset(&edges, 0, sizeof edges);
         fflush(stdout);
         return;
+    } else if (!strcmp(line, "reset")) {
+        if (bridge) push_until_now();
+        enabled = 0;
+        avr_reset(avr);
     } else if (!strcmp(line, "hang")) {
         hang();
     } else if (sscanf(line, "run %ld", &a) == 1) {
