@@ -173,7 +173,7 @@ def met(source: Source, dialect: str) -> Contact:
 
     with tempfile.TemporaryDirectory() as folder:
         log = written(source, dialect, Path(folder))
-        began = time.perf_counter()
+        began = time.process_time()
         at: dict[str, Any] = {"log": source.name, "dialect": dialect}
         study = Path(folder) / "study.toml"
         step = "show"
@@ -186,13 +186,13 @@ def met(source: Source, dialect: str) -> Contact:
             step = "design"
             held, design = _designed(source, fit)
         except UprightError as error:
-            return Contact(**at, ended="refused", said=f"{step}: {error}", seconds=time.perf_counter() - began)
+            return Contact(**at, ended="refused", said=f"{step}: {error}", seconds=time.process_time() - began)
         except Exception as error:  # what a stranger must never meet
             return Contact(
                 **at, ended="error", said=f"{step}: {type(error).__name__}: {error}",
-                seconds=time.perf_counter() - began,
+                seconds=time.process_time() - began,
             )  # fmt: skip
-        seconds = time.perf_counter() - began
+        seconds = time.process_time() - began
         drafted = tomllib.loads(study.read_text(encoding="utf-8"))
     assumed = {n for n, v in drafted["parameters"].items() if isinstance(v, dict) and v.get("assumed")}
     usable = {n: e.value for n, e in fit.estimates.items() if fit.trusted and e.status == "firm" and not e.rests_on}
