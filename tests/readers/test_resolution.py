@@ -95,7 +95,7 @@ def test_an_angles_counts_are_the_same_in_degrees_and_in_radians(counts):
     turns = np.round(counts * 0.15 * np.sin(4 * t) * np.exp(-0.1 * t)) / counts
     signals = {"theta_rad": 2 * math.pi * turns, "theta_deg": 360 * turns}
     written = {n: np.array([float(f"{x:.9g}") for x in v]) for n, v in signals.items()}
-    seen = inspect_record(Record(t=t, signals=written, units=dict(theta_rad="rad", theta_deg="deg")))
+    seen = inspect_record(Record(t=t, signals=written, units={"theta_rad": "rad", "theta_deg": "deg"}))
     assert {c.name: c.quantum.counts_per_rev for c in seen.columns} == dict.fromkeys(signals, counts)
 
 

@@ -64,7 +64,8 @@ def no_drive_table() -> TomlTable:
 def drive_table(c: Column, unit: str, scale: float, *, reversed_: bool) -> TomlTable:
     """The command's column; `reversed_`: it first moves the driven body down."""
     table = TomlTable("[drive]")
-    raw = "DAC counts" if in_dac_counts(c) or c.guess == "counts" else c.unit or c.guess
+    own = c.unit or c.guess
+    raw = unit if scale == 1.0 else "DAC counts" if own in ("", "counts") else own
     table.key("column", c.name, f"{c.low:.4g} to {c.high:.4g} {raw}".rstrip())
     table.key("unit", unit or "V", off=not unit)
     if scale != 1.0:
