@@ -104,7 +104,7 @@ def test_commands_are_those_of_the_law_in_float32_to_the_last_step(host, name):
     whole = law.over(ABOUT.coordinates, 1) if law.measured else law
     limit = math.floor(min(law.limit, FREE.command) / STEP + 1e-9) * STEP
     references = r[::every] if law.signal().shape[1] else None
-    double = replace(whole, command_quantum=STEP, limit=limit, references=references)
+    double = replace(whole, command_resolution=STEP, limit=limit, references=references)
     exact, memory = double.follow(q[::every] / COUNTS)
     assert len(np.unique(exact)) > 10
     apart = np.abs(expected[::every] - exact[:, 0] / STEP).max()

@@ -25,7 +25,12 @@ def for_rig(law: Law | Rule, about: Capabilities, limits: Limits, target: Sequen
     name = about.name
     if any(width > 1 for width in law.widths().values()):
         raise BadInput("a rig runs one law, and this one is of several lanes; take one of them (of_lanes).")
-    changes = {"command_quantum": about.step, "limit": min(law.limit, limits.command), "delay": 0.0, "quantum": 0.0}
+    changes = {
+        "command_resolution": about.step,
+        "limit": min(law.limit, limits.command),
+        "delay": 0.0,
+        "resolution": 0.0,
+    }
     if isinstance(law, Rule):
         return replace(law, **changes)
     if len(law.D) != 1 or law.readings != len(about.coordinates):
