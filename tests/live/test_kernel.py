@@ -91,7 +91,7 @@ def test_every_shipped_plant_with_dry_friction_law_and_delay_gives_the_same_bits
         gains = np.full((nu, n), -0.3)
         law = Law(
             A=0.5 * np.eye(1), B=np.full((1, n), 0.1), C=np.full((nu, 1), 0.2), D=gains,
-            limit=0.4, delay=1.3, quantum=1e-3,
+            limit=0.4, delay=1.3, resolution=1e-3,
         )  # fmt: skip
     friction = {j.coulomb: 0.02 for j in derived.joints if j.coulomb}
     drive = {"actuator.delay": 0.0037, "actuator.lag": 0.006} if nu else {}
@@ -112,7 +112,7 @@ def test_a_motion_that_goes_on_frame_by_frame_is_the_motion_in_one(case):
 
 @needs_node
 def test_a_reduced_ensemble_is_the_processors():
-    law = state_feedback([-0.2, -3.0, -0.1, -0.3], DT, memory=0.7, target=[0.0, pi], quantum=1e-3)
+    law = state_feedback([-0.2, -3.0, -0.1, -0.3], DT, memory=0.7, target=[0.0, pi], resolution=1e-3)
     simulator, params, x0, u = ready(FURUTA, {**LATE, "b_1c": 0.02}, loop=law, lanes=19, record=False, strict=True)
     assert np.array_equal(simulator.run(params, x0, u, samples=SAMPLES), stepped_in_node(simulator, params, x0, u))
 
