@@ -1,9 +1,10 @@
-"""Do the quick tests notice when one place of the code is changed? Random changes, room by room.
+"""Do the tests notice when one place of the code is changed? Random changes, room by room.
 
 Operators, comparisons, constants, guards, indices and signs: each change is one place, drawn from all of them, and the
-tests that cover it run until one fails, the nearest and cheapest first, 60 s of them. A test that hangs has noticed.
-Intervals are Wilson's of 95 %. What no test noticed is listed; a change that a person judged to make no difference is
-left out of the share when a file names it: its lines are `file:line before -> after  # reason`, as they are listed.
+quick tests that cover it run until one fails, the nearest and cheapest first, 60 s of CPU of them. `--slow` then runs
+the slow tests that cover what no quick one noticed, 120 s of them. A test that hangs has noticed. Intervals are
+Wilson's of 95 %. What no test noticed is listed; a change that a person judged to make no difference is left out of
+the shares when a file names it: its lines are `file:line before -> after  # reason`, as they are listed.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from queue import SimpleQueue
 
-from benchmarks.measure import Line, Target
+from benchmarks.measure import Line, Target, page
 from benchmarks.mutants.covering import SOURCE, map_of
 from benchmarks.mutants.places import Change, compiles, places
 from benchmarks.mutants.trial import Bench, Outcome
@@ -26,6 +27,7 @@ from benchmarks.mutants.trial import Bench, Outcome
 ROOT = Path(__file__).parents[2]
 UNNOTICED = 0.10
 """Share of changes that may go unnoticed."""
+NOT = ": share not noticed"
 DEEPER = "identification"
 """Room whose own rooms are counted one by one."""
 
@@ -79,14 +81,16 @@ def judged(file: Path | None) -> set[str]:
 
 def run(
     *, quick: bool, progress: Callable[[str], None], sample: int = 150, seed: int = 0, within: str = "",
-    folder: Path | None = None, verdicts: Path | None = None, workers: int = 2,
+    folder: Path | None = None, verdicts: Path | None = None, workers: int = 2, slow: bool = False,
+    markdown: Path | None = None,
 ) -> list[Line]:  # fmt: skip
-    """A line for each room, one for all, and one for each change that went unnoticed."""
+    """A line for each room, one or two for all, and one for each change that went unnoticed."""
     cache = Path(os.environ["UPRIGHT_CACHE"]) if os.environ.get("UPRIGHT_CACHE") else None
     kept = folder or (cache or ROOT / "build") / "mutants"
     harmless = judged(verdicts)
     changes = drawn(ROOT, min(sample, 10) if quick else sample, seed, within)
     covered = map_of(ROOT, kept, workers, progress)
+    slower = map_of(ROOT, kept, workers, progress, slow=True) if slow else None
     done: list[Outcome] = []
     stop = threading.Event()
     with tempfile.TemporaryDirectory(prefix="upright-mutants-", ignore_cleanup_errors=True) as name:
@@ -98,7 +102,7 @@ def run(
         def work(change: Change) -> Outcome | None:
             bench = idle.get()
             try:
-                outcome = None if stop.is_set() else bench.outcome(change, covered)
+                outcome = None if stop.is_set() else bench.outcome(change, covered, slower)
                 return None if stop.is_set() else outcome
             finally:
                 idle.put(bench)
@@ -109,40 +113,58 @@ def run(
                     if (outcome := future.result()) is not None:
                         done.append(outcome)
                         what = said(outcome.change, outcome.shown)
-                        heard = f"noticed by {outcome.by}" if outcome.noticed else f"NOT noticed, {outcome.ran} tests"
+                        heard = f"noticed by {outcome.by}" if outcome.by else f"NOT noticed, {outcome.ran} tests"
                         progress(f"{len(done)} of {len(changes)}: {what}: {heard}")
             except KeyboardInterrupt:
                 progress("interrupted; what is finished is counted")
                 stop.set()
                 for bench in benches:
                     bench.end()
-    return table(done, harmless)
+    lines = table(done, harmless, slow=slow)
+    if markdown is not None:
+        asked = f"Sample {len(changes)}, seed {seed}{f', within {within}' * bool(within)}; {len(done)} were tried."
+        text = page("mutants", "Changes that tests notice", __doc__, _body(asked, lines))
+        markdown.write_text(text, encoding="utf-8")
+    return lines
 
 
-def table(done: Sequence[Outcome], harmless: Iterable[str] = ()) -> list[Line]:
-    """Shares of rooms and of all, then what was not noticed."""
+def table(done: Sequence[Outcome], harmless: Iterable[str] = (), *, slow: bool = False) -> list[Line]:
+    """Shares of rooms and of all, by quick tests and by all of them, then what was not noticed."""
     left_out = set(harmless)
     counted = [o for o in done if " ".join(said(o.change, o.shown).split()) not in left_out]
-    lines = [_share(name, [o for o in counted if room(o.change.path) == name])
+    lines = [_share(name, [o.noticed for o in counted if room(o.change.path) == name])
              for name in sorted({room(o.change.path) for o in counted})]  # fmt: skip
     judged_out = len(done) - len(counted)
-    lines.append(
-        _share("all", counted, asked=True, note=f"; {judged_out} judged to make no difference" * bool(judged_out))
-    )
+    note = f"; {judged_out} judged to make no difference" * bool(judged_out)
+    lines.append(_share("all", [o.noticed for o in counted], asked=True, note=note))
+    if slow:
+        both = [o.noticed or o.slowly for o in counted]
+        lines.append(_share("all, by quick and slow tests", both, asked=True, note=note))
     missed = sorted((o for o in counted if not o.noticed), key=lambda o: (o.change.path, o.change.place.line))
     return lines + [
         Line(contender=f"{o.change.path.removeprefix(SOURCE + '/')}:{o.change.place.line}",
-             note=f"{o.shown} ({o.ran} tests ran, {o.covering} cover it)")
+             note=f"{o.shown} ({f'slow: {o.by}' if o.slowly else f'{o.ran} tests ran, {o.covering} cover it'})")
         for o in missed
     ]  # fmt: skip
 
 
-def _share(name: str, outcomes: Sequence[Outcome], *, asked: bool = False, note: str = "") -> Line:
-    noticed, of = sum(o.noticed for o in outcomes), len(outcomes)
-    low, high = interval(noticed, of)
-    missed = 1 - noticed / of if of else 0.0
+def _share(name: str, noticed: Sequence[bool], *, asked: bool = False, note: str = "") -> Line:
+    hits, of = sum(noticed), len(noticed)
+    low, high = interval(hits, of)
+    missed = 1 - hits / of if of else 0.0
     return Line(
-        contender=f"{name}: share not noticed", ratio=(missed, 1 - high, 1 - low) if of else None,
+        contender=f"{name}{NOT}", ratio=(missed, 1 - high, 1 - low) if of else None,
         target=Target(most=UNNOTICED) if asked else None,
-        note=f"{noticed} of {of} noticed, {100 * (1 - missed):.0f} % ({100 * low:.0f} to {100 * high:.0f}){note}",
+        note=f"{hits} of {of} noticed, {100 * (1 - missed):.0f} % ({100 * low:.0f} to {100 * high:.0f}){note}",
     )  # fmt: skip
+
+
+def _body(asked: str, lines: Sequence[Line]) -> list[str]:
+    """Shares as a table, then the changes that no quick test noticed."""
+    shares = [line for line in lines if line.contender.endswith(NOT)]
+    listed = [line for line in lines if not line.contender.endswith(NOT)]
+    return [
+        asked, "", "| room | noticed |", "|---|---|",
+        *(f"| {line.contender.removesuffix(NOT)} | {line.note} |" for line in shares),
+        "", "Not noticed by a quick test:", "", *(f"- `{line.contender}` `{line.note}`" for line in listed),
+    ]  # fmt: skip

@@ -130,6 +130,19 @@ def covering_of(root, **tests):
 
 
 @pytest.mark.slow
+def test_what_no_quick_test_notices_is_put_to_the_slow_ones(tree, tmp_path):
+    bench = Bench(tree, tmp_path / "bench", None)
+    half = next(Change(path="src/pkg.py", place=p, text=b"*") for p in places(HALF.encode()) if b"*" in p.instead)
+    quick, slow = covering_of(tree, test_nothing=2), covering_of(tree, test_half=2)
+    alone, both = bench.outcome(half, quick), bench.outcome(half, quick, slow)
+    assert (alone.noticed, alone.slowly, alone.by) == (False, False, "")
+    assert (both.noticed, both.slowly, both.by) == (False, True, "tests/test_pkg.py::test_half")
+    assert (alone.ran, both.ran) == (1, 2)
+    at_once = bench.outcome(half, slow, quick)
+    assert (at_once.noticed, at_once.slowly, at_once.ran) == (True, False, 1)
+
+
+@pytest.mark.slow
 def test_a_change_is_noticed_by_a_test_that_passes_without_it(tree, tmp_path):
     """The test of the function that changed; not one that only runs it, and not one that fails in any case."""
     bench = Bench(tree, tmp_path / "bench", None)
@@ -178,6 +191,22 @@ def test_lines_keep_their_tests_when_they_move():
     assert moved(both, {"src/upright/p.py": text}, {"tests/test_a.py"}).seconds == again.seconds
     # a line that no test runs: those of the whole module stand in
     assert set(both.of("src/upright/p.py", 1, 1, text)) == {"tests/test_a.py::z", "tests/test_b.py::y"}
+
+
+def test_quick_tests_alone_and_all_tests_have_a_share_each(tmp_path):
+    """Of four changes one is noticed by a quick test and two by slow ones: 25 and 75 %."""
+    outcomes = [
+        Outcome(
+            change=change, shown=f"a < {i}", noticed=i == 0, by="" if i == 3 else f"test_{i}", ran=3, covering=3,
+            slowly=i in (1, 2),
+        )
+        for i, change in enumerate(drawn(ROOT, 4, seed=1, within="gains"))
+    ]  # fmt: skip
+    both = {line.contender: line for line in table(outcomes, slow=True)}
+    assert both["all: share not noticed"].ratio[0] == 0.75
+    assert both["all, by quick and slow tests: share not noticed"].ratio[0] == 0.25
+    assert sum("slow: test_" in line.note for line in both.values()) == 2
+    assert not any(name.startswith("all, by") for name in (line.contender for line in table(outcomes)))
 
 
 def test_a_change_judged_to_make_no_difference_is_left_out_of_the_share(tmp_path):
