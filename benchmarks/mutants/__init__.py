@@ -13,16 +13,14 @@ import math
 import os
 import random
 import tempfile
-import threading
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
-from queue import SimpleQueue
 
 from benchmarks.measure import Line, Target, page
-from benchmarks.mutants.covering import SOURCE, map_of
+from benchmarks.mutants.covering import SOURCE, digest, map_of
 from benchmarks.mutants.places import Change, compiles, places
-from benchmarks.mutants.trial import Bench, Outcome
+from benchmarks.mutants.trial import SECONDS, SLOW_SECONDS, Bench, Outcome
+from benchmarks.mutants.trying import Kept, said, tried
 
 ROOT = Path(__file__).parents[2]
 UNNOTICED = 0.10
@@ -68,11 +66,6 @@ def interval(hits: int, of: int) -> tuple[float, float]:
     return (middle - half) / (1 + z * z / of), (middle + half) / (1 + z * z / of)
 
 
-def said(change: Change, shown: str) -> str:
-    """A change as it is listed, and as a judge writes it down."""
-    return f"{change.path.removeprefix(SOURCE + '/')}:{change.place.line} {shown}"
-
-
 def judged(file: Path | None) -> set[str]:
     """Changes that make no difference, by a file: everything before `  # ` in each line."""
     lines = file.read_text(encoding="utf-8").splitlines() if file else []
@@ -91,36 +84,15 @@ def run(
     changes = drawn(ROOT, min(sample, 10) if quick else sample, seed, within)
     covered = map_of(ROOT, kept, workers, progress)
     slower = map_of(ROOT, kept, workers, progress, slow=True) if slow else None
-    done: list[Outcome] = []
-    stop = threading.Event()
+    by_slow: list[Outcome] | None = None
     with tempfile.TemporaryDirectory(prefix="upright-mutants-", ignore_cleanup_errors=True) as name:
         benches = [Bench(ROOT, Path(name) / str(i), cache) for i in range(workers)]
-        idle: SimpleQueue[Bench] = SimpleQueue()
-        for bench in benches:
-            idle.put(bench)
-
-        def work(change: Change) -> Outcome | None:
-            bench = idle.get()
-            try:
-                outcome = None if stop.is_set() else bench.outcome(change, covered, slower)
-                return None if stop.is_set() else outcome
-            finally:
-                idle.put(bench)
-
-        with ThreadPoolExecutor(workers) as pool:
-            try:
-                for future in as_completed([pool.submit(work, change) for change in changes]):
-                    if (outcome := future.result()) is not None:
-                        done.append(outcome)
-                        what = said(outcome.change, outcome.shown)
-                        heard = f"noticed by {outcome.by}" if outcome.by else f"NOT noticed, {outcome.ran} tests"
-                        progress(f"{len(done)} of {len(changes)}: {what}: {heard}")
-            except KeyboardInterrupt:
-                progress("interrupted; what is finished is counted")
-                stop.set()
-                for bench in benches:
-                    bench.end()
-    lines = table(done, harmless, slow=slow)
+        before = [Kept(kept / f"{suite}-{digest(ROOT)}.jsonl") for suite in ("quick", "slow")]
+        done = tried(benches, changes, covered, SECONDS, before[0], progress)
+        if slower is not None:
+            left = [o.change for o in done if not o.noticed and _line(o) not in harmless]
+            by_slow = tried(benches, left, slower, SLOW_SECONDS, before[1], progress)
+    lines = table(done, harmless, by_slow)
     if markdown is not None:
         asked = f"Sample {len(changes)}, seed {seed}{f', within {within}' * bool(within)}; {len(done)} were tried."
         text = page("mutants", "Changes that tests notice", __doc__, _body(asked, lines))
@@ -128,24 +100,40 @@ def run(
     return lines
 
 
-def table(done: Sequence[Outcome], harmless: Iterable[str] = (), *, slow: bool = False) -> list[Line]:
-    """Shares of rooms and of all, by quick tests and by all of them, then what was not noticed."""
+def _line(outcome: Outcome) -> str:
+    """An outcome as a line of the judged ones begins."""
+    return " ".join(said(outcome.change, outcome.shown).split())
+
+
+def table(
+    done: Sequence[Outcome], harmless: Iterable[str] = (), by_slow: Sequence[Outcome] | None = None
+) -> list[Line]:
+    """Shares of rooms and of all, by quick tests and by all of them, then what no quick test noticed."""
     left_out = set(harmless)
-    counted = [o for o in done if " ".join(said(o.change, o.shown).split()) not in left_out]
+    counted = [o for o in done if _line(o) not in left_out]
     lines = [_share(name, [o.noticed for o in counted if room(o.change.path) == name])
              for name in sorted({room(o.change.path) for o in counted})]  # fmt: skip
     judged_out = len(done) - len(counted)
     note = f"; {judged_out} judged to make no difference" * bool(judged_out)
     lines.append(_share("all", [o.noticed for o in counted], asked=True, note=note))
-    if slow:
-        both = [o.noticed or o.slowly for o in counted]
+    slowly = {o.change: o for o in by_slow or ()}
+    if by_slow is not None:
+        known = [o for o in counted if o.noticed or o.change in slowly]
+        both = [o.noticed or slowly[o.change].noticed for o in known]
         lines.append(_share("all, by quick and slow tests", both, asked=True, note=note))
     missed = sorted((o for o in counted if not o.noticed), key=lambda o: (o.change.path, o.change.place.line))
     return lines + [
         Line(contender=f"{o.change.path.removeprefix(SOURCE + '/')}:{o.change.place.line}",
-             note=f"{o.shown} ({f'slow: {o.by}' if o.slowly else f'{o.ran} tests ran, {o.covering} cover it'})")
+             note=f"{o.shown} ({_tests(o, slowly.get(o.change))})")
         for o in missed
     ]  # fmt: skip
+
+
+def _tests(quick: Outcome, slow: Outcome | None) -> str:
+    if slow is not None and slow.noticed:
+        return f"slow: {slow.by}"
+    also = "" if slow is None else f"; slow: {slow.ran} ran, {slow.covering} cover it"
+    return f"{quick.ran} tests ran, {quick.covering} cover it{also}"
 
 
 def _share(name: str, noticed: Sequence[bool], *, asked: bool = False, note: str = "") -> Line:

@@ -95,9 +95,8 @@ def map_of(root: Path, folder: Path, workers: int, progress: Callable[[str], Non
     """The map of a tree by its quick tests or by its slow ones, made or brought up to date where there is none."""
     files = {p: _digest(root / p) for p in _listed(root, "tests", "benchmarks")}
     sources = {p: (root / p).read_text(encoding="utf-8") for p in _listed(root, SOURCE)}
-    key = hashlib.sha256(json.dumps([files, sources], sort_keys=True).encode()).hexdigest()[:16]
     name = "slow" if slow else "covering"
-    kept = folder / f"{name}-{key}.json"
+    kept = folder / f"{name}-{digest(root)}.json"
     folder.mkdir(parents=True, exist_ok=True)
     maps = sorted(folder.glob(f"{name}-*.json"), key=lambda path: path.stat().st_mtime)
     for path in maps[:-MAPS]:
@@ -122,6 +121,12 @@ def map_of(root: Path, folder: Path, workers: int, progress: Callable[[str], Non
         whole = Covering(seconds=whole.seconds, tests=whole.tests, files=dict(ran), sources=sources, lines=whole.lines)
         _write(kept, whole)
     return whole
+
+
+def digest(root: Path) -> str:
+    """The text of a tree's sources and tests, in a few letters."""
+    texts = [(path, _digest(root / path)) for path in _listed(root, "tests", "benchmarks", SOURCE)]
+    return hashlib.sha256(json.dumps(texts).encode()).hexdigest()[:16]
 
 
 def run_tests(root: Path, folder: Path, tests: Iterable[str], workers: int, *, slow: bool = False) -> None:

@@ -31,7 +31,7 @@ SHORT = 0.5
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """Whether a quick test noticed a change, or else a slow one; which or how; tests that ran, and that cover it."""
+    """Whether a change was noticed, by which test or how; tests that ran of those that cover the place."""
 
     change: Change
     shown: str
@@ -39,7 +39,6 @@ class Outcome:
     by: str
     ran: int
     covering: int
-    slowly: bool = False
 
 
 def chosen(covering: Covering, change: Change, source: bytes, seconds: float = SECONDS) -> tuple[list[str], int]:
@@ -87,36 +86,24 @@ class Bench:
         if self.process is not None:
             _kill(self.process)
 
-    def outcome(self, change: Change, quick: Covering, slow: Covering | None = None) -> Outcome:
-        """Run the quick tests of a change, then the slow ones; one that fails without it as well does not count."""
+    def outcome(self, change: Change, covering: Covering, seconds: float = SECONDS) -> Outcome:
+        """Run the tests of a change; one that fails without it as well does not count."""
         file = self.tree / change.path
         source = file.read_bytes()
-        by, ran, direct = self._tried(file, change, source, quick, SECONDS)
-        slowly = ""
-        if slow is not None and not by:
-            slowly, more, others = self._tried(file, change, source, slow, SLOW_SECONDS)
-            ran, direct = ran + more, direct + others
-        return Outcome(
-            change=change, shown=change.shown(source), noticed=bool(by), by=by or slowly, ran=ran, covering=direct,
-            slowly=bool(slowly),
-        )  # fmt: skip
-
-    def _tried(
-        self, file: Path, change: Change, source: bytes, covering: Covering, seconds: float
-    ) -> tuple[str, int, int]:
-        """What noticed a change, tests that ran, and how many cover the place."""
         tests, direct = chosen(covering, change, source, seconds)
-        ran = 0
-        while tests:
+        ran, noticed, by = 0, False, ""
+        while tests and not noticed:
             by = self._with(file, change.applied(source), source, tests, covering, seconds)
             begun = self._begun()
             ran += len(begun)
             if not by:
                 break
-            if not begun or self._passes(begun[-1], covering):
-                return by, ran, direct
-            tests = tests[tests.index(begun[-1]) + 1 :]
-        return "", ran, direct
+            noticed = not begun or self._passes(begun[-1], covering)
+            tests = tests[tests.index(begun[-1]) + 1 :] if begun else []
+        shown = change.shown(source)
+        return Outcome(
+            change=change, shown=shown, noticed=noticed, by=by if noticed else "", ran=ran, covering=direct
+        )  # fmt: skip
 
     def _with(
         self, file: Path, changed: bytes, source: bytes, tests: Sequence[str], covering: Covering, seconds: float

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.mutants import drawn, interval, judged, room, said, table
+from benchmarks.mutants import drawn, interval, judged, room, table
 from benchmarks.mutants.covering import Covering, joined, moved
 from benchmarks.mutants.places import Change, compiles, places
 from benchmarks.mutants.trial import Bench, Outcome
+from benchmarks.mutants.trying import Kept, said, tried
 
 ROOT = Path(__file__).parents[2]
 
@@ -130,16 +131,19 @@ def covering_of(root, **tests):
 
 
 @pytest.mark.slow
-def test_what_no_quick_test_notices_is_put_to_the_slow_ones(tree, tmp_path):
+def test_what_came_of_a_change_is_kept_and_not_tried_again(tree, tmp_path):
     bench = Bench(tree, tmp_path / "bench", None)
-    half = next(Change(path="src/pkg.py", place=p, text=b"*") for p in places(HALF.encode()) if b"*" in p.instead)
-    quick, slow = covering_of(tree, test_nothing=2), covering_of(tree, test_half=2)
-    alone, both = bench.outcome(half, quick), bench.outcome(half, quick, slow)
-    assert (alone.noticed, alone.slowly, alone.by) == (False, False, "")
-    assert (both.noticed, both.slowly, both.by) == (False, True, "tests/test_pkg.py::test_half")
-    assert (alone.ran, both.ran) == (1, 2)
-    at_once = bench.outcome(half, slow, quick)
-    assert (at_once.noticed, at_once.slowly, at_once.ran) == (True, False, 1)
+    file = tmp_path / "kept.jsonl"
+    changes = [Change(path="src/pkg.py", place=p, text=b"*") for p in places(HALF.encode()) if b"*" in p.instead]
+    covering = covering_of(tree, test_half=2)
+    first = tried([bench], changes[:1], covering, 60.0, Kept(file), lambda _: None)
+    heard = []
+    again = tried([bench], changes, covering, 60.0, Kept(file), heard.append)
+    assert [o.noticed for o in again] == [True, False]
+    assert again[:1] == first
+    assert len(heard) == 1  # of the second change alone
+    assert tried([bench], changes[:1], covering, 60.0, Kept(file), heard.append) == first
+    assert len(heard) == 1
 
 
 @pytest.mark.slow
@@ -193,20 +197,25 @@ def test_lines_keep_their_tests_when_they_move():
     assert set(both.of("src/upright/p.py", 1, 1, text)) == {"tests/test_a.py::z", "tests/test_b.py::y"}
 
 
-def test_quick_tests_alone_and_all_tests_have_a_share_each(tmp_path):
+def test_quick_tests_alone_and_all_tests_have_a_share_each():
     """Of four changes one is noticed by a quick test and two by slow ones: 25 and 75 %."""
-    outcomes = [
-        Outcome(
-            change=change, shown=f"a < {i}", noticed=i == 0, by="" if i == 3 else f"test_{i}", ran=3, covering=3,
-            slowly=i in (1, 2),
-        )
-        for i, change in enumerate(drawn(ROOT, 4, seed=1, within="gains"))
-    ]  # fmt: skip
-    both = {line.contender: line for line in table(outcomes, slow=True)}
+    changes = drawn(ROOT, 4, seed=1, within="gains")
+    quick, slow = (
+        [
+            Outcome(change=c, shown=f"a < {i}", noticed=i in noticed, by=f"test_{i}", ran=3, covering=5)
+            for i, c in enumerate(changes)
+        ]
+        for noticed in ((0,), (1, 2))
+    )
+    both = {line.contender: line for line in table(quick, by_slow=slow[1:])}
     assert both["all: share not noticed"].ratio[0] == 0.75
     assert both["all, by quick and slow tests: share not noticed"].ratio[0] == 0.25
     assert sum("slow: test_" in line.note for line in both.values()) == 2
-    assert not any(name.startswith("all, by") for name in (line.contender for line in table(outcomes)))
+    assert sum("slow: 3 ran, 5 cover it" in line.note for line in both.values()) == 1
+    assert not [line.contender for line in table(quick) if line.contender.startswith("all, by")]
+    # one that the slow tests have not come to yet counts for neither
+    some = {line.contender: line for line in table(quick, by_slow=slow[1:3])}
+    assert some["all, by quick and slow tests: share not noticed"].ratio[0] == 0.0
 
 
 def test_a_change_judged_to_make_no_difference_is_left_out_of_the_share(tmp_path):
