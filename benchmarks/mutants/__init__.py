@@ -38,7 +38,7 @@ def drawn(root: Path, sample: int, seed: int, within: str = "") -> list[Change]:
     everywhere = [
         (path, place)
         for path, source in sources.items()
-        if "/generated/" not in path and path.startswith(file)
+        if path.startswith(file)
         for place in places(source)
         if f"{path}:{place.line}:".startswith(f"{SOURCE}/{within}{':' if ':' in within else ''}")
     ]

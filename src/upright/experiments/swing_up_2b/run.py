@@ -187,7 +187,7 @@ def scales_of_log(model: Rig, log: Record, known: Mapping[str, float] | None = N
             raise BadInput(f"the check needs a column '{c.name}'; {nearest(c.name, log.names)}")
         unit = log.units.get(c.name, "") or c.unit
         if unit == "counts":
-            size = float(model.quantum[i])
+            size = float(model.resolution[i])
         elif same_dimension(unit, c.unit):
             size = scale(unit)
         else:

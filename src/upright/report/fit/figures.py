@@ -208,7 +208,7 @@ def interval_figure(estimates: Mapping[str, Estimate], *, truth: Mapping[str, fl
                 ax.plot(100 * limit, row, marker=mark, color=colour, markersize=6, clip_on=False)
     ax.axvline(0, color=GREY, linewidth=0.6)
     status = {n: f"  ({shown[n].status})" if truth is None else "" for n in ends}
-    ax.set_yticks(range(len(ends)), [f"{mathtext(n)}{said}" for n, said in status.items()])
+    ax.set_yticks(range(len(ends)), [f"{mathtext(n)}{word}" for n, word in status.items()])
     ax.set_ylim(len(ends) - 0.5, -0.5)
     ax.set_xlim(-100 * reach, 100 * reach)
     what = "95 % interval relative to the estimate" if truth is None else "estimate and 95 % interval, from the truth"

@@ -110,8 +110,8 @@ def _steps(address: int) -> Callable[..., None]:
 
     function = machine.function(address)
 
-    def run(*given: Any) -> None:
-        function(_WORDS.pack(*[id(a) if isinstance(t, ArrayOf) else a for t, a in zip(RUN, given, strict=True)]))
+    def run(*args: Any) -> None:
+        function(_WORDS.pack(*[id(a) if isinstance(t, ArrayOf) else a for t, a in zip(RUN, args, strict=True)]))
 
     return run
 

@@ -40,8 +40,8 @@ def functions(text: str) -> dict[str, ast.FunctionDef]:
 
 def mark(node: ast.FunctionDef) -> str:
     """The decorator of a function of the text."""
-    found = node.decorator_list[0] if node.decorator_list else None
-    return found.id if isinstance(found, ast.Name) else "inline_strict"
+    decorator = node.decorator_list[0] if node.decorator_list else None
+    return decorator.id if isinstance(decorator, ast.Name) else "inline_strict"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,23 +111,23 @@ class Module:
         """
         symbol, _ = self.instance(name, tuple(types))
         lines: list[str] = []
-        given: list[str] = []
+        parameters: list[str] = []
         for k, t in enumerate(types):
             lines += [f"%word{k} = getelementptr i64, ptr %words, i64 {k}"]
             kind = llvm(t, 1)
             lines += [f"%v{k} = load {kind}, ptr %word{k}"]
             if not isinstance(t, ArrayOf):
-                given.append(f"{kind} %v{k}")
+                parameters.append(f"{kind} %v{k}")
                 continue
             for what, at in (("data", platform.head), ("sizes", platform.head + 16)):
                 lines += [f"%{what}{k}.at = getelementptr i8, ptr %v{k}, i64 {at}"]
                 lines += [f"%{what}{k} = load ptr, ptr %{what}{k}.at"]
-            given.append(f"ptr %data{k}")
+            parameters.append(f"ptr %data{k}")
             for axis in range(t.axes):
                 lines += [f"%size{k}.{axis}.at = getelementptr i64, ptr %sizes{k}, i64 {axis}"]
                 lines += [f"%size{k}.{axis} = load i64, ptr %size{k}.{axis}.at"]
-                given.append(f"i64 %size{k}.{axis}")
-        lines += [f"call void @{symbol}({', '.join(given)})", "ret void"]
+                parameters.append(f"i64 %size{k}.{axis}")
+        lines += [f"call void @{symbol}({', '.join(parameters)})", "ret void"]
         body = "\n".join(f"  {line}" for line in lines)
         return self.whole(platform, f"define void @{name}(ptr %words) {_WIDE} {{\n{body}\n}}\n")
 
