@@ -20,8 +20,8 @@ from upright.identification.ladder.growth import Ladder, RungResult
 from upright.identification.ladder.rungs import neutral
 from upright.physics.actuator import ACTUATOR
 from upright.rig.hardware import Hardware
-from upright.study.fitted import FORMAT
 from upright.study.load import Study
+from upright.study.stored_fit import FORMAT
 from upright.study.text import StudyText
 
 

@@ -22,7 +22,7 @@ PENDULUM = {"m_p": 0.1, "l_cg": 0.2, "J_p": 0.0, "g": 9.81}
 POLE = math.sqrt(9.81 / 0.2)
 
 
-def upright_pendulum(quantum: float, *, spread: float = 0.1, dt: float = 0.01) -> Problem:
+def upright_pendulum(resolution: float, *, spread: float = 0.1, dt: float = 0.01) -> Problem:
     """A frictionless pendulum near upright that no random force moves; its record has the standard deviation `spread`.
 
     What the readings are does not matter for how well a state can be known from them.
@@ -30,42 +30,44 @@ def upright_pendulum(quantum: float, *, spread: float = 0.1, dt: float = 0.01) -
     t = np.arange(1001) * dt
     y = np.pi + spread * math.sqrt(2) * np.sin(2 * np.pi * t)[:, None]
     run = Run(
-        label="balanced", role="fit", t=t, u=np.zeros((t.size, 1)), y=y, measured=("theta",), quantum=(quantum,),
+        label="balanced", role="fit", t=t, u=np.zeros((t.size, 1)), y=y, measured=("theta",), resolution=(resolution,),
         horizon=(0.1, 0.8), restart="kalman", unknown=(),
     )  # fmt: skip
     known = rig(Pendulum, {**PENDULUM, "noise.theta": 0.0, "noise.T": 0.0}, {})
     return formulate(known, [run])
 
 
-def missed(quantum: float, ahead: float, dt: float = 0.01) -> float:
+def missed(resolution: float, ahead: float, dt: float = 0.01) -> float:
     """Root mean square of what is missed `ahead` seconds later, in closed form.
 
     Without a random force the filter forgets the mode that decays; of the one that grows by exp(a dt) it keeps, from
     readings of variance R, R (1 - exp(-2 a dt)), the scalar Riccati equation's solution.
     """
-    R = quantum**2 / 12
+    R = resolution**2 / 12
     return math.sqrt(R + R * (1 - math.exp(-2 * POLE * dt)) * math.exp(2 * POLE * ahead))
 
 
-@pytest.mark.parametrize("quantum", [1e-4, 1e-3, 5e-3])
-def test_the_start_state_of_one_unstable_mode_limits_a_prediction_as_its_riccati_equation_says(quantum: float) -> None:
-    problem = upright_pendulum(quantum)
+@pytest.mark.parametrize("resolution", [1e-4, 1e-3, 5e-3])
+def test_the_start_state_of_one_unstable_mode_limits_a_prediction_as_its_riccati_equation_says(
+    resolution: float,
+) -> None:
+    problem = upright_pendulum(resolution)
     found = ceilings(problem, 0, problem.start, [1, 10, 40])[:, 0]
     spread = float(np.std(problem.tracks[0].y[problem.tracks[0].restarts[0] :]))
-    expected = [100 * (1 - missed(quantum, h) / spread) for h in (0.01, 0.1, 0.4)]
+    expected = [100 * (1 - missed(resolution, h) / spread) for h in (0.01, 0.1, 0.4)]
     # the filter has followed the record for 3.2 s, so the mode that decays is forgotten to exp(-7 * 3.2)
     np.testing.assert_allclose(100 - found, 100 - np.array(expected), rtol=1e-3)
 
 
 def test_a_fit_is_judged_where_the_start_state_still_allows_ninety_percent() -> None:
-    for quantum in (2e-3, 5e-3, 2e-2):
-        problem = upright_pendulum(quantum)
+    for resolution in (2e-3, 5e-3, 2e-2):
+        problem = upright_pendulum(resolution)
         found = judged(problem, problem.start)
         assert found is not None
         spread = float(np.std(problem.tracks[0].y[problem.tracks[0].restarts[0] :]))
         most = (1 - ENOUGH / 100) * spread
-        assert missed(quantum, found.seconds) <= most * (1 + 1e-3)
-        assert missed(quantum, found.seconds + 0.01) > most * (1 - 1e-3)
+        assert missed(resolution, found.seconds) <= most * (1 + 1e-3)
+        assert missed(resolution, found.seconds + 0.01) > most * (1 - 1e-3)
         assert found.growth == pytest.approx(POLE, rel=1e-6)
 
 

@@ -45,7 +45,7 @@ def balanced(
         a * np.sin(2 * np.pi * f * t + generator.uniform(0, 6.3)) for a, f in ((0.8, 0.4), (0.8, 1.1), (0.6, 2.7))
     )
     hidden = push / np.sqrt(dt) * generator.normal(size=n)
-    law = state_feedback([-6.0, -1.8, -30.0, -2.5], dt, memory=1 / 1.1, target=[0.0, np.pi], quantum=QUANTUM)
+    law = state_feedback([-6.0, -1.8, -30.0, -2.5], dt, memory=1 / 1.1, target=[0.0, np.pi], resolution=QUANTUM)
     x0 = Furuta(**PLANT).state("inverted")
     plant, drive = Furuta(**{**PLANT, "b_1c": friction}), {"actuator.gain": VALUES["actuator.gain"]}
     command = (known + hidden)[:, None]
@@ -53,7 +53,7 @@ def balanced(
     y = motion[:, [0, 2]] if exact else np.round(motion[:, [0, 2]] / QUANTUM) * QUANTUM
     fields = {"label": f"seed {seed}", "role": "fit", "horizon": (0.05, 0.2), "restart": "kalman", "unknown": ()} | run
     return Run(
-        t=t, u=motion[:, 4:] - hidden[:, None], y=y, measured=("psi", "theta"), quantum=(QUANTUM, QUANTUM), **fields
+        t=t, u=motion[:, 4:] - hidden[:, None], y=y, measured=("psi", "theta"), resolution=(QUANTUM, QUANTUM), **fields
     )
 
 
@@ -120,7 +120,7 @@ def test_a_filter_without_friction_is_the_textbook_kalman_filter() -> None:
     run = balanced(1, seconds=3.0)
     small = 1e-3
     upright = np.array([0.0, np.pi])
-    run = replace(run, y=upright + small * (run.y - upright), u=small * run.u, quantum=(small * QUANTUM,) * 2)
+    run = replace(run, y=upright + small * (run.y - upright), u=small * run.u, resolution=(small * QUANTUM,) * 2)
     levels = {n: small * v for n, v in LEVELS.items()}
     problem = posed(run, levels, b_1c=0.0)
     track = problem.tracks[0]

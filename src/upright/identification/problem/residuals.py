@@ -456,8 +456,8 @@ def unreached(problem: Problem, x: Array) -> tuple[str, ...]:
 def _shortest(rig: GreyBox, runs: Sequence[Run]) -> dict[str, float]:
     """Least presliding length worth telling, by its name."""
     derived = rig.plant.derived()
-    seen = [pair for run in runs for pair in zip(run.measured, run.quantum, strict=False)]
-    steps = [min((quantum for name, quantum in seen if name == c), default=0.0) for c in derived.coordinates]
+    seen = [pair for run in runs for pair in zip(run.measured, run.resolution, strict=False)]
+    steps = [min((resolution for name, resolution in seen if name == c), default=0.0) for c in derived.coordinates]
     return {j.presliding: ROUNDING * float(np.abs(j.direction) @ steps) for j in derived.joints if j.presliding}
 
 

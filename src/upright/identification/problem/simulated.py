@@ -113,9 +113,9 @@ def law_of_loop(loop: ClosedLoop, run: Run, plant: type[Plant]) -> Law:
             raise BadInput(f"the law of run '{run.label}' reads '{name}'; {plant.__name__} has {', '.join(names)}.")
     law = loop.law.over(names, len(plant.inputs))
     if not loop.quantized:
-        return replace(law, command_quantum=0.0)
-    steps = dict(zip(run.measured, run.quantum, strict=False))
-    return replace(law, quantum=[steps.get(name, 0.0) for name in names])
+        return replace(law, command_resolution=0.0)
+    steps = dict(zip(run.measured, run.resolution, strict=False))
+    return replace(law, resolution=[steps.get(name, 0.0) for name in names])
 
 
 def remembering(solver: Simulator, run: Run, restarts: NDArray[np.int64], lanes: int) -> Simulator:

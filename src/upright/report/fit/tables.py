@@ -34,16 +34,16 @@ def parameter_table(
     caption : str
     """
     about = fit.model.parameters
-    told = {n: _estimate(n, e, about.get(n)) for n, e in fit.estimates.items() if e.status != "known"}
-    told |= {
+    described = {n: _estimate(n, e, about.get(n)) for n, e in fit.estimates.items() if e.status != "known"}
+    described |= {
         n: (number(p.value), _sure(p), "", unit(p.unit), "assumed" if p.assumed else "given", _called(n, p))
         for n, p in about.items()
         if not p.estimate
-        and n not in told
+        and n not in described
         and (p.assumed or p.value != (ACTUATOR[n].default if n in ACTUATOR else 0.0))
     }  # fmt: skip
     rows: list[tuple[str, ...]] = []
-    for name, (value, error, around, *rest) in told.items():
+    for name, (value, error, around, *rest) in described.items():
         true, place = ((), ()) if truth is None else _true(fit.estimates.get(name), truth.get(name))
         other = () if beside is None else (beside[1].get(name, ""),)
         rows.append((Symbol(name), *true, value, error, around, *place, *other, *rest))
@@ -116,8 +116,8 @@ def finding(what: str, e: Estimate, true: float | None = None) -> KeyNumber:
 
 def plain_estimate(e: Estimate, true: float | None = None) -> dict[str, object]:
     """An estimate as plain values, beside the truth of a twin."""
-    told: dict[str, object] = {"value": e.value, "stderr": e.stderr, "interval": e.interval}
-    return told if true is None else told | {"truth": true, "inside": within(e, true)}
+    plain: dict[str, object] = {"value": e.value, "stderr": e.stderr, "interval": e.interval}
+    return plain if true is None else plain | {"truth": true, "inside": within(e, true)}
 
 
 def interval(e: Estimate) -> str:
@@ -141,9 +141,9 @@ def score_table(runs: Mapping[str, RunScore]) -> Table:
         for horizon, how, percents in ((score.horizon, _compared(score), score.fit_percent), *further):
             for name, value in percents.items():
                 first = percents is score.fit_percent  # of several horizons that which is judged alone is compared
-                told = [of for of, some in ((score.naive, windowed), (score.black_box, boxed)) if some]
-                told += [score.inside] if banded else []
-                beside = [percent(of[name]) if first and name in of else "" for of in told]
+                columns = [of for of, some in ((score.naive, windowed), (score.black_box, boxed)) if some]
+                columns += [score.inside] if banded else []
+                beside = [percent(of[name]) if first and name in of else "" for of in columns]
                 allowed = score.ceiling.get(horizon or 0.0, {})
                 beside += [percent(allowed[name]) if name in allowed else ""] if limited else []
                 fits = (percent(value),) if not apart else (percent(value), "")[:: 1 if horizon is None else -1]
@@ -186,8 +186,8 @@ def cross_table(crossed: CrossValidation) -> Table:
 def pole_table(fit: Fit) -> Table:
     """Poles at every equilibrium with their 95 % intervals, and the frequency of each swing."""
     rows: list[tuple[str, ...]] = []
-    for at, found in fit.poles.items():
-        for pole in found:
+    for at, poles in fit.poles.items():
+        for pole in poles:
             value, around = with_error(pole.real.value, pole.real.stderr)[0], interval(pole.real)
             if pole.imag.value > 0:
                 value += f" ± {with_error(pole.imag.value, pole.imag.stderr)[0]} i"

@@ -81,10 +81,10 @@ def sensor_table(
     if c.guess == "counts":
         count: dict[str, Value] = {"value": counts[0], "assumed": True}
         table.key("counts_per_rev" if turns else "counts_per_m", count, f"MEASURE: {counts[1]}")
-    elif c.quantum.counts_per_rev and turns:
-        table.key("counts_per_rev", {"value": c.quantum.counts_per_rev, "measured": True}, "from the column's steps")
-    elif c.quantum.step and c.guess in ("rad", "m"):
-        step = {"value": f"{c.quantum.step:.4g} {c.guess}", "measured": True}
+    elif c.resolution.counts_per_rev and turns:
+        table.key("counts_per_rev", {"value": c.resolution.counts_per_rev, "measured": True}, "from the column's steps")
+    elif c.resolution.step and c.guess in ("rad", "m"):
+        step = {"value": f"{c.resolution.step:.4g} {c.guess}", "measured": True}
         table.key("resolution", step, "from the column's steps")
     where = "lay before the first command" if driven else "comes to rest"
     zero = zero if abs(zero) > 1e-9 * (c.high - c.low) else 0.0  # a motion that has died out ends in rounding
