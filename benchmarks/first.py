@@ -105,9 +105,9 @@ def _twin(make: Make, seed: int) -> Source:
     names = [c.name for c in plant.coordinates]
     units = [c.unit for c in plant.coordinates]
     columns: dict[str, tuple[str, np.ndarray]] = {}
-    for i, (name, unit, quantum) in enumerate(zip(names, units, make.quantum, strict=True)):
+    for i, (name, unit, resolution) in enumerate(zip(names, units, make.resolution, strict=True)):
         y = x[:, 2 * i, 0] + (noise if unit == "rad" else 0.01 * noise) * generator.normal(size=samples)
-        columns[name] = (unit, np.round(y / quantum) * quantum)
+        columns[name] = (unit, np.round(y / resolution) * resolution)
     if plant.inputs:
         columns["u"] = ("V", volts[:, 0])
     return Source(

@@ -71,7 +71,7 @@ def test_a_fit_predicts_another_swing_and_knows_a_different_rig(fit):
 
 
 def test_a_fit_goes_to_a_file_that_the_commands_read(fit, tmp_path):
-    from upright.study.fitted import read_fit
+    from upright.study.stored_fit import read_fit
 
     assert read_fit(fit.save(tmp_path / "fit.json")).values["l_cg"] == fit.parameters.value["l_cg"]
     assert json.loads((tmp_path / "fit.json").read_text(encoding="utf-8")) == plain_values(fit.numbers)

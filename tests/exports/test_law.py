@@ -403,11 +403,11 @@ def test_the_replay_finds_a_law_that_forgets_a_bad_reading(to, tmp_path):
 
 def test_the_module_holds_the_simulated_rig_with_the_kernel_s_commands(tmp_path):
     """Closed loop of the nonlinear rig: what its encoders showed, given to the Python module, one by one."""
-    law = replace(designed("filtered"), **REST, command_quantum=1e-3)
+    law = replace(designed("filtered"), **REST, command_resolution=1e-3)
     x0 = RIG.state("inverted", theta=math.pi + 0.03)
     motion = simulate(RIG, {}, x0, None, law.period, samples=500, substeps=2, loop=law)[:, :, 0]
-    quantum = REST["quantum"]
-    readings = np.floor(motion[:, [0, 2]] * (1.0 / quantum) + 0.5) * quantum
+    resolution = REST["resolution"]
+    readings = np.floor(motion[:, [0, 2]] * (1.0 / resolution) + 0.5) * resolution
     scope: dict[str, object] = {}
     exec(TARGETS["python"].write(of_law(law), self_test(of_law(law)), False)["law.py"], scope)
     run = scope["Law"]()  # type: ignore[operator]

@@ -64,7 +64,7 @@ def relay(t, y, r, z, p):
 
 MIXED = Rule(
     function=everything, initial=[0.0, 0.1], parameters=[0.3], measured=("theta", "psi"), period=2e-3,
-    references=[[0.0]], limit=2.0, command_quantum=[0.001, 0.0], quantum=[2 * pi / 4096, 0.0],
+    references=[[0.0]], limit=2.0, command_resolution=[0.001, 0.0], resolution=[2 * pi / 4096, 0.0],
 )  # fmt: skip
 RULES = {"swing-up": swing_up, "everything": lambda: MIXED, "relay": lambda: BARE}
 BARE = Rule(function=relay, measured=("x",), period=0.01)

@@ -41,7 +41,7 @@ class Workers:
     executor: Executor | None = None
 
     @classmethod
-    def of(cls, given: int | str | Executor | Workers) -> Workers:
+    def of(cls, workers: int | str | Executor | Workers) -> Workers:
         """Workers by their number, the address of a Dask scheduler, or as any executor of `concurrent.futures`.
 
         Raises
@@ -49,14 +49,14 @@ class Workers:
         BadInput
             When it is none of these.
         """
-        if isinstance(given, Workers):
-            return given
-        if isinstance(given, Executor) or callable(getattr(given, "submit", None)):
-            return cls(executor=cast("Executor", given))
+        if isinstance(workers, Workers):
+            return workers
+        if isinstance(workers, Executor) or callable(getattr(workers, "submit", None)):
+            return cls(executor=cast("Executor", workers))
         try:
-            return cls(number=index(given))  # type: ignore[arg-type]
+            return cls(number=index(workers))  # type: ignore[arg-type]
         except TypeError:
-            text = str(given).strip()
+            text = str(workers).strip()
         return cls(number=int(text)) if re.fullmatch(r"[+-]?\d+", text) else cls(cluster=text)
 
     def __post_init__(self) -> None:
@@ -171,8 +171,8 @@ def _there(
     order = carried(task)
     interrupted = False
 
-    def collect(done: Any) -> None:
-        for future in done:
+    def collect(ended: Any) -> None:
+        for future in ended:
             results[running[future]] = unpacked(future.result())
             del running[future]
 

@@ -48,7 +48,7 @@ def test_degrees_and_nameless_columns_about_half_a_turn_are_angles(drafted):
 def test_encoder_counts_are_found_in_radians(drafted):
     step = 2 * math.pi / 4000
     _, study = drafted(theta=np.round(SWING / step) * step)
-    assert study.runs[0].quantum == pytest.approx((step,), rel=1e-6)
+    assert study.runs[0].resolution == pytest.approx((step,), rel=1e-6)
 
 
 def test_the_part_before_the_release_and_the_rest_are_left_out(drafted):

@@ -302,7 +302,7 @@ def _foreseen(
     others: Mapping[str, Array], wish: RegulationRequest, seed: int, workers: Workers, progress: Progress,
 ) -> Attempt:  # fmt: skip
     placed = place(model.A, model.B, poles)
-    law = feedback(velocities(model, sampled, wish.speed, wish.memory, rig.limit, rig.quantum), placed.K)
+    law = feedback(velocities(model, sampled, wish.speed, wish.memory, rig.limit, rig.resolution), placed.K)
     told = preflight(
         rig, model, sampled, law, task, parameters=others, lanes=wish.draws, seed=seed, workers=workers,
         progress=progress,
@@ -340,14 +340,14 @@ def _ways(done: Regulation, model: StateSpace, sampled: StateSpace) -> list[Velo
     driven = model.to_sampled(sampled.period, sampled.delay, done.rig.lag)
     out: list[VelocityRun] = []
     for speed in SPEEDS:
-        way = velocities(model, sampled, speed, done.wish.memory, done.rig.limit, done.rig.quantum)
+        way = velocities(model, sampled, speed, done.wish.memory, done.rig.limit, done.rig.resolution)
         law = feedback(way, K)
         stands = bool(np.abs(poles_of(closed(driven, law))).max() < 1)
         went = trial(on, law, at=done.task.at, start=actual_start(done.task, done.seed), seconds=done.task.seconds)
         out.append(
             VelocityRun(
                 name=way.name,
-                noise=command_noise(driven, law, done.rig.quantum) if stands else None,
+                noise=command_noise(driven, law, done.rig.resolution) if stands else None,
                 margins=margins(driven, law) if stands else None,
                 run=went,
                 score=score(went),

@@ -125,7 +125,7 @@ def balance_of(record: Record, found: Recognised) -> Balanced | None:
     if np.abs(tilt).max() > SMALL or np.mean(np.abs(u) > 1e-3 * np.abs(u).max()) < BUSY:
         return None
     dt = float(record.t[-1] - record.t[0]) / (record.t.size - 1)
-    steps = [(c.quantum.step or 0.0) * _si(c.guess) for c in found.columns.values()]
+    steps = [(c.resolution.step or 0.0) * _si(c.guess) for c in found.columns.values()]
     wide = max(acceleration_width(x, dt, step) for x, step in zip((first, tilt), steps, strict=True))
     width = max(7, int(min(max(wide, SMOOTHED[0] / dt), SMOOTHED[1] / dt)) | 1)
     if record.t.size < 30 * width:

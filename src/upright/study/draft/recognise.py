@@ -181,7 +181,7 @@ def _as_angle(record: Record, c: Column, seen: Inspection) -> Column:
 
 def _in_degrees(record: Record, c: Column) -> Column:
     """A column guessed to be an angle in rad that swings to and fro by more than half a turn is one in degrees."""
-    if c.unit or c.guess != "rad" or c.quantum.counts_per_rev:  # its steps are whole parts of a turn in rad
+    if c.unit or c.guess != "rad" or c.resolution.counts_per_rev:  # its steps are whole parts of a turn in rad
         return c
     x = record[c.name] - np.median(record[c.name])
     far = x[np.abs(x) > math.pi]

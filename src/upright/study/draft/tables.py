@@ -90,12 +90,12 @@ def sensor_table(
     if c.guess == "counts":
         count: dict[str, Value] = {"value": counts[0], "assumed": True}
         table.key("counts_per_rev" if turns else "counts_per_m", count, f"MEASURE: {counts[1]}")
-    elif c.quantum.counts_per_rev and turns:
-        table.key("counts_per_rev", {"value": c.quantum.counts_per_rev, "measured": True}, "from the column's steps")
-    elif c.quantum.step and not c.quantum.decimals and c.guess in PLACES:
-        step = {"value": f"{c.quantum.step:.4g} {c.guess}", "measured": True}
+    elif c.resolution.counts_per_rev and turns:
+        table.key("counts_per_rev", {"value": c.resolution.counts_per_rev, "measured": True}, "from the column's steps")
+    elif c.resolution.step and not c.resolution.decimals and c.guess in PLACES:
+        step = {"value": f"{c.resolution.step:.4g} {c.guess}", "measured": True}
         table.key("resolution", step, "from the column's steps")
-    elif (most := c.quantum.step or c.quantum.hidden) and c.guess in PLACES:
+    elif (most := c.resolution.step or c.resolution.hidden) and c.guess in PLACES:
         why = "MEASURE: no encoder's steps are seen; digits or noise hide any up to that"
         table.key("resolution", {"value": f"{most:.3g} {c.guess}", "assumed": True}, why)
     where = "lay before the first command" if driven else "comes to rest"

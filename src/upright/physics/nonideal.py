@@ -12,7 +12,7 @@ from upright.quantities import quantity
 from upright.systems import StateSpace
 
 
-class WornFuruta(Furuta):
+class NonidealFuruta(Furuta):
     """A Furuta pendulum whose drive's torque ripples with its angle; out of level by `tilt_x` and `tilt_y`."""
 
     T_r: float = quantity("N m", "ripple of the drive's torque", default=0.0, at_least=0)
@@ -35,7 +35,7 @@ class WornFuruta(Furuta):
         return plant.replace(tilt_x=0.0, tilt_y=0.0).linear(at, side=side)
 
 
-class WornCartPendulum(CartPendulum):
+class NonidealCartPendulum(CartPendulum):
     """A pendulum on a cart whose drive's force ripples along a rail that is out of level."""
 
     F_r: float = quantity("N", "ripple of the drive's force", default=0.0, at_least=0)
