@@ -1,7 +1,7 @@
 """Loops in which nothing is broken: which interlocks that know a model would have stopped them all the same?
 
-Rigs of both makes, drawn and non-ideal (more friction close to rest, ripple of the torque, a frame out of level, play and
-encoders off centre), are held upright by a law for the rig as designed, for 4 s each: at rest inside dry friction,
+Rigs of both makes, drawn and non-ideal (more friction close to rest, ripple of the torque, a frame out of level, play
+and encoders off centre), are held upright by a law for the rig as designed, for 4 s each: at rest inside dry friction,
 tapped, pushed by a finger for up to 0.2 s, and led by a reference.
 """
 

@@ -357,8 +357,8 @@ def _failed(e: Experiment, why: str) -> Chapter:
 
 
 NONIDEAL = (
-    "They have unmodelled effects: friction larger close to rest, a drive that ripples and lags, a tilted frame, encoders "
-    "with play and off centre. No model has this; what remains of it is reported."
+    "They have unmodelled effects: friction larger close to rest, a drive that ripples and lags, a tilted frame, "
+    "encoders with play and off centre. No model has this; what remains of it is reported."
 )
 TWINS = "Digital twins: dry friction, encoder counts, delay and limits as on rigs; none was touched."
 TITLE = "The laboratory: identify it hanging, hold it upright"
