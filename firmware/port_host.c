@@ -9,6 +9,8 @@
  *     wrap CHANNEL V  the counter's own number, without that anything moved
  *     illegal         a quadrature transition that no encoder makes
  *     overrun         a tick comes due during the one before
+ *     glitch STEPS    the converter puts out something else than it was commanded
+ *     reset           the board starts anew, as after a dip of its supply
  *     run TICKS       time passes without the host
  *     skip TICKS      the same, but of these ticks only the last one comes
  *     state           answers: tick, psi, psi', theta, theta', command [steps], enable line, mode
@@ -49,11 +51,13 @@ static uint32_t tick;
 uint32_t port_counts(uint8_t channel) { return counter[channel]; }
 uint16_t port_illegal(void) { return illegal; }
 void port_command(int16_t steps) { command = steps; }
+bool port_settled(void) { return true; }
 void port_enable(bool on) {
     enabled = on;
     plant.running |= on;
 }
 uint8_t port_reset_cause(void) { return 0; }
+uint32_t port_boot(void) { return port_virtual ? 0 : (uint32_t)time(NULL) ^ (uint32_t)getpid() << 16; }
 uint32_t port_lock(void) { return 0; } /* tick and frames take turns in one thread */
 void port_unlock(uint32_t before) { (void)before; }
 
@@ -89,6 +93,11 @@ static void obey(const char *line) {
         counter[a] = (uint32_t)b;
     } else if (!strcmp(line, "illegal")) {
         illegal++;
+    } else if (sscanf(line, "glitch %ld", &a) == 1) {
+        command = (int16_t)a;
+    } else if (!strcmp(line, "reset")) {
+        tick = 0;
+        rig_reset();
     } else if (!strcmp(line, "overrun")) {
         rig_overrun();
     } else if (sscanf(line, "run %ld", &a) == 1 && port_virtual) {

@@ -39,7 +39,7 @@
 #define SLICES_PER_TICK 20
 #define BYTES_PER_SLICE 5  /* 1 Mbaud */
 #define EDGES_PER_SLICE 4  /* of one encoder, at most; its interrupt takes 110 cycles each time */
-#define LONGEST_ANSWER(bytes) (260 + 2 * (bytes)) /* slices; a host may exchange at every tenth tick only */
+#define LONGEST_ANSWER(bytes) (10000 + 2 * (bytes)) /* slices; a law is looked at for 0.1 s */
 #define WRITE_AND_UPDATE 0x03
 #define RAM 0x800000
 
@@ -62,7 +62,8 @@ static avr_cycle_count_t worst_tick;
 
 static void sent(struct avr_irq_t *irq, uint32_t byte, void *unused) {
     (void)irq, (void)unused;
-    answered |= byte == 0;
+    static receiver_t as_host;
+    answered |= frame_receive(&as_host, (uint8_t)byte) > 0;
     if (answer_bytes < sizeof answer) answer[answer_bytes++] = over_the_wire(&mishaps, (uint8_t)byte);
 }
 static void uart_on(struct avr_irq_t *irq, uint32_t value, void *unused) {
@@ -225,7 +226,10 @@ static void listen_to_wire(int wire) {
     for (ssize_t i = 0; i < got; i++) bytes[n + i] = over_the_wire(&mishaps, bytes[n + i]);
     n += (size_t)got;
     uint8_t *frame = bytes, *end;
-    while ((end = memchr(frame, 0, n - (size_t)(frame - bytes)))) {
+    for (;;) {
+        uint8_t *from = frame, *last = bytes + n;
+        while (from < last && !*from) from++; /* zeros in front go with a frame */
+        if (!(end = memchr(from, 0, (size_t)(last - from)))) break;
         if (!mishaps.cut) hand_over(wire, frame, (size_t)(end + 1 - frame));
         frame = end + 1;
     }

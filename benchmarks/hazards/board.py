@@ -73,7 +73,7 @@ def in_a_buffer(story: Story) -> None:
     old = story.tick.tick
     story.go(0.05)
     story.breaks()
-    story.on.line.write(pack(Kind.EXCHANGE, 0, exchange(16_000, 0.0, old)))
+    story.on.line.write(pack(Kind.EXCHANGE, 0, story.on.rig.session, exchange(16_000.0, old)))
     story.tick = story.beside.rig.exchange(0.0)
 
 
@@ -95,7 +95,8 @@ def past_supervisor(law: Callable[[Any], Any], sent: Callable[[OnboardLaw], Onbo
         story.breaks()
         try:
             if sent:
-                on.line.write(pack(Kind.LAW, 0, sent(onboard(bad, beside.about, beside.about.period)).body()))
+                body = sent(onboard(bad, beside.about, beside.about.period)).body()
+                on.line.write(pack(Kind.LAW, 0, on.rig.session, body))
             else:
                 on.rig.start(Mode.MCU, bad)
             on.let_go()

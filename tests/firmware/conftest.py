@@ -49,7 +49,7 @@ def avr(built: Callable[[str, str], Path]) -> Iterator[Start]:
     built("simrig", "cc simavr")
 
     def start(*arguments: str) -> Board:
-        boards.append(Board(folder / "simrig", folder / "atmega2560.elf", *arguments))
+        boards.append(Board(folder / "simrig", folder / "atmega2560-analog.elf", *arguments))
         return boards[-1]
 
     yield start

@@ -37,6 +37,7 @@ from upright.records import Array
 from upright.rig import Rig
 from upright.rig.completion import completed
 from upright.systems import StateSpace, to_s, to_z
+from upright.workers import one_thread
 
 SLOWEST, ROWS = 10.0, 60_000
 """Time constants of the slowest pole, and most samples, for which the motion to rest is simulated."""
@@ -215,6 +216,7 @@ class Designed:
         return out
 
 
+@one_thread()
 def design_for(rig: Rig | StateSpace, request: DesignRequest) -> Designed:
     """Gains as wished, and their loop as a computer runs it.
 

@@ -16,10 +16,11 @@ from upright.physics import Plant, find, name_of
 from upright.readers.inspection import Column, Inspection
 from upright.records import Array, Record
 from upright.rig import Hardware, Rig
+from upright.study.description import rig_with_guesses
 from upright.study.draft.recognise import RATE, drive_column, recognise
 from upright.study.rig import read_plant, read_rig
 from upright.study.sensors import Drive, Sensor, Wiring, drive_unit, read_drives, read_sensors
-from upright.study.stored_rig import read_stored_rig, rig_with_guesses
+from upright.study.stored_rig import read_stored_rig
 from upright.study.text import Section, StudyText
 
 COUNTERS = (2 * math.pi, 360.0, 65536.0, 4294967296.0)

@@ -26,12 +26,11 @@ from upright.records import Array, Record
 from upright.rig import Hardware, Rig
 from upright.study.clock import check_clock
 from upright.study.coordinates import Sensors
-from upright.study.description import read_hardware
+from upright.study.description import read_hardware, rig_with_guesses
 from upright.study.keys import names
 from upright.study.loop import Scene, read_loop, state_units
 from upright.study.rig import known_values, read_plant, read_rig
 from upright.study.sensors import Grid, drive_unit, read_drives, read_sensors
-from upright.study.stored_rig import rig_with_guesses
 from upright.study.text import Section, StudyText, as_written, in_si
 
 PathLike = str | os.PathLike[str]

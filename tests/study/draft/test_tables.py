@@ -37,11 +37,11 @@ def comments(*tables: TomlTable) -> dict[str, str]:
 @pytest.mark.parametrize(
     ("column", "unit", "factor"),
     [
-        (col("u", "V"), "V", 1.0), (col("u", "V", unit="mV"), "mV", 1.0), (col("u"), "", 1.0),
-        (col("u", "counts", lies=DAC), "V", 1 / 819),
+        (col("u", "V"), "V", 1.0), (col("u", "V", unit="mV"), "V", 1e-3), (col("u"), "", 1.0),
+        (col("u", "kN"), "N", 1e3), (col("u", "N mm"), "N m", 1e-3), (col("u", "counts", lies=DAC), "V", 1 / 819),
     ],
 )  # fmt: skip
-def test_a_command_has_the_unit_it_states_or_that_of_its_converter(column, unit, factor):
+def test_a_command_has_its_unit_without_a_prefix_or_that_of_its_converter(column, unit, factor):
     assert command_unit(column) == (unit, factor)
 
 
@@ -77,7 +77,12 @@ THETA, X = Coordinate("theta", "rad", "angle"), Coordinate("x", "m", "place")
          {"unit": "m", "resolution": {"value": "0.003142 m", "measured": True}, "offset": 0.0}),
         (THETA, col("a", "rad", resolution=Resolution(step=0.02)), 0, False,
          {"unit": "rad", "resolution": {"value": "0.02 rad", "measured": True}, "offset": 0.0}),
-        (X, col("a", "mm", resolution=Resolution(step=0.02)), 0, False, {"unit": "mm", "offset": 0.0}),
+        (X, col("a", "mm", resolution=Resolution(step=0.02)), 0, False,
+         {"unit": "mm", "resolution": {"value": "0.02 mm", "measured": True}, "offset": 0.0}),
+        (X, col("a", "mm", resolution=Resolution(step=0.1, decimals=True)), 0, False,
+         {"unit": "mm", "resolution": {"value": "0.1 mm", "assumed": True}, "offset": 0.0}),
+        (THETA, col("a", "deg", resolution=Resolution(hidden=0.01)), 0, False,
+         {"unit": "deg", "resolution": {"value": "0.01 deg", "assumed": True}, "offset": 0.0}),
         (X, col("a", high=100.0), 0.99e-7, False, {"offset": 0.0}),
         (X, col("a", high=100.0), 1.01e-7, False, {"offset": 1.01e-7}),
         (X, col("a", low=-100.0, high=0.0), -0.99e-7, False, {"offset": 0.0}),

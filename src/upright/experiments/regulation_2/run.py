@@ -33,7 +33,7 @@ from upright.rig.makes import MAKES, PENDULUMS, make_of_vendor
 from upright.rig.variation import allowed
 from upright.study.stored_rig import read_stored_rig
 from upright.systems import StateSpace
-from upright.workers import HERE, Workers
+from upright.workers import HERE, Workers, one_thread
 
 START = (math.radians(5), 0.0)
 """Tilt [rad] and speed [rad/s] with which a pendulum is let go where nobody says and no make has its own."""
@@ -217,6 +217,7 @@ def request_for(stand: TestStand, known: Rig) -> RegulationRequest:
     return replace(request, poles={f"{name} x{faster:.2g}": faster * p for name, p in request.poles.items()})
 
 
+@one_thread()
 def run_regulation(
     rig: Rig, stand: TestStand | None, seed: int, folder: Path, progress: Progress = silent,
     stopped: Callable[[], bool] = lambda: False, request: RegulationRequest | None = None, source: str = "FIT",

@@ -114,9 +114,9 @@ class SwingUpRun:
 
     @property
     def caught(self) -> bool:
-        """Whether it stood for `HELD` at the end."""
+        """Whether it stood for `HELD` at the end, the drive on."""
         a = self.ascent
-        return a is not None and a.up <= float(a.trial.t[-1]) - HELD
+        return a is not None and math.isinf(a.tripped) and a.up <= float(a.trial.t[-1]) - HELD
 
     @property
     def sound(self) -> bool:

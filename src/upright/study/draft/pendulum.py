@@ -17,13 +17,13 @@ import numpy as np
 
 from upright.physics import Plant, find
 from upright.quantities import with_unit
-from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Inspection
+from upright.readers.inspection import Inspection
 from upright.records import Record
 from upright.signals.smoothing import acceleration_width, savitzky_golay, smoothed
 from upright.study.draft.described import counts_of
 from upright.study.draft.hinge import hinge_of
 from upright.study.draft.plausible import implausible
-from upright.study.draft.recognise import Recognised, in_dac_counts
+from upright.study.draft.recognise import Recognised
 from upright.study.draft.tables import (
     assumed,
     command_unit,
@@ -119,7 +119,7 @@ def balance_of(record: Record, recognised: Recognised) -> Balanced | None:
     if recognised.plant not in ("cart-pendulum", "furuta") or recognised.drive is None or len(recognised.columns) < 2:
         return None
     first, last = (record[c.name] * _si(c.guess) for c in recognised.columns.values())
-    u = record[recognised.drive.name]
+    u = command_unit(recognised.drive)[1] * record[recognised.drive.name]
     centre = float(np.median(last))
     tilt = last - centre
     if np.abs(tilt).max() > SMALL or np.mean(np.abs(u) > 1e-3 * np.abs(u).max()) < BUSY:
@@ -256,7 +256,7 @@ def _gain(recognised: Recognised) -> float:
     c = next(iter(recognised.columns.values()))
     swing = (c.high - c.low) / 2 * {"counts": 4e-4, "mm": 1e-3, "deg": 0.017}.get(c.guess, 1.0)
     u = max(abs(recognised.drive.low), abs(recognised.drive.high)) or 1.0
-    u /= DAC_COUNTS_PER_VOLT if in_dac_counts(recognised.drive) else 1.0
+    u *= command_unit(recognised.drive)[1]
     w = recognised.frequency or 6.0
     inertia = INERTIA.get(recognised.plant, (G / w**2) ** 2)  # of the 1 kg that is assumed
     return max(inertia * swing * w**2 / u, 1e-9)

@@ -21,9 +21,13 @@ from upright.files import read_text
 from upright.identification.model.bands import Bands, Spread
 from upright.identification.model.fit import Judgement
 from upright.identification.model.grey_box import SUBSTEPS
-from upright.physics import PLANTS, find
+from upright.physics import PLANTS, Plant, find
 from upright.physics.actuator import ACTUATOR
+from upright.rig import Rig
+from upright.rig.drive import GAIN
 from upright.rig.hardware import DRIVE_SIGN, Entry, Hardware, check_vendor
+from upright.study.description import rig_of_numbers
+from upright.trust import before_running
 
 FORMAT = 1
 LARGEST = 1e12
@@ -32,10 +36,11 @@ SILENT = Basis(level=NOT_TRUSTED, sentence="This fit does not say whether it can
 
 
 @dataclass(frozen=True, kw_only=True)
-class FittedModel:
-    """What is read of a `fit.json`: the plant's name, every parameter [SI], what groups share, the rig, all content.
+class StoredFit:
+    """What is read of a `fit.json`: every parameter [SI], what groups share, the hardware, all content.
 
     `bands` are None in files that versions without them wrote. `basis` is the fit's own verdict, for what rests on it.
+    `path` is that of the file, None of a fit in memory, whose plant is the `kind` itself.
     """
 
     plant: str
@@ -48,6 +53,55 @@ class FittedModel:
     bands: Bands | None = None
     basis: Basis = SILENT
     content: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    path: Path | None = None
+    in_memory: type[Plant] | None = None
+
+    @property
+    def kind(self) -> type[Plant]:
+        """The plant that it is a fit of; one in a file of its own is announced before it runs."""
+        if self.in_memory is not None:
+            return self.in_memory
+        if self.path is None:
+            return find(self.plant)
+        before_running(self.plant, self.path)
+        return find(self.plant, self.path.parent)
+
+    def rig(self, *, seed: int = 0, draws: int = 200) -> Rig:
+        """The rig as identified, and rigs drawn from the fit's covariance.
+
+        Raises
+        ------
+        BadInput
+            When a parameter of the plant is missing.
+        """
+        kind = self.kind
+        names = set(kind.names())
+        try:
+            plant = kind(**{n: v for n, v in self.values.items() if n in names})
+        except TypeError:
+            raise BadInput(f"the fit does not hold every parameter of '{self.plant}'; identify again.") from None
+        sources = {n: self.source(n) for n in self.values if n in names | {GAIN}}
+        known = rig_of_numbers(plant, self.plant, self.values, self.unit(GAIN), self.hardware)
+        return replace(known, basis=self.basis, sources=sources, draws=tuple(self._drawn(plant, seed, draws)))
+
+    def _drawn(self, plant: Plant, seed: int, draws: int) -> list[tuple[Plant, float]]:
+        """Sets of numbers as standard errors and correlations scatter them; impossible ones are left out."""
+        names, covariance = self.covariance((*plant.names(), GAIN))
+        if not covariance.any():
+            return []
+        size, axes = np.linalg.eigh(covariance)
+        rng = np.random.default_rng([seed, 17])
+        moves = rng.normal(size=(draws, len(names))) * np.sqrt(np.maximum(size, 0.0)) @ axes.T
+        out: list[tuple[Plant, float]] = []
+        gain, sign = self.values.get(GAIN, 1.0), self.hardware.value(DRIVE_SIGN, 1.0)
+        for move in moves.tolist():
+            change = dict(zip(names, move, strict=True))
+            moved = sign * (gain + change.pop(GAIN, 0.0))
+            try:
+                out.append((plant.replace(**{n: getattr(plant, n) + d for n, d in change.items()}), moved))
+            except ImpossiblePhysics:
+                continue
+        return out
 
     def unit(self, name: str) -> str:
         """Unit of a parameter, "" where the file does not tell."""
@@ -85,7 +139,7 @@ class FittedModel:
         return names, correlation[np.ix_(places, places)] * np.outer(errors, errors)
 
 
-def read_fit(path: Path) -> FittedModel:
+def read_fit(path: Path) -> StoredFit:
     """Model of a `fit.json`.
 
     Raises
@@ -107,12 +161,12 @@ def read_fit(path: Path) -> FittedModel:
             f"{path} has format {_shown(content.get('format'))}, this version reads {FORMAT}; identify again"
         )
     try:
-        return fitted_model(content)
+        return replace(stored_fit(content), path=path)
     except (BadInput, ImpossiblePhysics) as error:
         raise BadInput(f"{path}: {str(error).rstrip('.')}; identify again, or put it right") from None
 
 
-def fitted_model(content: dict[str, Any]) -> FittedModel:
+def stored_fit(content: dict[str, Any]) -> StoredFit:
     """Model of what a `fit.json` holds; see `read_fit`."""
     plant, verdict = (_text(content.get(key, ""), key) for key in ("plant", "verdict"))
     if not plant:
@@ -133,7 +187,7 @@ def fitted_model(content: dict[str, Any]) -> FittedModel:
         label: {n: _value(f"groups.{label}.{n}", e) for n, e in _table(group, f"groups.{label}").items()}
         for label, group in _table(content.get("groups", {}), "groups").items()
     }
-    return FittedModel(
+    return StoredFit(
         plant=plant, values=values, substeps=substeps, verdict=verdict, trusted=trusted, groups=groups, content=content,
         basis=_basis(content, verdict, trusted=trusted), hardware=_hardware(content, values),
         bands=None if content.get("bands") is None else _bands(content["bands"]),

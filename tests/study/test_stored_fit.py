@@ -9,7 +9,7 @@ from tests.study.mutations import at, changed, paths, wrong
 from upright.diagnosis.case import read_known
 from upright.errors import BadInput, UprightError
 from upright.physics import CartPendulum
-from upright.study.fitted import read_fit
+from upright.study.stored_fit import read_fit
 from upright.study.stored_rig import read_stored_rig
 
 
