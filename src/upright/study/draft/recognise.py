@@ -12,7 +12,7 @@ from upright.errors import BadInput
 from upright.physics import PLANTS, Plant, find
 from upright.readers.inspection import Column, Inspection, effort_unit
 from upright.records import Array, Record
-from upright.records.columns import bare_name
+from upright.records.columns import ANGLES, LENGTHS, bare_name
 from upright.signals.smoothing import savitzky_golay, smoothed, white_noise
 from upright.study.draft.hinge import hinge_of
 from upright.study.draft.release import free_from, free_swings
@@ -100,7 +100,7 @@ def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
     centre = rest[list(columns)[-1]]
     driven = record[next(iter(columns.values())).name]
     earlier: tuple[tuple[float, float], ...] = ()
-    turned = {"rad": 1.0, "deg": math.pi / 180}.get(columns[list(columns)[-1]].guess, 0.0)
+    turned = ANGLES.get(columns[list(columns)[-1]].guess, 0.0)
     if drive is None and turned and list(columns)[-1] == "theta":
         angle = turned * (last - centre)
         small = swing_frequency(record.t[inside], angle[inside])
@@ -131,7 +131,7 @@ def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
 
 def position_columns(record: Record, seen: Inspection) -> list[Column]:
     """Columns that measure a place and move, without speeds, drives, clocks and liars."""
-    kinds = ("rad", "m", "counts", "deg", "mm", "")
+    kinds = (*ANGLES, *LENGTHS, "counts", "")
     places = [c for c in seen.columns if not c.drive and c.name not in record.inputs and c.guess in kinds]
     found = [c for c in places if not (c.constant or _lies(c, seen))]
     found = [c for c in found if not RATE.search(c.name) and not _is_speed(record, c.name, [o.name for o in found])]
@@ -219,9 +219,9 @@ def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
     named = _by_coordinates({bare_name(c.name) for c in places})
     if named:
         return named, f"The columns are called as the coordinates of a {named}."
-    lengths = [c for c in places if c.guess in ("m", "mm")]
+    lengths = [c for c in places if c.guess in LENGTHS]
     counts = [c for c in places if c.guess in ("counts", "")]
-    angles = [c for c in places if c.guess in ("rad", "deg")]
+    angles = [c for c in places if c.guess in ANGLES]
     bodies = min(len(counts), 3)
     if counts and not angles and not lengths:
         kind = "torsional" if any(_DISK.search(c.name) for c in counts) else "rectilinear"
@@ -262,7 +262,7 @@ def _assign(plant: type[Plant], places: list[Column]) -> tuple[dict[str, Column]
     """Column per coordinate: by name, then by kind and order."""
     left, out, missing = list(places), dict[str, Column](), list[str]()
     for coordinate in plant.coordinates:
-        kinds = ("rad", "deg") if coordinate.unit == "rad" else ("m", "mm")
+        kinds = ANGLES if coordinate.unit == "rad" else LENGTHS
         fitting = [c for c in left if c.guess in kinds] or [c for c in left if c.guess in ("counts", "")]
         pattern = {"psi": _ARM, "x": _CART}.get(coordinate.name)
         best = next((c for c in left if bare_name(c.name) == coordinate.name), None)
@@ -290,7 +290,7 @@ def zero_reading(
         u = record[drive.name]
         first = int(np.argmax(u != u[0]))
         before = x[max(0, first - 50) : first]
-        angle = c.guess in ("rad", "deg")
+        angle = c.guess in ANGLES
         if u[0] == 0 and first >= 5 and not (hangs and not _starts_still(x, u)):
             return float(np.median(before))
         return rest_level(x, seen, record.t) if angle else float(x[np.searchsorted(record.t, window[0])])
