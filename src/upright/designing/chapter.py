@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from upright.basis import in_percent
 from upright.control.effort import shown
 from upright.designing.run import Designed, Holding, VelocityLoop
 from upright.gains.lqr import locus
@@ -15,7 +16,7 @@ from upright.laws import as_values
 from upright.report.drawing import BLACK, BLUE, VERMILLION, Poles, locus_figure, pole_map, swing_figure
 from upright.report.page import Block, Chapter, Part, Picture, Points, Step, Table, resting_on
 from upright.report.rig import rig_table
-from upright.report.symbols import number, percent, plain
+from upright.report.symbols import number, plain
 from upright.report.symbols import unit as raised
 from upright.rig import Rig
 from upright.rig.completion import doubts
@@ -39,8 +40,9 @@ def chapter(done: Designed, *, source: str = "OUT/fit.json", folder: str = ".") 
         gains.append(f"Weight of the effort: {number(done.R)}.")
     sure: list[Block] = []
     if done.chance is not None:
-        stand = f"{percent(100 * done.chance)} stand with these gains"
-        sure.append(Points((f"Of the rigs that the fit's covariance allows, {stand}.",)))
+        stable = done.basis.supported(in_percent(done.chance))
+        what = "Share of the rigs sampled from the fit's covariance that these gains stabilise"
+        sure.append(Points((f"{what}: {stable}.",)))
     plain_matrices = isinstance(done.rig, StateSpace)
     loop = (
         f"Period {1e3 * done.wish.period:.4g} ms, command {done.sampled.delay:.3g} samples late "
@@ -207,7 +209,7 @@ def _numbers(done: Designed) -> dict[str, Any]:
         "lag": done.sampled.lag,
         "peak_command": done.peak,
         "peak_command_sampled": done.peak_sampled,
-        "chance_over_the_fit": done.chance,
+        "chance_over_the_fit": None if done.chance is None else done.basis.supported(done.chance),
         "at_rest": None if done.holding is None else _at_rest(done.holding),
         "readings": _readings(done),
         "states_from": done.chosen.name,

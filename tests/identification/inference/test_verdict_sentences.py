@@ -315,8 +315,8 @@ def test_the_loop_is_judged_on_the_fastest_pole_with_its_digits() -> None:
     told = growing(10.0, 9.9, 10.1, 0.05)
     assert told.answer == "yes"
     assert told.headline == (
-        "Inverted, the fastest pole is 10.000 1/s (9.9000 to 10.100); a loop whose poles are as fast as that holds "
-        "99 % of the rigs within the intervals."
+        "Inverted, the fastest pole is 10.000 1/s (9.9000 to 10.100); a loop with poles as fast as that "
+        "stabilises 99.4 % of the rigs within the intervals."
     )
     assert told.advice == ""
     at_limit = growing(10.0, 9.0, 11.0, 0.5)  # a tenth to either side, included

@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from upright.basis import NOT_SUPPORTED, in_percent
 from upright.identification.inference.assumptions import proportional, resting
 from upright.identification.inference.loop import Standing
 from upright.identification.model.fit import Assumption, Estimate, Judgement, RunScore
@@ -73,7 +74,7 @@ class Evidence:
 def judge(found: Evidence) -> tuple[Judgement, ...]:
     """The three answers."""
     predicts = _predicts(found)
-    others = _usable(found, confirmed=predicts.answer == "yes"), _loop(found)
+    others = _usable(found, confirmed=predicts.answer == "yes"), _loop(found, supported=predicts.answer != "no")
     if found.interrupted:
         return predicts, *map(_not_evaluated, others)
     if predicts.answer != "no":
@@ -260,7 +261,7 @@ def _lumped(rig: GreyBox) -> list[str]:
     return []
 
 
-def _loop(found: Evidence) -> Judgement:
+def _loop(found: Evidence, *, supported: bool) -> Judgement:
     s = found.standing
     if found.lost:
         return Judgement(question=LOOP, answer="not tested", headline="Not evaluated: the fit failed.")
@@ -284,7 +285,11 @@ def _loop(found: Evidence) -> Judgement:
             advice="Add a run in which it acts.",
         )  # fmt: skip
     half = (s.growth.interval[1] - s.growth.interval[0]) / 2 / s.growth.value
-    held = f"a loop whose poles are as fast as that holds {100 * s.share:.0f} % of the rigs within the intervals"
+    held = f"a loop with poles as fast as that stabilises {in_percent(s.share)} of the rigs within the intervals"
+    if not supported:
+        held = (
+            f"how many of the rigs within the intervals a loop with poles as fast as that stabilises is {NOT_SUPPORTED}"
+        )
     answer = "no"
     if half <= NARROW and s.share >= SURE:
         answer = "yes"
