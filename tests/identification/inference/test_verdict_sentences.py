@@ -373,3 +373,14 @@ def test_without_bands_a_signal_may_fall_behind_the_worst_fitted_one_by_fifteen(
     for percent, kept in ((80.0, True), (79.9, False)):  # never fitted: good, or not
         assert promise({"r": score("predict", psi=percent)}, None, fitted).kept == kept
     assert not promise({"r": score("predict", psi=79.9)}, None).kept
+
+
+@pytest.mark.parametrize("status", ["at bound", "firm", "weak"])
+def test_a_mass_that_went_to_nothing_fails_the_fit_in_a_sentence(status: str) -> None:
+    guessed = rig(Furuta, FURUTA, {"J_d": 2e-3})
+    told = judged(estimates={"J_d": firm(5e-13, status=status, unit="kg m^2")}, rig=guessed)
+    assert told[1].answer == "no"
+    assert not trusted(told)
+    assert any(r.startswith("J_d went to nothing, 5e-13 kg m^2, from a guess of 0.002:") for r in told[1].reasons)
+    small = judged(estimates={"J_d": firm(4e-9, status="weak", unit="kg m^2")}, rig=guessed)
+    assert not any("went to nothing" in r for r in small[1].reasons)  # 2 millionths are small, and still a number

@@ -28,6 +28,9 @@ MARGIN = 2.0
 VAGUE = 10.0
 """An interval of a positive number whose ends are this many times apart leaves it undetermined."""
 
+VANISHED = 1e-6
+"""Share of its guess below which a mass has vanished: no guess of a rig's is a million times too large."""
+
 ESSENTIAL = ("J_", "m_", "k_", "l_", "actuator.gain")
 """Numbers without which a model is none: inertias, stiffnesses, lengths, the drive; friction is often vague."""
 
@@ -193,7 +196,14 @@ def _usable(found: Evidence, *, confirmed: bool) -> Judgement:
     for n, e in asked.items():
         low, high = e.interval
         limit = found.rig.bounds(n) if n in found.rig.parameters else (-math.inf, math.inf)
-        if e.status == "at bound" and e.value != 0:
+        if _vanished(found.rig, n, e):
+            no = True
+            reasons.append(
+                f"{n} went to nothing, {e.value:.1g} {e.unit}, from a guess of {found.rig.parameters[n].value:.2g}: a "
+                "degenerate optimum, so the other numbers are not the rig's either. Measure it or the drive's gain and "
+                "give that as known, and look at the drive's sign."
+            )
+        elif e.status == "at bound" and e.value != 0:
             no = True
             reasons.append(
                 f"{n} reached its {'lower' if e.value <= limit[0] else 'upper'} limit, {_shown(e.value, e)}: the data "
@@ -251,6 +261,12 @@ def _usable(found: Evidence, *, confirmed: bool) -> Judgement:
     if any(e.status in ("weak", "unseen") for e in asked.values()):
         advice = "Measure one of the others on the bench and give it as known, or add a run that moves it more."
     return Judgement(question=USABLE, answer=answer, headline=headline, advice=advice, reasons=tuple(reasons))
+
+
+def _vanished(rig: GreyBox, name: str, e: Estimate) -> bool:
+    """Whether a mass, inertia, length or gain that cannot be zero was driven there."""
+    guess = rig.parameters[name].value if name in rig.parameters else 0.0
+    return name.startswith(("m_", "J_", "l_", "actuator.gain")) and 0 < abs(e.value) < VANISHED * abs(guess)
 
 
 def _lumped(rig: GreyBox) -> list[str]:
