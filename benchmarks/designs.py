@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from upright.gains import feedback, kalman, place, shaken
+from upright.gains import feedback, kalman, place, process_noise
 from upright.laws import Law, state_feedback
 from upright.rig.makes import NOMINAL
 from upright.rigs.protocol import Limits
@@ -38,7 +38,7 @@ def observed() -> Law:
     """The same by a Kalman observer of all four states, whose matrices have few zeros: the most that a board takes."""
     model = FURUTA.linear("inverted")
     sampled = replace(model, B=GAIN * model.B).to_sampled(PERIOD, 0.0)
-    estimator = kalman(sampled, shaken(sampled, [30.0, 30.0]), math.tau / 16_000 / math.sqrt(12))
+    estimator = kalman(sampled, process_noise(sampled, [30.0, 30.0]), math.tau / 16_000 / math.sqrt(12))
     return replace(feedback(estimator, gains("inverted", SET_1)), limit=LIMITS.command, period=PERIOD)
 
 

@@ -44,7 +44,7 @@ def count(fault: str, each: int, seed: int) -> Count:
     start = time.process_time()
     for plant in PLANTS:
         for d in batch(plant, fault, each, seed):
-            found = {f.kind for f in examine(d.record, d.known).wrong}
+            found = {f.kind for f in examine(d.record, d.rig, d.wiring).wrong}
             wanted = FAULTS.get(fault, set())
             hits += bool(found & wanted)
             others += bool(found - wanted)

@@ -46,7 +46,8 @@ class Doctored:
     """One record with what the doctor is told about its rig, and what was put in."""
 
     record: Any
-    known: Any
+    rig: Any
+    wiring: Any
     fault: str
     plant: str
     how: str
@@ -198,11 +199,9 @@ def _record(
     reference: np.ndarray | None, own: dict[str, float], gain: float, rng: np.random.Generator,
 ) -> Doctored:  # fmt: skip
     """Sensors, log and fault of one motion."""
-    from upright.diagnosis import KnownRig
-    from upright.identification import Parameter
-    from upright.physics.actuator import ACTUATOR
     from upright.records import Provenance, Record
-    from upright.study.sensors import Drive, Sensor
+    from upright.rig import Rig
+    from upright.study.sensors import Drive, Sensor, Wiring
 
     names = [c.name for c in cls.coordinates]
     encoders = rng.random() < 0.7
@@ -242,18 +241,21 @@ def _record(
                                   offset=-float(crossing) - math.pi)  # fmt: skip
     elif fault:
         t, columns, channel = inject(fault, t, columns, channel, cls, q, reference, rng)
-    known = {n: Parameter(name=n, value=0.0, estimate=True, lower=0.0) for n in cls.names()}
+    known: dict[str, float] = {}
     for n in cls.names():
         value = 9.81 if n == "g" else own.get(n, 0.0)
         if n in ("g",) or n.startswith(("m_", "l_", "J_", "r", "k_", "a_", "tilt")):
             off = 1.0 if n == "g" else 1 + KNOWN_TO * rng.normal()
-            known[n] = Parameter(name=n, value=value * off)
-    known |= {n: Parameter(name=n, value=what.default) for n, what in ACTUATOR.items()}
-    known["actuator.gain"] = Parameter(name="actuator.gain", value=gain * (1 + KNOWN_TO * rng.normal()))
-    rig = KnownRig(name=plant, plant=cls, parameters=known, sensors=sensors, drive=Drive(what="`u`"))
+            known[n] = value * off
+    guessed = {n: 0.0 for n in cls.names() if n not in known}
+    rig = Rig(
+        plant=cls(**known, **{n: v for n, v in guessed.items() if n not in cls.optional}), name=plant,
+        gain=gain * (1 + KNOWN_TO * rng.normal()), sources=dict.fromkeys(guessed, "guessed"),
+    )  # fmt: skip
+    wiring = Wiring(sensors=sensors, drive=Drive(what="`u`"))
     units = {n: s.unit for n, s in sensors.items()}
     record = Record(t=t, signals=columns, units=units, provenance=Provenance(file="log.csv", reader="table"))
-    return Doctored(record=record, known=rig, fault=fault, plant=plant, how=how, channel=channel)
+    return Doctored(record=record, rig=rig, wiring=wiring, fault=fault, plant=plant, how=how, channel=channel)
 
 
 def _moving(x: np.ndarray, rng: np.random.Generator, share: float = 0.3) -> int:

@@ -113,7 +113,7 @@ def twin(case: Case) -> Twin:
         rest = round(REST / DT)
         clean = np.concatenate([np.repeat(clean[:1], rest, 0), clean])
         u, moves = np.concatenate([np.zeros(rest), u]), np.concatenate([np.zeros(rest, bool), moves])
-    y = np.round((clean + loud * generator.normal(size=clean.shape)) / make.quantum) * make.quantum
+    y = np.round((clean + loud * generator.normal(size=clean.shape)) / make.resolution) * make.resolution
     columns = {c.name: (c.unit, y[:, i]) for i, c in enumerate(plant.coordinates)}
     if case.named:
         columns["u"] = ("V", u / gain)
@@ -142,7 +142,7 @@ def _driven(
     u = np.zeros(round(LONGEST / DT))
     u[:moved] = command(make.force or TORQUE, moved, generator)[:, 0]
     u = np.roll(u, -int(np.argmax(u != 0)))
-    clean = _moved(make, numbers, [0.0] * 2 * len(make.quantum), u)
+    clean = _moved(make, numbers, [0.0] * 2 * len(make.resolution), u)
     moves = moving(clean, loud)
     samples = _end(case, moves)
     return clean[:samples], u[:samples], moves[:samples]

@@ -48,7 +48,11 @@ def ensemble(
     values = parameters(p, stick_slip=stick_slip) | {"actuator.limit": problem.LIMIT}
     start = np.ascontiguousarray(x0[list(ORDER)].T)
     loop = state_feedback(
-        problem.gains()[list(ORDER)], problem.PERIOD, memory=problem.KEEP, target=[0.0, np.pi], quantum=problem.QUANTUM
+        problem.gains()[list(ORDER)],
+        problem.PERIOD,
+        memory=problem.KEEP,
+        target=[0.0, np.pi],
+        resolution=problem.QUANTUM,
     )
 
     def run() -> np.ndarray:
@@ -86,7 +90,7 @@ def study() -> tuple[Any, Any]:
         u=np.append(problem.TORQUE, problem.TORQUE[-1])[:, None],
         y=problem.counts(states),
         measured=("psi", "theta"),
-        quantum=(problem.QUANTUM,) * 2,
+        resolution=(problem.QUANTUM,) * 2,
         initial={"psi": 0.0, "psi_dot": 0.0, "theta_dot": 0.0},
     )
     return rig, run

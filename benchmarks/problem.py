@@ -90,7 +90,7 @@ def gains() -> np.ndarray:
 
 
 def loop_numbers() -> np.ndarray:
-    """Gains, quantum, filter, limit and period, in the baseline's order."""
+    """Gains, resolution, filter, limit and period, in the baseline's order."""
     return np.array([*gains(), QUANTUM, KEEP, LIMIT, PERIOD])
 
 

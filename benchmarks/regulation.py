@@ -73,7 +73,7 @@ def identify(truth: Rig, seed: int) -> tuple[Rig, tuple[str, ...], Array] | None
 
     noise = math.radians(0.05 * 40 ** rng.random())
     spread = np.array([noise if c.unit == "rad" else 0.2 * noise for c in truth.plant.coordinates])
-    step = truth.quantum
+    step = truth.resolution
     log = np.round(shown(truth, {}, rows)[:, :, 0] / step) * step + rng.normal(size=(rows, 2)) * spread
     error = np.hypot(spread, step / math.sqrt(12))
     model = make_rig(make.key)
@@ -169,7 +169,7 @@ def one(make: str, seed: int, *, swept: Path | None = None, flawed: bool = False
     model = rig.linear("inverted")
     sampled = model.to_sampled(rig.period, rig.delay / rig.period)
     poles = read_poles(SETS[f"set {rng.integers(1, 5)}"])
-    way = velocities(model, sampled, SPEEDS[rng.integers(3)], 0.5, rig.limit, rig.quantum)
+    way = velocities(model, sampled, SPEEDS[rng.integers(3)], 0.5, rig.limit, rig.resolution)
     law = gains.feedback(way, gains.place(model.A, model.B, poles).K)
     angle = rng.uniform(0, math.pi / 2)
     outwards = np.array([0, 0, 0.7 * math.cos(angle), 6.0 * math.sin(angle)])

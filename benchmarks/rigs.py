@@ -34,7 +34,7 @@ class Make:
     known: dict[str, float]
     force: float
     start: dict[str, float]
-    quantum: tuple[float, ...]
+    resolution: tuple[float, ...]
 
 
 MAKES = (
@@ -106,9 +106,9 @@ def sensed(make: Make, clean: np.ndarray, memory: float, loud: float, generator:
     """Motion (samples, coordinates) with noise, a share `loud` of each principal component, and rounded by encoders."""
     samples = len(clean)
     _, size, axes = np.linalg.svd(clean - clean.mean(axis=0), full_matrices=False)
-    white = np.stack([noise(samples, memory, generator) for _ in make.quantum], axis=1)
+    white = np.stack([noise(samples, memory, generator) for _ in make.resolution], axis=1)
     rough = (loud * white * size / math.sqrt(samples)) @ axes
-    return np.round((clean + rough) / make.quantum) * np.array(make.quantum)
+    return np.round((clean + rough) / make.resolution) * np.array(make.resolution)
 
 
 def logged(make: Make, label: str, role: Any, u: np.ndarray, y: np.ndarray) -> Any:
@@ -118,7 +118,7 @@ def logged(make: Make, label: str, role: Any, u: np.ndarray, y: np.ndarray) -> A
 
     measured = tuple(c.name for c in find(make.plant).coordinates)
     t = np.arange(float(len(u))) * DT
-    return Run(label=label, role=role, t=t, u=u, y=y, measured=measured, quantum=make.quantum)
+    return Run(label=label, role=role, t=t, u=u, y=y, measured=measured, resolution=make.resolution)
 
 
 def asked(make: Make, guesses: dict[str, float], known: dict[str, float] | None = None) -> Any:

@@ -14,8 +14,8 @@ from upright.identification.frequency.response import FrequencyResponse, is_resp
 from upright.questionnaire.sheet import read_sheet as read_sheet
 from upright.readers import read
 from upright.records import Record
-from upright.study.fitted import read_fit
 from upright.study.load import load_study
+from upright.study.stored_fit import read_fit
 
 READERS = {
     "log": read,

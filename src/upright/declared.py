@@ -102,23 +102,23 @@ class Declared(Mapping[str, T]):
 
     def sound(self) -> dict[str, T]:
         """Those that load; a warning names the package of one that does not."""
-        found, unsound = self._tried()
+        loaded, unsound = self._tried()
         for sentence in unsound:
             warnings.warn(sentence, stacklevel=2)
-        return found
+        return loaded
 
     def unsound(self) -> tuple[str, ...]:
         """Sentences about those that do not load."""
         return self._tried()[1]
 
     def _tried(self) -> tuple[dict[str, T], tuple[str, ...]]:
-        found, unsound = dict(self.own), list[str]()
+        loaded, unsound = dict(self.own), list[str]()
         for name, entry in self._entries.items():
             try:
-                found[name] = self._load(entry)
+                loaded[name] = self._load(entry)
             except BadInput as error:
                 unsound.append(str(error))
-        return found, tuple(unsound)
+        return loaded, tuple(unsound)
 
     def _load(self, entry: EntryPoint) -> T:
         if entry not in self._loaded:
@@ -150,11 +150,11 @@ def declared_in(kind: type[D], *rooms: str) -> Callable[[], dict[str, D]]:
     """What gathers the declarations of a kind that stand in the modules of packages, in their order."""
 
     def gather() -> dict[str, D]:
-        found: list[D] = []
+        values: list[D] = []
         for room in rooms:
             for module in iter_modules(import_module(room).__path__):
                 inside = vars(import_module(f"{room}.{module.name}")).values()
-                found += (value for value in inside if isinstance(value, kind))
-        return {one.name: one for one in sorted(found, key=lambda one: (one.order, one.name))}
+                values += (value for value in inside if isinstance(value, kind))
+        return {one.name: one for one in sorted(values, key=lambda one: (one.order, one.name))}
 
     return gather

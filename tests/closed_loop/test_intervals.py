@@ -16,10 +16,10 @@ def proportional(x, gain=0.0):
     return Regression(family=Family(), pole=0.0, columns=columns, gains=np.array([gain]), missed=0.0)
 
 
-def rounded(u, quantum):
+def rounded(u, resolution):
     """Gain and its interval of a command that is the gain itself, in rows that were rounded."""
     u = np.array(u, dtype=float)
-    best, width = sharpen(proportional(np.ones(u.size)), u, np.ones(u.size, dtype=bool), quantum)
+    best, width = sharpen(proportional(np.ones(u.size)), u, np.ones(u.size, dtype=bool), resolution)
     value, (below, above) = float(best.gains[0]), width(np.array([1.0, 0.0]))
     return value, value - below, value + above
 

@@ -72,15 +72,15 @@ def test_gains_of_many_lanes_change_their_units_lane_by_lane() -> None:
     K = np.random.default_rng(8).normal(size=(1, 4, 3))
     k_pf = np.array([2.0, 1.0, 0.5])
     scale, offset = [500.0, 800.0], [30.0, -7.0]
-    lanes = state_feedback(K, T, memory=0.5, k_pf=k_pf, limit=2.0, command_quantum=0.1).in_units(scale, offset, -3.0)
+    lanes = state_feedback(K, T, memory=0.5, k_pf=k_pf, limit=2.0, command_resolution=0.1).in_units(scale, offset, -3.0)
     for k in range(3):
         alone = state_feedback(
-            K[..., k], T, memory=0.5, k_pf=float(k_pf[k]), limit=2.0, command_quantum=0.1
+            K[..., k], T, memory=0.5, k_pf=float(k_pf[k]), limit=2.0, command_resolution=0.1
         ).in_units(scale, offset, -3.0)  # fmt: skip
         for name, (value, axes) in alone.arrays().items():
             many = lanes.arrays()[name][0]
             np.testing.assert_array_equal(many[..., k] if many.ndim > axes else many, value, err_msg=name)
-        assert (lanes.limit, float(np.max(lanes.command_quantum))) == pytest.approx((6.0, 0.3))
+        assert (lanes.limit, float(np.max(lanes.command_resolution))) == pytest.approx((6.0, 0.3))
 
 
 @pytest.mark.parametrize("every", [1, 4])

@@ -58,8 +58,8 @@ def test_every_structure_is_found_exactly(structure: str, program: dict) -> None
 @pytest.mark.parametrize(("structure", "program"), STRUCTURES.items(), ids=STRUCTURES)
 def test_rounded_commands_bound_the_gains_on_both_sides(structure: str, program: dict) -> None:
     found = found_in(closed_loop(Pid(**program), count=1e-3, step=0.01))
-    assert found.quantum == pytest.approx(0.01)
-    assert found.largest <= found.quantum
+    assert found.resolution == pytest.approx(0.01)
+    assert found.largest <= found.resolution
     for name in ("kp", "ki", "kd"):
         # every gain of the interval puts out every rounded command, so the program's own must be among them
         if program.get(name) and not program.get("tau"):

@@ -111,19 +111,19 @@ def test_what_counts_as_missing_no_more_is_a_share_a_step_or_the_arithmetic():
     u = np.round(RNG.normal(size=200) * 4) / 4
     u[5] = 3.0
     made = search(u)
-    assert made.quantum == pytest.approx(0.25)
+    assert made.resolution == pytest.approx(0.25)
     assert made.bar(10.0) == pytest.approx(10.03)
     assert made.bar(0.0) == pytest.approx(0.35 * 0.25)
     smooth = search(RNG.normal(size=200))
     assert smooth.bar(0.0) == pytest.approx(
-        max(1e-12 * np.abs(smooth.u[3:]).max(), 0.35 * smooth.quantum)
+        max(1e-12 * np.abs(smooth.u[3:]).max(), 0.35 * smooth.resolution)
     )  # fmt: skip
 
 
 def test_the_first_three_rows_tell_nothing_of_the_step_of_a_command():
     u = 0.25 * RNG.integers(-9, 9, size=200)
     u[:3] = 0.1037, -7.77e-5, 0.013  # what a front end's memory held
-    assert search(u).quantum == pytest.approx(0.25)
+    assert search(u).resolution == pytest.approx(0.25)
 
 
 def regression(terms, gains, *, missed=0.0, pole=0.0, X=None, **family):
@@ -317,14 +317,14 @@ def test_a_structure_is_named_by_its_terms(terms, family, measured, words):
     assert structure(regression(terms, [1.0] * len(terms), **family), measured) == words
 
 
-def recovered(*channels, quantum=0.0, saturated=0.0, every=1, feedforward=None, missed=None, **law):
+def recovered(*channels, resolution=0.0, saturated=0.0, every=1, feedforward=None, missed=None, **law):
     made = joined(channels or [Channel(measured="y", reference="r", kp=2.0)], period=T, **law)
     u = RNG.normal(size=100)
     return Recovery(
         law=made, command="u", feedforward=feedforward or {}, channels=channels, structure="P",
         gains={"kp": Gain(value=2.0, stderr=0.1, interval=(1.8, 2.3), meaning="on y")}, rows=np.arange(100),
         recorded=u, reproduced=u - (np.zeros(100) if missed is None else missed), used=np.ones(100, dtype=bool),
-        quantum=quantum, saturated=saturated, every=every, unit="V",
+        resolution=resolution, saturated=saturated, every=every, unit="V",
         candidates=(TriedStructure(name="P", parameters=2, missed=0.5),),
     )  # fmt: skip
 
@@ -334,15 +334,15 @@ def test_the_quality_of_a_law_is_what_its_largest_miss_and_the_column_s_steps_sa
     missed[:3] = 9.0  # junk
     assert recovered(missed=missed).quality == "exact"
     missed[50] = 0.01
-    stepped_ = recovered(missed=missed, quantum=0.01)
+    stepped_ = recovered(missed=missed, resolution=0.01)
     assert (stepped_.quality, stepped_.largest) == ("rounding", pytest.approx(0.01))
     missed[51] = -0.004
     # 96 of 97 rows to half a step
-    assert recovered(missed=missed, quantum=0.01).sentence == (
+    assert recovered(missed=missed, resolution=0.01).sentence == (
         "The law reproduces all 100 commands to 1.00 steps of the column (0.01 V), 99 % of them to its rounding: exact "
         "but for the rounding."
     )
-    assert recovered(missed=missed, quantum=0.0099).quality == "partial"
+    assert recovered(missed=missed, resolution=0.0099).quality == "partial"
     flat = recovered(missed=missed)
     assert flat.explained == pytest.approx(100 * (1 - np.sqrt(np.mean(missed[3:] ** 2)) / np.std(flat.recorded[3:])))
 

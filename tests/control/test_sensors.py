@@ -152,10 +152,10 @@ def test_the_filters_settle_on_the_riccati_gain():
     rig = make_rig("linear")
     watch, _ = loop("linear")
     s = rig.linear("inverted").to_sampled(rig.period, (rig.delay + rig.lag) / rig.period)
-    W = design.shaken(s, UNKNOWN * rig.limit * np.abs(rig.linear("inverted").B[1::2, 0]))
+    W = design.process_noise(s, UNKNOWN * rig.limit * np.abs(rig.linear("inverted").B[1::2, 0]))
     W[4:, 4:] += 1e-12 * np.eye(len(W) - 4)  # commands are known; scipy wants to be asked of something that moves
-    P = solve_discrete_are(s.A.T, s.C.T, W, np.diag(rig.quantum**2 / 12))
-    gain = np.linalg.solve(s.C @ P @ s.C.T + np.diag(rig.quantum**2 / 12), s.C @ P).T
+    P = solve_discrete_are(s.A.T, s.C.T, W, np.diag(rig.resolution**2 / 12))
+    gain = np.linalg.solve(s.C @ P @ s.C.T + np.diag(rig.resolution**2 / 12), s.C @ P).T
     # 0.35 s of settling leave this of the start, on which the filters of a falling body forget slowest
     assert np.allclose(watch.gains[-1, 0], gain, rtol=0.01, atol=1e-5 * np.abs(gain).max())
 
@@ -168,7 +168,7 @@ def test_a_likelihood_is_that_of_all_readings_at_once(which):
     suspicion = watch.suspicions[which]
     s = rig.linear("inverted").to_sampled(rig.period, (rig.delay + rig.lag) / rig.period)
     scale = np.array([suspicion.factor if c.name == suspicion.name else 1.0 for c in rig.plant.coordinates])
-    C, n, noise = scale[:, None] * s.C, len(s.A), rig.quantum**2 / 12
+    C, n, noise = scale[:, None] * s.C, len(s.A), rig.resolution**2 / 12
     rng = np.random.default_rng(which)
     start = np.append(rng.normal(size=4) / np.repeat(np.abs(scale), 2), np.zeros(n - 4))
     y, known = np.zeros((samples, 2)), np.zeros((samples + 1, n))
@@ -180,7 +180,7 @@ def test_a_likelihood_is_that_of_all_readings_at_once(which):
     # readings are linear in the start and in the shaking of every sample
     of_start = np.vstack([C @ np.linalg.matrix_power(s.A, k) for k in range(samples)])
     driven = rig.limit * np.abs(rig.linear("inverted").B[1::2, 0])
-    W = design.shaken(s, UNKNOWN * driven / np.abs(scale))
+    W = design.process_noise(s, UNKNOWN * driven / np.abs(scale))
     cov = of_start @ np.diag([*np.repeat(scale, 2) ** -2.0, *np.zeros(n - 4)]) @ of_start.T
     for i in range(1, samples):
         later = np.vstack([np.zeros((2 * i, n)), of_start[: -2 * i]])
@@ -204,7 +204,7 @@ def test_sound_sensors_are_seldom_suspected():
     x[:, :4] = rng.normal(size=(runs, 4))
     highest = np.full((runs, len(watch.suspicions)), -np.inf)
     for k in range(150):
-        y = x @ s.C.T + rng.normal(size=(runs, 2)) * rig.quantum / math.sqrt(12)
+        y = x @ s.C.T + rng.normal(size=(runs, 2)) * rig.resolution / math.sqrt(12)
         u = 2.0 * math.sin(0.1 * k)
         watch.see(y, u)
         highest = np.maximum(highest, watch.likelihood - watch.likelihood[:, :1])

@@ -53,16 +53,18 @@ def test_python_control_says_the_same(poles):
 
 
 def test_an_encoder_moves_the_figures_by_no_more_than_its_step():
-    zeta, omega, quantum = 0.3, 6.0, 0.02  # fifty steps in all, as wide as the narrow band
+    zeta, omega, resolution = 0.3, 6.0, 0.02  # fifty steps in all, as wide as the narrow band
     damped, phase = omega * math.sqrt(1 - zeta**2), math.acos(zeta)
     y = 1 - np.exp(-zeta * omega * T) * np.sin(damped * T + phase) / math.sin(phase)
     smooth = step_figures(T, y, before=0.0, reference=1.0)
-    shown = step_figures(T, np.floor(y / quantum + 0.5) * quantum, before=0.0, reference=1.0, quantum=quantum)
-    assert shown.overshoot == pytest.approx(smooth.overshoot, abs=quantum)
+    shown = step_figures(
+        T, np.floor(y / resolution + 0.5) * resolution, before=0.0, reference=1.0, resolution=resolution
+    )
+    assert shown.overshoot == pytest.approx(smooth.overshoot, abs=resolution)
     # the envelope falls from 5 to 4 or 6 % within log(6/4)/(zeta omega)
     assert shown.settling_5 == pytest.approx(smooth.settling_5, abs=math.log(6 / 4) / (zeta * omega))
     assert shown.rise == pytest.approx(smooth.rise, rel=0.1)
-    assert shown.resolution == pytest.approx(quantum)
+    assert shown.resolution == pytest.approx(resolution)
 
 
 def test_dry_friction_leaves_an_error_and_no_endless_settling():
@@ -83,7 +85,7 @@ def test_what_has_not_settled_is_said_to_take_for_ever():
 
 def test_what_did_not_move_is_refused():
     with pytest.raises(BadInput, match="nothing stepped"):
-        step_figures(T, np.zeros_like(T), before=0.0, reference=1.0, quantum=1e-3)
+        step_figures(T, np.zeros_like(T), before=0.0, reference=1.0, resolution=1e-3)
 
 
 def test_a_ramp_passes_its_levels_by_straight_lines_and_settles_where_it_enters_the_band():
@@ -123,13 +125,13 @@ def test_what_the_encoder_does_not_resolve_is_no_overshoot_and_no_settling():
     y = np.ones(100)
     y[:10], y[20:30], y[40] = 0.0, 1.04, 1.03
     t = np.arange(100.0)
-    fine = step_figures(t, y, before=0.0, reference=1.0, quantum=0.03)
+    fine = step_figures(t, y, before=0.0, reference=1.0, resolution=0.03)
     assert fine.overshoot == pytest.approx(0.04)
     assert fine.settling_2 == pytest.approx(29 + 1 / 4)  # a band of 3 %, left at 1.04 for 1.0
-    coarse = step_figures(t, y, before=0.0, reference=1.0, quantum=0.041)
+    coarse = step_figures(t, y, before=0.0, reference=1.0, resolution=0.041)
     assert coarse.overshoot == 0.0
     assert coarse.settling_2 == pytest.approx(9.959)
-    assert step_figures(t, y, before=0.0, reference=1.0, quantum=0.1).settling_5 == pytest.approx(9.9)
+    assert step_figures(t, y, before=0.0, reference=1.0, resolution=0.1).settling_5 == pytest.approx(9.9)
 
 
 def test_a_record_that_begins_at_its_rest_has_settled_and_risen_at_once():
@@ -153,5 +155,5 @@ def test_a_step_of_too_few_samples_or_to_nowhere_is_refused(t, y, before, refere
 
 def test_a_change_of_one_encoder_step_is_none():
     with pytest.raises(BadInput, match="nothing stepped"):
-        step_figures(np.arange(20.0), np.full(20, -0.5), before=0.0, reference=1.0, quantum=0.5)
-    assert step_figures(np.arange(20.0), np.full(20, -0.5), before=0.0, reference=-1.0, quantum=0.49).change == -0.5
+        step_figures(np.arange(20.0), np.full(20, -0.5), before=0.0, reference=1.0, resolution=0.5)
+    assert step_figures(np.arange(20.0), np.full(20, -0.5), before=0.0, reference=-1.0, resolution=0.49).change == -0.5

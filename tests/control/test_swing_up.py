@@ -322,8 +322,8 @@ def test_the_law_begins_where_the_encoders_stand():
     # zeros where it hangs, in what is shown; switched on while it swings, speeds are not known, and no event was
     assert np.asarray(still.initial).ravel() == pytest.approx([0.5, -0.6, 0.0, 0.0, SWINGING, 0.0, 0.0, -1.0])
     assert np.asarray(held.initial).ravel() == pytest.approx([0.5, -0.6, 0.1, 0.2, HOLDING, 0.0, 0.0, -1.0])
-    assert np.asarray(still.quantum) == pytest.approx([0.01, 0.0005])
-    assert (still.command_quantum, still.measured, still.period) == (0.25, ("psi", "theta"), law.period)
+    assert np.asarray(still.resolution) == pytest.approx([0.01, 0.0005])
+    assert (still.command_resolution, still.measured, still.period) == (0.25, ("psi", "theta"), law.period)
     lanes = law.rule(rig, [[0.5, 0.1, 0.3, 0.2], [-0.25, 0.0, 0.1, 0.0]], holding=True)
     assert np.asarray(lanes.initial)[:, 1] == pytest.approx([-0.25, -0.2, 0.0, 0.0, HOLDING, 0.0, 0.0, -1.0])
     numbers = dict(zip(PARAMETERS, np.asarray(still.parameters), strict=True))

@@ -48,15 +48,15 @@ def test_a_small_tilt_comes_back_as_the_matrix_of_the_loop_says():
 
 def test_switching_on_off_centre_is_not_taken_for_a_speed():
     run = trial(RIG, LAW, at="inverted", start=tilt(0.1), seconds=0.01)
-    rounding = RIG.converter / 2 + abs(GAINS[0, 2]) * RIG.quantum[1] / 2
+    rounding = RIG.converter / 2 + abs(GAINS[0, 2]) * RIG.resolution[1] / 2
     assert run.u[0] == pytest.approx(-GAINS[0, 2] * 0.1, abs=rounding)
 
 
 def test_an_encoder_shows_its_scale_times_the_truth_to_a_count():
     wrong = replace(RIG, scales=(1.0, 1.03))
     run = trial(wrong, LAW, at="inverted", start=tilt(0.05), seconds=0.05)
-    assert np.abs(run.record["theta"] - 1.03 * run.x[:, 2]).max() <= RIG.quantum[1] / 2 * (1 + 1e-9)
-    assert np.abs(run.record["psi"] - run.x[:, 0]).max() <= RIG.quantum[0] / 2 * (1 + 1e-9)
+    assert np.abs(run.record["theta"] - 1.03 * run.x[:, 2]).max() <= RIG.resolution[1] / 2 * (1 + 1e-9)
+    assert np.abs(run.record["psi"] - run.x[:, 0]).max() <= RIG.resolution[0] / 2 * (1 + 1e-9)
     # a law that takes the true half turn for upright is told of a tilt of 3 % of it
     assert run.u[0] == pytest.approx(-GAINS[0, 2] * (1.03 * (math.pi + 0.05) - math.pi), abs=0.02)
 
@@ -271,7 +271,7 @@ def test_pushes_shorter_than_the_run_end_and_longer_ones_are_cut():
 def test_a_law_at_work_takes_rest_and_reference_of_the_rig():
     rig = RIG.replace(scales=(1.0, -0.5), converter=0.25)
     made = law_on_rig(rig, LAW, [0.1, 3.0])
-    assert (made.delay, made.command_quantum) == (0.0, 0.25)
-    assert np.asarray(made.quantum) == pytest.approx(rig.quantum * [1.0, 2.0])
+    assert (made.delay, made.command_resolution) == (0.0, 0.25)
+    assert np.asarray(made.resolution) == pytest.approx(rig.resolution * [1.0, 2.0])
     assert made.references is LAW.references
     assert np.asarray(law_on_rig(rig, LAW, [0.1, 3.0], [1.0, 2.0]).references).tolist() == [1.0, 2.0]

@@ -21,7 +21,7 @@ def asked(counts, *, which=1, speed="plain", **more):
     rig = make_rig("furuta").changed(b_1c=1e-15, b_2c=1e-15).replace(counts=(counts, counts))
     return rig, DesignRequest(
         at="inverted", poles=read_poles(TABLE_1[which]), period=rig.period, speed=speed,
-        quantum=tuple(rig.quantum.tolist()), limit=rig.limit, on=rig, **more,
+        resolution=tuple(rig.resolution.tolist()), limit=rig.limit, on=rig, **more,
     )  # fmt: skip
 
 

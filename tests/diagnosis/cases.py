@@ -36,7 +36,7 @@ def case(
     said = columns or {}
     inspection = replace(inspection, columns=tuple(replace(c, **said.get(c.name, {})) for c in inspection.columns))
     places = {
-        f"q_{name}": Place(column=name, y=log[name], quantum=1e-5, unit=given[name]) for name in measured
+        f"q_{name}": Place(column=name, y=log[name], resolution=1e-5, unit=given[name]) for name in measured
     }  # fmt: skip
     u = log[drive] if drive in log else np.zeros(n)
     return Case(record=record, inspection=inspection, places=places, drive=drive, u=u)

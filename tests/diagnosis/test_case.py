@@ -10,12 +10,13 @@ import pytest
 
 from benchmarks.doctored import batch
 from tests.diagnosis.cases import case
-from upright.diagnosis import KnownRig
 from upright.diagnosis.case import COUNTERS, Place, case_of, column_unit, read_known, tells_speed, tells_time
+from upright.diagnosis.forces import friction_of
 from upright.errors import BadInput
 from upright.physics import CartPendulum, Furuta, Pendulum, find
 from upright.readers.inspection import inspect_record
 from upright.records import Provenance, Record
+from upright.study.sensors import Wiring
 
 T = np.arange(200) * 0.01
 SINE = np.sin(6 * T)
@@ -25,13 +26,13 @@ def test_a_coordinate_moves_by_more_than_three_percent_of_the_widest_in_its_unit
     plant = find("rectilinear-2")
     made = replace(case(x_1=SINE), plant=plant)
     for share, moves in ((0.031, True), (0.029, False)):
-        places = {n: Place(column=n, y=s * SINE, quantum=0.0, unit="m") for n, s in (("x_1", 1.0), ("x_2", share))}
+        places = {n: Place(column=n, y=s * SINE, resolution=0.0, unit="m") for n, s in (("x_1", 1.0), ("x_2", share))}
         with_both = replace(made, places=places)
         assert with_both.moves("x_1")
         assert with_both.moves("x_2") == moves
     # an angle of 0.01 rad is not weighed against a metre
-    other = {"x": Place(column="x", y=SINE, quantum=0.0, unit="m"),
-             "theta": Place(column="theta", y=0.01 * SINE, quantum=0.0, unit="rad")}  # fmt: skip
+    other = {"x": Place(column="x", y=SINE, resolution=0.0, unit="m"),
+             "theta": Place(column="theta", y=0.01 * SINE, resolution=0.0, unit="rad")}  # fmt: skip
     assert replace(made, plant=CartPendulum, places=other).moves("theta")
     assert not replace(made, places={}).moves("x_1")
 
@@ -62,7 +63,7 @@ def test_what_is_measured_is_what_is_placed_else_the_outputs_else_what_looks_lik
     assert [c.name for c in made.measured] == ["a", "b"]
     outputs = replace(made, record=made.record.replace(outputs=("b",)))
     assert [c.name for c in outputs.measured] == ["b"]
-    placed = replace(made, places={"x": Place(column="push", y=SINE, quantum=0.0, unit="m")})
+    placed = replace(made, places={"x": Place(column="push", y=SINE, resolution=0.0, unit="m")})
     assert [c.name for c in placed.measured] == ["push"]
     assert placed.coordinate("push") == "x"
     assert placed.coordinate("a") == "COORDINATE"
@@ -79,7 +80,7 @@ def test_what_is_measured_is_what_is_placed_else_the_outputs_else_what_looks_lik
     ],
 )
 def test_a_correction_comes_on_top_of_what_is_stated(factor, stated, line):
-    known = batch("rectilinear-2", "", 1, seed=5)[0].known
+    known = batch("rectilinear-2", "", 1, seed=5)[0].wiring
     made = replace(case(x_1=SINE), stated={
         "x_1": replace(known.sensors["x_1"], **stated), "effort": replace(known.drive, **stated)
     })  # fmt: skip
@@ -118,32 +119,32 @@ def test_a_column_tells_time_or_speed_by_what_is_known_of_it():
 
 def test_a_locked_coordinate_is_not_read_and_the_others_are_as_stated():
     doctored = batch("rectilinear-2", "", 1, seed=5)[0]
-    record, known = doctored.record, doctored.known
+    record, known = doctored.record, doctored.wiring
     inspection = inspect_record(record)
-    both = case_of(record, inspection, known)
+    both = case_of(record, inspection, doctored.rig, known)
     assert set(both.places) == {"x_1", "x_2"}
     assert both.zeroed
     assert both.stated.keys() == {"x_1", "x_2", "effort"}
     assert both.u == pytest.approx(known.drive.read(record))
-    locked = case_of(record, inspection, replace(known, locked=("x_2",), drive=None))
+    locked = case_of(record, inspection, doctored.rig, replace(known, locked=("x_2",), drive=None))
     assert set(locked.places) == {"x_1"}
     assert locked.locked == ("x_2",)
     assert (locked.drive, np.any(locked.u)) == ("", False)
     assert locked.stated.keys() == {"x_1", "x_2"}
     sensor = known.sensors["x_1"]
-    y, quantum, _ = sensor.read(record)
+    y, resolution, _ = sensor.read(record)
     assert both.places["x_1"].y == pytest.approx(y)
     assert both.places["x_1"].unit == "m"
-    step = inspection.column(sensor.column).quantum.step
+    step = inspection.column(sensor.column).resolution.step
     factor = abs(sensor.factor(sensor.column_unit(record, record[sensor.column])))
-    assert both.places["x_1"].quantum == pytest.approx(quantum or step * factor)
+    assert both.places["x_1"].resolution == pytest.approx(resolution or step * factor)
     assert set(both.moduli[sensor.column]) == set(COUNTERS)  # a length makes no turn of its own
 
 
 def test_an_angle_in_degrees_turns_at_360_of_its_column():
     doctored = batch("furuta", "", 1, seed=5)[0]
-    sensor = doctored.known.sensors["theta"]
-    made = case_of(doctored.record, inspect_record(doctored.record), doctored.known)
+    sensor = doctored.wiring.sensors["theta"]
+    made = case_of(doctored.record, inspect_record(doctored.record), doctored.rig, doctored.wiring)
     factor = sensor.factor(sensor.column_unit(doctored.record, doctored.record[sensor.column]))
     assert set(made.moduli[sensor.column]) == {2 * math.pi / factor, *COUNTERS}
 
@@ -153,7 +154,7 @@ def test_columns_that_are_recognised_are_in_the_coordinate_s_unit_from_their_res
     x = np.concatenate([np.full(200, 5.0), 5 + 30 * np.exp(-T) * SINE, np.full(400, 5.0)]) / (factor * 1e3)
     t = np.arange(x.size) * 0.01
     record = Record(t=t, signals={"x_1": x}, units={"x_1": unit}, provenance=Provenance(file="a.csv", reader="table"))
-    made = case_of(record, inspect_record(record), KnownRig(name="", plant=find("rectilinear-1")))
+    made = case_of(record, inspect_record(record), find("rectilinear-1"), Wiring())
     (place,) = made.places.values()
     assert place.y == pytest.approx(factor * (x - x[0]), abs=1e-9)
     assert (place.unit, made.zeroed, made.plant) == ("m", False, find("rectilinear-1"))
@@ -161,9 +162,9 @@ def test_columns_that_are_recognised_are_in_the_coordinate_s_unit_from_their_res
 
 
 def test_friction_is_what_only_dissipates():
-    known = KnownRig(name="", plant=CartPendulum)
-    assert {"b_1", "b_2", "b_1c", "b_2c"} <= known.friction
-    assert not {"m_p", "l_cg", "g", "m_c"} & known.friction
+    friction = friction_of(CartPendulum)
+    assert {"b_1", "b_2", "b_1c", "b_2c"} <= friction
+    assert not {"m_p", "l_cg", "g", "m_c"} & friction
 
 
 STUDY = """
@@ -197,19 +198,19 @@ loop = { kind = "recover", command = "volts" }
 def test_a_study_is_read_for_the_run_that_the_log_is(tmp_path):
     path = tmp_path / "study.toml"
     path.write_text(STUDY, encoding="utf-8")
-    one, other = read_known(str(path), "elsewhere/one.csv"), read_known(str(path), "three.csv")
-    assert (one.plant, one.locked, one.name) == (find("rectilinear-2"), ("x_2",), str(path))
+    (rig, one), (_, other) = read_known(str(path), "elsewhere/one.csv"), read_known(str(path), "three.csv")
+    assert (type(rig.plant), one.locked, rig.name) == (find("rectilinear-2"), ("x_2",), str(path))
     assert other.locked == ()
     assert one.sensors["x_1"].column == "a"
     assert other.sensors["x_2"].sign == -1.0
     assert one.drive.what.strip("`") == "volts"
-    assert (one.parameters["m_2"].value, one.parameters["actuator.gain"].value) == (1.5, 5.0)
+    assert (rig.plant.m_2, rig.gain, rig.guessed) == (1.5, 5.0, frozenset())
     # what a loop puts out is not a command of its own
-    assert read_known(str(path), "two.csv").drive is None
+    assert read_known(str(path), "two.csv")[1].drive is None
 
 
 def test_a_rig_is_known_by_its_plant_s_name_and_by_nothing_else():
-    assert read_known("furuta") == KnownRig(name="furuta", plant=Furuta)
+    assert read_known("furuta") == (Furuta, Wiring())
     with pytest.raises(BadInput, match="it may be a plant's name, a study"):
         read_known("no-such-rig")
 
@@ -224,7 +225,7 @@ def test_an_angle_that_is_guessed_to_be_in_degrees_is_read_in_radians():
     record = Record(t=t, signals={"theta": swing}, units={"theta": "deg"}, provenance=Provenance(file="a.csv"))
     inspection = inspect_record(record)
     inspection = replace(inspection, columns=tuple(replace(c, guess="deg") for c in inspection.columns))
-    (place,) = case_of(record, inspection, KnownRig(name="", plant=Pendulum)).places.values()
+    (place,) = case_of(record, inspection, Pendulum, Wiring()).places.values()
     # from where it rests, which the end of the swing leaves open by a tenth of a degree or so
     assert np.ptp(place.y) == pytest.approx(math.radians(np.ptp(swing)))
     assert place.y[0] == pytest.approx(0.0, abs=0.01)

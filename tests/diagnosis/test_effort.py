@@ -242,7 +242,7 @@ def pushed(**how):
 
 def with_drive():
     made = case(x=SWING, u=np.where(T < 8, np.cos(T) + 2, 0.0), measured=("x",), drive="u")
-    return replace(made, places={"x_1": Place(column="x", y=SWING, quantum=0.0, unit="m")})
+    return replace(made, places={"x_1": Place(column="x", y=SWING, resolution=0.0, unit="m")})
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.diagnosis.cases import case
-from upright.diagnosis import KnownRig, examine
+from upright.diagnosis import examine
 from upright.diagnosis.case import Place
 from upright.diagnosis.findings import KINDS, Diagnosis, Finding
 from upright.diagnosis.motion import motion_of
@@ -140,7 +140,7 @@ def test_a_sensor_at_its_limit_is_told_with_the_share_of_its_samples():
     # a body that was held reached no limit
     made = case(DT, x=x, y=20 * np.sin(T), measured=("x", "y"))
     assert not [f for f in examine_sensors(replace(made, plant=find("rectilinear-2")))[0] if f.columns == ("x",)]
-    coarse = {"x": {"quantum": replace(made.inspection.column("x").quantum, step=3.5 / 49)}}
+    coarse = {"x": {"resolution": replace(made.inspection.column("x").resolution, step=3.5 / 49)}}
     assert not found_in("saturation", x=x, measured=("x",), columns=coarse)[0]
 
 
@@ -164,7 +164,7 @@ def record(**signals):
 
 
 def test_what_cannot_be_looked_for_is_said_with_its_reason():
-    cart = KnownRig(name="rectilinear-1", plant=find("rectilinear-1"))
+    cart = find("rectilinear-1")
     alone = examine(record(x_1=SWING))
     assert alone.unchecked["effort"] == "the log has no effort column that could be recognised"
     assert alone.unchecked["sign"] == "nobody said what the rig is; name it with --rig"
@@ -211,7 +211,7 @@ def test_a_record_that_is_spoilt_is_not_asked_for_its_forces():
         t=holed, signals={"x_1": SWING[rows], "u": np.cos(3 * T)[rows]}, units={"x_1": "m", "u": "V"},
         provenance=Provenance(file="log.csv", reader="table"),
     )  # fmt: skip
-    found = examine(log, KnownRig(name="", plant=find("rectilinear-1")))
+    found = examine(log, find("rectilinear-1"))
     assert "gap" in {f.kind for f in found.wrong}
     assert found.unchecked["sign"] == "after the gap found above, mend that first"
 
@@ -220,7 +220,7 @@ def test_a_motion_is_missed_where_a_coordinate_is():
     made = case(DT, x=SWING, measured=("x",))
     assert motion_of(made) == "nobody said what the rig is; name it with --rig"
     plant = find("cart-pendulum")
-    place = {"x": Place(column="x", y=SWING, quantum=STEP, unit="m")}
+    place = {"x": Place(column="x", y=SWING, resolution=STEP, unit="m")}
     assert motion_of(replace(made, plant=plant, places=place)) == "no column measures theta"
     locked = motion_of(replace(made, plant=plant, places=place, locked=("theta",)))
     assert locked.rows == (0,)

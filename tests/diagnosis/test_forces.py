@@ -20,8 +20,8 @@ from upright.diagnosis.forces import (
     values_of,
 )
 from upright.diagnosis.motion import SmoothedMotion, Term
-from upright.identification import Parameter
 from upright.physics import CartPendulum, Pendulum, find
+from upright.rig import Rig
 
 T = np.arange(0, 12, 0.02)
 CART = find("rectilinear-2")
@@ -107,9 +107,8 @@ def test_the_stiffer_the_bodies_are_joined_the_sharper_is_the_factor(coupling, r
 def known(m):
     """The case of a motion: columns named after the coordinates, the effort in volts."""
     made = case(0.02, x_1=m.q[0], x_2=m.q[1], u=m.u, drive="u")
-    places = {n: Place(column=n, y=m.q[i], quantum=1e-5, unit="m") for i, n in enumerate(("x_1", "x_2"))}
-    parameters = {n: Parameter(name=n, value=v) for n, v in values().items()}
-    return replace(made, plant=CART, places=places, parameters=parameters)
+    places = {n: Place(column=n, y=m.q[i], resolution=1e-5, unit="m") for i, n in enumerate(("x_1", "x_2"))}
+    return replace(made, plant=CART, places=places, rig=Rig(plant=CART(**NUMBERS), gain=7.0))
 
 
 def test_a_reversed_effort_is_told_as_a_sign_and_half_of_it_as_a_scale():
@@ -263,21 +262,19 @@ def test_another_row_that_is_unexplained_does_not_tell_of_the_effort():
 
 def test_numbers_that_are_guesses_hold_nothing():
     made = known(motion())
-    assert values_of(replace(made, parameters={}), frozenset()) == (
-        "only the plant's name is known; a study or fit.json with its numbers tells"
+    assert values_of(replace(made, rig=None), frozenset()) == (
+        "only the plant's name is known; a study with its numbers tells"
     )
 
     def guess(*names):
-        return replace(made, parameters={
-            n: replace(p, estimate=n in names) for n, p in made.parameters.items()
-        } | {"actuator.gain": Parameter(name="actuator.gain", value=7.0)})  # fmt: skip
+        return replace(made, rig=replace(made.rig, sources=dict.fromkeys(names, "guessed")))
 
     assert values_of(guess("m_1"), frozenset()) == "m_1 is a guess; give the fit.json"
     assert values_of(guess("m_1", "m_2"), frozenset()) == "m_1, m_2 are guesses; give the fit.json"
     found, gain = values_of(guess("c_1"), frozenset({"c_1"}))
     assert gain == 7.0
     assert (found["c_1"], found["m_1"]) == (0.0, 2.0)
-    assert math.isnan(values_of(made, frozenset())[1])
+    assert math.isnan(values_of(guess("actuator.gain"), frozenset())[1])
 
 
 def term(who, text, slope, share=0.5, total=0.1):
@@ -293,7 +290,7 @@ def signs(*found, plant=CART, made=None, **how):
     names = [c.name for c in plant.coordinates]
     made = made or replace(
         case(0.02, **dict.fromkeys(names, T), u=T, drive="u"), plant=plant,
-        places={n: Place(column=n, y=0.5 * np.sin(T), quantum=1e-5, unit=c.unit)
+        places={n: Place(column=n, y=0.5 * np.sin(T), resolution=1e-5, unit=c.unit)
                 for n, c in zip(names, plant.coordinates, strict=True)},
     )  # fmt: skip
     return against_form(replace(made, **how), m, list(found))

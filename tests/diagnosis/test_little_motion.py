@@ -28,7 +28,7 @@ def record(**columns: np.ndarray) -> Record:
 
 
 def found(rig: str, **columns: np.ndarray) -> list[str]:
-    return [f.kind for f in examine(record(**columns), read_known(rig) if rig else None).findings]
+    return [f.kind for f in examine(record(**columns), *(read_known(rig) if rig else ())).findings]
 
 
 @pytest.mark.parametrize("rig", ["", "cart-pendulum"])

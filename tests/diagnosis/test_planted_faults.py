@@ -24,7 +24,7 @@ IN_EFFORT = {"saturated", "trip", *(fault for fault in FAULTS if fault.startswit
 @cache
 def planted(plant: str, fault: str) -> tuple[Doctored, tuple[Finding, ...]]:
     doctored = batch(plant, fault, 2, seed=5)[0]
-    return doctored, examine(doctored.record, doctored.known).wrong
+    return doctored, examine(doctored.record, doctored.rig, doctored.wiring).wrong
 
 
 @pytest.mark.parametrize("plant", RIGS)
@@ -39,7 +39,7 @@ def test_a_planted_fault_is_found_alone_and_where_it_was_put(plant, fault):
 @pytest.mark.parametrize("plant", PLANTS)
 def test_a_clean_log_brings_no_finding(plant):
     for doctored in batch(plant, "", 2, seed=5):
-        assert examine(doctored.record, doctored.known).wrong == ()
+        assert examine(doctored.record, doctored.rig, doctored.wiring).wrong == ()
 
 
 @pytest.mark.parametrize("plant", RIGS)
@@ -83,7 +83,7 @@ def test_a_window_begins_where_counts_were_lost(plant):
 @pytest.mark.parametrize("plant", RIGS)
 def test_a_counter_is_known_by_its_turn(plant):
     doctored, (finding,) = planted(plant, "wrap")
-    sensor = doctored.known.sensors[doctored.channel]
+    sensor = doctored.wiring.sensors[doctored.channel]
     turn = finding.evidence[f"turn [{sensor.unit}]"]
     if sensor.coordinate.unit == "rad":
         assert turn * (1.0 if sensor.unit == "rad" else sensor.scale) == pytest.approx(2 * math.pi)
@@ -108,7 +108,7 @@ def test_an_effort_that_did_not_act_is_replaced_left_out_or_cut(plant, fault, ke
 @pytest.mark.parametrize("plant", RIGS)
 def test_a_reference_in_the_place_of_the_effort_is_known_by_what_follows_it(plant):
     doctored, (finding,) = planted(plant, "effort is the reference")
-    x, u = doctored.record[doctored.known.plant.coordinates[0].name], doctored.record["u"]
+    x, u = doctored.record[doctored.rig.plant.coordinates[0].name], doctored.record["u"]
     alike = 100 * float(np.corrcoef(x, u)[0, 1])
     assert finding.evidence["correlation with the motion [%]"] == pytest.approx(alike)
     assert f"follows it ({alike:.0f} % correlation), as it would a reference" in finding.sentence
@@ -117,7 +117,7 @@ def test_a_reference_in_the_place_of_the_effort_is_known_by_what_follows_it(plan
 @pytest.mark.parametrize("plant", RIGS)
 def test_an_effort_that_repeats_a_position_does_so_by_its_factor(plant):
     doctored, (finding,) = planted(plant, "effort is the position")
-    x, u = doctored.record[doctored.known.plant.coordinates[0].name], doctored.record["u"]
+    x, u = doctored.record[doctored.rig.plant.coordinates[0].name], doctored.record["u"]
     assert finding.evidence["factor [1]"] == pytest.approx(np.ptp(u) / np.ptp(x))
 
 

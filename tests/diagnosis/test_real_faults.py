@@ -42,7 +42,7 @@ SOUND = {
 
 
 def diagnosis(file: str, rig: str) -> Diagnosis:
-    return examine(read(Path(os.environ["UPRIGHT_REAL_DATA"]) / file), read_known(rig))
+    return examine(read(Path(os.environ["UPRIGHT_REAL_DATA"]) / file), *read_known(rig))
 
 
 @pytest.mark.parametrize(("log", "kinds"), FAULTS.items(), ids=lambda x: x[0] if isinstance(x, tuple) else "")

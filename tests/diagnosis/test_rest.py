@@ -21,7 +21,7 @@ def told(kind: str, rig: str = "", **columns: np.ndarray) -> list[Finding]:
     units = {n: "V" if n == "u" else "m" for n in columns}
     log = {n: x if n == "u" else np.round(x / STEP) * STEP for n, x in columns.items()}
     record = Record(t=t, signals=log, units=units, provenance=Provenance(file="log.csv", reader="table"))
-    return [f for f in examine(record, read_known(rig) if rig else None).findings if f.kind == kind]
+    return [f for f in examine(record, *(read_known(rig) if rig else ())).findings if f.kind == kind]
 
 
 def settling(levels: list[float], seconds: float = 6.0, first: float = 1.0) -> np.ndarray:
@@ -205,7 +205,7 @@ def test_every_body_that_is_free_must_grow() -> None:
 @pytest.mark.parametrize(("steps", "creeps"), [(4.9, False), (5.1, True)])
 def test_a_body_creeps_from_five_steps_of_its_sensor_on(steps: float, creeps: bool) -> None:
     x = np.exp(-0.1 * T) * np.cos(9 * T)
-    q = {"quantum": replace(case(x=x).inspection.columns[0].quantum, step=0.01)}
+    q = {"resolution": replace(case(x=x).inspection.columns[0].resolution, step=0.01)}
     y = steps * 0.01 * (np.arange(1500) / 1499)
     made = case(x=x, y=y, columns={"y": q})
     assert bool([f for f in examine_rest(made) if f.kind == "creep"]) == creeps

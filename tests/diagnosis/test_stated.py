@@ -8,31 +8,32 @@ import numpy as np
 import pytest
 
 from benchmarks.doctored import batch
-from upright.diagnosis import KnownRig, examine, read_known
+from upright.diagnosis import examine, read_known
 from upright.physics import find
 from upright.records import Provenance, Record
 from upright.simulation import simulate
+from upright.study.sensors import Wiring
 
 
-def stated(known: KnownRig, who: str, **convention: float) -> KnownRig:
-    """The rig as a study would state it that has these keys for a coordinate, or for the effort."""
+def stated(wiring: Wiring, who: str, **convention: float) -> Wiring:
+    """The wiring as a study would state it that has these keys for a coordinate, or for the effort."""
     if who == "effort":
-        assert known.drive is not None
-        return replace(known, drive=replace(known.drive, **convention))
-    return replace(known, sensors={**known.sensors, who: replace(known.sensors[who], **convention)})
+        assert wiring.drive is not None
+        return replace(wiring, drive=replace(wiring.drive, **convention))
+    return replace(wiring, sensors={**wiring.sensors, who: replace(wiring.sensors[who], **convention)})
 
 
 @pytest.mark.parametrize("who", ["x_1", "x_2", "effort"])
 def test_a_sign_that_a_study_gives_wrongly_is_taken_out(who: str) -> None:
     sound = next(d for d in batch("rectilinear-2", "", 3, seed=5) if d.how != "free")
-    (finding,) = examine(sound.record, stated(sound.known, who, sign=-1.0)).wrong
+    (finding,) = examine(sound.record, sound.rig, stated(sound.wiring, who, sign=-1.0)).wrong
     assert finding.kind == "sign"
     assert finding.key.endswith("sign = 1")
 
 
 def test_a_scale_is_corrected_on_top_of_the_one_that_is_stated() -> None:
     sound = next(d for d in batch("rectilinear-2", "", 3, seed=5) if d.how != "free")
-    (finding,) = examine(sound.record, stated(sound.known, "x_1", scale=4.0)).wrong
+    (finding,) = examine(sound.record, sound.rig, stated(sound.wiring, "x_1", scale=4.0)).wrong
     table, line = finding.key.splitlines()
     assert table == "[sensors.x_1]"
     # the rig's numbers are known to 3 percent each
@@ -48,7 +49,7 @@ def test_the_acceleration_of_a_body_read_in_counts_is_in_counts() -> None:
     one, two = np.round(-16000 / (2 * np.pi) * angle).T
     log = {"Encoder 1 Pos": one, "Encoder 2 Pos": two, "volts": volts}
     record = Record(t=t, signals=log, provenance=Provenance(file="log.csv", reader="table"))
-    (finding,) = (f for f in examine(record, read_known("torsional-2")).findings if f.kind == "sign")
+    (finding,) = (f for f in examine(record, *read_known("torsional-2")).findings if f.kind == "sign")
     assert "[counts/s^2]" in finding.panels[-1].label
     assert "slope found [counts]" in finding.evidence
     assert not any("rad" in p.label or "SI" in k for p in finding.panels for k in finding.evidence)
@@ -66,7 +67,7 @@ def test_a_zero_that_is_upright_is_half_a_turn_from_the_one_that_is_stated(befor
         t=t, signals={"theta": column, "u": torque}, units={"theta": "rad", "u": "N m"},
         provenance=Provenance(file="log.csv", reader="table"),
     )  # fmt: skip
-    sound = batch("pendulum", "", 3, seed=5)[0].known
-    known = replace(sound, parameters={}, sensors={"theta": replace(sound.sensors["theta"], offset=np.radians(before))})
-    (finding,) = (f for f in examine(record, known).wrong if "upright" in f.sentence)
+    sound = batch("pendulum", "", 3, seed=5)[0].wiring
+    wiring = replace(sound, sensors={"theta": replace(sound.sensors["theta"], offset=np.radians(before))})
+    (finding,) = (f for f in examine(record, find("pendulum"), wiring).wrong if "upright" in f.sentence)
     assert finding.key == f'[sensors.theta]\noffset = "{after}"'

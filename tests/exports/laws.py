@@ -6,11 +6,11 @@ import numpy as np
 
 from tests.gains.furuta import RIG
 from upright.exports.controller import SampledController, of_law
-from upright.gains import feedback, filtered, kalman, place, shaken
+from upright.gains import feedback, filtered, kalman, place, process_noise
 from upright.laws import Law
 
 PERIOD, TURN = 2e-3, 2 * np.pi
-REST = {"target": np.array([0.0, np.pi]), "measured": ("psi", "theta"), "quantum": TURN / 16000, "limit": 0.6}
+REST = {"target": np.array([0.0, np.pi]), "measured": ("psi", "theta"), "resolution": TURN / 16000, "limit": 0.6}
 POLES = [-4.15 + 1.63j, -4.15 - 1.63j, -16.9, -3.2]
 
 
@@ -21,7 +21,7 @@ def designed(way: str) -> Law:
     K = place(model.A, model.B, POLES).K
     if way == "filtered":
         return feedback(filtered(sampled, 0.5), K, 0.2)
-    return feedback(kalman(sampled, shaken(sampled, 5.0), TURN / 16000 / np.sqrt(12)), K)
+    return feedback(kalman(sampled, process_noise(sampled, 5.0), TURN / 16000 / np.sqrt(12)), K)
 
 
 def pid() -> Law:
@@ -32,7 +32,7 @@ def pid() -> Law:
     return Law(
         [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, rate, alpha]], [T * e, [1.0, 0.0], [-rate, 0.0]],
         [[ki, kd * rate, kd * alpha]], [kp * e + ki * T * e + [-kd * rate, 0.0]], windup="hold", limit=2.5,
-        command_quantum=0.01, period=T, reference_names=("r",), initial=[0.0, 0.3, 0.0],
+        command_resolution=0.01, period=T, reference_names=("r",), initial=[0.0, 0.3, 0.0],
     )  # fmt: skip
 
 
@@ -43,7 +43,7 @@ def dense() -> Law:
     return Law(
         0.8 * A / np.abs(np.linalg.eigvals(A)).max(), rng.normal(size=(4, 3)), rng.normal(size=(2, 4)),
         rng.normal(size=(2, 3)), begin=rng.normal(size=(4, 3)), target=rng.normal(size=3), limit=1.7, period=0.005,
-        command_quantum=[0.0, 20 / 4096],
+        command_resolution=[0.0, 20 / 4096],
     )  # fmt: skip
 
 
@@ -57,7 +57,7 @@ def laws() -> dict[str, SampledController]:
     from dataclasses import replace
 
     made = {
-        "filtered": replace(designed("filtered"), **REST, command_quantum=1e-3),
+        "filtered": replace(designed("filtered"), **REST, command_resolution=1e-3),
         "kalman": replace(designed("kalman"), **REST),
         "pid": pid(),
         "dense": dense(),

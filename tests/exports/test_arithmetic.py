@@ -26,7 +26,8 @@ TOY = Language(
 LAW = Law(
     [[1.0, 0.0], [0.0, 0.25]], [[0.5, 0.0, -0.5], [0.0, 3.0, 0.0]], [[2.0, 1.0]], [[-4.0, 0.0, 5.0]],
     target=[0.0, 1.5], initial=[0.0, 7.0], begin=np.array([[0.0, 0.0], [0.0, -2.0]]), windup="hold", limit=6.0,
-    command_quantum=0.5, period=0.01, references=np.zeros((1, 1)), measured=("x", "theta"), reference_names=("goal",),
+    command_resolution=0.5, period=0.01, references=np.zeros((1, 1)), measured=("x", "theta"),
+    reference_names=("goal",),
 )  # fmt: skip
 MADE = SampledController(
     law=LAW, readings=("x", "theta"), commands=("u",), references=("goal",), reading_units=("m", ""), command_unit="V",
@@ -68,7 +69,7 @@ def test_without_limit_steps_or_memory_little_is_left():
 
 def test_commands_of_a_rule_are_rounded_and_limited():
     two = Law(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((2, 0)), [[1.0], [1.0]], period=0.1, limit=3.0,
-              command_quantum=[0.0, 0.25])  # fmt: skip
+              command_resolution=[0.0, 0.25])  # fmt: skip
     made = SampledController(law=two, readings=("x",), commands=("a", "b"))
     assert output_lines(made, TOY) == [
         "stop if bad(c0) or bad(c1 * 4)", "c1 = floor(c1 * 4 + 0.5) * 0.25;", "u0 = clip(c0, 3);", "u1 = clip(c1, 3);",
@@ -176,7 +177,7 @@ def test_what_is_no_design_is_refused_with_what_is_missing(content, said):
 
 def test_a_replay_swings_about_rest_on_the_encoders_steps_while_its_reference_steps_half_way():
     """Unlimited and unrounded its largest command is one and a half limits, so that some are limited and most not."""
-    made = replace(MADE, law=replace(LAW, quantum=[0.01, 0.0], windup="free"))
+    made = replace(MADE, law=replace(LAW, resolution=[0.01, 0.0], windup="free"))
     test = self_test(made)
     steps = test.readings[:, 0] / 0.01
     np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
@@ -184,7 +185,7 @@ def test_a_replay_swings_about_rest_on_the_encoders_steps_while_its_reference_st
     assert not test.references[:half].any()
     assert len(set(test.references[half:].ravel())) == 1
     assert test.references[-1, 0] > 0
-    free = replace(made.law, references=test.references, limit=math.inf, command_quantum=0.0)
+    free = replace(made.law, references=test.references, limit=math.inf, command_resolution=0.0)
     assert np.abs(free.follow(test.readings)[0]).max() == pytest.approx(1.5 * 6.0, rel=0.02)  # but for the steps
     off = test.readings - [0.0, 1.5]
     assert np.abs(off).max() == pytest.approx(2 * test.references[-1, 0], rel=0.02)
@@ -216,8 +217,8 @@ def test_single_precision_is_bounded_by_errors_that_are_handed_on_from_sample_to
     eps = 2.0**-24
     a, b, c, d = (1.0 if hold else 0.5), np.array([2.0, -0.75]), 3.0, np.array([1.5, 0.3])
     law = Law([[a]], [b], [[c]], [d], target=[0.7], initial=[0.9], references=np.zeros((1, 1)), period=0.1,
-              windup="hold" if hold else "free", limit=2.0 if hold else math.inf, command_quantum=0.25 if hold else 0.0,
-              begin=np.array([[-0.4]]))  # fmt: skip
+              windup="hold" if hold else "free", limit=2.0 if hold else math.inf,
+              command_resolution=0.25 if hold else 0.0, begin=np.array([[-0.4]]))  # fmt: skip
     made = of_law(law)
     test, step = self_test(made), (0.25 if hold else 0.0)
     memory = replace(law, references=test.references).follow(test.readings)[1][:, 0]
@@ -245,7 +246,7 @@ def in_c(made, single=False):
 
 def test_a_header_names_every_signal_and_the_step_of_each_encoder_that_has_one():
     """A reversed encoder counts the other way: its step has the sign of its wiring."""
-    made = replace(MADE, law=replace(LAW, quantum=[0.001, 0.0]), signs=(-1.0, 1.0), reading_units=("m", "rad"))
+    made = replace(MADE, law=replace(LAW, resolution=[0.001, 0.0]), signs=(-1.0, 1.0), reading_units=("m", "rad"))
     text = in_c(made)["law.h"]
     assert "#define LAW_STEP_X -0.001 /* reading per count of the encoder [m] */\n" in text
     assert "LAW_STEP_THETA" not in text

@@ -64,7 +64,7 @@ def relay(t, y, r, z, p):
 
 MIXED = Rule(
     function=everything, initial=[0.0, 0.1], parameters=[0.3], measured=("theta", "psi"), period=2e-3,
-    references=[[0.0]], limit=2.0, command_quantum=[0.001, 0.0], quantum=[2 * pi / 4096, 0.0],
+    references=[[0.0]], limit=2.0, command_resolution=[0.001, 0.0], resolution=[2 * pi / 4096, 0.0],
 )  # fmt: skip
 RULES = {"swing-up": swing_up, "everything": lambda: MIXED, "relay": lambda: BARE}
 BARE = Rule(function=relay, measured=("x",), period=0.01)
@@ -172,10 +172,10 @@ def test_the_replay_takes_every_branch():
     assert np.ptp(memory[:, 1]) > 1.0
 
 
-def test_the_verb_writes_a_sketch_and_says_what_an_uno_does_not(tmp_path):
+def test_the_verb_writes_a_sketch_and_says_what_a_mega_does_not(tmp_path):
     done = up.export(MIXED, to="arduino", out=tmp_path)
     assert (tmp_path / "law" / "law.ino").exists()
-    assert "double has 32 bits (Uno, Mega, Nano) the self-test may fail" in str(done)
+    assert "double has 32 bits (Mega) the self-test may fail" in str(done)
 
 
 @pytest.mark.parametrize(

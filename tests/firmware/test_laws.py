@@ -104,7 +104,7 @@ def test_commands_are_those_of_the_law_in_float32_to_the_last_step(host, name):
     whole = law.over(ABOUT.coordinates, 1) if law.measured else law
     limit = math.floor(min(law.limit, FREE.command) / STEP + 1e-9) * STEP
     references = r[::every] if law.signal().shape[1] else None
-    double = replace(whole, command_quantum=STEP, limit=limit, references=references)
+    double = replace(whole, command_resolution=STEP, limit=limit, references=references)
     exact, memory = double.follow(q[::every] / COUNTS)
     assert len(np.unique(exact)) > 10
     apart = np.abs(expected[::every] - exact[:, 0] / STEP).max()
@@ -145,7 +145,7 @@ def test_a_law_is_compared_bit_by_bit_with_what_the_board_holds(host):
                 body = f.body
                 if f.answers(Kind.LAW):
                     body = body[:50] + bytes([body[50] ^ 1]) + body[51:]
-                out += pack(f.kind, f.sequence, body)
+                out += pack(f.kind, f.sequence, f.session, body)
             return out
 
         def close(self):

@@ -20,8 +20,8 @@ from upright.gains import (
     place,
     place_sampled,
     prefilter,
+    process_noise,
     read_off,
-    shaken,
 )
 from upright.gains.loop import closed, command_noise, loop_gain
 from upright.gains.velocity import observer
@@ -164,7 +164,7 @@ def test_the_kernel_moves_as_the_sampled_loop_says(kind, delay):
 
 
 def test_noise_of_differences_in_closed_form():
-    """Plain: quantum/(T sqrt 6). Filtered: variance quantum^2/12 * 2 (1 - a)^2/((1 + a) T^2)."""
+    """Plain: resolution/(T sqrt 6). Filtered: variance resolution^2/12 * 2 (1 - a)^2/((1 + a) T^2)."""
     model, T = UPRIGHT.to_sampled(0.002), 0.002
     assert difference(model).noise(COUNT)[1::2] == pytest.approx(COUNT / (T * math.sqrt(6)))
     for a in (0.2, 0.9):
@@ -186,7 +186,7 @@ def test_kalman_filter_of_a_tracked_target(index):
 
 def test_a_shaken_double_integrator_is_one_whose_command_is_noise():
     model = DOUBLE_INTEGRATOR.to_sampled(0.1)
-    np.testing.assert_allclose(shaken(model, 3.0), 9.0 * model.B @ model.B.T, rtol=1e-12)
+    np.testing.assert_allclose(process_noise(model, 3.0), 9.0 * model.B @ model.B.T, rtol=1e-12)
 
 
 def test_a_filter_that_expects_pushes_anywhere_corrects_faster_than_the_zeros_of_the_drive():
@@ -198,7 +198,7 @@ def test_a_filter_that_expects_pushes_anywhere_corrects_faster_than_the_zeros_of
     count = COUNT / math.sqrt(12)
     by_command, anywhere = (
         -to_s(np.linalg.eigvals(kalman(model, process, count).A), 0.001).real.max()
-        for process in (100.0, shaken(model, 100.0 * np.abs(UPRIGHT.B[1::2, 0])))
+        for process in (100.0, process_noise(model, 100.0 * np.abs(UPRIGHT.B[1::2, 0])))
     )
     assert by_command < 1.1 * zero
     assert anywhere > 10 * zero

@@ -29,7 +29,7 @@ def test_a_swing_of_relative_encoders_or_a_camera_tells_the_friction_between_the
     }
     run = Run(
         label="swing", role="fit", t=t, u=np.zeros((t.size, 1)), y=y, measured=("theta_1", "theta_2"),
-        quantum=(step, step),
+        resolution=(step, step),
     )  # fmt: skip
     fit = identify(GreyBox(plant=plant, parameters=numbers), [run])
     for name in GUESSES:

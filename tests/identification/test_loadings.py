@@ -24,7 +24,7 @@ K, BARE, C, F = 390.0, 0.77, 1.2, 0.2
 
 def loaded(added: float, seed: int = 0, noise: float = 1e-5) -> Loaded:
     t, y, _ = swing(BARE + added, K, C, F, x0=0.02, noise=noise, seed=seed)
-    return Loaded(label=f"{added:g} kg", added=added, decay=decay(t, y, quantum=2 * noise))
+    return Loaded(label=f"{added:g} kg", added=added, decay=decay(t, y, resolution=2 * noise))
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
         again = []
         for a, (t, y) in clean.items():
             for _ in range(2):
-                noisy = decay(t, y + 1e-5 * rng.normal(size=t.size), quantum=2e-5)
+                noisy = decay(t, y + 1e-5 * rng.normal(size=t.size), resolution=2e-5)
                 again.append(Loaded(label="", added=a, decay=noisy))
         found = fit_loadings(again)
         held += [w.interval[0] <= v <= w.interval[1] for w, v in ((found.k, K), (found.bare, BARE), (found.damping, C))]
@@ -95,7 +95,7 @@ def test_a_step_on_and_off_are_two_swings():
         t=np.arange(2 * n) * 2e-3,
         signals={"x": np.concatenate([0.02 - y, y]), "u": np.repeat([1.0, 0.0], n)},
     )
-    found = swings(record, added=0.0, label="bare", signal="x", command="u", quantum=0.0)
+    found = swings(record, added=0.0, label="bare", signal="x", command="u", resolution=0.0)
     assert [s.command for s in found] == [1.0, 0.0]
     assert found[0].decay.omega_n == pytest.approx(found[1].decay.omega_n, rel=1e-6)
 

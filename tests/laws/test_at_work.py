@@ -22,7 +22,7 @@ READINGS = np.random.default_rng(0).normal(size=(300, 2)).cumsum(axis=0) * 1e-3
 LAWS = {
     "filtered differences": state_feedback([-1.2, -0.3, 9.1, 1.1], 1e-3, memory=0.5),
     "plain differences, limited, rounded, with a target": state_feedback(
-        [-1.2, -0.3, 9.1, 1.1], 1e-3, limit=0.05, command_quantum=0.01, target=[0.0, 0.1]
+        [-1.2, -0.3, 9.1, 1.1], 1e-3, limit=0.05, command_resolution=0.01, target=[0.0, 0.1]
     ),
     "a sum that holds at the limit, with a reference": Law(
         [[1.0]], [[1e-3, 0.0, -1e-3]], [[-40.0]], [[-3.0, 0.5, 3.0]], limit=0.02, windup="hold", initial=[1e-4],
@@ -86,7 +86,7 @@ def test_references_begin_with_the_first_sample_and_the_last_is_held():
 
 
 def test_a_rule_is_limited_and_rounded():
-    step = at_work(Rule(function=hop, initial=[0.0], parameters=[2.03], limit=2.0, command_quantum=0.25))
+    step = at_work(Rule(function=hop, initial=[0.0], parameters=[2.03], limit=2.0, command_resolution=0.25))
     assert step(0.0, (1.0,)) == (-2.0,)
     assert step(1.0, (0.5,)) == (2.0,)
 
@@ -120,7 +120,7 @@ def test_one_reading_of_several_that_is_no_number_stops_a_rule(place, bad):
 
 def test_a_command_that_overflows_is_none_and_raises_nothing():
     """5e307 is a double, and so many steps of 0.01 are not."""
-    law = Law(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), [[1.0]], limit=2.0, command_quantum=0.01)
+    law = Law(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), [[1.0]], limit=2.0, command_resolution=0.01)
     step = at_work(law)
     assert step(0.0, (1.0,)) == (1.0,)
     assert np.isnan(step(0.0, (5e307,))).all()

@@ -49,7 +49,7 @@ def test_a_law_follows_its_matrices():
     assert u[:, 0] == pytest.approx(expected)
     assert z == pytest.approx(memory)
     assert some().follow(Y, 2.5)[0][:, 0] == pytest.approx(expected + 2.5)
-    step = some(command_quantum=0.25, limit=1.1).follow(Y)[0][:, 0]
+    step = some(command_resolution=0.25, limit=1.1).follow(Y)[0][:, 0]
     assert step == pytest.approx(np.clip(np.floor(expected / 0.25 + 0.5) * 0.25, -1.1, 1.1))
 
 
@@ -73,7 +73,7 @@ def test_sums_stand_still_beyond_the_limit_and_filters_go_on():
 
 
 def test_a_law_between_other_units_commands_the_same():
-    law = some(limit=1.5, command_quantum=0.1)
+    law = some(limit=1.5, command_resolution=0.1)
     scale, offset = np.array([2.0, -0.5]), np.array([0.3, 0.7])
     other = law.in_units(scale, offset, -3.0)
     assert other.follow((Y - offset) / scale)[0] == pytest.approx(-3.0 * law.follow(Y)[0], abs=0.31)
@@ -82,7 +82,7 @@ def test_a_law_between_other_units_commands_the_same():
         -3.0 * smooth.follow(Y)[0]
     )
     assert other.limit == pytest.approx(4.5)
-    assert np.asarray(other.command_quantum) == pytest.approx(0.3)
+    assert np.asarray(other.command_resolution) == pytest.approx(0.3)
 
 
 def test_a_law_on_more_columns_reads_its_own_and_feeds_the_first_input():
@@ -113,17 +113,17 @@ def test_numbers_of_lanes_are_taken_lane_by_lane():
 
 
 def test_what_all_lanes_share_stands_in_its_order():
-    law = some(quantum=[0.1, 0.2], delay=1.5, command_quantum=0.3)
+    law = some(resolution=[0.1, 0.2], delay=1.5, command_resolution=0.3)
     assert law.scalars(2, 1).tolist() == [0.1, 0.2, 1.5, 0.0, 0.3]
-    assert replace(law, quantum=0.4).scalars(2, 1).tolist() == [0.4, 0.4, 1.5, 0.0, 0.3]
-    with pytest.raises(BadInput, match="quantum needs one value or 3"):
+    assert replace(law, resolution=0.4).scalars(2, 1).tolist() == [0.4, 0.4, 1.5, 0.0, 0.3]
+    with pytest.raises(BadInput, match="resolution needs one value or 3"):
         law.scalars(3, 1)
 
 
 def test_a_kernel_s_numbers_leave_out_what_is_compiled_in_and_begin_with_the_first_reading():
     law = Law(
         [[1.0, 0.0], [0.5, 0.0]], [[1.0, 0.25], [0.0, 1.0]], [[2.0, 3.0]], [[4.0, 5.0]], target=[0.1, 0.2],
-        initial=[7.0, 8.0], begin=np.array([[1.0, 0.0], [2.0, 3.0]]), quantum=0.5,
+        initial=[7.0, 8.0], begin=np.array([[1.0, 0.0], [2.0, 3.0]]), resolution=0.5,
     )  # fmt: skip
     assert law.compiled_in.A == ((1.0, 0.0), (None, 0.0))
     assert law.compiled_in.B == ((1.0, None), (0.0, 1.0))
@@ -143,8 +143,8 @@ def test_a_kernel_s_numbers_leave_out_what_is_compiled_in_and_begin_with_the_fir
     ("changed", "words"),
     [
         ({"delay": -0.1}, "delay must be at least 0 samples"), ({"delay": 1e4}, "delay must be at least 0 samples"),
-        ({"limit": 0.0}, "limit above zero"), ({"quantum": -1.0}, "quantum must be at least 0"),
-        ({"command_quantum": [-1.0]}, "quantum must be at least 0"),
+        ({"limit": 0.0}, "limit above zero"), ({"resolution": -1.0}, "resolution must be at least 0"),
+        ({"command_resolution": [-1.0]}, "resolution must be at least 0"),
         ({"references": np.zeros((0, 1))}, "references need finite values"),
         ({"references": [math.nan]}, "references need finite values"),
         ({"references": np.zeros((1, 1, 1)), "measured": ()}, "references need finite values"),
@@ -164,7 +164,7 @@ def test_a_law_that_cannot_be_is_refused(changed, words):
 
 
 def test_what_is_at_a_bound_is_a_law():
-    assert some(delay=0.0, quantum=0.0, period=0.0).period == 0.0
+    assert some(delay=0.0, resolution=0.0, period=0.0).period == 0.0
     assert some(references=None).signal().shape == (1, 1)
     assert some(references=None).readings == 2
     assert some(references=[1.0, 2.0]).signal().tolist() == [[1.0], [2.0]]
@@ -249,9 +249,20 @@ def test_what_is_as_it_would_be_is_not_said_and_comes_back():
     told = as_values(law)
     assert told["kind"] == "linear"
     assert told["limit"] == 2.0
-    assert not {"delay", "quantum", "command_quantum", "windup"} & told.keys()
+    assert not {"delay", "resolution", "command_resolution", "windup"} & told.keys()
     again = of_values(told)
     assert again.follow(Y)[0].tolist() == law.follow(Y)[0].tolist()
     plain = as_values(Law(np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((1, 0)), [[2.0, -1.0]]))
     assert plain.keys() == {"kind", "A", "B", "C", "D"}
     assert of_values(plain).B.shape == (0, 2)
+
+
+@pytest.mark.parametrize(("former", "now"), [("quantum", "resolution"), ("command_quantum", "command_resolution")])
+def test_a_former_name_of_a_resolution_means_the_same_and_warns(former, now):
+    with pytest.warns(DeprecationWarning, match=f"{now}="):
+        law = some(**{former: 0.25})
+    assert getattr(law, now) == 0.25
+    with pytest.warns(DeprecationWarning, match=f"read .{now}"):
+        assert getattr(law, former) == 0.25
+    values = as_values(law)
+    assert getattr(of_values({former: values.pop(now), **values}), now) == 0.25  # as a log of before says it

@@ -93,7 +93,7 @@ def test_a_file_that_exists_is_not_written_over_and_the_loop_hears_of_it(run, tm
     run.ring.put(row(0))
     path = run.go()
     assert path.read_bytes() == b"mine"
-    assert (run.ring.marks[STATE], run.ring.said()) == (FAILED, "File exists")
+    assert (run.ring.marks[STATE], run.ring.message()) == (FAILED, "File exists")
 
 
 def test_what_fails_is_said_with_how_many_rows_are_safe(run, monkeypatch):
@@ -109,7 +109,7 @@ def test_what_fails_is_said_with_how_many_rows_are_safe(run, monkeypatch):
 
     monkeypatch.setattr(process.RunFile, "flush", full)
     run.go()
-    assert (run.ring.marks[STATE], run.ring.said()) == (FAILED, "disk full after 100 rows; the loop goes on")
+    assert (run.ring.marks[STATE], run.ring.message()) == (FAILED, "disk full after 100 rows; the loop goes on")
     assert run.ring.marks[WRITTEN] == 100
     assert run.ring.marks[9] == 150  # lost: a chunk that failed and what came after
     assert list(run.ring.take(9)) == []  # taken all the same, so that the loop goes on
@@ -122,7 +122,7 @@ def test_another_error_of_the_file_is_told_in_its_own_words(run, monkeypatch):
     monkeypatch.setattr(process.RunFile, "flush", broken)
     run.ring.put(row(0))
     run.go()
-    assert run.ring.said() == "the log's file failed (Input/output error) after 0 rows; the loop goes on"
+    assert run.ring.message() == "the log's file failed (Input/output error) after 0 rows; the loop goes on"
 
 
 def test_memory_is_the_same_on_both_sides(run):

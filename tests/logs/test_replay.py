@@ -19,7 +19,7 @@ from upright.logs.layout import RunFile
 from upright.logs.replay import replay
 from upright.logs.whole import log_of
 
-LAW = state_feedback([-1.2, -0.3, 9.1, 1.1], 1e-3, memory=0.5, limit=0.5, command_quantum=0.001)
+LAW = state_feedback([-1.2, -0.3, 9.1, 1.1], 1e-3, memory=0.5, limit=0.5, command_resolution=0.001)
 
 
 def damped(t, y, r, z, p):

@@ -110,15 +110,15 @@ def test_an_event_is_not_given_before_all_of_it_can_be_seen(pair):
 
 def test_a_sentence_reaches_the_other_side_cut_to_its_place(pair):
     writer, reader, memory = pair
-    assert reader.said() == ""
+    assert reader.message() == ""
     writer.say("The disk is full: ä.")
-    assert reader.said() == "The disk is full: ä."
+    assert reader.message() == "The disk is full: ä."
     put(writer, 1)
     writer.say("x" * 2000)
-    assert reader.said() == "x" * 888  # up to the first row: 1024 less 128 and 8
+    assert reader.message() == "x" * 888  # up to the first row: 1024 less 128 and 8
     assert list(reader.take(1)) == [(0, 0.5, -1)]
     memory[200] = 0
-    assert reader.said() == ""
+    assert reader.message() == ""
 
 
 def test_the_last_event_s_place_lies_within_the_memory():

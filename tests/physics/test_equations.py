@@ -12,9 +12,10 @@ from tests.paper.symbolic import linear
 from tests.physics.specimens import EXAMPLES, SPECIMENS
 from tests.physics.text import acceleration, slope, swing
 from upright.physics import Plant, find, lagrange
-from upright.physics.generate import FOLDER, module_source, variants
+from upright.physics.generate import variants
 from upright.physics.lagrange import derive
-from upright.physics.plant import module_name
+from upright.physics.plant import stem
+from upright.physics.stored import FOLDER, text_of
 
 MOTOR = find("qube_motor.py:QubeMotor", EXAMPLES)(
     m_p=0.024, l_cg=0.0645, r=0.085, J_d=2.3e-4, J_p=3.3e-5, b_1=5e-4, b_2=1e-5
@@ -93,8 +94,8 @@ def test_accelerations_are_those_of_an_unabridged_derivation(name, rng):
 @pytest.mark.parametrize(("plant", "without"), variants(), ids=lambda x: getattr(x, "__name__", None))
 def test_generated_equations_are_those_of_the_energies(plant, without):
     """If this fails: python -m upright.physics.generate."""
-    path = FOLDER / f"{module_name(plant, without)}.py"
-    assert path.read_text(encoding="utf-8") == module_source(derive(plant, without=without))
+    path = FOLDER / f"{stem(plant, without)}.json"
+    assert path.read_text(encoding="utf-8") == text_of(derive(plant, without=without))
 
 
 @pytest.mark.slow

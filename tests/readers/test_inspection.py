@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from upright.readers import inspect
-from upright.readers.resolution import find_quantum
+from upright.readers.resolution import resolution_of
 from upright.records import Record
 
 
@@ -27,7 +27,7 @@ def counted(x: np.ndarray, step: float) -> np.ndarray:
 @given(st.sampled_from([2000, 2048, 4096, 8192, 14400, 16000, 40000]), st.floats(-3, 3))
 def test_the_counts_of_an_encoder_are_found(counts: int, offset: float) -> None:
     _, theta = swing()
-    found = find_quantum(counted(theta, 2 * math.pi / counts) + offset)
+    found = resolution_of(counted(theta, 2 * math.pi / counts) + offset)
     assert found.counts_per_rev == counts
     assert found.step == pytest.approx(2 * math.pi / counts, rel=1e-9)
 
@@ -35,7 +35,7 @@ def test_the_counts_of_an_encoder_are_found(counts: int, offset: float) -> None:
 @pytest.mark.parametrize("decimals", [5, 6, 9])
 def test_the_counts_survive_text_with_few_decimals(decimals: int) -> None:
     _, theta = swing()
-    found = find_quantum(np.round(counted(theta, 2 * math.pi / 2000), decimals))
+    found = resolution_of(np.round(counted(theta, 2 * math.pi / 2000), decimals))
     assert found.counts_per_rev == 2000
 
 
@@ -43,25 +43,25 @@ def test_the_counts_survive_text_with_few_decimals(decimals: int) -> None:
 @given(st.floats(2e-5, 1e-2).filter(lambda step: abs(math.log10(step) % 1) > 1e-6))  # 1e-3 could be decimals
 def test_a_linear_encoder_has_its_step_and_no_revolution(step: float) -> None:
     _, x = swing()
-    found = find_quantum(counted(x, step))
+    found = resolution_of(counted(x, step))
     assert found.step == pytest.approx(step, rel=1e-6)
 
 
 def test_a_converter_is_told_from_the_digits_of_its_text() -> None:
     _, x = swing()
-    found = find_quantum(np.round(counted(30 * x, 80 / 4096), 6))  # 12 bits over +-40 V, always an even last digit
+    found = resolution_of(np.round(counted(30 * x, 80 / 4096), 6))  # 12 bits over +-40 V, always an even last digit
     assert found.step == pytest.approx(80 / 4096, rel=1e-5)
-    assert find_quantum(counted(x, 2e-5)).step == pytest.approx(2e-5)
+    assert resolution_of(counted(x, 2e-5)).step == pytest.approx(2e-5)
 
 
 def test_a_smooth_signal_has_no_step() -> None:
     rng = np.random.default_rng(5)
-    assert find_quantum(rng.normal(size=3000)).step == 0
-    assert find_quantum(swing()[1]).step == 0
+    assert resolution_of(rng.normal(size=3000)).step == 0
+    assert resolution_of(swing()[1]).step == 0
 
 
 def test_whole_counts_are_exact() -> None:
-    assert find_quantum(np.array([0.0, 6, -9, 3, 12])).step == 3
+    assert resolution_of(np.array([0.0, 6, -9, 3, 12])).step == 3
 
 
 def test_a_difference_quotient_is_no_sensor_but_a_tachometer_is() -> None:
@@ -181,7 +181,9 @@ def test_any_valid_record_can_be_inspected(rows: list[tuple[float, float, float,
     names = {"Commanded Pos": x, "Encoder 1 Pos": y, "Control Effort": z, "theta": x + y}
     seen = inspect(Record(t=np.cumsum(steps), signals=names))
     assert len(seen.columns) == 4
-    assert all(math.isfinite(c.low) and math.isfinite(c.quantum.step) and 0 <= c.low_share <= 1 for c in seen.columns)
+    assert all(
+        math.isfinite(c.low) and math.isfinite(c.resolution.step) and 0 <= c.low_share <= 1 for c in seen.columns
+    )
     assert seen.time.period > 0
 
 

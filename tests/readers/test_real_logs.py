@@ -60,7 +60,7 @@ def test_length_and_true_period(name: str, samples: int, period: float, toleranc
     ],
 )
 def test_counts_of_the_encoders(name: str, column: str, counts: int) -> None:
-    found = inspect(real(name)).column(column).quantum
+    found = inspect(real(name)).column(column).resolution
     assert found.counts_per_rev == counts
     assert found.step == pytest.approx(2 * math.pi / counts, rel=2e-4)
 
@@ -76,7 +76,7 @@ def test_counts_of_the_encoders(name: str, column: str, counts: int) -> None:
     ],
 )
 def test_steps_of_the_other_sensors(name: str, column: str, step: float, relative: float) -> None:
-    assert inspect(real(name)).column(column).quantum.step == pytest.approx(step, rel=relative)
+    assert inspect(real(name)).column(column).resolution.step == pytest.approx(step, rel=relative)
 
 
 def test_an_ecp_commanded_position_follows_the_encoder_in_open_loop_only() -> None:

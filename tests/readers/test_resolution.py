@@ -8,16 +8,18 @@ import re
 import numpy as np
 import pytest
 
+from upright.readers.inspection import inspect_record
 from upright.readers.resolution import (
-    Quantum,
+    Resolution,
     counts_per_rev,
     decimal_step,
-    find_quantum,
     is_epoch,
     is_index,
     rebuild,
+    resolution_of,
     rounding,
 )
+from upright.records import Record
 
 
 @pytest.mark.parametrize(
@@ -44,7 +46,7 @@ def test_a_step_is_found_from_the_middle_of_very_many_levels(outside):
     levels = step * np.arange(-3500, 3500)
     bent = levels + 0.3 * step * np.sin(np.arange(7000) ** 2)  # off the grid by up to 0.3 of a step
     far = {"below": levels < -2001 * step, "above": levels > 2001 * step, "both": np.abs(levels) > 2001 * step}
-    found = find_quantum(np.random.default_rng(2).permutation(np.where(far[outside], bent, levels)))
+    found = resolution_of(np.random.default_rng(2).permutation(np.where(far[outside], bent, levels)))
     assert found.step == pytest.approx(step, rel=1e-9)
     assert found.counts_per_rev == 20000
 
@@ -53,7 +55,7 @@ def test_the_middle_matters_not_the_ends():
     step = 2 * math.pi / 20000
     levels = step * np.arange(-3500, 3500)
     bent = levels + 0.3 * step * np.sin(np.arange(7000) ** 2)
-    assert find_quantum(np.where(np.abs(levels) < 1500 * step, bent, levels)).step == 0.0
+    assert resolution_of(np.where(np.abs(levels) < 1500 * step, bent, levels)).step == 0.0
 
 
 @pytest.mark.parametrize("middle", [0.0, 3.0])
@@ -61,7 +63,7 @@ def test_a_step_is_found_although_most_levels_are_far_apart(middle):
     """Five decimals know the step of a few neighbours to a part in a thousand: too little to count to 16384 with."""
     count = np.array([0, 1, 2, 3, 4, *(1 << np.arange(3, 15))])
     step = 2 * math.pi / 2000
-    found = find_quantum(np.round(middle + step * np.concatenate([-count[1:], count]), 5))
+    found = resolution_of(np.round(middle + step * np.concatenate([-count[1:], count]), 5))
     assert found.counts_per_rev == 2000
     assert found.step == pytest.approx(step, rel=1e-5 / (16384 * step))
 
@@ -69,23 +71,45 @@ def test_a_step_is_found_although_most_levels_are_far_apart(middle):
 def test_decimals_are_the_texts_when_values_come_again_and_again():
     """180 levels of 4000 samples; of 300 samples that hardly ever repeat nobody knows."""
     t = 2e-3 * np.arange(4000)
-    found = find_quantum(np.round(0.9 * np.exp(-0.3 * t) * np.cos(5 * t), 2))
+    found = resolution_of(np.round(0.9 * np.exp(-0.3 * t) * np.cos(5 * t), 2))
     assert (found.step, found.decimals) == (0.01, True)
-    assert find_quantum(np.round(np.random.default_rng(3).normal(size=300), 6)) == Quantum()
-    assert find_quantum(np.array([0.25, 0.5] * 9)) == Quantum()  # two levels are no grid
+    assert resolution_of(np.round(np.random.default_rng(3).normal(size=300), 6)).step == 0
+    assert resolution_of(np.array([0.25, 0.5] * 9)).step == 0  # two levels are no grid
+
+
+def test_where_no_step_is_seen_its_bound_is_that_of_the_digits_or_of_the_noise():
+    """Rounding to q errs by q/sqrt(12), rms: noise of sigma hides steps up to sqrt(12) sigma. 4000 samples tell a
+    standard deviation by the median of overlapping fourth differences to some percent."""
+    t, rng = 2e-3 * np.arange(4000), np.random.default_rng(5)
+    swing = np.sin(3 * t) * np.exp(-0.1 * t)
+    fine, noisy = (resolution_of(x) for x in (np.round(swing, 5), swing + 1e-3 * rng.normal(size=t.size)))
+    assert (fine.step, noisy.step) == (0, 0)
+    assert fine.hidden == pytest.approx(1e-5)
+    assert noisy.hidden == pytest.approx(math.sqrt(12) * 1e-3, rel=0.1)
+
+
+@pytest.mark.parametrize("counts", [2000, 4096, 10_000, 16_384])
+def test_an_angles_counts_are_the_same_in_degrees_and_in_radians(counts):
+    """A unit is how an angle is written, and no other encoder."""
+    t = 5e-3 * np.arange(2000)
+    turns = np.round(counts * 0.15 * np.sin(4 * t) * np.exp(-0.1 * t)) / counts
+    signals = {"theta_rad": 2 * math.pi * turns, "theta_deg": 360 * turns}
+    written = {n: np.array([float(f"{x:.9g}") for x in v]) for n, v in signals.items()}
+    seen = inspect_record(Record(t=t, signals=written, units={"theta_rad": "rad", "theta_deg": "deg"}))
+    assert {c.name: c.resolution.counts_per_rev for c in seen.columns} == dict.fromkeys(signals, counts)
 
 
 @pytest.mark.parametrize(
-    ("quantum", "words"),
+    ("resolution", "words"),
     [
-        (Quantum(), ""),
-        (Quantum(step=2 * math.pi / 2000, counts_per_rev=2000), "2 pi/2000 = 0.003142"),
-        (Quantum(step=0.01, decimals=True), "0.01 (decimals)"),
-        (Quantum(step=0.0195312), "0.01953"),
+        (Resolution(), ""),
+        (Resolution(step=2 * math.pi / 2000, counts_per_rev=2000), "2 pi/2000 = 0.003142"),
+        (Resolution(step=0.01, decimals=True), "0.01 (decimals)"),
+        (Resolution(step=0.0195312), "0.01953"),
     ],
 )
-def test_a_step_is_spelt_with_where_it_comes_from(quantum, words):
-    assert str(quantum) == words
+def test_a_step_is_spelt_with_where_it_comes_from(resolution, words):
+    assert str(resolution) == words
 
 
 @pytest.mark.parametrize(

@@ -57,7 +57,7 @@ def test_every_tick_is_shown_and_logged_as_it_was(tmp_path):
     columns = {name: np.asarray(log.columns[name]) for name in log.columns}
     counts = np.column_stack([columns["psi_counts"], columns["theta_counts"]])
     readings = np.column_stack([columns["psi"], columns["theta"]])
-    assert readings == pytest.approx(counts * RIG.quantum)
+    assert readings == pytest.approx(counts * RIG.resolution)
     assert [s.readings for s in running[:-1]] == pytest.approx((readings - end.target)[1:])
     assert [s.command for s in running] == pytest.approx(columns["u"])
     assert [s.applied for s in running] == pytest.approx(columns["u_applied"])

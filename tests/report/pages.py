@@ -70,7 +70,7 @@ def design_page(**wish):
         plant = Furuta(m_p=0.135, l_cg=0.19, r=0.16, J_d=0.011, J_p=6e-4, b_1=6e-4)
         others = tuple((plant.replace(m_p=m), 0.5) for m in (0.134, 0.136))
         rig = Rig(plant=plant, name="furuta", gain=0.5, unit="V", draws=others)
-        return chapter(design_for(rig, DesignRequest(at="inverted", limit=1.0, quantum=(4e-4, 4e-4), **wish)))
+        return chapter(design_for(rig, DesignRequest(at="inverted", limit=1.0, resolution=(4e-4, 4e-4), **wish)))
 
     return page
 

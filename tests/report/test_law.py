@@ -25,7 +25,7 @@ LAW = Law(
 FOUND = Recovery(
     law=LAW, command="u", feedforward={}, channels=(Channel(measured="y", reference="r", kp=2.0),),
     gains={"kp": Gain(value=2.0, stderr=0.1, interval=(1.8, 2.25), meaning="on the error")}, structure="P of r - y",
-    rows=np.arange(N), recorded=STEPS, reproduced=STEPS - 0.25, used=np.ones(N, dtype=bool), quantum=0.5,
+    rows=np.arange(N), recorded=STEPS, reproduced=STEPS - 0.25, used=np.ones(N, dtype=bool), resolution=0.5,
     saturated=0.0, every=1, unit="V",
     candidates=tuple(TriedStructure(name=f"s{i // 2}", parameters=i + 1, missed=0.5 + i) for i in range(20)),
 )  # fmt: skip
@@ -103,7 +103,7 @@ def test_the_command_is_drawn_whole_close_up_and_as_what_is_left():
     assert [a.get_ylabel() for a in drawing.axes] == ["u [V]", "u [V]", "residual [V]"]
     assert left.get_xlabel() == "time [s]"
     assert not any(a.yaxis.label.get_parse_math() for a in drawing.axes)
-    assert not draw_law(RECORD, replace(FOUND, quantum=0.0)).axes[2].patches
+    assert not draw_law(RECORD, replace(FOUND, resolution=0.0)).axes[2].patches
     assert whole.get_title(loc="left") == f"P of r - y; explains {FOUND.explained:.4g} %"
 
 

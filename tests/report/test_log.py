@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from upright.readers.inspection import Column, Gap, Inspection, TimeBase
-from upright.readers.resolution import Quantum
+from upright.readers.resolution import Resolution
 from upright.records import Record
 from upright.report.log import chapter, draw_columns
 
 T = np.linspace(0.0, 2.0, 41)
 TIME = TimeBase(samples=41, period=0.05, duration=2.0, late=0.0, rounding=0.0, jitter=0.0, gaps=(), rebuilt=False)
 PLAIN = Column(
-    name="theta", unit="rad", guess="", low=-1.25, high=2.5, quantum=Quantum(), constant=False, low_share=0.0,
+    name="theta", unit="rad", guess="", low=-1.25, high=2.5, resolution=Resolution(), constant=False, low_share=0.0,
     high_share=0.0, turns=0, drive=False, idle=False, switches=(), stepwise=False, lies=(),
 )  # fmt: skip
 
@@ -76,10 +76,10 @@ def remarks(**changes):
 
 def test_a_column_stands_with_its_range_unit_and_step():
     rows = page(
-        replace(PLAIN, quantum=Quantum(step=0.01, decimals=True)), replace(PLAIN, name="u", unit="", guess="V"),
+        replace(PLAIN, resolution=Resolution(step=0.01, decimals=True)), replace(PLAIN, name="u", unit="", guess="V"),
         replace(PLAIN, name="n", unit=""),
     )[1]  # fmt: skip
-    assert rows.headings == ("column", "unit", "lowest", "highest", "quantum", "remarks")
+    assert rows.headings == ("column", "unit", "lowest", "highest", "resolution", "remarks")
     assert rows.rows == (
         ("theta", "rad", "-1.25", "2.5", "0.01 (decimals)", ""), ("u", "V?", "-1.25", "2.5", "", ""),
         ("n", "", "-1.25", "2.5", "", ""),

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from tests.pictures import unreadable
 from tests.report.pages import (
     blocks,
     design_page,
@@ -112,6 +113,12 @@ def test_every_table_has_headings_and_every_picture_words(chapter):
     described = page.named("div", "aria-label")
     assert len(described) == len(pictures)
     assert all(described)
+
+
+@pytest.mark.slow
+def test_nothing_written_in_a_picture_is_cut_off_or_lies_on_something_else(chapter):
+    for picture in blocks(chapter, Picture):
+        assert (picture.name, unreadable(picture.draw())) == (picture.name, [])
 
 
 @pytest.mark.slow

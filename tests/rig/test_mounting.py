@@ -27,7 +27,7 @@ def test_after_a_reversal_play_is_lost_before_the_encoder_follows():
     q = np.repeat(np.concatenate([there, there[::-1]])[:, None], 2, axis=1)
     shown = readings(mounted(play=(0.02, 0.0)), q)
     lost = shown[:1001] - shown[:1000:-1]  # the same place on the way out and back
-    step = RIG.quantum[0]
+    step = RIG.resolution[0]
     inside = slice(30, 970)  # from where the play is taken up on either way
     assert np.abs(np.abs(lost[inside, 0]) - 0.02).max() <= step * (1 + 1e-9)
     assert np.abs(lost[:, 1]).max() == 0.0
@@ -46,7 +46,7 @@ def test_a_shaft_off_centre_errs_once_a_turn_from_where_it_was_zeroed():
     error, phase = 0.01, 0.7
     shown = readings(mounted(off_centre=(error, 0.0), phase=(phase, 0.0)), np.column_stack([turns, turns]))
     expected = turns + error * (np.sin(turns + phase) - math.sin(phase))
-    assert np.abs(shown[:, 0] - expected).max() <= RIG.quantum[0] / 2 * (1 + 1e-9)
+    assert np.abs(shown[:, 0] - expected).max() <= RIG.resolution[0] / 2 * (1 + 1e-9)
 
 
 @pytest.mark.parametrize("phase", [0.0, 0.7, 2.5])
@@ -59,9 +59,9 @@ def test_a_loop_reads_the_same_as_its_log_close_to_upright(phase):
     rig = mounted(off_centre=(0.0, error), phase=(0.0, phase))
     run = trial(rig, law, at="inverted", start=[0, 0, tilt, 0], seconds=0.01)
     expected = tilt + error * (math.sin(math.pi + tilt + phase) - math.sin(phase))
-    rounding = RIG.converter / 2 + abs(K[0, 2]) * (RIG.quantum[1] / 2 + error * tilt**2 / 2)
+    rounding = RIG.converter / 2 + abs(K[0, 2]) * (RIG.resolution[1] / 2 + error * tilt**2 / 2)
     assert run.u[0] == pytest.approx(-K[0, 2] * expected, abs=rounding)
-    assert run.record["theta"][0] - math.pi == pytest.approx(expected, abs=RIG.quantum[1] / 2)
+    assert run.record["theta"][0] - math.pi == pytest.approx(expected, abs=RIG.resolution[1] / 2)
 
 
 def test_an_off_centre_error_goes_with_the_turn_of_its_own_shaft():

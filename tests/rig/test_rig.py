@@ -38,7 +38,7 @@ def test_counts_are_per_turn_or_metre_and_steps_in_si():
     rig = Rig.known(CART, counts=(20_000, 4096))
     assert rig.counts == (20_000, 4096)
     assert rig.per_unit == pytest.approx((20_000, 4096 / math.tau))
-    assert rig.quantum == pytest.approx([5e-5, math.tau / 4096])
+    assert rig.resolution == pytest.approx([5e-5, math.tau / 4096])
     assert rig.replace(counts=1000).counts == (1000, 1000)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 
-def swing(m, k, c, f, *, x0=1.0, centre=0.0, rate=500.0, quantum=0.0, noise=0.0, seed=0):
+def swing(m, k, c, f, *, x0=1.0, centre=0.0, rate=500.0, resolution=0.0, noise=0.0, seed=0):
     """Time, signal and true extremes until friction holds the body, then as long again at rest."""
     t0, x, pieces, extremes = 0.0, x0, [], [(0.0, x0)]
     while abs(k * (x - centre)) > f and len(extremes) < 60:
@@ -31,4 +31,4 @@ def swing(m, k, c, f, *, x0=1.0, centre=0.0, rate=500.0, quantum=0.0, noise=0.0,
         inside = (t >= first) & (t < last)
         y[inside] = sol(t[inside] - first)[0]
     y = y + noise * np.random.default_rng(seed).normal(size=t.size)
-    return t, (np.round(y / quantum) * quantum if quantum else y), np.array(extremes)
+    return t, (np.round(y / resolution) * resolution if resolution else y), np.array(extremes)

@@ -25,19 +25,19 @@ def test_the_recursion_gives_the_extremes_that_scipy_integrates():
 
 
 @pytest.mark.parametrize("f", [0.0, 0.2, 0.8])
-@pytest.mark.parametrize("quantum", [0.0, 1e-4])
-def test_frequency_and_both_frictions_are_recovered(f, quantum):
+@pytest.mark.parametrize("resolution", [0.0, 1e-4])
+def test_frequency_and_both_frictions_are_recovered(f, resolution):
     m, k, c, centre = 0.8, 390.0, 1.2, 0.0123
-    t, y, extremes = swing(m, k, c, f, x0=0.05, centre=centre, quantum=quantum)
-    found = decay(t, y, quantum=quantum)
+    t, y, extremes = swing(m, k, c, f, x0=0.05, centre=centre, resolution=resolution)
+    found = decay(t, y, resolution=resolution)
     assert 4 <= found.t.size < extremes.shape[0]  # the first and the last rest are no turns
     n = found.t.size
     # a few errors of least squares on n heights; a rounding of 1e-4 in 0.05 leaves 0.1 % of frequency at most
-    assert found.omega_n == pytest.approx(math.sqrt(k / m), rel=1e-5 if quantum == 0 else 1e-3)
+    assert found.omega_n == pytest.approx(math.sqrt(k / m), rel=1e-5 if resolution == 0 else 1e-3)
     assert abs(found.sigma - c / (2 * m)) < max(5 * found.sigma_error, 2e-3)
     assert abs(found.delta - f / k) < max(5 * found.delta_error, 1e-6)
-    assert abs(found.centre - centre) < max(quantum, 1e-6)
-    assert np.allclose(found.t, extremes[1 : n + 1, 0], rtol=0, atol=2e-5 if quantum == 0 else 2e-3)
+    assert abs(found.centre - centre) < max(resolution, 1e-6)
+    assert np.allclose(found.t, extremes[1 : n + 1, 0], rtol=0, atol=2e-5 if resolution == 0 else 2e-3)
 
 
 def test_dry_friction_alone_takes_four_delta_off_the_amplitude_every_period():
@@ -72,7 +72,7 @@ def test_stated_errors_are_those_seen_over_repetitions():
     rows = []
     for seed in range(60):
         t, y, _ = swing(m, k, c, f, x0=0.05, noise=noise, seed=seed)
-        found = decay(t, y, quantum=noise * 2)
+        found = decay(t, y, resolution=noise * 2)
         rows.append(((found.omega_n - math.sqrt(k / m)) / found.omega_error, (found.delta - f / k) / found.delta_error))
     scatter = np.std(rows, axis=0)
     # 60 draws know a standard deviation to 9 %; scatter accounts take the larger of two, so errors may be too large
@@ -89,7 +89,7 @@ def test_errors_are_those_that_noise_makes():
     rng = np.random.default_rng(2)
     off = []
     for _ in range(20):
-        found = decay(t, x + noise * rng.normal(size=t.size), quantum=noise)
+        found = decay(t, x + noise * rng.normal(size=t.size), resolution=noise)
         off.append(
             [
                 (found.omega_n - omega) / found.omega_error,

@@ -128,7 +128,7 @@ def test_an_acceleration_is_smoothed_until_its_noise_is_a_tenth_and_hardly_more(
 
 
 @pytest.mark.parametrize(
-    ("period", "quantum", "width"),
+    ("period", "resolution", "width"),
     [
         (1.0, 0.0, 12),  # an eighth of 100 samples
         (0.4, 0.0, 7),  # no less than 7
@@ -137,10 +137,10 @@ def test_an_acceleration_is_smoothed_until_its_noise_is_a_tenth_and_hardly_more(
         (1.0, 0.2, 24),  # 48 samples, and twice an eighth at most
     ],
 )
-def test_a_window_is_an_eighth_of_a_period_or_fifteen_steps_of_motion(period, quantum, width):
+def test_a_window_is_an_eighth_of_a_period_or_fifteen_steps_of_motion(period, resolution, width):
     """A sine of standard deviation 1 moves at 2 pi/period, root mean square."""
     y = math.sqrt(2) * np.sin(2 * np.pi * np.arange(1000) / 100)
-    assert smoothing_width(y, DT, period, quantum) == width
+    assert smoothing_width(y, DT, period, resolution) == width
 
 
 def test_a_body_at_rest_has_no_steps_to_wait_for():

@@ -104,7 +104,7 @@ def speed(t, begin, end, drag=0.4):
 def test_a_drive_that_went_off_early_is_found_with_the_acceleration_on_both_sides():
     t, y = spun(1.0, 4.0)
     u = np.where((t >= 1) & (t < 7), 1.0, 0.0)
-    trip = find_trip(t, u, y, quantum=1e-7)
+    trip = find_trip(t, u, y, resolution=1e-7)
     assert not trip.late
     assert trip.at == pytest.approx(4.0, abs=0.02)
     assert trip.logged == pytest.approx(7.0, abs=0.011)
@@ -115,14 +115,14 @@ def test_a_drive_that_went_off_early_is_found_with_the_acceleration_on_both_side
     assert trip.unexplained < 0.01
     assert trip.otherwise > 2 * trip.unexplained
     assert 0 < trip.error < 0.1
-    found, left = trip_or_misfit(t, u, y, (), quantum=1e-7, late=False)
+    found, left = trip_or_misfit(t, u, y, (), resolution=1e-7, late=False)
     assert (found.at, left) == (trip.at, trip.otherwise)
 
 
 def test_a_drive_that_came_on_late_is_found_and_one_that_did_what_it_was_told_is_none():
     t, y = spun(3.0, 7.0)
     u = np.where((t >= 1) & (t < 7), 1.0, 0.0)
-    trip = find_trip(t, u, y, quantum=1e-7, late=True)
+    trip = find_trip(t, u, y, resolution=1e-7, late=True)
     assert trip.late
     assert trip.at == pytest.approx(3.0, abs=0.02)
     assert trip.logged == pytest.approx(1.0, abs=0.011)
@@ -130,7 +130,7 @@ def test_a_drive_that_came_on_late_is_found_and_one_that_did_what_it_was_told_is
     assert trip.after == pytest.approx(np.polyfit(t[300:400], speed(t, 3, 7)[300:400], 1)[0], rel=0.05)
     t, y = spun(1.0, 7.0)
     for late in (False, True):
-        found, left = trip_or_misfit(t, u, y, (), quantum=1e-7, late=late)
+        found, left = trip_or_misfit(t, u, y, (), resolution=1e-7, late=late)
         assert found is None
         assert left < 0.01  # of what is logged nothing is left
 
@@ -139,10 +139,10 @@ def test_a_record_too_short_or_without_a_command_says_nothing():
     t, y = spun(1.0, 4.0)
     u = np.where((t >= 1) & (t < 7), 1.0, 0.0)
     nobody = (None, math.inf)
-    assert trip_or_misfit(t, 0 * u, y, (), quantum=0.0, late=False) == nobody
-    assert trip_or_misfit(t, np.where(np.arange(t.size) < 9, 1.0, 0.0), y, (), quantum=0.0, late=False) == nobody
-    assert trip_or_misfit(t[:99], u[:99] + 1, y[:99], (), quantum=0.0, late=False) == nobody
-    assert trip_or_misfit(t, u, 0 * y, (), quantum=0.0, late=False) == nobody
+    assert trip_or_misfit(t, 0 * u, y, (), resolution=0.0, late=False) == nobody
+    assert trip_or_misfit(t, np.where(np.arange(t.size) < 9, 1.0, 0.0), y, (), resolution=0.0, late=False) == nobody
+    assert trip_or_misfit(t[:99], u[:99] + 1, y[:99], (), resolution=0.0, late=False) == nobody
+    assert trip_or_misfit(t, u, 0 * y, (), resolution=0.0, late=False) == nobody
 
 
 def combs(u, truth, *, unit=1.0, late=False):

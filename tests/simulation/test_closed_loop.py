@@ -55,7 +55,7 @@ def test_a_delayed_loop_is_the_exactly_discretized_one(block, delay):
     assert np.allclose(y[:, :2, 0], path, rtol=0, atol=1e-8)
 
 
-def plain_loop(p, x, K, target, quantum, alpha, k_pf, r, uff, dt, n):
+def plain_loop(p, x, K, target, resolution, alpha, k_pf, r, uff, dt, n):
     """Encoder, differentiator, gains, limit and hold in plain Python; the plant by scipy's tightest integrator."""
     from scipy.integrate import solve_ivp
 
@@ -71,7 +71,7 @@ def plain_loop(p, x, K, target, quantum, alpha, k_pf, r, uff, dt, n):
 
     before, speed, rows = None, [0.0, 0.0], []
     for k in range(n):
-        y = [math.floor(x[2 * i] / quantum + 0.5) * quantum for i in range(2)]
+        y = [math.floor(x[2 * i] / resolution + 0.5) * resolution for i in range(2)]
         if before is not None:
             speed = [alpha * speed[i] + (1 - alpha) * (y[i] - before[i]) / dt for i in range(2)]
         before = y
@@ -87,11 +87,11 @@ def test_the_sampled_loop_is_the_one_written_in_plain_python(rotary):
     p = {**FURUTA, "b_1": 5e-3, "b_2": 2e-4, "actuator.limit": 0.12}
     dt, n = 1e-3, 120
     r, uff = 0.1 * np.sin(np.arange(n) * 0.1), 0.01 * np.cos(np.arange(n) * 0.2)
-    quantum = 2 * math.pi / 4096
+    resolution = 2 * math.pi / 4096
     K, target = [0.22, 0.2, -2.5, -0.3], [0.1, math.pi]
-    loop = state_feedback(K, dt, memory=0.7, k_pf=0.22, target=target, references=r, quantum=quantum)
+    loop = state_feedback(K, dt, memory=0.7, k_pf=0.22, target=target, references=r, resolution=resolution)
     x0 = [0.0123, 0.0, math.pi + 0.1234, 0.0]
-    plain = plain_loop(p, x0, K, target, quantum, 0.7, 0.22, r, uff, dt, n)
+    plain = plain_loop(p, x0, K, target, resolution, 0.7, 0.22, r, uff, dt, n)
     assert 0 < np.mean(np.abs(plain[:, 4]) == 0.12) < 1  # saturated at times
     for lanes in (1, 2):
         x = simulate(rotary, p, np.tile(x0, (lanes, 1)), uff, dt, samples=n, substeps=4, loop=loop)
@@ -115,7 +115,7 @@ def test_an_ensemble_reduces_what_simulate_records(rotary):
     x0 = np.zeros((40, 4))
     x0[:, 2] = math.pi + rng.uniform(-0.3, 0.3, 40)
     p = {**FURUTA, "b_1c": 1e-3, "b_2c": 2e-4, "actuator.limit": 0.3}
-    loop = state_feedback([0.22, 0.2, -2.5, -0.3], 1e-3, memory=0.7, target=[0.0, math.pi], quantum=1e-3)
+    loop = state_feedback([0.22, 0.2, -2.5, -0.3], 1e-3, memory=0.7, target=[0.0, math.pi], resolution=1e-3)
     x = simulate(rotary, p, x0, None, 1e-3, samples=301, substeps=2, loop=loop)
     e = ensemble(rotary, p, x0, None, 1e-3, samples=301, settle=0.2, substeps=2, loop=loop)
     # 0.3 s of a loop that rounds: the two kernels may order additions differently

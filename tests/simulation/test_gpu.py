@@ -22,7 +22,7 @@ from upright.workers import Workers
 
 CALLS = [name for name in vars(Driver) if name.startswith("cu")]
 STARTS = np.column_stack([np.zeros(130), np.zeros(130), np.linspace(pi - 0.1, pi + 0.1, 130), np.zeros(130)])
-LOOP = state_feedback([-0.2, -3.0, -0.1, -0.3], DT, memory=0.7, target=[0.0, pi], quantum=1e-3)
+LOOP = state_feedback([-0.2, -3.0, -0.1, -0.3], DT, memory=0.7, target=[0.0, pi], resolution=1e-3)
 
 
 @pytest.fixture

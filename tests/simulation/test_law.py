@@ -32,10 +32,10 @@ def plain(law, x, r, uff, dt, n, limit=math.inf, delay=0.0):
     late, soon = held(part * dt), held((1.0 - part) * dt)
     x, u, rows, over = np.asarray(x, dtype=float), [0.0] * (whole + 1), [], 0
     for k in range(n):
-        y = math.floor(x[0] / law.quantum + 0.5) * law.quantum if law.quantum else x[0]
+        y = math.floor(x[0] / law.resolution + 0.5) * law.resolution if law.resolution else x[0]
         w = np.array([y, *r[min(k, len(r) - 1)]])
         c = uff[k] + M[2][0] @ z + M[3][0] @ w
-        c = math.floor(c / law.command_quantum + 0.5) * law.command_quantum if law.command_quantum else c
+        c = math.floor(c / law.command_resolution + 0.5) * law.command_resolution if law.command_resolution else c
         beyond, c = abs(c) > limit, min(max(c, -limit), limit)
         over += beyond
         stands = (np.eye(len(z)) == M[0]).all(axis=1) & (beyond and law.windup == "hold")
@@ -102,10 +102,10 @@ def test_an_observer_with_its_gain_is_what_python_control_makes_of_it(block):
 
 def test_state_feedback_about_a_target_is_a_law_whose_references_hold_it(rotary):
     p = {**FURUTA, "b_1": 5e-3, "b_2": 2e-4, "actuator.limit": 0.12}
-    dt, n, alpha, quantum = 1e-3, 150, 0.7, 2 * math.pi / 4096
+    dt, n, alpha, resolution = 1e-3, 150, 0.7, 2 * math.pi / 4096
     K, target = np.array([0.22, 0.2, -2.5, -0.3]), np.array([0.1, math.pi])
     reference, uff = 0.1 * np.sin(np.arange(n) * 0.1), 0.01 * np.cos(np.arange(n) * 0.2)
-    loop = state_feedback(K, dt, memory=alpha, k_pf=0.22, target=target, references=reference, quantum=quantum)
+    loop = state_feedback(K, dt, memory=alpha, k_pf=0.22, target=target, references=reference, resolution=resolution)
     rate, O, I = (1.0 - alpha) / dt, np.zeros((2, 2)), np.eye(2)
     x0 = np.array([0.0123, 0.0, math.pi + 0.1234, 0.0])
     law = Law(
@@ -114,8 +114,8 @@ def test_state_feedback_about_a_target_is_a_law_whose_references_hold_it(rotary)
         C=-np.concatenate([-rate * K[1::2], alpha * K[1::2]])[None],
         D=np.concatenate([-K[0::2] - rate * K[1::2], [0.22, K[0::2] @ target]])[None],
         references=np.column_stack([reference, np.ones(n)]),
-        quantum=quantum,
-        initial=[*(np.floor(x0[0::2] / quantum + 0.5) * quantum), 0.0, 0.0],
+        resolution=resolution,
+        initial=[*(np.floor(x0[0::2] / resolution + 0.5) * resolution), 0.0, 0.0],
     )
     for lanes in (1, 2):
         a, b = (
@@ -129,7 +129,7 @@ def test_state_feedback_about_a_target_is_a_law_whose_references_hold_it(rotary)
 @pytest.mark.parametrize("step", [0.0, 0.05])
 def test_limit_windup_and_rounded_commands_are_those_of_a_plain_loop(block, windup, step):
     n, uff = 150, 0.1 * np.cos(np.arange(150) * 0.3)
-    law = Law(**PID, references=R * 2, windup=windup, command_quantum=step, initial=[0.0, 0.123, 0.0])
+    law = Law(**PID, references=R * 2, windup=windup, command_resolution=step, initial=[0.0, 0.123, 0.0])
     truth, over = plain(law, [0.123, 0.0], R * 2, uff, DT, n, limit=2.5)
     assert 0.1 < over < 0.9
     p = {**SPRING, "actuator.limit": 2.5}
@@ -155,7 +155,7 @@ def test_holding_the_state_ends_the_overshoot_that_windup_makes(block):
 @pytest.mark.parametrize("delay", [0.25, 1.0, 1.6])
 def test_a_delayed_law_is_the_exactly_discretized_one(block, delay):
     n = 60
-    law = Law(**pid(4.0, 3.0, 0.4, 0.4, DT), references=R, delay=delay, quantum=0.0, initial=[0.0, 0.3, 0.0])
+    law = Law(**pid(4.0, 3.0, 0.4, 0.4, DT), references=R, delay=delay, resolution=0.0, initial=[0.0, 0.3, 0.0])
     truth, _ = plain(law, [0.3, 0.0], R, np.zeros(n), DT, n, delay=delay)
     y = simulate(block, SPRING, [[0.3, 0.0]] * 2, None, DT, samples=n, substeps=20, loop=law)
     # four or five of twenty substeps fit the delay exactly
@@ -163,8 +163,8 @@ def test_a_delayed_law_is_the_exactly_discretized_one(block, delay):
 
 
 def test_encoders_round_before_the_law(block):
-    n, quantum = 40, 0.01
-    law = Law(**PID, references=R, quantum=quantum, initial=[0.0, 0.12, 0.0])
+    n, resolution = 40, 0.01
+    law = Law(**PID, references=R, resolution=resolution, initial=[0.0, 0.12, 0.0])
     truth, _ = plain(law, [0.1234, 0.0], R, np.zeros(n), DT, n)
     y = simulate(block, SPRING, [[0.1234, 0.0]] * 2, None, DT, samples=n, substeps=8, loop=law)
     assert np.allclose(y[:, :, 0], truth, rtol=0, atol=1e-8)
@@ -233,19 +233,19 @@ def plain_sum(terms):
 def test_commands_are_those_of_the_sums_written_out_bit_for_bit(rotary, lanes, step):
     """What a rig's own computer finds from the same readings, so that a program on it can be checked by this one."""
     rng, n, dt = np.random.default_rng(5), 200, 1e-3
-    quantum, target = 2 * math.pi / 16000, [0.1, math.pi]
+    resolution, target = 2 * math.pi / 16000, [0.1, math.pi]
     C, D = rng.normal(size=(1, 3)), np.array([[0.7, -3.1, 0.2]])
     law = Law(
         A=[[0.3, 0.1, 0.0], [0.0, 1.0, 0.0], [0.1, 0.2, 0.5]], B=rng.normal(size=(3, 3)) * 0.01, C=C * 0.1, D=D,
-        begin=rng.normal(size=(3, 2)), target=target, references=rng.normal(size=(n, 1)) * 0.1, quantum=quantum,
-        command_quantum=step,
+        begin=rng.normal(size=(3, 2)), target=target, references=rng.normal(size=(n, 1)) * 0.1, resolution=resolution,
+        command_resolution=step,
     )  # fmt: skip
     x0 = [0.0, 0.0, math.pi + 0.05, 0.0]
     motion = simulate(rotary, {**FURUTA, "actuator.limit": 0.3}, [x0] * lanes, None, dt, samples=n, loop=law)[:, :, -1]
     r = law.signal()[:, 0].tolist()
-    per, z, expected = 1.0 / quantum, [0.0] * 3, []
+    per, z, expected = 1.0 / resolution, [0.0] * 3, []
     for k, x in enumerate(motion[:, [0, 2]].tolist()):
-        y = [math.floor(q * per + 0.5) * quantum - rest for q, rest in zip(x, target, strict=True)]
+        y = [math.floor(q * per + 0.5) * resolution - rest for q, rest in zip(x, target, strict=True)]
         if k == 0:
             z = [plain_sum(zip(row, y, strict=True)) for row in law.begin.tolist()]
         w = [*y, r[k]]

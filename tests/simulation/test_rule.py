@@ -42,7 +42,7 @@ def as_matrices(kp, ki, kd, alpha, dt):
 def test_a_law_written_as_a_function_moves_the_plant_alike(block, delay):
     numbers = [(9.0, 14.0, 1.1, 0.4, DT), (4.0, 2.0, 0.6, 0.7, DT)]
     start = np.array([[0.0, 0.1], [0.12, 0.2], [0.0, -0.5]])
-    common = {"references": R, "quantum": 0.01, "command_quantum": 0.005, "delay": delay, "initial": start}
+    common = {"references": R, "resolution": 0.01, "command_resolution": 0.005, "delay": delay, "initial": start}
     law = Law(**{c: np.stack([np.array(as_matrices(*n)[c]) for n in numbers], axis=-1) for c in "ABCD"}, **common)
     rule = Rule(function=pid, parameters=np.array(numbers).T, **common)
     p, feed = {**SPRING, "actuator.limit": 2.5}, 0.1 * np.cos(np.arange(90) * 0.3)
@@ -63,7 +63,7 @@ def dead_zone(t, y, r, z, p):
 
 
 def test_what_the_kernel_computes_is_what_the_function_says_called_by_hand(block):
-    rule = Rule(function=dead_zone, initial=[0.0], parameters=[0.03, 1.0], quantum=0.01)
+    rule = Rule(function=dead_zone, initial=[0.0], parameters=[0.03, 1.0], resolution=0.01)
     for lanes in (1, 3):
         out = simulate(block, SPRING, [[0.2, 0.0]] * lanes, None, DT, samples=200, loop=rule)[:, :, 0]
         commands, memory = rule.follow(np.floor(out[:, 0] / 0.01 + 0.5) * 0.01, DT)

@@ -5,9 +5,9 @@ import numpy as np
 from tests.identification.twins import PENDULUM, noisy, rig, swing
 from upright.identification.estimate import identify
 from upright.physics import Pendulum
-from upright.study.fitted import read_fit
 from upright.study.load import Study
 from upright.study.results import write_fit
+from upright.study.stored_fit import read_fit
 
 
 def test_bands_come_back_as_they_were_written(tmp_path):

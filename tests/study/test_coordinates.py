@@ -78,7 +78,7 @@ def test_steps_of_two_encoders_add_up_as_their_roundings_scatter(study):
     counts = f'unit = "counts"\ncounts_per_m = {per_m}\n[sensors.theta]\nunit = "counts"\ncounts_per_rev = {per_rev}\n'
     run = one(study(RIG + TIP + counts + RUN, tip=tip, theta=theta))
     scatter = np.std(run.y[:, 0] - X)  # of 2000 roundings: off by 1.6 % (one sigma)
-    assert run.quantum[0] / math.sqrt(12) == pytest.approx(scatter, rel=0.06)
+    assert run.resolution[0] / math.sqrt(12) == pytest.approx(scatter, rel=0.06)
 
 
 def test_a_law_on_coordinates_begins_at_what_the_sum_tells(study):

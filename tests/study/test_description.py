@@ -17,9 +17,9 @@ from upright.physics import CartPendulum
 from upright.readers import inspect
 from upright.simulation import simulate
 from upright.study.draft.draft import draft
-from upright.study.fitted import read_fit
 from upright.study.load import load_study
 from upright.study.results import write_fit
+from upright.study.stored_fit import read_fit
 
 STUDY = """
 [rig]

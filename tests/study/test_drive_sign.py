@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import upright as up
-from tests.study.test_fitted import FIT
+from tests.study.test_stored_fit import FIT
 from upright.simulation import simulate
 from upright.study.stored_rig import read_stored_rig
 

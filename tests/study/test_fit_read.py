@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.study.test_fitted import FIT
+from tests.study.test_stored_fit import FIT
 from upright.basis import NOT_TRUSTED, RESERVED, TRUSTED
 from upright.errors import BadInput
 from upright.identification.model.fit import Judgement
-from upright.study.fitted import basis_of, fitted_model, read_fit
+from upright.study.stored_fit import basis_of, read_fit, stored_fit
 
 
 def model(**changes: Any):
-    return fitted_model(copy.deepcopy(FIT) | changes)
+    return stored_fit(copy.deepcopy(FIT) | changes)
 
 
 def answer(word: str, headline: str = "So.", **more: Any) -> Judgement:
@@ -52,8 +52,8 @@ def test_a_fit_without_a_verdict_says_so():
     assert basis_of("", [], trusted=True).sentence == "The fit is trusted."
     assert basis_of("", [], trusted=False).sentence == "The fit's own verdict: it is not to be trusted."
     without = {k: v for k, v in FIT.items() if k != "trusted"}
-    assert fitted_model(without).basis.sentence == "This fit does not say whether it can be trusted."
-    assert fitted_model(without).trusted is False
+    assert stored_fit(without).basis.sentence == "This fit does not say whether it can be trusted."
+    assert stored_fit(without).trusted is False
     assert model().basis.level == RESERVED
     assert model(answers=[]).basis.level == TRUSTED
 
@@ -69,9 +69,9 @@ def test_estimates_and_their_covariance_are_in_one_order():
     assert names == ["actuator.gain"]
     np.testing.assert_allclose(covariance, [[0.01]])
     bare = {k: v for k, v in FIT.items() if k not in ("correlation", "estimated")}
-    assert fitted_model(bare).covariance(["J_p"])[0] == []
+    assert stored_fit(bare).covariance(["J_p"])[0] == []
     without = {k: v for k, v in FIT.items() if k != "correlation"}
-    np.testing.assert_array_equal(fitted_model(without).covariance(["J_p"])[1], [[0.0]])
+    np.testing.assert_array_equal(stored_fit(without).covariance(["J_p"])[1], [[0.0]])
 
 
 def test_units_groups_and_scores_are_read_under_their_names():

@@ -40,20 +40,20 @@ def test_a_sensor_turns_readings_into_the_coordinate(study, sensor, reading):
 def test_whole_numbers_are_counts_when_counts_per_turn_are_given(study):
     counts = np.round(THETA * 4096 / (2 * math.pi))
     run = one(study(RIG + "[sensors.theta]\ncounts_per_rev = 4096\n" + RUN, theta=counts, x=X))
-    assert run.quantum == pytest.approx((2 * math.pi / 4096,))
+    assert run.resolution == pytest.approx((2 * math.pi / 4096,))
     assert np.abs(run.y[:, 0] - THETA).max() <= math.pi / 4096 + 1e-12  # half a count
 
 
 def test_radians_stay_radians_and_counts_per_turn_set_their_resolution(study):
     run = one(study(RIG + "[sensors.theta]\ncounts_per_rev = 14400\nsign = -1\n" + RUN))
     np.testing.assert_array_equal(run.y[:, 0], -THETA)
-    assert run.quantum == pytest.approx((2 * math.pi / 14400,))
+    assert run.resolution == pytest.approx((2 * math.pi / 14400,))
 
 
 def test_a_position_in_counts_needs_counts_per_metre(study):
     run = one(study(RIG + '[sensors.x]\nunit = "counts"\ncounts_per_m = 226629\n' + RUN, x=X * 226629))
     np.testing.assert_allclose(run.y[:, 0], X, atol=1e-12)
-    assert run.quantum == pytest.approx((1 / 226629,))
+    assert run.resolution == pytest.approx((1 / 226629,))
 
 
 def test_an_angle_that_jumps_by_a_turn_is_unwrapped(study):

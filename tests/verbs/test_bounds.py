@@ -52,14 +52,14 @@ def of_rig(**options):
 
 
 @pytest.mark.parametrize(
-    ("counts", "quantum"),
+    ("counts", "resolution"),
     [
         (4000, (4000, 4000)), ({"psi": 1000, "theta": 2000}, (1000, 2000)), ("4000, psi=1000", (1000, 4000)),
     ],
 )  # fmt: skip
-def test_counts_are_per_turn_of_all_or_of_each(counts, quantum):
+def test_counts_are_per_turn_of_all_or_of_each(counts, resolution):
     done = of_rig(counts=counts)
-    assert done.value.wish.quantum == pytest.approx([2 * math.pi / n for n in quantum])
+    assert done.value.wish.resolution == pytest.approx([2 * math.pi / n for n in resolution])
     assert (done.value.wish.at, done.value.wish.limit, done.value.wish.period) == ("inverted", 5.0, 2e-3)
 
 

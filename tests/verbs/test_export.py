@@ -13,7 +13,7 @@ from upright.errors import BadInput
 from upright.laws import Law
 
 LAW = Law(
-    np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), [[-3.3]], period=0.1, limit=2.0, command_quantum=0.25,
+    np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), [[-3.3]], period=0.1, limit=2.0, command_resolution=0.25,
     measured=("theta",),
 )  # fmt: skip
 
@@ -46,7 +46,7 @@ def test_single_precision_is_said_to_miss_by_as_much_as_it_may(tmp_path):
     assert done.numbers["single_precision_misses"] == pytest.approx(0.25, rel=1e-3)
     assert "48 samples are replayed and may miss by 0.25 in single precision" in done.chapter.verdict
     assert not done.chapter.warnings
-    (warned,) = up.export(replace(LAW, command_quantum=0.0), to="c", single=True, out=tmp_path).chapter.warnings
+    (warned,) = up.export(replace(LAW, command_resolution=0.0), to="c", single=True, out=tmp_path).chapter.warnings
     assert "which no converter hides; a slower period moves it less" in warned
 
 

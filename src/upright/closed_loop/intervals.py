@@ -57,14 +57,14 @@ def errors(regression: Regression, u: Array, used: Rows) -> Array:
     return inverse @ spread @ inverse / np.outer(size, size)
 
 
-def sharpen(best: Regression, u: Array, used: Rows, quantum: float) -> tuple[Regression, HalfWidth]:
+def sharpen(best: Regression, u: Array, used: Rows, resolution: float) -> tuple[Regression, HalfWidth]:
     """Gains that come nearest every rounded row, and how far they may go until one row is missed by half a step.
 
     Where even the nearest miss by more than that, such as under a clock that jitters, they are given twice the excess.
     """
     X, recorded = best.columns.X[used], u[used]
     gains, largest = least_worst(X, recorded)
-    within = max(0.5 * quantum, largest + max(largest - 0.5 * quantum, 0.0)) * (1 + 1e-6)
+    within = max(0.5 * resolution, largest + max(largest - 0.5 * resolution, 0.0)) * (1 + 1e-6)
 
     def width(v: Array) -> tuple[float, float]:
         value = float(v[:-1] @ gains)
@@ -119,8 +119,8 @@ def least_worst(X: Array, u: Array) -> tuple[Array, float]:
     A, p = X / size, X.shape[1]
     one = np.ones((len(A), 1))
     cost = np.concatenate([np.zeros(p), [1.0]])
-    found = _least(cost, np.block([[A, -one], [-A, -one]]), np.concatenate([u, -u]))
-    return found[:p] / size, float(found[p])
+    solution = _least(cost, np.block([[A, -one], [-A, -one]]), np.concatenate([u, -u]))
+    return solution[:p] / size, float(solution[p])
 
 
 def range_of(X: Array, u: Array, weights: Array, within: float) -> tuple[float, float]:
@@ -144,10 +144,10 @@ def _least(cost: Array, G: Array, h: Array) -> Array:
     rows = np.unique(np.linspace(0, len(h) - 1, FEW).astype(int))
     x = np.zeros(cost.size)
     for _ in range(60):
-        found = linprog(cost, A_ub=G[rows], b_ub=h[rows], bounds=(-LARGEST, LARGEST), method="highs")
-        if found.x is None:
+        result = linprog(cost, A_ub=G[rows], b_ub=h[rows], bounds=(-LARGEST, LARGEST), method="highs")
+        if result.x is None:
             return x
-        x = np.asarray(found.x, dtype=np.float64)
+        x = np.asarray(result.x, dtype=np.float64)
         over = G @ x - h
         if over.max() <= slack:
             return x

@@ -65,7 +65,7 @@ class Recovery:
         Command there, and what the law makes of the recorded measurements.
     used : (K,) array of bool
         Rows that the gains rest on; the others are the first ones and those at the limit.
-    quantum : float
+    resolution : float
         Step of the command's column, 0 for none.
     saturated : float
         Share of the rows at the limit.
@@ -87,7 +87,7 @@ class Recovery:
     recorded: Array
     reproduced: Array
     used: NDArray[np.bool_]
-    quantum: float
+    resolution: float
     saturated: float
     every: int
     candidates: tuple[TriedStructure, ...]
@@ -115,7 +115,7 @@ class Recovery:
         """How much of the log the law tells; "rounding" is within one step of the command's column."""
         if self.largest <= EXACT * float(np.ptp(self.recorded[3:])):
             return "exact"
-        if self.quantum and self.largest <= self.quantum * (1 + 1e-6):
+        if self.resolution and self.largest <= self.resolution * (1 + 1e-6):
             return "rounding"
         return "partial" if self.explained >= POOR else "poor"
 
@@ -127,21 +127,21 @@ class Recovery:
         if self.quality == "exact":
             return f"The law reproduces all {n} commands to {self.largest:.1g}{unit}: exact."
         if self.quality == "rounding":
-            half = 100 * float(np.mean(np.abs(self.residual[3:]) <= 0.5 * self.quantum * (1 + 1e-6)))
+            half = 100 * float(np.mean(np.abs(self.residual[3:]) <= 0.5 * self.resolution * (1 + 1e-6)))
             return (
-                f"The law reproduces all {n} commands to {self.largest / self.quantum:.2f} steps of the column"
-                f" ({self.quantum:.4g}{unit}), {half:.3g} % of them to its rounding: exact but for the rounding."
+                f"The law reproduces all {n} commands to {self.largest / self.resolution:.2f} steps of the column"
+                f" ({self.resolution:.4g}{unit}), {half:.3g} % of them to its rounding: exact but for the rounding."
             )
-        told = f"The law explains {self.explained:.1f} % of the command and misses up to {self.largest:.3g}{unit}"
+        fit = f"The law explains {self.explained:.1f} % of the command and misses up to {self.largest:.3g}{unit}"
         if self.quality == "poor":
-            return f"{told}: no linear law of these signals made this command."
+            return f"{fit}: no linear law of these signals made this command."
         if self.every > 1:
             return (
-                f"{told}: not the whole law. The rows seem to be every {_th(self.every)} sample of a faster servo,"
+                f"{fit}: not the whole law. The rows seem to be every {_th(self.every)} sample of a faster servo,"
                 " whose differences they cannot show; its gains are good to a few percent."
             )
         return (
-            f"{told}: not the whole law. Something is missing (another signal, a filter, a dead zone), the rows are"
+            f"{fit}: not the whole law. Something is missing (another signal, a filter, a dead zone), the rows are"
             " a decimation of the servo's samples, or the command is no feedback and follows from the plant's motion."
         )
 
@@ -150,55 +150,56 @@ def _th(n: int) -> str:
     return {2: "second", 3: "third"}.get(n, f"{n}th")
 
 
-def as_json(found: Recovery) -> str:
+def as_json(recovery: Recovery) -> str:
     """Everything about the law but the samples."""
-    law = found.law
+    law = recovery.law
     whole: dict[str, Any] = {
-        "command": found.command,
-        "structure": found.structure,
-        "quality": found.quality,
-        "sentence": found.sentence,
-        "explained_percent": found.explained,
-        "largest_residual": found.largest,
+        "command": recovery.command,
+        "structure": recovery.structure,
+        "quality": recovery.quality,
+        "sentence": recovery.sentence,
+        "explained_percent": recovery.explained,
+        "largest_residual": recovery.largest,
         "gains": {
             name: {"value": g.value, "low": g.interval[0], "high": g.interval[1], "meaning": g.meaning}
-            for name, g in found.gains.items()
+            for name, g in recovery.gains.items()
         },
         "period_s": law.period,
-        "samples_per_row": found.every,
-        "limit": law.limit if found.saturated else None,
+        "samples_per_row": recovery.every,
+        "limit": law.limit if recovery.saturated else None,
         "windup": law.windup,
         "delay_samples": law.delay,
-        "command_step": found.quantum,
+        "command_step": recovery.resolution,
         "measured": law.measured,
         "references": law.reference_names,
         "A": law.A.tolist(),
         "B": law.B.tolist(),
         "C": law.C[0].tolist(),
         "D": law.D[0].tolist(),
-        "tried": [{"name": c.name, "numbers": c.parameters, "missed": c.missed} for c in found.candidates],
+        "tried": [{"name": c.name, "numbers": c.parameters, "missed": c.missed} for c in recovery.candidates],
     }
     return json.dumps(whole, indent=1)
 
 
-def loop_recovered(found: Recovery) -> str:
+def loop_recovered(recovery: Recovery) -> str:
     """`loop` of a study that recovers the law from the log each time; coordinates stay to be named."""
+    references = recovery.law.reference_names
     parts = [
-        'kind = "recover"', f"command = {_text(found.command)}",
-        f"reference = {_list([_text(r) for r in found.law.reference_names])}" if found.law.reference_names else "",
-        f"feedforward = {_list([_text(f) for f in found.feedforward])}" if found.feedforward else "",
+        'kind = "recover"', f"command = {_text(recovery.command)}",
+        f"reference = {_list([_text(r) for r in references])}" if references else "",
+        f"feedforward = {_list([_text(f) for f in recovery.feedforward])}" if recovery.feedforward else "",
     ]  # fmt: skip
     return f"loop = {{ {', '.join(part for part in parts if part)} }}"
 
 
-def loop_written(found: Recovery) -> str:
+def loop_written(recovery: Recovery) -> str:
     """`loop` of a study with the gains written out, for other runs under the same law; "" when PID keys cannot say it.
 
     The coordinates that the columns measure are named as the columns are: the study's reader has to say which.
     """
-    channels, law = found.channels, found.law
+    channels, law = recovery.channels, recovery.law
     first = channels[0]
-    if found.feedforward or any(c.filter != first.filter for c in channels):
+    if recovery.feedforward or any(c.filter != first.filter for c in channels):
         return ""
     parts = ['kind = "pid"']
     for key in ("kp", "ki", "kd"):
@@ -212,23 +213,23 @@ def loop_written(found: Recovery) -> str:
         parts.append(f"taps = [{1 - first.filter.second:.4g}, {first.filter.second:.4g}]")
     if first.on == "measurement":
         parts.append('on = "measurement"')
-    parts.append(f"measured = {_coordinates(found)}")
+    parts.append(f"measured = {_coordinates(recovery)}")
     references = [c.reference for c in channels if c.reference]
     if references:
         parts.append(f"reference = {_list([_text(r) for r in references])}")
-    if found.saturated:
+    if recovery.saturated:
         parts.append(f"limit = {law.limit:.6g}")
     if law.windup == "hold":
         parts.append('windup = "hold"')
     if law.delay:
         parts.append(f"delay = {law.delay:g}")
-    if found.every > 1:
+    if recovery.every > 1:
         parts.append(f'period = "{law.period * 1e3:.6g} ms"')
     return f'loop = {{ {", ".join(parts)}, units = "log" }}'
 
 
-def _coordinates(found: Recovery) -> str:
-    return _list([_text(f"COORDINATE OF {c.measured}") for c in found.channels])
+def _coordinates(recovery: Recovery) -> str:
+    return _list([_text(f"COORDINATE OF {c.measured}") for c in recovery.channels])
 
 
 def _text(name: str) -> str:

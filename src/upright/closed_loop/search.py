@@ -16,7 +16,7 @@ from upright.closed_loop.recovery import Recovery, TriedStructure
 from upright.closed_loop.regression import TERMS, Family, Regression, Signals, Term, channels_of, fit, law_of, structure
 from upright.closed_loop.structures import finer
 from upright.errors import BadInput, NotIdentifiable
-from upright.readers.resolution import find_quantum
+from upright.readers.resolution import resolution_of
 from upright.records import Record
 
 Array = NDArray[np.float64]
@@ -121,12 +121,12 @@ def held_for(u: Array) -> tuple[int, int]:
 
 def extremes(u: Array) -> tuple[Rows, Rows]:
     """Rows at the highest and at the lowest command, where the command stays there for three rows or more."""
-    found: list[Rows] = []
+    rows: list[Rows] = []
     for level in (u.max(), u.min()):
         at = np.abs(u - level) <= 1e-9 * max(1.0, abs(float(level)))
         stays = at[2:] & at[1:-1] & at[:-2]
-        found.append(at if stays.any() and level != 0 else np.zeros_like(at))
-    return found[0], found[1]
+        rows.append(at if stays.any() and level != 0 else np.zeros_like(at))
+    return rows[0], rows[1]
 
 
 def stepped(values: Array, every: int) -> Array:
@@ -147,7 +147,7 @@ class Search:
         self.measured, self.references, self.y, self.r, self.u, self.every = measured, references, y, r, u, every
         self.high, self.low = extremes(u)
         self.extreme = self.high | self.low
-        self.quantum = find_quantum(u[_JUNK:]).step
+        self.resolution = resolution_of(u[_JUNK:]).step
         pairs = tuple(
             (finer(values, every), stepped(r[i], every) if i < len(r) else None) for i, values in enumerate(y)
         )
@@ -200,7 +200,7 @@ class Search:
 
     def bar(self, least: float) -> float:
         """What counts as missing no more than `least`: nothing is nearer than the arithmetic and the column's steps."""
-        return max(ALIKE * least, ROUNDED * self.quantum, FLOOR * float(np.abs(self.u[_JUNK:]).max()))
+        return max(ALIKE * least, ROUNDED * self.resolution, FLOOR * float(np.abs(self.u[_JUNK:]).max()))
 
     def simplest(self, fits: Sequence[Regression]) -> Regression:
         """Fewest numbers among those that predict as well as the best."""
@@ -209,10 +209,10 @@ class Search:
             self.tried.append((structure(f, self.measured), f))
         return min((f for f in fits if f.missed <= bar), key=lambda f: (f.parameters, f.missed))
 
-    def dropped(self, kept: Regression) -> frozenset[Term]:
+    def dropped(self, retained: Regression) -> frozenset[Term]:
         """Terms that a regression goes without."""
         full = {(kind, i) for kind in TERMS for i in range(len(self.measured))}
-        return frozenset(full - set(kept.columns.terms))
+        return frozenset(full - set(retained.columns.terms))
 
     def prune(self, best: Regression) -> Regression:
         """Leave out one term after the other while rows held out are predicted as well."""
@@ -245,9 +245,9 @@ class Search:
 
     def recovery(self, best: Regression, record: Record, command: str, rows: NDArray[np.int64]) -> Recovery:
         """Everything about the structure kept."""
-        rounded = self.every == 1 and FLOOR * float(np.abs(self.u).max()) < best.missed < 0.5 * self.quantum
+        rounded = self.every == 1 and FLOOR * float(np.abs(self.u).max()) < best.missed < 0.5 * self.resolution
         if rounded:
-            best, covered = sharpen(best, self.u, self.used, self.quantum)
+            best, covered = sharpen(best, self.u, self.used, self.resolution)
             named = gains_with_intervals(best, self.signals, covered)
         else:
             named = gains_with_intervals(best, self.signals, averaged(best, self.u, self.used))
@@ -270,9 +270,9 @@ class Search:
         else:
             reproduced = np.clip(best.predicted, -limit, limit)
         return Recovery(
-            law=replace(law, command_quantum=self.quantum) if rounded else law, command=command, feedforward=extra,
-            channels=channels, gains=named, structure=structure(best, self.measured),
-            rows=rows, recorded=self.u, reproduced=reproduced, used=self.used, quantum=self.quantum,
+            law=replace(law, command_resolution=self.resolution) if rounded else law, command=command,
+            feedforward=extra, channels=channels, gains=named, structure=structure(best, self.measured),
+            rows=rows, recorded=self.u, reproduced=reproduced, used=self.used, resolution=self.resolution,
             saturated=float(limited.mean()), every=self.every,
             candidates=tuple(
                 TriedStructure(name=name, parameters=f.parameters, missed=f.missed)

@@ -149,8 +149,8 @@ def cycle(t: Array, x: Array, step: float = 0.0) -> Cycle | None:
         return None
     # where it last was beyond a quarter: up, down, or neither yet
     side = np.where(x >= high - swing / 4, 1, np.where(x <= low + swing / 4, -1, 0))
-    seen = np.flatnonzero(side)
-    turns = seen[1:][(side[seen][1:] == 1) & (side[seen][:-1] == -1)]
+    sided = np.flatnonzero(side)
+    turns = sided[1:][(side[sided][1:] == 1) & (side[sided][:-1] == -1)]
     periods = np.diff(t[turns])
     if periods.size < 2 or periods.std() > REGULAR * periods.mean():
         return None
@@ -162,13 +162,15 @@ def of_limit(share: float, bound: str = "") -> str:
     return "less than 0.1 % of the limit" if share < 1e-3 else f"{bound}{100 * share:.2g} % of the limit"
 
 
-def shown(found: RestEffort, limit: float, unit: str) -> str:
+def shown(effort: RestEffort, limit: float, unit: str) -> str:
     """The command at rest in words, as what comes after "the command at rest"."""
-    told = f"has an rms of {of_limit(found.rms)} and peaks at {found.peak * limit:.2g} of {limit:g} {unit}"
-    if found.command is not None:
-        told += f", every {_seconds(found.command.period)}"
+    described = f"has an rms of {of_limit(effort.rms)} and peaks at {effort.peak * limit:.2g} of {limit:g} {unit}"
+    if effort.command is not None:
+        described += f", every {_seconds(effort.command.period)}"
     return (
-        told if found.quiet else f"{told} (quiet: up to {100 * QUIET_RMS:.0f} % rms, {QUIET_PEAK * limit:.3g} {unit})"
+        described
+        if effort.quiet
+        else f"{described} (quiet: up to {100 * QUIET_RMS:.0f} % rms, {QUIET_PEAK * limit:.3g} {unit})"
     )
 
 

@@ -184,24 +184,24 @@ def preflight(
         rig, law, at=task.at, starts=starts, seconds=task.seconds, parameters=parameters, workers=workers,
         progress=progress,
     )  # fmt: skip
-    told = words(drawn)
+    verdicts = words(drawn)
     last = np.zeros(len(task.start))
     tilted, tapped = last.copy(), last.copy()
     tilted[-2], tapped[-1] = 1.0, 1.0
     return Preflight(
         margins=margins(driven, law) if stands else None,
-        noise=command_noise(driven, law, rig.quantum) if stands else None,
+        noise=command_noise(driven, law, rig.resolution) if stands else None,
         run=run,
         score=score(run),
         rest=effort_at_rest(run),
         tilt=largest(rig, law, task.at, tilted, most=np.pi / 2) if stands else 0.0,
         push=largest(rig, law, task.at, tapped, most=20.0) if stands else 0.0,
         drawn=drawn,
-        words={w: float(np.mean([t == w for t in told])) for w in WORDS},
+        words={w: float(np.mean([t == w for t in verdicts])) for w in WORDS},
     )
 
 
-def words(found: Scores) -> list[str]:
+def words(scores: Scores) -> list[str]:
     """What each run came to.
 
     It *falls*; the driven body *leaves its travel*; it *does not settle* when dry friction or the law keep the
@@ -210,8 +210,8 @@ def words(found: Scores) -> list[str]:
     """
     out: list[str] = []
     for fell, ran_out, settled, full, calm in zip(
-        found.fell.tolist(), found.ran_out.tolist(), found.settled.tolist(), found.at_limit.tolist(),
-        found.quiet.tolist(), strict=True,
+        scores.fell.tolist(), scores.ran_out.tolist(), scores.settled.tolist(), scores.at_limit.tolist(),
+        scores.quiet.tolist(), strict=True,
     ):  # fmt: skip
         if fell < ran_out:
             out.append("falls")
@@ -226,9 +226,9 @@ def words(found: Scores) -> list[str]:
     return out
 
 
-def word(found: Score) -> str:
+def word(score: Score) -> str:
     """The same of one run."""
-    return words(Scores(**{n: np.asarray(v)[..., None] for n, v in vars(found).items()}))[0]
+    return words(Scores(**{n: np.asarray(v)[..., None] for n, v in vars(score).items()}))[0]
 
 
 def largest(rig: Rig, law: Law, at: str, direction: ArrayLike, *, most: float, seconds: float = 3.0) -> float:

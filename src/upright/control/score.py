@@ -114,7 +114,7 @@ def effort_at_rest(run: Trial) -> RestEffort:
     names = [c.name for c in run.rig.plant.coordinates]
     moved = run.rig.plant.inputs[0].on
     return rest_effort(
-        run.t, run.u, run.rig.saturation, body=run.record[moved], count=float(run.rig.quantum[names.index(moved)])
+        run.t, run.u, run.rig.saturation, body=run.record[moved], count=float(run.rig.resolution[names.index(moved)])
     )
 
 
@@ -240,28 +240,30 @@ def outcomes(
     """
     first = np.atleast_2d(np.asarray(starts, dtype=np.float64))
     lanes = first.shape[0]
-    given = {name: np.broadcast_to(np.asarray(v, dtype=np.float64), (lanes,)) for name, v in (parameters or {}).items()}
+    per_lane = {
+        name: np.broadcast_to(np.asarray(v, dtype=np.float64), (lanes,)) for name, v in (parameters or {}).items()
+    }
     size = max(LEAST, min(BLOCK, BLOCK * ROWS // (round(seconds / rig.period) + 1)) // LEAST * LEAST)
-    blocks = [(first[part], {n: v[part] for n, v in given.items()}) for part in cut(lanes, size)]
+    blocks = [(first[part], {n: v[part] for n, v in per_lane.items()}) for part in cut(lanes, size)]
     work = partial(_outcomes, rig, law, at, seconds)
-    found = spread(work, blocks, workers=workers, progress=progress, what="block of rigs").all()
-    if len(found) == 1:
-        return found[0]
-    return Scores(**{n: np.concatenate([getattr(s, n) for s in found], axis=-1) for n in vars(found[0])})
+    scored = spread(work, blocks, workers=workers, progress=progress, what="block of rigs").all()
+    if len(scored) == 1:
+        return scored[0]
+    return Scores(**{n: np.concatenate([getattr(s, n) for s in scored], axis=-1) for n in vars(scored[0])})
 
 
 def _outcomes(
     rig: Rig, law: Law, at: str, seconds: float, block: tuple[Array, Mapping[str, Array]], _progress: Progress
 ) -> Scores:
     """Figures of one block: starts (lanes, states) and the parameters of its lanes."""
-    starts, given = block
+    starts, parameters = block
     rows = round(seconds / rig.period) + 1
     t = np.arange(rows, dtype=np.float64) * rig.period
     point = np.array(list(rig.plant.equilibrium(at).values()))
     x0 = rig.plant.state(at) + starts
-    drives = [{**rig.drive, **{n: float(v[i]) for n, v in given.items()}} for i in range(len(x0))]
+    drives = [{**rig.drive, **{n: float(v[i]) for n, v in parameters.items()}} for i in range(len(x0))]
     motion = simulate(
-        rig.plant, {**rig.drive, **given}, x0, None, rig.period, samples=rows, substeps=SUBSTEPS,
+        rig.plant, {**rig.drive, **parameters}, x0, None, rig.period, samples=rows, substeps=SUBSTEPS,
         loop=law_on_rig(rig, law, point),
     )  # fmt: skip
     away = motion[:, 0 : x0.shape[1] : 2] - point[:, None]
@@ -309,7 +311,9 @@ TAIL = 0.1
 """Share of the record that counts as rest; a median over it hears neither a bump nor an encoder that flickers."""
 
 
-def step_figures(t: ArrayLike, y: ArrayLike, *, before: float, reference: float, quantum: float = 0.0) -> StepFigures:
+def step_figures(
+    t: ArrayLike, y: ArrayLike, *, before: float, reference: float, resolution: float = 0.0
+) -> StepFigures:
     """Figures of a step of the reference at the first sample.
 
     Parameters
@@ -322,7 +326,7 @@ def step_figures(t: ArrayLike, y: ArrayLike, *, before: float, reference: float,
         Where it rested before.
     reference : float
         Where it should go.
-    quantum : float
+    resolution : float
         Step of its encoder.
 
     Raises
@@ -338,25 +342,25 @@ def step_figures(t: ArrayLike, y: ArrayLike, *, before: float, reference: float,
         raise BadInput(f"a step goes somewhere else; it was at {before:g} and should stay there.")
     rest = float(np.median(signal[-tail:]))
     change = rest - before
-    if abs(change) <= max(quantum, 1e-12 * float(np.abs(signal).max())):
+    if abs(change) <= max(resolution, 1e-12 * float(np.abs(signal).max())):
         raise BadInput(
             f"nothing stepped: it rests {abs(change):.3g} from where it began, and its encoder shows steps of "
-            f"{quantum:.3g}; ask for a larger step or look at friction."
+            f"{resolution:.3g}; ask for a larger step or look at friction."
         )
     clock, share = time - time[0], (signal - before) / change
-    resolution = quantum / abs(change)
+    relative = resolution / abs(change)
     top = int(np.argmax(share))
     beyond = float(share[top]) - 1.0
     return StepFigures(
         change=change,
         rise=_passed(clock, share, 0.9) - _passed(clock, share, 0.1),
         peak_time=float(clock[top]),
-        overshoot=beyond if beyond > resolution else 0.0,
-        settling_2=_settled(clock, share, max(0.02, resolution), tail),
-        settling_5=_settled(clock, share, max(0.05, resolution), tail),
-        arrival=_settled(clock, (signal - before) / (reference - before), max(0.05, resolution), tail),
+        overshoot=beyond if beyond > relative else 0.0,
+        settling_2=_settled(clock, share, max(0.02, relative), tail),
+        settling_5=_settled(clock, share, max(0.05, relative), tail),
+        arrival=_settled(clock, (signal - before) / (reference - before), max(0.05, relative), tail),
         error=reference - rest,
-        resolution=resolution,
+        resolution=relative,
     )
 
 

@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 from upright.control.bank import TEXT
 from upright.control.swing_up import SwingUp
 from upright.control.trial import SUBSTEPS, Trial, logged, trial
-from upright.gains import shaken
+from upright.gains import process_noise
 from upright.laws import Law
 from upright.records import Array, Record
 from upright.rig import Rig
@@ -46,7 +46,7 @@ KNOWN = {"m": 0.02, "l": 0.02, "r": 0.02, "J": 0.03, "b": 0.2}
 """How well a plant's numbers are known where no fit says so, by their first letter; relative standard errors."""
 GAIN_KNOWN, LAG_KNOWN = 0.03, 0.5
 _FINE = 1e-3  # s in which `SUBSTEPS` suffice
-_SEEN = 7e-3  # s between the samples that are looked at
+_SAMPLED = 7e-3  # s between the samples that are looked at
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -154,10 +154,10 @@ def scales(model: Rig, log: Record, known: Mapping[str, float] | None = None) ->
     """
     names = tuple(c.name for c in model.plant.coordinates)
     model = model.replace(period=log.period)
-    every = max(1, round(_SEEN / model.period))
+    every = max(1, round(_SAMPLED / model.period))
     shown = np.column_stack([log[n] for n in names])[::every]
-    told = _known(model, known or {})
-    moving, size = tuple(told), np.array(list(told.values()))
+    known_sizes = _known(model, known or {})
+    moving, size = tuple(known_sizes), np.array(list(known_sizes.values()))
     p, m, command = len(names), size.size, log["u"]
     drift = np.linspace(0.0, 1.0, len(shown))[:, None] ** np.arange(1, 4)
     z, step, J = np.zeros(m), 0.3, np.zeros((0, 0))
@@ -172,7 +172,9 @@ def scales(model: Rig, log: Record, known: Mapping[str, float] | None = None) ->
         left[:, 0] -= drift @ wander
         left[part:] = 0.0
         quarters = max(8.0, 2.0 * float(np.sum(np.diff(np.sign(at[:, 1])) != 0)))
-        sigma = np.maximum(np.sqrt(np.mean(left[:part] ** 2, axis=0)), model.quantum) * math.sqrt(len(shown) / quarters)
+        sigma = np.maximum(np.sqrt(np.mean(left[:part] ** 2, axis=0)), model.resolution) * math.sqrt(
+            len(shown) / quarters
+        )
         # unknown: scales, drift of the driven body, numbers of the model in units of what is known of them
         J = np.zeros((p * len(shown) + m, p + 3 + m))
         for i in range(p):
@@ -191,7 +193,7 @@ def scales(model: Rig, log: Record, known: Mapping[str, float] | None = None) ->
     s, wander = _projected(shown, at, drift)
     motion = s * at
     motion[:, 0] += drift @ wander
-    spread = np.maximum(np.mean((shown - shown.mean(axis=0)) ** 2, axis=0), model.quantum**2)
+    spread = np.maximum(np.mean((shown - shown.mean(axis=0)) ** 2, axis=0), model.resolution**2)
     return Scales(
         names=names, value=s, error=np.sqrt(np.diag(np.linalg.inv(J.T @ J))[:p]),
         explained=1.0 - np.mean((shown - motion) ** 2, axis=0) / spread, t=log.t[::every], shown=shown, motion=motion,
@@ -327,8 +329,8 @@ def watched(
         return trial(rig, law, at=watch.at, start=start, seconds=seconds, rest=rest, off=off)
 
     free = run(math.inf)
-    seen = np.column_stack([free.record[c.name] for c in rig.plant.coordinates]) - free.rest
-    alarm = watch.over(seen, free.u)
+    readings = np.column_stack([free.record[c.name] for c in rig.plant.coordinates]) - free.rest
+    alarm = watch.over(readings, free.u)
     k = int(alarm.sample[0])
     return (free if k < 0 else run((k + 1) * rig.period)), alarm
 
@@ -369,10 +371,10 @@ class Watch:
         driven = model.limit * np.abs(linear.B[1::2, 0])
         self._moved = MOVED * driven * WITHIN**2 / 2
         # rounding repeats itself for as many samples as a count takes at the speeds that are evidence: as one sample
-        repeated = np.maximum(1.0, model.quantum / (self._moved / WITHIN * model.period))
-        noise = repeated * model.quantum**2 / 12
+        repeated = np.maximum(1.0, model.resolution / (self._moved / WITHIN * model.period))
+        noise = repeated * model.resolution**2 / 12
         shaking = unknown * driven / np.abs(scales)
-        W = np.array([shaken(sampled, a) for a in shaking])
+        W = np.array([process_noise(sampled, a) for a in shaking])
         # the start is known to a rad or m, and at rest to a rad/s or m/s; commands on their way are known
         P = np.zeros((len(scales), n, n))
         P[:, range(4), range(4)] = np.repeat(scales, 2, axis=1) ** -2.0
@@ -434,7 +436,7 @@ class Watch:
         self._begin(lanes)
         for k in range(len(y)):
             odds[k] = self.see(y[k].T, u[k])
-            said, best = self.speaks()
-            now = (sample < 0) & said
+            alarm, best = self.speaks()
+            now = (sample < 0) & alarm
             sample[now], which[now] = k, best[now]
         return Alarm(sample=sample, what=tuple(self.suspicions[i] for i in which.tolist()), odds=odds)

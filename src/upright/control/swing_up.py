@@ -235,7 +235,7 @@ class SwingUp:
         return Rule(
             function=swing_and_hold, parameters=[numbers[n] for n in PARAMETERS],
             initial=np.array([at[..., 0], at[..., 1], speeds[..., 0], speeds[..., 1], mode, zero, zero, zero - 1.0]),
-            quantum=np.abs(rig.quantum / rig.shown), command_quantum=rig.converter,
+            resolution=np.abs(rig.resolution / rig.shown), command_resolution=rig.converter,
             measured=tuple(c.name for c in rig.plant.coordinates), period=self.period,
         )  # fmt: skip
 
@@ -424,10 +424,10 @@ def ascent_of(run: Trial, law: SwingUp, rule: Rule) -> Ascent:
     """What a run of a swing-up came to, by its readings and what the law made of them."""
     rig = run.rig
     names = [c.name for c in rig.plant.coordinates]
-    seen = np.column_stack([run.record[n] for n in names])
-    memory = rule.follow(seen / rig.shown, rig.period)[1]
+    measured = np.column_stack([run.record[n] for n in names])
+    memory = rule.follow(measured / rig.shown, rig.period)[1]
     memory = np.vstack([memory[1:], memory[-1:]])  # what it knew once it had read this sample
-    theta = seen[:, 1]
+    theta = measured[:, 1]
     return Ascent(
         trial=run, law=law, mode=memory[:, MODE], angle=np.mod(theta, 2 * math.pi) - math.pi,
         speeds=memory[:, 2:4], energy=law.body.energy(theta, memory[:, 3]),

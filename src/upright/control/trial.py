@@ -106,27 +106,27 @@ def trial(
     point = np.array(list(rig.plant.equilibrium(at).values()))
     held = point if rest is None else np.asarray(rest, dtype=np.float64)
     x0 = rig.plant.state(at) + np.asarray(start, dtype=np.float64)
-    given = law if isinstance(law, Rule) else law_on_rig(rig, law, held, reference)
+    loop = law if isinstance(law, Rule) else law_on_rig(rig, law, held, reference)
     late = None
     if pushes is not None:
         late = np.zeros(count)
         kicks = np.asarray(pushes, dtype=np.float64)[:count]
         late[: kicks.size] = kicks
     drive = dict(rig.drive) if math.isinf(off) else {**rig.drive, "actuator.end": off}
-    found = simulate(
-        rig.plant, drive, x0, late, rig.period, samples=count, substeps=SUBSTEPS, loop=given
+    motion = simulate(
+        rig.plant, drive, x0, late, rig.period, samples=count, substeps=SUBSTEPS, loop=loop
     )[:, :, 0]  # fmt: skip
     n = x0.size
-    x, t = found[:, :n], np.arange(count, dtype=np.float64) * rig.period
-    u = np.where(t < off, found[:, n], 0.0)
+    x, t = motion[:, :n], np.arange(count, dtype=np.float64) * rig.period
+    u = np.where(t < off, motion[:, n], 0.0)
     return Trial(rig=rig, at=at, t=t, x=x, u=u, rest=held, record=logged(rig, t, x, u, reference))
 
 
 def readings(rig: Rig, q: ArrayLike) -> Array:
     """What the encoders show [m or rad] of motions, shape (N, ..., coordinates)."""
-    step = rig.quantum / rig.shown  # a count is what its true length is; the program multiplies by the said one
+    step = rig.resolution / rig.shown  # a count is what its true length is; the program multiplies by the said one
     felt = np.asarray(q, dtype=np.float64) if rig.mounting is None else rig.mounting.felt(q)
-    return np.floor(felt / step + 0.5) * rig.quantum
+    return np.floor(felt / step + 0.5) * rig.resolution
 
 
 def law_on_rig(rig: Rig, law: Law, rest: ArrayLike, reference: ArrayLike | None = None) -> Law:
@@ -148,7 +148,7 @@ def law_on_rig(rig: Rig, law: Law, rest: ArrayLike, reference: ArrayLike | None 
     made = law.in_units(scale, offset, 1.0)
     return replace(
         made, references=law.references if reference is None else reference, delay=0.0,
-        quantum=np.abs(rig.quantum / scale), command_quantum=rig.converter,
+        resolution=np.abs(rig.resolution / scale), command_resolution=rig.converter,
     )  # fmt: skip
 
 
@@ -157,8 +157,8 @@ def logged(rig: Rig, t: Array, x: Array, u: Array, reference: ArrayLike | None =
     log = twin_log(rig, t, readings(rig, x[:, 0::2]), u)
     signals = {name: log[name] for name in (*log.outputs, "u")}
     if reference is not None:
-        asked = np.asarray(reference, dtype=np.float64)
-        signals["reference"] = asked[np.minimum(np.arange(t.size), asked.size - 1)]
+        r = np.asarray(reference, dtype=np.float64)
+        signals["reference"] = r[np.minimum(np.arange(t.size), r.size - 1)]
     return log.replace(signals=signals)
 
 

@@ -118,7 +118,7 @@ def _pole_table(done: Designed) -> Table:
     discrete = done.model.dt is not None
     rows = [("model, open loop", _outlasting(done, done.open_loop, 5) if discrete else written(done.open_loop))]
     if done.placement is not None:
-        rows.append(("asked", written(done.placement.asked)))
+        rows.append(("asked", written(done.placement.requested)))
         rows.append((f"attained, {_of_model(done)}", written(done.placement.attained)))
     else:
         least = _outlasting(done, done.wanted, 5) if discrete else written(done.wanted)
@@ -199,7 +199,7 @@ def _numbers(done: Designed) -> dict[str, Any]:
         "effort_weight": done.R,
         "poles": {
             "open_loop": done.open_loop,
-            "asked": None if done.placement is None else done.placement.asked,
+            "asked": None if done.placement is None else done.placement.requested,
             "attained": None if done.placement is None else done.placement.attained,
             "sampled_loop": done.poles,
         },
@@ -229,7 +229,7 @@ def _at_rest(held: Holding) -> dict[str, Any]:
 def _readings(done: Designed) -> list[dict[str, Any]]:
     """What the law reads, one by one: encoder's step and sign as described."""
     rig, on = done.rig, done.wish.on
-    steps = dict(zip(rig.outputs, done.wish.quantum, strict=False))
+    steps = dict(zip(rig.outputs, done.wish.resolution, strict=False))
     return [
         {
             "name": name,

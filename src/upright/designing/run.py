@@ -25,8 +25,8 @@ from upright.gains import (
     place,
     place_sampled,
     prefilter,
+    process_noise,
     read_off,
-    shaken,
     weight_for_effort,
 )
 from upright.gains.loop import closed, command_noise, swing
@@ -37,6 +37,7 @@ from upright.records import Array
 from upright.rig import Rig
 from upright.rig.completion import completed
 from upright.systems import StateSpace, to_s, to_z
+from upright.workers import one_thread
 
 SLOWEST, ROWS = 10.0, 60_000
 """Time constants of the slowest pole, and most samples, for which the motion to rest is simulated."""
@@ -69,7 +70,7 @@ class DesignRequest:
     lag: float | None = None
     speed: str = "filtered"
     memory: float = 0.5
-    quantum: tuple[float, ...] = ()
+    resolution: tuple[float, ...] = ()
     limit: float | None = None
     start: tuple[float, ...] = ()
     track: str = ""
@@ -154,7 +155,7 @@ class Designed:
     def wanted(self) -> Roots:
         """Poles asked for, or those of least cost."""
         if self.placement is not None:
-            return self.placement.asked
+            return self.placement.requested
         return _in_s(self.model, poles_of(self.model.A - self.model.B @ self.continuous))
 
     @property
@@ -215,6 +216,7 @@ class Designed:
         return out
 
 
+@one_thread()
 def design_for(rig: Rig | StateSpace, wish: DesignRequest) -> Designed:
     """Gains as wished, and their loop as a computer runs it.
 
@@ -238,14 +240,14 @@ def design_for(rig: Rig | StateSpace, wish: DesignRequest) -> Designed:
     if model.B.shape[1] != 1:
         raise BadInput(f"upright design is for one input, and this model has {model.B.shape[1]}; use place.")
     K, placement, R = _gains(model, wish, start)
-    wanted = placement.asked if placement is not None else _in_s(model, poles_of(model.A - model.B @ K))
-    quantum: tuple[float, ...] | None = None
+    wanted = placement.requested if placement is not None else _in_s(model, poles_of(model.A - model.B @ K))
+    resolution: tuple[float, ...] | None = None
     if isinstance(rig, StateSpace):
         speed = chosen(model, wish.speed)
         known = dict.fromkeys((speed, *estimators(model)[:-1]))
         ways = {s: estimator(s, sampled, wish.memory, wanted) for s in known}
     else:
-        speed, ways, quantum = _from_encoders(rig, model, sampled, wish)
+        speed, ways, resolution = _from_encoders(rig, model, sampled, wish)
     observed = speed in ("kalman", "observer")
     if wish.sampled and observed:
         raise BadInput(
@@ -263,7 +265,7 @@ def design_for(rig: Rig | StateSpace, wish: DesignRequest) -> Designed:
         k_pf = prefilter(model.A, model.B, model.C[i], used, D=D, sampled=model.dt is not None)
     law = replace(feedback(ways[speed], used, k_pf or 0.0), target=at_rest(model))
     t, x, u = _way_back(model, K, start)
-    loops = {s: _velocity_loop(model, sampled, e, used, quantum) for s, e in ways.items()}
+    loops = {s: _velocity_loop(model, sampled, e, used, resolution) for s, e in ways.items()}
     cloud, chance = _cloud(rig, wish, sampled, law)
     peak = _peak(sampled, law, start, float(t[-1]))
     return Designed(
@@ -332,7 +334,7 @@ def _placed_samples(model: StateSpace, poles: Roots) -> Placement:
         )
     found = place((model.A - np.eye(asked.size)) / T, model.B / T, (to_z(asked, T) - 1) / T)
     attained = to_s(1 + T * found.attained, T)
-    return replace(found, asked=asked, attained=attained, miss=float(np.abs(attained - asked).max()))
+    return replace(found, requested=asked, attained=attained, miss=float(np.abs(attained - asked).max()))
 
 
 def _way_back(model: StateSpace, K: Array, start: Array) -> tuple[Array, Array, Array]:
@@ -350,7 +352,7 @@ def _from_encoders(
     rig: Rig, model: StateSpace, sampled: StateSpace, wish: DesignRequest
 ) -> tuple[str, dict[str, Estimator], tuple[float, ...]]:
     """The way to the velocities that was asked for, all that a rig has, and the steps of its encoders."""
-    quantum = wish.quantum or tuple(completed(rig, needs=("counts",), who="upright design").quantum.tolist())
+    resolution = wish.resolution or tuple(completed(rig, needs=("counts",), who="upright design").resolution.tolist())
     if wish.limit is None and wish.speed == "kalman":
         raise BadInput(
             "a Kalman filter has to know how hard the rig is pushed, a tenth of what the drive can; give the largest "
@@ -358,7 +360,7 @@ def _from_encoders(
         )
     ways = SPEEDS if wish.limit is not None else SPEEDS[:-1]
     limit = wish.limit or math.inf
-    return wish.speed, {s: velocities(model, sampled, s, wish.memory, limit, quantum) for s in ways}, quantum
+    return wish.speed, {s: velocities(model, sampled, s, wish.memory, limit, resolution) for s in ways}, resolution
 
 
 def _late(rig: Rig, wish: DesignRequest) -> float:
@@ -399,7 +401,7 @@ def _tilt(rig: Rig | StateSpace) -> Array:
 
 
 def velocities(
-    model: StateSpace, sampled: StateSpace, speed: str, memory: float, limit: float, quantum: ArrayLike
+    model: StateSpace, sampled: StateSpace, speed: str, memory: float, limit: float, resolution: ArrayLike
 ) -> Estimator:
     """States from encoders in one of the ways of `SPEEDS`.
 
@@ -413,25 +415,25 @@ def velocities(
     limit : float
         Largest command. For the Kalman filter every coordinate is shaken by itself as much as a tenth of it would:
         pushes, friction, what the model leaves out.
-    quantum : float or array
+    resolution : float or array
         Step of each encoder [m or rad].
     """
     if speed == "kalman":
-        shaking = shaken(sampled, 0.1 * limit * np.abs(model.B[1::2, 0]))
-        return kalman(sampled, shaking, np.asarray(quantum) / math.sqrt(12))
+        shaking = process_noise(sampled, 0.1 * limit * np.abs(model.B[1::2, 0]))
+        return kalman(sampled, shaking, np.asarray(resolution) / math.sqrt(12))
     return filtered(sampled, memory if speed == "filtered" else 0.0)
 
 
 def _velocity_loop(
-    model: StateSpace, sampled: StateSpace, estimator: Estimator, K: Array, quantum: tuple[float, ...] | None,
+    model: StateSpace, sampled: StateSpace, estimator: Estimator, K: Array, resolution: tuple[float, ...] | None,
 ) -> VelocityLoop:  # fmt: skip
     law = feedback(estimator, K)
     poles = poles_of(closed(sampled, law))
     stands = bool(np.abs(poles).max() < 1)
     return VelocityLoop(
         name=estimator.name,
-        speed_noise=None if quantum is None else estimator.noise(quantum)[1 : model.A.shape[0] : 2],
-        command_noise=command_noise(sampled, law, quantum) if stands and quantum is not None else None,
+        speed_noise=None if resolution is None else estimator.noise(resolution)[1 : model.A.shape[0] : 2],
+        command_noise=command_noise(sampled, law, resolution) if stands and resolution is not None else None,
         margins=margins(sampled, law) if stands else None,
         poles=to_s(poles, sampled.period),
     )

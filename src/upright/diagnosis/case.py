@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -13,14 +12,17 @@ import numpy as np
 
 from upright.diagnosis.findings import Curve, Panel
 from upright.errors import BadInput
-from upright.identification import Parameter
 from upright.physics import Plant, find, name_of
 from upright.readers.inspection import Column, Inspection
 from upright.records import Array, Record
 from upright.records.columns import ANGLES, LENGTHS
+from upright.rig import Hardware, Rig
+from upright.study.description import rig_with_guesses
 from upright.study.draft.recognise import RATE, drive_column, recognise
-from upright.study.sensors import Drive, Sensor
-from upright.trust import before_running
+from upright.study.rig import read_plant, read_rig
+from upright.study.sensors import Drive, Sensor, Wiring, drive_unit, read_drives, read_sensors
+from upright.study.stored_rig import read_stored_rig
+from upright.study.text import Section, StudyText
 
 COUNTERS = (2 * math.pi, 360.0, 65536.0, 4294967296.0)
 """Turns that counters are known to make, in rad, deg and counts."""
@@ -29,35 +31,16 @@ HELD = 0.2
 """A body that moves less than this part of the largest motion was held."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class KnownRig:
-    """A rig as it was said to be: plant, parameters, and which column is what; all but the plant may be empty."""
-
-    name: str
-    plant: type[Plant]
-    parameters: Mapping[str, Parameter] = field(default_factory=dict[str, Parameter])
-    sensors: Mapping[str, Sensor] = field(default_factory=dict[str, Sensor])
-    drive: Drive | None = None
-    locked: tuple[str, ...] = ()
-
-    @property
-    def friction(self) -> frozenset[str]:
-        """Names of the parameters that only dissipate."""
-        viscous = re.findall(r"\w+", self.plant.derived().power_lost)
-        dry = [n for j in self.plant.joints for n in vars(j).values() if isinstance(n, str)]
-        return frozenset(self.plant.names()) & frozenset([*viscous, *dry])
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Place:
-    """A coordinate as it was measured: `y` (N,) and its `quantum` in `unit`, and the column it came from.
+    """A coordinate as it was measured: `y` (N,) and its `resolution` in `unit`, and the column it came from.
 
     The unit is the coordinate's, or counts where nobody said how many make a turn or a metre.
     """
 
     column: str
     y: Array
-    quantum: float
+    resolution: float
     unit: str
 
 
@@ -70,8 +53,8 @@ class Case:
     record, inspection
         The log, and what can be told about it before any model.
     plant : type of Plant or None
-    parameters : mapping of str to Parameter
-        Of the plant and its actuator; empty when only the plant's name is known.
+    rig : Rig or None
+        With the numbers that are known; None where only the plant's name is, or nobody said which column is what.
     places : mapping of str to Place
         Measured coordinates.
     zeroed : bool
@@ -91,7 +74,7 @@ class Case:
     record: Record
     inspection: Inspection
     plant: type[Plant] | None = None
-    parameters: Mapping[str, Parameter] = field(default_factory=dict[str, Parameter])
+    rig: Rig | None = None
     places: Mapping[str, Place] = field(default_factory=dict[str, Place])
     zeroed: bool = False
     drive: str = ""
@@ -190,8 +173,14 @@ def column_unit(c: Column) -> str:
     return c.unit or c.guess
 
 
-def read_known(text: str, log: str = "") -> KnownRig:
-    """Rig of a plant's name, a study (TOML) or a ``fit.json``; `log` is the file whose run a study may describe.
+def read_known(text: str, log: str = "") -> tuple[Rig | type[Plant], Wiring]:
+    """Rig, or kind of plant, and wiring by a plant's name, a study (TOML) or a ``fit.json``.
+
+    Parameters
+    ----------
+    text : str
+    log : str
+        File whose run a study may describe.
 
     Raises
     ------
@@ -200,32 +189,22 @@ def read_known(text: str, log: str = "") -> KnownRig:
     """
     path = Path(text)
     if path.suffix == ".json" or (path.is_dir() and (path / "fit.json").is_file()):
-        from upright.study.fitted import read_fit
-
-        path = path / "fit.json" if path.is_dir() else path
-        fit = read_fit(path)
-        before_running(fit.plant, path)
-        parameters = {n: Parameter(name=n, value=v) for n, v in fit.values.items()}
-        return KnownRig(name=text, plant=find(fit.plant, path.parent), parameters=parameters)
+        return replace(read_stored_rig(path, draws=0), name=text), Wiring()
     if path.suffix == ".toml":
         return _study(path, log)
     try:
-        return KnownRig(name=text, plant=find(text))
+        return find(text), Wiring()
     except BadInput as error:
         raise BadInput(
             f"--rig {text}: {error}; it may be a plant's name, a study (TOML) or the fit.json of `upright identify`"
         ) from None
 
 
-def _study(path: Path, log: str) -> KnownRig:
-    from upright.study.rig import read_plant, read_rig
-    from upright.study.sensors import drive_unit, read_drives, read_sensors
-    from upright.study.text import Section, StudyText
-
+def _study(path: Path, log: str) -> tuple[Rig, Wiring]:
     text = StudyText(path)
     study = text.root()
     plant = read_plant(study)
-    rig = read_rig(study, plant, drive_unit(study))
+    model = read_rig(study, plant, drive_unit(study))
     entries = study.values.get("runs", [])
     run = Section(text, ("runs",), {})
     for i, values in enumerate(entries if isinstance(entries, list) else []):
@@ -238,48 +217,52 @@ def _study(path: Path, log: str) -> KnownRig:
     drive = drives[0] if drives and drives[0].what and "loop" not in run else None
     locked: object = run.values.get("locked", ())
     names = tuple(str(n) for n in locked) if isinstance(locked, list | dict) else ()
-    return KnownRig(name=str(path), plant=plant, parameters=rig.parameters, sensors=sensors, drive=drive, locked=names)
+    # the drive's sign is in the wiring, so not in the rig
+    rig = rig_with_guesses(model, str(path), Hardware())
+    return rig, Wiring(sensors=sensors, drive=drive, locked=names)
 
 
-def case_of(record: Record, inspection: Inspection, known: KnownRig | None) -> Case:
+def case_of(record: Record, inspection: Inspection, rig: Rig | type[Plant] | None, wiring: Wiring) -> Case:
     """Record and rig brought together."""
-    if known is None or not any(s.column in record.signals for s in known.sensors.values()):
-        return _recognised(record, inspection, known)
+    plant = type(rig.plant) if isinstance(rig, Rig) else rig
+    if plant is None or not any(s.column in record.signals for s in wiring.sensors.values()):
+        return _recognised(record, inspection, plant)
     places: dict[str, Place] = {}
     moduli: dict[str, tuple[float, ...]] = {}
-    for name, sensor in known.sensors.items():
-        if sensor.column not in record.signals or name in known.locked:
+    for name, sensor in wiring.sensors.items():
+        if sensor.column not in record.signals or name in wiring.locked:
             continue
-        y, quantum, _ = sensor.read(record)
+        y, resolution, _ = sensor.read(record)
         factor = sensor.factor(sensor.column_unit(record, record[sensor.column]))
-        step = inspection.column(sensor.column).quantum.step
-        places[name] = Place(column=sensor.column, y=y, quantum=quantum or step * factor, unit=sensor.coordinate.unit)
+        step = inspection.column(sensor.column).resolution.step
+        places[name] = Place(
+            column=sensor.column, y=y, resolution=resolution or step * factor, unit=sensor.coordinate.unit
+        )
         turn = 2 * math.pi / factor if sensor.coordinate.unit == "rad" and factor else 0.0
         moduli[sensor.column] = tuple({m for m in (turn, *COUNTERS) if m})
     u, drive = np.zeros(record.t.size), ""
-    if known.drive is not None:
-        u = known.drive.read(record)
-        plain = known.drive.what.strip("`")
-        drive = plain if plain in record.signals else known.drive.what
+    if wiring.drive is not None:
+        u = wiring.drive.read(record)
+        plain = wiring.drive.what.strip("`")
+        drive = plain if plain in record.signals else wiring.drive.what
     return Case(
-        record=record, inspection=inspection, plant=known.plant, parameters=known.parameters, places=places,
-        zeroed=True, drive=drive, u=u, moduli=moduli, locked=known.locked,
-        stated={**known.sensors, **({"effort": known.drive} if known.drive is not None else {})},
+        record=record, inspection=inspection, plant=plant, rig=rig if isinstance(rig, Rig) else None,
+        places=places, zeroed=True, drive=drive, u=u, moduli=moduli, locked=wiring.locked,
+        stated={**wiring.sensors, **({"effort": wiring.drive} if wiring.drive is not None else {})},
     )  # fmt: skip
 
 
-def _recognised(record: Record, inspection: Inspection, known: KnownRig | None) -> Case:
+def _recognised(record: Record, inspection: Inspection, plant: type[Plant] | None) -> Case:
     """Columns found by name and kind; a plant that needs angles gets none from counts of an unknown encoder."""
-    named = "" if known is None else name_of(known.plant)
+    named = "" if plant is None else name_of(plant)
     try:
         found = recognise(record, inspection, named)
     except BadInput:
         found = None
     column = found.drive if found else drive_column(record, inspection)
-    u: Array = record[column.name].copy() if column is not None else np.zeros(record.t.size)
+    u: Array = record[column.name] if column is not None else np.zeros(record.t.size)
     if column is not None and any(lie.startswith("the first samples are outliers") for lie in column.lies):
-        u[:3] = u[3]
-    plant = known.plant if known is not None else None
+        u = np.concatenate([np.full(3, u[3]), u[3:]])
     places: dict[str, Place] = {}
     chain = plant is not None and not any(c.name in ("theta", "psi", "x") for c in plant.coordinates)
     for coordinate in plant.coordinates if plant is not None else ():
@@ -291,7 +274,7 @@ def _recognised(record: Record, inspection: Inspection, known: KnownRig | None) 
             factor = factor or 1.0
             y = factor * (record[c.name] - found.rest[coordinate.name])
             unit = c.guess if c.guess == "counts" else coordinate.unit
-            places[coordinate.name] = Place(column=c.name, y=y, quantum=factor * c.quantum.step, unit=unit)
+            places[coordinate.name] = Place(column=c.name, y=y, resolution=factor * c.resolution.step, unit=unit)
     return Case(
         record=record, inspection=inspection, plant=plant, places=places,
         drive=column.name if column is not None else "", u=u,

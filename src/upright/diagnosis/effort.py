@@ -81,7 +81,7 @@ def _copies(case: Case) -> Iterator[Finding]:
             continue
         a, b = x - x.mean(), u - u.mean()
         gain = float(a @ b) / float(a @ a)
-        if float(np.abs(b - gain * a).max()) < 1e-6 * float(np.abs(b).max()) + 0.6 * abs(gain) * c.quantum.step:
+        if float(np.abs(b - gain * a).max()) < 1e-6 * float(np.abs(b).max()) + 0.6 * abs(gain) * c.resolution.step:
             yield Finding(
                 kind="effort",
                 columns=(case.drive,),
@@ -117,7 +117,7 @@ def _limited(case: Case) -> Iterator[Finding]:
         asked = any(word in c.name.casefold() for word in ("command", "target", "ref"))
         if not c.drive or c.constant or c.stepwise or asked:
             continue
-        low, high, share = clipped(case.record[c.name], c.quantum.step, inertia=False)
+        low, high, share = clipped(case.record[c.name], c.resolution.step, inertia=False)
         if share < 0.0002:
             continue
         ends = " and ".join(f"{v:.5g}" for v in (low, high) if v == v)
@@ -149,9 +149,9 @@ def _early(case: Case) -> Iterator[Finding]:
     for c in case.measured:
         x = case.record[c.name]
         span = float(np.ptp(x))
-        if case.held(c) or span == 0 or np.ptp(x[:still]) > max(0.005 * span, 2 * c.quantum.step):
+        if case.held(c) or span == 0 or np.ptp(x[:still]) > max(0.005 * span, 2 * c.resolution.step):
             continue
-        far = np.abs(x[:command] - x[0]) > max(0.03 * span, 6 * c.quantum.step)
+        far = np.abs(x[:command] - x[0]) > max(0.03 * span, 6 * c.resolution.step)
         if far.any() and int(np.argmax(far)) < first:
             first, who = int(np.argmax(far)), c.name
     ahead = float(t[command] - t[min(first, command)])

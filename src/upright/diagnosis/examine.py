@@ -6,30 +6,38 @@ from dataclasses import replace
 
 import numpy as np
 
-from upright.diagnosis.case import Case, KnownRig, case_of
+from upright.diagnosis.case import Case, case_of
 from upright.diagnosis.clock import examine_clock
 from upright.diagnosis.effort import examine_effort, examine_push, examine_settings, examine_uselessness, push_of
 from upright.diagnosis.findings import KINDS, SEVERITIES, Diagnosis, Finding
-from upright.diagnosis.forces import ForceBalance, against_form, against_gain, against_numbers, values_of
+from upright.diagnosis.forces import ForceBalance, against_form, against_gain, against_numbers, friction_of, values_of
 from upright.diagnosis.motion import SmoothedMotion, motion_of, terms
 from upright.diagnosis.rest import examine_rest
 from upright.diagnosis.sensors import examine_sensors
+from upright.physics import Plant, name_of
 from upright.readers.inspection import inspect_record
 from upright.records import Record
+from upright.rig import Rig
 from upright.study.draft.suits import plants_that_suit
+from upright.study.sensors import Wiring
 
 HOPELESS = frozenset({"dead", "stuck", "gap", "doubled", "jitter"})
 """Findings after which equations of motion are not asked, because they would only say the same again."""
 
 
-def examine(record: Record, known: KnownRig | None = None, *, before: tuple[Finding, ...] = ()) -> Diagnosis:
+def examine(
+    record: Record, rig: Rig | type[Plant] | None = None, wiring: Wiring | None = None, *,
+    before: tuple[Finding, ...] = (),
+) -> Diagnosis:  # fmt: skip
     """Everything that looks wrong with a record.
 
     Parameters
     ----------
     record : Record
-    known : KnownRig, optional
-        Its rig, from `read_known`; what needs one is left out without.
+    rig : Rig or type of Plant, optional
+        What needs one is left out without; what needs numbers is left out where only the kind of plant is known.
+    wiring : Wiring, optional
+        Which column is what, from `read_known`; recognised without.
     before : tuple of Finding
         What was found, and mended, while the log was read.
 
@@ -38,14 +46,15 @@ def examine(record: Record, known: KnownRig | None = None, *, before: tuple[Find
     Diagnosis
     """
     inspection = inspect_record(record)
-    case = case_of(record, inspection, known)
+    wiring = wiring or Wiring()
+    case = case_of(record, inspection, rig, wiring)
     found = [*before, *examine_clock(case)]
     sensors, mended = examine_sensors(case)
     if mended is not None:
-        case = replace(case_of(mended, inspection, known), drive=case.drive, u=case.u)
+        case = replace(case_of(mended, inspection, rig, wiring), drive=case.drive, u=case.u)
     found += [*sensors, *examine_effort(case), *examine_rest(case), *examine_settings(case)]
-    unchecked = _unchecked(case, known)
-    forces, reasons = _forces(case, known, found)
+    unchecked = _unchecked(case)
+    forces, reasons = _forces(case, found)
     if any(f.kind == "scale" for f in forces):  # what looks held is only read on another scale
         found = [f for f in found if f.kind != "creep"]
     found += forces
@@ -53,17 +62,17 @@ def examine(record: Record, known: KnownRig | None = None, *, before: tuple[Find
     order = {s: i for i, s in enumerate(SEVERITIES)}
     return Diagnosis(
         file=inspection.file,
-        rig=known.name if known else "",
+        rig="" if rig is None else rig.name if isinstance(rig, Rig) else name_of(rig) or rig.__name__,
         samples=len(record),
         duration=inspection.time.duration,
         findings=tuple(sorted(found, key=lambda f: order[f.severity])),
         checked=tuple(k for k in KINDS if k not in unchecked and (k != "settings" or _settings(case))),
         unchecked=unchecked,
-        rigs=plants_that_suit(case.record, inspection) if known is None else (),
+        rigs=plants_that_suit(case.record, inspection) if rig is None else (),
     )
 
 
-def _unchecked(case: Case, known: KnownRig | None) -> dict[str, str]:
+def _unchecked(case: Case) -> dict[str, str]:
     """What this record cannot tell, whatever the rig."""
     out: dict[str, str] = {}
     if not case.drive:
@@ -74,7 +83,7 @@ def _unchecked(case: Case, known: KnownRig | None) -> dict[str, str]:
         out |= dict.fromkeys(("trip", "early"), f"the effort '{case.drive}' is zero throughout")
     elif case.u[0] != 0:
         out["early"] = f"'{case.drive}' acts from the first sample on"
-    if known is None:
+    if case.plant is None:
         out |= dict.fromkeys(("sign", "scale", "trip"), "nobody said what the rig is; name it with --rig")
     return out
 
@@ -83,9 +92,9 @@ def _settings(case: Case) -> bool:
     return any(n.startswith("runParameters") for n in case.inspection.notes)
 
 
-def _forces(case: Case, known: KnownRig | None, found: list[Finding]) -> tuple[list[Finding], dict[str, str]]:
+def _forces(case: Case, found: list[Finding]) -> tuple[list[Finding], dict[str, str]]:
     """What effort and motion say about each other, and why they do not where they do not."""
-    if known is None:
+    if case.plant is None:
         return [], {}
     spoilt = next((f for f in found if f.kind in HOPELESS and f.severity != "note" and f.spoils), None)
     motion: SmoothedMotion | str = (
@@ -95,7 +104,7 @@ def _forces(case: Case, known: KnownRig | None, found: list[Finding]) -> tuple[l
         return [], dict.fromkeys(("sign", "scale", "trip"), motion)
     told = {f.columns for f in found if f.kind == "effort" and f.severity != "note"}
     lying = (case.drive,) in told and not _in_dac(case)
-    numbers = values_of(case, known.friction)
+    numbers = values_of(case, friction_of(case.plant))
     out: list[Finding] = []
     reasons: dict[str, str] = {}
     balance: ForceBalance | None = None

@@ -8,6 +8,7 @@ leave far less. No simulation, and no friction has to be known: it is regressed.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
@@ -16,8 +17,10 @@ import numpy as np
 from upright.diagnosis.case import Case
 from upright.diagnosis.findings import Curve, Finding, Panel
 from upright.diagnosis.motion import MATTERS, SmoothedMotion, Term
+from upright.physics import Plant
 from upright.physics.equations import mass_and_force
 from upright.records import Array
+from upright.rig.drive import GAIN
 from upright.study.sensors import Sensor
 
 FLOOR = 0.004
@@ -178,14 +181,21 @@ CAUSES = {
 
 def values_of(case: Case, friction: frozenset[str]) -> tuple[dict[str, float], float] | str:
     """Parameters for the balance and the gain, or the reason why there is none."""
-    if case.plant is None or not case.parameters:
-        return "only the plant's name is known; a study or fit.json with its numbers tells"
-    guessed = [n for n in case.plant.names() if case.parameters[n].estimate and n not in friction]
+    rig = case.rig
+    if rig is None:
+        return "only the plant's name is known; a study with its numbers tells"
+    guessed = [n for n in rig.plant.names() if n in rig.guessed and n not in friction]
     if guessed:
         return f"{', '.join(guessed)} {'is a guess' if len(guessed) == 1 else 'are guesses'}; give the fit.json"
-    values = {n: 0.0 if p.estimate else p.value for n, p in case.parameters.items()}
-    gain = case.parameters.get("actuator.gain")
-    return values, gain.value if gain is not None and not gain.estimate else math.nan
+    values = {n: 0.0 if n in rig.guessed else v for n, v in rig.plant.parameters().items()}
+    return values, math.nan if GAIN in rig.guessed else rig.gain
+
+
+def friction_of(plant: type[Plant]) -> frozenset[str]:
+    """Names of the parameters that only dissipate."""
+    viscous = re.findall(r"\w+", plant.derived().power_lost)
+    dry = [n for j in plant.joints for n in vars(j).values() if isinstance(n, str)]
+    return frozenset(plant.names()) & frozenset([*viscous, *dry])
 
 
 def against_numbers(case: Case, balance: ForceBalance) -> list[Finding]:

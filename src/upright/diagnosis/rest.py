@@ -25,7 +25,7 @@ def _creep(case: Case) -> Iterator[Finding]:
         unit, span = column_unit(c), case.span(c)
         largest = case.widest(unit)
         beside = case.span(largest)
-        if not 5 * c.quantum.step < span < HELD * beside:
+        if not 5 * c.resolution.step < span < HELD * beside:
             continue
         yield Finding(
             kind="creep",
@@ -57,7 +57,7 @@ def _drift(case: Case) -> Iterator[Finding]:
         if len(levels) < 2 or any("reference" in lie for c in case.inspection.columns for lie in c.lies):
             continue
         off, span = max(levels) - min(levels), float(np.ptp(x))
-        if off > max(0.03 * span, 5 * c.quantum.step):
+        if off > max(0.03 * span, 5 * c.resolution.step):
             unit = column_unit(c)
             yield Finding(
                 kind="drift",
@@ -79,7 +79,7 @@ def _turning_free(case: Case) -> frozenset[str]:
     if plant is None:
         return frozenset()
     values = {f.name: 1.0 if f.default is MISSING else f.default for f in fields(plant)}  # type: ignore[arg-type]
-    values |= {n: p.value for n, p in case.parameters.items() if n in values}
+    values |= {} if case.rig is None else case.rig.plant.parameters()
     at = next(iter(plant.equilibria.values()))
     stiffness = small_motions(plant.derived_for(values), {**values, **at})[2]
     _, s, ways = np.linalg.svd(stiffness)

@@ -28,7 +28,7 @@ def examine_sensors(case: Case) -> tuple[list[Finding], Record | None]:
         if column.constant:
             continue
         x = case.record[column.name]
-        jumped = jumps(case.record.t, x, column.quantum.step, case.moduli.get(column.name, ()))
+        jumped = jumps(case.record.t, x, column.resolution.step, case.moduli.get(column.name, ()))
         if tells_speed(column):
             jumped = replace(jumped, steps=jumped.steps[:0], step_sizes=jumped.step_sizes[:0])
         found += _jumped(case, column, x, jumped)
@@ -113,7 +113,7 @@ def _jumped(case: Case, c: Column, x: Array, jumped: Jumps) -> Iterator[Finding]
 
 
 def _frozen(case: Case, c: Column, x: Array) -> Iterator[Finding]:
-    at, sudden = frozen_from(x, c.quantum.step)
+    at, sudden = frozen_from(x, c.resolution.step)
     if at < 0:
         return
     t = case.record.t
@@ -137,9 +137,9 @@ FEW = 50
 
 
 def _limited(case: Case, c: Column, x: Array) -> Iterator[Finding]:
-    if float(np.ptp(x)) < FEW * c.quantum.step or case.held(c):
+    if float(np.ptp(x)) < FEW * c.resolution.step or case.held(c):
         return
-    low, high, share = clipped(x, c.quantum.step, inertia=True)
+    low, high, share = clipped(x, c.resolution.step, inertia=True)
     if share < 0.005:
         return
     ends = " and ".join(f"{v:.5g}" for v in (low, high) if v == v)
@@ -155,7 +155,7 @@ def _limited(case: Case, c: Column, x: Array) -> Iterator[Finding]:
     )
 
 
-def frozen_from(x: Array, quantum: float) -> tuple[int, float]:
+def frozen_from(x: Array, resolution: float) -> tuple[int, float]:
     """Sample from which a column never changes again after it stopped dead in full motion, and how sudden that was.
 
     The second number is the speed lost at once, beside the largest change of speed within as short a time before;
@@ -171,14 +171,14 @@ def frozen_from(x: Array, quantum: float) -> tuple[int, float]:
     slope = (x[w : last + 1] - x[: last + 1 - w]) / w
     before = float(np.abs(np.diff(x[last - w : last + 1])).mean())
     changed = np.abs(slope[w:] - slope[:-w])
-    usual = max(float(np.percentile(changed, 99.5)), 0.5 * quantum) if changed.size else 0.0
+    usual = max(float(np.percentile(changed, 99.5)), 0.5 * resolution) if changed.size else 0.0
     noise = float(np.median(np.abs(np.diff(x[: last + 1], n=2)))) / w
     sudden = abs(float(slope[-1])) / max(usual, noise, 1e-300)
-    moving = before > 1.2 * quantum
+    moving = before > 1.2 * resolution
     return (last, sudden) if moving and sudden > 0.9 else (-1, sudden)
 
 
-def clipped(x: Array, quantum: float, *, inertia: bool) -> tuple[float, float, float]:
+def clipped(x: Array, resolution: float, *, inertia: bool) -> tuple[float, float, float]:
     """Lowest and highest value of a column if it is cut off there, else nan, and the share of samples cut off.
 
     A signal that turns by itself slows down before its extreme and leaves it slowly; one that is cut off comes or
@@ -199,7 +199,7 @@ def clipped(x: Array, quantum: float, *, inertia: bool) -> tuple[float, float, f
         if not long.any():
             continue
         first, after = first[long], after[long]
-        came, left = _abrupt(x, first, -1, quantum), _abrupt(x, after - 1, 1, quantum)
+        came, left = _abrupt(x, first, -1, resolution), _abrupt(x, after - 1, 1, resolution)
         hard = came & left if inertia else came | left
         if hard.any():
             ends[k] = level
@@ -207,9 +207,9 @@ def clipped(x: Array, quantum: float, *, inertia: bool) -> tuple[float, float, f
     return ends[0], ends[1], share
 
 
-def _abrupt(x: Array, at: NDArray[np.int64], way: int, quantum: float) -> NDArray[np.bool_]:
+def _abrupt(x: Array, at: NDArray[np.int64], way: int, resolution: float) -> NDArray[np.bool_]:
     """Whether a column leaves its value at samples `at`, going `way`, at the pace it has a few samples on."""
     place = np.clip(at, 6, None) if way < 0 else np.clip(at, None, x.size - 7)
     near = np.abs(x[place + 2 * way] - x[place]) / 2
     far = np.abs(x[place + 6 * way] - x[place + 4 * way]) / 2
-    return (at == place) & (near > 1.25 * quantum) & (near > 0.5 * far) & (near < 3 * far)
+    return (at == place) & (near > 1.25 * resolution) & (near > 0.5 * far) & (near < 3 * far)

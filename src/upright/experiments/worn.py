@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from upright.physics import CartPendulum, Furuta, Plant
-from upright.physics.worn import WornCartPendulum, WornFuruta
+from upright.physics.nonideal import NonidealCartPendulum, NonidealFuruta
 from upright.rig import Rig
 from upright.rig.mounting import Mounting
 
@@ -62,8 +62,8 @@ def _worn_plant(rig: Rig, rng: np.random.Generator) -> Plant:
     phase, tilt, towards = rng.uniform(0, 2 * math.pi), math.sin(rng.uniform(-TILT, TILT)), rng.uniform(0, 2 * math.pi)
     if isinstance(plant, Furuta):
         lean = {"tilt_x": tilt * math.cos(towards), "tilt_y": tilt * math.sin(towards)}
-        return WornFuruta(**values | lean, T_r=force, n_r=float(around), phi_r=phase)
+        return NonidealFuruta(**values | lean, T_r=force, n_r=float(around), phi_r=phase)
     if isinstance(plant, CartPendulum):
         per_metre = 2 * math.pi * around / TURN["m"]
-        return WornCartPendulum(**values, F_r=force, n_r=per_metre, phi_r=phase, slope=tilt)
+        return NonidealCartPendulum(**values, F_r=force, n_r=per_metre, phi_r=phase, slope=tilt)
     return plant.replace(**values)

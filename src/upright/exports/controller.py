@@ -64,12 +64,12 @@ class SampledController:
     @property
     def converter(self) -> np.ndarray[Any, np.dtype[np.float64]]:
         """Step of each command's converter, 0 for none."""
-        return np.broadcast_to(np.asarray(self.law.command_quantum, dtype=np.float64), (len(self.commands),))
+        return np.broadcast_to(np.asarray(self.law.command_resolution, dtype=np.float64), (len(self.commands),))
 
     @property
     def encoder(self) -> np.ndarray[Any, np.dtype[np.float64]]:
         """Step of each encoder, 0 for none."""
-        return np.broadcast_to(np.asarray(self.law.quantum, dtype=np.float64), (len(self.readings),))
+        return np.broadcast_to(np.asarray(self.law.resolution, dtype=np.float64), (len(self.readings),))
 
     @property
     def facts(self) -> list[str]:
@@ -175,7 +175,8 @@ def _read(content: Mapping[str, Any]) -> SampledController:
     law = replace(
         designed, measured=names, reference_names=designed.reference_names or ("reference",) * others,
         period=float(content["period"]), limit=math.inf if limit is None else float(limit),
-        command_quantum=float(content["converter"]), quantum=np.array([r["step"] for r in readings], dtype=np.float64),
+        command_resolution=float(content["converter"]),
+        resolution=np.array([r["step"] for r in readings], dtype=np.float64),
     )  # fmt: skip
     at = f" at '{content['at']}'" if content.get("at") else ""
     return SampledController(

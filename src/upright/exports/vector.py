@@ -53,7 +53,7 @@ def self_test(made: SampledController) -> ReplayVector:
     n, target = len(made.readings), law.arrays()["target"][0]
     shape = np.column_stack([np.cos(0.006 * (i + 2) * k**1.6 + i) for i in range(n)])
     signal = np.repeat(np.where(k < SAMPLES // 2, 0.0, 0.5)[:, None], len(made.references), axis=1)
-    unit = replace(law, references=signal, limit=math.inf, command_quantum=0.0, quantum=0.0, delay=0.0)
+    unit = replace(law, references=signal, limit=math.inf, command_resolution=0.0, resolution=0.0, delay=0.0)
     peak = float(np.abs(unit.follow(target + shape)[0]).max(initial=0.0))
     size = BEYOND * law.limit / peak if math.isfinite(law.limit) and peak > 0 else 0.1
     readings = _on_steps(made, target + size * shape)
@@ -119,7 +119,7 @@ def _single_precision(made: SampledController, law: Law, readings: Array) -> flo
     w = np.hstack([readings - target, np.broadcast_to(signal, (len(readings), signal.shape[1]))])
     A, B, C, D = (np.abs(getattr(law, name)) for name in "ABCD")
     roundings = (A.shape[0] + D.shape[1] + 2) * SINGLE
-    free = replace(law, limit=math.inf, command_quantum=0.0, target=0.0, initial=None, delay=0.0, windup="free")
+    free = replace(law, limit=math.inf, command_resolution=0.0, target=0.0, initial=None, delay=0.0, windup="free")
     moved = np.abs(replace(free, references=_rounding(signal)).follow(_rounding(readings) - _rounding(target))[0])
     asked = memory @ law.C.T + w @ law.D.T
     jump = np.abs(memory @ law.A.T + w @ law.B.T - memory) * (law.windup == "hold")

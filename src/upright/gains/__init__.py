@@ -4,7 +4,7 @@ from upright.gains.loop import feedback, margins, place_sampled
 from upright.gains.lqr import dlqr, locus, lqr, weight_for_effort
 from upright.gains.margins import Margins
 from upright.gains.placement import Placement, place, prefilter
-from upright.gains.velocity import Estimator, difference, filtered, kalman, placed_observer, read_off, shaken
+from upright.gains.velocity import Estimator, difference, filtered, kalman, placed_observer, process_noise, read_off
 
 __all__ = [
     "Estimator",
@@ -22,7 +22,7 @@ __all__ = [
     "place_sampled",
     "placed_observer",
     "prefilter",
+    "process_noise",
     "read_off",
-    "shaken",
     "weight_for_effort",
 ]

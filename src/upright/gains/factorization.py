@@ -100,9 +100,9 @@ def recover_locus(
 
     def misses(x: Array) -> Array:
         out: list[Array] = []
-        for poles, asked, half in zip(locus(x).sets(len(printed)), printed, rounding, strict=True):
-            off, unit = matched(asked, poles) - asked, np.asarray(half, dtype=np.complex128)
-            out += [off.real / unit.real, (off.imag / unit.imag)[asked.imag != 0]]
+        for poles, published, half in zip(locus(x).sets(len(printed)), printed, rounding, strict=True):
+            off, unit = matched(published, poles) - published, np.asarray(half, dtype=np.complex128)
+            out += [off.real / unit.real, (off.imag / unit.imag)[published.imag != 0]]
         return np.concatenate(out)
 
     x = _least_largest(misses, x, scale)

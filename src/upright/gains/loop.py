@@ -64,7 +64,7 @@ def place_sampled(model: StateSpace, estimator: Estimator, poles: ArrayLike) -> 
     array, shape (1, n)
     """
     n = model.A.shape[0] - model.remembered
-    asked = conjugate_poles(poles, n)
+    requested = conjugate_poles(poles, n)
     if model.B.shape[1] != 1:
         raise BadInput(f"sampled placement is for one input, and this model has {model.B.shape[1]}; use place.")
     size = model.A.shape[0]
@@ -75,13 +75,13 @@ def place_sampled(model: StateSpace, estimator: Estimator, poles: ArrayLike) -> 
     C = np.hstack([estimator.D @ model.C, estimator.C])[:n]
     rows: list[Array] = []
     wanted: list[float] = []
-    seen: list[complex] = []
+    earlier: list[complex] = []
     try:
-        for z in to_z(asked, model.period).tolist():
+        for z in to_z(requested, model.period).tolist():
             if z.imag < 0:
                 continue
-            order = sum(abs(z - other) < 1e-9 for other in seen)
-            seen.append(z)
+            order = sum(abs(z - other) < 1e-9 for other in earlier)
+            earlier.append(z)
             column = B.astype(np.complex128)
             for _ in range(order + 1):
                 column = np.linalg.solve(z * np.eye(A.shape[0]) - A, column)
@@ -205,14 +205,14 @@ def loop_gain(model: StateSpace, law: Law, omega: ArrayLike) -> Roots:
             return np.zeros((z.shape[0], last.shape[0], first.shape[1]), dtype=np.complex128)
         return last @ np.linalg.solve(z * np.eye(A.shape[0]) - A, first[None].astype(np.complex128))
 
-    found: Roots = -(through(law.A, B, law.C) + D) @ through(model.A, model.B, model.C)
-    return found[:, 0, 0]
+    gain: Roots = -(through(law.A, B, law.C) + D) @ through(model.A, model.B, model.C)
+    return gain[:, 0, 0]
 
 
-def command_noise(model: StateSpace, law: Law, quantum: ArrayLike) -> float:
+def command_noise(model: StateSpace, law: Law, resolution: ArrayLike) -> float:
     """Standard deviation of the command in the closed loop from the rounding of the encoders [the input's unit]."""
     B, D = law.B[:, : law.readings], law.D[:, : law.readings]
-    sigma = np.broadcast_to(np.asarray(quantum, dtype=np.float64) / np.sqrt(12), (law.readings,))
+    sigma = np.broadcast_to(np.asarray(resolution, dtype=np.float64) / np.sqrt(12), (law.readings,))
     inlet = np.vstack([model.B @ D, B]) * sigma
     outlet = np.hstack([D @ model.C, law.C])
     spread = stationary(closed(model, law), inlet)

@@ -140,8 +140,8 @@ def locus(A: ArrayLike, B: ArrayLike, Q: ArrayLike, weights: ArrayLike, *, sampl
     A, B = np.asarray(A, dtype=np.float64), np.asarray(B, dtype=np.float64)
     rows: list[Roots] = []
     for R in np.atleast_1d(np.asarray(weights, dtype=np.float64)).tolist():
-        found = least_cost(A, B, Q, R, sampled=sampled).E
-        rows.append(matched(rows[-1], found) if rows else found[np.lexsort((found.imag, found.real))])
+        poles = least_cost(A, B, Q, R, sampled=sampled).E
+        rows.append(matched(rows[-1], poles) if rows else poles[np.lexsort((poles.imag, poles.real))])
     return np.array(rows)
 
 

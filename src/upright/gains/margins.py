@@ -87,10 +87,10 @@ class Response:
         # z x = A x + B u; p = z (A' p + C' u); C x = B' p
         left = _blocks([[A, None, B], [None, np.eye(len(A)), None], [C, -B.T, np.zeros((1, 1))]])
         right = _blocks([[np.eye(len(A)), None, B * 0], [None, A.T, C.T], [C * 0, None, np.zeros((1, 1))]])
-        found = _crossings(_angles(left, right), lambda w: np.imag(self.at(w)) / np.abs(self.at(w)))
-        values = self.at(found).real if found.size else found
+        crossings = _crossings(_angles(left, right), lambda w: np.imag(self.at(w)) / np.abs(self.at(w)))
+        values = self.at(crossings).real if crossings.size else crossings
         ends = np.array([[w, v] for w in (0.0, math.pi) if math.isfinite(v := self._at_end(w))]).reshape(-1, 2)
-        return np.concatenate([found, ends[:, 0]]), np.concatenate([values, ends[:, 1]])
+        return np.concatenate([crossings, ends[:, 0]]), np.concatenate([values, ends[:, 1]])
 
     def _at_end(self, angle: float) -> float:
         """Value at z = 1 or z = -1, infinite at a pole."""
@@ -222,9 +222,9 @@ def _angles(left: Array, right: Array) -> Array:
     from scipy.linalg import eigvals
 
     z: Roots = np.asarray(eigvals(left, right), dtype=np.complex128)
-    found = np.unique(np.abs(np.angle(z[np.isfinite(z)])))
-    found = found[(found > 1e-12) & (found < math.pi - 1e-12)]
-    return found[np.diff(found, prepend=0.0) > 1e-12 * found]  # what rounding makes of one
+    angles = np.unique(np.abs(np.angle(z[np.isfinite(z)])))
+    angles = angles[(angles > 1e-12) & (angles < math.pi - 1e-12)]
+    return angles[np.diff(angles, prepend=0.0) > 1e-12 * angles]  # what rounding makes of one
 
 
 def _crossings(candidates: Array, f: Callable[[Array], Array]) -> Array:
@@ -249,9 +249,9 @@ def root(f: Callable[[float], float], low: float, high: float) -> float:
     for _ in range(200):
         c = b - f_b * (b - a) / (f_b - f_a)
         f_c = f(c)
-        done = f_c == 0.0 or abs(c - b) <= 1e-14 * abs(c)
+        converged = f_c == 0.0 or abs(c - b) <= 1e-14 * abs(c)
         a, f_a = (b, f_b) if f_c * f_b < 0 else (a, f_a / 2)  # an end that stays twice loses half its weight
         b, f_b = c, f_c
-        if done:
+        if converged:
             break
     return b

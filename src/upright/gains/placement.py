@@ -66,8 +66,8 @@ def eigenvalues(A: Array, B: Array, K: Array) -> Roots:
     with mp.workdps(DIGITS):
         closed = mp.matrix(A.tolist()) - mp.matrix(B.tolist()) * mp.matrix(K.tolist())
         # of one number it gives back its vectors too, asked for or not
-        found: Any = mp.eig(closed, left=False, right=False) if len(A) > 1 else [closed[0, 0]]
-        values = np.array([complex(z) for z in found], dtype=np.complex128)
+        result: Any = mp.eig(closed, left=False, right=False) if len(A) > 1 else [closed[0, 0]]
+        values = np.array([complex(z) for z in result], dtype=np.complex128)
         values.imag[np.abs(values.imag) < 1e-25 * np.abs(values)] = 0.0
         return values
 
@@ -100,7 +100,7 @@ class Placement:
     """
 
     K: Array
-    asked: Roots
+    requested: Roots
     attained: Roots
     miss: float
     condition: float
@@ -148,7 +148,7 @@ def place(A: ArrayLike, B: ArrayLike, poles: ArrayLike) -> Placement:
     """
     A, B = checked(A, B)
     n, m = B.shape
-    asked = conjugate_poles(poles, n)
+    requested = conjugate_poles(poles, n)
     even = _balanced(A, B)
     lost = lost_modes(even.A, even.B)
     if lost:
@@ -158,26 +158,26 @@ def place(A: ArrayLike, B: ArrayLike, poles: ArrayLike) -> Placement:
             f"test: [A - s I, B] has rank {n - lost.count(lost[0])} of {n} there), so no gain places all poles; add an "
             "input or a coupling, or leave that mode out of the model."
         )
-    found = _single(even, asked) if m == 1 else _several(even, asked)
+    gains = _single(even, requested) if m == 1 else _several(even, requested)
     weakest = written([weak_modes(even.A, even.B)[0][1] * even.rate])
-    if found is None or not np.isfinite(found).all():
+    if gains is None or not np.isfinite(gains).all():
         raise BadInput(
-            f"no gains were found for the poles {written(asked)}: the mode at {weakest} is almost out of the inputs' "
+            f"no gains place the poles {written(requested)}: the mode at {weakest} is almost out of the inputs' "
             "reach; leave it where it is, or add an input or a coupling."
         )
-    K = even.gains(found)
-    attained = matched(asked, eigenvalues(A, B, K))
+    K = even.gains(gains)
+    attained = matched(requested, eigenvalues(A, B, K))
     condition, sensitivity = _condition(even), _sensitivity(A, B, K)
-    miss = float(np.abs(attained - asked).max())
-    _refuse_a_miss(asked, attained, condition, weakest)
+    miss = float(np.abs(attained - requested).max())
+    _refuse_a_miss(requested, attained, condition, weakest)
     return Placement(
         K=K,
-        asked=asked,
+        requested=requested,
         attained=attained,
         miss=miss,
         condition=condition,
         sensitivity=sensitivity,
-        sentence=_sentence(asked, condition, sensitivity),
+        sentence=_sentence(requested, condition, sensitivity),
     )
 
 
@@ -197,36 +197,36 @@ def _power(value: float) -> float:
     return float(2.0 ** np.round(np.log2(value))) if value > 0 else 1.0
 
 
-def _single(even: _Balanced, asked: Roots) -> Array | None:
-    gains = ackermann(even.A, even.B[:, 0], asked / even.rate)
+def _single(even: _Balanced, requested: Roots) -> Array | None:
+    gains = ackermann(even.A, even.B[:, 0], requested / even.rate)
     return None if gains is None else gains[None]
 
 
-def _several(even: _Balanced, asked: Roots) -> Array | None:
+def _several(even: _Balanced, requested: Roots) -> Array | None:
     """Gains of several inputs; None when neither way leads to any."""
     import scipy.signal
 
     place_poles: Any = scipy.signal.place_poles
 
-    crowd = max(int(np.sum(np.abs(asked - p) <= 1e-9 * abs(p))) for p in asked)
+    crowd = max(int(np.sum(np.abs(requested - p) <= 1e-9 * abs(p))) for p in requested)
     if crowd <= np.linalg.matrix_rank(even.B):
         try:
-            found: Array = np.asarray(place_poles(even.A, even.B, asked / even.rate).gain_matrix, dtype=np.float64)
+            K: Array = np.asarray(place_poles(even.A, even.B, requested / even.rate).gain_matrix, dtype=np.float64)
         except ValueError:
-            found = np.full((even.B.shape[1], even.A.shape[0]), np.nan)
-        if np.isfinite(found).all():
-            attained = matched(asked, even.rate * eigenvalues(even.A, even.B, found))
-            if np.all(np.abs(attained - asked) <= _allowed(asked)):
-                return found
+            K = np.full((even.B.shape[1], even.A.shape[0]), np.nan)
+        if np.isfinite(K).all():
+            attained = matched(requested, even.rate * eigenvalues(even.A, even.B, K))
+            if np.all(np.abs(attained - requested) <= _allowed(requested)):
+                return K
     # Heymann's lemma: after a feedback that gives distinct poles, a single mixture of the inputs reaches every mode
     first = np.zeros((even.B.shape[1], even.A.shape[0]))
     for _ in range(2):
         A = even.A - even.B @ first
         v = _mixture(A, even.B)
         if not lost_modes(A, even.B @ v[:, None]):
-            gains = ackermann(A, even.B @ v, asked / even.rate)
+            gains = ackermann(A, even.B @ v, requested / even.rate)
             return None if gains is None else first + np.outer(v, gains)
-        spread = -float(np.abs(asked).max()) * np.linspace(0.5, 1.5, asked.size) / even.rate
+        spread = -float(np.abs(requested).max()) * np.linspace(0.5, 1.5, requested.size) / even.rate
         first = np.asarray(place_poles(even.A, even.B, spread).gain_matrix, dtype=np.float64)
     return None
 
@@ -238,20 +238,20 @@ def _mixture(A: Array, B: Array) -> Array:
     return max(mixtures, key=lambda v: weak_modes(A, B @ v[:, None])[0][0])
 
 
-def _allowed(asked: Roots) -> Array:
+def _allowed(requested: Roots) -> Array:
     """How far from each pole asked is still right."""
-    scale = float(np.abs(asked).max(initial=0.0)) or 1.0
-    together = np.sum(np.abs(asked[:, None] - asked[None, :]) <= 1e-3 * scale, axis=1)
+    scale = float(np.abs(requested).max(initial=0.0)) or 1.0
+    together = np.sum(np.abs(requested[:, None] - requested[None, :]) <= 1e-3 * scale, axis=1)
     return scale * MISSED ** (1.0 / together)
 
 
-def _refuse_a_miss(asked: Roots, attained: Roots, condition: float, weakest: str) -> None:
-    over = np.abs(attained - asked) / _allowed(asked)
+def _refuse_a_miss(requested: Roots, attained: Roots, condition: float, weakest: str) -> None:
+    over = np.abs(attained - requested) / _allowed(requested)
     i = int(np.argmax(over))
     if over[i] > 1.0:
         raise BadInput(
-            f"gains rounded to double precision leave a pole {abs(attained[i] - asked[i]):.2g} 1/s away from where "
-            f"it was asked, {written(asked[i : i + 1])} (controllability matrix: condition {condition:.1e}). "
+            f"gains rounded to double precision leave a pole {abs(attained[i] - requested[i]):.2g} 1/s away from where "
+            f"it was asked, {written(requested[i : i + 1])} (controllability matrix: condition {condition:.1e}). "
             f"Ask for poles closer to those of the model, of which {weakest} is the hardest to reach, or for fewer."
         )
 
@@ -280,8 +280,8 @@ def _sensitivity(A: Array, B: Array, K: Array, part: float = 1e-3) -> float:
     return worst
 
 
-def _sentence(asked: Roots, condition: float, sensitivity: float) -> str:
-    fastest = float(np.abs(asked).max(initial=0.0))
+def _sentence(requested: Roots, condition: float, sensitivity: float) -> str:
+    fastest = float(np.abs(requested).max(initial=0.0))
     size = f"condition {condition:.2g}" if np.isfinite(condition) else "condition beyond 1e16"
     moved = f"one number of the model 0.1 % off moves a pole by up to {sensitivity:.2g} 1/s"
     if condition > ILL or sensitivity > fastest:

@@ -46,26 +46,26 @@ def conjugate_poles(poles: ArrayLike, states: int) -> Roots:
     BadInput
         When there are too few or too many, one is not finite, or a complex one has no conjugate.
     """
-    asked = np.atleast_1d(np.array(poles, dtype=np.complex128))
-    if asked.ndim != 1 or asked.size != states:
+    requested = np.atleast_1d(np.array(poles, dtype=np.complex128))
+    if requested.ndim != 1 or requested.size != states:
         raise BadInput(
-            f"a model of {states} states needs {states} poles, got {asked.size}: {written(asked.ravel())}; "
+            f"a model of {states} states needs {states} poles, got {requested.size}: {written(requested.ravel())}; "
             "a pair such as -4+-2j counts as two."
         )
-    if not np.isfinite(asked).all():
-        raise BadInput(f"poles must be finite numbers, got {written(asked)}.")
-    open_ones = [i for i in range(states) if asked[i].imag != 0.0]
+    if not np.isfinite(requested).all():
+        raise BadInput(f"poles must be finite numbers, got {written(requested)}.")
+    open_ones = [i for i in range(states) if requested[i].imag != 0.0]
     while open_ones:
         i = open_ones.pop(0)
-        near = min(open_ones, key=lambda j: abs(asked[j] - asked[i].conjugate()), default=None)
-        if near is None or abs(asked[near] - asked[i].conjugate()) > 1e-9 * abs(asked[i]):
+        near = min(open_ones, key=lambda j: abs(requested[j] - requested[i].conjugate()), default=None)
+        if near is None or abs(requested[near] - requested[i].conjugate()) > 1e-9 * abs(requested[i]):
             raise BadInput(
-                f"real gains give conjugate poles only, and {written(asked[i : i + 1])} comes without "
-                f"{written(asked[i : i + 1].conj())}; write the pair as {_pair(asked[i])}."
+                f"real gains give conjugate poles only, and {written(requested[i : i + 1])} comes without "
+                f"{written(requested[i : i + 1].conj())}; write the pair as {_pair(requested[i])}."
             )
         open_ones.remove(near)
-        asked[near] = asked[i].conjugate()
-    return asked
+        requested[near] = requested[i].conjugate()
+    return requested
 
 
 def checked(A: ArrayLike, B: ArrayLike) -> tuple[Array, Array]:
@@ -115,13 +115,13 @@ def poles_of(A: Array) -> Roots:
     return np.asarray(np.linalg.eigvals(A), dtype=np.complex128)
 
 
-def matched(asked: Roots, found: Roots) -> Roots:
+def matched(requested: Roots, attained: Roots) -> Roots:
     """The roots found, each beside the one asked that it is closest to, the closest pairs first."""
-    distance = np.abs(asked[:, None] - found[None, :])
-    out = np.zeros_like(asked)
-    for _ in range(asked.size):
+    distance = np.abs(requested[:, None] - attained[None, :])
+    out = np.zeros_like(requested)
+    for _ in range(requested.size):
         i, j = np.unravel_index(int(np.argmin(distance)), distance.shape)
-        out[i] = found[j]
+        out[i] = attained[j]
         distance[i, :] = np.inf
         distance[:, j] = np.inf
     return out

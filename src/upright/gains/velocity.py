@@ -35,30 +35,30 @@ class Estimator:
     period: float
     name: str
 
-    def noise(self, quantum: ArrayLike) -> Array:
+    def noise(self, resolution: ArrayLike) -> Array:
         """Standard deviation of each estimated state [its unit] from the rounding of the encoders alone, shape (n,).
 
         Parameters
         ----------
-        quantum : float or array, shape (p,)
-            Step of each encoder [rad or m]; its rounding is white with variance ``quantum^2/12`` (Widrow), true for a
-            body that crosses several steps between samples.
+        resolution : float or array, shape (p,)
+            Step of each encoder [rad or m]; its rounding is white with variance ``resolution^2/12`` (Widrow), true for
+            a body that crosses several steps between samples.
         """
-        variance = np.broadcast_to(np.asarray(quantum, dtype=np.float64) ** 2 / 12, (self.B.shape[1],))
+        variance = np.broadcast_to(np.asarray(resolution, dtype=np.float64) ** 2 / 12, (self.B.shape[1],))
         spread = stationary(self.A, self.B * np.sqrt(variance))
         return np.sqrt(np.diag(self.C @ spread @ self.C.T + (self.D * variance) @ self.D.T))
 
 
 def difference(model: StateSpace) -> Estimator:
-    """Plain difference of two readings, ``v[k] = (y[k] - y[k-1])/T``; its noise is ``quantum/(T sqrt 6)``."""
+    """Plain difference of two readings, ``v[k] = (y[k] - y[k-1])/T``; its noise is ``resolution/(T sqrt 6)``."""
     return filtered(model, 0.0)
 
 
 def filtered(model: StateSpace, memory: float) -> Estimator:
     """Difference through a low pass, ``v[k] = a v[k-1] + (1 - a) (y[k] - y[k-1])/T``.
 
-    Its noise has the variance ``quantum^2/12 * 2 (1 - a)^2/((1 + a) T^2)``; it is late by about ``a/(1 - a)`` samples
-    more than the half of one that every difference is.
+    Its noise has the variance ``resolution^2/12 * 2 (1 - a)^2/((1 + a) T^2)``; it is late by about ``a/(1 - a)``
+    samples more than the half of one that every difference is.
 
     Parameters
     ----------
@@ -90,10 +90,10 @@ def observer(model: StateSpace, gain: ArrayLike, name: str = "observer") -> Esti
     L = np.asarray(gain, dtype=np.float64)
     if L.shape != model.C.T.shape:
         raise BadInput(f"an observer of this model needs a gain of shape {model.C.T.shape}, got {L.shape}.")
-    kept = np.eye(model.A.shape[0]) - L @ model.C
+    remaining = np.eye(model.A.shape[0]) - L @ model.C
     begin: Array = np.linalg.pinv(model.C).astype(np.float64)
     return Estimator(
-        A=model.A @ kept, B=model.A @ L, E=model.B, C=kept, D=L, begin=begin, period=model.period,
+        A=model.A @ remaining, B=model.A @ L, E=model.B, C=remaining, D=L, begin=begin, period=model.period,
         name=name,
     )  # fmt: skip
 
@@ -162,7 +162,7 @@ def kalman(model: StateSpace, process: ArrayLike, noise: ArrayLike) -> Estimator
         What shakes the states from sample to sample: a covariance, or one number, the standard deviation of a white
         force held over a period [the input's unit].
     noise : float or array, shape (p,)
-        Standard deviation of each reading; ``quantum/sqrt(12)`` for an encoder.
+        Standard deviation of each reading; ``resolution/sqrt(12)`` for an encoder.
 
     Raises
     ------
@@ -176,7 +176,7 @@ def kalman(model: StateSpace, process: ArrayLike, noise: ArrayLike) -> Estimator
     p = model.C.shape[0]
     V = np.diag(np.broadcast_to(np.asarray(noise, dtype=np.float64) ** 2, (p,)))
     if not np.all(np.diag(V) > 0):
-        raise BadInput("a Kalman filter needs readings with noise above 0; give quantum/sqrt(12) for an encoder.")
+        raise BadInput("a Kalman filter needs readings with noise above 0; give resolution/sqrt(12) for an encoder.")
     try:
         solve: Any = solve_discrete_are
         P = np.asarray(solve(model.A.T, model.C.T, W, V), dtype=np.float64)
@@ -189,7 +189,7 @@ def kalman(model: StateSpace, process: ArrayLike, noise: ArrayLike) -> Estimator
     return observer(model, gain, "Kalman filter")
 
 
-def shaken(model: StateSpace, accelerations: ArrayLike) -> Array:
+def process_noise(model: StateSpace, accelerations: ArrayLike) -> Array:
     """Covariance of what shakes every coordinate by itself, for `kalman`: a white acceleration held over a period.
 
     A force that enters like the command alone is a poor guess where bodies are also pushed by hands and dry friction:
@@ -203,12 +203,12 @@ def shaken(model: StateSpace, accelerations: ArrayLike) -> Array:
         Standard deviation of the acceleration of each coordinate [m/s^2 or rad/s^2].
     """
     p = model.C.shape[0]
-    found = np.zeros_like(model.A)
+    Q = np.zeros_like(model.A)
     for i, a in enumerate(np.broadcast_to(np.asarray(accelerations, dtype=np.float64), (p,)).tolist()):
-        moved = np.zeros(found.shape[0])
+        moved = np.zeros(Q.shape[0])
         moved[2 * i : 2 * i + 2] = model.period**2 / 2, model.period
-        found += a**2 * np.outer(moved, moved)
-    return found
+        Q += a**2 * np.outer(moved, moved)
+    return Q
 
 
 def stationary(A: Array, B: Array) -> Array:

@@ -63,7 +63,7 @@ class Loadings:
 
 
 def swings(
-    record: Record, *, added: float, label: str, signal: str, command: str = "", quantum: float | None = None
+    record: Record, *, added: float, label: str, signal: str, command: str = "", resolution: float | None = None
 ) -> tuple[Loaded, ...]:
     """Free swings of a log, one after each switch of its command; the whole log when it has none.
 
@@ -77,7 +77,7 @@ def swings(
         Column of the position, in any unit.
     command : str
         Column of the command: piecewise constant.
-    quantum : float, optional
+    resolution : float, optional
         Smallest step of the sensor, told from the column when omitted.
 
     Raises
@@ -86,9 +86,9 @@ def swings(
         When no stretch shows enough extremes.
     """
     x = record[signal]
-    if quantum is None:
+    if resolution is None:
         steps = np.abs(np.diff(np.unique(x)))
-        quantum = float(steps.min()) if steps.size else 0.0
+        resolution = float(steps.min()) if steps.size else 0.0
     cuts = [0, record.t.size]
     if command:
         cuts = [0, *(np.flatnonzero(np.diff(record[command])) + 1).tolist(), record.t.size]
@@ -101,10 +101,10 @@ def swings(
     reason = ""
     for i, (first, last) in enumerate(pairwise(cuts)):
         part = slice(first, last)
-        if last - first < 20 or np.ptp(x[part]) < max(20 * quantum, 0.05 * float(np.ptp(x))):
+        if last - first < 20 or np.ptp(x[part]) < max(20 * resolution, 0.05 * float(np.ptp(x))):
             continue  # at rest
         try:
-            swing = decay(record.t[part], x[part], quantum=quantum)
+            swing = decay(record.t[part], x[part], resolution=resolution)
         except NotIdentifiable as error:
             reason = str(error)
             continue

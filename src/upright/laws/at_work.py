@@ -26,7 +26,7 @@ def at_work(law: Law | Rule) -> AtWork:
     """The law from its first sample on, one call for each.
 
     Commands are rounded and limited as the law says; its `delay` is left to the computer and the converter that have
-    it, and its `quantum` to the encoders.
+    it, and its `resolution` to the encoders.
 
     A reading or a command that is not finite stops the law: it gives NaN from there on, upon which a rig's supervisor
     stops the rig with a message. An exported program has nobody above it, and gives zero instead.
@@ -113,14 +113,14 @@ def _references(law: Controller) -> Callable[[int], Numbers]:
 
 def _finish(law: Controller) -> Callable[[Sequence[float]], tuple[Numbers, bool]]:
     """Commands rounded and limited, and whether one was beyond the limit."""
-    limit, quantum = law.limit, np.asarray(law.command_quantum, dtype=np.float64)
-    quanta = _row(quantum) if quantum.ndim else (float(quantum),)
+    limit, resolution = law.limit, np.asarray(law.command_resolution, dtype=np.float64)
+    quanta = _row(resolution) if resolution.ndim else (float(resolution),)
 
     def finish(u: Sequence[float]) -> tuple[Numbers, bool]:
         values = [_rounded(x, q) for x, q in zip(u, quanta if len(quanta) > 1 else quanta * len(u), strict=True)]
         # a command that is infinite is none: the limit would make all that the drive can of it
-        given = tuple(min(max(x, -limit), limit) if isfinite(x) else nan for x in values)
-        return given, any(abs(x) > limit for x in values)
+        limited = tuple(min(max(x, -limit), limit) if isfinite(x) else nan for x in values)
+        return limited, any(abs(x) > limit for x in values)
 
     return finish
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 from typing import Any, Literal, Self
@@ -13,11 +13,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput
+from upright.renamed import Now, former, renamed
 
 Array = NDArray[np.float64]
 Windup = Literal["free", "hold"]
 Pattern = tuple[tuple[float | None, ...], ...]
 """Entries of a matrix that are 0 or 1 in every lane; None for numbers that are known at run time only."""
+
+
+FORMER: Mapping[str, Now] = {
+    "quantum": ("resolution", lambda value: value),
+    "command_quantum": ("command_resolution", lambda value: value),
+}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -30,9 +37,9 @@ class Controller(ABC):
     ----------
     references : array, shape (T,) or (T, references), optional
         Reference signals at the samples; the last values are held.
-    quantum : float or array, shape (coordinates,)
-        Resolution of each encoder [rad or m], ``y = floor(q/quantum + 1/2) quantum``; 0 for none.
-    command_quantum : float or array, shape (inputs,)
+    resolution : float or array, shape (coordinates,)
+        Resolution of each encoder [rad or m], ``y = floor(q/resolution + 1/2) resolution``; 0 for none.
+    command_resolution : float or array, shape (inputs,)
         Step of the converter that puts the command out, in the command's unit; 0 for none.
     limit : float
         Largest command that leaves the controller, either way; the actuator's own limit acts besides.
@@ -41,18 +48,20 @@ class Controller(ABC):
     """
 
     references: ArrayLike | None = None
-    quantum: ArrayLike = 0.0
-    command_quantum: ArrayLike = 0.0
+    resolution: ArrayLike = 0.0
+    command_resolution: ArrayLike = 0.0
     limit: float = math.inf
     delay: float = 0.0
+    quantum = former("resolution")
+    command_quantum = former("command_resolution")
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.delay < 1e4:
             raise BadInput(f"the delay must be at least 0 samples, got {self.delay:g}; give it in samples.")
         if not self.limit > 0.0:
             raise BadInput(f"a law needs a limit above zero, got {self.limit:g}.")
-        if np.any(np.asarray(self.quantum) < 0.0) or np.any(np.asarray(self.command_quantum) < 0.0):
-            raise BadInput("a quantum must be at least 0, which means no rounding.")
+        if np.any(np.asarray(self.resolution) < 0.0) or np.any(np.asarray(self.command_resolution) < 0.0):
+            raise BadInput("a resolution must be at least 0, which means no rounding.")
         r = self.signal()
         if r.ndim != 2 or (r.shape[1] > 0 and r.shape[0] == 0) or not np.isfinite(r).all():
             raise BadInput(f"references need finite values in shape (T, references), got {r.shape}.")
@@ -92,7 +101,7 @@ class Controller(ABC):
         """What all lanes share, as the kernel reads it: encoder quanta, delay, room for one more, command quanta."""
         out = np.zeros(n + 2 + nu)
         out[n] = self.delay
-        for name, place, size in (("quantum", 0, n), ("command_quantum", n + 2, nu)):
+        for name, place, size in (("resolution", 0, n), ("command_resolution", n + 2, nu)):
             try:
                 out[place : place + size] = getattr(self, name)
             except ValueError:
@@ -110,6 +119,7 @@ class Structure:
     hold: bool
 
 
+@renamed(FORMER)
 @dataclass(frozen=True, eq=False)
 class Law(Controller):
     """Sampled linear controller with a state of its own, evaluated at every sample, its output held until the next.
@@ -220,8 +230,8 @@ class Law(Controller):
             )
         parts = self.by_lane(lanes)
         if self.begin is not None:
-            quantum = np.broadcast_to(np.asarray(self.quantum, dtype=np.float64), (n,))
-            w = rounded(q, quantum[:, None]) - parts["target"]
+            resolution = np.broadcast_to(np.asarray(self.resolution, dtype=np.float64), (n,))
+            w = rounded(q, resolution[:, None]) - parts["target"]
             for column, value in zip(self.begin.T, w, strict=True):  # in this order, as `@` has none that is its own
                 parts["initial"] = parts["initial"] + column[:, None] * value
         for name, pattern in (("A", self.compiled_in.A), ("B", self.compiled_in.B)):
@@ -257,9 +267,9 @@ class Law(Controller):
         sums = (np.eye(len(self.A)) == self.A).all(axis=1) & (self.windup == "hold")
         for k in range(len(y)):
             z[k + 1] = self.A @ z[k] + driven[k]
-            if sums.any() and (np.abs(rounded(fed[k] + self.C @ z[k], self.command_quantum)) > self.limit).any():
+            if sums.any() and (np.abs(rounded(fed[k] + self.C @ z[k], self.command_resolution)) > self.limit).any():
                 z[k + 1, sums] = z[k, sums]
-        u = np.clip(rounded(fed + z[:-1] @ self.C.T, self.command_quantum), -self.limit, self.limit)
+        u = np.clip(rounded(fed + z[:-1] @ self.C.T, self.command_resolution), -self.limit, self.limit)
         if self.delay:
             k = np.arange(len(u), dtype=np.float64)
             u = np.column_stack([np.interp(k - self.delay, k, column, left=0.0) for column in u.T])
@@ -294,7 +304,7 @@ class Law(Controller):
         return replace(
             self, B=B, C=command * self.C, D=command * D, target=(np.asarray(self.target) - offset) / s,
             begin=None if self.begin is None else self.begin * s, limit=abs(command) * self.limit,
-            command_quantum=abs(command) * np.asarray(self.command_quantum),
+            command_resolution=abs(command) * np.asarray(self.command_resolution),
         )  # fmt: skip
 
 
@@ -340,14 +350,14 @@ def state_feedback(
     remembered: Array
     direct: Array
     remembered, direct = (-np.einsum("us...,sy->uy...", gains, M) for M in (C, D))
-    given: dict[str, Any] = {"begin": np.eye(len(A), len(D.T)), "period": period}
+    common: dict[str, Any] = {"begin": np.eye(len(A), len(D.T)), "period": period}
     if k_pf is not None:
         pull = np.zeros((len(gains), 1, *np.broadcast_shapes(gains.shape[2:], np.shape(k_pf)))) + np.asarray(k_pf)
         direct = direct[..., None] if direct.ndim < pull.ndim else direct
         direct = np.concatenate([direct + 0.0 * pull, pull], axis=1)
         B = np.hstack([B, np.zeros((len(B), 1))])
-        given["reference_names"] = ("reference",)
-    return Law(A, B, remembered, direct, **given | fields)
+        common["reference_names"] = ("reference",)
+    return Law(A, B, remembered, direct, **common | fields)
 
 
 def rounded(values: Array, step: ArrayLike) -> Array:

@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput
-from upright.laws.linear import Controller
+from upright.laws.linear import FORMER, Controller
+from upright.renamed import renamed
 
 Array = NDArray[np.float64]
 Numbers = tuple[float, ...]
@@ -49,6 +50,7 @@ class Written:
         return tuple([f"rp{i}" for i in range(self.parameters)] + [f"z{i}" for i in range(self.states)])
 
 
+@renamed(FORMER)
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Rule(Controller):
     """Sampled controller given as a function, evaluated at every sample, its output held until the next.
@@ -119,8 +121,8 @@ class Rule(Controller):
         parts = self.by_lane(lanes)
         p, z = (parts[n] for n in ("parameters", "initial"))
         with suppress(ZeroDivisionError):  # compiled, it would go on with infinity
-            u, kept = self.function(0.0, (0.0,) * len(q), _tuple(self.signal()[0]), _tuple(z[:, 0]), _tuple(p[:, 0]))
-            for what, got, needed in (("commands", len(u), nu), ("numbers to remember", len(kept), len(z))):
+            u, memory = self.function(0.0, (0.0,) * len(q), _tuple(self.signal()[0]), _tuple(z[:, 0]), _tuple(p[:, 0]))
+            for what, got, needed in (("commands", len(u), nu), ("numbers to remember", len(memory), len(z))):
                 if got != needed:
                     raise BadInput(f"a rule here must return {needed} {what}, and this one returns {got}.")
         return np.concatenate([p, z])

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from upright.errors import BadInput
-from upright.laws.linear import Law
+from upright.laws.linear import FORMER, Law
 from upright.laws.rule import KNOWN, Function, Rule
 
 _CALLED = {name: getattr(math, name) for name in sorted(KNOWN)} | {
@@ -53,17 +53,17 @@ def of_values(values: Mapping[str, Any]) -> Law | Rule:
     BadInput
         When the values are no law's.
     """
-    given: dict[str, Any] = dict(values)
-    kind = given.pop("kind", None)
+    stored: dict[str, Any] = {FORMER[n][0] if n in FORMER else n: value for n, value in values.items()}
+    kind = stored.pop("kind", None)
     try:
-        given |= {n: tuple(given[n]) for n in ("measured", "reference_names") if n in given}
+        stored |= {n: tuple(stored[n]) for n in ("measured", "reference_names") if n in stored}
         if kind == "linear":
-            if np.shape(given["C"])[1] == 0:  # rows of no numbers are none in a list
-                given |= {"A": np.zeros((0, 0)), "B": np.zeros((0, np.shape(given["D"])[1]))}
-            given |= {n: np.asarray(given[n], dtype=np.float64) for n in (*"ABCD", "begin") if n in given}
-            return Law(**given)
+            if np.shape(stored["C"])[1] == 0:  # rows of no numbers are none in a list
+                stored |= {"A": np.zeros((0, 0)), "B": np.zeros((0, np.shape(stored["D"])[1]))}
+            stored |= {n: np.asarray(stored[n], dtype=np.float64) for n in (*"ABCD", "begin") if n in stored}
+            return Law(**stored)
         if kind == "rule":
-            return Rule(function=_function(str(given.pop("text"))), **given)
+            return Rule(function=_function(str(stored.pop("text"))), **stored)
     except (TypeError, ValueError, KeyError, IndexError, RecursionError, MemoryError) as error:
         if isinstance(error, BadInput):
             raise

@@ -165,7 +165,7 @@ class Container:
         return []
 
     def _messages(self, chunk: Cursor) -> list[Message]:
-        found: list[Message] = []
+        messages: list[Message] = []
         while chunk.at < len(chunk.content):
             opcode, length = chunk.number("B"), chunk.number("Q")
             record = Cursor(chunk.bytes(length))
@@ -181,8 +181,8 @@ class Container:
                 if number != self._counts.get(topic, 0) & 0xFFFFFFFF:
                     raise ValueError(f"message {self._counts.get(topic, 0)} of {topic} is missing before it")
                 self._counts[topic] = self._counts.get(topic, 0) + 1
-                found.append(Message(topic, number, record.bytes(length - 22)))
-        return found
+                messages.append(Message(topic, number, record.bytes(length - 22)))
+        return messages
 
     def count(self) -> int:
         """Messages that were read."""

@@ -165,14 +165,14 @@ def _git_version() -> str:
     if git is None:
         return ""
 
-    def said(*words: str) -> str:
-        done = subprocess.run(
+    def output(*words: str) -> str:
+        process = subprocess.run(
             [git, "-C", str(Path(__file__).parent), *words], capture_output=True, encoding="utf-8", timeout=10
         )
-        return done.stdout.strip() if done.returncode == 0 else ""
+        return process.stdout.strip() if process.returncode == 0 else ""
 
     try:
         # a package that is installed somewhere below another repository is not a part of it
-        return said("describe", "--always", "--dirty") if said("ls-files", "--error-unmatch", "header.py") else ""
+        return output("describe", "--always", "--dirty") if output("ls-files", "--error-unmatch", "header.py") else ""
     except (OSError, subprocess.SubprocessError):
         return ""

@@ -104,7 +104,7 @@ class _Log:
             self.add(row)
             if self.unwritten >= BATCH:
                 self.flush()
-        taken = self.number > before or bool(self.events)
+        fresh = self.number > before or bool(self.events)
         self.happened(self.number if self.ring.marks[of.TAIL] < self.ring.marks[of.HEAD] else sys.maxsize)
         now = time.monotonic()
         if self.unwritten and now - self.flushed > LATEST:
@@ -112,7 +112,7 @@ class _Log:
         if now - self.synced > SYNC and self.file is not None:
             self.synced = now
             self.disk.ask()
-        return taken
+        return fresh
 
     def happened(self, number: int) -> None:
         """Events from before the row of this number: each ends a chunk, a fault goes to the disk at once."""

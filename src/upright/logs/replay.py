@@ -99,23 +99,28 @@ def replay(log: RunLog, law: Law | Rule | None = None) -> Replay:
     rows = np.concatenate([np.arange(begin, known) for begin, known, _ in stretches] or [[]]).astype(np.intp)
     if not rows.size:
         raise BadInput(f"there is no row in '{log.file}' in which its law gave the command.")
-    asked = [
+    recomputed = [
         Stretch(
-            first=begin, t=t[begin:known], readings=readings[begin:known], references=_asked(law, log, begin, known)
+            first=begin,
+            t=t[begin:known],
+            readings=readings[begin:known],
+            references=_references(law, log, begin, known),
         )
         for begin, known, _ in stretches
         if known > begin  # rows were dropped before its first one
     ]
-    given = (_in_a_process if of_log and isinstance(law, Rule) else _commands)(law, asked, log.file)
+    commands = (_in_a_process if of_log and isinstance(law, Rule) else _commands)(law, recomputed, log.file)
     there = logged[rows]
-    other = np.flatnonzero(given.view(np.int64) != there.view(np.int64))
+    other = np.flatnonzero(commands.view(np.int64) != there.view(np.int64))
     first = None
     if other.size:
         k = int(other[0])
-        first = Difference(row=int(rows[k]) + 1, t=float(t[rows[k]]), logged=float(there[k]), replayed=float(given[k]))
+        first = Difference(
+            row=int(rows[k]) + 1, t=float(t[rows[k]]), logged=float(there[k]), replayed=float(commands[k])
+        )
     return Replay(
-        rows=rows, commands=given, starts=len(stretches), differing=int(other.size),
-        largest=float(np.nanmax(np.abs(given - there)[other], initial=0.0)), first=first,
+        rows=rows, commands=commands, starts=len(stretches), differing=int(other.size),
+        largest=float(np.nanmax(np.abs(commands - there)[other], initial=0.0)), first=first,
         passed_over=sum(end - known for _, known, end in stretches),
     )  # fmt: skip
 
@@ -153,7 +158,7 @@ def _in_a_process(law: Law | Rule, stretches: Sequence[Stretch], file: str) -> A
     rows = sum(part.t.size for part in stretches)
     deadline = once + each * rows
     try:
-        done = subprocess.run(
+        process = subprocess.run(
             [sys.executable, "-P", "-c", "from upright.logs.replay import answer; answer()"],
             input=pickle.dumps((as_values(law), stretches, file)), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}, timeout=deadline, check=False,
@@ -163,7 +168,7 @@ def _in_a_process(law: Law | Rule, stretches: Sequence[Stretch], file: str) -> A
             f"the rule of '{file}' was stopped: it gave no commands for {rows} rows within {deadline:.3g} s, as a loop"
             " without an end does not; read its text with `upright log show --json`."
         ) from None
-    verdict, content = done.stdout[:1], done.stdout[1:]
+    verdict, content = process.stdout[:1], process.stdout[1:]
     if verdict == _REFUSED:
         raise BadInput(content.decode())
     if verdict != _GIVEN or len(content) != 8 * rows:
@@ -184,7 +189,7 @@ def answer() -> None:
     sys.stdout.buffer.write(content)
 
 
-def _asked(law: Law | Rule, log: RunLog, begin: int, end: int) -> Array | None:
+def _references(law: Law | Rule, log: RunLog, begin: int, end: int) -> Array | None:
     """Logged references of some rows, where they are the law's."""
     names = [name for name, _ in log.header.references]
     if not names or law.signal().shape[1] != len(names):

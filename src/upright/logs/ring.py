@@ -113,7 +113,7 @@ class Ring:
         self._memory[_MESSAGE + 8 : _MESSAGE + 8 + len(content)] = content
         struct.pack_into("<II", self._memory, _MESSAGE, len(content), zlib.crc32(content))
 
-    def said(self) -> str:
+    def message(self) -> str:
         """What was said; empty when nothing was."""
         length, check = struct.unpack_from("<II", self._memory, _MESSAGE)
         content = self._memory[_MESSAGE + 8 : _MESSAGE + 8 + min(length, _ROWS)]

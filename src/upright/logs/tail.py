@@ -44,10 +44,10 @@ def follow(path: PathLike, wait: Callable[[], bool]) -> Iterator[Fresh]:
             rows, before = Rows(), container.at
             try:
                 for messages in container.read(file.read()):
-                    seen = len(rows.events)
+                    reported = len(rows.events)
                     columns = rows.add(container, messages)
                     header = header_of(container, str(path))
-                    yield Fresh(header=header, columns=columns, events=tuple(rows.events[seen:]))
+                    yield Fresh(header=header, columns=columns, events=tuple(rows.events[reported:]))
             except Damaged as damage:
                 raise BadInput(f"'{path}' is damaged at byte {damage.at}: {damage}; see upright log recover.") from None
             if container.at == before and not wait():

@@ -80,9 +80,9 @@ class LogWriter:
                 break
             self._clock.wait(0.005)
         if self._ring.marks[of.STATE] != of.WRITING:
-            said = self._ring.said() or "its process did not begin"
+            message = self._ring.message() or "its process did not begin"
             _end(self._process, 0.0)
-            raise BadInput(f"the log '{path}' cannot be written: {said}; name another file.")
+            raise BadInput(f"the log '{path}' cannot be written: {message}; name another file.")
 
     def _begin(self, header: LogHeader, name: str, inherited: tuple[int, ...], rows: int) -> subprocess.Popen[bytes]:
         """The process, told the header by its input, whose end tells it later that the loop is gone."""
@@ -131,7 +131,7 @@ class LogWriter:
         if ring is None:
             return self._last
         dropped = self._full + self._unfit + ring.marks[of.LOST]
-        messages = [ring.said()]
+        messages = [ring.message()]
         ended = self._process.poll()
         if ended is not None and ring.marks[of.STATE] != of.DONE:
             dropped = ring.marks[of.NUMBER] - ring.marks[of.WRITTEN]

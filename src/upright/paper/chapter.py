@@ -37,16 +37,16 @@ def _set_table(table: Regenerated) -> Table:
     )
 
 
-def _errata_table(done: Reproduced) -> Table:
+def _errata_table(result: Reproduced) -> Table:
     """Every erratum with what shows it."""
     rows = [
         (str(e.number), e.where, e.printed, e.right, e.against, _range(e.printed_misses), _range(e.right_misses))
-        for e in done.errata
+        for e in result.errata
     ]
-    means = f"{done.impossible[STUDENTS]} of 26 impossible"
+    means = f"{result.impossible[STUDENTS]} of 26 impossible"
     rows.append(
         ("6", "Tables 3, 4", f"n = {STUDENTS}", "n = 48 or 52", "whole answers (GRIM)", means,
-         f"{done.impossible[48]} and {done.impossible[52]} impossible")
+         f"{result.impossible[48]} and {result.impossible[52]} impossible")
     )  # fmt: skip
     return Table(
         caption="Relative error of the form as printed and of the right one, on 20 rigs drawn at random",
@@ -61,9 +61,9 @@ def _range(span: tuple[float, float]) -> str:
     return f"{number(100 * span[0], 2)} to {number(100 * span[1], 2)} %"
 
 
-def _facts(done: Reproduced) -> tuple[list[str], list[str], list[str]]:
+def _facts(result: Reproduced) -> tuple[list[str], list[str], list[str]]:
     """Sentences on Table 1, on Table 2 and on the errata."""
-    first, second = done.tables
+    first, second = result.tables
     omega = float(np.sqrt(-first.locus.a[2]))
     a3, a2, a1 = second.locus.a[1:4]
     roots = np.roots([1.0, a3, a2, a1])
@@ -74,10 +74,10 @@ def _facts(done: Reproduced) -> tuple[list[str], list[str], list[str]]:
         "From set to set R falls by the factor " + " and ".join(number(r, 5) for r in first.ratios)
         + " (sets 1 to 3, 2 to 4; told by the sets' differences alone): it was halved.",
     ]  # fmt: skip
-    if done.weights:
-        least, most = min(done.weights), max(done.weights)
-        middle = sorted(done.weights)[len(done.weights) // 2]
-        q = ", ".join(number(v, 3) for v in done.weights[middle])
+    if result.weights:
+        least, most = min(result.weights), max(result.weights)
+        middle = sorted(result.weights)[len(result.weights) // 2]
+        q = ", ".join(number(v, 3) for v in result.weights[middle])
         one.append(
             f"A diagonal Q without negative weights makes this N when the hanging rod swings at {least:.2f} to "
             f"{most:.2f} rad/s; at {middle:.2f} its entries over R, times the squared gains of the torque, are {q}."
@@ -88,10 +88,10 @@ def _facts(done: Reproduced) -> tuple[list[str], list[str], list[str]]:
         f"N(w)/R of set 1: {_polynomial(second.locus)}.",
         "R falls by the factor " + " and ".join(number(r, 4) for r in second.ratios) + ".",
     ]
-    wrong, right = done.unstable
+    wrong, right = result.unstable
     three = [
         f"With eq. (2) as printed the twin's unstable pole would be {number(wrong, 4)} instead of {number(right, 4)} "
-        f"1/s, and gains placed with it give {written(done.missed, 4)} where {written(done.asked, 4)} was asked.",
+        f"1/s, and gains placed with it give {written(result.missed, 4)}, not {written(result.printed_poles, 4)}.",
     ]
     return one, two, three
 
@@ -119,37 +119,37 @@ def _locus_picture(table: Regenerated, name: str) -> Picture:
     )  # fmt: skip
 
 
-def chapter(done: Reproduced) -> Chapter:
+def chapter(result: Reproduced) -> Chapter:
     """The tables again, and the errata."""
-    one, two, three = _facts(done)
+    one, two, three = _facts(result)
     kinds = [
-        Poles(name="asked, Table 1, set 1", values=done.asked, mark="o", colour=BLUE),
-        Poles(name="attained, eq. (2) as printed", values=done.missed, mark="x", colour=VERMILLION),
-        Poles(name="open loop", values=np.array([done.unstable[1]], dtype=np.complex128), mark="+", colour=BLACK),
+        Poles(name="asked, Table 1, set 1", values=result.printed_poles, mark="o", colour=BLUE),
+        Poles(name="attained, eq. (2) as printed", values=result.missed, mark="x", colour=VERMILLION),
+        Poles(name="open loop", values=np.array([result.unstable[1]], dtype=np.complex128), mark="+", colour=BLACK),
     ]
     missed = Picture(
         name="missed", draw=lambda: pole_map(kinds, frame=3),
         caption="Poles of the right model under gains that Ackermann's formula gives for eq. (2) as printed.",
-        description=f"Attained: {written(done.missed, 4)}.",
+        description=f"Attained: {written(result.missed, 4)}.",
     )  # fmt: skip
     impossible = Picture(
-        name="grim", draw=lambda: answers_figure(done.impossible, STUDENTS),
+        name="grim", draw=lambda: answers_figure(result.impossible, STUDENTS),
         caption="How many of the 24 means of Table 4 and the two percentages of Table 3's first question cannot be "
         "averages of so many whole answers.",
-        description=f"{done.impossible[STUDENTS]} for {STUDENTS} students, 1 for 48 and for 52.",
+        description=f"{result.impossible[STUDENTS]} for {STUDENTS} students, 1 for 48 and for 52.",
     )  # fmt: skip
     return Chapter(
         title="The paper's tables and misprints, again",
-        verdict=done.verdict,
-        sound=max(t.worst for t in done.tables) <= 1 and all(e.shown for e in done.errata),
+        verdict=result.verdict,
+        sound=max(t.worst for t in result.tables) <= 1 and all(e.shown for e in result.errata),
         question="Do the printed poles follow from one plant and one set of weights each, and which printed formulas "
         "contradict the energies? p(s) p(−s) = a(s) a(−s) + N(s)/R holds for poles of least cost.",
         parts=(
             *(
-                Part(f"Table {i}", (Points(tuple(told)), _set_table(t), _locus_picture(t, f"t{i}")))
-                for i, told, t in zip((1, 2), (one, two), done.tables, strict=True)
+                Part(f"Table {i}", (Points(tuple(facts)), _set_table(t), _locus_picture(t, f"t{i}")))
+                for i, facts, t in zip((1, 2), (one, two), result.tables, strict=True)
             ),
-            Part("Errata", (Points(tuple(three)), _errata_table(done), missed, impossible)),
+            Part("Errata", (Points(tuple(three)), _errata_table(result), missed, impossible)),
         ),
         steps=(
             Step(
@@ -162,7 +162,7 @@ def chapter(done: Reproduced) -> Chapter:
             ),
         ),
         numbers={
-            "verdict": done.verdict,
+            "verdict": result.verdict,
             "tables": [
                 {
                     "name": t.name,
@@ -172,16 +172,16 @@ def chapter(done: Reproduced) -> Chapter:
                     "worst_in_roundings": t.worst,
                     "sets": [np.asarray(poles, dtype=np.complex128) for poles in t.again],
                 }
-                for t in done.tables
+                for t in result.tables
             ],
             "errata": [
                 {
                     "number": e.number, "where": e.where, "printed_misses": e.printed_misses,
                     "right_misses": e.right_misses, "shown": e.shown,
                 }
-                for e in done.errata
+                for e in result.errata
             ],
-            "impossible_means": done.impossible,
+            "impossible_means": result.impossible,
         },
     )  # fmt: skip
 

@@ -162,17 +162,17 @@ _FORMULAS: tuple[tuple[int, str, str, str, str, Value, Value, Value], ...] = (
 def errata(seed: int = 0, rigs: int = 20) -> list[Erratum]:
     """Errata 1 to 5 on rigs drawn at random."""
     rng = np.random.default_rng(seed)
-    found: list[Erratum] = []
+    out: list[Erratum] = []
     for number, where, printed, right, against, wrong, good, truth in _FORMULAS:
         misses = np.array([_misses(_Sizes(_rig(rng, axial=number == 3)), wrong, good, truth) for _ in range(rigs)])
         low, high = misses.min(axis=0), misses.max(axis=0)
-        found.append(
+        out.append(
             Erratum(
                 number=number, where=where, printed=printed, right=right, against=against,
                 printed_misses=(float(low[0]), float(high[0])), right_misses=(float(low[1]), float(high[1])),
             )
         )  # fmt: skip
-    return found
+    return out
 
 
 def _misses(s: _Sizes, wrong: Value, good: Value, truth: Value) -> tuple[float, float]:
@@ -245,7 +245,7 @@ class Reproduced:
     tables: tuple[Regenerated, Regenerated]
     errata: tuple[Erratum, ...]
     impossible: dict[int, int]
-    asked: Roots
+    printed_poles: Roots
     missed: Roots
     unstable: tuple[float, float]
     weights: dict[float, Array]
@@ -264,15 +264,15 @@ def reproduce(furuta: Furuta, seed: int = 0) -> Reproduced:
     """Tables 1 and 2 again, and the errata: `furuta` gets gains by eq. (2) as printed, `seed` draws rigs to try on."""
     first = _again("Table 1: Furuta pendulum, inverted", TABLE_1, free=(2,))
     second = _again("Table 2: two carts, ECP 210", TABLE_2, free=(3, 2, 1))
-    model, asked = furuta.linear("inverted"), first.printed[0]
+    model, printed = furuta.linear("inverted"), first.printed[0]
     A, b = printed_inverted(furuta)
-    closed = poles_of(model.A - model.B @ place(A, b, asked).K)
+    closed = poles_of(model.A - model.B @ place(A, b, printed).K)
     return Reproduced(
         tables=(first, second),
         errata=tuple(errata(seed)),
         impossible={n: impossible_means(n) for n in range(44, 61)},
-        asked=asked,
-        missed=matched(asked, closed),
+        printed_poles=printed,
+        missed=matched(printed, closed),
         unstable=(float(poles_of(A).real.max()), float(model.poles()[0].real)),
         weights=furuta_weights(first.locus),
     )

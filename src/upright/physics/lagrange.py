@@ -151,11 +151,11 @@ def _zeros(g: Any, s: Any) -> list[Any]:
     slope = sp.diff(g, s)
     if not slope.has(s):
         return [-g.subs(s, 0) / slope]
-    found: list[Any] = []
+    roots: list[Any] = []
     for start in (0.3, -0.3, 2.0):
         with suppress(ValueError, TypeError, ZeroDivisionError):  # none is found from here
-            found.append(sp.nsolve(g, s, start, prec=60))
-    return found
+            roots.append(sp.nsolve(g, s, start, prec=60))
+    return roots
 
 
 def _value(e: Any, at: dict[Any, Any]) -> complex:

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from importlib import import_module
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -17,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from upright.errors import ImpossiblePhysics, NotIdentifiable
 from upright.physics.equations import Derived, chooses, evaluated, mass_and_force, small_motions
 from upright.physics.statement import Statement
+from upright.physics.stored import stored
 from upright.shown import Shown
 from upright.systems import StateSpace
 
@@ -84,9 +83,9 @@ def _rest(plant: Statement, derived: Derived, point: dict[str, float]) -> dict[s
     """Nearest true equilibrium to a nominal one; a coordinate that floats there is also tried from either side."""
     aside = [{**point, name: value + d} for name, value in point.items() for d in (0.5, -0.5)]
     for start in (point, *aside):
-        found = _newton(plant, derived, start)
-        if found is not None:
-            return found
+        rest = _newton(plant, derived, start)
+        if rest is not None:
+            return rest
     raise NotIdentifiable(
         f"{type(plant).__name__} has no equilibrium near {point}; level the rig or anchor the free coordinate."
     )
@@ -158,14 +157,14 @@ class Plant(Shown, Statement, abstract=True):
 
 @cache
 def _derived(cls: type[Plant], without: frozenset[str]) -> Derived:
-    module = f"upright.physics.generated.{module_name(cls, without)}"
-    if cls.__module__.startswith("upright.physics.") and find_spec(module):
-        return import_module(module).DERIVED
+    shipped = cls.__module__.startswith("upright.physics.")
+    if shipped and (known := stored(stem(cls, without))) is not None:
+        return known
     from upright.physics.lagrange import derive
 
     return derive(cls, without=without)
 
 
-def module_name(cls: type[Plant], without: frozenset[str] = frozenset()) -> str:
-    """Name of the module that holds a built-in plant's equations."""
+def stem(cls: type[Plant], without: frozenset[str] = frozenset()) -> str:
+    """Name of the file that holds a built-in plant's equations."""
     return "_without_".join([cls.__name__.lower(), *(["_".join(sorted(without))] if without else [])])

@@ -103,8 +103,8 @@ class Regressor:
         That of its own inertia is left out, and accelerations with an inertia that may be missing.
         """
         own, roles = self.own(i), self.roles(i)
-        told = [k for k, b in enumerate(self.base) if k != own and (roles[k] == "force" or (roles[k] and b.always))]
-        return -self.columns(q, v, a)[told, i]
+        forces = [k for k, b in enumerate(self.base) if k != own and (roles[k] == "force" or (roles[k] and b.always))]
+        return -self.columns(q, v, a)[forces, i]
 
     def values(self, parameters: Mapping[str, float]) -> Array:
         """Base parameters (n,) of a plant with these parameters."""
@@ -231,14 +231,14 @@ def _nonlinear(opened: Derived) -> set[str]:
     Where pieces are chosen, points at random may lie in one of them: what is in such a text is taken as not linear.
     """
     texts = [*opened.mass, *opened.force, *(text for _, text in opened.steps)]
-    found = {name for _, _, argument in opened.trig for name in _LUMP.findall(argument)}
+    nonlinear = {name for _, _, argument in opened.trig for name in _LUMP.findall(argument)}
     if any(chooses(text) for text in texts):
-        found |= {name for text in texts if chooses(text) or text in dict(opened.steps).values()
+        nonlinear |= {name for text in texts if chooses(text) or text in dict(opened.steps).values()
                   for name in _LUMP.findall(text)}  # fmt: skip
     rng = np.random.default_rng(0)
     q, v, a = rng.uniform(0.3, 1.0, (3, len(opened.coordinates), 6))
     k = {name: rng.uniform(1.0, 2.0) for name in opened.parameters}
-    names = [name for name in opened.parameters if name not in found]
+    names = [name for name in opened.parameters if name not in nonlinear]
 
     def change(*moved: str, by: float = 1.0) -> Array:
         more = {name: k[name] + by for name in moved}
@@ -248,10 +248,10 @@ def _nonlinear(opened: Derived) -> set[str]:
         return not np.allclose(one, other, rtol=1e-9, atol=1e-9 * float(np.abs(one).max(initial=1.0)))
 
     alone = {name: change(name) for name in names}
-    found |= {name for name in names if differ(change(name, by=2.0), 2 * alone[name])}
-    names = [name for name in names if name not in found]
+    nonlinear |= {name for name in names if differ(change(name, by=2.0), 2 * alone[name])}
+    names = [name for name in names if name not in nonlinear]
     if names and differ(change(*names), np.sum([alone[name] for name in names], axis=0)):
         for one, other in combinations(names, 2):
-            if not {one, other} & found and differ(change(one, other), alone[one] + alone[other]):
-                found.add(other)
-    return found
+            if not {one, other} & nonlinear and differ(change(one, other), alone[one] + alone[other]):
+                nonlinear.add(other)
+    return nonlinear

@@ -210,7 +210,7 @@ def declare(cls: type[Any]) -> None:
 
 def _check_names(cls: type[Any]) -> None:
     """Every name is an identifier, used once, and none that equations or plants use for themselves."""
-    seen: dict[str, str] = {}
+    kinds: dict[str, str] = {}
     for kind, names in (
         ("coordinate", [c.name for c in cls.coordinates]),
         ("velocity", [f"{c.name}_dot" for c in cls.coordinates]),
@@ -230,15 +230,15 @@ def _check_names(cls: type[Any]) -> None:
                     f"{cls.__name__}: {kind} '{name}' is a name that equations use themselves; "
                     f"call it '{name[0]}_{name[1:]}'."
                 )
-            if name in seen:
-                raise BadInput(f"{cls.__name__}: '{name}' is both {seen[name]} and {kind}; rename one of them.")
+            if name in kinds:
+                raise BadInput(f"{cls.__name__}: '{name}' is both {kinds[name]} and {kind}; rename one of them.")
             if kind == "coordinate" and name == "at":
                 raise BadInput(f"{cls.__name__}: coordinate 'at' hides an argument of state(at=...); call it 'at_0'.")
             if kind == "parameter" and hasattr(cls._base, name):
                 raise BadInput(
                     f"{cls.__name__}: parameter '{name}' hides what a plant itself calls {name}; call it '{name}_0'."
                 )
-            seen[name] = kind
+            kinds[name] = kind
 
 
 def _check_references(cls: type[Any]) -> None:

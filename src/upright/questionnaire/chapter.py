@@ -68,37 +68,37 @@ def chapter(
     """
     n = answers or 0
     if isinstance(sheet, Ratings):
-        done = _ratings(sheet, scale)
+        analysis = _ratings(sheet, scale)
     else:
-        done = _means(sheet, n, scale) if isinstance(sheet, Means) else _shares(sheet, n)
-    verdict, *more = done.sentences or ("Nothing was compared.",)
+        analysis = _means(sheet, n, scale) if isinstance(sheet, Means) else _shares(sheet, n)
+    verdict, *more = analysis.sentences or ("Nothing was compared.",)
     also = (Points(tuple(more)),) if more else ()
     return Chapter(
         title=title,
         verdict=verdict,
         question="Did the course help, as far as its survey can tell?",
         parts=(
-            Part(title="What the survey can say", key="said", content=(f"From {source}.", *also, *done.shown)),
-            *((Part(title="Notes", key="notes", content=(Points(done.notes),)),) if done.notes else ()),
+            Part(title="What the survey can say", key="said", content=(f"From {source}.", *also, *analysis.shown)),
+            *((Part(title="Notes", key="notes", content=(Points(analysis.notes),)),) if analysis.notes else ()),
             Part(title="How it was found", key="how", content=(_HOW,)),
         ),
         steps=tuple(steps),
-        numbers={"sentences": done.sentences, "notes": done.notes, "found": done.numbers},
+        numbers={"sentences": analysis.sentences, "notes": analysis.notes, "found": analysis.numbers},
     )
 
 
 def _ratings(sheet: Ratings, scale: tuple[int, int]) -> _Evaluated:
     pairs = {i.name: np.isfinite(i.pre) & np.isfinite(i.post) for i in sheet.items}
     few = [i for i in sheet.items if pairs[i.name].sum() < 2]
-    found = [(i.name, compare_ratings(i.pre, i.post, top=scale[1])) for i in sheet.items if i not in few]
-    adjusted = holm([p.p for _, p in found])
+    compared = [(i.name, compare_ratings(i.pre, i.post, top=scale[1])) for i in sheet.items if i not in few]
+    adjusted = holm([p.p for _, p in compared])
     rows = tuple(
         (
             name, str(p.n), number(p.pre, 3), number(p.post, 3), number(p.gain, 3), _span(p.interval),
             number(p.t, 3), _chance(p.p), _chance(q), number(p.signed_rank, 3), _chance(p.p_ranks),
             number(p.effect, 2), _span(p.effect_interval), number(p.ranks_effect, 2), number(p.normalized, 2),
         )
-        for (name, p), q in zip(found, adjusted, strict=True)
+        for (name, p), q in zip(compared, adjusted, strict=True)
     )  # fmt: skip
     sentences = [
         f"{name}: {_moved(p.gain)} ({_span(p.interval)}), "
@@ -109,7 +109,7 @@ def _ratings(sheet: Ratings, scale: tuple[int, int]) -> _Evaluated:
             if not math.isnan(q)
             else "the same for everybody, so there is no spread to test against."
         )
-        for (name, p), q in zip(found, adjusted, strict=True)
+        for (name, p), q in zip(compared, adjusted, strict=True)
     ]
     sentences += [
         f"{i.name}: {_people(int(pairs[i.name].sum()))} answered before and after, and a comparison needs at least 2; "
@@ -122,9 +122,9 @@ def _ratings(sheet: Ratings, scale: tuple[int, int]) -> _Evaluated:
             f"{lost} comparisons miss one of their two answers and are left out, each for its question only."
         )
     shown: list[Block] = []
-    if found:
+    if compared:
         gains = Picture(
-            name="gains", draw=lambda: gain_figure(found, scale),
+            name="gains", draw=lambda: gain_figure(compared, scale),
             caption="Mean ratings before and after, and mean gains.", description="; ".join(sentences),
         )  # fmt: skip
         headings = (
@@ -137,7 +137,7 @@ def _ratings(sheet: Ratings, scale: tuple[int, int]) -> _Evaluated:
         shown += [_agreement_picture(bars), _agreement_table(sheet.likert)]
     return _Evaluated(
         sentences=tuple(sentences), shown=tuple(shown), notes=sheet.notes,
-        numbers={name: asdict(p) | {"p_holm": q} for (name, p), q in zip(found, adjusted, strict=True)}
+        numbers={name: asdict(p) | {"p_holm": q} for (name, p), q in zip(compared, adjusted, strict=True)}
         | {i.name: {"n": int(pairs[i.name].sum()), "missing": int((~pairs[i.name]).sum())} for i in few},
     )  # fmt: skip
 
@@ -175,20 +175,20 @@ def _agreement_table(likert: Sequence[Likert]) -> Table:
 
 
 def _means(sheet: Means, n: int, scale: tuple[int, int]) -> _Evaluated:
-    found = [(f"{name}, {what.lower()}" if what else name, pre, post, bound(pre, post, n, scale=scale))
+    changes = [(f"{name}, {what.lower()}" if what else name, pre, post, bound(pre, post, n, scale=scale))
              for name, what, pre, post in sheet.rows]  # fmt: skip
-    printed = [m for _, pre, post, _ in found for m in (pre, post)]
+    printed = [m for _, pre, post, _ in changes for m in (pre, post)]
     wrong = [m for m in printed if not can_be_printed(m, n)]
     rows = [
         (name, _marked(pre, n), _marked(post, n), number(_gain(pre, post), 3), _span(b.t), b.verdict)
-        for name, pre, post, b in found
+        for name, pre, post, b in changes
     ]
-    sure = _verdicts(found, "significant")
+    sure = _verdicts(changes, "significant")
     fits = fitting(printed, [], max(2 * n, 20))
     sentences = [
-        f"{sure} of {len(found)} changes are significant at 5 % however the single answers were paired and spread"
+        f"{sure} of {len(changes)} changes are significant at 5 % however the single answers were paired and spread"
         + (", nearest totals taken where a mean is impossible" if wrong else "")
-        + f"; {_rest(found)}.",
+        + f"; {_rest(changes)}.",
         "The means say nothing about sizes of effect beyond these bounds, about single people, or about what caused"
         " the change: there is no group that did not take the course.",
         _impossible(wrong, printed, n, "means"),
@@ -196,14 +196,14 @@ def _means(sheet: Means, n: int, scale: tuple[int, int]) -> _Evaluated:
     ]
     others = [k for k in _best(fits, n)[:4] if 2 <= k != n]
     if wrong and others:
-        again = [sum(bound(a, b, k, scale=scale).verdict == "significant" for _, a, b, _ in found) for k in others]
+        again = [sum(bound(a, b, k, scale=scale).verdict == "significant" for _, a, b, _ in changes) for k in others]
         sentences.append(
             "Significant whatever the pairing if fewer answered: "
-            + ", ".join(f"{sure} of {len(found)} with {k} answers" for k, sure in zip(others, again, strict=True))
+            + ", ".join(f"{sure} of {len(changes)} with {k} answers" for k, sure in zip(others, again, strict=True))
             + "."
         )
     bounds = Picture(
-        name="bounds", draw=lambda: bounds_figure([(name, b) for name, _, _, b in found]),
+        name="bounds", draw=lambda: bounds_figure([(name, b) for name, _, _, b in changes]),
         caption="Paired t that the printed means allow: its least value has to pass the dashed line.",
         description=sentences[0],
     )  # fmt: skip
@@ -217,7 +217,7 @@ def _means(sheet: Means, n: int, scale: tuple[int, int]) -> _Evaluated:
             "impossible": wrong, "fits": {f.answers: f.possible for f in fits}, "printed": len(printed),
             "bounds": {
                 name: {"gain": _gain(pre, post), "gain_between": b.gain, "t": b.t, "verdict": b.verdict}
-                for name, pre, post, b in found
+                for name, pre, post, b in changes
             },
         },
     )  # fmt: skip
@@ -228,17 +228,17 @@ def _gain(pre: str, post: str) -> float:
     return float(Fraction(post) - Fraction(pre))
 
 
-def _verdicts(found: Sequence[tuple[str, str, str, Bound]], verdict: str) -> int:
-    return sum(b.verdict == verdict for *_, b in found)
+def _verdicts(changes: Sequence[tuple[str, str, str, Bound]], verdict: str) -> int:
+    return sum(b.verdict == verdict for *_, b in changes)
 
 
-def _rest(found: Sequence[tuple[str, str, str, Bound]]) -> str:
+def _rest(changes: Sequence[tuple[str, str, str, Bound]]) -> str:
     """How many changes no pairing makes significant, and how many the means leave open."""
-    never, open_ones = _verdicts(found, "not significant"), _verdicts(found, "open")
-    said = [f"{never} {'is' if never == 1 else 'are'} not significant, however they were"] if never else []
+    never, open_ones = _verdicts(changes, "not significant"), _verdicts(changes, "open")
+    sentences = [f"{never} {'is' if never == 1 else 'are'} not significant, however they were"] if never else []
     if open_ones or not never:
-        said.append(f"{open_ones} cannot be told from the means alone")
-    return "; ".join(said)
+        sentences.append(f"{open_ones} cannot be told from the means alone")
+    return "; ".join(sentences)
 
 
 def _shares(sheet: Shares, n: int) -> _Evaluated:
@@ -276,11 +276,11 @@ def _shares(sheet: Shares, n: int) -> _Evaluated:
 
 
 def _agreement_picture(bars: Sequence[tuple[str, Sequence[str], Sequence[float]]]) -> Picture:
-    said = "; ".join(f"{name}: " + ", ".join(f"{s:.0f} % {o}" for o, s in zip(options, shares, strict=True))
+    description = "; ".join(f"{name}: " + ", ".join(f"{s:.0f} % {o}" for o, s in zip(options, shares, strict=True))
                      for name, options, shares in bars)  # fmt: skip
     return Picture(
         name="agreement", draw=lambda: agreement_figure(bars), caption="Agreement with each statement.",
-        description=said,
+        description=description,
     )  # fmt: skip
 
 
@@ -339,19 +339,19 @@ _TONES: dict[str, str] = dict(zip(LIKERT, (BLUE, SKY, "#e4e4e4", ORANGE, VERMILL
 
 
 @styled
-def gain_figure(found: Sequence[tuple[str, Paired]], scale: tuple[int, int]) -> Figure:
+def gain_figure(compared: Sequence[tuple[str, Paired]], scale: tuple[int, int]) -> Figure:
     """Means before and after, and the mean gain with its 95 % interval."""
-    drawing = figure(1.1 + 0.42 * len(found), margins=(2.2, 0.2, 0.5, 0.5))
+    drawing = figure(1.1 + 0.42 * len(compared), margins=(2.2, 0.2, 0.5, 0.5))
     left, right = drawing.subplots(1, 2, sharey=True)
-    for i, (_, p) in enumerate(found):
+    for i, (_, p) in enumerate(compared):
         left.plot([p.pre, p.post], [i, i], color=GREY, linewidth=1.5)
         left.plot([p.pre], [i], "o", color=ORANGE, label="before" if i == 0 else "")
         left.plot([p.post], [i], "s", color=BLUE, label="after" if i == 0 else "")
         half = p.interval[1] - p.gain
         right.errorbar([p.gain], [i], xerr=[half], fmt="o", color=BLACK, capsize=3)
     right.axvline(0, color=GREY, linewidth=0.8, linestyle=":")
-    left.set_yticks(range(len(found)), [_short(name) for name, _ in found])
-    left.set_ylim(len(found) - 0.5, -0.5)
+    left.set_yticks(range(len(compared)), [_short(name) for name, _ in compared])
+    left.set_ylim(len(compared) - 0.5, -0.5)
     left.set_xlim(scale[0] - 0.1, scale[1] + 0.1)
     left.set_xlabel("mean rating")
     right.set_xlabel("mean gain, 95 % interval")
@@ -364,14 +364,14 @@ def agreement_figure(rows: Sequence[tuple[str, Sequence[str], Sequence[float]]])
     """Share of every answer, one bar per statement."""
     drawing = figure(1.1 + 0.42 * len(rows), margins=(2.4, 0.2, 0.6, 0.45))
     axes = drawing.subplots()
-    seen: set[str] = set()
+    labelled: set[str] = set()
     for i, (_, options, shares) in enumerate(rows):
         start = 0.0
         for option, share in zip(options, shares, strict=True):
             name = option.lower()
             tone = _TONES[name.replace("’", "'")]
-            axes.barh([i], [share], left=[start], color=tone, edgecolor="white", label="" if name in seen else name)
-            seen.add(name)
+            axes.barh([i], [share], left=[start], color=tone, edgecolor="white", label="" if name in labelled else name)
+            labelled.add(name)
             if share >= 7:
                 dark = tone in (BLUE, VERMILLION, GREY)
                 axes.text(start + share / 2, i, f"{share:.0f}", ha="center", va="center",

@@ -113,8 +113,8 @@ def _find(words: Sequence[set[str]], among: set[str]) -> int | None:
 
 
 def _without(heading: str, drop: set[str]) -> str:
-    kept = [w for w in re.findall(r"[^\s_\-:]+", heading) if re.sub(r"\W", "", w.lower()) not in drop]
-    return " ".join(kept)
+    words = [w for w in re.findall(r"[^\s_\-:]+", heading) if re.sub(r"\W", "", w.lower()) not in drop]
+    return " ".join(words)
 
 
 def _agreement(rows: Sequence[tuple[int, list[str]]]) -> bool:
@@ -139,19 +139,19 @@ def _rating(cell: str, scale: tuple[int, int], where: str) -> float:
 
 def _pairs(header: Sequence[str], words: Sequence[set[str]]) -> dict[str, tuple[int, int]]:
     """Columns before and after by name of what was asked."""
-    found: dict[str, dict[str, int]] = {}
+    pairs: dict[str, dict[str, int]] = {}
     for i, (heading, w) in enumerate(zip(header, words, strict=True)):
         if not w & (_BEFORE | _AFTER):
             continue
         name = _without(heading, _BEFORE | _AFTER | {"course", "mean", "test"})
         side = "post" if w & _AFTER else "pre"
-        if side in found.setdefault(name, {}):
+        if side in pairs.setdefault(name, {}):
             raise BadInput(f"The heading '{name}' has two columns '{side}'; name each question once.")
-        found[name][side] = i
-    for name, sides in found.items():
+        pairs[name][side] = i
+    for name, sides in pairs.items():
         if len(sides) < 2:
             raise BadInput(f"'{name or header[0]}' has a column {next(iter(sides))} but none for the other time.")
-    return {name: (sides["pre"], sides["post"]) for name, sides in found.items()}
+    return {name: (sides["pre"], sides["post"]) for name, sides in pairs.items()}
 
 
 def _wide(
@@ -159,14 +159,14 @@ def _wide(
 ) -> Ratings:
     person = _find(words, _PERSON)
     if person is not None:
-        seen: dict[str, int] = {}
+        lines: dict[str, int] = {}
         for number, cells in rows:
-            if cells[person] and cells[person] in seen:
+            if cells[person] and cells[person] in lines:
                 raise BadInput(
-                    f"'{cells[person]}' answers in line {seen[cells[person]]} and again in line {number};"
+                    f"'{cells[person]}' answers in line {lines[cells[person]]} and again in line {number};"
                     " keep one of them."
                 )
-            seen[cells[person]] = number
+            lines[cells[person]] = number
     items: list[Item] = []
     notes: list[str] = []
     pairs = _pairs(header, words)
@@ -182,11 +182,11 @@ def _wide(
         if i in used:
             continue
         answers = [cells[i].lower().replace("’", "'") for _, cells in rows]
-        given = [a for a in answers if a not in _MISSING]
-        if given and set(given) <= set(LIKERT):
-            options = tuple(o for o in LIKERT if o in given or o not in ("neutral", "i don't know"))
-            told = tuple(given.count(o) for o in options)
-            likert.append(Likert(name=heading, options=options, counts=told, missing=len(answers) - len(given)))
+        answered = [a for a in answers if a not in _MISSING]
+        if answered and set(answered) <= set(LIKERT):
+            options = tuple(o for o in LIKERT if o in answered or o not in ("neutral", "i don't know"))
+            counts = tuple(answered.count(o) for o in options)
+            likert.append(Likert(name=heading, options=options, counts=counts, missing=len(answers) - len(answered)))
         else:
             notes.append(f"The column '{heading}' is neither a rating before or after nor agreement, and is left out.")
     return Ratings(items=tuple(items), likert=tuple(likert), people=len(rows), notes=tuple(notes))
@@ -198,45 +198,45 @@ def _long(
     people = {cells[person]: i for i, cells in enumerate({c[person]: c for _, c in rows}.values())}
     names = list(dict.fromkeys(cells[item] for _, cells in rows))
     table = {(name, side): np.full(len(people), np.nan) for name in names for side in ("pre", "post")}
-    seen: dict[tuple[str, str, str], int] = {}
+    lines: dict[tuple[str, str, str], int] = {}
     for number, cells in rows:
-        said = set(_words(cells[when]))
-        if not said & (_BEFORE | _AFTER):
+        words = set(_words(cells[when]))
+        if not words & (_BEFORE | _AFTER):
             raise BadInput(f"line {number}: pre or post was needed for the time, got '{cells[when][:40]}'.")
-        side = "post" if said & _AFTER else "pre"
+        side = "post" if words & _AFTER else "pre"
         key = (cells[person], cells[item], side)
-        if key in seen:
+        if key in lines:
             raise BadInput(
-                f"'{key[0]}' rates '{key[1]}' ({side}) in line {seen[key]} and again in line {number}; keep one."
+                f"'{key[0]}' rates '{key[1]}' ({side}) in line {lines[key]} and again in line {number}; keep one."
             )
-        seen[key] = number
+        lines[key] = number
         table[cells[item], side][people[cells[person]]] = _rating(cells[answer], scale, f"line {number}")
     items = tuple(Item(name=n, pre=table[n, "pre"], post=table[n, "post"]) for n in names)
     return Ratings(items=items, likert=(), people=len(people), notes=())
 
 
 def _means(header: list[str], words: Sequence[set[str]], item: int, rows: Sequence[tuple[int, list[str]]]) -> Means:
-    found: list[tuple[str, str, str, str]] = []
+    means: list[tuple[str, str, str, str]] = []
     for measure, (pre, post) in _pairs(header, words).items():
         for number, cells in rows:
             for c in (pre, post):
                 if not is_number(cells[c]):
                     raise BadInput(f"line {number}, '{header[c]}': a printed mean was needed, got '{cells[c][:40]}'.")
-            found.append((cells[item], measure, cells[pre], cells[post]))
-    return Means(rows=tuple(found))
+            means.append((cells[item], measure, cells[pre], cells[post]))
+    return Means(rows=tuple(means))
 
 
 def _shares(header: list[str], rows: Sequence[tuple[int, list[str]]]) -> Shares:
     columns = [i for i, h in enumerate(header) if h.strip().lower().replace("’", "'") in LIKERT]
     name = next((i for i in range(len(header)) if i not in columns), None)
-    found: list[tuple[str, tuple[str, ...]]] = []
+    shares: list[tuple[str, tuple[str, ...]]] = []
     for number, cells in rows:
         texts = tuple(cells[c].rstrip("% ").strip() for c in columns)
         for text in texts:
             if not is_number(text):
                 raise BadInput(f"line {number}: a percentage was needed, got '{text[:40]}'; write 0 for none.")
-        found.append((cells[name] if name is not None else f"row {number}", texts))
-    return Shares(options=tuple(header[c] for c in columns), rows=tuple(found))
+        shares.append((cells[name] if name is not None else f"row {number}", texts))
+    return Shares(options=tuple(header[c] for c in columns), rows=tuple(shares))
 
 
 def decoded(path: Path) -> str:

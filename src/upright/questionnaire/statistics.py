@@ -190,8 +190,8 @@ def can_be_printed(printed: str, answers: int, *, of: int = 1) -> bool:
 
 def whole_row(shares: Sequence[str], answers: int) -> bool:
     """Whether the percentages of one question can come from whole counts that add up to all answers."""
-    found = [counts(share, answers, of=100) for share in shares]
-    return all(found) and sum(c[0] for c in found) <= answers <= sum(c[-1] for c in found)
+    possible = [counts(share, answers, of=100) for share in shares]
+    return all(possible) and sum(c[0] for c in possible) <= answers <= sum(c[-1] for c in possible)
 
 
 def fitting(means: Sequence[str], shares: Sequence[str], most: int) -> tuple[Fits, ...]:
@@ -258,13 +258,15 @@ def bound(pre: str, post: str, answers: int, *, scale: tuple[int, int] = (1, 4))
             exact = False
             whole = [math.floor(float(text) * answers), math.ceil(float(text) * answers)]
         totals.append([s for s in whole if low * answers <= s <= high * answers])
-    found: list[float] = []
+    statistics: list[float] = []
     gains: list[float] = []
     for before, after in product(*totals):
         gains.append((after - before) / answers)
-        found += [_t(after - before, squares, answers) for squares in squares_of_gains(before, after, answers, scale)]
+        statistics += [
+            _t(after - before, squares, answers) for squares in squares_of_gains(before, after, answers, scale)
+        ]
     critical = float(student.ppf(0.975, answers - 1))
-    span = (min(found), max(found))
+    span = (min(statistics), max(statistics))
     if span[0] > critical or span[1] < -critical:
         verdict = "significant"
     else:

@@ -36,9 +36,9 @@ def read(path: PathLike, *, reader: str | None = None) -> Record:
 
 def read_source(source: Source, *, reader: str | None = None) -> Record:
     """Record of content already in memory; see `read`."""
-    found = READERS.named(reader or recognise(source))
+    chosen = READERS.named(reader or recognise(source))
     try:
-        return found.read(source)
+        return chosen.read(source)
     except BadInput as error:
         where = "" if source.file in str(error) else f"'{source.file}': "  # the record refused what the reader found
         raise BadInput(" ".join((f"{where}{error}", *(() if reader else READERS.unsound())))) from None

@@ -89,32 +89,32 @@ def _first_lines(text: str) -> list[str]:
 
 def read(source: Source) -> Record:
     """Record of a table; time is the column named like it, else the first when it increases."""
-    found = layout(source)
-    table = found.numbers()
-    at, seconds = _time_column(found, table)
+    text = layout(source)
+    table = text.numbers()
+    at, seconds = _time_column(text, table)
     notes: list[str] = []
-    if not found.named:
+    if not text.named:
         notes.append("The log names no columns; they are called c0, c1, ... and c0 increases, so it is the time.")
-    elif not (time_scale(found.names[at]) or stated_time_unit(found.names[at])):
-        notes.append(f"No column is named like a time; '{found.names[at]}' is the first and increases.")
+    elif not (time_scale(text.names[at]) or stated_time_unit(text.names[at])):
+        notes.append(f"No column is named like a time; '{text.names[at]}' is the first and increases.")
     t = table[:, at] * seconds
     if is_epoch(t) and seconds == 1:
-        rows = [line for line in found.body.split("\n") if line.strip()]
-        cells = [row.split(found.delimiter)[at] for row in rows]
+        rows = [line for line in text.body.split("\n") if line.strip()]
+        cells = [row.split(text.delimiter)[at] for row in rows]
         t, first = exact_seconds(
-            source, cells, range(found.first_line, found.first_line + len(cells)), name=found.names[at], column=at + 1
+            source, cells, range(text.first_line, text.first_line + len(cells)), name=text.names[at], column=at + 1
         )
         notes.append(f"Time is counted from the first sample, epoch {first * 1e-9:.6f} s.")
     source.must_increase(
         t,
-        lambda row: {"line": found.line(row), "column": at + 1, "name": found.names[at]},
+        lambda row: {"line": text.line(row), "column": at + 1, "name": text.names[at]},
         advice="mend or delete the row, or read each run on its own",
     )
-    index = next((table[:, j] for j, name in enumerate(found.names) if is_index(name, table[:, j])), None)
+    index = next((table[:, j] for j, name in enumerate(text.names) if is_index(name, table[:, j])), None)
     t, note = rebuild(t, index)
-    if not source.text.endswith("\n") and found.body.rstrip(" "):
-        notes.append(_torn(found, table.shape[0]))
-    signals = {name: table[:, j] for j, name in enumerate(found.names) if j != at}
+    if not source.text.endswith("\n") and text.body.rstrip(" "):
+        notes.append(_torn(text, table.shape[0]))
+    signals = {name: table[:, j] for j, name in enumerate(text.names) if j != at}
     return Record(
         t=t,
         signals=signals,
@@ -171,38 +171,38 @@ def _split(line: str, delimiter: str | None) -> list[str]:
     return [name.strip() for name in cells]
 
 
-def _time_column(found: TextTable, table: Array) -> tuple[int, float]:
-    for j, name in enumerate(found.names if found.named else ()):
+def _time_column(text: TextTable, table: Array) -> tuple[int, float]:
+    for j, name in enumerate(text.names if text.named else ()):
         if seconds := time_scale(name):
             return j, seconds
     first = table[:, 0]
-    if found.named and is_index(found.names[0], first):
-        raise found.source.bad(
-            f"expected a time column named 't' or 'time', got only the sample index '{found.names[0]}';"
+    if text.named and is_index(text.names[0], first):
+        raise text.source.bad(
+            f"expected a time column named 't' or 'time', got only the sample index '{text.names[0]}';"
             " add the time of each sample in s",
-            line=found.first_line - 1,
+            line=text.first_line - 1,
         )
-    if found.named and first.size > 1 and not (np.diff(first) > 0).all():
-        raise found.source.bad(
-            f"expected a time column named 't' or 'time', got: {', '.join(found.names)[:120]};"
+    if text.named and first.size > 1 and not (np.diff(first) > 0).all():
+        raise text.source.bad(
+            f"expected a time column named 't' or 'time', got: {', '.join(text.names)[:120]};"
             " name the time column or put it first",
-            line=max(found.first_line - 1, 1),
+            line=max(text.first_line - 1, 1),
         )
     return 0, (stated_time_unit(found.names[0]) if found.named else 0.0) or 1.0
 
 
-def _torn(found: TextTable, rows: int) -> str:
+def _torn(text: TextTable, rows: int) -> str:
     """Judge a last row without line end: torn when its last number is shorter than the fixed format above it."""
-    lines = [line for line in found.body.rsplit("\n", 8)[-8:] if line.strip()]
-    ends = [line.split(found.delimiter)[-1].strip() for line in lines]
+    lines = [line for line in text.body.rsplit("\n", 8)[-8:] if line.strip()]
+    ends = [line.split(text.delimiter)[-1].strip() for line in lines]
     decimals = {len(end.partition(".")[2]) for end in ends[:-1]}
     if len(ends) > 3 and len(decimals) == 1 and len(ends[-1].partition(".")[2]) not in decimals:
-        raise found.source.bad(
+        raise text.source.bad(
             f"expected {decimals.pop()} decimals and a line end, got {ends[-1]!r}; the last row is torn,"
             " export the log again or delete it",
-            line=found.line(rows - 1),
-            column=len(found.names),
-            name=found.names[-1],
+            line=text.line(rows - 1),
+            column=len(text.names),
+            name=text.names[-1],
         )
     return "The last row has no line end; if the log was cut short, its last number may be cut as well."
 

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from upright import units
 from upright.errors import BadInput, nearest
-from upright.readers.resolution import Quantum, find_quantum, rounding
+from upright.readers.resolution import Resolution, counts_per_rev, resolution_of, rounding
 from upright.records import Array, Record
 from upright.signals.stretches import stretches
 
@@ -78,7 +78,7 @@ class Column:
     guess: str
     low: float
     high: float
-    quantum: Quantum
+    resolution: Resolution
     constant: bool
     low_share: float
     high_share: float
@@ -156,20 +156,21 @@ def time_base(record: Record) -> TimeBase:
 def _column(record: Record, name: str) -> Column:
     x = record.signals[name]
     low, high = float(x.min()), float(x.max())
-    step = find_quantum(x)
+    step = resolution_of(x)
     unit = record.units[name]
     guess = unit or ("1" if sample_index(x) else effort_unit(name) or _guess_unit(name, x, step))
     constant = low == high
     drive = _is_drive(name, x, guess)
-    if step.counts_per_rev and guess != "rad":
-        step = Quantum(step=step.step, decimals=step.decimals)
+    turn = {"rad": 1.0, "deg": math.pi / 180}.get(guess, 0.0)
+    exact = turn and step.step and not step.decimals
+    step = replace(step, counts_per_rev=counts_per_rev(turn * step.step) if exact else 0)
     return Column(
         name=name,
         unit=unit,
         guess=guess,
         low=low,
         high=high,
-        quantum=step,
+        resolution=step,
         constant=constant,
         low_share=0.0 if constant else _pinned(x, low, step.step),
         high_share=0.0 if constant else _pinned(x, high, step.step),
@@ -182,7 +183,7 @@ def _column(record: Record, name: str) -> Column:
     )
 
 
-def _guess_unit(name: str, values: Array, step: Quantum) -> str:
+def _guess_unit(name: str, values: Array, step: Resolution) -> str:
     """Unit from name and step; empty when neither tells."""
     whole = bool((values == np.round(values)).all()) and np.ptp(values) > 0
     if _RATE.search(name):
@@ -275,7 +276,7 @@ def lies(record: Record, name: str) -> tuple[str, ...]:
     x = record.signals[name]
     if np.ptp(x) == 0:
         return ()
-    found = [
+    sentences = [
         sample_index(x),
         time_copy(record.t, x),
         *(copy_of(x, other, y) for other, y in record.signals.items() if other != name),
@@ -284,7 +285,7 @@ def lies(record: Record, name: str) -> tuple[str, ...]:
         first_outlier(x),
         *(difference_of(record.t, other, y, x) for other, y in record.signals.items() if other != name),
     ]
-    return tuple(sentence for sentence in found if sentence)
+    return tuple(sentence for sentence in sentences if sentence)
 
 
 def sample_index(x: Array) -> str:
@@ -365,8 +366,8 @@ def difference_of(t: Array, other: str, p: Array, v: Array) -> str:
     if _share(change[1:], change[:-1]) > -_ROUGH:
         return ""  # too smooth to tell a true rate from a quotient
     for shift, word in ((1, "backward"), (0, "forward")):
-        taken = v[shift : shift + quotient.size]
-        if _share(taken, quotient) > 0.95 and _share(np.diff(taken), change) > _SAME:
+        shifted = v[shift : shift + quotient.size]
+        if _share(shifted, quotient) > 0.95 and _share(np.diff(shifted), change) > _SAME:
             return f"the {word} difference quotient of '{other}', not a sensor of its own"
     central = (quotient[1:] + quotient[:-1]) / 2
     if _share(v[1 : n - 1], central) > 0.95 and _share(np.diff(v[1 : n - 1]), np.diff(central)) > _SAME:

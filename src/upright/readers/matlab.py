@@ -73,10 +73,10 @@ def read(source: Source) -> Record:
     content = variables(source)
     if KEY in content and {"t", "signals", "names"} <= set(content):
         return _written_by_us(source, content)
-    found = _pieces(source, content) or _structures(content) or _vectors(source, content)
-    if found is None or not found[1]:
-        found = _vectors(source, _lifted(content)) or _table(content)
-    if found is None or not found[1]:
+    pieces = _pieces(source, content) or _structures(content) or _vectors(source, content)
+    if pieces is None or not pieces[1]:
+        pieces = _vectors(source, _lifted(content)) or _table(content)
+    if pieces is None or not pieces[1]:
         objects = any(isinstance(value, Unreadable) and value.kind == "object" for value in content.values())
         save = "; of a timeseries x, in MATLAB: t = x.Time; y = squeeze(x.Data); save('log.mat', 't', 'y', '-v7')"
         raise source.bad(
@@ -85,7 +85,7 @@ def read(source: Source) -> Record:
             + "; a log needs a vector called t or time"
             + save * objects
         )
-    t, signals, notes = found
+    t, signals, notes = pieces
     advice = "remove the sample or read each run on its own"
     source.must_increase(t, lambda row: {"sample": row + 1}, each="sample", advice=advice)
     t, note = rebuild(t)
@@ -296,11 +296,11 @@ def _vectors(source: Source, content: Variables) -> Signals | None:
 
 def _lifted(content: Variables) -> Variables:
     """The variables with the fields of structures beside them, under their own names where these are free."""
-    found = {name: value for name, value in content.items() if not isinstance(value, dict)}
+    lifted = {name: value for name, value in content.items() if not isinstance(value, dict)}
     for name, value in content.items():
         for field, item in value.items() if isinstance(value, dict) else ():
-            found[field if field not in found else f"{name}_{field}"] = item
-    return found
+            lifted[field if field not in lifted else f"{name}_{field}"] = item
+    return lifted
 
 
 EVEN = 0.2
@@ -400,8 +400,8 @@ def _settings(content: Variables) -> Iterator[str]:
     """Notes on scalars, text and flat structures of settings."""
     for name, value in content.items():
         if isinstance(value, dict) and "signals" not in value:
-            if told := [f"{key} = {text}" for key, item in value.items() if (text := _plain(item))]:
-                yield f"{name}: {', '.join(told)}."
+            if settings := [f"{key} = {text}" for key, item in value.items() if (text := _plain(item))]:
+                yield f"{name}: {', '.join(settings)}."
         elif _plain(value):
             yield f"{name} = {_plain(value)}."
         elif isinstance(value, Unreadable):

@@ -18,6 +18,7 @@ import numpy as np
 
 from upright.readers.source import Source
 from upright.records import Array
+from upright.signals.smoothing import white_noise
 
 INDEX_NAMES = ("sample", "n", "index", "i", "k", "no", "step", "row")
 
@@ -117,12 +118,16 @@ _FITS = 0.08  # rms distance from the grid in steps; 0.289 when there is no grid
 
 
 @dataclass(frozen=True, kw_only=True)
-class Quantum:
-    """Step of a column in its unit, 0 when there is none; `decimals` says that it is the rounding of the text."""
+class Resolution:
+    """Step of a column in its unit, 0 when there is none; `decimals` says that it is the rounding of the text.
+
+    `hidden` is what no step shows: the largest that the text's digits, or the noise, could hide, in the same unit.
+    """
 
     step: float = 0.0
     decimals: bool = False
     counts_per_rev: int = 0
+    hidden: float = 0.0
 
     def __str__(self) -> str:
         if not self.step:
@@ -132,21 +137,27 @@ class Quantum:
         return f"{self.step:.4g}" + (" (decimals)" if self.decimals else "")
 
 
-def find_quantum(values: Array) -> Quantum:
+def resolution_of(values: Array) -> Resolution:
     """Step of a column (N,)."""
     rounding = decimal_step(values, 7, 1e-6)
     if rounding >= 1:  # counts
-        return Quantum(step=_common_divisor(values, rounding))
+        return Resolution(step=_common_divisor(values, rounding))
     levels = _levels(values, rounding)
     step = _grid(levels, rounding) if levels.size > 2 else 0.0
     if step >= 1.5 * rounding and step > 0:
-        return Quantum(step=step, counts_per_rev=counts_per_rev(step))
+        return Resolution(step=step, counts_per_rev=counts_per_rev(step))
     common = _common_divisor(values, rounding) if rounding else 0.0
     if levels.size > 8 and common > 1.5 * rounding:  # too fine beside its text for a fit, yet exact
-        return Quantum(step=common)
+        return Resolution(step=common)
     # Steps no coarser than the text's own digits tell about the text, not about the sensor.
     few = rounding > 0 and 2 < np.unique(values).size < 0.5 * values.size
-    return Quantum(step=rounding, decimals=True) if few else Quantum()
+    return Resolution(step=rounding, decimals=True) if few else Resolution(hidden=_hidden(values, rounding))
+
+
+def _hidden(values: Array, digit: float) -> float:
+    """Step that rounded text or noise hides, or a millionth of the range: rounding to q errs by q/sqrt(12), rms."""
+    noise = math.sqrt(12) * white_noise(values)
+    return max(digit, noise if noise > 2 * digit else 0.0, 1e-6 * float(np.ptp(values)))
 
 
 def _common_divisor(values: Array, digit: float) -> float:

@@ -86,13 +86,13 @@ class _Bag:
         """Columns with a stamp above them, then the rest by the rows they are filled on."""
         filled = np.array([[bool(entry) for entry in column] for column in self.cells])
         topics: list[Topic] = []
-        taken: set[int] = set()
+        used: set[int] = set()
         for clock, name in enumerate(self.names):
             if not (name.endswith(STAMP) and filled[clock].any()):
                 continue
             prefix = name.removesuffix(STAMP) + "/"
             columns = [
-                j for j, n in enumerate(self.names) if n.startswith(prefix) and filled[j].any() and j not in taken
+                j for j, n in enumerate(self.names) if n.startswith(prefix) and filled[j].any() and j not in used
             ]
             for j in columns:
                 uneven = np.flatnonzero(filled[j] != filled[clock])
@@ -101,7 +101,7 @@ class _Bag:
                     empty = j if filled[clock][row] else clock
                     sentence = "expected a value, the message has others but this cell is empty; mend or delete the row"
                     raise self.source.bad(sentence, line=row + 2, column=empty + 1, name=self.names[empty])
-            taken.update(columns)
+            used.update(columns)
             topics.append(Topic(clock=clock, columns=tuple(columns), rows=np.flatnonzero(filled[clock])))
         if RECEIVED not in self.names:
             return topics
@@ -111,7 +111,7 @@ class _Bag:
             raise self.source.bad(sentence, line=row + 2, column=received + 1, name=RECEIVED)
         groups: dict[bytes, list[int]] = {}
         for j in range(len(self.names)):
-            if j not in taken and j != received and filled[j].any():
+            if j not in used and j != received and filled[j].any():
                 groups.setdefault(filled[j].tobytes(), []).append(j)
         rest = (
             Topic(clock=received, columns=tuple(columns), rows=np.flatnonzero(filled[columns[0]]))

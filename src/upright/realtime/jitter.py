@@ -143,15 +143,15 @@ def measure(
     child.start()
     theirs.close()
     try:
-        found: dict[str, Any] | UprightError = ours.recv()
+        result: dict[str, Any] | UprightError = ours.recv()
     except EOFError:
         raise BadInput("the process that measures did not come back; is there memory left?") from None
     finally:
         child.join(5.0)
         ours.close()
-    if isinstance(found, UprightError):
-        raise found
-    return Jitter(period=1.0 / rate, stolen=_stolen() - before, **found)
+    if isinstance(result, UprightError):
+        raise result
+    return Jitter(period=1.0 / rate, stolen=_stolen() - before, **result)
 
 
 def _stolen() -> float:
@@ -181,6 +181,6 @@ def _measured(pipe: Any, seconds: float, rate: float, fifo: bool, make: Callable
     except UprightError as error:
         pipe.send(error)
     else:
-        found = {"behind": behind, "overslept": overslept, "work": work, "late": pace.late, "standing": standing}
-        pipe.send(found)
+        result = {"behind": behind, "overslept": overslept, "work": work, "late": pace.late, "standing": standing}
+        pipe.send(result)
     pipe.close()

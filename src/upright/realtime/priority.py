@@ -108,5 +108,5 @@ def _short_slice(libc: ctypes.CDLL) -> bool:
         return False
     if (int(release[0]), int(release[1])) < (6, 12):  # before, the number is taken and not used
         return False
-    asked = _Attributes(size=ctypes.sizeof(_Attributes), policy=0, nice=os.nice(0), runtime=SLICE)
-    return libc.syscall(number, 0, ctypes.byref(asked), 0) == 0
+    attributes = _Attributes(size=ctypes.sizeof(_Attributes), policy=0, nice=os.nice(0), runtime=SLICE)
+    return libc.syscall(number, 0, ctypes.byref(attributes), 0) == 0

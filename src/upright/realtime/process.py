@@ -26,9 +26,9 @@ from upright.rigs.protocol import Capabilities, Fault, Mode
 
 _READINGS = 8
 _FIELDS = 8
-_SEEN = 0.05  # s between two looks of the parent
+_POLL = 0.05  # s between two looks of the parent
 _PR_SET_PDEATHSIG = 1  # of linux/prctl.h
-WISH = "Stopped by hand."
+BY_HAND = "Stopped by hand."
 
 
 class _Window:
@@ -102,7 +102,7 @@ def run_in_process(
     window = _Window(memory, phase)
     answer: Any = None
     try:
-        while not wait([ours, child.sentinel], _SEEN):
+        while not wait([ours, child.sentinel], _POLL):
             _ask(wish, watch, window)
         answer = ours.recv() if ours.poll(1.0) else None
     except EOFError:
@@ -167,7 +167,7 @@ def _child(
 
     def stopped() -> str:
         if wish.value:
-            return WISH
+            return BY_HAND
         return "The program that started the loop is gone." if orphan() else ""
 
     def clock(about: Capabilities) -> tuple[Pace, str]:

@@ -134,7 +134,7 @@ class RunEnd:
 
 
 @dataclass(eq=False)
-class _Told:
+class _Events:
     """Events of a run, to the log as soon as there is one."""
 
     events: list[tuple[float, str, str]] = field(default_factory=list[tuple[float, str, str]])
@@ -167,7 +167,7 @@ def carry_out(
     pace : callable
         Gives the clock of the loop for a rig, and a warning about it; called when all is ready.
     """
-    hear = _Told()
+    hear = _Events()
     stage = order.make()
     beside = stage.supervisor
     beside.event, beside.stopped = hear, stopped

@@ -220,15 +220,15 @@ class Record(Shown):
         """Record of columns and the JSON of `describe`; units `stated` elsewhere go before those of the description."""
         try:
             about = json.loads(description) if description else {}
-            told: dict[str, Any] = dict(about.get("provenance", {}))
-            window = tuple(float(v) for v in told.pop("window", ()))
-            notes = tuple(str(v) for v in told.pop("notes", ()))
+            source: dict[str, Any] = dict(about.get("provenance", {}))
+            window = tuple(float(v) for v in source.pop("window", ()))
+            notes = tuple(str(v) for v in source.pop("notes", ()))
             units: dict[str, str] = {str(k): str(v) for k, v in dict(about.get("units", {})).items() if k in signals}
             units |= {k: v for k, v in (stated or {}).items() if v}
             # columns may have been dropped since the description was written
             inputs = tuple(str(name) for name in about.get("inputs", ()) if name in signals)
             outputs = tuple(str(name) for name in about.get("outputs", ()) if name in signals)
-            provenance = Provenance(**{k: str(v) for k, v in told.items()}, window=window, notes=notes)
+            provenance = Provenance(**{k: str(v) for k, v in source.items()}, window=window, notes=notes)
         except (ValueError, TypeError, AttributeError, RecursionError) as error:
             raise BadInput(
                 f"The description of the record must be the JSON this package wrote, got {description[:60]!r}"

@@ -184,10 +184,10 @@ def decimated(t: Array, y: Array, buckets: int = 450) -> tuple[Array, Array]:
     if t.size <= 3 * buckets:
         return t, y
     edges = np.linspace(0, t.size, buckets + 1).astype(int)
-    kept = {0, t.size - 1}
+    rows = {0, t.size - 1}
     for lo, hi in pairwise(edges):
-        kept |= {int(lo + np.argmin(y[lo:hi])), int(lo + np.argmax(y[lo:hi]))}
-    index = np.array(sorted(kept))
+        rows |= {int(lo + np.argmin(y[lo:hi])), int(lo + np.argmax(y[lo:hi]))}
+    index = np.array(sorted(rows))
     return t[index], y[index]
 
 
@@ -252,10 +252,10 @@ def pole_map(kinds: Sequence[Poles], cloud: Roots | None = None, *, frame: int =
     """
     drawing = figure(4.2, width=6.2)
     ax: Any = drawing.subplots()
-    seen = np.concatenate([k.values for k in kinds[:frame]])
+    shown = np.concatenate([k.values for k in kinds[:frame]])
     within = 1.3
-    left, right = within * float(min(seen.real.min(), -1.0)), within * float(max(seen.real.max(), 1.0))
-    high = within * float(max(np.abs(seen.imag).max(), 0.25 * (right - left)))
+    left, right = within * float(min(shown.real.min(), -1.0)), within * float(max(shown.real.max(), 1.0))
+    high = within * float(max(np.abs(shown.imag).max(), 0.25 * (right - left)))
     ax.axvspan(left, 0.0, color=BLUE, alpha=0.06, linewidth=0)
     s_plane(ax)
     if cloud is not None and cloud.size:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 def chapter(ladder: Ladder, *, title: str, provenance: Mapping[str, object], steps: Iterable[Step] = ()) -> Chapter:
     """What a ladder says; `steps` are those of `ladder_steps`."""
-    seen = "; ".join(
+    description = "; ".join(
         f"{s.rung.name}: fitted {percent(s.fit_percent)}, predicted {percent(s.predicted_percent)}"
         for s in ladder.steps
     )
@@ -32,7 +32,7 @@ def chapter(ladder: Ladder, *, title: str, provenance: Mapping[str, object], ste
         draw=lambda: ladder_figure(ladder),
         caption="Mean fit percent of all signals and runs against the rung: fitted, and predicted "
         f"({ladder.held_out}). Open marks: refused. Dash-dotted: how well one repeat of a run predicts another.",
-        description=seen,
+        description=description,
     )
     refused = f"Refused: {', '.join(_refused(ladder))}. " if ladder.accepted and _refused(ladder) else ""
     return Chapter(
@@ -74,10 +74,10 @@ def rung_table(ladder: Ladder) -> Table:
 def _terms(step: RungResult) -> str:
     """What a rung changes: names it adds, drops, and lets differ from run to run."""
     rung = step.rung
-    said = [", ".join(rung.adds)] if rung.adds else []
-    said += [f"without {', '.join(rung.drops)}"] if rung.drops else []
-    said += [f"{', '.join(rung.unknown)} of each run"] if rung.unknown else []
-    return "; ".join(said)
+    terms = [", ".join(rung.adds)] if rung.adds else []
+    terms += [f"without {', '.join(rung.drops)}"] if rung.drops else []
+    terms += [f"{', '.join(rung.unknown)} of each run"] if rung.unknown else []
+    return "; ".join(terms)
 
 
 def _ceilings(ladder: Ladder) -> tuple[Block, ...]:
@@ -133,13 +133,13 @@ def ladder_figure(ladder: Ladder) -> Figure:
     ax = drawing.add_subplot()
     predicted = np.array([s.predicted_percent for s in steps])
     fitted = np.array([s.fit_percent for s in steps])
-    kept = np.array([s.accepted for s in steps])
-    ax.plot(x[kept], fitted[kept], color=BLUE, linestyle="--", linewidth=1)
-    ax.plot(x[kept], predicted[kept], color=VERMILLION, linestyle="-", linewidth=1.4)
+    accepted = np.array([s.accepted for s in steps])
+    ax.plot(x[accepted], fitted[accepted], color=BLUE, linestyle="--", linewidth=1)
+    ax.plot(x[accepted], predicted[accepted], color=VERMILLION, linestyle="-", linewidth=1.4)
     for values, colour, mark, label in ((fitted, BLUE, "s", "fitted"), (predicted, VERMILLION, "o", "predicted")):
-        ax.plot(x[kept], values[kept], mark, color=colour, markersize=6, label=label)
-        ax.plot(x[~kept], values[~kept], mark, color=colour, markersize=6, markerfacecolor="white",
-                label=f"{label}, refused" if not kept.all() else None)  # fmt: skip
+        ax.plot(x[accepted], values[accepted], mark, color=colour, markersize=6, label=label)
+        ax.plot(x[~accepted], values[~accepted], mark, color=colour, markersize=6, markerfacecolor="white",
+                label=f"{label}, refused" if not accepted.all() else None)  # fmt: skip
     ceiling = _ceiling(ladder)
     if math.isfinite(ceiling):
         ax.axhline(ceiling, color=BLACK, linestyle=(0, (6, 2, 1, 2)), linewidth=1.1, label="a repeat by another")
@@ -196,8 +196,8 @@ def ladder_steps(ladder: Ladder, *, study: str, folder: str, data: str, trimmed:
 
 def _refused(ladder: Ladder) -> list[str]:
     """Names of the rungs that were refused and not kept later."""
-    kept = [s.rung for s in ladder.accepted]
-    return list(dict.fromkeys(s.rung.name for s in ladder.steps if s.rung not in kept))
+    accepted = [s.rung for s in ladder.accepted]
+    return list(dict.fromkeys(s.rung.name for s in ladder.steps if s.rung not in accepted))
 
 
 def _verdict(ladder: Ladder) -> str:

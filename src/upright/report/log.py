@@ -16,37 +16,37 @@ if TYPE_CHECKING:
 MOST_PANELS = 8
 
 
-def chapter(record: Record, seen: Inspection) -> Chapter:
+def chapter(record: Record, inspection: Inspection) -> Chapter:
     """What a log holds."""
     drawn = Picture(
         name="columns",
-        draw=lambda: draw_columns(record, seen),
+        draw=lambda: draw_columns(record, inspection),
         caption="The columns over time; grey: at rest, dotted: gaps.",
-        description="; ".join(f"{c.name} from {c.low:.5g} to {c.high:.5g}" for c in seen.columns),
+        description="; ".join(f"{c.name} from {c.low:.5g} to {c.high:.5g}" for c in inspection.columns),
     )
-    notes = (Points(tuple(f"Note: {note}" for note in seen.notes)),) if seen.notes else ()
-    name = f"{seen.file} ({seen.reader})"
-    content = (Points(tuple(_time_lines(seen))), _table(seen), *notes, drawn)
+    notes = (Points(tuple(f"Note: {note}" for note in inspection.notes)),) if inspection.notes else ()
+    name = f"{inspection.file} ({inspection.reader})"
+    content = (Points(tuple(_time_lines(inspection))), _table(inspection), *notes, drawn)
     return Chapter(title=name, verdict="", parts=(Part(name, content),))
 
 
-def _table(seen: Inspection) -> Table:
+def _table(inspection: Inspection) -> Table:
     rows = tuple(
         (
-            c.name, c.unit or (f"{c.guess}?" if c.guess else ""), f"{c.low:.5g}", f"{c.high:.5g}", str(c.quantum),
+            c.name, c.unit or (f"{c.guess}?" if c.guess else ""), f"{c.low:.5g}", f"{c.high:.5g}", str(c.resolution),
             "; ".join(_remarks(c)),
         )
-        for c in seen.columns
+        for c in inspection.columns
     )  # fmt: skip
     return Table(
-        caption="Columns", headings=("column", "unit", "lowest", "highest", "quantum", "remarks"), rows=rows,
+        caption="Columns", headings=("column", "unit", "lowest", "highest", "resolution", "remarks"), rows=rows,
         numbers=(2, 3),
     )  # fmt: skip
 
 
-def _time_lines(seen: Inspection) -> list[str]:
+def _time_lines(inspection: Inspection) -> list[str]:
     """Sentences about the time base."""
-    time = seen.time
+    time = inspection.time
     lines = [
         f"{time.samples} samples over {time.duration:.6g} s, period {time.period * 1e3:.6g} ms"
         + f" ({1 / time.period:.5g} Hz)"
@@ -62,8 +62,8 @@ def _time_lines(seen: Inspection) -> list[str]:
             f"{len(time.gaps)} gap{'s' if len(time.gaps) > 1 else ''}, the largest {largest.length * 1e3:.4g} ms"
             f" at {largest.start:.5g} s ({largest.missing} sample{'s' if largest.missing > 1 else ''} missing)."
         )
-    if seen.rests:
-        spans = ", ".join(f"{start:.4g} to {stop:.4g} s" for start, stop in seen.rests[:6])
+    if inspection.rests:
+        spans = ", ".join(f"{start:.4g} to {stop:.4g} s" for start, stop in inspection.rests[:6])
         lines.append(f"Nothing moves: {spans}.")
     return lines
 
@@ -72,41 +72,43 @@ def _remarks(column: Column) -> list[str]:
     """Short remarks on one column."""
     if column.constant:
         return ["idle, always 0" if column.idle else f"constant {column.low:g}"]
-    told = list(column.lies)
-    if column.drive and not told:
-        told.append("drives?")
+    remarks = list(column.lies)
+    if column.drive and not remarks:
+        remarks.append("drives?")
     if column.switches and not column.stepwise:
-        told.append(
+        remarks.append(
             ", ".join(f"{'back at' if value == 0 else 'leaves'} 0 at {t:.4g} s" for t, value in column.switches)
         )
     elif column.switches and len(column.switches) <= 6:
-        told.append("switches " + ", ".join(f"to {value:.4g} at {t:.4g} s" for t, value in column.switches))
+        remarks.append("switches " + ", ".join(f"to {value:.4g} at {t:.4g} s" for t, value in column.switches))
     if column.drive:
         for share, level in ((column.low_share, column.low), (column.high_share, column.high)):
             if share and not column.stepwise:
-                told.append(f"at {level:.4g} for {100 * share:.2g} % of the samples (saturated?)")
+                remarks.append(f"at {level:.4g} for {100 * share:.2g} % of the samples (saturated?)")
     if column.turns:
-        told.append(f"offset of {column.turns} turns (2 pi each)")
-    return told
+        remarks.append(f"offset of {column.turns} turns (2 pi each)")
+    return remarks
 
 
 @styled
-def draw_columns(record: Record, seen: Inspection) -> Figure:
+def draw_columns(record: Record, inspection: Inspection) -> Figure:
     """One panel per column over time [s]; spans at rest are grey, gaps are marked.
 
     Left out are columns that do not move, time and sample index; drives come last. Where nothing moves, the constant
     columns are drawn, so that no axis is empty.
     """
-    signals = [c for c in seen.columns if not any("the time" in s or "index" in s for s in c.lies)] or [*seen.columns]
+    signals = [c for c in inspection.columns if not any("the time" in s or "index" in s for s in c.lies)] or [
+        *inspection.columns
+    ]
     moving = [c for c in signals if not c.constant]
     columns = sorted(moving or signals, key=lambda c: c.drive)[:MOST_PANELS]
     drawing = figure(1.1 + 1.15 * len(columns))
     panels: list[Any] = drawing.subplots(len(columns), 1, sharex=True, squeeze=False)[:, 0].tolist()
     for i, (axes, column) in enumerate(zip(panels, columns, strict=True)):
         colour, _ = CYCLE[i % len(CYCLE)]
-        for start, stop in seen.rests if moving else ():
+        for start, stop in inspection.rests if moving else ():
             axes.axvspan(start, stop, color="#f0f0f0", linewidth=0)
-        for gap in seen.time.gaps[:20]:
+        for gap in inspection.time.gaps[:20]:
             axes.axvline(gap.start, color=GREY, linewidth=0.6, linestyle=":")
         t, y = decimated(record.t, record[column.name], buckets=800)
         axes.plot(t, y, color=colour, linewidth=1.0, drawstyle="steps-post" if column.stepwise else "default")
@@ -123,5 +125,7 @@ def draw_columns(record: Record, seen: Inspection) -> Figure:
     hide_inner_times(panels)
     drawing.align_ylabels(panels)
     state = "grey: at rest" if moving else "nothing moves"
-    drawing.suptitle(f"{Path(seen.file).name}, {seen.time.samples} samples, {state}", fontsize=10, parse_math=False)
+    drawing.suptitle(
+        f"{Path(inspection.file).name}, {inspection.time.samples} samples, {state}", fontsize=10, parse_math=False
+    )
     return drawing

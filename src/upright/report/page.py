@@ -278,18 +278,18 @@ class Book:
         """What stands before the chapters: facts, verdicts at a glance, numbers found."""
         glance = [(c.key, c.title, c.about, c.verdict, c.state) for c in self.chapters]
         glance += [(key, title, "", "", "not run") for key, title in self.missing]
-        found = [(c, f) for c in self.chapters for f in c.findings]
+        findings = [(c, f) for c in self.chapters for f in c.findings]
         verdicts = Table(
             caption="One line for each experiment; every verdict is argued in its chapter",
             headings=("", "experiment", "rig", "verdict", "it is"), rows=tuple(glance), badge=4,
             anchors=tuple(c.anchor for c in self.chapters),
         )  # fmt: skip
-        twin = any(f.truth for _, f in found)
+        twin = any(f.truth for _, f in findings)
         numbers = Table(
             caption="Key numbers with 95 % intervals" + (", beside the truth that only a twin can tell" * twin),
             headings=("from", "quantity", "value", "95 % interval", "truth")[: 4 + twin],
-            rows=tuple((c.key, f.what, f.value, f.interval, f.truth)[: 4 + twin] for c, f in found),
-            numbers=(2, 3, 4)[: 2 + twin], anchors=tuple(c.anchor for c, _ in found),
+            rows=tuple((c.key, f.what, f.value, f.interval, f.truth)[: 4 + twin] for c, f in findings),
+            numbers=(2, 3, 4)[: 2 + twin], anchors=tuple(c.anchor for c, _ in findings),
         )  # fmt: skip
         return (
             Part("", (Facts(self.facts),)),
@@ -298,7 +298,7 @@ class Book:
                 key="verdicts",
                 content=(verdicts, f"{READING} {TWIN}" if twin else READING),
             ),
-            *((Part(title="What was found", key="numbers", content=(numbers,)),) if found else ()),
+            *((Part(title="What was found", key="numbers", content=(numbers,)),) if findings else ()),
         )
 
 
@@ -321,8 +321,8 @@ def as_plain(value: Any, instead: Callable[[Any], Any] = lambda value: None) -> 
     if isinstance(value, Mapping):
         return plain_values(value)
     if is_dataclass(value):
-        told = {f.name: as_plain(getattr(value, f.name), instead) for f in fields(value)}
-        return {"kind": type(value).__name__, **told}
+        content = {f.name: as_plain(getattr(value, f.name), instead) for f in fields(value)}
+        return {"kind": type(value).__name__, **content}
     return [as_plain(v, instead) for v in value] if isinstance(value, tuple | list) else value
 
 
@@ -335,7 +335,7 @@ def from_plain(content: Any) -> Any:
     kind = content["kind"]
     if kind == "Symbol":
         return Symbol(content["text"])
-    told = {name: from_plain(value) for name, value in content.items() if name not in ("kind", "numbers")}
+    plain = {name: from_plain(value) for name, value in content.items() if name not in ("kind", "numbers")}
     if "numbers" in content:  # columns of a table, or a chapter's values for another program, which stay as they are
-        told["numbers"] = tuple(content["numbers"]) if kind == "Table" else content["numbers"]
-    return _KINDS[kind](**told)
+        plain["numbers"] = tuple(content["numbers"]) if kind == "Table" else content["numbers"]
+    return _KINDS[kind](**plain)

@@ -46,8 +46,8 @@ def write_pdf(path: Path, page: Chapter | Book) -> Path:
             name = f"figure-{len(files)}.svg"
             share = _SHARE.search(value.svg)
             files[name] = _SHARE.sub("", value.svg).replace("<svg", _ROOT, 1).encode()
-            told = {"caption": value.caption, "description": value.description, "file": name}
-            return {"kind": "Picture", **told, "share": int(share[1]) if share else 100}
+            plain = {"caption": value.caption, "description": value.description, "file": name}
+            return {"kind": "Picture", **plain, "share": int(share[1]) if share else 100}
         if isinstance(value, Formula):
             return {"kind": "Formula", "tree": _tree(ElementTree.fromstring(value.markup))}
         if isinstance(value, Symbol):

@@ -45,8 +45,8 @@ def chapter(log: RunLog) -> Chapter:
     if log.events:
         rows = tuple((f"{e.t:.6g}", str(e.row), e.kind, e.text) for e in log.events[:_MOST])
         more = f", the first {_MOST} of {len(log.events)}" if len(log.events) > _MOST else ""
-        said = Table(caption=f"Events{more}", headings=("t [s]", "after row", "kind", ""), rows=rows, numbers=(0, 1))
-        parts.append(Part("Events", (said,)))
+        events = Table(caption=f"Events{more}", headings=("t [s]", "after row", "kind", ""), rows=rows, numbers=(0, 1))
+        parts.append(Part("Events", (events,)))
     if log.header.rig.strip():
         parts.append(Part("Rig", (Code(log.header.rig.strip()),)))
     if n > 1:
@@ -119,67 +119,69 @@ def draw_run(log: RunLog) -> Figure:
     return draw_columns(record, inspect(record))
 
 
-def recovered_chapter(found: Salvaged) -> Chapter:
+def recovered_chapter(salvaged: Salvaged) -> Chapter:
     """What was kept of a torn log."""
-    log = found.log
+    log = salvaged.log
     lost = (
-        f"{found.lost_bytes} bytes behind them (about {found.lost_rows} rows) could not be read"
-        if found.lost_bytes
+        f"{salvaged.lost_bytes} bytes behind them (about {salvaged.lost_rows} rows) could not be read"
+        if salvaged.lost_bytes
         else "nothing that was written is missing"
     )
     return Chapter(
         title=f"{Path(log.file).name} recovered",
         verdict=f"{len(log)} rows and {len(log.events)} events kept; {lost}.",
         parts=(Part("Why", (Points((log.complaint or "The log was whole.",)),)),),
-        steps=(Step("Look at it.", f"upright log show {typed(found.file)}"),),
+        steps=(Step("Look at it.", f"upright log show {typed(salvaged.file)}"),),
         numbers={
-            "rows": len(log), "events": len(log.events), "lost_bytes": found.lost_bytes, "lost_rows": found.lost_rows,
-            "complaint": log.complaint, "file": str(found.file),
+            "rows": len(log), "events": len(log.events), "lost_bytes": salvaged.lost_bytes,
+            "lost_rows": salvaged.lost_rows, "complaint": log.complaint, "file": str(salvaged.file),
         },
     )  # fmt: skip
 
 
-def replayed(log: RunLog, found: Replay) -> Chapter:
+def replayed(log: RunLog, replay: Replay) -> Chapter:
     """Whether a law gives its commands again."""
-    unit, first = log.header.command_unit, found.first
-    told = [f"{found.rows.size} rows compared; the law began {found.starts} time{'s' if found.starts > 1 else ''}."]
+    unit, first = log.header.command_unit, replay.first
+    sentences = [
+        f"{replay.rows.size} rows compared; the law began {replay.starts} time{'s' if replay.starts > 1 else ''}."
+    ]
     if first is not None:
         verdict = (
-            f"{found.differing} of {found.rows.size} commands differ, the first in row {first.row} at {first.t:.6g} s:"
-            f" logged {first.logged!r} {unit}, replayed {first.replayed!r} {unit}."
+            f"{replay.differing} of {replay.rows.size} commands differ, the first in row {first.row} at {first.t:.6g} "
+            f"s: logged {first.logged!r} {unit}, replayed {first.replayed!r} {unit}."
         )
-        told.append(f"The largest difference is {found.largest:.3g} {unit}.")
+        sentences.append(f"The largest difference is {replay.largest:.3g} {unit}.")
     else:
-        verdict = f"All {found.rows.size} commands are bit-identical to the logged ones."
-    if found.passed_over:
-        told.append(
-            f"{found.passed_over} rows were passed over: rows before them were dropped from the log, so that what the"
+        verdict = f"All {replay.rows.size} commands are bit-identical to the logged ones."
+    if replay.passed_over:
+        sentences.append(
+            f"{replay.passed_over} rows were passed over: rows before them were dropped from the log, so that what the"
             " law remembered there is not known."
         )
     drawn = Picture(
-        name="replay", draw=lambda: draw_replay(log, found), caption="The command logged and replayed; their distance.",
-        description=verdict,
+        name="replay", draw=lambda: draw_replay(log, replay),
+        caption="The logged and the replayed command; their distance.", description=verdict,
     )  # fmt: skip
     return Chapter(
-        title=f"{Path(log.file).name}, its law asked again", verdict=verdict, sound=found.identical,
-        parts=(Part("Commands", (Points(tuple(told)), drawn)),),
+        title=f"{Path(log.file).name}, its law asked again", verdict=verdict, sound=replay.identical,
+        parts=(Part("Commands", (Points(tuple(sentences)), drawn)),),
         numbers={
-            "identical": found.identical, "compared": found.rows.size, "differing": found.differing,
-            "largest": found.largest, "starts": found.starts, "passed_over": found.passed_over,
+            "identical": replay.identical, "compared": replay.rows.size, "differing": replay.differing,
+            "largest": replay.largest, "starts": replay.starts, "passed_over": replay.passed_over,
             "first": None if first is None else vars(first),
         },
     )  # fmt: skip
 
 
 @styled
-def draw_replay(log: RunLog, found: Replay) -> Figure:
+def draw_replay(log: RunLog, replay: Replay) -> Figure:
     """Commands over time [s], logged and replayed, and below them their difference."""
-    t, logged = log.columns["t"][found.rows], log.columns[log.header.command][found.rows]
+    t, logged = log.columns["t"][replay.rows], log.columns[log.header.command][replay.rows]
     drawing = figure(4.2)
     above, below = drawing.subplots(2, 1, sharex=True)
-    for values, colour, label in ((logged, GREY, "logged"), (found.commands, BLUE, "replayed")):
+    for values, colour, label in ((logged, GREY, "logged"), (replay.commands, BLUE, "replayed")):
         above.plot(*decimated(t, values, buckets=800), color=colour, linewidth=1.0, label=label)
-    below.plot(*decimated(t, found.commands - logged, buckets=800), color=VERMILLION, linewidth=1.0)
+    below.plot(*decimated(t, replay.commands - logged, buckets=800), color=VERMILLION, linewidth=1.0)
     above.set_ylabel(f"{log.header.command} [{log.header.command_unit}]", parse_math=False)
     below.set_ylabel("difference")
     below.set_xlabel("time [s]")

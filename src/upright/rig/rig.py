@@ -14,6 +14,7 @@ from upright.errors import BadInput, nearest
 from upright.physics import Plant, name_of
 from upright.physics.actuator import ACTUATOR
 from upright.records import Array
+from upright.renamed import former
 from upright.rig.drive import GAIN, MORE, driven, saturation
 from upright.rig.hardware import Entry, Hardware, counts_unit, driven_unit, meaning_of, place_of, turn_of
 from upright.rig.mounting import Mounting
@@ -45,6 +46,9 @@ class Rig(Shown):
         Of the command.
     hardware : Hardware
         Drive, encoders, servo and travel, each number with its source.
+    sources : mapping of str to str
+        Where the plant's numbers and ``"actuator.gain"`` come from: ``"known"``, ``"identified"``, ``"assumed"`` or
+        ``"guessed"``; a number that is not named was given.
     draws : tuple of (Plant, float)
         Plants and gains drawn from a fit's covariance; empty without one.
     scales : tuple of float
@@ -63,6 +67,7 @@ class Rig(Shown):
     gain: float = 1.0
     unit: str = ""
     hardware: Hardware = field(default_factory=Hardware)
+    sources: Mapping[str, str] = field(default_factory=dict[str, str])
     draws: tuple[tuple[Plant, float], ...] = ()
     scales: tuple[float, ...] = ()
     mounting: Mounting | None = None
@@ -161,6 +166,11 @@ class Rig(Shown):
             hardware = replace(hardware, entries=kept | said)
         return replace(self, hardware=hardware, **changes)
 
+    @property
+    def guessed(self) -> frozenset[str]:
+        """Numbers of the plant and the drive that somebody guessed, for an identification to start from."""
+        return frozenset(n for n, source in self.sources.items() if source == "guessed")
+
     def changed(self, **parameters: float) -> Rig:
         """The same rig with other parameters of its plant."""
         return replace(self, plant=self.plant.replace(**parameters))
@@ -252,9 +262,11 @@ class Rig(Shown):
         return saturation(self.drive)
 
     @property
-    def quantum(self) -> Array:
+    def resolution(self) -> Array:
         """Resolution of each encoder [m or rad], shape (coordinates,)."""
         return 1.0 / np.array(self.per_unit)
+
+    quantum = former("resolution")
 
     @property
     def shown(self) -> Array:

@@ -80,7 +80,7 @@ class Decay:
         return -2 * math.log(self.rho)
 
 
-def decay(t: Array, x: Array, *, quantum: float = 0.0) -> Decay:
+def decay(t: Array, x: Array, *, resolution: float = 0.0) -> Decay:
     """Frequencies and friction of one free swing.
 
     Parameters
@@ -89,7 +89,7 @@ def decay(t: Array, x: Array, *, quantum: float = 0.0) -> Decay:
         Time [s].
     x : (T,) array
         Position in any unit, offset and all, from where the last step of the force acted.
-    quantum : float
+    resolution : float
         Smallest step of the sensor.
 
     Raises
@@ -97,7 +97,7 @@ def decay(t: Array, x: Array, *, quantum: float = 0.0) -> Decay:
     NotIdentifiable
         When fewer than four extremes can be seen, or they are not those of one decaying swing.
     """
-    at = turning_points(x, max(4 * quantum, LOUDEST * float(np.ptp(x))))
+    at = turning_points(x, max(4 * resolution, LOUDEST * float(np.ptp(x))))
     if at.size < FEWEST:
         raise NotIdentifiable(
             f"A decrement needs at least {FEWEST} extremes, and this swing shows {at.size};"
@@ -105,13 +105,13 @@ def decay(t: Array, x: Array, *, quantum: float = 0.0) -> Decay:
         )
     half = float(np.median(np.diff(t[at])))
     rho, omega_d = 0.9, math.pi / half
-    found = [(float(t[i]), float(x[i]), 0.0, 0.0) for i in at]
+    extremes = [(float(t[i]), float(x[i]), 0.0, 0.0) for i in at]
     omega_d_error, covariance, numbers, maximum = 0.0, np.eye(4), np.zeros(4), _maxima(x, at)
     times = heights = np.zeros(0)
     for _ in range(4):  # shape and extremes improve each other; the shape is known to 1e-4 after two rounds
         sigma = -math.log(rho) * omega_d / math.pi
-        found = [_extreme(t, x, f[0], omega_d, sigma, quantum) for f in found]
-        times, heights, t_error, x_error = (np.array(column) for column in zip(*found, strict=True))
+        extremes = [_extreme(t, x, f[0], omega_d, sigma, resolution) for f in extremes]
+        times, heights, t_error, x_error = (np.array(column) for column in zip(*extremes, strict=True))
         omega_d, omega_d_error = _frequency(times, t_error)
         numbers, covariance = _heights(heights, x_error, maximum)
         rho = float(numbers[1])
@@ -151,7 +151,7 @@ def recursion(numbers: Array, maximum: NDArray[np.bool_]) -> Array:
 
 
 def _extreme(
-    t: Array, x: Array, at: float, omega_d: float, sigma: float, quantum: float
+    t: Array, x: Array, at: float, omega_d: float, sigma: float, resolution: float
 ) -> tuple[float, float, float, float]:
     """Time and height of an extreme and their errors: the exact shape, about a centre of its own on either side."""
     width = WINDOW * math.pi / omega_d
@@ -175,7 +175,7 @@ def _extreme(
         step = float(np.linalg.lstsq(J, y - J[:, :3] @ z[:3], rcond=None)[0][3])
         at += min(max(step, -width / 4), width / 4)
     left = y - J[:, :3] @ z[:3]
-    variance = max(float(left @ left) / (time.size - 4), quantum**2 / 12)
+    variance = max(float(left @ left) / (time.size - 4), resolution**2 / 12)
     covariance = np.linalg.pinv(J.T @ J) * variance
     return at, float(z[0]), math.sqrt(covariance[3, 3]), math.sqrt(covariance[0, 0])
 

@@ -131,10 +131,10 @@ ROUGH = 0.1
 """Noise of a smoothed acceleration as a share of its spread, at most; the smoothing is as narrow as this allows."""
 
 
-def acceleration_width(y: Array, dt: float, quantum: float) -> int:
+def acceleration_width(y: Array, dt: float, resolution: float) -> int:
     """Samples over which a cubic gives an acceleration that counts and noise do not drown; odd."""
     rough = float(np.median(np.abs(np.diff(y, 2)))) / (0.6745 * np.sqrt(6))
-    noise = max(quantum / np.sqrt(12), rough)
+    noise = max(resolution / np.sqrt(12), rough)
     width = 9
     while width < y.size // 8:
         a = savitzky_golay(y, dt, width, order=3).a
@@ -155,13 +155,13 @@ def noise_gain(width: int, *, order: int = 4) -> float:
     return 2 * float(np.linalg.norm(_polynomials(width, order)[0][2]))
 
 
-def smoothing_width(y: Array, dt: float, period: float, quantum: float) -> int:
+def smoothing_width(y: Array, dt: float, period: float, resolution: float) -> int:
     """Samples over which a polynomial of order 4 may be fitted: an eighth of a period, at least 15 steps of motion."""
     width = int(round(period / 8 / dt))
-    if quantum > 0:
+    if resolution > 0:
         speed = float(np.std(y)) * 2 * np.pi / period
         if speed > 0:
-            width = max(width, min(int(round(15 * quantum / (speed * dt))), 2 * width))
+            width = max(width, min(int(round(15 * resolution / (speed * dt))), 2 * width))
     return max(7, width)
 
 

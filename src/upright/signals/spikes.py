@@ -58,7 +58,7 @@ class Jumps:
         return without(out, self.spikes)
 
 
-def spikes(x: Array, quantum: float = 0.0) -> NDArray[np.int64]:
+def spikes(x: Array, resolution: float = 0.0) -> NDArray[np.int64]:
     """Places of single samples of a signal (N,) that jump away and back.
 
     They are compared with the upper percent of what a running median of five takes away, so that neither noise nor
@@ -67,7 +67,7 @@ def spikes(x: Array, quantum: float = 0.0) -> NDArray[np.int64]:
     calm = _running_median(x)
     off = np.abs(x - calm)
     usual = float(np.quantile(off, 0.99))
-    far = off > max(FAR * usual, LEAST * float(np.std(calm)), 4 * _step(x, quantum), 1e-300)
+    far = off > max(FAR * usual, LEAST * float(np.std(calm)), 4 * _step(x, resolution), 1e-300)
     keep: list[int] = []
     for first, last in stretches(far):
         here = np.arange(first, last + 1)
@@ -78,11 +78,11 @@ def spikes(x: Array, quantum: float = 0.0) -> NDArray[np.int64]:
     return np.array(keep, dtype=np.int64)
 
 
-def _step(x: Array, quantum: float) -> float:
+def _step(x: Array, resolution: float) -> float:
     """Step of a signal (N,); two values alone do not tell theirs: 1 between counts, else all that they differ by."""
     low, high = float(x.min()), float(x.max())
-    if quantum or not ((x == low) | (x == high)).all():
-        return quantum
+    if resolution or not ((x == low) | (x == high)).all():
+        return resolution
     return min(high - low, 1.0) if low.is_integer() and high.is_integer() else high - low
 
 
@@ -95,28 +95,29 @@ def _returns(x: Array, first: int, last: int) -> bool:
 
 def without(x: Array, at: NDArray[np.int64]) -> Array:
     """A signal (N,) with samples replaced by straight lines between their neighbours."""
+    if not at.size:
+        return x
+    good = np.ones(x.size, dtype=bool)
+    good[at] = False
+    beside = np.flatnonzero(good)
     out = x.copy()
-    if at.size:
-        kept = np.ones(x.size, dtype=bool)
-        kept[at] = False
-        beside = np.flatnonzero(kept)
-        out[at] = np.interp(at, beside, x[beside])
+    out[at] = np.interp(at, beside, x[beside])
     return out
 
 
-def jumps(t: Array, x: Array, quantum: float, moduli: Sequence[float] = ()) -> Jumps:
-    """Jumps of a column (N,) at instants `t` (N,), in steps of `quantum`; `moduli` are turns its counter may make.
+def jumps(t: Array, x: Array, resolution: float, moduli: Sequence[float] = ()) -> Jumps:
+    """Jumps of a column (N,) at instants `t` (N,), in steps of `resolution`; `moduli` are turns its counter may make.
 
     A change counts as a lasting jump when it differs from the changes around it by four times their own spread, by
-    more than noise and quantum allow, and by more than a few missed samples would explain.
+    more than noise and resolution allow, and by more than a few missed samples would explain.
     """
     nothing = np.zeros(0, np.int64)
     if x.size < 4 * REACH:
         return Jumps(wraps=nothing, modulus=0.0, steps=nothing, step_sizes=x[:0], spikes=nothing, spike_sizes=x[:0])
-    quantum = _step(x, quantum)
+    resolution = _step(x, resolution)
     ratio = np.diff(t)
     ratio /= float(np.median(ratio))
-    peaks = spikes(x, quantum)
+    peaks = spikes(x, resolution)
     peaks = peaks[np.pad(ratio, 1, constant_values=1.0)[peaks + np.array([[0], [1]])].max(axis=0) < 1.5]
     calm = without(x, peaks)
     heights = x[peaks] - calm[peaks]
@@ -126,7 +127,7 @@ def jumps(t: Array, x: Array, quantum: float, moduli: Sequence[float] = ()) -> J
     off -= usual
     spread *= np.maximum(ratio, 1.0)
     noise = 1.4826 * float(np.median(np.abs(off), overwrite_input=True))
-    far = np.abs(off) > 4 * spread + max(8 * noise, 6 * quantum, 2e-4 * float(np.ptp(calm)))
+    far = np.abs(off) > 4 * spread + max(8 * noise, 6 * resolution, 2e-4 * float(np.ptp(calm)))
     # a reading that came late is caught up at once: what jumps was missing just before, or is missing just after
     caught = np.abs(np.convolve(off, np.ones(2 * REACH + 1), "same")) < 0.35 * np.abs(off)
     steps = np.flatnonzero(far & ~caught)

@@ -34,7 +34,7 @@ def turning_points(x: Array, least: float, *, ends: bool = False) -> NDArray[np.
     The extremes before the first turn and after the last are left out, since nobody sees the motion turn there; with
     `ends` they are given too.
     """
-    found: list[int] = []
+    turns: list[int] = []
     low = high = 0
     direction = 0
     for i, value in enumerate(x.tolist()):
@@ -44,12 +44,12 @@ def turning_points(x: Array, least: float, *, ends: bool = False) -> NDArray[np.
             low = i
         if direction >= 0 and value <= x[high] - least:
             if direction > 0 or ends:
-                found.append(high)
+                turns.append(high)
             direction, low = -1, i
         elif direction <= 0 and value >= x[low] + least:
             if direction < 0 or ends:
-                found.append(low)
+                turns.append(low)
             direction, high = 1, i
     if ends and direction:
-        found.append(high if direction > 0 else low)
-    return np.array(found, dtype=np.int64)
+        turns.append(high if direction > 0 else low)
+    return np.array(turns, dtype=np.int64)

@@ -140,9 +140,9 @@ class TripRegression:
         """Share of the variance that base and `columns` (T, p) leave unexplained, and the slopes (p,) of the latter."""
         alone = self._aside(columns)
         size = np.linalg.norm(columns, axis=0)
-        seen = np.linalg.norm(alone, axis=0) > 1e-4 * size
+        acts = np.linalg.norm(alone, axis=0) > 1e-4 * size
         slopes = np.zeros(size.size)
-        slopes[seen] = np.linalg.lstsq(alone[:, seen] / size[seen], self.rest, rcond=1e-5)[0] / size[seen]
+        slopes[acts] = np.linalg.lstsq(alone[:, acts] / size[acts], self.rest, rcond=1e-5)[0] / size[acts]
         left = self.rest - alone @ slopes
         return float(left @ left) / self.variance, slopes
 
@@ -200,7 +200,7 @@ def find_trip(
     y: Array,
     others: Sequence[Array] = (),
     *,
-    quantum: float = 0.0,
+    resolution: float = 0.0,
     late: bool = False,
     terms: Terms = linear,
 ) -> Trip | None:
@@ -212,18 +212,18 @@ def find_trip(
         Uniform time [s], logged command, measured coordinate that it drives; a positive command pushes it up.
     others : sequence of (N,) arrays
         Coordinates that pull at it.
-    quantum : float
+    resolution : float
         Resolution of `y`.
     late : bool
         Ask for a late begin instead of an early end.
     terms : callable, optional
         What acts on `y`, from the motion of `y` and `others`.
     """
-    return trip_or_misfit(t, u, y, others, quantum=quantum, late=late, terms=terms)[0]
+    return trip_or_misfit(t, u, y, others, resolution=resolution, late=late, terms=terms)[0]
 
 
 def trip_or_misfit(
-    t: Array, u: Array, y: Array, others: Sequence[Array], *, quantum: float, late: bool, terms: Terms = linear
+    t: Array, u: Array, y: Array, others: Sequence[Array], *, resolution: float, late: bool, terms: Terms = linear
 ) -> tuple[Trip | None, float]:
     """What `find_trip` says, and what is left unexplained with the command as logged, infinite if nobody can say."""
     nobody = None, math.inf
@@ -231,7 +231,7 @@ def trip_or_misfit(
     if t.size < 100 or live.size < 10:
         return nobody
     dt = float(t[-1] - t[0]) / (t.size - 1)
-    width = acceleration_width(y, dt, quantum)
+    width = acceleration_width(y, dt, resolution)
     if t.size < LEAST * width:
         return nobody
     speed, table = _regression(u, [y, *others], dt, width, late=late, terms=terms)

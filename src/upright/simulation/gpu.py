@@ -82,9 +82,9 @@ def launch(
                 written.append((a, place))
             elif a.nbytes:
                 _do(driver, "cuMemcpyHtoD", place, a.ctypes.data, a.nbytes)
-        given = (ctypes.c_void_p * len(words))(*map(ctypes.addressof, words))
+        pointers = (ctypes.c_void_p * len(words))(*map(ctypes.addressof, words))
         blocks = -(-lanes // THREADS)
-        _do(driver, "cuLaunchKernel", function, blocks, 1, 1, THREADS, 1, 1, 0, 0, ctypes.addressof(given), 0)
+        _do(driver, "cuLaunchKernel", function, blocks, 1, 1, THREADS, 1, 1, 0, 0, ctypes.addressof(pointers), 0)
         _do(driver, "cuCtxSynchronize")
         for a, place in written:
             _do(driver, "cuMemcpyDtoH", a.ctypes.data, place, a.nbytes)
@@ -97,19 +97,19 @@ def _context(driver: Any) -> Any:
         _do(driver, "cuInit", 0)
         device = _do(driver, "cuDeviceGet", 0)
     except (BadInput, RuntimeError) as error:  # the latter where there is not even a driver
-        said = str(error).rstrip(".")
-        raise BadInput(f"device='gpu' needs a GPU of NVIDIA's and its driver, got: {said}; or {_STAY}.") from None
+        message = str(error).rstrip(".")
+        raise BadInput(f"device='gpu' needs a GPU of NVIDIA's and its driver, got: {message}; or {_STAY}.") from None
     return _do(driver, "cuDevicePrimaryCtxRetain", device)
 
 
-def _do(driver: Any, name: str, *given: Any) -> Any:
+def _do(driver: Any, name: str, *args: Any) -> Any:
     """A call of the driver, and what it gives."""
-    status, *out = getattr(driver, name)(*given)
+    status, *out = getattr(driver, name)(*args)
     if int(status):
-        said = getattr(status, "name", status)
-        if said == "CUDA_ERROR_OUT_OF_MEMORY":
+        code = getattr(status, "name", status)
+        if code == "CUDA_ERROR_OUT_OF_MEMORY":
             raise BadInput(f"the GPU has no room for so many motions; give it fewer lanes at a time, or {_STAY}.")
         raise BadInput(
-            f"the GPU's driver answers {said} to {name}; an A100 or newer and a current driver are needed, or {_STAY}."
+            f"the GPU's driver answers {code} to {name}; an A100 or newer and a current driver are needed, or {_STAY}."
         )
     return out[0] if out else None

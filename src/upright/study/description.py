@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
+from dataclasses import replace
 
 from upright.errors import BadInput
-from upright.identification import GreyBox
+from upright.identification import GreyBox, Parameter
 from upright.physics import Plant
 from upright.physics.actuator import ACTUATOR
+from upright.rig import Rig
+from upright.rig.drive import GAIN
 from upright.rig.hardware import (
     DRIVE_SIGN,
     SERVO,
@@ -87,3 +90,33 @@ def _offset(sensor: Sensor) -> float:
         return parse(sensor.offset, sensor.coordinate.unit) if isinstance(sensor.offset, str) else sensor.offset
     except BadInput:
         return parse(sensor.offset, sensor.unit)  # type: ignore[arg-type]
+
+
+def rig_with_guesses(model: GreyBox, name: str, hardware: Hardware) -> Rig:
+    """The rig of a study's model, its guesses counting as its numbers."""
+    kind, numbers = model.plant, model.parameters
+    plant = kind(**{n: numbers[n].value for n in kind.names()})
+    values = {n: p.value for n, p in numbers.items()}
+    sources = {n: _source(numbers[n]) for n in (*kind.names(), GAIN) if n in numbers}
+    per = numbers[GAIN].unit if GAIN in numbers else ""
+    return replace(rig_of_numbers(plant, name, values, per, hardware), sources=sources)
+
+
+def _source(p: Parameter) -> str:
+    return "guessed" if p.estimate else "assumed" if p.assumed else "known"
+
+
+def rig_of_numbers(plant: Plant, name: str, values: Mapping[str, float], per: str, hardware: Hardware) -> Rig:
+    """A rig whose commands are those of its log, which a study turns where its drive has a sign.
+
+    `per` is the unit of the drive's gain, ``N m/V``, which tells that of the command.
+    """
+    force = force_unit(type(plant))
+    unit = per.rpartition("/")[2].strip("()") if "/" in per and per != force else force
+    sign, as_commanded = hardware.as_commanded()
+    return Rig(plant=plant, name=name, gain=sign * values.get(GAIN, 1.0), unit=unit, hardware=as_commanded)
+
+
+def force_unit(kind: type[Plant]) -> str:
+    """Unit of the plant's input, "" without one."""
+    return kind.inputs[0].unit if kind.inputs else ""

@@ -26,12 +26,11 @@ from upright.records import Array, Record
 from upright.rig import Hardware, Rig
 from upright.study.clock import check_clock, with_time_unit
 from upright.study.coordinates import Sensors
-from upright.study.description import read_hardware
+from upright.study.description import read_hardware, rig_with_guesses
 from upright.study.keys import names
 from upright.study.loop import Scene, read_loop, state_units
 from upright.study.rig import known_values, read_plant, read_rig
 from upright.study.sensors import Grid, drive_unit, read_drives, read_sensors
-from upright.study.stored_rig import rig_with_guesses
 from upright.study.text import Section, StudyText, as_written, in_si
 
 PathLike = str | os.PathLike[str]
@@ -305,7 +304,7 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
         u=u,
         y=np.column_stack([readings[n] for n in measured]),
         measured=measured,
-        quantum=tuple(quanta[n] for n in measured),
+        resolution=tuple(quanta[n] for n in measured),
         held={**locked, **{n: readings[n] for n in held_names}},
         known=known_values(run.section("known"), plant),
         unknown=run.names("unknown", (*PER_RUN, *sensor_nuisances(plant)), ("initial",)),

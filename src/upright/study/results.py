@@ -20,8 +20,8 @@ from upright.identification.ladder.growth import Ladder, RungResult
 from upright.identification.ladder.rungs import neutral
 from upright.physics.actuator import ACTUATOR
 from upright.rig.hardware import Hardware
-from upright.study.fitted import FORMAT
 from upright.study.load import Study
+from upright.study.stored_fit import FORMAT
 from upright.study.text import StudyText
 
 
@@ -72,7 +72,10 @@ def fit_content(fit: Fit, study: Study, crossed: CrossValidation | None = None) 
         "runs": {
             label: {
                 **_fields(score, "role fit_percent horizon score_from naive black_box adapted offer inside beyond"),
-                "ahead": [{"horizon": h, "fit_percent": percents} for h, percents in score.ahead.items()],
+                "ahead": [
+                    {"horizon": h, "fit_percent": percents, "ceiling": score.ceiling.get(h, {})}
+                    for h, percents in score.ahead.items()
+                ],
             }
             for label, score in fit.runs.items()
         },

@@ -119,6 +119,15 @@ class Drive:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Wiring:
+    """Which column of a log is what, and which coordinates were locked meanwhile; all of it may be empty."""
+
+    sensors: Mapping[str, Sensor] = field(default_factory=dict[str, Sensor])
+    drive: Drive | None = None
+    locked: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
 class Grid:
     """Uniform time base of one run, and how a record is brought onto it."""
 

@@ -163,8 +163,8 @@ class StateSpace(Shown):
         pairs: Any = scipy.linalg.eigvals(left, right, homogeneous_eigvals=True)
         above, below = np.asarray(pairs, dtype=np.complex128)
         finite = np.abs(below) > 1e-10 * np.abs(above)
-        found = scale * above[finite] / below[finite]
-        return found[np.lexsort((found.imag, -found.real))]
+        finite_zeros = scale * above[finite] / below[finite]
+        return finite_zeros[np.lexsort((finite_zeros.imag, -finite_zeros.real))]
 
     def damping(self) -> tuple[Array, Array, Roots]:
         """Natural frequency [rad/s] and damping ratio of every pole, and the pole, as python-control's `damp`."""
@@ -223,8 +223,8 @@ class StateSpace(Shown):
         if self.dt is not None:
             return self._delayed(period, delay, lag)
         matrices = held(self.A, self.B, self.C, self.D, period, delay, lag, method == "foh")
-        given = tuple(f"{u} given" for u in self.inputs) if lag > 0 else ()
-        return self._with(matrices, given, delay, dt=period, lag=lag, continuous=self)
+        inputs = tuple(f"{u} given" for u in self.inputs) if lag > 0 else ()
+        return self._with(matrices, inputs, delay, dt=period, lag=lag, continuous=self)
 
     def _delayed(self, period: float, delay: float, lag: float) -> StateSpace:
         """A sampled model with commands some whole samples later."""
@@ -242,11 +242,11 @@ class StateSpace(Shown):
             raise BadInput("this sampled model has a delay or a lag already; sample the continuous one again.")
         return self._with(with_past_commands(self.A, {int(delay): self.B}, self.C, self.D, delay), (), delay)
 
-    def _with(self, matrices: Matrices, given: Sequence[str], delay: float, **fields: Any) -> StateSpace:
+    def _with(self, matrices: Matrices, inputs: Sequence[str], delay: float, **fields: Any) -> StateSpace:
         """The same signals and point about other matrices, with the states that drive and delay add."""
         ago = [f"{u} {k} ago" for k in range(1, math.ceil(delay - 1e-12) + 1) for u in self.inputs]
         A, B, C, D = matrices
-        return replace(self, A=A, B=B, C=C, D=D, delay=delay, states=(*self.states, *given, *ago), **fields)
+        return replace(self, A=A, B=B, C=C, D=D, delay=delay, states=(*self.states, *inputs, *ago), **fields)
 
     def to_control(self) -> Any:
         """The same model as a `control.StateSpace` with named signals.
@@ -310,10 +310,10 @@ _KINDS = ("state", "input", "output")
 
 def _labels(system: Any, kind: str, default: Sequence[str]) -> Sequence[str]:
     """Names as python-control or a plain object has them."""
-    found = getattr(system, f"{kind}_labels", None)
-    found = getattr(system, f"{kind}s", None) if found is None else found
-    fits = isinstance(found, list | tuple) and len(found) == len(default)  # type: ignore[reportUnknownArgumentType]
-    return tuple(found) if fits else default  # type: ignore[reportUnknownArgumentType]
+    labels = getattr(system, f"{kind}_labels", None)
+    labels = getattr(system, f"{kind}s", None) if labels is None else labels
+    fits = isinstance(labels, list | tuple) and len(labels) == len(default)  # type: ignore[reportUnknownArgumentType]
+    return tuple(labels) if fits else default  # type: ignore[reportUnknownArgumentType]
 
 
 def _chosen(key: Any, names: Sequence[str], kind: str) -> list[int]:

@@ -11,7 +11,7 @@ from upright.verbs.answer import Answer
 
 if TYPE_CHECKING:
     from upright.rig import Rig
-    from upright.study.fitted import FittedModel
+    from upright.study.stored_fit import StoredFit
 
 SAVED = "fit.json"
 """What a command calls a fit that is in memory, once it is saved."""
@@ -43,7 +43,7 @@ def rig_of(source: Any, verb: str, *, seed: int = 0, draws: int = 200) -> Rig:
     if isinstance(source, Rig):
         return source
     if isinstance(source, FitAnswer):
-        return stored_rig.rig_of_fit(fitted_of(source, verb), source.value.model.plant, seed=seed, draws=draws)
+        return source.fitted.rig(seed=seed, draws=draws)
     if isinstance(source, Study):
         return source.rig
     if isinstance(source, Plant):
@@ -51,7 +51,7 @@ def rig_of(source: Any, verb: str, *, seed: int = 0, draws: int = 200) -> Rig:
     return stored_rig.read_stored_rig(_file(source, verb), seed=seed, draws=draws)
 
 
-def fitted_of(source: Any, verb: str) -> FittedModel:
+def fitted_of(source: Any, verb: str) -> StoredFit:
     """The fitted model of a fit in memory, of a fit.json or of its folder.
 
     Raises
@@ -59,10 +59,10 @@ def fitted_of(source: Any, verb: str) -> FittedModel:
     BadInput
         When it is none of these.
     """
-    from upright.study.fitted import FittedModel, read_fit
+    from upright.study.stored_fit import StoredFit, read_fit
     from upright.verbs.model.fit import FitAnswer
 
-    if isinstance(source, FittedModel):
+    if isinstance(source, StoredFit):
         return source
     if isinstance(source, FitAnswer):
         return source.fitted

@@ -20,10 +20,12 @@ from upright.verbs.values import open_log, texts
 if TYPE_CHECKING:
     from upright.closed_loop import Recovery
     from upright.diagnosis import Diagnosis
-    from upright.diagnosis.case import KnownRig
+    from upright.physics import Plant
     from upright.readers import Inspection
     from upright.records import Record
     from upright.report.page import Step
+    from upright.rig import Rig
+    from upright.study.sensors import Wiring
     from upright.verbs.values import Log
 
 
@@ -210,47 +212,30 @@ def doctor(
     if page is not None and page.is_dir():
         raise BadInput(f"--html needs a file, and {page} is a folder; name one in it, such as {page / 'doctor.html'}")
     mended: tuple[Finding, ...] = ()
-    known = _known(rig, str(path or ""))
+    known, wiring = _known(rig, str(path or ""))
     if path is not None:
         from upright.diagnosis.clock import read_mended
 
         record, mended = read_mended(path, reader=reader)
     else:
         record, path = open_log(log)
-    diagnosis = examine(record, known, before=mended)
+    diagnosis = examine(record, known, wiring, before=mended)
     told = chapter(diagnosis, log=path, rig=rig if isinstance(rig, str) else called(rig), page=page is not None)
     told = replace(told, numbers=_plain_diagnosis(diagnosis, page))
     return Answer(diagnosis, told, [] if page is None else write_page(told, page, pdf))
 
 
-def _known(rig: Any, log: str) -> KnownRig | None:
-    """What is known of the rig: a name or a file, or an object with its numbers."""
-    from upright.diagnosis.case import KnownRig, read_known
-    from upright.identification import Parameter
+def _known(rig: Any, log: str) -> tuple[Rig | type[Plant] | None, Wiring | None]:
+    """The rig by a name or a file, which may say how it is wired, or as an object with its numbers."""
+    from upright.diagnosis.case import read_known
     from upright.physics import Plant
-    from upright.rig import Rig
-    from upright.verbs.handover import SAVED
-    from upright.verbs.model.fit import FitAnswer
+    from upright.verbs.handover import rig_of
 
     if isinstance(rig, str | os.PathLike):
-        return read_known(str(rig), log) if str(rig) else None
+        return read_known(str(rig), log) if str(rig) else (None, None)
     if isinstance(rig, type) and issubclass(rig, Plant):
-        return KnownRig(name=rig.__name__, plant=rig)
-    if isinstance(rig, Plant):
-        numbers = {n: Parameter(name=n, value=v) for n, v in rig.parameters().items()}
-        return KnownRig(name=type(rig).__name__, plant=type(rig), parameters=numbers)
-    if isinstance(rig, Rig):
-        numbers = {n: Parameter(name=n, value=v) for n, v in {**rig.plant.parameters(), **rig.drive}.items()}
-        return KnownRig(name=rig.name, plant=type(rig.plant), parameters=numbers)
-    if isinstance(rig, FitAnswer):
-        fit = rig.value
-        values = {n: p.value for n, p in fit.model.parameters.items()} | {n: e.value for n, e in fit.estimates.items()}
-        numbers = {n: Parameter(name=n, value=v) for n, v in values.items()}
-        return KnownRig(name=SAVED, plant=fit.model.plant, parameters=numbers)
-    raise BadInput(
-        "doctor takes a plant's name, a study (TOML), a fit.json, a rig or what up.identify answered as the rig, got "
-        f"{type(rig).__name__}."
-    )
+        return rig, None
+    return rig_of(rig, "doctor", draws=0), None
 
 
 def _file(log: Log) -> Path | None:

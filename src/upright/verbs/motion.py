@@ -98,7 +98,7 @@ def simulate(
     steps = _steps(plant, counts)
     loop = _loop(plant, law, point, dt, memory, limit, steps)
     if rig is not None and isinstance(loop, Law):  # late and rounded as the rig is, once
-        loop = replace(loop, delay=0.0, quantum=steps, command_quantum=rig.converter)
+        loop = replace(loop, delay=0.0, resolution=steps, command_resolution=rig.converter)
     given = _command(u, t, len(plant.inputs))
     x = motion(plant, drive, x0, given, dt, samples=samples, substeps=2, loop=loop)[:, :, 0]
     _check_bounded(t, x[:, : len(names)], names)
@@ -244,7 +244,7 @@ def _loop(
     if K.shape != wanted:
         raise BadInput(f"gains for {type(plant).__name__} need shape {wanted}, got {K.shape}.")
     target = np.array([point[c.name] for c in plant.coordinates])
-    return state_feedback(K, dt, memory=memory, target=target, limit=limit, quantum=steps)
+    return state_feedback(K, dt, memory=memory, target=target, limit=limit, resolution=steps)
 
 
 def _command(u: Any, t: Array, inputs: int) -> Array | None:

@@ -43,9 +43,9 @@ def summary(value: Any) -> Chapter:
 
 def text(value: Any) -> str:
     """What a prompt shows."""
-    told = summary(value)
-    headline = " ".join(filter(None, (f"{told.title}.", told.verdict, told.detail)))
-    return chapter_text(replace(told, title=headline, verdict="", detail=""))
+    page = summary(value)
+    headline = " ".join(filter(None, (f"{page.title}.", page.verdict, page.detail)))
+    return chapter_text(replace(page, title=headline, verdict="", detail=""))
 
 
 def html(value: Any) -> str:

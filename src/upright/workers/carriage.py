@@ -61,7 +61,7 @@ def _of_own_file(name: str, what: str, file: str, text: str) -> Any:
         sys.modules[name] = module
         linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
         exec(compile(text, file, "exec"), vars(module))
-    found: Any = module
+    value: Any = module
     for part in what.split("."):
-        found = getattr(found, part)
-    return found
+        value = getattr(value, part)
+    return value

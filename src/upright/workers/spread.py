@@ -20,6 +20,7 @@ from upright.errors import BadInput, WorkersLost
 from upright.progress import Progress, part, silent
 from upright.workers.carriage import carried, unpacked
 from upright.workers.labour import Cluster, Lent, Pool, Processes, do
+from upright.workers.linear_algebra import one_thread
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -40,7 +41,7 @@ class Workers:
     executor: Executor | None = None
 
     @classmethod
-    def of(cls, given: int | str | Executor | Workers) -> Workers:
+    def of(cls, workers: int | str | Executor | Workers) -> Workers:
         """Workers by their number, the address of a Dask scheduler, or as any executor of `concurrent.futures`.
 
         Raises
@@ -48,14 +49,14 @@ class Workers:
         BadInput
             When it is none of these.
         """
-        if isinstance(given, Workers):
-            return given
-        if isinstance(given, Executor) or callable(getattr(given, "submit", None)):
-            return cls(executor=cast("Executor", given))
+        if isinstance(workers, Workers):
+            return workers
+        if isinstance(workers, Executor) or callable(getattr(workers, "submit", None)):
+            return cls(executor=cast("Executor", workers))
         try:
-            return cls(number=index(given))  # type: ignore[arg-type]
+            return cls(number=index(workers))  # type: ignore[arg-type]
         except TypeError:
-            text = str(given).strip()
+            text = str(workers).strip()
         return cls(number=int(text)) if re.fullmatch(r"[+-]?\d+", text) else cls(cluster=text)
 
     def __post_init__(self) -> None:
@@ -147,12 +148,10 @@ def _pool(workers: Workers, items: int) -> Pool:
 
 
 def _here(task: Callable[[T, Progress], R], items: Sequence[T], progress: Progress, what: str) -> Finished[R]:
-    from threadpoolctl import threadpool_limits
-
     results: dict[int, R] = {}
     interrupted = False
     try:
-        with threadpool_limits(1, user_api="blas"):
+        with one_thread():
             for i, item in enumerate(items):
                 progress(f"{what} {i} of {len(items)}", i / len(items))
                 tell = part(progress, i / len(items), (i + 1) / len(items), f"{what} {i + 1} of {len(items)}")
@@ -172,8 +171,8 @@ def _there(
     order = carried(task)
     interrupted = False
 
-    def collect(done: Any) -> None:
-        for future in done:
+    def collect(ended: Any) -> None:
+        for future in ended:
             results[running[future]] = unpacked(future.result())
             del running[future]
 

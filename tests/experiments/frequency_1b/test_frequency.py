@@ -299,7 +299,7 @@ def test_amplitudes_are_scheduled(furuta):
     assert np.abs(data.drive).max() <= SHARE * furuta.rig.limit
     assert np.abs(furuta.sweep.log["u"]).max() <= furuta.rig.limit
     assert np.all(moved.max(axis=0) < 1.3 * np.array(furuta.make.reach))
-    assert (np.abs(used.response * used.drive[:, None]) / furuta.rig.quantum).min() > 50
+    assert (np.abs(used.response * used.drive[:, None]) / furuta.rig.resolution).min() > 50
     assert len(used) >= 24
     assert all("sticks" in s for s in furuta.answer.left_out)
 

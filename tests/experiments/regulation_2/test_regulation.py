@@ -123,7 +123,7 @@ def test_the_log_of_a_run_is_what_the_encoders_show(tmp_path):
     run = done.attempts[0].after
     counts = log["theta"] * truth.per_unit[1]
     np.testing.assert_allclose(counts, np.round(counts), atol=1e-6)
-    assert np.abs(log["theta"] - run.x[:, 2]).max() <= truth.quantum[1] / 2 * (1 + 1e-9)
+    assert np.abs(log["theta"] - run.x[:, 2]).max() <= truth.resolution[1] / 2 * (1 + 1e-9)
 
 
 def test_without_a_rig_nothing_is_run(tmp_path):
@@ -202,8 +202,8 @@ def test_a_cart_whose_friction_is_larger_close_to_rest_hunts():
     law = gains.feedback(gains.filtered(sampled, 0.5), K)
     sticks = {"b_1s": rig.plant.b_1c * np.array([1.0, 1.5]), "v_1s": [0.05, 0.05]}
     found = outcomes(rig, law, at="inverted", starts=[[0, 0, 0.05, 0]] * 2, seconds=6.0, parameters=sticks)
-    assert found.final[0, 0] <= rig.quantum[0]
-    assert found.final[0, 1] > 10 * rig.quantum[0]
+    assert found.final[0, 0] <= rig.resolution[0]
+    assert found.final[0, 1] > 10 * rig.resolution[0]
 
 
 @pytest.mark.parametrize(

@@ -84,7 +84,7 @@ def test_a_signal_comes_alike_and_leaves_a_file(stands, tmp_path):
         assert again.units[APPLIED] == rig.unit
         for name in stand.names:
             np.testing.assert_array_equal(again[name], log[name])
-    for name, count in zip(stands[0].names, rig.quantum, strict=True):
+    for name, count in zip(stands[0].names, rig.resolution, strict=True):
         np.testing.assert_allclose(driven[name][-300:], simulated[name][-300:], atol=1.01 * count)
 
 

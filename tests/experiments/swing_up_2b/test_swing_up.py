@@ -42,7 +42,9 @@ def test_it_stands_and_says_so(done, tmp_path):
 
 def test_the_logs_are_those_of_a_program_at_the_rig(done):
     log = Record.from_csv(done.folder / "swing_up.csv")
-    assert np.allclose(log["theta"], np.round(log["theta"] / done.truth.quantum[1]) * done.truth.quantum[1], atol=1e-9)
+    assert np.allclose(
+        log["theta"], np.round(log["theta"] / done.truth.resolution[1]) * done.truth.resolution[1], atol=1e-9
+    )
     assert np.abs(log["u"]).max() == pytest.approx(done.ascent.peak)
     assert abs(log["theta"][0]) < 1e-9
     assert math.cos(log["theta"][-1]) < -0.99
@@ -71,7 +73,7 @@ def test_no_loop_is_closed_on_a_lying_encoder(tmp_path):
 
 def test_a_log_of_one_s_own_is_checked_in_any_unit(done):
     model, log = done.model, Record.from_csv(done.folder / "sensors.csv")
-    counts = {"psi": np.round(log["psi"] / model.quantum[0]), "theta": np.degrees(log["theta"]) * 2, "u": log["u"]}
+    counts = {"psi": np.round(log["psi"] / model.resolution[0]), "theta": np.degrees(log["theta"]) * 2, "u": log["u"]}
     found = scales_of_log(model, log.replace(signals=counts, units={"psi": "counts", "theta": "deg", "u": "V"}))
     assert found.value == pytest.approx([1.0, 2.0], rel=0.01)
     assert found.wrong == ("theta",)

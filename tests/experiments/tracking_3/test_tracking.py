@@ -34,7 +34,7 @@ def test_the_far_body_ends_at_the_reference_without_friction():
             step = 0.5 * rig.limit / law.k_pf
             done = trial(rig, law.law, at=AT, start=np.zeros(4), seconds=2.0, reference=np.full(1, step))
             # a count of each encoder by its gain, a step of the converter
-            blur = np.abs(law.K[::2]) @ rig.quantum / law.k_pf + rig.converter / law.k_pf
+            blur = np.abs(law.K[::2]) @ rig.resolution / law.k_pf + rig.converter / law.k_pf
             assert done.x[-1, 2] == pytest.approx(step, abs=blur)
             assert np.abs(done.u).max() == pytest.approx(law.k_pf * step, abs=rig.converter)
 
@@ -130,7 +130,7 @@ def test_a_sum_makes_up_for_a_push_and_follows_the_step_as_before(kind):
     ]
     assert ends[0] - step == pytest.approx(0.1 * rig.limit / base.k_pf, rel=0.05)  # the loop's static force
     # what is left of the sum's slow pole, and two counts
-    assert ends[1] == pytest.approx(step, abs=abs(ends[0] - step) * 3 * math.exp(3 * EXTRA) + 2 * rig.quantum[1])
+    assert ends[1] == pytest.approx(step, abs=abs(ends[0] - step) * 3 * math.exp(3 * EXTRA) + 2 * rig.resolution[1])
 
 
 @pytest.mark.parametrize("summed", [False, True])
@@ -140,7 +140,7 @@ def test_a_law_begins_where_the_rig_rests_without_a_jump(kind, summed):
     rig = make_rig(kind, 2)
     law = paper_sets(rig, (4,))[0]
     law = with_sum(rig, law, "") if summed else law
-    q = np.array([3.0, -2.0]) * rig.quantum
+    q = np.array([3.0, -2.0]) * rig.resolution
     u, _ = law.law.follow(np.tile(q, (4, 1)))
     assert u[0] == pytest.approx(-law.K[::2] @ q, rel=1e-9)
     growth = -law.law.C[0, -1] * rig.period * q[1] if summed else 0.0
@@ -204,7 +204,7 @@ def test_pulses_stay_within_travel_and_twist():
         for seed in range(12):
             rig = make_rig(kind, seed)
             for file in ("pulses.csv", "others.csv"):
-                q = pulses(rig, file).y * rig.quantum
+                q = pulses(rig, file).y * rig.resolution
                 assert np.abs(q).max() < rig.travel
                 assert np.abs(q[:, 0] - q[:, 1]).max() < MAKES[kind].twist
 
@@ -225,7 +225,9 @@ def test_four_sets_follow_and_the_fourth_comes_close_to_the_limit(kind, tmp_path
         assert o.within
         assert o.measured.effort.peak == pytest.approx(o.law.k_pf * done.step.size, abs=done.rig.converter)
         assert o.measured.figures.settling_5 < 4.0 / o.law.decay
-        assert abs(o.measured.figures.error) < 1.4 * o.law.play + 2 * done.rig.quantum[1]  # friction of the day: 13 %
+        assert (
+            abs(o.measured.figures.error) < 1.4 * o.law.play + 2 * done.rig.resolution[1]
+        )  # friction of the day: 13 %
     assert done.far.measured.tripped < 1.0
     assert done.stiff.measured.figures.settling_5 > 2 * done.sets[-1].measured.figures.settling_5
     assert done.pd.measured.give > 4 * done.sets[-1].measured.give

@@ -86,7 +86,7 @@ def test_a_part_is_called_by_its_times_and_keeps_a_first_state_of_its_own_alone(
 def test_a_sample_that_jumps_away_and_back_is_replaced_and_told_with_its_time() -> None:
     smooth = np.cos(0.05 * np.arange(N))
     y = np.column_stack([smooth, smooth])
-    run = replace(RUN, y=y, measured=("x", "z"), quantum=(1e-3, 1e-3))
+    run = replace(RUN, y=y, measured=("x", "z"), resolution=(1e-3, 1e-3))
     assert without_spikes(run) == (run, [])
     jumped = y.copy()
     jumped[[50, 200], [1, 0]] += 3.0

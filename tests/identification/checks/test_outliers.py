@@ -238,7 +238,7 @@ def missed(where, by=0.5, constant=True, moved=0.5, **more):
     far[list(where), 0] = by
     run = replace(swing(angle=0.5, label="a"), measured=("theta",))
     return Stretches(run=run, start=times, stop=times + 1, missed=far, moved=np.broadcast_to(moved, (N, 1)),
-                     constant=np.broadcast_to(constant, N), quantum=np.array([1e-4]), **more)  # fmt: skip
+                     constant=np.broadcast_to(constant, N), resolution=np.array([1e-4]), **more)  # fmt: skip
 
 
 def told_of(stretches, spread=0.4):

@@ -95,7 +95,7 @@ def test_the_variance_of_a_response_is_that_of_its_line_over_the_command() -> No
     # 16 parts tell a variance to a third, and the larger of two estimates counts
     ratio = found.variance[:, 0] * AMPLITUDES**2 / (4 * 0.01 / 1600)
     assert np.all((ratio > 0.6) & (ratio < 3.0))
-    rounded = told(stepped(), quantum=[0.2])
+    rounded = told(stepped(), resolution=[0.2])
     per_period = 2 * math.pi / FREQUENCIES / DT
     assert rounded.variance[:, 0] * AMPLITUDES**2 == pytest.approx(4 * 0.04 / 12 / per_period, rel=0.01)
     heard = told(stepped(overtone=0.02))
@@ -168,7 +168,7 @@ def test_the_variance_of_a_periodic_response_is_that_of_repeats() -> None:
     assert np.all(np.abs(found.response[:, 0] - answer) < 4 * np.sqrt(found.variance[:, 0]))
     power = (np.abs(answer) * np.array([1.0, 2.0, 0.5, 1.0])) ** 2
     assert 1 - found.coherence[:, 0] == pytest.approx(4 * 0.02**2 / LENGTH / power, rel=0.5)
-    rounded = told(periodic()[0], quantum=[0.3])
+    rounded = told(periodic()[0], resolution=[0.3])
     assert rounded.variance[:, 0] == pytest.approx(4 * 0.09 / 12 / LENGTH / np.array([1.0, 4.0, 0.25, 1.0]))
 
 
@@ -212,7 +212,7 @@ def test_repeats_of_a_sweep_are_averaged() -> None:
 
 def test_rounding_bounds_the_variance_of_a_sweep() -> None:
     logs = [swept(0, 0.0) for _ in range(4)]
-    found = told(*logs, quantum=[0.1])
+    found = told(*logs, resolution=[0.1])
     assert found.variance[:, 0] == pytest.approx(0.01 / 3 / 2000 / np.abs(found.drive) ** 2, rel=1e-3)
 
 

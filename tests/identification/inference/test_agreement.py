@@ -30,7 +30,7 @@ def test_intervals_that_share_a_value_agree_and_wide_ones_are_counted_apart() ->
 def test_halves_share_no_sample_and_leave_the_rest_out() -> None:
     run = swing(seconds=10.0)
     rested = np.concatenate([run.y, np.zeros((1000, 1))])
-    run = replace(run, t=np.arange(len(rested)) * 0.01, u=np.zeros((len(rested), 1)), y=rested, quantum=(1e-3,))
+    run = replace(run, t=np.arange(len(rested)) * 0.01, u=np.zeros((len(rested), 1)), y=rested, resolution=(1e-3,))
     first, second = (cut(run, half) for half in (0, 1))
     assert np.concatenate([first.y, second.y]) == pytest.approx(rested[: first.t.size + second.t.size])
     assert first.t.size + second.t.size <= 1001
@@ -39,4 +39,4 @@ def test_halves_share_no_sample_and_leave_the_rest_out() -> None:
 
 def test_a_half_that_hardly_moves_is_refused() -> None:
     with pytest.raises(BadInput, match="second half moves"):
-        cut(replace(swing(seconds=10.0), y=np.exp(-np.arange(1001) / 200)[:, None], quantum=(2e-3,)), 1)
+        cut(replace(swing(seconds=10.0), y=np.exp(-np.arange(1001) / 200)[:, None], resolution=(2e-3,)), 1)

@@ -29,7 +29,7 @@ def steps(gain: float = GAIN, added: float = 0.0, label: str = "step") -> Run:
     x = simulate(plant, {"actuator.gain": values["actuator.gain"]}, [0.0, 0.0], u, DT, samples=t.size)
     y = QUANTUM * np.round(x[:, [0], 0] / QUANTUM)
     return Run(
-        label=label, role="fit", t=t, u=u, y=y, measured=(DISK.coordinates[0].name,), quantum=(QUANTUM,),
+        label=label, role="fit", t=t, u=u, y=y, measured=(DISK.coordinates[0].name,), resolution=(QUANTUM,),
         known={"a_1": added}, unknown=(), initial=dict.fromkeys(DISK.state_names(), 0.0),
     )  # fmt: skip
 

@@ -175,15 +175,15 @@ def test_the_errors_of_restarted_runs_grow_with_their_age() -> None:
     assert spread.start == pytest.approx(np.sqrt(max(start, least)), rel=1e-6)
 
 
-@pytest.mark.parametrize(("quantum", "least"), [(0.0, 1e-3), (0.3, 0.3 / 12**0.5)])
-def test_nothing_is_promised_finer_than_a_count_or_a_line(quantum: float, least: float) -> None:
+@pytest.mark.parametrize(("resolution", "least"), [(0.0, 1e-3), (0.3, 0.3 / 12**0.5)])
+def test_nothing_is_promised_finer_than_a_count_or_a_line(resolution: float, least: float) -> None:
     """Of a run that is met exactly: rounding's deviation, or a thousandth of how much the signal varies."""
-    run = rolled(0, quantum=(quantum,))
+    run = rolled(0, resolution=(resolution,))
     y = (0.1 + 0.2 * run.t + GAIN / MASS * twice_integrated(command(0)))[:, None]
     problem = formulate(cart(), [replace(run, y=y)])
     bands = calibrated(assess(problem, problem.place({"run 0: initial.x_1": 0.1, "run 0: initial.x_1_dot": 0.2})))
     assert bands is not None
-    expected = least if quantum else least * float(np.std(y))
+    expected = least if resolution else least * float(np.std(y))
     assert bands.spreads["x_1"][0].end == pytest.approx(expected, rel=1e-3)
 
 

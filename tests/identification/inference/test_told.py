@@ -288,7 +288,7 @@ def test_numbers_per_assumed_gain_are_in_counts_where_all_encoders_have_one(
     quanta: tuple[float, ...], per: float
 ) -> None:
     """m/g in V s^2/m; in counts of q m each it is q times that."""
-    runs = [driven(quantum=(q,), label=f"{q}") for q in quanta]
+    runs = [driven(resolution=(q,), label=f"{q}") for q in quanta]
     best = fitted(cart("m_1", "k_1", "c_1", assumed="actuator.gain"), *runs)
     given = {n: Estimate(value=v, stderr=0.1 * v, interval=(0.7 * v, 1.4 * v), unit=UNITS[n]) for n, v in TRUTH.items()}
     (a,) = assumptions(best, given)

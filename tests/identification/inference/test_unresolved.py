@@ -17,7 +17,7 @@ STEP = 2 * np.pi / 2000
 
 
 def _counted(angle: float, seed: int, **more: float) -> Run:
-    run = swing({**TRUTH, **more}, angle=angle, seconds=8.0, label=f"{angle} rad", quantum=(STEP,))
+    run = swing({**TRUTH, **more}, angle=angle, seconds=8.0, label=f"{angle} rad", resolution=(STEP,))
     dither = np.random.default_rng(seed).uniform(-0.5, 0.5, run.y.shape)
     return replace(run, y=np.round(run.y / STEP + dither) * STEP)
 

@@ -27,14 +27,14 @@ def scored(missed: np.ndarray, *, score_from: float = 0.0, **percent: float) -> 
                  t=5.0 + np.arange(N) * DT, simulated=y - missed, measured=names, score_from=score_from)  # fmt: skip
 
 
-def gain(poorer: np.ndarray, richer: np.ndarray, quantum: float = 0.0, runs: int = 3, **more: float) -> Comparison:
-    return compare(*([scored(m, **more)] * runs for m in (poorer, richer)), [np.full(2, quantum)] * runs)
+def gain(poorer: np.ndarray, richer: np.ndarray, resolution: float = 0.0, runs: int = 3, **more: float) -> Comparison:
+    return compare(*([scored(m, **more)] * runs for m in (poorer, richer)), [np.full(2, resolution)] * runs)
 
 
 @pytest.mark.parametrize("runs", [1, 2, 3])
 def test_no_error_counts_as_less_than_rounding_leaves(runs: int) -> None:
     """In steps of the root of 12 rounding has variance 1: an error of 1 besides makes it 2, none leaves 1."""
-    found = gain(SQUARE, np.zeros(N), quantum=math.sqrt(12), runs=runs)
+    found = gain(SQUARE, np.zeros(N), resolution=math.sqrt(12), runs=runs)
     assert found.gain == pytest.approx(0.5 * math.log(2))
     assert (found.pairs, found.between) == ((3, "runs") if runs == 3 else (12 * runs, "stretches"))
 

@@ -73,14 +73,14 @@ def test_friction_that_shows_once_the_drive_is_off_is_not_left_out():
     # friction that the first two thirds ask for would be refused
     truth = {"J_1": 2.4e-3, "J_2": 1.9e-3, "k_12": 1.1, "c_1": 5e-4, "c_2": 3e-4, "c_12": 4e-4}
     truth |= {"f_1c": 8e-3, "f_2c": 2e-3}
-    plant, dt, quantum = find("torsional-2"), 1e-3, 2 * np.pi / 16000
+    plant, dt, resolution = find("torsional-2"), 1e-3, 2 * np.pi / 16000
     t = np.arange(5001) * dt
     u = np.where((t > 0.3) & (t < 3.3), 0.06, 0.0)[:, None]
     given = u * np.where(t < 1.0, 1.15, 1.035)[:, None]
     x = simulate(plant(**truth), {}, [0.0] * 4, given, dt, samples=t.size, substeps=2)
     run = Run(
-        label="spin-up", role="fit", t=t, u=u, y=quantum * np.round(x[:, ::2, 0] / quantum), unknown=(),
-        measured=("theta_1", "theta_2"), quantum=(quantum,) * 2, initial=dict.fromkeys(plant.state_names(), 0.0),
+        label="spin-up", role="fit", t=t, u=u, y=resolution * np.round(x[:, ::2, 0] / resolution), unknown=(),
+        measured=("theta_1", "theta_2"), resolution=(resolution,) * 2, initial=dict.fromkeys(plant.state_names(), 0.0),
     )  # fmt: skip
     guesses = {n: 1.3 * truth[n] for n in ("J_1", "J_2", "k_12", "c_1", "c_12", "f_1c", "f_2c")}
     fit = identify(rig(plant, truth, guesses), [run])

@@ -127,8 +127,8 @@ def test_a_fit_file_keeps_what_groups_share(two_days, tmp_path):
     from types import SimpleNamespace
 
     from upright.rig.hardware import Hardware
-    from upright.study.fitted import read_fit
     from upright.study.results import write_fit
+    from upright.study.stored_fit import read_fit
 
     fit, runs = two_days
     study = SimpleNamespace(

@@ -90,7 +90,7 @@ def test_a_run_knows_its_period_its_horizons_and_what_moved() -> None:
     assert not replace(plain, horizon=0.5).filtered
     assert not replace(plain, restart="kalman").filtered
     assert replace(plain, held={"a": 0.0}).free == [1]
-    assert replace(plain, quantum=(0.1, 0.2)).quanta == (0.1, 0.2)
+    assert replace(plain, resolution=(0.1, 0.2)).quanta == (0.1, 0.2)
 
 
 def test_an_estimate_is_qualified_by_what_it_rests_on() -> None:

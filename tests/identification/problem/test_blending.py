@@ -22,7 +22,7 @@ def spin_up() -> Run:
     u = np.where((t > 0.5) & (t < 3.0), 0.06, 0.0)[:, None]
     x = simulate(PLANT(**TRUTH), {}, [0.0] * 4, u, DT, samples=t.size, substeps=2)
     y = QUANTUM * np.round(x[:, ::2, 0] / QUANTUM)
-    return Run(label="spin-up", role="fit", t=t, u=u, y=y, measured=("theta_1", "theta_2"), quantum=(QUANTUM,) * 2,
+    return Run(label="spin-up", role="fit", t=t, u=u, y=y, measured=("theta_1", "theta_2"), resolution=(QUANTUM,) * 2,
                unknown=(), initial=dict.fromkeys(PLANT.state_names(), 0.0))  # fmt: skip
 
 

@@ -29,7 +29,7 @@ def test_a_hand_that_gives_way_quickly_hides_neither_stiffness_nor_damping():
     ring = np.exp(-4 * (t - 0.5)) * np.sin(2 * np.pi * 4.0 * (t - 0.5))
     creep = COUNT * (8 * t + 60 * np.where(t < 0.5, 0.0, ring))
     run = Run(
-        label="held", role="fit", t=t, u=u, y=step(creep, t, u), measured=("theta_1",), quantum=(COUNT,),
+        label="held", role="fit", t=t, u=u, y=step(creep, t, u), measured=("theta_1",), resolution=(COUNT,),
         held={"theta_2": np.round(creep / COUNT) * COUNT},
     )  # fmt: skip
     parameters = {n: Parameter(name=n, value=v) for n, v in DISKS.items()}
@@ -49,7 +49,7 @@ def test_a_disk_that_does_not_move_may_be_given_as_measured(level):
     u = np.where(t < 0.2, 0.0, 0.2)[:, None]
     run = Run(
         label="still", role="fit", t=t, u=u, y=step(np.full(t.size, level), t, u), measured=("theta_1",),
-        quantum=(COUNT,), held={"theta_2": np.full(t.size, level)},
+        resolution=(COUNT,), held={"theta_2": np.full(t.size, level)},
     )  # fmt: skip
     parameters = {n: Parameter(name=n, value=v) for n, v in DISKS.items()}
     parameters["k_12"] = Parameter(name="k_12", value=0.35, estimate=True)

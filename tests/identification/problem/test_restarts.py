@@ -17,7 +17,7 @@ def counted(run: Run, per_rev: int) -> Run:
     from dataclasses import replace
 
     step = 2 * np.pi / per_rev
-    return replace(run, y=np.round(run.y / step) * step, quantum=(step,) * run.y.shape[1])
+    return replace(run, y=np.round(run.y / step) * step, resolution=(step,) * run.y.shape[1])
 
 
 def test_a_fall_from_near_upright_keeps_its_dry_friction() -> None:

@@ -29,7 +29,7 @@ def spin_up(*, seconds: float = 6.0, dt: float = 2e-3, volts: float = 0.5, **fie
     t = np.arange(n) * dt
     u = np.where((t >= 1.0) & (t < 4.0), volts, 0.0)[:, None]
     y = simulate(Torsional2(**DISKS), drive, [0.0] * 4, u, dt, samples=n)[:, [0, 2], 0]
-    run = {"label": "spin-up", "role": "fit", "measured": ("theta_1", "theta_2"), "quantum": (COUNT, COUNT)} | fields
+    run = {"label": "spin-up", "role": "fit", "measured": ("theta_1", "theta_2"), "resolution": (COUNT, COUNT)} | fields
     return Run(t=t, u=u, y=np.round(y / COUNT) * COUNT, **run)
 
 
@@ -77,7 +77,7 @@ def test_an_arm_whose_pendulum_swings_far_trips_where_it_does_and_nowhere_else(e
     u = np.where((t >= 0.5) & (t < 4.5), 2.0 * np.sin(5 * t + 1), 0.0)[:, None]
     y = simulate(Furuta(**arm), drive, [0.0, 0.0, 1.5, 0.0], u, dt, samples=n)[:, [0, 2], 0]
     run = Run(label="arm", role="fit", t=t, u=u, y=np.round(y / COUNT) * COUNT, measured=("psi", "theta"),
-              quantum=(COUNT, COUNT))  # fmt: skip
+              resolution=(COUNT, COUNT))  # fmt: skip
     known = {n: Parameter(name=n, value=v) for n, v in (dict.fromkeys(Furuta.names(), 0.0) | arm | {"g": 9.81}).items()}
     found = find_trips(GreyBox(plant=Furuta, parameters=known), run)
     assert [trip.late for trip in found] == [False] * bool(end)
@@ -101,8 +101,8 @@ def test_neither_a_sine_nor_a_held_disk_is_a_trip():
         locked = {"theta_2": Held()} if held else None
         y = simulate(Torsional2(**DISKS), DRIVE, [0.0] * 4, u[:, None], dt, samples=n, held=locked)[:, 0, 0]
         y = np.round(y / COUNT) * COUNT
-        assert find_trip(t, u, y, quantum=COUNT) is None
-        assert find_trip(t, u, y, quantum=COUNT, late=True) is None
+        assert find_trip(t, u, y, resolution=COUNT) is None
+        assert find_trip(t, u, y, resolution=COUNT, late=True) is None
 
 
 def test_a_sine_that_trips_is_seen():
@@ -112,7 +112,7 @@ def test_a_sine_that_trips_is_seen():
     p = DRIVE | {"actuator.end": end}
     y = simulate(Torsional2(**DISKS), p, [0.0] * 4, u[:, None], dt, samples=n)[:, [0, 2], 0]
     y = np.round(y / COUNT) * COUNT
-    trip = find_trip(t, u, y[:, 0], [y[:, 1]], quantum=COUNT)
+    trip = find_trip(t, u, y[:, 0], [y[:, 1]], resolution=COUNT)
     assert trip is not None
     assert trip.at == pytest.approx(end, abs=0.02)
 
@@ -192,7 +192,7 @@ def test_silent_trips_of_a_real_drive_are_found(name, end):
     record = read(Path(os.environ["UPRIGHT_REAL_DATA"]) / "ecp205_torsional_ucsd" / f"{name}.mat")
     t = np.linspace(record.t[0], record.t[-1], record.t.size)
     u, y, other = (np.asarray(record[c], dtype=float) for c in ("target_value", "cart1pos", "cart2pos"))
-    trip = find_trip(t, u, -y, [other], quantum=1.0)
+    trip = find_trip(t, u, -y, [other], resolution=1.0)
     if end is None:
         assert trip is None
     else:

@@ -229,16 +229,16 @@ def test_runs_of_one_group_share_one_number_that_a_prediction_is_given() -> None
     assert [(u.value, u.lower, u.upper) for u in given.unknowns] == [(1.3, 1.3, 1.3)]
 
 
-@pytest.mark.parametrize(("quantum", "lower"), [((0.01,), 0.01 / math.sqrt(12)), ((), 0.0)])
+@pytest.mark.parametrize(("resolution", "lower"), [((0.01,), 0.01 / math.sqrt(12)), ((), 0.0)])
 def test_a_presliding_length_is_no_shorter_than_the_rounding_that_sees_it(
-    quantum: tuple[float, ...], lower: float
+    resolution: tuple[float, ...], lower: float
 ) -> None:
     numbers = {n: Parameter(name=n, value=v) for n, v in VALUES.items()}
     numbers["delta_1"] = Parameter(name="delta_1", value=1e-4, unit="m", estimate=True, lower=0.0)
-    problem = formulate(GreyBox(plant=CART, parameters=numbers), [swung(quantum=quantum, unknown=())])
+    problem = formulate(GreyBox(plant=CART, parameters=numbers), [swung(resolution=resolution, unknown=())])
     (u,) = problem.unknowns
     assert (u.lower, u.value) == (pytest.approx(lower, abs=1e-8), pytest.approx(max(lower, 1e-4)))
-    if quantum:
+    if resolution:
         assert unresolved(problem, problem.start) == ("delta_1",)
         assert unresolved(problem, problem.place({"delta_1": 1.001 * lower})) == ()
 
@@ -282,7 +282,7 @@ CRANE = {"m_c": 0.4, "m_p": 0.3, "l_cg": 0.3, "J_p": 5e-3, "b_2": 5e-3}
 
 def test_a_filter_plans_its_horizons_its_warming_up_and_what_it_begins_with() -> None:
     asked = rig(CartPendulum, CRANE, {})
-    track = prepare(asked, filtered(quantum=(0.0, 0.012), score_from=3.0), thin=True)
+    track = prepare(asked, filtered(resolution=(0.0, 0.012), score_from=3.0), thin=True)
     plan = track.ahead
     assert plan is not None
     assert (plan.samples, plan.warm) == ((10, 50), 200)

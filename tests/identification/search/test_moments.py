@@ -20,9 +20,9 @@ def test_the_end_of_a_push_is_found_from_one_swing_too_early():
     u = np.where((t > 0.2) & (t < 5.0), 0.5, 0.0)[:, None]
     end = 0.9
     x = simulate(PLANT(**TRUTH), {"actuator.end": end}, [0.0] * 4, u, 2e-3, samples=t.size)
-    quantum = 2 * math.pi / 16000
-    y = quantum * np.round(x[:, ::2, 0] / quantum)
-    run = Run(label="trip", role="fit", t=t, u=u, y=y, measured=("theta_1", "theta_2"), quantum=(quantum,) * 2,
+    resolution = 2 * math.pi / 16000
+    y = resolution * np.round(x[:, ::2, 0] / resolution)
+    run = Run(label="trip", role="fit", t=t, u=u, y=y, measured=("theta_1", "theta_2"), resolution=(resolution,) * 2,
               unknown=("input_end",), initial=dict.fromkeys(PLANT.state_names(), 0.0))  # fmt: skip
     parameters = {n: Parameter(name=n, value=1.1 * v, estimate=True, lower=0.0) for n, v in TRUTH.items()}
     fit = identify(GreyBox(plant=PLANT, parameters=parameters), [run])

@@ -44,7 +44,7 @@ def linear(lanes):
     rng = np.random.default_rng(3)
     return Law(
         A=0.5 * np.eye(2), B=0.1 * rng.standard_normal((2, 3)), C=rng.standard_normal((1, 2)),
-        D=rng.standard_normal((1, 3)), references=np.sin(0.1 * np.arange(SAMPLES)), quantum=1e-3, delay=0.0011,
+        D=rng.standard_normal((1, 3)), references=np.sin(0.1 * np.arange(SAMPLES)), resolution=1e-3, delay=0.0011,
     )  # fmt: skip
 
 

@@ -80,20 +80,20 @@ def only(fresh):
 
 
 def test_what_was_written_is_read_again(only):
-    assert cache.kept_code("name") == b"code"
+    assert cache.cached_code("name") == b"code"
 
 
 @pytest.mark.parametrize("change", [b"", b"co", bytes(36)])
 def test_a_torn_file_is_not_loaded_and_is_written_again(only, change):
     only.write_bytes(change)
-    assert cache.kept_code("name") is None
+    assert cache.cached_code("name") is None
     cache.keep_code("name", b"code")
-    assert cache.kept_code("name") == b"code"
+    assert cache.cached_code("name") == b"code"
 
 
 def test_code_under_another_name_is_not_loaded(only):
     os.replace(only, only.with_name("other"))
-    assert cache.kept_code("other") is None
+    assert cache.cached_code("other") is None
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="here nobody else can write to a user's profile")
@@ -110,12 +110,12 @@ class TestOthers:
 
     def test_a_file_that_others_can_write_to_is_not_loaded(self, only):
         only.chmod(0o666)
-        assert cache.kept_code("name") is None
+        assert cache.cached_code("name") is None
 
     def test_a_file_of_somebody_else_is_not_loaded(self, only, monkeypatch):
         nobody = os.getuid() + 1
         monkeypatch.setattr(os, "getuid", lambda: nobody)
-        assert cache.kept_code("name") is None
+        assert cache.cached_code("name") is None
 
     def test_neither_is_a_folder_of_somebody_else_used(self, fresh, monkeypatch):
         fresh.mkdir()
@@ -127,7 +127,7 @@ class TestOthers:
     def test_a_link_is_not_followed(self, only):
         os.replace(only, only.with_name("elsewhere"))
         only.symlink_to(only.with_name("elsewhere"))
-        assert cache.kept_code("name") is None
+        assert cache.cached_code("name") is None
 
 
 def test_without_a_folder_to_write_to_motions_are_simulated_all_the_same(monkeypatch, tmp_path, block):
@@ -154,7 +154,7 @@ def test_a_full_disk_leaves_nothing_behind(fresh, monkeypatch):
     monkeypatch.setattr(os, "replace", full)
     cache.keep_code("name", b"code")
     assert list(fresh.iterdir()) == []
-    assert cache.kept_code("name") is None
+    assert cache.cached_code("name") is None
 
 
 def test_every_kind_of_array_and_number_gives_the_same_motion(block):

@@ -8,7 +8,7 @@ import pytest
 from tests.study.draft.test_recognise import col, log, resting
 from upright.errors import BadInput
 from upright.readers import inspect
-from upright.readers.resolution import Quantum
+from upright.readers.resolution import Resolution
 from upright.records import Provenance, Record
 from upright.study.draft.chain_log import (
     ChainLog,
@@ -82,7 +82,7 @@ def test_a_body_is_held_below_a_fifth_of_the_widest_and_locked_within_two_steps(
     bodies = [("a", 500.0), ("b", 101.0), ("c", 99.0), ("d", 1.01), ("e", 0.99)]
     rise = np.clip(np.arange(N) - 100, 0, 100) / 50
     record = log(**{name: size * rise for name, size in bodies})
-    columns = [col(name, "counts", quantum=Quantum(step=1.0)) for name, _ in bodies]
+    columns = [col(name, "counts", resolution=Resolution(step=1.0)) for name, _ in bodies]
     names = [f"x_{i}" for i in range(1, 6)]
     assert held_bodies(record, columns, names, [(1.0, 2.0)]) == (("x_3", "x_4"), ("x_5",))
     # within a stretch, and within all of them
@@ -116,7 +116,7 @@ def test_a_body_lies_still_that_creeps_by_three_steps_or_half_a_percent(before, 
     x[100] = before
     x[101:] = high
     record = log(x=x)
-    column = col("x", "counts", low=0.0, high=high, quantum=Quantum(step=step))
+    column = col("x", "counts", low=0.0, high=high, resolution=Resolution(step=step))
     assert still_bodies(record, {"x_1": column}, 100) == (("x_1",) if still else ())
 
 

@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from tests.study.draft.test_recognise import col, log
 from upright.physics import find
 from upright.readers.inspection import Column
-from upright.readers.resolution import Quantum
+from upright.readers.resolution import Resolution
 from upright.study.draft.chain import ChainStarts, chain_tables, starts
 from upright.study.draft.chain_log import ChainLog
 from upright.study.draft.recognise import Recognised
@@ -206,7 +206,7 @@ def test_a_free_swing_assumes_one_inertia_and_says_that_it_sees_only_ratios():
     three = study(chain(windows=((0.0, 4.0), (4.0, 7.0), (7.0, 10.0))), record)[0]
     assert three["defaults"]["unknown"] == ["initial", "offset", "friction"]
     coarse = chain(windows=((0.0, 4.0),))
-    coarse.recognised.columns["x_1"] = col("enc1", "counts", low=-500, high=500, quantum=Quantum(step=1.0))
+    coarse.recognised.columns["x_1"] = col("enc1", "counts", low=-500, high=500, resolution=Resolution(step=1.0))
     assert study(coarse, record)[0]["parameters"]["delta_1"] == {"guess": "0.0015 m", "min": "0.0003 m"}
 
 

@@ -13,7 +13,7 @@ from upright.errors import BadInput
 from upright.physics import CartPendulum, Furuta
 from upright.readers import inspect
 from upright.readers.inspection import Column, Inspection
-from upright.readers.resolution import Quantum
+from upright.readers.resolution import Resolution
 from upright.records import Record
 from upright.study.draft.recognise import (
     coupling,
@@ -32,7 +32,7 @@ from upright.study.draft.recognise import (
 
 def col(name: str, guess: str = "", **more: Any) -> Column:
     about: dict[str, Any] = {
-        "unit": "", "low": 0.0, "high": 1.0, "quantum": Quantum(), "constant": False, "low_share": 0.0,
+        "unit": "", "low": 0.0, "high": 1.0, "resolution": Resolution(), "constant": False, "low_share": 0.0,
         "high_share": 0.0, "turns": 0, "drive": False, "idle": False, "switches": (), "stepwise": False, "lies": (),
     }  # fmt: skip
     return Column(name=name, guess=guess, **(about | more))
@@ -192,7 +192,7 @@ def test_a_swing_of_more_than_half_a_turn_to_and_fro_is_in_degrees(x, guess):
     stated = Record(t=record.t, signals=record.signals, units={"theta": "rad"})
     assert positions(stated) == [("theta", "rad")]
     seen = inspect(record)
-    counted = replace(seen, columns=(replace(seen.columns[0], quantum=Quantum(step=0.003, counts_per_rev=2000)),))
+    counted = replace(seen, columns=(replace(seen.columns[0], resolution=Resolution(step=0.003, counts_per_rev=2000)),))
     assert positions(record, counted) == [("theta", "rad")]
 
 

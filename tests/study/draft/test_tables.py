@@ -14,7 +14,7 @@ from tests.study.draft.test_recognise import col, log, resting
 from upright.physics import find
 from upright.physics.statement import Coordinate
 from upright.readers.inspection import Column
-from upright.readers.resolution import Quantum
+from upright.readers.resolution import Resolution
 from upright.study.draft.described import counts_of, describe, is_cut_off
 from upright.study.draft.pendulum import Balanced, balance_of, pendulum_tables, recognised_upright, starts_upright
 from upright.study.draft.recognise import Recognised
@@ -37,11 +37,11 @@ def comments(*tables: TomlTable) -> dict[str, str]:
 @pytest.mark.parametrize(
     ("column", "unit", "factor"),
     [
-        (col("u", "V"), "V", 1.0), (col("u", "V", unit="mV"), "mV", 1.0), (col("u"), "", 1.0),
-        (col("u", "counts", lies=DAC), "V", 1 / 819),
+        (col("u", "V"), "V", 1.0), (col("u", "V", unit="mV"), "V", 1e-3), (col("u"), "", 1.0),
+        (col("u", "kN"), "N", 1e3), (col("u", "N mm"), "N m", 1e-3), (col("u", "counts", lies=DAC), "V", 1 / 819),
     ],
 )  # fmt: skip
-def test_a_command_has_the_unit_it_states_or_that_of_its_converter(column, unit, factor):
+def test_a_command_has_its_unit_without_a_prefix_or_that_of_its_converter(column, unit, factor):
     assert command_unit(column) == (unit, factor)
 
 
@@ -71,13 +71,18 @@ THETA, X = Coordinate("theta", "rad", "angle"), Coordinate("x", "m", "place")
          {"unit": "counts", "counts_per_rev": {"value": 4096, "assumed": True}, "offset": 3.0, "sign": -1}),
         (X, col("a", "counts"), 3.0, False,
          {"unit": "counts", "counts_per_m": {"value": 4096, "assumed": True}, "offset": 3.0}),
-        (THETA, col("a", "rad", quantum=Quantum(step=math.pi / 1000, counts_per_rev=2000)), 0, False,
+        (THETA, col("a", "rad", resolution=Resolution(step=math.pi / 1000, counts_per_rev=2000)), 0, False,
          {"unit": "rad", "counts_per_rev": {"value": 2000, "measured": True}, "offset": 0.0}),
-        (X, col("a", "m", quantum=Quantum(step=math.pi / 1000, counts_per_rev=2000)), 0, False,
+        (X, col("a", "m", resolution=Resolution(step=math.pi / 1000, counts_per_rev=2000)), 0, False,
          {"unit": "m", "resolution": {"value": "0.003142 m", "measured": True}, "offset": 0.0}),
-        (THETA, col("a", "rad", quantum=Quantum(step=0.02)), 0, False,
+        (THETA, col("a", "rad", resolution=Resolution(step=0.02)), 0, False,
          {"unit": "rad", "resolution": {"value": "0.02 rad", "measured": True}, "offset": 0.0}),
-        (X, col("a", "mm", quantum=Quantum(step=0.02)), 0, False, {"unit": "mm", "offset": 0.0}),
+        (X, col("a", "mm", resolution=Resolution(step=0.02)), 0, False,
+         {"unit": "mm", "resolution": {"value": "0.02 mm", "measured": True}, "offset": 0.0}),
+        (X, col("a", "mm", resolution=Resolution(step=0.1, decimals=True)), 0, False,
+         {"unit": "mm", "resolution": {"value": "0.1 mm", "assumed": True}, "offset": 0.0}),
+        (THETA, col("a", "deg", resolution=Resolution(hidden=0.01)), 0, False,
+         {"unit": "deg", "resolution": {"value": "0.01 deg", "assumed": True}, "offset": 0.0}),
         (X, col("a", high=100.0), 0.99e-7, False, {"offset": 0.0}),
         (X, col("a", high=100.0), 1.01e-7, False, {"offset": 1.01e-7}),
         (X, col("a", low=-100.0, high=0.0), -0.99e-7, False, {"offset": 0.0}),

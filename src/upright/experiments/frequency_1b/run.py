@@ -185,9 +185,9 @@ def response_of_logs(
     rest: GreyBox | None = None
     plant, said = "", Hardware()
     if len(sources) == 1 and sources[0].suffix == ".toml":
-        rest, plant, records, quantum, said = _study(sources[0], data)
+        rest, plant, records, resolution, said = _study(sources[0], data)
         response = response_of(records, command="u", outputs=records[0].outputs, kind=wish.kind, hold=wish.hold,
-                               quantum=quantum, band=wish.band)  # fmt: skip
+                               resolution=resolution, band=wish.band)  # fmt: skip
     elif len(sources) == 1 and is_response(sources[0]):
         response = FrequencyResponse.from_csv(sources[0])
         if wish.band is not None:
@@ -237,7 +237,7 @@ def _study(path: Path, data: Path | None) -> tuple[GreyBox, str, list[Record], l
         columns = {"u": run.u[:, 0], **{n: run.y[:, j] for j, n in enumerate(run.measured)}}
         units = {c.name: c.unit for c in study.model.plant.coordinates if c.name in run.measured}
         records.append(Record(t=run.t, signals=columns, units=units, inputs=("u",), outputs=run.measured))
-    return study.model, study.plant, records, list(runs[0].quantum or [0.0] * len(runs[0].measured)), study.hardware
+    return study.model, study.plant, records, list(runs[0].resolution or [0.0] * len(runs[0].measured)), study.hardware
 
 
 def _logs(sources: Sequence[Path], wish: LogRequest) -> FrequencyResponse:
@@ -253,9 +253,9 @@ def _logs(sources: Sequence[Path], wish: LogRequest) -> FrequencyResponse:
         if name not in signals:
             raise BadInput(f"--counts names '{name}', which is no output; {nearest(name, signals)}")
     scaled = [_scaled(r, command, signals, wish) for r in records]
-    quantum = [_step(scaled[0][n]) for n in signals]
+    resolution = [_step(scaled[0][n]) for n in signals]
     return response_of(scaled, command=command, outputs=list(signals), kind=wish.kind, hold=wish.hold,
-                       quantum=quantum, band=wish.band)  # fmt: skip
+                       resolution=resolution, band=wish.band)  # fmt: skip
 
 
 def _scaled(record: Record, command: str, signals: Mapping[str, str], wish: LogRequest) -> Record:

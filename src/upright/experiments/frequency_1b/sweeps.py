@@ -150,7 +150,7 @@ def _probed(rig: Rig, lengths: NDArray[np.int64], amplitude: Array, goal: Array,
     for _ in range(PROBES):
         y = sines(rig, lengths, amplitude, seconds)[1]
         seen = np.array([_peak(y[:, :, i], int(n), rig.period * EVERY) for i, n in enumerate(lengths)])
-        over = np.max(np.maximum(seen, rig.quantum) / goal, axis=1)  # above 1: more than was asked
+        over = np.max(np.maximum(seen, rig.resolution) / goal, axis=1)  # above 1: more than was asked
         off = np.abs(np.log(over))
         best, miss = np.where(off < miss, amplitude, best), np.minimum(off, miss)
         low, high = np.where(over < 1, amplitude, low), np.where(over < 1, high, amplitude)
@@ -168,7 +168,7 @@ def _peak(y: Array, length: int, tick: float) -> Array:
 def _dwell(rig: Rig, omega: float, length: int, u: Array, y: Array, amplitude: float, periods: int) -> Dwell:
     tick = rig.period * EVERY
     lines = by_period(y, length, tick)
-    rounding = rig.quantum / math.sqrt(12) * math.sqrt(4 / length)
+    rounding = rig.resolution / math.sqrt(12) * math.sqrt(4 / length)
     wanted = max(periods, math.ceil(1.0 / (length * tick)))
     at = settled(lines[: len(lines) - wanted], noise=rounding)
     first = (len(lines) - wanted if at is None else at) * length
@@ -177,8 +177,8 @@ def _dwell(rig: Rig, omega: float, length: int, u: Array, y: Array, amplitude: f
     record = twin_log(rig, t[part], y[part], u[part])
     return Dwell(
         omega=omega, amplitude=amplitude, settle=math.nan if at is None else first * tick, record=record,
-        tone=detect(record.t, record.y, omega, quantum=rig.quantum),
-        command=detect(record.t, record.u, omega, quantum=rig.converter),
+        tone=detect(record.t, record.y, omega, resolution=rig.resolution),
+        command=detect(record.t, record.u, omega, resolution=rig.converter),
     )  # fmt: skip
 
 
@@ -233,7 +233,7 @@ def broadband(rig: Rig, make: Make, kind: str, *, seed: int = 0) -> Sweep:
         outputs=record.outputs,
         kind=kind,
         hold=tick,
-        quantum=rig.quantum.tolist(),
+        resolution=rig.resolution.tolist(),
         band=(low, high),
     )
     return Sweep(dwells=(), response=response, seconds=float(np.ptp(record.t)), log=record)

@@ -177,7 +177,7 @@ def _came(rig: Rig, s: Score, rest: RestEffort) -> str:
         return f"Measured: it did not settle; the pendulum kept swinging by {math.degrees(s.final[-1]):.2g}°."
     full = f", {1e3 * s.at_limit:.0f} ms of it at the limit" if s.at_limit > FELT else ""
     still = "comes to rest"
-    if s.final[0] > 2 * rig.quantum[0]:
+    if s.final[0] > 2 * rig.resolution[0]:
         every = f" every {rest.body.period:.2g} s" if rest.body is not None else ""
         still = f"swings on by {_shown(rig, 0, s.final[0])}{every}"
     return (
@@ -202,7 +202,7 @@ def _gain_table(done: Regulation) -> Table:
             f"{number(m.least_gain, 2)} to {number(m.most_gain, 3)}", number(1e3 * m.delay, 3), number(m.modulus, 2)
         )  # fmt: skip
         gains = ", ".join(number(k, 3) for k in a.placement.K[0])
-        rows.append((a.name, written(a.placement.asked), gains, *worth))
+        rows.append((a.name, written(a.placement.requested), gains, *worth))
     states = ", ".join(plain(n) for n in done.rig.plant.state_names())
     return Table(
         caption=f"Gains of u = −K x for {states} [{done.rig.unit} per SI unit], and the sampled loop's margins: "
@@ -250,7 +250,7 @@ def _told_table(done: Regulation) -> Table:
 
 def _figures(done: Regulation, s: Score) -> tuple[str, ...]:
     settled = number(s.settled, 3) if math.isfinite(s.settled) else "never"
-    still = "still" if s.final[0] <= 2 * done.rig.quantum[0] else f"±{_shown(done.rig, 0, s.final[0])}"
+    still = "still" if s.final[0] <= 2 * done.rig.resolution[0] else f"±{_shown(done.rig, 0, s.final[0])}"
     rest = still if s.held else "–"
     return (
         settled, number(s.effort_peak, 3), f"{100 * s.saturated:.1f} %",
@@ -346,7 +346,7 @@ def _steps(done: Regulation) -> list[Step]:
         Step("Run the laws on another rig: of this make, or one that the fit allows.",
              f"upright regulate {done.source} --seed 0")
     ]  # fmt: skip
-    own = f'--poles "{written(done.best.placement.asked).replace("±", "+-")}"'
+    own = f'--poles "{written(done.best.placement.requested).replace("±", "+-")}"'
     best = f"--set {done.best.name[4:]}" if done.best.name in SETS else own
     return [
         *first,
@@ -379,7 +379,7 @@ def _set(a: Attempt) -> dict[str, Any]:
     b = a.before
     came = a.came
     return {
-        "poles": a.placement.asked,
+        "poles": a.placement.requested,
         "K": a.placement.K[0],
         "before": {
             "word": b.word, "words": dict(b.words), "chance": b.basis.supported(b.share),

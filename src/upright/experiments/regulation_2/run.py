@@ -33,7 +33,7 @@ from upright.rig.makes import MAKES, PENDULUMS, make_of_vendor
 from upright.rig.variation import allowed
 from upright.study.stored_rig import read_stored_rig
 from upright.systems import StateSpace
-from upright.workers import HERE, Workers
+from upright.workers import HERE, Workers, one_thread
 
 START = (math.radians(5), 0.0)
 """Tilt [rad] and speed [rad/s] with which a pendulum is let go where nobody says and no make has its own."""
@@ -217,6 +217,7 @@ def request_for(stand: TestStand, known: Rig) -> RegulationRequest:
     return replace(asked, poles={f"{name} x{faster:.2g}": faster * p for name, p in asked.poles.items()})
 
 
+@one_thread()
 def run_regulation(
     rig: Rig, stand: TestStand | None, seed: int, folder: Path, progress: Progress = silent,
     stopped: Callable[[], bool] = lambda: False, wish: RegulationRequest | None = None, source: str = "FIT",
@@ -301,7 +302,7 @@ def _foreseen(
     others: Mapping[str, Array], wish: RegulationRequest, seed: int, workers: Workers, progress: Progress,
 ) -> Attempt:  # fmt: skip
     placed = place(model.A, model.B, poles)
-    law = feedback(velocities(model, sampled, wish.speed, wish.memory, rig.limit, rig.quantum), placed.K)
+    law = feedback(velocities(model, sampled, wish.speed, wish.memory, rig.limit, rig.resolution), placed.K)
     told = preflight(
         rig, model, sampled, law, task, parameters=others, lanes=wish.draws, seed=seed, workers=workers,
         progress=progress,
@@ -340,14 +341,14 @@ def _ways(done: Regulation, model: StateSpace, sampled: StateSpace) -> list[Velo
     driven = model.to_sampled(sampled.period, sampled.delay, done.rig.lag)
     out: list[VelocityRun] = []
     for speed in SPEEDS:
-        way = velocities(model, sampled, speed, done.wish.memory, done.rig.limit, done.rig.quantum)
+        way = velocities(model, sampled, speed, done.wish.memory, done.rig.limit, done.rig.resolution)
         law = feedback(way, K)
         stands = bool(np.abs(poles_of(closed(driven, law))).max() < 1)
         went = trial(on, law, at=done.task.at, start=actual_start(done.task, done.seed), seconds=done.task.seconds)
         out.append(
             VelocityRun(
                 name=way.name,
-                noise=command_noise(driven, law, done.rig.quantum) if stands else None,
+                noise=command_noise(driven, law, done.rig.resolution) if stands else None,
                 margins=margins(driven, law) if stands else None,
                 run=went,
                 score=score(went),

@@ -114,9 +114,9 @@ class SwingUpRun:
 
     @property
     def caught(self) -> bool:
-        """Whether it stood for `HELD` at the end."""
+        """Whether it stood for `HELD` at the end, the drive on."""
         a = self.ascent
-        return a is not None and a.up <= float(a.trial.t[-1]) - HELD
+        return a is not None and math.isinf(a.tripped) and a.up <= float(a.trial.t[-1]) - HELD
 
     @property
     def sound(self) -> bool:
@@ -187,7 +187,7 @@ def scales_of_log(model: Rig, log: Record, known: Mapping[str, float] | None = N
             raise BadInput(f"the check needs a column '{c.name}'; {nearest(c.name, log.names)}")
         unit = log.units.get(c.name, "") or c.unit
         if unit == "counts":
-            size = float(model.quantum[i])
+            size = float(model.resolution[i])
         elif same_dimension(unit, c.unit):
             size = scale(unit)
         else:

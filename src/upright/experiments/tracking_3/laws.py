@@ -236,7 +236,7 @@ def tried(rig: Rig, pairs: Array, step: float) -> Array:
     t, out = np.arange(count, dtype=np.float64) * rig.period, np.full((len(laws), 2), np.inf)
     for i, y in enumerate(x.T):
         try:
-            found = step_figures(t, y, before=0.0, reference=step, quantum=float(rig.quantum[-1]))
+            found = step_figures(t, y, before=0.0, reference=step, resolution=float(rig.resolution[-1]))
         except BadInput:  # friction held it where it was
             continue
         out[i] = found.arrival, found.settling_5

@@ -24,8 +24,8 @@ from upright.quantities import with_unit
 from upright.records import Record
 from upright.rig import Rig
 from upright.rig.makes import SHAFTS, Make, make_of
-from upright.study.fitted import basis_of
 from upright.study.load import Study
+from upright.study.stored_fit import basis_of
 from upright.study.text import TomlTable, counted_sensor, study_text, table
 
 EVERY = 5

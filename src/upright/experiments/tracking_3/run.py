@@ -361,7 +361,7 @@ def figured(done: Trial, step: float) -> StepTrial:
     if not ended:
         try:
             figures = step_figures(
-                done.t[before:at], y[before:at], before=0.0, reference=step, quantum=float(rig.quantum[-1])
+                done.t[before:at], y[before:at], before=0.0, reference=step, resolution=float(rig.resolution[-1])
             )
         except BadInput:  # friction held it where it was
             figures = None

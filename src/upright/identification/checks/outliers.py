@@ -80,7 +80,7 @@ class Outlier:
 class Stretches:
     """Half swings of one run: when they begin and end (W,), by how much each signal is missed and moves (W, outputs).
 
-    `constant` (W,) says where the commands do not change, `quantum` (outputs,) the sensors' resolution.
+    `constant` (W,) says where the commands do not change, `resolution` (outputs,) the sensors' resolution.
     """
 
     run: Run
@@ -89,7 +89,7 @@ class Stretches:
     missed: Array
     moved: Array
     constant: NDArray[np.bool_]
-    quantum: Array
+    resolution: Array
 
 
 def outliers(fit: Fit, rig: GreyBox, runs: Sequence[Run]) -> tuple[Outlier, ...]:
@@ -160,7 +160,7 @@ def _restarted(known: GreyBox, run: Run, own: Mapping[str, float], seconds: floa
         run=replace(run, y=run.y[:, free], measured=tuple(run.measured[k] for k in free)),
         start=start, stop=start + (track.length - 1) * track.dt,
         missed=np.where(np.isfinite(missed), missed, math.inf), moved=np.ptp(measured, axis=0),
-        constant=np.all(u == u[:1], axis=(0, 2)), quantum=np.array([run.quanta[k] for k in free]),
+        constant=np.all(u == u[:1], axis=(0, 2)), resolution=np.array([run.quanta[k] for k in free]),
     )  # fmt: skip
 
 
@@ -214,7 +214,7 @@ def _strange(s: Stretches, judges: Sequence[Stretches], spread: Mapping[str, flo
     times = np.zeros(s.start.size)
     for k, c in enumerate(s.run.measured):
         usual = max(_usual(s, judges, c, spread[c]), 1e-3 * spread[c])
-        far |= s.missed[:, k] > max(FAR * usual, LEAST * spread[c], 5 * s.quantum[k])
+        far |= s.missed[:, k] > max(FAR * usual, LEAST * spread[c], 5 * s.resolution[k])
         times = np.maximum(times, s.missed[:, k] / usual)
     found: list[Outlier] = []
     for first, last in stretches(far, gap=2):

@@ -88,7 +88,7 @@ class Tone:
         return np.where(first == 0, 0, sign / np.where(first == 0, 1, first))
 
 
-def detect(t: Array, y: Array, omega: float, *, quantum: Array | float = 0.0, blocks: int = 0) -> Tone:
+def detect(t: Array, y: Array, omega: float, *, resolution: Array | float = 0.0, blocks: int = 0) -> Tone:
     """What the signals hold at `omega`.
 
     Parameters
@@ -99,7 +99,7 @@ def detect(t: Array, y: Array, omega: float, *, quantum: Array | float = 0.0, bl
         Signals.
     omega : float
         [rad/s]
-    quantum : float or (m,) array
+    resolution : float or (m,) array
         Resolution of the signals: rounding repeats from period to period, so that only one period averages it.
     blocks : int
         Parts whose first lines are compared for the variance; the number of whole periods, 16 at most, when 0.
@@ -135,7 +135,7 @@ def detect(t: Array, y: Array, omega: float, *, quantum: Array | float = 0.0, bl
         # what each part has at the frequency beyond the whole: slow changes and beats show here
         own = np.array([2 * np.conj(waves[a:b, 0]) @ rest[a:b] / (b - a) for a, b in pairwise(cuts)])
         variance = np.maximum(variance, np.sum(np.abs(own) ** 2, axis=0) / (parts - 1) / parts)
-    rounding = 4 * np.asarray(quantum) ** 2 / 12 / per_period
+    rounding = 4 * np.asarray(resolution) ** 2 / 12 / per_period
     return Tone(
         omega=omega,
         lines=lines,

@@ -36,7 +36,7 @@ MOST = 80
 
 def response_of(
     records: Sequence[Record], *, command: str, outputs: Sequence[str], kind: str = "", hold: float | None = None,
-    quantum: Sequence[float] = (), band: tuple[float, float] | None = None,
+    resolution: Sequence[float] = (), band: tuple[float, float] | None = None,
 ) -> FrequencyResponse:  # fmt: skip
     """Response that one log, or several repeats, hold.
 
@@ -50,7 +50,7 @@ def response_of(
         How the rig was asked; told from the command when empty.
     hold : float, optional
         Time for which the converter holds a command [s]; one sample when omitted.
-    quantum : sequence of float
+    resolution : sequence of float
         Resolution of each output.
     band : (float, float), optional
         Frequencies to keep [rad/s].
@@ -62,7 +62,7 @@ def response_of(
     """
     if kind not in ("", "sines", "multisine", "sweep"):
         raise BadInput(f"a log holds sines, a multisine or a sweep, not '{kind}'.")
-    quanta = np.array(quantum if len(quantum) else [0.0] * len(outputs))
+    quanta = np.array(resolution if len(resolution) else [0.0] * len(outputs))
     hold = records[0].period if hold is None else hold
     u = records[0][command]
     if not np.ptp(u) > 0:
@@ -130,7 +130,7 @@ def _sines(
             first = edges[min(begin, max(0, len(edges) - 3))]
             part = slice(int(first), int(edges[-1]))
             found.append((
-                omega, detect(r.t[part], y[part], omega, quantum=quanta), detect(r.t[part], r[command][part], omega),
+                omega, detect(r.t[part], y[part], omega, resolution=quanta), detect(r.t[part], r[command][part], omega),
             ))  # fmt: skip
     if not found:
         raise NotIdentifiable("The command holds no sine of three periods; try --kind sweep.")

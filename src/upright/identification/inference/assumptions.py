@@ -155,22 +155,22 @@ def _without(
     if assumed.name != "actuator.gain":
         return {}
     force, _, command = assumed.unit.partition("/")
-    quanta = {q for track in problem.tracks for q in track.run.quantum}
-    quantum = quanta.pop() if len(quanta) == 1 else 0.0
+    quanta = {q for track in problem.tracks for q in track.run.resolution}
+    resolution = quanta.pop() if len(quanta) == 1 else 0.0
     out: dict[str, Estimate] = {}
     for n, share in follows.items():
         power = per_length(problem.rig.parameters[n].unit, force) if abs(share - 1) < NEGLIGIBLE else None
         if power is None or n not in estimates:
             continue
         time, length = power
-        factor = quantum**-length / assumed.value if quantum > 0 else 1.0 / assumed.value
+        factor = resolution**-length / assumed.value if resolution > 0 else 1.0 / assumed.value
         e = estimates[n]
         out[n] = replace(
             e,
             value=e.value * factor,
             stderr=e.stderr * factor,
             interval=(e.interval[0] * factor, e.interval[1] * factor),
-            unit=_written(command or "1", time, length, "count" if quantum > 0 else force_length(force)),
+            unit=_written(command or "1", time, length, "count" if resolution > 0 else force_length(force)),
         )
     return out
 

@@ -115,11 +115,11 @@ def _scored(score: RunScore) -> slice:
     return slice(int(np.searchsorted(score.t, score.t[0] + score.score_from - 1e-9)), score.t.size)
 
 
-def _error(y: Array, simulated: Array, size: float, quantum: float) -> float:
+def _error(y: Array, simulated: Array, size: float, resolution: float) -> float:
     """Root mean square of what is missed over the signal's spread, rounding included."""
     with np.errstate(over="ignore", invalid="ignore"):
         missed = float(np.mean((y - simulated) ** 2))
-    least = quantum**2 / 12 + (1e-9 * size) ** 2
+    least = resolution**2 / 12 + (1e-9 * size) ** 2
     return min(math.sqrt(missed + least) / size, LOST) if math.isfinite(missed) else LOST
 
 
@@ -130,11 +130,11 @@ def _run_gain(poorer: RunScore, richer: RunScore, quanta: Array) -> float:
     return float(np.mean(gains)) if gains else 0.0
 
 
-def _signal_gain(poorer: RunScore, richer: RunScore, k: int, here: slice, quantum: float) -> float:
+def _signal_gain(poorer: RunScore, richer: RunScore, k: int, here: slice, resolution: float) -> float:
     size = float(np.std(poorer.y[_scored(poorer), k]))
     if size == 0:
         return 0.0
-    a, b = (_error(s.y[here, k], s.simulated[here, k], size, quantum) for s in (poorer, richer))
+    a, b = (_error(s.y[here, k], s.simulated[here, k], size, resolution) for s in (poorer, richer))
     return math.log(a / b)
 
 

@@ -52,7 +52,7 @@ class Run:
         Measured coordinates, sign and scale applied.
     measured : tuple of str
         Names of the coordinates in the columns of `y`.
-    quantum : tuple of float
+    resolution : tuple of float
         Resolution of each column of `y` [SI], 0 when continuous.
     held : mapping of str to (N,) array or float
         Coordinates that did not move freely: their measured motion, or the constant they were locked at.
@@ -92,7 +92,7 @@ class Run:
     u: Array
     y: Array
     measured: tuple[str, ...]
-    quantum: tuple[float, ...] = ()
+    resolution: tuple[float, ...] = ()
     held: Mapping[str, Array | float] = field(default_factory=dict[str, "Array | float"])
     known: Mapping[str, float] = field(default_factory=dict[str, float])
     unknown: tuple[str, ...] = ("initial",)
@@ -123,7 +123,7 @@ class Run:
     @property
     def quanta(self) -> tuple[float, ...]:
         """Resolution of each column of `y`, 0 where nobody says."""
-        return self.quantum or (0.0,) * len(self.measured)
+        return self.resolution or (0.0,) * len(self.measured)
 
     @property
     def free(self) -> list[int]:

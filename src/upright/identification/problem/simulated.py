@@ -113,9 +113,9 @@ def law_of_loop(loop: ClosedLoop, run: Run, plant: type[Plant]) -> Law:
             raise BadInput(f"the law of run '{run.label}' reads '{name}'; {plant.__name__} has {', '.join(names)}.")
     law = loop.law.over(names, len(plant.inputs))
     if not loop.quantized:
-        return replace(law, command_quantum=0.0)
-    steps = dict(zip(run.measured, run.quantum, strict=False))
-    return replace(law, quantum=[steps.get(name, 0.0) for name in names])
+        return replace(law, command_resolution=0.0)
+    steps = dict(zip(run.measured, run.resolution, strict=False))
+    return replace(law, resolution=[steps.get(name, 0.0) for name in names])
 
 
 def remembering(solver: Simulator, run: Run, restarts: NDArray[np.int64], lanes: int) -> Simulator:
@@ -218,6 +218,13 @@ def restart_states(
 
 def gains(solver: Simulator, track: Track, values: Mapping[str, float | Array], steps: int, lanes: int) -> list[Array]:
     """Kalman gains (outputs, states, lanes) at the samples of a stretch, until they have settled; the first is zero."""
+    return filtering(solver, track, values, steps, lanes)[0]
+
+
+def filtering(
+    solver: Simulator, track: Track, values: Mapping[str, float | Array], steps: int, lanes: int
+) -> tuple[list[Array], Array]:
+    """As `gains`, and the covariance (lanes, S, S) of states and drifts of the inputs that they leave at the last."""
     Phi, Q = discrete_model(solver, track, values, lanes)
     plan = _plan(track)
     n = Phi.shape[1]
@@ -238,10 +245,11 @@ def gains(solver: Simulator, track: Track, values: Mapping[str, float | Array], 
         new = keep @ ahead @ keep.transpose(0, 2, 1) + L @ R @ L.transpose(0, 2, 1)  # Joseph: stays positive
         found.append(L)
         size = np.sqrt(np.maximum(np.einsum("lii->li", new), 0.0)) + 1e-300  # lanes of impossible numbers run away
-        if not np.any(np.abs(new - P) > SETTLED * size[:, :, None] * size[:, None, :]):
-            break
+        same = not np.any(np.abs(new - P) > SETTLED * size[:, :, None] * size[:, None, :])
         P = new
-    return [np.ascontiguousarray(L.transpose(2, 1, 0)) for L in found]
+        if same:
+            break
+    return [np.ascontiguousarray(L.transpose(2, 1, 0)) for L in found], P
 
 
 def discrete_model(

@@ -145,8 +145,8 @@ class Track:
         if np.abs(S / np.outer(d, d) - np.eye(free.size)).max() < ALIKE:
             return None
         power, V = np.linalg.eigh(S)
-        quantum = np.array(self.run.quanta)[free] * w
-        rounding = np.einsum("ij,i,ij->j", V, quantum**2, V)
+        resolution = np.array(self.run.quanta)[free] * w
+        rounding = np.einsum("ij,i,ij->j", V, resolution**2, V)
         floor = 1e-12 * power[-1]
         W = np.diag(self.weights)
         W[np.ix_(free, free)] = (V / np.sqrt(np.maximum(power, floor) + rounding)).T * w
@@ -166,6 +166,12 @@ class Track:
     def spacing(self) -> float:
         """Seconds from one residual to the next."""
         return float(self.restarts[1] - self.restarts[0]) * self.dt if self.ahead else self.dt
+
+    def predicting(self, seconds: float) -> Track:
+        """The run with every sample predicted so many seconds ahead, and no other horizon."""
+        assert self.ahead is not None
+        plan = replace(self.ahead, samples=(max(1, round(seconds / self.dt)),), weight=np.ones(1))
+        return replace(self, run=replace(self.run, horizon=seconds), ahead=plan, length=1)
 
     def within(self, horizon: float) -> int:
         """Samples that are simulated within `horizon` seconds, at least two; of horizons at least one."""
@@ -311,8 +317,8 @@ def filter_plan(rig: GreyBox, run: Run, dt: float, start: State, noise: Array) -
             f"{samples[-1] * dt:.3g} s ahead needs more. Widen the window or shorten the horizon."
         )
     columns = [names.index(c) for c in run.measured]
-    quantum = np.array(run.quanta)
-    sensor = np.where(quantum > 0, quantum**2 / 12, np.maximum(noise, 1e-6 * start.spread[columns]) ** 2)
+    resolution = np.array(run.quanta)
+    sensor = np.where(resolution > 0, resolution**2 / 12, np.maximum(noise, 1e-6 * start.spread[columns]) ** 2)
     initial = start.spread**2
     initial[columns] = sensor
     for n in run.held:

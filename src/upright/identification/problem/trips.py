@@ -31,7 +31,7 @@ def _moments(rig: GreyBox, run: Run) -> tuple[list[Trip], bool]:
     on = rig.plant.inputs[0].on
     if on not in run.measured or on in run.held or not np.any(run.u[:, 0]):
         return found, plain
-    quantum = dict(zip(run.measured, run.quanta, strict=True))
+    resolution = dict(zip(run.measured, run.quanta, strict=True))
     signals = {c: run.y[:, k] for k, c in enumerate(run.measured)}
     signals |= {c: v for c, v in run.held.items() if isinstance(v, np.ndarray)}
     signals |= {c: np.full(run.t.size, v) for c, v in run.held.items() if not isinstance(v, np.ndarray)}
@@ -41,7 +41,7 @@ def _moments(rig: GreyBox, run: Run) -> tuple[list[Trip], bool]:
     for late in (False, True):
         u = silenced(run, found).u[:, 0] * math.copysign(1.0, gain)
         trip, otherwise = trip_or_misfit(
-            run.t, u, signals[on], [*others.values()], quantum=quantum[on], late=late, terms=terms
+            run.t, u, signals[on], [*others.values()], resolution=resolution[on], late=late, terms=terms
         )
         found += [trip] if trip is not None else []
         plain = plain or (not late and trip is None and otherwise < CLEAR[1])

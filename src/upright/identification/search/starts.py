@@ -68,10 +68,10 @@ def observe(rig: GreyBox, run: Run, *, flips: Mapping[str, float] | None = None,
     free = tuple(i for i, c in enumerate(coordinates) if c not in run.held)
     if not free or any(coordinates[i] not in run.measured for i in free) or n < 30:
         return None
-    quantum = dict(zip(run.measured, run.quanta, strict=True))
+    resolution = dict(zip(run.measured, run.quanta, strict=True))
     signal = {c: run.y[:, k] for k, c in enumerate(run.measured)}
     period = min(dominant_period(signal[coordinates[i]], dt) for i in free)
-    width = max(smoothing_width(signal[coordinates[i]], dt, period, quantum[coordinates[i]]) for i in free)
+    width = max(smoothing_width(signal[coordinates[i]], dt, period, resolution[coordinates[i]]) for i in free)
 
     def counted(c: str) -> Array:
         if c in run.held and np.ndim(run.held[c]) == 0:

@@ -107,9 +107,11 @@ def question(fit: Fit) -> str:
     fitted = sum(s.role == "fit" for s in fit.runs.values())
     predicted = len(fit.runs) - fitted
     runs = f"{fitted} run{'s' if fitted != 1 else ''}"
-    asked = ", ".join(fit.model.estimated) or "no parameter"
+    estimated = ", ".join(fit.model.estimated) or "no parameter"
     held = f", and does the model then predict {predicted} more that it has not seen?" if predicted else "?"
-    return f"Which values of {asked} let the equations of motion of '{fit.model.plant.__name__}' follow {runs}{held}"
+    return (
+        f"Which values of {estimated} let the equations of motion of '{fit.model.plant.__name__}' follow {runs}{held}"
+    )
 
 
 def data_part(provenance: Mapping[str, object]) -> Part:
@@ -150,14 +152,14 @@ def motion_part(fit: Fit) -> Part:
 
 
 def _scores(fit: Fit, crossed: CrossValidation | None) -> list[Block]:
-    told: list[Block] = [score_table(fit.runs)] if fit.runs else ["No run was scored."]
+    blocks: list[Block] = [score_table(fit.runs)] if fit.runs else ["No run was scored."]
     if any(score.naive for score in fit.runs.values()):
-        told.append(_HELD)
+        blocks.append(_HELD)
     if crossed is not None:
-        told.append(cross_table(crossed))
+        blocks.append(cross_table(crossed))
         if crossed.interrupted:
-            told.append(Points(("Interrupted: runs without a prediction were not reached.",)))
-    return told
+            blocks.append(Points(("Interrupted: runs without a prediction were not reached.",)))
+    return blocks
 
 
 def run_pictures(fit: Fit, prefix: str) -> list[Picture]:
@@ -204,8 +206,8 @@ def _parameters(fit: Fit) -> list[Part]:
     ]
     without, own, poles = without_table(fit), run_table(fit), pole_table(fit)
     if fit.assumptions:
-        told = (Points(tuple(assumption_sentences(fit.assumptions))), *((without,) if without.rows else ()))
-        parts.append(Part(title="What rests on assumed numbers", key="assumed", content=told))
+        content = (Points(tuple(assumption_sentences(fit.assumptions))), *((without,) if without.rows else ()))
+        parts.append(Part(title="What rests on assumed numbers", key="assumed", content=content))
     if own.rows:
         parts.append(Part(title="Runs and groups", key="runs", content=(own,)))
     if poles.rows:
@@ -239,11 +241,11 @@ def rest_picture(fit: Fit, prefix: str) -> list[Picture]:
 
 def _unseen(fit: Fit) -> Part:
     """What the data cannot see, with intervals, correlations and directions as far as the fit states them."""
-    told: list[Block] = [
+    blocks: list[Block] = [
         Points(fit.unseen) if fit.unseen else "No combination of the estimated parameters is invisible in these runs."
     ]
     if any(e.status != "known" and e.value != 0 for e in fit.estimates.values()):
-        told.append(
+        blocks.append(
             Picture(
                 name="fit-intervals",
                 draw=lambda: interval_figure(fit.estimates),
@@ -254,7 +256,7 @@ def _unseen(fit: Fit) -> Part:
         )
     n = len(fit.names)
     if 1 < n <= 24 and fit.correlation.shape == (n, n):
-        told.append(
+        blocks.append(
             Picture(
                 name="fit-correlation",
                 draw=lambda: correlation_figure(fit),
@@ -264,7 +266,7 @@ def _unseen(fit: Fit) -> Part:
             )
         )
     if n and n <= 24 and fit.singular_values.size and fit.directions.shape == (fit.singular_values.size, n):
-        told.append(
+        blocks.append(
             Picture(
                 name="fit-directions",
                 draw=lambda: directions_figure(fit),
@@ -273,7 +275,7 @@ def _unseen(fit: Fit) -> Part:
                 description="; ".join(fit.unseen) or "No combination of the parameters is unseen.",
             )
         )
-    return Part(title="What the data cannot see", key="unseen", content=tuple(told))
+    return Part(title="What the data cannot see", key="unseen", content=tuple(blocks))
 
 
 def _strongest(fit: Fit) -> str:

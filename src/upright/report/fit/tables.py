@@ -34,16 +34,16 @@ def parameter_table(
     caption : str
     """
     about = fit.model.parameters
-    told = {n: _estimate(n, e, about.get(n)) for n, e in fit.estimates.items() if e.status != "known"}
-    told |= {
+    described = {n: _estimate(n, e, about.get(n)) for n, e in fit.estimates.items() if e.status != "known"}
+    described |= {
         n: (number(p.value), _sure(p), "", unit(p.unit), "assumed" if p.assumed else "given", _called(n, p))
         for n, p in about.items()
         if not p.estimate
-        and n not in told
+        and n not in described
         and (p.assumed or p.value != (ACTUATOR[n].default if n in ACTUATOR else 0.0))
     }  # fmt: skip
     rows: list[tuple[str, ...]] = []
-    for name, (value, error, around, *rest) in told.items():
+    for name, (value, error, around, *rest) in described.items():
         true, place = ((), ()) if truth is None else _true(fit.estimates.get(name), truth.get(name))
         other = () if beside is None else (beside[1].get(name, ""),)
         rows.append((Symbol(name), *true, value, error, around, *place, *other, *rest))
@@ -116,8 +116,8 @@ def finding(what: str, e: Estimate, true: float | None = None) -> KeyNumber:
 
 def plain_estimate(e: Estimate, true: float | None = None) -> dict[str, object]:
     """An estimate as plain values, beside the truth of a twin."""
-    told: dict[str, object] = {"value": e.value, "stderr": e.stderr, "interval": e.interval}
-    return told if true is None else told | {"truth": true, "inside": within(e, true)}
+    plain: dict[str, object] = {"value": e.value, "stderr": e.stderr, "interval": e.interval}
+    return plain if true is None else plain | {"truth": true, "inside": within(e, true)}
 
 
 def interval(e: Estimate) -> str:
@@ -127,28 +127,35 @@ def interval(e: Estimate) -> str:
 
 
 def score_table(runs: Mapping[str, RunScore]) -> Table:
-    """Fit percent of every signal of every run, fitted runs first."""
+    """Fit percent of every signal of every run, fitted runs first; free runs and predictions ahead in columns apart."""
     windowed = any(score.naive for score in runs.values())
     boxed = any(score.black_box for score in runs.values())
     banded = any(score.band for score in runs.values())
+    limited = any(score.ceiling for score in runs.values())
+    apart = len({score.horizon is None for score in runs.values()}) == 2
     rows: list[tuple[str, ...]] = []
     for label, score in sorted(runs.items(), key=lambda item: item[1].role != "fit"):
         role = "fitted" if score.role == "fit" else "predicted"
-        further = [(f"{horizon:g} s ahead", percents) for horizon, percents in list(score.ahead.items())[1:]]
-        for how, percents in ((_compared(score), score.fit_percent), *further):
+        others = {h: percents for h, percents in score.ahead.items() if h != score.horizon}
+        further = [(h, f"{h:g} s ahead", percents) for h, percents in others.items()]
+        for horizon, how, percents in ((score.horizon, _compared(score), score.fit_percent), *further):
             for name, value in percents.items():
-                first = percents is score.fit_percent  # of several horizons the shortest alone is compared
-                told = [of for of, some in ((score.naive, windowed), (score.black_box, boxed)) if some]
-                told += [score.inside] if banded else []
-                beside = [percent(of[name]) if first and name in of else "" for of in told]
-                rows.append((label, role, plain(name), percent(value), *beside, how))
+                first = percents is score.fit_percent  # of several horizons that which is judged alone is compared
+                columns = [of for of, some in ((score.naive, windowed), (score.black_box, boxed)) if some]
+                columns += [score.inside] if banded else []
+                beside = [percent(of[name]) if first and name in of else "" for of in columns]
+                allowed = score.ceiling.get(horizon or 0.0, {})
+                beside += [percent(allowed[name]) if name in allowed else ""] if limited else []
+                fits = (percent(value),) if not apart else (percent(value), "")[:: 1 if horizon is None else -1]
+                rows.append((label, role, plain(name), *fits, *beside, how))
+    fit = ("fit, free run", "fit, ahead") if apart else ("fit",)
     return Table(
         caption="Fit percent, 100 (1 − |y − ŷ| / |y − mean y|), of every signal",
         headings=(
-            "run", "role", "signal", "fit", *(("held speed",) if windowed else ()), *(("black box",) if boxed else ()),
-            *(("in 90 % band",) if banded else ()), "simulated",
+            "run", "role", "signal", *fit, *(("held speed",) if windowed else ()), *(("black box",) if boxed else ()),
+            *(("in 90 % band",) if banded else ()), *(("start state allows",) if limited else ()), "simulated",
         ),
-        rows=tuple(rows), numbers=tuple(range(3, 4 + windowed + boxed + banded)),
+        rows=tuple(rows), numbers=tuple(range(3, 3 + len(fit) + windowed + boxed + banded + limited)),
     )  # fmt: skip
 
 
@@ -179,8 +186,8 @@ def cross_table(crossed: CrossValidation) -> Table:
 def pole_table(fit: Fit) -> Table:
     """Poles at every equilibrium with their 95 % intervals, and the frequency of each swing."""
     rows: list[tuple[str, ...]] = []
-    for at, found in fit.poles.items():
-        for pole in found:
+    for at, poles in fit.poles.items():
+        for pole in poles:
             value, around = with_error(pole.real.value, pole.real.stderr)[0], interval(pole.real)
             if pole.imag.value > 0:
                 value += f" ± {with_error(pole.imag.value, pole.imag.stderr)[0]} i"

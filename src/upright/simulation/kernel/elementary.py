@@ -181,14 +181,14 @@ NAMES = frozenset(_TEXTS) - {"exact_sincos"}
 
 def definitions(*texts: str) -> str:
     """Definitions of what these texts call, each before those that call it."""
-    found: list[str] = []
+    distinct: list[str] = []
 
     def visit(text: str) -> None:
         for name in sorted(_TEXTS.keys() & set(re.findall(r"\b([a-z]\w*)\(", text))):
-            if _TEXTS[name] not in found and _TEXTS[name] != text:
+            if _TEXTS[name] not in distinct and _TEXTS[name] != text:
                 visit(_TEXTS[name])
-                found.append(_TEXTS[name])
+                distinct.append(_TEXTS[name])
 
     for text in texts:
         visit(text)
-    return "\n".join(found)
+    return "\n".join(distinct)

@@ -63,6 +63,9 @@ class Flavour:
     carried : bool
         What joints and braking remember goes in and comes out behind the states, so that a motion can be taken up where
         another ended.
+    strict : bool
+        Every operation is rounded by itself, in the order of the text: the same numbers, to the last bit, on every
+        processor and in a page; a third slower.
     """
 
     dry: tuple[int, ...] = ()
@@ -81,6 +84,7 @@ class Flavour:
     loop: Structure | Written | None = None
     record: bool = True
     carried: bool = False
+    strict: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,8 +117,8 @@ class Layout:
     @cached_property
     def joints(self) -> dict[int, Array]:
         """Direction of each joint that can move, by its pivot."""
-        found = zip(self.pivots, self.derived.joints, strict=True)
-        return {i: np.array(j.direction) for i, j in found if i is not None}
+        pairs = zip(self.pivots, self.derived.joints, strict=True)
+        return {i: np.array(j.direction) for i, j in pairs if i is not None}
 
     @cached_property
     def to_joints(self) -> Array:
@@ -215,18 +219,18 @@ def pivots(derived: Derived, held: tuple[int, ...]) -> tuple[int | None, ...]:
     """
     rows = np.array([j.direction for j in derived.joints]).reshape(len(derived.joints), len(derived.coordinates))
     rows[:, list(held)] = 0.0
-    found: list[int | None] = [None] * len(rows)
+    columns: list[int | None] = [None] * len(rows)
     reduced: dict[int, Array] = {}
     for k in sorted((k for k, row in enumerate(rows) if row.any()), key=lambda k: np.count_nonzero(rows[k])):
         left = rows[k].copy()
-        for done, row in reduced.items():
-            left = left - left[found[done]] / row[found[done]] * row
+        for earlier, row in reduced.items():
+            left = left - left[columns[earlier]] / row[columns[earlier]] * row
         if np.abs(left).max() <= 1e-9 * np.abs(rows[k]).max():
             names = ", ".join(derived.coordinates[i] for i in held)
             raise BadInput(f"{derived.name}: with {names} held, two joints are one; let it move or merge them.")
         i = int(np.argmax(np.abs(left)))
-        reduced[k], found[k] = left, i
-    return tuple(found)
+        reduced[k], columns[k] = left, i
+    return tuple(columns)
 
 
 @lru_cache(maxsize=64)
@@ -248,6 +252,7 @@ def choose(
     held: Collection[str] = (),
     loop: Law | Rule | None = None,
     record: bool = True,
+    strict: bool = False,
 ) -> Flavour:
     """Smallest flavour that computes what `params` ask for.
 
@@ -265,6 +270,8 @@ def choose(
         Controller that computes the input.
     record : bool
         The motion is returned.
+    strict : bool
+        Same numbers on every processor, see `Flavour`.
 
     Raises
     ------
@@ -312,6 +319,7 @@ def choose(
         droop=on("actuator.droop"),
         loop=None if loop is None else loop.compiled_in,
         record=record,
+        strict=strict,
     )
 
 

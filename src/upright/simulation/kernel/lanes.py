@@ -85,7 +85,7 @@ def _actuator(w: Writer, j: int, first: int) -> None:
     )
     begin(w, j, row)
     if loop:
-        w.add(*_asked(w, j, f"{{w{j}}}", "0.0"))
+        w.add(*_force_lines(w, j, f"{{w{j}}}", "0.0"))
         return
     # settle the lag on the input before the first sample, which is held where the record does not reach
     w.add(
@@ -99,7 +99,7 @@ def _actuator(w: Writer, j: int, first: int) -> None:
             f"_z = U[min(max(START[_m] + _k - int({{di}}) - {back}, 0), _last), {j}] if _last >= 0 else 0.0",
             f"_z = {{lim{j}}} if _z > {{lim{j}}} else _z",
             f"_z = 0.0 - {{lim{j}}} if _z < 0.0 - {{lim{j}}} else _z",
-            *_asked(w, j, name, "_z"),
+            *_force_lines(w, j, name, "_z"),
         )
     w.add(
         "if _k == -_n - 1:",
@@ -127,10 +127,10 @@ def prescribed(w: Writer) -> None:
 
 def _clip(w: Writer, j: int, name: str) -> None:
     w.add(f"_c = {{lim{j}}} if _c > {{lim{j}}} else _c", f"_c = 0.0 - {{lim{j}}} if _c < 0.0 - {{lim{j}}} else _c")
-    w.add(*_asked(w, j, f"{{{name}{j}}}", "_c"))
+    w.add(*_force_lines(w, j, f"{{{name}{j}}}", "_c"))
 
 
-def _asked(w: Writer, j: int, name: str, command: str) -> list[str]:
+def _force_lines(w: Writer, j: int, name: str, command: str) -> list[str]:
     """Lines for the force asked of input `j` by a command."""
     if not w.p.flavour.droop:
         return [f"{name} = {{gain{j}}} * ({command} + {{off{j}}})"]
@@ -176,8 +176,8 @@ def controller(w: Writer) -> None:
     w.depth += 1
     _feed(w, (("ff", "START[_base + _i] + _k"),))
     w.depth -= 1
-    w.add(*(f"_quantum{i} = FL[{i}]" for i in range(n)))
-    w.add(*(f"_per{i} = 1.0 / _quantum{i} if _quantum{i} > 0.0 else 0.0" for i in range(n)))
+    w.add(*(f"_resolution{i} = FL[{i}]" for i in range(n)))
+    w.add(*(f"_per{i} = 1.0 / _resolution{i} if _resolution{i} > 0.0 else 0.0" for i in range(n)))
     (_law if isinstance(f.loop, Structure) else _rule)(w)
     if f.dynamic:
         w.depth -= 1
@@ -189,7 +189,7 @@ def controller(w: Writer) -> None:
                 gap = back if name == "cn" else "int({di}) + 1"
                 w.add(f"_slot = (_k - ({gap})) % _nbuf", f"_c = W[{place}]", f"_c = _c if _k >= {gap} else 0.0")
                 commanded(w, j, name[1])
-                w.add(*_asked(w, j, f"{{{name}{j}}}", "_c"))
+                w.add(*_force_lines(w, j, f"{{{name}{j}}}", "_c"))
 
 
 ROUNDING = """
@@ -222,7 +222,7 @@ def _read(w: Writer) -> None:
         w.add(f"_step{j} = FL[{p.n + 2 + j}]", f"_steps{j} = 1.0 / _step{j} if _step{j} > 0.0 else 0.0")
     w.lanes()
     for i in range(p.n):
-        w.add(f"_y{i} = rounded({{q{i}}}, _per{i}, _quantum{i})")
+        w.add(f"_y{i} = rounded({{q{i}}}, _per{i}, _resolution{i})")
 
 
 def _rule(w: Writer) -> None:
@@ -237,8 +237,8 @@ def _rule(w: Writer) -> None:
             for c, size in (("ref", rule.references), ("z", rule.states), ("rp", rule.parameters))
         ),
     )
-    given = ", ".join(f"({''.join(f'{name}, ' for name in group)})" for group in names)
-    w.add(f"_put, _kept = rule((START[_base + _i] + _k) * _dt, {given})")
+    args = ", ".join(f"({''.join(f'{name}, ' for name in group)})" for group in names)
+    w.add(f"_put, _kept = rule((START[_base + _i] + _k) * _dt, {args})")
     for j in range(p.nu):
         w.add(f"_c = rounded({{ff{j}}} + _put[{j}], _steps{j}, _step{j})")
         _put(w, j)
@@ -250,9 +250,9 @@ def _law(w: Writer) -> None:
     p, law = w.p, w.p.flavour.loop
     assert isinstance(law, Structure)  # asked before
     _read(w)
-    given = [name if name.startswith("_") else f"{{{name}}}" for name in _law_arguments(p, law)]
-    found = [f"_c{j}" for j in range(p.nu)] + [f"{{z{i}}}" for i in range(len(law.A))]
-    w.add(f"({', '.join(found)},) = law({', '.join(given)})")
+    args = [name if name.startswith("_") else f"{{{name}}}" for name in _law_arguments(p, law)]
+    outputs = [f"_c{j}" for j in range(p.nu)] + [f"{{z{i}}}" for i in range(len(law.A))]
+    w.add(f"({', '.join(outputs)},) = law({', '.join(args)})")
     for j in range(p.nu):
         w.add(f"_c = _c{j}")
         _put(w, j)
@@ -292,15 +292,21 @@ def law_text(p: Layout) -> str:
         if law.hold and all(k in (None, float(i == j)) for j, k in enumerate(row)):
             sums = "".join(f" & (lA{i}_{j} == {float(i == j)})" for j, k in enumerate(row) if k is None)
             lines.append(f"_z{i} = z{i} if (_over != 0.0){sums} else _z{i}")
-    found = [f"_c{j}" for j in range(p.nu)] + [f"_z{i}" for i in range(len(law.A))]
-    body = "\n".join(f"    {line}" for line in [*lines, f"return ({', '.join(found)},)"])
+    outputs = [f"_c{j}" for j in range(p.nu)] + [f"_z{i}" for i in range(len(law.A))]
+    body = "\n".join(f"    {line}" for line in [*lines, f"return ({', '.join(outputs)},)"])
     return f"@exact\ndef law({', '.join(_law_arguments(p, law))}):\n{body}\n"
 
 
 RUN_ARGUMENTS = (
-    "_b0, _b1, _total, P, X0, U, R, START, HELD, HBASE, _nsteps, _every, _substeps, _dt, FL, _nbuf, OUT, STAT, "
-    "W, _events"
+    "_b0, _b1, _total, P, X0, U, R, START, HELD, HBASE, _first, _end, _nsteps, _every, _substeps, _dt, FL, "
+    "_nbuf, OUT, STAT, W, _events"
 )
+"""What ``run_L`` takes.
+
+A motion in one call has `_first` 0 and `_end` after `_nsteps`, the sample that nothing follows. One block's motion in
+several calls has an `_end` where the next `_first` goes on from ``W`` as it was left, and no `_nsteps` that it reaches.
+Rows of ``OUT`` are counted from `_first`.
+"""
 
 
 def room(p: Layout, width: int, buffer: int) -> int:
@@ -319,16 +325,16 @@ def run_text(p: Layout, width: int) -> str:
         "for _b in range(_b0, _b1):",
     )
     w.depth = 2
-    w.add(f"_base = _b * {width}", f"_valid = min({width}, _total - _base)", "W[:] = 0.0")
+    w.add(f"_base = _b * {width}", f"_valid = min({width}, _total - _base)", "if _first == 0:")
+    w.depth = 3
+    w.add("W[:] = 0.0")
     w.lanes()
     start(w)
     w.depth = 2
-    w.add("for _k in range(_nsteps + 1):")
-    w.depth = 3
-    prescribed(w)
-    (controller if p.flavour.loop else open_loop)(w)
-    w.depth = 3
-    (_record if p.flavour.record else _reduce)(w)
+    w.add("for _k in range(_first, _end):")
+    for part in (prescribed, controller if p.flavour.loop else open_loop, _record if p.flavour.record else _reduce):
+        w.depth = 3
+        part(w)
     w.depth = 3
     w.add("if _k == _nsteps:", "    break", "for _j in range(_substeps):")
     w.depth = 4
@@ -349,9 +355,9 @@ def _statistics(p: Layout) -> list[str]:
 
 def _record(w: Writer) -> None:
     p = w.p
-    w.add("if _k % _every == 0:")
+    w.add("if (_k - _first) % _every == 0:")
     w.depth += 1
-    w.add("_row = _k // _every")
+    w.add("_row = (_k - _first) // _every")
     columns = [f"{c}{i}" for i in range(p.n) for c in "qv"]
     columns += [f"ua{j}" for j in range(p.nu)] if p.flavour.loop else []
     for c, name in enumerate(columns):

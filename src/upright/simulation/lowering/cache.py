@@ -35,9 +35,9 @@ def cache_folder() -> Path | None:
     return None
 
 
-def _only_ours(found: os.stat_result) -> bool:
+def _only_ours(status: os.stat_result) -> bool:
     """Whether nobody but this user can write there; on Windows the user's profile sees to that."""
-    return not hasattr(os, "getuid") or (found.st_uid == os.getuid() and not found.st_mode & 0o022)
+    return not hasattr(os, "getuid") or (status.st_uid == os.getuid() and not status.st_mode & 0o022)
 
 
 @cache
@@ -56,14 +56,14 @@ def key(*parts: str) -> str:
 
 def code(name: str, compiled: Callable[[], bytes]) -> bytes:
     """What was kept under a name; where there is nothing, what is compiled now, which is kept."""
-    found = kept_code(name)
-    if found is None:
-        found = compiled()
-        keep_code(name, found)
-    return found
+    content = cached_code(name)
+    if content is None:
+        content = compiled()
+        keep_code(name, content)
+    return content
 
 
-def kept_code(name: str) -> bytes | None:
+def cached_code(name: str) -> bytes | None:
     """What was kept under a name; None when there is nothing, or not what was written."""
     place = cache_folder()
     if place is None:
@@ -72,8 +72,8 @@ def kept_code(name: str) -> bytes | None:
         # a link planted there is not followed, and what is opened is what is examined
         descriptor = os.open(place / name, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0))
         with os.fdopen(descriptor, "rb") as file:
-            found = os.fstat(descriptor)
-            if not stat.S_ISREG(found.st_mode) or not _only_ours(found):
+            status = os.fstat(descriptor)
+            if not stat.S_ISREG(status.st_mode) or not _only_ours(status):
                 return None
             content = file.read()
     except OSError:

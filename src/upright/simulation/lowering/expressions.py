@@ -78,11 +78,11 @@ class Expressions:
         """What a name stands for."""
         if self.in_lane is not None and name in self.in_lane:
             return self.in_lane[name]
-        found = self.names.get(name)
-        if isinstance(found, Slot):
-            return self.write.fetch(found)
-        if found is not None:
-            return found
+        operand = self.names.get(name)
+        if isinstance(operand, Slot):
+            return self.write.fetch(operand)
+        if operand is not None:
+            return operand
         if name in _CONSTANTS:
             return real(_CONSTANTS[name])
         raise Unsupported(f"'{name}' is not known where it is used")
@@ -307,23 +307,23 @@ class Expressions:
         separate = self.callees.separate(name)
         args = [self._tail(x) if isinstance(x, ast.Subscript) and isinstance(x.slice, ast.Slice) else
                 w.vector(self.value(x)) for x in nodes]  # fmt: skip
-        given: list[str] = []
+        typed: list[str] = []
         for a in args:
             if isinstance(a, Array):
-                given += [f"ptr {a.pointer}", *(f"i64 {n.text}" for n in a.shape[: a.type.axes])]
+                typed += [f"ptr {a.pointer}", *(f"i64 {n.text}" for n in a.shape[: a.type.axes])]
             else:
-                given.append(f"{w.named(a.type)} {w.packed(a)}")
+                typed.append(f"{w.named(a.type)} {w.packed(a)}")
         if separate:
             address = w.number(self.read(f"_{name}"))
             pointer = w.result(f"inttoptr i64 {address.text} to ptr")
-            w.do(f"call void {pointer}({', '.join(given)})")
+            w.do(f"call void {pointer}({', '.join(typed)})")
             return None
         node = self.callees.defined(name)
         assert node is not None  # asked by who calls
         if any(has_lanes(a.type) for a in args) and not is_straight(node):
             raise Crooked
         symbol, result = self.callees.instance(name, tuple(a.type for a in args))
-        call = f"@{symbol}({', '.join(given)})"
+        call = f"@{symbol}({', '.join(typed)})"
         if result is None:
             w.do(f"call void {call}")
             return None

@@ -127,10 +127,10 @@ class Function(Expressions):
         self.known[name] = t
         if before not in (None, t):
             raise Wider
-        found = self.names.get(name)
-        if not isinstance(found, Slot):
-            found = self.names[name] = self.write.slot(t)
-        return found
+        slot = self.names.get(name)
+        if not isinstance(slot, Slot):
+            slot = self.names[name] = self.write.slot(t)
+        return slot
 
     # -- statements -----------------------------------------------------------------------------------------------
 
@@ -298,9 +298,9 @@ class Function(Expressions):
         self.write.jump(end)
         self.write.start(end)
 
-    def _counted(self, node: ast.For, name: str, given: list[Operand]) -> None:
+    def _counted(self, node: ast.For, name: str, bounds: list[Operand]) -> None:
         w = self.write
-        args = [w.number(w.convert(a, INT)) for a in given]
+        args = [w.number(w.convert(a, INT)) for a in bounds]
         if not 1 <= len(args) <= 3:
             raise Unsupported("range takes one to three whole numbers")
         first, last, by = ([whole(0), *args, whole(1)] if len(args) == 1 else [*args, whole(1)])[:3]

@@ -60,10 +60,10 @@ def threads(text: str, entry: str, arguments: Mapping[str, Type], platform: Plat
         )
     own = {_FIRST: "i64 %index", _LAST: "i64 %after", _WORK: f"ptr %room, i64 {room}", _ADDRESS: "i64 0"}
     plain = {name: _plainly(name, t) for name, t in arguments.items() if name not in own}
-    taken = ", ".join(plain.values())
+    parameters = ", ".join(plain.values())
     on_gpu = platform.triple.startswith("nvptx")
     thread = _function(
-        f"{'internal ' if on_gpu else ''}void @{THREAD}(i64 %index, {taken})",
+        f"{'internal ' if on_gpu else ''}void @{THREAD}(i64 %index, {parameters})",
         [
             f"%room = alloca [{room} x double], align 64",
             f"%exists = icmp slt i64 %index, %{_TOTAL}",
@@ -75,8 +75,8 @@ def threads(text: str, entry: str, arguments: Mapping[str, Type], platform: Plat
             "end:",
         ],
     )
-    call = f"call void @{THREAD}(i64 %index, {taken})"
-    kernel = f"{_DECLARED}{_function(f'ptx_kernel void @{KERNEL}({taken})', [*_INDEX, call])}"
+    call = f"call void @{THREAD}(i64 %index, {parameters})"
+    kernel = f"{_DECLARED}{_function(f'ptx_kernel void @{KERNEL}({parameters})', [*_INDEX, call])}"
     return module.whole(platform, thread + kernel if on_gpu else thread)
 
 

@@ -40,8 +40,8 @@ def functions(text: str) -> dict[str, ast.FunctionDef]:
 
 def mark(node: ast.FunctionDef) -> str:
     """The decorator of a function of the text."""
-    found = node.decorator_list[0] if node.decorator_list else None
-    return found.id if isinstance(found, ast.Name) else "inline_strict"
+    decorator = node.decorator_list[0] if node.decorator_list else None
+    return decorator.id if isinstance(decorator, ast.Name) else "inline_strict"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,10 +62,13 @@ class Platform:
 
 
 class Module:
-    """Functions of one text, written for so many lanes in a vector; `together` when none of them is `separate`."""
+    """Functions of one text, written for so many lanes in a vector; `together` when none of them is `separate`.
 
-    def __init__(self, text: str, lanes: int, *, together: bool = False) -> None:
-        self._functions, self._lanes, self._together = functions(text), lanes, together
+    With `strict` every operation is rounded by itself, in the order of the text: the same numbers on every processor.
+    """
+
+    def __init__(self, text: str, lanes: int, *, together: bool = False, strict: bool = False) -> None:
+        self._functions, self._lanes, self._together, self._strict = functions(text), lanes, together, strict
         self._written: list[str] = []
         self.declared: dict[str, str] = {}
         """What of LLVM and of the C library is called, by name."""
@@ -84,6 +87,7 @@ class Module:
         key = name, types
         if key not in self._instances:
             flags, attribute = _MARKS[mark(self._functions[name])]
+            flags = "" if self._strict else flags
             if self._together and mark(self._functions[name]) == "separate":
                 attribute = "noinline"  # few lanes need it, at a time
             symbol = f"{name}.{len(self._instances)}"
@@ -111,23 +115,23 @@ class Module:
         """
         symbol, _ = self.instance(name, tuple(types))
         lines: list[str] = []
-        given: list[str] = []
+        parameters: list[str] = []
         for k, t in enumerate(types):
             lines += [f"%word{k} = getelementptr i64, ptr %words, i64 {k}"]
             kind = llvm(t, 1)
             lines += [f"%v{k} = load {kind}, ptr %word{k}"]
             if not isinstance(t, ArrayOf):
-                given.append(f"{kind} %v{k}")
+                parameters.append(f"{kind} %v{k}")
                 continue
             for what, at in (("data", platform.head), ("sizes", platform.head + 16)):
                 lines += [f"%{what}{k}.at = getelementptr i8, ptr %v{k}, i64 {at}"]
                 lines += [f"%{what}{k} = load ptr, ptr %{what}{k}.at"]
-            given.append(f"ptr %data{k}")
+            parameters.append(f"ptr %data{k}")
             for axis in range(t.axes):
                 lines += [f"%size{k}.{axis}.at = getelementptr i64, ptr %sizes{k}, i64 {axis}"]
                 lines += [f"%size{k}.{axis} = load i64, ptr %size{k}.{axis}.at"]
-                given.append(f"i64 %size{k}.{axis}")
-        lines += [f"call void @{symbol}({', '.join(given)})", "ret void"]
+                parameters.append(f"i64 %size{k}.{axis}")
+        lines += [f"call void @{symbol}({', '.join(parameters)})", "ret void"]
         body = "\n".join(f"  {line}" for line in lines)
         return self.whole(platform, f"define void @{name}(ptr %words) {_WIDE} {{\n{body}\n}}\n")
 

@@ -13,7 +13,7 @@ from upright.simulation.lowering import cache as kept
 from upright.simulation.lowering.module import Module
 from upright.simulation.lowering.operands import FLOAT, INT, ArrayOf, Kind, Type
 
-Given = NDArray[Any] | float | int
+Argument = NDArray[Any] | float | int
 _KINDS: dict[np.dtype[Any], Kind] = {np.dtype(np.float64): "float", np.dtype(np.int64): "int"}
 
 
@@ -29,12 +29,12 @@ class Routine:
         Its arguments; arrays of float64 or int64 whose numbers lie one behind the other.
     """
 
-    def __init__(self, text: str, name: str, *given: Given) -> None:
+    def __init__(self, text: str, name: str, *args: Argument) -> None:
         from upright.simulation.lowering import machine
 
-        self._given = given  # whose places the words say
-        self._words = b"".join(_word(x) for x in given)
-        self._call = machine.function(_address(text, name, tuple(_type(x) for x in given)))
+        self._given = args  # whose places the words say
+        self._words = b"".join(_word(x) for x in args)
+        self._call = machine.function(_address(text, name, tuple(_type(x) for x in args)))
 
     def __call__(self) -> None:
         """Run it once."""
@@ -51,7 +51,7 @@ def _address(text: str, name: str, types: tuple[Type, ...]) -> int:
     return machine.address_of(kept.code(kept.key(kept.lowered_by(), name, repr(types), text), compiled), name)
 
 
-def _type(x: Given) -> Type:
+def _type(x: Argument) -> Type:
     if not isinstance(x, np.ndarray):
         return INT if isinstance(x, int) else FLOAT
     kind = _KINDS.get(x.dtype)
@@ -60,5 +60,5 @@ def _type(x: Given) -> Type:
     return ArrayOf(x.ndim, kind)
 
 
-def _word(x: Given) -> bytes:
+def _word(x: Argument) -> bytes:
     return struct.pack("=d", x) if isinstance(x, float) else struct.pack("=q", x if isinstance(x, int) else id(x))

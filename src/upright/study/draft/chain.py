@@ -23,7 +23,7 @@ from upright.signals.stretches import pieces
 from upright.signals.trips import find_trip
 from upright.study.draft.chain_log import ChainLog
 from upright.study.draft.plausible import implausible
-from upright.study.draft.recognise import Recognised, swing_frequency
+from upright.study.draft.recognise import Recognised, in_dac_counts, swing_frequency
 from upright.study.draft.tables import (
     assumed,
     command_unit,
@@ -124,14 +124,14 @@ def _starts_of(record: Record, log: ChainLog, plant: type[Plant]) -> ChainStarts
     if drive is not None:
         scale = _volts(drive)[1]
         u = record[drive.name][rows] * (-scale if log.recognised.reversed else scale)
-        reach = REACH if scale != 1.0 else np.inf
+        reach = REACH if drive.guess == "counts" or in_dac_counts(drive) else np.inf
     return starts(
         record.t[rows],
         u,
         [(record[c.name][rows] - log.recognised.rest[n]) * factors[n] for n, c in columns.items()],
         [n not in log.fixed for n in columns],
         plant=plant,
-        quanta=[(c.quantum.step or 0.0) * factors[n] for n, c in columns.items()],
+        quanta=[(c.resolution.step or 0.0) * factors[n] for n, c in columns.items()],
         loop=log.reference is not None,
         reach=reach,
     )
@@ -169,7 +169,7 @@ def _parameters(log: ChainLog, plant: type[Plant], start: ChainStarts) -> TomlTa
             # a free swing ends in small reversals, which tell how far a body moves before its friction is whole
             coordinate = plant.coordinates[body].name
             c = log.recognised.columns[coordinate]
-            least = max(3 * (c.quantum.step or 0.0), 1e-4 * (c.high - c.low)) * _factor(log, plant, coordinate)
+            least = max(3 * (c.resolution.step or 0.0), 1e-4 * (c.high - c.low)) * _factor(log, plant, coordinate)
             guess = {"guess": with_unit(5 * least, what.unit, 2), "min": with_unit(least, what.unit, 2)}
             table.key(name, guess, what.meaning)
         elif value is not None:
@@ -315,7 +315,7 @@ def starts(
     trips = False
     if u is not None and not loop and free[0]:
         whole = regressor(plant)
-        trips = find_trip(t, u, bodies[0], bodies[1:], quantum=quanta[0],
+        trips = find_trip(t, u, bodies[0], bodies[1:], resolution=quanta[0],
                           terms=lambda m: list(whole.acting(0, m.q, m.v, m.a))) is not None  # fmt: skip
     return ChainStarts(numbers=numbers, braked=braked, trips=trips, limit=limit, fastest=w, grounded=grounded)
 

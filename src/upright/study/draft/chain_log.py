@@ -273,7 +273,7 @@ def held_bodies(
     for a, b in windows:
         inside |= (record.t >= a) & (record.t <= b)
     travel = [float(np.ptp(record[c.name][inside])) for c in columns]
-    step = [max(c.quantum.step or 0.0, 1e-9 * max(travel)) for c in columns]
+    step = [max(c.resolution.step or 0.0, 1e-9 * max(travel)) for c in columns]
     still, locked = list[str](), list[str]()
     for name, far, least in zip(names, travel, step, strict=True):
         if far <= 2 * least:
@@ -289,7 +289,7 @@ def still_bodies(record: Record, columns: dict[str, Column], at: int) -> tuple[s
     return tuple(
         name
         for name, c in columns.items()
-        if float(np.ptp(record[c.name][before])) <= max(3 * (c.quantum.step or 0.0), STILL * (c.high - c.low))
+        if float(np.ptp(record[c.name][before])) <= max(3 * (c.resolution.step or 0.0), STILL * (c.high - c.low))
     )
 
 

@@ -17,14 +17,14 @@ import numpy as np
 
 from upright.physics import Plant, find
 from upright.quantities import with_unit
-from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Inspection
+from upright.readers.inspection import Inspection
 from upright.records import Record
 from upright.records.columns import ANGLES, LENGTHS
 from upright.signals.smoothing import acceleration_width, savitzky_golay, smoothed
 from upright.study.draft.described import counts_of
 from upright.study.draft.hinge import hinge_of
 from upright.study.draft.plausible import implausible
-from upright.study.draft.recognise import Recognised, in_dac_counts
+from upright.study.draft.recognise import Recognised
 from upright.study.draft.tables import (
     assumed,
     command_unit,
@@ -120,13 +120,13 @@ def balance_of(record: Record, found: Recognised) -> Balanced | None:
     if found.plant not in ("cart-pendulum", "furuta") or found.drive is None or len(found.columns) < 2:
         return None
     first, last = (record[c.name] * _si(c.guess) for c in found.columns.values())
-    u = record[found.drive.name]
+    u = command_unit(found.drive)[1] * record[found.drive.name]
     centre = float(np.median(last))
     tilt = last - centre
     if np.abs(tilt).max() > SMALL or np.mean(np.abs(u) > 1e-3 * np.abs(u).max()) < BUSY:
         return None
     dt = float(record.t[-1] - record.t[0]) / (record.t.size - 1)
-    steps = [(c.quantum.step or 0.0) * _si(c.guess) for c in found.columns.values()]
+    steps = [(c.resolution.step or 0.0) * _si(c.guess) for c in found.columns.values()]
     wide = max(acceleration_width(x, dt, step) for x, step in zip((first, tilt), steps, strict=True))
     width = max(7, int(min(max(wide, SMOOTHED[0] / dt), SMOOTHED[1] / dt)) | 1)
     if record.t.size < 30 * width:
@@ -257,7 +257,7 @@ def _gain(found: Recognised) -> float:
     c = next(iter(found.columns.values()))
     swing = (c.high - c.low) / 2 * {"counts": 4e-4, **ANGLES, **LENGTHS}.get(c.guess, 1.0)
     u = max(abs(found.drive.low), abs(found.drive.high)) or 1.0
-    u /= DAC_COUNTS_PER_VOLT if in_dac_counts(found.drive) else 1.0
+    u *= command_unit(found.drive)[1]
     w = found.frequency or 6.0
     inertia = INERTIA.get(found.plant, (G / w**2) ** 2)  # of the 1 kg that is assumed
     return max(inertia * swing * w**2 / u, 1e-9)

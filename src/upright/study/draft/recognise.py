@@ -22,6 +22,7 @@ _EFFORT = re.compile(r"effort|volt|current|torque|force|plant_input|cmd|duty|^(u
 REFERENCE = re.compile(r"target|reference|\bref\b|commanded|set.?point", re.IGNORECASE)
 _ARM = re.compile(r"arm|psi|joint0|base|motor", re.IGNORECASE)
 _CART = re.compile(r"cart|pos|^[xz]\d?$|distance|displacement", re.IGNORECASE)
+_SI = {"deg": math.pi / 180, "mm": 1e-3}
 _COORDINATES = ("psi", "theta", "x")
 """Of the rigs that carry a pendulum."""
 _DISK = re.compile(r"disk|disc|theta\s*_?[123]\b", re.IGNORECASE)
@@ -112,8 +113,10 @@ def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
             window, earlier = swings[-1], tuple(swings[:-1])
         inside = (record.t >= window[0]) & (record.t <= window[1])
     mirrored = False
-    if pushed and all(c.guess == "rad" or name == "x" for name, c in columns.items()):
-        mirrored = coupling(find(plant), record.t[inside], driven[inside], last[inside] - centre) < 0
+    if pushed and all(c.guess in ("rad", "deg") or name == "x" for name, c in columns.items()):
+        first, hanging = (_SI.get(c.guess, 1.0) for c in columns.values())
+        angle = hanging * (last[inside] - centre)
+        mirrored = coupling(find(plant), record.t[inside], first * driven[inside], angle) < 0
     return Recognised(
         plant=plant,
         columns=columns,
@@ -178,7 +181,7 @@ def _as_angle(record: Record, c: Column, seen: Inspection) -> Column:
 
 def _in_degrees(record: Record, c: Column) -> Column:
     """A column guessed to be an angle in rad that swings to and fro by more than half a turn is one in degrees."""
-    if c.unit or c.guess != "rad" or c.quantum.counts_per_rev:  # its steps are whole parts of a turn in rad
+    if c.unit or c.guess != "rad" or c.resolution.counts_per_rev:  # its steps are whole parts of a turn in rad
         return c
     x = record[c.name] - np.median(record[c.name])
     far = x[np.abs(x) > math.pi]
@@ -224,7 +227,7 @@ def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
     angles = [c for c in places if c.guess in ANGLES]
     bodies = min(len(counts), 3)
     if counts and not angles and not lengths:
-        kind = "torsional" if any(_DISK.search(c.name) for c in counts) else "rectilinear"
+        kind = "torsional" if any(_DISK.search(bare_name(c.name)) for c in counts) else "rectilinear"
         other = "rectilinear" if kind == "torsional" else "torsional"
         what = f"Counts of {bodies} encoder{'s' if bodies > 1 else ''} were"
         if not all(c.guess for c in counts):
@@ -238,7 +241,7 @@ def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
     if lengths and angles:
         return "cart-pendulum", ""
     if len(angles) >= 2:
-        if all(_DISK.search(c.name) for c in angles):
+        if all(_DISK.search(bare_name(c.name)) for c in angles):
             return f"torsional-{min(len(angles), 3)}", "Several angles were taken for disks on a shaft."
         return "furuta", "Two angles were taken for arm and pendulum of a Furuta pendulum."
     if lengths:
@@ -266,7 +269,7 @@ def _assign(plant: type[Plant], places: list[Column]) -> tuple[dict[str, Column]
         fitting = [c for c in left if c.guess in kinds] or [c for c in left if c.guess in ("counts", "")]
         pattern = {"psi": _ARM, "x": _CART}.get(coordinate.name)
         best = next((c for c in left if bare_name(c.name) == coordinate.name), None)
-        best = best or next((c for c in fitting if pattern and pattern.search(c.name)), None)
+        best = best or next((c for c in fitting if pattern and pattern.search(bare_name(c.name))), None)
         best = best or (fitting[0] if fitting else None)
         if best is None:
             missing.append(coordinate.name)

@@ -9,9 +9,9 @@ import numpy as np
 
 from upright.errors import BadInput
 from upright.progress import Progress, silent
+from upright.renamed import CLUSTER, LET_GO, renamed
 from upright.verbs.answer import Answer
 from upright.verbs.options import HoldingOptions, known_options, rig_entries
-from upright.verbs.renamed import CLUSTER, LET_GO, renamed
 from upright.verbs.values import Start, read_start
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def chance(
     if K.shape != (1, len(model.states)):
         raise BadInput(f"gains for {known.name} need shape {(1, len(model.states))}, got {K.shape}.")
     sampled = model.to_sampled(rig.period, rig.delay / rig.period)
-    law = feedback(velocities(model, sampled, speed, memory, rig.limit, rig.quantum), K)
+    law = feedback(velocities(model, sampled, speed, memory, rig.limit, rig.resolution), K)
     let_go = dict(zip(("theta", "theta_dot"), usual, strict=True))
     let_go |= read_start(start, ("theta", "theta_dot"), ("rad", "rad/s"))
     task = Task(start=(0.0, 0.0, *let_go.values()), hand=(0.0, 0.0, *HAND), seconds=seconds)

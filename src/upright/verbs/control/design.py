@@ -141,7 +141,7 @@ def design(
             needs=("servo_period", "counts"), who="upright design",
         )  # fmt: skip
         wish = replace(
-            wish, at=here, period=loop.period, speed=speed, quantum=tuple(loop.quantum.tolist()),
+            wish, at=here, period=loop.period, speed=speed, resolution=tuple(loop.resolution.tolist()),
             limit=loop.saturation if math.isfinite(loop.saturation) else None, start=_start(rig, start), on=loop,
         )  # fmt: skip
         name = called(source)

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any, Unpack
 from upright.errors import BadInput
 from upright.files import keeps_its_inputs
 from upright.progress import Progress, part, silent
+from upright.renamed import CLUSTER, LET_GO, renamed
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
 from upright.verbs.handover import called, rig_of
 from upright.verbs.options import FIT, HoldingOptions, as_typed, known_options, rig_entries, vendor_of
 from upright.verbs.pages import page_folder, write_page, written_where_named
-from upright.verbs.renamed import CLUSTER, LET_GO, renamed
 from upright.verbs.values import Start, read_pole_list, read_start
 
 if TYPE_CHECKING:

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from upright.records import Record
     from upright.report.page import Chapter
     from upright.rig import Rig
-    from upright.study.fitted import FittedModel
     from upright.study.load import Study
+    from upright.study.stored_fit import StoredFit
 
 
 class FitAnswer(Answer["Fit"]):
@@ -109,17 +109,16 @@ class FitAnswer(Answer["Fit"]):
 
         Every verb takes it, and tells how far the fit can be trusted.
         """
-        from upright.study.stored_rig import rig_of_fit
-
-        return rig_of_fit(self.fitted, self.value.model.plant)
+        return self.fitted.rig()
 
     @property
-    def fitted(self) -> FittedModel:
+    def fitted(self) -> StoredFit:
         """What `save` writes, as it is read again."""
-        from upright.study.fitted import fitted_model
         from upright.study.results import fit_content
+        from upright.study.stored_fit import stored_fit
 
-        return fitted_model(fit_content(self.value, self.study, self.crossed))
+        stored = stored_fit(fit_content(self.value, self.study, self.crossed))
+        return replace(stored, in_memory=self.value.model.plant)
 
     @property
     def plant(self) -> Plant:

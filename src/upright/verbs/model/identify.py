@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
 from upright.progress import Progress, silent
+from upright.renamed import CLUSTER, renamed
 from upright.verbs.command import Flag, command
-from upright.verbs.renamed import CLUSTER, renamed
 from upright.verbs.study import folder_beside, read_study
 from upright.verbs.values import open_log
 

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 from upright.errors import BadInput
 from upright.files import check_output, keeps_its_inputs
 from upright.progress import Progress, silent
+from upright.renamed import CLUSTER, renamed
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
 from upright.verbs.pages import pdf_has_folder, write_page
-from upright.verbs.renamed import CLUSTER, renamed
 from upright.verbs.study import folder_beside, read_study
 
 if TYPE_CHECKING:

@@ -16,8 +16,8 @@ from upright.verbs.values import open_log
 
 if TYPE_CHECKING:
     from upright.identification.inference.scoring import RunScore
-    from upright.study.fitted import FittedModel
     from upright.study.load import Study
+    from upright.study.stored_fit import StoredFit
 
 
 @command(
@@ -85,7 +85,7 @@ def predict(
         if isinstance(given, str | os.PathLike) and not Path(given).exists():
             raise BadInput(f"{what} {given} does not exist; the call is upright predict OUT/fit.json STUDY.toml")
     fitted, of = fitted_of(model, "predict"), Path(called(model)).name
-    asked, on = _runs_to_predict(fitted, model, study, data)
+    asked, on = _runs_to_predict(fitted, study, data)
     missing = [n for n in fitted.values if n not in asked.model.parameters]
     if missing:
         raise BadInput(
@@ -126,24 +126,17 @@ def predict(
     )
 
 
-def _runs_to_predict(
-    fitted: FittedModel, model: Any, given: Any, data: str | os.PathLike[str] | None
-) -> tuple[Study, str]:  # fmt: skip
+def _runs_to_predict(fitted: StoredFit, given: Any, data: str | os.PathLike[str] | None) -> tuple[Study, str]:
     """Study of the runs to score, and what it is called."""
-    from upright.physics import find
     from upright.study.draft.from_record import study_of_record
     from upright.study.load import Study, load_study
-    from upright.verbs.model.fit import FitAnswer
 
     if isinstance(given, Study):
         return given, given.path.name
     if isinstance(given, str | os.PathLike) and Path(given).suffix.lower() in (".toml", ""):
         study = load_study(Path(given), data=None if data is None else Path(data), fixed=fitted.values)
         return study, Path(given).name
-    if isinstance(model, FitAnswer):
-        kind = model.value.model.plant
-    else:
-        kind = find(fitted.plant, Path(model).parent) if isinstance(model, str | os.PathLike) else find(fitted.plant)
+    kind = fitted.kind
     record, path = open_log(given)
     known = {n: v for n, v in fitted.values.items() if n in kind.names()}
     whole = (float(record.t[0]), float(record.t[-1]))

@@ -1,1 +1,0 @@
-"""Equations of motion of the built-in plants, generated."""
