@@ -188,7 +188,7 @@ def _time_column(text: TextTable, table: Array) -> tuple[int, float]:
             " name the time column or put it first",
             line=max(text.first_line - 1, 1),
         )
-    return 0, (stated_time_unit(found.names[0]) if found.named else 0.0) or 1.0
+    return 0, (stated_time_unit(text.names[0]) if text.named else 0.0) or 1.0
 
 
 def _torn(text: TextTable, rows: int) -> str:
