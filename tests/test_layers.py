@@ -41,7 +41,7 @@ identification
 rig
 study
 study.draft
-control
+control live
 rigs
 realtime
 report

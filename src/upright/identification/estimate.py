@@ -18,6 +18,7 @@ from upright.identification.checks.structure import with_proposal
 from upright.identification.inference.assumptions import assumption_sentences, assumptions, with_assumptions
 from upright.identification.inference.bands import calibrated
 from upright.identification.inference.black_box import black_box
+from upright.identification.inference.ceiling import judged
 from upright.identification.inference.covariance import Identifiability, Optimum, assess, identifiability
 from upright.identification.inference.intervals import run_estimates, shared_estimates, widened, with_model_uncertainty
 from upright.identification.inference.lateness import lateness
@@ -257,7 +258,8 @@ def _conclude(
         estimates = with_model_uncertainty(estimates, best, asked, left_out, log)
     scored = [run for run in runs if run.role == "fit" or not brief]
     bands = None if brief else calibrated(best)
-    scores = _scores(best, scored, estimates, groups, bands, log)
+    ahead = None if best.lost else judged(problem, best.x)
+    scores = _scores(best, scored, estimates, groups, bands, log, None if ahead is None else ahead.seconds)
     skipped = _skipped(runs, watch=watch) if found.interrupted else ()
     if skipped:
         warnings.append(f"Not evaluated: interrupted. This concerns {', '.join(skipped)}.")
@@ -284,6 +286,7 @@ def _conclude(
             bent=late.bent if late else (),
             period=min(t.period for t in problem.tracks),
             standing=None if brief or seen.hidden else standing(best),
+            judged=ahead,
             lost=best.lost,
             nothing=best.explains_nothing,
             driven=any(np.any(track.u) or track.run.loop is not None for track in problem.tracks),
@@ -320,13 +323,13 @@ def _conclude(
 
 def _scores(
     best: Optimum, runs: Sequence[Run], estimates: dict[str, Estimate], groups: dict[str, dict[str, Estimate]],
-    bands: Bands | None, log: SearchLog,
+    bands: Bands | None, log: SearchLog, ahead: float | None,
 ) -> dict[str, RunScore]:  # fmt: skip
     problem, rig = best.problem, best.problem.rig
     fitted = [run for run in runs if run.role == "fit"]
     thinned = any(t.y.shape[0] < t.run.t.size for t in problem.tracks)
     whole = formulate(rig, fitted, thin=False) if thinned else problem
-    found = {run.label: score_run(whole, i, best.x) for i, run in enumerate(fitted)}
+    found = {run.label: score_run(whole, i, best.x, ahead) for i, run in enumerate(fitted)}
     values = {n: e.value for n, e in estimates.items()}
     known = {label: {n: e.value for n, e in group.items()} for label, group in groups.items()}
     foreseen = [r for r in runs if r.role != "fit"]

@@ -72,7 +72,10 @@ def fit_content(fit: Fit, study: Study, crossed: CrossValidation | None = None) 
         "runs": {
             label: {
                 **_fields(score, "role fit_percent horizon score_from naive black_box adapted offer inside beyond"),
-                "ahead": [{"horizon": h, "fit_percent": percents} for h, percents in score.ahead.items()],
+                "ahead": [
+                    {"horizon": h, "fit_percent": percents, "ceiling": score.ceiling.get(h, {})}
+                    for h, percents in score.ahead.items()
+                ],
             }
             for label, score in fit.runs.items()
         },

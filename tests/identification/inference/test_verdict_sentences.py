@@ -74,11 +74,18 @@ def test_a_prediction_is_bad_by_itself_or_beside_what_was_fitted() -> None:
     assert predicts(("a", score(theta=99.0)), ("b", score("predict", theta=80.1))).answer == "yes"
 
 
-def test_of_several_horizons_the_worst_is_told() -> None:
-    near_and_far = replace(score("predict", theta=98.0), ahead={0.1: {"theta": 98.0}, 0.5: {"theta": 83.5, "psi": 2.0}})
-    assert (
-        "It predicts 83.5 % of runs it has not seen" in predicts(("a", score(theta=99.0)), ("b", near_and_far)).headline
+def test_of_several_horizons_that_one_decides_which_is_judged() -> None:
+    near_and_far = replace(
+        score("predict", theta=98.0), horizon=0.1, ahead={0.1: {"theta": 98.0}, 0.5: {"theta": 13.5, "psi": 2.0}}
     )
+    told = predicts(("a", score(theta=99.0)), ("b", near_and_far))
+    assert told.answer == "yes"
+    assert "It predicts 98.0 % 100 ms ahead of runs it has not seen" in told.headline
+
+
+def test_free_runs_and_predictions_ahead_are_told_apart() -> None:
+    told = predicts(("a", score(theta=91.0)), ("b", replace(score(theta=99.0), horizon=0.5)))
+    assert told.headline.startswith("It explains 91.0 % in free runs and 99.0 % 0.5 s ahead of the fitted runs.")
 
 
 @pytest.mark.parametrize(

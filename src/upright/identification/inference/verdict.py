@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from upright.identification.inference.assumptions import proportional, resting
+from upright.identification.inference.ceiling import ENOUGH, Judged
 from upright.identification.inference.loop import Standing
 from upright.identification.model.fit import Assumption, Estimate, Judgement, RunScore
 from upright.identification.model.grey_box import GreyBox
@@ -47,7 +48,8 @@ class Evidence:
 
     `unseen` and `conventions` are sentences on what the data cannot see and on signs or zeros that look wrong. The
     residuals are autocorrelated over `memory` seconds, the motion takes `period` seconds for one period. `standing`
-    says how a rig within the intervals stands upright, if this plant can, `driven` whether a command acted in a run.
+    says how a rig within the intervals stands upright, if this plant can, `judged` how far ahead runs count that a
+    filter predicts, `driven` whether a command acted in a run.
     Numbers that are `bent` leave their intervals with a dead time of the drive that would explain the runs better.
     Runs that are `lost` run away at the numbers or as soon as one is moved; `nothing` says that the runs are missed by
     more than they vary.
@@ -64,6 +66,7 @@ class Evidence:
     memory: float
     period: float
     standing: Standing | None
+    judged: Judged | None = None
     driven: bool = True
     bent: Sequence[str] = ()
     lost: Sequence[str] = ()
@@ -121,10 +124,10 @@ def _predicts(found: Evidence) -> Judgement:
         against.append(f"Runs that were not fitted are not predicted ({', '.join(bad)}; {GOOD:.0f} % is the least).")
     against += [s[0].upper() + s[1:] for s in found.conventions]
     blank = uninformative(found.runs)
-    explains = f"It explains {_range(fitted)} of the fitted runs. " if fitted else ""
+    explains = f"It explains {_ranges(found.runs, 'fit')} of the fitted runs. " if fitted else ""
     if blank and len(blank) == sum(len(s.fit_percent) for s in found.runs.values()):
         against.append("No run is predicted far enough ahead to test the model.")
-    notes: list[str] = []
+    notes: list[str] = [] if found.judged is None else _horizon(found.judged, found.runs)
     if blank:
         where = ", ".join(f"{label} {signal} at {found.runs[label].horizon:g} s" for label, signal in blank)
         notes.append(
@@ -148,7 +151,7 @@ def _predicts(found: Evidence) -> Judgement:
             advice="Hold a run or a tail out (role = \"predict\", or --hold-out).", reasons=tuple(notes),
         )  # fmt: skip
     part = "in part" if blank else "yes"
-    headline = f"{explains}It predicts {_range(predicted)} of runs it has not seen{_beside(found.runs)}."
+    headline = f"{explains}It predicts {_ranges(found.runs, 'predict')} of runs it has not seen{_beside(found.runs)}."
     beaten = _beaten(found.runs)
     if beaten:
         notes.append(
@@ -156,6 +159,34 @@ def _predicts(found: Evidence) -> Judgement:
             "model misses something that these data show."
         )
     return Judgement(question=PREDICTS, answer=part, headline=headline, reasons=tuple(notes))
+
+
+def _horizon(judged: Judged, runs: Mapping[str, RunScore]) -> list[str]:
+    """Why runs are judged so far ahead, and what the start state alone leaves further on."""
+    allowed: dict[float, list[float]] = {}
+    reached: dict[float, list[float]] = {}
+    for s in runs.values():
+        for horizon, percents in s.ceiling.items():
+            allowed.setdefault(horizon, []).extend(percents.values())
+            reached.setdefault(horizon, []).extend(s.ahead[horizon].values())
+    if not allowed:
+        return []
+    least = min(allowed[judged.seconds], default=ENOUGH)
+    ms = _seconds(judged.seconds)
+    falls = "" if not judged.growth else f": the plant falls by e in {1e3 / judged.growth:.2g} ms"
+    if least < ENOUGH:
+        return [
+            f"No horizon tests this model{falls}, and already {ms} ahead the start state, known no better than the "
+            f"sensors allow, limits any model to {least:.0f} %. Let it move more, or measure it finer."
+        ]
+    further = [h for h in allowed if h > judged.seconds * (1 + 1e-9)]
+    if not further:
+        return []
+    h = max(further)
+    return [
+        f"It is judged {ms} ahead{falls}, and further on any model misses by what its start state is unknown: at "
+        f"{_seconds(h)} that allows {min(allowed[h]):.0f} %, and {min(reached[h]):.0f} % are reached."
+    ]
 
 
 def _failure(lost: Sequence[str]) -> str:
@@ -304,14 +335,13 @@ def _shown(value: float, e: Estimate) -> str:
 
 
 def _percents(runs: Mapping[str, RunScore], role: str) -> dict[str, float]:
-    """Fit percent by run and signal, of several horizons the worst, since that is the one asked for last."""
-    found: dict[str, float] = {}
-    for label, s in runs.items():
-        if s.role == role:
-            for signal, percent in s.fit_percent.items():
-                every = [percents[signal] for percents in s.ahead.values() if signal in percents]
-                found[f"{label} {signal}"] = min([percent, *every])
-    return found
+    """Fit percent by run and signal, of what a filter predicts as far ahead as it is judged."""
+    return {
+        f"{label} {signal}": percent
+        for label, s in runs.items()
+        if s.role == role
+        for signal, percent in s.fit_percent.items()
+    }
 
 
 def _beside(runs: Mapping[str, RunScore]) -> str:
@@ -353,6 +383,24 @@ def uninformative(runs: Mapping[str, RunScore]) -> list[tuple[str, str]]:
 def _range(percents: Mapping[str, float]) -> str:
     low, high = (f"{p:.1f}" for p in (min(percents.values()), max(percents.values())))
     return f"{low} %" if low == high else f"{low} to {high} %"
+
+
+def _ranges(runs: Mapping[str, RunScore], role: str) -> str:
+    """Ranges of the fit percents of runs with a role, those of free runs and of every horizon by themselves."""
+    kinds: dict[float, dict[str, float]] = {}
+    for label, s in runs.items():
+        if s.role == role:
+            percents = {f"{label} {signal}": p for signal, p in s.fit_percent.items()}
+            kinds.setdefault(s.horizon or 0.0, {}).update(percents)
+    free = "" if len(kinds) == 1 else " in free runs"
+    return " and ".join(
+        f"{_range(percents)}{f' {_seconds(horizon)} ahead' if horizon else free}"
+        for horizon, percents in sorted(kinds.items()) if percents
+    )  # fmt: skip
+
+
+def _seconds(horizon: float) -> str:
+    return f"{1e3 * horizon:.3g} ms" if horizon < 0.3 else f"{horizon:.3g} s"
 
 
 def _worse(runs: Mapping[str, RunScore]) -> list[str]:

@@ -17,7 +17,14 @@ from upright.identification.model.grey_box import GreyBox, base_values, neutral
 from upright.identification.model.runs import Run
 from upright.identification.problem.normal_equations import Normal, finite, mixed, products, slopes, squares
 from upright.identification.problem.restarts import PERTURBATION, Restart, settle
-from upright.identification.problem.simulated import motions, outputs, restart_states, simulator
+from upright.identification.problem.simulated import (
+    discrete_model,
+    filtering,
+    motions,
+    outputs,
+    restart_states,
+    simulator,
+)
 from upright.identification.problem.tracks import Track, prepare
 from upright.identification.problem.unknowns import (
     CHANGES,
@@ -154,6 +161,24 @@ class Problem:
         q, v = (at[np.add(track.columns, k)].T for k in (0, 1))
         gain = 1.0 if d.scales is None else d.scales[:, 0]
         return q * gain + d.offsets[:, 0], v * gain
+
+    def known_state(self, index: int, x: Array) -> tuple[Array, Array]:
+        """Transition over one sample, and the covariance that a filter leaves at the restarts, (S, S) each.
+
+        Of the states and of the drifts of the inputs.
+        """
+        track, d, solver = self.tracks[index], self._setting(index, x[:, None]), self.solver(index)
+        assert track.ahead is not None
+        Phi, _ = discrete_model(solver, track, d.values, 1)
+        _, P = filtering(solver, track, d.values, track.ahead.warm + 1, 1)
+        return Phi[0], P[0]
+
+    def ahead(self, seconds: float) -> Problem:
+        """The problem with its filtered runs predicted so many seconds ahead alone, from the same restarts."""
+        tracks = [t.predicting(seconds) if t.ahead else t for t in self.tracks]
+        found = replace(self, tracks=tracks)
+        found._solvers.update(self._solvers)
+        return found
 
     def _setting(self, index: int, x: Array) -> Setting:
         """What one run is simulated with, for coordinates `x` (sought, lanes)."""

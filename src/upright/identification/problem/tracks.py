@@ -167,6 +167,12 @@ class Track:
         """Seconds from one residual to the next."""
         return float(self.restarts[1] - self.restarts[0]) * self.dt if self.ahead else self.dt
 
+    def predicting(self, seconds: float) -> Track:
+        """The run with every sample predicted so many seconds ahead, and no other horizon."""
+        assert self.ahead is not None
+        plan = replace(self.ahead, samples=(max(1, round(seconds / self.dt)),), weight=np.ones(1))
+        return replace(self, run=replace(self.run, horizon=seconds), ahead=plan, length=1)
+
     def within(self, horizon: float) -> int:
         """Samples that are simulated within `horizon` seconds, at least two; of horizons at least one."""
         if self.ahead:
