@@ -85,7 +85,8 @@ def test_the_chosen_study_says_what_was_refused_and_has_no_rungs_left(tmp_path):
 def test_a_ladder_s_file_holds_every_step_and_what_repeats_allow():
     one = RungResult(
         rung=Rung(name="dry", adds=("b_1c",)), accepted=True, reason="better", fitted={"run": {"theta": 95.0}},
-        predicted={"other": {"theta": 91.5}}, cost=1.25, parameters=4, per_run=2, values={"b_1c": 0.01}, seconds=1.23456,
+        predicted={"other": {"theta": 91.5}}, cost=1.25, parameters=4, per_run=2, values={"b_1c": 0.01},
+        seconds=1.23456,
         comparison=Comparison(gain=0.5, scatter=0.1, pairs=3, between="runs"),
     )  # fmt: skip
     two = RungResult(
